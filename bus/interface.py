@@ -1,0 +1,56 @@
+"""What a bus is: the Zenoh bus and the in-memory bus both are one, and pass the same contract tests."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from bus.codec import Envelope
+from schemas.topics import Topic
+
+
+@dataclass(slots=True)
+class Arrival:
+    """One message as it came: still bytes, the envelope decoded where it could be."""
+
+    topic: Topic
+    payload: bytes | memoryview
+    envelope: Envelope | None
+    received_ns: int
+
+
+@dataclass(frozen=True, order=True)
+class Member:
+    """An instance of a module."""
+
+    module: str
+    instance: str
+
+
+class Bus(Protocol):
+    """Carries bytes on topics between members. Callbacks only enqueue; nothing is published from one."""
+
+    def publish(self, topic: Topic, payload: bytes, envelope: Envelope) -> None:
+        """Send `payload` to every subscriber of `topic`. Declare the topic first."""
+
+    def declare(self, topic: Topic) -> None:
+        """Prepare to publish on `topic`."""
+
+    def subscribe(self, topic: Topic, deliver: Callable[[Arrival], None], on_gap: Callable[[str, int], None]) -> None:
+        """Hand every message of `topic` to `deliver`; `on_gap` is told (topic name, how many) that are lost for good."""
+
+    def answer(self, topic: Topic, handler: Callable[[bytes], bytes]) -> None:
+        """Answer queries on `topic`; an exception in `handler` goes back as an error."""
+
+    def query(self, topic: Topic, payload: bytes, timeout_s: float) -> bytes:
+        """Ask on `topic`. Raises NoAnswerError."""
+
+    def announce(self, member: Member) -> None:
+        """Tell everybody that `member` is ready; it holds until this bus closes or dies."""
+
+    def watch(self, on_change: Callable[[Member, bool], None]) -> None:
+        """Tell of every member that is there, comes or goes."""
+
+    def close(self) -> None:
+        """Leave. What was published is sent first."""

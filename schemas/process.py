@@ -1,0 +1,40 @@
+"""Messages about the processes themselves: the clock, who is there, how each fares."""
+
+from __future__ import annotations
+
+from schemas.base import Count, Message, Name
+
+
+class Clock(Message, kw_only=True):
+    """The time that messages are stamped in. `rate` is its speed against wall time, 0 in lockstep."""
+
+    rate: float = 1.0
+
+
+class Presence(Message, kw_only=True):
+    """That an instance of a module came or went, as `observer` saw it."""
+
+    module: Name
+    instance: Name
+    alive: bool
+    observer: Name
+
+
+class Health(Message, kw_only=True):
+    """How one process fares: counts since it started and, over the last second, what time and memory it took."""
+
+    module: Name
+    instance: Name
+    ready: bool
+    uptime_s: float
+    received: dict[str, Count]
+    emitted: dict[str, Count]
+    rejected: dict[str, Count]
+    superseded: dict[str, Count]
+    gaps: dict[str, Count]
+    queued: Count
+    busy: float
+    compute_p50_ms: float
+    compute_p99_ms: float
+    memory_mb: float
+    notes: list[str] = []

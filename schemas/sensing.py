@@ -1,0 +1,153 @@
+"""Messages between the body and perception: frames, odometry, views, percepts, motor commands."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+
+from schemas.array import Array
+from schemas.base import Count, Message, Name, Part
+
+Unit = Annotated[float, msgspec.Meta(ge=0, le=1)]
+Metres = Annotated[float, msgspec.Meta(ge=0, le=1e6)]
+
+
+class Calibration(Part, kw_only=True):
+    """A stereo camera: pinhole intrinsics in pixels, right camera relative to the left, mount on the robot.
+
+    `right_rotation_rad` is the rotation vector of the right camera in the left one's frame (x right, y down,
+    z forward); distortions are OpenCV's k1, k2, p1, p2, k3.
+    """
+
+    width_px: Annotated[int, msgspec.Meta(ge=16, le=8192)]
+    height_px: Annotated[int, msgspec.Meta(ge=16, le=8192)]
+    fx_px: Metres
+    fy_px: Metres
+    cx_px: Metres
+    cy_px: Metres
+    baseline_m: Annotated[float, msgspec.Meta(gt=0, le=10)]
+    mount_height_m: Metres
+    mount_forward_m: float = 0.0
+    right_rotation_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    left_distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    right_distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class StereoFrame(Message, kw_only=True):
+    """A pair of RGB images, uint8 (height, width, 3), as the cameras gave them. `frame` counts from 0."""
+
+    frame: Count
+    left: Array
+    right: Array
+    calibration: Calibration
+
+
+class Odometry(Message, kw_only=True):
+    """Wheel odometry over the `dt_s` that end at `stamp_ns`: noisy mean speeds of the robot."""
+
+    speed_m_s: float
+    turn_rate_rad_s: float
+    dt_s: Annotated[float, msgspec.Meta(gt=0, le=10)]
+
+
+class SelfMotion(Message, kw_only=True):
+    """What moved between two views: float64 (n, 3) rows of speed_m_s, turn_rate_rad_s, dt_s."""
+
+    frame: Count
+    since_ns: Count
+    motions: Array
+
+
+class View(Message, kw_only=True):
+    """The rectified left image, uint8 (h, w, 3), and depth along the optical axis in metres, float32 (h, w); 0 is unknown."""
+
+    frame: Count
+    image: Array
+    depth_m: Array
+    calibration: Calibration
+
+
+class RangeScan(Message, kw_only=True):
+    """Nearest obstacle by bearing (left positive), float32 (n,) each; range 0 is nothing seen."""
+
+    frame: Count
+    bearing_rad: Array
+    range_m: Array
+
+
+class Percept(Part, kw_only=True):
+    """One recognised object: a PAM node over threshold, and where it stands as seen from the robot.
+
+    Bearing (left positive) and range point to the object's estimated centre; `whole` says that neither
+    image border nor another object cuts it. `box_px` is left, top, width, height in the view.
+    """
+
+    label: Name
+    activation: Unit
+    bearing_rad: float
+    range_m: Annotated[float, msgspec.Meta(gt=0, le=1e4)]
+    bearing_sd_rad: Annotated[float, msgspec.Meta(gt=0, le=7)]
+    range_sd_m: Annotated[float, msgspec.Meta(gt=0, le=1e4)]
+    width_m: Metres
+    height_m: Metres
+    whole: bool
+    box_px: tuple[int, int, int, int]
+
+
+class Percepts(Message, kw_only=True):
+    """All that was recognised in one view. `road_m`: float32 (n, 2) ground points seen as road, x forward, y left."""
+
+    frame: Count
+    objects: list[Percept]
+    road_m: Array
+
+
+class MotorCommand(Message, kw_only=True):
+    """Wheel speeds, answering the frame whose stamp it carries."""
+
+    left_wheel_rad_s: Annotated[float, msgspec.Meta(ge=-1000, le=1000)]
+    right_wheel_rad_s: Annotated[float, msgspec.Meta(ge=-1000, le=1000)]
+    halted_by: str = ""
+
+
+class Pose(Part, kw_only=True):
+    """A pose in the plane, heading counter-clockwise from x."""
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+
+
+class TruePose(Message, kw_only=True):
+    """Where the robot really is. Observers only."""
+
+    pose: Pose
+    travelled_m: Metres
+    progress: Unit
+
+
+class Street(Part, kw_only=True):
+    """A street's centre line, (x, y) in metres, and its width."""
+
+    name: Name
+    line_m: list[tuple[float, float]]
+    width_m: Metres
+
+
+class Building(Part, kw_only=True):
+    """A building's footprint: centre, width along its heading, depth across it, height."""
+
+    name: Name
+    pose: Pose
+    width_m: Metres
+    depth_m: Metres
+    height_m: Metres
+
+
+class TrueTown(Message, kw_only=True):
+    """The town as it was built. Observers only."""
+
+    seed: Count
+    streets: list[Street]
+    buildings: list[Building]
