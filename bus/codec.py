@@ -31,6 +31,13 @@ class Envelope(msgspec.Struct, array_like=True):
     stages: list[Stage] = []
     causes: list[Cause] = []
 
+    def follow(self, cause: Envelope, module: str, compute_ns: int) -> None:
+        """Count on from `cause`, the envelope of the message that `module` answers after computing so long."""
+        self.born_ns = cause.born_ns
+        passed_ns = sum(compute + rest for _, compute, rest in cause.stages)
+        rest_ns = self.sent_ns - cause.born_ns - passed_ns - compute_ns
+        self.stages = [*cause.stages, (module, compute_ns, max(0, rest_ns))]
+
 
 _encoder = msgspec.msgpack.Encoder()
 _envelope_decoder = msgspec.msgpack.Decoder(Envelope)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import threading
 from collections import Counter, OrderedDict
-from collections.abc import Callable
 from itertools import count
 
-from bus.interface import Arrival
+from bus.interface import Arrival, Job
 from schemas.topics import Delivery
 
 _Key = tuple[str, str] | int
@@ -17,7 +16,7 @@ class Inbox:
     """Arrivals in order. Of a LATEST_WINS topic only each source's newest stays; what it replaced is counted."""
 
     def __init__(self) -> None:
-        self._waiting: OrderedDict[_Key, Arrival | Callable[[], None]] = OrderedDict()
+        self._waiting: OrderedDict[_Key, Arrival | Job] = OrderedDict()
         self._changed = threading.Condition()
         self._ticket = count()
         self.superseded: Counter[str] = Counter()
@@ -33,13 +32,13 @@ class Inbox:
             self._waiting[key] = arrival
             self._changed.notify()
 
-    def call(self, job: Callable[[], None]) -> None:
+    def call(self, job: Job) -> None:
         """Enqueue something to do on the module's own thread, between messages."""
         with self._changed:
             self._waiting[next(self._ticket)] = job
             self._changed.notify()
 
-    def take(self, timeout_s: float | None) -> Arrival | Callable[[], None] | None:
+    def take(self, timeout_s: float | None) -> Arrival | Job | None:
         """The oldest arrival or job; None if there is none within `timeout_s` (None waits for ever)."""
         with self._changed:
             if not self._waiting and timeout_s != 0:

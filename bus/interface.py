@@ -20,6 +20,9 @@ class Arrival:
     received_ns: int
 
 
+Job = Callable[[], None]
+
+
 @dataclass(frozen=True, order=True)
 class Member:
     """An instance of a module."""
@@ -38,10 +41,13 @@ class Bus(Protocol):
         """Prepare to publish on `topic`."""
 
     def subscribe(self, topic: Topic, deliver: Callable[[Arrival], None], on_gap: Callable[[str, int], None]) -> None:
-        """Hand every message of `topic` to `deliver`; `on_gap` is told (topic name, how many) that are lost for good."""
+        """Hand every message of `topic` to `deliver`; `on_gap` is told (topic name, how many) of those lost for good."""
 
-    def answer(self, topic: Topic, handler: Callable[[bytes], bytes]) -> None:
-        """Answer queries on `topic`; an exception in `handler` goes back as an error."""
+    def answer(self, topic: Topic, handler: Callable[[bytes], bytes], enqueue: Callable[[Job], None]) -> None:
+        """Answer queries on `topic`; an exception in `handler` goes back as an error.
+
+        A bus with threads of its own hands the work to `enqueue`, for the member's own thread.
+        """
 
     def query(self, topic: Topic, payload: bytes, timeout_s: float) -> bytes:
         """Ask on `topic`. Raises NoAnswerError."""

@@ -6,14 +6,14 @@ from collections.abc import Callable
 
 from bus.codec import Envelope
 from bus.errors import NoAnswerError
-from bus.interface import Arrival, Member
+from bus.interface import Arrival, Job, Member
 from schemas.topics import Topic
 
 _Subscriber = tuple[Callable[[Arrival], None], Callable[[str, int], None]]
 
 
 class MemoryNetwork:
-    """What the in-memory buses of one experiment share: no message is lost, each is delivered before `publish` returns."""
+    """What the in-memory buses of one experiment share. Each message is delivered before `publish` returns."""
 
     def __init__(self) -> None:
         self.subscribers: dict[Topic, list[_Subscriber]] = {}
@@ -51,7 +51,7 @@ class MemoryBus:
         self._network.subscribers.setdefault(topic, []).append(subscriber)
         self._subscriptions.append((topic, subscriber))
 
-    def answer(self, topic: Topic, handler: Callable[[bytes], bytes]) -> None:
+    def answer(self, topic: Topic, handler: Callable[[bytes], bytes], enqueue: Callable[[Job], None]) -> None:
         self._network.answers[topic] = handler
         self._answers.append(topic)
 

@@ -38,6 +38,7 @@ class Module:
     start: Callable[[], Reply] | None = None
     journal: Topic | None = None
     restore: Callable[[Iterable[Message]], None] | None = None
+    condense: Callable[[], Message] | None = None
     _next_seq: Counter[Topic] = field(default_factory=Counter)
 
     def __post_init__(self) -> None:
@@ -66,9 +67,14 @@ class Module:
         self.answers[request] = (reply, handler)
         return self
 
-    def journaling(self, topic: Topic, restore: Callable[[Iterable[Message]], None]) -> Module:
-        """Write down what it says on `topic` before it is sent, and give it back to `restore` after a restart."""
-        self.journal, self.restore = topic, restore
+    def journaling(
+        self, topic: Topic, restore: Callable[[Iterable[Message]], None], condense: Callable[[], Message]
+    ) -> Module:
+        """Write down what it says on `topic` before it is sent, and give it back to `restore` after a restart.
+
+        `condense` returns one message that stands for all that was said.
+        """
+        self.journal, self.restore, self.condense = topic, restore, condense
         return self
 
     def feed(self, message: Message) -> list[Message]:

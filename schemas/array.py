@@ -37,7 +37,7 @@ class Array(msgspec.Struct, frozen=True, eq=False):
     def of(cls, values: npt.ArrayLike, dtype: str | None = None) -> Array:
         """Wrap `values`, without a copy where they are contiguous and of that dtype already."""
         array = np.ascontiguousarray(values, dtype)
-        return cls(array.dtype.str, array.shape, memoryview(array.reshape(-1).view(np.uint8)))
+        return cls(array.dtype.str, array.shape, array.reshape(-1).view(np.uint8).data)
 
     def numpy(self) -> npt.NDArray[np.generic]:
         """The values, read-only, sharing memory with the message."""

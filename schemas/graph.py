@@ -11,7 +11,7 @@ import msgspec
 
 from schemas.array import Array
 from schemas.base import Count, Message, Name, Part, Scalar
-from schemas.sensing import Metres, Unit
+from schemas.sensing import Unit
 
 
 class Node(Part, kw_only=True, tag="node"):
@@ -37,7 +37,7 @@ class Link(Part, kw_only=True, tag="link"):
 class PlaceTile(Part, kw_only=True, tag="tile"):
     """A square of place nodes in bulk: `side` x `side` cells of `cell_m`, row-major from (`x`, `y`) in tiles.
 
-    Cell (i, j) of the whole plane is the node `place:i:j`. `activation`, `visited` and `road` are float32
+    Cell (i, j) of the whole plane is the node `place:i:j`. `activation`, `road` and `traversable` are float32
     (side, side); each cell links to its eight neighbours with the mean of the two cells' `traversable`.
     """
 

@@ -60,7 +60,7 @@ class SelfMotion(Message, kw_only=True):
 
 
 class View(Message, kw_only=True):
-    """The rectified left image, uint8 (h, w, 3), and depth along the optical axis in metres, float32 (h, w); 0 is unknown."""
+    """The rectified left image, uint8 (h, w, 3), and depth along the optical axis, float32 (h, w); 0 is unknown."""
 
     frame: Count
     image: Array

@@ -33,7 +33,10 @@ class About(enum.Enum):
 
 @dataclass(frozen=True, eq=False)
 class Topic:
-    """A row of the table: `rate_hz` as in the default configuration, 0 where it depends on what happens."""
+    """A row of the table: `rate_hz` as in the default configuration, 0 where it depends on what happens.
+
+    Latency is counted from the messages that are `sensed`: they derive from the world, not from other messages.
+    """
 
     name: str
     type: type[Message]
@@ -42,6 +45,7 @@ class Topic:
     about: About = About.MODEL
     max_bytes: int = MIB
     keep_in_log: bool = True
+    sensed: bool = False
 
     def key(self, agent: str) -> str:
         """The Zenoh key expression of this topic for `agent`."""
@@ -50,9 +54,9 @@ class Topic:
 
 _LATEST, _NEVER, _REQUEST = Delivery.LATEST_WINS, Delivery.NEVER_DROP, Delivery.ON_REQUEST
 
-CLOCK = Topic("clock", process.Clock, 20, _LATEST)
-STEREO = Topic("camera/stereo", sensing.StereoFrame, 5, _LATEST, max_bytes=32 * MIB)
-ODOMETRY = Topic("odometry", sensing.Odometry, 20, _NEVER)
+CLOCK = Topic("clock", process.Clock, 20, _LATEST, sensed=True)
+STEREO = Topic("camera/stereo", sensing.StereoFrame, 5, _LATEST, max_bytes=32 * MIB, sensed=True)
+ODOMETRY = Topic("odometry", sensing.Odometry, 20, _NEVER, sensed=True)
 SELF_MOTION = Topic("sensory/motion", sensing.SelfMotion, 5, _NEVER)
 VIEW = Topic("sensory/view", sensing.View, 5, _LATEST, max_bytes=64 * MIB)
 SCAN = Topic("sensory/scan", sensing.RangeScan, 5, _LATEST)
@@ -67,8 +71,8 @@ COMPETITION = Topic("global_workspace/competition", mind.Competition, 5, _NEVER)
 BROADCAST = Topic("global_workspace/broadcast", mind.Broadcast, 0, _NEVER)
 ACTION = Topic("action/selected", mind.Action, 0, _NEVER)
 MOTOR_COMMAND = Topic("motor/command", sensing.MotorCommand, 5, _NEVER)
-TRUE_POSE = Topic("truth/pose", sensing.TruePose, 20, _LATEST, About.TRUTH)
-TRUE_TOWN = Topic("truth/town", sensing.TrueTown, 0.2, _NEVER, About.TRUTH)
+TRUE_POSE = Topic("truth/pose", sensing.TruePose, 20, _LATEST, About.TRUTH, sensed=True)
+TRUE_TOWN = Topic("truth/town", sensing.TrueTown, 0.2, _NEVER, About.TRUTH, sensed=True)
 PRESENCE = Topic("presence", process.Presence, 0, _NEVER, About.PROCESS)
 HEALTH = Topic("health", process.Health, 0, _LATEST, About.PROCESS)
 

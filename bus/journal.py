@@ -1,0 +1,77 @@
+"""What a module has committed, on disk before it is sent, so that a kill loses none of it."""
+
+from __future__ import annotations
+
+import os
+import struct
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+
+from bus.codec import decode, encode
+from bus.errors import MessageError
+from schemas import topics
+from schemas.base import Message
+
+_HEAD = struct.Struct("<IIH")
+CONDENSE_BYTES = 64 * 2**20
+
+
+class Journal:
+    """An append-only file of messages. A torn tail, left by a kill amid a write, is cut off when it is opened."""
+
+    def __init__(self, path: Path) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._path = path
+        self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        self._size = 0
+        self._limit = CONDENSE_BYTES
+
+    def messages(self) -> Iterator[Message]:
+        """Everything written so far, oldest first."""
+        while (record := self._record_at(self._size)) is not None:
+            message, length = record
+            self._size += length
+            yield message
+        os.ftruncate(self._file, self._size)
+
+    def _record_at(self, offset: int) -> tuple[Message, int] | None:
+        head = os.pread(self._file, _HEAD.size, offset)
+        if len(head) < _HEAD.size:
+            return None
+        length, checksum, name_length = _HEAD.unpack(head)
+        body = os.pread(self._file, length, offset + _HEAD.size)
+        if len(body) < length or zlib.crc32(body) != checksum:
+            return None
+        try:
+            topic = topics.BY_NAME[body[:name_length].decode()]
+            return decode(topic, body[name_length:]), _HEAD.size + length
+        except (KeyError, UnicodeDecodeError, MessageError):
+            return None
+
+    def append(self, message: Message, payload: bytes) -> None:
+        """Write `message`, whose bytes are `payload`; it survives this process from here on."""
+        name = topics.of(message).name.encode()
+        body = name + payload
+        record = _HEAD.pack(len(body), zlib.crc32(body), len(name)) + body
+        os.pwrite(self._file, record, self._size)
+        self._size += len(record)
+
+    @property
+    def is_long(self) -> bool:
+        """Whether it is time to put one message in place of all."""
+        return self._size > self._limit
+
+    def condense(self, message: Message) -> None:
+        """Put `message` in place of everything, at once or not at all."""
+        fresh = Journal(self._path.with_suffix(".new"))
+        os.ftruncate(fresh._file, 0)
+        fresh.append(message, encode(message))
+        fresh._path.replace(self._path)
+        os.close(self._file)
+        self._file, self._size = fresh._file, fresh._size
+        self._limit = max(CONDENSE_BYTES, 4 * self._size)
+
+    def close(self) -> None:
+        """Close the file; what is in it stays."""
+        os.close(self._file)

@@ -1,0 +1,78 @@
+"""The one place that opens a Zenoh session: clients with an explicit endpoint, and the router they meet at."""
+
+from __future__ import annotations
+
+import json
+import socket
+
+import zenoh
+
+from bus.errors import NoRouterError, PortInUseError, UsageError
+from bus.interface import Member
+
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+CONNECT_TIMEOUT_S = 5.0
+
+
+def ready_key(agent: str, member: Member) -> str:
+    """The key of the liveliness token that says that `member` is ready."""
+    return f"cogmap/{agent}/@ready/{member.module}/{member.instance}"
+
+
+def _config(mode: str, **settings: object) -> zenoh.Config:
+    config = zenoh.Config()
+    settings |= {
+        "mode": mode,
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": False,
+        "transport/shared_memory/enabled": False,
+    }
+    for key, value in settings.items():
+        config.insert_json5(key, json.dumps(value))
+    return config
+
+
+def open_client(endpoint: str, timeout_s: float = CONNECT_TIMEOUT_S) -> zenoh.Session:
+    """A session with the router at `endpoint`. Raises NoRouterError if none answers within `timeout_s`."""
+    _address(endpoint)
+    settings = {
+        "connect/endpoints": [endpoint],
+        "connect/timeout_ms": int(timeout_s * 1000),
+        "connect/exit_on_failure": True,
+        "connect/retry": {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 1.5},
+    }
+    try:
+        return zenoh.open(_config("client", **settings))
+    except zenoh.ZError:
+        raise NoRouterError(
+            f"no router at {endpoint} within {timeout_s:g} s: start one with `cogmap run` or `cogmap router`, "
+            f"or name its endpoint with --connect"
+        ) from None
+
+
+def open_router(endpoint: str) -> zenoh.Session:
+    """A router that listens at `endpoint`. Raises PortInUseError where something else does."""
+    host, port = _address(endpoint)
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except OSError as error:
+            raise PortInUseError(
+                f"cannot listen at {endpoint} ({error.strerror}): stop what listens there, "
+                f"or choose another port with --connect tcp/{host}:PORT"
+            ) from None
+    settings = {
+        "listen/endpoints": [endpoint],
+        "adminspace/enabled": True,
+        "adminspace/permissions": {"read": True, "write": False},
+    }
+    return zenoh.open(_config("router", **settings))
+
+
+def _address(endpoint: str) -> tuple[str, int]:
+    protocol, _, address = endpoint.partition("/")
+    host, _, port = address.rpartition(":")
+    if protocol != "tcp" or not host or not port.isdigit():
+        raise UsageError(f"endpoint {endpoint!r}: write it as tcp/HOST:PORT")
+    return host.strip("[]"), int(port)

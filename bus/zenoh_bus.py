@@ -1,0 +1,122 @@
+"""The Zenoh bus: one session as a client of a router."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import zenoh
+from zenoh import ext
+
+from bus.codec import Envelope, decode_envelope, encode
+from bus.errors import MessageError, NoAnswerError
+from bus.interface import Arrival, Job, Member
+from bus.session import open_client, ready_key
+from schemas.topics import About, Delivery, Topic
+
+CACHED_SAMPLES = 1024
+HEARTBEAT_S = 0.1
+_LARGE_BYTES = 8 * 2**20
+
+
+class _Closable(Protocol):
+    def undeclare(self) -> None: ...
+
+
+def _priority(topic: Topic) -> zenoh.Priority:
+    """Images and facts about processes give way to what the cycle waits for."""
+    behind = topic.max_bytes > _LARGE_BYTES and topic.delivery is Delivery.LATEST_WINS
+    return zenoh.Priority.DATA_LOW if behind or topic.about is not About.MODEL else zenoh.Priority.DATA_HIGH
+
+
+class ZenohBus:
+    """Connects to the router at `endpoint` as `agent`. Raises NoRouterError where none answers in time."""
+
+    def __init__(self, endpoint: str, agent: str) -> None:
+        self._agent = agent
+        self._session = open_client(endpoint)
+        self._publishers: dict[Topic, Any] = {}
+        self._declared: list[_Closable] = []
+
+    def declare(self, topic: Topic) -> None:
+        if topic in self._publishers:
+            return
+        key = topic.key(self._agent)
+        if topic.delivery is Delivery.NEVER_DROP:
+            # Dropped on a congested link, a message is mended from the cache; blocking would stall every subscriber.
+            self._publishers[topic] = ext.declare_advanced_publisher(
+                self._session,
+                key,
+                congestion_control=zenoh.CongestionControl.DROP,
+                cache=ext.CacheConfig(max_samples=CACHED_SAMPLES),
+                sample_miss_detection=ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=HEARTBEAT_S),
+                publisher_detection=True,
+                priority=_priority(topic),
+                express=True,
+            )
+        else:
+            self._publishers[topic] = self._session.declare_publisher(
+                key, congestion_control=zenoh.CongestionControl.DROP, priority=_priority(topic), express=True
+            )
+
+    def publish(self, topic: Topic, payload: bytes, envelope: Envelope) -> None:
+        self._publishers[topic].put(payload, attachment=encode(envelope))
+
+    def subscribe(self, topic: Topic, deliver: Callable[[Arrival], None], on_gap: Callable[[str, int], None]) -> None:
+        def receive(sample: zenoh.Sample) -> None:
+            now_ns = time.time_ns()
+            try:
+                envelope = decode_envelope(None if sample.attachment is None else bytes(sample.attachment))
+            except MessageError:
+                envelope = None
+            deliver(Arrival(topic, bytes(sample.payload), envelope, now_ns))
+
+        key = topic.key(self._agent)
+        if topic.delivery is not Delivery.NEVER_DROP:
+            self._declared.append(self._session.declare_subscriber(key, receive))
+            return
+        subscriber = ext.declare_advanced_subscriber(
+            self._session, key, receive, recovery=ext.RecoveryConfig(periodic_queries=None, heartbeat=True)
+        )
+        self._declared.append(subscriber.sample_miss_listener(lambda miss: on_gap(topic.name, miss.nb)))
+        self._declared.append(subscriber)
+
+    def answer(self, topic: Topic, handler: Callable[[bytes], bytes], enqueue: Callable[[Job], None]) -> None:
+        def reply(query: zenoh.Query) -> None:
+            with query:
+                try:
+                    answer = handler(b"" if query.payload is None else bytes(query.payload))
+                except Exception as error:  # it goes back to whoever asked: an empty reply would hide it
+                    query.reply_err(str(error).encode())
+                else:
+                    query.reply(query.key_expr, answer)
+
+        key = topic.key(self._agent)
+        self._declared.append(self._session.declare_queryable(key, lambda query: enqueue(lambda: reply(query))))
+
+    def query(self, topic: Topic, payload: bytes, timeout_s: float) -> bytes:
+        for reply in self._session.get(topic.key(self._agent), payload=payload, timeout=timeout_s):
+            if reply.ok is not None:
+                return bytes(reply.ok.payload)
+            reason = "" if reply.err is None else bytes(reply.err.payload).decode(errors="replace")
+            raise NoAnswerError(f"{topic.name}: {reason}")
+        raise NoAnswerError(f"nobody answers {topic.name} within {timeout_s:g} s: is the module that does running?")
+
+    def announce(self, member: Member) -> None:
+        self._declared.append(self._session.liveliness().declare_token(ready_key(self._agent, member)))
+
+    def watch(self, on_change: Callable[[Member, bool], None]) -> None:
+        def changed(sample: zenoh.Sample) -> None:
+            *_, module, instance = str(sample.key_expr).split("/")
+            on_change(Member(module, instance), sample.kind == zenoh.SampleKind.PUT)
+
+        every = ready_key(self._agent, Member("*", "*"))
+        self._declared.append(self._session.liveliness().declare_subscriber(every, changed, history=True))
+
+    def close(self) -> None:
+        for declared in reversed(self._declared):
+            declared.undeclare()
+        for publisher in self._publishers.values():
+            publisher.undeclare()
+        self._session.close()  # type: ignore[no-untyped-call]
