@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import logging
 import sys
 from pathlib import Path
@@ -10,28 +11,29 @@ import click
 
 from bus import config, runner
 from bus.errors import CogmapError, UsageError
-from bus.session import DEFAULT_ENDPOINT
+from cli.options import agent_option, config_option, connect_option, set_option
 from services import table
 
-connect_option = click.option(
-    "--connect", default=DEFAULT_ENDPOINT, show_default=True, envvar="COGMAP_CONNECT", help="The router's endpoint."
-)
-agent_option = click.option(
-    "--agent",
-    default="agent",
-    show_default=True,
-    envvar="COGMAP_AGENT",
-    help="Whose topics, where several agents share a bus.",
-)
-config_option = click.option(
-    "--config", "config_path", type=click.Path(path_type=Path), help="A TOML file, a section a module."
-)
-set_option = click.option(
-    "--set", "settings", multiple=True, metavar="MODULE.KEY=VALUE", help="Override one key; repeat at will."
-)
+COMMANDS = {
+    "run": "cli.run.command:run",
+}
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+class _Commands(click.Group):
+    """Imports a command of COMMANDS when it is asked for: a module's process has no use for the others."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return sorted([*super().list_commands(ctx), *COMMANDS])
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return super().get_command(ctx, cmd_name)
+        path, _, name = COMMANDS[cmd_name].partition(":")
+        command: click.Command = getattr(importlib.import_module(path), name)
+        return command
+
+
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.option("--verbose", is_flag=True, help="Say more of what goes on.")
 def cogmap(verbose: bool) -> None:
     """Cogmap: LIDA's cognitive cycle with spatial memory, every module a process on a message bus."""

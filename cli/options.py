@@ -1,0 +1,30 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from bus.session import DEFAULT_ENDPOINT
+
+connect_option = click.option(
+    "--connect", default=DEFAULT_ENDPOINT, show_default=True, envvar="COGMAP_CONNECT", help="The router's endpoint."
+)
+agent_option = click.option(
+    "--agent",
+    default="agent",
+    show_default=True,
+    envvar="COGMAP_AGENT",
+    help="Whose topics, where several agents share a bus.",
+)
+config_option = click.option(
+    "--config",
+    "config_path",
+    type=click.Path(path_type=Path),
+    envvar="COGMAP_CONFIG",
+    help="A TOML file, a section a module.",
+)
+set_option = click.option(
+    "--set", "settings", multiple=True, metavar="MODULE.KEY=VALUE", help="Override one key; repeat at will."
+)
