@@ -1,0 +1,111 @@
+"""The town as pybullet knows it: shapes with pictures, and a wheeled robot with physics."""
+
+from __future__ import annotations
+
+import importlib.util
+import logging
+import math
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pybullet
+
+from schemas.sensing import Pose
+from services.sim import mesh, robot
+from services.sim.facade import Image
+from services.sim.quiet import quiet
+from services.sim.town import Plot, Town
+
+STEP_S = 1 / 240
+_log = logging.getLogger(__name__)
+
+
+class World:
+    """A town with a robot in it. Positions in metres, x east, y north, z up; close it when done."""
+
+    def __init__(self, town: Town) -> None:
+        self.town = town
+        with quiet():
+            self.client: int = pybullet.connect(pybullet.DIRECT)
+            self._plugin = self._load_egl()
+        _log.info("rendering with %s", "EGL" if self.egl else "TinyRenderer: the EGL plugin does not load here")
+        self.building_of_body: dict[int, str] = {}
+        self._build()
+        self.robot = robot.Robot(self.client, town.start)
+
+    @property
+    def egl(self) -> bool:
+        """Whether the EGL plugin renders; else TinyRenderer does, and slowly."""
+        return self._plugin >= 0
+
+    def step(self, dt_s: float) -> None:
+        """Let `dt_s` pass, in steps of STEP_S."""
+        for _ in range(round(dt_s / STEP_S)):
+            pybullet.stepSimulation(physicsClientId=self.client)
+
+    def pose(self) -> Pose:
+        """Where the robot is."""
+        return self.robot.pose()
+
+    def close(self) -> None:
+        """Leave pybullet; nothing of it stays."""
+        with quiet():
+            if self.egl:
+                pybullet.unloadPlugin(self._plugin, physicsClientId=self.client)
+            pybullet.disconnect(physicsClientId=self.client)
+
+    def _load_egl(self) -> int:
+        found = importlib.util.find_spec("eglRenderer")
+        if found is None or found.origin is None:
+            return -1
+        return int(pybullet.loadPlugin(found.origin, "_eglRendererPlugin", physicsClientId=self.client))
+
+    def _build(self) -> None:
+        client = self.client
+        pybullet.setGravity(0, 0, -9.81, physicsClientId=client)
+        pybullet.setTimeStep(STEP_S, physicsClientId=client)
+        half = [mesh.GROUND_M, mesh.GROUND_M, 1.0]
+        floor = pybullet.createCollisionShape(
+            pybullet.GEOM_BOX, halfExtents=half, collisionFramePosition=[0, 0, -1.0], physicsClientId=client
+        )
+        grass, *surfaces = mesh.ground(self.town.roads)
+        self._add(*grass, floor)
+        for surface, picture in surfaces:
+            self._add(surface, picture)
+        self.sky = self._add(*mesh.sky())
+        for plot in self.town.plots:
+            self._raise(plot)
+
+    def _raise(self, plot: Plot) -> None:
+        kind = plot.kind
+        half = [kind.width_m / 2, kind.depth_m / 2, kind.height_m / 2]
+        solid = pybullet.createCollisionShape(
+            pybullet.GEOM_BOX, halfExtents=half, collisionFramePosition=[0, 0, half[2]], physicsClientId=self.client
+        )
+        body = self._add(*mesh.building(kind), solid, (plot.x_m, plot.y_m, 0.0), plot.heading_rad)
+        self.building_of_body[body] = kind.name
+
+    def _add(
+        self,
+        surface: mesh.Mesh,
+        picture: Image,
+        solid: int = -1,
+        place: Sequence[float] = (0.0, 0.0, 0.0),
+        heading_rad: float = 0.0,
+    ) -> int:
+        """Add a body. Its shape and picture go through files, the only way that every renderer of pybullet takes."""
+        with tempfile.TemporaryDirectory(prefix="cogmap-") as folder:
+            form, paint = Path(folder) / "surface.obj", Path(folder) / "texture.png"
+            form.write_text(surface.obj())
+            cv2.imwrite(str(paint), np.ascontiguousarray(picture[..., ::-1]), [cv2.IMWRITE_PNG_COMPRESSION, 1])
+            shape = pybullet.createVisualShape(
+                pybullet.GEOM_MESH, fileName=str(form), specularColor=[0, 0, 0], physicsClientId=self.client
+            )
+            turned = (0.0, 0.0, math.sin(heading_rad / 2), math.cos(heading_rad / 2))
+            body = int(pybullet.createMultiBody(0, solid, shape, place, turned, physicsClientId=self.client))
+            texture = pybullet.loadTexture(str(paint), physicsClientId=self.client)
+        pybullet.changeVisualShape(body, -1, textureUniqueId=texture, physicsClientId=self.client)
+        return body
