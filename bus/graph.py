@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterator
+from copy import copy
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -103,12 +104,14 @@ class Graph:
             self.links = {key: weight for key, weight in self.links.items() if drop.id not in (key[0], key[2])}
 
     def _put_activations(self, activations: Activations) -> None:
-        values = activations.values.numpy()
-        if len(values) != len(activations.ids):
-            raise MessageError(f"{len(activations.ids)} nodes with {len(values)} activations")
-        for identifier, value in zip(activations.ids, values.tolist(), strict=True):
+        ids, values, base_levels = activations.ids, activations.values.numpy(), activations.base_levels.numpy()
+        if values.shape != (len(ids),) or base_levels.shape != (len(ids),):
+            raise MessageError(f"{len(ids)} nodes with {values.shape} activations, {base_levels.shape} base-levels")
+        for identifier, value, base_level in zip(ids, values.tolist(), base_levels.tolist(), strict=True):
             if (node := self.nodes.get(identifier)) is not None:
-                node.activation = value
+                faded = copy(node)  # the node itself may be in a message that is still to be sent
+                faded.activation, faded.base_level = value, base_level
+                self.nodes[identifier] = faded
 
     def _put_tile(self, tile: PlaceTile) -> None:
         if tile.side != TILE_SIDE:

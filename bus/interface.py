@@ -41,7 +41,7 @@ class Bus(Protocol):
         """Prepare to publish on `topic`."""
 
     def subscribe(self, topic: Topic, deliver: Callable[[Arrival], None], on_gap: Callable[[str, int], None]) -> None:
-        """Hand every message of `topic` to `deliver`; `on_gap` is told (topic name, how many) of those lost for good."""
+        """Hand every message of `topic` to `deliver`; `on_gap` is told (topic name, how many) where some are lost."""
 
     def answer(self, topic: Topic, handler: Callable[[bytes], bytes], enqueue: Callable[[Job], None]) -> None:
         """Answer queries on `topic`; an exception in `handler` goes back as an error.

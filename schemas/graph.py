@@ -65,10 +65,11 @@ class DropLink(Part, kw_only=True, tag="drop_link"):
 
 
 class Activations(Part, kw_only=True, tag="activations"):
-    """The new activation of many nodes, float32 (n,): decay in bulk. A node unknown here is passed over."""
+    """New activations and base-levels of many nodes, float32 (n,): decay in bulk. An unknown node is passed over."""
 
     ids: list[Name]
     values: Array
+    base_levels: Array
 
 
 class Cells(Part, kw_only=True, tag="cells"):

@@ -17,6 +17,7 @@ class Task(Message, kw_only=True):
     attempt: Count
     cycle: Count
     base_version: Count
+    cell_m: float
     nodes: list[Node]
     percepts: list[Percept]
     motions: Array

@@ -1,0 +1,69 @@
+"""A worker: it answers the tasks that the workspace gives it, and keeps nothing between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from bus.errors import MessageError
+from bus.module import Module
+from schemas import topics
+from schemas.base import Message
+from schemas.graph import Operation, Proposal
+from schemas.mind import Coalitions, Task
+from services.codelets.attention import attend
+from services.codelets.localization import localize, locate_landmark
+from services.codelets.object_place import place_object, place_road
+from services.codelets.settings import Config
+
+__all__ = ["Config", "Worker", "build"]
+
+BUILDERS: dict[str, Callable[[Task, Config], list[Operation]]] = {
+    "localization": localize,
+    "landmark": locate_landmark,
+    "object_place": place_object,
+    "road_place": place_road,
+}
+ATTENTION = "attention"
+
+
+class Worker:
+    """Runs the codelet that a task names, if the task is for this worker."""
+
+    def __init__(self, config: Config, instance: str) -> None:
+        self._config = config
+        self._instance = instance
+
+    def work(self, task: Task) -> list[Message] | None:
+        """A proposal for a task, before it the coalitions for an attention task; a failure is said, not kept back."""
+        if task.worker != self._instance:
+            return None
+        said: list[Message] = []
+        operations: list[Operation] = []
+        failure = ""
+        try:
+            if task.codelet == ATTENTION:
+                said.append(attend(task, self._config))
+            elif task.codelet in BUILDERS:
+                operations = BUILDERS[task.codelet](task, self._config)
+            else:
+                failure = f"no codelet {task.codelet}: there are {', '.join(BUILDERS)}, {ATTENTION}"
+        except (MessageError, ValueError, IndexError, StopIteration) as error:
+            failure = f"{task.codelet}: {error or type(error).__name__}"
+        if failure and task.codelet == ATTENTION:
+            said.append(Coalitions(stamp_ns=task.stamp_ns, cycle=task.cycle, coalitions=[]))
+        proposal = Proposal(
+            stamp_ns=task.stamp_ns,
+            task_id=task.task_id,
+            worker=self._instance,
+            codelet=task.codelet,
+            base_version=task.base_version,
+            operations=operations,
+            failure=failure,
+        )
+        return [*said, proposal]
+
+
+def build(config: Config, instance: str) -> Module:
+    """The module `codelets`, one worker of it."""
+    worker = Worker(config, instance)
+    return Module("codelets", instance).on(topics.TASK, worker.work, emits=[topics.PROPOSAL, topics.COALITIONS])

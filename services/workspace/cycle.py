@@ -1,0 +1,161 @@
+"""The cognitive cycle in the workspace: percepts in, codelets' proposals collected, deltas out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from bus.errors import MessageError
+from schemas.array import Array
+from schemas.base import Message
+from schemas.graph import Delta, Operation, Proposal, Snapshot, SnapshotRequest
+from schemas.mind import Task
+from schemas.process import Clock, Presence
+from schemas.sensing import Percepts, SelfMotion
+from services.workspace.commit import Ledger
+from services.workspace.decay import fade
+from services.workspace.dispatch import Dispatch
+from services.workspace.settings import Config
+from services.workspace.triggers import PHASES, SELF, Scene, first_self, percept_operations, tasks_for
+
+WORKERS = "codelets"
+
+
+class Workspace:
+    """One cycle for each view: a state machine that messages drive. It is the only writer of its graph."""
+
+    def __init__(self, config: Config) -> None:
+        self._config = config
+        self._ledger = Ledger(config.cell_m)
+        self._dispatch = Dispatch(int(config.lease_ms * 1e6), config.attempts)
+        self._motions: list[SelfMotion] = []
+        self._waiting: Percepts | None = None
+        self._scene: Scene | None = None
+        self._phase = 0
+        self._late: dict[str, None] = {}
+        self._now_ns = 0
+        self._begun_ns = -1
+
+    def restore(self, past: Iterable[Message]) -> None:
+        """Take up the graph where it was left."""
+        for message in past:
+            if isinstance(message, Snapshot | Delta):
+                self._ledger.restore(message)
+                self._begun_ns = max(self._begun_ns, message.stamp_ns)
+
+    def snapshot(self, request: SnapshotRequest | None = None) -> Snapshot:
+        """The whole graph. Raises MessageError where `request` wants a version that is not committed yet."""
+        graph = self._ledger.graph
+        if request is not None and request.at_least > graph.version:
+            raise MessageError(f"version {request.at_least} is not committed yet: the graph is at {graph.version}")
+        return graph.snapshot()
+
+    def on_motion(self, motion: SelfMotion) -> list[Message]:
+        """Keep what moved until a cycle moves the self node by it."""
+        if motion.motions.dtype != "<f8" or len(motion.motions.shape) != 2 or motion.motions.shape[1] != 3:
+            raise MessageError(f"self-motion of shape {motion.motions.shape} and dtype {motion.motions.dtype}")
+        if motion.stamp_ns > self._moved_until_ns:
+            self._motions.append(motion)
+        return self._begin()
+
+    def on_percepts(self, percepts: Percepts) -> list[Message]:
+        """Start a cycle with the view's percepts, as soon as the one before has ended."""
+        if len(percepts.road_m.shape) != 2 or percepts.road_m.shape[1] != 2:
+            raise MessageError(f"road points of shape {percepts.road_m.shape}")
+        if percepts.stamp_ns <= self._begun_ns:
+            return []
+        self._waiting = percepts
+        return self._begin()
+
+    def on_proposal(self, proposal: Proposal) -> list[Message]:
+        """Collect an answer. One that comes after its cycle has ended is committed now if it still applies."""
+        if self._dispatch.answer(proposal):
+            return self._go_on() if self._dispatch.complete else []
+        if proposal.task_id not in self._late:
+            return []
+        del self._late[proposal.task_id]
+        operations, tasks, refused = self._ledger.judge([proposal])
+        if refused:
+            raise MessageError(refused[0])
+        cycle = self._ledger.graph.cycle
+        return [self._ledger.commit(proposal.stamp_ns, cycle, "late", operations, tasks)]
+
+    def on_presence(self, presence: Presence) -> list[Task]:
+        """A worker came or went."""
+        if presence.module != WORKERS:
+            return []
+        return self._dispatch.presence(presence.instance, presence.alive, self._now_ns)
+
+    def on_clock(self, clock: Clock) -> list[Message]:
+        """In real time, take back what a lease has ended for, and end a cycle at its deadline."""
+        self._now_ns = max(self._now_ns, clock.stamp_ns)
+        if self._config.mode == "lockstep" or self._scene is None:
+            return []
+        if self._now_ns > self._scene.percepts.stamp_ns + self._config.deadline_ms * 1e6:
+            return self._end_at_deadline()
+        return [*self._dispatch.expire(self._now_ns)]
+
+    @property
+    def _moved_until_ns(self) -> int:
+        node = self._ledger.graph.nodes.get(SELF)
+        return 0 if node is None else int(node.attributes["stamp_ns"])
+
+    def _begin(self) -> list[Message]:
+        """Begin a cycle if none runs, a view waits, and the self-motion up to it has come."""
+        percepts = self._waiting
+        if self._scene is not None or percepts is None:
+            return []
+        if not self._motions or self._motions[-1].stamp_ns < percepts.stamp_ns:
+            return []
+        self._waiting, self._begun_ns = None, percepts.stamp_ns
+        graph = self._ledger.graph
+        self._scene = Scene(graph.cycle + 1, percepts, self._motions_until(percepts.stamp_ns))
+        self._phase = -1
+        operations: list[Operation] = [] if SELF in graph.nodes else [first_self(self._config.first_samples)]
+        operations += percept_operations(graph, percepts)
+        return [self._commit("percepts", operations), *self._next_phase()]
+
+    def _motions_until(self, stamp_ns: int) -> Array:
+        """Rows of self-motion since the self node was moved last, up to `stamp_ns`."""
+        moved_ns = self._moved_until_ns
+        rows = [
+            motion.motions.numpy()
+            for motion in self._motions
+            if motion.since_ns >= moved_ns and motion.stamp_ns <= stamp_ns
+        ]
+        return Array.of(np.vstack(rows) if rows else np.zeros((0, 3)), "<f8")
+
+    def _commit(self, phase: str, operations: list[Operation], tasks: list[str] | None = None) -> Delta:
+        if self._scene is None:
+            raise MessageError("nothing is committed between cycles")
+        return self._ledger.commit(self._scene.percepts.stamp_ns, self._scene.cycle, phase, operations, tasks)
+
+    def _next_phase(self) -> list[Message]:
+        """Dispatch the next phase's tasks; after the last, let activation fade and end the cycle."""
+        self._phase += 1
+        if self._scene is None or self._phase == len(PHASES):
+            return self._end()
+        tasks = tasks_for(PHASES[self._phase], self._scene, self._ledger.graph)
+        return [*self._dispatch.begin(tasks, self._now_ns)]
+
+    def _go_on(self) -> list[Message]:
+        return [*self._commit_answers(), *self._next_phase()]
+
+    def _commit_answers(self) -> list[Message]:
+        answers, unanswered = self._dispatch.collect()
+        self._late |= {task.task_id: None for task in unanswered}
+        while len(self._late) > 256:
+            del self._late[next(iter(self._late))]
+        operations, tasks, _ = self._ledger.judge(answers)
+        return [self._commit(PHASES[self._phase], operations, tasks)] if operations else []
+
+    def _end_at_deadline(self) -> list[Message]:
+        """Commit what has come; the rest may still come in the next cycle."""
+        return [*self._commit_answers(), *self._end()]
+
+    def _end(self) -> list[Message]:
+        delta = self._commit("decay", fade(self._ledger.graph, self._config))
+        self._motions = [motion for motion in self._motions if motion.stamp_ns > self._moved_until_ns]
+        self._scene = None
+        return [delta, *self._begin()]

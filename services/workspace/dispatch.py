@@ -1,0 +1,92 @@
+"""Which worker does which task: leases, taken back when the worker goes or the lease ends."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import msgspec
+
+from schemas.graph import Proposal
+from schemas.mind import Task
+
+
+@dataclass
+class Lease:
+    """A task that a worker holds until `until_ns`; it waits for a worker while `task.worker` is its placeholder."""
+
+    task: Task
+    until_ns: int
+    proposal: Proposal | None = None
+
+
+NOBODY = "nobody"
+
+
+class Dispatch:
+    """Gives tasks to the least loaded worker. The same workers and tasks give the same choice."""
+
+    def __init__(self, lease_ns: int, attempts: int) -> None:
+        self._lease_ns = lease_ns
+        self._attempts = attempts
+        self._workers: set[str] = set()
+        self._leases: dict[str, Lease] = {}
+
+    def begin(self, tasks: list[Task], now_ns: int) -> list[Task]:
+        """Take on `tasks` and return those to be sent now; where there is no worker they wait for one."""
+        for task in tasks:
+            self._leases[task.task_id] = Lease(task, now_ns)
+        return self._assign(now_ns)
+
+    def presence(self, worker: str, alive: bool, now_ns: int) -> list[Task]:
+        """A worker came or went: tasks to send because of it."""
+        if alive:
+            self._workers.add(worker)
+        else:
+            self._workers.discard(worker)
+            self._take_back(lambda lease: lease.task.worker == worker)
+        return self._assign(now_ns)
+
+    def expire(self, now_ns: int) -> list[Task]:
+        """Tasks to send to somebody else, since their lease has ended."""
+        self._take_back(lambda lease: lease.task.worker != NOBODY and now_ns > lease.until_ns)
+        return self._assign(now_ns)
+
+    def answer(self, proposal: Proposal) -> bool:
+        """Take in a proposal. False where nobody waits for it: it was answered before, or is of another time."""
+        lease = self._leases.get(proposal.task_id)
+        if lease is None or lease.proposal is not None:
+            return False
+        lease.proposal = proposal
+        return True
+
+    @property
+    def complete(self) -> bool:
+        """Whether every task is answered."""
+        return all(lease.proposal is not None for lease in self._leases.values())
+
+    def collect(self) -> tuple[list[Proposal], list[Task]]:
+        """The answers, in the order of the tasks, and the tasks without one; all are done with now."""
+        leases, self._leases = self._leases, {}
+        answers = [lease.proposal for lease in leases.values() if lease.proposal is not None]
+        return answers, [lease.task for lease in leases.values() if lease.proposal is None]
+
+    def _take_back(self, lost: Callable[[Lease], bool]) -> None:
+        for lease in self._leases.values():
+            if lease.proposal is None and lost(lease):
+                lease.task = msgspec.structs.replace(lease.task, worker=NOBODY, attempt=lease.task.attempt + 1)
+
+    def _assign(self, now_ns: int) -> list[Task]:
+        load: Counter[str] = Counter(lease.task.worker for lease in self._leases.values() if lease.proposal is None)
+        sent = []
+        for lease in self._leases.values():
+            waits = lease.proposal is None and lease.task.worker == NOBODY
+            if not waits or not self._workers or lease.task.attempt >= self._attempts:
+                continue
+            worker = min(sorted(self._workers), key=lambda name: load[name])
+            load[worker] += 1
+            lease.task = msgspec.structs.replace(lease.task, worker=worker)
+            lease.until_ns = now_ns + self._lease_ns
+            sent.append(lease.task)
+        return sent

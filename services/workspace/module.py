@@ -1,0 +1,26 @@
+"""The workspace as a module."""
+
+from __future__ import annotations
+
+from bus.module import Module
+from schemas import topics
+from services.workspace.cycle import Workspace
+from services.workspace.settings import Config
+
+__all__ = ["Config", "Workspace", "build"]
+
+
+def build(config: Config, instance: str) -> Module:
+    """The module `workspace`, the single writer of the graph."""
+    workspace = Workspace(config)
+    says = (topics.DELTA, topics.TASK)
+    return (
+        Module("workspace", instance, emits={topics.PRESENCE})
+        .on(topics.SELF_MOTION, workspace.on_motion, emits=says)
+        .on(topics.PERCEPTS, workspace.on_percepts, emits=says)
+        .on(topics.PROPOSAL, workspace.on_proposal, emits=says)
+        .on(topics.PRESENCE, workspace.on_presence, emits=says)
+        .on(topics.CLOCK, workspace.on_clock, emits=says)
+        .answering(topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, workspace.snapshot)
+        .journaling(topics.DELTA, workspace.restore, workspace.snapshot)
+    )

@@ -1,0 +1,25 @@
+"""How the workspace is configured."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import msgspec
+
+Positive = Annotated[float, msgspec.Meta(gt=0)]
+Share = Annotated[float, msgspec.Meta(ge=0, le=1)]
+
+
+class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """Lockstep waits for every answer; real time commits what there is at the deadline, counted from the frame."""
+
+    mode: Literal["lockstep", "real_time"] = "real_time"
+    cell_m: Positive = 1.0
+    deadline_ms: Positive = 180.0
+    lease_ms: Positive = 120.0
+    attempts: Annotated[int, msgspec.Meta(ge=1, le=100)] = 5
+    first_samples: Annotated[int, msgspec.Meta(ge=10, le=100_000)] = 200
+    decay: Share = 0.1
+    base_level_decay: Share = 0.0005
+    place_decay: Share = 0.02
+    forget_below: Share = 0.05

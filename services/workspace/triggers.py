@@ -1,0 +1,97 @@
+"""Which codelets a cycle calls, with what: the phases of a cycle, each after what the one before committed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bus.graph import Graph
+from schemas.array import Array
+from schemas.graph import Link, Node, Operation
+from schemas.mind import Task
+from schemas.sensing import Percept, Percepts
+from services.workspace.dispatch import NOBODY
+
+SELF = "self"
+PHASES = ("localization", "objects", "attention")
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What one cycle is about: a view's percepts and the self-motion since the self node was last moved."""
+
+    cycle: int
+    percepts: Percepts
+    motions: Array
+
+
+def object_id(label: str) -> str:
+    """The name of the node of the object that EPAM calls `label`."""
+    return f"object:{label}"
+
+
+def first_self(samples: int) -> Node:
+    """The self node before anything is known: the agent's own origin, for certain."""
+    where: dict[str, float | int | str | bool] = {"x_m": 0.0, "y_m": 0.0, "heading_rad": 0.0, "stamp_ns": 0}
+    zeros = Array.of(np.zeros((samples, 3)))
+    return Node(id=SELF, kind="self", activation=1.0, base_level=1.0, attributes=where, samples=zeros)
+
+
+def percept_operations(graph: Graph, percepts: Percepts) -> list[Operation]:
+    """The PAM nodes over threshold, entering the workspace, each linked to the object that it is an instance of."""
+    operations: list[Operation] = []
+    for percept in percepts.objects:
+        node = Node(
+            id=f"percept:{percept.label}",
+            kind="percept",
+            activation=percept.activation,
+            attributes={"label": percept.label, "bearing_rad": percept.bearing_rad, "range_m": percept.range_m},
+        )
+        operations.append(node)
+        if object_id(percept.label) in graph.nodes:
+            operations.append(Link(source=node.id, target=object_id(percept.label), kind="instance"))
+    return operations
+
+
+def tasks_for(phase: str, scene: Scene, graph: Graph) -> list[Task]:
+    """The tasks of a phase, in the order in which their answers will be committed."""
+    agent = graph.nodes[SELF]
+    seen = {percept.label: percept for percept in scene.percepts.objects}
+    known = [node for label in sorted(seen) if (node := graph.nodes.get(object_id(label))) is not None]
+    if phase == "localization":
+        return [_task(scene, graph, "localization", [agent, *known], list(scene.percepts.objects))]
+    if phase == "attention":
+        bare = [_bare(node) for node in (agent, *known)]
+        return [_task(scene, graph, "attention", bare, [])]
+    tasks = []
+    for label in sorted(seen):
+        node = graph.nodes.get(object_id(label))
+        codelet, nodes = ("object_place", [agent]) if node is None else ("landmark", [agent, node])
+        tasks.append(_task(scene, graph, codelet, nodes, [seen[label]]))
+    return [*tasks, _task(scene, graph, "road_place", [agent], [])]
+
+
+def _task(scene: Scene, graph: Graph, codelet: str, nodes: list[Node], percepts: list[Percept]) -> Task:
+    subject = f"/{percepts[0].label}" if codelet in {"landmark", "object_place"} else ""
+    nothing = Array.of(np.zeros((0, 3)))
+    return Task(
+        stamp_ns=scene.percepts.stamp_ns,
+        task_id=f"{scene.cycle}/{codelet}{subject}",
+        codelet=codelet,
+        worker=NOBODY,
+        attempt=0,
+        cycle=scene.cycle,
+        base_version=graph.version,
+        cell_m=graph.cell_m,
+        nodes=nodes,
+        percepts=percepts,
+        motions=scene.motions if codelet == "localization" else nothing,
+        road_m=scene.percepts.road_m if codelet == "road_place" else Array.of(np.zeros((0, 2), np.float32)),
+    )
+
+
+def _bare(node: Node) -> Node:
+    return Node(
+        id=node.id, kind=node.kind, activation=node.activation, base_level=node.base_level, attributes=node.attributes
+    )
