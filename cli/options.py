@@ -28,3 +28,4 @@ config_option = click.option(
 set_option = click.option(
     "--set", "settings", multiple=True, metavar="MODULE.KEY=VALUE", help="Override one key; repeat at will."
 )
+json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON, for other programs.")
