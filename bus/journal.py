@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from bus.codec import decode, encode
-from bus.errors import MessageError
+from bus.errors import MessageError, UsageError
 from schemas import topics
 from schemas.base import Message
 
@@ -28,7 +28,7 @@ class Journal:
         self._limit = CONDENSE_BYTES
 
     def messages(self) -> Iterator[Message]:
-        """Everything written so far, oldest first."""
+        """Everything written so far, oldest first. Raises UsageError at a whole record that cannot be read."""
         while (record := self._record_at(self._size)) is not None:
             message, length = record
             self._size += length
@@ -46,8 +46,10 @@ class Journal:
         try:
             topic = topics.BY_NAME[body[:name_length].decode()]
             return decode(topic, body[name_length:]), _HEAD.size + length
-        except (KeyError, UnicodeDecodeError, MessageError):
-            return None
+        except (KeyError, UnicodeDecodeError, MessageError) as error:
+            raise UsageError(
+                f"{self._path}: a record of another version cannot be read ({error}): move the file away to start anew"
+            ) from None
 
     def append(self, message: Message, payload: bytes) -> None:
         """Write `message`, whose bytes are `payload`; it survives this process from here on."""

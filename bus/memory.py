@@ -73,9 +73,10 @@ class MemoryBus:
             on_change(member, True)
 
     def close(self) -> None:
-        for topic, subscriber in self._subscriptions:
+        while self._subscriptions:
+            topic, subscriber = self._subscriptions.pop()
             self._network.subscribers[topic].remove(subscriber)
-        for topic in self._answers:
-            self._network.answers.pop(topic, None)
+        while self._answers:
+            self._network.answers.pop(self._answers.pop(), None)
         for member in [m for m, bus in self._network.members.items() if bus is self]:
             self._network.change(member, None)

@@ -129,7 +129,15 @@ class Shell:
 
     def _answerer(self, request: topics.Topic) -> Callable[[bytes], bytes]:
         _, handler = self.module.answers[request]
-        return lambda payload: encode(handler(decode(request, payload)))
+
+        def answer(payload: bytes) -> bytes:
+            try:
+                return encode(handler(decode(request, payload)))
+            except MessageError as error:
+                self.intake.reject(request.name, str(error))
+                raise
+
+        return answer
 
     def _on_presence(self, member: Member, alive: bool) -> None:
         (self._present.add if alive else self._present.discard)(member)

@@ -30,7 +30,7 @@ class Timers:
         now_ns = time.monotonic_ns()
         for job in self._jobs:
             if now_ns >= job.at_ns:
-                job.at_ns = max(job.at_ns + job.period_ns, now_ns)
+                job.at_ns += job.period_ns * (1 + (now_ns - job.at_ns) // job.period_ns)
                 job.due(now_ns)
         next_ns = min(job.at_ns for job in self._jobs)
         return max(0, next_ns - time.monotonic_ns()) / 1e9

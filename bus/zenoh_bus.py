@@ -10,6 +10,7 @@ import zenoh
 from zenoh import ext
 
 from bus.codec import Envelope, decode_envelope, encode
+from bus.discovery import identify
 from bus.errors import MessageError, NoAnswerError
 from bus.interface import Arrival, Job, Member
 from bus.session import open_client, ready_key
@@ -38,6 +39,11 @@ class ZenohBus:
         self._session = open_client(endpoint)
         self._publishers: dict[Topic, Any] = {}
         self._declared: list[_Closable] = []
+
+    @property
+    def session(self) -> zenoh.Session:
+        """The session itself, for observers."""
+        return self._session
 
     def declare(self, topic: Topic) -> None:
         if topic in self._publishers:
@@ -104,7 +110,12 @@ class ZenohBus:
         raise NoAnswerError(f"nobody answers {topic.name} within {timeout_s:g} s: is the module that does running?")
 
     def announce(self, member: Member) -> None:
+        self.identify(member)
         self._declared.append(self._session.liveliness().declare_token(ready_key(self._agent, member)))
+
+    def identify(self, member: Member) -> None:
+        """Tell whoever looks at the system who this is, without being one of those that others wait for."""
+        self._declared.append(identify(self._session, self._agent, member))
 
     def watch(self, on_change: Callable[[Member, bool], None]) -> None:
         def changed(sample: zenoh.Sample) -> None:
@@ -115,8 +126,8 @@ class ZenohBus:
         self._declared.append(self._session.liveliness().declare_subscriber(every, changed, history=True))
 
     def close(self) -> None:
-        for declared in reversed(self._declared):
-            declared.undeclare()
-        for publisher in self._publishers.values():
-            publisher.undeclare()
+        while self._declared:
+            self._declared.pop().undeclare()
+        while self._publishers:
+            self._publishers.popitem()[1].undeclare()
         self._session.close()  # type: ignore[no-untyped-call]

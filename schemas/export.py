@@ -1,0 +1,67 @@
+"""The messages for other languages: `python -m schemas.export DIR` writes a JSON Schema for every topic.
+
+With `--golden` it writes the golden bytes instead, which is how they are changed on purpose:
+`python -m schemas.export --golden schemas/golden`. JSON Schema has no bytes: `data` of an array, a base64 string
+there, is msgpack's bin.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from schemas import topics
+from schemas.samples import samples
+from schemas.topics import Topic
+
+GOLDEN = Path(__file__).parent / "golden"
+
+
+def file_name(topic: Topic, suffix: str) -> str:
+    """The name of a file about `topic`."""
+    return topic.name.replace("/", ".") + suffix
+
+
+def json_schema(topic: Topic) -> dict[str, Any]:
+    """The JSON Schema (2020-12) of what `topic` carries."""
+    about = {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": f"cogmap/{topic.name}"}
+    return about | msgspec.json.schema(topic.type)
+
+
+def export_schemas(folder: Path) -> list[Path]:
+    """Write a JSON Schema for every topic into `folder`; the files written."""
+    files = {
+        file_name(topic, ".json"): msgspec.json.format(msgspec.json.encode(json_schema(topic))) + b"\n"
+        for topic in topics.ALL
+    }
+    return _write(folder, files)
+
+
+def export_golden(folder: Path) -> list[Path]:
+    """Write the bytes of one message of every type into `folder`; the files written."""
+    encode = msgspec.msgpack.encode
+    return _write(folder, {file_name(topics.of(message), ".msgpack"): encode(message) for message in samples()})
+
+
+def _write(folder: Path, files: dict[str, bytes]) -> list[Path]:
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, content in files.items():
+        (folder / name).write_bytes(content)
+    return [folder / name for name in files]
+
+
+def main() -> None:
+    """Write what the command line asks for, and say how much it was."""
+    parser = argparse.ArgumentParser(prog="python -m schemas.export", description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--golden", action="store_true", help="write the golden bytes instead")
+    arguments = parser.parse_args()
+    written = (export_golden if arguments.golden else export_schemas)(arguments.folder)
+    print(f"{len(written)} files in {arguments.folder}")  # noqa: T201
+
+
+if __name__ == "__main__":
+    main()

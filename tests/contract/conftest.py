@@ -1,0 +1,36 @@
+"""One suite over both buses: what a `network` joins is a bus, in memory or through a real router."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Iterator
+
+import pytest
+from networks import InMemory, Network, OverZenoh
+
+from bus.session import open_router
+
+
+@pytest.fixture(scope="session")
+def endpoint() -> Iterator[str]:
+    """The endpoint of a router of this test run's own."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        address = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    router = open_router(address)
+    yield address
+    router.close()
+
+
+@pytest.fixture(params=["memory", "zenoh"])
+def network(request: pytest.FixtureRequest) -> Iterator[Network]:
+    joined = InMemory() if request.param == "memory" else OverZenoh(request.getfixturevalue("endpoint"))
+    yield joined
+    joined.close()
+
+
+@pytest.fixture
+def over_zenoh(endpoint: str) -> Iterator[OverZenoh]:
+    joined = OverZenoh(endpoint)
+    yield joined
+    joined.close()

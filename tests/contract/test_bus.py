@@ -1,0 +1,153 @@
+"""What every bus promises."""
+
+from __future__ import annotations
+
+import threading
+from queue import SimpleQueue
+
+import pytest
+from networks import PATIENCE_S, Network, Peer, meet, publish
+
+from bus.codec import decode
+from bus.errors import NoAnswerError
+from bus.interface import Job, Member
+from schemas import topics
+from schemas.process import Clock
+from schemas.samples import samples
+from schemas.sensing import Odometry
+from schemas.topics import Delivery
+
+MESSAGES = {topics.of(message): message for message in samples()}
+TRAVELLING = [topic for topic in topics.ALL if topic.delivery is not Delivery.ON_REQUEST]
+
+
+def odometry(seq: int) -> Odometry:
+    return Odometry(speed_m_s=1.0, turn_rate_rad_s=0.0, dt_s=0.05, seq=seq, source="sim", stamp_ns=seq)
+
+
+def clock(seq: int) -> Clock:
+    return Clock(seq=seq, source="sim", stamp_ns=seq)
+
+
+@pytest.mark.parametrize("topic", TRAVELLING, ids=lambda topic: topic.name)
+def test_a_message_of_every_topic_arrives_whole(network: Network, topic: topics.Topic) -> None:
+    publisher, subscriber = network.join(), network.join()
+    publisher.declare(topic)
+    peer = Peer(subscriber, topic)
+    meet(publisher, subscriber)
+
+    publish(publisher, MESSAGES[topic])
+
+    (arrival,) = peer.take(1)
+    assert decode(topic, arrival.payload) == MESSAGES[topic]
+    assert arrival.envelope is not None
+    assert (arrival.envelope.source, arrival.envelope.seq) == (MESSAGES[topic].source, MESSAGES[topic].seq)
+
+
+def test_2000_quick_messages_that_must_not_be_dropped_arrive_in_order_at_every_subscriber(network: Network) -> None:
+    publisher, *subscribers = (network.join() for _ in range(4))
+    publisher.declare(topics.ODOMETRY)
+    peers = [Peer(subscriber, topics.ODOMETRY) for subscriber in subscribers]
+    meet(publisher, *subscribers)
+
+    publish(publisher, *(odometry(seq) for seq in range(2000)))
+
+    for peer in peers:
+        assert [arrival.envelope.seq for arrival in peer.take(2000) if arrival.envelope] == list(range(2000))
+        assert len(peer.inbox) == 0
+
+
+def test_a_slow_subscriber_sees_the_newest_and_counts_what_it_replaced(network: Network) -> None:
+    publisher, subscriber = network.join(), network.join()
+    publisher.declare(topics.CLOCK)
+    peer = Peer(subscriber, topics.CLOCK)
+    meet(publisher, subscriber)
+
+    publish(publisher, *(clock(seq) for seq in range(50)))
+    peer.wait_for(50)
+
+    (arrival,) = peer.take(1)
+    assert decode(topics.CLOCK, arrival.payload) == clock(49)
+    assert peer.inbox.superseded[topics.CLOCK.name] == 49
+    assert len(peer.inbox) == 0
+
+
+def test_the_newest_of_one_source_does_not_replace_that_of_another(network: Network) -> None:
+    publisher, subscriber = network.join(), network.join()
+    publisher.declare(topics.CLOCK)
+    peer = Peer(subscriber, topics.CLOCK)
+    meet(publisher, subscriber)
+
+    publish(publisher, Clock(source="left"), Clock(source="right"), Clock(source="left", seq=1))
+    peer.wait_for(3)
+
+    assert [(a.envelope.source, a.envelope.seq) for a in peer.take(2) if a.envelope] == [("right", 0), ("left", 1)]
+
+
+def test_a_publisher_does_not_wait_for_a_subscriber_that_takes_nothing_in(network: Network) -> None:
+    publisher, idle, busy = network.join(), network.join(), network.join()
+    publisher.declare(topics.ODOMETRY)
+    Peer(idle, topics.ODOMETRY)
+    peer = Peer(busy, topics.ODOMETRY)
+    meet(publisher, idle, busy)
+
+    publish(publisher, *(odometry(seq) for seq in range(200)))
+
+    assert len(peer.take(200)) == 200
+
+
+def work(job: Job) -> None:
+    threading.Thread(target=job).start()
+
+
+def test_a_query_is_answered(network: Network) -> None:
+    asker, answerer = network.join(), network.join()
+    answerer.answer(topics.SNAPSHOT_REQUEST, lambda payload: payload * 2, work)
+    meet(asker, answerer)
+
+    assert asker.query(topics.SNAPSHOT_REQUEST, b"once", PATIENCE_S) == b"onceonce"
+
+
+def test_an_error_of_whoever_answers_comes_back_in_words(network: Network) -> None:
+    def refuse(payload: bytes) -> bytes:
+        raise ValueError("no such version")
+
+    asker, answerer = network.join(), network.join()
+    answerer.answer(topics.SNAPSHOT_REQUEST, refuse, work)
+    meet(asker, answerer)
+
+    with pytest.raises(NoAnswerError, match="no such version"):
+        asker.query(topics.SNAPSHOT_REQUEST, b"", PATIENCE_S)
+
+
+def test_a_query_that_nobody_answers_says_so(network: Network) -> None:
+    with pytest.raises(NoAnswerError, match=r"nobody answers workspace/snapshot_request"):
+        network.join().query(topics.SNAPSHOT_REQUEST, b"", 1.0)
+
+
+def test_a_query_to_somebody_who_left_says_so(network: Network) -> None:
+    asker, answerer = network.join(), network.join()
+    answerer.answer(topics.SNAPSHOT_REQUEST, lambda payload: payload, work)
+    gone: SimpleQueue[tuple[Member, bool]] = SimpleQueue()
+    meet(asker, answerer)
+    asker.watch(lambda member, alive: None if alive else gone.put((member, alive)))
+    answerer.close()
+    gone.get(timeout=PATIENCE_S)
+
+    with pytest.raises(NoAnswerError):
+        asker.query(topics.SNAPSHOT_REQUEST, b"", 1.0)
+
+
+def test_members_are_told_of_who_is_there_comes_and_goes(network: Network) -> None:
+    watcher, early, late = network.join(), network.join(), network.join()
+    changes: SimpleQueue[tuple[Member, bool]] = SimpleQueue()
+    first, second = Member("codelets", "codelets-1"), Member("codelets", "codelets-2")
+
+    early.announce(first)
+    watcher.watch(lambda member, alive: changes.put((member, alive)))
+    assert changes.get(timeout=PATIENCE_S) == (first, True)
+    late.announce(second)
+    assert changes.get(timeout=PATIENCE_S) == (second, True)
+    early.close()
+    assert changes.get(timeout=PATIENCE_S) == (first, False)
+    assert changes.empty()
