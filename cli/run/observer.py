@@ -128,7 +128,7 @@ class Observer:
         start = self.start or Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)
         cos, sin = math.cos(start.heading_rad), math.sin(start.heading_rad)
         turned: Floats = points_m @ np.array([[cos, sin], [-sin, cos]])
-        return turned + (start.x_m, start.y_m)
+        return np.array([start.x_m, start.y_m]) + turned
 
     @property
     def true_path_m(self) -> Floats:
