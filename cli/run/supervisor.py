@@ -7,7 +7,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,10 +22,13 @@ _SOURCES = Path(__file__).parents[2]
 
 @dataclass(frozen=True)
 class Program:
-    """A process to run: the name of its instance, which names its log file too, and its command line."""
+    """A process to run: the name of its instance, which names its log file too, and its command line.
+
+    `command` is told how often it has been started before.
+    """
 
     instance: str
-    command: Sequence[str]
+    command: Callable[[int], Sequence[str]]
 
 
 def cogmap_command(*arguments: str) -> list[str]:
@@ -47,19 +50,21 @@ class Child:
         self._log = folder / f"{program.instance}.log"
         self._backoff_s = FIRST_BACKOFF_S
         self._due_s: float | None = None
+        self.starts = 0
         self.start()
 
     def start(self) -> None:
         """Start it, in a session of its own so that a Ctrl-C here does not reach it."""
         with self._log.open("ab") as log:
             self._process = subprocess.Popen(
-                self.program.command,
+                self.program.command(self.starts),
                 stdin=subprocess.PIPE,
                 stdout=log,
                 stderr=subprocess.STDOUT,
                 env=_environment(),
                 start_new_session=True,
             )
+        self.starts += 1
         self._started_s = time.monotonic()
         self._due_s = None
 

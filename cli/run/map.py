@@ -1,0 +1,96 @@
+"""Draws map.png: the town as it is, and as the agent has come to know it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+
+import numpy as np
+from matplotlib import pyplot
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from bus.graph import Graph
+from cli.run import map_layers as layers
+from cli.run.figures import Figures
+from cli.run.observer import Observer
+
+PAPER, INK, FAINT = "#fbfaf7", "#37352f", "#8a857a"
+TRUE, ESTIMATE, WHEELS = "#1f2430", "#e4572e", "#8d7cc4"
+MARGIN_M = 6.0
+
+
+def draw(path: Path, observer: Observer, graph: Graph, figures: Figures) -> None:
+    """Write the map to `path` as a PNG."""
+    with pyplot.rc_context({"font.family": "sans-serif", "font.size": 9, "axes.edgecolor": layers.KERB}):
+        figure, axes = pyplot.subplots(figsize=(11, 10), dpi=130, facecolor=PAPER, layout="constrained")
+        axes.set_facecolor(PAPER)
+        layers.draw_town(axes, observer)
+        layers.draw_road(axes, observer, graph)
+        layers.draw_objects(axes, observer, graph)
+        _draw_paths(axes, observer)
+        _dress(axes, observer, figures)
+        figure.savefig(path, facecolor=PAPER)
+        pyplot.close(figure)
+
+
+def _draw_paths(axes: Axes, observer: Observer) -> None:
+    axes.plot(*observer.integrated_path_m.T, color=WHEELS, lw=1.6, ls=(0, (4, 2)), zorder=8)
+    axes.plot(*observer.true_path_m.T, color=TRUE, lw=3.2, alpha=0.9, solid_capstyle="round", zorder=9)
+    axes.plot(*observer.estimated_path_m.T, color=ESTIMATE, lw=1.5, zorder=10)
+    if observer.start is not None:
+        axes.plot(observer.start.x_m, observer.start.y_m, "o", ms=9, mfc="white", mec=TRUE, mew=2, zorder=11)
+
+
+def _dress(axes: Axes, observer: Observer, figures: Figures) -> None:
+    """Limits, scale, title and legend."""
+    town = observer.town
+    corners = [point for street in (town.streets if town else []) for point in street.line_m]
+    corners += [(b.pose.x_m, b.pose.y_m) for b in (town.buildings if town else [])]
+    every = np.vstack([np.array(corners).reshape(-1, 2), observer.true_path_m, observer.integrated_path_m])
+    if len(every):
+        (west, south), (east, north) = every.min(axis=0) - MARGIN_M, every.max(axis=0) + MARGIN_M
+        axes.set_xlim(west, east)
+        axes.set_ylim(south, north)
+        _draw_scale(axes, west + 2.0, south + 2.0)
+    axes.set_aspect("equal")
+    axes.tick_params(colors=FAINT, length=3)
+    axes.set_xlabel("x, metres east", color=FAINT)
+    axes.set_ylabel("y, metres north", color=FAINT)
+    axes.set_title(_title(figures), loc="left", color=INK, fontsize=10, linespacing=1.5, pad=10)
+    axes.legend(
+        handles=_legend(), loc="upper center", bbox_to_anchor=(0.5, -0.06), ncols=4, frameon=False, fontsize=8.5
+    )
+
+
+def _draw_scale(axes: Axes, west_m: float, south_m: float, length_m: float = 10.0) -> None:
+    axes.plot([west_m, west_m + length_m], [south_m, south_m], color=INK, lw=3, solid_capstyle="butt", zorder=12)
+    axes.text(west_m + length_m / 2, south_m + 0.7, f"{length_m:g} m", ha="center", color=INK, zorder=12)
+
+
+def _title(figures: Figures) -> str:
+    return (
+        f"Town {figures.seed}: {figures.distance_m:.0f} m in {figures.drive_s:.0f} s, "
+        f"{figures.objects} buildings and {figures.road_m2:.0f} m² of street learned\n"
+        f"mean position error {figures.estimate.mean_m:.2f} m, by path integration alone "
+        f"{figures.path_integration.mean_m:.2f} m: {figures.error_ratio:.2f} of it"
+    )
+
+
+def _legend() -> list[Patch | Line2D]:
+    return [
+        Patch(fc=layers.STREET, ec=layers.KERB, label="street"),
+        Patch(fc=layers.HOUSE, ec=layers.WALL, label="building"),
+        Line2D([], [], color=TRUE, lw=3.2, label="true path"),
+        Line2D([], [], color=ESTIMATE, lw=1.5, label="estimated path"),
+        Line2D([], [], color=WHEELS, lw=1.6, ls=(0, (4, 2)), label="path integration alone"),
+        Patch(fc=layers.ROAD, alpha=layers.ROAD_OPACITY, label="learned street"),
+        Line2D(
+            [], [], marker="o", ls="", mfc=layers.OBJECT, mec="white", label="learned building, its samples and 2 SD"
+        ),
+        Line2D([], [], color=layers.OBJECT, lw=1.0, label="its error"),
+    ]

@@ -1,0 +1,101 @@
+"""What a run consists of: the configuration of every module, and the processes to start."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from bus import config
+from bus.config import Sections
+from cli.run.supervisor import Program, cogmap_command
+from services import table
+from services.sim.town import generate
+
+OBSERVER = "observer"
+RECORDER = "recorder"
+ROUTER = "router"
+LOG_NAME = "log.mcap"
+CONFIG_NAME = "config.toml"
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What the user chooses about a drive; None leaves it to the configuration."""
+
+    seed: int | None = None
+    laps: float = 1.0
+    lockstep: bool = False
+    codelets: int = 1
+    record: bool = True
+
+
+def effective(base: Sections, choices: Choices, awaits: dict[str, int]) -> Sections:
+    """The whole configuration of every module: `base`, the choices, the route through the town, all defaults.
+
+    The route is what a passenger would tell the agent: so many metres, a turn, and so on. Raises ConfigError.
+    """
+    config.check_sections(base, table.MODULES)
+    sections: Sections = {name: dict(base.get(name, {})) for name in table.MODULES}
+    sim = sections["sim"]
+    if choices.seed is not None:
+        sim["seed"] = choices.seed
+    sim.setdefault("awaits", awaits)
+    for name in ("sim", "workspace", "action"):
+        sections[name].setdefault("mode", "lockstep" if choices.lockstep else "real_time")
+    whole = {name: _whole(sections, name) for name in table.MODULES}
+    if not whole["action"]["route"]:
+        whole["action"]["route"] = [list(leg) for leg in generate(whole["sim"]["seed"]).route(choices.laps)]
+    return whole
+
+
+def _whole(sections: Sections, name: str) -> dict[str, Any]:
+    settings: dict[str, Any] = msgspec.to_builtins(config.typed(sections, name, table.config_type(name)))
+    return settings
+
+
+def everybody(choices: Choices, observer: bool) -> dict[str, int]:
+    """Whom the simulator waits for: every other module, the workers, and whoever watches."""
+    awaits = {name: 1 for name in table.MODULES if name != "sim"} | {"codelets": choices.codelets}
+    return awaits | ({RECORDER: 1} if choices.record else {}) | ({OBSERVER: 1} if observer else {})
+
+
+def to_toml(sections: Sections) -> str:
+    """`sections` as a TOML file that `config.load` reads back to the same."""
+    return "\n".join(
+        f"[{name}]\n"
+        + "".join(f"{key} = {_toml_value(value)}\n" for key, value in settings.items() if value is not None)
+        for name, settings in sections.items()
+    )
+
+
+def _toml_value(value: object) -> str:
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{json.dumps(key)} = {_toml_value(item)}" for key, item in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_toml_value(item) for item in value) + "]"
+    return json.dumps(value)
+
+
+def programs(folder: Path, connect: str, agent: str, choices: Choices) -> list[Program]:
+    """Every process of a run but the launcher, in the order to start them."""
+    where = ["--tied", "--connect", connect]
+    whose = ["--agent", agent]
+    configured = ["--config", str(folder / CONFIG_NAME), "--state", str(folder / "state")]
+
+    def module(name: str, instance: str) -> Program:
+        command = cogmap_command("module", name, "--instance", instance, *where, *whose, *configured)
+        return Program(instance, lambda starts: command)
+
+    def record(starts: int) -> list[str]:
+        """A recorder that died leaves its log as it is, and the next one writes another."""
+        name = LOG_NAME if starts == 0 else f"log-{starts + 1}.mcap"
+        return cogmap_command("log", "record", *where, *whose, "-o", str(folder / name))
+
+    workers = [f"codelets-{number}" for number in range(1, choices.codelets + 1)]
+    named = [(name, name) for name in table.MODULES if name != "codelets"] + [("codelets", name) for name in workers]
+    router = Program(ROUTER, lambda starts: cogmap_command("router", *where))
+    return [router, *([Program(RECORDER, record)] if choices.record else []), *(module(*each) for each in named)]
