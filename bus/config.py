@@ -41,7 +41,7 @@ def load(path: Path | None, settings: Iterable[str] = ()) -> Sections:
         section, dot, name = key.partition(".")
         if not (equals and dot and name):
             raise ConfigError(f"--set {setting}: write it as module.key=value")
-        sections.setdefault(section, {})[name] = _parse(value)
+        _keys_of(section, sections.setdefault(section, {}))[name] = _parse(value)
     return sections
 
 
@@ -51,8 +51,13 @@ def check_sections(sections: Mapping[str, Any], known: Iterable[str]) -> None:
     for name, section in sections.items():
         if name not in names:
             raise ConfigError(f"unknown section [{name}]{_nearest(name, names)}")
-        if not isinstance(section, dict):
-            raise ConfigError(f"{name} must be a section [{name}] with keys in it")
+        _keys_of(name, section)
+
+
+def _keys_of(name: str, section: Any) -> dict[str, Any]:
+    if not isinstance(section, dict):
+        raise ConfigError(f"{name} must be a section [{name}] with keys in it")
+    return section
 
 
 def typed(sections: Sections, name: str, kind: type[C]) -> C:

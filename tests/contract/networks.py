@@ -5,7 +5,8 @@ from __future__ import annotations
 import itertools
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Protocol
 
 import zenoh
@@ -24,6 +25,7 @@ from schemas.topics import Topic
 
 PATIENCE_S = 20.0
 INCARNATION = 1
+BLOCK = zenoh.CongestionControl.BLOCK
 _numbers = itertools.count()
 
 
@@ -72,7 +74,7 @@ class OverZenoh:
 
     def put(self, topic: Topic, payload: bytes, attachment: bytes | None) -> None:
         self.stranger = self.stranger or open_client(self.endpoint)
-        self.stranger.put(topic.key(self.agent), payload, attachment=attachment)
+        self.stranger.put(topic.key(self.agent), payload, attachment=attachment, congestion_control=BLOCK)
 
     def close(self) -> None:
         for bus in self.buses:
@@ -131,6 +133,26 @@ def pump_until(condition: Callable[[], bool], *shells: Shell) -> None:
         assert time.monotonic() < deadline_s, "the condition never held"
         for shell in shells:
             shell.pump(0.01)
+
+
+@contextmanager
+def answering(shell: Shell) -> Iterator[None]:
+    """Let the shell work on a thread of its own, so that it can answer whoever asks here."""
+    ended = threading.Event()
+
+    def work() -> None:
+        while not ended.is_set():
+            shell.pump(0.01)
+
+    shell.open()
+    thread = threading.Thread(target=work)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+        shell.close()
 
 
 def envelope_of(message: Message, incarnation: int = INCARNATION) -> Envelope:

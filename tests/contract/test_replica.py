@@ -1,0 +1,75 @@
+"""What a replica of the graph promises over either bus."""
+
+from __future__ import annotations
+
+from networks import Network, answering, meet
+
+from bus.graph import Graph
+from bus.module import Module
+from bus.replica import Replica, snapshot_over
+from bus.shell import Shell
+from schemas import topics
+from schemas.graph import Delta, Link, Node
+
+
+def delta(version: int) -> Delta:
+    node = Node(id=f"building-{version}", kind="object", activation=0.5)
+    link = Link(source=node.id, target=f"place:{version}:0")
+    return Delta(version=version, cycle=version, phase="collect", tasks=[], operations=[node, link])
+
+
+def keeper(network: Network, graph: Graph) -> Shell:
+    """The shell of a module that answers for `graph`."""
+    module = Module("workspace").answering(topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, lambda request: graph.snapshot())
+    return Shell(module, network.join(), health=False)
+
+
+def test_deltas_in_order_make_the_same_graph(network: Network) -> None:
+    graph, replica = Graph(), Replica(snapshot_over(network.join()))
+    for version in range(1, 20):
+        assert graph.apply(delta(version))
+        assert replica.follow(delta(version))
+
+    assert replica.graph.digest() == graph.digest()
+    assert replica.mended == 0
+
+
+def test_a_gap_is_mended_by_a_snapshot(network: Network) -> None:
+    graph, bus = Graph(), network.join()
+    for version in range(1, 11):
+        graph.apply(delta(version))
+    replica = Replica(snapshot_over(bus))
+    shell = keeper(network, graph)
+
+    with answering(shell):
+        meet(bus, shell.bus)
+        assert replica.follow(delta(1))
+        assert replica.follow(delta(7))
+
+    assert replica.mended == 1
+    assert replica.graph.digest() == graph.digest()
+
+
+def test_a_delta_that_the_snapshot_held_already_changes_nothing(network: Network) -> None:
+    graph, bus = Graph(), network.join()
+    for version in range(1, 6):
+        graph.apply(delta(version))
+    replica = Replica(snapshot_over(bus))
+    shell = keeper(network, graph)
+
+    with answering(shell):
+        meet(bus, shell.bus)
+        assert replica.follow(delta(3))
+    assert all(replica.follow(delta(version)) for version in (4, 5))
+
+    assert replica.graph.digest() == graph.digest()
+
+
+def test_without_an_answer_the_graph_stays_as_it_is_and_says_so(network: Network) -> None:
+    replica = Replica(snapshot_over(network.join(), timeout_s=0.5))
+    assert replica.follow(delta(1))
+    before = replica.graph.digest()
+
+    assert not replica.follow(delta(3))
+
+    assert (replica.graph.digest(), replica.mended) == (before, 0)

@@ -1,0 +1,98 @@
+"""What the table of topics and its messages promise to yesterday's logs and to other languages."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import msgpack
+import pytest
+from damage import golden
+
+from bus.codec import decode, encode
+from schemas import topics
+from schemas.base import Message
+from schemas.export import GOLDEN, export_golden, export_schemas, file_name, json_schema
+from schemas.samples import samples
+from schemas.topics import About, Delivery, Topic
+
+BY_TOPIC = {topics.of(message): message for message in samples()}
+each_topic = pytest.mark.parametrize("topic", topics.ALL, ids=lambda topic: topic.name)
+
+
+@each_topic
+def test_golden_bytes_decode_and_encode_to_the_same_bytes(topic: Topic) -> None:
+    message = decode(topic, golden(topic))
+
+    assert encode(message) == golden(topic)
+    assert message == BY_TOPIC[topic]
+
+
+@each_topic
+def test_golden_bytes_are_plain_msgpack_to_any_library(topic: Topic) -> None:
+    plain = msgpack.unpackb(golden(topic))
+
+    assert plain["source"] == "sample"
+    assert msgpack.packb(plain) == golden(topic)
+
+
+@each_topic
+def test_a_field_of_tomorrow_does_not_trouble_todays_reader(topic: Topic) -> None:
+    plain = msgpack.unpackb(golden(topic)) | {"field_of_tomorrow": [1, {"two": 3.0}]}
+
+    assert decode(topic, msgpack.packb(plain)) == BY_TOPIC[topic]
+
+
+@each_topic
+def test_the_json_schema_names_every_field_and_what_it_means(topic: Topic) -> None:
+    schema = json_schema(topic)
+    definition = schema["$defs"][topic.type.__name__]
+
+    assert list(definition["properties"]) == list(topic.type.__struct_fields__)
+    assert definition["description"]
+
+
+def test_every_golden_file_belongs_to_a_topic() -> None:
+    assert {path.name for path in GOLDEN.iterdir()} == {file_name(topic, ".msgpack") for topic in topics.ALL}
+
+
+def test_golden_bytes_are_written_the_same_every_time(tmp_path: Path) -> None:
+    for path in export_golden(tmp_path):
+        assert path.read_bytes() == (GOLDEN / path.name).read_bytes(), f"{path.name} differs: export it on purpose"
+
+
+def test_every_export_is_one_command(tmp_path: Path) -> None:
+    run = subprocess.run(
+        [sys.executable, "-m", "schemas.export", str(tmp_path)], capture_output=True, text=True, check=True
+    )
+
+    assert run.stdout.startswith(f"{len(topics.ALL)} files")
+    written = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert written == {path.name: path.read_bytes() for path in export_schemas(tmp_path)}
+
+
+def test_names_and_types_are_unique() -> None:
+    assert len(topics.ALL) == len(topics.BY_NAME) == len(topics.BY_TYPE)
+
+
+@each_topic
+def test_a_row_of_the_table_makes_sense(topic: Topic) -> None:
+    assert re.fullmatch(r"[a-z][a-z_]*(/[a-z][a-z_]*)*", topic.name)
+    assert topic.key("robot-1") == f"cogmap/robot-1/{topic.name}"
+    assert issubclass(topic.type, Message)
+    assert topic.rate_hz >= 0
+    assert topic.max_bytes >= len(golden(topic))
+    assert topic.delivery is not Delivery.ON_REQUEST or topic.rate_hz == 0
+    assert (topic.about is About.TRUTH) == topic.name.startswith("truth/")
+
+
+@each_topic
+def test_every_field_of_a_sample_differs_from_its_default(topic: Topic) -> None:
+    sample = BY_TOPIC[topic]
+    defaults = sample.__struct_defaults__
+    optional = sample.__struct_fields__[-len(defaults) :]
+    same = [name for name, default in zip(optional, defaults, strict=True) if getattr(sample, name) == default]
+
+    assert same in ([], ["seq"])

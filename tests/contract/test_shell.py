@@ -1,0 +1,313 @@
+"""What the shell promises the module inside it and everybody outside, on either bus."""
+
+from __future__ import annotations
+
+import logging
+import time
+
+import pytest
+from damage import damaged, golden
+from networks import PATIENCE_S, Network, Peer, answering, envelope_of, meet, publish, pump_until
+
+from bus.codec import Envelope, decode, encode
+from bus.errors import MessageError, NoAnswerError
+from bus.interface import Member
+from bus.module import Module
+from bus.shell import Shell
+from schemas import topics
+from schemas.base import Message
+from schemas.graph import Snapshot, SnapshotRequest
+from schemas.process import Clock, Health, Presence
+from schemas.sensing import MotorCommand, Odometry
+from schemas.topics import Delivery, Topic
+
+TAKEN_IN = [topic for topic in topics.ALL if topic.delivery is not Delivery.ON_REQUEST and topic is not topics.PRESENCE]
+
+
+def odometry(seq: int, source: str = "sim") -> Odometry:
+    return Odometry(speed_m_s=1.0, turn_rate_rad_s=0.0, dt_s=0.05, seq=seq, source=source, stamp_ns=seq)
+
+
+def command(odometry: Odometry) -> MotorCommand:
+    return MotorCommand(left_wheel_rad_s=1.0, right_wheel_rad_s=1.0, stamp_ns=odometry.stamp_ns)
+
+
+def listener(network: Network, topic: Topic, heard: list[Message]) -> Shell:
+    """An open shell around a module that only keeps what it hears on `topic`."""
+    shell = Shell(Module("listener").on(topic, heard.append), network.join(), health=False)
+    shell.open()
+    return shell
+
+
+@pytest.mark.parametrize("topic", TAKEN_IN, ids=lambda topic: topic.name)
+def test_bad_input_is_counted_and_changes_nothing_else(network: Network, topic: Topic) -> None:
+    heard: list[Message] = []
+    shell = listener(network, topic, heard)
+    meet(network.join(), shell.bus)
+    whole = decode(topic, golden(topic))
+    proper = encode(envelope_of(whole))
+    stranger = encode(Envelope("stranger", whole.seq, 1, 0, 0))
+    arrivals = [(payload, proper) for payload in damaged(topic).values()]
+    arrivals += [(golden(topic), attachment) for attachment in (None, b"", b"\xc1garbage", stranger)]
+
+    for number, (payload, attachment) in enumerate(arrivals, 1):
+        network.put(topic, payload, attachment)
+        pump_until(lambda: shell.intake.rejected[topic.name] == number, shell)  # noqa: B023
+    assert heard == []
+
+    network.put(topic, golden(topic), proper)
+    pump_until(lambda: bool(heard), shell)
+    assert heard == [whole]
+    assert dict(shell.intake.rejected) == {topic.name: len(arrivals)}
+    assert dict(shell.intake.received) == {topic.name: 1}
+    assert not shell.intake.gaps
+    assert shell.meter.faults == 0
+    shell.close()
+
+
+def test_bad_input_is_named_once_a_second_at_most(network: Network, caplog: pytest.LogCaptureFixture) -> None:
+    shell = listener(network, topics.ODOMETRY, [])
+    meet(network.join(), shell.bus)
+    began_s = time.monotonic()
+
+    with caplog.at_level(logging.WARNING, "cogmap"):
+        for _ in range(200):
+            network.put(topics.ODOMETRY, b"\x80", encode(envelope_of(odometry(0))))
+        pump_until(lambda: shell.intake.rejected["odometry"] == 200, shell)
+
+    said = [record.getMessage() for record in caplog.records]
+    assert "odometry" in said[0]
+    assert "speed_m_s" in said[0]
+    assert len(said) <= 1 + time.monotonic() - began_s
+    shell.close()
+
+
+def test_a_message_that_comes_twice_is_taken_in_once(network: Network) -> None:
+    heard: list[Message] = []
+    shell, publisher = listener(network, topics.ODOMETRY, heard), network.join()
+    publisher.declare(topics.ODOMETRY)
+    meet(publisher, shell.bus)
+
+    publish(publisher, odometry(0), odometry(1), odometry(1), odometry(0), odometry(2))
+    pump_until(lambda: len(heard) == 3, shell)
+
+    assert [message.seq for message in heard] == [0, 1, 2]
+    assert (shell.intake.received["odometry"], shell.intake.rejected["odometry"]) == (3, 2)
+    shell.close()
+
+
+def test_a_source_that_starts_anew_counts_from_the_beginning(network: Network) -> None:
+    heard: list[Message] = []
+    shell, publisher = listener(network, topics.ODOMETRY, heard), network.join()
+    publisher.declare(topics.ODOMETRY)
+    meet(publisher, shell.bus)
+
+    publish(publisher, odometry(0), odometry(1))
+    publish(publisher, odometry(0), odometry(1), incarnation=2)
+    pump_until(lambda: len(heard) == 4, shell)
+
+    assert not shell.intake.rejected
+    assert not shell.intake.gaps
+    shell.close()
+
+
+def test_a_gap_in_the_numbers_of_a_source_is_counted(network: Network) -> None:
+    heard: list[Message] = []
+    shell, publisher = listener(network, topics.ODOMETRY, heard), network.join()
+    publisher.declare(topics.ODOMETRY)
+    meet(publisher, shell.bus)
+
+    publish(publisher, odometry(0), odometry(4), odometry(0, "other"), odometry(5))
+    pump_until(lambda: len(heard) == 4, shell)
+
+    assert dict(shell.intake.gaps) == {"odometry": 3}
+    shell.close()
+
+
+def test_a_loss_that_the_bus_tells_of_and_the_numbers_show_counts_once(network: Network) -> None:
+    heard: list[Message] = []
+    shell, publisher = listener(network, topics.ODOMETRY, heard), network.join()
+    publisher.declare(topics.ODOMETRY)
+    meet(publisher, shell.bus)
+
+    publish(publisher, odometry(0))
+    pump_until(lambda: len(heard) == 1, shell)
+    shell.intake.lose("odometry", 2)
+    assert dict(shell.intake.gaps) == {"odometry": 2}
+    publish(publisher, odometry(3))
+    pump_until(lambda: len(heard) == 2, shell)
+
+    assert dict(shell.intake.gaps) == {"odometry": 2}
+    shell.close()
+
+
+@pytest.mark.parametrize("error", [MessageError("image of the wrong shape"), ZeroDivisionError("division by zero")])
+def test_a_module_whose_handler_raises_goes_on(network: Network, error: Exception) -> None:
+    def think(message: Odometry) -> MotorCommand:
+        if message.seq == 1:
+            raise error
+        return command(message)
+
+    module = Module("action").on(topics.ODOMETRY, think, emits=[topics.MOTOR_COMMAND])
+    shell, observer = Shell(module, network.join(), health=False), network.join()
+    observer.declare(topics.ODOMETRY)
+    peer = Peer(observer, topics.MOTOR_COMMAND)
+    shell.open()
+    meet(observer, shell.bus)
+
+    publish(observer, odometry(0), odometry(1), odometry(2))
+    pump_until(lambda: peer.arrived == 2, shell)
+
+    answers = [decode(topics.MOTOR_COMMAND, arrival.payload) for arrival in peer.take(2)]
+    assert [(answer.stamp_ns, answer.seq, answer.source) for answer in answers] == [(0, 0, "action"), (2, 1, "action")]
+    assert shell.intake.rejected["odometry"] == 1
+    assert shell.meter.faults == (0 if isinstance(error, MessageError) else 1)
+    shell.close()
+
+
+def test_what_led_to_a_message_and_the_time_it_took_travel_with_it(network: Network) -> None:
+    module = Module("action").on(
+        topics.ODOMETRY, lambda m: command(m) if m.seq % 2 else None, emits=[topics.MOTOR_COMMAND]
+    )
+    shell, observer = Shell(module, network.join(), health=False), network.join()
+    observer.declare(topics.ODOMETRY)
+    peer = Peer(observer, topics.MOTOR_COMMAND)
+    shell.open()
+    meet(observer, shell.bus)
+
+    publish(observer, *(odometry(seq) for seq in range(4)))
+    pump_until(lambda: peer.arrived == 2, shell)
+
+    for arrival, causes in zip(peer.take(2), ([0, 1], [2, 3]), strict=True):
+        assert arrival.envelope is not None
+        assert arrival.envelope.causes == [("odometry", "sim", seq) for seq in causes]
+        ((name, compute_ns, rest_ns),) = arrival.envelope.stages
+        assert name == "action"
+        assert compute_ns + rest_ns == arrival.envelope.sent_ns - arrival.envelope.born_ns
+    shell.close()
+
+
+def test_health_is_published_and_says_what_was_taken_in_and_refused(network: Network) -> None:
+    module = Module("action", "action-1").on(topics.ODOMETRY, command, emits=[topics.MOTOR_COMMAND])
+    shell, observer = Shell(module, network.join()), network.join()
+    observer.declare(topics.ODOMETRY)
+    peer = Peer(observer, topics.HEALTH)
+    shell.open()
+    meet(observer, shell.bus)
+
+    publish(observer, odometry(0), odometry(0), odometry(2))
+    pump_until(lambda: shell.intake.received["odometry"] == 2, shell)
+    pump_until(lambda: peer.arrived > 0, shell)
+
+    health = decode(topics.HEALTH, peer.take(1)[0].payload)
+    assert isinstance(health, Health)
+    assert (health.module, health.instance, health.source, health.ready) == ("action", "action-1", "action-1", True)
+    assert (health.received, health.rejected, health.gaps) == ({"odometry": 2}, {"odometry": 1}, {"odometry": 1})
+    assert health.emitted == {"motor/command": 2}
+    assert health.memory_mb > 1
+    shell.close()
+
+
+def test_a_module_that_waits_for_others_is_not_ready_and_says_so(network: Network) -> None:
+    module = Module("sim").starts(lambda: None, awaits={"action": 1})
+    shell, observer = Shell(module, network.join()), network.join()
+    peer = Peer(observer, topics.HEALTH)
+    shell.open()
+    meet(observer, shell.bus)
+
+    pump_until(lambda: peer.arrived > 0, shell)
+
+    health = decode(topics.HEALTH, peer.take(1)[0].payload)
+    assert isinstance(health, Health)
+    assert health.ready is False
+    assert shell.missing == {"action": 1}
+    shell.close()
+
+
+def test_nothing_is_missed_by_those_that_a_start_awaits(network: Network) -> None:
+    heard: dict[str, list[int]] = {"one": [], "two": []}
+    first = [odometry(seq) for seq in range(20)]
+    sim = Module("sim").starts(lambda: first, awaits={"listener": 2}, emits=[topics.ODOMETRY])
+    starting = Shell(sim, network.join(), health=False)
+    starting.open()
+    waiting = [
+        Shell(
+            Module("listener", name).on(topics.ODOMETRY, lambda m, name=name: heard[name].append(m.seq)),
+            network.join(),
+            health=False,
+        )
+        for name in heard
+    ]
+
+    waiting[0].open()
+    pump_until(lambda: starting.missing == {"listener": 1}, starting)
+    assert heard == {"one": [], "two": []}
+    waiting[1].open()
+    pump_until(lambda: all(len(seqs) == 20 for seqs in heard.values()), starting, *waiting)
+
+    assert heard == {name: list(range(20)) for name in heard}
+    for shell in (starting, *waiting):
+        shell.close()
+
+
+def test_a_start_happens_once_though_one_that_it_awaited_goes_and_comes(network: Network) -> None:
+    started: list[int] = []
+    shell = Shell(Module("sim").starts(lambda: started.append(1), awaits={"action": 1}), network.join(), health=False)
+    shell.open()
+    for _ in range(2):
+        action = Shell(Module("action"), network.join(), health=False)
+        action.open()
+        pump_until(lambda: not shell.missing, shell)
+        action.close()
+        pump_until(lambda: bool(shell.missing), shell)
+
+    assert started == [1]
+    shell.close()
+
+
+def test_a_module_that_asks_is_told_who_comes_and_goes(network: Network) -> None:
+    told: list[Presence] = []
+    module = Module("workspace").on(topics.PRESENCE, told.append, emits=[topics.PRESENCE])
+    shell, worker = Shell(module, network.join(), health=False), network.join()
+    shell.open()
+
+    worker.announce(Member("codelets", "codelets-1"))
+    pump_until(lambda: any(presence.module == "codelets" for presence in told), shell)
+    worker.close()
+    pump_until(lambda: any(not presence.alive for presence in told), shell)
+
+    assert [(p.instance, p.alive) for p in told if p.module == "codelets"] == [
+        ("codelets-1", True),
+        ("codelets-1", False),
+    ]
+    shell.close()
+
+
+def test_a_question_that_makes_no_sense_is_refused_and_counted(network: Network) -> None:
+    empty = Snapshot(version=0, cycle=0, nodes=[], links=[], tiles=[])
+    module = Module("workspace").answering(topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, lambda request: empty)
+    shell, asker = Shell(module, network.join(), health=False), network.join()
+    with answering(shell):
+        meet(asker, shell.bus)
+        with pytest.raises(NoAnswerError, match="stamp_ns"):
+            asker.query(topics.SNAPSHOT_REQUEST, encode(SnapshotRequest()).replace(b"\x00", b"\xff", 1), PATIENCE_S)
+        answer = asker.query(topics.SNAPSHOT_REQUEST, encode(SnapshotRequest()), PATIENCE_S)
+
+    assert decode(topics.SNAPSHOT, answer) == empty
+    assert shell.intake.rejected == {"workspace/snapshot_request": 1}
+
+
+def test_a_clock_that_is_older_than_the_newest_is_never_thought_about(network: Network) -> None:
+    heard: list[Message] = []
+    shell, publisher = listener(network, topics.CLOCK, heard), network.join()
+    publisher.declare(topics.CLOCK)
+    meet(publisher, shell.bus)
+    peer = Peer(network.join(), topics.CLOCK)
+    meet(publisher, peer.bus)
+
+    publish(publisher, *(Clock(seq=seq, source="sim") for seq in range(100)))
+    peer.wait_for(100)
+    pump_until(lambda: bool(heard) and heard[-1].seq == 99, shell)
+
+    assert shell.inbox.superseded["clock"] + len(heard) == 100
+    shell.close()

@@ -1,0 +1,126 @@
+"""Bytes changed at random: decoding takes them for a message or says why not, and never believes a wild number."""
+
+from __future__ import annotations
+
+import math
+import random
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+
+from bus.codec import Envelope, decode, decode_envelope, encode
+from bus.errors import MessageError
+from schemas import topics
+from schemas.array import Array
+from schemas.export import GOLDEN, file_name
+from schemas.topics import Topic
+
+ROUNDS = 1500
+WILD = [math.nan, math.inf, -math.inf, 1e308, -0.0, 2**64 - 1, -(2**63), None, "", "x" * 300, b"", [], {}, True]
+
+
+def flipped(data: bytearray, rng: random.Random) -> None:
+    for _ in range(rng.randint(1, 4)):
+        data[rng.randrange(len(data))] = rng.randrange(256)
+
+
+def cut(data: bytearray, rng: random.Random) -> None:
+    start = rng.randrange(len(data))
+    del data[start : start + rng.randint(1, 16)]
+
+
+def grown(data: bytearray, rng: random.Random) -> None:
+    data[rng.randrange(len(data)) : 0] = rng.randbytes(rng.randint(1, 16))
+
+
+def poisoned(data: bytearray, rng: random.Random) -> None:
+    """Put NaN or infinity over eight or four bytes, where a float may be."""
+    poison = np.array([rng.choice([math.nan, math.inf, -math.inf])], rng.choice(["<f8", ">f8", "<f4", ">f4"])).tobytes()
+    start = rng.randrange(len(data))
+    data[start : start + len(poison)] = poison
+
+
+def mutated(payload: bytes, rng: random.Random) -> bytes:
+    data = bytearray(payload)
+    for _ in range(rng.randint(1, 3)):
+        if data:
+            rng.choice([flipped, cut, grown, poisoned])(data, rng)
+    return bytes(data)
+
+
+def rewritten(value: Any, rng: random.Random, odds: float) -> Any:
+    """`value` with some of its leaves and keys replaced by what nobody expects there."""
+    if rng.random() < odds:
+        return rng.choice(WILD)
+    if isinstance(value, dict):
+        return {key: rewritten(item, rng, odds) for key, item in value.items() if rng.random() > odds / 4}
+    if isinstance(value, list):
+        return [rewritten(item, rng, odds) for item in value] * (2 if rng.random() < odds else 1)
+    return value
+
+
+def numbers(value: Any) -> list[float]:
+    """Every float in a message, in its arrays too."""
+    if isinstance(value, float):
+        return [value]
+    if isinstance(value, Array):
+        return [float(number) for number in value.numpy().ravel()]
+    if isinstance(value, msgspec.Struct):
+        return numbers([getattr(value, name) for name in value.__struct_fields__])
+    if isinstance(value, dict):
+        return numbers(list(value.values()))
+    if isinstance(value, list | tuple):
+        return [number for item in value for number in numbers(item)]
+    return []
+
+
+def judge(topic: Topic, payload: bytes) -> bool:
+    """Whether `payload` is taken for a message; whatever is, has finite numbers and can be said again."""
+    try:
+        message = decode(topic, payload)
+    except MessageError as error:
+        assert str(error).startswith(topic.name)
+        return False
+    assert all(map(math.isfinite, numbers(message)))
+    assert decode(topic, encode(message)) == message
+    return True
+
+
+@pytest.mark.parametrize("topic", topics.ALL, ids=lambda topic: topic.name)
+def test_mutated_bytes_are_refused_by_name_or_are_a_finite_message(topic: Topic) -> None:
+    rng = random.Random(topic.name)
+    whole = (GOLDEN / file_name(topic, ".msgpack")).read_bytes()
+
+    taken = [judge(topic, mutated(whole, rng)) for _ in range(ROUNDS)]
+
+    assert judge(topic, whole)
+    assert taken.count(False) > ROUNDS / 4
+
+
+@pytest.mark.parametrize("topic", topics.ALL, ids=lambda topic: topic.name)
+def test_wellformed_bytes_of_the_wrong_content_are_refused_or_are_a_finite_message(topic: Topic) -> None:
+    rng = random.Random(topic.name)
+    plain = msgspec.msgpack.decode((GOLDEN / file_name(topic, ".msgpack")).read_bytes())
+
+    taken = [judge(topic, msgspec.msgpack.encode(rewritten(plain, rng, 0.1))) for _ in range(ROUNDS)]
+
+    assert False in taken
+
+
+def test_every_byte_string_up_to_two_bytes_is_refused_or_an_envelope() -> None:
+    for number in range(2**16):
+        with pytest.raises(MessageError):
+            decode_envelope(number.to_bytes(2, "big"))
+
+
+def test_mutated_envelopes_are_refused_or_can_be_said_again() -> None:
+    rng = random.Random(7)
+    whole = encode(Envelope("sim", 7, 1, 2**60, 2**60, [("sensory", 10, 20)], [("odometry", "sim", 3)]))
+    for _ in range(ROUNDS * 3):
+        try:
+            envelope = decode_envelope(mutated(whole, rng))
+        except MessageError:
+            continue
+        assert decode_envelope(encode(envelope)) == envelope
