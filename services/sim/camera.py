@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 import numpy.typing as npt
-import pybullet
 
 from schemas.sensing import Calibration
-from services.sim.facade import Image
+from services.sim.quiet import pybullet, quiet
+from services.sim.wall import Image
 from services.sim.world import World
 
 Matrix = npt.NDArray[np.float64]
@@ -63,6 +63,9 @@ class StereoCamera:
         self._projection = _projection(calibration)
         right, _ = cv2.Rodrigues(np.asarray(calibration.right_rotation_rad))
         self._right_turn: Matrix = np.asarray(right, float)
+        # The first pictures take long, and EGL announces them.
+        with quiet():
+            self.shoot()
 
     def shoot(self) -> tuple[Image, Image]:
         """The left and the right picture from where the robot is."""
@@ -85,6 +88,8 @@ class StereoCamera:
 
     def _expose(self, turn: Matrix, at: Matrix, labelled: bool) -> Exposure:
         mount, world = self.calibration, self._world
+        if world.egl is not None:
+            world.egl.check()
         _, _, rgba, depth, mask = pybullet.getCameraImage(
             mount.width_px,
             mount.height_px,

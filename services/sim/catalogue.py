@@ -9,7 +9,7 @@ Colour = tuple[int, int, int]
 
 @dataclass(frozen=True)
 class BuildingType:
-    """Size in metres, colours as RGB bytes, `pattern` and `roof_shape` as `facade` and `mesh` draw them.
+    """Size in metres, colours as RGB bytes, `pattern` and `roof_shape` as `patterns` and `mesh` draw them.
 
     `accent` is the second strong colour: of shutters, bands or stripes.
     """
@@ -27,34 +27,53 @@ class BuildingType:
     roof_shape: str = "flat"
 
 
-_WHITE, _CREAM, _STONE, _DARK = (240, 238, 232), (236, 222, 186), (196, 188, 172), (52, 48, 50)
-_TILE, _SLATE, _COPPER, _THATCH = (158, 72, 50), (74, 82, 98), (96, 168, 142), (170, 142, 86)
+def _rgb(hexadecimal: str) -> Colour:
+    red, green, blue = bytes.fromhex(hexadecimal)
+    return red, green, blue
+
+
+def _type(
+    name: str,
+    size_m: tuple[float, float, float],
+    colours: str,
+    finish: tuple[str, str],
+    pattern: str,
+    *,
+    shape: str = "flat",
+) -> BuildingType:
+    """`size_m`: width, depth, height; `colours`: of wall, accent and door; `finish`: colours of trim and roof."""
+    wall, accent, door = (_rgb(colour) for colour in colours.split())
+    return BuildingType(name, *size_m, wall, accent, _rgb(finish[0]), door, _rgb(finish[1]), pattern, shape)
+
+
+_WHITE, _CREAM, _STONE, _DARK = "f0eee8", "ecdeba", "c4bcac", "343032"
+_TILE, _SLATE, _COPPER, _THATCH = "9e4832", "4a5262", "60a88e", "aa8e56"
 
 CATALOGUE: tuple[BuildingType, ...] = (
-    BuildingType("bakery", 9.0, 8.0, 6.5, (240, 176, 72), (132, 52, 28), _CREAM, (96, 44, 24), _TILE, "shutters", "gable"),
-    BuildingType("library", 13.5, 10.0, 9.0, (150, 44, 40), (238, 226, 196), _CREAM, (64, 40, 28), _SLATE, "bands"),
-    BuildingType("town_hall", 14.0, 9.5, 13.0, (232, 206, 96), (36, 70, 150), _WHITE, (36, 60, 128), _SLATE, "bands", "gable"),
-    BuildingType("pharmacy", 8.0, 7.0, 7.0, (238, 240, 236), (22, 160, 76), (22, 160, 76), (20, 110, 60), _SLATE, "cross"),
-    BuildingType("post_office", 10.0, 8.0, 7.5, (248, 210, 30), (34, 34, 38), _DARK, (34, 34, 38), _DARK, "bands"),
-    BuildingType("cinema", 13.0, 11.0, 10.5, (98, 34, 122), (246, 200, 46), (246, 200, 46), (190, 30, 60), _DARK, "stripes"),
-    BuildingType("school", 14.0, 9.0, 8.0, (224, 116, 62), (250, 244, 226), _WHITE, (28, 92, 120), _SLATE, "grid"),
-    BuildingType("bank", 11.0, 9.0, 10.0, (122, 136, 120), (26, 74, 52), _STONE, (24, 60, 44), _COPPER, "columns"),
-    BuildingType("hotel", 12.0, 9.0, 14.0, (236, 148, 164), (132, 20, 62), _WHITE, (120, 20, 56), _SLATE, "shutters"),
-    BuildingType("fire_station", 12.0, 10.0, 8.0, (206, 28, 30), (246, 246, 240), _WHITE, (250, 248, 240), _DARK, "gates"),
-    BuildingType("police_station", 11.0, 8.5, 8.5, (36, 66, 158), (236, 240, 248), _WHITE, (22, 34, 84), _SLATE, "bands"),
-    BuildingType("florist", 7.0, 6.0, 5.0, (246, 168, 206), (46, 138, 52), (46, 138, 52), (46, 138, 52), _THATCH, "stripes", "gable"),
-    BuildingType("cafe", 7.5, 7.0, 6.0, (70, 178, 178), (250, 236, 204), _CREAM, (126, 66, 36), _TILE, "stripes"),
-    BuildingType("museum", 14.0, 12.0, 9.5, (176, 220, 190), (92, 62, 140), _STONE, (70, 50, 110), _COPPER, "columns", "gable"),
-    BuildingType("theatre", 12.5, 11.0, 12.0, (120, 22, 58), (222, 172, 98), (222, 172, 98), (60, 14, 30), _COPPER, "columns"),
-    BuildingType("workshop", 10.5, 9.5, 5.5, (96, 102, 110), (244, 132, 20), (244, 132, 20), (244, 132, 20), _SLATE, "gates"),
-    BuildingType("brewery", 11.0, 10.0, 11.0, (124, 74, 34), (206, 222, 60), _CREAM, (52, 82, 38), _TILE, "grid", "gable"),
-    BuildingType("greengrocer", 8.5, 7.0, 6.0, (128, 196, 58), (246, 246, 232), _WHITE, (56, 104, 34), _TILE, "stripes"),
-    BuildingType("bookshop", 6.5, 7.0, 8.5, (30, 84, 66), (226, 90, 72), _CREAM, (150, 40, 34), _TILE, "shutters", "gable"),
-    BuildingType("clinic", 13.0, 8.0, 7.0, (196, 226, 246), (206, 30, 44), _WHITE, (70, 120, 160), _SLATE, "cross"),
-    BuildingType("boathouse", 9.5, 8.0, 5.5, (40, 146, 224), (250, 240, 220), _WHITE, (248, 196, 60), _THATCH, "planks", "gable"),
-    BuildingType("toy_shop", 7.0, 6.5, 7.0, (250, 226, 60), (222, 40, 130), (40, 110, 210), (222, 40, 130), _TILE, "checker", "gable"),
-    BuildingType("tailor", 6.0, 6.5, 9.5, (164, 132, 214), (60, 32, 96), _WHITE, (60, 32, 96), _SLATE, "shutters"),
-    BuildingType("farmhouse", 10.0, 7.5, 6.5, (238, 232, 214), (92, 56, 32), (92, 56, 32), (70, 44, 26), _THATCH, "timber", "gable"),
+    _type("bakery", (9.0, 8.0, 6.5), "f0b048 84341c 602c18", (_CREAM, _TILE), "shutters", shape="gable"),
+    _type("library", (13.5, 10.0, 9.0), "962c28 eee2c4 40281c", (_CREAM, _SLATE), "bands"),
+    _type("town_hall", (14.0, 9.5, 13.0), "e8ce60 244696 243c80", (_WHITE, _SLATE), "bands", shape="gable"),
+    _type("pharmacy", (8.0, 7.0, 7.0), "eef0ec 16a04c 146e3c", ("16a04c", _SLATE), "cross"),
+    _type("post_office", (10.0, 8.0, 7.5), "f8d21e 222226 222226", (_DARK, _DARK), "bands"),
+    _type("cinema", (13.0, 11.0, 10.5), "62227a f6c82e be1e3c", ("f6c82e", _DARK), "stripes"),
+    _type("school", (14.0, 9.0, 8.0), "e0743e faf4e2 1c5c78", (_WHITE, _SLATE), "grid"),
+    _type("bank", (11.0, 9.0, 10.0), "7a8878 1a4a34 183c2c", (_STONE, _COPPER), "columns"),
+    _type("hotel", (12.0, 9.0, 14.0), "ec94a4 84143e 781438", (_WHITE, _SLATE), "shutters"),
+    _type("fire_station", (12.0, 10.0, 8.0), "ce1c1e f6f6f0 faf8f0", (_WHITE, _DARK), "gates"),
+    _type("police_station", (11.0, 8.5, 8.5), "24429e ecf0f8 162254", (_WHITE, _SLATE), "bands"),
+    _type("florist", (7.0, 6.0, 5.0), "f6a8ce 2e8a34 2e8a34", ("2e8a34", _THATCH), "stripes", shape="gable"),
+    _type("cafe", (7.5, 7.0, 6.0), "46b2b2 faeccc 7e4224", (_CREAM, _TILE), "stripes"),
+    _type("museum", (14.0, 12.0, 9.5), "b0dcbe 5c3e8c 46326e", (_STONE, _COPPER), "columns", shape="gable"),
+    _type("theatre", (12.5, 11.0, 12.0), "78163a deac62 3c0e1e", ("deac62", _COPPER), "columns"),
+    _type("workshop", (10.5, 9.5, 5.5), "60666e f48414 f48414", ("f48414", _SLATE), "gates"),
+    _type("brewery", (11.0, 10.0, 11.0), "7c4a22 cede3c 345226", (_CREAM, _TILE), "grid", shape="gable"),
+    _type("greengrocer", (8.5, 7.0, 6.0), "80c43a f6f6e8 386822", (_WHITE, _TILE), "stripes"),
+    _type("bookshop", (6.5, 7.0, 8.5), "1e5442 e25a48 962822", (_CREAM, _TILE), "shutters", shape="gable"),
+    _type("clinic", (13.0, 8.0, 7.0), "c4e2f6 ce1e2c 4678a0", (_WHITE, _SLATE), "cross"),
+    _type("boathouse", (9.5, 8.0, 5.5), "2892e0 faf0dc f8c43c", (_WHITE, _THATCH), "planks", shape="gable"),
+    _type("toy_shop", (7.0, 6.5, 7.0), "fae23c de2882 de2882", ("286ed2", _TILE), "checker", shape="gable"),
+    _type("tailor", (6.0, 6.5, 9.5), "a484d6 3c2060 3c2060", (_WHITE, _SLATE), "shutters"),
+    _type("farmhouse", (10.0, 7.5, 6.5), "eee8d6 5c3820 462c1a", ("5c3820", _THATCH), "timber", shape="gable"),
 )
 
 BY_NAME: dict[str, BuildingType] = {kind.name: kind for kind in CATALOGUE}

@@ -23,3 +23,10 @@ def quiet() -> Iterator[None]:
             os.dup2(kept_fd, fd)
             os.close(kept_fd)
         os.close(nowhere)
+
+
+# It greets on standard error while it is imported.
+with quiet():
+    import pybullet
+
+__all__ = ["pybullet", "quiet"]

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 
-import pybullet
-
 from schemas.sensing import Pose
+from services.sim.quiet import pybullet
 
 TRACK_M = 0.8
 WHEEL_RADIUS_M = 0.2
 MAX_WHEEL_RAD_S = 30.0
 _MASS_KG, _WHEEL_KG, _CASTER_KG = 30.0, 2.0, 0.5
-_TORQUE_NM = 20.0
+_TORQUE_NM, _GRIP = 20.0, 1.5
 _CASTER_RADIUS_M, _CASTER_FORWARD_M = 0.1, 0.45
 
 
@@ -84,8 +83,7 @@ class Robot:
             linkJointAxis=[(0, 1, 0)] * 4,
             physicsClientId=client,
         )
-        for link, friction in ((-1, 0.2), (0, 1.2), (1, 1.2), (2, 0.0), (3, 0.0)):
-            pybullet.changeDynamics(
-                body, link, lateralFriction=friction, linearDamping=0.0, angularDamping=0.0, physicsClientId=client
-            )
+        pybullet.changeDynamics(body, -1, linearDamping=0.0, angularDamping=0.0, physicsClientId=client)
+        for link, friction in enumerate((_GRIP, _GRIP, 0.0, 0.0)):
+            pybullet.changeDynamics(body, link, lateralFriction=friction, physicsClientId=client)
         return int(body)

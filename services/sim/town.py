@@ -2,171 +2,144 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from schemas.sensing import Building, Pose, Street, TrueTown
 from services.sim.catalogue import CATALOGUE, BuildingType
+from services.sim.plan import PAVEMENT_WIDTH_M, STREET_WIDTH_M, Plot, Point, Rectangle, Road, overlap
 
-STREET_WIDTH_M = 8.0
-PAVEMENT_WIDTH_M = 2.0
-MIN_BUILDINGS = 20
+MIN_BUILDINGS = 21
 _REACH_M = STREET_WIDTH_M / 2 + PAVEMENT_WIDTH_M
+_CHOICE = 6
 
-Point = tuple[float, float]
-Rectangle = tuple[float, float, float, float]
 Leg = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Plot:
-    """A building where it stands. Its front looks to the right of `heading_rad`; that heading runs along its width."""
-
-    kind: BuildingType
-    x_m: float
-    y_m: float
-    heading_rad: float
-
-    @property
-    def footprint(self) -> Rectangle:
-        """West, south, east, north in metres."""
-        along, across = self.kind.width_m / 2, self.kind.depth_m / 2
-        half_x, half_y = (across, along) if abs(math.sin(self.heading_rad)) > 0.5 else (along, across)
-        return self.x_m - half_x, self.y_m - half_y, self.x_m + half_x, self.y_m + half_y
-
-
-@dataclass(frozen=True)
-class Road:
-    """A straight street along x or y: its centre line from `start` to `end`."""
-
-    name: str
-    start: Point
-    end: Point
-
-    def area(self, reach_m: float) -> Rectangle:
-        """West, south, east, north of what lies within `reach_m` of the centre line, ends squared off."""
-        (ax, ay), (bx, by) = self.start, self.end
-        return min(ax, bx) - reach_m, min(ay, by) - reach_m, max(ax, bx) + reach_m, max(ay, by) + reach_m
-
-
-@dataclass(frozen=True)
 class Town:
-    """Streets on a rectangular loop with stubs, and buildings; the robot starts at `start` and drives `corners` in order."""
+    """Streets on a rectangular loop with stubs, and buildings; the way leads from `start` to the `corners` in order."""
 
     seed: int
     roads: tuple[Road, ...]
     plots: tuple[Plot, ...]
     start: Pose
-    corners: tuple[Point, ...]
-
-    def route(self, laps: float = 1.0) -> list[Leg]:
-        """The legs (length_m, turn_rad at its end, left positive) of `laps` laps from the start; the last turn is 0."""
-        left_m = laps * self.lap_m
-        here, heading, number = (self.start.x_m, self.start.y_m), self.start.heading_rad, 0
-        legs: list[Leg] = []
-        while left_m > 1e-9:
-            corner, after = self.corners[number % 4], self.corners[(number + 1) % 4]
-            length_m, next_heading = math.dist(here, corner), math.atan2(after[1] - corner[1], after[0] - corner[0])
-            if left_m <= length_m:
-                legs.append((left_m, 0.0))
-                break
-            legs.append((length_m, math.remainder(next_heading - heading, math.tau)))
-            left_m, here, heading, number = left_m - length_m, corner, next_heading, number + 1
-        return legs
+    corners: tuple[Point, Point, Point, Point]
 
     @property
     def lap_m(self) -> float:
         """The length of one lap along the centre lines."""
-        return sum(math.dist(a, b) for a, b in zip(self.corners, self.corners[1:] + self.corners[:1], strict=True))
+        return sum(math.dist(self.corners[i - 1], self.corners[i]) for i in range(4))
+
+    def route(self, laps: float = 1.0) -> list[Leg]:
+        """The legs (length_m, turn_rad at its end, left positive) of `laps` laps from the start; the last turn is 0."""
+        points = self.line(laps)
+        headings = [math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in itertools.pairwise(points)]
+        turns = [math.remainder(b - a, math.tau) for a, b in itertools.pairwise(headings)]
+        lengths = [math.dist(a, b) for a, b in itertools.pairwise(points)]
+        return list(zip(lengths, [*turns, 0.0], strict=True))
+
+    def line(self, laps: float = 1.0) -> list[Point]:
+        """The points between the route's legs: the start, the corners passed, the end."""
+        points: list[Point] = [(self.start.x_m, self.start.y_m)]
+        left_m = laps * self.lap_m
+        while True:
+            corner = self.corners[(len(points) - 1) % 4]
+            length_m = math.dist(points[-1], corner)
+            if left_m <= length_m:
+                points.append(_between(points[-1], corner, left_m / length_m))
+                return points
+            points.append(corner)
+            left_m -= length_m
 
     def message(self) -> TrueTown:
         """The town as it travels."""
-        return TrueTown(
-            seed=self.seed,
-            streets=[Street(name=r.name, line_m=[r.start, r.end], width_m=STREET_WIDTH_M) for r in self.roads],
-            buildings=[
-                Building(
-                    name=plot.kind.name,
-                    pose=Pose(x_m=plot.x_m, y_m=plot.y_m, heading_rad=plot.heading_rad),
-                    width_m=plot.kind.width_m,
-                    depth_m=plot.kind.depth_m,
-                    height_m=plot.kind.height_m,
-                )
-                for plot in self.plots
-            ],
-        )
+        streets = [Street(name=r.name, line_m=[r.start, r.end], width_m=STREET_WIDTH_M) for r in self.roads]
+        return TrueTown(seed=self.seed, streets=streets, buildings=[_building(plot) for plot in self.plots])
 
 
 def generate(seed: int) -> Town:
     """The town of `seed`: the same every time, with at least MIN_BUILDINGS buildings, none on a street or another."""
     rng = np.random.default_rng([seed, 0x70])
-    for _ in range(1000):
+    plots: list[Plot] = []
+    while len(plots) < MIN_BUILDINGS:
         half_x, half_y = float(rng.uniform(23, 28)), float(rng.uniform(18, 21))
         roads = _roads(rng, half_x, half_y)
-        plots = _settle(rng, roads, half_x, half_y)
-        if len(plots) >= MIN_BUILDINGS:
-            break
-    else:
-        raise AssertionError(f"no town for seed {seed}")
-    corners = [(half_x, -half_y), (half_x, half_y), (-half_x, half_y), (-half_x, -half_y)]
+        settlement = _Settlement(rng, [road.area(_REACH_M) for road in roads])
+        for road in (roads[0], roads[2], roads[1], roads[3]):
+            settlement.line(road, left=True)
+            settlement.line(road, left=False)
+        plots = settlement.plots
     start = Pose(x_m=float(rng.uniform(-0.7, -0.3)) * half_x, y_m=-half_y, heading_rad=0.0)
-    return Town(seed, tuple(roads), tuple(plots), start, tuple(corners))
+    corners = ((half_x, -half_y), (half_x, half_y), (-half_x, half_y), (-half_x, -half_y))
+    return Town(seed, tuple(roads), tuple(plots), start, corners)
+
+
+@dataclass
+class _Settlement:
+    """Buildings as they come: each kind is built once, and none on a street."""
+
+    rng: np.random.Generator
+    streets: list[Rectangle]
+    plots: list[Plot] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.kinds: list[BuildingType] = [CATALOGUE[i] for i in self.rng.permutation(len(CATALOGUE))]
+
+    def line(self, road: Road, left: bool) -> None:
+        """Go along one side of `road` and build wherever something fits."""
+        along_m = -_REACH_M
+        while along_m < road.length_m + _REACH_M:
+            plot = self._fitting(road, along_m, left)
+            if plot is None:
+                along_m += 1.0
+                continue
+            self.plots.append(plot)
+            self.kinds.remove(plot.kind)
+            along_m += plot.kind.width_m + float(self.rng.uniform(1.2, 4.0))
+
+    def _fitting(self, road: Road, along_m: float, left: bool) -> Plot | None:
+        # A front looks to the right of its heading: to the road.
+        heading_rad = math.remainder(road.heading_rad + (0.0 if left else math.pi), math.tau)
+        for kind in self.kinds[:_CHOICE]:
+            back_m = _REACH_M + float(self.rng.uniform(0.3, 2.0)) + kind.depth_m / 2
+            x, y = road.point(along_m + kind.width_m / 2, back_m if left else -back_m)
+            plot = Plot(kind, round(x, 3), round(y, 3), heading_rad)
+            if along_m + kind.width_m < road.length_m + _REACH_M and self._is_free(plot.footprint):
+                return plot
+        return None
+
+    def _is_free(self, area: Rectangle) -> bool:
+        on_street = any(overlap(area, street, 0.2) for street in self.streets)
+        return not on_street and not any(overlap(area, plot.footprint, 1.0) for plot in self.plots)
 
 
 def _roads(rng: np.random.Generator, half_x: float, half_y: float) -> list[Road]:
-    roads = [
+    east, north = rng.choice([-1.0, 1.0], 2).tolist()
+    stub_m = float(rng.uniform(14, 20))
+    corner, opposite = (east * half_x, north * half_y), (-east * half_x, -north * half_y)
+    return [
         Road("South Street", (-half_x, -half_y), (half_x, -half_y)),
         Road("East Street", (half_x, -half_y), (half_x, half_y)),
         Road("North Street", (half_x, half_y), (-half_x, half_y)),
         Road("West Street", (-half_x, half_y), (-half_x, -half_y)),
+        Road("Station Road", corner, (corner[0] + east * stub_m, corner[1])),
+        Road("Mill Lane", opposite, (opposite[0], opposite[1] - north * stub_m)),
     ]
-    east, north = rng.choice([-1.0, 1.0], 2)
-    stub_m = float(rng.uniform(14, 20))
-    roads.append(Road("Station Road", (east * half_x, north * half_y), (east * (half_x + stub_m), north * half_y)))
-    roads.append(Road("Mill Lane", (-east * half_x, -north * half_y), (-east * half_x, -north * (half_y + stub_m))))
-    return roads
 
 
-def _overlap(a: Rectangle, b: Rectangle, gap_m: float) -> bool:
-    return a[0] < b[2] + gap_m and b[0] < a[2] + gap_m and a[1] < b[3] + gap_m and b[1] < a[3] + gap_m
+def _between(a: Point, b: Point, share: float) -> Point:
+    return a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])
 
 
-def _settle(rng: np.random.Generator, roads: list[Road], half_x: float, half_y: float) -> list[Plot]:
-    """Go along both sides of each street of the loop and put a building wherever one fits."""
-    areas = [road.area(_REACH_M) for road in roads]
-    kinds = [CATALOGUE[i] for i in rng.permutation(len(CATALOGUE))]
-    plots: list[Plot] = []
-    for road in (roads[0], roads[2], roads[1], roads[3]):
-        for outer in (False, True):
-            _line(rng, road, outer, kinds, plots, areas)
-    return plots
-
-
-def _line(
-    rng: np.random.Generator, road: Road, outer: bool, kinds: list[BuildingType], plots: list[Plot], areas: list[Rectangle]
-) -> None:
-    heading = math.atan2(road.end[1] - road.start[1], road.end[0] - road.start[0])
-    along = (math.cos(heading), math.sin(heading))
-    # The loop runs counter-clockwise, so outside is to the right of each street and a front there looks left.
-    sideways = (along[1], -along[0]) if outer else (-along[1], along[0])
-    facing = heading + math.pi if outer else heading
-    s, end_m = -_REACH_M, math.dist(road.start, road.end) + _REACH_M
-    while s < end_m and kinds:
-        placed = False
-        for kind in kinds[:6]:
-            set_back = _REACH_M + float(rng.uniform(0.3, 2.0)) + kind.depth_m / 2
-            middle = s + kind.width_m / 2
-            x = road.start[0] + middle * along[0] + set_back * sideways[0]
-            y = road.start[1] + middle * along[1] + set_back * sideways[1]
-            plot = Plot(kind, round(x, 3), round(y, 3), math.remainder(facing, math.tau))
-            taken = [(area, 0.2) for area in areas] + [(other.footprint, 1.0) for other in plots]
-            if middle + kind.width_m / 2 <= end_m and not any(_overlap(plot.footprint, area, gap) for area, gap in taken):
-                plots.append(plot)
-                kinds.remove(kind)
-                s += kind.width_m + float(rng.uniform(1.2, 4.0))
-                placed = True
-                break
-        if not placed:
-            s += 1.0
+def _building(plot: Plot) -> Building:
+    return Building(
+        name=plot.kind.name,
+        pose=Pose(x_m=plot.x_m, y_m=plot.y_m, heading_rad=plot.heading_rad),
+        width_m=plot.kind.width_m,
+        depth_m=plot.kind.depth_m,
+        height_m=plot.kind.height_m,
+    )

@@ -2,44 +2,48 @@
 
 from __future__ import annotations
 
-import importlib.util
 import logging
 import math
 import tempfile
+import weakref
 from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
 import numpy as np
-import pybullet
 
 from schemas.sensing import Pose
-from services.sim import mesh, robot
-from services.sim.facade import Image
-from services.sim.quiet import quiet
-from services.sim.town import Plot, Town
+from services.sim import mesh, scenery
+from services.sim.egl import Egl
+from services.sim.egl import works as egl_works
+from services.sim.plan import Plot
+from services.sim.quiet import pybullet, quiet
+from services.sim.robot import Robot
+from services.sim.town import Town
+from services.sim.wall import Image
 
 STEP_S = 1 / 240
 _log = logging.getLogger(__name__)
 
 
 class World:
-    """A town with a robot in it. Positions in metres, x east, y north, z up; close it when done."""
+    """A town with a robot in it. Positions in metres, x east, y north, z up; close it when done.
 
-    def __init__(self, town: Town) -> None:
+    With `want_egl` EGL draws it where it works, and only in one world at a time in a process (else CogmapError).
+    """
+
+    def __init__(self, town: Town, want_egl: bool = True) -> None:
         self.town = town
         with quiet():
             self.client: int = pybullet.connect(pybullet.DIRECT)
-            self._plugin = self._load_egl()
-        _log.info("rendering with %s", "EGL" if self.egl else "TinyRenderer: the EGL plugin does not load here")
+        self.egl = Egl.load(self.client) if want_egl and egl_works() else None
+        self._leave = weakref.finalize(self, _leave, self.client, self.egl)
+        _log.info(
+            "the camera's pictures are drawn by %s", "EGL" if self.egl else "TinyRenderer, more slowly than by EGL"
+        )
         self.building_of_body: dict[int, str] = {}
         self._build()
-        self.robot = robot.Robot(self.client, town.start)
-
-    @property
-    def egl(self) -> bool:
-        """Whether the EGL plugin renders; else TinyRenderer does, and slowly."""
-        return self._plugin >= 0
+        self.robot = Robot(self.client, town.start)
 
     def step(self, dt_s: float) -> None:
         """Let `dt_s` pass, in steps of STEP_S."""
@@ -52,30 +56,22 @@ class World:
 
     def close(self) -> None:
         """Leave pybullet; nothing of it stays."""
-        with quiet():
-            if self.egl:
-                pybullet.unloadPlugin(self._plugin, physicsClientId=self.client)
-            pybullet.disconnect(physicsClientId=self.client)
-
-    def _load_egl(self) -> int:
-        found = importlib.util.find_spec("eglRenderer")
-        if found is None or found.origin is None:
-            return -1
-        return int(pybullet.loadPlugin(found.origin, "_eglRendererPlugin", physicsClientId=self.client))
+        self._leave()
 
     def _build(self) -> None:
         client = self.client
         pybullet.setGravity(0, 0, -9.81, physicsClientId=client)
         pybullet.setTimeStep(STEP_S, physicsClientId=client)
-        half = [mesh.GROUND_M, mesh.GROUND_M, 1.0]
+        half = [scenery.GROUND_M, scenery.GROUND_M, 1.0]
         floor = pybullet.createCollisionShape(
             pybullet.GEOM_BOX, halfExtents=half, collisionFramePosition=[0, 0, -1.0], physicsClientId=client
         )
-        grass, *surfaces = mesh.ground(self.town.roads)
-        self._add(*grass, floor)
+        grass, *surfaces = scenery.ground(self.town.roads)
+        soil = self._add(*grass, floor)
+        pybullet.changeDynamics(soil, -1, lateralFriction=1.0, physicsClientId=client)
         for surface, picture in surfaces:
             self._add(surface, picture)
-        self.sky = self._add(*mesh.sky())
+        self.sky = self._add(*scenery.sky())
         for plot in self.town.plots:
             self._raise(plot)
 
@@ -98,9 +94,9 @@ class World:
     ) -> int:
         """Add a body. Its shape and picture go through files, the only way that every renderer of pybullet takes."""
         with tempfile.TemporaryDirectory(prefix="cogmap-") as folder:
-            form, paint = Path(folder) / "surface.obj", Path(folder) / "texture.png"
+            form, paint = Path(folder) / "surface.obj", Path(folder) / "texture.bmp"
             form.write_text(surface.obj())
-            cv2.imwrite(str(paint), np.ascontiguousarray(picture[..., ::-1]), [cv2.IMWRITE_PNG_COMPRESSION, 1])
+            cv2.imwrite(str(paint), np.ascontiguousarray(picture[..., ::-1]))
             shape = pybullet.createVisualShape(
                 pybullet.GEOM_MESH, fileName=str(form), specularColor=[0, 0, 0], physicsClientId=self.client
             )
@@ -109,3 +105,10 @@ class World:
             texture = pybullet.loadTexture(str(paint), physicsClientId=self.client)
         pybullet.changeVisualShape(body, -1, textureUniqueId=texture, physicsClientId=self.client)
         return body
+
+
+def _leave(client: int, egl: Egl | None) -> None:
+    with quiet():
+        if egl is not None:
+            egl.unload()
+        pybullet.disconnect(physicsClientId=client)

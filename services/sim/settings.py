@@ -1,0 +1,43 @@
+"""How the simulation is configured."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import msgspec
+
+from bus.errors import ConfigError
+from services.sim.odometry import Noise
+from services.sim.world import STEP_S
+
+Rate = Annotated[int, msgspec.Meta(ge=1, le=240)]
+Side = Annotated[int, msgspec.Meta(ge=64, le=1024)]
+Instances = Annotated[int, msgspec.Meta(ge=1, le=1000)]
+
+
+class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """`awaits` are the modules, and how many instances of each, that must be ready before time begins.
+
+    Without `egl` TinyRenderer draws the pictures even where EGL would.
+    """
+
+    seed: Annotated[int, msgspec.Meta(ge=0, le=2**32)] = 1
+    mode: Literal["lockstep", "real_time"] = "real_time"
+    frame_hz: Rate = 5
+    odometry_hz: Rate = 20
+    width_px: Side = 320
+    height_px: Side = 240
+    egl: bool = True
+    laps: Annotated[float, msgspec.Meta(gt=0, le=1000)] = 1.0
+    noise: Noise = Noise()
+    awaits: dict[str, Instances] = {}
+
+
+def check(config: Config) -> None:
+    """Raise ConfigError where the rates do not divide one another."""
+    if config.odometry_hz % config.frame_hz:
+        raise ConfigError(
+            f"[sim] frame_hz is {config.frame_hz}: choose one that divides odometry_hz, {config.odometry_hz}"
+        )
+    if round(1 / STEP_S) % config.odometry_hz:
+        raise ConfigError(f"[sim] odometry_hz is {config.odometry_hz}: choose one that divides {round(1 / STEP_S)}")

@@ -1,0 +1,77 @@
+"""The world and all that senses it, tick by tick of the odometry."""
+
+from __future__ import annotations
+
+from schemas.array import Array
+from schemas.process import Clock
+from schemas.sensing import MotorCommand, Odometry, StereoFrame, TruePose, TrueTown
+from services.sim import town
+from services.sim.camera import StereoCamera, calibration
+from services.sim.odometry import WheelOdometry
+from services.sim.progress import Progress
+from services.sim.settings import Config
+from services.sim.world import World
+
+
+class Simulation:
+    """Simulated time starts at 0 and goes on by `tick_ns` with every `tick`."""
+
+    def __init__(self, config: Config) -> None:
+        self.config = config
+        self.tick_ns = 1_000_000_000 // config.odometry_hz
+        self.ticks_per_frame = config.odometry_hz // config.frame_hz
+        self.now_ns = 0
+        self.world = World(town.generate(config.seed), config.egl)
+        self.camera = StereoCamera(self.world, calibration(config.width_px, config.height_px))
+        self._odometry = WheelOdometry(config.noise, config.seed)
+        self._progress = Progress(self.world.town.line(config.laps))
+        self._pose = self.world.pose()
+        self._travelled_m = 0.0
+        self._frames = 0
+
+    def drive(self, command: MotorCommand) -> None:
+        """Set the wheels' speeds."""
+        self.world.robot.drive(command.left_wheel_rad_s, command.right_wheel_rad_s)
+
+    def brake(self) -> None:
+        """Stop the wheels."""
+        self.world.robot.drive(0.0, 0.0)
+
+    def tick(self) -> Odometry:
+        """Let one tick pass; what the wheels report of it."""
+        dt_s = self.tick_ns / 1e9
+        before = self._pose
+        self.world.step(dt_s)
+        self.now_ns += self.tick_ns
+        self._pose = self.world.pose()
+        self._travelled_m += ((self._pose.x_m - before.x_m) ** 2 + (self._pose.y_m - before.y_m) ** 2) ** 0.5
+        odometry = self._odometry.measure(before, self._pose, dt_s)
+        odometry.stamp_ns = self.now_ns
+        return odometry
+
+    def frame(self) -> StereoFrame:
+        """The next stereo frame, as of now."""
+        left, right = self.camera.shoot()
+        number, self._frames = self._frames, self._frames + 1
+        return StereoFrame(
+            stamp_ns=self.now_ns,
+            frame=number,
+            left=Array.of(left),
+            right=Array.of(right),
+            calibration=self.camera.calibration,
+        )
+
+    def clock(self, rate: float) -> Clock:
+        """Now, and how fast it goes by."""
+        return Clock(stamp_ns=self.now_ns, rate=rate)
+
+    def truth(self) -> TruePose:
+        """Where the robot is now."""
+        progress = self._progress.advance(self._pose.x_m, self._pose.y_m)
+        return TruePose(stamp_ns=self.now_ns, pose=self._pose, travelled_m=self._travelled_m, progress=progress)
+
+    def town(self) -> TrueTown:
+        """The town, as of now."""
+        message = self.world.town.message()
+        message.stamp_ns = self.now_ns
+        return message
