@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import logging
+import os
 import signal
 import sys
 import threading
+import time
 from pathlib import Path
 from types import FrameType
 
@@ -17,6 +19,7 @@ from bus.zenoh_bus import ZenohBus
 
 log = logging.getLogger("cogmap")
 IDLE_S = 0.25
+ORPHAN_GRACE_S = 10.0
 
 
 class Stop:
@@ -24,7 +27,7 @@ class Stop:
 
     def __init__(self, tied: bool = False) -> None:
         self._asked = threading.Event()
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, self._on_signal)
         if tied:
             threading.Thread(target=self._watch_parent, daemon=True).start()
@@ -33,8 +36,11 @@ class Stop:
         self._asked.set()
 
     def _watch_parent(self) -> None:
-        sys.stdin.buffer.read()
+        while os.read(sys.stdin.fileno(), 4096):  # not sys.stdin.read(): its lock would outlive the main thread
+            pass
         self._asked.set()
+        time.sleep(ORPHAN_GRACE_S)
+        os._exit(1)  # it hangs, and nobody is left to end it
 
     @property
     def asked(self) -> bool:

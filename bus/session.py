@@ -50,8 +50,8 @@ def open_client(endpoint: str, timeout_s: float = CONNECT_TIMEOUT_S) -> zenoh.Se
         ) from None
 
 
-def open_router(endpoint: str) -> zenoh.Session:
-    """A router that listens at `endpoint`. Raises PortInUseError where something else does."""
+def check_free(endpoint: str) -> None:
+    """Raise PortInUseError where something listens at `endpoint` already, or nothing can."""
     host, port = _address(endpoint)
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -62,6 +62,11 @@ def open_router(endpoint: str) -> zenoh.Session:
                 f"cannot listen at {endpoint} ({error.strerror}): stop what listens there, "
                 f"or choose another port with --connect tcp/{host}:PORT"
             ) from None
+
+
+def open_router(endpoint: str) -> zenoh.Session:
+    """A router that listens at `endpoint`. Raises PortInUseError where something else does."""
+    check_free(endpoint)
     settings = {
         "listen/endpoints": [endpoint],
         "adminspace/enabled": True,

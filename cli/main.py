@@ -15,6 +15,7 @@ from cli.options import agent_option, config_option, connect_option, set_option
 from services import table
 
 COMMANDS = {
+    "config": "cli.run.command:print_config",
     "run": "cli.run.command:run",
 }
 

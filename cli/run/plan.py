@@ -27,7 +27,7 @@ class Choices:
     """What the user chooses about a drive; None leaves it to the configuration."""
 
     seed: int | None = None
-    laps: float = 1.0
+    laps: float | None = None
     lockstep: bool = False
     codelets: int = 1
     record: bool = True
@@ -41,14 +41,14 @@ def effective(base: Sections, choices: Choices, awaits: dict[str, int]) -> Secti
     config.check_sections(base, table.MODULES)
     sections: Sections = {name: dict(base.get(name, {})) for name in table.MODULES}
     sim = sections["sim"]
-    if choices.seed is not None:
-        sim["seed"] = choices.seed
+    sim |= {key: value for key, value in (("seed", choices.seed), ("laps", choices.laps)) if value is not None}
     sim.setdefault("awaits", awaits)
     for name in ("sim", "workspace", "action"):
         sections[name].setdefault("mode", "lockstep" if choices.lockstep else "real_time")
     whole = {name: _whole(sections, name) for name in table.MODULES}
     if not whole["action"]["route"]:
-        whole["action"]["route"] = [list(leg) for leg in generate(whole["sim"]["seed"]).route(choices.laps)]
+        town = generate(whole["sim"]["seed"])
+        whole["action"]["route"] = [list(leg) for leg in town.route(whole["sim"]["laps"])]
     return whole
 
 

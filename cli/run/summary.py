@@ -1,0 +1,56 @@
+"""What a run leaves: a summary, a map, and a table on the screen."""
+
+from __future__ import annotations
+
+import importlib
+import time
+from pathlib import Path
+
+import msgspec
+from rich.table import Table
+
+from cli.run.drive import ROUTE_COMPLETE, Drive
+from cli.run.figures import Figures, measured
+from cli.run.watch import Watch
+
+
+def finish(drive: Drive, watch: Watch) -> Figures:
+    """Write the summary and the map."""
+    sim, errors = drive.sections["sim"], watch.observer.errors()
+    figures = Figures(
+        completed=drive.ended_by == ROUTE_COMPLETE,
+        ended_by=drive.ended_by,
+        seed=sim["seed"],
+        laps=sim["laps"],
+        mode=sim["mode"],
+        codelets=drive.choices.codelets,
+        wall_s=time.monotonic() - drive.began_s,
+        start_s=drive.start_s,
+        restarts=dict(drive.supervisor.restarts),
+        killed=drive.supervisor.killed,
+        **measured(watch, errors),
+    )
+    (drive.folder / "summary.json").write_bytes(msgspec.json.format(msgspec.json.encode(figures)) + b"\n")
+    picture = importlib.import_module("cli.run.map")  # half a second, which the start of a run has no use for
+    picture.draw(drive.folder / "map.png", watch.observer, watch.replica.graph, figures)
+    return figures
+
+
+def table(figures: Figures, folder: Path) -> Table:
+    """The figures that matter most."""
+    shown = Table(show_header=False, title=f"{figures.ended_by} · {folder}", title_justify="left")
+    estimate, alone = figures.estimate, figures.path_integration
+    rows = {
+        "driven": f"{figures.distance_m:.1f} m in {figures.drive_s:.1f} s, {figures.progress:.0%} of the route",
+        "position error": f"{estimate.mean_m:.2f} m on average, at most {estimate.max_m:.2f} m",
+        "path integration alone": f"{alone.mean_m:.2f} m on average, at most {alone.max_m:.2f} m",
+        "error ratio": f"{figures.error_ratio:.3f}",
+        "learned": f"{figures.objects} buildings, off by {figures.object_error_mean_m:.2f} m on average; "
+        f"{figures.road_m2:.0f} m² of street",
+        "cycle": f"{figures.cycle_p50_ms:.0f} ms, 99 % within {figures.cycle_p99_ms:.0f} ms",
+        "lost messages": str(figures.gaps_total),
+        "restarts": ", ".join(f"{name} {number}" for name, number in figures.restarts.items()) or "none",
+    }
+    for name, value in rows.items():
+        shown.add_row(name, value)
+    return shown
