@@ -6,6 +6,7 @@ from functools import cache
 from typing import Annotated
 
 import msgspec
+import numpy as np
 
 from bus.errors import MessageError
 from schemas.base import Message
@@ -39,7 +40,14 @@ class Envelope(msgspec.Struct, array_like=True):
         self.stages = [*cause.stages, (module, compute_ns, max(0, rest_ns))]
 
 
-_encoder = msgspec.msgpack.Encoder()
+
+def _plain(value: object) -> object:
+    if isinstance(value, np.generic):
+        return value.item()
+    raise NotImplementedError(f"a message cannot hold {type(value).__name__}")
+
+
+_encoder = msgspec.msgpack.Encoder(enc_hook=_plain)
 _envelope_decoder = msgspec.msgpack.Decoder(Envelope)
 
 

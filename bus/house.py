@@ -21,7 +21,8 @@ class House:
     def run(self, until: Callable[[], bool] = lambda: False) -> None:
         """Go on until `until` says so, or nobody has anything left to do."""
         while not until():
-            if not any([shell.pump(0.0) for shell in self.shells]):
+            busy = [shell.pump(0.0) for shell in self.shells]
+            if not any(busy):
                 return
 
     def close(self) -> None:

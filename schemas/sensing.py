@@ -52,7 +52,10 @@ class Odometry(Message, kw_only=True):
 
 
 class SelfMotion(Message, kw_only=True):
-    """What moved between two views: float64 (n, 3) rows of speed_m_s, turn_rate_rad_s, dt_s."""
+    """What moved between two views: float64 (n, 5) rows, in order of time.
+
+    Each is speed_m_s, turn_rate_rad_s and dt_s, then the standard deviations of the two speeds.
+    """
 
     frame: Count
     since_ns: Count

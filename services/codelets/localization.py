@@ -33,17 +33,12 @@ class Sighting(NamedTuple):
     range_sd_m: Samples
 
 
-def move(start: Samples, motions: Samples, config: Config, rng: np.random.Generator) -> Samples:
-    """Path integration (paper §5.4): (n, 3) poses after (m, 3) rows of speed, turn rate and duration.
-
-    The noise is multiplicative and of mean one on both speeds; wheels that differ a little also turn the
-    agent in proportion to its speed.
-    """
+def move(start: Samples, motions: Samples, rng: np.random.Generator) -> Samples:
+    """Path integration (paper §5.4): (n, 3) poses after (m, 5) rows of speed, turn rate, duration and noise."""
     poses = start.copy()
-    for speed, turn_rate, dt in motions:
-        way = speed * dt * rng.normal(1.0, config.speed_noise, len(poses))
-        turn = turn_rate * dt * rng.normal(1.0, config.turn_noise, len(poses))
-        turn += rng.normal(0.0, config.drift_rad_per_sqrt_m * np.sqrt(abs(speed) * dt), len(poses))
+    for speed, turn_rate, dt, speed_sd, turn_rate_sd in motions:
+        way = dt * rng.normal(speed, speed_sd, len(poses))
+        turn = dt * rng.normal(turn_rate, turn_rate_sd, len(poses))
         poses[:, 0] += way * np.cos(poses[:, 2] + turn / 2)
         poses[:, 1] += way * np.sin(poses[:, 2] + turn / 2)
         poses[:, 2] += turn
@@ -100,7 +95,7 @@ def localize(task: Task, config: Config) -> list[Operation]:
     motions = np.asarray(task.motions.numpy(), np.float64)
     seen = sightings(task, config.largest_landmark_sd_m)
     if seen is None or not motions[:, 0].any():
-        kept, share = move(start, motions, config, rng), 1.0
+        kept, share = move(start, motions, rng), 1.0
     else:
         kept, share = _correct(start, motions, seen, config, rng)
     return _self_operations(task, self_node, kept, share)
@@ -112,7 +107,7 @@ def _correct(
     """Move and reject until enough samples are kept, or rounds run out; the share that was kept."""
     poses, scores = np.empty((0, 3)), np.empty(0)
     for _ in range(ROUNDS):
-        moved = move(start, motions, config, rng)
+        moved = move(start, motions, rng)
         poses = np.vstack([poses, moved])
         scores = np.append(scores, log_likelihood(moved, seen, config.outlier_share))
         kept = keep(scores, rng)

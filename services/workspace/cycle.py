@@ -53,7 +53,7 @@ class Workspace:
 
     def on_motion(self, motion: SelfMotion) -> list[Message]:
         """Keep what moved until a cycle moves the self node by it."""
-        if motion.motions.dtype != "<f8" or len(motion.motions.shape) != 2 or motion.motions.shape[1] != 3:
+        if motion.motions.dtype != "<f8" or len(motion.motions.shape) != 2 or motion.motions.shape[1] != 5:
             raise MessageError(f"self-motion of shape {motion.motions.shape} and dtype {motion.motions.dtype}")
         if motion.stamp_ns > self._moved_until_ns:
             self._motions.append(motion)
@@ -99,7 +99,7 @@ class Workspace:
     @property
     def _moved_until_ns(self) -> int:
         node = self._ledger.graph.nodes.get(SELF)
-        return 0 if node is None else int(node.attributes["stamp_ns"])
+        return -1 if node is None else int(node.attributes["stamp_ns"])
 
     def _begin(self) -> list[Message]:
         """Begin a cycle if none runs, a view waits, and the self-motion up to it has come."""
@@ -124,7 +124,7 @@ class Workspace:
             for motion in self._motions
             if motion.since_ns >= moved_ns and motion.stamp_ns <= stamp_ns
         ]
-        return Array.of(np.vstack(rows) if rows else np.zeros((0, 3)), "<f8")
+        return Array.of(np.vstack(rows) if rows else np.zeros((0, 5)), "<f8")
 
     def _commit(self, phase: str, operations: list[Operation], tasks: list[str] | None = None) -> Delta:
         if self._scene is None:

@@ -33,7 +33,7 @@ def object_id(label: str) -> str:
 
 def first_self(samples: int) -> Node:
     """The self node before anything is known: the agent's own origin, for certain."""
-    where: dict[str, float | int | str | bool] = {"x_m": 0.0, "y_m": 0.0, "heading_rad": 0.0, "stamp_ns": 0}
+    where: dict[str, float | int | str | bool] = {"x_m": 0.0, "y_m": 0.0, "heading_rad": 0.0, "stamp_ns": -1}
     zeros = Array.of(np.zeros((samples, 3)))
     return Node(id=SELF, kind="self", activation=1.0, base_level=1.0, attributes=where, samples=zeros)
 
@@ -74,7 +74,7 @@ def tasks_for(phase: str, scene: Scene, graph: Graph) -> list[Task]:
 
 def _task(scene: Scene, graph: Graph, codelet: str, nodes: list[Node], percepts: list[Percept]) -> Task:
     subject = f"/{percepts[0].label}" if codelet in {"landmark", "object_place"} else ""
-    nothing = Array.of(np.zeros((0, 3)))
+    nothing = Array.of(np.zeros((0, 5)))
     return Task(
         stamp_ns=scene.percepts.stamp_ns,
         task_id=f"{scene.cycle}/{codelet}{subject}",

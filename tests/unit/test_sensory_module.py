@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -67,22 +68,24 @@ def test_any_interleaving_of_frames_with_their_odometry_gives_the_same_bytes() -
 def test_motions_cover_exactly_what_came_since_the_last_view() -> None:
     said = _said([*(_odometry(step) for step in range(1, 10)), _frame(0, 3), _frame(1, 8)])
     first, second = [message for message in said if isinstance(message, SelfMotion)]
-    assert (first.since_ns, first.motions.shape) == (0, (3, 3))
+    assert (first.since_ns, first.motions.shape) == (0, (3, 5))
     assert (second.since_ns, second.stamp_ns) == (3 * STEP_NS, 8 * STEP_NS)
-    assert [round(float(row[1]), 9) for row in second.motions.numpy()] == [0.4, 0.5, 0.6, 0.7, 0.8]
+    turn_rates = [float(row[1]) for row in second.motions.numpy()]
+    steps = [round(after - before, 9) for before, after in pairwise(turn_rates)]
+    assert steps == [0.1] * 4  # odometry's own steps; what is seen moves them all alike
 
 
 def test_a_newer_frame_takes_the_place_of_a_waiting_one_and_no_motion_is_lost() -> None:
     said = _said([_odometry(1), _frame(0, 1), _frame(1, 3), _frame(2, 5), *(_odometry(s) for s in range(2, 6))])
     motions = [message for message in said if isinstance(message, SelfMotion)]
     assert [message.frame for message in motions] == [0, 2]
-    assert (motions[1].since_ns, motions[1].motions.shape) == (STEP_NS, (4, 3))
+    assert (motions[1].since_ns, motions[1].motions.shape) == (STEP_NS, (4, 5))
 
 
 def test_the_first_frame_without_earlier_odometry_has_no_motion() -> None:
     motion = _said([_frame(0, 4), _odometry(5)])[0]
     assert isinstance(motion, SelfMotion)
-    assert (motion.since_ns, motion.motions.shape) == (4 * STEP_NS, (0, 3))
+    assert (motion.since_ns, motion.motions.shape) == (4 * STEP_NS, (0, 5))
 
 
 def test_frames_and_odometry_that_came_before_are_passed_over() -> None:
@@ -131,7 +134,7 @@ def test_odometry_that_makes_no_sense_is_refused_and_changes_nothing(row: Odomet
     module.feed(_odometry(2))
     motion = module.feed(_frame(0, 2))[0]
     assert isinstance(motion, SelfMotion)
-    assert motion.motions.shape == (2, 3)
+    assert motion.motions.shape == (2, 5)
 
 
 def test_it_takes_and_says_what_the_table_of_topics_names() -> None:
