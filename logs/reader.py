@@ -29,7 +29,7 @@ Progress = Callable[[float], None]
 class Record:
     """A message in a log: where its bytes are, and all that is known without decoding them."""
 
-    topic: Topic
+    topic_name: str
     channel: int
     sequence: int
     log_time_ns: int
@@ -38,6 +38,11 @@ class Record:
     chunk: int
     start: int
     end: int
+
+    @property
+    def topic(self) -> Topic:
+        """The row of the table that it travelled on."""
+        return BY_NAME[self.topic_name]
 
     @property
     def size(self) -> int:
@@ -67,6 +72,18 @@ class LogReader:
     def about(self, name: str) -> dict[str, str]:
         """The last metadata record called `name`, empty where there is none."""
         return next((facts for found, facts in reversed(self.metadata) if found == name), {})
+
+    @property
+    def span_ns(self) -> tuple[int, int]:
+        """The log times of the first and the last message, (0, 0) where there is none."""
+        times = [self.file.times_ns(chunk) for chunk in self._chunks]
+        return (min(first for first, _ in times), max(last for _, last in times)) if times else (0, 0)
+
+    @property
+    def span_s(self) -> float:
+        """Seconds from the first message to the last."""
+        first_ns, last_ns = self.span_ns
+        return (last_ns - first_ns) / 1e9
 
     def records(self, topics: Collection[Topic] | None = None, progress: Progress | None = None) -> Iterator[Record]:
         """Messages on `topics`, all known ones where it is None, in order; `progress` is told the share done."""
@@ -136,7 +153,7 @@ class LogReader:
             topic = BY_NAME.get(name)
             if topic is not None and (topics is None or topic in topics):
                 yield Record(
-                    topic,
+                    name,
                     piece.channel,
                     piece.sequence,
                     piece.log_time_ns,
