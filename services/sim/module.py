@@ -101,7 +101,7 @@ class RealTime:
     def _rate(self, wall_ns: int) -> float:
         """Simulated over wall time in the last second."""
         self._history.append((wall_ns, self._simulation.now_ns))
-        while wall_ns - self._history[0][0] > _RATE_WINDOW_NS:
+        while len(self._history) > 2 and wall_ns - self._history[0][0] > _RATE_WINDOW_NS:
             self._history.popleft()
         passed_ns = wall_ns - self._history[0][0]
         return (self._simulation.now_ns - self._history[0][1]) / passed_ns if passed_ns else 1.0
