@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from pathlib import Path
+from typing import IO
 
 import click
 import msgspec
@@ -97,6 +98,7 @@ def run(
 @lockstep_option
 @codelets_option
 @click.option("--record/--no-record", default=True, help="Whether the drive waits for a recorder.")
+@click.option("-o", "--output", type=click.File("w", atomic=True), default="-", help="Where to write it.")
 @config_option
 @set_option
 def print_config(
@@ -105,13 +107,14 @@ def print_config(
     lockstep: bool,
     codelets: int,
     record: bool,
+    output: IO[str],
     config_path: Path | None,
     settings: tuple[str, ...],
 ) -> None:
-    """Print the whole configuration of a drive as TOML: for modules that are started one by one."""
+    """Write the whole configuration of a drive as TOML: for modules that are started one by one."""
     choices = Choices(seed=seed, laps=laps, lockstep=lockstep, codelets=codelets, record=record)
     sections = effective(config.load(config_path, settings), choices, everybody(choices, observer=False))
-    click.echo(to_toml(sections), nl=False)
+    output.write(to_toml(sections))
 
 
 def _new_folder(out: Path | None) -> Path:

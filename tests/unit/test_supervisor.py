@@ -22,7 +22,7 @@ PATIENCE_S = 20.0
 
 
 def python(instance: str, code: str) -> Program:
-    return Program(instance, [sys.executable, "-c", code])
+    return Program(instance, lambda starts: [sys.executable, "-c", code])
 
 
 def wait_until(condition: Callable[[], bool]) -> None:
@@ -110,7 +110,8 @@ import pathlib, sys
 from cli.run.supervisor import Supervisor, Program, cogmap_command
 supervisor = Supervisor(pathlib.Path(sys.argv[1]))
 for name, port in (("one", sys.argv[2]), ("two", sys.argv[3])):
-    supervisor.start(Program(name, cogmap_command("router", "--tied", "--connect", f"tcp/127.0.0.1:{port}")))
+    command = cogmap_command("router", "--tied", "--connect", f"tcp/127.0.0.1:{port}")
+    supervisor.start(Program(name, lambda starts, command=command: command))
 print(*[child.pid for child in supervisor.children.values()], flush=True)
 sys.stdin.read()
 """
