@@ -1,0 +1,40 @@
+"""The TOPIC that a command is about."""
+
+from __future__ import annotations
+
+import difflib
+
+import click
+
+from bus.errors import UsageError
+from schemas import topics
+from schemas.topics import Delivery, Topic
+
+
+def topic_named(name: str) -> Topic:
+    """The topic called so, with or without a slash before it. Raises UsageError naming the nearest."""
+    found = topics.BY_NAME.get(name.strip("/"))
+    if found is not None:
+        return found
+    close = difflib.get_close_matches(name, topics.BY_NAME, 1)
+    raise UsageError(f"no topic {name!r}: " + (f"did you mean {close[0]!r}?" if close else "see `cogmap topic list`"))
+
+
+def streamed(name: str) -> Topic:
+    """The topic called so, which must be one that is published. Raises UsageError."""
+    topic = topic_named(name)
+    if topic.delivery is Delivery.ON_REQUEST:
+        raise UsageError(f"{topic.name} is answered on request and never published: there is nothing to watch")
+    return topic
+
+
+def _convert(context: click.Context, parameter: click.Parameter, value: str) -> Topic:
+    return topic_named(value)
+
+
+def _convert_streamed(context: click.Context, parameter: click.Parameter, value: str) -> Topic:
+    return streamed(value)
+
+
+topic_argument = click.argument("topic", metavar="TOPIC", callback=_convert)
+streamed_argument = click.argument("topic", metavar="TOPIC", callback=_convert_streamed)

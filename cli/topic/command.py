@@ -1,0 +1,19 @@
+"""`cogmap topic`: looks at topics, and speaks on them, while a system runs."""
+
+from __future__ import annotations
+
+import click
+
+from cli.topic.echo import echo
+from cli.topic.listing import find, info, listing, type_
+from cli.topic.pub import pub
+from cli.topic.rates import bw, delay, hz
+
+
+@click.group()
+def topic() -> None:
+    """Watch topics of a running system, or publish on them."""
+
+
+for command in (listing, info, type_, find, echo, hz, bw, delay, pub):
+    topic.add_command(command)
