@@ -12,7 +12,12 @@ from functools import cache
 from bus.errors import CogmapError
 from services.sim.quiet import pybullet, quiet
 
-_PROBE = "from services.sim.egl import Egl; import pybullet; Egl.load(pybullet.connect(pybullet.DIRECT))"
+_PROBE = """
+import importlib.util, pybullet
+pybullet.connect(pybullet.DIRECT)
+plugin = importlib.util.find_spec("eglRenderer").origin
+raise SystemExit(pybullet.loadPlugin(plugin, "_eglRendererPlugin") < 0)
+"""
 _PROBE_S = 20.0
 
 
