@@ -21,8 +21,11 @@ class House:
     def run(self, until: Callable[[], bool] = lambda: False) -> None:
         """Go on until `until` says so, or nobody has anything left to do."""
         while not until():
-            busy = [shell.pump(0.0) for shell in self.shells]
-            if not any(busy):
+            idle = True
+            for shell in self.shells:
+                while shell.pump(0.0):
+                    idle = False
+            if idle:
                 return
 
     def close(self) -> None:
