@@ -16,7 +16,11 @@ from services import table
 
 COMMANDS = {
     "config": "cli.run.command:print_config",
+    "doctor": "cli.doctor.command:doctor",
+    "graph": "cli.graph:graph",
+    "log": "cli.log.command:log",
     "run": "cli.run.command:run",
+    "topic": "cli.topic.command:topic",
 }
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import logging
+import math
 import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import msgspec
@@ -67,6 +68,11 @@ class Recorder:
         self._unrecovered: Counter[str] = Counter()
         self._began_s = time.monotonic()
 
+    @property
+    def path(self) -> Path:
+        """The file that it writes."""
+        return self._writer.path
+
     def open(self) -> None:
         """Join the bus, and tell everybody: all that is sent from now on is recorded."""
         for topic in self._topics:
@@ -94,7 +100,7 @@ class Recorder:
         summary = self._summary()
         self._writer.note(layout.SUMMARY, {"json": msgspec.json.encode(summary).decode()})
         self._writer.close()
-        summary.size_bytes = self._writer.path.stat().st_size
+        summary.size_bytes = self.path.stat().st_size
         return summary
 
     def _take(self, timeout_s: float) -> bool:
@@ -122,7 +128,7 @@ class Recorder:
         lost, dropped = self._continuity.lost(), dict(self._backlog.dropped)
         lacking = {*lost, *dropped, *self._unrecovered}
         return Summary(
-            path=str(self._writer.path),
+            path=str(self.path),
             duration_s=time.monotonic() - self._began_s,
             size_bytes=0,
             messages=dict(self._intake.received),
@@ -134,3 +140,13 @@ class Recorder:
             never_drop_whole=not any(BY_NAME[name].delivery is Delivery.NEVER_DROP for name in lacking),
             backlog_peak_mb=self._backlog.peak_bytes / 1e6,
         )
+
+
+def run(recorder: Recorder, stop: Callable[[], bool], max_duration_s: float | None = None) -> Summary:
+    """Record until `stop` says so or the time is over. Raises LogError."""
+    recorder.open()
+    log.info("recording to %s", recorder.path)
+    end_s = math.inf if max_duration_s is None else time.monotonic() + max_duration_s
+    while not stop() and (left_s := end_s - time.monotonic()) > 0:
+        recorder.pump(min(IDLE_S, left_s))
+    return recorder.close()

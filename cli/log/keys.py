@@ -1,0 +1,64 @@
+"""The space bar pauses a replay, where there is a terminal."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import signal
+import socket
+import sys
+import termios
+import tty
+from collections.abc import Iterator
+
+import click
+
+from bus.runner import Stop
+
+
+class Keys:
+    """Waits for time to pass, for a signal, and, on a terminal, for the space bar."""
+
+    def __init__(self, stop: Stop, paused: bool) -> None:
+        self._stop = stop
+        self.paused = paused
+        self._wakes: list[socket.socket] = []
+
+    @property
+    def asked(self) -> bool:
+        """Whether to end."""
+        return self._stop.asked
+
+    @contextlib.contextmanager
+    def listening(self) -> Iterator[Keys]:
+        """Take single keys from the terminal until left; nothing where standard input is none."""
+        if not sys.stdin.isatty():
+            if self.paused:
+                raise click.UsageError("--start-paused needs a terminal: the space bar goes on")
+            yield self
+            return
+        terminal = sys.stdin.fileno()
+        before = termios.tcgetattr(terminal)
+        self._wakes = list(socket.socketpair())
+        self._wakes[1].setblocking(False)
+        signal.set_wakeup_fd(self._wakes[1].fileno())
+        tty.setcbreak(terminal)
+        try:
+            yield self
+        finally:
+            termios.tcsetattr(terminal, termios.TCSADRAIN, before)
+            signal.set_wakeup_fd(-1)
+            for end in self._wakes:
+                end.close()
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait so long, or until asked to end, to pause or to go on; whether it is to end."""
+        if not self._wakes:
+            return self._stop.wait(timeout_s)
+        terminal = sys.stdin.fileno()
+        ready, _, _ = select.select([terminal, self._wakes[0]], [], [], timeout_s)
+        if terminal in ready and b" " in os.read(terminal, 64):
+            self.paused = not self.paused
+            click.echo("paused: space goes on" if self.paused else "going on", err=True)
+        return self._stop.asked

@@ -1,0 +1,75 @@
+"""`cogmap log record`."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+
+import click
+
+from bus import config
+from bus.runner import Stop
+from bus.zenoh_bus import ZenohBus
+from cli.log import text
+from cli.options import agent_option, config_option, connect_option, json_option, set_option
+from logs import recorder, selection
+
+_EPILOG = """\b
+Examples:
+  cogmap log record                          everything, until Ctrl-C
+  cogmap log record -o drive.mcap -x camera  everything but the camera
+  cogmap log record odometry motor/command   two topics
+  cogmap log record -e '^workspace/'         what the workspace says
+"""
+
+
+@click.command(epilog=_EPILOG)
+@click.argument("topics", nargs=-1)
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="The file; named by the time unless given.")
+@click.option("-a", "--all", "everything", is_flag=True, help="Every topic: so it is unless some are chosen.")
+@click.option("-e", "--regex", default="", help="Topics that match this, besides those named.")
+@click.option("-x", "--exclude", default="", help="Leave out topics that match this.")
+@click.option("-d", "--max-duration", type=click.FloatRange(min=0, min_open=True), help="End after so many seconds.")
+@click.option("--instance", default=recorder.MODULE, show_default=True, help="Its own name, where several record.")
+@click.option("--tied", is_flag=True, help="End when standard input ends.")
+@connect_option
+@agent_option
+@config_option
+@set_option
+@json_option
+def record(
+    topics: tuple[str, ...],
+    output: Path | None,
+    everything: bool,
+    regex: str,
+    exclude: str,
+    max_duration: float | None,
+    instance: str,
+    tied: bool,
+    connect: str,
+    agent: str,
+    config_path: Path | None,
+    settings: tuple[str, ...],
+    as_json: bool,
+) -> None:
+    """Record what travels on the bus into an MCAP file, until Ctrl-C.
+
+    The file is flushed four times a second, so a kill loses no more than that. At the end, and in the file, every
+    gap in the numbers of any source is told. The configuration goes into the file too: replay uses it.
+    """
+    if everything and (topics or regex):
+        raise click.UsageError("--all records every topic: leave it out, or the choice of topics")
+    chosen = selection.to_record(topics, regex, exclude)
+    about = {"agent": agent, "config": json.dumps(config.load(config_path, settings))}
+    path = output or Path(f"cogmap_{time.strftime('%Y_%m_%d-%H_%M_%S')}.mcap")
+    stop = Stop(tied)
+    summary = recorder.run(
+        recorder.Recorder(ZenohBus(connect, agent), path, chosen, about, instance=instance),
+        lambda: stop.asked,
+        max_duration,
+    )
+    if as_json:
+        text.say_json(summary)
+    else:
+        text.say_summary(summary)

@@ -1,0 +1,121 @@
+"""`cogmap log replay`: onto a bus, or into modules."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from bus import config
+from bus.runner import Stop
+from bus.zenoh_bus import ZenohBus
+from cli.log import text
+from cli.log.keys import Keys
+from cli.log.progress import bar
+from cli.options import agent_option, config_option, connect_option, json_option, set_option
+from logs import selection
+from logs.player import Choices, Player
+from logs.reader import LogReader
+from logs.replay import replay_into
+from services import table
+
+CLOCK_HZ = 40.0
+_EPILOG = """\b
+Examples:
+  cogmap log replay drive.mcap                      onto the bus, as it was
+  cogmap log replay drive.mcap -r 2 -l              twice as fast, again and again
+  cogmap log replay drive.mcap --topics odometry --topics camera/stereo --clock
+  cogmap log replay drive.mcap --into sensory       does it still say the same?
+  cogmap log replay drive.mcap --into epam --set epam.threshold=0.6
+"""
+
+
+@click.command(epilog=_EPILOG)
+@click.argument("log", type=click.Path(path_type=Path))
+@click.option("-r", "--rate", type=click.FloatRange(min=0, min_open=True), help="So many times as fast.")
+@click.option("--topics", multiple=True, metavar="TOPIC", help="Only this one; repeat at will.")
+@click.option("--start-offset", type=click.FloatRange(min=0), help="Begin so many seconds into the log.")
+@click.option("-l", "--loop", is_flag=True, help="Begin again at the end.")
+@click.option("--start-paused", is_flag=True, help="Begin at rest; the space bar goes on and pauses.")
+@click.option(
+    "--clock",
+    "clock_hz",
+    type=click.FloatRange(min=0, min_open=True),
+    is_flag=False,
+    flag_value=CLOCK_HZ,
+    metavar="[HZ]",
+    help=f"Say on the clock how far it is, so often a second ({CLOCK_HZ:g} unless given).",
+)
+@click.option("--into", multiple=True, metavar="MODULE", help="Feed this module and compare; repeat at will.")
+@connect_option
+@agent_option
+@config_option
+@set_option
+@json_option
+@click.pass_context
+def replay(
+    context: click.Context,
+    log: Path,
+    rate: float | None,
+    topics: tuple[str, ...],
+    start_offset: float | None,
+    loop: bool,
+    start_paused: bool,
+    clock_hz: float | None,
+    into: tuple[str, ...],
+    connect: str,
+    agent: str,
+    config_path: Path | None,
+    settings: tuple[str, ...],
+    as_json: bool,
+) -> None:
+    """Play LOG back onto the bus, or feed it to modules with --into.
+
+    With --into, each recorded instance of the module takes in what it took in then, in the same order and with the
+    recorded configuration, and what it says is held against what it said: exit code 1, and the first difference in
+    words, where a byte differs.
+    """
+    overrides = config.load(config_path, settings)
+    if into:
+        if rate or topics or start_offset or loop or start_paused or clock_hz:
+            raise click.UsageError("--into replays everything as fast as it goes: leave the options of playing out")
+        _into(log, into, overrides, as_json)
+        return
+    if overrides:
+        raise click.UsageError("--config and --set are for --into: messages are played as they are")
+    choices = Choices(
+        rate=rate or 1.0,
+        topics=selection.named(topics) or None,
+        start_offset_s=start_offset or 0.0,
+        loop=loop,
+        clock_hz=clock_hz or 0.0,
+    )
+    _onto_bus(log, choices, Keys(Stop(), start_paused), (connect, agent), as_json)
+
+
+def _into(log: Path, modules: tuple[str, ...], overrides: config.Sections, as_json: bool) -> None:
+    for name in modules:
+        table.config_type(name)
+    with bar(f"replaying {', '.join(modules)}") as progress:
+        report = replay_into(log, modules, table.build, overrides=overrides, progress=progress)
+    if as_json:
+        text.say_json(report)
+    else:
+        text.say_report(report)
+    if not report.same:
+        sys.exit(1)
+
+
+def _onto_bus(log: Path, choices: Choices, keys: Keys, where: tuple[str, str], as_json: bool) -> None:
+    reader = LogReader(log)
+    bus = ZenohBus(*where)
+    with keys.listening():
+        try:
+            played = Player(reader, bus, choices, keys).play()
+        finally:
+            bus.close()
+    if as_json:
+        text.say_json(played)
+    else:
+        text.say_played(played)
