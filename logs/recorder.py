@@ -73,6 +73,11 @@ class Recorder:
         """The file that it writes."""
         return self._writer.path
 
+    @property
+    def received(self) -> Counter[str]:
+        """How many messages of each topic have been written."""
+        return self._intake.received
+
     def open(self) -> None:
         """Join the bus, and tell everybody: all that is sent from now on is recorded."""
         for topic in self._topics:

@@ -63,12 +63,9 @@ def record(
     chosen = selection.to_record(topics, regex, exclude)
     about = {"agent": agent, "config": json.dumps(config.load(config_path, settings))}
     path = output or Path(f"cogmap_{time.strftime('%Y_%m_%d-%H_%M_%S')}.mcap")
-    stop = Stop(tied)
-    summary = recorder.run(
-        recorder.Recorder(ZenohBus(connect, agent), path, chosen, about, instance=instance),
-        lambda: stop.asked,
-        max_duration,
-    )
+    bus, stop = ZenohBus(connect, agent), Stop(tied)
+    recording = recorder.Recorder(bus, path, chosen, about, instance=instance)
+    summary = recorder.run(recording, lambda: stop.asked, max_duration)
     if as_json:
         text.say_json(summary)
     else:

@@ -91,7 +91,7 @@ def replay(
         loop=loop,
         clock_hz=clock_hz or 0.0,
     )
-    _onto_bus(log, choices, Keys(Stop(), start_paused), (connect, agent), as_json)
+    _onto_bus(LogReader(log), choices, ZenohBus(connect, agent), start_paused, as_json)
 
 
 def _into(log: Path, modules: tuple[str, ...], overrides: config.Sections, as_json: bool) -> None:
@@ -107,14 +107,12 @@ def _into(log: Path, modules: tuple[str, ...], overrides: config.Sections, as_js
         sys.exit(1)
 
 
-def _onto_bus(log: Path, choices: Choices, keys: Keys, where: tuple[str, str], as_json: bool) -> None:
-    reader = LogReader(log)
-    bus = ZenohBus(*where)
-    with keys.listening():
-        try:
+def _onto_bus(reader: LogReader, choices: Choices, bus: ZenohBus, start_paused: bool, as_json: bool) -> None:
+    try:
+        with Keys(Stop(), start_paused).listening() as keys:
             played = Player(reader, bus, choices, keys).play()
-        finally:
-            bus.close()
+    finally:
+        bus.close()
     if as_json:
         text.say_json(played)
     else:

@@ -1,0 +1,131 @@
+"""A recorder as its own process on Zenoh: what is in its file when it is killed, and when it is asked to end."""
+
+from __future__ import annotations
+
+import json
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from bus.codec import Envelope, encode
+from bus.interface import Member
+from bus.session import open_router
+from bus.zenoh_bus import ZenohBus
+from logs.reader import LogReader
+from logs.recover import recover
+from schemas import topics
+from schemas.sensing import Odometry
+
+PATIENCE_S = 30.0
+AGENT = "recorded"
+FLUSH_S, SLACK_S = 0.25, 0.5
+
+
+@pytest.fixture
+def endpoint() -> Iterator[str]:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        address = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    router = open_router(address)
+    yield address
+    router.close()
+
+
+class Speaker:
+    """Says odometry on Zenoh, a few hundred times a second."""
+
+    def __init__(self, endpoint: str) -> None:
+        self.bus = ZenohBus(endpoint, AGENT)
+        self.bus.declare(topics.ODOMETRY)
+        self.count, self._pause, self._here = 0, threading.Event(), threading.Event()
+        self.bus.watch(self._saw)
+
+    def _saw(self, member: Member, alive: bool) -> None:
+        if member.module == "recorder" and alive:
+            self._here.set()
+
+    def await_recorder(self) -> None:
+        assert self._here.wait(PATIENCE_S)
+
+    def speak(self) -> None:
+        now_ns = time.time_ns()
+        message = Odometry(seq=self.count, stamp_ns=now_ns, source="sim", speed_m_s=1.0, turn_rate_rad_s=0.0, dt_s=0.05)
+        self.bus.publish(topics.ODOMETRY, encode(message), Envelope("sim", self.count, 2**62, now_ns, now_ns))
+        self.count += 1
+        self._pause.wait(0.002)
+
+    def speak_until_it_grows(self, path: Path, times: int) -> None:
+        """Go on until the file has grown so often."""
+        size, deadline_s = path.stat().st_size, time.monotonic() + PATIENCE_S
+        while times:
+            assert time.monotonic() < deadline_s, "the file does not grow"
+            self.speak()
+            grown = path.stat().st_size
+            times -= grown > size
+            size = grown
+
+
+@pytest.fixture
+def speaker(endpoint: str) -> Iterator[Speaker]:
+    speaker = Speaker(endpoint)
+    yield speaker
+    speaker.bus.close()
+
+
+def start(endpoint: str, path: Path, *options: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "cli.main", "log", "record", "-o", str(path), "--connect", endpoint]
+    return subprocess.Popen(
+        [*command, "--agent", AGENT, *options], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+
+
+def numbers(path: Path) -> list[int]:
+    return [record.sequence for record in LogReader(path).records({topics.ODOMETRY})]
+
+
+def test_a_recorder_killed_with_9_loses_no_more_than_what_came_since_its_last_flush(
+    endpoint: str, speaker: Speaker, tmp_path: Path
+) -> None:
+    path = tmp_path / "log.mcap"
+    recorder = start(endpoint, path)
+    speaker.await_recorder()
+    speaker.speak_until_it_grows(path, 4)
+    speaker.speak()
+    recorder.kill()
+    killed_ns = time.time_ns()
+    recorder.wait()
+    found = list(LogReader(path).records({topics.ODOMETRY}))
+    assert [record.sequence for record in found] == list(range(len(found)))
+    assert killed_ns - found[-1].log_time_ns < (FLUSH_S + SLACK_S) * 1e9
+    recovery = recover(path, tmp_path / "saved.mcap")
+    assert recovery.messages == len(found)
+    assert numbers(tmp_path / "saved.mcap") == numbers(path)
+
+
+@pytest.mark.parametrize("how", ["SIGTERM", "SIGINT", "end of input"])
+def test_a_recorder_that_is_asked_to_end_has_every_message_and_says_so(
+    endpoint: str, speaker: Speaker, tmp_path: Path, how: str
+) -> None:
+    path = tmp_path / "log.mcap"
+    recorder = start(endpoint, path, "--json", "--tied")
+    speaker.await_recorder()
+    speaker.speak_until_it_grows(path, 2)
+    if how == "end of input":
+        assert recorder.stdin is not None
+        recorder.stdin.close()
+    else:
+        recorder.send_signal(getattr(signal, how))
+    assert recorder.stdout is not None
+    summary = json.loads(recorder.stdout.read())
+    assert recorder.wait() == 0
+    assert summary["never_drop_whole"]
+    assert summary["messages"]["odometry"] == len(numbers(path))
+    assert summary["messages"]["odometry"] > 0
+    assert LogReader(path).about("summary")
