@@ -11,7 +11,7 @@ from bus.config import Sections
 from bus.runner import Stop
 from bus.zenoh_bus import ZenohBus
 from cli.run.display import Display
-from cli.run.plan import CONFIG_NAME, RECORDER, ROUTER, Choices, programs, to_toml
+from cli.run.plan import CONFIG_NAME, RECORDER, ROUTER, STATE_NAME, Choices, programs, to_toml
 from cli.run.supervisor import Supervisor
 from cli.run.watch import Watch
 
@@ -94,7 +94,7 @@ class Drive:
             watch.close()
         supervisor.end([RECORDER], GRACE_S)
         supervisor.end([ROUTER], GRACE_S)
-        shutil.rmtree(self.folder / "state", ignore_errors=True)
+        shutil.rmtree(self.folder / STATE_NAME, ignore_errors=True)
 
     def _note(self, milestone: str) -> None:
         self.start_s.setdefault(milestone, round(time.monotonic() - self.began_s, 3))

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from bus.errors import LogError
 from bus.graph import Graph
 from cli.run.observer import Errors, Observer
 from cli.run.watch import Watch
+from logs.format import SUMMARY
+from logs.reader import LogReader
+from logs.recorder import Summary
 from schemas.graph import Node
 
 
@@ -28,6 +33,32 @@ class ErrorFigures(msgspec.Struct, kw_only=True):
         if not errors_m.size:
             return cls(mean_m=0.0, max_m=0.0, final_m=0.0)
         return cls(mean_m=float(errors_m.mean()), max_m=float(errors_m.max()), final_m=float(errors_m[-1]))
+
+
+class Recording(msgspec.Struct, kw_only=True):
+    """How the recording went. `gaps` are sentences; `never_drop_whole` says that no NEVER_DROP topic lacks any."""
+
+    messages: int
+    size_mb: float
+    never_drop_whole: bool
+    gaps: list[str]
+
+    @classmethod
+    def read(cls, path: Path) -> Recording | None:
+        """From the log at `path`; None where it was not finished."""
+        try:
+            about = LogReader(path).about(SUMMARY)
+        except LogError:
+            return None
+        if not about:
+            return None
+        summary = msgspec.json.decode(about["json"], type=Summary)
+        return cls(
+            messages=sum(summary.messages.values()),
+            size_mb=path.stat().st_size / 1e6,
+            never_drop_whole=summary.never_drop_whole,
+            gaps=summary.gaps,
+        )
 
 
 class Figures(msgspec.Struct, kw_only=True):
@@ -71,6 +102,7 @@ class Figures(msgspec.Struct, kw_only=True):
     killed: list[str]
     busy: dict[str, float]
     memory_mb: dict[str, float]
+    log: Recording | None
 
 
 def objects(graph: Graph) -> list[Node]:

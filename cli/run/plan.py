@@ -20,6 +20,7 @@ RECORDER = "recorder"
 ROUTER = "router"
 LOG_NAME = "log.mcap"
 CONFIG_NAME = "config.toml"
+STATE_NAME = "state"
 
 
 @dataclass(frozen=True)
@@ -84,16 +85,17 @@ def programs(folder: Path, connect: str, agent: str, choices: Choices) -> list[P
     """Every process of a run but the launcher, in the order to start them."""
     where = ["--tied", "--connect", connect]
     whose = ["--agent", agent]
-    configured = ["--config", str(folder / CONFIG_NAME), "--state", str(folder / "state")]
+    config_file = ["--config", str(folder / CONFIG_NAME)]
+    state = ["--state", str(folder / STATE_NAME)]
 
     def module(name: str, instance: str) -> Program:
-        command = cogmap_command("module", name, "--instance", instance, *where, *whose, *configured)
+        command = cogmap_command("module", name, "--instance", instance, *where, *whose, *config_file, *state)
         return Program(instance, lambda starts: command)
 
     def record(starts: int) -> list[str]:
         """A recorder that died leaves its log as it is, and the next one writes another."""
         name = LOG_NAME if starts == 0 else f"log-{starts + 1}.mcap"
-        return cogmap_command("log", "record", *where, *whose, "-o", str(folder / name))
+        return cogmap_command("log", "record", *where, *whose, *config_file, "-o", str(folder / name))
 
     workers = [f"codelets-{number}" for number in range(1, choices.codelets + 1)]
     named = [(name, name) for name in table.MODULES if name != "codelets"] + [("codelets", name) for name in workers]

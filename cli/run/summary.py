@@ -10,7 +10,8 @@ import msgspec
 from rich.table import Table
 
 from cli.run.drive import ROUTE_COMPLETE, Drive
-from cli.run.figures import Figures, measured
+from cli.run.figures import Figures, Recording, measured
+from cli.run.plan import LOG_NAME
 from cli.run.watch import Watch
 
 
@@ -28,6 +29,7 @@ def finish(drive: Drive, watch: Watch) -> Figures:
         start_s=drive.start_s,
         restarts=dict(drive.supervisor.restarts),
         killed=drive.supervisor.killed,
+        log=Recording.read(drive.folder / LOG_NAME) if drive.choices.record else None,
         **measured(watch, errors),
     )
     (drive.folder / "summary.json").write_bytes(msgspec.json.format(msgspec.json.encode(figures)) + b"\n")
@@ -48,9 +50,19 @@ def table(figures: Figures, folder: Path) -> Table:
         "learned": f"{figures.objects} buildings, off by {figures.object_error_mean_m:.2f} m on average; "
         f"{figures.road_m2:.0f} m² of street",
         "cycle": f"{figures.cycle_p50_ms:.0f} ms, 99 % within {figures.cycle_p99_ms:.0f} ms",
-        "lost messages": str(figures.gaps_total),
+        "lost messages": _losses(figures),
         "restarts": ", ".join(f"{name} {number}" for name, number in figures.restarts.items()) or "none",
     }
     for name, value in rows.items():
         shown.add_row(name, value)
     return shown
+
+
+def _losses(figures: Figures) -> str:
+    """What was lost, as the modules and the recorder counted it."""
+    if figures.log is None:
+        return f"{figures.gaps_total}; not recorded"
+    recorded = "no gap in any NEVER_DROP topic" if figures.log.never_drop_whole else "; ".join(figures.log.gaps)
+    return (
+        f"{figures.gaps_total}; in the log, {figures.log.messages} messages, {figures.log.size_mb:.0f} MB: {recorded}"
+    )

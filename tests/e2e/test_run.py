@@ -1,0 +1,177 @@
+"""`cogmap run` as users run it: real processes, a real router, a short way."""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+COGMAP = [sys.executable, "-m", "cli.main"]
+PATIENCE_S = 60.0
+
+
+def free_endpoint() -> str:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+def processes_at(endpoint: str) -> list[int]:
+    """Every process with `endpoint` in its command line."""
+    found = []
+    for entry in Path("/proc").iterdir():
+        try:
+            command = (entry / "cmdline").read_bytes().decode(errors="replace")
+            state = (entry / "stat").read_text().rpartition(")")[2].split()[0]
+        except (OSError, IndexError):
+            continue
+        if entry.name.isdigit() and endpoint in command and state != "Z":
+            found.append(int(entry.name))
+    return found
+
+
+def wait_until(condition: Callable[[], bool]) -> None:
+    deadline_s = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < deadline_s, "it never happened"
+        select.select([], [], [], 0.02)
+
+
+class Run:
+    """A `cogmap run` in a new folder, without a terminal."""
+
+    def __init__(self, folder: Path, *arguments: str) -> None:
+        self.folder, self.endpoint = folder, free_endpoint()
+        command = [*COGMAP, "run", "--out", str(folder), "--connect", self.endpoint, *arguments]
+        self._output = folder.with_suffix(".txt").open("w+")
+        self.process = subprocess.Popen(command, stdout=self._output, stderr=subprocess.STDOUT)
+
+    def output(self) -> str:
+        return Path(self._output.name).read_text()
+
+    def end(self) -> int:
+        return self.process.wait(PATIENCE_S)
+
+    def wait_for(self, sentence: str) -> None:
+        def said() -> bool:
+            assert self.process.poll() is None, self.output()
+            return sentence in self.output()
+
+        wait_until(said)
+
+    def pid_of(self, instance: str) -> int:
+        (pid,) = [
+            pid
+            for pid in processes_at(self.endpoint)
+            if f"--instance\0{instance}\0" in Path(f"/proc/{pid}/cmdline").read_text()
+        ]
+        return pid
+
+    def close(self) -> None:
+        if self.process.poll() is None:
+            self.process.terminate()
+            self.end()
+        self._output.close()
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Callable[..., Run]]:
+    runs: list[Run] = []
+
+    def start(*arguments: str) -> Run:
+        runs.append(Run(tmp_path / f"run-{len(runs)}", *arguments))
+        return runs[-1]
+
+    yield start
+    for run in runs:
+        run.close()
+
+
+def test_a_short_drive_ends_by_itself_and_leaves_a_log_a_map_and_a_summary(start: Callable[..., Run]) -> None:
+    run = start("--lockstep", "--laps", "0.05", "--codelets", "2")
+    assert run.end() == 0, run.output()
+    summary = json.loads((run.folder / "summary.json").read_text())
+    assert summary["completed"] and summary["ended_by"] == "route complete"
+    assert summary["gaps_total"] == 0 and summary["restarts"] == {} and summary["killed"] == []
+    assert summary["distance_m"] > 5.0 and summary["estimates"] == summary["commands"] > 5
+    assert (run.folder / "map.png").read_bytes().startswith(b"\x89PNG")
+    assert (run.folder / "log.mcap").read_bytes().endswith(b"\x89MCAP0\r\n")
+    assert "[sim]" in (run.folder / "config.toml").read_text()
+    assert not (run.folder / "state").exists()
+    assert processes_at(run.endpoint) == []
+
+
+def test_the_summary_comes_as_json_too(start: Callable[..., Run]) -> None:
+    run = start("--lockstep", "--laps", "0.02", "--no-record", "--json")
+    assert run.end() == 0, run.output()
+    assert json.loads(run.output().splitlines()[-1])["completed"]
+
+
+def test_ctrl_c_ends_a_drive_cleanly(start: Callable[..., Run]) -> None:
+    run = start()
+    run.wait_for("path integration alone")
+    run.process.send_signal(signal.SIGINT)
+    assert run.end() == 130, run.output()
+    assert json.loads((run.folder / "summary.json").read_text())["ended_by"] == "interrupted"
+    assert (run.folder / "log.mcap").read_bytes().endswith(b"\x89MCAP0\r\n")
+    assert "Traceback" not in run.output() + "".join(log.read_text() for log in run.folder.glob("*.log"))
+    assert processes_at(run.endpoint) == []
+
+
+def test_nothing_is_left_of_a_launcher_that_is_killed(start: Callable[..., Run]) -> None:
+    run = start()
+    run.wait_for("path integration alone")
+    assert len(processes_at(run.endpoint)) > 7
+    run.process.kill()
+    run.end()
+    wait_until(lambda: processes_at(run.endpoint) == [])
+    assert (run.folder / "log.mcap").read_bytes().endswith(b"\x89MCAP0\r\n")
+
+
+@pytest.mark.parametrize("instance", ["epam", "workspace", "codelets-1"])
+def test_a_module_that_is_killed_is_started_again_and_the_drive_goes_on(
+    start: Callable[..., Run], instance: str
+) -> None:
+    run = start("--laps", "0.1", "--no-record", "--time-limit", "50")
+    run.wait_for("path integration alone")
+    os.kill(run.pid_of(instance), signal.SIGKILL)
+    assert run.end() == 0, run.output()
+    assert json.loads((run.folder / "summary.json").read_text())["restarts"] == {instance: 1}
+
+
+def test_a_port_in_use_is_one_sentence_and_code_2(start: Callable[..., Run], tmp_path: Path) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        endpoint = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
+        run = start("--connect", endpoint)
+        assert run.end() == 2
+    assert run.output().startswith(f"cogmap: cannot listen at {endpoint}")
+    assert len(run.output().splitlines()) == 1
+    assert not run.folder.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--set", "sim.sed=2"], "unknown key 'sed' in [sim]: did you mean 'seed'?"),
+        (["--set", "action.cruise_m_s=fast"], "[action] Expected `float`, got `str`"),
+        (["--config", "nowhere.toml"], "no configuration file nowhere.toml"),
+    ],
+)
+def test_a_wrong_configuration_is_one_sentence_and_code_2(
+    start: Callable[..., Run], arguments: list[str], words: str
+) -> None:
+    run = start(*arguments)
+    assert run.end() == 2
+    assert words in run.output()
+    assert len(run.output().splitlines()) == 1
