@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bus.errors import MessageError
-from bus.graph import Graph, place_cell
+from bus.graph import COLUMNS, Graph, place_cell
 from schemas.graph import Cells, Delta, DropLink, DropNode, Link, Node, Operation, Proposal, Snapshot
 
 MAX_SAMPLES = 100_000
@@ -48,23 +48,22 @@ class Ledger:
         self._note(delta)
         return delta
 
-    def judge(self, proposals: list[Proposal]) -> tuple[list[Operation], list[str], list[str]]:
-        """Operations and task ids of the proposals that hold, in order, and for each that does not, why."""
+    def judge(self, proposals: list[Proposal]) -> tuple[list[Operation], list[str]]:
+        """Operations and task ids of the proposals that hold, in order; the next delta counts those that do not."""
         operations: list[Operation] = []
         tasks: list[str] = []
-        refused: list[str] = []
         for proposal in proposals:
             try:
-                self._check(proposal)
-            except MessageError as error:
-                refused.append(str(error))
+                self.check(proposal)
+            except MessageError:
                 self.dropped += 1
             else:
                 operations.extend(proposal.operations)
                 tasks.append(proposal.task_id)
-        return operations, tasks, refused
+        return operations, tasks
 
-    def _check(self, proposal: Proposal) -> None:
+    def check(self, proposal: Proposal) -> None:
+        """Raise MessageError where `proposal` does not hold, saying why."""
         name = f"proposal {proposal.task_id}"
         if proposal.failure:
             raise MessageError(f"{name} failed: {proposal.failure}")
@@ -89,6 +88,8 @@ class Ledger:
             number = operation.values.shape
             if operation.cells.shape != (*number, 2) or operation.cells.dtype != "<i4":
                 raise MessageError(f"{name}: cells of shape {operation.cells.shape} with {number} values")
+            if operation.column not in COLUMNS:
+                raise MessageError(f"{name}: place nodes have no column {operation.column!r}")
 
     def _note(self, delta: Delta) -> None:
         for operation in delta.operations:

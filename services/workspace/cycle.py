@@ -69,15 +69,18 @@ class Workspace:
         return self._begin()
 
     def on_proposal(self, proposal: Proposal) -> list[Message]:
-        """Collect an answer. One that comes after its cycle has ended is committed now if it still applies."""
+        """Collect an answer. One that comes after its cycle has ended is committed now if it still applies.
+
+        Where it does not, it is dropped, and the next delta counts it.
+        """
         if self._dispatch.answer(proposal):
             return self._go_on() if self._dispatch.complete else []
         if proposal.task_id not in self._late:
             return []
         del self._late[proposal.task_id]
-        operations, tasks, refused = self._ledger.judge([proposal])
-        if refused:
-            raise MessageError(refused[0])
+        operations, tasks = self._ledger.judge([proposal])
+        if not tasks:
+            return []
         cycle = self._ledger.graph.cycle
         return [self._ledger.commit(proposal.stamp_ns, cycle, "late", operations, tasks)]
 
@@ -147,7 +150,7 @@ class Workspace:
         self._late |= {task.task_id: None for task in unanswered}
         while len(self._late) > 256:
             del self._late[next(iter(self._late))]
-        operations, tasks, _ = self._ledger.judge(answers)
+        operations, tasks = self._ledger.judge(answers)
         return [self._commit(PHASES[self._phase], operations, tasks)] if operations else []
 
     def _end_at_deadline(self) -> list[Message]:

@@ -14,10 +14,14 @@ from schemas.mind import Task
 
 @dataclass
 class Lease:
-    """A task that a worker holds until `until_ns`; it waits for a worker while `task.worker` is its placeholder."""
+    """A task that a worker holds until `until_ns`; it waits for a worker while `task.worker` is its placeholder.
+
+    `lost_by` had it before.
+    """
 
     task: Task
     until_ns: int
+    lost_by: str = ""
     proposal: Proposal | None = None
 
 
@@ -25,7 +29,10 @@ NOBODY = "nobody"
 
 
 class Dispatch:
-    """Gives tasks to the least loaded worker. The same workers and tasks give the same choice."""
+    """Gives tasks to the least loaded worker, but not again to the one that lost it where there is another.
+
+    The same workers and tasks give the same choice.
+    """
 
     def __init__(self, lease_ns: int, attempts: int) -> None:
         self._lease_ns = lease_ns
@@ -75,6 +82,7 @@ class Dispatch:
     def _take_back(self, lost: Callable[[Lease], bool]) -> None:
         for lease in self._leases.values():
             if lease.proposal is None and lost(lease):
+                lease.lost_by = lease.task.worker
                 lease.task = msgspec.structs.replace(lease.task, worker=NOBODY, attempt=lease.task.attempt + 1)
 
     def _assign(self, now_ns: int) -> list[Task]:
@@ -84,7 +92,7 @@ class Dispatch:
             waits = lease.proposal is None and lease.task.worker == NOBODY
             if not waits or not self._workers or lease.task.attempt >= self._attempts:
                 continue
-            worker = min(sorted(self._workers), key=lambda name: load[name])
+            worker = min(self._workers, key=lambda name: (name == lease.lost_by, load[name], name))
             load[worker] += 1
             lease.task = msgspec.structs.replace(lease.task, worker=worker)
             lease.until_ns = now_ns + self._lease_ns
