@@ -8,6 +8,8 @@ from schemas.graph import Cells, Delta, DropLink, DropNode, Link, Node, Operatio
 
 MAX_SAMPLES = 100_000
 WRITABLE = (Node, Link, DropLink, Cells, DropNode)
+SELF = "self"
+POSE = ("x_m", "y_m", "heading_rad", "stamp_ns")
 
 
 def written(operation: Operation) -> str | None:
@@ -76,6 +78,7 @@ class Ledger:
             if node is not None and self._written.get(node, 0) > proposal.base_version:
                 raise MessageError(f"{name} is late: {node} has changed since version {proposal.base_version}")
             self._check_shape(name, operation)
+            _check_self(name, operation)
 
     def _check_shape(self, name: str, operation: Operation) -> None:
         if isinstance(operation, Node) and operation.samples is not None:
@@ -96,3 +99,13 @@ class Ledger:
             node = written(operation)
             if node is not None:
                 self._written[node] = delta.version
+
+
+def _check_self(name: str, operation: Operation) -> None:
+    """The self node stays, with samples of its pose and the numbers that everybody reads."""
+    if isinstance(operation, DropNode) and operation.id == SELF:
+        raise MessageError(f"{name}: the self node is never forgotten")
+    if isinstance(operation, Node) and operation.id == SELF:
+        lacking = [key for key in POSE if type(operation.attributes.get(key)) not in {int, float}]
+        if lacking or operation.samples is None or operation.samples.shape[1] != 3:
+            raise MessageError(f"{name}: self without {', '.join(lacking) or 'samples of its pose'}")

@@ -50,7 +50,11 @@ def test_a_phase_begins_when_every_task_of_the_one_before_is_answered() -> None:
     (localization,) = desk.take()
     desk.feed(answer(localization))
     first, second, road = desk.take()
-    assert [asked.task_id for asked in (first, second, road)] == ["1/object_place/a", "1/object_place/b", "1/road_place"]
+    assert [asked.task_id for asked in (first, second, road)] == [
+        "1/object_place/a",
+        "1/object_place/b",
+        "1/road_place",
+    ]
     desk.feed(answer(second))
     desk.feed(answer(road))
     assert desk.take() == []
