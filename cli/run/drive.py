@@ -18,6 +18,7 @@ from cli.run.watch import Watch
 PUMP_S = 0.05
 SHOW_PERIOD_S = 0.25
 GRACE_S = 3.0
+QUIET_S = 0.3
 ROUTE_COMPLETE, TIME_LIMIT, INTERRUPTED = "route complete", "time limit", "interrupted"
 
 
@@ -50,6 +51,8 @@ class Drive:
             watch = Watch(ZenohBus(self.connect, self.agent))
             self._note("processes started")
             self._follow(watch, until_s, stop, display)
+            if self.sections["sim"]["mode"] == "lockstep" and self.ended_by == ROUTE_COMPLETE:
+                watch.pump_until_quiet(QUIET_S)
         finally:
             self._end(watch)
         return watch

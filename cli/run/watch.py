@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import Counter
 
 from bus.codec import Envelope
@@ -50,15 +51,24 @@ class Watch:
         bus.watch(lambda member, alive: self._inbox.call(lambda: self._on_presence(member, alive)))
         bus.announce(Member(OBSERVER, OBSERVER))
 
-    def pump(self, timeout_s: float) -> None:
-        """Take in all that has come, waiting up to `timeout_s` for the first of it."""
-        item = self._inbox.take(timeout_s)
+    def pump(self, timeout_s: float) -> bool:
+        """Take in all that has come, waiting up to `timeout_s` for the first. Whether it was more than health."""
+        item, moved = self._inbox.take(timeout_s), False
         while item is not None:
             if isinstance(item, Arrival):
+                moved |= item.topic is not topics.HEALTH
                 self._take_in(item)
             else:
                 item()
             item = self._inbox.take(0.0)
+        return moved
+
+    def pump_until_quiet(self, quiet_s: float) -> None:
+        """Take in what comes until for `quiet_s` there was nothing but news of the processes."""
+        until_s = time.monotonic() + quiet_s
+        while (left_s := until_s - time.monotonic()) > 0:
+            if self.pump(left_s):
+                until_s = time.monotonic() + quiet_s
 
     def _on_presence(self, member: Member, alive: bool) -> None:
         (self.present.add if alive else self.present.discard)(member)

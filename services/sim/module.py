@@ -21,7 +21,7 @@ _EMITS = (topics.CLOCK, topics.ODOMETRY, topics.STEREO, topics.TRUE_POSE, topics
 
 
 class Lockstep:
-    """Time goes on by one frame for each motor command that answers the last frame."""
+    """Time goes on by one frame for each motor command that answers the last frame, until the route is complete."""
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
@@ -33,7 +33,7 @@ class Lockstep:
 
     def command(self, command: MotorCommand) -> list[Message] | None:
         """The next frame and what led to it, if `command` answers the last one; else it is passed over."""
-        if command.stamp_ns != self._asked_ns:
+        if command.stamp_ns != self._asked_ns or self._simulation.progress >= 1.0:
             return None
         self._simulation.drive(command)
         return self._advance()

@@ -28,6 +28,7 @@ class Simulation:
         self._pose = self.world.pose()
         self._travelled_m = 0.0
         self._frames = 0
+        self.progress = 0.0
 
     def drive(self, command: MotorCommand) -> None:
         """Set the wheels' speeds."""
@@ -67,8 +68,8 @@ class Simulation:
 
     def truth(self) -> TruePose:
         """Where the robot is now."""
-        progress = self._progress.advance(self._pose.x_m, self._pose.y_m)
-        return TruePose(stamp_ns=self.now_ns, pose=self._pose, travelled_m=self._travelled_m, progress=progress)
+        self.progress = self._progress.advance(self._pose.x_m, self._pose.y_m)
+        return TruePose(stamp_ns=self.now_ns, pose=self._pose, travelled_m=self._travelled_m, progress=self.progress)
 
     def town(self) -> TrueTown:
         """The town, as of now."""
