@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from datetime import timedelta
 from typing import Any, Protocol
 
 import zenoh
@@ -17,7 +18,7 @@ from bus.session import open_client, ready_key
 from schemas.topics import About, Delivery, Topic
 
 CACHED_SAMPLES = 1024
-HEARTBEAT_S = 0.1
+RECOVERY_PERIOD = timedelta(seconds=0.5)
 _LARGE_BYTES = 8 * 2**20
 
 
@@ -56,7 +57,7 @@ class ZenohBus:
                 key,
                 congestion_control=zenoh.CongestionControl.DROP,
                 cache=ext.CacheConfig(max_samples=CACHED_SAMPLES),
-                sample_miss_detection=ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=HEARTBEAT_S),
+                sample_miss_detection=ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=None),
                 publisher_detection=True,
                 priority=_priority(topic),
                 express=True,
@@ -82,9 +83,9 @@ class ZenohBus:
         if topic.delivery is not Delivery.NEVER_DROP:
             self._declared.append(self._session.declare_subscriber(key, receive))
             return
-        subscriber = ext.declare_advanced_subscriber(
-            self._session, key, receive, recovery=ext.RecoveryConfig(periodic_queries=None, heartbeat=True)
-        )
+        # Heartbeats will not do: they hand a late subscriber the whole cache, and tell nothing after a lost link.
+        recovery = ext.RecoveryConfig(periodic_queries=RECOVERY_PERIOD, heartbeat=None)  # type: ignore[arg-type]
+        subscriber = ext.declare_advanced_subscriber(self._session, key, receive, recovery=recovery)
         self._declared.append(subscriber.sample_miss_listener(lambda miss: on_gap(topic.name, miss.nb)))
         self._declared.append(subscriber)
 

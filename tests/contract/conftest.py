@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import socket
 from collections.abc import Iterator
 
 import pytest
-from networks import InMemory, Network, OverZenoh
+from networks import InMemory, Network, OverZenoh, free_endpoint
 
 from bus.session import open_router
 
@@ -14,9 +13,7 @@ from bus.session import open_router
 @pytest.fixture(scope="session")
 def endpoint() -> Iterator[str]:
     """The endpoint of a router of this test run's own."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        address = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    address = free_endpoint()
     router = open_router(address)
     yield address
     router.close()

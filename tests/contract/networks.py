@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -27,6 +28,13 @@ PATIENCE_S = 20.0
 INCARNATION = 1
 BLOCK = zenoh.CongestionControl.BLOCK
 _numbers = itertools.count()
+
+
+def free_endpoint() -> str:
+    """An endpoint where nothing listens."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
 class Network(Protocol):

@@ -96,6 +96,22 @@ def test_a_publisher_does_not_wait_for_a_subscriber_that_takes_nothing_in(networ
     assert len(peer.take(200)) == 200
 
 
+def test_who_comes_late_gets_nothing_of_what_was_said_before(network: Network) -> None:
+    publisher, early = network.join(), network.join()
+    publisher.declare(topics.ODOMETRY)
+    peer = Peer(early, topics.ODOMETRY)
+    meet(publisher, early)
+    publish(publisher, *(odometry(seq) for seq in range(50)))
+    peer.wait_for(50)
+
+    late = Peer(network.join(), topics.ODOMETRY)
+    meet(publisher, late.bus)
+    assert late.inbox.take(0.3) is None
+    publish(publisher, odometry(50))
+
+    assert [arrival.envelope.seq for arrival in late.take(1) if arrival.envelope] == [50]
+
+
 def work(job: Job) -> None:
     threading.Thread(target=job).start()
 

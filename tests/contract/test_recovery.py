@@ -1,0 +1,64 @@
+"""What the Zenoh bus promises when the router dies and comes back."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import pytest
+from networks import OverZenoh, Peer, free_endpoint, meet, publish
+
+from schemas import topics
+from schemas.sensing import Odometry
+
+
+class Router:
+    """A router in a process of its own, to be killed."""
+
+    def __init__(self) -> None:
+        self.endpoint = free_endpoint()
+        self.start()
+
+    def start(self) -> None:
+        command = [sys.executable, "-m", "cli.main", "router", "--tied", "--connect", self.endpoint]
+        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        assert self._process.stderr is not None
+        assert "router listens" in self._process.stderr.readline()
+
+    def kill(self) -> None:
+        with self._process as process:
+            process.kill()
+
+
+@pytest.fixture
+def router() -> Iterator[Router]:
+    router = Router()
+    yield router
+    router.kill()
+
+
+def odometry(seq: int) -> Odometry:
+    return Odometry(speed_m_s=1.0, turn_rate_rad_s=0.0, dt_s=0.05, seq=seq, source="sim", stamp_ns=seq)
+
+
+@pytest.mark.parametrize("afterwards", [0, 20], ids=["nothing said since", "more said since"])
+def test_what_is_said_while_the_router_is_dead_arrives_when_it_is_back(router: Router, afterwards: int) -> None:
+    network = OverZenoh(router.endpoint)
+    publisher, *subscribers = (network.join() for _ in range(3))
+    publisher.declare(topics.ODOMETRY)
+    peers = [Peer(subscriber, topics.ODOMETRY) for subscriber in subscribers]
+    meet(publisher, *subscribers)
+
+    publish(publisher, *(odometry(seq) for seq in range(20)))
+    for peer in peers:
+        peer.wait_for(20)
+    router.kill()
+    publish(publisher, *(odometry(seq) for seq in range(20, 40)))
+    router.start()
+    publish(publisher, *(odometry(seq) for seq in range(40, 40 + afterwards)))
+
+    for peer in peers:
+        seqs = [arrival.envelope.seq for arrival in peer.take(40 + afterwards) if arrival.envelope]
+        assert seqs == list(range(40 + afterwards))
+    network.close()
