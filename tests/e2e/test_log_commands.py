@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import pty
 import socket
 import subprocess
 import sys
@@ -168,3 +170,21 @@ def test_what_is_played_onto_zenoh_and_recorded_again_says_the_same(endpoint: st
         assert json.loads(player.stdout.read())["messages"] == {"odometry": COUNT, "sensory/scan": COUNT}
     assert recorder.close().never_drop_whole
     assert diff(path, again).same
+
+
+def test_the_space_bar_lets_a_replay_go_on_that_began_paused(endpoint: str, path: Path) -> None:
+    observer, here = ZenohBus(endpoint, "paused"), threading.Event()
+    observer.watch(lambda member, alive: here.set())
+    terminal, other = pty.openpty()
+    command = [sys.executable, "-m", "cli.main", "log", "replay", str(path), "-r", "1000", "--start-paused", "--json"]
+    with subprocess.Popen(
+        [*command, "--connect", endpoint, "--agent", "paused"], stdin=other, stdout=subprocess.PIPE, text=True
+    ) as player:
+        assert here.wait(PATIENCE_S)
+        assert player.poll() is None
+        os.write(terminal, b" ")
+        assert player.stdout is not None
+        assert json.loads(player.stdout.read())["messages"] == {"odometry": COUNT, "sensory/scan": COUNT}
+    observer.close()
+    os.close(terminal)
+    os.close(other)
