@@ -9,6 +9,7 @@ from services.action.settings import Leg
 
 STEP_M = 0.25
 SEARCH_M = 6.0
+ARC = 12
 
 
 class Route:
@@ -21,9 +22,11 @@ class Route:
             corners.append(corners[-1] + length_m * np.array([np.cos(heading), np.sin(heading)]))
             heading += turn_rad
         self.length_m = sum(length_m for length_m, _ in legs)
-        self.leg_ends_m = np.cumsum([length_m for length_m, _ in legs])
         corners.append(corners[-1] + max(overrun_m, STEP_M) * np.array([np.cos(heading), np.sin(heading)]))
-        self.points_m = _resampled(_rounded(corners, corner_radius_m))
+        line = _rounded(corners, corner_radius_m)
+        along_m = _along(line)
+        self.leg_ends_m = along_m[ARC // 2 + 1 : -1 : ARC]
+        self.points_m = _resampled(line, along_m)
         ahead = np.gradient(self.points_m, axis=0)
         turning = np.abs(np.diff(np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0])), append=0.0))
         turning[-1] = 0.0
@@ -63,20 +66,24 @@ class Route:
 
 
 def _rounded(corners: list[npt.NDArray[np.float64]], radius_m: float) -> npt.NDArray[np.float64]:
-    """The polyline with an arc in place of each corner, as wide as its legs allow."""
+    """The polyline with an arc of ARC points in place of each corner, as wide as its legs allow."""
     points = [corners[0]]
     for before, corner, after in zip(corners, corners[1:], corners[2:], strict=False):
         into, out = corner - before, after - corner
         turn = np.arctan2(into[0] * out[1] - into[1] * out[0], into @ out)
         reach = min(radius_m * abs(np.tan(turn / 2)), np.linalg.norm(into) / 2, np.linalg.norm(out) / 2)
         start, end = corner - into / np.linalg.norm(into) * reach, corner + out / np.linalg.norm(out) * reach
-        share = np.linspace(0, 1, 12)[:, None]
+        share = np.linspace(0, 1, ARC)[:, None]
         points.extend((1 - share) ** 2 * start + 2 * share * (1 - share) * corner + share**2 * end)
     return np.vstack([*points, corners[-1]])
 
 
-def _resampled(points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+def _along(points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """How far along the line each of its points is."""
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+
+
+def _resampled(points: npt.NDArray[np.float64], along_m: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     """The same line with a point every STEP_M."""
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-    at = np.arange(0.0, along[-1], STEP_M)
-    return np.column_stack([np.interp(at, along, points[:, 0]), np.interp(at, along, points[:, 1])])
+    at = np.arange(0.0, along_m[-1], STEP_M)
+    return np.column_stack([np.interp(at, along_m, points[:, 0]), np.interp(at, along_m, points[:, 1])])

@@ -163,7 +163,7 @@ def locate_landmark(task: Task, config: Config) -> list[Operation]:
     misses = 0 if squared.min() < config.gate**2 else int(landmark.attributes.get("misses", 0)) + 1
     if misses == 0:
         kept = refill(before[keep(-squared / 2, rng)], len(before), config.landmark_jitter_m, rng)
-    elif misses <= config.misses:
+    elif misses < config.misses:
         kept = before
     else:
         kept, misses = first_sighting(poses, percept, rng), 0
