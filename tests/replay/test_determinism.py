@@ -1,0 +1,88 @@
+"""The whole system in one process, in lockstep: what it says depends on its seed alone."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from reference import Said, drive, graph
+
+from bus.codec import decode
+from schemas import topics
+from schemas.graph import Delta, Node, Proposal
+from schemas.topics import About, Delivery
+
+FRAMES = 8
+HERE = Path(__file__).parent
+BY_WORKER = {topic.name for topic in (topics.TASK, topics.PROPOSAL, topics.COALITIONS)}
+
+
+@pytest.fixture(scope="module")
+def first() -> Said:
+    """A drive with one worker."""
+    return drive(FRAMES)
+
+
+def _deltas(said: Said) -> list[Delta]:
+    messages = [decode(topics.DELTA, payload) for payload in said[topics.DELTA.name]]
+    return [message for message in messages if isinstance(message, Delta)]
+
+
+def _check_that_all_is_the_same(left: Said, right: Said, but: frozenset[str] = frozenset()) -> None:
+    assert left.keys() == right.keys()
+    assert [name for name in left if name not in but and left[name] != right[name]] == []
+
+
+def test_a_drive_says_something_on_every_topic_of_the_model_and_of_the_truth(first: Said) -> None:
+    spoken = {topic.name for topic in topics.ALL if topic.delivery is not Delivery.ON_REQUEST}
+    processes = {topic.name for topic in topics.ALL if topic.about is About.PROCESS}
+    assert set(first) == spoken - processes
+    assert len(first[topics.MOTOR_COMMAND.name]) == FRAMES
+
+
+def test_a_drive_recognises_objects_and_moves(first: Said) -> None:
+    learned = graph(_deltas(first))
+    assert [name for name in learned.nodes if name.startswith("object:")]
+    assert float(learned.nodes["self"].attributes["x_m"]) > 0.1
+
+
+def test_two_lockstep_drives_of_one_seed_give_the_same_bytes_on_every_topic(first: Said) -> None:
+    _check_that_all_is_the_same(first, drive(FRAMES))
+
+
+def test_another_process_with_other_hashes_of_strings_says_the_same(first: Said) -> None:
+    script = "import sys, reference; sys.stdout.buffer.write(b''.join(reference.drive(3)['motor/command']))"
+    path = os.pathsep.join([str(HERE), str(HERE.parents[1])])
+    environment = os.environ | {"PYTHONHASHSEED": "4711", "PYTHONPATH": path}
+    done = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, check=True)
+    assert done.stdout == b"".join(first[topics.MOTOR_COMMAND.name][:3])
+
+
+def test_another_seed_gives_another_drive(first: Said) -> None:
+    other = drive(2, seed=2)
+    for topic in (topics.STEREO, topics.ODOMETRY, topics.TRUE_TOWN):
+        assert other[topic.name][0] != first[topic.name][0]
+
+
+def test_three_workers_give_the_deltas_and_the_graph_of_one_to_the_byte(first: Said) -> None:
+    three = drive(FRAMES, workers=3)
+    _check_that_all_is_the_same(first, three, frozenset(BY_WORKER))
+    proposals = [decode(topics.PROPOSAL, payload) for payload in three[topics.PROPOSAL.name]]
+    shares = [sum(isinstance(p, Proposal) and p.worker == f"codelets-{n}" for p in proposals) for n in (1, 2, 3)]
+    assert min(shares) > 0
+    assert graph(_deltas(three)).digest() == graph(_deltas(first)).digest()
+
+
+def test_what_three_workers_propose_for_a_task_is_what_one_does(first: Said) -> None:
+    def proposed(said: Said) -> dict[str, list[Node]]:
+        proposals = [decode(topics.PROPOSAL, payload) for payload in said[topics.PROPOSAL.name]]
+        return {
+            proposal.task_id: [operation for operation in proposal.operations if isinstance(operation, Node)]
+            for proposal in proposals
+            if isinstance(proposal, Proposal)
+        }
+
+    assert proposed(drive(3, workers=3)).items() <= proposed(first).items()
