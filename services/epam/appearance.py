@@ -24,21 +24,26 @@ DEFAULT_PATH = Path(__file__).with_name("appearance.npz")
 class Appearance:
     """The learned model of n kinds of building.
 
-    `log_colour` float32 (BINS, n + 1): log probability of each colour given the kind; the last column is that of
-    anything else. `footprint_m` (n, 2): sides of the ground plan; `height_m` (n,); `flat` (n,): whether the walls
-    are equally high all round.
+    `log_colour` float32 (BINS, n + 2): log probability of each colour given the kind, then given something that was
+    not learned, then given no object at all: ground, sky. `footprint_m` (n, 2): sides of the ground plan, the longer
+    first; `height_m` (n,); `top_m` (n, 2): how low and how high the upper end of a wall and its roof appears.
     """
 
     names: tuple[str, ...]
     log_colour: npt.NDArray[np.float32]
     footprint_m: Floats
     height_m: Floats
-    flat: npt.NDArray[np.bool_]
+    top_m: Floats
 
     @property
     def other(self) -> int:
-        """The column of whatever was not learned."""
+        """The column of an object that was not learned."""
         return len(self.names)
+
+    @property
+    def background(self) -> int:
+        """The column of no object."""
+        return len(self.names) + 1
 
     def save(self, path: Path) -> None:
         """Write the model to `path`."""
@@ -48,7 +53,7 @@ class Appearance:
             log_colour=self.log_colour.astype(np.float16),
             footprint_m=self.footprint_m,
             height_m=self.height_m,
-            flat=self.flat,
+            top_m=self.top_m,
         )
 
 
@@ -61,7 +66,7 @@ def load(path: Path) -> Appearance:
                 stored["log_colour"].astype(np.float32),
                 stored["footprint_m"].astype(np.float64),
                 stored["height_m"].astype(np.float64),
-                stored["flat"].astype(np.bool_),
+                stored["top_m"].astype(np.float64),
             )
     except FileNotFoundError:
         raise ConfigError(f"no appearance model {path}: make one with python -m services.epam.learn") from None
@@ -69,7 +74,7 @@ def load(path: Path) -> Appearance:
         raise ConfigError(
             f"{path} is no appearance model ({error}): make one with python -m services.epam.learn"
         ) from None
-    if model.log_colour.shape != (BINS, len(model.names) + 1):
+    if model.log_colour.shape != (BINS, len(model.names) + 2):
         raise ConfigError(f"{path} was learned by another version: learn it again with python -m services.epam.learn")
     return model
 

@@ -142,9 +142,8 @@ def _edge_error(x: Floats, z: Floats, cos: Floats, sin: Floats, problem: _Proble
     corner_z = z[:, None] + a * sin[:, None] + b * cos[:, None]
     corner = camera.cx_px + camera.fx_px * corner_x / np.maximum(corner_z, NEAREST_M)
     error = np.stack([corner.min(1) - problem.edge[:, 0], corner.max(1) - problem.edge[:, 1]], axis=1)
-    outside = np.array([-1.0, 1.0])
-    error = np.where(problem.hidden & (error * outside > 0), 0.0, error)
-    return error / EDGE_SD_PX
+    farther = error * np.array([-1.0, 1.0])
+    return np.where(problem.hidden & (farther > 0), 0.0, error) / EDGE_SD_PX
 
 
 def _linearised(parameters: Floats, problem: _Problem) -> tuple[Floats, Floats]:

@@ -21,6 +21,7 @@ from services.epam.appearance import BINS, DEFAULT_PATH, LIGHTNESS_LEVELS, Appea
 FARTHEST_M = 60.0
 FEWEST_POINTS = 400
 EDGE_M = 0.35
+GROUND_BAND = 0.05
 _CHROMA_LEVELS = round((BINS / LIGHTNESS_LEVELS) ** 0.5)
 
 
@@ -63,6 +64,7 @@ def learn(towns: Iterator[TownViews]) -> Appearance:
     names: tuple[str, ...] = ()
     colours = np.zeros((BINS, 0))
     sizes: dict[int, list[Floats]] = {}
+    tops: dict[int, list[Floats]] = {}
     for town in towns:
         if not names:
             names = town.names
@@ -71,15 +73,17 @@ def learn(towns: Iterator[TownViews]) -> Appearance:
         for view in town.views:
             _count_colours(view, colours)
             _gather_points(view, points)
+            _gather_tops(view, tops)
         for name, clouds in sorted(points.items()):
             size = _size(np.concatenate(clouds))
             if size is not None:
                 sizes.setdefault(name, []).append(size)
-    missing = [name for index, name in enumerate(names) if index not in sizes]
+    missing = [name for index, name in enumerate(names) if index not in sizes or index not in tops]
     if missing or not names:
         raise UsageError(f"too few views of {', '.join(missing) or 'anything'}: render more towns or more views")
     merged = np.array([np.median(sizes[index], axis=0) for index in range(len(names))])
-    return Appearance(names, _log_colour(colours), merged[:, :2], merged[:, 2], merged[:, 3] > 0.5)
+    top_m = np.array([np.quantile(np.concatenate(tops[index]), (0.1, 0.9)) for index in range(len(names))])
+    return Appearance(names, _log_colour(colours), merged[:, :2], merged[:, 2], top_m)
 
 
 def _surface(view: LabelledView) -> tuple[Floats, npt.NDArray[np.bool_]]:
@@ -96,9 +100,10 @@ def _surface(view: LabelledView) -> tuple[Floats, npt.NDArray[np.bool_]]:
 
 
 def _count_colours(view: LabelledView, colours: Floats) -> None:
-    """Add the view's colours, each wall in each view counting alike, however near it is; the last column is no wall."""
+    """Add the view's colours, each wall in each view counting alike. The last column is what shows where no wall is."""
     _, shown = _surface(view)
-    shown |= view.label == 0
+    below_horizon = np.arange(len(view.label))[:, None] - view.calibration.cy_px
+    shown |= (view.label == 0) & (below_horizon < GROUND_BAND * view.calibration.fy_px)
     background = colours.shape[1] - 1
     labels = np.where(view.label > 0, view.label.astype(np.intp) - 1, background)[shown]
     bins = colour_bins(lab(view.image))[shown]
@@ -116,8 +121,19 @@ def _gather_points(view: LabelledView, points: dict[int, list[Floats]]) -> None:
         points.setdefault(name, []).append(places[labels == name])
 
 
+def _gather_tops(view: LabelledView, tops: dict[int, list[Floats]]) -> None:
+    """The height at which each column of a building ends, where the image does not cut it off."""
+    surface, shown = _surface(view)
+    for name in np.unique(view.label[shown]).tolist():
+        mask = shown & (view.label == name)
+        row, column = mask.argmax(0), np.flatnonzero(mask.any(0))
+        column = column[row[column] > 2]
+        if len(column):
+            tops.setdefault(name - 1, []).append(surface[row[column], column, 2])
+
+
 def _size(points: Floats) -> Floats | None:
-    """Sides of the ground plan, height, and 1 for walls equally high all round; None where not all sides were seen."""
+    """Sides of the ground plan and height; None where not all sides were seen."""
     walls = points[points[:, 2] > 0.3]
     if len(walls) < FEWEST_POINTS:
         return None
@@ -130,20 +146,18 @@ def _size(points: Floats) -> Floats | None:
     if min(int(edge.sum()) for edge in near_edge) < FEWEST_POINTS // 8:
         return None
     height = float(np.quantile(walls[:, 2], 0.999))
-    edge_heights = [float(np.quantile(walls[edge, 2], 0.99)) for edge in near_edge]
-    long_first = (half[0], half[1]) if half[0] >= half[1] else (half[1], half[0])
-    return np.array([2 * long_first[0], 2 * long_first[1], height, float(min(edge_heights) > 0.93 * height)])
+    return np.array([2 * half.max(), 2 * half.min(), height])
 
 
 def _log_colour(colours: Floats) -> npt.NDArray[np.float32]:
-    """Smoothed log probabilities; the last column, anything else, mixes no wall, an average wall and any colour."""
+    """Smoothed log probabilities. What was not learned, the last column but one, is an average wall or any colour."""
     grid = colours.reshape(LIGHTNESS_LEVELS, _CHROMA_LEVELS, _CHROMA_LEVELS, -1).copy()
     for axis in range(3):
         grid = 0.5 * grid + 0.25 * (_shifted(grid, axis, 1) + _shifted(grid, axis, -1))
     smooth = grid.reshape(BINS, -1)
     smooth = smooth / smooth.sum(0) * 0.98 + 0.02 / BINS
-    smooth[:, -1] = 0.5 * smooth[:, -1] + 0.25 * smooth[:, :-1].mean(1) + 0.25 / BINS
-    return np.asarray(np.log(smooth), np.float32)
+    unknown = 0.5 * smooth[:, :-1].mean(1) + 0.5 / BINS
+    return np.asarray(np.log(np.insert(smooth, -1, unknown, axis=1)), np.float32)
 
 
 def _shifted(grid: Floats, axis: int, step: int) -> Floats:

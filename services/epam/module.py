@@ -93,6 +93,8 @@ def outline(segment: Segment, seen: Columns, model: Appearance) -> Outline:
     """What geometry needs of a segment: its columns less the two at each end, where depths of two things mix."""
     trim = min(2, (segment.right - segment.left) // 4)
     inner = np.arange(segment.left + trim, segment.right + 1 - trim)
+    matched = inner >= seen.disparity_px[inner]
+    inner = inner[matched] if matched.sum() > trim else inner
     depth, width = model.footprint_m[segment.name]
     return Outline(
         columns=inner.astype(np.float64),
@@ -106,10 +108,13 @@ def outline(segment: Segment, seen: Columns, model: Appearance) -> Outline:
 
 
 def _ends(seen: Columns, column: int, outward: int) -> bool:
-    """Whether the object really ends at `column`, and not at the border or behind something nearer."""
+    """Whether the object really ends at `column`, and not at the border or behind something nearer.
+
+    On the left the view ends, for what is nearer, where the right camera's does: as far in as the disparity.
+    """
     beyond, inside = column + 4 * outward, column - 3 * outward
     wide = len(seen.disparity_px)
-    if not 0 <= beyond < wide or not 0 <= inside < wide:
+    if not 0 <= beyond < wide or not 0 <= inside < wide or beyond < seen.disparity_px[inside]:
         return False
     return bool(seen.disparity_px[beyond] <= seen.disparity_px[inside] + 0.3)
 

@@ -20,18 +20,23 @@ FARTHEST_M = 80.0
 SAMPLES = 32
 FEWEST_PIXELS = 4
 LEAST_TALL_M = 2.0
-INDEPENDENT_PIXELS = 6.0
-SWITCH_COST, SWITCH_COST_AT_EDGE = 12.0, 4.0
+INDEPENDENT_PER_M, MOST_INDEPENDENT = 15.0, 6.0
+SWITCH_COST, SWITCH_COST_AT_EDGE = 15.0, 4.0
+SLIVER_M = 1.6
+HEIGHT_SHARE, UNKNOWN_HEIGHT = 0.5, -1.0
+TOP_SD_PX, CUT_ROW = 1.5, 2
 
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """The nearest wall in each of w columns: disparity in pixels, 0 where none stands, its top row, and its evidence.
+    """The nearest wall in each of w columns: disparity in pixels, 0 where none stands, how wide
+    a piece of it fills the column, and its rows.
 
-    `evidence` (w, n + 1) is the log probability of the colours seen on it for each name and for anything else.
+    `evidence` (w, n + 2) is the log probability of the colours seen on it, for the columns of Appearance.log_colour.
     """
 
     disparity_px: Floats
+    width_m: Floats
     top_row: npt.NDArray[np.intp]
     bottom_row: npt.NDArray[np.intp]
     evidence: Floats
@@ -58,9 +63,14 @@ def columns(lab_image: Image, depth_m: npt.NDArray[np.float32], calibration: Cal
     on_wall = upright & (np.abs(disparity - wall_px) < 0.6 + 0.12 * wall_px)
     count = on_wall.sum(0)
     wall_px[count < np.maximum(FEWEST_PIXELS, LEAST_TALL_M / calibration.baseline_m * wall_px)] = 0.0
-    evidence = _evidence(lab_image, on_wall, count, model)
-    top, bottom = on_wall.argmax(0), len(rows) - 1 - on_wall[::-1].argmax(0)
-    return Columns(wall_px.astype(np.float64), top, bottom, evidence)
+    column_m = np.divide(calibration.baseline_m, wall_px, out=np.zeros_like(wall_px), where=wall_px > 0)
+    weight = np.minimum(MOST_INDEPENDENT, INDEPENDENT_PER_M * column_m)
+    order = np.argsort(~on_wall, axis=0, kind="stable")
+    top, bottom = _row_at(order, np.array([[0.0], [0.97]]) * count)
+    evidence = _colours(lab_image, order, count, model) + HEIGHT_SHARE * _heights(top, wall_px, calibration, model)
+    evidence *= weight[:, None]
+    evidence[wall_px == 0] = 0.0
+    return Columns(wall_px.astype(np.float64), column_m.astype(np.float64), top, bottom, evidence)
 
 
 def _middle(values: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
@@ -71,28 +81,39 @@ def _middle(values: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
     return np.where(count >= FEWEST_PIXELS, middle, 0).astype(np.float32)
 
 
-def _evidence(
-    lab_image: Image, on_wall: npt.NDArray[np.bool_], count: npt.NDArray[np.intp], model: Appearance
+def _row_at(order: npt.NDArray[np.intp], place: Floats) -> npt.NDArray[np.intp]:
+    """The rows that are at `place` (k, w) among those on the wall, which `order` (h, w) puts first, from the top."""
+    return np.take_along_axis(order, place.astype(np.intp), axis=0)
+
+
+def _heights(
+    top: npt.NDArray[np.intp], wall_px: npt.NDArray[np.float32], camera: Calibration, model: Appearance
 ) -> Floats:
-    """Log probability of SAMPLES pixels spread over each column's wall, as if INDEPENDENT_PIXELS of them told apart."""
-    width = on_wall.shape[1]
-    order = np.argsort(~on_wall, axis=0, kind="stable")
-    place = (np.arange(SAMPLES)[:, None] + 0.5) * count[None] / SAMPLES
-    rows = np.take_along_axis(order, place.astype(np.intp), axis=0)
-    bins = colour_bins(lab_image[rows, np.arange(width)])
-    mean = np.asarray(model.log_colour[bins].mean(0, dtype=np.float64))
-    mean[count < FEWEST_PIXELS] = 0.0
-    return mean * INDEPENDENT_PIXELS
+    """Log probability (w, n + 2), but for a constant, of a wall that ends at row `top`; cut off there, it may be higher."""
+    depth_m = camera.fx_px * camera.baseline_m / np.maximum(wall_px, 0.5).astype(np.float64)
+    top_m = camera.mount_height_m + (camera.cy_px - top) / camera.fy_px * depth_m
+    sd_m = 0.25 + 0.05 * top_m + TOP_SD_PX * depth_m / camera.fy_px
+    low, high = model.top_m.T
+    short = np.where(top[:, None] <= CUT_ROW, 0.0, low - top_m[:, None])
+    off = np.maximum(np.maximum(short, top_m[:, None] - high), 0.0) / sd_m[:, None]
+    known = -0.5 * np.minimum(off, 3.0) ** 2
+    return np.concatenate([known, np.full((len(top), 2), UNKNOWN_HEIGHT)], axis=1)
+
+
+def _colours(lab_image: Image, order: npt.NDArray[np.intp], count: npt.NDArray[np.intp], model: Appearance) -> Floats:
+    """Mean log probability (w, n + 2) of SAMPLES pixels spread over each column's wall."""
+    rows = _row_at(order, (np.arange(SAMPLES)[:, None] + 0.5) * count[None] / SAMPLES)
+    bins = colour_bins(lab_image[rows, np.arange(len(count))])
+    return np.asarray(model.log_colour[bins].mean(0, dtype=np.float64))
 
 
 def segments(seen: Columns, model: Appearance) -> list[Segment]:
     """The objects in view that have a name, from left to right."""
     names = _likeliest(seen)
-    names[seen.disparity_px == 0] = -1
-    starts = np.flatnonzero(np.diff(names, prepend=-2))
-    ends = np.append(starts[1:], len(names)) - 1
+    names[(seen.disparity_px == 0) | (names == model.background)] = -1
+    _join_slivers(names, seen)
     found = []
-    for left, right in zip(starts.tolist(), ends.tolist(), strict=True):
+    for left, right in runs(names):
         name = int(names[left])
         if 0 <= name < model.other:
             found.append(Segment(left, right, name, _activation(seen.evidence[left : right + 1], name)))
@@ -119,6 +140,31 @@ def _likeliest(seen: Columns) -> npt.NDArray[np.intp]:
     for column in range(width - 1, 0, -1):
         names[column - 1] = came_from[column, names[column]]
     return names
+
+
+def runs(names: npt.NDArray[np.intp]) -> list[tuple[int, int]]:
+    """First and last column of each run of equal names."""
+    starts = np.flatnonzero(np.diff(names, prepend=-2))
+    ends = np.append(starts[1:], len(names)) - 1
+    return list(zip(starts.tolist(), ends.tolist(), strict=True))
+
+
+def _join_slivers(names: npt.NDArray[np.intp], seen: Columns) -> None:
+    """Give a piece too narrow to be an object the name of the wall that it continues: it is a stripe or a corner."""
+    pieces = runs(names)
+    for number, (left, right) in enumerate(pieces):
+        if names[left] < 0 or seen.width_m[left : right + 1].sum() > SLIVER_M:
+            continue
+        best_m, name = 0.0, -1
+        for other, near, far in ((number - 1, left, left - 1), (number + 1, right, right + 1)):
+            if not 0 <= other < len(pieces) or names[far] < 0:
+                continue
+            step = abs(seen.disparity_px[near] - seen.disparity_px[far])
+            wide_m = seen.width_m[pieces[other][0] : pieces[other][1] + 1].sum()
+            if step < 0.3 + 0.03 * seen.disparity_px[near] and wide_m > max(best_m, SLIVER_M):
+                best_m, name = float(wide_m), int(names[far])
+        if name >= 0:
+            names[left : right + 1] = name
 
 
 def _activation(evidence: Floats, name: int) -> float:
