@@ -92,6 +92,7 @@ class Figures(msgspec.Struct, kw_only=True):
     bus_share: float
     objects: int
     object_error_mean_m: float
+    object_error_median_m: float
     road_m2: float
     deltas: int
     gaps: dict[str, int]
@@ -148,6 +149,7 @@ def measured(watch: Watch, errors: Errors) -> dict[str, Any]:
         "bus_share": sum(watch.bus_ms) / max(1e-9, sum(cycle_ms)),
         "objects": len(objects(graph)),
         "object_error_mean_m": float(off_m.mean()) if off_m.size else 0.0,
+        "object_error_median_m": float(np.median(off_m)) if off_m.size else 0.0,
         "road_m2": sum(int((tile.columns["road"] > 0.5).sum()) for tile in graph.tiles.values()) * graph.cell_m**2,
         "deltas": graph.version,
         "gaps": gaps,

@@ -61,7 +61,7 @@ def _dress(axes: Axes, observer: Observer, figures: Figures) -> None:
     axes.tick_params(colors=FAINT, length=3)
     axes.set_xlabel("x, metres east", color=FAINT)
     axes.set_ylabel("y, metres north", color=FAINT)
-    axes.set_title(_title(figures), loc="left", color=INK, fontsize=10, linespacing=1.5, pad=10)
+    _title(axes, figures)
     axes.legend(
         handles=_legend(), loc="upper center", bbox_to_anchor=(0.5, -0.06), ncols=4, frameon=False, fontsize=8.5
     )
@@ -72,13 +72,15 @@ def _draw_scale(axes: Axes, west_m: float, south_m: float, length_m: float = 10.
     axes.text(west_m + length_m / 2, south_m + 0.7, f"{length_m:g} m", ha="center", color=INK, zorder=12)
 
 
-def _title(figures: Figures) -> str:
-    return (
-        f"Town {figures.seed}: {figures.distance_m:.0f} m in {figures.drive_s:.0f} s, "
-        f"{figures.objects} buildings and {figures.road_m2:.0f} m² of street learned\n"
-        f"mean position error {figures.estimate.mean_m:.2f} m, by path integration alone "
-        f"{figures.path_integration.mean_m:.2f} m: {figures.error_ratio:.2f} of it"
+def _title(axes: Axes, figures: Figures) -> None:
+    driven = f"Town {figures.seed}, driven through for {figures.distance_m:.0f} m in {figures.drive_s:.0f} s"
+    learned = f"{figures.objects} buildings and {figures.road_m2:.0f} m² of street learned"
+    errors = (
+        f"position off by {figures.estimate.mean_m:.2f} m on average, "
+        f"{figures.path_integration.mean_m:.2f} m by path integration alone"
     )
+    axes.set_title(f"{driven}\n\n", loc="left", color=INK, fontsize=14, fontweight="bold")
+    axes.text(0, 1.012, f"{learned}\n{errors}", transform=axes.transAxes, color=INK, va="bottom", linespacing=1.5)
 
 
 def _legend() -> list[Patch | Line2D]:

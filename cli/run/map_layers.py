@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import Any
 
@@ -66,9 +67,10 @@ def _draw_building(axes: Axes, building: Building) -> None:
     pose = building.pose
     style = {"facecolor": HOUSE, "edgecolor": WALL, "linewidth": 0.8, "zorder": 2}
     _box(axes, np.array([pose.x_m, pose.y_m]), building.width_m, building.depth_m, pose.heading_rad, style)
-    name = building.name.replace("_", "\n")
-    label = axes.text(pose.x_m, pose.y_m, name, ha="center", va="center", fontsize=7, color=NAME, zorder=6)
-    label.set_path_effects([outlines.withStroke(linewidth=1.8, foreground=HOUSE)])
+    half_m = abs(building.width_m * math.sin(pose.heading_rad)) + abs(building.depth_m * math.cos(pose.heading_rad))
+    place = (pose.x_m, pose.y_m - half_m / 2 + 0.6)
+    name = axes.text(*place, building.name.replace("_", " "), ha="center", va="bottom", fontsize=6.5, color=NAME)
+    name.set(zorder=6, path_effects=[outlines.withStroke(linewidth=1.8, foreground=HOUSE)])
 
 
 def _agent_frame(axes: Axes, start: Pose | None) -> Transform:

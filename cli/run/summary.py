@@ -47,7 +47,7 @@ def table(figures: Figures, folder: Path) -> Table:
         "position error": f"{estimate.mean_m:.2f} m on average, at most {estimate.max_m:.2f} m",
         "path integration alone": f"{alone.mean_m:.2f} m on average, at most {alone.max_m:.2f} m",
         "error ratio": f"{figures.error_ratio:.3f}",
-        "learned": f"{figures.objects} buildings, off by {figures.object_error_mean_m:.2f} m on average; "
+        "learned": f"{figures.objects} buildings, half of them within {figures.object_error_median_m:.2f} m; "
         f"{figures.road_m2:.0f} m² of street",
         "cycle": f"{figures.cycle_p50_ms:.0f} ms, 99 % within {figures.cycle_p99_ms:.0f} ms",
         "lost messages": _losses(figures),
