@@ -19,11 +19,13 @@ Floats = npt.NDArray[np.float64]
 TURNS = 10
 POINTS = 20
 ROUNDS = 9
-DISPARITY_SD_PX = 0.12
-DISPARITY_BIAS_SD_PX = 0.05
+DISPARITY_SD_PX = 0.14
+ALIKE_COLUMNS = 5
+DISPARITY_BIAS_SD_PX, NARROW_BIAS_PX = 0.04, 0.6
 EDGE_SD_PX = 1.2
 HUBER = 1.5
 NEAREST_M = 0.5
+LEAST_BEARING_SD_RAD, LEAST_RANGE_SD_M = 0.003, 0.1
 
 
 @dataclass(frozen=True)
@@ -60,11 +62,20 @@ class _Problem:
     edge: Floats
     hidden: npt.NDArray[np.bool_]
     half: Floats
+    sd_px: Floats
+    bias_sd_px: Floats
     camera: Calibration
 
     def take(self, rows: npt.NDArray[np.intp]) -> _Problem:
         return _Problem(
-            self.slope[rows], self.disparity[rows], self.edge[rows], self.hidden[rows], self.half[rows], self.camera
+            self.slope[rows],
+            self.disparity[rows],
+            self.edge[rows],
+            self.hidden[rows],
+            self.half[rows],
+            self.sd_px[rows],
+            self.bias_sd_px[rows],
+            self.camera,
         )
 
 
@@ -79,7 +90,8 @@ def locate(outlines: list[Outline], camera: Calibration) -> list[Place]:
     cost = (residual**2).sum(1)
     covariance = _covariance(normal, pull)
     shape = (len(outlines), TURNS)
-    misfit = np.sqrt(cost / residual.shape[1]).reshape(shape).min(1)
+    error_px = residual[:, :POINTS] * problem.sd_px[:, None]
+    misfit = np.sqrt((error_px**2).mean(1)).reshape(shape).min(1) / DISPARITY_SD_PX
     return [
         _place(*parts, camera)
         for parts in zip(
@@ -91,12 +103,16 @@ def locate(outlines: list[Outline], camera: Calibration) -> list[Place]:
 def _stack(outlines: list[Outline], camera: Calibration) -> _Problem:
     picks = [np.linspace(0, len(outline.columns) - 1, POINTS).round().astype(np.intp) for outline in outlines]
     columns = np.array([outline.columns[pick] for outline, pick in zip(outlines, picks, strict=True)])
+    wide = np.array([len(outline.columns) for outline in outlines], float)
     return _Problem(
         (columns - camera.cx_px) / camera.fx_px,
         np.array([outline.disparity_px[pick] for outline, pick in zip(outlines, picks, strict=True)]),
         np.array([(outline.left, outline.right) for outline in outlines]),
         np.array([(not outline.left_true, not outline.right_true) for outline in outlines]),
         np.array([outline.sides_m for outline in outlines]) / 2,
+        # Neighbouring columns err alike, so that many of them tell no more than few.
+        DISPARITY_SD_PX * np.sqrt(np.maximum(1.0, POINTS * ALIKE_COLUMNS / wide)),
+        DISPARITY_BIAS_SD_PX + NARROW_BIAS_PX / wide,
         camera,
     )
 
@@ -129,7 +145,7 @@ def _residuals(parameters: Floats, problem: _Problem) -> Floats:
         inverse = np.where(facing[:, None], np.minimum(inverse, plane), inverse)
     inverse = np.where(np.isfinite(inverse), inverse, 1 / NEAREST_M)
     disparity = camera.fx_px * camera.baseline_m * inverse
-    depth_error = (disparity - problem.disparity) / DISPARITY_SD_PX
+    depth_error = (disparity - problem.disparity) / problem.sd_px[:, None]
     return np.concatenate([depth_error, _edge_error(x, z, cos, sin, problem)], axis=1)
 
 
@@ -179,7 +195,7 @@ def _solve(parameters: Floats, problem: _Problem) -> tuple[Floats, Floats, Float
     weight = _weight(residual)
     weighted = slope * weight[..., None]
     normal = np.einsum("sri,srj->sij", weighted, slope)
-    pull = weighted[:, :POINTS].sum(1) / DISPARITY_SD_PX
+    pull = weighted[:, :POINTS].sum(1) * (problem.bias_sd_px / problem.sd_px)[:, None]
     return kept, residual * np.sqrt(weight), np.asarray(normal), np.asarray(pull)
 
 
@@ -195,7 +211,7 @@ def _huber_cost(residual: Floats) -> Floats:
 def _covariance(normal: Floats, pull: Floats) -> Floats:
     """(s, 3, 3): of independent errors, and of one that all disparities have in common."""
     spread = np.linalg.inv(normal + np.diag([1e-4, 1e-4, 1e-2]))
-    common = np.einsum("sij,sj->si", spread, pull) * DISPARITY_BIAS_SD_PX
+    common = np.einsum("sij,sj->si", spread, pull)
     return np.asarray(spread + common[:, :, None] * common[:, None, :])
 
 
@@ -213,7 +229,7 @@ def _place(found: Floats, cost: Floats, covariance: Floats, misfit: float, camer
     return Place(
         bearing_rad=float(np.arctan2(left, forward)),
         range_m=range_m,
-        bearing_sd_rad=float(np.sqrt(across @ spread @ across) / range_m),
-        range_sd_m=float(np.sqrt(outward @ spread @ outward)),
+        bearing_sd_rad=float(np.hypot(np.sqrt(across @ spread @ across) / range_m, LEAST_BEARING_SD_RAD)),
+        range_sd_m=float(np.hypot(np.sqrt(outward @ spread @ outward), LEAST_RANGE_SD_M)),
         misfit=float(misfit),
     )

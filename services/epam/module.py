@@ -20,6 +20,7 @@ from services.epam.road import road
 from services.epam.segmentation import Columns, Segment, columns, segments
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
+MIXED, MIXED_WHERE_HIDDEN = 2, 5
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -32,7 +33,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     model: str = ""
     base_level: Unit = 0.0
     percept_threshold: Unit = 0.7
-    narrowest_px: Annotated[int, msgspec.Meta(ge=2, le=1000)] = 6
+    narrowest_px: Annotated[int, msgspec.Meta(ge=4, le=1000)] = 10
     worst_misfit: Positive = 2.0
     worst_range_sd_share: Positive = 0.15
 
@@ -90,33 +91,26 @@ class ExtendedPam:
 
 
 def outline(segment: Segment, seen: Columns, model: Appearance) -> Outline:
-    """What geometry needs of a segment: its columns less the two at each end, where depths of two things mix."""
-    trim = min(2, (segment.right - segment.left) // 4)
-    inner = np.arange(segment.left + trim, segment.right + 1 - trim)
+    """What geometry needs of a segment: its columns less those at each end where the depths of two things mix.
+
+    Depth spreads from what is nearer over what it hides, so more is left out where the object is hidden.
+    """
+    spare = (segment.right - segment.left - 3) // 2
+    first = segment.left + max(0, min(MIXED if segment.left_true else MIXED_WHERE_HIDDEN, spare))
+    last = segment.right - max(0, min(MIXED if segment.right_true else MIXED_WHERE_HIDDEN, spare))
+    inner = np.arange(first, last + 1)
     matched = inner >= seen.disparity_px[inner]
-    inner = inner[matched] if matched.sum() > trim else inner
-    depth, width = model.footprint_m[segment.name]
+    inner = inner[matched] if matched.sum() > 3 else inner
+    longer, shorter = model.footprint_m[segment.name]
     return Outline(
         columns=inner.astype(np.float64),
         disparity_px=seen.disparity_px[inner],
         left=segment.left - 0.5,
         right=segment.right + 0.5,
-        left_true=_ends(seen, segment.left, -1),
-        right_true=_ends(seen, segment.right, 1),
-        sides_m=(float(depth), float(width)),
+        left_true=segment.left_true,
+        right_true=segment.right_true,
+        sides_m=(float(longer), float(shorter)),
     )
-
-
-def _ends(seen: Columns, column: int, outward: int) -> bool:
-    """Whether the object really ends at `column`, and not at the border or behind something nearer.
-
-    On the left the view ends, for what is nearer, where the right camera's does: as far in as the disparity.
-    """
-    beyond, inside = column + 4 * outward, column - 3 * outward
-    wide = len(seen.disparity_px)
-    if not 0 <= beyond < wide or not 0 <= inside < wide or beyond < seen.disparity_px[inside]:
-        return False
-    return bool(seen.disparity_px[beyond] <= seen.disparity_px[inside] + 0.3)
 
 
 def _one_each(objects: list[Percept]) -> list[Percept]:

@@ -44,10 +44,15 @@ class Columns:
 
 @dataclass(frozen=True)
 class Segment:
-    """Columns `left` to `right`, inclusive, that show one object; `name` indexes the model's names."""
+    """Columns `left` to `right`, inclusive, that show one object; `name` indexes the model's names.
+
+    `left_true` and `right_true` say that the object itself ends there, and is not hidden or cut off by the image.
+    """
 
     left: int
     right: int
+    left_true: bool
+    right_true: bool
     name: int
     activation: float
 
@@ -89,7 +94,7 @@ def _row_at(order: npt.NDArray[np.intp], place: Floats) -> npt.NDArray[np.intp]:
 def _heights(
     top: npt.NDArray[np.intp], wall_px: npt.NDArray[np.float32], camera: Calibration, model: Appearance
 ) -> Floats:
-    """Log probability (w, n + 2), but for a constant, of a wall that ends at row `top`; cut off there, it may be higher."""
+    """Log probability (w, n + 2), but for a constant, of a wall that ends at row `top`; cut there, it may be higher."""
     depth_m = camera.fx_px * camera.baseline_m / np.maximum(wall_px, 0.5).astype(np.float64)
     top_m = camera.mount_height_m + (camera.cy_px - top) / camera.fy_px * depth_m
     sd_m = 0.25 + 0.05 * top_m + TOP_SD_PX * depth_m / camera.fy_px
@@ -111,13 +116,27 @@ def segments(seen: Columns, model: Appearance) -> list[Segment]:
     """The objects in view that have a name, from left to right."""
     names = _likeliest(seen)
     names[(seen.disparity_px == 0) | (names == model.background)] = -1
+    disparity_px = np.where(names < 0, 0.0, seen.disparity_px)
     _join_slivers(names, seen)
     found = []
     for left, right in runs(names):
         name = int(names[left])
         if 0 <= name < model.other:
-            found.append(Segment(left, right, name, _activation(seen.evidence[left : right + 1], name)))
+            ends = (_ends(disparity_px, left, -1), _ends(disparity_px, right, 1))
+            found.append(Segment(left, right, *ends, name, _activation(seen.evidence[left : right + 1], name)))
     return found
+
+
+def _ends(disparity_px: Floats, column: int, outward: int) -> bool:
+    """Whether an object whose last column is `column` really ends there.
+
+    On the left the view ends, for what is nearer, where the right camera's does: as far in as the disparity.
+    """
+    beyond, inside = column + 4 * outward, column - 3 * outward
+    wide = len(disparity_px)
+    if not 0 <= beyond < wide or not 0 <= inside < wide or beyond < disparity_px[inside]:
+        return False
+    return bool(disparity_px[beyond] <= disparity_px[inside] + 0.3)
 
 
 def _likeliest(seen: Columns) -> npt.NDArray[np.intp]:
