@@ -33,7 +33,7 @@ def _drive_line(observer: Observer, errors: Errors) -> str:
     estimate_m, integration_m = ((each[-1] if each.size else 0.0) for each in (errors.estimate_m, errors.integration_m))
     return (
         f"{observer.elapsed_s:5.1f} s  {observer.travelled_m:6.1f} m  "
-        f"off by {estimate_m:.2f} m, path integration alone by {integration_m:.2f} m"
+        f"{estimate_m:.2f} m off, path integration alone {integration_m:.2f} m"
     )
 
 
@@ -42,7 +42,11 @@ class LiveDisplay:
 
     def __init__(self, console: Console) -> None:
         self._progress = Progress(
-            BarColumn(bar_width=30), TaskProgressColumn(), TextColumn("{task.description}"), console=console
+            BarColumn(bar_width=None),
+            TaskProgressColumn(),
+            TextColumn("{task.description}"),
+            console=console,
+            expand=True,
         )
         self._task = self._progress.add_task("starting", total=1.0)
         self._progress.start()

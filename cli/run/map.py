@@ -21,7 +21,7 @@ from cli.run.observer import Observer
 
 PAPER, INK, FAINT = "#fbfaf7", "#37352f", "#8a857a"
 TRUE, ESTIMATE, WHEELS = "#1f2430", "#e4572e", "#8d7cc4"
-MARGIN_M = 6.0
+MARGIN_M = 2.0
 
 
 def draw(path: Path, observer: Observer, graph: Graph, figures: Figures) -> None:
@@ -50,7 +50,9 @@ def _dress(axes: Axes, observer: Observer, figures: Figures) -> None:
     """Limits, scale, title and legend."""
     town = observer.town
     corners = [point for street in (town.streets if town else []) for point in street.line_m]
-    corners += [(b.pose.x_m, b.pose.y_m) for b in (town.buildings if town else [])]
+    for building in town.buildings if town else []:
+        reach_m = max(building.width_m, building.depth_m) / 2
+        corners += [(building.pose.x_m + side * reach_m, building.pose.y_m + side * reach_m) for side in (-1, 1)]
     every = np.vstack([np.array(corners).reshape(-1, 2), observer.true_path_m, observer.integrated_path_m])
     if len(every):
         (west, south), (east, north) = every.min(axis=0) - MARGIN_M, every.max(axis=0) + MARGIN_M
