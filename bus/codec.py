@@ -79,7 +79,8 @@ def _may_hold_not_finite(payload: bytes | memoryview) -> bool:
     """Whether any bytes could be a float marker and an exponent of all ones: looking is far cheaper than walking."""
     data = np.frombuffer(payload, np.uint8)
     at = np.flatnonzero((data[:-2] & 0xFE) == _FLOAT_MARKERS)
-    return bool(((data[at + 1] & 0x7F == 0x7F) & (data[at + 2] >= 0x80)).any())
+    least = np.where(data[at] == _FLOAT_MARKERS, 0x80, 0xF0)
+    return bool(((data[at + 1] & 0x7F == 0x7F) & (data[at + 2] >= least)).any())
 
 
 def decode_envelope(data: bytes | memoryview | None) -> Envelope:

@@ -3,47 +3,55 @@
 from __future__ import annotations
 
 import threading
-from collections import Counter, OrderedDict
-from itertools import count
+from collections import Counter
+from queue import Empty, SimpleQueue
 
 from bus.interface import Arrival, Job
 from schemas.topics import Delivery
 
-_Key = tuple[str, str] | int
+_Slot = tuple[str, str]
 
 
 class Inbox:
-    """Arrivals in order. Of a LATEST_WINS topic only each source's newest stays; what it replaced is counted."""
+    """Arrivals in order. Of a LATEST_WINS topic only each source's newest stays, in the place of the one it replaced.
+
+    What was replaced is counted.
+    """
 
     def __init__(self) -> None:
-        self._waiting: OrderedDict[_Key, Arrival | Job] = OrderedDict()
-        self._changed = threading.Condition()
-        self._ticket = count()
+        self._waiting: SimpleQueue[Arrival | Job | _Slot] = SimpleQueue()
+        self._newest: dict[_Slot, Arrival] = {}
+        self._replacing = threading.Lock()
         self.superseded: Counter[str] = Counter()
 
     def put(self, arrival: Arrival) -> None:
         """Enqueue; called from the bus's threads."""
-        key: _Key = next(self._ticket)
-        if arrival.topic.delivery is Delivery.LATEST_WINS:
-            key = (arrival.topic.name, arrival.envelope.source if arrival.envelope else "")
-        with self._changed:
-            if self._waiting.pop(key, None) is not None:
-                self.superseded[arrival.topic.name] += 1
-            self._waiting[key] = arrival
-            self._changed.notify()
+        if arrival.topic.delivery is not Delivery.LATEST_WINS:
+            self._waiting.put(arrival)
+            return
+        slot = (arrival.topic.name, arrival.envelope.source if arrival.envelope else "")
+        with self._replacing:
+            replaced = slot in self._newest
+            self._newest[slot] = arrival
+        if replaced:
+            self.superseded[arrival.topic.name] += 1
+        else:
+            self._waiting.put(slot)
 
     def call(self, job: Job) -> None:
         """Enqueue something to do on the module's own thread, between messages."""
-        with self._changed:
-            self._waiting[next(self._ticket)] = job
-            self._changed.notify()
+        self._waiting.put(job)
 
     def take(self, timeout_s: float | None) -> Arrival | Job | None:
         """The oldest arrival or job; None if there is none within `timeout_s` (None waits for ever)."""
-        with self._changed:
-            if not self._waiting and timeout_s != 0:
-                self._changed.wait_for(lambda: bool(self._waiting), timeout_s)
-            return self._waiting.popitem(last=False)[1] if self._waiting else None
+        try:
+            item = self._waiting.get(timeout_s != 0, timeout_s)
+        except Empty:
+            return None
+        if not isinstance(item, tuple):
+            return item
+        with self._replacing:
+            return self._newest.pop(item)
 
     def __len__(self) -> int:
-        return len(self._waiting)
+        return self._waiting.qsize()

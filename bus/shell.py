@@ -69,6 +69,10 @@ class Shell:
             item()
         return item is not None
 
+    def say(self, messages: Iterable[Message]) -> None:
+        """Send what the module says of its own accord, numbered."""
+        self._send(messages, None, 0, time.time_ns())
+
     def close(self) -> None:
         """Leave the bus."""
         self.bus.close()
@@ -145,7 +149,7 @@ class Shell:
             presence = Presence(
                 module=member.module, instance=member.instance, alive=alive, observer=self.module.instance
             )
-            self._send(self.module.stamp(presence), None, 0, 0)
+            self.say(self.module.stamp(presence))
             cause = (topics.PRESENCE.name, presence.source, presence.seq)
             self._think(lambda: self.module.feed(presence), cause, None, time.time_ns())
         if not self._started and not self.missing:

@@ -18,7 +18,7 @@ def _is_finite(values: npt.NDArray[np.generic]) -> bool:
     return math.isfinite(np.add.reduce(values)) or bool(np.isfinite(values).all())
 
 
-class Array(msgspec.Struct, frozen=True, eq=False):
+class Array(msgspec.Struct, frozen=True, eq=False, gc=False):
     """An n-dimensional array; floats in it are finite.
 
     `data` is a view of the buffer it was decoded from or made of: encoding copies it once, decoding never.

@@ -14,7 +14,7 @@ POSE = ("x_m", "y_m", "heading_rad", "stamp_ns")
 
 def written(operation: Operation) -> str | None:
     """The node that an operation rewrites; None for links and for place nodes, which many may write."""
-    return operation.id if isinstance(operation, Node | DropNode) else None
+    return operation.id if isinstance(operation, (Node, DropNode)) else None
 
 
 class Ledger:

@@ -81,7 +81,7 @@ def test_the_newest_of_one_source_does_not_replace_that_of_another(network: Netw
     publish(publisher, Clock(source="left"), Clock(source="right"), Clock(source="left", seq=1))
     peer.wait_for(3)
 
-    assert [(a.envelope.source, a.envelope.seq) for a in peer.take(2) if a.envelope] == [("right", 0), ("left", 1)]
+    assert [(a.envelope.source, a.envelope.seq) for a in peer.take(2) if a.envelope] == [("left", 1), ("right", 0)]
 
 
 def test_a_publisher_does_not_wait_for_a_subscriber_that_takes_nothing_in(network: Network) -> None:
