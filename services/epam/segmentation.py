@@ -22,7 +22,7 @@ FEWEST_PIXELS = 4
 LEAST_TALL_M = 2.0
 INDEPENDENT_PER_M, MOST_INDEPENDENT = 15.0, 6.0
 SWITCH_COST, SWITCH_COST_AT_EDGE = 15.0, 4.0
-SLIVER_M = 1.6
+SLIVER_M, DOUBTFUL_M = 1.1, 1.8
 HEIGHT_SHARE, UNKNOWN_HEIGHT = 0.5, -1.0
 TOP_SD_PX, CUT_ROW = 1.5, 2
 
@@ -113,16 +113,25 @@ def _colours(lab_image: Image, order: npt.NDArray[np.intp], count: npt.NDArray[n
 
 
 def segments(seen: Columns, model: Appearance) -> list[Segment]:
-    """The objects in view that have a name, from left to right."""
+    """The objects in view that have a name, from left to right.
+
+    Next to a piece so narrow that it might be a part of the object or of another, nobody knows where the object ends.
+    """
     names = _likeliest(seen)
     names[(seen.disparity_px == 0) | (names == model.background)] = -1
     disparity_px = np.where(names < 0, 0.0, seen.disparity_px)
     _join_slivers(names, seen)
+    pieces = runs(names)
+    doubtful = [names[left] >= 0 and seen.width_m[left : right + 1].sum() < DOUBTFUL_M for left, right in pieces]
     found = []
-    for left, right in runs(names):
+    for number, (left, right) in enumerate(pieces):
         name = int(names[left])
         if 0 <= name < model.other:
-            ends = (_ends(disparity_px, left, -1), _ends(disparity_px, right, 1))
+            after_doubt, before_doubt = doubtful[max(number - 1, 0)], doubtful[min(number + 1, len(pieces) - 1)]
+            ends = (
+                not after_doubt and _ends(disparity_px, left, -1),
+                not before_doubt and _ends(disparity_px, right, 1),
+            )
             found.append(Segment(left, right, *ends, name, _activation(seen.evidence[left : right + 1], name)))
     return found
 
