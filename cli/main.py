@@ -15,6 +15,7 @@ from cli.options import agent_option, config_option, connect_option, set_option
 from services import table
 
 COMMANDS = {
+    "architecture": "cli.architecture:architecture",
     "config": "cli.run.command:print_config",
     "doctor": "cli.doctor.command:doctor",
     "graph": "cli.graph:graph",
