@@ -120,7 +120,7 @@ class ZenohBus:
         self._declared.append(self._session.liveliness().declare_token(ready_key(self._agent, member)))
 
     def identify(self, member: Member) -> None:
-        """Tell whoever looks at the system who this is, without being one of those that others wait for; the first name holds."""
+        """Tell observers who this is, without being one of those that others wait for; the first name holds."""
         if self._is_named:
             return
         self._is_named = True

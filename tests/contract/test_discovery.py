@@ -1,0 +1,130 @@
+"""Who publishes and subscribes what, as the router tells it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+
+import pytest
+from networks import PATIENCE_S, OverZenoh, Peer, meet
+
+from bus.discovery import Process, Role, System, discover, read
+from bus.interface import Member
+from bus.session import open_client
+from bus.shell import Shell
+from cli.graph import to_dot, to_json, to_tree
+from schemas import topics
+from schemas.topics import About
+from services import table
+
+
+def discovered(network: OverZenoh) -> System:
+    session = open_client(network.endpoint)
+    system = discover(session, network.agent)
+    session.close()
+    return system
+
+
+def names(system: System, role: Role, topic: topics.Topic) -> list[str]:
+    return [process.name for process in system.doing(role, topic)]
+
+
+def test_every_process_is_found_by_name_with_all_that_it_does(over_zenoh: OverZenoh) -> None:
+    sim, first, second = (over_zenoh.join() for _ in range(3))
+    sim.declare(topics.ODOMETRY)
+    sim.declare(topics.VIEW)
+    for bus in (first, second):
+        Peer(bus, topics.ODOMETRY)
+    first.answer(topics.SNAPSHOT_REQUEST, lambda payload: payload, lambda job: job())
+    sim.announce(Member("sim", "sim"))
+    first.announce(Member("workspace", "workspace"))
+    second.announce(Member("codelets", "codelets-2"))
+    meet(over_zenoh.join(), sim, first, second)
+
+    system = discovered(over_zenoh)
+
+    assert names(system, Role.PUBLISHES, topics.ODOMETRY) == ["sim"]
+    assert names(system, Role.PUBLISHES, topics.VIEW) == ["sim"]
+    assert names(system, Role.SUBSCRIBES, topics.ODOMETRY) == ["codelets-2", "workspace"]
+    assert names(system, Role.SUBSCRIBES, topics.VIEW) == []
+    assert names(system, Role.ANSWERS, topics.SNAPSHOT_REQUEST) == ["workspace"]
+    assert system.topics() == [topics.ODOMETRY, topics.VIEW, topics.SNAPSHOT_REQUEST]
+    assert system.foreign_keys() == []
+
+
+def test_no_module_subscribes_to_the_truth_on_the_live_system(over_zenoh: OverZenoh) -> None:
+    shells = [Shell(table.build(name, {"sim": {"egl": False}}), over_zenoh.join()) for name in table.MODULES]
+    for shell in shells:
+        shell.open()
+    meet(over_zenoh.join(), *(shell.bus for shell in shells))
+
+    system = discovered(over_zenoh)
+
+    assert {process.member.module for process in system.processes if process.member} >= set(table.MODULES)
+    assert names(system, Role.PUBLISHES, topics.TRUE_POSE) == ["sim"]
+    for topic in topics.ALL:
+        if topic.about is About.TRUTH:
+            assert names(system, Role.SUBSCRIBES, topic) == []
+
+
+ZIDS = {"aa": Member("sim", "sim"), "bb": Member("recorder", "recorder")}
+TOKENS = [f"cogmap/agent/@session/{zid}/{member.module}/{member.instance}" for zid, member in ZIDS.items()]
+
+
+def fact(router: str, role: str, key: str, *zids: str) -> tuple[str, bytes]:
+    return f"@/{router}/router/{role}/{key}", json.dumps({"routers": [], "peers": [], "clients": zids}).encode()
+
+
+FACTS = [
+    ("@/r1/router", b'{"zid": "r1"}'),
+    ("@/r1/router/linkstate/north", b"graph {}"),
+    ("@/r1/router/metrics", b"\x1f\x8b"),
+    fact("r1", "publisher", "cogmap/agent/odometry", "aa"),
+    fact("r2", "publisher", "cogmap/agent/odometry", "cc"),
+    fact("r1", "subscriber", "cogmap/agent/truth/**", "bb", "own"),
+    fact("r1", "subscriber", "cogmap/other/odometry", "dd"),
+    fact("r1", "publisher", "cogmap/agent/odometry_v2", "aa"),
+]
+
+
+@pytest.fixture
+def system() -> System:
+    return read("agent", TOKENS, FACTS, "own")
+
+
+def test_what_several_routers_tell_is_put_together_and_the_nameless_keep_their_session(system: System) -> None:
+    assert names(system, Role.PUBLISHES, topics.ODOMETRY) == ["?cc", "sim"]
+    assert system.doing(Role.PUBLISHES, topics.ODOMETRY)[0] == Process("cc")
+
+
+def test_one_on_many_topics_at_once_counts_for_each_and_whoever_asks_for_none(system: System) -> None:
+    assert names(system, Role.SUBSCRIBES, topics.TRUE_POSE) == ["recorder"]
+    assert names(system, Role.SUBSCRIBES, topics.TRUE_TOWN) == ["recorder"]
+    assert names(system, Role.SUBSCRIBES, topics.ODOMETRY) == []
+
+
+def test_keys_that_are_no_topics_are_named(system: System) -> None:
+    assert system.foreign_keys() == ["cogmap/agent/odometry_v2"]
+
+
+@pytest.mark.parametrize("show", [to_tree, to_json, to_dot])
+def test_the_graph_shows_every_process_and_what_it_does(system: System, show: Callable[[System], str]) -> None:
+    shown = show(system)
+
+    assert all(name in shown for name in ("sim", "recorder", "?cc", "odometry", "truth/pose"))
+
+
+def test_the_graph_of_nobody_says_so() -> None:
+    assert to_tree(read("agent", [], [])) == "no process of 'agent' is on the bus"
+
+
+def test_a_process_that_left_is_not_found(over_zenoh: OverZenoh) -> None:
+    watcher, leaver = over_zenoh.join(), over_zenoh.join()
+    leaver.declare(topics.ODOMETRY)
+    meet(watcher, leaver)
+    gone = Peer(watcher)
+    watcher.watch(lambda member, alive: gone.inbox.call(lambda: None) if not alive else None)
+    leaver.close()
+    assert gone.inbox.take(PATIENCE_S) is not None
+
+    assert names(discovered(over_zenoh), Role.PUBLISHES, topics.ODOMETRY) == []

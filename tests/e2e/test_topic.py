@@ -1,0 +1,186 @@
+"""`cogmap topic`, `graph` and `doctor` on a running system, as users run them."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from bus.module import Module
+from bus.session import open_router
+from bus.shell import Shell
+from bus.zenoh_bus import ZenohBus
+from schemas import topics
+from schemas.samples import samples
+from schemas.sensing import MotorCommand, Odometry
+
+PATIENCE_S = 30.0
+SAMPLES = {topics.of(message): message for message in samples()}
+
+
+class System:
+    """A robot that tells its odometry 50 times a second and keeps the commands it gets."""
+
+    def __init__(self, endpoint: str) -> None:
+        self.commands: list[MotorCommand] = []
+        self.got_command, self._ended = threading.Event(), threading.Event()
+        self._router = open_router(endpoint)
+        sim = Module("sim").every(20_000_000, self._odometry, emits=[topics.ODOMETRY])
+        sim.every(20_000_000, lambda now_ns: SAMPLES[topics.SELF_MOTION], emits=[topics.SELF_MOTION])
+        self._shell = Shell(sim.on(topics.MOTOR_COMMAND, self._obey), ZenohBus(endpoint, "agent"))
+        self._shell.open()
+        self._thread = threading.Thread(target=self._work)
+        self._thread.start()
+
+    def _odometry(self, now_ns: int) -> Odometry:
+        return Odometry(speed_m_s=1.5, turn_rate_rad_s=0.0, dt_s=0.02, stamp_ns=now_ns)
+
+    def _obey(self, command: MotorCommand) -> None:
+        self.commands.append(command)
+        self.got_command.set()
+
+    def _work(self) -> None:
+        while not self._ended.is_set():
+            self._shell.pump(0.01)
+
+    def close(self) -> None:
+        self._ended.set()
+        self._thread.join()
+        self._shell.close()
+        self._router.close()
+
+
+@pytest.fixture(scope="module")
+def endpoint() -> str:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+@pytest.fixture(scope="module")
+def system(endpoint: str) -> Iterator[System]:
+    system = System(endpoint)
+    yield system
+    system.close()
+
+
+def start(endpoint: str, *arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "cli.main", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"COGMAP_CONNECT": endpoint},
+    )
+
+
+def said(endpoint: str, *arguments: str, code: int = 0) -> tuple[str, str]:
+    """What a command prints, to its output and its errors."""
+    process = start(endpoint, *arguments)
+    output, errors = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == code, errors
+    return output, errors
+
+
+def test_list_names_the_topics_in_use(system: System, endpoint: str) -> None:
+    output, _ = said(endpoint, "topic", "list", "-t")
+
+    assert output.splitlines() == [
+        "odometry [Odometry]",
+        "sensory/motion [SelfMotion]",
+        "motor/command [MotorCommand]",
+        "health [Health]",
+    ]
+
+
+def test_info_names_the_processes(system: System, endpoint: str) -> None:
+    output, _ = said(endpoint, "topic", "info", "-v", "odometry")
+
+    assert "Type: Odometry" in output
+    assert "Publisher count: 1\n\nProcess name: sim\nModule: sim\nEndpoint type: PUBLISHER" in output
+    assert "Subscription count: 0" in output
+
+
+def test_echo_prints_so_many_messages_and_ends(system: System, endpoint: str) -> None:
+    output, _ = said(endpoint, "topic", "echo", "odometry", "-n", "3", "--json")
+
+    messages = [json.loads(line) for line in output.splitlines()]
+    assert [message["speed_m_s"] for message in messages] == [1.5] * 3
+    assert [message["seq"] - messages[0]["seq"] for message in messages] == [0, 1, 2]
+
+
+@pytest.mark.parametrize(
+    ("command", "figure"), [("hz", "average rate: "), ("bw", "/s from "), ("delay", "average delay: ")]
+)
+def test_ctrl_c_ends_with_the_figures(system: System, endpoint: str, command: str, figure: str) -> None:
+    process = start(endpoint, "topic", command, "sensory/motion")
+    assert process.stdout is not None
+    assert figure in process.stdout.readline()
+    process.send_signal(signal.SIGINT)
+    output, errors = process.communicate(timeout=PATIENCE_S)
+
+    assert (process.returncode, errors) == (0, "")
+    assert figure in output
+
+
+def test_pub_is_obeyed(system: System, endpoint: str) -> None:
+    system.got_command.clear()
+    written = '{"left_wheel_rad_s": 1.5, "right_wheel_rad_s": 2}'
+
+    said(endpoint, "topic", "pub", "-t", "2", "-r", "20", "motor/command", written)
+
+    assert system.got_command.wait(PATIENCE_S)
+    assert system.commands[0] == MotorCommand(left_wheel_rad_s=1.5, right_wheel_rad_s=2.0, source="cli")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (
+            ("topic", "pub", "-1", "motor/command", '{"left_wheel_rad_s": "x", "right_wheel_rad_s": 1}'),
+            "got `str` - at",
+        ),
+        (("topic", "echo", "odometri"), "did you mean 'odometry'?"),
+        (("topic", "echo", "odometry", "--field", "speed"), "no 'speed'"),
+        (("topic", "echo", "workspace/snapshot"), "answered on request"),
+        (("topic", "hz", "odometry", "-w", "many"), "Invalid value for '-w'"),
+    ],
+)
+def test_what_the_user_can_mend_is_a_sentence_and_exit_code_2(
+    system: System, endpoint: str, arguments: tuple[str, ...], sentence: str
+) -> None:
+    output, errors = said(endpoint, *arguments, code=2)
+
+    assert output == ""
+    assert sentence in errors
+    assert "Traceback" not in errors
+
+
+def test_no_router_is_a_sentence_and_exit_code_2() -> None:
+    _, errors = said("tcp/127.0.0.1:1", "topic", "list", code=2)
+
+    assert errors.startswith("cogmap: no router at tcp/127.0.0.1:1 within 5 s: start one")
+    assert errors.count("\n") == 1
+
+
+def test_graph_shows_the_process_and_its_topics(system: System, endpoint: str) -> None:
+    (sim,) = json.loads(said(endpoint, "graph", "--json")[0])
+
+    assert (sim["process"], sim["subscribes"]) == ("sim", ["motor/command"])
+    assert sim["publishes"] == ["odometry", "sensory/motion", "health"]
+
+
+def test_doctor_names_what_is_missing_and_what_is_off_its_rate(system: System, endpoint: str) -> None:
+    found = json.loads(said(endpoint, "doctor", "--json", code=1)[0])
+
+    about = {finding["about"] for finding in found}
+    assert {"sensory", "epam", "workspace", "codelets", "global_workspace", "action"} <= about
+    assert {"odometry", "sensory/motion"} <= about
+    assert "sim" not in about
