@@ -15,7 +15,8 @@ MAX_DIMENSIONS = 4
 
 def _is_finite(values: npt.NDArray[np.generic]) -> bool:
     """A finite sum proves it at a third of the cost; one that is not may only have grown too large."""
-    return math.isfinite(np.add.reduce(values)) or bool(np.isfinite(values).all())
+    with np.errstate(invalid="ignore", over="ignore"):
+        return math.isfinite(np.add.reduce(values)) or bool(np.isfinite(values).all())
 
 
 class Array(msgspec.Struct, frozen=True, eq=False, gc=False):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cli.topic.rates import in_bytes
+from cli.topic.figures import in_bytes
 from cli.topic.statistics import Bandwidth, Delay, Rate
 
 S = 1_000_000_000
