@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 
 import matplotlib as mpl
 
 mpl.use("Agg")
+logging.getLogger("matplotlib").setLevel(logging.WARNING)
 
 import numpy as np
 from matplotlib import pyplot
