@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import logging
 from pathlib import Path
 
 import matplotlib as mpl
-
-mpl.use("Agg")
-logging.getLogger("matplotlib").setLevel(logging.WARNING)
-
 import numpy as np
-from matplotlib import pyplot
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
@@ -28,8 +23,9 @@ MARGIN_M = 2.0
 
 def draw(path: Path, observer: Observer, graph: Graph, figures: Figures) -> None:
     """Write the map to `path` as a PNG."""
-    with pyplot.rc_context({"font.family": "sans-serif", "font.size": 9, "axes.edgecolor": layers.KERB}):
-        figure, axes = pyplot.subplots(figsize=(11, 10), dpi=130, facecolor=PAPER, layout="constrained")
+    with mpl.rc_context({"font.family": "sans-serif", "font.size": 9, "axes.edgecolor": layers.KERB}):
+        figure = Figure(figsize=(11, 10), dpi=130, facecolor=PAPER, layout="constrained")
+        axes = figure.add_subplot()
         axes.set_facecolor(PAPER)
         layers.draw_town(axes, observer)
         layers.draw_road(axes, observer, graph)
@@ -37,7 +33,6 @@ def draw(path: Path, observer: Observer, graph: Graph, figures: Figures) -> None
         _draw_paths(axes, observer)
         _dress(axes, observer, figures)
         figure.savefig(path, facecolor=PAPER)
-        pyplot.close(figure)
 
 
 def _draw_paths(axes: Axes, observer: Observer) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import logging
 import time
 from pathlib import Path
 
@@ -33,6 +34,7 @@ def finish(drive: Drive, watch: Watch) -> Figures:
         **measured(watch, errors),
     )
     (drive.folder / "summary.json").write_bytes(msgspec.json.format(msgspec.json.encode(figures)) + b"\n")
+    logging.getLogger("matplotlib").setLevel(logging.WARNING)
     picture = importlib.import_module("cli.run.map")  # half a second, which the start of a run has no use for
     picture.draw(drive.folder / "map.png", watch.observer, watch.replica.graph, figures)
     return figures
