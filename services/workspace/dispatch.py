@@ -56,8 +56,8 @@ class Dispatch:
         return self._assign(now_ns)
 
     def expire(self, now_ns: int) -> list[Task]:
-        """Tasks to send to somebody else, since their lease has ended."""
-        self._take_back(lambda lease: lease.task.worker != NOBODY and now_ns > lease.until_ns)
+        """Tasks to send to somebody else, since their lease has ended; where there is nobody else, they stay."""
+        self._take_back(lambda lease: now_ns > lease.until_ns and not self._workers <= {lease.task.worker})
         return self._assign(now_ns)
 
     def answer(self, proposal: Proposal) -> bool:
@@ -81,7 +81,7 @@ class Dispatch:
 
     def _take_back(self, lost: Callable[[Lease], bool]) -> None:
         for lease in self._leases.values():
-            if lease.proposal is None and lost(lease):
+            if lease.proposal is None and lease.task.worker != NOBODY and lost(lease):
                 lease.lost_by = lease.task.worker
                 lease.task = msgspec.structs.replace(lease.task, worker=NOBODY, attempt=lease.task.attempt + 1)
 

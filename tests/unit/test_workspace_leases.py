@@ -100,10 +100,20 @@ def test_in_real_time_a_task_whose_lease_has_ended_goes_to_another_worker_and_is
     assert _committed(desk, asked) == 1
 
 
-def test_the_only_worker_gets_its_task_again_when_the_lease_has_ended() -> None:
+def test_the_only_worker_keeps_its_task_when_the_lease_has_ended_until_there_is_another() -> None:
     desk, asked = _real_time("w1")
-    desk.clock(stamp_ns(0) + 101 * MS)
-    assert [(again.task_id, again.worker) for again in desk.take()] == [(asked.task_id, "w1")]
+    assert desk.clock(stamp_ns(0) + 101 * MS) == []
+    desk.presence("w2")
+    desk.clock(stamp_ns(0) + 102 * MS)
+    assert [(again.task_id, again.worker) for again in desk.take()] == [(asked.task_id, "w2")]
+
+
+def test_a_task_that_nobody_has_is_given_to_the_first_worker_however_long_it_has_waited() -> None:
+    desk = Desk(mode="real_time", deadline_ms=10_000.0)
+    desk.see(0)
+    desk.clock(stamp_ns(0) + 5_000 * MS)
+    desk.presence("w1")
+    assert [(asked.worker, asked.attempt) for asked in desk.take()] == [("w1", 0)]
 
 
 def test_a_task_is_given_out_only_so_often() -> None:
