@@ -18,7 +18,7 @@ from cli.run.observer import Observer
 
 PAPER, INK, FAINT = "#fbfaf7", "#37352f", "#8a857a"
 TRUE, ESTIMATE, WHEELS = "#1f2430", "#e4572e", "#8d7cc4"
-MARGIN_M = 2.0
+MARGIN_M = 5.0
 
 
 def draw(path: Path, observer: Observer, graph: Graph, figures: Figures) -> None:
