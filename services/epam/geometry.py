@@ -21,11 +21,11 @@ POINTS = 20
 ROUNDS = 9
 DISPARITY_SD_PX = 0.14
 ALIKE_COLUMNS = 5
-DISPARITY_BIAS_SD_PX, NARROW_BIAS_PX = 0.04, 0.6
+DISPARITY_BIAS_SD_PX, NARROW_BIAS_PX = 0.03, 0.4
 EDGE_SD_PX = 1.2
 HUBER = 1.5
 NEAREST_M = 0.5
-LEAST_BEARING_SD_RAD, LEAST_RANGE_SD_M = 0.003, 0.1
+LEAST_BEARING_SD_RAD, LEAST_RANGE_SD_M, HIDDEN_SD_M = 0.003, 0.1, 0.2
 
 
 @dataclass(frozen=True)
@@ -89,6 +89,8 @@ def locate(outlines: list[Outline], camera: Calibration) -> list[Place]:
     found, residual, normal, pull = _solve(starts, problem)
     cost = (residual**2).sum(1)
     covariance = _covariance(normal, pull)
+    hidden_variance = np.asarray(np.where(problem.hidden.any(1), HIDDEN_SD_M**2, 0.0))
+    covariance[:, :2, :2] += hidden_variance[:, None, None] * np.eye(2)
     shape = (len(outlines), TURNS)
     error_px = residual[:, :POINTS] * problem.sd_px[:, None]
     misfit = np.sqrt((error_px**2).mean(1)).reshape(shape).min(1) / DISPARITY_SD_PX
@@ -217,13 +219,13 @@ def _covariance(normal: Floats, pull: Floats) -> Floats:
 
 def _place(found: Floats, cost: Floats, covariance: Floats, misfit: float, camera: Calibration) -> Place:
     """The mean and spread over all turns, weighted by their likelihood, as bearing and range from the robot."""
-    weight = np.exp(-0.25 * (cost - cost.min()))
+    weight = np.exp(-0.5 * (cost - cost.min()))
     weight /= weight.sum()
     centre = weight @ found[:, :2]
     away = found[:, :2] - centre
     spread = np.einsum("s,sij->ij", weight, covariance[:, :2, :2] + away[:, :, None] * away[:, None, :])
     forward, left = centre[1] + camera.mount_forward_m, -centre[0]
-    range_m = float(np.hypot(forward, left))
+    range_m = max(float(np.hypot(forward, left)), NEAREST_M)
     outward = np.array([-left, forward]) / range_m
     across = np.array([outward[1], -outward[0]])
     return Place(

@@ -142,11 +142,16 @@ def _size(points: Floats) -> Floats | None:
     axes = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     local = (walls[:, :2] - centre) @ axes
     half = np.array(sides) / 2
-    near_edge = [sign * local[:, axis] > half[axis] - EDGE_M for axis in (0, 1) for sign in (-1, 1)]
-    if min(int(edge.sum()) for edge in near_edge) < FEWEST_POINTS // 8:
+    if not all(_spanned(local, half, axis, sign) for axis in (0, 1) for sign in (-1, 1)):
         return None
     height = float(np.quantile(walls[:, 2], 0.999))
     return np.array([2 * half.max(), 2 * half.min(), height])
+
+
+def _spanned(local: Floats, half: Floats, axis: int, sign: int) -> bool:
+    """Whether most of one side was seen: points along the edge at `sign` of `axis`, in the rectangle's own frame."""
+    along = local[sign * local[:, axis] > half[axis] - EDGE_M, 1 - axis]
+    return len(along) > FEWEST_POINTS // 8 and float(np.ptp(np.quantile(along, (0.05, 0.95)))) > half[1 - axis]
 
 
 def _log_colour(colours: Floats) -> npt.NDArray[np.float32]:

@@ -27,7 +27,8 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     """`model` is the file of the appearance model, the one in this package where empty.
 
     A node becomes a percept when its total activation, base level and current, is over `percept_threshold`. What
-    fits its learned size worse than `worst_misfit` deviations, or stands nobody knows where, is not recognised.
+    fits its learned size worse than `worst_misfit` deviations, begins and ends out of sight, or stands nobody knows
+    where, is not recognised.
     """
 
     model: str = ""
@@ -56,6 +57,7 @@ class ExtendedPam:
             segment
             for segment in segments(seen, self._model)
             if segment.right - segment.left + 1 >= self._config.narrowest_px
+            and (segment.left_true or segment.right_true)
         ]
         outlines = [outline(segment, seen, self._model) for segment in candidates]
         places = locate(outlines, camera)

@@ -57,8 +57,10 @@ def _on_plane(
 def _thinned(points: npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
     """The mean of the points in each cell, in order of the cells."""
     near = points[np.hypot(points[:, 0], points[:, 1]) <= FARTHEST_M]
-    cells = np.floor(near / CELL_M).astype(np.int64)
-    wide = 4 * round(FARTHEST_M / CELL_M)
-    keys, cell, count = np.unique(cells[:, 0] * wide + cells[:, 1], return_inverse=True, return_counts=True)
-    sums = np.stack([np.bincount(cell, near[:, axis], len(keys)) for axis in (0, 1)], axis=1)
-    return np.asarray(sums / count[:, None], np.float32)
+    reach = round(FARTHEST_M / CELL_M) + 1
+    cells = np.floor(near / CELL_M).astype(np.intp) + reach
+    cell = cells[:, 0] * 2 * reach + cells[:, 1]
+    count = np.bincount(cell, minlength=1)
+    kept = np.flatnonzero(count)
+    sums = np.stack([np.bincount(cell, near[:, axis], minlength=1)[kept] for axis in (0, 1)], axis=1)
+    return np.asarray(sums / count[kept, None], np.float32)

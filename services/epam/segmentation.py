@@ -63,7 +63,8 @@ def columns(lab_image: Image, depth_m: npt.NDArray[np.float32], calibration: Cal
     rows = np.arange(calibration.height_px, dtype=np.float32)[:, None]
     height = calibration.mount_height_m - (rows - calibration.cy_px) / calibration.fy_px * depth_m
     disparity = np.divide(focal_baseline, depth_m, out=np.zeros_like(depth_m), where=depth_m > 0)
-    upright = (disparity > focal_baseline / FARTHEST_M) & (height > LOWEST_M)
+    possible = (disparity > focal_baseline / FARTHEST_M) & (disparity < calibration.width_px)
+    upright = possible & (height > LOWEST_M)
     wall_px = _middle(np.where(upright & (height < HIGHEST_M), disparity, np.inf))
     on_wall = upright & (np.abs(disparity - wall_px) < 0.6 + 0.12 * wall_px)
     count = on_wall.sum(0)
@@ -97,7 +98,7 @@ def _heights(
     """Log probability (w, n + 2), but for a constant, of a wall that ends at row `top`; cut there, it may be higher."""
     depth_m = camera.fx_px * camera.baseline_m / np.maximum(wall_px, 0.5).astype(np.float64)
     top_m = camera.mount_height_m + (camera.cy_px - top) / camera.fy_px * depth_m
-    sd_m = 0.25 + 0.05 * top_m + TOP_SD_PX * depth_m / camera.fy_px
+    sd_m = 0.25 + 0.05 * np.abs(top_m) + TOP_SD_PX * depth_m / camera.fy_px
     low, high = model.top_m.T
     short = np.where(top[:, None] <= CUT_ROW, 0.0, low - top_m[:, None])
     off = np.maximum(np.maximum(short, top_m[:, None] - high), 0.0) / sd_m[:, None]
