@@ -10,7 +10,7 @@ from typing import Annotated
 import msgspec
 
 from schemas.array import Array
-from schemas.base import Count, Message, Name, Part, Scalar
+from schemas.base import Count, Finite, Message, Name, Part, Scalar
 from schemas.sensing import Unit
 
 
@@ -31,7 +31,7 @@ class Link(Part, kw_only=True, tag="link"):
     source: Name
     target: Name
     kind: Name = "at"
-    weight: float = 1.0
+    weight: Finite = 1.0
 
 
 class PlaceTile(Part, kw_only=True, tag="tile"):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from schemas.array import Array
-from schemas.base import Count, Message, Name, Part, Scalar
+from schemas.base import Count, Finite, Message, Name, Part, Scalar
 from schemas.graph import Node
 from schemas.sensing import Percept, Unit
 
@@ -17,7 +17,7 @@ class Task(Message, kw_only=True):
     attempt: Count
     cycle: Count
     base_version: Count
-    cell_m: float
+    cell_m: Finite
     nodes: list[Node]
     percepts: list[Percept]
     motions: Array
@@ -43,7 +43,7 @@ class Competition(Message, kw_only=True):
     """How one cycle's competition for consciousness went. `trigger` is empty where nothing was broadcast."""
 
     cycle: Count
-    contenders: dict[str, float]
+    contenders: dict[str, Finite]
     trigger: str = ""
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from schemas.base import Count, Message, Name
+from schemas.base import Count, Finite, Message, Name
 
 
 class Clock(Message, kw_only=True):
     """The time that messages are stamped in. `rate` is its speed against wall time, 0 in lockstep."""
 
-    rate: float = 1.0
+    rate: Finite = 1.0
 
 
 class Presence(Message, kw_only=True):
@@ -26,15 +26,15 @@ class Health(Message, kw_only=True):
     module: Name
     instance: Name
     ready: bool
-    uptime_s: float
+    uptime_s: Finite
     received: dict[str, Count]
     emitted: dict[str, Count]
     rejected: dict[str, Count]
     superseded: dict[str, Count]
     gaps: dict[str, Count]
     queued: Count
-    busy: float
-    compute_p50_ms: float
-    compute_p99_ms: float
-    memory_mb: float
+    busy: Finite
+    compute_p50_ms: Finite
+    compute_p99_ms: Finite
+    memory_mb: Finite
     notes: list[str] = []

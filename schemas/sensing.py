@@ -7,7 +7,7 @@ from typing import Annotated
 import msgspec
 
 from schemas.array import Array
-from schemas.base import Count, Message, Name, Part
+from schemas.base import Count, Finite, Message, Name, Part
 
 Unit = Annotated[float, msgspec.Meta(ge=0, le=1)]
 Metres = Annotated[float, msgspec.Meta(ge=0, le=1e6)]
@@ -28,10 +28,10 @@ class Calibration(Part, kw_only=True):
     cy_px: Metres
     baseline_m: Annotated[float, msgspec.Meta(gt=0, le=10)]
     mount_height_m: Metres
-    mount_forward_m: float = 0.0
-    right_rotation_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    left_distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
-    right_distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    mount_forward_m: Finite = 0.0
+    right_rotation_rad: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)
+    left_distortion: tuple[Finite, Finite, Finite, Finite, Finite] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    right_distortion: tuple[Finite, Finite, Finite, Finite, Finite] = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class StereoFrame(Message, kw_only=True):
@@ -46,8 +46,8 @@ class StereoFrame(Message, kw_only=True):
 class Odometry(Message, kw_only=True):
     """Wheel odometry over the `dt_s` that end at `stamp_ns`: noisy mean speeds of the robot."""
 
-    speed_m_s: float
-    turn_rate_rad_s: float
+    speed_m_s: Finite
+    turn_rate_rad_s: Finite
     dt_s: Annotated[float, msgspec.Meta(gt=0, le=10)]
 
 
@@ -88,7 +88,7 @@ class Percept(Part, kw_only=True):
 
     label: Name
     activation: Unit
-    bearing_rad: float
+    bearing_rad: Finite
     range_m: Annotated[float, msgspec.Meta(gt=0, le=1e4)]
     bearing_sd_rad: Annotated[float, msgspec.Meta(gt=0, le=7)]
     range_sd_m: Annotated[float, msgspec.Meta(gt=0, le=1e4)]
@@ -117,9 +117,9 @@ class MotorCommand(Message, kw_only=True):
 class Pose(Part, kw_only=True):
     """A pose in the plane, heading counter-clockwise from x."""
 
-    x_m: float
-    y_m: float
-    heading_rad: float
+    x_m: Finite
+    y_m: Finite
+    heading_rad: Finite
 
 
 class TruePose(Message, kw_only=True):
@@ -134,7 +134,7 @@ class Street(Part, kw_only=True):
     """A street's centre line, (x, y) in metres, and its width."""
 
     name: Name
-    line_m: list[tuple[float, float]]
+    line_m: list[tuple[Finite, Finite]]
     width_m: Metres
 
 

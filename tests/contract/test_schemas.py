@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import msgspec
 import pytest
 from damage import golden
+from msgspec.inspect import FloatType
 
 from bus.codec import decode, encode
 from schemas import topics
@@ -89,6 +91,24 @@ def test_a_row_of_the_table_makes_sense(topic: Topic) -> None:
     assert topic.max_bytes >= len(golden(topic))
     assert topic.delivery is not Delivery.ON_REQUEST or topic.rate_hz == 0
     assert (topic.about is About.TRUTH) == topic.name.startswith("truth/")
+
+
+def _floats(kind: object) -> Iterator[FloatType]:
+    """Every float type within a type."""
+    if isinstance(kind, FloatType):
+        yield kind
+    if isinstance(kind, msgspec.Struct):
+        for name in kind.__struct_fields__:
+            value = getattr(kind, name)
+            for part in value if isinstance(value, tuple) else [value]:
+                yield from _floats(part)
+
+
+@each_topic
+def test_every_float_is_bounded_which_keeps_nan_and_infinity_out(topic: Topic) -> None:
+    for kind in _floats(msgspec.inspect.type_info(topic.type)):
+        assert kind.ge is not None or kind.gt is not None
+        assert kind.le is not None or kind.lt is not None
 
 
 @each_topic
