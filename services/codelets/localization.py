@@ -109,7 +109,7 @@ def _correct(
     for _ in range(ROUNDS):
         moved = move(start, motions, rng)
         poses = np.vstack([poses, moved])
-        scores = np.append(scores, log_likelihood(moved, seen, config.outlier_share))
+        scores = np.append(scores, log_likelihood(moved, seen, config.outlier_share) / config.views_alike)
         kept = keep(scores, rng)
         if kept.sum() >= config.kept_samples:
             break
@@ -162,7 +162,8 @@ def locate_landmark(task: Task, config: Config) -> list[Operation]:
     squared = (off / percept.bearing_sd_rad) ** 2 + ((distance - percept.range_m) / percept.range_sd_m) ** 2
     misses = 0 if squared.min() < config.gate**2 else int(landmark.attributes.get("misses", 0)) + 1
     if misses == 0:
-        kept = refill(before[keep(-squared / 2, rng)], len(before), config.landmark_jitter_m, rng)
+        kept = before[keep(-squared / 2 / config.views_alike, rng)]
+        kept = refill(kept, len(before), config.landmark_jitter_m, rng)
     elif misses < config.misses:
         kept = before
     else:

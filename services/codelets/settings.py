@@ -11,12 +11,17 @@ Share = Annotated[float, msgspec.Meta(ge=0, le=1)]
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Numbers of samples, and what is believed of sightings. The noise of each sense comes with what it says."""
+    """Numbers of samples, and what is believed of sightings. The noise of each sense comes with what it says.
+
+    `views_alike`: so many views of a landmark on end err alike and count for one, about 4 s of driving by. The
+    paper takes each for independent (eq. 1); a landmark that is always seen a little too near then drags the agent.
+    """
 
     samples: Annotated[int, msgspec.Meta(ge=10, le=100_000)] = 800
     kept_samples: Annotated[int, msgspec.Meta(ge=1, le=10_000)] = 200
     landmark_samples: Annotated[int, msgspec.Meta(ge=10, le=10_000)] = 200
     outlier_share: Share = 1e-3
+    views_alike: Annotated[float, msgspec.Meta(ge=1, le=1000)] = 20.0
     largest_landmark_sd_m: Positive = 4.0
     landmark_jitter_m: Positive = 0.03
     gate: Positive = 4.0
