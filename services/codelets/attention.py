@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from schemas.base import Scalar
 from schemas.graph import Node
 from schemas.mind import Coalition, Coalitions, Task
 from services.codelets.settings import Config
@@ -20,8 +21,8 @@ def coalition_activation(content: list[Node], base_level: float) -> float:
 
 def attend(task: Task, config: Config) -> Coalitions:
     """What two attention codelets find: where the agent is among what it sees, and what is new to it."""
-    own = [_without_samples(node) for node in task.nodes if node.kind == "self"]
-    objects = [_without_samples(node) for node in task.nodes if node.kind == "object"]
+    own = [_copy(node) for node in task.nodes if node.kind == "self"]
+    objects = [_copy(node) for node in task.nodes if node.kind == "object"]
     novel = [_salient(node) for node in objects if int(node.attributes.get("sightings", 0)) <= NOVEL_SIGHTINGS]
     found = {"whereabouts": own + objects, "novelty": own + novel if novel else []}
     return Coalitions(
@@ -37,14 +38,15 @@ def attend(task: Task, config: Config) -> Coalitions:
     )
 
 
-def _without_samples(node: Node) -> Node:
+def _copy(node: Node, **more: Scalar) -> Node:
+    """The node with `more` attributes and without samples, which nobody needs to be conscious of."""
+    attributes = node.attributes | more
     return Node(
-        id=node.id, kind=node.kind, activation=node.activation, base_level=node.base_level, attributes=node.attributes
+        id=node.id, kind=node.kind, activation=node.activation, base_level=node.base_level, attributes=attributes
     )
 
 
 def _salient(node: Node) -> Node:
     """A new object is salient in proportion to how little it has been seen."""
     sightings = int(node.attributes.get("sightings", 0))
-    node.attributes = node.attributes | {"salience": 1.0 - sightings / (NOVEL_SIGHTINGS + 1)}
-    return node
+    return _copy(node, salience=1.0 - sightings / (NOVEL_SIGHTINGS + 1))

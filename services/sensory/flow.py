@@ -118,7 +118,8 @@ def _tracked_back(
     grey: Bytes, redrawn: Bytes, before: Floats, corners_px: Floats
 ) -> tuple[Matrix, npt.NDArray[np.bool_]]:
     """Where the corners were in the view before, (n, 2), and which were found."""
-    tracked, found, _ = cv2.calcOpticalFlowPyrLK(grey, redrawn, corners_px, None, winSize=(11, 11), maxLevel=3)
+    anywhere = np.zeros_like(corners_px)
+    tracked, found, _ = cv2.calcOpticalFlowPyrLK(grey, redrawn, corners_px, anywhere, winSize=(11, 11), maxLevel=3)
     at = tracked.reshape(1, -1, 2)
     before_px = cv2.remap(before, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[0]
     inside = np.all((before_px >= 0) & (before_px <= (grey.shape[1] - 1, grey.shape[0] - 1)), axis=1)

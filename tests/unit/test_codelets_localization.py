@@ -16,7 +16,7 @@ from services.codelets.module import Config
 from services.codelets.sampling import generator, keep, mean_pose, refill, spread, wrapped
 
 Samples = npt.NDArray[np.float64]
-EXACT = Config(samples=4000, kept_samples=2000, outlier_share=1e-9)
+EXACT = Config(samples=4000, kept_samples=2000, outlier_share=1e-9, views_alike=1.0)
 
 
 def _self(samples: Samples | None = None, **facts: float | str) -> Node:
@@ -204,7 +204,7 @@ def test_a_task_without_a_self_node_or_without_its_samples_is_refused() -> None:
             localize(task("localization", *nodes), Config())
 
 
-LANDMARK = Config(misses=3)
+LANDMARK = Config(misses=3, views_alike=1.0)
 
 
 def _landmark_task(landmark: Node, bearing_rad: float, range_m: float, number: int = 0) -> Task:
@@ -228,7 +228,7 @@ def test_a_landmarks_samples_become_the_exact_gaussian_posterior_of_eq_4() -> No
     prior, sensed = 1 / 1.0**2, 1 / 0.4**2
     samples = np.random.default_rng(6).normal((10.0, 0.0), (1.0, 0.01), (8000, 2))
     landmark = node("object:house", samples, label="house")
-    found = _moved(locate_landmark(_landmark_task(landmark, 0.0, 11.0), Config(landmark_jitter_m=1e-6)))
+    found = _moved(locate_landmark(_landmark_task(landmark, 0.0, 11.0), Config(landmark_jitter_m=1e-6, views_alike=1.0)))
     assert found.attributes["x_m"] == pytest.approx((prior * 10 + sensed * 11) / (prior + sensed), abs=0.03)
     assert found.attributes["x_sd_m"] == pytest.approx((prior + sensed) ** -0.5, rel=0.1)
 
