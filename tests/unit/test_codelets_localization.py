@@ -228,7 +228,8 @@ def test_a_landmarks_samples_become_the_exact_gaussian_posterior_of_eq_4() -> No
     prior, sensed = 1 / 1.0**2, 1 / 0.4**2
     samples = np.random.default_rng(6).normal((10.0, 0.0), (1.0, 0.01), (8000, 2))
     landmark = node("object:house", samples, label="house")
-    found = _moved(locate_landmark(_landmark_task(landmark, 0.0, 11.0), Config(landmark_jitter_m=1e-6, views_alike=1.0)))
+    config = Config(landmark_jitter_m=1e-6, views_alike=1.0)
+    found = _moved(locate_landmark(_landmark_task(landmark, 0.0, 11.0), config))
     assert found.attributes["x_m"] == pytest.approx((prior * 10 + sensed * 11) / (prior + sensed), abs=0.03)
     assert found.attributes["x_sd_m"] == pytest.approx((prior + sensed) ** -0.5, rel=0.1)
 
