@@ -20,14 +20,14 @@ from bus.shell import Shell
 from bus.zenoh_bus import ZenohBus
 from schemas import topics
 from schemas.array import Array
-from schemas.graph import Delta, Link, Node, Operation
+from schemas.graph import Delta, Links, Node, Operation
 from schemas.process import Clock
 from services.workspace.commit import Ledger
 
 REPLICAS = 3
 AGENT = "benchmark"
 RAW_KEY = "benchmark/raw"
-NODES, LINKS, SAMPLES = 50, 200, 400
+NODES, LINKS, SAMPLES = 50, 200, 730
 _spawn = multiprocessing.get_context("spawn")
 
 
@@ -49,7 +49,7 @@ class Race:
 
 
 def typical_operations() -> list[Operation]:
-    """50 nodes, 200 links and one cloud of samples: 31 KB, as the workspace commits them in a busy cycle."""
+    """50 nodes, 200 links and one cloud of samples: 31 KB in the operations that the workspace commits."""
     rng = np.random.default_rng(31)
     nodes: list[Operation] = [
         Node(
@@ -62,11 +62,11 @@ def typical_operations() -> list[Operation]:
         )
         for number in range(NODES)
     ]
-    links: list[Operation] = [
-        Link(source=f"object:building_{number % NODES}", target=f"place:{number}:{-number}", weight=0.5)
-        for number in range(LINKS)
-    ]
-    return [*nodes, *links]
+    weights = {
+        f"object:building_{number}": {f"place:{at}:{-at}": 0.5 for at in range(number, LINKS, NODES)}
+        for number in range(NODES)
+    }
+    return [*nodes, Links(weights=weights)]
 
 
 def _commit(race: Race) -> None:

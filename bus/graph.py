@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from copy import copy
 from dataclasses import dataclass, field
@@ -21,6 +22,7 @@ from schemas.graph import (
     DropLink,
     DropNode,
     Link,
+    Links,
     Node,
     Operation,
     PlaceTile,
@@ -30,7 +32,7 @@ from schemas.graph import (
 TILE_SIDE = 32
 COLUMNS = {"activation": 0.0, "road": 0.0, "traversable": 1.0}
 _PLACE = "place"
-LinkKey = tuple[str, str, str]
+Weights = dict[str, dict[str, float]]
 
 
 def place_id(i: int, j: int) -> str:
@@ -57,18 +59,22 @@ class Tile:
 
 
 class Graph:
-    """Nodes, links and place tiles at one version. Place nodes are made with their tile, `cell_m` apart."""
+    """Nodes, links and place tiles at one version. Place nodes are made with their tile, `cell_m` apart.
+
+    `links` holds weights by kind, source and target.
+    """
 
     def __init__(self, cell_m: float = 1.0) -> None:
         self.version = 0
         self.cycle = 0
         self.cell_m = cell_m
         self.nodes: dict[str, Node] = {}
-        self.links: dict[LinkKey, float] = {}
+        self.links: defaultdict[str, Weights] = defaultdict(dict)
         self.tiles: dict[tuple[int, int], Tile] = {}
         self._appliers: dict[type, Callable[[Any], None]] = {
             Node: self._put_node,
             Link: self._put_link,
+            Links: self._put_links,
             PlaceTile: self._put_tile,
             DropNode: self._drop_node,
             DropLink: self._drop_link,
@@ -94,14 +100,26 @@ class Graph:
         self.nodes[node.id] = node
 
     def _put_link(self, link: Link) -> None:
-        self.links[link.source, link.kind, link.target] = link.weight
+        self.links[link.kind].setdefault(link.source, {})[link.target] = link.weight
+
+    def _put_links(self, links: Links) -> None:
+        here = self.links[links.kind]
+        for source, weights in links.weights.items():
+            if source in here:
+                here[source].update(weights)
+            else:
+                here[source] = weights.copy()  # the message's own may be still to be sent
 
     def _drop_link(self, drop: DropLink) -> None:
-        self.links.pop((drop.source, drop.kind, drop.target), None)
+        self.links[drop.kind].get(drop.source, {}).pop(drop.target, None)
 
     def _drop_node(self, drop: DropNode) -> None:
-        if self.nodes.pop(drop.id, None) is not None:
-            self.links = {key: weight for key, weight in self.links.items() if drop.id not in (key[0], key[2])}
+        if self.nodes.pop(drop.id, None) is None:
+            return
+        for sources in self.links.values():
+            sources.pop(drop.id, None)
+            for weights in sources.values():
+                weights.pop(drop.id, None)
 
     def _put_activations(self, activations: Activations) -> None:
         ids, values, base_levels = activations.ids, activations.values.numpy(), activations.base_levels.numpy()
@@ -162,8 +180,16 @@ class Graph:
             version=self.version,
             cycle=self.cycle,
             nodes=[self.nodes[identifier] for identifier in sorted(self.nodes)],
-            links=[Link(source=s, kind=k, target=t, weight=self.links[s, k, t]) for s, k, t in sorted(self.links)],
+            links=[Link(source=s, kind=k, target=t, weight=weight) for s, k, t, weight in self._sorted_links()],
             tiles=[self._tile_message(x, y) for x, y in sorted(self.tiles)],
+        )
+
+    def _sorted_links(self) -> list[tuple[str, str, str, float]]:
+        return sorted(
+            (source, kind, target, weight)
+            for kind, sources in self.links.items()
+            for source, weights in sources.items()
+            for target, weight in weights.items()
         )
 
     def _tile_message(self, x: int, y: int) -> PlaceTile:
@@ -172,7 +198,8 @@ class Graph:
 
     def load(self, snapshot: Snapshot) -> None:
         """Put `snapshot` in place of everything."""
-        self.nodes, self.links, self.tiles = {}, {}, {}
+        self.nodes, self.tiles = {}, {}
+        self.links.clear()
         self.change([*snapshot.nodes, *snapshot.links, *snapshot.tiles])
         self.version, self.cycle = snapshot.version, snapshot.cycle
 

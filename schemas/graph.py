@@ -34,6 +34,13 @@ class Link(Part, kw_only=True, tag="link"):
     weight: Finite = 1.0
 
 
+class Links(Part, kw_only=True, tag="links"):
+    """Many links of one kind: weights by source, then target. They join the links that there are."""
+
+    kind: Name = "at"
+    weights: dict[Name, dict[Name, Finite]]
+
+
 class PlaceTile(Part, kw_only=True, tag="tile"):
     """A square of place nodes in bulk: `side` x `side` cells of `cell_m`, row-major from (`x`, `y`) in tiles.
 
@@ -80,7 +87,7 @@ class Cells(Part, kw_only=True, tag="cells"):
     values: Array
 
 
-Operation = Node | Link | PlaceTile | DropNode | DropLink | Activations | Cells
+Operation = Node | Link | Links | PlaceTile | DropNode | DropLink | Activations | Cells
 
 
 class Proposal(Message, kw_only=True):

@@ -66,6 +66,7 @@ def _operations() -> list[graph.Operation]:
         _node(),
         graph.Link(source="self", target="place:3:-4", kind="at", weight=0.75),
         _tile(),
+        graph.Links(kind="instance", weights={"percept:07": {"building-07": 1.0, "building-08": 0.25}}),
         graph.DropNode(id="building-03"),
         graph.DropLink(source="self", target="place:2:-4", kind="at"),
         graph.Activations(ids=["self", "building-07"], values=_ramp(2, dtype="<f4"), base_levels=_ramp(2, dtype="<f4")),

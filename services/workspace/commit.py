@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from bus.errors import MessageError
 from bus.graph import COLUMNS, Graph, place_cell
-from schemas.graph import Cells, Delta, DropLink, DropNode, Link, Node, Operation, Proposal, Snapshot
+from schemas.graph import Cells, Delta, DropLink, DropNode, Link, Links, Node, Operation, Proposal, Snapshot
 
 MAX_SAMPLES = 100_000
-WRITABLE = (Node, Link, DropLink, Cells, DropNode)
+WRITABLE = (Node, Link, Links, DropLink, Cells, DropNode)
 SELF = "self"
 POSE = ("x_m", "y_m", "heading_rad", "stamp_ns")
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from bus.graph import Graph
 from schemas.array import Array
-from schemas.graph import Link, Node, Operation
+from schemas.graph import Links, Node, Operation
 from schemas.mind import Task
 from schemas.sensing import Percept, Percepts
 from services.workspace.dispatch import NOBODY
@@ -40,7 +40,8 @@ def first_self(samples: int) -> Node:
 
 def percept_operations(graph: Graph, percepts: Percepts) -> list[Operation]:
     """The PAM nodes over threshold, entering the workspace, each linked to the object that it is an instance of."""
-    operations: list[Operation] = []
+    nodes: list[Operation] = []
+    weights = {}
     for percept in percepts.objects:
         node = Node(
             id=f"percept:{percept.label}",
@@ -48,10 +49,10 @@ def percept_operations(graph: Graph, percepts: Percepts) -> list[Operation]:
             activation=percept.activation,
             attributes={"label": percept.label, "bearing_rad": percept.bearing_rad, "range_m": percept.range_m},
         )
-        operations.append(node)
+        nodes.append(node)
         if object_id(percept.label) in graph.nodes:
-            operations.append(Link(source=node.id, target=object_id(percept.label), kind="instance"))
-    return operations
+            weights[node.id] = {object_id(percept.label): 1.0}
+    return [*nodes, Links(kind="instance", weights=weights)] if weights else nodes
 
 
 def tasks_for(phase: str, scene: Scene, graph: Graph) -> list[Task]:

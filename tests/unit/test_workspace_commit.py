@@ -152,7 +152,7 @@ def test_a_forgotten_node_takes_its_links_with_it() -> None:
     graph.change([node("a"), node("b"), Link(source="a", target="b"), Link(source="b", target="a"), _cells()])
     graph.change([Link(source="b", target="place:0:0"), DropNode(id="a")])
     assert list(graph.nodes) == ["b"]
-    assert list(graph.links) == [("b", "at", "place:0:0")]
+    assert graph.snapshot().links == [Link(source="b", target="place:0:0")]
 
 
 def test_the_ledger_keeps_the_nodes_of_a_commit_as_they_were_said() -> None:

@@ -133,9 +133,9 @@ def test_a_known_object_is_located_and_an_unknown_one_is_placed() -> None:
 def test_a_percept_becomes_a_node_linked_to_the_object_that_it_is_an_instance_of() -> None:
     desk = Desk("w1")
     desk.drive(range(1), percept("a"))
-    assert ("percept:a", "instance", "object:a") not in desk.graph.links
+    assert "instance" not in desk.graph.links
     desk.drive(range(1, 2), percept("a"))
-    assert desk.graph.links["percept:a", "instance", "object:a"] == 1.0
+    assert desk.graph.links["instance"] == {"percept:a": {"object:a": 1.0}}
 
 
 def test_tasks_carry_all_that_a_worker_needs() -> None:
