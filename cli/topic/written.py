@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 from typing import Any
 
@@ -31,14 +32,10 @@ def parse(topic: Topic, text: str) -> Message:
 
 
 def _read(text: str) -> Any:
-    try:
+    with contextlib.suppress(msgspec.DecodeError):
         return msgspec.json.decode(text)
-    except msgspec.DecodeError as error:
-        reason = str(error)
     try:
         return msgspec.yaml.decode(text)
-    except ImportError:
-        raise UsageError(f"{text!r} is not JSON ({reason}), and reading YAML needs PyYAML: write JSON") from None
     except msgspec.DecodeError as error:
         raise UsageError(f"{text!r} is neither JSON nor YAML: {' '.join(str(error).split())}") from None
 

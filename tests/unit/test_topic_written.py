@@ -88,3 +88,13 @@ def test_echo_prints_a_line_of_csv_a_message() -> None:
 
 def test_echo_leaves_the_numbers_of_arrays_out_where_asked() -> None:
     assert "motions: '<array type: <f8[4, 3]>'" in shower(None, False, True, "text")(BY_TOPIC[topics.SELF_MOTION])
+
+
+def test_a_message_may_be_written_as_yaml_as_for_ros2_topic_pub() -> None:
+    message = parse(topics.MOTOR_COMMAND, "{left_wheel_rad_s: 1.5, right_wheel_rad_s: -2}")
+    assert message == MotorCommand(left_wheel_rad_s=1.5, right_wheel_rad_s=-2.0)
+
+
+def test_what_is_neither_json_nor_yaml_is_named() -> None:
+    with pytest.raises(UsageError, match="neither JSON nor YAML"):
+        parse(topics.MOTOR_COMMAND, "{left_wheel_rad_s: [")
