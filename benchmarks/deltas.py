@@ -13,6 +13,7 @@ import numpy as np
 import zenoh
 
 from bus.codec import encode
+from bus.errors import CogmapError
 from bus.module import Module
 from bus.replica import Replica, snapshot_over
 from bus.session import open_client, open_router
@@ -26,6 +27,7 @@ from services.workspace.commit import Ledger
 
 REPLICAS = 3
 AGENT = "benchmark"
+PATIENCE_S = 60.0
 RAW_KEY = "benchmark/raw"
 NODES, LINKS, SAMPLES = 50, 200, 730
 _spawn = multiprocessing.get_context("spawn")
@@ -130,8 +132,13 @@ def _receive(race: Race) -> None:
     race.ready.release()
     everything.wait()
     race.done.release()
-    subscriber.undeclare()
+    subscriber.undeclare()  # type: ignore[no-untyped-call]
     session.close()  # type: ignore[no-untyped-call]
+
+
+def _wait(semaphore: multiprocessing.synchronize.Semaphore) -> None:
+    if not semaphore.acquire(timeout=PATIENCE_S):
+        raise CogmapError(f"no word from a process of the benchmark within {PATIENCE_S:g} s: see what it printed")
 
 
 def _rate(endpoint: str, number: int, publish: Callable[[Race], None], follow: Callable[[Race], None]) -> float:
@@ -142,11 +149,11 @@ def _rate(endpoint: str, number: int, publish: Callable[[Race], None], follow: C
     for process in processes:
         process.start()
     for _ in processes:
-        race.ready.acquire()
+        _wait(race.ready)
     began_s = time.monotonic()
     race.go.set()
     for _ in range(REPLICAS):
-        race.done.acquire()
+        _wait(race.done)
     took_s = time.monotonic() - began_s
     race.end.set()
     for process in processes:
@@ -159,7 +166,7 @@ def measure(endpoint: str, number: int, pairs: int, tell: Callable[[str], None])
     router = open_router(endpoint)
     ours, raw = [], []
     for pair in range(pairs):
-        tell(f"pair {pair + 1} of {pairs}")
+        tell(f"deltas and raw puts, pair {pair + 1} of {pairs}")
         raw.append(_rate(endpoint, number, _put, _receive))
         ours.append(_rate(endpoint, number, _commit, _replicate))
     router.close()  # type: ignore[no-untyped-call]
@@ -169,5 +176,3 @@ def measure(endpoint: str, number: int, pairs: int, tell: Callable[[str], None])
         "raw_put_rate_hz": median(raw),
         "delta_bytes": float(len(encode(Ledger(1.0).commit(0, 1, "objects", typical_operations())))),
     }
-
-
