@@ -44,7 +44,10 @@ def place_cell(identifier: str) -> tuple[int, int] | None:
     """The grid cell of a place node's name; None for any other node's."""
     kind, _, cell = identifier.partition(":")
     i, _, j = cell.partition(":")
-    return (int(i), int(j)) if kind == _PLACE and j else None
+    try:
+        return (int(i), int(j)) if kind == _PLACE else None
+    except ValueError:
+        return None
 
 
 @dataclass

@@ -102,7 +102,10 @@ class Proposal(Message, kw_only=True):
 
 
 class Delta(Message, kw_only=True):
-    """A numbered commit. `version` follows the one before by 1; `tasks` are those whose proposals are in it."""
+    """A numbered commit. `version` follows the one before by 1; `tasks` are those whose proposals are in it.
+
+    `dropped` counts the answers since the delta before that are in none, and `refused` says why, of the first few.
+    """
 
     version: Count
     cycle: Count
@@ -110,6 +113,7 @@ class Delta(Message, kw_only=True):
     tasks: list[str]
     operations: list[Operation]
     dropped: Count = 0
+    refused: list[str] = []
 
 
 class Snapshot(Message, kw_only=True):

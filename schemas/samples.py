@@ -110,7 +110,13 @@ def _mind() -> list[Message]:
             failure="too few samples",
         ),
         graph.Delta(
-            version=42, cycle=6, phase="collect", tasks=["6:localization"], operations=_operations(), dropped=1
+            version=42,
+            cycle=6,
+            phase="collect",
+            tasks=["6:localization"],
+            operations=_operations(),
+            dropped=1,
+            refused=["proposal 6:landmark failed: too few samples"],
         ),
         graph.Snapshot(
             version=42, cycle=6, nodes=[_node()], links=[graph.Link(source="self", target="a")], tiles=[_tile()]

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from bus.errors import MessageError
-from bus.graph import COLUMNS, Graph, place_cell
+from bus.graph import COLUMNS, TILE_SIDE, Graph, place_cell
 from schemas.graph import Cells, Delta, DropLink, DropNode, Link, Links, Node, Operation, Proposal, Snapshot
 
 MAX_SAMPLES = 100_000
+MAX_CELLS = 2**16
+MAX_TILES = 1024
+FARTHEST_CELL = 2**20
+TOLD = 8
+TOLD_CHARACTERS = 200
 WRITABLE = (Node, Link, Links, DropLink, Cells, DropNode)
 SELF = "self"
 POSE = ("x_m", "y_m", "heading_rad", "stamp_ns")
@@ -22,7 +29,8 @@ class Ledger:
 
     def __init__(self, cell_m: float) -> None:
         self.graph = Graph(cell_m)
-        self.dropped = 0
+        self._dropped = 0
+        self._refused: list[str] = []
         self._written: dict[str, int] = {}
 
     def restore(self, past: Snapshot | Delta) -> None:
@@ -35,8 +43,9 @@ class Ledger:
     def commit(
         self, stamp_ns: int, cycle: int, phase: str, operations: list[Operation], tasks: list[str] | None = None
     ) -> Delta:
-        """Number `operations`, carry them out, and return the delta; it tells how many proposals were dropped."""
-        dropped, self.dropped = self.dropped, 0
+        """Number `operations`, carry them out, and return the delta; it tells how many answers were dropped, and why."""
+        dropped, self._dropped = self._dropped, 0
+        refused, self._refused = self._refused, []
         delta = Delta(
             stamp_ns=stamp_ns,
             version=self.graph.version + 1,
@@ -45,24 +54,31 @@ class Ledger:
             tasks=tasks or [],
             operations=operations,
             dropped=dropped,
+            refused=refused,
         )
         self.graph.apply(delta)
         self._note(delta)
         return delta
 
     def judge(self, proposals: list[Proposal]) -> tuple[list[Operation], list[str]]:
-        """Operations and task ids of the proposals that hold, in order; the next delta counts those that do not."""
+        """Operations and task ids of the proposals that hold, in order; the next delta tells of those that do not."""
         operations: list[Operation] = []
         tasks: list[str] = []
         for proposal in proposals:
             try:
                 self.check(proposal)
-            except MessageError:
-                self.dropped += 1
+            except MessageError as error:
+                self.drop(str(error))
             else:
                 operations.extend(proposal.operations)
                 tasks.append(proposal.task_id)
         return operations, tasks
+
+    def drop(self, reason: str) -> None:
+        """Have the next delta count an answer that is in none, and say why if it is one of the first."""
+        self._dropped += 1
+        if len(self._refused) < TOLD:
+            self._refused.append(reason[:TOLD_CHARACTERS])
 
     def check(self, proposal: Proposal) -> None:
         """Raise MessageError where `proposal` does not hold, saying why."""
@@ -88,17 +104,30 @@ class Ledger:
         if isinstance(operation, Node | DropNode) and place_cell(operation.id) is not None:
             raise MessageError(f"{name}: place nodes are written as cells")
         if isinstance(operation, Cells):
-            number = operation.values.shape
-            if operation.cells.shape != (*number, 2) or operation.cells.dtype != "<i4":
-                raise MessageError(f"{name}: cells of shape {operation.cells.shape} with {number} values")
-            if operation.column not in COLUMNS:
-                raise MessageError(f"{name}: place nodes have no column {operation.column!r}")
+            _check_cells(name, operation)
 
     def _note(self, delta: Delta) -> None:
         for operation in delta.operations:
             node = written(operation)
             if node is not None:
                 self._written[node] = delta.version
+
+
+def _check_cells(name: str, operation: Cells) -> None:
+    """Place nodes come into being by the tile, so their number and how far they lie apart are bounded."""
+    cells, values = operation.cells, operation.values
+    number = len(cells.shape) and cells.shape[0]
+    if (cells.shape, cells.dtype) != ((number, 2), "<i4") or (values.shape, values.dtype) != ((number,), "<f4"):
+        raise MessageError(f"{name}: cells of shape {cells.shape} with {values.shape} values, or of another dtype")
+    if operation.column not in COLUMNS:
+        raise MessageError(f"{name}: place nodes have no column {operation.column!r}")
+    if number > MAX_CELLS:
+        raise MessageError(f"{name}: {number} cells, at most {MAX_CELLS} are taken at once")
+    where = np.asarray(cells.numpy(), np.int64)
+    if number and np.abs(where).max() > FARTHEST_CELL:
+        raise MessageError(f"{name}: a cell {np.abs(where).max()} cells away, the farthest is {FARTHEST_CELL}")
+    if number > MAX_TILES and (tiles := len(np.unique(where // TILE_SIDE, axis=0))) > MAX_TILES:
+        raise MessageError(f"{name}: cells in {tiles} tiles, at most {MAX_TILES} are taken at once")
 
 
 def _check_self(name: str, operation: Operation) -> None:

@@ -60,6 +60,13 @@ SENSELESS: dict[str, Operation] = {
     "cells of shape (1, 3)": _cells(where=((0, 0, 0),)),
     "cells of shape (1, 2) with (2,) values": _cells(number=2),
     "cells of shape (2,)": _cells(where=(0, 0)),
+    "cells of shape (1, 1, 2) with (1, 1) values": Cells(
+        column="road", cells=Array.of([[[0, 0]]], "<i4"), values=Array.of(np.ones((1, 1), np.float32))
+    ),
+    "at most 65536 are taken": _cells(where=np.zeros((2**16 + 1, 2)), number=2**16 + 1),
+    "a cell 1048577 cells away": _cells(where=((0, -(2**20) - 1),)),
+    "a cell 2147483648 cells away": _cells(where=((-(2**31), 0),)),
+    "cells in 1025 tiles": _cells(where=[(TILE_SIDE * tile, 0) for tile in range(1025)], number=1025),
     "place nodes have no column 'colour'": _cells(column="colour"),
     "the self node is never forgotten": DropNode(id="self"),
     "self without stamp_ns": node("self", np.zeros((4, 3)), x_m=0.0, y_m=0.0, heading_rad=0.0),
@@ -78,7 +85,9 @@ def test_a_senseless_proposal_is_refused_with_a_reason_and_the_next_delta_counts
     before = ledger.graph.digest()
     assert ledger.judge([proposal]) == ([], [])
     assert ledger.graph.digest() == before
-    assert [ledger.commit(0, 2, "decay", []).dropped for _ in range(2)] == [1, 0]
+    told, later = (ledger.commit(0, 2, "decay", []) for _ in range(2))
+    assert (told.dropped, later.dropped, later.refused) == (1, 0, [])
+    assert [sentence for sentence in told.refused if reason in sentence]
 
 
 def test_a_cell_array_of_another_kind_of_number_is_refused() -> None:
@@ -89,7 +98,21 @@ def test_a_cell_array_of_another_kind_of_number_is_refused() -> None:
 def test_a_proposal_that_tells_of_a_failure_is_dropped_whatever_else_it_holds() -> None:
     ledger = _ledger()
     assert ledger.judge([_proposal(node("new"), failure="too few samples")]) == ([], [])
-    assert ledger.dropped == 1
+    assert ledger.commit(0, 2, "decay", []).refused == ["proposal 1/object_place failed: too few samples"]
+
+
+def test_reasons_are_told_of_the_first_few_and_in_short_and_the_rest_is_counted() -> None:
+    ledger = _ledger()
+    ledger.judge([_proposal(failure=f"{number}" + "x" * 10_000) for number in range(100)])
+    delta = ledger.commit(0, 2, "decay", [])
+    assert delta.dropped == 100
+    assert [sentence[len("proposal 1/object_place failed: ")] for sentence in delta.refused] == list("01234567")
+    assert max(map(len, delta.refused)) == 200
+
+
+@pytest.mark.parametrize("name", ["place:here:there", "place:1:", "place::", "place:1"])
+def test_a_node_that_is_only_called_like_a_place_is_a_node_like_any_other(name: str) -> None:
+    _ledger().check(_proposal(node(name)))
 
 
 def test_a_proposal_on_a_version_that_is_not_committed_yet_is_refused() -> None:
