@@ -74,7 +74,7 @@ class Workspace:
         Where it does not, it is dropped, and the next delta counts it.
         """
         if self._dispatch.answer(proposal):
-            return self._go_on() if self._dispatch.complete else []
+            return self._go_on_if_complete([])
         if proposal.task_id not in self._late:
             return []
         del self._late[proposal.task_id]
@@ -84,11 +84,11 @@ class Workspace:
         cycle = self._ledger.graph.cycle
         return [self._ledger.commit(proposal.stamp_ns, cycle, "late", operations, tasks)]
 
-    def on_presence(self, presence: Presence) -> list[Task]:
-        """A worker came or went."""
+    def on_presence(self, presence: Presence) -> list[Message]:
+        """A worker came or went; the cycle goes on without a task that too many have been lost with."""
         if presence.module != WORKERS:
             return []
-        return self._dispatch.presence(presence.instance, presence.alive, self._now_ns)
+        return self._go_on_if_complete(self._dispatch.presence(presence.instance, presence.alive, self._now_ns))
 
     def on_clock(self, clock: Clock) -> list[Message]:
         """In real time, take back what a lease has ended for, and end a cycle at its deadline."""
@@ -97,7 +97,7 @@ class Workspace:
             return []
         if self._now_ns > self._scene.percepts.stamp_ns + self._config.deadline_ms * 1e6:
             return self._end_at_deadline()
-        return [*self._dispatch.expire(self._now_ns)]
+        return self._go_on_if_complete(self._dispatch.expire(self._now_ns))
 
     @property
     def _moved_until_ns(self) -> int:
@@ -142,10 +142,15 @@ class Workspace:
         tasks = tasks_for(PHASES[self._phase], self._scene, self._ledger.graph)
         return [*self._dispatch.begin(tasks, self._now_ns)]
 
-    def _go_on(self) -> list[Message]:
+    def _go_on_if_complete(self, tasks: list[Task]) -> list[Message]:
+        """`tasks` to be sent, or the next phase where nothing is left to wait for in this one."""
+        if self._scene is None or not self._dispatch.complete:
+            return [*tasks]
         return [*self._commit_answers(), *self._next_phase()]
 
     def _commit_answers(self) -> list[Message]:
+        for name in self._dispatch.failed:
+            self._ledger.drop(f"task {name} was given to {self._config.attempts} workers and lost each time")
         answers, unanswered = self._dispatch.collect()
         self._late |= {task.task_id: None for task in unanswered}
         while len(self._late) > 256:

@@ -70,14 +70,22 @@ class Dispatch:
 
     @property
     def complete(self) -> bool:
-        """Whether every task is answered."""
-        return all(lease.proposal is not None for lease in self._leases.values())
+        """Whether every task is answered, or given up."""
+        return all(lease.proposal is not None or self._has_failed(lease) for lease in self._leases.values())
+
+    @property
+    def failed(self) -> list[str]:
+        """The tasks that are given up: handed out as often as is allowed, and lost each time."""
+        return [name for name, lease in self._leases.items() if self._has_failed(lease)]
 
     def collect(self) -> tuple[list[Proposal], list[Task]]:
         """The answers, in the order of the tasks, and the tasks without one; all are done with now."""
         leases, self._leases = self._leases, {}
         answers = [lease.proposal for lease in leases.values() if lease.proposal is not None]
         return answers, [lease.task for lease in leases.values() if lease.proposal is None]
+
+    def _has_failed(self, lease: Lease) -> bool:
+        return lease.proposal is None and lease.task.worker == NOBODY and lease.task.attempt >= self._attempts
 
     def _take_back(self, lost: Callable[[Lease], bool]) -> None:
         for lease in self._leases.values():
@@ -90,7 +98,7 @@ class Dispatch:
         sent = []
         for lease in self._leases.values():
             waits = lease.proposal is None and lease.task.worker == NOBODY
-            if not waits or not self._workers or lease.task.attempt >= self._attempts:
+            if not waits or not self._workers or self._has_failed(lease):
                 continue
             worker = min(self._workers, key=lambda name: (name == lease.lost_by, load[name], name))
             load[worker] += 1

@@ -116,13 +116,30 @@ def test_a_task_that_nobody_has_is_given_to_the_first_worker_however_long_it_has
     assert [(asked.worker, asked.attempt) for asked in desk.take()] == [("w1", 0)]
 
 
-def test_a_task_is_given_out_only_so_often() -> None:
+def test_a_task_that_is_lost_as_often_as_it_may_be_given_out_is_given_up_and_the_cycle_goes_on() -> None:
     desk = Desk("w1", "w2", mode="real_time", lease_ms=10.0, deadline_ms=10_000.0, attempts=3)
     desk.clock(stamp_ns(0))
     desk.see(0)
-    for ms in range(11, 200, 11):
+    for ms in (11, 22, 33):
         desk.clock(stamp_ns(0) + ms * MS)
-    assert [asked.attempt for asked in desk.tasks] == [0, 1, 2]
+    *localization, road = desk.take()
+    assert [(asked.codelet, asked.attempt) for asked in localization] == [("localization", n) for n in range(3)]
+    assert (road.codelet, road.attempt) == ("road_place", 0)
+
+
+def test_in_lockstep_a_task_that_kills_every_worker_is_given_up_and_told_of() -> None:
+    desk = Desk(attempts=3)
+    desk.see(0)
+    for number in range(3):
+        assert not any(delta.phase == "decay" for delta in desk.deltas)
+        desk.presence(f"w{number}")
+        desk.presence(f"w{number}", alive=False)
+    desk.presence("steady")
+    desk.work()
+    assert desk.deltas[-1].phase == "decay"
+    assert [delta.refused for delta in desk.deltas if delta.dropped] == [
+        ["task 1/localization was given to 3 workers and lost each time"]
+    ]
 
 
 def test_in_lockstep_neither_lease_nor_deadline_ends() -> None:
