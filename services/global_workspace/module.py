@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass
 
+from bus.errors import MessageError
 from bus.module import Module
 from schemas import topics
 from schemas.base import Message
@@ -12,6 +14,8 @@ from schemas.mind import Broadcast, Coalition, Coalitions, Competition
 from services.global_workspace.settings import Config
 
 __all__ = ["Config", "GlobalWorkspace", "build"]
+
+REMEMBERED_CYCLES = 64
 
 
 @dataclass
@@ -31,9 +35,17 @@ class GlobalWorkspace:
         self._stamp_ns = 0
         self._broadcast_ns: int | None = None
         self._new_ns = 0
+        self._had: deque[tuple[int, int]] = deque(maxlen=REMEMBERED_CYCLES)
 
     def compete(self, coalitions: Coalitions) -> list[Message]:
-        """Take in a cycle's coalitions; a competition is always reported, a broadcast where a trigger fires."""
+        """Take in a cycle's coalitions; a competition is always reported, a broadcast where a trigger fires.
+
+        Raises MessageError where they came before: a task that one worker lost is answered by two.
+        """
+        which = (coalitions.cycle, coalitions.stamp_ns)
+        if which in self._had:
+            raise MessageError(f"the coalitions of cycle {coalitions.cycle} came twice")
+        self._had.append(which)
         self._decay(max(0, coalitions.stamp_ns - self._stamp_ns))
         self._stamp_ns = max(self._stamp_ns, coalitions.stamp_ns)
         for coalition in coalitions.coalitions:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import pytest
 
+from bus.errors import MessageError
 from bus.module import Module
 from schemas.mind import Broadcast, Coalition, Coalitions, Competition
 from services.global_workspace.module import Config, build
@@ -140,3 +141,13 @@ def test_coalitions_of_an_earlier_time_turn_no_clock_back() -> None:
     arena.compete(100, a=0.9)
     assert arena.trigger(60, b=0.9) == ""
     assert arena.trigger(140) == "one coalition over threshold"
+
+
+def test_the_coalitions_of_a_cycle_compete_once_whoever_sends_them_and_those_of_a_new_start_are_new() -> None:
+    module = build(Config(), "global_workspace")
+    first = Coalitions(stamp_ns=5, cycle=7, coalitions=[])
+    assert module.feed(first)
+    assert module.feed(Coalitions(stamp_ns=6, cycle=8, coalitions=[]))
+    with pytest.raises(MessageError, match="cycle 7 came twice"):
+        module.feed(first)
+    assert module.feed(Coalitions(stamp_ns=1000, cycle=7, coalitions=[]))
