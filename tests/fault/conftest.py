@@ -1,0 +1,27 @@
+"""A system of processes for each test, with nothing left of it afterwards."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from live import Feeder, System, Witness, working
+
+
+@pytest.fixture
+def system(tmp_path: Path) -> Iterator[System]:
+    system = System(tmp_path)
+    yield system
+    system.close()
+
+
+@pytest.fixture
+def mind(request: pytest.FixtureRequest, system: System) -> Iterator[tuple[System, Feeder, Witness]]:
+    """The workspace and two workers, with the settings in the fixture's parameter, fed and followed."""
+    system.router()
+    system.modules("workspace", "codelets-1", "codelets-2", settings=getattr(request, "param", ()))
+    feeder, witness = Feeder(system.bus()), Witness(system.bus())
+    with working(witness.shell), working(feeder.shell):
+        witness.goes_on(3)
+        yield system, feeder, witness

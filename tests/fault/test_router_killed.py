@@ -1,0 +1,26 @@
+"""The router dies and comes back: what was said meanwhile arrives, and the mind goes on."""
+
+from __future__ import annotations
+
+import signal
+
+from live import Feeder, System, Witness, wait_until
+
+
+def test_every_delta_arrives_in_order_though_the_router_was_killed_and_the_cycle_goes_on(
+    mind: tuple[System, Feeder, Witness],
+) -> None:
+    system, feeder, witness = mind
+    last, views = witness.versions[-1], feeder.views
+    system.processes["router"].end(signal.SIGKILL)
+    wait_until(lambda: feeder.views >= views + 5, "views go on without a router")
+    system.router()
+    wait_until(lambda: witness.versions[-1] > last, "deltas arrive again")
+    witness.goes_on(5)
+    feeder.pause()
+    witness.agrees()
+    first = witness.versions[0]
+    assert witness.versions == list(range(first, first + len(witness.versions)))
+    assert witness.replica.mended == (first > 1)
+    assert not witness.shell.intake.gaps
+    assert all(process.is_alive for process in system.processes.values())

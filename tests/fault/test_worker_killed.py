@@ -1,0 +1,40 @@
+"""A worker dies with a task in hand: another does it, and it is committed once."""
+
+from __future__ import annotations
+
+import signal
+from collections import Counter
+
+import pytest
+from live import Feeder, System, Witness, wait_until, working
+
+from bus.module import Module
+from bus.shell import Shell
+from schemas import topics
+from schemas.mind import Task
+
+PATIENT = ("workspace.deadline_ms=20000", "workspace.lease_ms=20000")
+STOPPED, OTHER = "codelets-1", "codelets-2"
+
+
+@pytest.mark.parametrize("mind", [PATIENT], indirect=True, ids=["only its death takes back what it holds"])
+def test_the_task_of_a_worker_killed_amid_it_is_done_by_another_and_committed_once(
+    mind: tuple[System, Feeder, Witness],
+) -> None:
+    system, feeder, witness = mind
+    tasks: list[Task] = []
+    looking = Shell(Module("looking").on(topics.TASK, tasks.append), system.bus())
+    with working(looking):
+        wait_until(lambda: any(task.worker == STOPPED for task in tasks), f"{STOPPED} is given tasks")
+        system.processes[STOPPED].send(signal.SIGSTOP)
+        given = len(tasks)
+        wait_until(lambda: any(task.worker == STOPPED for task in tasks[given:]), f"{STOPPED} holds a task")
+        held = next(task for task in tasks[given:] if task.worker == STOPPED)
+        system.processes[STOPPED].end(signal.SIGKILL)
+        wait_until(lambda: held.task_id in witness.tasks_done, f"{held.task_id} is committed")
+        witness.goes_on(5)
+        feeder.pause()
+        witness.agrees()
+    again = [task for task in tasks if task.task_id == held.task_id]
+    assert [(task.worker, task.attempt) for task in again] == [(STOPPED, 0), (OTHER, 1)]
+    assert max(Counter(witness.tasks_done).values()) == 1
