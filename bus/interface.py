@@ -21,6 +21,7 @@ class Arrival:
 
 
 Job = Callable[[], None]
+CACHED_MESSAGES = 1024
 
 
 @dataclass(frozen=True, order=True)
@@ -40,8 +41,13 @@ class Bus(Protocol):
     def declare(self, topic: Topic) -> None:
         """Prepare to publish on `topic`."""
 
-    def subscribe(self, topic: Topic, deliver: Callable[[Arrival], None], on_gap: Callable[[str, int], None]) -> None:
-        """Hand every message of `topic` to `deliver`; `on_gap` is told (topic name, how many) where some are lost."""
+    def subscribe(
+        self, topic: Topic, deliver: Callable[[Arrival], None], on_gap: Callable[[str, int], None], history: int = 0
+    ) -> None:
+        """Hand every message of `topic` to `deliver`; `on_gap` is told (topic name, how many) where some are lost.
+
+        Of a NEVER_DROP topic, up to `history` messages that each publisher still there said before come first.
+        """
 
     def answer(self, topic: Topic, handler: Callable[[bytes], bytes], enqueue: Callable[[Job], None]) -> None:
         """Answer queries on `topic`; an exception in `handler` goes back as an error.

@@ -60,6 +60,11 @@ class Journal:
         self._size += len(record)
 
     @property
+    def is_empty(self) -> bool:
+        """Whether there was nothing to read, and nothing has been written."""
+        return self._size == 0
+
+    @property
     def is_long(self) -> bool:
         """Whether it is time to put one message in place of all."""
         return self._size > self._limit

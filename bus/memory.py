@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 
 from bus.codec import Envelope
 from bus.errors import NoAnswerError
-from bus.interface import Arrival, Job, Member
-from schemas.topics import Topic
+from bus.interface import CACHED_MESSAGES, Arrival, Job, Member
+from schemas.topics import Delivery, Topic
 
 _Subscriber = tuple[Callable[[Arrival], None], Callable[[str, int], None]]
 
@@ -19,6 +20,7 @@ class MemoryNetwork:
         self.subscribers: dict[Topic, list[_Subscriber]] = {}
         self.answers: dict[Topic, Callable[[bytes], bytes]] = {}
         self.members: dict[Member, MemoryBus] = {}
+        self.buses: list[MemoryBus] = []
         self.watchers: list[Callable[[Member, bool], None]] = []
 
     def change(self, member: Member, bus: MemoryBus | None) -> None:
@@ -36,18 +38,29 @@ class MemoryBus:
 
     def __init__(self, network: MemoryNetwork) -> None:
         self._network = network
+        self.said: dict[Topic, deque[Arrival]] = {}
+        network.buses.append(self)
         self._subscriptions: list[tuple[Topic, _Subscriber]] = []
         self._answers: list[Topic] = []
 
     def declare(self, topic: Topic) -> None:
-        """Nothing to prepare."""
+        if topic.delivery is Delivery.NEVER_DROP:
+            self.said.setdefault(topic, deque(maxlen=CACHED_MESSAGES))
 
     def publish(self, topic: Topic, payload: bytes, envelope: Envelope) -> None:
+        arrival = Arrival(topic, payload, envelope, envelope.sent_ns)
+        if topic in self.said:
+            self.said[topic].append(arrival)
         for deliver, _ in tuple(self._network.subscribers.get(topic, ())):
-            deliver(Arrival(topic, payload, envelope, envelope.sent_ns))
+            deliver(arrival)
 
-    def subscribe(self, topic: Topic, deliver: Callable[[Arrival], None], on_gap: Callable[[str, int], None]) -> None:
+    def subscribe(
+        self, topic: Topic, deliver: Callable[[Arrival], None], on_gap: Callable[[str, int], None], history: int = 0
+    ) -> None:
         subscriber = (deliver, on_gap)
+        for bus in self._network.buses if history else ():
+            for arrival in list(bus.said.get(topic, ()))[-history:]:
+                deliver(arrival)
         self._network.subscribers.setdefault(topic, []).append(subscriber)
         self._subscriptions.append((topic, subscriber))
 
@@ -78,5 +91,7 @@ class MemoryBus:
             self._network.subscribers[topic].remove(subscriber)
         while self._answers:
             self._network.answers.pop(self._answers.pop(), None)
+        if self in self._network.buses:
+            self._network.buses.remove(self)
         for member in [m for m, bus in self._network.members.items() if bus is self]:
             self._network.change(member, None)

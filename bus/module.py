@@ -39,6 +39,7 @@ class Module:
     journal: Topic | None = None
     restore: Callable[[Iterable[Message]], None] | None = None
     condense: Callable[[], Message] | None = None
+    catches_up: frozenset[Topic] = frozenset()
     _next_seq: Counter[Topic] = field(default_factory=Counter)
 
     def __post_init__(self) -> None:
@@ -68,13 +69,19 @@ class Module:
         return self
 
     def journaling(
-        self, topic: Topic, restore: Callable[[Iterable[Message]], None], condense: Callable[[], Message]
+        self,
+        topic: Topic,
+        restore: Callable[[Iterable[Message]], None],
+        condense: Callable[[], Message],
+        catches_up: Iterable[Topic] = (),
     ) -> Module:
         """Write down what it says on `topic` before it is sent, and give it back to `restore` after a restart.
 
-        `condense` returns one message that stands for all that was said.
+        `condense` returns one message that stands for all that was said. On the topics that it `catches_up` with,
+        it is given after a restart what was said before: of what it had, and of what was said while it was away.
         """
         self.journal, self.restore, self.condense = topic, restore, condense
+        self.catches_up = frozenset(catches_up)
         return self
 
     def feed(self, message: Message) -> list[Message]:

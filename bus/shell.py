@@ -11,7 +11,7 @@ from bus.errors import MessageError
 from bus.health import Meter
 from bus.inbox import Inbox
 from bus.intake import Intake
-from bus.interface import Arrival, Bus, Member
+from bus.interface import CACHED_MESSAGES, Arrival, Bus, Member
 from bus.journal import Journal
 from bus.module import Module, Reply
 from bus.timers import Timers
@@ -43,15 +43,18 @@ class Shell:
 
     def open(self) -> None:
         """Take up the journal, join the bus, and tell everybody: all that is sent from now on arrives here."""
+        missed: frozenset[topics.Topic] = frozenset()
         if self._journal is not None and self.module.restore is not None:
             self.module.restore(self._journal.messages())
+            missed = frozenset() if self._journal.is_empty else self.module.catches_up
         for topic in sorted(self.module.emits, key=lambda topic: topic.name):
             self.bus.declare(topic)
         if self._health:
             self.bus.declare(topics.HEALTH)
         for topic in self.module.handlers:
             if topic is not topics.PRESENCE:
-                self.bus.subscribe(topic, self.inbox.put, self.intake.lose)
+                history = CACHED_MESSAGES if topic in missed else 0
+                self.bus.subscribe(topic, self.inbox.put, self.intake.lose, history)
         for request in self.module.answers:
             self.bus.answer(request, self._answerer(request), self.inbox.call)
         self.bus.announce(Member(self.module.name, self.module.instance))

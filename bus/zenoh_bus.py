@@ -14,11 +14,10 @@ from zenoh import ext
 from bus.codec import Envelope, decode_envelope, encode
 from bus.discovery import identify
 from bus.errors import MessageError, NoAnswerError
-from bus.interface import Arrival, Job, Member
+from bus.interface import CACHED_MESSAGES, Arrival, Job, Member
 from bus.session import open_client, ready_key
 from schemas.topics import About, Delivery, Topic
 
-CACHED_SAMPLES = 1024
 # Zenoh delivers on a thread of its own, which at Python's default would wait 5 ms for a module that computes.
 SWITCH_S = 5e-5
 RECOVERY_PERIOD = timedelta(seconds=0.5)
@@ -61,7 +60,7 @@ class ZenohBus:
                 self._session,
                 key,
                 congestion_control=zenoh.CongestionControl.DROP,
-                cache=ext.CacheConfig(max_samples=CACHED_SAMPLES),
+                cache=ext.CacheConfig(max_samples=CACHED_MESSAGES),
                 sample_miss_detection=ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=None),
                 publisher_detection=True,
                 priority=_priority(topic),
@@ -75,7 +74,9 @@ class ZenohBus:
     def publish(self, topic: Topic, payload: bytes, envelope: Envelope) -> None:
         self._publishers[topic].put(payload, attachment=encode(envelope))
 
-    def subscribe(self, topic: Topic, deliver: Callable[[Arrival], None], on_gap: Callable[[str, int], None]) -> None:
+    def subscribe(
+        self, topic: Topic, deliver: Callable[[Arrival], None], on_gap: Callable[[str, int], None], history: int = 0
+    ) -> None:
         def receive(sample: zenoh.Sample) -> None:
             now_ns = time.time_ns()
             try:
@@ -90,7 +91,8 @@ class ZenohBus:
             return
         # Heartbeats will not do: they hand a late subscriber the whole cache, and tell nothing after a lost link.
         recovery = ext.RecoveryConfig(periodic_queries=RECOVERY_PERIOD, heartbeat=None)  # type: ignore[arg-type]
-        subscriber = ext.declare_advanced_subscriber(self._session, key, receive, recovery=recovery)
+        past = ext.HistoryConfig(max_samples=history) if history else None
+        subscriber = ext.declare_advanced_subscriber(self._session, key, receive, history=past, recovery=recovery)
         self._declared.append(subscriber.sample_miss_listener(lambda miss: on_gap(topic.name, miss.nb)))
         self._declared.append(subscriber)
 

@@ -94,11 +94,11 @@ class OverZenoh:
 class Peer:
     """A member that takes in what it subscribed to only when asked."""
 
-    def __init__(self, bus: Bus, *subscribed: Topic) -> None:
+    def __init__(self, bus: Bus, *subscribed: Topic, history: int = 0) -> None:
         self.bus, self.inbox, self.arrived = bus, Inbox(), 0
         self._changed = threading.Condition()
         for topic in subscribed:
-            bus.subscribe(topic, self._deliver, lambda topic, number: None)
+            bus.subscribe(topic, self._deliver, lambda topic, number: None, history)
 
     def _deliver(self, arrival: Arrival) -> None:
         self.inbox.put(arrival)

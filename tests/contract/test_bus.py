@@ -21,8 +21,8 @@ MESSAGES = {topics.of(message): message for message in samples()}
 TRAVELLING = [topic for topic in topics.ALL if topic.delivery is not Delivery.ON_REQUEST]
 
 
-def odometry(seq: int) -> Odometry:
-    return Odometry(speed_m_s=1.0, turn_rate_rad_s=0.0, dt_s=0.05, seq=seq, source="sim", stamp_ns=seq)
+def odometry(seq: int, source: str = "sim") -> Odometry:
+    return Odometry(speed_m_s=1.0, turn_rate_rad_s=0.0, dt_s=0.05, seq=seq, source=source, stamp_ns=seq)
 
 
 def clock(seq: int) -> Clock:
@@ -110,6 +110,40 @@ def test_who_comes_late_gets_nothing_of_what_was_said_before(network: Network) -
     publish(publisher, odometry(50))
 
     assert [arrival.envelope.seq for arrival in late.take(1) if arrival.envelope] == [50]
+
+
+def test_who_asks_for_the_past_gets_the_last_of_it_first_and_then_goes_on(network: Network) -> None:
+    publishers, early = [network.join(), network.join()], network.join()
+    peer = Peer(early, topics.ODOMETRY)
+    for publisher in publishers:
+        publisher.declare(topics.ODOMETRY)
+    meet(publishers[0], early)
+    meet(publishers[1], early)
+    for source, publisher in zip(("left", "right"), publishers, strict=True):
+        publish(publisher, *(odometry(seq, source) for seq in range(50)))
+    peer.wait_for(100)
+
+    late = Peer(network.join(), topics.ODOMETRY, history=30)
+    late.wait_for(60)
+    meet(publishers[0], late.bus)
+    publish(publishers[0], odometry(50, "left"))
+
+    heard = [arrival.envelope for arrival in late.take(61) if arrival.envelope]
+    assert [envelope.seq for envelope in heard if envelope.source == "left"] == list(range(20, 51))
+    assert [envelope.seq for envelope in heard if envelope.source == "right"] == list(range(20, 50))
+    assert len(late.inbox) == 0
+
+
+def test_the_past_of_somebody_who_left_is_gone_with_it(network: Network) -> None:
+    gone, early = network.join(), network.join()
+    gone.declare(topics.ODOMETRY)
+    peer = Peer(early, topics.ODOMETRY)
+    meet(gone, early)
+    publish(gone, odometry(0))
+    peer.wait_for(1)
+    gone.close()
+
+    assert Peer(network.join(), topics.ODOMETRY, history=30).inbox.take(0.3) is None
 
 
 def work(job: Job) -> None:
