@@ -27,7 +27,7 @@ Examples:
   cogmap log replay drive.mcap -r 2 -l              twice as fast, again and again
   cogmap log replay drive.mcap --topics odometry --topics camera/stereo --clock
   cogmap log replay drive.mcap --into sensory       does it still say the same?
-  cogmap log replay drive.mcap --into epam --set epam.threshold=0.6
+  cogmap log replay drive.mcap --into epam --set epam.percept_threshold=0.6
 """
 
 

@@ -46,9 +46,13 @@ class Drive:
         (self.folder / CONFIG_NAME).write_text(to_toml(self.sections))
         watch: Watch | None = None
         try:
-            for program in programs(self.folder, self.connect, self.agent, self.choices):
+            first, rest = programs(self.folder, self.connect, self.agent, self.choices)
+            for program in first:
                 self.supervisor.start(program)
             watch = Watch(ZenohBus(self.connect, self.agent))
+            self._await_recorder(watch, until_s, stop)
+            for program in rest:
+                self.supervisor.start(program)
             self._note("processes started")
             self._follow(watch, until_s, stop, display)
             if self.sections["sim"]["mode"] == "lockstep" and self.ended_by == ROUTE_COMPLETE:
@@ -56,6 +60,13 @@ class Drive:
         finally:
             self._end(watch)
         return watch
+
+    def _await_recorder(self, watch: Watch, until_s: float, stop: Stop) -> None:
+        """Wait for it, so that the log has what each module says from its first message on."""
+        recorders = {RECORDER: 1} if self.choices.record else {}
+        while watch.missing(recorders) and not self._has_ended(watch, until_s, stop):
+            watch.pump(PUMP_S)
+            self.supervisor.check()
 
     def _follow(self, watch: Watch, until_s: float, stop: Stop, display: Display) -> None:
         show_s = 0.0

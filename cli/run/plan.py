@@ -81,8 +81,8 @@ def _toml_value(value: object) -> str:
     return json.dumps(value)
 
 
-def programs(folder: Path, connect: str, agent: str, choices: Choices) -> list[Program]:
-    """Every process of a run but the launcher, in the order to start them."""
+def programs(folder: Path, connect: str, agent: str, choices: Choices) -> tuple[list[Program], list[Program]]:
+    """Every process of a run but the launcher: what carries and records the messages, then the modules."""
     where = ["--tied", "--connect", connect]
     whose = ["--agent", agent]
     config_file = ["--config", str(folder / CONFIG_NAME)]
@@ -100,4 +100,5 @@ def programs(folder: Path, connect: str, agent: str, choices: Choices) -> list[P
     workers = [f"codelets-{number}" for number in range(1, choices.codelets + 1)]
     named = [(name, name) for name in table.MODULES if name != "codelets"] + [("codelets", name) for name in workers]
     router = Program(ROUTER, lambda starts: cogmap_command("router", *where))
-    return [router, *([Program(RECORDER, record)] if choices.record else []), *(module(*each) for each in named)]
+    recorders = [Program(RECORDER, record)] if choices.record else []
+    return [router, *recorders], [module(*each) for each in named]
