@@ -73,8 +73,7 @@ def test_each_module_is_a_process_and_each_worker_one_more(tmp_path: Path) -> No
 
 
 def test_a_recorder_that_is_started_again_writes_another_log(tmp_path: Path) -> None:
-    (recorder,) = [
-        program for program in programs(tmp_path, "tcp/127.0.0.1:1", "agent", Choices())[0] if program.instance == RECORDER
-    ]
+    first, _ = programs(tmp_path, "tcp/127.0.0.1:1", "agent", Choices())
+    (recorder,) = [program for program in first if program.instance == RECORDER]
     assert str(tmp_path / "log.mcap") in recorder.command(0)
     assert str(tmp_path / "log-2.mcap") in recorder.command(1)
