@@ -153,17 +153,26 @@ def working(shell: Shell) -> Iterator[None]:
 
 
 class Feeder:
-    """Stands in for body and perception: straight on at SPEED_M_S past one building, ten views a second."""
+    """Stands in for body and perception: straight on at SPEED_M_S past one building, ten views a second.
+
+    The building is seen so vaguely that the self node moves as the self-motion says.
+    """
 
     def __init__(self, bus: ZenohBus) -> None:
-        self.views, self._last_ns, self._paused = 0, 0, False
+        self.stamps: list[int] = []
+        self._last_ns, self._paused = 0, False
         says = (topics.CLOCK, topics.SELF_MOTION, topics.PERCEPTS)
         self.shell = Shell(Module("feeder").every(PERIOD_NS // 2, self._say, emits=says), bus)
 
     @property
-    def driven_m(self) -> float:
-        """How far it has gone."""
-        return self.views * PERIOD_NS / 1e9 * SPEED_M_S
+    def views(self) -> int:
+        """How many there have been."""
+        return len(self.stamps)
+
+    def driven_m(self, stamp_ns: int | None = None) -> float:
+        """How far it has gone, or had at the view of `stamp_ns`."""
+        views = self.views if stamp_ns is None else self.stamps.index(stamp_ns) + 1
+        return views * PERIOD_NS / 1e9 * SPEED_M_S
 
     def pause(self) -> None:
         """Let the clock go on and nothing move."""
@@ -176,19 +185,19 @@ class Feeder:
         since_ns, self._last_ns = self._last_ns, now_ns
         row = [[SPEED_M_S, 0.0, PERIOD_NS / 1e9, 1e-3, 1e-3]]
         motion = SelfMotion(stamp_ns=now_ns, frame=self.views, since_ns=since_ns, motions=Array.of(row, "<f8"))
-        self.views += 1
+        self.stamps.append(now_ns)
         return [clock, motion, Percepts(stamp_ns=now_ns, frame=self.views, objects=self._seen(), road_m=_ROAD)]
 
     def _seen(self) -> list[Percept]:
-        x_m, y_m = 60.0 - self.driven_m, 8.0
+        x_m, y_m = 60.0 - self.driven_m(), 8.0
         return [
             Percept(
                 label="building-01",
                 activation=0.9,
                 bearing_rad=float(np.arctan2(y_m, x_m)),
                 range_m=float(np.hypot(x_m, y_m)),
-                bearing_sd_rad=0.02,
-                range_sd_m=0.5,
+                bearing_sd_rad=0.5,
+                range_sd_m=20.0,
                 width_m=9.0,
                 height_m=6.0,
                 whole=True,
