@@ -92,28 +92,29 @@ class System:
 
     def router(self) -> Process:
         """Start the router, or start it again."""
-        return self._start("router", "router listens", "router")
+        return self._start_and_await("router", "router listens", "router")
 
     def modules(self, *instances: str, settings: tuple[str, ...] = ()) -> list[Process]:
         """Start modules, named after their instances such as `codelets-1`, and wait until all are ready."""
         options = ["--agent", AGENT, "--state", str(self.folder / "state")]
         options += [word for setting in settings for word in ("--set", setting)]
         started = {
-            instance: self._launch(instance, "module", instance.partition("-")[0], "--instance", instance, *options)
+            instance: self.start(instance, "module", instance.partition("-")[0], "--instance", instance, *options)
             for instance in instances
         }
         for instance, before in started.items():
             self._await(instance, f"{instance} is ready", before)
         return [self.processes[instance] for instance in instances]
 
-    def _launch(self, name: str, *arguments: str) -> int:
+    def start(self, name: str, *arguments: str) -> int:
+        """Start `cogmap` with these arguments; how many lines those of that name said before it."""
         log = self.folder / f"{name}.log"
         before = len(log.read_text().splitlines()) if log.exists() else 0
         self.processes[name] = Process(name, log, *arguments, "--tied", "--connect", self.endpoint)
         return before
 
-    def _start(self, name: str, sentence: str, *arguments: str) -> Process:
-        self._await(name, sentence, self._launch(name, *arguments))
+    def _start_and_await(self, name: str, sentence: str, *arguments: str) -> Process:
+        self._await(name, sentence, self.start(name, *arguments))
         return self.processes[name]
 
     def _await(self, name: str, sentence: str, before: int) -> None:
