@@ -1,4 +1,4 @@
-"""A subscriber that is stopped for five seconds: the others do not notice, and it loses nothing that must not be lost."""
+"""A subscriber that is stopped for five seconds: the others do not notice, and nothing is lost for good."""
 
 from __future__ import annotations
 
