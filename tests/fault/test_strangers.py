@@ -1,0 +1,104 @@
+"""A stranger's bytes on every topic while the modules run: counted and named, and nothing else changes."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections import Counter
+
+import pytest
+import zenoh
+from damage import damaged, golden
+from live import AGENT, Feeder, System, Witness, wait_until, working
+
+from bus.codec import Envelope, encode
+from bus.errors import NoAnswerError
+from bus.module import Module
+from bus.session import open_client
+from bus.shell import Shell
+from schemas import topics
+from schemas.base import Message
+from schemas.topics import Delivery, Topic
+from services import table
+
+MODULES = ("sensory", "epam", "global_workspace", "action")
+CARRIED = tuple(
+    topic for topic in topics.ALL if topic.delivery is not Delivery.ON_REQUEST and topic is not topics.PRESENCE
+)
+# Every field of a request has a default, so that an object of another type is one too.
+NO_REQUESTS = [bad for what, bad in damaged(topics.SNAPSHOT_REQUEST).items() if what != "wrong type"]
+BLOCK = zenoh.CongestionControl.BLOCK
+
+
+class Stranger:
+    """A foreign session that puts bytes on topics, each from a source of its own so that none replaces another."""
+
+    def __init__(self, endpoint: str) -> None:
+        self.session = open_client(endpoint)
+        self.put: Counter[str] = Counter()
+
+    def damage(self, topic: Topic) -> None:
+        """Put everything on `topic` that is no message of it."""
+        for payload in damaged(topic).values():
+            self._put(topic, payload, encode(Envelope(f"stranger-{self.put[topic.name]}", 0, 1, 1, 1)))
+        self._put(topic, golden(topic), b"\xc1 no envelope")
+
+    def _put(self, topic: Topic, payload: bytes, attachment: bytes) -> None:
+        self.session.put(topic.key(AGENT), payload, attachment=attachment, congestion_control=BLOCK)
+        self.put[topic.name] += 1
+
+
+def auditor() -> Module:
+    """Subscribes to every topic, those that no module takes in among them."""
+    module = Module("auditor")
+    for topic in CARRIED:
+        module.on(topic, _pass_over)
+    return module
+
+
+def _pass_over(message: Message) -> None:
+    """What is believed is of no interest here."""
+
+
+def taken_in(instance: str) -> set[str]:
+    """The topics whose messages come to an instance."""
+    handlers = table.build(instance.partition("-")[0], {}).handlers
+    return {topic.name for topic in handlers if topic is not topics.PRESENCE}
+
+
+def test_bytes_that_are_no_message_are_counted_and_named_and_the_mind_goes_on(
+    mind: tuple[System, Feeder, Witness],
+) -> None:
+    system, feeder, witness = mind
+    system.modules(*MODULES)
+    auditing, stranger, began_s = Shell(auditor(), system.bus()), Stranger(system.endpoint), time.monotonic()
+    with working(auditing):
+        for topic in CARRIED:
+            stranger.damage(topic)
+        for payload in NO_REQUESTS:
+            with pytest.raises(NoAnswerError):
+                auditing.bus.query(topics.SNAPSHOT_REQUEST, payload, 10.0)
+        expected = {
+            instance: {name: stranger.put[name] for name in taken_in(instance)}
+            for instance in (*MODULES, "workspace", "codelets-1", "codelets-2")
+        }
+        expected["workspace"][topics.SNAPSHOT_REQUEST.name] = len(NO_REQUESTS)
+
+        def counted() -> bool:
+            told = {name: health.rejected for name, health in witness.health.items()}
+            return all(told.get(name) == counts for name, counts in expected.items())
+
+        wait_until(counted, f"{expected} are counted")
+        wait_until(lambda: auditing.intake.rejected == stranger.put, f"{stranger.put} are counted")
+        lasted_s = time.monotonic() - began_s
+        witness.goes_on(5)
+        feeder.pause()
+        witness.agrees()
+    stranger.session.close()  # type: ignore[no-untyped-call]
+    for instance, counts in expected.items():
+        assert system.processes[instance].is_alive
+        assert not witness.health[instance].notes
+        assert not witness.health[instance].gaps
+        named = Counter(re.findall(r"rejected ([\w/]+): ", "\n".join(system.processes[instance].said())))
+        assert set(named) == set(counts)
+        assert max(named.values()) <= lasted_s + 1
