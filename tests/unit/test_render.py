@@ -61,6 +61,7 @@ def test_text_has_a_line_a_field_in_yamls_manner() -> None:
         "- type: 'drop_node'",
         "  id: 'tree'",
         "dropped: 0",
+        "refused: []",
     ]
 
 
