@@ -9,11 +9,19 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+
+from bus.module import Module
+from bus.session import check_free
+from bus.shell import Shell
+from bus.zenoh_bus import ZenohBus
+from schemas import topics
+from schemas.sensing import MotorCommand
 
 COGMAP = [sys.executable, "-m", "cli.main"]
 PATIENCE_S = 60.0
@@ -25,8 +33,8 @@ def free_endpoint() -> str:
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
-def processes_at(endpoint: str) -> list[int]:
-    """Every process with `endpoint` in its command line."""
+def processes_at(endpoint: str, words: str = "") -> list[int]:
+    """Every process with `endpoint`, and `words`, in its command line."""
     found = []
     for entry in Path("/proc").iterdir():
         try:
@@ -34,7 +42,7 @@ def processes_at(endpoint: str) -> list[int]:
             state = (entry / "stat").read_text().rpartition(")")[2].split()[0]
         except (OSError, IndexError):
             continue
-        if entry.name.isdigit() and endpoint in command and state != "Z":
+        if entry.name.isdigit() and endpoint in command and words in command and state != "Z":
             found.append(int(entry.name))
     return found
 
@@ -68,13 +76,10 @@ class Run:
 
         wait_until(said)
 
-    def pid_of(self, instance: str) -> int:
-        (pid,) = [
-            pid
-            for pid in processes_at(self.endpoint)
-            if f"--instance\0{instance}\0" in Path(f"/proc/{pid}/cmdline").read_text()
-        ]
-        return pid
+    def pid_of(self, instance: str) -> int | None:
+        """The process of a module's instance, or of the router or the recorder; None where it does not run."""
+        words = {"router": "\0router\0", "recorder": "\0log\0record\0"}.get(instance, f"\0--instance\0{instance}\0")
+        return next(iter(processes_at(self.endpoint, words)), None)
 
     def close(self) -> None:
         if self.process.poll() is None:
@@ -137,15 +142,61 @@ def test_nothing_is_left_of_a_launcher_that_is_killed(start: Callable[..., Run])
     assert (run.folder / "log.mcap").read_bytes().endswith(b"\x89MCAP0\r\n")
 
 
-@pytest.mark.parametrize("instance", ["epam", "workspace", "codelets-1"])
-def test_a_module_that_is_killed_is_started_again_and_the_drive_goes_on(
-    start: Callable[..., Run], instance: str
+KILLED_TOGETHER = (
+    ("sensory", "epam", "codelets-1", "global_workspace", "action"),
+    ("workspace",),
+    ("recorder", "router"),
+)
+
+
+@pytest.fixture
+def commands() -> Iterator[Callable[[str], list[MotorCommand]]]:
+    """Gives the list of the commands that move the wheels of the robot at an endpoint, which grows."""
+    ended, shells, threads = threading.Event(), [], []
+
+    def listen(endpoint: str) -> list[MotorCommand]:
+        heard: list[MotorCommand] = []
+        keep = Module("listener").on(topics.MOTOR_COMMAND, lambda command: command.halted_by or heard.append(command))
+        shells.append(Shell(keep, ZenohBus(endpoint, "agent")))
+        shells[-1].open()
+        threads.append(threading.Thread(target=work, args=shells[-1:]))
+        threads[-1].start()
+        return heard
+
+    def work(shell: Shell) -> None:
+        while not ended.is_set():
+            shell.pump(0.05)
+
+    yield listen
+    ended.set()
+    for thread in threads:
+        thread.join()
+    for shell in shells:
+        shell.close()
+
+
+def test_whatever_is_killed_is_started_again_and_the_robot_is_moved_on(
+    start: Callable[..., Run], commands: Callable[[str], list[MotorCommand]]
 ) -> None:
-    run = start("--laps", "0.1", "--no-record", "--time-limit", "50")
+    left_over = set(Path("/dev/shm").iterdir())
+    run = start("--laps", "3", "--time-limit", "100")
     run.wait_for("path integration alone")
-    os.kill(run.pid_of(instance), signal.SIGKILL)
-    assert run.end() == 0, run.output()
-    assert json.loads((run.folder / "summary.json").read_text())["restarts"] == {instance: 1}
+    heard = commands(run.endpoint)
+    for together in KILLED_TOGETHER:
+        pids = {instance: run.pid_of(instance) for instance in together}
+        for pid in pids.values():
+            os.kill(pid, signal.SIGKILL)
+        wait_until(lambda pids=pids: all(run.pid_of(name) not in (pid, None) for name, pid in pids.items()))
+        before = len(heard)
+        wait_until(lambda before=before: len(heard) >= before + 5)
+    run.process.send_signal(signal.SIGINT)
+    assert run.end() == 130, run.output()
+    summary = json.loads((run.folder / "summary.json").read_text())
+    assert summary["restarts"] == {instance: 1 for together in KILLED_TOGETHER for instance in together}
+    assert (run.folder / "log-2.mcap").read_bytes().endswith(b"\x89MCAP0\r\n")
+    assert processes_at(run.endpoint) == []
+    assert set(Path("/dev/shm").iterdir()) <= left_over
+    check_free(run.endpoint)
 
 
 def test_a_port_in_use_is_one_sentence_and_code_2(start: Callable[..., Run], tmp_path: Path) -> None:
