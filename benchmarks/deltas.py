@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import multiprocessing
 import multiprocessing.synchronize
+import threading
 import time
-from collections.abc import Callable
+import timeit
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from multiprocessing.sharedctypes import Synchronized
 from statistics import median
 
 import numpy as np
 import zenoh
 
-from bus.codec import encode
+from bus.codec import decode, encode
 from bus.errors import CogmapError
+from bus.graph import Graph
 from bus.module import Module
 from bus.replica import Replica, snapshot_over
 from bus.session import open_client, open_router
@@ -28,6 +33,7 @@ from services.workspace.commit import Ledger
 REPLICAS = 3
 AGENT = "benchmark"
 PATIENCE_S = 60.0
+COST_ROUNDS = 400
 RAW_KEY = "benchmark/raw"
 NODES, LINKS, SAMPLES = 50, 200, 730
 _spawn = multiprocessing.get_context("spawn")
@@ -43,11 +49,30 @@ class Race:
     go: multiprocessing.synchronize.Event
     done: multiprocessing.synchronize.Semaphore
     end: multiprocessing.synchronize.Event
+    cpu_s: Synchronized[float]
 
     @classmethod
     def at(cls, endpoint: str, number: int) -> Race:
         """A race of `number` messages through the router at `endpoint`."""
-        return cls(endpoint, number, _spawn.Semaphore(0), _spawn.Event(), _spawn.Semaphore(0), _spawn.Event())
+        ready, done, cpu_s = _spawn.Semaphore(0), _spawn.Semaphore(0), _spawn.Value("d", 0.0)
+        return cls(endpoint, number, ready, _spawn.Event(), done, _spawn.Event(), cpu_s)
+
+    @contextmanager
+    def at_work(self) -> Iterator[None]:
+        """Tell that this process is ready; what it does within counts."""
+        began_s = time.process_time()
+        self.ready.release()
+        yield
+        with self.cpu_s.get_lock():
+            self.cpu_s.value += time.process_time() - began_s
+
+
+@dataclass
+class Pace:
+    """How a run went: messages per second until the last process had the last, CPU time of all processes for each."""
+
+    rate_hz: float
+    cpu_us: float
 
 
 def typical_operations() -> list[Operation]:
@@ -79,11 +104,11 @@ def _commit(race: Race) -> None:
     )
     shell = Shell(publisher, ZenohBus(race.endpoint, AGENT), health=False)
     shell.open()
-    race.ready.release()
-    race.go.wait()
-    for number in range(race.number):
-        shell.say(publisher.feed(Clock(stamp_ns=number)))
-    race.end.wait()
+    with race.at_work():
+        race.go.wait()
+        for number in range(race.number):
+            shell.say(publisher.feed(Clock(stamp_ns=number)))
+        race.end.wait()
     shell.close()
 
 
@@ -94,10 +119,10 @@ def _replicate(race: Race) -> None:
     follower = Module("replica", f"replica-{time.time_ns()}").on(topics.DELTA, lambda delta: _follow(replica, delta))
     shell = Shell(follower, bus, health=False)
     shell.open()
-    race.ready.release()
-    while replica.graph.version < race.number:
-        shell.pump(1.0)
-    race.done.release()
+    with race.at_work():
+        while replica.graph.version < race.number:
+            shell.pump(1.0)
+        race.done.release()
     shell.close()
 
 
@@ -110,17 +135,17 @@ def _put(race: Race) -> None:
     payload = encode(Ledger(1.0).commit(0, 1, "objects", typical_operations()))
     session = open_client(race.endpoint)
     publisher = session.declare_publisher(RAW_KEY, congestion_control=zenoh.CongestionControl.BLOCK)
-    race.ready.release()
-    race.go.wait()
-    for _ in range(race.number):
-        publisher.put(payload)
-    race.end.wait()
+    with race.at_work():
+        race.go.wait()
+        for _ in range(race.number):
+            publisher.put(payload)
+        race.end.wait()
     session.close()  # type: ignore[no-untyped-call]
 
 
 def _receive(race: Race) -> None:
     """The peer: the bytes received, nothing made of them."""
-    session, received, everything = open_client(race.endpoint), [0], _spawn.Event()
+    session, received, everything = open_client(race.endpoint), [0], threading.Event()
 
     def count(sample: zenoh.Sample) -> None:
         bytes(sample.payload)
@@ -129,9 +154,9 @@ def _receive(race: Race) -> None:
             everything.set()
 
     subscriber = session.declare_subscriber(RAW_KEY, count)
-    race.ready.release()
-    everything.wait()
-    race.done.release()
+    with race.at_work():
+        everything.wait()
+        race.done.release()
     subscriber.undeclare()  # type: ignore[no-untyped-call]
     session.close()  # type: ignore[no-untyped-call]
 
@@ -141,8 +166,8 @@ def _wait(semaphore: multiprocessing.synchronize.Semaphore) -> None:
         raise CogmapError(f"no word from a process of the benchmark within {PATIENCE_S:g} s: see what it printed")
 
 
-def _rate(endpoint: str, number: int, publish: Callable[[Race], None], follow: Callable[[Race], None]) -> float:
-    """Messages per second until the last replica has the last."""
+def _pace(endpoint: str, number: int, publish: Callable[[Race], None], follow: Callable[[Race], None]) -> Pace:
+    """Let one process publish `number` messages to three that follow, through the router in this one."""
     race = Race.at(endpoint, number)
     processes = [_spawn.Process(target=follow, args=(race,), daemon=True) for _ in range(REPLICAS)]
     processes.append(_spawn.Process(target=publish, args=(race,), daemon=True))
@@ -150,29 +175,50 @@ def _rate(endpoint: str, number: int, publish: Callable[[Race], None], follow: C
         process.start()
     for _ in processes:
         _wait(race.ready)
-    began_s = time.monotonic()
+    began_s, router_s = time.monotonic(), time.process_time()
     race.go.set()
     for _ in range(REPLICAS):
         _wait(race.done)
-    took_s = time.monotonic() - began_s
+    took_s, router_s = time.monotonic() - began_s, time.process_time() - router_s
     race.end.set()
     for process in processes:
         process.join()
-    return number / took_s
+    return Pace(number / took_s, (race.cpu_s.value + router_s) / number * 1e6)
 
 
 def measure(endpoint: str, number: int, pairs: int, tell: Callable[[str], None]) -> dict[str, float]:
-    """Rates of both, in turn, through one router; the ratio is the median over the pairs."""
+    """The paces of both, in turn, through one router; the ratio is the median over the pairs."""
     router = open_router(endpoint)
     ours, raw = [], []
     for pair in range(pairs):
         tell(f"deltas and raw puts, pair {pair + 1} of {pairs}")
-        raw.append(_rate(endpoint, number, _put, _receive))
-        ours.append(_rate(endpoint, number, _commit, _replicate))
+        raw.append(_pace(endpoint, number, _put, _receive))
+        ours.append(_pace(endpoint, number, _commit, _replicate))
     router.close()  # type: ignore[no-untyped-call]
     return {
-        "delta_rate_ratio": median(our / peer for our, peer in zip(ours, raw, strict=True)),
-        "delta_rate_hz": median(ours),
-        "raw_put_rate_hz": median(raw),
-        "delta_bytes": float(len(encode(Ledger(1.0).commit(0, 1, "objects", typical_operations())))),
+        "delta_rate_ratio": median(our.rate_hz / peer.rate_hz for our, peer in zip(ours, raw, strict=True)),
+        "delta_rate_hz": median(our.rate_hz for our in ours),
+        "raw_put_rate_hz": median(peer.rate_hz for peer in raw),
+        "delta_cpu_us": median(our.cpu_us for our in ours),
+        "raw_put_cpu_us": median(peer.cpu_us for peer in raw),
+        **_costs(),
     }
+
+
+def _costs() -> dict[str, float]:
+    """What the parts of a delta's way cost where nothing else runs, and its size."""
+    ledger, replica, operations = Ledger(1.0), Graph(), typical_operations()
+    payload = encode(ledger.commit(0, 1, "objects", operations))
+    delta = decode(topics.DELTA, payload)
+    assert isinstance(delta, Delta)
+    return {
+        "delta_commit_us": _cost_us(lambda: ledger.commit(0, 1, "objects", operations)),
+        "delta_encode_us": _cost_us(lambda: encode(delta)),
+        "delta_decode_us": _cost_us(lambda: decode(topics.DELTA, payload)),
+        "delta_apply_us": _cost_us(lambda: replica.change(delta.operations)),
+        "delta_bytes": float(len(payload)),
+    }
+
+
+def _cost_us(work: Callable[[], object]) -> float:
+    return min(timeit.repeat(work, repeat=5, number=COST_ROUNDS, timer=time.process_time)) / COST_ROUNDS * 1e6

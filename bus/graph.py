@@ -75,7 +75,6 @@ class Graph:
         self.links: defaultdict[str, Weights] = defaultdict(dict)
         self.tiles: dict[tuple[int, int], Tile] = {}
         self._appliers: dict[type, Callable[[Any], None]] = {
-            Node: self._put_node,
             Link: self._put_link,
             Links: self._put_links,
             PlaceTile: self._put_tile,
@@ -95,12 +94,12 @@ class Graph:
 
     def change(self, operations: list[Operation]) -> None:
         """Carry out operations, in order."""
-        appliers = self._appliers
+        nodes, appliers = self.nodes, self._appliers
         for operation in operations:
-            appliers[type(operation)](operation)
-
-    def _put_node(self, node: Node) -> None:
-        self.nodes[node.id] = node
+            if type(operation) is Node:  # most are
+                nodes[operation.id] = operation
+            else:
+                appliers[type(operation)](operation)
 
     def _put_link(self, link: Link) -> None:
         self.links[link.kind].setdefault(link.source, {})[link.target] = link.weight

@@ -108,9 +108,8 @@ class Ledger:
 
     def _note(self, delta: Delta) -> None:
         for operation in delta.operations:
-            node = written(operation)
-            if node is not None:
-                self._written[node] = delta.version
+            if isinstance(operation, (Node, DropNode)):
+                self._written[operation.id] = delta.version
 
 
 def _check_cells(name: str, operation: Cells) -> None:
