@@ -18,12 +18,18 @@ CONDENSE_BYTES = 64 * 2**20
 
 
 class Journal:
-    """An append-only file of messages. A torn tail, left by a kill amid a write, is cut off when it is opened."""
+    """An append-only file of messages. A torn tail, left by a kill amid a write, is cut off when it is opened.
+
+    Raises UsageError where it cannot be opened.
+    """
 
     def __init__(self, path: Path) -> None:
-        path.parent.mkdir(parents=True, exist_ok=True)
         self._path = path
-        self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        except OSError as error:
+            raise UsageError(f"cannot write {path} ({error.strerror}): name another folder with --state") from None
         self._size = 0
         self._limit = CONDENSE_BYTES
 

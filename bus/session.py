@@ -12,6 +12,7 @@ from bus.interface import Member
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 CONNECT_TIMEOUT_S = 5.0
+LAST_PORT = 65535
 # How long a link that is full holds up the others before it loses a message, which the publisher's cache then mends.
 # Once it has, it loses the next at once until it has room: a subscriber that has stopped costs this long once.
 PATIENCE_US = 100_000
@@ -96,6 +97,6 @@ def open_router(endpoint: str) -> zenoh.Session:
 def _address(endpoint: str) -> tuple[str, int]:
     protocol, _, address = endpoint.partition("/")
     host, _, port = address.rpartition(":")
-    if protocol != "tcp" or not host or not port.isdigit():
-        raise UsageError(f"endpoint {endpoint!r}: write it as tcp/HOST:PORT")
+    if protocol != "tcp" or not host or not port.isdecimal() or int(port) > LAST_PORT:
+        raise UsageError(f"endpoint {endpoint!r}: write it as tcp/HOST:PORT, with a port of at most {LAST_PORT}")
     return host.strip("[]"), int(port)

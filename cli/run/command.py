@@ -126,5 +126,5 @@ def _new_folder(out: Path | None) -> Path:
     except FileExistsError:
         raise ConfigError(f"{folder} exists already: name another with --out") from None
     except OSError as error:
-        raise ConfigError(f"cannot make the folder {folder}: {error.strerror}") from None
+        raise ConfigError(f"cannot make the folder {folder} ({error.strerror}): name another with --out") from None
     return folder
