@@ -199,6 +199,18 @@ def test_whatever_is_killed_is_started_again_and_the_robot_is_moved_on(
     check_free(run.endpoint)
 
 
+def test_a_drive_ends_when_its_simulator_is_killed_for_the_town_died_with_it(start: Callable[..., Run]) -> None:
+    run = start("--laps", "3")
+    run.wait_for("path integration alone")
+    pid = run.pid_of("sim")
+    assert pid is not None
+    os.kill(pid, signal.SIGKILL)
+    assert run.end() == 1, run.output()
+    assert json.loads((run.folder / "summary.json").read_text())["ended_by"].startswith("the simulator died")
+    assert "Traceback" not in run.output() + "".join(log.read_text() for log in run.folder.glob("*.log"))
+    assert processes_at(run.endpoint) == []
+
+
 def test_a_port_in_use_is_one_sentence_and_code_2(start: Callable[..., Run], tmp_path: Path) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
