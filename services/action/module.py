@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
+from bus.errors import MessageError
 from bus.module import Module
 from schemas import topics
 from schemas.base import Message
@@ -39,6 +41,21 @@ class ActionModule:
         self._clear_m = math.inf
         self._scanned_ns = -1
         self._waiting: tuple[Delta, Pose] | None = None
+        self._chosen: Action | None = None
+
+    def restore(self, past: Iterable[Message]) -> None:
+        """Take up the action that was selected last, and the route from where it was then."""
+        for message in past:
+            if isinstance(message, Action):
+                self._chosen, self._scheme = message, message.scheme
+        if self._chosen is not None and self._route is not None:
+            self._route.resume(float(self._chosen.parameters.get("travelled_m", 0.0)))
+
+    def chosen(self) -> Action:
+        """The action that was selected last. Raises MessageError where none was."""
+        if self._chosen is None:
+            raise MessageError("no action was selected yet")
+        return self._chosen
 
     def on_scan(self, scan: RangeScan) -> MotorCommand | None:
         """See how far the way is clear."""
@@ -75,13 +92,14 @@ class ActionModule:
             return None
         scheme, activation = chosen
         self._scheme = scheme.name
-        return Action(
+        self._chosen = Action(
             stamp_ns=broadcast.stamp_ns,
             cycle=broadcast.cycle,
             scheme=scheme.name,
             activation=activation,
             parameters=self._parameters(),
         )
+        return self._chosen
 
     def _parameters(self) -> dict[str, float | int | str | bool]:
         if self._route is None:
@@ -118,4 +136,5 @@ def build(config: Config, instance: str) -> Module:
         .on(topics.DELTA, action.on_delta, emits=commands)
         .on(topics.COMPETITION, action.on_competition, emits=commands)
         .on(topics.BROADCAST, action.on_broadcast, emits=[topics.ACTION, *commands])
+        .journaling(topics.ACTION, action.restore, action.chosen)
     )

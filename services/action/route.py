@@ -53,6 +53,10 @@ class Route:
         window = self.points_m[self._at : self._at + int(SEARCH_M / STEP_M) + 1]
         self._at += int(np.argmin(np.hypot(*(window - (x_m, y_m)).T)))
 
+    def resume(self, travelled_m: float) -> None:
+        """Go on from so far along the line."""
+        self._at = max(0, min(round(travelled_m / STEP_M), len(self.points_m) - 1))
+
     def ahead(self, distance_m: float) -> npt.NDArray[np.float64]:
         """The point so far ahead on the line."""
         point: npt.NDArray[np.float64] = self.points_m[

@@ -51,7 +51,6 @@ class RealTime:
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
         self._started = False
-        self._ticks = 0
         self._owed_ns = 0
         self._seen_ns: int | None = None
         self._history: deque[tuple[int, int]] = deque()
@@ -95,8 +94,7 @@ class RealTime:
             said.append(simulation.town())
         said.append(simulation.tick())
         self._owed_ns -= simulation.tick_ns
-        self._ticks += 1
-        return self._ticks % simulation.ticks_per_frame == 0
+        return simulation.now_ns // simulation.tick_ns % simulation.ticks_per_frame == 0
 
     def _rate(self, wall_ns: int) -> float:
         """Simulated over wall time in the last second."""
@@ -112,7 +110,7 @@ def build(config: Config, instance: str = "sim") -> Module:
     check(config)
     simulation = Simulation(config)
     awaits = config.awaits or {"sim": 1}
-    module = Module("sim", instance)
+    module = Module("sim", instance).journaling(topics.TRUE_POSE, simulation.resume, simulation.truth)
     if config.mode == "lockstep":
         lockstep = Lockstep(simulation)
         return module.on(topics.MOTOR_COMMAND, lockstep.command, _EMITS).starts(lockstep.start, awaits, _EMITS)

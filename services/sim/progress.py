@@ -24,6 +24,10 @@ class Progress:
         self._points = np.column_stack([np.interp(at_m, along_m, xs), np.interp(at_m, along_m, ys)])
         self._at = 0
 
+    def resume(self, share: float) -> None:
+        """Go on from so large a share of the route."""
+        self._at = round(share * (len(self._points) - 1))
+
     def advance(self, x_m: float, y_m: float) -> float:
         """The share of the route that lies behind the robot at this place."""
         window = self._points[self._at : self._at + round(_WINDOW_M / _STEP_M)]

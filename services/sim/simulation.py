@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from schemas.array import Array
+from schemas.base import Message
 from schemas.process import Clock
 from schemas.sensing import MotorCommand, Odometry, StereoFrame, TruePose, TrueTown
 from services.sim import town
@@ -29,6 +32,17 @@ class Simulation:
         self._travelled_m = 0.0
         self._frames = 0
         self.progress = 0.0
+
+    def resume(self, past: Iterable[Message]) -> None:
+        """Go on at the time and from the place of the last truth that was told, at rest."""
+        last: Message | None = None
+        for message in past:
+            last = message
+        if isinstance(last, TruePose):
+            self.world.robot.place(last.pose)
+            self._pose, self._travelled_m, self.now_ns = self.world.pose(), last.travelled_m, last.stamp_ns
+            self._frames = self.now_ns // self.tick_ns // self.ticks_per_frame
+            self._progress.resume(last.progress)
 
     def drive(self, command: MotorCommand) -> None:
         """Set the wheels' speeds."""

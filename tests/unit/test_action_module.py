@@ -275,3 +275,21 @@ def test_each_pose_brings_one_command() -> None:
     module = _module("lockstep")
     said = [module.feed(message) for message in (_scan(), _delta(1), _scan(), _competition(1), _competition(1))]
     assert [len(_commands(messages)) for messages in said] == [0, 1, 0, 0, 0]
+
+
+def test_an_action_module_that_was_killed_goes_on_along_the_route_from_its_last_action() -> None:
+    legs = ((20.0, 0.0), (20.0, 0.0))
+    before, after = _module(route=legs), _module(route=legs)
+    said = before.feed(_broadcast())
+    for cycle in range(1, 13):
+        said += before.feed(_delta(cycle, 2.0 * cycle))
+    said += before.feed(_broadcast(12))
+    assert before.condense is not None
+    assert after.restore is not None
+    assert before.condense() == said[-1]
+    after.restore([message for message in said if isinstance(message, Action)])
+    (command,) = _commands(after.feed(_delta(13, 25.0)))
+    assert command.left_wheel_rad_s > 0
+    (action,) = after.feed(_broadcast(14))
+    assert isinstance(action, Action)
+    assert action.parameters == {"leg": 1, "length_m": 20.0, "turn_rad": 0.0, "travelled_m": 25.0}

@@ -131,3 +131,21 @@ def test_an_older_command_that_comes_late_does_not_replace_a_newer_one() -> None
 def test_rates_that_do_not_divide_one_another_are_refused_by_name(wrong: dict[str, int]) -> None:
     with pytest.raises(ConfigError, match="choose one that divides"):
         build(Config(**wrong))
+
+
+@pytest.mark.parametrize("mode", ["real_time", "lockstep"])
+def test_a_world_that_was_killed_goes_on_from_where_and_when_it_was_with_the_robot_at_rest(mode: str) -> None:
+    config = Config(mode=mode, egl=False, **SMALL)  # type: ignore[arg-type]
+    before, after = build(config), build(config)
+    said = _start(before)
+    said += before.feed(_command(said[-1].stamp_ns)) if mode == "lockstep" else _real_time(before, 90)
+    told, last = _of(TruePose, said), _of(StereoFrame, said)[-1]
+    assert after.restore is not None
+    after.restore(told)
+    again = _start(after)
+    again += [] if mode == "lockstep" else _real_time(after, 4)
+    assert _of(Odometry, again)[0].stamp_ns == told[-1].stamp_ns + TICK_NS
+    assert _of(StereoFrame, again)[0].frame == last.frame + 1
+    assert _of(TruePose, again)[0].pose.x_m == pytest.approx(told[-1].pose.x_m, abs=0.1)
+    assert _of(TruePose, again)[0].travelled_m == pytest.approx(told[-1].travelled_m, abs=0.1)
+    assert _of(TruePose, again)[0].progress == pytest.approx(told[-1].progress, abs=0.005)
