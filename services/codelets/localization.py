@@ -85,7 +85,11 @@ def sightings(task: Task, largest_sd_m: float) -> Sighting | None:
 
 
 def localize(task: Task, config: Config) -> list[Operation]:
-    """Move the self node's samples, correct them by the landmarks in view, and link it to its new place."""
+    """Move the self node's samples, correct them by the landmarks in view, and link it to its new place.
+
+    Where the paper starts each step from the mean of the samples, these go on from the samples themselves: what
+    the agent does not know of its heading now, it must still not know when it comes to matter.
+    """
     self_node = next((node for node in task.nodes if node.kind == "self"), None)
     if self_node is None or self_node.samples is None:
         raise MessageError(f"task {task.task_id} has no self node with samples")
