@@ -20,7 +20,6 @@ SHOW_PERIOD_S = 0.25
 GRACE_S = 3.0
 QUIET_S = 0.3
 ROUTE_COMPLETE, TIME_LIMIT, INTERRUPTED = "route complete", "time limit", "interrupted"
-WORLD_LOST = "the simulator died, and its town with it"
 
 
 @dataclass
@@ -95,8 +94,6 @@ class Drive:
             self.ended_by = INTERRUPTED
         elif watch.observer.progress >= 1.0:
             self.ended_by = ROUTE_COMPLETE
-        elif watch.observer.began_anew:
-            self.ended_by = WORLD_LOST
         elif time.monotonic() >= until_s:
             self.ended_by = TIME_LIMIT
         return bool(self.ended_by)

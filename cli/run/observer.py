@@ -72,16 +72,12 @@ class Errors:
 
 
 class Observer:
-    """Follows a drive from outside. The agent's frame has its origin in the pose that the robot starts from.
-
-    `began_anew`: time went back, since another simulator took the place of the one there was.
-    """
+    """Follows a drive from outside. The agent's frame has its origin in the pose that the robot starts from."""
 
     def __init__(self) -> None:
         self.town: TrueTown | None = None
         self.start: Pose | None = None
         self.travelled_m = self.progress = 0.0
-        self.began_anew = False
         self._began_ns = self._now_ns = 0
         self._true, self._estimate, self._integrated = Track(), Track(), Track()
         self._wheels = (0.0, 0.0, 0.0)
@@ -102,7 +98,6 @@ class Observer:
     def _take_pose(self, true: TruePose) -> None:
         if self.start is None:
             self.start, self._began_ns = true.pose, true.stamp_ns
-        self.began_anew |= true.stamp_ns < self._now_ns
         self._true.add(true.stamp_ns, true.pose.x_m, true.pose.y_m)
         self._now_ns = max(self._now_ns, true.stamp_ns)
         self.travelled_m, self.progress = true.travelled_m, true.progress

@@ -47,6 +47,11 @@ def processes_at(endpoint: str, words: str = "") -> list[int]:
     return found
 
 
+def shared_memory() -> set[Path]:
+    """Files in shared memory, but for those of Python's own pools of processes, which are none of ours."""
+    return {path for path in Path("/dev/shm").iterdir() if not path.name.startswith("sem.mp-")}
+
+
 def wait_until(condition: Callable[[], bool]) -> None:
     deadline_s = time.monotonic() + PATIENCE_S
     while not condition():
@@ -145,6 +150,7 @@ def test_nothing_is_left_of_a_launcher_that_is_killed(start: Callable[..., Run])
 KILLED_TOGETHER = (
     ("sensory", "epam", "codelets-1", "global_workspace", "action"),
     ("workspace",),
+    ("sim",),
     ("recorder", "router"),
 )
 
@@ -178,7 +184,7 @@ def commands() -> Iterator[Callable[[str], list[MotorCommand]]]:
 def test_whatever_is_killed_is_started_again_and_the_robot_is_moved_on(
     start: Callable[..., Run], commands: Callable[[str], list[MotorCommand]]
 ) -> None:
-    left_over = set(Path("/dev/shm").iterdir())
+    before = shared_memory()
     run = start("--laps", "3", "--time-limit", "100")
     run.wait_for("path integration alone")
     heard = commands(run.endpoint)
@@ -187,28 +193,16 @@ def test_whatever_is_killed_is_started_again_and_the_robot_is_moved_on(
         for pid in pids.values():
             os.kill(pid, signal.SIGKILL)
         wait_until(lambda pids=pids: all(run.pid_of(name) not in (pid, None) for name, pid in pids.items()))
-        before = len(heard)
-        wait_until(lambda before=before: len(heard) >= before + 5)
+        enough = len(heard) + 5
+        wait_until(lambda enough=enough: len(heard) >= enough)
     run.process.send_signal(signal.SIGINT)
     assert run.end() == 130, run.output()
     summary = json.loads((run.folder / "summary.json").read_text())
     assert summary["restarts"] == {instance: 1 for together in KILLED_TOGETHER for instance in together}
     assert (run.folder / "log-2.mcap").read_bytes().endswith(b"\x89MCAP0\r\n")
     assert processes_at(run.endpoint) == []
-    assert set(Path("/dev/shm").iterdir()) <= left_over
+    assert shared_memory() <= before
     check_free(run.endpoint)
-
-
-def test_a_drive_ends_when_its_simulator_is_killed_for_the_town_died_with_it(start: Callable[..., Run]) -> None:
-    run = start("--laps", "3")
-    run.wait_for("path integration alone")
-    pid = run.pid_of("sim")
-    assert pid is not None
-    os.kill(pid, signal.SIGKILL)
-    assert run.end() == 1, run.output()
-    assert json.loads((run.folder / "summary.json").read_text())["ended_by"].startswith("the simulator died")
-    assert "Traceback" not in run.output() + "".join(log.read_text() for log in run.folder.glob("*.log"))
-    assert processes_at(run.endpoint) == []
 
 
 def test_a_port_in_use_is_one_sentence_and_code_2(start: Callable[..., Run], tmp_path: Path) -> None:

@@ -117,11 +117,3 @@ def test_a_track_keeps_its_order_when_an_old_position_comes_late() -> None:
         track.add(stamp_ns, float(stamp_ns), 0.0)
     assert track.stamps_ns.tolist() == [1, 3]
     assert track.covers(np.array([0, 1, 2, 3, 4])).tolist() == [False, True, True, True, False]
-
-
-def test_time_that_goes_back_tells_that_the_world_began_anew() -> None:
-    observer = Observer()
-    straight_drive(observer, 20, 1.0)
-    assert not observer.began_anew
-    observer.take(true_pose(0, 0.0, 0.0))
-    assert observer.began_anew
