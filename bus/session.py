@@ -16,10 +16,9 @@ LAST_PORT = 65535
 # How long a link that is full holds up the others before it loses a message, which the publisher's cache then mends.
 # Once it has, it loses the next at once until it has room: a subscriber that has stopped costs this long once.
 PATIENCE_US = 100_000
+# A stereo frame is seven batches: where only two find room, a busy machine drops it before it is under way.
 QUEUE_BATCHES = 16
 _QUEUES = ("data_high", "data", "data_low")
-QUEUED_BATCHES = 16
-_DROP = "transport/link/tx/queue/congestion_control/drop"
 
 
 def ready_key(agent: str, member: Member) -> str:
@@ -39,10 +38,6 @@ def _config(mode: str, **settings: object) -> zenoh.Config:
             "wait_before_drop": PATIENCE_US,
             "max_wait_before_drop_fragments": PATIENCE_US,
         },
-        # A stereo frame is seven batches: where only two find room, a busy machine drops it before it is under way.
-        **{
-            f"transport/link/tx/queue/size/{priority}": QUEUED_BATCHES for priority in ("data_high", "data", "data_low")
-        },
     }
     for key, value in settings.items():
         config.insert_json5(key, json.dumps(value))
@@ -56,8 +51,6 @@ def open_client(endpoint: str, timeout_s: float = CONNECT_TIMEOUT_S) -> zenoh.Se
         "connect/endpoints": [endpoint],
         "connect/timeout_ms": int(timeout_s * 1000),
         "connect/exit_on_failure": True,
-        f"{_DROP}/wait_before_drop": 20_000,
-        f"{_DROP}/max_wait_before_drop_fragments": 500_000,
         "connect/retry": {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 1.5},
     }
     try:
