@@ -102,8 +102,11 @@ def _commit(race: Race) -> None:
     publisher = Module("workspace").on(
         topics.CLOCK, lambda clock: ledger.commit(clock.stamp_ns, 1, "objects", operations), emits=[topics.DELTA]
     )
+    publisher.awaits = {"replica": REPLICAS}
     shell = Shell(publisher, ZenohBus(race.endpoint, AGENT), health=False)
     shell.open()
+    while shell.missing:
+        shell.pump(1.0)
     with race.at_work():
         race.go.wait()
         for number in range(race.number):
@@ -135,6 +138,9 @@ def _put(race: Race) -> None:
     payload = encode(Ledger(1.0).commit(0, 1, "objects", typical_operations()))
     session = open_client(race.endpoint)
     publisher = session.declare_publisher(RAW_KEY, congestion_control=zenoh.CongestionControl.BLOCK)
+    followers = session.liveliness().declare_subscriber(f"{RAW_KEY}/*", history=True)
+    for _ in range(REPLICAS):
+        followers.recv()
     with race.at_work():
         race.go.wait()
         for _ in range(race.number):
@@ -154,9 +160,11 @@ def _receive(race: Race) -> None:
             everything.set()
 
     subscriber = session.declare_subscriber(RAW_KEY, count)
+    token = session.liveliness().declare_token(f"{RAW_KEY}/{session.zid()}")
     with race.at_work():
         everything.wait()
         race.done.release()
+    token.undeclare()
     subscriber.undeclare()  # type: ignore[no-untyped-call]
     session.close()  # type: ignore[no-untyped-call]
 
