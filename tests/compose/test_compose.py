@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import socket
@@ -115,7 +116,12 @@ def test_the_recorder_writes_a_log(compose: Compose) -> None:
     assert int(sizes[0]) > 0
 
 
-@pytest.mark.parametrize("service", ["epam", "workspace"])
+def test_the_log_has_what_the_workspace_says_from_its_first_message_on(compose: Compose) -> None:
+    said = compose("exec", "-T", "recorder", "sh", "-c", "cogmap log cat *.mcap presence -n 1 --json")
+    assert json.loads(said.splitlines()[0])["message"]["seq"] == 0
+
+
+@pytest.mark.parametrize("service", ["epam", "workspace", "sim", "action"])
 def test_a_container_that_is_killed_comes_back_and_the_drive_goes_on(
     watch: Watch, compose: Compose, service: str
 ) -> None:
