@@ -164,7 +164,7 @@ def _receive(race: Race) -> None:
     with race.at_work():
         everything.wait()
         race.done.release()
-    token.undeclare()
+    token.undeclare()  # type: ignore[no-untyped-call]
     subscriber.undeclare()  # type: ignore[no-untyped-call]
     session.close()  # type: ignore[no-untyped-call]
 
