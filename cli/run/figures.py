@@ -66,7 +66,8 @@ class Figures(msgspec.Struct, kw_only=True):
     `start_s` says when, after the command began, what was there.
 
     `cycle_*_ms`: camera frame stamped to motor command received; `bus_share`: the part of the mean spent in anything
-    but computing. `gaps`: messages lost for good, by NEVER_DROP topic. `restarts` and `killed` name processes.
+    but computing. `dropped` answers of codelets are in no delta, and `refused` says why of the last few. `gaps`:
+    messages lost for good, by NEVER_DROP topic. `restarts` and `killed` name processes.
     """
 
     completed: bool
@@ -95,6 +96,8 @@ class Figures(msgspec.Struct, kw_only=True):
     object_error_median_m: float
     road_m2: float
     deltas: int
+    dropped: int
+    refused: list[str]
     gaps: dict[str, int]
     gaps_total: int
     rejected: dict[str, int]
@@ -152,6 +155,8 @@ def measured(watch: Watch, errors: Errors) -> dict[str, Any]:
         "object_error_median_m": float(np.median(off_m)) if off_m.size else 0.0,
         "road_m2": sum(int((tile.columns["road"] > 0.5).sum()) for tile in graph.tiles.values()) * graph.cell_m**2,
         "deltas": graph.version,
+        "dropped": watch.dropped,
+        "refused": list(watch.refused),
         "gaps": gaps,
         "gaps_total": sum(gaps.values()),
         "rejected": watch.rejected(),

@@ -53,6 +53,7 @@ def table(figures: Figures, folder: Path) -> Table:
         f"{figures.road_m2:.0f} m² of street",
         "cycle": f"{figures.cycle_p50_ms:.0f} ms, 99 % within {figures.cycle_p99_ms:.0f} ms",
         "lost messages": _losses(figures),
+        "dropped answers": f"{figures.dropped}, the last: {figures.refused[-1]}" if figures.refused else "none",
         "restarts": ", ".join(f"{name} {number}" for name, number in figures.restarts.items()) or "none",
     }
     for name, value in rows.items():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections import Counter
+from collections import Counter, deque
 
 from bus.codec import Envelope
 from bus.errors import MessageError
@@ -21,6 +21,7 @@ from schemas.process import Health
 from schemas.sensing import MotorCommand
 from schemas.topics import Delivery
 
+TOLD = 8
 FOLLOWED = (
     topics.TRUE_TOWN,
     topics.TRUE_POSE,
@@ -41,6 +42,8 @@ class Watch:
         self.cycle_ms: list[float] = []
         self.bus_ms: list[float] = []
         self.broadcasts = 0
+        self.dropped = 0
+        self.refused: deque[str] = deque(maxlen=TOLD)
         self.halted: Counter[str] = Counter()
         self.health: dict[str, Health] = {}
         self.present: set[Member] = set()
@@ -87,6 +90,8 @@ class Watch:
         match message:
             case Delta():
                 self.replica.follow(message)
+                self.dropped += message.dropped
+                self.refused.extend(message.refused)
             case Health():
                 self.health[message.instance] = message
                 self._busy.setdefault(message.instance, []).append(message.busy)

@@ -126,6 +126,28 @@ def test_gaps_are_those_of_whoever_missed_most(watch: Watch, speaker: Speaker) -
     assert watch.busy == {"epam": pytest.approx(0.3), "sensory": 0.5}
 
 
+def test_answers_that_were_dropped_are_counted_and_the_reasons_of_the_last_are_kept(
+    watch: Watch, speaker: Speaker
+) -> None:
+    for version in range(1, 12):
+        refused = [f"proposal {version} is late"]
+        speaker.say(
+            Delta(
+                seq=version,
+                version=version,
+                cycle=1,
+                phase="decay",
+                tasks=[],
+                operations=[],
+                dropped=2,
+                refused=refused,
+            )
+        )
+    figures = measured(watch, watch.observer.errors())
+    assert figures["dropped"] == 22
+    assert figures["refused"] == [f"proposal {version} is late" for version in range(4, 12)]
+
+
 def test_quiet_is_when_only_health_is_told(watch: Watch, speaker: Speaker) -> None:
     assert speaker.say(generate(1).message())
     assert not speaker.say(health("epam", {}))
