@@ -6,14 +6,20 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from live import Feeder, System, Witness, working
+from live import Feeder, System, Witness, shared_memory, working
+
+from bus.session import check_free
 
 
 @pytest.fixture
 def system(tmp_path: Path) -> Iterator[System]:
+    before = shared_memory()
     system = System(tmp_path)
     yield system
     system.close()
+    assert not any(process.is_alive for process in system.processes.values())
+    assert shared_memory() <= before
+    check_free(system.endpoint)
 
 
 @pytest.fixture

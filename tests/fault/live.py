@@ -42,6 +42,11 @@ def wait_until(condition: Callable[[], bool], what: str) -> None:
         pause.wait(0.02)
 
 
+def shared_memory() -> set[Path]:
+    """Files in shared memory, but for those of Python's own pools of processes, which are none of ours."""
+    return {path for path in Path("/dev/shm").iterdir() if not path.name.startswith("sem.mp-")}
+
+
 class Process:
     """A `cogmap` process with a pipe that ends it with this one."""
 
