@@ -43,7 +43,7 @@ class Ledger:
     def commit(
         self, stamp_ns: int, cycle: int, phase: str, operations: list[Operation], tasks: list[str] | None = None
     ) -> Delta:
-        """Number `operations`, carry them out, and return the delta; it tells how many answers were dropped, and why."""
+        """Number `operations`, carry them out, and return the delta; it tells how many answers were dropped, why."""
         dropped, self._dropped = self._dropped, 0
         refused, self._refused = self._refused, []
         delta = Delta(
