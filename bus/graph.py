@@ -35,6 +35,11 @@ _PLACE = "place"
 Weights = dict[str, dict[str, float]]
 
 
+def object_id(label: str) -> str:
+    """The name of the node of the object that EPAM calls `label`."""
+    return f"object:{label}"
+
+
 def place_id(i: int, j: int) -> str:
     """The name of the place node of grid cell (i, j)."""
     return f"{_PLACE}:{i}:{j}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bus.errors import MessageError
+from bus.graph import object_id
 from schemas.array import Array
 from schemas.base import Scalar
 from schemas.graph import Cells, Node, Operation
@@ -16,11 +17,6 @@ from services.codelets.settings import Config
 FIRST_BASE_LEVEL = 0.2
 ROAD_REACH_M = 12.0
 ENOUGH_POINTS = 3
-
-
-def object_id(label: str) -> str:
-    """The name of the node of the object that EPAM calls `label`."""
-    return f"object:{label}"
 
 
 def place_object(task: Task, config: Config) -> list[Operation]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bus.graph import Graph
+from bus.graph import Graph, object_id
 from schemas.array import Array
 from schemas.graph import Links, Node, Operation
 from schemas.mind import Task
@@ -24,11 +24,6 @@ class Scene:
     cycle: int
     percepts: Percepts
     motions: Array
-
-
-def object_id(label: str) -> str:
-    """The name of the node of the object that EPAM calls `label`."""
-    return f"object:{label}"
 
 
 def first_self(samples: int) -> Node:
