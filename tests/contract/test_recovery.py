@@ -7,9 +7,15 @@ import sys
 from collections.abc import Iterator
 
 import pytest
-from networks import OverZenoh, Peer, free_endpoint, meet, publish
+from networks import OverZenoh, Peer, answering, free_endpoint, meet, publish, pump_until
 
+from bus.graph import Graph
+from bus.interface import CACHED_MESSAGES
+from bus.module import Module
+from bus.replica import Replica, snapshot_over
+from bus.shell import Shell
 from schemas import topics
+from schemas.graph import Delta, Node
 from schemas.sensing import Odometry
 
 
@@ -62,3 +68,35 @@ def test_what_is_said_while_the_router_is_dead_arrives_when_it_is_back(router: R
         seqs = [arrival.envelope.seq for arrival in peer.take(40 + afterwards) if arrival.envelope]
         assert seqs == list(range(40 + afterwards))
     network.close()
+
+
+def test_of_more_than_the_cache_holds_the_loss_is_counted_and_a_replica_is_mended_by_a_snapshot(router: Router) -> None:
+    graph, network, lost = Graph(), OverZenoh(router.endpoint), 50
+    keeper = Module("workspace").answering(topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, lambda request: graph.snapshot())
+    publisher, reader = network.join(), network.join()
+    publisher.declare(topics.DELTA)
+    replica = Replica(snapshot_over(reader))
+    follower = Shell(Module("follower").on(topics.DELTA, replica.follow), reader, health=False)
+    follower.open()
+
+    def commit() -> None:
+        node = Node(id=f"building-{graph.version}", kind="object", activation=0.5)
+        delta = Delta(version=graph.version + 1, cycle=1, phase="objects", tasks=[], operations=[node])
+        graph.apply(delta)
+        delta.source, delta.seq = "workspace", delta.version
+        publish(publisher, delta)
+
+    with answering(Shell(keeper, network.join(), health=False)):
+        meet(publisher, reader)
+        commit()
+        pump_until(lambda: replica.graph.version == 1, follower)
+        router.kill()
+        for _ in range(CACHED_MESSAGES + lost):
+            commit()
+        router.start()
+        pump_until(lambda: replica.graph.version == graph.version, follower)
+
+    assert replica.graph.digest() == graph.digest()
+    assert replica.mended == 1
+    assert dict(follower.intake.gaps) == {topics.DELTA.name: lost}
+    follower.close()
