@@ -21,6 +21,7 @@ from schemas.process import Presence
 
 log = logging.getLogger("cogmap")
 HEALTH_PERIOD_NS = 1_000_000_000
+MANY_CAUSES = 1000
 START = "@start"
 TIMER = "@timer"
 
@@ -175,4 +176,6 @@ class Shell:
         sent_ns = time.time_ns()
         health.stamp_ns = sent_ns
         envelope = Envelope(health.source, health.seq, self._incarnation, sent_ns, sent_ns)
+        if len(self._causes) > MANY_CAUSES:  # whoever says little else would remember all that it ever took in
+            envelope.causes, self._causes = self._causes, []
         self.bus.publish(topics.HEALTH, encode(health), envelope)

@@ -9,11 +9,11 @@ import pytest
 from damage import damaged, golden
 from networks import PATIENCE_S, Network, Peer, answering, envelope_of, meet, publish, pump_until
 
-from bus.codec import Envelope, decode, encode
+from bus.codec import Cause, Envelope, decode, encode
 from bus.errors import MessageError, NoAnswerError
 from bus.interface import Member
 from bus.module import Module
-from bus.shell import Shell
+from bus.shell import MANY_CAUSES, Shell
 from schemas import topics
 from schemas.base import Message
 from schemas.graph import Snapshot, SnapshotRequest
@@ -184,6 +184,25 @@ def test_what_led_to_a_message_and_the_time_it_took_travel_with_it(network: Netw
         ((name, compute_ns, rest_ns),) = arrival.envelope.stages
         assert name == "action"
         assert compute_ns + rest_ns == arrival.envelope.sent_ns - arrival.envelope.born_ns
+    shell.close()
+
+
+def test_what_a_silent_module_took_in_is_told_with_its_health_before_it_grows_long(network: Network) -> None:
+    module = Module("codelets", "codelets-2").on(topics.ODOMETRY, lambda odometry: None, emits=[topics.MOTOR_COMMAND])
+    shell, observer = Shell(module, network.join()), network.join()
+    observer.declare(topics.ODOMETRY)
+    peer = Peer(observer, topics.HEALTH)
+    shell.open()
+    meet(observer, shell.bus)
+
+    publish(observer, *(odometry(seq) for seq in range(MANY_CAUSES + 1)))
+    pump_until(lambda: shell.intake.received["odometry"] == MANY_CAUSES + 1, shell)
+    told: list[Cause] = []
+    while not told:
+        pump_until(lambda: len(peer.inbox) > 0, shell)
+        told += [cause for arrival in peer.take(1) if arrival.envelope for cause in arrival.envelope.causes]
+
+    assert told == [("odometry", "sim", seq) for seq in range(MANY_CAUSES + 1)]
     shell.close()
 
 
