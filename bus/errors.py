@@ -31,9 +31,5 @@ class NoAnswerError(CogmapError):
     """A query got no answer, or an error for an answer."""
 
 
-class NotReadyError(CogmapError):
-    """A module that others wait for did not become ready in time."""
-
-
 class LogError(UsageError):
     """A log file is missing, damaged, or not one of ours."""

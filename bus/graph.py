@@ -45,6 +45,11 @@ def place_id(i: int, j: int) -> str:
     return f"{_PLACE}:{i}:{j}"
 
 
+def nearest_place(x_m: float, y_m: float, cell_m: float) -> str:
+    """The name of the place node nearest to a position, in a grid of `cell_m`."""
+    return place_id(round(x_m / cell_m), round(y_m / cell_m))
+
+
 def place_cell(identifier: str) -> tuple[int, int] | None:
     """The grid cell of a place node's name; None for any other node's."""
     kind, _, cell = identifier.partition(":")
@@ -157,10 +162,6 @@ class Graph:
             mine = (tiles[:, 0] == x) & (tiles[:, 1] == y)
             tile = self.tiles.setdefault((x, y), Tile())
             tile.columns[cells.column][inside[mine, 0], inside[mine, 1]] = values[mine]
-
-    def cell_of(self, x_m: float, y_m: float) -> tuple[int, int]:
-        """The grid cell whose place node is nearest to a position."""
-        return round(x_m / self.cell_m), round(y_m / self.cell_m)
 
     def place(self, i: int, j: int) -> Node | None:
         """The place node of a cell, as a node like any other; None where no tile has come into being."""

@@ -15,7 +15,6 @@ class Scheme:
     name: str
     context: tuple[str, ...]
     adding: dict[str, float] = field(default_factory=dict)
-    executions: int = 0
 
     def activation(self, context: dict[str, float]) -> float:
         """min(1, mean context + mean |adding-list salience|); 0 where a part of the context is missing."""
@@ -58,5 +57,4 @@ class ActionSelection:
             self._threshold = max(0.0, self._threshold - self._config.threshold_fall)
             return None
         self._threshold = self._config.selection_threshold
-        best[0].executions += 1
         return best

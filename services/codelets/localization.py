@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bus.errors import MessageError
-from bus.graph import place_id
+from bus.graph import nearest_place
 from schemas.array import Array
 from schemas.graph import DropLink, Link, Node, Operation
 from schemas.mind import Task
@@ -123,7 +123,7 @@ def _correct(
 def _self_operations(task: Task, node: Node, kept: Samples, share: float) -> list[Operation]:
     mean = mean_pose(kept)
     sd = spread(kept, mean)
-    cell = place_id(round(mean[0] / task.cell_m), round(mean[1] / task.cell_m))
+    cell = nearest_place(mean[0], mean[1], task.cell_m)
     attributes = node.attributes | {
         "x_m": float(mean[0]),
         "y_m": float(mean[1]),
@@ -187,7 +187,7 @@ def object_operations(task: Task, node: Node, samples: Samples, percept: Percept
     """An object node with new samples, refreshed by a percept, and its link to the place of their mean."""
     mean = samples.mean(axis=0)
     sd = spread(samples, mean)
-    cell = place_id(round(mean[0] / task.cell_m), round(mean[1] / task.cell_m))
+    cell = nearest_place(mean[0], mean[1], task.cell_m)
     attributes = node.attributes | {
         "x_m": float(mean[0]),
         "y_m": float(mean[1]),

@@ -91,8 +91,11 @@ class Workspace:
         return self._go_on_if_complete(self._dispatch.presence(presence.instance, presence.alive, self._now_ns))
 
     def on_clock(self, clock: Clock) -> list[Message]:
-        """In real time, take back what a lease has ended for, and end a cycle at its deadline."""
-        self._now_ns = max(self._now_ns, clock.stamp_ns)
+        """In real time, take back what a lease has ended for, and end a cycle at its deadline.
+
+        The newest word holds: after a clock that ran far ahead, once, no later deadline would be kept.
+        """
+        self._now_ns = clock.stamp_ns
         if self._config.mode == "lockstep" or self._scene is None:
             return []
         if self._now_ns > self._scene.percepts.stamp_ns + self._config.deadline_ms * 1e6:

@@ -69,14 +69,6 @@ def test_the_end_of_the_route_calls_for_a_halt() -> None:
     assert chosen[0].name == HALT
 
 
-def test_the_scheme_that_is_selected_counts_its_executions() -> None:
-    selection = ActionSelection(Config())
-    for executions in (1, 2, 3):
-        chosen = selection.select(_nodes(self=1.0), {"route_ahead": 1.0})
-        assert chosen is not None
-        assert (chosen[0].name, chosen[0].executions) == (FOLLOW_ROUTE, executions)
-
-
 # Sensory-motor memory
 
 

@@ -161,6 +161,16 @@ def test_at_its_deadline_a_cycle_commits_what_has_come_and_the_next_one_begins()
     assert _committed(desk, road) == 0
 
 
+def test_a_clock_that_once_ran_far_ahead_spoils_no_later_cycle() -> None:
+    desk, _ = _real_time("w1", "w2")
+    desk.clock(stamp_ns(1000))
+    assert desk.deltas[-1].phase == "decay"
+    desk.clock(stamp_ns(1))
+    desk.see(1)
+    desk.clock(stamp_ns(1) + 50 * MS)
+    assert desk.deltas[-1].phase == "percepts"
+
+
 def test_a_part_of_the_answers_is_committed_at_the_deadline() -> None:
     desk = Desk("w1", "w2", mode="real_time")
     desk.see(0, percept("a"), percept("b"))
