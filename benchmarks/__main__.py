@@ -9,9 +9,9 @@ from pathlib import Path
 import click
 
 from benchmarks import cycle, deltas, losses
-from benchmarks.drive import free_endpoint
 from benchmarks.report import Bar, publish
 from bus.errors import CogmapError, UsageError
+from bus.session import free_endpoint
 
 BUS_BARS = {"delta_rate_ratio": Bar(0.5, at_least=True), "never_drop_lost": Bar(0)}
 

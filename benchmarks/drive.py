@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 import sys
 import time
 from pathlib import Path
@@ -12,6 +11,7 @@ from rich.console import Console
 
 from bus.errors import CogmapError
 from bus.runner import Stop
+from bus.session import free_endpoint
 from cli.run import display, summary
 from cli.run.display import Display
 from cli.run.drive import INTERRUPTED, Drive
@@ -59,13 +59,6 @@ class Course(Stop):
     def close(self) -> None:
         """Leave the screen as it should stay."""
         self._shown_on.close()
-
-
-def free_endpoint() -> str:
-    """An endpoint where nothing listens."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
 def drive(folder: Path, laps: float = 1.0, seconds: float = PATIENCE_S) -> tuple[Figures, Watch]:

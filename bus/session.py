@@ -44,6 +44,13 @@ def _config(mode: str, **settings: object) -> zenoh.Config:
     return config
 
 
+def free_endpoint() -> str:
+    """An endpoint on this machine where nothing listens."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
 def open_client(endpoint: str, timeout_s: float = CONNECT_TIMEOUT_S) -> zenoh.Session:
     """A session with the router at `endpoint`. Raises NoRouterError if none answers within `timeout_s`."""
     _address(endpoint)

@@ -5,18 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from networks import InMemory, Network, OverZenoh, free_endpoint
-
-from bus.session import open_router
+from networks import InMemory, Network, OverZenoh, routed
 
 
 @pytest.fixture(scope="session")
 def endpoint() -> Iterator[str]:
     """The endpoint of a router of this test run's own."""
-    address = free_endpoint()
-    router = open_router(address)
-    yield address
-    router.close()
+    with routed() as address:
+        yield address
 
 
 @pytest.fixture(params=["memory", "zenoh"])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -17,7 +16,7 @@ from bus.errors import MessageError
 from bus.inbox import Inbox
 from bus.interface import Arrival, Bus, Member
 from bus.memory import MemoryBus, MemoryNetwork
-from bus.session import open_client
+from bus.session import free_endpoint, open_client, open_router
 from bus.shell import Shell
 from bus.zenoh_bus import ZenohBus
 from schemas import topics
@@ -30,11 +29,15 @@ BLOCK = zenoh.CongestionControl.BLOCK
 _numbers = itertools.count()
 
 
-def free_endpoint() -> str:
-    """An endpoint where nothing listens."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+@contextmanager
+def routed() -> Iterator[str]:
+    """The endpoint of a router that is there meanwhile."""
+    address = free_endpoint()
+    router = open_router(address)
+    try:
+        yield address
+    finally:
+        router.close()  # type: ignore[no-untyped-call]
 
 
 class Network(Protocol):
@@ -144,8 +147,8 @@ def pump_until(condition: Callable[[], bool], *shells: Shell) -> None:
 
 
 @contextmanager
-def answering(shell: Shell) -> Iterator[None]:
-    """Let the shell work on a thread of its own, so that it can answer whoever asks here."""
+def working(shell: Shell) -> Iterator[None]:
+    """Let `shell` work on a thread of its own."""
     ended = threading.Event()
 
     def work() -> None:
@@ -153,7 +156,7 @@ def answering(shell: Shell) -> Iterator[None]:
             shell.pump(0.01)
 
     shell.open()
-    thread = threading.Thread(target=work)
+    thread = threading.Thread(target=work, daemon=True)
     thread.start()
     try:
         yield

@@ -7,12 +7,13 @@ import sys
 from collections.abc import Iterator
 
 import pytest
-from networks import OverZenoh, Peer, answering, free_endpoint, meet, publish, pump_until
+from networks import OverZenoh, Peer, meet, publish, pump_until, working
 
 from bus.graph import Graph
 from bus.interface import CACHED_MESSAGES
 from bus.module import Module
 from bus.replica import Replica, snapshot_over
+from bus.session import free_endpoint
 from bus.shell import Shell
 from schemas import topics
 from schemas.graph import Delta, Node
@@ -86,7 +87,7 @@ def test_of_more_than_the_cache_holds_the_loss_is_counted_and_a_replica_is_mende
         delta.source, delta.seq = "workspace", delta.version
         publish(publisher, delta)
 
-    with answering(Shell(keeper, network.join(), health=False)):
+    with working(Shell(keeper, network.join(), health=False)):
         meet(publisher, reader)
         commit()
         pump_until(lambda: replica.graph.version == 1, follower)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from networks import Network, answering, meet
+from networks import Network, meet, working
 
 from bus.graph import Graph
 from bus.module import Module
@@ -41,7 +41,7 @@ def test_a_gap_is_mended_by_a_snapshot(network: Network) -> None:
     replica = Replica(snapshot_over(bus))
     shell = keeper(network, graph)
 
-    with answering(shell):
+    with working(shell):
         meet(bus, shell.bus)
         assert replica.follow(delta(1))
         assert replica.follow(delta(7))
@@ -57,7 +57,7 @@ def test_a_delta_that_the_snapshot_held_already_changes_nothing(network: Network
     replica = Replica(snapshot_over(bus))
     shell = keeper(network, graph)
 
-    with answering(shell):
+    with working(shell):
         meet(bus, shell.bus)
         assert replica.follow(delta(3))
     assert all(replica.follow(delta(version)) for version in (4, 5))

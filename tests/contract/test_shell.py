@@ -7,7 +7,7 @@ import time
 
 import pytest
 from damage import damaged, golden
-from networks import PATIENCE_S, Network, Peer, answering, envelope_of, meet, publish, pump_until
+from networks import PATIENCE_S, Network, Peer, envelope_of, meet, publish, pump_until, working
 
 from bus.codec import Cause, Envelope, decode, encode
 from bus.errors import MessageError, NoAnswerError
@@ -306,7 +306,7 @@ def test_a_question_that_makes_no_sense_is_refused_and_counted(network: Network)
     empty = Snapshot(version=0, cycle=0, nodes=[], links=[], tiles=[])
     module = Module("workspace").answering(topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, lambda request: empty)
     shell, asker = Shell(module, network.join(), health=False), network.join()
-    with answering(shell):
+    with working(shell):
         meet(asker, shell.bus)
         with pytest.raises(NoAnswerError, match="stamp_ns"):
             asker.query(topics.SNAPSHOT_REQUEST, encode(SnapshotRequest()).replace(b"\x00", b"\xff", 1), PATIENCE_S)

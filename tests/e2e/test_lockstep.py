@@ -7,8 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from test_run import free_endpoint
-
+from bus.session import free_endpoint
 from logs.diff import diff
 
 PATIENCE_S = 90.0

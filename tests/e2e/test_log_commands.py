@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import pty
-import socket
 import subprocess
 import sys
 import threading
@@ -16,10 +15,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from networks import routed
 
 from bus.codec import Envelope, encode
 from bus.errors import UsageError
-from bus.session import open_router
 from bus.zenoh_bus import ZenohBus
 from cli.main import cogmap
 from logs.diff import diff
@@ -143,12 +142,8 @@ def test_what_the_user_can_mend_is_one_sentence(
 
 @pytest.fixture
 def endpoint() -> Iterator[str]:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        address = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
-    router = open_router(address)
-    yield address
-    router.close()
+    with routed() as address:
+        yield address
 
 
 def test_what_is_played_onto_zenoh_and_recorded_again_says_the_same(endpoint: str, path: Path, tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 
 from bus.module import Module
-from bus.session import check_free
+from bus.session import check_free, free_endpoint
 from bus.shell import Shell
 from bus.zenoh_bus import ZenohBus
 from schemas import topics
@@ -25,12 +25,6 @@ from schemas.sensing import MotorCommand
 
 COGMAP = [sys.executable, "-m", "cli.main"]
 PATIENCE_S = 60.0
-
-
-def free_endpoint() -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
 def processes_at(endpoint: str, words: str = "") -> list[int]:

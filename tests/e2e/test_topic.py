@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -14,7 +13,7 @@ from collections.abc import Iterator
 import pytest
 
 from bus.module import Module
-from bus.session import open_router
+from bus.session import free_endpoint, open_router
 from bus.shell import Shell
 from bus.zenoh_bus import ZenohBus
 from schemas import topics
@@ -59,9 +58,7 @@ class System:
 
 @pytest.fixture(scope="module")
 def endpoint() -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    return free_endpoint()
 
 
 @pytest.fixture(scope="module")

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import socket
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-
-from bus.session import open_router
+from networks import routed
 
 PATIENCE_S = 30.0
 NOBODY = "tcp/127.0.0.1:1"
@@ -32,12 +30,8 @@ def sentence_of(process: subprocess.Popen[str]) -> str:
 
 @pytest.fixture(scope="module")
 def endpoint() -> Iterator[str]:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        address = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
-    router = open_router(address)
-    yield address
-    router.close()  # type: ignore[no-untyped-call]
+    with routed() as address:
+        yield address
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from live import Feeder, System, Witness, shared_memory, working
+from live import Feeder, System, Witness, shared_memory
+from networks import working
 
 from bus.session import check_free
 

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import signal
-import socket
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +17,7 @@ from bus.errors import NoAnswerError
 from bus.graph import Graph
 from bus.module import Module
 from bus.replica import Replica, snapshot_over
+from bus.session import free_endpoint
 from bus.shell import Shell
 from bus.zenoh_bus import ZenohBus
 from schemas import topics
@@ -85,9 +84,7 @@ class System:
     """Processes that meet at one endpoint."""
 
     def __init__(self, folder: Path) -> None:
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+        self.endpoint = free_endpoint()
         self.folder = folder
         self.processes: dict[str, Process] = {}
 
@@ -136,26 +133,6 @@ class System:
         for name in sorted(self.processes, key=lambda name: name == "router"):
             if self.processes[name].is_alive:
                 self.processes[name].end(signal.SIGTERM)
-
-
-@contextmanager
-def working(shell: Shell) -> Iterator[None]:
-    """Let `shell` work on a thread of its own."""
-    ended = threading.Event()
-
-    def work() -> None:
-        while not ended.is_set():
-            shell.pump(0.02)
-
-    shell.open()
-    thread = threading.Thread(target=work, daemon=True)
-    thread.start()
-    try:
-        yield
-    finally:
-        ended.set()
-        thread.join()
-        shell.close()
 
 
 class Feeder:

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from damage import damaged
-from live import AGENT, System, Witness, wait_until, working
+from live import AGENT, System, Witness, wait_until
+from networks import working
 
 from bus.module import Module
 from bus.session import open_client

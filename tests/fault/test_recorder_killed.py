@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -13,10 +12,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from networks import routed
 
 from bus.codec import Envelope, encode
 from bus.interface import Member
-from bus.session import open_router
 from bus.zenoh_bus import ZenohBus
 from logs.reader import LogReader
 from logs.recover import recover
@@ -30,12 +29,8 @@ FLUSH_S, SLACK_S = 0.25, 0.5
 
 @pytest.fixture
 def endpoint() -> Iterator[str]:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        address = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
-    router = open_router(address)
-    yield address
-    router.close()
+    with routed() as address:
+        yield address
 
 
 class Speaker:

@@ -9,7 +9,8 @@ from collections import Counter
 import pytest
 import zenoh
 from damage import damaged, golden
-from live import AGENT, Feeder, System, Witness, wait_until, working
+from live import AGENT, Feeder, System, Witness, wait_until
+from networks import working
 
 from bus.codec import Envelope, encode
 from bus.errors import NoAnswerError

@@ -10,7 +10,8 @@ from itertools import pairwise
 import msgspec
 import numpy as np
 import pytest
-from live import AGENT, Feeder, System, Witness, wait_until, working
+from live import AGENT, Feeder, System, Witness, wait_until
+from networks import working
 
 from bus.module import Module
 from bus.shell import Shell

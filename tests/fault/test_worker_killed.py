@@ -6,7 +6,8 @@ import signal
 from collections import Counter
 
 import pytest
-from live import Feeder, System, Witness, wait_until, working
+from live import Feeder, System, Witness, wait_until
+from networks import working
 
 from bus.module import Module
 from bus.shell import Shell
