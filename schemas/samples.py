@@ -47,6 +47,7 @@ def _percept() -> sensing.Percept:
         height_m=6.5,
         whole=True,
         box_px=(12, 34, 56, 78),
+        outline_px=[(12, 34), (68, 34), (68, 112)],
     )
 
 
@@ -91,7 +92,13 @@ def _sensing() -> list[Message]:
         sensing.SelfMotion(frame=6, since_ns=1_000_000_000, motions=_ramp(4, 3, dtype="<f8")),
         sensing.View(frame=6, image=image, depth_m=depth, calibration=_calibration()),
         sensing.RangeScan(frame=6, bearing_rad=_ramp(5, dtype="<f4"), range_m=_ramp(5, dtype="<f4")),
-        sensing.Percepts(frame=6, objects=[_percept()], road_m=_ramp(3, 2, dtype="<f4")),
+        sensing.Percepts(
+            frame=6,
+            objects=[_percept()],
+            road_m=_ramp(3, 2, dtype="<f4"),
+            road_boundary_m=_ramp(2, 2, dtype="<f4"),
+            matches=[sensing.PlaceMatch(frame=2, view_ns=400_000_000, score=0.75)],
+        ),
         sensing.MotorCommand(left_wheel_rad_s=10.5, right_wheel_rad_s=-9.5, halted_by="obstacle"),
         sensing.TruePose(pose=pose, travelled_m=12.5, progress=0.25),
         sensing.TrueTown(seed=7, streets=[street], buildings=[house]),
@@ -166,9 +173,17 @@ def _process() -> list[Message]:
     ]
 
 
+def _learned() -> sensing.Learned:
+    return sensing.Learned(
+        frame=6,
+        objects=[sensing.LearnedObject(label="building-08", embedding=_ramp(4, dtype="<f4"))],
+        views=[sensing.RememberedView(frame=2, view_ns=400_000_000, code=_ramp(4, dtype="|u1"))],
+    )
+
+
 def samples() -> list[Message]:
     """A message of every type in the table of topics, every field of it other than its default."""
-    messages = [*_sensing(), *_mind(), *_process()]
+    messages = [*_sensing(), *_mind(), *_process(), _learned()]
     for seq, message in enumerate(messages):
         message.stamp_ns, message.seq, message.source = _STAMP_NS, seq, "sample"
     return messages

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 import msgspec
+import numpy as np
 
 from schemas.array import Array
 from schemas.base import Count, Finite, Message, Name, Part
@@ -83,7 +84,8 @@ class Percept(Part, kw_only=True):
     """One recognised object: a PAM node over threshold, and where it stands as seen from the robot.
 
     Bearing (left positive) and range point to the object's estimated centre; `whole` says that neither
-    image border nor another object cuts it. `box_px` is left, top, width, height in the view.
+    image border nor another object cuts it. `box_px` is left, top, width, height in the view; `outline_px` are the
+    corners, column and row, of a polygon around what is seen of it.
     """
 
     label: Name
@@ -96,14 +98,59 @@ class Percept(Part, kw_only=True):
     height_m: Metres
     whole: bool
     box_px: tuple[int, int, int, int]
+    outline_px: list[tuple[int, int]] = []
+
+
+class PlaceMatch(Part, kw_only=True):
+    """A view from a place that was seen before, recognised by the views that led to it.
+
+    `frame` and `view_ns` are those of the remembered view; `score` is how sure it is.
+    """
+
+    frame: Count
+    view_ns: Count
+    score: Unit
+
+
+def _no_points() -> Array:
+    return Array.of(np.empty((0, 2), np.float32))
 
 
 class Percepts(Message, kw_only=True):
-    """All that was recognised in one view. `road_m`: float32 (n, 2) ground points seen as road, x forward, y left."""
+    """All that was recognised in one view.
+
+    `road_m` and `road_boundary_m`: float32 (n, 2), ground points seen as road, and where it ends, in the robot's
+    frame, x forward, y left. `matches` has at most one remembered view.
+    """
 
     frame: Count
     objects: list[Percept]
     road_m: Array
+    road_boundary_m: Array = msgspec.field(default_factory=_no_points)
+    matches: list[PlaceMatch] = []
+
+
+class LearnedObject(Part, kw_only=True):
+    """A PAM node that one encounter gave: its label, and what the object looks like, float32 (n,) of length 1."""
+
+    label: Name
+    embedding: Array
+
+
+class RememberedView(Part, kw_only=True):
+    """A view to recognise a place by: its `frame` and stamp, and `code`, uint8 (n,), for EPAM to compare."""
+
+    frame: Count
+    view_ns: Count
+    code: Array
+
+
+class Learned(Message, kw_only=True):
+    """What perception learned from one view, or, after a restart, from all before."""
+
+    frame: Count
+    objects: list[LearnedObject] = []
+    views: list[RememberedView] = []
 
 
 class MotorCommand(Message, kw_only=True):
