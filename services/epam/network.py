@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import cv2
@@ -21,7 +22,7 @@ class Network:
     Raises ConfigError where there is no such file, or what is in it has other inputs or outputs.
     """
 
-    def __init__(self, path: Path, takes: Shape, gives: dict[str, Shape]) -> None:
+    def __init__(self, path: Path, takes: Shape, gives: Mapping[str, Shape]) -> None:
         cv2.setNumThreads(1)
         self._takes, self._names = takes, list(gives)
         if not path.is_file():

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 from schemas.sensing import Calibration
+from services.sim.light import Light, brightness, shadow_top, taken
 from services.sim.quiet import pybullet, quiet
 from services.sim.wall import Image
 from services.sim.world import World
 
 Matrix = npt.NDArray[np.float64]
 NEAR_M, FAR_M = 0.2, 400.0
+_NOON = (-0.4, -0.7, 1.0)
 # The camera's axes (x right, y down, z forward) in the robot's (x forward, y left, z up).
 _MOUNT: Matrix = np.array([[0, 0, 1], [-1, 0, 0], [0, -1, 0]], float)
 
@@ -63,6 +65,9 @@ class StereoCamera:
         self._projection = _projection(calibration)
         right, _ = cv2.Rodrigues(np.asarray(calibration.right_rotation_rad))
         self._right_turn: Matrix = np.asarray(right, float)
+        columns, rows = np.meshgrid(np.arange(calibration.width_px), np.arange(calibration.height_px))
+        across, down = (columns - calibration.cx_px) / calibration.fx_px, (rows - calibration.cy_px) / calibration.fy_px
+        self._rays = np.stack([across, down, np.ones_like(across)], axis=2).astype(np.float32)
         # The first pictures take long, and EGL announces them.
         with quiet():
             self.shoot()
@@ -70,11 +75,21 @@ class StereoCamera:
     def shoot(self) -> tuple[Image, Image]:
         """The left and the right picture from where the robot is."""
         (left, left_at), (right, right_at) = self._stations()
-        return self._expose(left, left_at, False).image, self._expose(right, right_at, False).image
+        return self._expose(left, left_at, False, None).image, self._expose(right, right_at, False, None).image
 
-    def survey(self) -> tuple[Exposure, Exposure]:
-        """As `shoot`, with true depth and bodies: for learning and tests."""
-        return tuple(self._expose(turn, at, True) for turn, at in self._stations())  # type: ignore[return-value]
+    def survey(self, light: Light | None = None, rng: np.random.Generator | None = None) -> tuple[Exposure, Exposure]:
+        """As `shoot`, with true depth and bodies, for learning and tests; in `light`, with noise from `rng`."""
+        left, right = (self._expose(turn, at, True, light) for turn, at in self._stations())
+        if light is None:
+            return left, right
+        rng = rng or np.random.default_rng(0)
+        top_m = shadow_top(self._world.relief, light)
+        lit = []
+        for exposure, (turn, at) in zip((left, right), self._stations(), strict=True):
+            rays = self._rays @ turn.T.astype(np.float32)
+            bright = brightness(exposure.depth_m, rays, at, top_m, light)
+            lit.append(replace(exposure, image=taken(exposure.image, bright, light, rng)))
+        return lit[0], lit[1]
 
     def _stations(self) -> list[tuple[Matrix, Matrix]]:
         """Each camera's axes as columns, and its place, in the world."""
@@ -86,7 +101,7 @@ class StereoCamera:
         left = turn @ _MOUNT
         return [(left, left_at), (left @ self._right_turn, left_at + left @ (mount.baseline_m, 0.0, 0.0))]
 
-    def _expose(self, turn: Matrix, at: Matrix, labelled: bool) -> Exposure:
+    def _expose(self, turn: Matrix, at: Matrix, labelled: bool, light: Light | None) -> Exposure:
         mount, world = self.calibration, self._world
         if world.egl is not None:
             world.egl.check()
@@ -95,7 +110,7 @@ class StereoCamera:
             mount.height_px,
             pybullet.computeViewMatrix(at.tolist(), (at + turn[:, 2]).tolist(), (-turn[:, 1]).tolist()),
             self._projection,
-            lightDirection=(-0.4, -0.7, 1.0),
+            lightDirection=light.sun if light else _NOON,
             lightColor=(1, 1, 1),
             lightAmbientCoeff=0.62,
             lightDiffuseCoeff=0.42,

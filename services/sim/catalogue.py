@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import colorsys
 from dataclasses import dataclass
+
+import numpy as np
 
 Colour = tuple[int, int, int]
 
@@ -76,4 +79,32 @@ CATALOGUE: tuple[BuildingType, ...] = (
     _type("farmhouse", (10.0, 7.5, 6.5), "eee8d6 5c3820 462c1a", ("5c3820", _THATCH), "timber", shape="gable"),
 )
 
-BY_NAME: dict[str, BuildingType] = {kind.name: kind for kind in CATALOGUE}
+_PATTERNS = ("", "bands", "stripes", "columns", "checker", "planks", "timber", "cross", "gates", "grid", "shutters")
+_FINISHES = (_WHITE, _CREAM, _STONE, _DARK)
+_ROOFS = (_TILE, _SLATE, _COPPER, _THATCH, _DARK)
+
+
+def invented(seed: int, count: int) -> tuple[BuildingType, ...]:
+    """`count` kinds that no catalogue has, named after `seed`: buildings that nobody was taught."""
+    rng = np.random.default_rng([seed, 0x1D])
+    return tuple(_invent(f"invented-{seed}-{number}", rng) for number in range(count))
+
+
+def _invent(name: str, rng: np.random.Generator) -> BuildingType:
+    pattern = str(rng.choice(_PATTERNS))
+    height_m = float(rng.uniform(5, 14))
+    size_m = float(rng.uniform(9 if pattern == "gates" else 6, 14)), float(rng.uniform(6, 12)), height_m
+    wall = _paint(rng)
+    accent = _paint(rng)
+    while max(abs(a - b) for a, b in zip(wall, accent, strict=True)) < 80:
+        accent = _paint(rng)
+    trim, roof = _rgb(str(rng.choice(_FINISHES))), _rgb(str(rng.choice(_ROOFS)))
+    shape = "gable" if rng.random() < 0.35 else "flat"
+    return BuildingType(name, *size_m, wall, accent, trim, _paint(rng), roof, pattern, shape)
+
+
+def _paint(rng: np.random.Generator) -> Colour:
+    """A colour that a house may have: of any hue, from white over strong to dark."""
+    saturation = float(rng.choice([rng.uniform(0.0, 0.2), rng.uniform(0.3, 0.95)], p=[0.25, 0.75]))
+    red, green, blue = colorsys.hsv_to_rgb(float(rng.random()), saturation, float(rng.uniform(0.35, 0.98)))
+    return round(255 * red), round(255 * green), round(255 * blue)

@@ -10,6 +10,7 @@ import numpy as np
 
 from schemas.sensing import Building, Pose, Street, TrueTown
 from services.sim.catalogue import CATALOGUE, BuildingType
+from services.sim.furniture import Prop, furnish
 from services.sim.plan import PAVEMENT_WIDTH_M, STREET_WIDTH_M, Plot, Point, Rectangle, Road, overlap
 
 MIN_BUILDINGS = 21
@@ -21,11 +22,15 @@ Leg = tuple[float, float]
 
 @dataclass(frozen=True)
 class Town:
-    """Streets on a rectangular loop with stubs, and buildings; the way leads from `start` to the `corners` in order."""
+    """Streets on a rectangular loop with stubs, buildings, and props such as trees along the streets.
+
+    The way leads from `start` to the `corners` in order.
+    """
 
     seed: int
     roads: tuple[Road, ...]
     plots: tuple[Plot, ...]
+    props: tuple[Prop, ...]
     start: Pose
     corners: tuple[Point, Point, Point, Point]
 
@@ -61,21 +66,24 @@ class Town:
         return TrueTown(seed=self.seed, streets=streets, buildings=[_building(plot) for plot in self.plots])
 
 
-def generate(seed: int) -> Town:
-    """The town of `seed`: the same every time, with at least MIN_BUILDINGS buildings, none on a street or another."""
+def generate(seed: int, kinds: tuple[BuildingType, ...] = CATALOGUE) -> Town:
+    """The town of `seed`: the same every time, with at least MIN_BUILDINGS buildings, none on a street or another.
+
+    It has each of `kinds` once at most; there should be some more of them than MIN_BUILDINGS.
+    """
     rng = np.random.default_rng([seed, 0x70])
     plots: list[Plot] = []
     while len(plots) < MIN_BUILDINGS:
         half_x, half_y = float(rng.uniform(23, 28)), float(rng.uniform(18, 21))
         roads = _roads(rng, half_x, half_y)
-        settlement = _Settlement(rng, [road.area(_REACH_M) for road in roads])
+        settlement = _Settlement(rng, [road.area(_REACH_M) for road in roads], kinds)
         for road in (roads[0], roads[2], roads[1], roads[3]):
             settlement.line(road, left=True)
             settlement.line(road, left=False)
         plots = settlement.plots
     start = Pose(x_m=float(rng.uniform(-0.7, -0.3)) * half_x, y_m=-half_y, heading_rad=0.0)
     corners = ((half_x, -half_y), (half_x, half_y), (-half_x, half_y), (-half_x, -half_y))
-    return Town(seed, tuple(roads), tuple(plots), start, corners)
+    return Town(seed, tuple(roads), tuple(plots), furnish(seed, roads, plots), start, corners)
 
 
 @dataclass
@@ -84,10 +92,11 @@ class _Settlement:
 
     rng: np.random.Generator
     streets: list[Rectangle]
+    choice: tuple[BuildingType, ...]
     plots: list[Plot] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.kinds: list[BuildingType] = [CATALOGUE[i] for i in self.rng.permutation(len(CATALOGUE))]
+        self.kinds: list[BuildingType] = [self.choice[i] for i in self.rng.permutation(len(self.choice))]
 
     def line(self, road: Road, left: bool) -> None:
         """Go along one side of `road` and build wherever something fits."""

@@ -13,9 +13,10 @@ import cv2
 import numpy as np
 
 from schemas.sensing import Pose
-from services.sim import mesh, scenery
+from services.sim import furniture, mesh, scenery
 from services.sim.egl import Egl
 from services.sim.egl import works as egl_works
+from services.sim.light import relief
 from services.sim.plan import Plot
 from services.sim.quiet import pybullet, quiet
 from services.sim.robot import Robot
@@ -41,7 +42,11 @@ class World:
         _log.info(
             "the camera's pictures are drawn by %s", "EGL" if self.egl else "TinyRenderer, more slowly than by EGL"
         )
+        plots = [(plot.footprint, plot.kind.height_m) for plot in town.plots]
+        self.relief = relief(plots + [(prop.area, prop.size_m[2]) for prop in town.props])
         self.building_of_body: dict[int, str] = {}
+        self.props: list[int] = []
+        self.streets: list[int] = []
         self._build()
         self.robot = Robot(self.client, town.start)
 
@@ -66,14 +71,18 @@ class World:
         floor = pybullet.createCollisionShape(
             pybullet.GEOM_BOX, halfExtents=half, collisionFramePosition=[0, 0, -1.0], physicsClientId=client
         )
-        grass, *surfaces = scenery.ground(self.town.roads)
+        grass, pavement, *street = scenery.ground(self.town.roads)
         soil = self._add(*grass, floor)
         pybullet.changeDynamics(soil, -1, lateralFriction=1.0, physicsClientId=client)
-        for surface, picture in surfaces:
-            self._add(surface, picture)
+        self._add(*pavement)
+        self.streets = [self._add(surface, picture) for surface, picture in street]
         self.sky = self._add(*scenery.sky())
         for plot in self.town.plots:
             self._raise(plot)
+        for prop in self.town.props:
+            self.props.append(
+                self._add(*furniture.shape(prop), place=(prop.x_m, prop.y_m, 0.0), heading_rad=prop.heading_rad)
+            )
 
     def _raise(self, plot: Plot) -> None:
         kind = plot.kind

@@ -8,7 +8,7 @@ import pytest
 
 from bus.codec import encode
 from services.sim import facade, mesh, town
-from services.sim.catalogue import CATALOGUE
+from services.sim.catalogue import CATALOGUE, invented
 from services.sim.plan import PAVEMENT_WIDTH_M, STREET_WIDTH_M, overlap
 from services.sim.progress import Progress
 
@@ -35,6 +35,24 @@ def test_no_building_stands_on_a_street_or_its_pavement_or_on_another_building()
             assert not overlap(road.area(STREET_WIDTH_M / 2 + PAVEMENT_WIDTH_M), plot.footprint)
         for one, other in itertools.combinations(place.plots, 2):
             assert not overlap(one.footprint, other.footprint)
+
+
+def test_no_prop_stands_on_a_street_or_in_a_building_or_in_another_prop() -> None:
+    for place in TOWNS:
+        assert len(place.props) > 20
+        for prop in place.props:
+            assert not any(overlap(prop.area, road.area(STREET_WIDTH_M / 2)) for road in place.roads)
+            assert not any(overlap(prop.area, plot.footprint) for plot in place.plots)
+        assert not any(overlap(one.area, other.area) for one, other in itertools.combinations(place.props, 2))
+
+
+def test_invented_kinds_are_the_same_for_a_seed_and_of_no_catalogue() -> None:
+    kinds = invented(7, 20)
+
+    assert kinds == invented(7, 20)
+    assert len({kind.wall for kind in (*kinds, *invented(8, 20))}) == 40
+    assert not {kind.name for kind in kinds} & {kind.name for kind in CATALOGUE}
+    assert len(town.generate(3, invented(3, 28)).plots) >= town.MIN_BUILDINGS
 
 
 def test_every_front_looks_at_a_street_of_the_loop() -> None:
