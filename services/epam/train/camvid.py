@@ -1,0 +1,48 @@
+"""Trains the road network on street photographs with label images, few of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from services.epam.camvid import Photograph, photographs
+from services.epam.train.augment import Augmentation, Sample
+from services.epam.train.road import Plan, export, train
+
+SIZE_PX = (240, 180)
+STRONG = Augmentation(
+    zoom=(0.9, 2.0),
+    shift=0.15,
+    turn_deg=4.0,
+    contrast=0.5,
+    gamma=0.4,
+    cast=0.15,
+    brightness=30.0,
+    noise=8.0,
+    shadow_share=0.5,
+    blur_share=0.3,
+)
+EPOCHS, SAMPLES = 12, 960
+
+
+def train_on_photographs(folder: Path, out: Path, seed: int, epochs: int = EPOCHS) -> None:
+    """Train on `folder`/train with the labels in `folder`/trainannot, and write the weights to `out`.
+
+    Raises UsageError where the photographs cannot be read.
+    """
+    samples = [_sample(photograph) for photograph in photographs(folder / "train", folder / "trainannot")]
+    export(train(samples, Plan(epochs, SAMPLES, seed, STRONG)), out)
+
+
+def _sample(photograph: Photograph) -> Sample:
+    image, road, known = (
+        cv2.resize(part, SIZE_PX, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
+        for part in (
+            photograph.image,
+            photograph.road.astype(np.uint8) * 255,
+            photograph.known.astype(np.uint8) * 255,
+        )
+    )
+    return Sample(image, road, known)
