@@ -26,14 +26,11 @@ LEAST_PX = 0.25
 NOISE_GRADIENT = 1.0
 
 
-class DepthFromStereo:
-    """Matches rectified pairs of one calibration, from infinity to `nearest_m` or a little nearer."""
+class StereoMatcher:
+    """Finds disparities up to `most_px`, rounded up to a multiple of 16, in rectified pairs of any size."""
 
-    def __init__(self, calibration: Calibration, nearest_m: float) -> None:
-        self._focal_baseline = calibration.fx_px * calibration.baseline_m
-        most = min(MOST_DISPARITIES, calibration.width_px)
-        wanted = min(self._focal_baseline / nearest_m, most)
-        self._disparities = max(16, 16 * math.ceil(wanted / 16))
+    def __init__(self, most_px: float) -> None:
+        self._disparities = max(16, 16 * math.ceil(most_px / 16))
         self._matcher = cv2.StereoSGBM.create(
             minDisparity=0,
             numDisparities=self._disparities,
@@ -48,21 +45,37 @@ class DepthFromStereo:
             mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY,
         )
 
-    def depth_m(self, left: Bytes, right: Bytes) -> Floats:
-        """Depth along the optical axis for each pixel of `left`, float32 (h, w), 0 where no match is sure.
+    def disparity_px(self, left: Bytes, right: Bytes, refine: bool = True) -> Floats:
+        """How far left each pixel of `left`, RGB (h, w, 3), is in `right`: float32 (h, w), 0 where no match is sure.
 
         The matcher leaves out a strip as wide as its search at the left border, so both images are padded there.
         """
         grey_left, grey_right = (cv2.cvtColor(image, cv2.COLOR_RGB2GRAY) for image in (left, right))
         steps = self._matcher.compute(self._padded(grey_left), self._padded(grey_right))[:, self._disparities :]
-        whole = steps.astype(np.float32) / np.float32(STEPS_PER_PIXEL)
-        disparity = refined(whole, _floats(grey_left), _floats(grey_right))
-        depth = np.zeros(steps.shape, np.float32)
-        np.divide(np.float32(self._focal_baseline), disparity, out=depth, where=(steps > 0) & (disparity > LEAST_PX))
-        return depth
+        disparity = steps.astype(np.float32) / np.float32(STEPS_PER_PIXEL)
+        if refine:
+            disparity = refined(disparity, _floats(grey_left), _floats(grey_right))
+        disparity[(steps <= 0) | (disparity <= LEAST_PX)] = 0.0
+        return disparity
 
     def _padded(self, grey: npt.NDArray[Any]) -> npt.NDArray[Any]:
         return cv2.copyMakeBorder(grey, 0, 0, self._disparities, 0, cv2.BORDER_REPLICATE)
+
+
+class DepthFromStereo:
+    """Matches rectified pairs of one calibration, from infinity to `nearest_m` or a little nearer."""
+
+    def __init__(self, calibration: Calibration, nearest_m: float) -> None:
+        self._focal_baseline = calibration.fx_px * calibration.baseline_m
+        most = min(MOST_DISPARITIES, calibration.width_px)
+        self._matcher = StereoMatcher(min(self._focal_baseline / nearest_m, most))
+
+    def depth_m(self, left: Bytes, right: Bytes) -> Floats:
+        """Depth along the optical axis for each pixel of `left`, float32 (h, w), 0 where no match is sure."""
+        disparity = self._matcher.disparity_px(left, right)
+        depth = np.zeros(disparity.shape, np.float32)
+        np.divide(np.float32(self._focal_baseline), disparity, out=depth, where=disparity > 0)
+        return depth
 
 
 def refined(disparity: Floats, left: Floats, right: Floats) -> Floats:
