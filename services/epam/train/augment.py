@@ -18,18 +18,21 @@ Floats = npt.NDArray[np.float32]
 class Augmentation:
     """How much is varied. `zoom` is the least and the greatest enlargement, `shift` the most that the image moves, as
     a share of its size, and `turn_deg` the most that it turns; `contrast`, `cast` and `gamma` are factors about 1,
-    given as natural logarithms; `noise` and `brightness` are in grey levels of 255."""
+    given as natural logarithms; `noise` and `brightness` are in grey levels of 255.
+
+    By default little, for renderings, which vary much of this themselves.
+    """
 
     zoom: tuple[float, float] = (0.9, 1.15)
     shift: float = 0.05
     turn_deg: float = 2.0
-    contrast: float = 0.35
-    gamma: float = 0.3
-    cast: float = 0.12
-    brightness: float = 20.0
-    noise: float = 8.0
-    shadow_share: float = 0.4
-    blur_share: float = 0.2
+    contrast: float = 0.15
+    gamma: float = 0.1
+    cast: float = 0.05
+    brightness: float = 8.0
+    noise: float = 4.0
+    shadow_share: float = 0.15
+    blur_share: float = 0.1
 
 
 @dataclass(frozen=True, eq=False)

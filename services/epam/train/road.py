@@ -12,14 +12,16 @@ import torch
 from rich.progress import track
 from torch import Tensor, nn
 
-from services.epam.road import CHANNELS, GIVES, PADDING_PX, TAKES, pixels
-from services.epam.train.augment import Augmentation, Sample, varied
+from services.epam.road import CHANNELS, GIVES, PADDING_PX, TAKES, load, pixels
+from services.epam.train.augment import Augmentation, Bytes, Sample, plain, varied
+from services.epam.train.renderings import files, read
 from services.epam.train.unet import UNet, unet
 
 WIDTHS = (8, 16, 32, 48, 64, 64)
-BATCH = 16
+BATCH = 8
 STEEPEST_RATE, WEIGHT_DECAY = 4e-3, 0.02
-GROUND_ROAD = 2
+EPOCHS = 4
+ROAD = 2
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,27 @@ class Plan:
     samples: int
     seed: int
     how: Augmentation
+
+
+def train_on_renderings(folder: Path, out: Path, seed: int, epochs: int = EPOCHS) -> float:
+    """Train on the towns in `folder`/train and write the weights to `out`; the IoU of road in `folder`/val.
+
+    Raises UsageError where there are no renderings.
+    """
+    held_out = files(folder, "val")
+    samples = [
+        _sample(image, surface)
+        for path in track(files(folder, "train"), "reading")
+        for image, surface in zip(*_views(path), strict=True)
+    ]
+    export(train(samples, Plan(epochs, len(samples), seed, Augmentation())), out)
+    roads, both, either = load(out), 0, 0
+    for path in track(held_out, "testing"):
+        for image, surface in zip(*_views(path), strict=True):
+            found, road = roads.mask(image), surface == ROAD
+            both += int(np.count_nonzero(found & road))
+            either += int(np.count_nonzero(found | road))
+    return both / max(either, 1)
 
 
 def train(samples: Sequence[Sample], plan: Plan) -> UNet:
@@ -72,6 +95,17 @@ def export(network: UNet, path: Path) -> None:
     torch.onnx.export(
         network.eval(), example, str(path), dynamo=False, opset_version=13, input_names=["image"], output_names=[*GIVES]
     )
+
+
+def _views(path: Path) -> tuple[Bytes, Bytes]:
+    """The images (n, h, w, 3) and the surfaces (n, h, w) in one file of renderings."""
+    town = read(path)
+    return town.left, town.surface
+
+
+def _sample(image: Bytes, surface: Bytes) -> Sample:
+    road = (surface == ROAD).astype(np.uint8) * 255
+    return plain(Sample(image, road, np.full_like(road, 255)))
 
 
 def _order(number: int, wanted: int, rng: np.random.Generator) -> npt.NDArray[np.intp]:
