@@ -20,6 +20,7 @@ PADDING_PX = 4
 CHANNELS = 5
 TAKES = (1, CHANNELS, HEIGHT_PX + 2 * PADDING_PX, WIDTH_PX)
 GIVES: dict[str, tuple[int, ...]] = {"road": (1, 1, HEIGHT_PX + 2 * PADDING_PX, WIDTH_PX)}
+MEAN_GREY, DARKEST_GREY = 112.0, 20.0
 LEAST_CONTRAST = 3.0
 LEAST_SHARE, LARGEST_HOLE_SHARE = 0.002, 0.0005
 _OPEN = np.ones((3, 3), np.uint8)
@@ -59,12 +60,13 @@ def load(path: Path = DEFAULT_PATH) -> Roads:
 
 
 def pixels(small: Image) -> Tensor:
-    """What the network takes: of RGB images (n, HEIGHT_PX, WIDTH_PX, 3) the colours, from about -2 to 2, and where
-    each pixel is, from -1 to 1 rightwards and downwards; padded, float32 (n, CHANNELS, h, w)."""
+    """What the network takes: of RGB images (n, HEIGHT_PX, WIDTH_PX, 3) the colours, all images about as bright, and
+    where each pixel is, from -1 to 1 rightwards and downwards; padded, float32 (n, CHANNELS, h, w)."""
+    gain = MEAN_GREY / np.maximum(small.mean((1, 2, 3), dtype=np.float32), DARKEST_GREY)
     tensor = np.empty((len(small), *TAKES[1:]), np.float32)
     padded = np.pad(small, ((0, 0), (PADDING_PX, PADDING_PX), (0, 0), (0, 0)), mode="edge")
     tensor[:, :3] = padded.transpose(0, 3, 1, 2)
-    tensor[:, :3] = tensor[:, :3] / 64.0 - 2.0
+    tensor[:, :3] = tensor[:, :3] * (gain[:, None, None, None] / 64) - 2
     tensor[:, 3] = np.linspace(-1, 1, TAKES[3], dtype=np.float32)
     tensor[:, 4] = np.linspace(-1, 1, TAKES[2], dtype=np.float32)[:, None]
     return tensor
