@@ -29,6 +29,7 @@ class Network:
             raise ConfigError(f"no weights {path}: train them with python -m services.epam.train")
         try:
             self._net = cv2.dnn.readNetFromONNX(str(path))
+            channels = _channels(path)
             given = [values.shape for values in self(np.zeros(takes, np.float32))]
         except cv2.error as error:
             reason = str(error).strip().splitlines()[0] if str(error).strip() else "OpenCV cannot read it"
@@ -36,6 +37,11 @@ class Network:
                 f"{path} does not hold a network that takes {takes} ({reason}): "
                 "train it again with python -m services.epam.train"
             ) from None
+        if channels != takes[1]:
+            raise ConfigError(
+                f"{path} takes {channels} channels, where {takes[1]} are expected: "
+                "train it again with python -m services.epam.train"
+            )
         if given != list(gives.values()):
             raise ConfigError(
                 f"{path} gives {given}, where {list(gives.values())} are expected: "
@@ -47,3 +53,10 @@ class Network:
         assert values.shape == self._takes
         self._net.setInput(values)
         return [np.asarray(output, np.float32) for output in self._net.forward(self._names)]
+
+
+def _channels(path: Path) -> int:
+    """How many channels the first layer takes. OpenCV's new engine, which runs the network, takes any number."""
+    net = cv2.dnn.readNetFromONNX(str(path), cv2.dnn.ENGINE_CLASSIC)
+    layers = (net.getLayer(number).blobs for number in range(1, len(net.getLayerNames()) + 1))
+    return next((int(blobs[0].shape[1]) for blobs in layers if blobs), 0)

@@ -24,16 +24,18 @@ STRONG = Augmentation(
     shadow_share=0.5,
     blur_share=0.3,
 )
+# Few photographs: an epoch is many variations of each.
 EPOCHS, SAMPLES = 12, 960
 
 
-def train_on_photographs(folder: Path, out: Path, seed: int, epochs: int = EPOCHS) -> None:
-    """Train on `folder`/train with the labels in `folder`/trainannot, and write the weights to `out`.
+def train_on_photographs(folder: Path, out: Path, seed: int, epochs: int = EPOCHS, samples: int = SAMPLES) -> None:
+    """Train on `folder`/train with the labels in `folder`/trainannot, and write the weights to `out`. An epoch is
+    so many `samples`, variations of the photographs.
 
     Raises UsageError where the photographs cannot be read.
     """
-    samples = [_sample(photograph) for photograph in photographs(folder / "train", folder / "trainannot")]
-    export(train(samples, Plan(epochs, SAMPLES, seed, STRONG)), out)
+    known = [_sample(photograph) for photograph in photographs(folder / "train", folder / "trainannot")]
+    export(train(known, Plan(epochs, samples, seed, STRONG)), out)
 
 
 def _sample(photograph: Photograph) -> Sample:
