@@ -1,0 +1,94 @@
+"""Training perception's networks: one seed gives the same weights, and what is missing is named."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from blocks import painted
+from click.testing import CliRunner
+
+from bus.errors import UsageError
+from services.epam.road import load
+from services.epam.train.__main__ import train
+
+needs_torch = pytest.mark.skipif(find_spec("torch") is None, reason="training needs torch: pip install 'cogmap[train]'")
+TRAINING = """
+import sys
+from pathlib import Path
+from services.epam.train.camvid import train_on_photographs
+
+folder, out = map(Path, sys.argv[1:])
+for name, seed in (("a", 3), ("b", 3), ("c", 4)):
+    train_on_photographs(folder, out / f"{name}.onnx", seed, epochs=1, samples=16)
+"""
+
+
+def _python(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Python in a process of its own: torch's compiler and the simulator's renderer each bring an LLVM, and no
+    process bears both."""
+    return subprocess.run([sys.executable, *arguments], capture_output=True, text=True, check=False)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Four small street photographs, in CamVid's folders."""
+    for name in ("train", "trainannot"):
+        (tmp_path / name).mkdir()
+    for number in range(4):
+        image, depth_m, _ = painted([], road_half_m=3.0 + number, seed=number)
+        grey = (np.ptp(image.astype(int), axis=2) < 40) & (depth_m > 0)
+        cv2.imwrite(str(tmp_path / "train" / f"{number}.png"), image[..., ::-1])
+        cv2.imwrite(
+            str(tmp_path / "trainannot" / f"{number}.png"), np.where(grey, 3, 11 * (number == 0)).astype(np.uint8)
+        )
+    return tmp_path
+
+
+@needs_torch
+def test_training_twice_from_one_seed_gives_the_same_weights_and_from_another_others(
+    folder: Path, tmp_path: Path
+) -> None:
+    done = _python("-c", TRAINING, str(folder), str(tmp_path))
+    assert done.returncode == 0, done.stderr
+    first, again, other = ((tmp_path / f"{name}.onnx").read_bytes() for name in "abc")
+    assert again == first
+    assert other != first
+    image = painted([])[0]
+    assert load(tmp_path / "a.onnx").mask(image).shape == image.shape[:2]
+
+
+def test_without_torch_the_remedy_is_named(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("torch", "services.epam.train.camvid", "services.epam.train.road", "services.epam.train.unet"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    monkeypatch.setitem(sys.modules, "torch", None)
+    run = CliRunner().invoke(train, ["road", "--camvid", str(folder), "--out", str(folder / "a.onnx")])
+    assert isinstance(run.exception, UsageError)
+    assert "pip install 'cogmap[train]'" in str(run.exception)
+
+
+@pytest.mark.parametrize("arguments", [[], ["DATA", "--camvid", "PHOTOGRAPHS"]])
+def test_roads_are_learned_from_one_kind_of_folder(arguments: list[str]) -> None:
+    run = CliRunner().invoke(train, ["road", *arguments])
+    assert isinstance(run.exception, UsageError)
+    assert "either DATA_DIR" in str(run.exception)
+
+
+@needs_torch
+def test_a_folder_without_renderings_is_named_before_anything_is_trained(tmp_path: Path) -> None:
+    done = _python("-m", "services.epam.train", "road", str(tmp_path), "--out", str(tmp_path / "a.onnx"))
+    assert done.returncode == 2
+    assert "services.epam.dataset" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_photographs_are_tested_alone_by_weights_that_must_be_there(folder: Path, tmp_path: Path) -> None:
+    out, pair = tmp_path / "none.onnx", (str(folder / "train"), str(folder / "trainannot"))
+    run = CliRunner().invoke(train, ["road", "--camvid-test", *pair, "--out", str(out)])
+    assert isinstance(run.exception, UsageError)
+    assert "none.onnx" in str(run.exception)
