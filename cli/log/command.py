@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from cli.log.look import cat, diff, info, recover
+from cli.log.pictures import image, perception
 from cli.log.record import record
 from cli.log.replay import replay
 
@@ -13,14 +14,15 @@ A first session, with `cogmap run` going on in another terminal:
   cogmap log record -o drive.mcap     Ctrl-C ends it
   cogmap log info drive.mcap          what is in it
   cogmap log cat drive.mcap action/selected
+  cogmap log image drive.mcap         a view, as a file
   cogmap log replay drive.mcap --into sensory
 """
 
 
 @click.group(epilog=_EPILOG)
 def log() -> None:
-    """Record what travels on the bus; look at it, play it back, compare it, recover it."""
+    """Record what travels on the bus; look at it, draw what was seen, play it back, compare it, recover it."""
 
 
-for _command in (record, info, cat, replay, diff, recover):
+for _command in (record, info, cat, image, perception, replay, diff, recover):
     log.add_command(_command)

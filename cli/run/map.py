@@ -12,18 +12,18 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from bus.graph import Graph
+from cli import palette
+from cli.palette import ESTIMATE, FAINT, INK, PAPER, TRUE, WHEELS
 from cli.run import map_layers as layers
 from cli.run.figures import Figures
 from cli.run.observer import Observer
 
-PAPER, INK, FAINT = "#fbfaf7", "#37352f", "#8a857a"
-TRUE, ESTIMATE, WHEELS = "#1f2430", "#e4572e", "#8d7cc4"
 MARGIN_M = 5.0
 
 
 def draw(path: Path, observer: Observer, graph: Graph, figures: Figures) -> None:
     """Write the map to `path` as a PNG."""
-    with mpl.rc_context({"font.family": "sans-serif", "font.size": 9, "axes.edgecolor": layers.KERB}):
+    with mpl.rc_context({"font.family": "sans-serif", "font.size": 9, "axes.edgecolor": palette.KERB}):
         figure = Figure(figsize=(11, 10), dpi=130, facecolor=PAPER, layout="constrained")
         axes = figure.add_subplot()
         axes.set_facecolor(PAPER)
@@ -84,14 +84,14 @@ def _title(axes: Axes, figures: Figures) -> None:
 
 def _legend() -> list[Patch | Line2D]:
     return [
-        Patch(fc=layers.STREET, ec=layers.KERB, label="street"),
-        Patch(fc=layers.HOUSE, ec=layers.WALL, label="building"),
+        Patch(fc=palette.STREET, ec=palette.KERB, label="street"),
+        Patch(fc=palette.HOUSE, ec=palette.WALL, label="building"),
         Line2D([], [], color=TRUE, lw=3.2, label="true path"),
         Line2D([], [], color=ESTIMATE, lw=1.5, label="estimated path"),
         Line2D([], [], color=WHEELS, lw=1.6, ls=(0, (4, 2)), label="path integration alone"),
-        Patch(fc=layers.ROAD, alpha=layers.ROAD_OPACITY, label="learned street"),
+        Patch(fc=palette.ROAD, alpha=palette.ROAD_OPACITY, label="learned street"),
         Line2D(
-            [], [], marker="o", ls="", mfc=layers.OBJECT, mec="white", label="learned building, its samples and 2 SD"
+            [], [], marker="o", ls="", mfc=palette.OBJECT, mec="white", label="learned building, its samples and 2 SD"
         ),
-        Line2D([], [], color=layers.OBJECT, lw=1.0, label="its error"),
+        Line2D([], [], color=palette.OBJECT, lw=1.0, label="its error"),
     ]

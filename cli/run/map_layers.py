@@ -15,14 +15,11 @@ from matplotlib.patches import Ellipse, Rectangle
 from matplotlib.transforms import Affine2D, Transform
 
 from bus.graph import TILE_SIDE, Graph
+from cli.palette import HOUSE, KERB, NAME, OBJECT, ROAD, ROAD_OPACITY, STREET, WALL
 from cli.run.figures import objects, position_m
 from cli.run.observer import Observer
 from schemas.graph import Node
 from schemas.sensing import Building, Pose
-
-STREET, KERB, HOUSE, WALL, NAME = "#e7e3da", "#cfc9bc", "#d3d0cb", "#b3aea5", "#6d6960"
-ROAD, OBJECT = "#4f9d8f", "#c98a12"
-ROAD_OPACITY = 0.62
 
 
 def draw_town(axes: Axes, observer: Observer) -> None:
