@@ -1,4 +1,4 @@
-"""The centre of a building does not depend on which of its walls are seen, and the road lies where it is."""
+"""The centre of a building does not depend on which of its walls are seen."""
 
 from __future__ import annotations
 
@@ -6,11 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from blocks import CAMERA, Block, painted
+from blocks import CAMERA, Block
 
-from services.epam.appearance import lab
 from services.epam.geometry import Outline, Place, locate
-from services.epam.road import CELL_M, FARTHEST_M, road
 
 SIDES_M = (12.0, 8.0)
 
@@ -74,22 +72,3 @@ def test_several_objects_are_placed_as_each_alone_is_and_none_as_none() -> None:
         assert (place.bearing_rad, place.range_m) == pytest.approx((alone.bearing_rad, alone.range_m), abs=1e-9)
     assert together == locate(outlines, CAMERA)
     assert locate([], CAMERA) == []
-
-
-def test_the_road_is_where_asphalt_is_and_thinned_to_a_point_a_cell() -> None:
-    image, depth_m, _ = painted([Block(12.0, 9.0, 0.0, (6.0, 6.0), 5.0, (200, 40, 40))])
-    points = road(lab(image), depth_m, CAMERA)
-    assert points.dtype == np.float32
-    assert len(points) > 150
-    assert np.abs(points[:, 1]).max() < 4.0 + 0.3
-    assert np.hypot(points[:, 0], points[:, 1]).max() <= FARTHEST_M
-    assert len(np.unique(np.floor(points.astype(float) / CELL_M), axis=0)) == len(points)
-
-
-def test_a_grey_wall_is_no_road_and_neither_is_grass() -> None:
-    grey = Block(6.0, 0.0, 0.0, (3.0, 30.0), 5.0, (88, 88, 94))
-    image, depth_m, _ = painted([grey], road_half_m=0.0)
-    points = road(lab(image), depth_m, CAMERA)
-    # The wall's foot is on the ground, within the error of depth.
-    assert len(points) < 20
-    assert (np.abs(points[:, 0] - (6.0 - 1.5)) < 0.4).all()
