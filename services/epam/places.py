@@ -1,8 +1,8 @@
 """Places recognised by the views that lead to them: the paper's future work, for where no landmark is in sight.
 
-One look may deceive, so looks are gathered as the robot goes on: a Bayes filter (a hidden Markov model, as in FAB-MAP's
-and SeqSLAM's successors) holds how probable it is that the robot is again where a remembered view was taken, or
-somewhere new. From one view to the next the place moves on by none to three remembered ones, whatever the speed.
+One look may deceive, so looks are gathered as the robot goes on: a Bayes filter (a hidden Markov model) holds how
+probable it is that the robot is again where a remembered view was taken, or somewhere new. From one view to the next
+the place moves on by none to three remembered ones, whatever the speed.
 A place that is recognised is not remembered anew (Churchill and Newman 2012): memory grows with what is new.
 """
 
@@ -29,6 +29,7 @@ from services.epam.view_code import (
     view_codes,
 )
 
+# Chosen on laps in the towns of seeds 2007 to 2010, where every threshold from 0.6 on was right in all it said.
 MOVES = (0.1, 0.4, 0.35, 0.15)
 FOUND, LOST = 0.02, 0.03
 SLOPE, EVEN, MOST_EVIDENCE = 15.0, 0.7, 3.0
