@@ -9,9 +9,13 @@ from pathlib import Path
 import click
 
 from benchmarks import cycle, deltas, losses
+from benchmarks.perception import measure as perception
+from benchmarks.perception import stereo as perception_stereo
 from benchmarks.report import Bar, publish
 from bus.errors import CogmapError, UsageError
 from bus.session import free_endpoint
+from services.epam.camvid import camvid_iou
+from services.epam.road import DEFAULT_PATH as ROAD_WEIGHTS
 
 BUS_BARS = {"delta_rate_ratio": Bar(0.5, at_least=True), "never_drop_lost": Bar(0)}
 
@@ -43,6 +47,7 @@ def benchmarks() -> None:
     \b
     python -m benchmarks cycle --json cycle.json
     python -m benchmarks bus --json bus.json
+    python -m benchmarks perception --json perception.json
     """
 
 
@@ -80,6 +85,61 @@ def bus_command(pairs: int, number: int, json_path: Path | None) -> None:
         _tell(f"driving for {losses.RUN_S:g} s, counting what is lost")
         figures |= losses.measure(Path(folder))
     publish("bus", figures, BUS_BARS, json_path)
+
+
+@benchmarks.command(name="perception")
+@click.option(
+    "--stereo",
+    nargs=3,
+    type=click.Path(path_type=Path),
+    metavar="LEFT RIGHT DISPARITY",
+    help="Measure only the stereo matching, on a rectified pair of yours: its images, and the true disparities of the "
+    "left one, as an image of --scale times the pixels, 0 where unknown.",
+)
+@click.option("--scale", type=click.FloatRange(0, min_open=True), metavar="N", help="Of --stereo; 1 if not given.")
+@click.option(
+    "--camvid-test",
+    nargs=2,
+    type=click.Path(path_type=Path),
+    metavar="IMAGES LABELS",
+    help="Measure only how well road is found in street photographs: two folders of PNG files with the same names, "
+    "labelled as CamVid's 12 classes are.",
+)
+@click.option(
+    "--road-weights",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Of --camvid-test: the road network, as python -m services.epam.train road --camvid wrote it; "
+    "that of the running system if not given.",
+)
+@json_option
+def perception_command(
+    stereo: tuple[Path, Path, Path] | None,
+    scale: float | None,
+    camvid_test: tuple[Path, Path] | None,
+    road_weights: Path | None,
+    json_path: Path | None,
+) -> None:
+    """What perception makes of towns that it never saw: names, new buildings, roads, depth, places, and how fast.
+
+    Draws them, with light, noise and clutter, and looks at them with the modules of the running system, in two
+    processes. Takes four to five minutes on two cores; leave both to it.
+    """
+    if scale is not None and not stereo:
+        raise click.BadParameter("it belongs to --stereo: give that too", param_hint="--scale")
+    if road_weights is not None and not camvid_test:
+        raise click.BadParameter("it belongs to --camvid-test: give that too", param_hint="--road-weights")
+    if not stereo and not camvid_test:
+        publish("perception", perception.measure(), perception.BARS, json_path)
+        return
+    figures: dict[str, float] = {}
+    bars: dict[str, Bar] = {}
+    if stereo:
+        figures, bars = perception_stereo.measure(*stereo, scale or 1.0)
+    if camvid_test:
+        figures["camvid_iou"] = camvid_iou(road_weights or ROAD_WEIGHTS, *camvid_test)
+        bars["camvid_iou"] = Bar(0.85, at_least=True)
+    publish("perception", figures, bars, json_path)
 
 
 def _tell(sentence: str) -> None:

@@ -75,10 +75,9 @@ def novel_look(seed: int, sightings: int, tick: Tick) -> Memory:
     """Meet NOVEL invented buildings of the town of `seed` once each, then see each up to `sightings` times more."""
 
     def poses(place: Town, rng: np.random.Generator) -> list[Pose]:
-        targets = rng.permutation(NOVEL).tolist()
-        first = [encounter(place, target, rng) for target in targets]
+        first = [encounter(place, target, rng) for target in range(NOVEL)]
         order = rng.permutation(np.repeat(np.arange(NOVEL), sightings)).tolist()
-        again = [later(place, targets[number], first[number], rng) for number in order]
+        again = [later(place, target, first[target], rng) for target in order]
         return first + [pose for pose in again if pose is not None]
 
     with drawn(seed, KINDS, poses, NOVEL) as (place, camera, scenes):
@@ -88,7 +87,7 @@ def novel_look(seed: int, sightings: int, tick: Tick) -> Memory:
             seen = _sight(claims(percepts, scene.label.shape), place, scene)
             meetings.append(Meeting(seen, side_and_range(place, scene.pose)))
             tick()
-    return remembered(meetings[:NOVEL], meetings[NOVEL:], frozenset(range(NOVEL)), TRAINED)
+    return remembered(meetings[:NOVEL], meetings[NOVEL:], TRAINED)
 
 
 def _sight(made: Sequence[Claim], place: Town, scene: Scene) -> Sight:

@@ -26,10 +26,10 @@ class Meeting:
 
 @dataclass(frozen=True)
 class Memory:
-    """What became of the buildings `met`: of their `later` sightings so many were `right`.
+    """What became of the buildings, of which `met` got a name of their own: of `later` sightings so many were `right`.
 
     `merges` are sightings by the name of another building, and buildings met that were given the name of one before;
-    `splits` are sightings by a name that is new, though the building has one; `mistaken` ones by a trained class's.
+    `splits` are sightings by a name that is new, though the building was met; `mistaken` ones by a trained class's.
     """
 
     met: int
@@ -40,40 +40,38 @@ class Memory:
     mistaken: int
 
 
-def remembered(
-    encounters: Sequence[Meeting], afterwards: Sequence[Meeting], novel: frozenset[int], trained: frozenset[str]
-) -> Memory:
-    """How buildings `novel` were known again after their encounters, in views from other sides and distances.
+def remembered(encounters: Sequence[Meeting], afterwards: Sequence[Meeting], trained: frozenset[str]) -> Memory:
+    """How the buildings of a town, all novel, were known again, in views from other sides and distances.
 
-    Other than in every encounter that showed the building. A building that its encounter gave the name of a trained
-    class, or of another building, has no name: no later sighting of it is right.
+    Each was to be met in the encounter of its number. Sides and distances are other than in that one, and in every one
+    that it was seen in by the way. A building that they gave no name, or that of a trained class or of another building,
+    has none: no later sighting of it is right.
     """
     names: dict[int, str] = {}
-    places: dict[int, list[Floats]] = {number: [] for number in novel}
+    places = {number: [meeting.from_where[number]] for number, meeting in enumerate(encounters)}
     merges = splits = mistaken = later = right = 0
     for meeting in encounters:
-        for number, label in _sightings(meeting, novel):
+        for number, label in _sightings(meeting):
             places[number].append(meeting.from_where[number])
             if number not in names:
                 taken = label in names.values()
                 merges += taken
                 names[number] = "" if taken or label in trained else label
     for meeting in afterwards:
-        for number, label in _sightings(meeting, novel):
-            if not places[number] or not all(_elsewhere(meeting.from_where[number], at) for at in places[number]):
+        for number, label in _sightings(meeting):
+            if not all(_elsewhere(meeting.from_where[number], at) for at in places[number]):
                 continue
             later += 1
-            right += label == names[number]
+            right += label == names.get(number)
             mistaken += label in trained
-            merges += label != names[number] and label in names.values()
+            merges += label != names.get(number) and label in names.values()
             splits += label not in trained and label not in names.values()
-    return Memory(len(names), later, right, merges, splits, mistaken)
+    return Memory(sum(map(bool, names.values())), later, right, merges, splits, mistaken)
 
 
-def _sightings(meeting: Meeting, novel: frozenset[int]) -> list[tuple[int, str]]:
-    """The novel buildings that a segment matches, and what it is called."""
-    segments = meeting.sight.segments
-    return [(s.building.number, s.label) for s in segments if s.building and s.building.number in novel]
+def _sightings(meeting: Meeting) -> list[tuple[int, str]]:
+    """The buildings that a segment matches, and what it is called."""
+    return [(segment.building.number, segment.label) for segment in meeting.sight.segments if segment.building]
 
 
 def _elsewhere(now: Floats, then: Floats) -> bool:

@@ -133,8 +133,8 @@ def right_or_not(
     """Activation of each candidate, and whether its label is right, over the views of one pair of eyes in order.
 
     That of a trained class is right where the building is of that kind, that of a node that was learned where the
-    building is the one whose percept it was first given to, and no label where the building has none yet. What
-    shows no building is wrong.
+    building is the one whose percept it was first given to, and no label where there is no building, or one that has
+    none yet.
     """
     owner: dict[str, int | None] = {}
     judged: list[tuple[float, bool]] = []
@@ -148,7 +148,7 @@ def right_or_not(
 def _right(segment: Segment, owner: dict[str, int | None], trained: frozenset[str]) -> bool:
     building = segment.shows
     if building is None:
-        return False
+        return not segment.label
     if segment.label in trained or building.kind in trained:
         return segment.label == building.kind
     if not segment.label:

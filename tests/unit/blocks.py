@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from schemas.array import Array
-from schemas.sensing import Calibration, View
+from schemas.sensing import Calibration
 
 CAMERA = Calibration(
     width_px=320,
@@ -68,9 +67,3 @@ def painted(
     depth[depth > 150] = 0
     noisy = image + np.random.default_rng(seed).normal(0, 3, image.shape)
     return np.clip(noisy, 0, 255).astype(np.uint8), depth.astype(np.float32), label
-
-
-def view(blocks: list[Block], frame: int = 0) -> View:
-    """`painted` blocks as a message."""
-    image, depth_m, _ = painted(blocks)
-    return View(stamp_ns=frame, frame=frame, image=Array.of(image), depth_m=Array.of(depth_m), calibration=CAMERA)
