@@ -44,8 +44,8 @@ def remembered(encounters: Sequence[Meeting], afterwards: Sequence[Meeting], tra
     """How the buildings of a town, all novel, were known again, in views from other sides and distances.
 
     Each was to be met in the encounter of its number. Sides and distances are other than in that one, and in every one
-    that it was seen in by the way. A building that they gave no name, or that of a trained class or of another building,
-    has none: no later sighting of it is right.
+    that it was seen in by the way. A building that they gave no name, or that of a trained class or of another
+    building, has none: no later sighting of it is right.
     """
     names: dict[int, str] = {}
     places = {number: [meeting.from_where[number]] for number, meeting in enumerate(encounters)}
