@@ -22,7 +22,7 @@ from services.epam.train.crops import Crops, crops
 from services.epam.train.renderings import files, read
 
 WIDTHS = (32, 64, 96, 128)
-BATCH, EPOCHS = 64, 16
+BATCH, EPOCHS = 64, 8
 RATE, DECAY = 2e-3, 5e-4
 SHARPNESS, MARGIN = 16.0, 0.15
 
