@@ -1,8 +1,9 @@
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
 INSTALLED := .venv/installed
+TRAINS := .venv/trains
 
-.PHONY: help setup demo test test-compose lint bench clean
+.PHONY: help setup train-setup demo test test-compose lint bench clean
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 16
@@ -15,6 +16,12 @@ $(INSTALLED): requirements/run.txt requirements/build.txt requirements/dev.txt p
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	touch $@
 
+train-setup: $(TRAINS) ## torch besides, to train the networks of perception
+
+$(TRAINS): $(INSTALLED) requirements/train.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements/train.txt
+	touch $@
+
 demo: setup ## drive around a simulated town; more options: make demo ARGS="--seed 2"
 	$(BIN)/cogmap run $(ARGS)
 
@@ -24,7 +31,7 @@ test: setup ## every test but the one of the containers
 test-compose: setup ## build the containers and test them as they run
 	$(BIN)/python -m pytest tests/compose -m compose --timeout 1200
 
-lint: setup ## style, types, and who imports whom
+lint: train-setup ## style, types, and who imports whom, torch for the types of training
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import tempfile
 from pathlib import Path
 
@@ -12,7 +11,7 @@ from benchmarks import cycle, deltas, losses
 from benchmarks.perception import measure as perception
 from benchmarks.perception import stereo as perception_stereo
 from benchmarks.report import Bar, publish
-from bus.errors import CogmapError, UsageError
+from bus.command import run_command
 from bus.session import free_endpoint
 from services.epam.camvid import camvid_iou
 from services.epam.road import DEFAULT_PATH as ROAD_WEIGHTS
@@ -148,16 +147,7 @@ def _tell(sentence: str) -> None:
 
 def main() -> None:
     """Run a benchmark; what the user can mend is one sentence and exit code 2."""
-    try:
-        benchmarks(standalone_mode=False, prog_name="python -m benchmarks")
-    except click.ClickException as error:
-        error.show()
-        sys.exit(2)
-    except (click.Abort, KeyboardInterrupt):
-        sys.exit(130)
-    except CogmapError as error:
-        _tell(f"benchmarks: {error}")
-        sys.exit(2 if isinstance(error, UsageError) else 1)
+    run_command(benchmarks, "benchmarks", "python -m benchmarks")
 
 
 if __name__ == "__main__":

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import importlib
 import logging
-import sys
 from pathlib import Path
 
 import click
 
 from bus import config, runner
-from bus.errors import CogmapError, UsageError
+from bus.command import run_command
 from cli.options import agent_option, config_option, connect_option, set_option
 from services import table
 
@@ -82,19 +81,7 @@ def router(tied: bool, connect: str) -> None:
 
 def main() -> None:
     """Run the command; what the user can mend is one sentence and exit code 2."""
-    try:
-        cogmap(standalone_mode=False)
-    except click.ClickException as error:
-        error.show()
-        sys.exit(2)
-    except click.Abort:
-        sys.exit(130)
-    except UsageError as error:
-        click.echo(f"cogmap: {error}", err=True)
-        sys.exit(2)
-    except CogmapError as error:
-        click.echo(f"cogmap: {error}", err=True)
-        sys.exit(1)
+    run_command(cogmap, "cogmap")
 
 
 if __name__ == "__main__":

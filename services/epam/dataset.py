@@ -36,7 +36,7 @@ class Split:
     views: int
 
 
-SPLITS = (Split("train", 1001, 42, 110), Split("val", 2001, 6, 90), Split("test", 3001, 6, 90))
+SPLITS = (Split("train", 1001, 84, 110), Split("val", 2001, 6, 90), Split("test", 3001, 6, 90))
 
 
 @dataclass(frozen=True)

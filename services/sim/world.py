@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from schemas.sensing import Pose
-from services.sim import furniture, mesh, scenery
+from services.sim import mesh, prop_shapes, scenery
 from services.sim.egl import Egl
 from services.sim.egl import works as egl_works
 from services.sim.light import relief
@@ -81,7 +81,7 @@ class World:
             self._raise(plot)
         for prop in self.town.props:
             self.props.append(
-                self._add(*furniture.shape(prop), place=(prop.x_m, prop.y_m, 0.0), heading_rad=prop.heading_rad)
+                self._add(*prop_shapes.shape(prop), place=(prop.x_m, prop.y_m, 0.0), heading_rad=prop.heading_rad)
             )
 
     def _raise(self, plot: Plot) -> None:

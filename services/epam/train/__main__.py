@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import importlib
-import sys
 from pathlib import Path
 from types import ModuleType
 
 import click
 
-from bus.errors import CogmapError, UsageError
+from bus.command import run_command
+from bus.errors import UsageError
 from services.epam.camvid import camvid_iou
 from services.epam.objects import DEFAULT_PATH as OBJECTS
 from services.epam.road import DEFAULT_PATH as ROAD
@@ -132,16 +132,7 @@ def _trainer(name: str) -> ModuleType:
 
 def main() -> None:
     """Run a command; what the user can mend is one sentence and exit code 2."""
-    try:
-        train(standalone_mode=False, prog_name="python -m services.epam.train")
-    except click.ClickException as error:
-        error.show()
-        sys.exit(2)
-    except (click.Abort, KeyboardInterrupt):
-        sys.exit(130)
-    except CogmapError as error:
-        click.echo(f"train: {error}", err=True)
-        sys.exit(2 if isinstance(error, UsageError) else 1)
+    run_command(train, "train", "python -m services.epam.train")
 
 
 if __name__ == "__main__":
