@@ -1,0 +1,14 @@
+"""`cogmap experiment`."""
+
+from __future__ import annotations
+
+import click
+
+_EPILOG = """\b
+Each leaves a folder with its figure as PNG and PDF, and a JSON file of every figure printed, the seed and the command.
+"""
+
+
+@click.group(epilog=_EPILOG)
+def experiment() -> None:
+    """Run the paper's experiments, through the same modules that drive the town."""
