@@ -26,7 +26,10 @@ class Timer:
 
 @dataclass
 class Module:
-    """Messages in, messages out. It has no clock, no bus, no thread and no file: the shell around it has."""
+    """Messages in, messages out. It has no clock, no bus, no thread and no file: the shell around it has.
+
+    What a module that `senses` says derives from the world, not from what it takes in.
+    """
 
     name: str
     instance: str = ""
@@ -40,6 +43,7 @@ class Module:
     restore: Callable[[Iterable[Message]], None] | None = None
     condense: Callable[[], Message] | None = None
     catches_up: frozenset[Topic] = frozenset()
+    senses: bool = False
     _next_seq: Counter[Topic] = field(default_factory=Counter)
 
     def __post_init__(self) -> None:

@@ -120,7 +120,7 @@ class Shell:
                 self._journal.append(message, payload)
             now_ns = time.time_ns()
             envelope = Envelope(message.source, message.seq, self._incarnation, now_ns, thinking_ns + compute_ns)
-            if of is not None and not topic.sensed:
+            if of is not None and not (topic.sensed or self.module.senses):
                 envelope.follow(of, self.module.name, compute_ns)
             envelope.causes, self._causes = self._causes, []
             self.bus.publish(topic, payload, envelope)
