@@ -1,0 +1,69 @@
+"""The participant's will as a module: it goes where the map in its workspace says that the first post stood."""
+
+from __future__ import annotations
+
+from bus.errors import MessageError
+from bus.graph import Graph
+from bus.module import Module
+from experiments.cue_integration.geometry import Pose, step
+from experiments.cue_integration.room import FOLLOW, STOP, WAIT, WALK
+from schemas import topics
+from schemas.base import Scalar
+from schemas.graph import Delta, Node
+from schemas.mind import Action
+
+POSTS_CARRIED = 3
+ARRIVED_M = 0.1
+MOST_MOVEMENTS = 24
+LOST_RAD = 0.8
+LOOK_M, MOST_LOOKS = 0.25, 3
+
+
+class Participant:
+    """Follows until three posts are picked up, waits once, then walks to where it believes the first was.
+
+    It knows what is in the workspace and nothing else. While it does not know where it faces it takes a short step
+    and looks.
+    """
+
+    def __init__(self) -> None:
+        self._graph = Graph()
+        self._movements = 0
+        self._looks = 0
+        self._has_waited = self._has_stopped = False
+
+    def on_delta(self, delta: Delta) -> Action | None:
+        """An action for each cycle that has ended. Raises MessageError where a delta is missing."""
+        if not self._graph.apply(delta):
+            raise MessageError(f"delta {delta.version} after version {self._graph.version}: a commit is missing")
+        if delta.phase != "decay" or self._has_stopped:
+            return None
+        scheme, parameters = self._choose()
+        return Action(stamp_ns=delta.stamp_ns, cycle=delta.cycle, scheme=scheme, activation=1.0, parameters=parameters)
+
+    def _choose(self) -> tuple[str, dict[str, Scalar]]:
+        posts = [node for name, node in sorted(self._graph.nodes.items()) if name.startswith("object:post-")]
+        if len(posts) < POSTS_CARRIED:
+            return FOLLOW, {}
+        if not self._has_waited:
+            self._has_waited = True
+            return WAIT, {}
+        return self._go_back(min(posts, key=lambda node: int(node.attributes["since_ns"])))
+
+    def _go_back(self, post: Node) -> tuple[str, dict[str, Scalar]]:
+        own = self._graph.nodes["self"].attributes
+        pose = Pose(float(own["x_m"]), float(own["y_m"]), float(own["heading_rad"]))
+        bearing_rad, distance_m = pose.towards((float(post.attributes["x_m"]), float(post.attributes["y_m"])))
+        is_lost = float(own["heading_sd_rad"]) > LOST_RAD and self._looks < MOST_LOOKS
+        if self._movements == MOST_MOVEMENTS or (distance_m < ARRIVED_M and not is_lost):
+            self._has_stopped = True
+            return STOP, {}
+        self._movements += 1
+        self._looks += is_lost
+        turn_rad, forward_m = (0.0, LOOK_M) if is_lost else step(bearing_rad, distance_m)
+        return WALK, {"turn_rad": turn_rad, "forward_m": forward_m}
+
+
+def build() -> Module:
+    """The module `participant`."""
+    return Module("participant").on(topics.DELTA, Participant().on_delta, emits=[topics.ACTION])
