@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import click
 
+from cli.experiment.cue_integration import cue_integration
+
 _EPILOG = """\b
 Each leaves a folder with its figure as PNG and PDF, and a JSON file of every figure printed, the seed and the command.
 """
@@ -12,3 +14,6 @@ Each leaves a folder with its figure as PNG and PDF, and a JSON file of every fi
 @click.group(epilog=_EPILOG)
 def experiment() -> None:
     """Run the paper's experiments, through the same modules that drive the town."""
+
+
+experiment.add_command(cue_integration)

@@ -51,6 +51,15 @@ def save_json(path: Path, figures: dict[str, Any], seed: int) -> None:
     path.write_text(json.dumps({**figures, "seed": seed, "command": command_line()}, indent=2) + "\n")
 
 
+def save(folder: Path, name: str, sheet: Figure, figures: dict[str, Any], seed: int, json_path: Path | None) -> None:
+    """Write the figure, and the JSON beside it and at `json_path`; say where."""
+    paths = [*save_figure(folder, name, sheet), folder / f"{name}.json"]
+    paths += [json_path] if json_path is not None else []
+    for path in paths[2:]:
+        save_json(path, figures, seed)
+    Console().print(*paths, sep="\n")
+
+
 def say(title: str, figures: dict[str, Any]) -> None:
     """Print `figures` as a table."""
     table = Table("key", "measured", title=title)

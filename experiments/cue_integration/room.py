@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from bus.module import Module
+from experiments import heard
 from experiments.cue_integration import senses
 from experiments.cue_integration.geometry import (
     CONFLICT_RAD,
@@ -29,7 +30,7 @@ from schemas.sensing import Percept, Percepts, SelfMotion
 PERIOD_NS = 500_000_000
 REACHED_M = 0.01
 FOLLOW, WAIT, WALK, STOP = "follow", "wait", "walk", "stop"
-AWAITS = {"workspace": 1, "codelets": 1, "participant": 1}
+AWAITS = {"workspace": 1, "codelets": 1, "participant": 1, heard.NAME: 1}
 
 
 class Room:
@@ -101,6 +102,6 @@ class Room:
 
 
 def build(room: Room) -> Module:
-    """The module `room`, which begins when everybody is there."""
+    """The module `room`, which begins when everybody is there, and somebody listens."""
     says = (topics.SELF_MOTION, topics.PERCEPTS)
     return Module("room").on(topics.ACTION, room.act, emits=says).starts(room.begin, AWAITS, emits=says)

@@ -8,28 +8,50 @@ from functools import cache
 
 from bus.errors import CogmapError
 from bus.house import House
+from bus.module import Module
 from experiments.cue_integration import analysis, mind, participant, published, room
 from experiments.cue_integration.analysis import Gaussian
 from experiments.cue_integration.fit import coordinate_descent
 from experiments.cue_integration.geometry import Points
 from experiments.cue_integration.trial import Condition, Noise, Response, Trial
+from experiments.heard import Heard
 from experiments.parallel import Progress, each
+from schemas import topics
 
 # What `fitted` gives with its defaults; tests hold that a fit of a few trials goes the same way.
 FITTED = Noise(speed=0.2, turn=0.2)
+SAID = (topics.SELF_MOTION, topics.PERCEPTS, topics.TASK, topics.PROPOSAL, topics.DELTA, topics.ACTION)
 FIT_TRIALS = 32
 FIT_TO = (Condition.SELF_MOTION, Condition.LANDMARKS, Condition.BOTH)
 
 
+@dataclass
+class Session:
+    """One trial to be run: the world, the participant's will, and who listens to what all say."""
+
+    trial: Trial
+
+    def __post_init__(self) -> None:
+        self.room = room.Room(self.trial)
+        self.heard = Heard(SAID)
+
+    def bodies(self) -> list[Module]:
+        """All that is not the mind. The room is the last, for it begins."""
+        return [self.heard.module(), participant.build(), room.build(self.room)]
+
+    def run(self) -> Response:
+        """Run it on the in-memory bus. Raises CogmapError where no response comes."""
+        house = House([*mind.modules(self.trial.number), *self.bodies()])
+        house.run()
+        house.close()
+        if self.room.response is None:
+            raise CogmapError(f"no response in {self.trial}")
+        return self.room.response
+
+
 def respond(trial: Trial) -> Response:
-    """Run `trial` from the start to the participant's answer. Raises CogmapError where none comes."""
-    world = room.Room(trial)
-    house = House([*mind.modules(trial.number), participant.build(), room.build(world)])
-    house.run()
-    house.close()
-    if world.response is None:
-        raise CogmapError(f"no response in {trial}")
-    return world.response
+    """Run `trial` on the in-memory bus, from the start to the participant's answer."""
+    return Session(trial).run()
 
 
 @dataclass(frozen=True)
