@@ -26,10 +26,7 @@ class Timer:
 
 @dataclass
 class Module:
-    """Messages in, messages out. It has no clock, no bus, no thread and no file: the shell around it has.
-
-    What a module that `senses` says derives from the world, not from what it takes in.
-    """
+    """Messages in, messages out. It has no clock, no bus, no thread and no file: the shell around it has."""
 
     name: str
     instance: str = ""
@@ -43,7 +40,6 @@ class Module:
     restore: Callable[[Iterable[Message]], None] | None = None
     condense: Callable[[], Message] | None = None
     catches_up: frozenset[Topic] = frozenset()
-    senses: bool = False
     _next_seq: Counter[Topic] = field(default_factory=Counter)
 
     def __post_init__(self) -> None:

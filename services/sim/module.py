@@ -114,7 +114,7 @@ def build(config: Config, instance: str = "sim") -> Module:
     awaits = config.awaits or {"sim": 1}
     if config.way is not None:
         led = Lockstep(LedSimulation(config.way, config.noise, config.percepts, config.frame_hz, config.seed))
-        module = Module("sim", instance, senses=True).on(topics.MOTOR_COMMAND, led.command, _EMITS_LED)
+        module = Module("sim", instance).on(topics.MOTOR_COMMAND, led.command, _EMITS_LED)
         return module.starts(led.start, awaits, _EMITS_LED)
     simulation = Simulation(config)
     module = Module("sim", instance).journaling(topics.TRUE_POSE, simulation.resume, simulation.truth)
