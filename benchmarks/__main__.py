@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from benchmarks import cycle, deltas, losses
+from benchmarks.map_correction import measure as map_correction
 from benchmarks.perception import measure as perception
 from benchmarks.perception import stereo as perception_stereo
 from benchmarks.report import Bar, publish
@@ -47,6 +48,7 @@ def benchmarks() -> None:
     python -m benchmarks cycle --json cycle.json
     python -m benchmarks bus --json bus.json
     python -m benchmarks perception --json perception.json
+    python -m benchmarks map_correction --graph manhattan.g2o --json map_correction.json
     """
 
 
@@ -139,6 +141,34 @@ def perception_command(
         figures["camvid_iou"] = camvid_iou(road_weights or ROAD_WEIGHTS, *camvid_test)
         bars["camvid_iou"] = Bar(0.85, at_least=True)
     publish("perception", figures, bars, json_path)
+
+
+@benchmarks.command(name="map_correction")
+@click.option(
+    "--graph",
+    "graph_path",
+    required=True,
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="A pose graph in the plane of yours: .g2o, or TORO's .graph; packed as .xz or not.",
+)
+@click.option(
+    "--truth",
+    "truth_path",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Its true poses, a line each: x, y and heading, with an index before them or not.",
+)
+@json_option
+def map_correction_command(graph_path: Path, truth_path: Path | None, json_path: Path | None) -> None:
+    """How well and how fast loops are closed, on a pose graph that was recorded elsewhere.
+
+    By the paper's rule, for positions only, against exact least squares; with headings too, against gtsam, which
+    `make bench-setup` installs; and one closure at a time. Takes up to half a minute.
+    """
+    figures = map_correction.measure(graph_path, truth_path)
+    bars = {key: bar for key, bar in map_correction.BARS.items() if key in figures}
+    publish("map correction", figures, bars, json_path)
 
 
 def _tell(sentence: str) -> None:
