@@ -50,11 +50,15 @@ class Environment:
         """The length of the tour."""
         return sum(float(np.hypot(*np.diff(leg, axis=0).T).sum()) for leg in self.legs_m)
 
-    def line(self, start: int, backward: bool, overrun_m: float) -> Points:
-        """The tour from building `start` round to it, and as much of the tour again as `overrun_m` says."""
+    def line(self, start: int, backward: bool, lead_m: float, overrun_m: float) -> Points:
+        """The tour past building `start`, all others and `start` again.
+
+        It begins `lead_m` before `start`, so that one comes up to it, and goes on `overrun_m` beyond where it began.
+        """
         legs = [self.legs_m[(start + k) % len(self.legs_m)] for k in range(len(self.legs_m))]
         whole = _joined([leg[::-1] for leg in reversed(legs)] if backward else legs)
-        return _joined([whole, _beginning(whole, overrun_m)])
+        lead = _beginning(whole[::-1], lead_m)[::-1]
+        return _joined([lead, whole, _beginning(whole, overrun_m)])
 
 
 def environments(city: City, number: int, seed: int) -> list[Environment]:

@@ -21,7 +21,6 @@ from schemas.sensing import (
     Building,
     MotorCommand,
     Percepts,
-    PlaceMatch,
     Pose,
     RangeScan,
     SelfMotion,
@@ -30,7 +29,7 @@ from schemas.sensing import (
     TrueTown,
 )
 from services.sim.odometry import Noise
-from services.sim.percepts import Landmark, Metres, PerceptErrors, PerceptSense
+from services.sim.percepts import Landmark, Metres, PerceptErrors, PerceptSense, PlaceSense
 
 Points = npt.NDArray[np.float64]
 TURN_AS_M = 1.0
@@ -90,6 +89,7 @@ class LedSimulation:
         self._way, self._noise, self._seed = way, noise, seed
         self._line = Line(np.array(way.line_m, float))
         self._sense = PerceptSense(errors, way.landmarks, seed)
+        self._places = PlaceSense(errors, seed)
         self._rng = np.random.default_rng([seed, 0x1ED])
         self._at_m = 0.0
         self._frames = 0
@@ -116,7 +116,12 @@ class LedSimulation:
         said = [
             SelfMotion(frame=number, since_ns=since_ns, motions=Array.of(self._motions, "<f8")),
             RangeScan(frame=number, bearing_rad=nothing, range_m=nothing),
-            Percepts(frame=number, objects=percepts, road_m=Array.of(self._road(pose), "<f4")),
+            Percepts(
+                frame=number,
+                objects=percepts,
+                road_m=Array.of(self._road(pose), "<f4"),
+                matches=self._places.see(number, self.now_ns, pose),
+            ),
         ]
         for message in said:
             message.stamp_ns = self.now_ns

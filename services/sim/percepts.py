@@ -13,12 +13,13 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
-from schemas.sensing import Percept, Pose
+from schemas.sensing import Percept, PlaceMatch, Pose
 
 Share = Annotated[float, msgspec.Meta(ge=0, le=1)]
 Positive = Annotated[float, msgspec.Meta(gt=0, le=1e4)]
 Metres = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
 NORMAL_MEDIAN = 0.6745
+ALIKE_M, ALIKE_RAD, SEQUENCE, RECENT = 3.0, 0.35, 4, 20
 
 
 class Landmark(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -42,6 +43,8 @@ class PerceptErrors(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fi
     | `named_phantoms` | a segment that is no building passes for a known one | see below |
     | `range_sd_share` | standard deviation of range by range | `depth_error`, a median, / 0.6745 |
     | `bearing_sd_rad` | standard deviation of bearing | the least that `services/epam/geometry.py` claims |
+    | `place_recall` | a place is known again, coming the same way | `sequence_recall_at_99p` |
+    | `place_precision` | it is that place and no other | the precision at which that recall was measured |
     """
 
     detected: Share = 0.839
@@ -50,6 +53,8 @@ class PerceptErrors(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fi
     named_phantoms: Share = 0.05
     range_sd_share: Share = 0.017 / NORMAL_MEDIAN
     bearing_sd_rad: Positive = 0.01
+    place_recall: Share = 0.965
+    place_precision: Share = 0.99
     nearest_m: Positive = 5.0
     farthest_m: Positive = 60.0
     field_of_view_rad: Positive = math.radians(75)
@@ -115,3 +120,39 @@ class PerceptSense:
             whole=True,
             box_px=(0, 0, 0, 0),
         )
+
+
+class PlaceSense:
+    """Knows places again where the robot comes the same way a second time, by the views that lead up to them."""
+
+    def __init__(self, errors: PerceptErrors, seed: int) -> None:
+        self._errors = errors
+        self._rng = np.random.default_rng([seed, 0x9F])
+        self._views: list[tuple[int, int]] = []
+        self._where: list[tuple[float, float, float]] = []
+        self._alike = 0
+
+    def see(self, frame: int, stamp_ns: int, pose: Pose) -> list[PlaceMatch]:
+        """The remembered view that this one matches, if any; one that matches none is remembered."""
+        errors, rng, before = self._errors, self._rng, self._nearest(frame, pose)
+        self._alike = 0 if before is None else self._alike + 1
+        if before is None:
+            self._views.append((frame, stamp_ns))
+            self._where.append((pose.x_m, pose.y_m, pose.heading_rad))
+        if before is None or self._alike < SEQUENCE or rng.random() >= errors.place_recall:
+            return []
+        right = rng.random() < errors.place_precision
+        matched, view_ns = self._views[before if right else int(rng.integers(len(self._views)))]
+        return [PlaceMatch(frame=matched, view_ns=view_ns, score=errors.place_precision)]
+
+    def _nearest(self, frame: int, pose: Pose) -> int | None:
+        """The remembered view nearest to `pose` that is near enough, looks the same way and is no recent one."""
+        if not self._views:
+            return None
+        where = np.array(self._where)
+        apart = np.hypot(where[:, 0] - pose.x_m, where[:, 1] - pose.y_m)
+        turned = np.abs(np.remainder(where[:, 2] - pose.heading_rad + np.pi, 2 * np.pi) - np.pi)
+        recent = np.array([number for number, _ in self._views]) > frame - RECENT
+        apart[(turned > ALIKE_RAD) | recent] = np.inf
+        best = int(apart.argmin())
+        return best if apart[best] <= ALIKE_M else None

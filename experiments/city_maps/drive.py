@@ -1,0 +1,161 @@
+"""One traversal: the modules that drive the town, on the in-memory bus, led along a tour; what they then believe."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bus.errors import CogmapError
+from bus.graph import Graph, object_id
+from bus.house import House
+from bus.module import Module
+from schemas import topics
+from schemas.graph import Delta, Node
+from schemas.sensing import Percepts, SelfMotion, TruePose
+from services import table
+from experiments.city_maps.environment import Environment
+from experiments.city_maps.streets import Points
+
+MIND = ("workspace", "codelets", "global_workspace", "action")
+SENSING = "percept-level sensing"
+SPEED_M_S, FRAME_HZ = 5.0, 1
+LEAD_M, OVERRUN_M = 70.0, 100.0
+CELL_M = 5.0
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Path integration: standard deviations of the mean-one factors of speed and turn, and of drift (radians after a
+    metre, growing with the root of the way)."""
+
+    speed: float
+    turn: float
+    drift_rad_per_sqrt_m: float
+
+
+@dataclass(frozen=True, eq=False)
+class Traversal:
+    """What one agent made of one tour, in the true frame: (n, 3) poses believed and true, view by view.
+
+    `buildings_m` (8, 2) has NaN for one that is not on the map; `road_m` (k, 2) are the places that are road.
+    """
+
+    believed: Points
+    true: Points
+    buildings_m: Points
+    road_m: Points
+    motions: tuple[Points, ...]
+    percepts: tuple[Percepts, ...]
+
+
+class _Watcher:
+    """An observer: the graph, what was sensed, and the truth."""
+
+    def __init__(self) -> None:
+        self.graph = Graph(CELL_M)
+        self.believed: list[tuple[float, float, float]] = []
+        self.true: list[tuple[float, float, float]] = []
+        self.motions: list[Points] = []
+        self.percepts: list[Percepts] = []
+
+    def on_delta(self, delta: Delta) -> None:
+        if not self.graph.apply(delta):
+            raise CogmapError(f"delta {delta.version} came out of turn")
+        if delta.phase == "localization":
+            facts = self.graph.nodes["self"].attributes
+            self.believed.append(tuple(float(facts[key]) for key in ("x_m", "y_m", "heading_rad")))  # type: ignore[arg-type]
+
+    def on_pose(self, told: TruePose) -> None:
+        self.true.append((told.pose.x_m, told.pose.y_m, told.pose.heading_rad))
+
+    def on_motion(self, motion: SelfMotion) -> None:
+        self.motions.append(np.array(motion.motions.numpy(), float))
+
+    def on_percepts(self, percepts: Percepts) -> None:
+        self.percepts.append(percepts)
+
+    def module(self) -> Module:
+        """Itself, as a module that only listens."""
+        return (
+            Module("observer")
+            .on(topics.DELTA, self.on_delta)
+            .on(topics.TRUE_POSE, self.on_pose)
+            .on(topics.SELF_MOTION, self.on_motion)
+            .on(topics.PERCEPTS, self.on_percepts)
+        )
+
+
+def sections(environment: Environment, start: int, backward: bool, noise: Noise, seed: int) -> dict[str, Any]:
+    """The configuration of every module for one traversal, as for `cogmap run --config`."""
+    line = environment.line(start, backward, LEAD_M, OVERRUN_M)
+    landmarks = [
+        {"name": name, "x_m": float(x), "y_m": float(y)}
+        for name, (x, y) in zip(environment.names, environment.buildings_m, strict=True)
+    ]
+    way = {"line_m": line.tolist(), "landmarks": landmarks, "speed_m_s": SPEED_M_S}
+    senses = {"speed": noise.speed, "turn": noise.turn, "drift_rad_per_sqrt_m": noise.drift_rad_per_sqrt_m}
+    sim = {"seed": seed, "frame_hz": FRAME_HZ, "odometry_hz": FRAME_HZ, "noise": senses, "way": way}
+    return {
+        "sim": {**sim, "mode": "lockstep", "awaits": dict.fromkeys(MIND, 1)},
+        "workspace": {"mode": "lockstep", "cell_m": CELL_M, "base_level_decay": 0.0},
+        "action": {"mode": "lockstep"},
+    }
+
+
+def traverse(settings: dict[str, Any], names: tuple[str, ...]) -> Traversal:
+    """Drive one tour to its end. Raises CogmapError where a message was lost or refused."""
+    watcher = _Watcher()
+    house = House([*(table.build(name, settings) for name in ("sim", *MIND)), watcher.module()])
+    try:
+        house.run()
+        for shell in house.shells:
+            if shell.intake.rejected:
+                raise CogmapError(f"{shell.module.name} refused messages: {dict(shell.intake.rejected)}")
+    finally:
+        house.close()
+    true = np.array(watcher.true)[: len(watcher.believed)]
+    first = true[0] if len(true) else np.zeros(3)
+    origin = np.array([*settings["sim"]["way"]["line_m"][0], _first_heading(settings)])
+    del first
+    return Traversal(
+        believed=_placed(np.array(watcher.believed), origin),
+        true=true,
+        buildings_m=_buildings(watcher.graph, names, origin),
+        road_m=_roads(watcher.graph, origin),
+        motions=tuple(watcher.motions),
+        percepts=tuple(watcher.percepts),
+    )
+
+
+def _first_heading(settings: dict[str, Any]) -> float:
+    (ax, ay), (bx, by) = settings["sim"]["way"]["line_m"][:2]
+    return float(np.arctan2(by - ay, bx - ax))
+
+
+def _placed(own: Points, origin: Points) -> Points:
+    """Positions or poses in the agent's own frame, (n, 2) or (n, 3), in the frame where that begins at `origin`."""
+    cos, sin = np.cos(origin[2]), np.sin(origin[2])
+    placed = np.array(own, float)
+    placed[:, :2] = own[:, :2] @ np.array([[cos, sin], [-sin, cos]]) + origin[:2]
+    if own.shape[1] == 3:
+        placed[:, 2] += origin[2]
+    return placed
+
+
+def _buildings(graph: Graph, names: tuple[str, ...], origin: Points) -> Points:
+    nodes: list[Node | None] = [graph.nodes.get(object_id(name)) for name in names]
+    own = [
+        (np.nan, np.nan) if node is None else (float(node.attributes["x_m"]), float(node.attributes["y_m"]))
+        for node in nodes
+    ]
+    return _placed(np.array(own), origin)
+
+
+def _roads(graph: Graph, origin: Points) -> Points:
+    cells = [
+        np.argwhere(graph.tiles[key].columns["road"] > 0) + np.array(key) * 32 for key in sorted(graph.tiles)
+    ]
+    where = np.vstack(cells) if cells else np.zeros((0, 2))
+    return _placed(where * graph.cell_m, origin)
