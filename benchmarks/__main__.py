@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
+import os
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -12,8 +15,11 @@ from benchmarks.map_correction import measure as map_correction
 from benchmarks.perception import measure as perception
 from benchmarks.perception import stereo as perception_stereo
 from benchmarks.report import Bar, publish
+from benchmarks.spiking import measure as spiking
 from bus.command import run_command
 from bus.session import free_endpoint
+from cli.experiment.outcome import save_figure
+from cli.log.progress import bar
 from services.epam.camvid import camvid_iou
 from services.epam.road import DEFAULT_PATH as ROAD_WEIGHTS
 
@@ -48,6 +54,7 @@ def benchmarks() -> None:
     python -m benchmarks cycle --json cycle.json
     python -m benchmarks bus --json bus.json
     python -m benchmarks perception --json perception.json
+    python -m benchmarks spiking --json spiking.json
     python -m benchmarks map_correction --graph manhattan.g2o --json map_correction.json
     """
 
@@ -169,6 +176,32 @@ def map_correction_command(graph_path: Path, truth_path: Path | None, json_path:
     figures = map_correction.measure(graph_path, truth_path)
     bars = {key: bar for key, bar in map_correction.BARS.items() if key in figures}
     publish("map correction", figures, bars, json_path)
+
+
+@benchmarks.command(name="spiking")
+@click.option("--seed", type=click.IntRange(0, 2**16), default=1, show_default=True, help="Which scenes.")
+@click.option("--processes", type=click.IntRange(1, 256), default=os.cpu_count() or 1, help="[default: one a core]")
+@click.option(
+    "--figure",
+    "folder",
+    type=click.Path(file_okay=False, exists=True, path_type=Path),
+    metavar="FOLDER",
+    help="Draw figure 4 there too, spiking.png and spiking.pdf.",
+)
+@json_option
+def spiking_command(seed: int, processes: int, folder: Path | None, json_path: Path | None) -> None:
+    """The posterior that spikes of place cells give, against the exact one; and that by rejection of samples.
+
+    Scenes with cues drawn at random: what path integration says of a position, and the distance to one or two walls.
+    A ratio is of standard deviations along x and y, an error is of the mean in exact standard deviations.
+    """
+    with bar("recording") as progress:
+        scenes = spiking.measure(seed, processes, progress)
+    publish("spiking", spiking.figures(scenes), spiking.BARS, json_path)
+    if folder is not None:
+        figure: Any = importlib.import_module("benchmarks.spiking.figure")
+        for path in save_figure(folder, "spiking", figure.figure(scenes, spiking.seeds(seed))):
+            _tell(str(path))
 
 
 def _tell(sentence: str) -> None:

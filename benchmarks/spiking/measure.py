@@ -67,14 +67,19 @@ def _rejection(given: Cues, seed: int) -> Posterior:
     return Posterior(kept.mean(axis=0), np.cov(kept, rowvar=False))
 
 
+def seeds(seed: int) -> list[int]:
+    """Those of the SCENES scenes."""
+    return [seed * SCENES + number for number in range(SCENES)]
+
+
 def measure(seed: int, processes: int, progress: Progress = lambda share: None) -> list[Scene]:
     """SCENES scenes, the same for the same seed."""
-    return each(scene, [seed * SCENES + number for number in range(SCENES)], processes, progress)
+    return each(scene, seeds(seed), processes, progress)
 
 
 def figures(scenes: list[Scene]) -> dict[str, float]:
     """Every figure: ratios of standard deviations, along x and y; errors of means in exact standard deviations."""
-    found = {}
+    found: dict[str, float] = {}
     for name in ("spiking", "rejection"):
         posteriors = [getattr(scene, name) for scene in scenes]
         ratios: Values = np.array([p.sd_m / s.exact.sd_m for p, s in zip(posteriors, scenes, strict=True)])

@@ -50,7 +50,8 @@ class GridModule:
         total = np.full((len(own), len(there)), -3.0, np.float32)
         for wave in range(3):
             total += np.cos(there[None, :, wave] - own[:, None, wave])
-        return np.exp(SHARPNESS * total)
+        tuning: npt.NDArray[np.float32] = np.exp(SHARPNESS * total)
+        return tuning
 
     def nearest(self, centres_m: Values) -> Indices:
         """Of positions (n, 2), the cell that has a field there."""
