@@ -48,8 +48,8 @@ def figure(found: Outcome) -> Figure:
 def _title(found: Outcome) -> str:
     noise, number = found.noise, len(found.errors_m[Condition.BOTH])
     return (
-        f"Cue integration in Nardini's room, {number} trials a condition; the room's senses simulated: distance noise "
-        f"{noise.distance:.0%}, fitted self-motion noise {noise.speed:.0%} of speed, {noise.turn:.0%} of turn rate"
+        f"Cue integration in Nardini's room, {number} trials a condition. Senses err by {noise.distance:.0%} of "
+        f"distance, {noise.speed:.0%} of speed, {noise.turn:.0%} of turn rate (the latter two fitted)"
     )
 
 
@@ -80,7 +80,7 @@ def _draw_responses(axes: Axes, found: Outcome) -> None:
     axes.set_aspect("equal", adjustable="datalim")
     axes.legend(frameon=False, fontsize=8, loc="upper right")
     axes.set_title("b   responses, and their SD about the mean", loc="left", color=INK, fontsize=10)
-    _label(axes, "metres along the way that turned landmarks move the target", "metres across")
+    _label(axes, "metres along the way that turned landmarks move the target", "metres towards post 8")
 
 
 def _one_sd(errors_m: Points, colour: str) -> Ellipse:

@@ -2,27 +2,35 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.cue_integration.geometry import Points
+from experiments.cue_integration.geometry import CONFLICT_RAD, Points
 from experiments.cue_integration.trial import Response, Trial
 
 
 def errors(trials: Sequence[Trial], responses: Sequence[Response]) -> Points:
-    """Where the post was put, seen from where it stood: (n, 2) metres, along and across.
+    """Where the post was put, seen from where it stood: (n, 2) metres, along and inward.
 
-    Along is the way that turned landmarks move the target, whether or not they did: trials of every route and
-    side then fall together.
+    Along is the way that turned landmarks move the target, whether or not they did, inward is across it, on the side
+    of post 8: trials of every route, and of landmarks turned either way, then fall together.
     """
     targets = np.array([trial.target for trial in trials])
     moved = np.array([trial.turned_target for trial in trials]) - targets
     along = moved / np.hypot(*moved.T)[:, None]
-    across = np.column_stack([-along[:, 1], along[:, 0]])
+    inward = np.column_stack([-along[:, 1], along[:, 0]]) * np.array([[trial.side] for trial in trials])
     off = np.array([(response.x_m, response.y_m) for response in responses]) - targets
-    return np.column_stack([(off * along).sum(axis=1), (off * across).sum(axis=1)])
+    return np.column_stack([(off * along).sum(axis=1), (off * inward).sum(axis=1)])
+
+
+def turned_errors(errors_m: Points, shift: float) -> Points:
+    """Errors about the target as they are about the turned one, `shift` metres along: turned by 15° with all else."""
+    cos, sin = math.cos(CONFLICT_RAD), math.sin(CONFLICT_RAD)
+    turned: Points = errors_m @ np.array([[cos, sin], [-sin, cos]]) + np.array([shift, 0.0])
+    return turned
 
 
 def shift_m(trials: Sequence[Trial]) -> float:
@@ -59,9 +67,9 @@ class Gaussian:
     covariance_m2: Points
 
     @classmethod
-    def of(cls, errors_m: Points, shift: float = 0.0) -> Gaussian:
-        """As (n, 2) errors are distributed, moved along by `shift` metres."""
-        return cls(errors_m.mean(axis=0) + np.array([shift, 0.0]), np.cov(errors_m, rowvar=False))
+    def of(cls, errors_m: Points) -> Gaussian:
+        """As (n, 2) errors are distributed."""
+        return cls(errors_m.mean(axis=0), np.cov(errors_m, rowvar=False))
 
     def log_density(self, points_m: Points) -> Points:
         """The log of the density at (n, 2) points."""

@@ -42,6 +42,7 @@ CONFLICT_RAD = math.radians(15)
 
 STEP_M, STEP_RAD = 0.5, math.radians(60)
 WHILE_TURNING_M = 0.1
+REACH_M = 0.3
 
 
 @dataclass(frozen=True)
@@ -65,10 +66,10 @@ class Pose:
 
 
 def step(bearing_rad: float, distance_m: float) -> tuple[float, float]:
-    """The next movement towards a goal: a turn, and a way forward; a short one while the goal is not yet ahead."""
+    """The next movement, until a goal is within reach: a turn, and a way forward, short while it is not yet ahead."""
     turn_rad = max(-STEP_RAD, min(STEP_RAD, bearing_rad))
     longest_m = STEP_M if turn_rad == bearing_rad else WHILE_TURNING_M
-    return turn_rad, min(distance_m, longest_m)
+    return turn_rad, max(0.0, min(distance_m - REACH_M, longest_m))
 
 
 def turned(points: tuple[Point, ...], angle_rad: float, about: Point = POSTS[8]) -> tuple[Point, ...]:

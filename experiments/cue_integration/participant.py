@@ -5,7 +5,7 @@ from __future__ import annotations
 from bus.errors import MessageError
 from bus.graph import Graph
 from bus.module import Module
-from experiments.cue_integration.geometry import Pose, step
+from experiments.cue_integration.geometry import REACH_M, Pose, step
 from experiments.cue_integration.room import FOLLOW, STOP, WAIT, WALK
 from schemas import topics
 from schemas.base import Scalar
@@ -13,14 +13,15 @@ from schemas.graph import Delta, Node
 from schemas.mind import Action
 
 POSTS_CARRIED = 3
-ARRIVED_M = 0.1
+NEAR_M = 0.1
 MOST_MOVEMENTS = 24
 LOST_RAD = 0.8
 LOOK_M, MOST_LOOKS = 0.25, 3
 
 
 class Participant:
-    """Follows until three posts are picked up, waits once, then walks to where it believes the first was.
+    """Follows until three posts are picked up, waits once, then walks to where it believes the first was, and puts it
+    there as soon as that is within reach.
 
     It knows what is in the workspace and nothing else. While it does not know where it faces it takes a short step
     and looks.
@@ -55,9 +56,9 @@ class Participant:
         pose = Pose(float(own["x_m"]), float(own["y_m"]), float(own["heading_rad"]))
         bearing_rad, distance_m = pose.towards((float(post.attributes["x_m"]), float(post.attributes["y_m"])))
         is_lost = float(own["heading_sd_rad"]) > LOST_RAD and self._looks < MOST_LOOKS
-        if self._movements == MOST_MOVEMENTS or (distance_m < ARRIVED_M and not is_lost):
+        if self._movements == MOST_MOVEMENTS or (distance_m < REACH_M + NEAR_M and not is_lost):
             self._has_stopped = True
-            return STOP, {}
+            return STOP, {"turn_rad": bearing_rad, "forward_m": distance_m}
         self._movements += 1
         self._looks += is_lost
         turn_rad, forward_m = (0.0, LOOK_M) if is_lost else step(bearing_rad, distance_m)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -13,8 +14,10 @@ from experiments.cue_integration.geometry import (
     CONFLICT_RAD,
     LANDMARKS,
     POSTS,
+    REACH_M,
     START,
     START_HEADING_RAD,
+    Point,
     Pose,
     step,
     turned,
@@ -28,8 +31,9 @@ from schemas.mind import Action
 from schemas.sensing import Percept, Percepts, SelfMotion
 
 PERIOD_NS = 500_000_000
-REACHED_M = 0.01
+TOLERANCE_M = 1e-6
 FOLLOW, WAIT, WALK, STOP = "follow", "wait", "walk", "stop"
+NOTHING: Mapping[str, Point] = {}
 AWAITS = {"workspace": 1, "codelets": 1, "participant": 1, heard.NAME: 1}
 
 
@@ -48,7 +52,7 @@ class Room:
 
     def begin(self) -> list[Message]:
         """What is seen from the start."""
-        return self._say(senses.STANDING, self._landmarks_seen())
+        return self._say(senses.STANDING, self._seen(NOTHING))
 
     def act(self, action: Action) -> list[Message]:
         """Carry out the participant's action; nothing more is sensed after the last."""
@@ -56,17 +60,21 @@ class Room:
             return self._follow()
         if action.scheme == WAIT:
             return self._change()
+        turn_rad, forward_m = float(action.parameters["turn_rad"]), float(action.parameters["forward_m"])
         if action.scheme == WALK:
-            return self._walk(float(action.parameters["turn_rad"]), float(action.parameters["forward_m"]), [])
-        self.response = Response(self._pose.x_m, self._pose.y_m, self._frame)
+            return self._walk(turn_rad, forward_m)
+        put = self._pose.after(turn_rad, forward_m)
+        self.response = Response(put.x_m, put.y_m, self._frame)
         return []
 
     def _follow(self) -> list[Message]:
-        """The participant goes on to the post that is lit, and picks it up where it is reached."""
-        goal = POSTS[self._to_pick[0]]
-        turn_rad, forward_m = step(*self._pose.towards(goal))
-        reached = self._pose.after(turn_rad, forward_m).towards(goal)[1] < REACHED_M
-        return self._walk(turn_rad, forward_m, [senses.at_hand(self._to_pick.pop(0))] if reached else [])
+        """The participant goes on to the post that is lit, and picks it up where it is within reach."""
+        post = self._to_pick[0]
+        turn_rad, forward_m = step(*self._pose.towards(POSTS[post]))
+        if self._pose.after(turn_rad, forward_m).towards(POSTS[post])[1] > REACH_M + TOLERANCE_M:
+            return self._walk(turn_rad, forward_m)
+        self._to_pick.pop(0)
+        return self._walk(turn_rad, forward_m, {f"post-{post}": POSTS[post]})
 
     def _change(self) -> list[Message]:
         """What happens, eyes closed, before the way back."""
@@ -80,15 +88,15 @@ class Room:
         self._pose = Pose(self._pose.x_m, self._pose.y_m, float(self._rng.uniform(-math.pi, math.pi)))
         return self._say(senses.DISORIENTED, [])
 
-    def _walk(self, turn_rad: float, forward_m: float, picked: list[Percept]) -> list[Message]:
+    def _walk(self, turn_rad: float, forward_m: float, picked: Mapping[str, Point] = NOTHING) -> list[Message]:
         self._pose = self._pose.after(turn_rad, forward_m)
         moved = senses.self_motion(turn_rad, forward_m, self._trial.noise, self._rng)
-        return self._say(moved if self._knows_motion else senses.UNKNOWN, [*self._landmarks_seen(), *picked])
+        return self._say(moved if self._knows_motion else senses.UNKNOWN, self._seen(picked))
 
-    def _landmarks_seen(self) -> list[Percept]:
-        if not self._are_lit:
-            return []
-        return senses.sightings(self._pose, self._landmarks, self._trial.noise, self._rng)
+    def _seen(self, picked: Mapping[str, Point]) -> list[Percept]:
+        """The landmarks that are lit, and what is being picked up."""
+        lit = {f"landmark-{number}": where for number, where in enumerate(self._landmarks)} if self._are_lit else {}
+        return senses.sightings(self._pose, {**lit, **picked}, self._trial.noise, self._rng)
 
     def _say(self, rows: Rows, objects: list[Percept]) -> list[Message]:
         since_ns, frame = self._frame * PERIOD_NS, self._frame

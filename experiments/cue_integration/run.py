@@ -56,7 +56,7 @@ def respond(trial: Trial) -> Response:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Errors (n, 2) of every condition, along and across, and what they say."""
+    """Errors (n, 2) of every condition, along and inward, and what they say."""
 
     noise: Noise
     errors_m: dict[Condition, Points]
@@ -98,7 +98,7 @@ class Outcome:
         """
         conflict_m = self.errors_m[Condition.CONFLICT]
         own = Gaussian.of(self.errors_m[Condition.SELF_MOTION])
-        seen = Gaussian.of(self.errors_m[Condition.LANDMARKS], self.shift_m)
+        seen = Gaussian.of(analysis.turned_errors(self.errors_m[Condition.LANDMARKS], self.shift_m))
         weight = analysis.landmark_weight(self.sd_m(Condition.SELF_MOTION), self.sd_m(Condition.LANDMARKS))
         integrated = float(analysis.combined(own, seen).log_density(conflict_m).sum())
         alternated = analysis.alternation_log_likelihood(conflict_m, own, seen, weight)

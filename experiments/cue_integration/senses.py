@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -12,7 +12,6 @@ from schemas.sensing import Percept
 
 Rows = list[tuple[float, float, float, float, float]]
 HALF_S = 0.25
-AT_HAND_M = 0.01
 STANDING: Rows = [(0.0, 0.0, HALF_S, 0.0, 0.0)]
 # Turned round and round until any heading is as likely as any other.
 DISORIENTED: Rows = [(0.0, 0.0, HALF_S, 0.0, 2 * np.pi / HALF_S)]
@@ -33,23 +32,18 @@ def self_motion(turn_rad: float, forward_m: float, noise: Noise, rng: np.random.
     ]
 
 
-def sightings(pose: Pose, landmarks: Sequence[Point], noise: Noise, rng: np.random.Generator) -> list[Percept]:
-    """Every landmark, wherever the participant faces: it looks around."""
+def sightings(pose: Pose, things: Mapping[str, Point], noise: Noise, rng: np.random.Generator) -> list[Percept]:
+    """All things, by label, wherever the participant faces: it looks around."""
     seen = []
-    for number, landmark in enumerate(landmarks):
-        bearing_rad, distance_m = pose.towards(landmark)
+    for label, where in things.items():
+        bearing_rad, distance_m = pose.towards(where)
         range_m = distance_m * float(rng.normal(1.0, noise.distance))
         bearing_rad += float(rng.normal(0.0, noise.distance))
-        seen.append(percept(f"landmark-{number}", bearing_rad, range_m, noise.distance, noise.distance * range_m))
+        seen.append(_percept(label, bearing_rad, range_m, noise.distance, noise.distance * range_m))
     return seen
 
 
-def at_hand(post: int) -> Percept:
-    """A post that is being picked up."""
-    return percept(f"post-{post}", 0.0, AT_HAND_M, 0.1, AT_HAND_M)
-
-
-def percept(label: str, bearing_rad: float, range_m: float, bearing_sd_rad: float, range_sd_m: float) -> Percept:
+def _percept(label: str, bearing_rad: float, range_m: float, bearing_sd_rad: float, range_sd_m: float) -> Percept:
     """A small glowing thing."""
     return Percept(
         label=label,
