@@ -122,18 +122,20 @@ def correct_headings(graph: PoseGraph) -> Floats:
     damping, before = 0.0, cost(poses, constraints)
     for _ in range(MOST_ITERATIONS):
         matrix, gradient = normal.matrix(poses, constraints), normal.gradient(poses, constraints)
-        while True:
-            damped = matrix + damping * sparse.diags(matrix.diagonal(), format="csc") if damping else matrix
-            moved = normal.moved(poses, -factor(damped).solve(gradient))
-            after = cost(moved, constraints)
-            if after <= before or damping > MOST_DAMPING:
-                break
-            damping = max(LEAST_DAMPING, damping * 100)
+        damped = matrix + damping * sparse.diags(matrix.diagonal(), format="csc") if damping else matrix
+        step = factor(damped).solve(gradient)
+        moved = normal.moved(poses, -step)
+        after = cost(moved, constraints)
         if after > before:
+            damping = max(LEAST_DAMPING, damping * 100)
+            if damping > MOST_DAMPING:
+                break
+            continue
+        # What the linear model did not foresee is about what another step would gain.
+        unforeseen = after - (before - float(gradient @ step))
+        gained = before - after
+        poses, before = moved, after
+        if gained <= RELATIVE_DECREASE * after or (not damping and unforeseen <= RELATIVE_DECREASE * after):
             break
-        done = before - after <= RELATIVE_DECREASE * before
-        poses, before, damping = moved, after, damping / 10 if damping > LEAST_DAMPING else 0.0
-        if done:
-            break
+        damping = damping / 10 if damping > LEAST_DAMPING else 0.0
     return poses
-

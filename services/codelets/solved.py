@@ -27,48 +27,46 @@ class Solved:
         self._normal = NormalEquations(len(poses), constraints)
         self._factors = factor(self._normal.matrix(poses, constraints))
         self._cost = cost(poses, constraints)
-        self._pulls = self._answers = np.empty((3 * (len(poses) - 1), 0))
+        self._stiffer: list[Floats] = []
 
     def settle(self) -> None:
         """Take the closures that have come into the factors: for when there is time."""
-        if self._pulls.size:
+        if self._stiffer:
             self._settle(self.graph)
 
     def chi_square(self, closure: Constraints) -> float:
         """How badly one closure fits all that is known without it; its degrees of freedom are what it tells of."""
-        return self._fit(closure, *self._columns(closure))[1]
+        return self._fit(closure)[1]
 
     def close(self, closure: Constraints) -> Floats:
         """Take in one more closure: the (n, 3) poses after it."""
-        pulls, answers = self._columns(closure)
-        step, chi_square = self._fit(closure, pulls, answers)
+        step, chi_square, stiffer = self._fit(closure)
         graph = self.graph
         poses = self._normal.moved(graph.poses, -step)
         self.graph = PoseGraph(poses, graph.steps, graph.closures + closure)
-        self._pulls, self._answers = np.hstack([self._pulls, pulls]), np.hstack([self._answers, answers])
+        self._stiffer.append(stiffer)
         self._cost += chi_square
         if cost(poses, self.graph.constraints) > (1 + TOLERANCE) * self._cost:
             self._settle(self.graph)
         return self.graph.poses
 
-    def _fit(self, closure: Constraints, pulls: Floats, answers: Floats) -> tuple[Floats, float]:
-        """The step that takes `closure` in, and its chi-square."""
-        if self._pulls.size:
-            capacitance = np.eye(self._pulls.shape[1]) + self._pulls.T @ self._answers
-            answers = answers - self._answers @ np.linalg.solve(capacitance, self._answers.T @ pulls)
-        off = _root(closure).T @ discrepancies(self.graph.poses, closure)[0]
-        forces = np.linalg.solve(np.eye(3) + pulls.T @ answers, off)
-        return answers @ forces, float(off @ forces)
-
-    def _columns(self, closure: Constraints) -> tuple[Floats, Floats]:
-        """`pulls`, whose product with its transpose the closure adds to the equations, and how the path answers."""
-        pulls = np.zeros((len(self._answers), 3))
-        ends = (closure.first, closure.second)
-        for end, by_end in zip(ends, jacobians(self.graph.poses, closure), strict=True):
+    def _fit(self, closure: Constraints) -> tuple[Floats, float, Floats]:
+        """The step that takes `closure` in, its chi-square, and by what the path answers less once it is in."""
+        root = _root(closure)
+        pulls = np.zeros((3 * (len(self.graph.poses) - 1), 3))
+        used = []
+        for end, by_end in zip((closure.first, closure.second), jacobians(self.graph.poses, closure), strict=True):
             unknowns, free = self._normal.unknowns(end)
             if free[0]:
-                pulls[unknowns[0]] = by_end[0].T @ _root(closure)
-        return pulls, self._factors.solve(pulls)
+                pulls[unknowns[0]] = by_end[0].T @ root
+                used += unknowns[0].tolist()
+        answers = self._factors.solve(pulls)
+        for stiffer in self._stiffer:
+            answers -= stiffer @ (stiffer[used].T @ pulls[used])
+        left = np.linalg.cholesky(np.eye(3) + pulls[used].T @ answers[used])
+        stiffer = np.linalg.solve(left, answers.T).T
+        off = np.linalg.solve(left, root.T @ discrepancies(self.graph.poses, closure)[0])
+        return stiffer @ off, float(off @ off), stiffer
 
 
 def _root(closure: Constraints) -> Floats:
