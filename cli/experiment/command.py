@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from cli.experiment.city_maps import city_maps
 from cli.experiment.cue_integration import cue_integration
 
 _EPILOG = """\b
@@ -16,4 +17,5 @@ def experiment() -> None:
     """Run the paper's experiments, through the same modules that drive the town."""
 
 
+experiment.add_command(city_maps)
 experiment.add_command(cue_integration)

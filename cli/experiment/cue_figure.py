@@ -39,7 +39,7 @@ def figure(found: Outcome) -> Figure:
         for name, title in (("sd", "c   SD of the responses"), ("rmse", "d   RMSE of the responses")):
             _draw_bars(panels[name], ours[name], theirs[name], title)
         panels["sd"].hlines(found.optimal_sd_m, 1.55, 2.45, color=OPTIMAL, lw=2, label="optimal combination of ours")
-        panels["sd"].legend(frameon=False, fontsize=8)
+        panels["sd"].legend(frameon=False, fontsize=8, loc="upper right")
         sheet.suptitle(_title(found), x=0.01, ha="left", color=INK, fontsize=12, fontweight="bold")
         sheet.draw_without_rendering()
     return sheet
@@ -47,10 +47,8 @@ def figure(found: Outcome) -> Figure:
 
 def _title(found: Outcome) -> str:
     noise, number = found.noise, len(found.errors_m[Condition.BOTH])
-    return (
-        f"Cue integration in Nardini's room, {number} trials a condition. Senses err by {noise.distance:.0%} of "
-        f"distance, {noise.speed:.0%} of speed, {noise.turn:.0%} of turn rate (the latter two fitted)"
-    )
+    senses = f"{noise.distance:.0%} of distance, {noise.speed:.0%} of speed and {noise.turn:.0%} of turn rate"
+    return f"Cue integration in Nardini's room, {number} trials a condition\nsimulated senses err by {senses}"
 
 
 def _draw_room(axes: Axes) -> None:
@@ -100,6 +98,7 @@ def _draw_bars(axes: Axes, ours: dict[Condition, float], theirs: dict[Condition,
         bars = axes.bar(places + offset, heights, 0.38, color=colour, label=label)
         axes.bar_label(bars, fmt="%.2f", fontsize=7.5, color=INK)
     axes.set_xticks(places, [NAMES[condition] for condition in Condition])
+    axes.set_ylim(0, 1.35 * max(*ours.values(), *theirs.values()))
     axes.set_title(title, loc="left", color=INK, fontsize=10)
     axes.legend(frameon=False, fontsize=8)
     _label(axes, "", "metres")
