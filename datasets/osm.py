@@ -40,12 +40,12 @@ class Extract:
     ways: list[Way] = field(default_factory=list)
 
 
-class _Wrong(Exception):
+class _WrongError(Exception):
     """What was expected where the parser stands."""
 
 
 class _Reader:
-    """Takes elements as they come; raises _Wrong where one is not what OSM XML has there."""
+    """Takes elements as they come; raises _WrongError where one is not what OSM XML has there."""
 
     def __init__(self) -> None:
         self.extract = Extract()
@@ -55,7 +55,7 @@ class _Reader:
 
     def start(self, name: str, has: Tags) -> None:
         if self._depth == 0 and name != "osm":
-            raise _Wrong("the element <osm>, the root of OpenStreetMap XML")
+            raise _WrongError("the element <osm>, the root of OpenStreetMap XML")
         self._depth += 1
         if name == "node":
             self._node = _whole(has, "node", "id")
@@ -69,7 +69,7 @@ class _Reader:
 
     def _tag(self, has: Tags) -> None:
         if "k" not in has or "v" not in has:
-            raise _Wrong("a <tag> with k and v")
+            raise _WrongError("a <tag> with k and v")
         if self._way is not None:
             self._way.tags[has["k"]] = has["v"]
         elif self._node is not None:
@@ -90,16 +90,17 @@ def read(path: Path) -> Extract:
     parser = expat.ParserCreate()
     parser.StartElementHandler, parser.EndElementHandler = reader.start, reader.end
     parser.EntityDeclHandler = _refuse_entities
-    number, line = 0, b""
+    number, line = 1, b""
     try:
-        for number, line in enumerate(_lines(path), start=1):
+        for read_so_far, line in enumerate(_lines(path), start=1):
+            number = read_so_far
             parser.Parse(line, False)
         parser.Parse(b"", True)
-    except _Wrong as error:
+    except _WrongError as error:
         raise wrong_line(path, number, _text(line), str(error)) from None
     except expat.ExpatError as error:
         expected = f"well-formed XML ({expat.ErrorString(error.code)})"
-        raise wrong_line(path, max(number, 1), _text(line), expected) from None
+        raise wrong_line(path, number, _text(line), expected) from None
     return reader.extract
 
 
@@ -113,7 +114,7 @@ def _lines(path: Path) -> Iterator[bytes]:
 
 
 def _refuse_entities(*declared: object) -> None:
-    raise _Wrong("no entity declarations")
+    raise _WrongError("no entity declarations")
 
 
 def _text(line: bytes) -> str:
@@ -124,7 +125,7 @@ def _whole(has: Tags, element: str, name: str) -> int:
     try:
         return int(has[name])
     except (KeyError, ValueError):
-        raise _Wrong(f"a <{element}> with a whole number for {name}") from None
+        raise _WrongError(f"a <{element}> with a whole number for {name}") from None
 
 
 def _degrees(has: Tags, name: str, most: float) -> float:
@@ -133,5 +134,5 @@ def _degrees(has: Tags, name: str, most: float) -> float:
     except (KeyError, ValueError):
         value = most + 1
     if not -most <= value <= most:
-        raise _Wrong(f"a <node> with {name} in degrees, from {-most:g} to {most:g}")
+        raise _WrongError(f"a <node> with {name} in degrees, from {-most:g} to {most:g}")
     return value

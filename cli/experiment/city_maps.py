@@ -15,7 +15,7 @@ from cli.log.progress import bar
 from experiments.city_maps.drive import Noise
 from experiments.city_maps.environment import Environment, environments
 from experiments.city_maps.figures import figures
-from experiments.city_maps.measure import NOISE, TRAVERSALS, measure
+from experiments.city_maps.measure import NOISE, TRAVERSALS, Effort, measure
 from experiments.city_maps.sources import folder, from_osm, grown
 
 NAME = "city-maps"
@@ -78,7 +78,7 @@ def city_maps(
     places = _places(osm, all_in, maps, seed)
     asked = Noise(*noise)
     with bar("traversals") as progress:
-        found = measure(places, traversals, asked, seed, processes, progress)
+        found = measure(places, asked, Effort(traversals, seed, processes, progress))
     said = figures(found, asked)
     outcome.say(NAME, said)
     draw: Any = importlib.import_module("cli.experiment.city_figure")  # other commands have no use for matplotlib

@@ -9,6 +9,7 @@ import numpy as np
 from experiments.city_maps.drive import Traversal
 from experiments.city_maps.streets import Points
 from services.codelets.least_squares import correct_headings
+from services.codelets.path import shifted
 from services.codelets.pose_graph import Constraints, PoseGraph
 from services.codelets.replay import close_loops
 
@@ -16,17 +17,26 @@ PLACE_SD_M, PLACE_SD_RAD = 2.5, 0.05
 LEAST_SD_M, LEAST_SD_RAD = 0.05, 0.002
 
 
-def corrected(made: Traversal, method: str) -> Traversal:
-    """`made` with its loops closed by "positions" (eq. 9) or "heading" (beyond the paper)."""
+def corrected(made: Traversal, names: tuple[str, ...], method: str) -> Traversal:
+    """`made` with its loops closed by "positions" (eq. 9) or "heading" (beyond the paper).
+
+    A building moves with the place on the path from where it was last seen, a piece of road with the nearest.
+    """
     graph = path_graph(made)
     if not len(graph.closures):
         return made
-    after = close_loops(graph).positions_m if method == "positions" else correct_headings(graph)[:, :2]
+    if method == "positions":
+        poses = np.column_stack([close_loops(graph).positions_m, made.believed[:, 2]])
+    else:
+        poses = correct_headings(graph)
+    last = {each.label: percepts.frame for percepts in made.percepts[: len(poses)] for each in percepts.objects}
+    seen_from = np.array([last.get(name, 0) for name in names])
+    nearest = ((made.road_m[:, None] - made.believed[:, :2]) ** 2).sum(2).argmin(1)
     return replace(
         made,
-        buildings_m=_moved(made.buildings_m, graph.poses, after),
-        road_m=_moved(made.road_m, graph.poses, after),
-        believed=np.column_stack([after, made.believed[:, 2]]),
+        believed=poses,
+        buildings_m=shifted(made.buildings_m, made.believed[seen_from], poses[seen_from]),
+        road_m=shifted(made.road_m, made.believed[nearest], poses[nearest]),
     )
 
 
@@ -38,7 +48,9 @@ def path_graph(made: Traversal) -> PoseGraph:
     for step in measured:
         x, y, heading = poses[-1]
         cos, sin = np.cos(heading), np.sin(heading)
-        poses.append(np.array([x + cos * step[0] - sin * step[1], y + sin * step[0] + cos * step[1], heading + step[2]]))
+        poses.append(
+            np.array([x + cos * step[0] - sin * step[1], y + sin * step[0] + cos * step[1], heading + step[2]])
+        )
     ends = [(match.frame, percepts.frame) for percepts in made.percepts for match in percepts.matches]
     first, second = np.array(ends, np.int64).reshape(-1, 2).T
     along = np.arange(len(steps))
@@ -63,15 +75,3 @@ def _step(rows: Points) -> tuple[Points, Points]:
         covariance = moved @ covariance @ moved.T + noise @ noise.T
         x, y, heading = x + cos * way, y + sin * way, heading + turn
     return np.array([x, y, heading]), np.linalg.inv(covariance)
-
-
-def _moved(points_m: Points, poses: Points, after_m: Points) -> Points:
-    """Each of (k, 2) points by as much as the position of the path that is nearest to it."""
-    if not len(points_m):
-        return points_m
-    known = ~np.isnan(points_m[:, 0])
-    moved = points_m.copy()
-    away = ((points_m[known][:, None] - poses[:, :2]) ** 2).sum(2)
-    nearest = away.argmin(1)
-    moved[known] += after_m[nearest] - poses[nearest, :2]
-    return moved

@@ -11,12 +11,12 @@ from bus.errors import CogmapError
 from bus.graph import Graph, object_id
 from bus.house import House
 from bus.module import Module
+from experiments.city_maps.environment import Environment
+from experiments.city_maps.streets import Points
 from schemas import topics
 from schemas.graph import Delta, Node
 from schemas.sensing import Percepts, SelfMotion, TruePose
 from services import table
-from experiments.city_maps.environment import Environment
-from experiments.city_maps.streets import Points
 
 MIND = ("workspace", "codelets", "global_workspace", "action")
 SENSING = "percept-level sensing"
@@ -116,9 +116,7 @@ def traverse(settings: dict[str, Any], names: tuple[str, ...]) -> Traversal:
     finally:
         house.close()
     true = np.array(watcher.true)[: len(watcher.believed)]
-    first = true[0] if len(true) else np.zeros(3)
     origin = np.array([*settings["sim"]["way"]["line_m"][0], _first_heading(settings)])
-    del first
     return Traversal(
         believed=_placed(np.array(watcher.believed), origin),
         true=true,
@@ -154,8 +152,6 @@ def _buildings(graph: Graph, names: tuple[str, ...], origin: Points) -> Points:
 
 
 def _roads(graph: Graph, origin: Points) -> Points:
-    cells = [
-        np.argwhere(graph.tiles[key].columns["road"] > 0) + np.array(key) * 32 for key in sorted(graph.tiles)
-    ]
+    cells = [np.argwhere(graph.tiles[key].columns["road"] > 0) + np.array(key) * 32 for key in sorted(graph.tiles)]
     where = np.vstack(cells) if cells else np.zeros((0, 2))
     return _placed(where * graph.cell_m, origin)

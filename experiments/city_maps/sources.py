@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 import numpy as np
 
 from bus.errors import UsageError
-from datasets import osm
+from datasets import osm, street_graphs
 from datasets.osm import Extract, Tags, Way
+from datasets.street_graphs import StreetGraph
 from experiments.city_maps.environment import City
 from experiments.city_maps.streets import Points, Streets
 
 EARTH_M = 6_371_008.8
 STREETS = frozenset(
-    f"{kind}{link}"
-    for kind in ("trunk", "primary", "secondary", "tertiary")
-    for link in ("", "_link")
+    f"{kind}{link}" for kind in ("trunk", "primary", "secondary", "tertiary") for link in ("", "_link")
 ) | {"unclassified", "residential", "living_street", "pedestrian", "road", "service"}
 KNOWN_BY = ("amenity", "shop", "tourism", "historic", "leisure", "office")
 GRID_SIDE, BLOCK_M = 20, (80.0, 170.0)
@@ -79,7 +79,7 @@ def _streets(extract: Extract, ways: list[Way], middle: Points) -> Streets:
     pieces = []
     for way in ways:
         inside = [node for node in way.nodes if node in extract.nodes]
-        for a, b in zip(inside, inside[1:], strict=False):
+        for a, b in itertools.pairwise(inside):
             if a != b:
                 pieces.append([number.setdefault(node, len(number)) for node in (a, b)])
     where = np.array([extract.nodes[node] for node in number])
@@ -115,3 +115,31 @@ def _name(path: Path) -> str:
     for suffix in sorted(osm.SUFFIXES, key=len, reverse=True):
         name = name.removesuffix(suffix)
     return name
+
+
+def from_street_graph(graph: StreetGraph, seed: int) -> City:
+    """A city of real streets, which has no buildings: houses are put along them, from a seed."""
+    middle = np.array(graph.nodes_lonlat).mean(axis=0)
+    number: dict[tuple[float, float], int] = {}
+    pieces = []
+    for edge in graph.edges:
+        line = [number.setdefault(point, len(number)) for point in graph.line(edge)]
+        pieces += [[a, b] for a, b in itertools.pairwise(line) if a != b]
+    streets = Streets(plane_m(np.array(list(number)), middle), np.array(pieces, np.intp)).connected()
+    where = _along(streets, np.random.default_rng([seed, 0xA10]))
+    return City(graph.city, streets, tuple(f"house {k + 1}" for k in range(len(where))), where)
+
+
+def folder(path: Path, seed: int) -> list[City]:
+    """Every city in a folder, in the order of the files' names. Raises UsageError where there is none."""
+    if not path.is_dir():
+        raise UsageError(f"there is no folder {path}")
+    cities = []
+    for file in sorted(path.iterdir()):
+        if file.name.endswith(osm.SUFFIXES):
+            cities.append(from_osm(file))
+        elif file.name.endswith(street_graphs.SUFFIXES):
+            cities += [from_street_graph(graph, seed) for graph in street_graphs.read(file)]
+    if not cities:
+        raise UsageError(f"{path} has no cities: put OpenStreetMap extracts there, {', '.join(osm.SUFFIXES)}")
+    return cities

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,7 +64,7 @@ class Streets:
             on_it = numbers[found == place]
             away = np.hypot(*(points[on_it] - points[a]).T)
             chain = [a, *on_it[np.argsort(away, kind="stable")].tolist(), b]
-            pieces.extend(list(pair) for pair in zip(chain, chain[1:], strict=False))
+            pieces.extend(list(pair) for pair in itertools.pairwise(chain))
         return Streets(points, np.array(pieces, np.intp)), numbers
 
     def ways(self, from_points: Indices) -> tuple[Points, Indices]:

@@ -39,8 +39,8 @@ class PerceptErrors(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fi
     |---|---|---|
     | `detected` | a building in view is found | `detect_recall` |
     | `right_name` | what is found has its own name, not another's | `top1` |
-    | `phantoms` | percepts of nothing for each building that is found | 1 / `detect_precision` - 1, times `named_phantoms` |
-    | `named_phantoms` | a segment that is no building passes for a known one | see below |
+    | `precision` | what is found is a building | `detect_precision` |
+    | `named_phantoms` | what is none passes for a known one all the same | top1's misses, as for buildings |
     | `range_sd_share` | standard deviation of range by range | `depth_error`, a median, / 0.6745 |
     | `bearing_sd_rad` | standard deviation of bearing | the least that `services/epam/geometry.py` claims |
     | `place_recall` | a place is known again, coming the same way | `sequence_recall_at_99p` |
@@ -50,7 +50,7 @@ class PerceptErrors(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fi
     detected: Share = 0.839
     right_name: Share = 0.972
     precision: Annotated[float, msgspec.Meta(gt=0, le=1)] = 0.914
-    named_phantoms: Share = 0.05
+    named_phantoms: Share = 0.028
     range_sd_share: Share = 0.017 / NORMAL_MEDIAN
     bearing_sd_rad: Positive = 0.01
     place_recall: Share = 0.965
