@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sparse
+from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from services.codelets.pose_graph import (
@@ -94,8 +94,9 @@ class NormalEquations:
 
 def _elimination_order(count: int, constraints: Constraints) -> Indices:
     """The poses but the first, in an order of little fill (minimum degree)."""
-    ends = np.concatenate([constraints.first, constraints.second]), np.concatenate(
-        [constraints.second, constraints.first]
+    ends = (
+        np.concatenate([constraints.first, constraints.second]),
+        np.concatenate([constraints.second, constraints.first]),
     )
     touching = sparse.csc_matrix((np.ones(len(ends[0])), ends), shape=(count, count))[1:, 1:]
     touching.data[:] = 1.0

@@ -3,7 +3,7 @@
 Eq. 9 gives every position of a loop a share of its discrepancy, as large as the share of path integration's
 uncertainty that lies before it. Seen as forces: a closed loop pulls with one force on each of its steps, and a step
 yields by its own covariance times the force. Where loops overlap, their forces add up. One replay from the last
-position to the first finds the sum at each step, since a loop's force comes in at its end and goes out at its beginning.
+position to the first finds the sum at each step: a loop's force comes in at its end and goes out at its beginning.
 Each loop then corrects its force by its own precision A_i times what is left of its discrepancy, and replay begins
 anew. The learning rate alpha of a replay and how much it takes over from the replay before are those of conjugate
 gradients; with them a handful of replays closes a few loops, and some hundred close thousands.
