@@ -41,6 +41,7 @@ bench: setup ## every benchmark there is
 	$(BIN)/python -m benchmarks cycle
 	$(BIN)/python -m benchmarks bus
 	$(BIN)/python -m benchmarks perception
+	$(BIN)/python -m benchmarks spiking
 
 clean: ## remove what was installed and built; runs stay
 	rm -rf .venv build *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

