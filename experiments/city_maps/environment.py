@@ -84,7 +84,7 @@ def environments(city: City, number: int, seed: int) -> list[Environment]:
 
 
 def _choose(buildings_m: Points, usable: npt.NDArray[np.intp], rng: np.random.Generator) -> list[int] | None:
-    """Eight buildings in a square of random size at a random place, none too near to another; None if there are none."""
+    """Eight buildings in a square of random size at a random place, none too near to another; or None."""
     if len(usable) < BUILDINGS:
         return None
     extent = np.ptp(buildings_m[usable], axis=0)
