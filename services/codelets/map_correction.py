@@ -56,11 +56,28 @@ def corrected(graph: PoseGraph, config: Config) -> tuple[Floats, int]:
 
     Where no loop is left, the path is as path integration has it.
     """
-    positions = close_loops(graph)
+    positions = close_loops(PoseGraph(graph.poses, _positions_only(graph), graph.closures))
     poses = np.column_stack([positions.positions_m, graph.poses[:, 2]])
     if config.correct == "positions":
         return poses, positions.replays
     return correct_headings(PoseGraph(graph.poses, graph.steps, graph.closures)), positions.replays
+
+
+def _positions_only(graph: PoseGraph) -> Constraints:
+    """The steps where headings are not corrected: what those are wrong by is left to the positions.
+
+    A turn of variance h somewhere on a loop of length L moves its end by a variance of h L^2 / 3 on the mean.
+    """
+    steps, loops = graph.steps, graph.closures
+    if not len(loops):
+        return steps
+    way_m = np.concatenate([[0.0], np.cumsum(np.hypot(steps.measured[:, 0], steps.measured[:, 1]))])
+    lengths_m = np.abs(way_m[loops.second] - way_m[loops.first])
+    variance = 1 / steps.information[:, 0, 0] + (lengths_m**2).mean() / 3 / steps.information[:, 2, 2]
+    information = np.zeros_like(steps.information)
+    information[:, 0, 0] = information[:, 1, 1] = 1 / variance
+    information[:, 2, 2] = steps.information[:, 2, 2]
+    return Constraints(steps.first, steps.second, steps.measured, information)
 
 
 def _judged(node: Node, holds: bool) -> Node:

@@ -27,6 +27,7 @@ COLUMNS = 7
 OLD, NEW = slice(1, 4), slice(4, 7)
 AROUND = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)])
 AT_ONCE = 4096
+FIRST_SEEN_S = 5.0
 
 
 def shift_map(task: Task, config: Config) -> list[Operation]:
@@ -70,13 +71,14 @@ def _self(task: Task, node: Node, last: Floats) -> list[Operation]:
 
 
 def _object(task: Task, node: Node, rows: Floats) -> list[Operation]:
-    """An object moves with the place nearest to it of those from where it was seen."""
+    """An object moves with the place nearest to it of those from where it came to be known."""
     if node.samples is None:
         return []
     samples = np.asarray(node.samples.numpy(), np.float64)
-    stamps = [int(node.attributes.get(key, 0)) * 1e-9 for key in ("since_ns", "stamp_ns")]
-    seen = rows[(rows[:, STAMP] >= stamps[0]) & (rows[:, STAMP] <= stamps[1])]
-    near = seen if len(seen) else rows
+    # Not of all: where a loop has drifted, its end may lie nearer than the beginning that the object belongs to.
+    late_s = rows[:, STAMP] - int(node.attributes.get("since_ns", 0)) * 1e-9
+    known = np.flatnonzero((late_s >= 0) & (late_s <= FIRST_SEEN_S))
+    near = rows[known] if len(known) else rows[[int(np.abs(late_s).argmin())]]
     away = np.hypot(*(near[:, OLD][:, :2] - samples[:, :2].mean(axis=0)).T)
     row = near[[int(away.argmin())]]
     return _placed(task, node, shifted(samples, row[:, OLD], row[:, NEW]), {})

@@ -10,12 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bus.errors import MessageError
 from bus.graph import object_id
 from schemas.base import Scalar
 from schemas.graph import Node
 from schemas.mind import Task
 from schemas.sensing import Percept, PlaceMatch
-from services.codelets.path import POSE, STAMP, step_between
+from services.codelets.path import POSE, STAMP, step_between, steps_of
 from services.codelets.pose_graph import Constraints, Floats
 from services.codelets.sampling import mean_pose
 from services.codelets.settings import Config
@@ -36,42 +37,51 @@ class Fix(NamedTuple):
 
 def found_again(task: Task, rows: Floats, config: Config) -> list[Node]:
     """The closures that the percepts and matches of `task` make, with the path of (n, COLUMNS) `rows`."""
-    agent = next(node for node in task.nodes if node.kind == "self")
-    if agent.samples is None or len(rows) <= LEAST_ROWS:
+    if len(rows) <= LEAST_ROWS:
         return []
-    pose = mean_pose(np.asarray(agent.samples.numpy(), np.float64))
     by_id = {node.id: node for node in task.nodes}
     closures = []
     for percept in task.percepts:
         landmark = by_id.get(object_id(percept.label))
         if landmark is not None:
-            closures.append(_by_landmark(task, rows, pose, landmark, percept))
-    closures += [_by_match(task, rows, pose, match, config) for match in task.matches]
+            closures.append(_by_landmark(task, rows, landmark, percept, config))
+    closures += [_by_match(task, rows, match, config) for match in task.matches]
     return [node for node in closures if _row(rows, node, "to_ns") - _row(rows, node, "from_ns") >= LEAST_ROWS]
 
 
-def _by_landmark(task: Task, rows: Floats, pose: Floats, landmark: Node, percept: Percept) -> Node:
+def _pose(task: Task) -> Floats:
+    agent = next(node for node in task.nodes if node.kind == "self")
+    if agent.samples is None:
+        raise MessageError(f"task {task.task_id} has a self node without samples")
+    return mean_pose(np.asarray(agent.samples.numpy(), np.float64))
+
+
+def _by_landmark(task: Task, rows: Floats, landmark: Node, percept: Percept, config: Config) -> Node:
     """The agent stands where the landmark is seen as it is; it was last seen when the path was at `from_ns`."""
     before_ns = int(landmark.attributes["stamp_ns"])
+    pose = _pose(task)
     bearing = pose[2] + percept.bearing_rad
     where = np.array([float(landmark.attributes["x_m"]), float(landmark.attributes["y_m"])])
     stands = where - percept.range_m * np.array([np.cos(bearing), np.sin(bearing)])
     spread_m = np.hypot(float(landmark.attributes["x_sd_m"]), float(landmark.attributes["y_sd_m"]))
-    sd_m = float(np.hypot(np.hypot(spread_m, percept.range_sd_m), percept.range_m * percept.bearing_sd_rad))
+    # How far it stands off to the side is as unsure as the heading has become on the way.
+    way = steps_of(rows[_nearest(rows, before_ns) :], config).information[:, 2, 2]
+    across_rad = float(np.sqrt(percept.bearing_sd_rad**2 + (1 / way).sum()))
+    sd_m = float(np.sqrt(spread_m**2 + percept.range_sd_m**2 + (percept.range_m * across_rad) ** 2))
     fix = Fix(before_ns, np.array([*stands, pose[2]]), sd_m, 0.0, percept.label)
-    return _closure(task, rows, pose, fix)
+    return _closure(task, rows, fix)
 
 
-def _by_match(task: Task, rows: Floats, pose: Floats, match: PlaceMatch, config: Config) -> Node:
+def _by_match(task: Task, rows: Floats, match: PlaceMatch, config: Config) -> Node:
     """The agent is where it was when it had the matching view, and looks the same way."""
     there = rows[_nearest(rows, match.view_ns), POSE]
     fix = Fix(match.view_ns, there, config.place_match_sd_m, config.place_match_sd_rad, f"view-{match.frame}")
-    return _closure(task, rows, pose, fix)
+    return _closure(task, rows, fix)
 
 
-def _closure(task: Task, rows: Floats, pose: Floats, fix: Fix) -> Node:
-    """From the path's place at that time to its last, if the agent stands there rather than at its `pose`."""
-    last, stands = rows[-1, POSE], fix.stands
+def _closure(task: Task, rows: Floats, fix: Fix) -> Node:
+    """From the path's place at that time to its last, if the agent stands there and not where it believes to be."""
+    last, stands, pose = rows[-1, POSE], fix.stands, _pose(task)
     # The last place of the path is a step behind: it would have been as far from where the agent stands.
     target = np.array([*(stands[:2] - pose[:2] + last[:2]), last[2] + stands[2] - pose[2]])
     measured = step_between(rows[_nearest(rows, fix.before_ns), POSE], target)
