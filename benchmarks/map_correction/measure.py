@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -117,7 +118,7 @@ def _incremental(graph: PoseGraph, batch_cost: float) -> dict[str, float]:
     took_s, settling_s = [], []
     for number, index in enumerate(track(held_out.tolist(), "closing one more loop", transient=True), 1):
         closure = graph.closures.select(np.array([index]))
-        took_s.append(_timed(lambda closure=closure: solved.close(closure))[0])
+        took_s.append(_timed(partial(solved.close, closure))[0])
         if number % SETTLE_EVERY == 0:
             settling_s.append(_timed(solved.settle)[0])
     if not took_s:

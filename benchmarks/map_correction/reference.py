@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,9 @@ from bus.errors import UsageError
 from services.codelets.pose_graph import Constraints, Floats, PoseGraph
 from services.codelets.replay import displacements
 
+gtsam: Any
 try:
-    import gtsam
+    gtsam = importlib.import_module("gtsam")
 except ImportError:
     gtsam = None
 
@@ -31,7 +33,8 @@ def best_positions(graph: PoseGraph) -> Floats:
     normal = (differences.T @ weights @ differences).tocsc()
     offset = known.off_m.reshape(-1)
     found = spsolve(normal, differences.T @ (weights @ offset), permc_spec="MMD_AT_PLUS_A")
-    return graph.poses[0, :2] + np.vstack([np.zeros(2), found.reshape(-1, 2)])
+    result: Floats = graph.poses[0, :2] + np.vstack([np.zeros(2), found.reshape(-1, 2)])
+    return result
 
 
 class Gtsam:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
@@ -80,7 +81,7 @@ class NormalEquations:
         result: Floats = (self._sum_ends @ np.concatenate(ends)).reshape(-1)
         return result
 
-    def unknowns(self, pose: Indices) -> tuple[Indices, Indices]:
+    def unknowns(self, pose: Indices) -> tuple[Indices, npt.NDArray[np.bool_]]:
         """(k, 3) which unknowns some poses are, and which of the poses are any: the first is none."""
         known = self._at[pose] >= 0
         return 3 * self._at[pose][:, None] + np.arange(3), known

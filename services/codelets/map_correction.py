@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import msgspec
 import numpy as np
+import numpy.typing as npt
 
 from schemas.array import Array
 from schemas.graph import Node, Operation
@@ -106,9 +107,7 @@ def _replay(rows: Floats, new: Floats, loops: Constraints, config: Config) -> Re
     )
 
 
-def _pairs(
-    after: Floats, loops: Constraints, count: int, config: Config
-) -> np.ndarray[tuple[int, int], np.dtype[np.int64]]:
+def _pairs(after: Floats, loops: Constraints, count: int, config: Config) -> npt.NDArray[np.int64]:
     """Place cells whose synapse changes most: those of one place, met on different ways; and neighbours on the way."""
     neighbours = np.column_stack([np.arange(len(after) - 1), np.arange(1, len(after))])
     ends = np.column_stack([count - 1 - loops.second, count - 1 - loops.first])
@@ -120,5 +119,5 @@ def _pairs(
         if abs(here - one) < abs(here - there)
     ]
     pairs = np.vstack([neighbours, np.array(near, np.int64).reshape(-1, 2)])
-    result: np.ndarray[tuple[int, int], np.dtype[np.int64]] = np.unique(pairs, axis=0)
+    result: npt.NDArray[np.int64] = np.unique(pairs, axis=0)
     return result

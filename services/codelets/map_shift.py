@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import msgspec
 import numpy as np
+import numpy.typing as npt
 
 from bus.errors import MessageError
 from bus.graph import TILE_SIDE, nearest_place
@@ -100,20 +101,24 @@ def _road(task: Task, rows: Floats) -> list[Operation]:
     cells, values = _road_cells(task)
     if not len(cells):
         return []
-    where = _moved(cells * task.cell_m, rows[:, OLD], rows[:, NEW])
+    where = _moved(cells.astype(np.float64) * task.cell_m, rows[:, OLD], rows[:, NEW])
     arrived = np.rint(where / task.cell_m).astype(np.int64)
     around = np.unique((arrived[:, None, :] + AROUND).reshape(-1, 2), axis=0)
     came_from = np.rint(_moved(around * task.cell_m, rows[:, NEW], rows[:, OLD]) / task.cell_m).astype(np.int64)
-    road = dict(zip(map(tuple, cells.tolist()), values.tolist(), strict=True))
+    road = dict(zip(_pairs(cells), values.tolist(), strict=True))
     result = dict.fromkeys(road, 0.0)
-    sources = zip(map(tuple, around.tolist()), map(tuple, came_from.tolist()), strict=True)
+    sources = zip(_pairs(around), _pairs(came_from), strict=True)
     for cell, source in sources:
         if (value := road.get(source, 0.0)) > 0:
             result[cell] = max(result.get(cell, 0.0), value)
-    for cell, value in zip(map(tuple, arrived.tolist()), values.tolist(), strict=True):
+    for cell, value in zip(_pairs(arrived), values.tolist(), strict=True):
         result[cell] = max(result.get(cell, 0.0), value)
     changed = {cell: value for cell, value in result.items() if road.get(cell, 0.0) != value}
     return _cells(changed)
+
+
+def _pairs(cells: npt.NDArray[np.int64]) -> list[tuple[int, int]]:
+    return [(i, j) for i, j in cells.tolist()]
 
 
 def _cells(values: dict[tuple[int, int], float]) -> list[Operation]:
@@ -127,7 +132,7 @@ def _cells(values: dict[tuple[int, int], float]) -> list[Operation]:
     ]
 
 
-def _road_cells(task: Task) -> tuple[np.ndarray[tuple[int, int], np.dtype[np.int64]], Floats]:
+def _road_cells(task: Task) -> tuple[npt.NDArray[np.int64], Floats]:
     """(k, 2) cells that are road, and how surely."""
     cells, values = [np.zeros((0, 2), np.int64)], [np.zeros(0)]
     for tile in task.tiles:

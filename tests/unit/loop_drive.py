@@ -9,7 +9,6 @@ from scenes import Desk, motion, percept, percepts, stamp_ns
 
 from schemas.sensing import Percept, PlaceMatch
 from services.codelets.module import Config as WorkerConfig
-from services.workspace.module import Config
 
 STEP_M, SIDE_STEPS = 2.0, 20
 LAP = 4 * SIDE_STEPS

@@ -71,7 +71,7 @@ def test_a_wrong_line_is_named_with_file_number_and_what_was_expected(tmp_path: 
 
 @pytest.mark.parametrize("name", ["none.g2o", "."])
 def test_a_file_that_cannot_be_read_is_said_so(tmp_path: Path, name: str) -> None:
-    with pytest.raises(UsageError, match="there is no file|cannot read"):
+    with pytest.raises(UsageError, match=r"there is no file|cannot read"):
         read_g2o(tmp_path / name)
 
 
