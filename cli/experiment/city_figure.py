@@ -47,8 +47,8 @@ def figure(maps: Sequence[CityMap], figures: dict[str, Any]) -> Figure:
 
 def _title(maps: Sequence[CityMap], figures: dict[str, Any]) -> str:
     return (
-        f"Learned maps of {len(maps)} environments, {len(maps[0].learned)} traversals each, {SENSING}. Corrected over "
-        f"uncorrected error: {figures['error_corrected_over_uncorrected']:.2f} with headings, "
+        f"Learned maps of {len(maps)} environments, {len(maps[0].learned)} traversals each, {SENSING}.\n"
+        f"Corrected over uncorrected error: {figures['error_corrected_over_uncorrected']:.2f} with headings, "
         f"{figures['error_positions_over_uncorrected']:.2f} positions only"
     )
 
@@ -78,8 +78,8 @@ def _draw_errors(axes: Axes, maps: Sequence[CityMap]) -> None:
         label=f"people, one SD, {published.SOURCE}",
     )
     axes.set_xticks(places, [each.environment.name for each in maps], rotation=40, ha="right", fontsize=7.5)
-    axes.set_yscale("symlog", linthresh=1.0)
-    axes.legend(frameon=False, fontsize=7.5)
+    axes.set_ylim(0, axes.get_ylim()[1] * 1.45)
+    axes.legend(frameon=False, fontsize=7.5, ncols=2, loc="upper left")
     axes.set_title("a   error of each map: sum of squared errors of its 8 buildings", loc="left", fontsize=10)
     _label(axes, "", "km²")
 
@@ -109,12 +109,12 @@ def _draw_maps(column: Sequence[Axes], each: CityMap) -> None:
     for axes, method, label in ((column[1], "none", "uncorrected"), (column[2], "heading", "corrected")):
         _streets(axes, each)
         axes.plot(*one.road_m[method].T, ".", ms=1.2, color=COLOURS[method], alpha=0.5, zorder=2)
-        axes.plot(*one.path_m[method][:, :2].T, color=COLOURS[method], lw=1.2, zorder=3)
+        axes.plot(*one.path_m[method].T, color=COLOURS[method], lw=1.2, zorder=3)
         axes.plot(*one.buildings_m[method].T, "s", ms=6, color=OBJECT, mec="white", zorder=5)
         lines = np.stack([environment.buildings_m, one.buildings_m[method]], axis=1)
         axes.add_collection(LineCollection(list(lines), colors=OBJECT, linewidths=0.8, linestyles="dotted"))
         axes.set_title(f"{label}: {one.error_km2[method]:.2f} km²", fontsize=9, color=INK)
-        reach.append(one.path_m[method][:, :2])
+        reach.append(one.path_m[method])
     ends = np.vstack(reach)
     for axes in column:
         axes.plot(*environment.buildings_m.T, "s", ms=5, color=TRUE, mec="white", zorder=4)

@@ -12,10 +12,10 @@ from bus.errors import UsageError
 from cli.experiment import outcome
 from cli.experiment.options import json_option, out_option, processes_option, seed_option
 from cli.log.progress import bar
-from experiments.city_maps.drive import Noise
 from experiments.city_maps.environment import Environment, environments
 from experiments.city_maps.figures import figures
 from experiments.city_maps.measure import NOISE, TRAVERSALS, Effort, measure
+from experiments.city_maps.noise import Noise
 from experiments.city_maps.sources import folder, from_osm, grown
 
 NAME = "city-maps"

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from bus.config import Sections
 from bus.errors import CogmapError
-from bus.graph import Graph, object_id
+from bus.graph import TILE_SIDE, Graph, object_id
 from bus.house import House
 from bus.module import Module
+from experiments.city_maps.correction import settings
 from experiments.city_maps.environment import Environment
+from experiments.city_maps.noise import Noise
 from experiments.city_maps.streets import Points
 from schemas import topics
 from schemas.graph import Delta, Node
-from schemas.sensing import Percepts, SelfMotion, TruePose
+from schemas.sensing import TruePose
 from services import table
+from services.codelets.path import POSE, rows_of
 
 MIND = ("workspace", "codelets", "global_workspace", "action")
 SENSING = "percept-level sensing"
@@ -25,40 +28,28 @@ LEAD_M, OVERRUN_M = 70.0, 100.0
 CELL_M = 5.0
 
 
-@dataclass(frozen=True)
-class Noise:
-    """Path integration: standard deviations of the mean-one factors of speed and turn, and of drift (radians after a
-    metre, growing with the root of the way)."""
-
-    speed: float
-    turn: float
-    drift_rad_per_sqrt_m: float
-
-
 @dataclass(frozen=True, eq=False)
 class Traversal:
     """What one agent made of one tour, in the true frame: (n, 3) poses believed and true, view by view.
 
-    `buildings_m` (8, 2) has NaN for one that is not on the map; `road_m` (k, 2) are the places that are road.
+    `path_m` (n, 2) is the way as the map has it in the end, `buildings_m` (8, 2) has NaN for one that is not on the
+    map, and `road_m` (k, 2) are the places that are road.
     """
 
     believed: Points
     true: Points
+    path_m: Points
     buildings_m: Points
     road_m: Points
-    motions: tuple[Points, ...]
-    percepts: tuple[Percepts, ...]
 
 
 class _Watcher:
-    """An observer: the graph, what was sensed, and the truth."""
+    """An observer: the graph, and the truth."""
 
     def __init__(self) -> None:
         self.graph = Graph(CELL_M)
         self.believed: list[tuple[float, float, float]] = []
         self.true: list[tuple[float, float, float]] = []
-        self.motions: list[Points] = []
-        self.percepts: list[Percepts] = []
 
     def on_delta(self, delta: Delta) -> None:
         if not self.graph.apply(delta):
@@ -70,44 +61,42 @@ class _Watcher:
     def on_pose(self, told: TruePose) -> None:
         self.true.append((told.pose.x_m, told.pose.y_m, told.pose.heading_rad))
 
-    def on_motion(self, motion: SelfMotion) -> None:
-        self.motions.append(np.array(motion.motions.numpy(), float))
-
-    def on_percepts(self, percepts: Percepts) -> None:
-        self.percepts.append(percepts)
-
     def module(self) -> Module:
         """Itself, as a module that only listens."""
-        return (
-            Module("observer")
-            .on(topics.DELTA, self.on_delta)
-            .on(topics.TRUE_POSE, self.on_pose)
-            .on(topics.SELF_MOTION, self.on_motion)
-            .on(topics.PERCEPTS, self.on_percepts)
-        )
+        return Module("observer").on(topics.DELTA, self.on_delta).on(topics.TRUE_POSE, self.on_pose)
 
 
-def sections(environment: Environment, start: int, backward: bool, noise: Noise, seed: int) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Tour:
+    """One way through an environment: from which building, in which direction; the seed of all its noise."""
+
+    start: int
+    backward: bool
+    seed: int
+
+
+def sections(environment: Environment, tour: Tour, noise: Noise, method: str) -> Sections:
     """The configuration of every module for one traversal, as for `cogmap run --config`."""
-    line = environment.line(start, backward, LEAD_M, OVERRUN_M)
+    line = environment.line(tour.start, tour.backward, LEAD_M, OVERRUN_M)
     landmarks = [
         {"name": name, "x_m": float(x), "y_m": float(y)}
         for name, (x, y) in zip(environment.names, environment.buildings_m, strict=True)
     ]
     way = {"line_m": line.tolist(), "landmarks": landmarks, "speed_m_s": SPEED_M_S}
-    senses = {"speed": noise.speed, "turn": noise.turn, "drift_rad_per_sqrt_m": noise.drift_rad_per_sqrt_m}
-    sim = {"seed": seed, "frame_hz": FRAME_HZ, "odometry_hz": FRAME_HZ, "noise": senses, "way": way}
+    rates = {"frame_hz": FRAME_HZ, "odometry_hz": FRAME_HZ, "awaits": dict.fromkeys(MIND, 1)}
+    correction = settings(method, noise, SPEED_M_S / FRAME_HZ)
     return {
-        "sim": {**sim, "mode": "lockstep", "awaits": dict.fromkeys(MIND, 1)},
-        "workspace": {"mode": "lockstep", "cell_m": CELL_M, "base_level_decay": 0.0},
+        "sim": {"mode": "lockstep", "seed": tour.seed, "noise": asdict(noise), "way": way, **rates},
+        "workspace": {"mode": "lockstep", "cell_m": CELL_M, "base_level_decay": 0.0, **correction["workspace"]},
+        "codelets": correction["codelets"],
         "action": {"mode": "lockstep"},
     }
 
 
-def traverse(settings: dict[str, Any], names: tuple[str, ...]) -> Traversal:
+def traverse(configured: Sections, names: tuple[str, ...]) -> Traversal:
     """Drive one tour to its end. Raises CogmapError where a message was lost or refused."""
     watcher = _Watcher()
-    house = House([*(table.build(name, settings) for name in ("sim", *MIND)), watcher.module()])
+    house = House([*(table.build(name, configured) for name in ("sim", *MIND)), watcher.module()])
     try:
         house.run()
         for shell in house.shells:
@@ -115,21 +104,15 @@ def traverse(settings: dict[str, Any], names: tuple[str, ...]) -> Traversal:
                 raise CogmapError(f"{shell.module.name} refused messages: {dict(shell.intake.rejected)}")
     finally:
         house.close()
-    true = np.array(watcher.true)[: len(watcher.believed)]
-    origin = np.array([*settings["sim"]["way"]["line_m"][0], _first_heading(settings)])
+    (x, y), (ahead_x, ahead_y) = configured["sim"]["way"]["line_m"][:2]
+    origin = np.array([x, y, np.arctan2(ahead_y - y, ahead_x - x)])
     return Traversal(
         believed=_placed(np.array(watcher.believed), origin),
-        true=true,
+        true=np.array(watcher.true)[: len(watcher.believed)],
+        path_m=_placed(rows_of(watcher.graph.nodes.values())[:, POSE], origin)[:, :2],
         buildings_m=_buildings(watcher.graph, names, origin),
         road_m=_roads(watcher.graph, origin),
-        motions=tuple(watcher.motions),
-        percepts=tuple(watcher.percepts),
     )
-
-
-def _first_heading(settings: dict[str, Any]) -> float:
-    (ax, ay), (bx, by) = settings["sim"]["way"]["line_m"][:2]
-    return float(np.arctan2(by - ay, bx - ax))
 
 
 def _placed(own: Points, origin: Points) -> Points:
@@ -152,6 +135,8 @@ def _buildings(graph: Graph, names: tuple[str, ...], origin: Points) -> Points:
 
 
 def _roads(graph: Graph, origin: Points) -> Points:
-    cells = [np.argwhere(graph.tiles[key].columns["road"] > 0) + np.array(key) * 32 for key in sorted(graph.tiles)]
+    cells = [
+        np.argwhere(graph.tiles[key].columns["road"] > 0) + np.array(key) * TILE_SIDE for key in sorted(graph.tiles)
+    ]
     where = np.vstack(cells) if cells else np.zeros((0, 2))
     return _placed(where * graph.cell_m, origin)

@@ -7,8 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from experiments.city_maps import published
-from experiments.city_maps.drive import SENSING, Noise
-from experiments.city_maps.measure import METHODS, CityMap
+from experiments.city_maps.correction import METHODS
+from experiments.city_maps.drive import SENSING
+from experiments.city_maps.measure import CityMap
+from experiments.city_maps.noise import Noise
 
 NAMES = {"none": "uncorrected", "positions": "positions", "heading": "corrected"}
 

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.city_maps.correction import corrected
-from experiments.city_maps.drive import Noise, Traversal, sections, traverse
+from experiments.city_maps.correction import METHODS
+from experiments.city_maps.drive import Tour, sections, traverse
 from experiments.city_maps.environment import BUILDINGS, Environment
+from experiments.city_maps.noise import Noise
 from experiments.city_maps.streets import Points
 from experiments.parallel import each
 
-METHODS = ("none", "positions", "heading")
 TRAVERSALS = 12
 NOISE = Noise(speed=0.1, turn=0.1, drift_rad_per_sqrt_m=0.0)
 
@@ -40,7 +40,7 @@ class Effort:
 
 @dataclass(frozen=True, eq=False)
 class Learned:
-    """What one traversal left, by METHODS: error in km^2, buildings (8, 2), path (n, 3), road (k, 2)."""
+    """What one traversal left, by METHODS: error in km^2, buildings (8, 2), path (n, 2), road (k, 2)."""
 
     error_km2: dict[str, float]
     missing: int
@@ -76,19 +76,16 @@ def map_error_km2(learned_m: Points, true_m: Points) -> float:
 
 
 def traversed(job: Job) -> Learned:
-    """Drive one tour from a building and in a direction drawn from the seed; correct what was learned."""
+    """Drive one tour from a building and in a direction drawn from the seed, with the same noise by each method."""
     rng = np.random.default_rng([job.seed, 0xCAFE, job.number])
-    start, backward = int(rng.integers(BUILDINGS)), bool(rng.integers(2))
-    settings = sections(job.environment, start, backward, job.noise, int(rng.integers(2**32)))
-    made = traverse(settings, job.environment.names)
-    maps: dict[str, Traversal] = {"none": made}
-    maps |= {method: corrected(made, job.environment.names, method) for method in METHODS[1:]}
-    true_m = job.environment.buildings_m
+    tour = Tour(int(rng.integers(BUILDINGS)), bool(rng.integers(2)), int(rng.integers(2**32)))
+    environment = job.environment
+    maps = {method: traverse(sections(environment, tour, job.noise, method), environment.names) for method in METHODS}
     return Learned(
-        error_km2={method: map_error_km2(one.buildings_m, true_m) for method, one in maps.items()},
-        missing=int(np.isnan(made.buildings_m[:, 0]).sum()),
+        error_km2={method: map_error_km2(one.buildings_m, environment.buildings_m) for method, one in maps.items()},
+        missing=sum(int(np.isnan(one.buildings_m[:, 0]).sum()) for one in maps.values()),
         buildings_m={method: one.buildings_m for method, one in maps.items()},
-        path_m={method: one.believed for method, one in maps.items()},
+        path_m={method: one.path_m for method, one in maps.items()},
         road_m={method: one.road_m for method, one in maps.items()},
     )
 
