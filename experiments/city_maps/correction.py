@@ -8,7 +8,7 @@ from experiments.city_maps.noise import Noise
 METHODS = ("none", "positions", "heading")
 NEVER_S = 1e9
 PLACE_SD_M, PLACE_SD_RAD = 2.5, 0.05
-LEAST_VARIANCE_M, LEAST_VARIANCE_RAD = 1e-3, 1e-6
+LEAST_VARIANCE_M, LEAST_VARIANCE_RAD = 0.01, 1e-5
 
 
 def settings(method: str, noise: Noise, step_m: float) -> Sections:
