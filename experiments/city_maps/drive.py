@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -26,6 +27,8 @@ SENSING = "percept-level sensing"
 SPEED_M_S, FRAME_HZ = 5.0, 1
 LEAD_M, OVERRUN_M = 70.0, 100.0
 CELL_M = 5.0
+# Who walks through a city looks about: to the sides too, where a camera that is fixed looks ahead alone.
+LOOKING_ABOUT_RAD = math.pi
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,10 +86,11 @@ def sections(environment: Environment, tour: Tour, noise: Noise, method: str) ->
         for name, (x, y) in zip(environment.names, environment.buildings_m, strict=True)
     ]
     way = {"line_m": line.tolist(), "landmarks": landmarks, "speed_m_s": SPEED_M_S}
+    senses = {"noise": asdict(noise), "percepts": {"field_of_view_rad": LOOKING_ABOUT_RAD}}
     rates = {"frame_hz": FRAME_HZ, "odometry_hz": FRAME_HZ, "awaits": dict.fromkeys(MIND, 1)}
     correction = settings(method, noise, SPEED_M_S / FRAME_HZ)
     return {
-        "sim": {"mode": "lockstep", "seed": tour.seed, "noise": asdict(noise), "way": way, **rates},
+        "sim": {"mode": "lockstep", "seed": tour.seed, "way": way, **senses, **rates},
         "workspace": {"mode": "lockstep", "cell_m": CELL_M, "base_level_decay": 0.0, **correction["workspace"]},
         "codelets": correction["codelets"],
         "action": {"mode": "lockstep"},
