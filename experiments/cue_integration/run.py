@@ -18,8 +18,8 @@ from experiments.heard import Heard
 from experiments.parallel import Progress, each
 from schemas import topics
 
-# What `fitted` gives with the seed and effort that the command has by default.
-FITTED = Noise(speed=0.15, turn=0.15)
+# What `fitted` gives with the seed and effort that the command has by default, rounded.
+FITTED = Noise(speed=0.3, turn=0.173)
 SAID = (topics.SELF_MOTION, topics.PERCEPTS, topics.TASK, topics.PROPOSAL, topics.DELTA, topics.ACTION)
 FIT_TRIALS = 64
 
