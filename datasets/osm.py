@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import bz2
-import gzip
-import lzma
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
 
-from bus.errors import UsageError
 from datasets.lines import wrong_line
+from datasets.packed import lines
 
 SUFFIXES = (".osm", ".osm.gz", ".osm.xz", ".osm.bz2")
-_OPENERS = {".gz": gzip.open, ".xz": lzma.open, ".bz2": bz2.open}
 
 Tags = dict[str, str]
 
@@ -92,7 +87,7 @@ def read(path: Path) -> Extract:
     parser.EntityDeclHandler = _refuse_entities
     number, line = 1, b""
     try:
-        for read_so_far, line in enumerate(_lines(path), start=1):
+        for read_so_far, line in enumerate(lines(path, "an OpenStreetMap extract"), start=1):
             number = read_so_far
             parser.Parse(line, False)
         parser.Parse(b"", True)
@@ -102,15 +97,6 @@ def read(path: Path) -> Extract:
         expected = f"well-formed XML ({expat.ErrorString(error.code)})"
         raise wrong_line(path, number, _text(line), expected) from None
     return reader.extract
-
-
-def _lines(path: Path) -> Iterator[bytes]:
-    opener = _OPENERS.get(path.suffix)
-    try:
-        with path.open("rb") if opener is None else opener(path, "rb") as file:
-            yield from file
-    except (OSError, EOFError, lzma.LZMAError) as error:
-        raise UsageError(f"{path} cannot be read ({error}): give an OpenStreetMap extract, plain or packed") from error
 
 
 def _refuse_entities(*declared: object) -> None:

@@ -5,19 +5,15 @@ A city a line: `city`, `nodes_lonlat`, and `edges` as [from, to, length_m, highw
 
 from __future__ import annotations
 
-import bz2
-import gzip
-import lzma
 from pathlib import Path
 from typing import Annotated, Any
 
 import msgspec
 
-from bus.errors import UsageError
 from datasets.lines import wrong_line
+from datasets.packed import lines
 
 SUFFIXES = (".jsonl", ".jsonl.gz", ".jsonl.xz", ".jsonl.bz2")
-_OPENERS = {".gz": gzip.open, ".xz": lzma.open, ".bz2": bz2.open}
 Lon = Annotated[float, msgspec.Meta(ge=-180, le=180)]
 Lat = Annotated[float, msgspec.Meta(ge=-90, le=90)]
 
@@ -38,16 +34,8 @@ class StreetGraph(msgspec.Struct):
 
 def read(path: Path) -> list[StreetGraph]:
     """Every city in a file. Raises UsageError that names file, line and what was expected there."""
-    opener = _OPENERS.get(path.suffix, open)
-    graphs = []
-    try:
-        with opener(path, "rt", encoding="utf-8") as file:
-            for number, line in enumerate(file, start=1):
-                if line.strip():
-                    graphs.append(_graph(path, number, line))
-    except (OSError, EOFError, lzma.LZMAError, UnicodeDecodeError) as error:
-        raise UsageError(f"{path} cannot be read ({error}): give street graphs as JSON Lines") from error
-    return graphs
+    numbered = enumerate(lines(path, "street graphs as JSON Lines"), start=1)
+    return [_graph(path, number, line.decode("utf-8", "replace")) for number, line in numbered if line.strip()]
 
 
 def _graph(path: Path, number: int, line: str) -> StreetGraph:

@@ -29,7 +29,8 @@ def figure(maps: Sequence[CityMap], figures: dict[str, Any]) -> Figure:
     columns = max(2, len(chosen))
     with mpl.rc_context(STYLE):
         sheet = Figure(figsize=(max(11.0, 2.9 * columns), 12.5), dpi=110, facecolor=PAPER, layout="constrained")
-        top, below = sheet.subfigures(2, 1, height_ratios=(1, 2.1))
+        above = sheet.add_gridspec(2, 1, height_ratios=(1, 2.1))
+        top, below = (sheet.add_subfigure(above[row]) for row in (0, 1))
         top.set_facecolor(PAPER)
         below.set_facecolor(PAPER)
         errors, sizes = top.subplots(1, 2, width_ratios=(2.2, 1))

@@ -118,7 +118,7 @@ def _environment(name: str, city: City, streets: Streets, chosen: Sequence[int])
 def _joined(lines: Sequence[Points]) -> Points:
     points = np.vstack(lines)
     fresh = np.hypot(*np.diff(points, axis=0).T) > 1e-6
-    return points[np.concatenate([[True], fresh])]
+    return np.asarray(points[np.concatenate([[True], fresh])])
 
 
 def _beginning(line: Points, length_m: float) -> Points:

@@ -74,7 +74,8 @@ class Streets:
         return distance, before
 
     def _lengths_m(self) -> Points:
-        return np.hypot(*(self.points_m[self.pieces[:, 1]] - self.points_m[self.pieces[:, 0]]).T)
+        along = self.points_m[self.pieces[:, 1]] - self.points_m[self.pieces[:, 0]]
+        return np.asarray(np.hypot(along[:, 0], along[:, 1]))
 
     def _graph(self) -> csr_array:
         # An explicit zero would be no edge at all; of two pieces between the same points the sum would be taken.
