@@ -38,7 +38,7 @@ def figure(maps: Sequence[CityMap], figures: dict[str, Any]) -> Figure:
         _draw_growth(sizes, maps, figures)
         panels = below.subplots(3, columns, squeeze=False)
         for column, each in enumerate(chosen):
-            _draw_maps(panels[:, column], each)
+            _draw_maps(panels[:, column].tolist(), each)
         for panel in panels[:, len(chosen) :].ravel():
             panel.axis("off")
         sheet.suptitle(_title(maps, figures), x=0.01, ha="left", color=INK, fontsize=12, fontweight="bold")
