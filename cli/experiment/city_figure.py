@@ -76,6 +76,7 @@ def _draw_errors(axes: Axes, maps: Sequence[CityMap]) -> None:
         color=KERB,
         alpha=0.35,
         lw=0,
+        zorder=0,
         label=f"people, one SD, {published.SOURCE}",
     )
     axes.set_xticks(places, [each.environment.name for each in maps], rotation=40, ha="right", fontsize=7.5)
