@@ -28,7 +28,7 @@ COLUMNS = 7
 OLD, NEW = slice(1, 4), slice(4, 7)
 AROUND = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)])
 AT_ONCE = 4096
-FIRST_SEEN_S = 5.0
+BESIDE_M = 10.0
 
 
 def shift_map(task: Task, config: Config) -> list[Operation]:
@@ -76,13 +76,23 @@ def _object(task: Task, node: Node, rows: Floats) -> list[Operation]:
     if node.samples is None:
         return []
     samples = np.asarray(node.samples.numpy(), np.float64)
-    # Not of all: where a loop has drifted, its end may lie nearer than the beginning that the object belongs to.
-    late_s = rows[:, STAMP] - int(node.attributes.get("since_ns", 0)) * 1e-9
-    known = np.flatnonzero((late_s >= 0) & (late_s <= FIRST_SEEN_S))
-    near = rows[known] if len(known) else rows[[int(np.abs(late_s).argmin())]]
+    since_s, until_s = (int(node.attributes.get(key, 0)) * 1e-9 for key in ("since_ns", "stamp_ns"))
+    known = np.flatnonzero((rows[:, STAMP] >= since_s) & (rows[:, STAMP] <= until_s))
+    near = rows[known] if len(known) else rows
     away = np.hypot(*(near[:, OLD][:, :2] - samples[:, :2].mean(axis=0)).T)
-    row = near[[int(away.argmin())]]
+    row = near[[_first_pass(away)]]
     return _placed(task, node, shifted(samples, row[:, OLD], row[:, NEW]), {})
+
+
+def _first_pass(away: Floats) -> int:
+    """The nearest of the places where the path first passes by.
+
+    Not the nearest of all: where a loop has drifted, its end may lie nearer than the beginning that an object is of.
+    """
+    passing = np.flatnonzero(away <= max(2 * away.min(), away.min() + BESIDE_M))
+    gone = np.flatnonzero(np.diff(passing) > 1)
+    first = passing[: gone[0] + 1] if len(gone) else passing
+    return int(first[away[first].argmin()])
 
 
 def _placed(task: Task, node: Node, samples: Floats, facts: dict[str, Scalar]) -> list[Operation]:
