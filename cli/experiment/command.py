@@ -6,6 +6,7 @@ import click
 
 from cli.experiment.city_maps import city_maps
 from cli.experiment.cue_integration import cue_integration
+from cli.experiment.loop_closing import loop_closing
 
 _EPILOG = """\b
 Each leaves a folder with its figure as PNG and PDF, and a JSON file of every figure printed, the seed and the command.
@@ -19,3 +20,4 @@ def experiment() -> None:
 
 experiment.add_command(city_maps)
 experiment.add_command(cue_integration)
+experiment.add_command(loop_closing)
