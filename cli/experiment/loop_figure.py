@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 
 from cli.log.paint import STYLE
 from cli.palette import ESTIMATE, FAINT, INK, OBJECT, PAPER, ROAD, SEVERAL, TRUE, WHEELS
-from experiments.loop_closing.run import SENSING, Loop, Map, nearing
-from schemas.mind import Replay
+from experiments.loop_closing.run import SENSING, Loop, Map, Replayed
 
 
 def figure(loops: dict[str, Loop], figures: dict[str, Any]) -> Figure:
@@ -65,17 +64,15 @@ def _draw_shifts(axes: Axes, before: Map, after: Map) -> None:
     axes.add_collection(LineCollection(list(lines), colors=FAINT, linewidths=0.7, zorder=2))
 
 
-def _draw_replay(axes: Axes, replay: Replay) -> None:
-    shifts_m = np.hypot(*np.asarray(replay.shifts_m.numpy(), float).T)
-    axes.plot(np.arange(len(shifts_m)), shifts_m, color=SEVERAL[1], lw=1.8)
+def _draw_replay(axes: Axes, replay: Replayed) -> None:
+    axes.plot(np.arange(len(replay.shifts_m)), replay.shifts_m, color=SEVERAL[1], lw=1.8)
     axes.set_ylim(bottom=0)
     axes.set_title("d   how far each place field shifts, in the order of the replay", loc="left", fontsize=10)
     _label(axes, "places, from the one met again backwards", "m")
 
 
-def _draw_synapses(axes: Axes, replay: Replay, figures: dict[str, Any]) -> None:
-    nearer_m, changes = nearing(replay)
-    axes.plot(nearer_m, changes, ".", ms=5, color=SEVERAL[4], alpha=0.6)
+def _draw_synapses(axes: Axes, replay: Replayed, figures: dict[str, Any]) -> None:
+    axes.plot(replay.nearer_m, replay.strength_changes, ".", ms=5, color=SEVERAL[4], alpha=0.6)
     slope = figures["strength_change_per_m"]
     axes.set_title(
         f"e   predicted change of synapses: {slope:.3f} a metre, r = {figures['strength_and_shift_correlation']:.2f}",

@@ -62,14 +62,36 @@ class Map:
         return float(np.hypot(*(self.path_m[-1] - self.true_path_m[-1])))
 
 
-@dataclass
+@dataclass(frozen=True)
+class Replayed:
+    """What a replay told: `shifts_m` (n,) of the place fields in its order, and how synapses change.
+
+    `nearer_m` (m,) is by how much the fields of each pair of place cells come nearer.
+    """
+
+    passes: int
+    shifts_m: Floats
+    nearer_m: Floats
+    strength_changes: Floats
+
+    @classmethod
+    def of(cls, told: Replay) -> Replayed:
+        """From the event on the bus."""
+        positions, shifts = np.asarray(told.positions_m.numpy(), float), np.asarray(told.shifts_m.numpy(), float)
+        pairs = np.asarray(told.pairs.numpy(), np.int64)
+        apart = [np.hypot(*(where[pairs[:, 0]] - where[pairs[:, 1]]).T) for where in (positions, positions + shifts)]
+        changes = np.asarray(told.strength_changes.numpy(), float)
+        return cls(told.replays, np.hypot(*shifts.T), apart[0] - apart[1], changes)
+
+
+@dataclass(frozen=True)
 class Loop:
     """The map before the first correction was carried out, right after it, and in the end; and all replays."""
 
     before: Map
     after: Map
     end: Map
-    replays: list[Replay]
+    replays: list[Replayed]
 
 
 @dataclass
@@ -79,7 +101,7 @@ class _Observer:
     landmarks: dict[str, tuple[float, float]]
     graph: Graph = field(default_factory=lambda: Graph(CELL_M))
     true: dict[int, tuple[float, float]] = field(default_factory=dict)
-    replays: list[Replay] = field(default_factory=list)
+    replays: list[Replayed] = field(default_factory=list)
     before: Map | None = None
     after: Map | None = None
 
@@ -92,6 +114,9 @@ class _Observer:
 
     def on_pose(self, told: TruePose) -> None:
         self.true[told.stamp_ns] = (told.pose.x_m, told.pose.y_m)
+
+    def on_replay(self, told: Replay) -> None:
+        self.replays.append(Replayed.of(told))
 
     def map(self) -> Map:
         """The map as it is now."""
@@ -158,7 +183,7 @@ def drive(seed: int, method: str) -> Loop:
     places = {item["name"]: (item["x_m"], item["y_m"]) for item in configured["sim"]["way"]["landmarks"]}
     observer = _Observer(places)
     watching = Module("observer").on(topics.DELTA, observer.on_delta).on(topics.TRUE_POSE, observer.on_pose)
-    watching.on(topics.REPLAY, observer.replays.append)
+    watching.on(topics.REPLAY, observer.on_replay)
     house = House([*(table.build(name, configured) for name in ("sim", *MIND)), watching])
     try:
         house.run()
@@ -181,19 +206,11 @@ def figures(loops: dict[str, Loop]) -> dict[str, float]:
             said[f"{name}_error_after_m_{method}"] = getattr(loop.after, f"{name}_error_m")
             said[f"{name}_error_in_the_end_m_{method}"] = getattr(loop.end, f"{name}_error_m")
         said[f"corrections_{method}"] = float(len(loop.replays))
-        said[f"replays_of_the_first_{method}"] = float(loop.replays[0].replays)
-    nearer, changes = nearing(loops["positions"].replays[0])
+        said[f"replays_of_the_first_{method}"] = float(loop.replays[0].passes)
+    nearer, changes = loops["positions"].replays[0].nearer_m, loops["positions"].replays[0].strength_changes
     said["strength_change_per_m"] = float(np.polyfit(nearer, changes, 1)[0]) if len(nearer) > 1 else 0.0
     said["strength_and_shift_correlation"] = float(np.corrcoef(nearer, changes)[0, 1]) if len(nearer) > 2 else 0.0
     return said
-
-
-def nearing(replay: Replay) -> tuple[Floats, Floats]:
-    """(m,) by how much the fields of each pair of place cells come nearer, and how their synapse changes."""
-    positions, shifts = np.asarray(replay.positions_m.numpy(), float), np.asarray(replay.shifts_m.numpy(), float)
-    pairs = np.asarray(replay.pairs.numpy(), np.int64)
-    apart = [np.hypot(*(where[pairs[:, 0]] - where[pairs[:, 1]]).T) for where in (positions, positions + shifts)]
-    return apart[0] - apart[1], np.asarray(replay.strength_changes.numpy(), float)
 
 
 def _rms(off: Floats) -> float:
