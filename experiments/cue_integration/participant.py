@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from bus.errors import MessageError
-from bus.graph import Graph
+from bus.graph import Graph, object_id
 from bus.module import Module
-from experiments.cue_integration.geometry import REACH_M, Pose, step
+from experiments.cue_integration.geometry import REACH_M, Point, Pose, step
 from experiments.cue_integration.room import FOLLOW, STOP, WAIT, WALK
 from schemas import topics
 from schemas.base import Scalar
@@ -29,6 +29,7 @@ class Participant:
 
     def __init__(self) -> None:
         self._graph = Graph()
+        self._carried: dict[str, Point] = {}
         self._movements = 0
         self._looks = 0
         self._has_waited = self._has_stopped = False
@@ -39,23 +40,37 @@ class Participant:
             raise MessageError(f"delta {delta.version} after version {self._graph.version}: a commit is missing")
         if delta.phase != "decay" or self._has_stopped:
             return None
-        scheme, parameters = self._choose()
+        pose = self._pose()
+        for name, node in sorted(self._graph.nodes.items()):
+            if name.startswith("percept:post-"):
+                self._pick_up(str(node.attributes["label"]), node, pose)
+        scheme, parameters = self._choose(pose)
         return Action(stamp_ns=delta.stamp_ns, cycle=delta.cycle, scheme=scheme, activation=1.0, parameters=parameters)
 
-    def _choose(self) -> tuple[str, dict[str, Scalar]]:
-        posts = [node for name, node in sorted(self._graph.nodes.items()) if name.startswith("object:post-")]
-        if len(posts) < POSTS_CARRIED:
+    def _pose(self) -> Pose:
+        own = self._graph.nodes["self"].attributes
+        return Pose(float(own["x_m"]), float(own["y_m"]), float(own["heading_rad"]))
+
+    def _pick_up(self, label: str, post: Node, pose: Pose) -> None:
+        """Carry a post from now on, and keep in mind where it was, for the map may not have it."""
+        there = pose.after(float(post.attributes["bearing_rad"]), float(post.attributes["range_m"]))
+        self._carried.setdefault(label, (there.x_m, there.y_m))
+
+    def _choose(self, pose: Pose) -> tuple[str, dict[str, Scalar]]:
+        if len(self._carried) < POSTS_CARRIED:
             return FOLLOW, {}
         if not self._has_waited:
             self._has_waited = True
             return WAIT, {}
-        return self._go_back(min(posts, key=lambda node: int(node.attributes["since_ns"])))
+        label, in_mind = next(iter(self._carried.items()))
+        node = self._graph.nodes.get(object_id(label))
+        on_map = in_mind if node is None else (float(node.attributes["x_m"]), float(node.attributes["y_m"]))
+        return self._go_back(pose, on_map)
 
-    def _go_back(self, post: Node) -> tuple[str, dict[str, Scalar]]:
-        own = self._graph.nodes["self"].attributes
-        pose = Pose(float(own["x_m"]), float(own["y_m"]), float(own["heading_rad"]))
-        bearing_rad, distance_m = pose.towards((float(post.attributes["x_m"]), float(post.attributes["y_m"])))
-        is_lost = float(own["heading_sd_rad"]) > LOST_RAD and self._looks < MOST_LOOKS
+    def _go_back(self, pose: Pose, goal: Point) -> tuple[str, dict[str, Scalar]]:
+        bearing_rad, distance_m = pose.towards(goal)
+        heading_sd_rad = float(self._graph.nodes["self"].attributes["heading_sd_rad"])
+        is_lost = heading_sd_rad > LOST_RAD and self._looks < MOST_LOOKS
         if self._movements == MOST_MOVEMENTS or (distance_m < REACH_M + NEAR_M and not is_lost):
             self._has_stopped = True
             return STOP, {"turn_rad": bearing_rad, "forward_m": distance_m}
