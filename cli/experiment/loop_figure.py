@@ -20,7 +20,8 @@ def figure(loops: dict[str, Loop], figures: dict[str, Any]) -> Figure:
     positions, heading = loops["positions"], loops["heading"]
     with mpl.rc_context(STYLE):
         sheet = Figure(figsize=(14.0, 9.0), dpi=110, facecolor=PAPER, layout="constrained")
-        maps, below = sheet.subfigures(2, 1, height_ratios=(1.45, 1))
+        parts: Any = sheet.subfigures(2, 1, height_ratios=(1.5, 1))
+        maps, below = parts
         for part in (maps, below):
             part.set_facecolor(PAPER)
         panels = maps.subplots(1, 3, sharex=True, sharey=True)
@@ -28,7 +29,7 @@ def figure(loops: dict[str, Loop], figures: dict[str, Any]) -> Figure:
         _draw_map(panels[1], positions.after, SEVERAL[1], "b   after the first replay, positions only (eq. 9)")
         _draw_map(panels[2], heading.end, ESTIMATE, "c   in the end, headings corrected too")
         _draw_shifts(panels[1], positions.before, positions.after)
-        panels[0].legend(frameon=False, fontsize=8, loc="upper left")
+        maps.legend(*panels[0].get_legend_handles_labels(), frameon=False, ncols=4, loc="outside upper left")
         shifts, synapses = below.subplots(1, 2)
         _draw_replay(shifts, positions.replays[0])
         _draw_synapses(synapses, positions.replays[0], figures)
@@ -49,7 +50,7 @@ def _draw_map(axes: Axes, drawn: Map, colour: str, title: str) -> None:
     axes.plot(*drawn.objects_m.T, "s", ms=5.5, color=OBJECT, mec="white", zorder=5, label="buildings")
     axes.plot(*drawn.path_m[0], "o", ms=8, color=ROAD, mec="white", zorder=6)
     axes.plot(*drawn.path_m[-1], "o", ms=8, color=colour, mec="white", zorder=6)
-    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_aspect("equal", adjustable="box")
     axes.set_title(title, loc="left", fontsize=10)
     said = (
         f"error: path {drawn.path_error_m:.1f} m, buildings {drawn.object_error_m:.1f} m, end {drawn.end_error_m:.1f} m"

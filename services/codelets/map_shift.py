@@ -78,7 +78,8 @@ def _object(task: Task, node: Node, rows: Floats) -> list[Operation]:
     samples = np.asarray(node.samples.numpy(), np.float64)
     since_s, until_s = (int(node.attributes.get(key, 0)) * 1e-9 for key in ("since_ns", "stamp_ns"))
     known = np.flatnonzero((rows[:, STAMP] >= since_s) & (rows[:, STAMP] <= until_s))
-    near = rows[known] if len(known) else rows
+    # One seen since the correction was computed goes with the path's last place.
+    near = rows[known] if len(known) else rows[[int(np.abs(rows[:, STAMP] - since_s).argmin())]]
     away = np.hypot(*(near[:, OLD][:, :2] - samples[:, :2].mean(axis=0)).T)
     row = near[[_first_pass(away)]]
     return _placed(task, node, shifted(samples, row[:, OLD], row[:, NEW]), {})
