@@ -49,7 +49,7 @@ class Replay(Message, kw_only=True):
     shifts_m: Array
     pairs: Array
     strength_changes: Array
-    decay_per_m: Annotated[float, msgspec.Meta(gt=0, le=1e3)]
+    decay_per_m: Annotated[float, msgspec.Meta(gt=0, le=100)]
 
 
 class Coalition(Part, kw_only=True):
