@@ -39,7 +39,7 @@ class Worker:
         self._instance = instance
 
     def work(self, task: Task) -> list[Message] | None:
-        """A proposal for a task, before it what attention found or what is replayed; a failure is said, not kept back."""
+        """A proposal for a task, before it what attention found or replay tells; a failure is said, not kept back."""
         if task.worker != self._instance:
             return None
         said: list[Message] = []
