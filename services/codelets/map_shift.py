@@ -16,10 +16,10 @@ from schemas.array import Array
 from schemas.base import Scalar
 from schemas.graph import Cells, DropNode, Node, Operation
 from schemas.mind import Task
-from services.codelets.localization import place_link
 from services.codelets.map_correction import CORRECTION
 from services.codelets.path import KIND as PATH
 from services.codelets.path import POSE, STAMP, rows_of, segments, shifted
+from services.codelets.places import place_link
 from services.codelets.pose_graph import Floats
 from services.codelets.sampling import mean_pose, wrapped
 from services.codelets.settings import Config
@@ -65,7 +65,7 @@ def _self(task: Task, node: Node, last: Floats) -> list[Operation]:
     if node.samples is None:
         raise MessageError(f"task {task.task_id} has a self node without samples")
     samples = np.asarray(node.samples.numpy(), np.float64)
-    moved = _poses(samples, last)
+    moved = np.column_stack([_poses(samples[:, :3], last), samples[:, 3:]])
     mean = mean_pose(moved)
     facts: dict[str, Scalar] = {"heading_rad": float(mean[2])}
     return _placed(task, node, moved, facts)

@@ -11,7 +11,8 @@ from schemas.base import Message
 from schemas.graph import Operation, Proposal
 from schemas.mind import Coalitions, Task
 from services.codelets.attention import attend
-from services.codelets.localization import localize, locate_landmark
+from services.codelets.landmarks import locate_landmark
+from services.codelets.localization import localize
 from services.codelets.map_correction import correct_map
 from services.codelets.map_shift import shift_map
 from services.codelets.object_place import place_object, place_road

@@ -10,8 +10,9 @@ from schemas.array import Array
 from schemas.base import Scalar
 from schemas.graph import Cells, Node, Operation
 from schemas.mind import Task
-from services.codelets.localization import first_sighting, object_operations
+from services.codelets.landmarks import first_sighting, object_operations
 from services.codelets.sampling import generator, mean_pose, refill
+from services.codelets.senses import with_gains
 from services.codelets.settings import Config
 
 FIRST_BASE_LEVEL = 0.2
@@ -20,15 +21,18 @@ ENOUGH_POINTS = 3
 
 
 def place_object(task: Task, config: Config) -> list[Operation]:
-    """A node for the one percept of `task`, with samples of where it stands."""
+    """A node for the one percept of `task`, with samples of where it stands; none while the agent is astray."""
     self_node = next(node for node in task.nodes if node.kind == "self")
     if self_node.samples is None:
         raise MessageError(f"task {task.task_id} has a self node without samples")
+    if int(self_node.attributes.get("astray", 0)):
+        return []
     rng, percept = generator(task.task_id), task.percepts[0]
-    poses = refill(np.array(self_node.samples.numpy(), np.float64), config.landmark_samples, 0.0, rng)
+    selves = with_gains(np.array(self_node.samples.numpy(), np.float64), config, rng)
+    selves = refill(selves, config.landmark_samples, 0.0, rng)
     attributes: dict[str, Scalar] = {"label": percept.label, "since_ns": task.stamp_ns}
     node = Node(id=object_id(percept.label), kind="object", base_level=FIRST_BASE_LEVEL, attributes=attributes)
-    return object_operations(task, node, first_sighting(poses, percept, rng), percept, 0)
+    return object_operations(task, node, first_sighting(selves, percept, config, rng), percept, 0)
 
 
 def place_road(task: Task, config: Config) -> list[Operation]:

@@ -8,6 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 Samples = npt.NDArray[np.float64]
+# How far samples that are all the same are spread where they must be: metres, metres, radians.
+BISECTIONS = 10
+HEAP = np.array([0.02, 0.02, 0.01])
 
 
 def generator(identifier: str) -> np.random.Generator:
@@ -47,8 +50,69 @@ def keep(log_likelihood: Samples, rng: np.random.Generator) -> npt.NDArray[np.bo
     return kept
 
 
+def widened(poses: Samples, factor: float, rng: np.random.Generator) -> Samples:
+    """Samples whose first three columns are `factor` times as far about their mean, and those of a heap a little."""
+    result = poses.copy()
+    mean = mean_pose(poses)
+    off = poses[:, :3] - mean
+    off[:, 2] = wrapped(off[:, 2])
+    result[:, :3] = mean + factor * off + rng.normal(0.0, 1.0, off.shape) * HEAP
+    return result
+
+
+def smoothed(drawn: Samples, tell_apart: float, rng: np.random.Generator) -> Samples:
+    """Samples in place of `drawn`, in which few stand for many, with the same mean and covariance.
+
+    A Gaussian kernel as wide as Silverman's rule has it for `tell_apart` samples, shrunk to the mean by as much
+    (Liu and West 2001). The third column may be a heading: it is taken on the circle.
+    """
+    number, columns = drawn.shape
+    mean = drawn.mean(axis=0)
+    if columns > 2:
+        mean[2] = mean_pose(drawn)[2]
+    off = drawn - mean
+    if columns > 2:
+        off[:, 2] = wrapped(off[:, 2])
+    width2 = min(0.9, (4 / ((columns + 2) * max(1.0, tell_apart))) ** (2 / (columns + 4)))
+    values, vectors = np.linalg.eigh(off.T @ off / number)
+    noise = rng.normal(0.0, 1.0, drawn.shape)
+    noise = (noise - noise.mean(axis=0)) * np.sqrt(values.clip(0.0) * width2)
+    result: Samples = mean + off * np.sqrt(1 - width2) + noise @ vectors.T
+    return result
+
+
+def bearable(log_likelihood: Samples, share: float) -> float:
+    """The largest power of the likelihood, at most 1, that leaves a `share` of the samples by rejection."""
+    relative = log_likelihood - log_likelihood.max()
+    low, high = 0.0, 1.0
+    if np.exp(relative).mean() >= share:
+        return high
+    for _ in range(BISECTIONS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if np.exp(middle * relative).mean() >= share else (low, middle)
+    return max(low, 2.0**-BISECTIONS)
+
+
+def reject(samples: Samples, log_likelihood: Samples, fewest: int, rng: np.random.Generator) -> tuple[Samples, float]:
+    """What rejection leaves of (n, d) samples, with a little about each, and the share that it is.
+
+    Each stays with a probability proportional to its likelihood, and of those alike in the last column as many as
+    should: independent draws would let the mean of what the likelihood says nothing of walk away, view by view.
+    Where fewer than `fewest` would stay, that many are drawn with the same probabilities, some more than once.
+    """
+    order = np.argsort(samples[:, -1], kind="stable")
+    chances = np.exp(log_likelihood - log_likelihood.max())[order]
+    share = float(chances.mean())
+    tell_apart = float(chances.sum() ** 2 / np.square(chances).sum())
+    chances *= max(1.0, fewest / chances.sum())
+    copies = np.diff(np.floor(np.cumsum(chances) + rng.random()), prepend=0.0).astype(np.int64)
+    chosen = samples[np.repeat(order, copies)]
+    return smoothed(chosen if len(chosen) else samples[[int(log_likelihood.argmax())]], tell_apart, rng), share
+
+
 def refill(kept: Samples, number: int, jitter: float | Samples, rng: np.random.Generator) -> Samples:
-    """`number` samples drawn from those kept, each moved a little so that none stands for many."""
-    chosen = kept[rng.integers(len(kept), size=number)]
-    moved: Samples = chosen + rng.normal(0.0, 1.0, chosen.shape) * jitter
+    """`number` samples of those kept, of each as many as of the next, moved a little so that none stands for many."""
+    whole, rest = divmod(number, len(kept))
+    chosen = np.concatenate([np.tile(np.arange(len(kept)), whole), rng.permutation(len(kept))[:rest]])
+    moved: Samples = kept[chosen] + rng.normal(0.0, 1.0, (number, kept.shape[1])) * jitter
     return moved

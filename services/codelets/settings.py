@@ -17,6 +17,10 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     paper takes each for independent (eq. 1); a landmark that is always seen a little too near then drags the agent.
     `correct`: the map's positions only, as in the paper, or its headings too. `false_closure`: closures that would
     be as wrong as they look with a smaller probability than this do not hold.
+    Gains: what each sense may be off by for longer than one step, as a share, and how long it stays so. The town's
+    senses have none; a robot's that nobody calibrated are found while it drives. After `astray` views on end that
+    fit nowhere, of two landmarks at least, the agent looks for itself anew. What is seen by its bearing alone stands
+    at most `farthest_m` away.
     """
 
     samples: Annotated[int, msgspec.Meta(ge=10, le=100_000)] = 800
@@ -28,6 +32,14 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     landmark_jitter_m: Positive = 0.03
     gate: Positive = 4.0
     misses: Annotated[int, msgspec.Meta(ge=1)] = 8
+    speed_gain_sd: Share = 0.0
+    turn_gain_sd: Share = 0.0
+    drift_rad_per_m: Share = 0.0
+    gait_memory_s: Positive = 30.0
+    range_gain_sd: Share = 0.0
+    range_memory_s: Positive = 300.0
+    astray: Annotated[int, msgspec.Meta(ge=2)] = 8
+    farthest_m: Positive = 50.0
     attention_base_level: Share = 1.0
     path_spacing_m: Positive = 1.0
     path_variance_per_m: Positive = 0.01

@@ -16,8 +16,9 @@ TOLD = 8
 TOLD_CHARACTERS = 200
 WRITABLE = (Node, Link, Links, DropLink, Cells, DropNode)
 SELF = "self"
-# The rows of the path and of its correction tell more than samples of a position do.
-COLUMNS_OF = {"path": (7,), "correction": (7,)}
+# The rows of the path and of its correction tell more than samples of a position do. Those of the self may hold
+# besides its pose what its senses are off by.
+COLUMNS_OF = {"path": (7,), "correction": (7,), "self": (3, 7)}
 NUMBERS_OF = {"path": ("number",), "closure": ("from_ns", "to_ns")}
 POSE = ("x_m", "y_m", "heading_rad", "stamp_ns")
 
@@ -140,7 +141,7 @@ def _check_self(name: str, operation: Operation) -> None:
         raise MessageError(f"{name}: the self node is never forgotten")
     if isinstance(operation, Node) and operation.id == SELF:
         lacking = [key for key in POSE if type(operation.attributes.get(key)) not in {int, float}]
-        if lacking or operation.samples is None or operation.samples.shape[1] != 3:
+        if lacking or operation.samples is None or operation.samples.shape[1] < 3:
             raise MessageError(f"{name}: self without {', '.join(lacking) or 'samples of its pose'}")
 
 

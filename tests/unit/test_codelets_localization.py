@@ -11,7 +11,8 @@ from bus.errors import MessageError
 from schemas.array import Array
 from schemas.graph import DropLink, Link, Node, Operation
 from schemas.mind import Task
-from services.codelets.localization import localize, locate_landmark
+from services.codelets.landmarks import locate_landmark
+from services.codelets.localization import localize
 from services.codelets.module import Config
 from services.codelets.sampling import generator, keep, mean_pose, refill, spread, wrapped
 
@@ -167,13 +168,16 @@ def test_one_landmark_taken_for_another_does_not_outvote_the_rest() -> None:
 
 
 def test_an_agent_that_stands_still_does_not_grow_surer_of_itself_by_looking() -> None:
-    found = _localized(
-        _self(),
-        _landmark(20.0, 0.0),
-        motions=_rows((0.0, 0.0, 0.2, 0.0, 0.0)),
-        percepts=[percept("house", 0.0, 17.0)],
-    )
-    assert _pose(found) == (0.0, 0.0, 0.0)
+    def looking(seen_ns: int) -> float:
+        agent = _self(np.random.default_rng(1).normal(0.0, (1.0, 0.01, 0.01), (4000, 3)), stands_ns=5)
+        house = _landmark(20.0, 0.0, stamp_ns=seen_ns)
+        motions = _rows((0.0, 0.0, 0.2, 0.0, 0.0))
+        return float(
+            _localized(agent, house, motions=motions, percepts=[percept("house", 0.0, 19.0)]).attributes["x_m"]
+        )
+
+    assert looking(seen_ns=4) == pytest.approx(0.92, abs=0.05)
+    assert looking(seen_ns=5) == pytest.approx(0.0, abs=0.05)
 
 
 def test_the_self_node_is_linked_to_the_place_of_its_mean_and_no_longer_to_the_one_before() -> None:

@@ -1,0 +1,115 @@
+"""Where each landmark in view is: the landmark codelet (paper §5.4, eq. 4)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bus.errors import MessageError
+from bus.graph import nearest_place
+from schemas.array import Array
+from schemas.graph import Node, Operation
+from schemas.mind import Task
+from schemas.sensing import Percept
+from services.codelets.places import place_link
+from services.codelets.sampling import Samples, generator, keep, refill, spread, wrapped
+from services.codelets.senses import RANGE, with_gains
+from services.codelets.settings import Config
+from services.codelets.sightings import MOVING, has_bearing, has_range, seen_from_here
+
+GAP = 3.0
+
+
+def locate_landmark(task: Task, config: Config) -> list[Operation]:
+    """Eq. 4 for the one landmark and percept of `task`: keep the samples that agree with what is seen now.
+
+    A landmark that disagrees `config.misses` times on end stands elsewhere: it starts anew from what is seen. But
+    while it is the agent who may be elsewhere, or stands and sees the same again, landmarks stay where they are, and
+    those that were surveyed always do.
+    """
+    self_node = next(node for node in task.nodes if node.kind == "self")
+    landmark = next(node for node in task.nodes if node.kind == "object")
+    if self_node.samples is None or landmark.samples is None:
+        raise MessageError(f"task {task.task_id} has nodes without samples")
+    rng, percept = generator(task.task_id), task.percepts[0]
+    before = np.array(landmark.samples.numpy(), np.float64)
+    if _stays(self_node, landmark):
+        return object_operations(task, landmark, before, percept, int(landmark.attributes.get("misses", 0)))
+    selves = with_gains(np.array(self_node.samples.numpy(), np.float64), config, rng)
+    selves = rng.permutation(refill(selves, len(before), 0.0, rng))
+    squared = _squared(before, selves, percept)
+    misses = 0 if squared.min() < config.gate**2 else int(landmark.attributes.get("misses", 0)) + 1
+    if misses == 0:
+        kept = before[keep(-squared / 2 / config.views_alike, rng)]
+        # Few that are left stand for all between them: of a ring or a ray, the next view must find some again.
+        jitter_m = np.maximum(config.landmark_jitter_m, GAP * spread(kept, kept.mean(axis=0)) / len(kept))
+        kept = refill(kept, len(before), jitter_m, rng)
+    elif misses < config.misses:
+        kept = before
+    else:
+        kept, misses = first_sighting(selves, percept, config, rng), 0
+    return object_operations(task, landmark, kept, percept, misses)
+
+
+def _stays(self_node: Node, landmark: Node) -> bool:
+    own, facts = self_node.attributes, landmark.attributes
+    here = seen_from_here(landmark, int(own.get("stands_ns", MOVING)))
+    return bool(facts.get("surveyed", False)) or bool(own.get("astray", 0)) or here
+
+
+def _squared(where_m: Samples, selves: Samples, percept: Percept) -> Samples:
+    """Squared deviations (n,) of the percept from what each pair of landmark and self would have it be."""
+    offset = where_m - selves[:, :2]
+    squared = np.zeros(len(offset))
+    if has_bearing(percept):
+        off = wrapped(np.arctan2(offset[:, 1], offset[:, 0]) - selves[:, 2] - percept.bearing_rad)
+        squared += (off / percept.bearing_sd_rad) ** 2
+    if has_range(percept):
+        distance = np.hypot(offset[:, 0], offset[:, 1]) * (1 + selves[:, RANGE])
+        squared += ((distance - percept.range_m) / percept.range_sd_m) ** 2
+    return squared
+
+
+def first_sighting(selves: Samples, percept: Percept, config: Config, rng: np.random.Generator) -> Samples:
+    """Where something may be that is seen from (n, 7) samples of the self for the first time: (n, 2) samples.
+
+    Seen by range alone it is on a ring, by bearing alone on a ray as long as `config.farthest_m`.
+    """
+    number = len(selves)
+    if has_bearing(percept):
+        bearing = selves[:, 2] + rng.normal(percept.bearing_rad, percept.bearing_sd_rad, number)
+    else:
+        bearing = rng.uniform(-np.pi, np.pi, number)
+    if has_range(percept):
+        distance = rng.normal(percept.range_m, percept.range_sd_m, number).clip(0.1) / (1 + selves[:, RANGE])
+    else:
+        distance = rng.uniform(0.0, config.farthest_m, number)
+    where: Samples = selves[:, :2] + distance[:, None] * np.column_stack([np.cos(bearing), np.sin(bearing)])
+    return where
+
+
+def object_operations(task: Task, node: Node, samples: Samples, percept: Percept, misses: int) -> list[Operation]:
+    """An object node with new samples, refreshed by a percept, and its link to the place of their mean."""
+    mean = samples.mean(axis=0)
+    sd = spread(samples, mean)
+    cell = nearest_place(mean[0], mean[1], task.cell_m)
+    attributes = node.attributes | {
+        "x_m": float(mean[0]),
+        "y_m": float(mean[1]),
+        "x_sd_m": float(sd[0]),
+        "y_sd_m": float(sd[1]),
+        "width_m": percept.width_m,
+        "height_m": percept.height_m,
+        "sightings": int(node.attributes.get("sightings", 0)) + 1,
+        "misses": misses,
+        "stamp_ns": task.stamp_ns,
+        "place": cell,
+    }
+    seen = Node(
+        id=node.id,
+        kind="object",
+        activation=percept.activation,
+        base_level=min(1.0, node.base_level + 0.05),
+        attributes=attributes,
+        samples=Array.of(samples),
+    )
+    return [seen, *place_link(node, cell)]
