@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from benchmarks import cycle, deltas, losses
+from benchmarks.localization import measure as localization
 from benchmarks.map_correction import measure as map_correction
 from benchmarks.perception import measure as perception
 from benchmarks.perception import stereo as perception_stereo
@@ -148,6 +149,27 @@ def perception_command(
         figures["camvid_iou"] = camvid_iou(road_weights or ROAD_WEIGHTS, *camvid_test)
         bars["camvid_iou"] = Bar(0.85, at_least=True)
     publish("perception", figures, bars, json_path)
+
+
+@benchmarks.command(name="localization")
+@click.option(
+    "--mrclam",
+    "folder",
+    required=True,
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="A folder of the UTIAS MRCLAM sets, as published, its files packed with xz or not.",
+)
+@click.option("--processes", type=click.IntRange(1, 256), default=os.cpu_count() or 1, help="[default: one a core]")
+@json_option
+def localization_command(folder: Path, processes: int, json_path: Path | None) -> None:
+    """How well real robots know where they are, on a map that is known and on one that they make; and how fast.
+
+    Each of the set's robots alone, by the town's codelets: its sightings of other robots are left out. The map that
+    it makes is turned to fit the truth, and held against gtsam's batch smoother, which `make bench-setup` installs.
+    Takes some minutes.
+    """
+    publish("localization", localization.measure(folder, processes), localization.BARS, json_path)
 
 
 @benchmarks.command(name="map_correction")

@@ -14,7 +14,7 @@ from services.codelets.module import Worker
 from services.codelets.settings import Config
 from services.workspace.commit import Ledger
 from services.workspace.scene import SELF, Scene
-from services.workspace.triggers import first_self, tasks_for
+from services.workspace.triggers import first_self, object_tasks, tasks_for
 
 # A robot whose senses nobody has calibrated, among landmarks no thicker than a finger: its gains may be off by what
 # sensory memory says of wheels and the paper of distances, and what it sees twice it sees in the same place.
@@ -28,7 +28,6 @@ CONFIG = Config(
     drift_rad_per_m=0.05,
     range_gain_sd=0.03,
 )
-MAPPING = {"landmark", "object_place"}
 CERTAIN_M = 1e-3
 NAME = "worker"
 
@@ -49,8 +48,8 @@ class Mind:
         """What is known, by name."""
         return self._ledger.graph.nodes
 
-    def learn(self, landmarks: dict[str, tuple[float, float]]) -> None:
-        """Put landmarks on the map whose places are surveyed."""
+    def learn(self, landmarks: dict[str, tuple[float, float]], surveyed: bool) -> None:
+        """Put landmarks on the map, which stay for good where they are if that was surveyed."""
         spread = np.random.default_rng(0).normal(0.0, CERTAIN_M, (50, 2))
         nodes: list[Operation] = [
             Node(
@@ -58,24 +57,20 @@ class Mind:
                 kind="object",
                 activation=1.0,
                 base_level=1.0,
-                attributes={"label": label, "surveyed": True},
+                attributes={"label": label, "surveyed": surveyed},
                 samples=Array.of(spread + where),
             )
             for label, where in landmarks.items()
         ]
         self._ledger.commit(0, 0, "survey", nodes)
 
-    def tasks(self, moment: Moment, phase: str) -> list[Task]:
-        """The tasks of a phase that are about where things are."""
-        graph = self._ledger.graph
-        stamp_ns = round(moment.stamp_s * 1e9)
+    def _scene(self, moment: Moment) -> Scene:
         nothing = Array.of(np.zeros((0, 2), np.float32))
+        stamp_ns = round(moment.stamp_s * 1e9)
         percepts = Percepts(stamp_ns=stamp_ns, frame=self._cycle, objects=moment.percepts, road_m=nothing)
-        scene = Scene(self._cycle, percepts, Array.of(moment.motions))
-        wanted = {"localization"} if phase == "localization" else MAPPING
-        return [task for task in tasks_for(phase, scene, graph, 1.0) if task.codelet in wanted]
+        return Scene(self._cycle, percepts, Array.of(moment.motions))
 
-    def answer(self, tasks: list[Task], phase: str) -> None:
+    def _answer(self, tasks: list[Task], phase: str) -> None:
         """Let the codelets work on `tasks`, and commit what holds."""
         proposals = []
         for task in tasks:
@@ -89,10 +84,18 @@ class Mind:
 
     def live(self, moment: Moment) -> None:
         """One cycle: localization, then the landmarks in view."""
+        self.localize(moment)
+        self.map(moment)
+
+    def localize(self, moment: Moment) -> None:
+        """A new cycle: the self node moves, corrected by what is in view."""
         self._cycle += 1
-        self.answer(self.tasks(moment, "localization"), "localization")
+        self._answer(tasks_for("localization", self._scene(moment), self._ledger.graph, 1.0), "localization")
+
+    def map(self, moment: Moment) -> None:
+        """The landmarks in view, new or known."""
         if moment.percepts:
-            self.answer(self.tasks(moment, "objects"), "objects")
+            self._answer(object_tasks(self._scene(moment), self._ledger.graph), "objects")
 
     @property
     def pose(self) -> tuple[float, float, float]:

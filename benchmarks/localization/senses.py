@@ -69,7 +69,8 @@ class Wheels:
 
     def heading_rad(self, stamps_s: Numbers) -> Numbers:
         """What the turns add up to at each of `stamps_s`."""
-        return np.interp(stamps_s, self._stamps, self._turned)
+        heading: Numbers = np.interp(stamps_s, self._stamps, self._turned)
+        return heading
 
     def rows(self, since_s: float, until_s: float) -> Numbers:
         """(n, 5) rows of self-motion, one for each time that the command changed in between."""

@@ -34,7 +34,7 @@ def look_around(gains: Samples, seen: Sighting, config: Config, rng: np.random.G
     turned = np.where(seen.has_bearing[which], bearing, rng.uniform(-np.pi, np.pi, number))
     candidates[:, 2] = direction + np.pi - turned
     density = compare(candidates, seen).density
-    density[np.arange(number), which] = 1.0  # it was drawn by that one
+    density[which, np.arange(number)] = 1.0  # it was drawn by that one
     scores = log_likelihood(density, config.outlier_share)
     chances = np.exp(scores - scores.max())
     return candidates[rng.choice(number, size=len(gains), p=chances / chances.sum())]

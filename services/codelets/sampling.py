@@ -114,5 +114,5 @@ def refill(kept: Samples, number: int, jitter: float | Samples, rng: np.random.G
     """`number` samples of those kept, of each as many as of the next, moved a little so that none stands for many."""
     whole, rest = divmod(number, len(kept))
     chosen = np.concatenate([np.tile(np.arange(len(kept)), whole), rng.permutation(len(kept))[:rest]])
-    moved: Samples = kept[chosen] + rng.normal(0.0, 1.0, (number, kept.shape[1])) * jitter
-    return moved
+    moved: Samples = kept[chosen]
+    return moved + rng.normal(0.0, 1.0, moved.shape) * jitter if np.any(jitter) else moved

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from schemas.graph import Node
 from schemas.mind import Task
 from schemas.sensing import Percept
-from services.codelets.sampling import Samples, wrapped
+from services.codelets.sampling import Samples
 from services.codelets.senses import RANGE
 
 LARGEST_SHARE = 0.5
@@ -85,42 +85,42 @@ def sightings(task: Task, largest_sd_m: float, stands_ns: int) -> Sighting | Non
 
 
 class Comparison(NamedTuple):
-    """How far (n, 7) samples of the self are off each of k sightings, all (n, k).
+    """How far n samples of the self are off each of k sightings, (k, n) each.
 
     `squared` is in squared deviations; `density` is relative to that of an exact match by a landmark whose place is
-    certain; `bearing_off` and `range_off` are in deviations, 0 where that is not known.
+    certain.
     """
 
     squared: Samples
     density: Samples
-    bearing_off: Samples
-    range_off: Samples
 
 
 def compare(samples: Samples, seen: Sighting) -> Comparison:
     """Each of (n, 7) samples of the self against what is seen."""
-    east = seen.mean_m[:, 0] - samples[:, :1]
-    north = seen.mean_m[:, 1] - samples[:, 1:2]
+    east = seen.mean_m[:, :1] - samples[:, 0]
+    north = seen.mean_m[:, 1:] - samples[:, 1]
     square = np.maximum(east * east + north * north, 1e-6)
     distance = np.sqrt(square)
-    xx, xy, yy = seen.covariance_m2[:, 0, 0], seen.covariance_m2[:, 0, 1], seen.covariance_m2[:, 1, 1]
+    xx, xy, yy = (seen.covariance_m2[:, i, j, None] for i, j in ((0, 0), (0, 1), (1, 1)))
     radial_var = (east * east * xx + 2 * east * north * xy + north * north * yy) / square
-    bearing_var = seen.bearing_sd_rad**2 + np.maximum(xx + yy - radial_var, 0.0) / square
-    range_var = seen.range_sd_m**2 + radial_var
-    bearing_off = wrapped(np.arctan2(north, east) - samples[:, 2:3] - seen.bearing_rad) / np.sqrt(bearing_var)
-    range_off = (distance * (1 + samples[:, RANGE, None]) - seen.range_m) / np.sqrt(range_var)
-    bearing_off *= seen.has_bearing
-    range_off *= seen.has_range
-    squared = bearing_off * bearing_off + range_off * range_off
-    sharp = np.where(seen.has_bearing, seen.bearing_sd_rad**2 / bearing_var, 1.0)
-    sharp = sharp * np.where(seen.has_range, seen.range_sd_m**2 / range_var, 1.0)
-    return Comparison(squared, np.exp(-squared / 2) * np.sqrt(sharp), bearing_off, range_off)
+    bearing_sd, range_sd = seen.bearing_sd_rad[:, None], seen.range_sd_m[:, None]
+    bearing_var = bearing_sd**2 + np.maximum(xx + yy - radial_var, 0.0) / square
+    range_var = range_sd**2 + radial_var
+    turned = np.arctan2(north, east) - samples[:, 2] - seen.bearing_rad[:, None]
+    turned -= 2 * np.pi * np.rint(turned / (2 * np.pi))
+    away = distance * (1 + samples[:, RANGE]) - seen.range_m[:, None]
+    with_bearing, with_range = seen.has_bearing[:, None], seen.has_range[:, None]
+    squared = with_bearing * turned * turned / bearing_var + with_range * away * away / range_var
+    sharp = np.where(with_bearing, bearing_sd**2 / bearing_var, 1.0) * np.where(
+        with_range, range_sd**2 / range_var, 1.0
+    )
+    return Comparison(squared, np.exp(-squared / 2) * np.sqrt(sharp))
 
 
 def log_likelihood(density: Samples, outlier: float) -> Samples:
-    """log of the product over landmarks of p(o_j | l_j, x), (n,), of densities (n, k) (eq. 1).
+    """log of the product over landmarks of p(o_j | l_j, x), (n,), of densities (k, n) (eq. 1).
 
     `outlier` is the share of sightings that may mean anything: a landmark taken for another outvotes nobody.
     """
-    result: Samples = np.log((1 - outlier) * density + outlier).sum(axis=1)
+    result: Samples = np.log((1 - outlier) * density + outlier).sum(axis=0)
     return result

@@ -51,12 +51,20 @@ def tasks_for(phase: str, scene: Scene, graph: Graph, spacing_m: float) -> list[
     if phase == "attention":
         bare = [_bare(node) for node in (agent, *known)]
         return [task_of(scene, graph, "attention", bare, [])]
+    road = task_of(scene, graph, "road_place", [agent], [])
+    return [*object_tasks(scene, graph), road, *path_tasks(scene, graph, spacing_m)]
+
+
+def object_tasks(scene: Scene, graph: Graph) -> list[Task]:
+    """One for each object in view: to be placed where it is new, to be located again where it is known."""
+    agent = graph.nodes[SELF]
+    seen = {percept.label: percept for percept in scene.percepts.objects}
     tasks = []
     for label in sorted(seen):
         node = graph.nodes.get(object_id(label))
         codelet, nodes = ("object_place", [agent]) if node is None else ("landmark", [agent, node])
         tasks.append(task_of(scene, graph, codelet, nodes, [seen[label]]))
-    return [*tasks, task_of(scene, graph, "road_place", [agent], []), *path_tasks(scene, graph, spacing_m)]
+    return tasks
 
 
 def _bare(node: Node) -> Node:

@@ -1,0 +1,121 @@
+"""The figures of localization and mapping on one MRCLAM set."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+from rich.progress import track
+
+from benchmarks.localization import smoother, speed
+from benchmarks.localization.mind import Mind
+from benchmarks.localization.senses import Moment, label_of, moments
+from benchmarks.map_correction.measure import trajectory_error_m
+from benchmarks.report import Bar
+from datasets.mrclam import Numbers, Recording, Robot, read
+
+BARS = {
+    "known_map_rmse_m": Bar(0.15),
+    "slam_rmse_m": Bar(0.25),
+    "slam_vs_smoother": Bar(1.5),
+    "update_ms_p99": Bar(2.0),
+    "map_size_ratio": Bar(1.2),
+}
+SEEDS = (0, 1)
+TRUTH_GAP_S = 0.5
+CARRIED_S = (300.0, 360.0)
+FOUND_M = 0.5
+Landmarks = dict[int, tuple[float, float]]
+
+
+def measure(folder: Path, processes: int) -> dict[str, float]:
+    """Every figure of BARS, and others that tell how it came about. Raises UsageError where `folder` is no set."""
+    smoother.check_installed()
+    recording = read(folder)
+    figures = speed.measure()
+    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+        work = partial(judge, landmarks=recording.landmarks)
+        told = pool.map(work, recording.robots)
+        rows = list(track(told, "driving", total=len(recording.robots), transient=True))
+    means = {key: float(np.mean([row[key] for row in rows])) for key in rows[0]}
+    means["slam_vs_smoother"] = means["slam_rmse_m"] / means["smoother_rmse_m"]
+    each = {
+        f"robot{robot.number}_{key}": row[key]
+        for key in ("known_map_rmse_m", "slam_rmse_m", "smoother_rmse_m")
+        for robot, row in zip(recording.robots, rows, strict=True)
+    }
+    return means | figures | each | _told(recording)
+
+
+def _told(recording: Recording) -> dict[str, float]:
+    return {
+        "landmark_sightings": float(sum(len(robot.landmark_sightings) for robot in recording.robots)),
+        "unread_barcodes": float(sum(robot.unread for robot in recording.robots)),
+    }
+
+
+def judge(robot: Robot, landmarks: Landmarks) -> dict[str, float]:
+    """The errors of one robot, each the mean over SEEDS."""
+    heard = list(moments(robot))
+    stamps = np.array([moment.stamp_s for moment in heard])
+    truth, judged = _truth(robot, stamps)
+    even = judged & np.array([moment.tick for moment in heard])
+    known = [_follow(heard, landmarks, tuple(_truth(robot, robot.odometry[:1, 0])[0][0]), seed) for seed in SEEDS]
+    slam = [_follow(heard, {}, (0.0, 0.0, 0.0), seed) for seed in SEEDS]
+    smoothed = smoother.smooth(heard)
+    return {
+        "known_map_rmse_m": float(np.mean([_rmse(path[judged], truth[judged]) for path in known])),
+        "known_map_rmse_even_m": float(np.mean([_rmse(path[even], truth[even]) for path in known])),
+        "slam_rmse_m": float(np.mean([trajectory_error_m(path[judged, :2], truth[judged, :2]) for path in slam])),
+        "smoother_rmse_m": trajectory_error_m(smoothed[judged, :2], truth[judged, :2]),
+        "recovery_s": _recovery_s(robot, landmarks),
+    }
+
+
+def _follow(heard: Iterable[Moment], landmarks: Landmarks, start: tuple[float, ...], seed: int) -> Numbers:
+    """(n, 3) poses that the codelets estimate at each moment."""
+    mind = Mind((start[0], start[1], start[2]), seed=seed)
+    mind.learn({label_of(subject): where for subject, where in landmarks.items()}, surveyed=True)
+    poses = []
+    for moment in heard:
+        mind.live(moment)
+        poses.append(mind.pose)
+    return np.array(poses)
+
+
+def _recovery_s(robot: Robot, landmarks: Landmarks) -> float:
+    """How long after it was carried away it takes the robot to know, within FOUND_M and for good, where it is.
+
+    A minute of its log never reaches it: neither that it moved nor what it saw. Counted from its next sighting on.
+    """
+    begin_s = float(robot.odometry[0, 0])
+    heard = [moment for moment in moments(robot, CARRIED_S) if moment.stamp_s < begin_s + 2 * CARRIED_S[1]]
+    stamps = np.array([moment.stamp_s for moment in heard])
+    truth, judged = _truth(robot, stamps)
+    path = _follow(heard, landmarks, tuple(_truth(robot, robot.odometry[:1, 0])[0][0]), 0)
+    seen = np.array([bool(moment.percepts) for moment in heard])
+    after = np.flatnonzero(seen & judged & (stamps > begin_s + CARRIED_S[1]))
+    if not len(after):
+        return 0.0
+    off = np.hypot(*(path[after, :2] - truth[after, :2]).T)
+    lost = np.flatnonzero(off > FOUND_M)
+    found = after[min(lost[-1] + 1, len(after) - 1)] if len(lost) else after[0]
+    return float(stamps[found] - stamps[after[0]])
+
+
+def _rmse(path: Numbers, truth: Numbers) -> float:
+    return float(np.sqrt(np.square(path[:, :2] - truth[:, :2]).sum(axis=1).mean()))
+
+
+def _truth(robot: Robot, stamps_s: Numbers) -> tuple[Numbers, np.ndarray]:
+    """(n, 3) true poses at `stamps_s`, and where motion capture saw the robot just before and just after."""
+    known_s = robot.truth[:, 0]
+    columns = (robot.truth[:, 1], robot.truth[:, 2], np.unwrap(robot.truth[:, 3]))
+    poses = np.column_stack([np.interp(stamps_s, known_s, column) for column in columns])
+    after = np.searchsorted(known_s, stamps_s).clip(1, len(known_s) - 1)
+    near = known_s[after] - known_s[after - 1] <= TRUTH_GAP_S
+    return poses, near & (stamps_s >= known_s[0]) & (stamps_s <= known_s[-1])
