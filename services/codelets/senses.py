@@ -51,7 +51,7 @@ def move(start: Samples, motions: Samples, config: Config, rng: np.random.Genera
     shape = (len(motions), len(samples))
     way = dt * (speed + speed_sd * rng.normal(0.0, 1.0, shape)) * (1 + samples[:, SPEED])
     turn = dt * (turn_rate + turn_rate_sd * rng.normal(0.0, 1.0, shape)) * (1 + samples[:, TURN])
-    turn += np.abs(way) * samples[:, DRIFT]
+    turn += way * samples[:, DRIFT]
     heading = samples[:, 2] + np.cumsum(turn, axis=0)
     middle = heading - turn / 2
     samples[:, 0] += (way * np.cos(middle)).sum(axis=0)
