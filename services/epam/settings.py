@@ -14,14 +14,17 @@ Positive = Annotated[float, msgspec.Meta(gt=0)]
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """The weights are ONNX files, those in this package where empty.
 
-    A node becomes a percept when its total activation, base level and current, is over `percept_threshold`; a building
-    of no known node gets one where it covers `learned_share` of the view. What fits its known size worse than
+    What is a building with a probability over `percept_threshold` becomes a percept, by the name of the node that is
+    likeliest, and with that node's total activation, base level and current. One of no known node gets one where it
+    covers `learned_share` of the view, and another look of it is learned where it is recognised with an activation over
+    `sure`. What fits its known size worse than
     `worst_misfit` deviations, or stands nobody knows where, is placed as a building of the usual size would be.
     """
 
     segments_weights: str = ""
     object_weights: str = ""
     road_weights: str = ""
+    sure: Unit = 0.95
     base_level: Unit = 0.0
     percept_threshold: Unit = 0.7
     learned_share: Unit = 0.01

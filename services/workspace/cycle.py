@@ -17,7 +17,7 @@ from services.workspace.commit import Ledger
 from services.workspace.decay import fade
 from services.workspace.dispatch import Dispatch
 from services.workspace.settings import Config
-from services.workspace.triggers import PHASES, SELF, Scene, first_self, percept_operations, tasks_for
+from services.workspace.triggers import PHASES, SELF, Scene, first_self, percept_operations, recognised, tasks_for
 
 WORKERS = "codelets"
 
@@ -65,7 +65,7 @@ class Workspace:
             raise MessageError(f"road points of shape {percepts.road_m.shape}")
         if percepts.stamp_ns <= self._begun_ns:
             return []
-        self._waiting = percepts
+        self._waiting = recognised(percepts, self._config.recognition_threshold)
         return self._begin()
 
     def on_proposal(self, proposal: Proposal) -> list[Message]:
