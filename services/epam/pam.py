@@ -22,6 +22,7 @@ from services.epam.view import Seen
 from services.epam.walls import walls
 
 NEW_LABEL = "new-building-{}"
+LIKELIER_THAN_NOT = 0.5
 
 
 class ExtendedPam:
@@ -101,10 +102,11 @@ class ExtendedPam:
         return candidate if beside(there[0], candidate) else self._again(candidate, pieces)
 
     def _is_new(self, candidate: Candidate) -> bool:
-        """Whether it is a building seen well, and surely none of those known."""
+        """Whether it is seen well, and likelier a building that is none of those known than all else together."""
         recognition, segment = candidate.recognition, candidate.segment
         large = segment.area_px >= self._config.learned_share * segment.mask.size
-        return large and min(recognition.new, recognition.look.whole) > self._config.percept_threshold
+        whole = recognition.look.whole > self._config.percept_threshold
+        return large and whole and recognition.new > LIKELIER_THAN_NOT
 
     def _is_another_look(self, candidate: Candidate) -> bool:
         """Whether it is surely a building that was learned, as it was not seen before."""
