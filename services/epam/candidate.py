@@ -10,7 +10,7 @@ import numpy as np
 
 from schemas.sensing import Calibration
 from services.epam.objects import Recognition
-from services.epam.segments import Mask, Segment
+from services.epam.segments import Image, Mask, Segment
 from services.epam.walls import Disparity, Walls, walls
 
 OUTLINE_PX = 1.0
@@ -53,21 +53,22 @@ def outline_px(segment: Segment) -> list[tuple[int, int]]:
 
     Where it is in pieces farther apart than that, the polygon is around the largest.
     """
+    left, top, wide, high = segment.box_px
+    shown = segment.mask[top : top + high, left : left + wide].astype(np.uint8)
     for bridged in BRIDGED_PX:
-        piece = _largest_piece(segment, bridged)
-        if segment.mask[piece].sum() >= MOST_OF_IT * segment.area_px:
+        piece = _largest_piece(shown, bridged)
+        if shown[piece].sum() >= MOST_OF_IT * shown.sum():
             break
     else:
-        piece = _largest_piece(segment, BRIDGED_PX[0])
+        piece = _largest_piece(shown, BRIDGED_PX[0])
     pieces, _ = cv2.findContours(piece.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     corners = cv2.approxPolyDP(max(pieces, key=len), OUTLINE_PX, True).reshape(-1, 2)
-    return [(int(column), int(row)) for column, row in corners]
+    return [(left + int(column), top + int(row)) for column, row in corners]
 
 
-def _largest_piece(segment: Segment, bridged_px: int) -> Mask:
-    """Its largest connected piece where gaps of less than `bridged_px` columns count as its own, (h, w)."""
-    kernel = np.ones((1, bridged_px), np.uint8)
-    closed = cv2.morphologyEx(segment.mask.astype(np.uint8), cv2.MORPH_CLOSE, kernel)
+def _largest_piece(shown: Image, bridged_px: int) -> Mask:
+    """The largest connected piece of `shown` (h, w) where gaps of less than `bridged_px` columns count as its own."""
+    closed = cv2.morphologyEx(shown, cv2.MORPH_CLOSE, np.ones((1, bridged_px), np.uint8))
     _, number, stats, _ = cv2.connectedComponentsWithStats(closed)
     return np.asarray(number == 1 + int(stats[1:, cv2.CC_STAT_AREA].argmax()))
 

@@ -21,6 +21,7 @@ UNKNOWN_DISTANCE_M = 30.0
 RELIEF = 4.0
 GROUND_M = 0.3
 FEWEST_PX = 50
+EVERY = 2
 
 
 def surroundings(image: Image, depth_m: Depth, camera: Calibration) -> Tensor:
@@ -28,7 +29,8 @@ def surroundings(image: Image, depth_m: Depth, camera: Calibration) -> Tensor:
 
     The sky is what has no depth, above the horizon.
     """
-    rows = np.arange(depth_m.shape[0], dtype=np.float32)[:, None]
+    image, depth_m = image[::EVERY, ::EVERY], depth_m[::EVERY, ::EVERY]
+    rows = EVERY * np.arange(depth_m.shape[0], dtype=np.float32)[:, None]
     down = (rows - np.float32(camera.cy_px)) / np.float32(camera.fy_px)
     ground = (depth_m > 0) & (down > 0) & (camera.mount_height_m - down * depth_m < GROUND_M)
     sky = (depth_m == 0) & (down < 0)
