@@ -68,8 +68,10 @@ def outline_px(segment: Segment) -> list[tuple[int, int]]:
 
 def _largest_piece(shown: Image, bridged_px: int) -> Mask:
     """The largest connected piece of `shown` (h, w) where gaps of less than `bridged_px` columns count as its own."""
-    closed = cv2.morphologyEx(shown, cv2.MORPH_CLOSE, np.ones((1, bridged_px), np.uint8))
-    _, number, stats, _ = cv2.connectedComponentsWithStats(closed)
+    # At a border, closing would fill what lies between it and the segment.
+    around = cv2.copyMakeBorder(shown, 0, 0, bridged_px, bridged_px, cv2.BORDER_CONSTANT, value=0)
+    closed = cv2.morphologyEx(around, cv2.MORPH_CLOSE, np.ones((1, bridged_px), np.uint8))
+    _, number, stats, _ = cv2.connectedComponentsWithStats(closed[:, bridged_px:-bridged_px])
     return np.asarray(number == 1 + int(stats[1:, cv2.CC_STAT_AREA].argmax()))
 
 

@@ -27,6 +27,15 @@ def test_an_outline_holds_what_is_seen_and_no_more() -> None:
     assert (held == segment.mask).all()
 
 
+def test_beside_a_gable_is_no_part_of_it() -> None:
+    mask = np.zeros((240, 320), np.uint8)
+    cv2.fillPoly(mask, [np.array([(100, 50), (140, 100), (60, 100)], np.int32)], 1)
+    segment = Segment(mask > 0, cv2.boundingRect(mask))
+    held = np.zeros((240, 320), np.uint8)
+    cv2.fillPoly(held, [np.array(outline_px(segment), np.int32)], 1)
+    assert np.count_nonzero(held != mask) < 0.05 * segment.area_px
+
+
 def test_a_lamp_or_a_tree_before_a_building_does_not_divide_it() -> None:
     for gap in (6, 20, 40):
         segment, held = _filled((50, 60, 60, 40), (110 + gap, 60, 60, 40))
