@@ -29,7 +29,7 @@ def test_an_outline_holds_what_is_seen_and_no_more() -> None:
 
 def test_beside_a_gable_is_no_part_of_it() -> None:
     mask = np.zeros((240, 320), np.uint8)
-    cv2.fillPoly(mask, [np.array([(100, 50), (140, 100), (60, 100)], np.int32)], 1)
+    cv2.fillPoly(mask, [np.array([(100, 20), (110, 120), (90, 120)], np.int32)], 1)
     segment = Segment(mask > 0, cv2.boundingRect(mask))
     held = np.zeros((240, 320), np.uint8)
     cv2.fillPoly(held, [np.array(outline_px(segment), np.int32)], 1)
