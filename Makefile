@@ -2,8 +2,9 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
 INSTALLED := .venv/installed
 TRAINS := .venv/trains
+MEASURES := .venv/measures
 
-.PHONY: help setup train-setup demo test test-compose lint bench clean
+.PHONY: help setup train-setup bench-setup demo test test-compose lint bench clean
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 16
@@ -20,6 +21,12 @@ train-setup: $(TRAINS) ## torch besides, to train the networks of perception
 
 $(TRAINS): $(INSTALLED) requirements/train.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements/train.txt
+	touch $@
+
+bench-setup: $(MEASURES) ## gtsam besides, which benchmarks measure against
+
+$(MEASURES): $(INSTALLED) requirements/bench.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements/bench.txt
 	touch $@
 
 demo: setup ## drive around a simulated town; more options: make demo ARGS="--seed 2"
@@ -41,6 +48,7 @@ bench: setup ## every benchmark there is
 	$(BIN)/python -m benchmarks cycle
 	$(BIN)/python -m benchmarks bus
 	$(BIN)/python -m benchmarks perception
+	$(BIN)/python -m benchmarks spiking
 
 clean: ## remove what was installed and built; runs stay
 	rm -rf .venv build *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import importlib
+import os
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import click
 
 from benchmarks import cycle, deltas, losses
+from benchmarks.map_correction import measure as map_correction
 from benchmarks.perception import measure as perception
 from benchmarks.perception import stereo as perception_stereo
 from benchmarks.report import Bar, publish
+from benchmarks.spiking import measure as spiking
 from bus.command import run_command
 from bus.session import free_endpoint
+from cli.experiment.outcome import save_figure
+from cli.log.progress import bar
 from services.epam.camvid import camvid_iou
 from services.epam.road import DEFAULT_PATH as ROAD_WEIGHTS
 
@@ -47,6 +54,8 @@ def benchmarks() -> None:
     python -m benchmarks cycle --json cycle.json
     python -m benchmarks bus --json bus.json
     python -m benchmarks perception --json perception.json
+    python -m benchmarks spiking --json spiking.json
+    python -m benchmarks map_correction --graph manhattan.g2o --json map_correction.json
     """
 
 
@@ -139,6 +148,60 @@ def perception_command(
         figures["camvid_iou"] = camvid_iou(road_weights or ROAD_WEIGHTS, *camvid_test)
         bars["camvid_iou"] = Bar(0.85, at_least=True)
     publish("perception", figures, bars, json_path)
+
+
+@benchmarks.command(name="map_correction")
+@click.option(
+    "--graph",
+    "graph_path",
+    required=True,
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="A pose graph in the plane of yours: .g2o, or TORO's .graph; packed as .xz or not.",
+)
+@click.option(
+    "--truth",
+    "truth_path",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Its true poses, a line each: x, y and heading, with an index before them or not.",
+)
+@json_option
+def map_correction_command(graph_path: Path, truth_path: Path | None, json_path: Path | None) -> None:
+    """How well and how fast loops are closed, on a pose graph that was recorded elsewhere.
+
+    By the paper's rule, for positions only, against exact least squares; with headings too, against gtsam, which
+    `make bench-setup` installs; and one closure at a time. Takes up to half a minute.
+    """
+    figures = map_correction.measure(graph_path, truth_path)
+    bars = {key: bar for key, bar in map_correction.BARS.items() if key in figures}
+    publish("map correction", figures, bars, json_path)
+
+
+@benchmarks.command(name="spiking")
+@click.option("--seed", type=click.IntRange(0, 2**16), default=1, show_default=True, help="Which scenes.")
+@click.option("--processes", type=click.IntRange(1, 256), default=os.cpu_count() or 1, help="[default: one a core]")
+@click.option(
+    "--figure",
+    "folder",
+    type=click.Path(file_okay=False, exists=True, path_type=Path),
+    metavar="FOLDER",
+    help="Draw figure 4 there too, spiking.png and spiking.pdf.",
+)
+@json_option
+def spiking_command(seed: int, processes: int, folder: Path | None, json_path: Path | None) -> None:
+    """The posterior that spikes of place cells give, against the exact one; and that by rejection of samples.
+
+    Scenes with cues drawn at random: what path integration says of a position, and the distance to one or two walls.
+    A ratio is of standard deviations along x and y, an error is of the mean in exact standard deviations.
+    """
+    with bar("recording") as progress:
+        scenes = spiking.measure(seed, processes, progress)
+    publish("spiking", spiking.figures(scenes), spiking.BARS, json_path)
+    if folder is not None:
+        figure: Any = importlib.import_module("benchmarks.spiking.figure")
+        for path in save_figure(folder, "spiking", figure.figure(scenes, spiking.seeds(seed))):
+            _tell(str(path))
 
 
 def _tell(sentence: str) -> None:

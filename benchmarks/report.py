@@ -12,16 +12,21 @@ from rich.table import Table
 
 @dataclass(frozen=True)
 class Bar:
-    """What a figure should be: at most, or at least, `limit`."""
+    """What a figure should be: at most, or at least, `limit`; or from `least` to `limit`."""
 
     limit: float
     at_least: bool = False
+    least: float | None = None
 
     def holds(self, value: float) -> bool:
         """Whether `value` meets it."""
+        if self.least is not None and value < self.least:
+            return False
         return value >= self.limit if self.at_least else value <= self.limit
 
     def __str__(self) -> str:
+        if self.least is not None:
+            return f"{self.least:g}-{self.limit:g}"
         return f"{'≥' if self.at_least else '≤'} {self.limit:g}"
 
 

@@ -22,6 +22,7 @@ from schemas.process import Presence
 log = logging.getLogger("cogmap")
 HEALTH_PERIOD_NS = 1_000_000_000
 MANY_CAUSES = 1000
+MANY_JOURNEYS = 32
 START = "@start"
 TIMER = "@timer"
 
@@ -35,6 +36,7 @@ class Shell:
         self._journal, self._health = journal, health
         self._incarnation = time.time_ns()
         self._causes: list[Cause] = []
+        self._journeys: dict[int, Envelope] = {}
         self._present: set[Member] = set()
         self._started = module.start is None
         self._timers = Timers(
@@ -88,8 +90,16 @@ class Shell:
         message = self.intake.accept(arrival)
         if message is None or arrival.envelope is None:
             return
+        self._remember(message.stamp_ns, arrival.envelope)
         cause = (arrival.topic.name, arrival.envelope.source, arrival.envelope.seq)
         self._think(lambda: self.module.feed(message), cause, arrival.envelope, started_ns)
+
+    def _remember(self, stamp_ns: int, envelope: Envelope) -> None:
+        """What is said with that stamp follows `envelope`, also where it is said while another message is taken in."""
+        self._journeys.pop(stamp_ns, None)
+        self._journeys[stamp_ns] = envelope
+        if len(self._journeys) > MANY_JOURNEYS:
+            del self._journeys[next(iter(self._journeys))]
 
     def _think(self, think: Callable[[], list[Message]], cause: Cause, of: Envelope | None, started_ns: int) -> None:
         """Let the module think; a message that it cannot make sense of changes nothing but a count."""
@@ -120,8 +130,9 @@ class Shell:
                 self._journal.append(message, payload)
             now_ns = time.time_ns()
             envelope = Envelope(message.source, message.seq, self._incarnation, now_ns, thinking_ns + compute_ns)
-            if of is not None and not topic.sensed:
-                envelope.follow(of, self.module.name, compute_ns)
+            cause = None if of is None or topic.sensed else self._journeys.get(message.stamp_ns)
+            if cause is not None:
+                envelope.follow(cause, self.module.name, compute_ns)
             envelope.causes, self._causes = self._causes, []
             self.bus.publish(topic, payload, envelope)
             self.meter.emitted[topic.name] += 1

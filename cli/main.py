@@ -17,6 +17,7 @@ COMMANDS = {
     "architecture": "cli.architecture:architecture",
     "config": "cli.run.command:print_config",
     "doctor": "cli.doctor.command:doctor",
+    "experiment": "cli.experiment.command:experiment",
     "graph": "cli.graph:graph",
     "log": "cli.log.command:log",
     "run": "cli.run.command:run",

@@ -15,7 +15,10 @@ from schemas.sensing import Unit
 
 
 class Node(Part, kw_only=True, tag="node"):
-    """A node of the graph. `samples`: float64 (n, d), positions (x_m, y_m) or poses (x_m, y_m, heading_rad)."""
+    """A node of the graph. `samples`: float64 (n, d), positions (x_m, y_m) or poses (x_m, y_m, heading_rad).
+
+    Nodes of the kinds `path` and `correction` have rows of their own there: see services.codelets.path.
+    """
 
     id: Name
     kind: Name

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+import msgspec
+
 from schemas.array import Array
 from schemas.base import Count, Finite, Message, Name, Part, Scalar
-from schemas.graph import Node
-from schemas.sensing import Percept, Unit
+from schemas.graph import Node, PlaceTile
+from schemas.sensing import Percept, PlaceMatch, Unit
 
 
 class Task(Message, kw_only=True):
@@ -22,6 +26,30 @@ class Task(Message, kw_only=True):
     percepts: list[Percept]
     motions: Array
     road_m: Array
+    matches: list[PlaceMatch] = []
+    tiles: list[PlaceTile] = []
+
+
+class Replay(Message, kw_only=True):
+    """A loop closed by reverse replay, and what it predicts of place cells (paper §5.6).
+
+    Positions of the path in the order in which they are replayed, the newest first: `stamps_ns` int64 (n,) when the
+    agent was there, `positions_m` float64 (n, 2) where it took itself to have been, `shifts_m` (n, 2) by how much the
+    place fields shift. `pairs` int32 (m, 2) are place cells by their index in these, `strength_changes` float64 (m,)
+    the change of the synapse between the two, whose strength is exp(-`decay_per_m` x distance of their fields).
+    `closed` and `undone` name the closures that hold now, and those that held and do not any more.
+    """
+
+    cycle: Count
+    replays: Count
+    closed: list[Name]
+    undone: list[Name]
+    stamps_ns: Array
+    positions_m: Array
+    shifts_m: Array
+    pairs: Array
+    strength_changes: Array
+    decay_per_m: Annotated[float, msgspec.Meta(gt=0, le=100)]
 
 
 class Coalition(Part, kw_only=True):

@@ -141,6 +141,8 @@ def _mind() -> list[Message]:
             motions=_ramp(4, 3, dtype="<f8"),
             cell_m=1.5,
             road_m=_ramp(3, 2, dtype="<f4"),
+            matches=[sensing.PlaceMatch(frame=2, view_ns=400_000_000, score=0.75)],
+            tiles=[_tile()],
         ),
         mind.Coalitions(cycle=6, coalitions=[coalition]),
         mind.Competition(cycle=6, contenders={"attention": 0.375, "road": 0.25}, trigger="aggregate"),
@@ -181,9 +183,24 @@ def _learned() -> sensing.Learned:
     )
 
 
+def _replay() -> mind.Replay:
+    return mind.Replay(
+        cycle=6,
+        replays=4,
+        closed=["closure:0"],
+        undone=["closure:1"],
+        stamps_ns=_ramp(3, dtype="<i8"),
+        positions_m=_ramp(3, 2, dtype="<f8"),
+        shifts_m=_ramp(3, 2, dtype="<f8"),
+        pairs=_ramp(1, 2, dtype="<i4"),
+        strength_changes=_ramp(1, dtype="<f8"),
+        decay_per_m=0.2,
+    )
+
+
 def samples() -> list[Message]:
     """A message of every type in the table of topics, every field of it other than its default."""
-    messages = [*_sensing(), *_mind(), *_process(), _learned()]
+    messages = [*_sensing(), *_mind(), *_process(), _learned(), _replay()]
     for seq, message in enumerate(messages):
         message.stamp_ns, message.seq, message.source = _STAMP_NS, seq, "sample"
     return messages

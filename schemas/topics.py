@@ -67,6 +67,7 @@ PROPOSAL = Topic("codelets/proposal", graph.Proposal, 0, _NEVER, max_bytes=16 * 
 DELTA = Topic("workspace/delta", graph.Delta, 0, _NEVER, max_bytes=64 * MIB)
 SNAPSHOT = Topic("workspace/snapshot", graph.Snapshot, 0, _REQUEST, max_bytes=512 * MIB)
 SNAPSHOT_REQUEST = Topic("workspace/snapshot_request", graph.SnapshotRequest, 0, _REQUEST)
+REPLAY = Topic("codelets/replay", mind.Replay, 0, _NEVER, max_bytes=16 * MIB)
 COALITIONS = Topic("codelets/coalitions", mind.Coalitions, 5, _NEVER)
 COMPETITION = Topic("global_workspace/competition", mind.Competition, 5, _NEVER)
 BROADCAST = Topic("global_workspace/broadcast", mind.Broadcast, 0, _NEVER)

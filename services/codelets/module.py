@@ -12,7 +12,10 @@ from schemas.graph import Operation, Proposal
 from schemas.mind import Coalitions, Task
 from services.codelets.attention import attend
 from services.codelets.localization import localize, locate_landmark
+from services.codelets.map_correction import correct_map
+from services.codelets.map_shift import shift_map
 from services.codelets.object_place import place_object, place_road
+from services.codelets.path import extend_path
 from services.codelets.settings import Config
 
 __all__ = ["Config", "Worker", "build"]
@@ -22,8 +25,10 @@ BUILDERS: dict[str, Callable[[Task, Config], list[Operation]]] = {
     "landmark": locate_landmark,
     "object_place": place_object,
     "road_place": place_road,
+    "path": extend_path,
+    "map_shift": shift_map,
 }
-ATTENTION = "attention"
+ATTENTION, MAP_CORRECTION = "attention", "map_correction"
 
 
 class Worker:
@@ -34,7 +39,7 @@ class Worker:
         self._instance = instance
 
     def work(self, task: Task) -> list[Message] | None:
-        """A proposal for a task, before it the coalitions for an attention task; a failure is said, not kept back."""
+        """A proposal for a task, before it what attention found or replay tells; a failure is said, not kept back."""
         if task.worker != self._instance:
             return None
         said: list[Message] = []
@@ -43,11 +48,14 @@ class Worker:
         try:
             if task.codelet == ATTENTION:
                 said.append(attend(task, self._config))
+            elif task.codelet == MAP_CORRECTION:
+                operations, replay = correct_map(task, self._config)
+                said += [] if replay is None else [replay]
             elif task.codelet in BUILDERS:
                 operations = BUILDERS[task.codelet](task, self._config)
             else:
-                failure = f"no codelet {task.codelet}: there are {', '.join(BUILDERS)}, {ATTENTION}"
-        except (MessageError, ValueError, IndexError, StopIteration) as error:
+                failure = f"no codelet {task.codelet}: there are {', '.join(BUILDERS)}, {MAP_CORRECTION}, {ATTENTION}"
+        except (MessageError, ValueError, IndexError, KeyError, StopIteration) as error:
             failure = f"{task.codelet}: {error or type(error).__name__}"
         if failure and task.codelet == ATTENTION:
             said.append(Coalitions(stamp_ns=task.stamp_ns, cycle=task.cycle, coalitions=[]))
@@ -66,4 +74,5 @@ class Worker:
 def build(config: Config, instance: str) -> Module:
     """The module `codelets`, one worker of it."""
     worker = Worker(config, instance)
-    return Module("codelets", instance).on(topics.TASK, worker.work, emits=[topics.PROPOSAL, topics.COALITIONS])
+    says = (topics.PROPOSAL, topics.COALITIONS, topics.REPLAY)
+    return Module("codelets", instance).on(topics.TASK, worker.work, emits=says)

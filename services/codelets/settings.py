@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 
@@ -15,6 +15,8 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
 
     `views_alike`: so many views of a landmark on end err alike and count for one, about 4 s of driving by. The
     paper takes each for independent (eq. 1); a landmark that is always seen a little too near then drags the agent.
+    `correct`: the map's positions only, as in the paper, or its headings too. `false_closure`: closures that would
+    be as wrong as they look with a smaller probability than this do not hold.
     """
 
     samples: Annotated[int, msgspec.Meta(ge=10, le=100_000)] = 800
@@ -27,3 +29,12 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     gate: Positive = 4.0
     misses: Annotated[int, msgspec.Meta(ge=1)] = 8
     attention_base_level: Share = 1.0
+    path_spacing_m: Positive = 1.0
+    path_variance_per_m: Positive = 0.01
+    heading_variance_per_m: Positive = 1e-4
+    heading_variance_per_rad: Positive = 2e-3
+    correct: Literal["positions", "heading"] = "positions"
+    place_match_sd_m: Positive = 2.0
+    place_match_sd_rad: Positive = 0.2
+    false_closure: Annotated[float, msgspec.Meta(gt=0, lt=1)] = 1e-3
+    synapse_decay_per_m: Positive = 0.2

@@ -8,6 +8,7 @@ from bus.module import Module
 from schemas import topics
 from schemas.base import Message
 from schemas.sensing import MotorCommand
+from services.sim.led import LedSimulation
 from services.sim.settings import Config, check
 from services.sim.simulation import Simulation
 
@@ -17,13 +18,15 @@ CATCH_UP_NS = 250_000_000
 PATIENCE_NS = 1_000_000_000
 TOWN_PERIOD_NS = 5_000_000_000
 _RATE_WINDOW_NS = 1_000_000_000
-_EMITS = (topics.CLOCK, topics.ODOMETRY, topics.STEREO, topics.TRUE_POSE, topics.TRUE_TOWN)
+_TELLS = (topics.CLOCK, topics.TRUE_POSE, topics.TRUE_TOWN)
+_EMITS = (*_TELLS, topics.ODOMETRY, topics.STEREO)
+_EMITS_LED = (*_TELLS, topics.SELF_MOTION, topics.SCAN, topics.PERCEPTS)
 
 
 class Lockstep:
     """Time goes on by one frame for each motor command that answers the last frame, until the route is complete."""
 
-    def __init__(self, simulation: Simulation) -> None:
+    def __init__(self, simulation: Simulation | LedSimulation) -> None:
         self._simulation = simulation
         self._asked_ns: int | None = None
 
@@ -40,9 +43,9 @@ class Lockstep:
 
     def _advance(self) -> list[Message]:
         simulation = self._simulation
-        said: list[Message] = [simulation.tick() for _ in range(simulation.ticks_per_frame)]
+        said = [message for _ in range(simulation.ticks_per_frame) for message in simulation.step()]
         self._asked_ns = simulation.now_ns
-        return [*said, simulation.clock(0.0), simulation.truth(), simulation.frame()]
+        return [*said, simulation.clock(0.0), simulation.truth(), *simulation.view()]
 
 
 class RealTime:
@@ -108,8 +111,12 @@ class RealTime:
 def build(config: Config, instance: str = "sim") -> Module:
     """The simulation module. Raises ConfigError where the rates do not divide one another."""
     check(config)
-    simulation = Simulation(config)
     awaits = config.awaits or {"sim": 1}
+    if config.way is not None:
+        led = Lockstep(LedSimulation(config.way, config.noise, config.percepts, config.frame_hz, config.seed))
+        module = Module("sim", instance).on(topics.MOTOR_COMMAND, led.command, _EMITS_LED)
+        return module.starts(led.start, awaits, _EMITS_LED)
+    simulation = Simulation(config)
     module = Module("sim", instance).journaling(topics.TRUE_POSE, simulation.resume, simulation.truth)
     if config.mode == "lockstep":
         lockstep = Lockstep(simulation)

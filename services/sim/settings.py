@@ -7,7 +7,9 @@ from typing import Annotated, Literal
 import msgspec
 
 from bus.errors import ConfigError
+from services.sim.led import Way
 from services.sim.odometry import Noise
+from services.sim.percepts import PerceptErrors
 from services.sim.world import STEP_S
 
 Rate = Annotated[int, msgspec.Meta(ge=1, le=240)]
@@ -18,7 +20,8 @@ Instances = Annotated[int, msgspec.Meta(ge=1, le=1000)]
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """`awaits` are the modules, and how many instances of each, that must be ready before time begins.
 
-    Without `egl` TinyRenderer draws the pictures even where EGL would.
+    Without `egl` TinyRenderer draws the pictures even where EGL would. With a `way` the robot is led along that, in
+    lockstep, and the simulation says percepts that err as `percepts` tells, in place of pictures and wheels.
     """
 
     seed: Annotated[int, msgspec.Meta(ge=0, le=2**32)] = 1
@@ -30,6 +33,8 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     egl: bool = True
     laps: Annotated[float, msgspec.Meta(gt=0, le=1000)] = 1.0
     noise: Noise = Noise()
+    percepts: PerceptErrors = PerceptErrors()
+    way: Way | None = None
     awaits: dict[str, Instances] = {}
 
 
@@ -39,5 +44,7 @@ def check(config: Config) -> None:
         raise ConfigError(
             f"[sim] frame_hz is {config.frame_hz}: choose one that divides odometry_hz, {config.odometry_hz}"
         )
+    if config.way is not None and config.mode != "lockstep":
+        raise ConfigError('[sim] a robot that is led along a way waits for its mind: set mode to "lockstep"')
     if round(1 / STEP_S) % config.odometry_hz:
         raise ConfigError(f"[sim] odometry_hz is {config.odometry_hz}: choose one that divides {round(1 / STEP_S)}")

@@ -64,6 +64,14 @@ class Simulation:
         odometry.stamp_ns = self.now_ns
         return odometry
 
+    def step(self) -> list[Message]:
+        """Let one tick pass, and say what the wheels report of it."""
+        return [self.tick()]
+
+    def view(self) -> list[Message]:
+        """What is sensed of the world now: the next stereo frame."""
+        return [self.frame()]
+
     def frame(self) -> StereoFrame:
         """The next stereo frame, as of now."""
         left, right = self.camera.shoot()

@@ -16,6 +16,9 @@ TOLD = 8
 TOLD_CHARACTERS = 200
 WRITABLE = (Node, Link, Links, DropLink, Cells, DropNode)
 SELF = "self"
+# The rows of the path and of its correction tell more than samples of a position do.
+COLUMNS_OF = {"path": (7,), "correction": (7,)}
+NUMBERS_OF = {"path": ("number",), "closure": ("from_ns", "to_ns")}
 POSE = ("x_m", "y_m", "heading_rad", "stamp_ns")
 
 
@@ -95,11 +98,13 @@ class Ledger:
                 raise MessageError(f"{name} is late: {node} has changed since version {proposal.base_version}")
             self._check_shape(name, operation)
             _check_self(name, operation)
+            _check_way(name, operation)
 
     def _check_shape(self, name: str, operation: Operation) -> None:
         if isinstance(operation, Node) and operation.samples is not None:
             shape = operation.samples.shape
-            if len(shape) != 2 or not 1 <= shape[0] <= MAX_SAMPLES or shape[1] not in {2, 3}:
+            columns = COLUMNS_OF.get(operation.kind, (2, 3))
+            if len(shape) != 2 or not 1 <= shape[0] <= MAX_SAMPLES or shape[1] not in columns:
                 raise MessageError(f"{name}: {operation.id} with samples of shape {shape}")
         if isinstance(operation, Node | DropNode) and place_cell(operation.id) is not None:
             raise MessageError(f"{name}: place nodes are written as cells")
@@ -137,3 +142,14 @@ def _check_self(name: str, operation: Operation) -> None:
         lacking = [key for key in POSE if type(operation.attributes.get(key)) not in {int, float}]
         if lacking or operation.samples is None or operation.samples.shape[1] != 3:
             raise MessageError(f"{name}: self without {', '.join(lacking) or 'samples of its pose'}")
+
+
+def _check_way(name: str, operation: Operation) -> None:
+    """Nodes of the agent's way have the rows and the numbers that the workspace itself reads."""
+    if not isinstance(operation, Node):
+        return
+    lacking = [key for key in NUMBERS_OF.get(operation.kind, ()) if type(operation.attributes.get(key)) is not int]
+    if operation.kind in COLUMNS_OF and operation.samples is None:
+        lacking.append("samples")
+    if lacking:
+        raise MessageError(f"{name}: {operation.id} without {', '.join(lacking)}")

@@ -14,10 +14,13 @@ from schemas.mind import Task
 from schemas.process import Clock, Presence
 from schemas.sensing import Percepts, SelfMotion
 from services.workspace.commit import Ledger
+from services.workspace.correction import Correction
 from services.workspace.decay import fade
 from services.workspace.dispatch import Dispatch
+from services.workspace.loops import correction_tasks
+from services.workspace.scene import SELF, Scene
 from services.workspace.settings import Config
-from services.workspace.triggers import PHASES, SELF, Scene, first_self, percept_operations, recognised, tasks_for
+from services.workspace.triggers import PHASES, first_self, percept_operations, recognised, tasks_for
 
 WORKERS = "codelets"
 
@@ -28,7 +31,8 @@ class Workspace:
     def __init__(self, config: Config) -> None:
         self._config = config
         self._ledger = Ledger(config.cell_m)
-        self._dispatch = Dispatch(int(config.lease_ms * 1e6), config.attempts)
+        self._correction = Correction(config)
+        self._dispatch = Dispatch(int(config.lease_ms * 1e6), config.attempts, self._correction.dispatch)
         self._motions: list[SelfMotion] = []
         self._waiting: Percepts | None = None
         self._scene: Scene | None = None
@@ -75,6 +79,8 @@ class Workspace:
         """
         if self._dispatch.answer(proposal):
             return self._go_on_if_complete([])
+        if self._correction.dispatch.answer(proposal):
+            return self._end() if self._scene is not None and self._phase == len(PHASES) else []
         if proposal.task_id not in self._late:
             return []
         del self._late[proposal.task_id]
@@ -88,7 +94,10 @@ class Workspace:
         """A worker came or went; the cycle goes on without a task that too many have been lost with."""
         if presence.module != WORKERS:
             return []
-        return self._go_on_if_complete(self._dispatch.presence(presence.instance, presence.alive, self._now_ns))
+        worker, alive = presence.instance, presence.alive
+        tasks = self._correction.dispatch.presence(worker, alive, self._now_ns)
+        tasks += self._dispatch.presence(worker, alive, self._now_ns)
+        return self._go_on_if_complete(tasks)
 
     def on_clock(self, clock: Clock) -> list[Message]:
         """In real time, take back what a lease has ended for, and end a cycle at its deadline.
@@ -96,11 +105,14 @@ class Workspace:
         The newest word holds: after a clock that ran far ahead, once, no later deadline would be kept.
         """
         self._now_ns = clock.stamp_ns
-        if self._config.mode == "lockstep" or self._scene is None:
+        if self._config.mode == "lockstep":
             return []
+        tasks = self._correction.dispatch.expire(self._now_ns)
+        if self._scene is None:
+            return [*tasks]
         if self._now_ns > self._scene.percepts.stamp_ns + self._config.deadline_ms * 1e6:
-            return self._end_at_deadline()
-        return self._go_on_if_complete(self._dispatch.expire(self._now_ns))
+            return [*tasks, *self._end_at_deadline()]
+        return self._go_on_if_complete(tasks + self._dispatch.expire(self._now_ns))
 
     @property
     def _moved_until_ns(self) -> int:
@@ -142,14 +154,22 @@ class Workspace:
         self._phase += 1
         if self._scene is None or self._phase == len(PHASES):
             return self._end()
-        tasks = tasks_for(PHASES[self._phase], self._scene, self._ledger.graph)
-        return [*self._dispatch.begin(tasks, self._now_ns)]
+        graph, now_ns = self._ledger.graph, self._now_ns
+        tasks = tasks_for(PHASES[self._phase], self._scene, graph, self._config.path_spacing_m)
+        sent: list[Message] = []
+        if PHASES[self._phase] == "objects" and not self._correction.runs:
+            loops = correction_tasks(self._scene, graph, self._config)
+            sent += self._correction.begin(loops, self._scene.cycle, now_ns)
+        sent += self._dispatch.begin(tasks, now_ns)
+        return sent if tasks else [*sent, *self._next_phase()]
 
     def _go_on_if_complete(self, tasks: list[Task]) -> list[Message]:
         """`tasks` to be sent, or the next phase where nothing is left to wait for in this one."""
         if self._scene is None or not self._dispatch.complete:
             return [*tasks]
-        return [*self._commit_answers(), *self._next_phase()]
+        if self._phase == len(PHASES):
+            return [*tasks, *self._end()]
+        return [*tasks, *self._commit_answers(), *self._next_phase()]
 
     def _commit_answers(self) -> list[Message]:
         for name in self._dispatch.failed:
@@ -166,7 +186,18 @@ class Workspace:
         return [*self._commit_answers(), *self._end()]
 
     def _end(self) -> list[Message]:
-        delta = self._commit("decay", fade(self._ledger.graph, self._config))
+        """Let activation fade and begin the next cycle, unless a correction of the map is to be waited for."""
+        if self._scene is None or self._correction.holds_up(self._scene.cycle):
+            return []
+        said: list[Message] = [*self._commit_correction(self._scene.cycle)]
+        said.append(self._commit("decay", fade(self._ledger.graph, self._config)))
         self._motions = [motion for motion in self._motions if motion.stamp_ns > self._moved_until_ns]
         self._scene = None
-        return [delta, *self._begin()]
+        return [*said, *self._begin()]
+
+    def _commit_correction(self, cycle: int) -> list[Delta]:
+        answers, failed = self._correction.collect(cycle)
+        for name in failed:
+            self._ledger.drop(f"task {name} was given to {self._config.attempts} workers and lost each time")
+        operations, tasks = self._ledger.judge(answers)
+        return [self._commit("correction", operations, tasks)] if operations else []

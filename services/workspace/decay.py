@@ -9,6 +9,9 @@ from schemas.array import Array
 from schemas.graph import Activations, Cells, DropNode, Operation
 from services.workspace.settings import Config
 
+# What the agent knows of itself and its way is not a matter of activation.
+LASTING = frozenset({"self", "path", "closure", "correction"})
+
 
 def fade(graph: Graph, config: Config) -> list[Operation]:
     """One tick of linear decay: results, not changes, so that they may be applied twice."""
@@ -16,7 +19,7 @@ def fade(graph: Graph, config: Config) -> list[Operation]:
     operations: list[Operation] = []
     for identifier in sorted(graph.nodes):
         node = graph.nodes[identifier]
-        if node.kind == "self":
+        if node.kind in LASTING:
             continue
         activation = max(0.0, node.activation - config.decay)
         base_level = max(0.0, node.base_level - config.base_level_decay)

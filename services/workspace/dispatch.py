@@ -26,17 +26,19 @@ class Lease:
 
 
 NOBODY = "nobody"
+BUSY = 1000
 
 
 class Dispatch:
     """Gives tasks to the least loaded worker, but not again to the one that lost it where there is another.
 
-    The same workers and tasks give the same choice.
+    The same workers and tasks give the same choice. Whoever is at a task of the dispatch `beside` counts as busy.
     """
 
-    def __init__(self, lease_ns: int, attempts: int) -> None:
+    def __init__(self, lease_ns: int, attempts: int, beside: Dispatch | None = None) -> None:
         self._lease_ns = lease_ns
         self._attempts = attempts
+        self._beside = beside
         self._workers: set[str] = set()
         self._leases: dict[str, Lease] = {}
 
@@ -93,8 +95,14 @@ class Dispatch:
                 lease.lost_by = lease.task.worker
                 lease.task = msgspec.structs.replace(lease.task, worker=NOBODY, attempt=lease.task.attempt + 1)
 
+    def _load(self) -> Counter[str]:
+        return Counter(lease.task.worker for lease in self._leases.values() if lease.proposal is None)
+
     def _assign(self, now_ns: int) -> list[Task]:
-        load: Counter[str] = Counter(lease.task.worker for lease in self._leases.values() if lease.proposal is None)
+        load = self._load()
+        if self._beside is not None:
+            # Who is at something long will be long.
+            load.update({worker: BUSY * tasks for worker, tasks in self._beside._load().items()})
         sent = []
         for lease in self._leases.values():
             waits = lease.proposal is None and lease.task.worker == NOBODY

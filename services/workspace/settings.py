@@ -14,6 +14,8 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     """Lockstep waits for every answer; real time commits what there is at the deadline, counted from the frame.
 
     A percept is an object of the map where its total activation is over `recognition_threshold`.
+    A place seen again after `revisit_s` closes a loop, at most one every `closure_spacing_s`. Map correction goes on
+    meanwhile: lockstep waits for it at the end of the `correction_cycles`th cycle.
     """
 
     mode: Literal["lockstep", "real_time"] = "real_time"
@@ -27,3 +29,8 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     base_level_decay: Share = 0.0005
     place_decay: Share = 0.02
     forget_below: Share = 0.05
+    path_spacing_m: Positive = 1.0
+    revisit_s: Positive = 20.0
+    closure_spacing_s: Positive = 2.0
+    correction_cycles: Annotated[int, msgspec.Meta(ge=1, le=1000)] = 3
+    correction_lease_ms: Positive = 5000.0

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import msgspec
 import numpy as np
 
@@ -11,20 +9,11 @@ from bus.graph import Graph, object_id
 from schemas.array import Array
 from schemas.graph import Links, Node, Operation
 from schemas.mind import Task
-from schemas.sensing import Percept, Percepts
-from services.workspace.dispatch import NOBODY
+from schemas.sensing import Percepts
+from services.workspace.loops import path_tasks, shift_tasks
+from services.workspace.scene import SELF, Scene, task_of
 
-SELF = "self"
-PHASES = ("localization", "objects", "attention")
-
-
-@dataclass(frozen=True)
-class Scene:
-    """What one cycle is about: a view's percepts and the self-motion since the self node was last moved."""
-
-    cycle: int
-    percepts: Percepts
-    motions: Array
+PHASES = ("shift", "localization", "objects", "attention")
 
 
 def first_self(samples: int) -> Node:
@@ -57,41 +46,24 @@ def percept_operations(graph: Graph, percepts: Percepts) -> list[Operation]:
     return [*nodes, Links(kind="instance", weights=weights)] if weights else nodes
 
 
-def tasks_for(phase: str, scene: Scene, graph: Graph) -> list[Task]:
+def tasks_for(phase: str, scene: Scene, graph: Graph, spacing_m: float) -> list[Task]:
     """The tasks of a phase, in the order in which their answers will be committed."""
     agent = graph.nodes[SELF]
     seen = {percept.label: percept for percept in scene.percepts.objects}
     known = [node for label in sorted(seen) if (node := graph.nodes.get(object_id(label))) is not None]
+    if phase == "shift":
+        return shift_tasks(scene, graph)
     if phase == "localization":
-        return [_task(scene, graph, "localization", [agent, *known], list(scene.percepts.objects))]
+        return [task_of(scene, graph, "localization", [agent, *known], list(scene.percepts.objects))]
     if phase == "attention":
         bare = [_bare(node) for node in (agent, *known)]
-        return [_task(scene, graph, "attention", bare, [])]
+        return [task_of(scene, graph, "attention", bare, [])]
     tasks = []
     for label in sorted(seen):
         node = graph.nodes.get(object_id(label))
         codelet, nodes = ("object_place", [agent]) if node is None else ("landmark", [agent, node])
-        tasks.append(_task(scene, graph, codelet, nodes, [seen[label]]))
-    return [*tasks, _task(scene, graph, "road_place", [agent], [])]
-
-
-def _task(scene: Scene, graph: Graph, codelet: str, nodes: list[Node], percepts: list[Percept]) -> Task:
-    subject = f"/{percepts[0].label}" if codelet in {"landmark", "object_place"} else ""
-    nothing = Array.of(np.zeros((0, 5)))
-    return Task(
-        stamp_ns=scene.percepts.stamp_ns,
-        task_id=f"{scene.cycle}/{codelet}{subject}",
-        codelet=codelet,
-        worker=NOBODY,
-        attempt=0,
-        cycle=scene.cycle,
-        base_version=graph.version,
-        cell_m=graph.cell_m,
-        nodes=nodes,
-        percepts=percepts,
-        motions=scene.motions if codelet == "localization" else nothing,
-        road_m=scene.percepts.road_m if codelet == "road_place" else Array.of(np.zeros((0, 2), np.float32)),
-    )
+        tasks.append(task_of(scene, graph, codelet, nodes, [seen[label]]))
+    return [*tasks, task_of(scene, graph, "road_place", [agent], []), *path_tasks(scene, graph, spacing_m)]
 
 
 def _bare(node: Node) -> Node:

@@ -39,7 +39,8 @@ def _check_that_all_is_the_same(left: Said, right: Said, but: frozenset[str] = f
 def test_a_drive_says_something_on_every_topic_of_the_model_and_of_the_truth(first: Said) -> None:
     spoken = {topic.name for topic in topics.ALL if topic.delivery is not Delivery.ON_REQUEST}
     processes = {topic.name for topic in topics.ALL if topic.about is About.PROCESS}
-    assert set(first) == spoken - processes
+    # No loop closes on so short a way.
+    assert set(first) == spoken - processes - {topics.REPLAY.name}
     assert len(first[topics.MOTOR_COMMAND.name]) == FRAMES
 
 

@@ -11,6 +11,7 @@ from schemas.array import Array
 from schemas.base import Message
 from schemas.graph import Cells, Link, Node, Proposal
 from schemas.mind import Coalitions, Task
+from schemas.sensing import PlaceMatch
 from services.codelets.attention import NOVEL_SIGHTINGS, attend, coalition_activation
 from services.codelets.module import BUILDERS, Config, build
 from services.codelets.object_place import ROAD_REACH_M, place_object, place_road
@@ -28,6 +29,19 @@ def _object(label: str = "house", sightings: int = 1) -> Node:
     return node(f"object:{label}", samples, label=label, sightings=sightings)
 
 
+def _path() -> Node:
+    rows = np.zeros((20, 7))
+    rows[:, 0] = rows[:, 1] = rows[:, 4] = np.arange(20)
+    return node("path:0", rows, "path", number=0)
+
+
+def _correction() -> Node:
+    rows = np.zeros((20, 7))
+    rows[:, 0] = rows[:, 1] = rows[:, 4] = np.arange(20)
+    rows[:, 5] = np.arange(20) * 0.1
+    return node("correction", rows, "correction")
+
+
 def _every_task() -> list[Task]:
     motions = Array.of(np.array([[2.0, 0.0, 1.0, 0.2, 0.05]]))
     road_m = Array.of(np.array([[2.0, 0.0], [3.0, 1.0]], np.float32))
@@ -36,6 +50,9 @@ def _every_task() -> list[Task]:
         task("landmark", _self(), _object(), percepts=[percept("house")]),
         task("object_place", _self(sd=0.1), percepts=[percept("house")]),
         task("road_place", _self(), road_m=road_m),
+        task("path", _self(), _path()),
+        task("map_shift", _self(), _path(), _object(), _correction()),
+        task("map_correction", _self(), _path(), matches=[PlaceMatch(frame=0, view_ns=0, score=0.9)]),
         task("attention", _self(), _object()),
     ]
 
@@ -50,7 +67,7 @@ def _proposal(said: list[Message]) -> Proposal:
 
 
 def test_every_codelet_is_tried_here() -> None:
-    assert [asked.codelet for asked in _every_task()] == [*BUILDERS, "attention"]
+    assert [asked.codelet for asked in _every_task()] == [*BUILDERS, "map_correction", "attention"]
 
 
 @pytest.mark.parametrize("asked", _every_task(), ids=lambda asked: asked.codelet)
@@ -77,7 +94,7 @@ def test_an_answer_names_its_task_its_worker_and_the_version_that_it_is_based_on
 
 
 def test_a_task_for_another_worker_is_ignored() -> None:
-    assert [_said(asked, "v") for asked in _every_task()] == [[]] * 5
+    assert [_said(asked, "v") for asked in _every_task()] == [[]] * len(_every_task())
 
 
 def test_a_codelet_that_there_is_not_is_said_to_be_missing_with_those_there_are() -> None:

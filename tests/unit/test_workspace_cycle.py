@@ -49,14 +49,16 @@ def test_a_phase_begins_when_every_task_of_the_one_before_is_answered() -> None:
     desk.see(0, percept("a"), percept("b"))
     (localization,) = desk.take()
     desk.feed(answer(localization))
-    first, second, road = desk.take()
-    assert [asked.task_id for asked in (first, second, road)] == [
+    first, second, road, path = desk.take()
+    assert [asked.task_id for asked in (first, second, road, path)] == [
         "1/object_place/a",
         "1/object_place/b",
         "1/road_place",
+        "1/path",
     ]
     desk.feed(answer(second))
     desk.feed(answer(road))
+    desk.feed(answer(path))
     assert desk.take() == []
     desk.feed(answer(first))
     assert [asked.codelet for asked in desk.take()] == ["attention"]
@@ -81,7 +83,7 @@ def test_deltas_are_numbered_without_a_gap() -> None:
 
 def test_answers_are_committed_in_the_order_of_the_tasks_whatever_the_order_they_come_in() -> None:
     said = []
-    for order in ((0, 1, 2), (2, 0, 1)):
+    for order in ((0, 1, 2, 3), (2, 0, 3, 1)):
         desk = Desk("w1")
         desk.see(0, percept("a"), percept("b"))
         desk.feed(answer(desk.take()[0]))

@@ -39,6 +39,14 @@ def test_activation_never_falls_below_zero() -> None:
     assert graph.nodes["a"].activation == 0.0
 
 
+@pytest.mark.parametrize("kind", ["path", "closure", "correction"])
+def test_what_the_agent_knows_of_its_way_does_not_fade(kind: str) -> None:
+    graph = _graph(node("a", kind=kind))
+    for _ in range(30):
+        _tick(graph)
+    assert "a" in graph.nodes
+
+
 def test_the_self_node_does_not_fade() -> None:
     graph = _graph(_node("self", 1.0, 1.0, "self"))
     _tick(graph, 100)
@@ -101,14 +109,14 @@ def test_an_object_that_is_no_longer_seen_stays_on_the_map_and_its_percept_goes(
     desk = Desk("w1")
     desk.drive(range(3), percept("a"))
     desk.drive(range(3, 15))
-    assert {"self", "object:a"} == set(desk.graph.nodes)
+    assert {"self", "path:0", "object:a"} == set(desk.graph.nodes)
 
 
 def test_a_replica_fades_as_the_workspace_does() -> None:
     desk = Desk("w1", decay=0.3, base_level_decay=0.1)
     desk.drive(range(2), percept("a"), percept("b", 0.7))
     desk.drive(range(2, 12))
-    assert set(desk.graph.nodes) == {"self"}
+    assert set(desk.graph.nodes) == {"self", "path:0"}
     assert desk.graph.digest() == desk.digest
 
 

@@ -1,0 +1,1 @@
+"""`cogmap experiment`: the paper's experiments, and the figures that come of them."""

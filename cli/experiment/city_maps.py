@@ -1,0 +1,95 @@
+"""`cogmap experiment city-maps`: experiment 2 of the paper."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+from typing import Any
+
+import click
+
+from bus.errors import UsageError
+from cli.experiment import outcome
+from cli.experiment.options import json_option, out_option, processes_option, seed_option
+from cli.log.progress import bar
+from experiments.city_maps.environment import Environment, environments
+from experiments.city_maps.figures import figures
+from experiments.city_maps.measure import NOISE, TRAVERSALS, Effort, measure
+from experiments.city_maps.noise import Noise
+from experiments.city_maps.sources import folder, from_osm, grown
+
+NAME = "city-maps"
+MAPS = 8
+_EPILOG = """\b
+Examples:
+  cogmap experiment city-maps --json city.json        cities grown from a seed
+  cogmap experiment city-maps --osm monaco.osm.xz --maps 4
+  cogmap experiment city-maps --all extracts          every extract in a folder
+"""
+
+
+@click.command(name=NAME, epilog=_EPILOG)
+@click.option(
+    "--osm", type=click.Path(path_type=Path), metavar="FILE", help="Streets and buildings of an OpenStreetMap extract."
+)
+@click.option(
+    "--all",
+    "all_in",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Every extract (.osm, packed or not) and street graph (.jsonl, packed or not) in a folder.",
+)
+@click.option(
+    "--maps",
+    type=click.IntRange(1, 1000),
+    help=f"So many maps of eight buildings.  [default: {MAPS} from a seed or --osm, one a city with --all]",
+)
+@click.option("--traversals", type=click.IntRange(1, 1000), default=TRAVERSALS, show_default=True, help="Of each map.")
+@click.option(
+    "--noise",
+    nargs=3,
+    type=click.FloatRange(0, 1),
+    default=(NOISE.speed, NOISE.turn, NOISE.drift_rad_per_sqrt_m),
+    show_default=True,
+    metavar="SPEED TURN DRIFT",
+    help="Of self-motion: shares of speed and of turn, and radians of drift after a metre.",
+)
+@seed_option
+@processes_option
+@out_option
+@json_option
+def city_maps(
+    osm: Path | None,
+    all_in: Path | None,
+    maps: int | None,
+    traversals: int,
+    noise: tuple[float, float, float],
+    seed: int,
+    processes: int,
+    out: Path | None,
+    json_path: Path | None,
+) -> None:
+    """Experiment 2, figure 8: the maps that an agent learns of cities, with their loops closed and not.
+
+    Eight buildings in at most 4 km², the shortest tour past all of them along the streets, driven anew so often by an
+    agent that knows nothing, from any of the buildings. Percepts are not drawn: they err as perception was measured to.
+    """
+    where = outcome.folder_for(NAME, out)
+    places = _places(osm, all_in, maps, seed)
+    asked = Noise(*noise)
+    with bar("traversals") as progress:
+        found = measure(places, asked, Effort(traversals, seed, processes, progress))
+    said = figures(found, asked)
+    outcome.say(NAME, said)
+    draw: Any = importlib.import_module("cli.experiment.city_figure")  # other commands have no use for matplotlib
+    outcome.save(where, NAME, draw.figure(found, said), said, seed, json_path)
+
+
+def _places(osm: Path | None, all_in: Path | None, maps: int | None, seed: int) -> list[Environment]:
+    if osm is not None and all_in is not None:
+        raise UsageError("--osm and --all: give one of them")
+    if osm is not None:
+        return environments(from_osm(osm), maps or MAPS, seed)
+    if all_in is not None:
+        return [each for city in folder(all_in, seed) for each in environments(city, maps or 1, seed)]
+    return [environments(grown(seed * 1000 + number), 1, seed)[0] for number in range(maps or MAPS)]

@@ -1,0 +1,23 @@
+"""`cogmap experiment`."""
+
+from __future__ import annotations
+
+import click
+
+from cli.experiment.city_maps import city_maps
+from cli.experiment.cue_integration import cue_integration
+from cli.experiment.loop_closing import loop_closing
+
+_EPILOG = """\b
+Each leaves a folder with its figure as PNG and PDF, and a JSON file of every figure printed, the seed and the command.
+"""
+
+
+@click.group(epilog=_EPILOG)
+def experiment() -> None:
+    """Run the paper's experiments, through the same modules that drive the town."""
+
+
+experiment.add_command(city_maps)
+experiment.add_command(cue_integration)
+experiment.add_command(loop_closing)

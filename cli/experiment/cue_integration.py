@@ -1,0 +1,80 @@
+"""`cogmap experiment cue-integration`: experiment 1 of the paper."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+from typing import Any
+
+import click
+
+from cli.experiment import live, outcome
+from cli.experiment.options import json_option, out_option, processes_option, seed_option
+from cli.log.progress import bar
+from experiments.cue_integration import mind
+from experiments.cue_integration.run import FIT_TRIALS, FITTED, Effort, Session, fitted, measure
+from experiments.cue_integration.trial import Condition, Noise, Trial
+
+NAME = "cue-integration"
+_EPILOG = """\b
+Examples:
+  cogmap experiment cue-integration --json cue.json
+  cogmap experiment cue-integration --fit             fit the noise of self-motion anew
+  cogmap experiment cue-integration --distance-noise 0.1   landmarks that are about as good as self-motion
+"""
+
+
+@click.command(name=NAME, epilog=_EPILOG)
+@click.option(
+    "--trials", type=click.IntRange(8, 100_000), default=200, show_default=True, help="So many of each condition."
+)
+@click.option(
+    "--distance-noise",
+    type=click.FloatRange(0.001, 0.5),
+    default=FITTED.distance,
+    show_default=True,
+    help="Of distances to landmarks, and of directions in rad.",
+)
+@click.option("--fit", is_flag=True, help="Fit the noise of self-motion first; else take what a fit gave.")
+@click.option("--live", "goes_live", is_flag=True, help="Run one trial through real processes too, and compare bytes.")
+@seed_option
+@processes_option
+@out_option
+@json_option
+def cue_integration(
+    trials: int,
+    distance_noise: float,
+    fit: bool,
+    goes_live: bool,
+    seed: int,
+    processes: int,
+    out: Path | None,
+    json_path: Path | None,
+) -> None:
+    """Experiment 1, figure 7: a post is carried back to its place in the dark, by self-motion, landmarks, or both.
+
+    In Nardini's room, with four conditions: self-motion alone, landmarks alone after disorientation, both, and both in
+    conflict, landmarks turned by 15°. The published figures beside ours are a simulation's, not people's.
+    """
+    folder = outcome.folder_for(NAME, out)
+    noise = Noise(FITTED.speed, FITTED.turn, distance_noise)
+    if fit:
+        with bar("fitting the noise") as progress:
+            noise = fitted(distance_noise, Effort(FIT_TRIALS, seed, processes, progress))
+    with bar("trials") as progress:
+        found = measure(noise, Effort(trials, seed, processes, progress))
+    figures = found.figures()
+    if goes_live:
+        figures["live_same"] = float(_same_live(Trial(Condition.CONFLICT, 0, noise, seed)))
+    outcome.say(NAME, figures)
+    draw: Any = importlib.import_module("cli.experiment.cue_figure")  # other commands have no use for matplotlib
+    outcome.save(folder, NAME, draw.figure(found), figures, seed, json_path)
+
+
+def _same_live(trial: Trial) -> bool:
+    """Whether `trial` says the same bytes on every topic, and gets the same response, through real processes."""
+    inside, outside = Session(trial), Session(trial)
+    response = inside.run()
+    minds = [("workspace", "workspace"), ("codelets", mind.WORKER)]
+    live.run(mind.SECTIONS, minds, outside.bodies(), lambda: outside.heard.has_as_many_as(inside.heard))
+    return outside.room.response == response and outside.heard.messages == inside.heard.messages

@@ -1,0 +1,60 @@
+"""The figures of the experiment as one flat object."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from experiments.city_maps import published
+from experiments.city_maps.correction import METHODS
+from experiments.city_maps.drive import SENSING
+from experiments.city_maps.measure import CityMap
+from experiments.city_maps.noise import Noise
+
+NAMES = {"none": "uncorrected", "positions": "positions", "heading": "corrected"}
+
+
+def figures(maps: Sequence[CityMap], noise: Noise) -> dict[str, float | str]:
+    """Every figure that is printed or drawn.
+
+    `error_corrected_over_uncorrected` is the mean over the maps of each one's ratio of mean errors. Corrected is with
+    headings, beyond the paper; `positions` is the paper's own rule.
+    """
+    errors = {NAMES[method]: np.array([each.error_km2(method) for each in maps]) for method in METHODS}
+    ratios = {name: errors[name] / errors["uncorrected"] for name in ("corrected", "positions")}
+    found: dict[str, float | str] = {
+        f"error_{name}_over_uncorrected": float(ratio.mean()) for name, ratio in ratios.items()
+    }
+    for name, values in errors.items():
+        found[f"error_{name}_km2"] = float(values.mean())
+        found[f"error_{name}_sd_km2"] = float(values.std())
+        found[f"growth_{name}_km2_per_km"] = growth(maps, values)
+    found |= {
+        "maps": float(len(maps)),
+        "traversals": float(len(maps[0].learned)),
+        "buildings_missing": float(sum(one.missing for each in maps for one in each.learned)),
+        "noise_speed": noise.speed,
+        "noise_turn": noise.turn,
+        "noise_drift_rad_per_sqrt_m": noise.drift_rad_per_sqrt_m,
+        "published_human_mean_km2": published.HUMAN_MEAN_KM2,
+        "published_human_sd_km2": published.HUMAN_SD_KM2,
+        "published_model_mean_km2": published.MODEL_MEAN_KM2,
+        "published_model_sd_km2": published.MODEL_SD_KM2,
+        "sensing": SENSING,
+    }
+    for number, each in enumerate(maps, start=1):
+        found |= {
+            f"map_{number:02d}_name": each.environment.name,
+            f"map_{number:02d}_area_km2": each.environment.area_km2,
+            f"map_{number:02d}_tour_km": each.environment.tour_m / 1e3,
+        }
+        found |= {f"map_{number:02d}_error_{name}_km2": float(values[number - 1]) for name, values in errors.items()}
+    return found
+
+
+def growth(maps: Sequence[CityMap], errors_km2: np.ndarray[tuple[int], np.dtype[np.float64]]) -> float:
+    """By how many km^2 the error grows for a kilometre of tour: a straight line's slope, 0 for a single map."""
+    length = np.array([each.environment.tour_m / 1e3 for each in maps])
+    off = length - length.mean()
+    return float(off @ errors_km2 / (off @ off)) if off @ off > 0 else 0.0

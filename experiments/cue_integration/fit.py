@@ -1,0 +1,31 @@
+"""The noise of self-motion, fitted by coordinate descent (paper §6.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from experiments.cue_integration.trial import Noise
+
+# Many pairs fit as well as one another; small steps from the same start keep either from running ahead.
+FACTORS = (1.2, 1.1)
+Cost = Callable[[Noise], float]
+
+
+def coordinate_descent(cost: Cost, noise: Noise, factors: tuple[float, ...] = FACTORS) -> Noise:
+    """The noise that no step up or down in speed or in turn alone betters, steps growing finer by `factors`.
+
+    `cost` must be the same for the same noise.
+    """
+    lowest = cost(noise)
+    for factor in factors:
+        improved = True
+        while improved:
+            improved = False
+            for name in ("speed", "turn"):
+                for step in (factor, 1 / factor):
+                    tried = replace(noise, **{name: getattr(noise, name) * step})
+                    if (found := cost(tried)) < lowest:
+                        noise, lowest, improved = tried, found, True
+                        break
+    return noise

@@ -1,0 +1,79 @@
+"""Nardini's room, in metres: where the landmarks and posts are, and how a walker steps from one to the other.
+
+The positions are those published with Kessler et al. (2024) for the experiment of Nardini et al. (2008).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Point = tuple[float, float]
+Points = npt.NDArray[np.float64]
+
+START: Point = (2.5, 0.0)
+START_HEADING_RAD = math.pi / 2
+LANDMARKS: tuple[Point, ...] = ((2.5, 7.0), (4.324, 4.824), (0.676, 4.824))
+POSTS: tuple[Point, ...] = (
+    (3.453, 4.468),
+    (1.547, 4.468),
+    (2.834, 4.718),
+    (2.166, 4.718),
+    (3.213, 4.099),
+    (1.787, 4.099),
+    (2.750, 4.286),
+    (2.250, 4.286),
+    (2.5, 3.0),
+)
+ROUTES: tuple[tuple[int, int, int], ...] = (
+    (0, 5, 8),
+    (0, 7, 8),
+    (1, 4, 8),
+    (1, 6, 8),
+    (2, 5, 8),
+    (2, 7, 8),
+    (3, 4, 8),
+    (3, 6, 8),
+)
+CONFLICT_RAD = math.radians(15)
+
+STEP_M, STEP_RAD = 0.5, math.radians(60)
+WHILE_TURNING_M = 0.1
+REACH_M = 0.3
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where somebody stands and faces; heading counter-clockwise from x."""
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+
+    def after(self, turn_rad: float, forward_m: float) -> Pose:
+        """Turned on the spot, then walked straight on."""
+        heading_rad = self.heading_rad + turn_rad
+        x_m, y_m = self.x_m + forward_m * math.cos(heading_rad), self.y_m + forward_m * math.sin(heading_rad)
+        return Pose(x_m, y_m, heading_rad)
+
+    def towards(self, goal: Point) -> tuple[float, float]:
+        """Bearing, left positive, and distance of `goal`."""
+        dx_m, dy_m = goal[0] - self.x_m, goal[1] - self.y_m
+        return math.remainder(math.atan2(dy_m, dx_m) - self.heading_rad, math.tau), math.hypot(dx_m, dy_m)
+
+
+def step(bearing_rad: float, distance_m: float) -> tuple[float, float]:
+    """The next movement, until a goal is within reach: a turn, and a way forward, short while it is not yet ahead."""
+    turn_rad = max(-STEP_RAD, min(STEP_RAD, bearing_rad))
+    longest_m = STEP_M if turn_rad == bearing_rad else WHILE_TURNING_M
+    return turn_rad, max(0.0, min(distance_m - REACH_M, longest_m))
+
+
+def turned(points: tuple[Point, ...], angle_rad: float, about: Point = POSTS[8]) -> tuple[Point, ...]:
+    """`points` turned counter-clockwise about another; by 15° about post 8, the targets move 0.457 m."""
+    cos, sin = math.cos(angle_rad), math.sin(angle_rad)
+    off = [(x_m - about[0], y_m - about[1]) for x_m, y_m in points]
+    return tuple((about[0] + cos * x_m - sin * y_m, about[1] + sin * x_m + cos * y_m) for x_m, y_m in off)

@@ -1,0 +1,85 @@
+"""The participant's will as a module: it goes where the map in its workspace says that the first post stood."""
+
+from __future__ import annotations
+
+from bus.errors import MessageError
+from bus.graph import Graph, object_id
+from bus.module import Module
+from experiments.cue_integration.geometry import REACH_M, Point, Pose, step
+from experiments.cue_integration.room import FOLLOW, STOP, WAIT, WALK
+from schemas import topics
+from schemas.base import Scalar
+from schemas.graph import Delta, Node
+from schemas.mind import Action
+
+POSTS_CARRIED = 3
+NEAR_M = 0.1
+MOST_MOVEMENTS = 24
+LOST_RAD = 0.8
+LOOK_M, MOST_LOOKS = 0.25, 3
+
+
+class Participant:
+    """Follows until three posts are picked up, waits once, then walks to where it believes the first was, and puts it
+    there as soon as that is within reach.
+
+    It knows what is in the workspace and nothing else. While it does not know where it faces it takes a short step
+    and looks.
+    """
+
+    def __init__(self) -> None:
+        self._graph = Graph()
+        self._carried: dict[str, Point] = {}
+        self._movements = 0
+        self._looks = 0
+        self._has_waited = self._has_stopped = False
+
+    def on_delta(self, delta: Delta) -> Action | None:
+        """An action for each cycle that has ended. Raises MessageError where a delta is missing."""
+        if not self._graph.apply(delta):
+            raise MessageError(f"delta {delta.version} after version {self._graph.version}: a commit is missing")
+        if delta.phase != "decay" or self._has_stopped:
+            return None
+        pose = self._pose()
+        for name, node in sorted(self._graph.nodes.items()):
+            if name.startswith("percept:post-"):
+                self._pick_up(str(node.attributes["label"]), node, pose)
+        scheme, parameters = self._choose(pose)
+        return Action(stamp_ns=delta.stamp_ns, cycle=delta.cycle, scheme=scheme, activation=1.0, parameters=parameters)
+
+    def _pose(self) -> Pose:
+        own = self._graph.nodes["self"].attributes
+        return Pose(float(own["x_m"]), float(own["y_m"]), float(own["heading_rad"]))
+
+    def _pick_up(self, label: str, post: Node, pose: Pose) -> None:
+        """Carry a post from now on, and keep in mind where it was, for the map may not have it."""
+        there = pose.after(float(post.attributes["bearing_rad"]), float(post.attributes["range_m"]))
+        self._carried.setdefault(label, (there.x_m, there.y_m))
+
+    def _choose(self, pose: Pose) -> tuple[str, dict[str, Scalar]]:
+        if len(self._carried) < POSTS_CARRIED:
+            return FOLLOW, {}
+        if not self._has_waited:
+            self._has_waited = True
+            return WAIT, {}
+        label, in_mind = next(iter(self._carried.items()))
+        node = self._graph.nodes.get(object_id(label))
+        on_map = in_mind if node is None else (float(node.attributes["x_m"]), float(node.attributes["y_m"]))
+        return self._go_back(pose, on_map)
+
+    def _go_back(self, pose: Pose, goal: Point) -> tuple[str, dict[str, Scalar]]:
+        bearing_rad, distance_m = pose.towards(goal)
+        heading_sd_rad = float(self._graph.nodes["self"].attributes["heading_sd_rad"])
+        is_lost = heading_sd_rad > LOST_RAD and self._looks < MOST_LOOKS
+        if self._movements == MOST_MOVEMENTS or (distance_m < REACH_M + NEAR_M and not is_lost):
+            self._has_stopped = True
+            return STOP, {"turn_rad": bearing_rad, "forward_m": distance_m}
+        self._movements += 1
+        self._looks += is_lost
+        turn_rad, forward_m = (0.0, LOOK_M) if is_lost else step(bearing_rad, distance_m)
+        return WALK, {"turn_rad": turn_rad, "forward_m": forward_m}
+
+
+def build() -> Module:
+    """The module `participant`."""
+    return Module("participant").on(topics.DELTA, Participant().on_delta, emits=[topics.ACTION])

@@ -1,0 +1,153 @@
+"""Trials on the in-memory bus, one or very many."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+
+from bus.errors import CogmapError
+from bus.house import House
+from bus.module import Module
+from experiments.cue_integration import analysis, mind, participant, published, room
+from experiments.cue_integration.analysis import Gaussian
+from experiments.cue_integration.fit import coordinate_descent
+from experiments.cue_integration.geometry import Points
+from experiments.cue_integration.trial import Condition, Noise, Response, Trial
+from experiments.heard import Heard
+from experiments.parallel import Progress, each
+from schemas import topics
+
+# What `fitted` gives with the seed and effort that the command has by default, rounded.
+FITTED = Noise(speed=0.3, turn=0.173)
+SAID = (topics.SELF_MOTION, topics.PERCEPTS, topics.TASK, topics.PROPOSAL, topics.DELTA, topics.ACTION)
+FIT_TRIALS = 64
+
+
+@dataclass
+class Session:
+    """One trial to be run: the world, the participant's will, and who listens to what all say."""
+
+    trial: Trial
+
+    def __post_init__(self) -> None:
+        self.room = room.Room(self.trial)
+        self.heard = Heard(SAID)
+
+    def bodies(self) -> list[Module]:
+        """All that is not the mind. The room is the last, for it begins."""
+        return [self.heard.module(), participant.build(), room.build(self.room)]
+
+    def run(self) -> Response:
+        """Run it on the in-memory bus. Raises CogmapError where no response comes."""
+        house = House([*mind.modules(self.trial.number), *self.bodies()])
+        house.run()
+        house.close()
+        if self.room.response is None:
+            raise CogmapError(f"no response in {self.trial}")
+        return self.room.response
+
+
+def respond(trial: Trial) -> Response:
+    """Run `trial` on the in-memory bus, from the start to the participant's answer."""
+    return Session(trial).run()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Errors (n, 2) of every condition, along and inward, and what they say."""
+
+    noise: Noise
+    errors_m: dict[Condition, Points]
+    shift_m: float
+
+    def sd_m(self, condition: Condition) -> float:
+        """The standard deviation of a condition's responses."""
+        return analysis.sd_m(self.errors_m[condition])
+
+    @property
+    def optimal_sd_m(self) -> float:
+        """That of both cues, were they combined optimally."""
+        return analysis.optimal_sd_m(self.sd_m(Condition.SELF_MOTION), self.sd_m(Condition.LANDMARKS))
+
+    def figures(self) -> dict[str, float]:
+        """Every figure, flat; lengths in metres."""
+        figures: dict[str, float] = {}
+        for condition, errors_m in self.errors_m.items():
+            name = condition.value
+            figures[f"sd_{name}_m"] = self.sd_m(condition)
+            figures[f"rmse_{name}_m"] = analysis.rmse_m(errors_m)
+            figures[f"published_simulation_sd_{name}_m"] = published.SD_M[condition]
+            figures[f"published_simulation_rmse_{name}_m"] = published.RMSE_M[condition]
+        figures["sd_optimal_m"] = self.optimal_sd_m
+        figures["sd_both_over_optimal"] = figures["sd_both_m"] / self.optimal_sd_m
+        figures |= self._conflict()
+        return figures | {
+            "sigma_v": self.noise.speed,
+            "sigma_w": self.noise.turn,
+            "distance_noise": self.noise.distance,
+            "trials_a_condition": float(len(self.errors_m[Condition.BOTH])),
+        }
+
+    def _conflict(self) -> dict[str, float]:
+        """How likely the conflict's responses are where cues are integrated, and where they alternate.
+
+        Both predictions follow from the conditions with one cue, with nothing left to fit; the best alternation has
+        the share of landmarks that suits it most.
+        """
+        conflict_m = self.errors_m[Condition.CONFLICT]
+        own = Gaussian.of(self.errors_m[Condition.SELF_MOTION])
+        seen = Gaussian.of(analysis.turned_errors(self.errors_m[Condition.LANDMARKS], self.shift_m))
+        weight = analysis.landmark_weight(self.sd_m(Condition.SELF_MOTION), self.sd_m(Condition.LANDMARKS))
+        integrated = float(analysis.combined(own, seen).log_density(conflict_m).sum())
+        alternated = analysis.alternation_log_likelihood(conflict_m, own, seen, weight)
+        best = analysis.best_alternation_log_likelihood(conflict_m, own, seen)
+        return {
+            "landmark_weight": weight,
+            "conflict_shift_m": self.shift_m,
+            "conflict_followed_m": float(conflict_m[:, 0].mean()),
+            "integration_log_likelihood": integrated,
+            "alternation_log_likelihood": alternated,
+            "integration_over_alternation": integrated - alternated,
+            "integration_over_best_alternation": integrated - best,
+        }
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How many trials of each condition, with what seed, on how many processes, and who is told of the progress."""
+
+    trials: int
+    seed: int
+    processes: int
+    progress: Progress = lambda share: None
+
+
+def measure(noise: Noise, effort: Effort, conditions: Sequence[Condition] = tuple(Condition)) -> Outcome:
+    """Trials of each condition. The same whatever the number of processes."""
+    trials = effort.trials
+    jobs = [Trial(condition, number, noise, effort.seed) for condition in conditions for number in range(trials)]
+    responses = each(respond, jobs, effort.processes, effort.progress)
+    errors_m = {}
+    for place, condition in enumerate(conditions):
+        mine = slice(place * trials, (place + 1) * trials)
+        errors_m[condition] = analysis.errors(jobs[mine], responses[mine])
+    return Outcome(noise, errors_m, analysis.shift_m(jobs))
+
+
+def fitted(distance: float, effort: Effort) -> Noise:
+    """Speed and turn noise that bring self-motion's SD and RMSE nearest to those published, by coordinate descent.
+
+    Only self-motion's: with distances at 3 %, no noise of self-motion makes landmarks as poor a cue as in the
+    published simulation, and a fit to all would make up for that with noise that it does not have. The other conditions
+    are predictions then. The trials are others than those that `measure` runs with the same seed.
+    """
+    effort, own = replace(effort, seed=effort.seed + 1), Condition.SELF_MOTION
+
+    @cache
+    def cost(noise: Noise) -> float:
+        errors_m = measure(noise, effort, (own,)).errors_m[own]
+        sd_off_m = analysis.sd_m(errors_m) - published.SD_M[own]
+        return sd_off_m**2 + (analysis.rmse_m(errors_m) - published.RMSE_M[own]) ** 2
+
+    return coordinate_descent(cost, Noise(speed=0.1, turn=0.1, distance=distance))

@@ -1,0 +1,59 @@
+"""What the participant's senses make of a movement and of the landmarks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from experiments.cue_integration.geometry import STEP_M, STEP_RAD, Point, Pose
+from experiments.cue_integration.trial import Noise
+from schemas.sensing import Percept
+
+Rows = list[tuple[float, float, float, float, float]]
+HALF_S = 0.25
+STANDING: Rows = [(0.0, 0.0, HALF_S, 0.0, 0.0)]
+# Turned round and round until any heading is as likely as any other.
+DISORIENTED: Rows = [(0.0, 0.0, HALF_S, 0.0, 2 * np.pi / HALF_S)]
+# A turn and a step forward of whatever length, the same whatever was done.
+UNKNOWN: Rows = [
+    (0.0, 0.0, HALF_S, 0.0, STEP_RAD / HALF_S),
+    (STEP_M / 2 / HALF_S, 0.0, HALF_S, STEP_M / 2 / HALF_S, 0.0),
+]
+
+
+def self_motion(turn_rad: float, forward_m: float, noise: Noise, rng: np.random.Generator) -> Rows:
+    """A turn on the spot, then a way straight on, as rows of SelfMotion: multiplied by Gaussians of mean one (§5.4)."""
+    turn_rate = turn_rad / HALF_S * float(rng.normal(1.0, noise.turn))
+    speed = forward_m / HALF_S * float(rng.normal(1.0, noise.speed))
+    return [
+        (0.0, turn_rate, HALF_S, 0.0, noise.turn * abs(turn_rate)),
+        (speed, 0.0, HALF_S, noise.speed * abs(speed), 0.0),
+    ]
+
+
+def sightings(pose: Pose, things: Mapping[str, Point], noise: Noise, rng: np.random.Generator) -> list[Percept]:
+    """All things, by label, wherever the participant faces: it looks around."""
+    seen = []
+    for label, where in things.items():
+        bearing_rad, distance_m = pose.towards(where)
+        range_m = distance_m * float(rng.normal(1.0, noise.distance))
+        bearing_rad += float(rng.normal(0.0, noise.distance))
+        seen.append(_percept(label, bearing_rad, range_m, noise.distance, noise.distance * range_m))
+    return seen
+
+
+def _percept(label: str, bearing_rad: float, range_m: float, bearing_sd_rad: float, range_sd_m: float) -> Percept:
+    """A small glowing thing."""
+    return Percept(
+        label=label,
+        activation=1.0,
+        bearing_rad=bearing_rad,
+        range_m=range_m,
+        bearing_sd_rad=bearing_sd_rad,
+        range_sd_m=range_sd_m,
+        width_m=0.1,
+        height_m=0.1,
+        whole=True,
+        box_px=(0, 0, 1, 1),
+    )

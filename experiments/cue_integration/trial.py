@@ -1,0 +1,74 @@
+"""What one trial is, and what came of it."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.cue_integration.geometry import CONFLICT_RAD, POSTS, ROUTES, Point, turned
+
+
+class Condition(enum.Enum):
+    """What the participant may use on the way back (Nardini et al. 2008)."""
+
+    SELF_MOTION = "self_motion"
+    LANDMARKS = "landmarks"
+    BOTH = "both"
+    CONFLICT = "conflict"
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Standard deviations as shares of what is sensed: of speed, of turn rate (fitted), and of distance.
+
+    Directions to landmarks are off by as much across as distances are along.
+    """
+
+    speed: float
+    turn: float
+    distance: float = 0.03
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One trial of one condition. The same numbers give the same bytes."""
+
+    condition: Condition
+    number: int
+    noise: Noise
+    seed: int
+
+    @property
+    def route(self) -> tuple[int, int, int]:
+        """The posts in the order in which they are picked up."""
+        return ROUTES[self.number % len(ROUTES)]
+
+    @property
+    def side(self) -> int:
+        """Which way landmarks turn in a conflict: 1 counter-clockwise, -1 clockwise."""
+        return 1 if (self.number // len(ROUTES)) % 2 == 0 else -1
+
+    def generator(self) -> np.random.Generator:
+        """The world's own noise in this trial."""
+        return np.random.default_rng([self.seed, list(Condition).index(self.condition), self.number])
+
+    @property
+    def target(self) -> Point:
+        """Where the first post stood."""
+        return POSTS[self.route[0]]
+
+    @property
+    def turned_target(self) -> Point:
+        """Where landmarks turned as in a conflict say that it stood."""
+        return turned((self.target,), self.side * CONFLICT_RAD)[0]
+
+
+@dataclass(frozen=True)
+class Response:
+    """Where the participant put the first post back, in room coordinates, after how many movements."""
+
+    x_m: float
+    y_m: float
+    movements: int

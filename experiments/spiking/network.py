@@ -1,0 +1,119 @@
+"""A place cell fires when its grid cells and its border cells fire together: Bayes' rule, by coincidence.
+
+Path integration moves grid cells: in each cycle they stand for one position out of its distribution, the prior.
+Border cells fire as likely as the sensed distance to a wall is from where they prefer to be. A place cell that
+fires on the coincidence of all its inputs fires in proportion to the product: its spikes are samples of the
+posterior (paper eq. 2, figure 4).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from experiments.spiking.cells import (
+    GAMMA_S,
+    SPACINGS_M,
+    BorderCells,
+    GridModule,
+    Spikes,
+    Values,
+    generate,
+    place_centres_m,
+)
+
+WEST, SOUTH = 0, 1
+
+
+@dataclass(frozen=True)
+class Border:
+    """A sensed distance to a wall: `axis` 0 to the west wall (along x), 1 to the south wall (along y)."""
+
+    axis: int
+    sensed_m: float
+    sd_m: float
+
+
+@dataclass(frozen=True)
+class Cues:
+    """What path integration says, a normal distribution, and what is sensed of walls."""
+
+    mean_m: tuple[float, float]
+    covariance_m2: tuple[tuple[float, float], tuple[float, float]]
+    borders: tuple[Border, ...]
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """A distribution of positions: mean (2,) and covariance (2, 2)."""
+
+    mean_m: Values
+    covariance_m2: Values
+
+    @property
+    def sd_m(self) -> Values:
+        """Standard deviation along x and y."""
+        return np.sqrt(np.diag(self.covariance_m2))
+
+    def off(self, mean_m: Values) -> float:
+        """How far another mean is from this one's, in its standard deviations (Mahalanobis)."""
+        difference = mean_m - self.mean_m
+        return float(np.sqrt(difference @ np.linalg.inv(self.covariance_m2) @ difference))
+
+
+def exact(cues: Cues) -> Posterior:
+    """Bayes' rule for normal distributions: precisions add, means weigh by them."""
+    precision = np.linalg.inv(np.array(cues.covariance_m2))
+    weighed = precision @ np.array(cues.mean_m)
+    for border in cues.borders:
+        precision[border.axis, border.axis] += border.sd_m**-2
+        weighed[border.axis] += border.sensed_m * border.sd_m**-2
+    covariance = np.linalg.inv(precision)
+    return Posterior(covariance @ weighed, covariance)
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Spikes as bits packed by eight cycles: of grid cells by module, of border cells by border, of place cells.
+
+    `centres_m` (n, 2) is where place cell i has its field.
+    """
+
+    grid: tuple[Spikes, ...]
+    border: tuple[Spikes, ...]
+    place: Spikes
+    centres_m: Values
+
+    @property
+    def counts(self) -> Values:
+        """How often each place cell fired."""
+        return np.asarray(np.bitwise_count(self.place).sum(axis=1), np.float64)
+
+    @property
+    def posterior(self) -> Posterior:
+        """Of the samples that place cells' spikes are. Raises ValueError where there are fewer than two."""
+        counts = self.counts
+        if counts.sum() < 2:
+            raise ValueError("place cells hardly fire: record for longer")
+        mean = counts @ self.centres_m / counts.sum()
+        return Posterior(mean, np.cov(self.centres_m, rowvar=False, fweights=counts.astype(np.int64)))
+
+
+def record(cues: Cues, side_m: float, seconds: float, rng: np.random.Generator) -> Recording:
+    """The network's spikes in a square room of `side_m`, as long as `seconds`."""
+    cycles = round(seconds / GAMMA_S)
+    centres_m = place_centres_m(side_m)
+    integrated_m = rng.multivariate_normal(cues.mean_m, cues.covariance_m2, cycles)
+    grid, border = [], []
+    place: Spikes = np.full((len(centres_m), -(-cycles // 8)), 255, np.uint8)
+    for spacing_m in SPACINGS_M:
+        module = GridModule(spacing_m)
+        grid.append(generate(module.tuning(integrated_m), rng))
+        place &= grid[-1][module.nearest(centres_m)]
+    for sensed in cues.borders:
+        cells = BorderCells(side_m)
+        share = np.repeat(cells.tuning(sensed.sensed_m, sensed.sd_m)[:, None], cycles, axis=1)
+        border.append(generate(share, rng))
+        place &= border[-1][cells.nearest(centres_m[:, sensed.axis])]
+    return Recording(tuple(grid), tuple(border), place, centres_m)

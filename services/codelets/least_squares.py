@@ -1,0 +1,143 @@
+"""Loops closed with headings corrected too, beyond the paper: Gauss-Newton on the whole path, sparse."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from scipy import sparse
+from scipy.sparse.linalg import SuperLU, splu
+
+from services.codelets.pose_graph import (
+    Constraints,
+    Floats,
+    Indices,
+    PoseGraph,
+    cost,
+    discrepancies,
+    relative,
+    rotations,
+)
+
+RELATIVE_DECREASE = 1e-5
+MOST_ITERATIONS = 100
+LEAST_DAMPING, MOST_DAMPING = 1e-6, 1e8
+# Symmetric and positive definite, and ordered beforehand: no pivoting.
+FACTORING = {"permc_spec": "NATURAL", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+
+
+def jacobians(poses: Floats, constraints: Constraints) -> tuple[Floats, Floats]:
+    """(m, 3, 3) each: how the discrepancy of each constraint changes with its first and with its second pose."""
+    seen = relative(poses, constraints)
+    by_second = np.zeros((len(constraints), 3, 3))
+    by_second[:, :2, :2] = rotations(-poses[constraints.first, 2])
+    by_second[:, 2, 2] = 1.0
+    by_first = -by_second
+    by_first[:, 0, 2], by_first[:, 1, 2] = seen[:, 1], -seen[:, 0]
+    return by_first, by_second
+
+
+class NormalEquations:
+    """The normal equations of constraints among `count` poses, whose sparsity is worked out once.
+
+    The first pose stays. Unknowns stand in an order that makes the factors sparse.
+    """
+
+    def __init__(self, count: int, constraints: Constraints) -> None:
+        self._order = _elimination_order(count, constraints)
+        self._at = np.full(count, -1)
+        self._at[self._order] = np.arange(count - 1)
+        first, second = self._at[constraints.first], self._at[constraints.second]
+        rows, columns = np.concatenate([first, first, second, second]), np.concatenate([first, second, first, second])
+        used = np.flatnonzero((rows >= 0) & (columns >= 0))
+        blocks, target = np.unique(columns[used] * (count - 1) + rows[used], return_inverse=True)
+        self._sum_blocks = _summing(target, used, len(blocks), len(rows))
+        self._indices = (blocks % (count - 1)).astype(np.int32)
+        self._starts = np.searchsorted(blocks, np.arange(count) * (count - 1)).astype(np.int32)
+        ends = np.concatenate([first, second])
+        used = np.flatnonzero(ends >= 0)
+        self._sum_ends = _summing(ends[used], used, count - 1, len(ends))
+        self._side = 3 * (count - 1)
+
+    def matrix(self, poses: Floats, constraints: Constraints) -> sparse.csc_matrix:
+        """J' S^-1 J at `poses`."""
+        by_first, by_second = jacobians(poses, constraints)
+        weighed_first = by_first.transpose(0, 2, 1) @ constraints.information
+        weighed_second = by_second.transpose(0, 2, 1) @ constraints.information
+        across = weighed_first @ by_second
+        # Columns are stored, and blocks by rows: each is transposed.
+        blocks = np.concatenate(
+            [weighed_first @ by_first, across.transpose(0, 2, 1), across, weighed_second @ by_second]
+        )
+        data = (self._sum_blocks @ blocks.reshape(-1, 9)).reshape(-1, 3, 3)
+        shape = (self._side, self._side)
+        rows = sparse.bsr_matrix((data, self._indices, self._starts), shape=shape).tocsr()
+        return sparse.csc_matrix((rows.data, rows.indices, rows.indptr), shape=shape)
+
+    def gradient(self, poses: Floats, constraints: Constraints) -> Floats:
+        """J' S^-1 d at `poses`."""
+        by_first, by_second = jacobians(poses, constraints)
+        weighed = np.einsum("mab,mb->ma", constraints.information, discrepancies(poses, constraints))
+        ends = [np.einsum("mba,mb->ma", by_end, weighed) for by_end in (by_first, by_second)]
+        result: Floats = (self._sum_ends @ np.concatenate(ends)).reshape(-1)
+        return result
+
+    def unknowns(self, pose: Indices) -> tuple[Indices, npt.NDArray[np.bool_]]:
+        """(k, 3) which unknowns some poses are, and which of the poses are any: the first is none."""
+        known = self._at[pose] >= 0
+        return 3 * self._at[pose][:, None] + np.arange(3), known
+
+    def moved(self, poses: Floats, step: Floats) -> Floats:
+        """`poses` after a step of the unknowns."""
+        result = poses.copy()
+        result[self._order] += step.reshape(-1, 3)
+        return result
+
+
+def _elimination_order(count: int, constraints: Constraints) -> Indices:
+    """The poses but the first, in an order of little fill (minimum degree)."""
+    ends = (
+        np.concatenate([constraints.first, constraints.second]),
+        np.concatenate([constraints.second, constraints.first]),
+    )
+    touching = sparse.csc_matrix((np.ones(len(ends[0])), ends), shape=(count, count))[1:, 1:]
+    touching.data[:] = 1.0
+    # Dominant diagonal, so that the order is decided by the pattern alone.
+    dominant = (touching + count * sparse.identity(count - 1)).tocsc()
+    order: Indices = np.argsort(splu(dominant, **(FACTORING | {"permc_spec": "MMD_AT_PLUS_A"})).perm_c) + 1
+    return order
+
+
+def _summing(target: Indices, source: Indices, targets: int, sources: int) -> sparse.csr_matrix:
+    """A matrix that adds row `source[k]` of what it is multiplied with to row `target[k]`."""
+    return sparse.csr_matrix((np.ones(len(target)), (target, source)), shape=(targets, sources))
+
+
+def factor(matrix: sparse.csc_matrix) -> SuperLU:
+    """Factors of a positive definite matrix, its order as it is."""
+    return splu(matrix, **FACTORING)
+
+
+def correct_headings(graph: PoseGraph) -> Floats:
+    """(n, 3) poses that minimise eq. 7, headings and all, near those of `graph`. The first pose stays."""
+    poses, constraints = graph.poses, graph.constraints
+    normal = NormalEquations(len(poses), constraints)
+    damping, before = 0.0, cost(poses, constraints)
+    for _ in range(MOST_ITERATIONS):
+        matrix, gradient = normal.matrix(poses, constraints), normal.gradient(poses, constraints)
+        damped = matrix + damping * sparse.diags(matrix.diagonal(), format="csc") if damping else matrix
+        step = factor(damped).solve(gradient)
+        moved = normal.moved(poses, -step)
+        after = cost(moved, constraints)
+        if after > before:
+            damping = max(LEAST_DAMPING, damping * 100)
+            if damping > MOST_DAMPING:
+                break
+            continue
+        # What the linear model did not foresee is about what another step would gain.
+        unforeseen = after - (before - float(gradient @ step))
+        gained = before - after
+        poses, before = moved, after
+        if gained <= RELATIVE_DECREASE * after or (not damping and unforeseen <= RELATIVE_DECREASE * after):
+            break
+        damping = damping / 10 if damping > LEAST_DAMPING else 0.0
+    return poses

@@ -1,0 +1,34 @@
+"""`cogmap experiment` as users run it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+COGMAP = [sys.executable, "-m", "cli.main", "experiment"]
+PATIENCE_S = 110.0
+
+
+def _run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([*COGMAP, *arguments], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+
+
+def test_cue_integration_leaves_figures_and_json_and_says_the_same_bytes_through_real_processes(tmp_path: Path) -> None:
+    out, chosen = tmp_path / "out", tmp_path / "cue.json"
+    done = _run("cue-integration", "--trials", "8", "--live", "--seed", "3", "--out", str(out), "--json", str(chosen))
+    assert done.returncode == 0, done.stdout + done.stderr
+    figures = json.loads(chosen.read_text())
+    assert figures["live_same"] == 1.0
+    assert figures["seed"] == 3 and "cue-integration --trials 8" in figures["command"]
+    assert figures["sd_both_m"] < figures["sd_self_motion_m"]
+    assert figures == json.loads((out / "cue-integration.json").read_text())
+    assert (out / "cue-integration.png").read_bytes().startswith(b"\x89PNG")
+    assert (out / "cue-integration.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_a_json_file_in_no_folder_is_one_sentence_and_code_2(tmp_path: Path) -> None:
+    done = _run("cue-integration", "--json", str(tmp_path / "nowhere" / "cue.json"))
+    assert done.returncode == 2
+    assert "there is no folder" in done.stderr and len(done.stderr.splitlines()) == 1
