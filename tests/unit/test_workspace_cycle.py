@@ -71,7 +71,7 @@ def test_what_is_recognised_with_too_little_activation_is_no_object_of_the_map()
     desk.feed(answer(localization))
 
     assert [seen.label for seen in localization.percepts] == ["a"]
-    assert [asked.task_id for asked in desk.take()] == ["1/object_place/a", "1/road_place"]
+    assert [asked.task_id for asked in desk.take()] == ["1/object_place/a", "1/road_place", "1/path"]
 
 
 def test_deltas_are_numbered_without_a_gap() -> None:
