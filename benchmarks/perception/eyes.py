@@ -70,4 +70,11 @@ class Bystander:
         """Label, empty for none that it knows, activation, and pixels (h, w) of each, before it learns from them."""
         found = self._pam.candidates(pixels(glance.view), glance.view.calibration)
         self._pam.recall(glance.learned)
-        return [(each.recognition.label, each.recognition.activation, each.segment.mask) for each in found]
+        return [(*_said(each.recognition), each.segment.mask) for each in found]
+
+
+def _said(recognition: objects.Recognition) -> tuple[str, float]:
+    """The likeliest that it says, which may be that there is no name for it, and the probability of that."""
+    if recognition.known:
+        return recognition.label, recognition.activation
+    return "", recognition.new + recognition.nothing

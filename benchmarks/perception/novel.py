@@ -11,7 +11,9 @@ import numpy.typing as npt
 
 from benchmarks.perception.objects import Sight
 from benchmarks.perception.scenes import LEAST_TURN_RAD, other_distance
+from services.workspace.settings import Config
 
+RECOGNISED = Config().recognition_threshold
 Floats = npt.NDArray[np.float64]
 
 
@@ -44,21 +46,22 @@ def remembered(encounters: Sequence[Meeting], afterwards: Sequence[Meeting], tra
     """How the buildings of a town, all novel, were known again, in views from other sides and distances.
 
     Each was to be met in the encounter of its number. Sides and distances are other than in that one, and in every one
-    that it was seen in by the way. A building that they gave no name, or that of a trained class or of another
-    building, has none: no later sighting of it is right.
+    that it was seen in by the way. Its name is the first that it was recognised by, with an activation over RECOGNISED.
+    A building that they gave no name, or that of a trained class or of another building, has none: no later sighting of
+    it is right. Of later sightings all count, however low their activation.
     """
     names: dict[int, str] = {}
     places = {number: [meeting.from_where[number]] for number, meeting in enumerate(encounters)}
     merges = splits = mistaken = later = right = 0
     for meeting in encounters:
-        for number, label in _sightings(meeting):
+        for number, label, activation in _sightings(meeting):
             places[number].append(meeting.from_where[number])
-            if number not in names:
+            if number not in names and activation > RECOGNISED:
                 taken = label in names.values()
                 merges += taken
                 names[number] = "" if taken or label in trained else label
     for meeting in afterwards:
-        for number, label in _sightings(meeting):
+        for number, label, _ in _sightings(meeting):
             if not all(_elsewhere(meeting.from_where[number], at) for at in places[number]):
                 continue
             later += 1
@@ -69,9 +72,10 @@ def remembered(encounters: Sequence[Meeting], afterwards: Sequence[Meeting], tra
     return Memory(sum(map(bool, names.values())), later, right, merges, splits, mistaken)
 
 
-def _sightings(meeting: Meeting) -> list[tuple[int, str]]:
-    """The buildings that a segment matches, and what it is called."""
-    return [(segment.building.number, segment.label) for segment in meeting.sight.segments if segment.building]
+def _sightings(meeting: Meeting) -> list[tuple[int, str, float]]:
+    """The buildings that a segment matches, what it is called, and how surely."""
+    segments = meeting.sight.segments
+    return [(each.building.number, each.label, each.activation) for each in segments if each.building]
 
 
 def _elsewhere(now: Floats, then: Floats) -> bool:

@@ -55,7 +55,7 @@ def effective(base: Sections, choices: Choices, awaits: dict[str, int]) -> Secti
 
 def _whole(sections: Sections, name: str) -> dict[str, Any]:
     settings: dict[str, Any] = msgspec.to_builtins(config.typed(sections, name, table.config_type(name)))
-    return settings
+    return {key: value for key, value in settings.items() if value is not None}
 
 
 def everybody(choices: Choices, observer: bool) -> dict[str, int]:
@@ -67,8 +67,7 @@ def everybody(choices: Choices, observer: bool) -> dict[str, int]:
 def to_toml(sections: Sections) -> str:
     """`sections` as a TOML file that `config.load` reads back to the same."""
     return "\n".join(
-        f"[{name}]\n"
-        + "".join(f"{key} = {_toml_value(value)}\n" for key, value in settings.items() if value is not None)
+        f"[{name}]\n" + "".join(f"{key} = {_toml_value(value)}\n" for key, value in settings.items())
         for name, settings in sections.items()
     )
 

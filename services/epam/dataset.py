@@ -1,8 +1,9 @@
 """Renders what perception is trained on: `python -m services.epam.dataset --out DIR`.
 
 The simulator draws towns from seeds, each view in a light of its own and from another place, and labels what it knows;
-sensory memory adds the depth that its stereo gives. Towns for training are in DIR/train, those to choose and calibrate
-by in DIR/val, and those for tests in DIR/test: no town is in two of them, and none of the invented kinds of building.
+sensory memory adds the depth that its stereo gives. Towns for training are in DIR/train, and in DIR/strangers more of
+them, for learning what tells buildings apart; those to choose and calibrate by are in DIR/val, and those for tests in
+DIR/test: no town is in two of them, and none of the invented kinds of building.
 A file that is there already is kept, so an interrupted command goes on where it was; the same command gives the same
 files.
 """
@@ -23,20 +24,24 @@ from rich.progress import Progress
 
 from bus.errors import CogmapError, UsageError
 
-UNKNOWN = (0, 14, 28)
-
 
 @dataclass(frozen=True)
 class Split:
-    """Towns `first` and on; every second or third is of invented kinds in part or whole (see UNKNOWN)."""
+    """Towns `first` and on, in turn with as many invented kinds of building as `unknown` says."""
 
     name: str
     first: int
     towns: int
     views: int
+    unknown: tuple[int, ...] = (0, 14, 28)
 
 
-SPLITS = (Split("train", 1001, 84, 110), Split("val", 2001, 6, 90), Split("test", 3001, 6, 90))
+SPLITS = (
+    Split("train", 1001, 84, 110),
+    Split("strangers", 5001, 140, 45, (30,)),
+    Split("val", 2001, 6, 90),
+    Split("test", 3001, 6, 90),
+)
 
 
 @dataclass(frozen=True)
@@ -54,7 +59,9 @@ def jobs(out: Path, scale: float) -> Iterator[Job]:
     for split in SPLITS:
         for number in range(max(1, round(scale * split.towns))):
             seed = split.first + number
-            yield Job(seed, split.views, UNKNOWN[number % len(UNKNOWN)], out / split.name / f"town-{seed}.npz")
+            yield Job(
+                seed, split.views, split.unknown[number % len(split.unknown)], out / split.name / f"town-{seed}.npz"
+            )
 
 
 def render(job: Job) -> None:

@@ -2,41 +2,43 @@
 
 The description, an embedding, is a direction: what looks alike points the same way, from whatever side and in whatever
 light it is seen, also where no name was taught. Names are directions too (Wang et al. 2018, cosine softmax), and the
-activation of one is the calibrated posterior (Guo et al. 2017) of it among all names and "none of them".
+activation of one is the calibrated posterior (Guo et al. 2017) of it among all names and "none of them". The network
+tells besides how likely the segment is to show a building at all.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Container
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-import cv2
 import msgspec
 import numpy as np
 import numpy.typing as npt
 
 from bus.errors import ConfigError
-from services.epam.network import WEIGHTS, Network, Tensor
+from schemas.sensing import Calibration
+from services.epam.crop import CHANNELS, SIDE_PX, crop, surroundings
+from services.epam.network import WEIGHTS, Network
 from services.epam.segments import Depth, Image, Segment
 
 DEFAULT_PATH = WEIGHTS / "objects.onnx"
-SIDE_PX = 48
-CHANNELS = 5
 DIMENSIONS = 64
 BATCH = 4
 TAKES = (BATCH, CHANNELS, SIDE_PX, SIDE_PX)
-GIVES = {"embedding": (BATCH, DIMENSIONS)}
-MARGIN = 0.04
-UNKNOWN_DISTANCE_M = 30.0
+GIVES = {"embedding": (BATCH, DIMENSIONS), "odds": (BATCH, 2)}
+MOST_LOOKS, ALIKE = 8, 0.9
 Vector = npt.NDArray[np.float32]
 
 
 class Names(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """What belongs to the network's weights: the names taught, and how sure a likeness makes.
 
-    `directions` (n, DIMENSIONS) are those of `names`; log odds are `sharpness` times the cosine with one of them, times
-    `unknown` for none. What was met once, and not taught, has a cosine of less than its due: `once` is added to it.
-    `size_m` (n, 3) is what towns showed of each: the longer and the shorter side of its ground plan, and its height.
+    `directions` (n, DIMENSIONS) are those of `names`. At a cosine of `unknown` with one of them, a building is as
+    likely that as none known, and log odds rise by `sharpness` with the cosine; `met_unknown` and `met_sharpness` are
+    those of what was met, and not taught. The network's log odds that a segment shows a building, or all of one, are
+    multiplied by `evidence`. `size_m` (n, 3) is what towns showed: the longer and the shorter side of its ground plan,
+    and its height.
     """
 
     names: list[str]
@@ -44,17 +46,37 @@ class Names(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
     size_m: list[tuple[float, float, float]]
     sharpness: float
     unknown: float
-    once: float
+    met_sharpness: float
+    met_unknown: float
+    evidence: float
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """What the network makes of a segment: its embedding (DIMENSIONS,), the probability that it shows a building, and
+    that it is most of what can be seen of that."""
+
+    embedding: Vector
+    building: float
+    whole: float
 
 
 @dataclass(frozen=True, eq=False)
 class Recognition:
-    """`label` is empty for what has none yet, `size_m` None where it was not taught; `activation` is its posterior."""
+    """The likeliest `label`, and its posterior `activation`; the probabilities of a `new`
+    building, none of those known, and of no building. `size_m` is None where it was not taught, or is not likely."""
 
     label: str
     activation: float
-    embedding: Vector
+    new: float
+    nothing: float
+    look: Look
     size_m: tuple[float, float, float] | None = None
+
+    @property
+    def known(self) -> bool:
+        """Whether that label is likelier than that it has none."""
+        return self.activation > self.new + self.nothing
 
 
 class Recogniser:
@@ -67,34 +89,51 @@ class Recogniser:
         self._labels: list[str] = []
         self._met = np.empty((0, DIMENSIONS), np.float32)
 
-    def embeddings(self, image: Image, depth_m: Depth, found: list[Segment], focal_px: float) -> list[Vector]:
-        """The embedding of each of `found`, float32 (DIMENSIONS,)."""
-        crops = [crop(image, depth_m, segment.mask, segment.box_px, focal_px) for segment in found]
-        embeddings: list[Vector] = []
+    def looks(self, image: Image, depth_m: Depth, found: list[Segment], camera: Calibration) -> list[Look]:
+        """What each of `found` looks like."""
+        around = surroundings(image, depth_m, camera)
+        crops = [crop(image, depth_m, segment, around, camera.fx_px) for segment in found]
+        looks: list[Look] = []
         for first in range(0, len(crops), BATCH):
             batch = np.zeros(TAKES, np.float32)
             some = crops[first : first + BATCH]
             batch[: len(some)] = some
-            embeddings += list(self._network(batch)[0][: len(some)])
-        return embeddings
+            embeddings, odds = self._network(batch)
+            likely = probability(odds, self._names)
+            looks += [Look(embeddings[row], *likely[row].tolist()) for row in range(len(some))]
+        return looks
 
-    def recognise(self, embedding: Vector) -> Recognition:
-        """What has that embedding, perhaps nothing known."""
-        posterior = posteriors(self._directions @ embedding, self._met @ embedding, self._names)
-        best, taught = int(posterior.argmax()), len(self._names.names)
-        activation = float(posterior[best])
-        if best < taught:
-            return Recognition(self._names.names[best], activation, embedding, self._names.size_m[best])
-        label = self._labels[best - taught] if best < len(posterior) - 1 else ""
-        if label:
-            same = [taught + number for number, other in enumerate(self._labels) if other == label]
-            activation = float(posterior[same].sum())
-        return Recognition(label, min(activation, 1.0), embedding)
+    def recognise(self, look: Look, apart_from: Container[str] = ()) -> Recognition:
+        """What looks so, perhaps nothing that is known, and in no case one of `apart_from`."""
+        labels = list(dict.fromkeys(self._labels))
+        alike = self._directions @ look.embedding, self._likeness(look, labels)
+        names = [*self._names.names, *labels]
+        excluded = np.array([name in apart_from for name in names])
+        *posterior, new, nothing = posteriors(*alike, look.building, self._names, excluded).tolist()
+        best = int(np.argmax(posterior))
+        found = Recognition(names[best], min(posterior[best], 1.0), new, nothing, look)
+        taught = found.known and best < len(self._names.names)
+        return replace(found, size_m=self._names.size_m[best]) if taught else found
+
+    def _likeness(self, look: Look, labels: list[str]) -> Vector:
+        """The cosine with each of `labels` that were met, with that of its looks which is most alike."""
+        cosines = self._met @ look.embedding
+        alike = np.full(len(labels), -1.0, np.float32)
+        np.maximum.at(alike, [labels.index(label) for label in self._labels], cosines)
+        return alike
 
     def learn(self, label: str, embedding: Vector) -> None:
         """From now on, what is like `embedding` is called `label`."""
         self._labels.append(label)
         self._met = np.concatenate([self._met, embedding[None]])
+
+    def is_another(self, recognition: Recognition) -> bool:
+        """Whether a building that was met, not taught, is unlike every look of it that was learned, and there is room
+        for one more."""
+        known = [vector for label, vector in self.learned if label == recognition.label]
+        if not 0 < len(known) < MOST_LOOKS:
+            return False
+        return bool(max(vector @ recognition.look.embedding for vector in known) < ALIKE)
 
     @property
     def sizes_m(self) -> dict[str, tuple[float, float, float]]:
@@ -125,32 +164,19 @@ def load(path: Path = DEFAULT_PATH) -> Recogniser:
     return Recogniser(network, names)
 
 
-def posteriors(taught: Vector, met: Vector, names: Names) -> npt.NDArray[np.float64]:
-    """The posterior (…, n + m + 1) of each name taught, each object met, and none of them, from the cosines (…, n)
-    and (…, m) with their directions."""
-    none = np.full((*taught.shape[:-1], 1), names.unknown)
-    log_odds = names.sharpness * np.concatenate([taught, met + names.once, none], axis=-1, dtype=np.float64)
-    weights = np.exp(log_odds - log_odds.max(axis=-1, keepdims=True))
-    return np.asarray(weights / weights.sum(axis=-1, keepdims=True))
+def posteriors(
+    taught: Vector, met: Vector, building: npt.ArrayLike, names: Names, excluded: npt.ArrayLike = False
+) -> npt.NDArray[np.float64]:
+    """The posterior (…, n + m + 2) of each name taught, each object met, another building, and no building, from the
+    cosines (…, n) and (…, m) with their directions, the probability (…) of a building, and which (n + m,) it is not."""
+    log_odds = [names.sharpness * (taught - names.unknown), names.met_sharpness * (met - names.met_unknown)]
+    possible = np.where(excluded, -np.inf, np.concatenate(log_odds, axis=-1, dtype=np.float64))
+    likelihood = np.concatenate([possible, np.zeros((*taught.shape[:-1], 1))], axis=-1)
+    weights = np.exp(likelihood - likelihood.max(axis=-1, keepdims=True))
+    likely = np.asarray(building, np.float64)[..., None]
+    return np.concatenate([likely * weights / weights.sum(axis=-1, keepdims=True), 1 - likely], axis=-1)
 
 
-def crop(
-    image: Image, depth_m: Depth, mask: npt.NDArray[np.bool_], box_px: tuple[int, int, int, int], focal_px: float
-) -> Tensor:
-    """A segment as the network sees it, float32 (CHANNELS, SIDE_PX, SIDE_PX): three colours, 0 where it is not, where
-    it is, and the logarithm of how many metres the picture is high."""
-    left, top, wide, high = box_px
-    side = round(max(wide, high) * (1 + 2 * MARGIN))
-    span = slice(top, top + high), slice(left, left + wide)
-    square = np.zeros((side, side, 4), np.float32)
-    into = slice((side - high) // 2, (side - high) // 2 + high), slice((side - wide) // 2, (side - wide) // 2 + wide)
-    shown = mask[span].astype(np.float32)
-    square[*into, :3] = (image[span].astype(np.float32) / 64.0 - 2.0) * shown[..., None]
-    square[*into, 3] = shown
-    how = cv2.INTER_AREA if side > SIDE_PX else cv2.INTER_LINEAR
-    values = np.empty((CHANNELS, SIDE_PX, SIDE_PX), np.float32)
-    values[:4] = cv2.resize(square, (SIDE_PX, SIDE_PX), interpolation=how).transpose(2, 0, 1)
-    known = depth_m[span][mask[span] & (depth_m[span] > 0)]
-    distance_m = float(np.median(known)) if len(known) else UNKNOWN_DISTANCE_M
-    values[4] = np.log(max(side * distance_m / focal_px, 1.0)) / 2.0 - 1.0
-    return values
+def probability(odds: Vector, names: Names) -> npt.NDArray[np.float64]:
+    """That of the network's log odds."""
+    return np.asarray(1 / (1 + np.exp(-names.evidence * odds.astype(np.float64).clip(-50, 50))))

@@ -5,34 +5,24 @@ Beyond the paper, a building of no known node gets one at the first sight, by wh
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Container, Iterable, Mapping
+from dataclasses import replace
 
-import cv2
 import numpy as np
 
 from schemas.array import Array
 from schemas.sensing import Calibration, LearnedObject, Percept, Percepts, View
+from services.epam.candidate import Candidate, beside, height_m, joined, outline_px
 from services.epam.geometry import Place, locate
-from services.epam.objects import Recogniser, Recognition
+from services.epam.objects import Look, Recogniser
 from services.epam.road import Roads
-from services.epam.segments import Segment, Segmenter
+from services.epam.segments import Segmenter
 from services.epam.settings import Config
 from services.epam.view import Seen
-from services.epam.walls import Walls, walls
+from services.epam.walls import walls
 
 NEW_LABEL = "new-building-{}"
-OUTLINE_PX, BRIDGED_PX = 1.0, 9
-LEAST_HEIGHT_M = 0.5
-
-
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """A segment that stands somewhere, and what it was recognised as."""
-
-    segment: Segment
-    walls: Walls
-    recognition: Recognition
+LIKELIER_THAN_NOT = 0.5
 
 
 class ExtendedPam:
@@ -45,7 +35,7 @@ class ExtendedPam:
     def perceive(self, view: View, seen: Seen) -> tuple[Percepts, list[LearnedObject]]:
         """The percepts of `view`, and the nodes that it gave."""
         camera = view.calibration
-        found, met = self._named(self.candidates(seen, camera))
+        found, met = self._named(self.candidates(seen, camera), seen)
         places = self._places(found, camera)
         objects = [self._percept(*pair, camera) for pair in zip(found, places, strict=True)]
         road_m, boundary_m = self._roads.project(self._roads.likelihood(seen.image), seen.depth_m, camera)
@@ -67,12 +57,10 @@ class ExtendedPam:
             for segment, wall in standing
             if wall is not None and segment.box_px[2] >= self._config.narrowest_px
         ]
-        embeddings = self._recogniser.embeddings(
-            seen.image, seen.depth_m, [segment for segment, _ in wide], camera.fx_px
-        )
+        looks = self._recogniser.looks(seen.image, seen.depth_m, [segment for segment, _ in wide], camera)
         return [
-            Candidate(segment, wall, self._recogniser.recognise(embedding))
-            for (segment, wall), embedding in zip(wide, embeddings, strict=True)
+            Candidate(segment, wall, self._recogniser.recognise(look))
+            for (segment, wall), look in zip(wide, looks, strict=True)
         ]
 
     def recall(self, objects: Iterable[LearnedObject]) -> None:
@@ -85,21 +73,50 @@ class ExtendedPam:
         """Every node learned since the teaching."""
         return [LearnedObject(label=label, embedding=Array.of(vector)) for label, vector in self._recogniser.learned]
 
-    def _named(self, candidates: list[Candidate]) -> tuple[list[Candidate], list[LearnedObject]]:
-        """Those over threshold, of each node the largest, with new nodes for what has none, and these nodes."""
-        largest: dict[str, Candidate] = {}
+    def _named(self, candidates: list[Candidate], seen: Seen) -> tuple[list[Candidate], list[LearnedObject]]:
+        """What is surely a building, one of each node, with new nodes for what has none, and what was learned."""
+        pieces: dict[str, list[Candidate]] = {}
         met: list[LearnedObject] = []
-        over = [candidate for candidate in candidates if self._total(candidate) > self._config.percept_threshold]
-        for candidate in sorted(over, key=lambda one: -one.segment.area_px):
-            label = candidate.recognition.label
-            if not label and candidate.segment.area_px >= self._config.learned_share * candidate.segment.mask.size:
+        for first in sorted(candidates, key=lambda one: -one.recognition.activation):
+            candidate = self._apart(self._again(first), pieces)
+            recognition = candidate.recognition
+            if 1 - recognition.nothing <= self._config.percept_threshold:
+                continue
+            if self._is_new(candidate):
                 label = NEW_LABEL.format(1 + len({known for known, _ in self._recogniser.learned}))
-                embedding = candidate.recognition.embedding
-                self._recogniser.learn(label, embedding)
-                met.append(LearnedObject(label=label, embedding=Array.of(embedding)))
-            if label:
-                largest.setdefault(label, _called(candidate, label))
-        return sorted(largest.values(), key=lambda one: one.walls.left), met
+                met.append(self._learn(label, recognition.look))
+                candidate = self._again(candidate)
+            elif recognition.label not in pieces and self._is_another_look(candidate):
+                met.append(self._learn(recognition.label, recognition.look))
+            pieces.setdefault(candidate.recognition.label, []).append(candidate)
+        found = [joined(some, seen.disparity_px) for some in pieces.values()]
+        return sorted(found, key=lambda one: one.walls.left), met
+
+    def _again(self, candidate: Candidate, apart_from: Container[str] = ()) -> Candidate:
+        """Recognised by all that is known by now, except by those names."""
+        return replace(candidate, recognition=self._recogniser.recognise(candidate.recognition.look, apart_from))
+
+    def _apart(self, candidate: Candidate, pieces: Mapping[str, list[Candidate]]) -> Candidate:
+        """Recognised as none of those seen elsewhere in the same view: nothing is in two places."""
+        there = pieces.get(candidate.recognition.label, [candidate])
+        return candidate if beside(there[0], candidate) else self._again(candidate, pieces)
+
+    def _is_new(self, candidate: Candidate) -> bool:
+        """Whether it is seen well, and likelier a building that is none of those known than all else together."""
+        recognition, segment = candidate.recognition, candidate.segment
+        large = segment.area_px >= self._config.learned_share * segment.mask.size
+        whole = recognition.look.whole > self._config.percept_threshold
+        return large and whole and recognition.new > LIKELIER_THAN_NOT
+
+    def _is_another_look(self, candidate: Candidate) -> bool:
+        """Whether it is surely a building that was learned, as it was not seen before."""
+        recognition = candidate.recognition
+        sure = min(recognition.activation, recognition.look.whole) > self._config.sure
+        return sure and self._recogniser.is_another(recognition)
+
+    def _learn(self, label: str, look: Look) -> LearnedObject:
+        self._recogniser.learn(label, look.embedding)
+        return LearnedObject(label=label, embedding=Array.of(look.embedding))
 
     def _total(self, candidate: Candidate) -> float:
         """Total activation: base level and current."""
@@ -130,31 +147,8 @@ class ExtendedPam:
             bearing_sd_rad=place.bearing_sd_rad,
             range_sd_m=place.range_sd_m,
             width_m=candidate.walls.width_m(camera) if size_m is None else sum(size_m[:2]) / 2,
-            height_m=_height_m(candidate, camera) if size_m is None else size_m[2],
+            height_m=height_m(candidate, camera) if size_m is None else size_m[2],
             whole=candidate.walls.whole,
             box_px=segment.box_px,
             outline_px=outline_px(segment),
         )
-
-
-def outline_px(segment: Segment) -> list[tuple[int, int]]:
-    """A polygon around the largest piece of `segment`, column and row of its corners; a lamp does not divide it."""
-    closed = cv2.morphologyEx(segment.mask.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((1, BRIDGED_PX), np.uint8))
-    pieces, _ = cv2.findContours(closed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
-    largest = max(pieces, key=cv2.contourArea)
-    corners = cv2.approxPolyDP(largest, OUTLINE_PX, True).reshape(-1, 2)
-    return [(int(column), int(row)) for column, row in corners]
-
-
-def _called(candidate: Candidate, label: str) -> Candidate:
-    recognition = candidate.recognition
-    named = Recognition(label, recognition.activation, recognition.embedding, recognition.size_m)
-    return Candidate(candidate.segment, candidate.walls, named)
-
-
-def _height_m(candidate: Candidate, camera: Calibration) -> float:
-    """How high over the ground the top of what is seen is."""
-    nearest_px = max(float(candidate.walls.disparity_px.max()), 1e-3)
-    depth_m = camera.fx_px * camera.baseline_m / nearest_px
-    top_m = camera.mount_height_m + (camera.cy_px - candidate.segment.box_px[1]) / camera.fy_px * depth_m
-    return float(np.clip(top_m, LEAST_HEIGHT_M, 1e3))

@@ -42,15 +42,15 @@ class PerceptErrors(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fi
     | `precision` | what is found is a building | `detect_precision` |
     | `named_phantoms` | what is none passes for a known one all the same | top1's misses, as for buildings |
     | `range_sd_share` | standard deviation of range by range | `depth_error`, a median, / 0.6745 |
-    | `bearing_sd_rad` | standard deviation of bearing | the least that `services/epam/geometry.py` claims |
+    | `bearing_sd_rad` | standard deviation of bearing | assumed; `services/epam/geometry.py` claims 0.003 at least |
     | `place_recall` | a place is known again, coming the same way | `sequence_recall_at_99p` |
     | `place_precision` | it is that place and no other | the precision at which that recall was measured |
     """
 
-    detected: Share = 0.839
-    right_name: Share = 0.972
-    precision: Annotated[float, msgspec.Meta(gt=0, le=1)] = 0.914
-    named_phantoms: Share = 0.028
+    detected: Share = 0.959
+    right_name: Share = 0.974
+    precision: Annotated[float, msgspec.Meta(gt=0, le=1)] = 0.968
+    named_phantoms: Share = 0.026
     range_sd_share: Share = 0.017 / NORMAL_MEDIAN
     bearing_sd_rad: Positive = 0.01
     place_recall: Share = 0.965

@@ -20,7 +20,7 @@ from services.workspace.dispatch import Dispatch
 from services.workspace.loops import correction_tasks
 from services.workspace.scene import SELF, Scene
 from services.workspace.settings import Config
-from services.workspace.triggers import PHASES, first_self, percept_operations, tasks_for
+from services.workspace.triggers import PHASES, first_self, percept_operations, recognised, tasks_for
 
 WORKERS = "codelets"
 
@@ -69,7 +69,7 @@ class Workspace:
             raise MessageError(f"road points of shape {percepts.road_m.shape}")
         if percepts.stamp_ns <= self._begun_ns:
             return []
-        self._waiting = percepts
+        self._waiting = recognised(percepts, self._config.recognition_threshold)
         return self._begin()
 
     def on_proposal(self, proposal: Proposal) -> list[Message]:

@@ -13,6 +13,7 @@ Share = Annotated[float, msgspec.Meta(ge=0, le=1)]
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """Lockstep waits for every answer; real time commits what there is at the deadline, counted from the frame.
 
+    A percept is an object of the map where its total activation is over `recognition_threshold`.
     A place seen again after `revisit_s` closes a loop, at most one every `closure_spacing_s`. Map correction goes on
     meanwhile: lockstep waits for it at the end of the `correction_cycles`th cycle.
     """
@@ -23,6 +24,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     lease_ms: Positive = 120.0
     attempts: Annotated[int, msgspec.Meta(ge=1, le=100)] = 5
     first_samples: Annotated[int, msgspec.Meta(ge=10, le=100_000)] = 200
+    recognition_threshold: Share = 0.7
     decay: Share = 0.1
     base_level_decay: Share = 0.0005
     place_decay: Share = 0.02

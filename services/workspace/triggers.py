@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 
 from bus.graph import Graph, object_id
@@ -20,6 +21,12 @@ def first_self(samples: int) -> Node:
     where: dict[str, float | int | str | bool] = {"x_m": 0.0, "y_m": 0.0, "heading_rad": 0.0, "stamp_ns": -1}
     zeros = Array.of(np.zeros((samples, 3)))
     return Node(id=SELF, kind="self", activation=1.0, base_level=1.0, attributes=where, samples=zeros)
+
+
+def recognised(percepts: Percepts, threshold: float) -> Percepts:
+    """Without the objects whose total activation is not over `threshold`: which they are is too unsure to map by."""
+    objects = [percept for percept in percepts.objects if percept.activation > threshold]
+    return percepts if len(objects) == len(percepts.objects) else msgspec.structs.replace(percepts, objects=objects)
 
 
 def percept_operations(graph: Graph, percepts: Percepts) -> list[Operation]:

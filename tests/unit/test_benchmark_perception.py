@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -179,6 +180,16 @@ def test_a_building_that_was_taken_for_another_or_for_a_trained_one_when_met_is_
     memory = remembered(met, later, TRAINED)
 
     assert (memory.later, memory.right, memory.merges, memory.mistaken) == (3, 1, 2, 1)
+
+
+def test_a_building_has_the_name_that_it_was_first_recognised_by_and_a_guess_is_none() -> None:
+    surely, guessed = _meeting(0.0, 10.0, (0, "new-1")), _meeting(0.0, 10.0, (0, "new-2"))
+    unsure = replace(guessed.sight.segments[0], activation=0.7)
+    guessed = replace(guessed, sight=replace(guessed.sight, segments=(unsure,)))
+    later = [_meeting(math.pi, 20.0, (0, "new-1"))]
+
+    assert remembered([guessed, surely], later, TRAINED).right == 1
+    assert remembered([guessed, guessed], later, TRAINED).met == 0
 
 
 def test_depth_is_judged_from_three_to_thirty_metres_where_it_is_known() -> None:

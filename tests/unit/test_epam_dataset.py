@@ -22,7 +22,8 @@ def test_no_town_is_in_two_splits_and_every_split_has_buildings_nobody_was_taugh
     for split in SPLITS:
         here = [job for job in wanted if job.target.parent.name == split.name]
         assert len(here) == split.towns
-        assert {job.unknown for job in here} == {0, 14, 28}
+        assert {job.unknown for job in here} == set(split.unknown)
+        assert max(split.unknown) >= 20
 
 
 def test_a_trial_is_a_part_of_each_split() -> None:
@@ -54,7 +55,7 @@ def test_what_is_rendered_already_is_kept(tmp_path: Path) -> None:
 
 
 def test_a_failure_of_the_simulator_is_told_by_its_last_word(tmp_path: Path) -> None:
-    with pytest.raises(CogmapError, match="services.sim.renderings failed: .*negative"):
+    with pytest.raises(CogmapError, match=r"services\.sim\.renderings failed: .*negative"):
         render(Job(-1, 1, 0, tmp_path / "town.npz"))
     assert list(tmp_path.iterdir()) == []
 

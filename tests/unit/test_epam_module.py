@@ -49,12 +49,20 @@ def test_every_view_is_answered_by_percepts_even_where_nothing_is_seen() -> None
     assert (percepts.stamp_ns, percepts.frame) == (5, 3)
 
 
-def test_a_node_must_be_over_the_threshold_not_at_it(views: list[View]) -> None:
-    every = _percepts(build(Config(percept_threshold=0.0), "epam"), views[1]).objects
-    highest = max(percept.activation for percept in every)
+def test_what_is_hardly_a_building_is_no_percept(views: list[View]) -> None:
+    some, fewer, none = (
+        sum(len(_percepts(build(Config(percept_threshold=threshold), "epam"), view).objects) for view in views)
+        for threshold in (0.0, 0.9, 1.0)
+    )
+    assert some > fewer > none == 0
 
-    assert _percepts(build(Config(percept_threshold=highest), "epam"), views[1]).objects == []
-    assert _percepts(build(Config(percept_threshold=highest - 1e-6), "epam"), views[1]).objects
+
+def test_base_level_activation_adds_to_the_current_one(views: list[View]) -> None:
+    bare, raised = (
+        [percept.activation for percept in _percepts(build(Config(base_level=level), "epam"), views[1]).objects]
+        for level in (0.0, 0.3)
+    )
+    assert raised == pytest.approx([min(1.0, activation + 0.3) for activation in bare])
 
 
 def test_a_percept_is_outlined_boxed_and_measured(views: list[View]) -> None:

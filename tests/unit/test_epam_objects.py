@@ -13,11 +13,11 @@ from services.epam.objects import DEFAULT_PATH as WEIGHTS
 from services.epam.objects import (
     DIMENSIONS,
     GIVES,
-    SIDE_PX,
+    MOST_LOOKS,
     TAKES,
+    Look,
     Names,
     Recogniser,
-    crop,
     load,
     posteriors,
 )
@@ -38,8 +38,14 @@ NAMES = Names(
     size_m=[(9.0, 8.0, 6.0), (11.0, 9.0, 10.0)],
     sharpness=20.0,
     unknown=0.5,
-    once=0.1,
+    met_sharpness=20.0,
+    met_unknown=0.4,
+    evidence=1.0,
 )
+
+
+def _look(number: int, towards: int = 0, share: float = 0.0, *, building: float = 1.0) -> Look:
+    return Look(_direction(number, towards, share), building, 1.0)
 
 
 @pytest.fixture
@@ -48,59 +54,72 @@ def recogniser() -> Recogniser:
 
 
 def test_what_was_taught_has_its_name_its_size_and_a_high_activation(recogniser: Recogniser) -> None:
-    found = recogniser.recognise(_direction(1, 2, 0.1))
+    found = recogniser.recognise(_look(1, 2, 0.1))
 
     assert (found.label, found.size_m) == ("bank", (11.0, 9.0, 10.0))
     assert found.activation > 0.95
 
 
 def test_what_is_like_nothing_has_no_label_and_is_known_once_it_was_learned(recogniser: Recogniser) -> None:
-    stranger = _direction(5)
+    stranger = _look(5)
     before = recogniser.recognise(stranger)
-    recogniser.learn("new-building-1", stranger)
-    after = recogniser.recognise(_direction(5, 6, 0.25))
+    recogniser.learn("new-building-1", stranger.embedding)
+    after = recogniser.recognise(_look(5, 6, 0.25))
 
-    assert (before.label, before.size_m) == ("", None)
-    assert before.activation > 0.9
+    assert (before.known, before.size_m) == (False, None)
+    assert before.new > 0.9
     assert (after.label, after.size_m) == ("new-building-1", None)
     assert after.activation > 0.9
-    assert recogniser.recognise(_direction(9)).label == ""
+    assert not recogniser.recognise(_look(9)).known
 
 
-def test_two_looks_of_one_object_are_one_label_and_their_posteriors_add_up(recogniser: Recogniser) -> None:
+def test_what_stands_elsewhere_is_not_considered(recogniser: Recogniser) -> None:
+    found = recogniser.recognise(_look(1, 0, 0.35))
+    other = recogniser.recognise(_look(1, 0, 0.35), {"bank"})
+
+    assert (found.label, other.label) == ("bank", "bakery")
+    assert other.activation > found.new
+
+
+def test_what_is_hardly_a_building_is_nothing_known_and_no_new_building_either(recogniser: Recogniser) -> None:
+    for number in (1, 5):
+        found = recogniser.recognise(_look(number, building=0.1))
+        assert not found.known
+        assert found.nothing == pytest.approx(0.9)
+        assert found.new < 0.1
+
+
+def test_an_object_is_as_like_as_the_look_of_it_that_is_most_alike(recogniser: Recogniser) -> None:
     recogniser.learn("new-building-1", _direction(5))
-    alone = recogniser.recognise(_direction(5, 6, 0.45)).activation
+    before = recogniser.recognise(_look(6))
     recogniser.learn("new-building-1", _direction(6))
-    both = recogniser.recognise(_direction(5, 6, 0.45))
+    after = recogniser.recognise(_look(6))
 
-    assert both.label == "new-building-1"
-    assert both.activation > alone
+    assert not before.known
+    assert after.label == "new-building-1"
+    assert after.activation == recogniser.recognise(_look(5)).activation
     assert [label for label, _ in recogniser.learned] == ["new-building-1", "new-building-1"]
 
 
-def test_posteriors_are_a_distribution_over_the_taught_the_met_and_none() -> None:
-    taught, met = np.array([[0.9, 0.1], [0.1, 0.2]], np.float32), np.array([[0.3], [0.3]], np.float32)
-    posterior = posteriors(taught, met, NAMES)
+def test_another_look_is_one_unlike_all_that_were_learned_until_there_are_enough(recogniser: Recogniser) -> None:
+    recogniser.learn("new-building-1", _direction(5))
+    alike, other = (recogniser.recognise(_look(5, 6, share)) for share in (0.1, 0.35))
+    taught = recogniser.recognise(_look(1, 2, 0.3))
 
-    assert posterior.shape == (2, 4)
+    assert other.label == "new-building-1"
+    assert [recogniser.is_another(one) for one in (alike, other, taught)] == [False, True, False]
+    for number in range(MOST_LOOKS - 1):
+        recogniser.learn("new-building-1", _direction(10 + number))
+    assert not recogniser.is_another(other)
+
+
+def test_posteriors_are_a_distribution_over_the_taught_the_met_another_building_and_none() -> None:
+    taught, met = np.array([[0.9, 0.1], [0.1, 0.2]] * 2, np.float32), np.full((4, 1), 0.2, np.float32)
+    posterior = posteriors(taught, met, np.array([1.0, 0.9, 0.2, 0.0]), NAMES)
+
+    assert posterior.shape == (4, 5)
     np.testing.assert_allclose(posterior.sum(1), 1.0)
-    assert posterior.argmax(1).tolist() == [0, 3]
-
-
-def test_a_crop_shows_the_segment_alone_and_how_large_it_is() -> None:
-    image = np.full((240, 320, 3), 200, np.uint8)
-    mask = np.zeros((240, 320), np.bool_)
-    mask[100:140, 50:130] = True
-    near, far = (
-        crop(image, np.full((240, 320), depth_m, np.float32), mask, (50, 100, 80, 40), 200.0)
-        for depth_m in (10.0, 40.0)
-    )
-
-    assert near.shape == (5, SIDE_PX, SIDE_PX)
-    assert near[3, SIDE_PX // 2, SIDE_PX // 2] == 1.0
-    assert not near[:4, :8].any()
-    assert near[0, SIDE_PX // 2, SIDE_PX // 2] == pytest.approx(200 / 64 - 2)
-    assert near[4, 0, 0] < far[4, 0, 0]
+    assert posterior.argmax(1).tolist() == [0, 3, 4, 4]
 
 
 def test_the_committed_names_are_those_of_the_catalogue_and_know_their_sizes() -> None:

@@ -76,13 +76,14 @@ def test_the_same_seed_says_the_same() -> None:
 
 def test_misses_confusions_and_noise_come_as_often_as_they_were_measured() -> None:
     landmarks = _landmarks(8)
-    sense = PerceptSense(PerceptErrors(named_phantoms=0.0), landmarks, seed=2)
+    errors = PerceptErrors(named_phantoms=0.0)
+    sense = PerceptSense(errors, landmarks, seed=2)
     views = [sense.see(Pose(x_m=0.0, y_m=0.0, heading_rad=0.0), [3]) for _ in range(4000)]
     said = [view[0] for view in views if view]
-    assert len(said) / len(views) == pytest.approx(0.839, abs=0.02)
-    assert sum(each.label == "house 3" for each in said) / len(said) == pytest.approx(0.972, abs=0.01)
+    assert len(said) / len(views) == pytest.approx(errors.detected, abs=0.02)
+    assert sum(each.label == "house 3" for each in said) / len(said) == pytest.approx(errors.right_name, abs=0.01)
     ranges = np.array([each.range_m for each in said])
-    assert ranges.std() / 23.0 == pytest.approx(0.017 / 0.6745, rel=0.1)
+    assert ranges.std() / 23.0 == pytest.approx(errors.range_sd_share, rel=0.1)
 
 
 def test_a_name_is_said_once_a_view() -> None:

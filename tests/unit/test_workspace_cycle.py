@@ -64,6 +64,16 @@ def test_a_phase_begins_when_every_task_of_the_one_before_is_answered() -> None:
     assert [asked.codelet for asked in desk.take()] == ["attention"]
 
 
+def test_what_is_recognised_with_too_little_activation_is_no_object_of_the_map() -> None:
+    desk = Desk("w1")
+    desk.see(0, percept("a"), percept("b", activation=0.7))
+    (localization,) = desk.take()
+    desk.feed(answer(localization))
+
+    assert [seen.label for seen in localization.percepts] == ["a"]
+    assert [asked.task_id for asked in desk.take()] == ["1/object_place/a", "1/road_place", "1/path"]
+
+
 def test_deltas_are_numbered_without_a_gap() -> None:
     desk = Desk("w1", "w2")
     desk.drive(range(6), percept("a"), percept("b", 0.4))

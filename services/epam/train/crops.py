@@ -8,24 +8,23 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from services.epam.objects import CHANNELS, SIDE_PX, crop
+from services.epam.crop import CHANNELS, SIDE_PX, crop, surroundings
 from services.epam.segments import Segment, Segmenter
 from services.epam.train.renderings import Town
 
 LEAST_OVERLAP = 0.5
-FARTHEST_M = 65.0
+LEAST_PURE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class Crops:
-    """`seen` float16 (n, CHANNELS, SIDE_PX, SIDE_PX); of each its `name`, the town and view that it is from, and the
-    direction (rad) and distance (m) from the building to the camera."""
+    """`seen` float16 (n, CHANNELS, SIDE_PX, SIDE_PX); of each the `name` of the building that it shows, empty for none,
+    whether it is most of what can be seen of that, the town and view that it is from, and how many pixels it has."""
 
     seen: npt.NDArray[np.float16]
     name: npt.NDArray[np.str_]
+    whole: npt.NDArray[np.bool_]
     view: npt.NDArray[np.int64]
-    direction_rad: npt.NDArray[np.float64]
-    distance_m: npt.NDArray[np.float64]
     area_px: npt.NDArray[np.int64]
 
 
@@ -39,15 +38,14 @@ def overlap(segment: Segment, label: npt.NDArray[np.uint8]) -> tuple[int, float]
 
 
 def crops(towns: Iterable[Town], segmenter: Segmenter) -> Crops:
-    """Every segment of every view that shows a building."""
+    """Every segment of every view."""
     rows = [row for index, town in enumerate(towns) for row in _of_town(index, town, segmenter)]
-    seen, name, view, direction, distance, area = zip(*rows, strict=True)
+    seen, name, whole, view, area = zip(*rows, strict=True)
     return Crops(
         np.asarray(seen).reshape(-1, CHANNELS, SIDE_PX, SIDE_PX),
         np.asarray(name),
+        np.asarray(whole),
         np.asarray(view),
-        np.asarray(direction),
-        np.asarray(distance),
         np.asarray(area),
     )
 
@@ -56,13 +54,16 @@ def _of_town(index: int, town: Town, segmenter: Segmenter) -> Iterator[tuple[obj
     camera = town.calibration
     for number in range(len(town.left)):
         image, depth_m, label = town.left[number], town.stereo_m[number], town.label[number]
+        around = surroundings(image, depth_m, camera)
         for segment in segmenter.segments(image, depth_m, camera):
-            building, share = overlap(segment, label)
-            if not building or share < LEAST_OVERLAP:
-                continue
-            off = town.pose[number, :2] - town.place_m[building - 1]
-            distance_m = float(np.hypot(*off))
-            if distance_m < FARTHEST_M:
-                values = crop(image, depth_m, segment.mask, segment.box_px, camera.fx_px).astype(np.float16)
-                place = float(np.arctan2(off[1], off[0])), distance_m, segment.area_px
-                yield values, town.names[building - 1], 1000 * index + number, *place
+            values = crop(image, depth_m, segment, around, camera.fx_px).astype(np.float16)
+            whole = overlap(segment, label)[1] >= LEAST_OVERLAP
+            yield values, _shown(segment, label, town.names), whole, 1000 * index + number, segment.area_px
+
+
+def _shown(segment: Segment, label: npt.NDArray[np.uint8], names: tuple[str, ...]) -> str:
+    """The building that LEAST_PURE of the segment shows; a segment of less shows none."""
+    count = np.bincount(label[segment.mask], minlength=2)
+    count[0] = 0
+    most = int(count.argmax())
+    return names[most - 1] if count[most] >= LEAST_PURE * segment.area_px else ""

@@ -14,104 +14,125 @@ from rich.progress import Progress
 from torch import Tensor, nn
 from torch.nn import functional
 
-from services.epam.objects import CHANNELS, DIMENSIONS, GIVES, SIDE_PX, TAKES
+from services.epam.crop import CHANNELS, SIDE_PX
+from services.epam.objects import DIMENSIONS, GIVES, TAKES, Names
 from services.epam.segments import load as load_segmenter
 from services.epam.train import calibration
 from services.epam.train.ahead import ahead
 from services.epam.train.crops import Crops, crops
 from services.epam.train.renderings import files, read
+from services.epam.train.unet import convolution
 
-WIDTHS = (32, 64, 96, 128)
-BATCH, EPOCHS = 64, 8
+WIDTHS = (32, 64, 128, 160)
+BATCH, EPOCHS = 64, 22
 RATE, DECAY = 2e-3, 5e-4
 SHARPNESS, MARGIN = 16.0, 0.15
+SHORT = 0.03
 
 
 class Describer(nn.Module):
-    """float32 (n, CHANNELS, SIDE_PX, SIDE_PX) to embeddings (n, DIMENSIONS) of length 1."""
+    """float32 (n, CHANNELS, SIDE_PX, SIDE_PX) to embeddings (n, DIMENSIONS) of length 1, and log odds (n, 2).
+
+    What it finds at each scale counts by how much of it there is and how clear it is, not by where: so it holds from
+    other sides as well.
+    """
 
     def __init__(self) -> None:
         super().__init__()
-        layers: list[nn.Module] = [_convolution(CHANNELS, WIDTHS[0], 2)]
-        for fine, coarse in itertools.pairwise(WIDTHS):
-            layers += [_convolution(fine, coarse, 2), _convolution(coarse, coarse, 1)]
-        self.layers = nn.Sequential(*layers)
-        self.head = nn.Linear(WIDTHS[-1] * (SIDE_PX // 2 ** len(WIDTHS)) ** 2, DIMENSIONS)
+        self.stem = convolution(CHANNELS, WIDTHS[0], 2)
+        self.scales = nn.ModuleList(
+            nn.Sequential(convolution(fine, coarse, 2), convolution(coarse, coarse, 1))
+            for fine, coarse in itertools.pairwise(WIDTHS)
+        )
+        many = 2 * sum(WIDTHS[1:])
+        self.head, self.odds = nn.Linear(many, DIMENSIONS), nn.Linear(many, 2)
 
-    def forward(self, values: Tensor) -> Tensor:
+    def forward(self, values: Tensor) -> tuple[Tensor, Tensor]:
         """What it makes of `values`."""
-        embedding = self.head(self.layers(values).flatten(1))
-        return embedding / embedding.square().sum(1, keepdim=True).add(1e-6).sqrt()
-
-
-def _convolution(channels_in: int, channels_out: int, stride: int) -> nn.Sequential:
-    return nn.Sequential(
-        nn.Conv2d(channels_in, channels_out, 3, stride=stride, padding=1, bias=False),
-        nn.BatchNorm2d(channels_out),
-        nn.ReLU(inplace=True),
-    )
+        values, found = self.stem(values), []
+        for scale in self.scales:
+            values = scale(values)
+            found += [values.mean((2, 3)), values.amax((2, 3))]
+        features = torch.cat(found, 1)
+        embedding = self.head(features)
+        return embedding / embedding.square().sum(1, keepdim=True).add(1e-6).sqrt(), self.odds(features)
 
 
 def varied(seen: npt.NDArray[np.float16], rng: np.random.Generator) -> npt.NDArray[np.float32]:
     """Crops (n, …) as they might have been: in another light, partly hidden, cut otherwise. Never mirrored."""
     values = seen.astype(np.float32)
     many = len(values)
-    mask = values[:, 3:4]
+    mask = values[:, 3:4].copy()
     gain = np.exp(rng.normal(0, 0.06, (many, 3, 1, 1)) + rng.normal(0, 0.15, (many, 1, 1, 1))).astype(np.float32)
     offset = rng.normal(0, 0.06, (many, 1, 1, 1)).astype(np.float32)
     values[:, :3] = ((values[:, :3] + 2 * mask) * gain - 2 * mask) + offset * mask
-    values[:, 4] += rng.normal(0, 0.04, (many, 1, 1)).astype(np.float32)
+    around = values[:, 6:].reshape(many, 2, 3, *values.shape[2:])
+    seen_around = np.abs(around).max(axis=2, keepdims=True) > 0
+    around[:] = np.where(seen_around, (around + 2) * gain[:, None] - 2 + offset[:, None], 0)
+    values[:, 5] += rng.normal(0, 0.04, (many, 1, 1)).astype(np.float32)
     for number in np.flatnonzero(rng.random(many) < 0.35):
         left, top = rng.integers(0, SIDE_PX, 2)
         wide, high = rng.integers(4, SIDE_PX // 2, 2)
         values[number, :4, top : top + high, left : left + wide] = 0.0
     shift = rng.integers(-3, 4, (many, 2))
     for row in range(many):
-        values[row, :4] = np.roll(values[row, :4], shift[row], axis=(1, 2))
+        values[row, :5] = np.roll(values[row, :5], shift[row], axis=(1, 2))
     return values
 
 
 def train_on_renderings(folder: Path, out: Path, *, seed: int, epochs: int = EPOCHS) -> dict[str, float]:
-    """Train on the segments of `folder`/train, calibrate on those of `folder`/val, write the network to `out` and what
-    belongs to it beside; the figures on `folder`/val."""
+    """Train on the segments of `folder`/train and `folder`/strangers, calibrate on those of `folder`/val, write the
+    network to `out` and what belongs to it beside; the figures on `folder`/val."""
     torch.manual_seed(seed)
     torch.use_deterministic_algorithms(True)
     torch.utils.deterministic.fill_uninitialized_memory = False
     torch.set_num_threads(1)
     with Progress() as progress:
         known, held = (
-            crops(
-                (read(path) for path in progress.track(files(folder, split), description=f"{split} segments")),
-                load_segmenter(),
-            )
-            for split in ("train", "val")
+            crops((read(path) for path in progress.track(paths, description="segments")), load_segmenter())
+            for paths in (files(folder, "train") + files(folder, "strangers"), files(folder, "val"))
         )
         net, directions, names = _fit(known, np.random.default_rng(seed), epochs, progress)
     export(net, out)
-    taught = [number for number, name in enumerate(names) if not name.startswith("invented-")]
-    sizes = sizes_m(folder, [names[number] for number in taught])
-    unit = functional.normalize(directions).detach().numpy()[taught]
-    found = calibration.calibrate(embeddings(net, held), held, [names[number] for number in taught], unit, sizes)
+    found = calibration.calibrate(*looks(net, held), held, _taught(folder, names, directions))
     out.with_suffix(".json").write_bytes(msgspec.json.format(msgspec.json.encode(found.names), indent=1) + b"\n")
     return found.figures
+
+
+def _taught(folder: Path, names: list[str], directions: Tensor) -> Names:
+    """Those of `names` that belong to the catalogue, before calibration."""
+    rows = [number for number, name in enumerate(names) if not name.startswith("invented-")]
+    taught, sizes = [names[row] for row in rows], sizes_m(folder, names)
+    unit = functional.normalize(directions).detach().numpy()[rows]
+    return Names(
+        names=taught,
+        directions=unit.astype(float).round(5).tolist(),
+        size_m=[sizes[name] for name in taught],
+        sharpness=1.0,
+        unknown=0.0,
+        met_sharpness=1.0,
+        met_unknown=0.0,
+        evidence=1.0,
+    )
 
 
 def _fit(
     known: Crops, rng: np.random.Generator, epochs: int, progress: Progress
 ) -> tuple[Describer, Tensor, list[str]]:
-    names = sorted(set(known.name.tolist()))
-    number = np.searchsorted(names, known.name)
+    names = sorted(set(known.name.tolist()) - {""})
+    number = np.where(known.name == "", -1, np.searchsorted(names, known.name))
     net = Describer().to(memory_format=torch.channels_last)
-    directions = nn.Parameter(torch.randn(len(names), DIMENSIONS))
-    steps = epochs * (len(number) // BATCH)
+    # Short ones turn fast at first: each of thousands of kinds is seldom seen.
+    directions = nn.Parameter(SHORT * torch.randn(len(names), DIMENSIONS))
+    steps = max(1, epochs * len(number) // BATCH)
     weights = [*net.parameters(), directions]
     best = torch.optim.AdamW(weights, weight_decay=DECAY)
     rate = torch.optim.lr_scheduler.OneCycleLR(best, RATE, total_steps=steps, pct_start=0.1)
     task = progress.add_task("training", total=steps)
-    for seen, wanted in ahead(_batches(known, number, steps, rng)):
-        cosines = net(seen) @ functional.normalize(directions).T
-        cosines = cosines - MARGIN * functional.one_hot(wanted, len(names))
-        wrong = functional.cross_entropy(SHARPNESS * cosines, wanted)
+    for seen, wanted, whole in ahead(_batches(known, number, steps, rng)):
+        with torch.autocast("cpu", torch.bfloat16):
+            embedding, odds = net(seen)
+        wrong = loss(embedding.float(), odds.float(), functional.normalize(directions), wanted, whole)
         best.zero_grad()
         wrong.backward()
         best.step()
@@ -120,24 +141,36 @@ def _fit(
     return net.eval(), directions, names
 
 
+def loss(embedding: Tensor, odds: Tensor, directions: Tensor, wanted: Tensor, whole: Tensor) -> Tensor:
+    """How wrong embeddings (n, d) and log odds (n, 2) are, by the number in `directions` (k, d) of what each shows, -1
+    for no building, and whether it is whole."""
+    shows = wanted >= 0
+    cosines = embedding[shows] @ directions.T
+    cosines = cosines - MARGIN * functional.one_hot(wanted[shows], len(directions))
+    named = functional.cross_entropy(SHARPNESS * cosines, wanted[shows])
+    return named + functional.binary_cross_entropy_with_logits(odds, torch.stack([shows, whole], 1).float())
+
+
 def _batches(
     known: Crops, number: npt.NDArray[np.intp], steps: int, rng: np.random.Generator
-) -> Iterator[tuple[Tensor, Tensor]]:
+) -> Iterator[tuple[Tensor, Tensor, Tensor]]:
     order = np.empty(0, np.intp)
     for _ in range(steps):
         if len(order) < BATCH:
             order = rng.permutation(len(number))
         chosen, order = order[:BATCH], order[BATCH:]
         seen = torch.from_numpy(varied(known.seen[chosen], rng))
-        yield seen.contiguous(memory_format=torch.channels_last), torch.from_numpy(number[chosen])
+        shown = torch.from_numpy(number[chosen]), torch.from_numpy(known.whole[chosen])
+        yield seen.contiguous(memory_format=torch.channels_last), *shown
 
 
-def embeddings(net: Describer, of: Crops) -> npt.NDArray[np.float32]:
-    """The embedding of each crop, float32 (n, DIMENSIONS)."""
+def looks(net: Describer, of: Crops) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
+    """The embedding of each crop, float32 (n, DIMENSIONS), and its log odds (n, 2)."""
     with torch.no_grad():
         some = np.array_split(of.seen, len(of.seen) // 256 + 1)
         parts = [net(torch.from_numpy(part.astype(np.float32))) for part in some]
-    return np.asarray(torch.cat(parts).numpy(), np.float32)
+    embedding, odds = (torch.cat(column).numpy().astype(np.float32) for column in zip(*parts, strict=True))
+    return embedding, odds
 
 
 def sizes_m(folder: Path, names: list[str]) -> dict[str, tuple[float, float, float]]:

@@ -31,8 +31,8 @@ from services.epam.train.crops import LEAST_OVERLAP, overlap
 from services.epam.train.renderings import Town, files, read, towns
 from services.epam.train.unet import unet
 
-WIDTHS = (16, 32, 64, 96)
-BATCH, EPOCHS = 16, 12
+WIDTHS = (16, 48, 96, 160)
+BATCH, EPOCHS = 16, 16
 RATE, DECAY = 3e-3, 1e-4
 LEAST_PX = 10
 LARGE_SHARE = 0.01
@@ -128,13 +128,14 @@ def train_on_renderings(folder: Path, out: Path, *, seed: int, epochs: int = EPO
         paths = files(folder, "train")
         known = examples(read(path) for path in progress.track(paths, description="reading"))
         net = Divider().to(memory_format=torch.channels_last)
-        steps = epochs * (len(known.label) // BATCH)
+        steps = max(1, epochs * len(known.label) // BATCH)
         best = torch.optim.AdamW(net.parameters(), weight_decay=DECAY)
         rate = torch.optim.lr_scheduler.OneCycleLR(best, RATE, total_steps=steps, pct_start=0.1)
         task = progress.add_task("training", total=steps)
         for seen, wanted in ahead(_batches(known, steps, np.random.default_rng(seed))):
-            said = net(seen)[:, :, PADDING_PX:-PADDING_PX]
-            wrong = loss(said, wanted)
+            with torch.autocast("cpu", torch.bfloat16):
+                said = net(seen)[:, :, PADDING_PX:-PADDING_PX]
+            wrong = loss(said.float(), wanted)
             best.zero_grad()
             wrong.backward()
             best.step()

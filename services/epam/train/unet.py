@@ -17,14 +17,14 @@ class UNet(nn.Module):
 
     def __init__(self, channels_in: int, channels_out: int, widths: Sequence[int]) -> None:
         super().__init__()
-        self.stem = _convolution(channels_in, widths[0])
+        self.stem = convolution(channels_in, widths[0])
         finer, coarser = widths[:-1], widths[1:]
         self.down = nn.ModuleList(
-            nn.Sequential(_convolution(fine, coarse, stride=2), _convolution(coarse, coarse))
+            nn.Sequential(convolution(fine, coarse, stride=2), convolution(coarse, coarse))
             for fine, coarse in zip(finer, coarser, strict=True)
         )
         self.up = nn.ModuleList(
-            _convolution(fine + coarse, fine) for fine, coarse in zip(reversed(finer), reversed(coarser), strict=True)
+            convolution(fine + coarse, fine) for fine, coarse in zip(reversed(finer), reversed(coarser), strict=True)
         )
         self.enlarge = nn.Upsample(scale_factor=2, mode="nearest")
         self.head = nn.Conv2d(widths[0], channels_out, 1)
@@ -45,7 +45,7 @@ def unet(channels_in: int, channels_out: int, widths: Sequence[int]) -> UNet:
     return UNet(channels_in, channels_out, widths)
 
 
-def _convolution(channels_in: int, channels_out: int, stride: int = 1) -> nn.Sequential:
+def convolution(channels_in: int, channels_out: int, stride: int = 1) -> nn.Sequential:
     """A 3 by 3 convolution, normalised and rectified; normalisation has no cost where the network runs."""
     return nn.Sequential(
         nn.Conv2d(channels_in, channels_out, 3, stride=stride, padding=1, bias=False),
