@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
+
 import numpy as np
 
 from bus.graph import Graph, object_id
 from schemas.array import Array
 from schemas.graph import Node, PlaceTile
 from schemas.mind import Task
-from schemas.sensing import Percept
 from services.workspace.scene import SELF, Scene, task_of
 from services.workspace.settings import Config
 
 PATH, CLOSURE, CORRECTION = "path", "closure", "correction"
+MET = ""
 
 
 def path_tasks(scene: Scene, graph: Graph, spacing_m: float) -> list[Task]:
@@ -38,28 +40,65 @@ def shift_tasks(scene: Scene, graph: Graph) -> list[Task]:
     return [task]
 
 
-def correction_tasks(scene: Scene, graph: Graph, config: Config) -> list[Task]:
-    """One where a landmark or a view comes again that was away for long, unless a loop was closed just now."""
+def revisit_tasks(scene: Scene, graph: Graph, config: Config) -> list[Task]:
+    """One where the path grows and a landmark or a view comes again that was away for long, or is passed by since.
+
+    It gets the landmarks, and the path where they came to be known; or the closures that this pass began with.
+    """
     percepts, now_ns = scene.percepts, scene.percepts.stamp_ns
-    closures = _of_kind(graph, CLOSURE)
-    newest_ns = max((int(node.attributes["to_ns"]) for node in closures), default=-(2**62))
-    if CORRECTION in graph.nodes or now_ns < newest_ns + config.closure_spacing_s * 1e9:
+    known = [percept for percept in percepts.objects if percept.whole and object_id(percept.label) in graph.nodes]
+    if not (known or percepts.matches) or not path_tasks(scene, graph, config.path_spacing_m):
         return []
-    long_ago_ns = now_ns - config.revisit_s * 1e9
-    again = [percept for percept in percepts.objects if _was_away(graph, percept, long_ago_ns)]
-    matches = [match for match in percepts.matches if match.view_ns <= long_ago_ns]
+    long_ago_ns, soon_ns = (now_ns - seconds * 1e9 for seconds in (config.revisit_s, config.closure_spacing_s))
+    newest = _newest_closures(graph)
+    again, nodes, since_ns = [], [], []
+    for percept in known:
+        landmark, closure = graph.nodes[object_id(percept.label)], newest.get(percept.label)
+        if closure is not None and _until_ns(closure) > long_ago_ns:
+            if _until_ns(closure) <= soon_ns:
+                again.append(percept)
+                nodes.append(closure)
+        elif int(landmark.attributes.get("stamp_ns", 2**62)) <= long_ago_ns:
+            again.append(percept)
+            nodes.append(landmark)
+            since_ns.append(int(landmark.attributes["since_ns"]))
+    ready = MET not in newest or _until_ns(newest[MET]) <= soon_ns
+    matches = [match for match in percepts.matches if ready and match.view_ns <= long_ago_ns]
     if not again and not matches:
         return []
-    known = [graph.nodes[object_id(percept.label)] for percept in again]
-    nodes = [graph.nodes[SELF], *known, *_of_kind(graph, PATH), *closures]
-    task = task_of(scene, graph, "map_correction", nodes, again)
+    task = task_of(scene, graph, "revisit", [*nodes, *_segments(graph, since_ns)], again)
     task.matches = matches
     return [task]
 
 
-def _was_away(graph: Graph, percept: Percept, long_ago_ns: float) -> bool:
-    node = graph.nodes.get(object_id(percept.label))
-    return percept.whole and node is not None and int(node.attributes.get("stamp_ns", 2**62)) <= long_ago_ns
+def _until_ns(closure: Node) -> int:
+    return int(closure.attributes["to_ns"])
+
+
+def correction_tasks(scene: Scene, graph: Graph, config: Config) -> list[Task]:
+    """One where there are closures that nobody has judged, unless some were judged just now."""
+    closures = _of_kind(graph, CLOSURE)
+    newest_ns = max((_until_ns(node) for node in closures if "holds" in node.attributes), default=-(2**62))
+    soon = scene.percepts.stamp_ns < newest_ns + config.closure_spacing_s * 1e9
+    if CORRECTION in graph.nodes or soon or all("holds" in node.attributes for node in closures):
+        return []
+    return [task_of(scene, graph, "map_correction", [*_of_kind(graph, PATH), *closures], [])]
+
+
+def _newest_closures(graph: Graph) -> dict[str, Node]:
+    """The newest closure by each landmark, and that by a place met again."""
+    newest: dict[str, Node] = {}
+    for node in sorted(_of_kind(graph, CLOSURE), key=_until_ns):
+        newest[MET if float(node.attributes["sd_rad"]) else str(node.attributes["by"])] = node
+    return newest
+
+
+def _segments(graph: Graph, since_ns: list[int]) -> list[Node]:
+    """The nodes of the path from which on things came to be known, and those after them."""
+    path = sorted(_of_kind(graph, PATH), key=lambda node: int(node.attributes["number"]))
+    begins_s = [float(node.samples.numpy()[0, 0]) for node in path if node.samples is not None]
+    first = [max(0, bisect_right(begins_s, stamp_ns * 1e-9) - 1) for stamp_ns in since_ns]
+    return [path[number] for number in sorted({*first, *(number + 1 for number in first)}) if number < len(path)]
 
 
 def _last(graph: Graph) -> Node | None:
