@@ -15,17 +15,22 @@ from services.workspace.settings import Config
 
 PATH, CLOSURE, CORRECTION = "path", "closure", "correction"
 MET = ""
+ODOMETRY, ODOMETRY_FACTS = slice(4, 6), ("odometry_x_m", "odometry_y_m")
 
 
 def path_tasks(scene: Scene, graph: Graph, spacing_m: float) -> list[Task]:
-    """One where the agent is `spacing_m` or more from the path's last place."""
+    """One where the agent has gone `spacing_m` or more from the path's last place, by path integration alone.
+
+    Where it takes itself to be may jump, or stay where it is, when it is lost.
+    """
     agent, last = graph.nodes[SELF], _last(graph)
     if last is None:
         return [task_of(scene, graph, "path", [agent], [])]
     if last.samples is None:
         return []
-    x_m, y_m = last.samples.numpy()[-1, 1:3].tolist()
-    far = np.hypot(float(agent.attributes["x_m"]) - x_m, float(agent.attributes["y_m"]) - y_m) >= spacing_m
+    before_m = last.samples.numpy()[-1, ODOMETRY]
+    gone_m = [float(agent.attributes.get(key, 0.0)) for key in ODOMETRY_FACTS] - before_m
+    far = np.hypot(*gone_m) >= spacing_m
     return [task_of(scene, graph, "path", [agent, last], [])] if far else []
 
 
