@@ -27,6 +27,7 @@ from services.codelets.sightings import MOVING, Sighting, compare, log_likelihoo
 WIDER, WIDENINGS = 1.5, 6
 ALONE = 4
 STAGES = 5
+FORGOTTEN_S = 20.0
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ def localize(task: Task, config: Config) -> list[Operation]:
     moved = move(refill(before, config.samples, 0.0, rng), motions, config, rng)
     stands_ns = _stands_since(self_node, bool(motions[:, :2].any()))
     seen = sightings(task, config.largest_landmark_sd_m, stands_ns)
-    past = _past(self_node, moved)
+    past = _past(self_node, moved, task.stamp_ns)
     found = past if seen is None else _correct(past, seen, config, rng)
     odometry = _odometry(self_node, motions, found, mean_pose(moved))
     return _self_operations(task, self_node, found, stands_ns, odometry)
@@ -86,8 +87,11 @@ def _stands_since(node: Node, moves: bool) -> int:
     return int(node.attributes.get("stamp_ns", 0)) if before == MOVING else before
 
 
-def _past(node: Node, moved: Samples) -> Found:
+def _past(node: Node, moved: Samples, stamp_ns: int) -> Found:
+    """What was found before; that something did not fit is forgotten where nothing has come of it for long."""
     facts = node.attributes
+    if stamp_ns > int(facts.get("missed_ns", 0)) + FORGOTTEN_S * 1e9:
+        return Found(moved)
     return Found(
         moved,
         1.0,
@@ -139,6 +143,7 @@ def _self_operations(task: Task, node: Node, found: Found, stands_ns: int, odome
     sd = spread(found.samples[:, :POSE_COLUMNS], mean)
     cell = nearest_place(mean[0], mean[1], task.cell_m)
     gains = found.samples[:, [SPEED, TURN, RANGE]].mean(axis=0).tolist()
+    missed_ns = int(node.attributes.get("missed_ns", 0))
     attributes: dict[str, Scalar] = node.attributes | {
         "x_m": float(mean[0]),
         "y_m": float(mean[1]),
@@ -150,6 +155,7 @@ def _self_operations(task: Task, node: Node, found: Found, stands_ns: int, odome
         "astray": found.astray,
         "missed": found.missed,
         "others": found.others,
+        "missed_ns": task.stamp_ns if found.astray > int(node.attributes.get("astray", 0)) else missed_ns,
         "stands_ns": stands_ns,
         **dict(zip(("speed_gain", "turn_gain", "range_gain"), gains, strict=True)),
         **dict(zip(ODOMETRY_FACTS, odometry.tolist(), strict=True)),

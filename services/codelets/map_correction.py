@@ -16,8 +16,8 @@ from schemas.mind import Replay, Task
 from services.codelets.agreement import Views, agreeing
 from services.codelets.closures import holding
 from services.codelets.least_squares import correct_headings
-from services.codelets.path import POSE, STAMP, rows_of, steps_of
-from services.codelets.pose_graph import Constraints, Floats, PoseGraph
+from services.codelets.path import ODOMETRY, POSE, STAMP, rows_of, shifted, steps_of
+from services.codelets.pose_graph import Constraints, Floats, PoseGraph, cost
 from services.codelets.replay import close_loops
 from services.codelets.revisits import KIND, constraints_of, views_of
 from services.codelets.sampling import wrapped
@@ -38,7 +38,7 @@ def correct_map(task: Task, config: Config) -> tuple[list[Operation], Replay | N
         return [], None
     views, steps = views_of(closures, rows), steps_of(rows, config)
     agrees = agreeing(views, steps, config.false_closure) & (views.second - views.first >= LEAST_ROWS)
-    graph, among = _holding(rows[:, POSE], steps, views.select(agrees), config)
+    graph, among = _holding(_start(rows, steps, views.select(agrees)), steps, views.select(agrees), config)
     holds = np.zeros(len(closures), bool)
     holds[agrees] = among
     written = _judged(closures, agrees, holds)
@@ -47,12 +47,22 @@ def correct_map(task: Task, config: Config) -> tuple[list[Operation], Replay | N
     if held == held_before:
         return written, None
     new, replays = corrected(graph, config)
-    samples = Array.of(np.column_stack([rows[:, STAMP], graph.poses, new]))
+    samples = Array.of(np.column_stack([rows[:, STAMP], rows[:, POSE], new]))
     written.append(Node(id=CORRECTION, kind=CORRECTION, base_level=1.0, samples=samples))
     replay = _replay(rows, new, graph.closures, config)
     replay.stamp_ns, replay.cycle, replay.replays = task.stamp_ns, task.cycle, replays
     replay.closed, replay.undone = sorted(held), sorted(held_before - held)
     return written, replay
+
+
+def _start(rows: Floats, steps: Constraints, views: Views) -> Floats:
+    """(n, 3) poses to correct from: as the agent believes them to be, or as path integration has them, if that fits
+    better: who was lost for a while believed what no step could lead to."""
+    believed, felt = rows[:, POSE], rows[:, ODOMETRY]
+    begun = np.repeat(felt[:1], len(rows), axis=0), np.repeat(believed[:1], len(rows), axis=0)
+    turned = wrapped(felt[:, 2] + begun[1][:, 2] - begun[0][:, 2])
+    integrated = np.column_stack([shifted(felt[:, :2], *begun), turned])
+    return min((believed, integrated), key=lambda poses: cost(poses, steps + constraints_of(views, poses)))
 
 
 def _holding(
