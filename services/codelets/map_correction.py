@@ -22,10 +22,12 @@ from services.codelets.replay import close_loops
 from services.codelets.revisits import KIND, constraints_of, views_of
 from services.codelets.sampling import wrapped
 from services.codelets.settings import Config
+from services.codelets.sighted import Sightings
 
 CORRECTION = "correction"
 LEAST_ROWS = 10
 MOST_ROUNDS, SAME_RAD = 3, 0.05
+ROUNDS = 5
 
 
 def correct_map(task: Task, config: Config) -> tuple[list[Operation], Replay | None]:
@@ -46,7 +48,8 @@ def correct_map(task: Task, config: Config) -> tuple[list[Operation], Replay | N
     held = {node.id for node, hold in zip(closures, holds, strict=True) if hold}
     if held == held_before:
         return written, None
-    new, replays = corrected(graph, config)
+    seen = Sightings.of(task.nodes, rows[:, STAMP])
+    new, replays = corrected(graph, seen, config)
     samples = Array.of(np.column_stack([rows[:, STAMP], rows[:, POSE], new]))
     written.append(Node(id=CORRECTION, kind=CORRECTION, base_level=1.0, samples=samples))
     replay = _replay(rows, new, graph.closures, config)
@@ -84,16 +87,22 @@ def _holding(
     return graph, holds
 
 
-def corrected(graph: PoseGraph, config: Config) -> tuple[Floats, int]:
+def corrected(graph: PoseGraph, seen: Sightings, config: Config) -> tuple[Floats, int]:
     """(n, 3) poses with all loops closed, by the paper's rule or with the headings, and how often the path replayed.
 
-    Where no loop is left, the path is as path integration has it.
+    Where no loop is left, the path is as path integration has it. With the headings, the path is also bound to what was
+    seen along it.
     """
     positions = close_loops(_positions_only(graph))
     poses = np.column_stack([positions.positions_m, graph.poses[:, 2]])
     if config.correct == "positions":
         return poses, positions.replays
-    return correct_headings(PoseGraph(graph.poses, graph.steps, graph.closures)), positions.replays
+    poses = correct_headings(graph)
+    landmarks_m = seen.landmarks_m(poses)
+    for _ in range(ROUNDS if len(landmarks_m) else 0):
+        joint = correct_headings(seen.joined(PoseGraph(poses, graph.steps, graph.closures), landmarks_m))
+        poses, landmarks_m = joint[: len(poses)], joint[len(poses) :, :2]
+    return poses, positions.replays
 
 
 def _positions_only(graph: PoseGraph) -> PoseGraph:

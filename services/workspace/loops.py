@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
-
-import numpy as np
 
 from bus.graph import Graph, object_id
 from schemas.array import Array
@@ -13,25 +12,41 @@ from schemas.mind import Task
 from services.workspace.scene import SELF, Scene, task_of
 from services.workspace.settings import Config
 
-PATH, CLOSURE, CORRECTION = "path", "closure", "correction"
+PATH, SIGHTED, CLOSURE, CORRECTION = "path", "sighted", "closure", "correction"
 MET = ""
 ODOMETRY, ODOMETRY_FACTS = slice(4, 6), ("odometry_x_m", "odometry_y_m")
 
 
 def path_tasks(scene: Scene, graph: Graph, spacing_m: float) -> list[Task]:
-    """One where the agent has gone `spacing_m` or more from the path's last place, by path integration alone.
-
-    Where it takes itself to be may jump, or stay where it is, when it is lost.
-    """
-    agent, last = graph.nodes[SELF], _last(graph)
-    if last is None:
-        return [task_of(scene, graph, "path", [agent], [])]
-    if last.samples is None:
+    """One where the path grows, or the agent sees what it had not seen from the path's last place."""
+    agent, last, far = graph.nodes[SELF], _last(graph), _grows(graph, spacing_m)
+    if last is None or last.samples is None:
+        return [task_of(scene, graph, "path", [agent], scene.percepts.objects)]
+    number, stamp_s = int(last.attributes["number"]), float(last.samples.numpy()[-1, 0])
+    known = {each.label: graph.nodes.get(f"{SIGHTED}:{number}:{each.label}") for each in scene.percepts.objects}
+    new = [each for each in scene.percepts.objects if far or not _seen_from(known[each.label], stamp_s)]
+    if not far and not new:
         return []
-    before_m = last.samples.numpy()[-1, ODOMETRY]
-    gone_m = [float(agent.attributes.get(key, 0.0)) for key in ODOMETRY_FACTS] - before_m
-    far = np.hypot(*gone_m) >= spacing_m
-    return [task_of(scene, graph, "path", [agent, last], [])] if far else []
+    sighted = [node for each in new if (node := known[each.label]) is not None]
+    return [task_of(scene, graph, "path", [agent, last, *sighted], new)]
+
+
+def _grows(graph: Graph, spacing_m: float) -> bool:
+    """Whether the agent has gone `spacing_m` from the path's last place, by path integration alone.
+
+    Where it takes itself to be may jump, or hardly move while it is lost.
+    """
+    last = _last(graph)
+    if last is None or last.samples is None:
+        return True
+    facts = graph.nodes[SELF].attributes
+    before_m = last.samples.numpy()[-1, ODOMETRY].tolist()
+    return math.dist([float(facts.get(key, 0.0)) for key in ODOMETRY_FACTS], before_m) >= spacing_m
+
+
+def _seen_from(sighted: Node | None, stamp_s: float) -> bool:
+    """Whether the last of a landmark's sightings is from the place of the path at `stamp_s`."""
+    return sighted is not None and sighted.samples is not None and float(sighted.samples.numpy()[-1, 0]) >= stamp_s
 
 
 def shift_tasks(scene: Scene, graph: Graph) -> list[Task]:
@@ -39,8 +54,8 @@ def shift_tasks(scene: Scene, graph: Graph) -> list[Task]:
     if CORRECTION not in graph.nodes:
         return []
     agent, correction = graph.nodes[SELF], graph.nodes[CORRECTION]
-    objects = [graph.nodes[name] for name in sorted(graph.nodes) if graph.nodes[name].kind == "object"]
-    task = task_of(scene, graph, "map_shift", [agent, correction, *_of_kind(graph, PATH), *objects], [])
+    found = [node for kind in (PATH, SIGHTED, "object") for node in _of_kind(graph, kind)]
+    task = task_of(scene, graph, "map_shift", [agent, correction, *found], [])
     task.tiles = [tile for tile in _tiles(graph) if tile.road.numpy().any()]
     return [task]
 
@@ -52,7 +67,7 @@ def revisit_tasks(scene: Scene, graph: Graph, config: Config) -> list[Task]:
     """
     percepts, now_ns = scene.percepts, scene.percepts.stamp_ns
     known = [percept for percept in percepts.objects if percept.whole and object_id(percept.label) in graph.nodes]
-    if not (known or percepts.matches) or not path_tasks(scene, graph, config.path_spacing_m):
+    if not (known or percepts.matches) or not _grows(graph, config.path_spacing_m):
         return []
     long_ago_ns, soon_ns = (now_ns - seconds * 1e9 for seconds in (config.revisit_s, config.closure_spacing_s))
     newest = _newest_closures(graph)
@@ -87,7 +102,7 @@ def correction_tasks(scene: Scene, graph: Graph, config: Config) -> list[Task]:
     soon = scene.percepts.stamp_ns < newest_ns + config.closure_spacing_s * 1e9
     if CORRECTION in graph.nodes or soon or all("holds" in node.attributes for node in closures):
         return []
-    return [task_of(scene, graph, "map_correction", [*_of_kind(graph, PATH), *closures], [])]
+    return [task_of(scene, graph, "map_correction", [*_of_kind(graph, PATH), *_of_kind(graph, SIGHTED), *closures], [])]
 
 
 def _newest_closures(graph: Graph) -> dict[str, Node]:
@@ -107,12 +122,15 @@ def _segments(graph: Graph, since_ns: list[int]) -> list[Node]:
 
 
 def _last(graph: Graph) -> Node | None:
-    path = _of_kind(graph, PATH)
-    return max(path, key=lambda node: int(node.attributes["number"]), default=None)
+    """The last node of the path, whose nodes are numbered from 0: found without a look at the rest of the map."""
+    number = 0
+    while f"{PATH}:{number}" in graph.nodes:
+        number += 1
+    return graph.nodes.get(f"{PATH}:{number - 1}")
 
 
 def _of_kind(graph: Graph, kind: str) -> list[Node]:
-    return [graph.nodes[name] for name in sorted(graph.nodes) if graph.nodes[name].kind == kind]
+    return sorted((node for node in graph.nodes.values() if node.kind == kind), key=lambda node: node.id)
 
 
 def _tiles(graph: Graph) -> list[PlaceTile]:
