@@ -16,8 +16,8 @@ from schemas.mind import Replay, Task
 from services.codelets.agreement import Views, agreeing
 from services.codelets.closures import holding
 from services.codelets.least_squares import correct_headings
-from services.codelets.path import ODOMETRY, POSE, STAMP, rows_of, shifted, steps_of
-from services.codelets.pose_graph import Constraints, Floats, PoseGraph, cost
+from services.codelets.path import POSE, STAMP, rows_of, steps_of
+from services.codelets.pose_graph import Constraints, Floats, PoseGraph, discrepancies, rotations, squared
 from services.codelets.replay import close_loops
 from services.codelets.revisits import KIND, constraints_of, views_of
 from services.codelets.sampling import wrapped
@@ -25,7 +25,7 @@ from services.codelets.settings import Config
 from services.codelets.sighted import Sightings
 
 CORRECTION = "correction"
-LEAST_ROWS = 10
+LEAST_ROWS, IMPOSSIBLE_SD = 10, 5.0
 MOST_ROUNDS, SAME_RAD = 3, 0.05
 ROUNDS = 5
 
@@ -40,7 +40,7 @@ def correct_map(task: Task, config: Config) -> tuple[list[Operation], Replay | N
         return [], None
     views, steps = views_of(closures, rows), steps_of(rows, config)
     agrees = agreeing(views, steps, config.false_closure) & (views.second - views.first >= LEAST_ROWS)
-    graph, among = _holding(_start(rows, steps, views.select(agrees)), steps, views.select(agrees), config)
+    graph, among = _holding(_start(rows[:, POSE], steps), steps, views.select(agrees), config)
     holds = np.zeros(len(closures), bool)
     holds[agrees] = among
     written = _judged(closures, agrees, holds)
@@ -58,14 +58,18 @@ def correct_map(task: Task, config: Config) -> tuple[list[Operation], Replay | N
     return written, replay
 
 
-def _start(rows: Floats, steps: Constraints, views: Views) -> Floats:
-    """(n, 3) poses to correct from: as the agent believes them to be, or as path integration has them, if that fits
-    better: who was lost for a while believed what no step could lead to."""
-    believed, felt = rows[:, POSE], rows[:, ODOMETRY]
-    begun = np.repeat(felt[:1], len(rows), axis=0), np.repeat(believed[:1], len(rows), axis=0)
-    turned = wrapped(felt[:, 2] + begun[1][:, 2] - begun[0][:, 2])
-    integrated = np.column_stack([shifted(felt[:, :2], *begun), turned])
-    return min((believed, integrated), key=lambda poses: cost(poses, steps + constraints_of(views, poses)))
+def _start(poses: Floats, steps: Constraints) -> Floats:
+    """(n, 3) poses to correct from: those believed, but where no step could have led from one to the next.
+
+    There the path goes on as it was felt. Who was lost for a while believed what would lead astray for good.
+    """
+    believed = discrepancies(poses, steps)
+    possible = squared(believed, steps.information) <= IMPOSSIBLE_SD**2
+    measured = steps.measured + np.where(possible[:, None], believed, 0.0)
+    heading = poses[0, 2] + np.concatenate([[0.0], np.cumsum(measured[:, 2])])
+    moved = np.einsum("mab,mb->ma", rotations(heading[:-1]), measured[:, :2])
+    where = poses[0, :2] + np.vstack([np.zeros(2), np.cumsum(moved, axis=0)])
+    return np.column_stack([where, wrapped(heading)])
 
 
 def _holding(
