@@ -21,7 +21,6 @@ from services.codelets.path import KIND as PATH
 from services.codelets.path import POSE, STAMP, rows_of, segments, shifted
 from services.codelets.places import place_link
 from services.codelets.pose_graph import Floats
-from services.codelets.revisits import first_pass
 from services.codelets.sampling import mean_pose, wrapped
 from services.codelets.settings import Config
 from services.codelets.sighted import Sightings
@@ -30,6 +29,7 @@ COLUMNS = 7
 OLD, NEW = slice(1, 4), slice(4, 7)
 AROUND = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)])
 AT_ONCE = 4096
+BESIDE_M = 10.0
 
 
 def shift_map(task: Task, config: Config) -> list[Operation]:
@@ -93,8 +93,19 @@ def _object(task: Task, node: Node, rows: Floats, seen_m: Floats | None) -> list
     # One seen since the correction was computed goes with the path's last place.
     near = rows[known] if len(known) else rows[[int(np.abs(rows[:, STAMP] - since_s).argmin())]]
     away = np.hypot(*(near[:, OLD][:, :2] - samples[:, :2].mean(axis=0)).T)
-    row = near[[first_pass(away)]]
+    row = near[[_first_pass(away)]]
     return _placed(task, node, shifted(samples, row[:, OLD], row[:, NEW]), {})
+
+
+def _first_pass(away: Floats) -> int:
+    """The nearest of the places, by (n,) distances along the path, where it first passes by.
+
+    Not the nearest of all: where a loop has drifted, its end may lie nearer than the beginning that an object is of.
+    """
+    passing = np.flatnonzero(away <= max(2 * away.min(), away.min() + BESIDE_M))
+    gone = np.flatnonzero(np.diff(passing) > 1)
+    first = passing[: gone[0] + 1] if len(gone) else passing
+    return int(first[away[first].argmin()])
 
 
 def _placed(task: Task, node: Node, samples: Floats, facts: dict[str, Scalar]) -> list[Operation]:

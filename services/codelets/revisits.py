@@ -14,81 +14,79 @@ from schemas.graph import Node, Operation
 from schemas.mind import Task
 from schemas.sensing import Percept, PlaceMatch
 from services.codelets.agreement import AGREEING, Views
-from services.codelets.path import POSE, STAMP, rows_of
-from services.codelets.pose_graph import Constraints, Floats, relative, rotations
+from services.codelets.path import ODOMETRY, STAMP, rows_of
+from services.codelets.pose_graph import Constraints, Floats, Indices, relative, rotations
 from services.codelets.sampling import wrapped
 from services.codelets.settings import Config
+from services.codelets.sighted import Sightings
 from services.codelets.sightings import has_bearing, has_range
 
 KIND = "closure"
-BESIDE_M = 10.0
+SAME_M = 6.0
 
-_Anchor = dict[str, Scalar]
+_Facts = dict[str, Scalar]
 
 
 def revisit(task: Task, config: Config) -> list[Operation]:
-    """A closure for each percept and match of `task`, which has the landmarks, and the path where each was met before.
+    """A closure for each percept and match of `task`.
 
-    Closures of the same landmark among its nodes are of the same pass: the landmark stands where it stood before that,
-    whatever this pass has made of it. One that was not seen often where it stands may be a mistake, and closes nothing.
+    It has the landmarks, or the newest closures that they have made on this pass, all sightings of them, and the path
+    along which these were made. Each view of a landmark is joined to a sighting of its own, so that one mistake, now or
+    then, makes one closure. What the map has the landmark at does not come into it: this pass may have moved it.
     """
     rows = rows_of(task.nodes)
-    passing = {str(node.attributes["by"]): node for node in task.nodes if node.kind == KIND}
-    landmarks = {node.attributes.get("label"): node for node in task.nodes if node.kind == "object"}
+    seen = Sightings.of(task.nodes, rows[:, STAMP])
     found: list[Operation] = []
     for percept in task.percepts:
-        if not (has_bearing(percept) and has_range(percept)):
+        begun = next(
+            node for node in task.nodes if percept.label in (node.attributes.get(key) for key in ("label", "by"))
+        )
+        before_ns, number = (int(begun.attributes.get(key, 0)) for key in ("before_ns", "view"))
+        before_ns = before_ns or int(begun.attributes["stamp_ns"])
+        there = _clearest(seen, percept.label, rows, before_ns)
+        if len(there) < AGREEING or not (has_bearing(percept) and has_range(percept)):
             continue
-        if (before := passing.get(percept.label)) is not None:
-            anchor = {key: before.attributes[key] for key in ("from_ns", "ahead_m", "left_m")}
-        elif _seen_often(landmarks[percept.label]):
-            anchor = _stands(landmarks[percept.label], rows)
-        else:
-            continue
-        found.append(_closure(task, percept.label, anchor | _sight(percept, anchor, config)))
+        facts = _joined(seen, int(there[number % len(there)]), rows, percept)
+        found.append(_closure(task, percept.label, facts | {"before_ns": before_ns, "view": number + 1}))
     return found + [_closure(task, f"view-{match.frame}", _place(match, config)) for match in task.matches]
 
 
-def _seen_often(landmark: Node) -> bool:
-    facts = landmark.attributes
-    return int(facts.get("sightings", 0)) - int(facts.get("misses", 0)) >= AGREEING
+def _clearest(seen: Sightings, label: str, rows: Floats, before_ns: int) -> Indices:
+    """The sightings of a landmark that most others agree with, up to `before_ns`, those from nearest first.
 
-
-def _stands(landmark: Node, rows: Floats) -> _Anchor:
-    """Where a landmark stands as seen from where the path first passed it by."""
-    facts = landmark.attributes
-    where = np.array([float(facts["x_m"]), float(facts["y_m"])])
-    since = rows[rows[:, STAMP] >= int(facts["since_ns"]) * 1e-9 - 1e-6]
-    near = since[first_pass(np.hypot(*(since[:, POSE][:, :2] - where).T))]
-    ahead_m, left_m = (rotations(-near[None, 3])[0] @ (where - near[POSE][:2])).tolist()
-    return {"from_ns": round(float(near[STAMP]) * 1e9), "ahead_m": ahead_m, "left_m": left_m}
-
-
-def first_pass(away: Floats) -> int:
-    """The nearest of the places, by (n,) distances along the path, where it first passes by.
-
-    Not the nearest of all: where a loop has drifted, its end may lie nearer than the beginning that an object is of.
+    On one pass by, they lead to the same place by path integration alone.
     """
-    passing = np.flatnonzero(away <= max(2 * away.min(), away.min() + BESIDE_M))
-    gone = np.flatnonzero(np.diff(passing) > 1)
-    first = passing[: gone[0] + 1] if len(gone) else passing
-    return int(first[away[first].argmin()])
+    known = np.flatnonzero(rows[seen.place, STAMP] <= before_ns * 1e-9 + 1e-6)
+    known = known[[seen.labels[index] == label for index in seen.landmark[known].tolist()]]
+    stood = rows[seen.place[known], ODOMETRY]
+    where = stood[:, :2] + np.einsum("mab,mb->ma", rotations(stood[:, 2]), seen.where_m[known])
+    same = np.hypot(*(where[:, None] - where).transpose(2, 0, 1)) <= SAME_M
+    chosen = known[same[same.sum(axis=1).argmax()]] if len(known) else known
+    order: Indices = chosen[np.argsort(np.hypot(*seen.where_m[chosen].T), kind="stable")]
+    return order
 
 
-def _sight(percept: Percept, anchor: _Anchor, config: Config) -> _Anchor:
-    """It was located as well as it is seen now, while the agent came by."""
-    seen2 = percept.range_sd_m**2 + (percept.range_m * percept.bearing_sd_rad) ** 2
-    by_m = float(np.hypot(float(anchor["ahead_m"]), float(anchor["left_m"])))
-    sd_m = float(np.sqrt(2 * seen2 + config.path_variance_per_m * (by_m + percept.range_m)))
-    return {"range_m": percept.range_m, "bearing_rad": percept.bearing_rad, "sd_m": sd_m, "sd_rad": 0.0}
+def _joined(seen: Sightings, there: int, rows: Floats, percept: Percept) -> _Facts:
+    ahead_m, left_m = seen.where_m[there].tolist()
+    there_m2 = 1 / float(np.linalg.eigvalsh(seen.information[there])[0])
+    here_m2 = percept.range_sd_m**2 + (percept.range_m * percept.bearing_sd_rad) ** 2
+    return {
+        "from_ns": round(float(rows[seen.place[there], STAMP]) * 1e9),
+        "ahead_m": ahead_m,
+        "left_m": left_m,
+        "range_m": percept.range_m,
+        "bearing_rad": percept.bearing_rad,
+        "sd_m": float(np.sqrt(there_m2 + here_m2)),
+        "sd_rad": 0.0,
+    }
 
 
-def _place(match: PlaceMatch, config: Config) -> _Anchor:
+def _place(match: PlaceMatch, config: Config) -> _Facts:
     here = dict.fromkeys(("ahead_m", "left_m", "range_m", "bearing_rad"), 0.0)
     return {"from_ns": match.view_ns, **here, "sd_m": config.place_match_sd_m, "sd_rad": config.place_match_sd_rad}
 
 
-def _closure(task: Task, by: str, facts: _Anchor) -> Node:
+def _closure(task: Task, by: str, facts: _Facts) -> Node:
     attributes = {**facts, "to_ns": task.stamp_ns, "by": by}
     return Node(id=f"{KIND}:{task.cycle}:{by}", kind=KIND, base_level=1.0, attributes=attributes)
 

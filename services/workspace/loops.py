@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
 
 from bus.graph import Graph, object_id
 from schemas.array import Array
@@ -32,14 +31,16 @@ def path_tasks(scene: Scene, graph: Graph, spacing_m: float) -> list[Task]:
 
 
 def _grows(graph: Graph, spacing_m: float) -> bool:
-    """Whether the agent has gone `spacing_m` from the path's last place, by path integration alone.
+    """Whether the agent has gone `spacing_m` from the path's last place, or has got lost there.
 
-    Where it takes itself to be may jump, or hardly move while it is lost.
+    That is by path integration alone: where it takes itself to be may jump, or hardly move while it is lost.
     """
     last = _last(graph)
     if last is None or last.samples is None:
         return True
     facts = graph.nodes[SELF].attributes
+    if facts.get("others", False) and float(last.samples.numpy()[-1, 0]) <= int(facts.get("fits_ns", 0)) * 1e-9:
+        return True
     before_m = last.samples.numpy()[-1, ODOMETRY].tolist()
     return math.dist([float(facts.get(key, 0.0)) for key in ODOMETRY_FACTS], before_m) >= spacing_m
 
@@ -47,6 +48,19 @@ def _grows(graph: Graph, spacing_m: float) -> bool:
 def _seen_from(sighted: Node | None, stamp_s: float) -> bool:
     """Whether the last of a landmark's sightings is from the place of the path at `stamp_s`."""
     return sighted is not None and sighted.samples is not None and float(sighted.samples.numpy()[-1, 0]) >= stamp_s
+
+
+def seen_lately(graph: Graph) -> list[Node]:
+    """The end of the path, what was seen from there, and that: for an agent that is lost."""
+    last = _last(graph)
+    if last is None:
+        return []
+    number = int(last.attributes["number"])
+    found = [last]
+    for label in sorted(node.attributes["label"] for node in _of_kind(graph, "object")):
+        sighted = graph.nodes.get(f"{SIGHTED}:{number}:{label}")
+        found += [] if sighted is None else [sighted, graph.nodes[object_id(str(label))]]
+    return found
 
 
 def shift_tasks(scene: Scene, graph: Graph) -> list[Task]:
@@ -63,7 +77,7 @@ def shift_tasks(scene: Scene, graph: Graph) -> list[Task]:
 def revisit_tasks(scene: Scene, graph: Graph, config: Config) -> list[Task]:
     """One where the path grows and a landmark or a view comes again that was away for long, or is passed by since.
 
-    It gets the landmarks, and the path where they came to be known; or the closures that this pass began with.
+    It gets the landmarks, or the newest closures that they have made on this pass, and all sightings of them before.
     """
     percepts, now_ns = scene.percepts, scene.percepts.stamp_ns
     known = [percept for percept in percepts.objects if percept.whole and object_id(percept.label) in graph.nodes]
@@ -71,22 +85,23 @@ def revisit_tasks(scene: Scene, graph: Graph, config: Config) -> list[Task]:
         return []
     long_ago_ns, soon_ns = (now_ns - seconds * 1e9 for seconds in (config.revisit_s, config.closure_spacing_s))
     newest = _newest_closures(graph)
-    again, nodes, since_ns = [], [], []
+    again, nodes = [], []
     for percept in known:
         landmark, closure = graph.nodes[object_id(percept.label)], newest.get(percept.label)
         if closure is not None and _until_ns(closure) > long_ago_ns:
-            if _until_ns(closure) <= soon_ns:
-                again.append(percept)
-                nodes.append(closure)
-        elif int(landmark.attributes.get("stamp_ns", 2**62)) <= long_ago_ns:
+            begun = closure if _until_ns(closure) <= soon_ns else None
+        else:
+            begun = landmark if int(landmark.attributes.get("stamp_ns", 2**62)) <= long_ago_ns else None
+        if begun is not None:
             again.append(percept)
-            nodes.append(landmark)
-            since_ns.append(int(landmark.attributes["since_ns"]))
+            nodes += [begun, *_seen_along(graph, percept.label)]
     ready = MET not in newest or _until_ns(newest[MET]) <= soon_ns
     matches = [match for match in percepts.matches if ready and match.view_ns <= long_ago_ns]
     if not again and not matches:
         return []
-    task = task_of(scene, graph, "revisit", [*nodes, *_segments(graph, since_ns)], again)
+    path = {int(node.attributes["number"]) for node in nodes if node.kind == SIGHTED}
+    nodes += [graph.nodes[f"{PATH}:{number}"] for number in sorted(path)]
+    task = task_of(scene, graph, "revisit", nodes, again)
     task.matches = matches
     return [task]
 
@@ -113,12 +128,9 @@ def _newest_closures(graph: Graph) -> dict[str, Node]:
     return newest
 
 
-def _segments(graph: Graph, since_ns: list[int]) -> list[Node]:
-    """The nodes of the path from which on things came to be known, and those after them."""
-    path = sorted(_of_kind(graph, PATH), key=lambda node: int(node.attributes["number"]))
-    begins_s = [float(node.samples.numpy()[0, 0]) for node in path if node.samples is not None]
-    first = [max(0, bisect_right(begins_s, stamp_ns * 1e-9) - 1) for stamp_ns in since_ns]
-    return [path[number] for number in sorted({*first, *(number + 1 for number in first)}) if number < len(path)]
+def _seen_along(graph: Graph, label: str) -> list[Node]:
+    """All sightings of a landmark."""
+    return [node for node in _of_kind(graph, SIGHTED) if node.attributes["landmark"] == label]
 
 
 def _last(graph: Graph) -> Node | None:
