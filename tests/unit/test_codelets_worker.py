@@ -42,6 +42,12 @@ def _correction() -> Node:
     return node("correction", rows, "correction")
 
 
+def _closure(number: int) -> Node:
+    met = {"ahead_m": 0.0, "left_m": 0.0, "range_m": 0.0, "bearing_rad": 0.0, "sd_m": 9.0, "sd_rad": 1.0}
+    ends = {"from_ns": number * 10**9, "to_ns": (number + 12) * 10**9}
+    return node(f"closure:{number}", kind="closure", by=f"view-{number}", **ends, **met)
+
+
 def _every_task() -> list[Task]:
     motions = Array.of(np.array([[2.0, 0.0, 1.0, 0.2, 0.05]]))
     road_m = Array.of(np.array([[2.0, 0.0], [3.0, 1.0]], np.float32))
@@ -51,8 +57,9 @@ def _every_task() -> list[Task]:
         task("object_place", _self(sd=0.1), percepts=[percept("house")]),
         task("road_place", _self(), road_m=road_m),
         task("path", _self(), _path()),
+        task("revisit", _path(), matches=[PlaceMatch(frame=0, view_ns=0, score=0.9)]),
         task("map_shift", _self(), _path(), _object(), _correction()),
-        task("map_correction", _self(), _path(), matches=[PlaceMatch(frame=0, view_ns=0, score=0.9)]),
+        task("map_correction", _path(), *(_closure(number) for number in (1, 2, 3))),
         task("attention", _self(), _object()),
     ]
 
