@@ -113,7 +113,7 @@ def _until_ns(closure: Node) -> int:
 
 
 def correction_tasks(scene: Scene, graph: Graph, config: Config) -> list[Task]:
-    """One where there are closures that nobody has judged, and enough of late to agree; unless some were just judged."""
+    """One where there are closures not judged yet, and enough of late to agree; unless some were judged just now."""
     closures, now_ns = _of_kind(graph, CLOSURE), scene.percepts.stamp_ns
     fresh = [node for node in closures if "holds" not in node.attributes]
     late = [node for node in closures if _until_ns(node) > now_ns - config.revisit_s * 1e9]

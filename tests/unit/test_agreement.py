@@ -17,7 +17,7 @@ def _rows() -> np.ndarray:
     """A street gone along twice, with a long way between that path integration has wrong."""
     once = np.column_stack([np.arange(0.0, 60.0, 4.0), np.zeros(15), np.zeros(15)])
     between = np.column_stack([np.full(40, 100.0), np.arange(40.0) * 4.0, np.full(40, np.pi / 2)])
-    again = once + (-35.0, 22.0, 0.0)
+    again = once + np.array([-35.0, 22.0, 0.0])
     poses = np.vstack([once, between, again])
     return np.column_stack([np.arange(len(poses), dtype=float), poses, poses])
 

@@ -8,7 +8,7 @@ from scenes import node, percept, task
 
 from bus.codec import encode
 from schemas.array import Array
-from schemas.base import Message
+from schemas.base import Message, Scalar
 from schemas.graph import Cells, Link, Node, Proposal
 from schemas.mind import Coalitions, Task
 from schemas.sensing import PlaceMatch
@@ -43,9 +43,15 @@ def _correction() -> Node:
 
 
 def _closure(number: int) -> Node:
-    met = {"ahead_m": 0.0, "left_m": 0.0, "range_m": 0.0, "bearing_rad": 0.0, "sd_m": 9.0, "sd_rad": 1.0}
-    ends = {"from_ns": number * 10**9, "to_ns": (number + 12) * 10**9}
-    return node(f"closure:{number}", kind="closure", by=f"view-{number}", **ends, **met)
+    facts: dict[str, Scalar] = {
+        "ahead_m": 0.0,
+        "left_m": 0.0,
+        "range_m": 0.0,
+        "bearing_rad": 0.0,
+        "by": f"view-{number}",
+    }
+    facts |= {"sd_m": 9.0, "sd_rad": 1.0, "from_ns": number * 10**9, "to_ns": (number + 12) * 10**9}
+    return node(f"closure:{number}", None, "closure", **facts)
 
 
 def _every_task() -> list[Task]:
