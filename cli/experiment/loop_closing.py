@@ -36,7 +36,7 @@ def loop_closing(seed: int, processes: int, out: Path | None, json_path: Path | 
     folder = outcome.folder_for(NAME, out)
     with bar("driving round the blocks") as progress:
         loops = dict(zip(METHODS, each(partial(drive, seed), METHODS, processes, progress), strict=True))
-    said = figures(loops)
+    said = figures(loops, seed)
     outcome.say(NAME, said)
     draw: Any = importlib.import_module("cli.experiment.loop_figure")  # other commands have no use for matplotlib
     outcome.save(folder, NAME, draw.figure(loops, said), said, seed, json_path)
