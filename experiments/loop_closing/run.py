@@ -206,7 +206,7 @@ def drive(seed: int, method: str) -> Loop:
     return Loop(observer.before, observer.after, observer.map(), observer.replays)
 
 
-def figures(loops: dict[str, Loop], seed: int) -> dict[str, float]:
+def figures(loops: dict[str, Loop]) -> dict[str, float]:
     """What is printed: errors before the first correction and in the end, by method, and what its replay predicts."""
     said: dict[str, float] = {}
     for method, loop in loops.items():
@@ -216,7 +216,7 @@ def figures(loops: dict[str, Loop], seed: int) -> dict[str, float]:
             said[f"{name}_error_in_the_end_m_{method}"] = getattr(loop.end, f"{name}_error_m")
         said[f"corrections_{method}"] = float(len(loop.replays))
         said[f"replays_of_the_first_{method}"] = float(loop.replays[0].passes)
-    return said | _predicted(loops["positions"].replays[0]) | _rule(seed)
+    return said | _predicted(loops["positions"].replays[0])
 
 
 def _predicted(replay: Replayed) -> dict[str, float]:
@@ -231,8 +231,8 @@ def _predicted(replay: Replayed) -> dict[str, float]:
     return said
 
 
-def _rule(seed: int) -> dict[str, float]:
-    """What eq. 9 does for laps of path integration alone, with the headings' noise and without."""
+def figures_of_rule(seed: int) -> dict[str, float]:
+    """What eq. 9 does for many laps of path integration alone, with the headings' noise and without."""
     said = {}
     for name, noise in (("", NOISE), ("_exact_headings", Noise(speed=NOISE.speed, turn=0.0, drift_rad_per_sqrt_m=0.0))):
         laps = close_laps(CORNERS_M, SPEED_M_S / FRAME_HZ, noise, LAPS, seed)

@@ -53,7 +53,7 @@ def test_pairs_are_close_where_their_fields_are_before_and_after() -> None:
 
 
 def test_synapses_of_close_places_change_by_the_decay_times_the_shift_and_others_do_not() -> None:
-    said = figures({method: _loop(3.0) for method in METHODS}, seed=1)
+    said = figures({method: _loop(3.0) for method in METHODS})
     expected = DECAY * np.exp(-DECAY * 2.375)
     assert said["strength_change_per_m_close_pairs"] == pytest.approx(expected, rel=0.05)
     assert said["strength_and_shift_correlation_close_pairs"] > 0.99
@@ -62,7 +62,7 @@ def test_synapses_of_close_places_change_by_the_decay_times_the_shift_and_others
 
 
 def test_errors_are_told_before_and_after_the_first_correction_and_in_the_end() -> None:
-    said = figures({method: _loop(3.0) for method in METHODS}, seed=1)
+    said = figures({method: _loop(3.0) for method in METHODS})
     told = [said[f"{name}_error_{when}_m_positions"] for name in ("path", "object") for when in ("before", "after")]
     assert told == pytest.approx([3.0, 0.0, 3.0, 0.0])
     assert said["end_error_in_the_end_m_heading"] == pytest.approx(3.0)
