@@ -16,13 +16,17 @@ PATH, SIGHTED, CLOSURE, CORRECTION = "path", "sighted", "closure", "correction"
 
 
 def path_tasks(scene: Scene, graph: Graph, spacing_m: float) -> list[Task]:
-    """One where the agent is `spacing_m` or more from the path's last place, or sees what it had not from there."""
+    """One where the agent is `spacing_m` or more from the path's last place, or sees what it had not from there.
+
+    So it is where the agent has got lost since that place.
+    """
     agent, last = graph.nodes[SELF], _last(graph)
     if last is None or last.samples is None:
         return [task_of(scene, graph, "path", [agent], scene.percepts.objects)]
     number = int(last.attributes["number"])
     stamp_s, x_m, y_m = last.samples.numpy()[-1, :3].tolist()
     far = np.hypot(float(agent.attributes["x_m"]) - x_m, float(agent.attributes["y_m"]) - y_m) >= spacing_m
+    far |= bool(agent.attributes.get("others", False)) and stamp_s <= int(agent.attributes.get("fits_ns", 0)) * 1e-9
     known = {each.label: graph.nodes.get(f"{SIGHTED}:{number}:{each.label}") for each in scene.percepts.objects}
     new = [each for each in scene.percepts.objects if far or not _seen_from(known[each.label], stamp_s)]
     if not far and not new:
@@ -34,6 +38,19 @@ def path_tasks(scene: Scene, graph: Graph, spacing_m: float) -> list[Task]:
 def _seen_from(sighted: Node | None, stamp_s: float) -> bool:
     """Whether the last of a landmark's sightings is from the place of the path at `stamp_s`."""
     return sighted is not None and sighted.samples is not None and float(sighted.samples.numpy()[-1, 0]) >= stamp_s
+
+
+def seen_lately(graph: Graph) -> list[Node]:
+    """The end of the path, what was seen from there, and that: for an agent that is lost."""
+    last = _last(graph)
+    if last is None:
+        return []
+    number = int(last.attributes["number"])
+    found = [last]
+    for label in sorted(node.attributes["label"] for node in _of_kind(graph, "object")):
+        sighted = graph.nodes.get(f"{SIGHTED}:{number}:{label}")
+        found += [] if sighted is None else [sighted, graph.nodes[object_id(str(label))]]
+    return found
 
 
 def shift_tasks(scene: Scene, graph: Graph) -> list[Task]:
