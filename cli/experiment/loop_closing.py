@@ -12,7 +12,7 @@ import click
 from cli.experiment import outcome
 from cli.experiment.options import json_option, out_option, processes_option, seed_option
 from cli.log.progress import bar
-from experiments.loop_closing.run import METHODS, drive, figures
+from experiments.loop_closing.run import METHODS, drive, figures, figures_of_rule
 from experiments.parallel import each
 
 NAME = "loop-closing"
@@ -36,7 +36,7 @@ def loop_closing(seed: int, processes: int, out: Path | None, json_path: Path | 
     folder = outcome.folder_for(NAME, out)
     with bar("driving round the blocks") as progress:
         loops = dict(zip(METHODS, each(partial(drive, seed), METHODS, processes, progress), strict=True))
-    said = figures(loops)
+    said = figures(loops) | figures_of_rule(seed)
     outcome.say(NAME, said)
     draw: Any = importlib.import_module("cli.experiment.loop_figure")  # other commands have no use for matplotlib
     outcome.save(folder, NAME, draw.figure(loops, said), said, seed, json_path)
