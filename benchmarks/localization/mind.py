@@ -29,6 +29,7 @@ CONFIG = Config(
     range_gain_sd=0.03,
 )
 CERTAIN_M = 1e-3
+KNOWN_WELL = 100
 NAME = "worker"
 
 
@@ -57,7 +58,7 @@ class Mind:
                 kind="object",
                 activation=1.0,
                 base_level=1.0,
-                attributes={"label": label, "surveyed": surveyed},
+                attributes={"label": label, "surveyed": surveyed, "sightings": KNOWN_WELL},
                 samples=Array.of(spread + where),
             )
             for label, where in landmarks.items()

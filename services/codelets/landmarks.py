@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from bus.errors import MessageError
@@ -19,12 +21,22 @@ from services.codelets.sightings import MOVING, has_bearing, has_range, seen_fro
 GAP = 3.0
 
 
+class Record(NamedTuple):
+    """How often a landmark was seen where it is believed to be, and how often on end it was seen elsewhere since."""
+
+    agreed: int
+    missed: int
+
+
+FIRST = Record(1, 0)
+
+
 def locate_landmark(task: Task, config: Config) -> list[Operation]:
     """Eq. 4 for the one landmark and percept of `task`: keep the samples that agree with what is seen now.
 
-    A landmark that disagrees `config.misses` times on end stands elsewhere: it starts anew from what is seen. But
-    while it is the agent who may be elsewhere, or stands and sees the same again, landmarks stay where they are, and
-    those that were surveyed always do.
+    A landmark that disagrees `config.misses` times on end, or more often than it ever agreed, stands elsewhere: it
+    starts anew from what is seen. But while it is the agent who may be elsewhere, or stands and sees the same again,
+    landmarks stay where they are, and those that were surveyed always do.
     """
     self_node = next(node for node in task.nodes if node.kind == "self")
     landmark = next(node for node in task.nodes if node.kind == "object")
@@ -32,28 +44,27 @@ def locate_landmark(task: Task, config: Config) -> list[Operation]:
         raise MessageError(f"task {task.task_id} has nodes without samples")
     rng, percept = generator(task.task_id), task.percepts[0]
     before = np.array(landmark.samples.numpy(), np.float64)
+    agreed, missed = (int(landmark.attributes.get(key, 0)) for key in ("sightings", "misses"))
     if _stays(self_node, landmark):
-        return object_operations(task, landmark, before, percept, int(landmark.attributes.get("misses", 0)))
+        return object_operations(task, landmark, before, percept, Record(agreed, missed))
     selves = with_gains(np.array(self_node.samples.numpy(), np.float64), config, rng)
     selves = rng.permutation(refill(selves, len(before), 0.0, rng))
     squared = _squared(before, selves, percept)
-    misses = 0 if squared.min() < config.gate**2 else int(landmark.attributes.get("misses", 0)) + 1
-    if misses == 0:
+    if squared.min() < config.gate**2:
         kept = before[keep(-squared / 2 / config.views_alike, rng)]
         # Few that are left stand for all between them: of a ring or a ray, the next view must find some again.
         jitter_m = np.maximum(config.landmark_jitter_m, GAP * spread(kept, kept.mean(axis=0)) / len(kept))
         kept = refill(kept, len(before), jitter_m, rng)
-    elif misses < config.misses:
-        kept = before
-    else:
-        kept, misses = first_sighting(selves, percept, config, rng), 0
-    return object_operations(task, landmark, kept, percept, misses)
+        return object_operations(task, landmark, kept, percept, Record(agreed + 1, 0))
+    if missed + 1 < min(config.misses, agreed + 1):
+        return object_operations(task, landmark, before, percept, Record(agreed, missed + 1))
+    return object_operations(task, landmark, first_sighting(selves, percept, config, rng), percept, FIRST)
 
 
 def _stays(self_node: Node, landmark: Node) -> bool:
     own, facts = self_node.attributes, landmark.attributes
     here = seen_from_here(landmark, int(own.get("stands_ns", MOVING)))
-    return bool(facts.get("surveyed", False)) or bool(own.get("astray", 0)) or here
+    return bool(facts.get("surveyed", False)) or bool(own.get("others", False)) or here
 
 
 def _squared(where_m: Samples, selves: Samples, percept: Percept) -> Samples:
@@ -87,7 +98,7 @@ def first_sighting(selves: Samples, percept: Percept, config: Config, rng: np.ra
     return where
 
 
-def object_operations(task: Task, node: Node, samples: Samples, percept: Percept, misses: int) -> list[Operation]:
+def object_operations(task: Task, node: Node, samples: Samples, percept: Percept, record: Record) -> list[Operation]:
     """An object node with new samples, refreshed by a percept, and its link to the place of their mean."""
     mean = samples.mean(axis=0)
     sd = spread(samples, mean)
@@ -99,8 +110,8 @@ def object_operations(task: Task, node: Node, samples: Samples, percept: Percept
         "y_sd_m": float(sd[1]),
         "width_m": percept.width_m,
         "height_m": percept.height_m,
-        "sightings": int(node.attributes.get("sightings", 0)) + 1,
-        "misses": misses,
+        "sightings": record.agreed,
+        "misses": record.missed,
         "stamp_ns": task.stamp_ns,
         "place": cell,
     }

@@ -16,14 +16,15 @@ from schemas.array import Array
 from schemas.base import Scalar
 from schemas.graph import Node, Operation
 from schemas.mind import Task
+from services.codelets.path import ODOMETRY_FACTS, composed, odometry_of, step_between
 from services.codelets.places import place_link
 from services.codelets.recovery import look_around
 from services.codelets.sampling import Samples, bearable, generator, mean_pose, refill, reject, spread, widened
-from services.codelets.senses import POSE_COLUMNS, RANGE, SPEED, TURN, move, with_gains
+from services.codelets.senses import POSE_COLUMNS, RANGE, SPEED, TURN, move, path_integrated, with_gains
 from services.codelets.settings import Config
 from services.codelets.sightings import MOVING, Sighting, compare, log_likelihood, sightings
 
-WIDER = 1.5
+WIDER, WIDENINGS = 1.5, 6
 ALONE = 4
 STAGES = 5
 
@@ -32,7 +33,8 @@ STAGES = 5
 class Found:
     """The samples that stay, the share of those tried that they are, and for how many views nothing has fitted.
 
-    `missed` names the landmark that was the first not to fit; `others` says whether another did not fit since.
+    `missed` names the landmark that was the first not to fit; `others` says whether another did not fit since: then it
+    is the agent who is elsewhere, not the landmark. `carried` says that it was found anew, wherever it moved.
     """
 
     samples: Samples
@@ -40,6 +42,7 @@ class Found:
     astray: int = 0
     missed: str = ""
     others: bool = False
+    carried: bool = False
 
 
 def localize(task: Task, config: Config) -> list[Operation]:
@@ -59,7 +62,20 @@ def localize(task: Task, config: Config) -> list[Operation]:
     seen = sightings(task, config.largest_landmark_sd_m, stands_ns)
     past = _past(self_node, moved)
     found = past if seen is None else _correct(past, seen, config, rng)
-    return _self_operations(task, self_node, found, stands_ns)
+    odometry = _odometry(self_node, motions, found, mean_pose(moved))
+    return _self_operations(task, self_node, found, stands_ns, odometry)
+
+
+def _odometry(node: Node, motions: Samples, found: Found, moved: Samples) -> Samples:
+    """Where path integration alone would have the agent (3,), its senses' gains as they are believed to be.
+
+    Who was carried away felt nothing of it: the way there counts as one that was gone.
+    """
+    gains = found.samples[:, POSE_COLUMNS:].mean(axis=0)
+    odometry = path_integrated(odometry_of(node), motions, gains)
+    if not found.carried:
+        return odometry
+    return composed(odometry, step_between(moved, mean_pose(found.samples)))
 
 
 def _stands_since(node: Node, moves: bool) -> int:
@@ -106,18 +122,19 @@ def _correct(past: Found, seen: Sighting, config: Config, rng: np.random.Generat
 def _stray(past: Found, seen: Sighting, config: Config, rng: np.random.Generator) -> Found:
     """Nothing fits: the agent is less sure of its pose than it took itself to be, the more the longer that goes on.
 
-    Where it has gone on for long and for several landmarks, the agent is elsewhere, and looks for itself as soon as
-    what it sees tells where it may be: at two landmarks, or, later, at one.
+    One landmark that does not fit may stand elsewhere, or be another. Where several do not, for long, the agent is
+    elsewhere, and looks for itself as soon as what it sees tells where it may be: at two landmarks, or, later, at one.
     """
     astray, missed = past.astray + 1, past.missed or seen.labels[0]
     others = past.others or any(label != missed for label in seen.labels)
     enough = config.astray if len(seen.labels) > 1 else ALONE * config.astray
     if astray >= enough and others:
-        return Found(look_around(past.samples, seen, config, rng), 0.0)
-    return Found(widened(past.samples, WIDER, rng), 0.0, astray, missed, others)
+        return Found(look_around(past.samples, seen, config, rng), 0.0, carried=True)
+    less_sure = widened(past.samples, WIDER, rng) if others and astray <= WIDENINGS else past.samples
+    return Found(less_sure, 0.0, astray, missed, others)
 
 
-def _self_operations(task: Task, node: Node, found: Found, stands_ns: int) -> list[Operation]:
+def _self_operations(task: Task, node: Node, found: Found, stands_ns: int, odometry: Samples) -> list[Operation]:
     mean = mean_pose(found.samples)
     sd = spread(found.samples[:, :POSE_COLUMNS], mean)
     cell = nearest_place(mean[0], mean[1], task.cell_m)
@@ -135,6 +152,7 @@ def _self_operations(task: Task, node: Node, found: Found, stands_ns: int) -> li
         "others": found.others,
         "stands_ns": stands_ns,
         **dict(zip(("speed_gain", "turn_gain", "range_gain"), gains, strict=True)),
+        **dict(zip(ODOMETRY_FACTS, odometry.tolist(), strict=True)),
         "stamp_ns": task.stamp_ns,
         "place": cell,
     }

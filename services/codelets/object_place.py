@@ -10,7 +10,7 @@ from schemas.array import Array
 from schemas.base import Scalar
 from schemas.graph import Cells, Node, Operation
 from schemas.mind import Task
-from services.codelets.landmarks import first_sighting, object_operations
+from services.codelets.landmarks import FIRST, first_sighting, object_operations
 from services.codelets.sampling import generator, mean_pose, refill
 from services.codelets.senses import with_gains
 from services.codelets.settings import Config
@@ -21,18 +21,18 @@ ENOUGH_POINTS = 3
 
 
 def place_object(task: Task, config: Config) -> list[Operation]:
-    """A node for the one percept of `task`, with samples of where it stands; none while the agent is astray."""
+    """A node for the one percept of `task`, with samples of where it stands; none while the agent is lost."""
     self_node = next(node for node in task.nodes if node.kind == "self")
     if self_node.samples is None:
         raise MessageError(f"task {task.task_id} has a self node without samples")
-    if int(self_node.attributes.get("astray", 0)):
+    if self_node.attributes.get("others", False):
         return []
     rng, percept = generator(task.task_id), task.percepts[0]
     selves = with_gains(np.array(self_node.samples.numpy(), np.float64), config, rng)
     selves = refill(selves, config.landmark_samples, 0.0, rng)
     attributes: dict[str, Scalar] = {"label": percept.label, "since_ns": task.stamp_ns}
     node = Node(id=object_id(percept.label), kind="object", base_level=FIRST_BASE_LEVEL, attributes=attributes)
-    return object_operations(task, node, first_sighting(selves, percept, config, rng), percept, 0)
+    return object_operations(task, node, first_sighting(selves, percept, config, rng), percept, FIRST)
 
 
 def place_road(task: Task, config: Config) -> list[Operation]:

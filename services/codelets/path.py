@@ -1,8 +1,8 @@
 """The path that the agent took, as nodes of the graph: what map correction corrects (paper §5.6).
 
-A node of kind `path` holds up to ROWS places on end. Each row of its samples is stamp_s, x_m, y_m, heading_rad, where
-the agent takes itself to have been then, and the step to there from the place before, as path integration had it:
-forwards_m, left_m, turn_rad. Corrections change the first, never the step.
+A node of kind `path` holds up to ROWS places on end. Each row of its samples is stamp_s, then x_m, y_m, heading_rad
+where the agent takes itself to have been, then the same where path integration alone would have had it. Landmarks and
+corrections change the former; the steps between the latter are what self-motion says, and nothing else.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from services.codelets.settings import Config
 
 KIND = "path"
 COLUMNS, ROWS = 7, 64
-STAMP, POSE, STEP = 0, slice(1, 4), slice(4, 7)
+STAMP, POSE, ODOMETRY = 0, slice(1, 4), slice(4, 7)
+ODOMETRY_FACTS = ("odometry_x_m", "odometry_y_m", "odometry_heading_rad")
 
 
 def segment_id(number: int) -> str:
@@ -60,13 +61,18 @@ def extend_path(task: Task, config: Config) -> list[Operation]:
     pose = mean_pose(np.asarray(self_node.samples.numpy(), np.float64))
     last = next((node for node in task.nodes if node.kind == KIND), None)
     before = np.zeros((0, COLUMNS)) if last is None else rows_of([last])
-    row = np.concatenate(
-        [[task.stamp_ns * 1e-9], pose, step_between(before[-1, POSE], pose) if len(before) else [0.0] * 3]
-    )
+    row = np.concatenate([[task.stamp_ns * 1e-9], pose, odometry_of(self_node)])
     number = 0 if last is None else int(last.attributes["number"])
     if len(before) < ROWS:
         return segments(np.vstack([before, row]), number)
     return segments(row[None], number + 1)
+
+
+def odometry_of(self_node: Node) -> Floats:
+    """(3,): where path integration alone would have the agent; where that is not known, where it takes itself to be."""
+    facts = self_node.attributes
+    own = [float(facts[key]) for key in ("x_m", "y_m", "heading_rad")]
+    return np.array([float(facts.get(key, other)) for key, other in zip(ODOMETRY_FACTS, own, strict=True)])
 
 
 def step_between(before: Floats, after: Floats) -> Floats:
@@ -78,15 +84,25 @@ def step_between(before: Floats, after: Floats) -> Floats:
     return step
 
 
+def composed(pose: Floats, step: Floats) -> Floats:
+    """(3,): the pose that is `step` as seen from `pose`."""
+    cos, sin = np.cos(pose[2]), np.sin(pose[2])
+    x_m, y_m = pose[0] + cos * step[0] - sin * step[1], pose[1] + sin * step[0] + cos * step[1]
+    return np.array([x_m, y_m, float(wrapped(pose[2] + step[2]))])
+
+
 def steps_of(rows: Floats, config: Config) -> Constraints:
     """What path integration says from each row to the next, less surely the longer the step."""
-    length = np.hypot(rows[1:, 4], rows[1:, 5]).clip(config.path_spacing_m / 2)
-    turned = np.abs(rows[1:, 6])
+    at = np.arange(max(0, len(rows) - 1))
+    nothing = np.empty(0)
+    steps = relative(rows[:, ODOMETRY], Constraints(at, at + 1, nothing, nothing))
+    steps[:, 2] = wrapped(steps[:, 2])
+    length = np.hypot(steps[:, 0], steps[:, 1]).clip(config.path_spacing_m / 2)
+    turned = np.abs(steps[:, 2])
     information = np.zeros((len(length), 3, 3))
     information[:, 0, 0] = information[:, 1, 1] = 1 / (config.path_variance_per_m * length)
     information[:, 2, 2] = 1 / (config.heading_variance_per_m * length + config.heading_variance_per_rad * turned)
-    at = np.arange(len(length))
-    return Constraints(at, at + 1, rows[1:, STEP], information)
+    return Constraints(at, at + 1, steps, information)
 
 
 def shifted(points: Floats, old: Floats, new: Floats) -> Floats:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from services.codelets.sampling import Samples
+from services.codelets.sampling import Samples, standard, wrapped
 from services.codelets.settings import Config
 
 POSE_COLUMNS = 3
@@ -35,26 +35,43 @@ def wander(samples: Samples, duration_s: float, config: Config, rng: np.random.G
 
     An Ornstein-Uhlenbeck process: its spread stays that of `spreads`, its memory is the configured time.
     """
-    if not duration_s:
+    sds = spreads(config)
+    if not duration_s or not sds.any():
         return
     times_s = np.array([config.gait_memory_s] * 3 + [config.range_memory_s])
     stays = np.exp(-duration_s / times_s)
-    fresh = rng.normal(0.0, 1.0, (len(samples), 4)) * (spreads(config) * np.sqrt(1 - stays**2))
+    fresh = standard(rng, len(samples), 4) * (sds * np.sqrt(1 - stays**2))
     samples[:, POSE_COLUMNS:] = samples[:, POSE_COLUMNS:] * stays + fresh
 
 
 def move(start: Samples, motions: Samples, config: Config, rng: np.random.Generator) -> Samples:
     """Path integration (paper §5.4): (n, 7) samples after (m, 5) rows of speed, turn rate, duration and noise."""
     samples = start.copy()
-    speed, turn_rate, dt, speed_sd, turn_rate_sd = (column[:, None] for column in motions.T)
-    wander(samples, float(dt.sum()), config, rng)
+    wander(samples, float(motions[:, 2].sum()), config, rng)
+    speed, turn_rate, _, speed_sd, turn_rate_sd = (column[:, None] for column in motions.T)
     shape = (len(motions), len(samples))
-    way = dt * (speed + speed_sd * rng.normal(0.0, 1.0, shape)) * (1 + samples[:, SPEED])
-    turn = dt * (turn_rate + turn_rate_sd * rng.normal(0.0, 1.0, shape)) * (1 + samples[:, TURN])
-    turn += way * samples[:, DRIFT]
+    noisy = speed + speed_sd * standard(rng, *shape), turn_rate + turn_rate_sd * standard(rng, *shape)
+    _advance(samples, *noisy, motions[:, 2])
+    return samples
+
+
+def path_integrated(pose: Samples, motions: Samples, gains: Samples) -> Samples:
+    """The pose (3,) after (m, 5) rows of motion, without noise, for senses whose gains (4,) are known."""
+    sample = np.concatenate([pose, gains])[None]
+    _advance(sample, motions[:, :1], motions[:, 1:2], motions[:, 2])
+    after: Samples = sample[0, :POSE_COLUMNS]
+    after[2] = wrapped(after[2])
+    return after
+
+
+def _advance(samples: Samples, speed: Samples, turn_rate: Samples, dt: Samples) -> None:
+    """Move (n, 7) samples in place, by speeds and turn rates (m, n) or (m, 1) that last (m,)."""
+    if not len(dt):
+        return
+    way = speed * dt[:, None] * (1 + samples[:, SPEED])
+    turn = turn_rate * dt[:, None] * (1 + samples[:, TURN]) + way * samples[:, DRIFT]
     heading = samples[:, 2] + np.cumsum(turn, axis=0)
     middle = heading - turn / 2
     samples[:, 0] += (way * np.cos(middle)).sum(axis=0)
     samples[:, 1] += (way * np.sin(middle)).sum(axis=0)
-    samples[:, 2] = heading[-1] if len(motions) else samples[:, 2]
-    return samples
+    samples[:, 2] = heading[-1]

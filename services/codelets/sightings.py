@@ -13,8 +13,11 @@ from schemas.sensing import Percept
 from services.codelets.sampling import Samples
 from services.codelets.senses import RANGE
 
+Singles = npt.NDArray[np.float32]
 LARGEST_SHARE = 0.5
+ENOUGH = 2
 MOVING = -1
+TURN = np.float32(2 * np.pi)
 
 
 class Sighting(NamedTuple):
@@ -60,21 +63,22 @@ def seen_from_here(landmark: Node, stands_ns: int) -> bool:
 def sightings(task: Task, largest_sd_m: float, stands_ns: int) -> Sighting | None:
     """The percepts of `task` whose object is on the map well enough to tell something; None if there are none.
 
-    Well enough is within `largest_sd_m`, and within half of its distance: samples on a ring around the agent have a
-    mean where nothing is. Who stands still sees the same again, and that makes nobody surer.
+    Well enough is within `largest_sd_m`, and within half of its distance, since samples on a ring around the agent have
+    a mean where nothing is; and seen there more than once, since a first sighting may have had another's name. Who
+    stands still sees the same again, and that makes nobody surer.
     """
     known = {node.attributes.get("label"): node for node in task.nodes if node.kind == "object"}
     rows = []
     for percept in task.percepts:
         node = known.get(percept.label)
-        if node is None or node.samples is None or seen_from_here(node, stands_ns):
+        if node is None or node.samples is None or _says_nothing(node, stands_ns):
             continue
         samples = np.asarray(node.samples.numpy(), np.float64)[:, :2]
-        mean = samples.mean(axis=0)
+        mean = np.full(len(samples), 1 / len(samples)) @ samples
         off = samples - mean
         covariance = off.T @ off / max(1, len(off) - 1)
         largest_m = min(largest_sd_m, LARGEST_SHARE * percept.range_m) if has_range(percept) else largest_sd_m
-        if np.trace(covariance) <= 2 * largest_m**2:
+        if covariance[0, 0] + covariance[1, 1] <= 2 * largest_m**2:
             rows.append((mean, covariance, percept))
     if not rows:
         return None
@@ -84,43 +88,56 @@ def sightings(task: Task, largest_sd_m: float, stands_ns: int) -> Sighting | Non
     return Sighting(labels, np.array(means), np.array(covariances), *np.array(numbers).T)
 
 
+def _says_nothing(landmark: Node, stands_ns: int) -> bool:
+    return int(landmark.attributes.get("sightings", ENOUGH)) < ENOUGH or seen_from_here(landmark, stands_ns)
+
+
 class Comparison(NamedTuple):
-    """How far n samples of the self are off each of k sightings, (k, n) each.
+    """How far n samples of the self are off each of k sightings, (k, n) each, of single precision.
 
     `squared` is in squared deviations; `density` is relative to that of an exact match by a landmark whose place is
     certain.
     """
 
-    squared: Samples
-    density: Samples
+    squared: Singles
+    density: Singles
 
 
 def compare(samples: Samples, seen: Sighting) -> Comparison:
     """Each of (n, 7) samples of the self against what is seen."""
-    east = seen.mean_m[:, :1] - samples[:, 0]
-    north = seen.mean_m[:, 1:] - samples[:, 1]
-    square = np.maximum(east * east + north * north, 1e-6)
-    distance = np.sqrt(square)
-    xx, xy, yy = (seen.covariance_m2[:, i, j, None] for i, j in ((0, 0), (0, 1), (1, 1)))
-    radial_var = (east * east * xx + 2 * east * north * xy + north * north * yy) / square
-    bearing_sd, range_sd = seen.bearing_sd_rad[:, None], seen.range_sd_m[:, None]
-    bearing_var = bearing_sd**2 + np.maximum(xx + yy - radial_var, 0.0) / square
-    range_var = range_sd**2 + radial_var
-    turned = np.arctan2(north, east) - samples[:, 2] - seen.bearing_rad[:, None]
-    turned -= 2 * np.pi * np.rint(turned / (2 * np.pi))
-    away = distance * (1 + samples[:, RANGE]) - seen.range_m[:, None]
-    with_bearing, with_range = seen.has_bearing[:, None], seen.has_range[:, None]
-    squared = with_bearing * turned * turned / bearing_var + with_range * away * away / range_var
-    sharp = np.where(with_bearing, bearing_sd**2 / bearing_var, 1.0) * np.where(
-        with_range, range_sd**2 / range_var, 1.0
-    )
-    return Comparison(squared, np.exp(-squared / 2) * np.sqrt(sharp))
+    east, north = (_single(seen.mean_m[:, axis, None] - samples[:, axis]) for axis in (0, 1))
+    xx, xy, yy = (_single(seen.covariance_m2[:, i, j, None]) for i, j in ((0, 0), (0, 1), (1, 1)))
+    bearing_var, range_var = (_single(sd[:, None] ** 2) for sd in (seen.bearing_sd_rad, seen.range_sd_m))
+    east2, north2 = east * east, north * north
+    square = np.maximum(east2 + north2, np.float32(1e-6))
+    per_square = 1 / square
+    radial_var = (east2 * xx + north2 * yy + east * north * (2 * xy)) * per_square
+    bearing_per_var = 1 / (bearing_var + np.maximum(xx + yy - radial_var, 0) * per_square)
+    range_per_var = 1 / (range_var + radial_var)
+    turned = np.arctan2(north, east) - _single(samples[:, 2]) - _single(seen.bearing_rad[:, None])
+    turned -= TURN * np.rint(turned / TURN)
+    away = np.sqrt(square) * _single(1 + samples[:, RANGE]) - _single(seen.range_m[:, None])
+    squared, sharp = np.zeros_like(square), np.ones_like(square)
+    for known, off, per_var, var in (
+        (seen.has_bearing, turned, bearing_per_var, bearing_var),
+        (seen.has_range, away, range_per_var, range_var),
+    ):
+        if known.all():
+            squared, sharp = squared + off * off * per_var, sharp * var * per_var
+        else:
+            squared[known] += (off * off * per_var)[known]
+            sharp[known] *= (var * per_var)[known]
+    return Comparison(squared, np.exp(squared / -2) * np.sqrt(sharp))
 
 
-def log_likelihood(density: Samples, outlier: float) -> Samples:
+def _single(numbers: Samples) -> Singles:
+    return numbers.astype(np.float32)
+
+
+def log_likelihood(density: Singles, outlier: float) -> Samples:
     """log of the product over landmarks of p(o_j | l_j, x), (n,), of densities (k, n) (eq. 1).
 
     `outlier` is the share of sightings that may mean anything: a landmark taken for another outvotes nobody.
     """
-    result: Samples = np.log((1 - outlier) * density + outlier).sum(axis=0)
-    return result
+    result = np.log((1 - outlier) * density + outlier).sum(axis=0)
+    return np.asarray(result, np.float64)

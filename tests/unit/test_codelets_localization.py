@@ -25,9 +25,11 @@ def _self(samples: Samples | None = None, **facts: float | str) -> Node:
     return node("self", samples, "self", x_m=0.0, y_m=0.0, heading_rad=0.0, stamp_ns=0, **facts)
 
 
-def _landmark(x_m: float, y_m: float, sd_m: float = 0.01, label: str = "house", **facts: float | str) -> Node:
+def _landmark(
+    x_m: float, y_m: float, sd_m: float = 0.01, label: str = "house", sightings: int = 20, **facts: float | str
+) -> Node:
     samples = np.random.default_rng(5).normal((x_m, y_m), sd_m, (200, 2))
-    return node(f"object:{label}", samples, label=label, **facts)
+    return node(f"object:{label}", samples, label=label, sightings=sightings, **facts)
 
 
 def _rows(*rows: tuple[float, float, float, float, float]) -> Array:
@@ -217,7 +219,7 @@ def _landmark_task(landmark: Node, bearing_rad: float, range_m: float, number: i
 
 
 def test_seeing_a_landmark_again_shrinks_its_spread_around_where_it_is() -> None:
-    landmark = _landmark(10.0, 0.0, 1.0)
+    landmark = _landmark(10.0, 0.0, 1.0, sightings=1)
     spreads = []
     for number in range(12):
         landmark = _moved(locate_landmark(_landmark_task(landmark, 0.0, 10.5, number), LANDMARK))
@@ -225,7 +227,7 @@ def test_seeing_a_landmark_again_shrinks_its_spread_around_where_it_is() -> None
     assert spreads[0] < 0.6
     assert spreads[-1] < 0.5 * spreads[0]
     assert (landmark.attributes["x_m"], landmark.attributes["y_m"]) == pytest.approx((10.5, 0.0), abs=0.25)
-    assert landmark.attributes["sightings"] == 12
+    assert landmark.attributes["sightings"] == 13
 
 
 def test_a_landmarks_samples_become_the_exact_gaussian_posterior_of_eq_4() -> None:
@@ -290,3 +292,43 @@ def test_refilling_draws_from_those_kept_and_jitters_each() -> None:
     kept = np.array([[1.0, 2.0], [3.0, 4.0]])
     assert {tuple(row) for row in refill(kept, 50, 0.0, generator("a")).tolist()} == {(1.0, 2.0), (3.0, 4.0)}
     assert len({tuple(row) for row in refill(kept, 50, 0.1, generator("a")).tolist()}) == 50
+
+
+def test_a_landmark_that_was_seen_but_once_and_then_twice_elsewhere_starts_anew_there() -> None:
+    landmark = _landmark(300.0, 0.0, 0.5, sightings=1)
+    for number in range(2):
+        landmark = _moved(locate_landmark(_landmark_task(landmark, 0.0, 10.0, number), LANDMARK))
+    assert landmark.attributes["x_m"] == pytest.approx(10.0, abs=0.5)
+    assert (landmark.attributes["sightings"], landmark.attributes["misses"]) == (1, 0)
+
+
+def test_a_landmark_that_was_seen_but_once_moves_nobody() -> None:
+    def found(sightings: int) -> Node:
+        house = _landmark(20.0, 0.0, sightings=sightings)
+        motions = _rows((5.0, 0.0, 1.0, 0.5, 0.0))
+        return _localized(_self(), house, motions=motions, percepts=[percept("house", 0.0, 14.0, range_sd_m=0.2)])
+
+    assert found(sightings=1).attributes["x_m"] == pytest.approx(5.0, abs=0.05)
+    assert float(found(sightings=2).attributes["x_m"]) > 5.5
+
+
+def test_an_agent_to_whom_one_landmark_does_not_fit_grows_no_less_sure_of_itself() -> None:
+    agent = _self(np.random.default_rng(1).normal(0.0, (0.3, 0.3, 0.01), (1000, 3)))
+    for number in range(20):
+        agent = _localized(
+            agent,
+            _landmark(20.0, 0.0),
+            motions=_rows((0.1, 0.0, 1.0, 0.0, 0.0)),
+            percepts=[percept("house", 2.0, 50.0)],
+            identifier=f"{number}/localization",
+        )
+    assert agent.attributes["astray"] == 20
+    assert float(agent.attributes["x_sd_m"]) < 0.4
+
+
+def test_path_integration_alone_goes_on_beside_the_pose_that_landmarks_correct() -> None:
+    motions = _rows((5.0, 0.0, 1.0, 0.5, 0.0))
+    seen = [percept("house", 0.0, 14.0, range_sd_m=0.2)]
+    found = _localized(_self(), _landmark(20.0, 0.0), motions=motions, percepts=seen)
+    assert float(found.attributes["x_m"]) > 5.5
+    assert found.attributes["odometry_x_m"] == pytest.approx(5.0)

@@ -13,7 +13,7 @@ from scenes import Desk, answer, node, stamp_ns
 from schemas.graph import Node, Proposal
 from schemas.mind import Replay, Task
 from services.codelets.module import build
-from services.codelets.path import POSE, STAMP, rows_of
+from services.codelets.path import ODOMETRY, POSE, STAMP, rows_of
 
 TOWER, HOUSE = {"tower": (8.0, 5.0)}, {"house": (40.0, 50.0)}
 
@@ -43,8 +43,9 @@ def test_the_path_has_a_place_for_every_metre_and_the_steps_between_as_path_inte
     assert [item.id for item in path] == ["path:0", "path:1"]
     rows = rows_of(path)
     assert len(rows) == 70
-    assert np.hypot(rows[1:20, 4], rows[1:20, 5]) == pytest.approx(2.0)
-    assert np.hypot(rows[20:40, 4], rows[20:40, 5]) == pytest.approx(2.0 * (1 + SLIP))
+    steps_m = np.hypot(*np.diff(rows[:, ODOMETRY][:, :2], axis=0).T)
+    assert steps_m[:19] == pytest.approx(2.0)
+    assert steps_m[19:39] == pytest.approx(2.0 * (1 + SLIP))
 
 
 def test_an_agent_that_stands_still_adds_nothing_to_its_path() -> None:
