@@ -17,6 +17,8 @@ from services import table
 from services.sim.catalogue import CATALOGUE
 
 SENSING = "cameras"
+# Of the time that all runs take.
+DRAWN_SHARE = 0.9
 SENSES = ("sensory", "epam")
 _SENSED = (topics.SELF_MOTION, topics.SCAN, topics.PERCEPTS)
 Result = TypeVar("Result")
@@ -95,7 +97,7 @@ def by_cameras(
     `drive` is given a configuration and the modules to run. The first run has everything; what was sensed in it is
     given to the other minds, so that nothing is drawn or recognised twice.
     """
-    tape, results = Tape(progress), dict[str, Result]()
+    tape, results = Tape(lambda share: progress(DRAWN_SHARE * share)), dict[str, Result]()
     for name, sections in configured.items():
         seeing = with_cameras(sections)
         minds = [table.build(module, seeing) for module in mind]
@@ -104,4 +106,5 @@ def by_cameras(
         else:
             senses = [*(table.build(module, seeing) for module in ("sim", *SENSES)), tape.recorder()]
         results[name] = drive(seeing, [*senses, *minds])
+    progress(1.0)
     return results

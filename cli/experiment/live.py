@@ -22,7 +22,7 @@ from experiments.heard import Heard
 from services import table
 
 PUMP_S = 0.005
-PATIENCE_S = 120.0
+PATIENCE_S = 60.0
 GRACE_S = 3.0
 AGENT = "agent"
 
@@ -47,8 +47,8 @@ def check(differing: Sequence[str]) -> None:
 
 
 def run(sections: Sections, minds: Sequence[tuple[str, str]], here: Sequence[Module], done: Callable[[], bool]) -> None:
-    """Run `minds` (module, instance) as processes, configured by `sections`, and the modules `here`, until `done` or
-    for PATIENCE_S: what was not said by then is missing."""
+    """Run `minds` (module, instance) as processes, configured by `sections`, and the modules `here`, until `done`,
+    or nothing was said for PATIENCE_S: what was not said by then is missing."""
     with tempfile.TemporaryDirectory() as name, ExitStack() as stack:
         folder, endpoint = Path(name), free_endpoint()
         (folder / CONFIG_NAME).write_text(to_toml(sections))
@@ -62,8 +62,8 @@ def run(sections: Sections, minds: Sequence[tuple[str, str]], here: Sequence[Mod
             shell.open()
         until_s = time.monotonic() + PATIENCE_S
         while not done() and time.monotonic() < until_s:
-            for shell in shells:
-                shell.pump(PUMP_S)
+            if any([shell.pump(PUMP_S) for shell in shells]):
+                until_s = time.monotonic() + PATIENCE_S
             supervisor.check()
 
 
