@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import gc
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
@@ -16,7 +17,6 @@ from schemas.sensing import MotorCommand, TruePose
 from services import table
 from services.sim.catalogue import CATALOGUE
 
-SENSING = "cameras"
 # Of the time that all runs take.
 DRAWN_SHARE = 0.9
 SENSES = ("sensory", "epam")
@@ -106,5 +106,8 @@ def by_cameras(
         else:
             senses = [*(table.build(module, seeing) for module in ("sim", *SENSES)), tape.recorder()]
         results[name] = drive(seeing, [*senses, *minds])
+        # A process has one renderer at a time, which goes with its module: now, not whenever that is found unused.
+        del senses
+        gc.collect()
     progress(1.0)
     return results

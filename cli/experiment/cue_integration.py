@@ -9,9 +9,9 @@ from typing import Any
 import click
 
 from cli.experiment import live, outcome
-from cli.experiment.options import json_option, live_option, out_option, processes_option, seed_option
+from cli.experiment.options import cameras_option, json_option, live_option, out_option, processes_option, seed_option
 from cli.log.progress import bar
-from experiments.cue_integration import mind
+from experiments.cue_integration import mind, pictured
 from experiments.cue_integration.run import FIT_TRIALS, FITTED, Effort, Session, fitted, measure
 from experiments.cue_integration.trial import Condition, Noise, Trial
 
@@ -36,6 +36,7 @@ Examples:
     help="Of distances to landmarks, and of directions in rad.",
 )
 @click.option("--fit", is_flag=True, help="Fit the noise of self-motion first; else take what a fit gave.")
+@cameras_option
 @live_option
 @seed_option
 @processes_option
@@ -45,6 +46,7 @@ def cue_integration(
     trials: int,
     distance_noise: float,
     fit: bool,
+    cameras: bool,
     goes_live: bool,
     seed: int,
     processes: int,
@@ -64,6 +66,9 @@ def cue_integration(
     with bar("trials") as progress:
         found = measure(noise, Effort(trials, seed, processes, progress))
     figures = found.figures()
+    if cameras:
+        with bar("trials with cameras") as progress:
+            figures |= pictured.figures(noise, seed, progress)
     differing = _differing(Trial(Condition.CONFLICT, 0, noise, seed)) if goes_live else []
     if goes_live:
         figures["live_same"] = float(not differing)

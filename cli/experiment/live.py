@@ -62,7 +62,8 @@ def run(sections: Sections, minds: Sequence[tuple[str, str]], here: Sequence[Mod
             shell.open()
         until_s = time.monotonic() + PATIENCE_S
         while not done() and time.monotonic() < until_s:
-            if any([shell.pump(PUMP_S) for shell in shells]):
+            news = [shell.pump(PUMP_S) for shell in shells]
+            if any(news):
                 until_s = time.monotonic() + PATIENCE_S
             supervisor.check()
 

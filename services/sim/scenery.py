@@ -18,7 +18,7 @@ _PANORAMA_PX = (512, 2048)
 
 
 def ground(roads: tuple[Road, ...]) -> list[tuple[Mesh, Image]]:
-    """Grass, pavements, asphalt and the lines on it, from below upwards, each with its picture."""
+    """Grass, pavements, asphalt and the lines on it, from below upwards, each with its picture; none that is empty."""
     rng = np.random.default_rng(11)
     grass, pavement, asphalt, lines = Mesh(), Mesh(), Mesh(), Mesh()
     grass.level((-GROUND_M, -GROUND_M, GROUND_M, GROUND_M), 0.0, GRASS_TILE_M, 20.0)
@@ -28,12 +28,13 @@ def ground(roads: tuple[Road, ...]) -> list[tuple[Mesh, Image]]:
         _dashes(lines, road)
     slabs = plain(128, (188, 180, 168))
     slabs[::32] = slabs[:, ::32] = (140, 134, 126)
-    return [
+    surfaces = [
         (grass, roughen(plain(512, (104, 138, 66)), rng, 0.2)),
         (pavement, roughen(slabs, rng, 0.1)),
         (asphalt, roughen(plain(512, (92, 92, 98)), rng, 0.15)),
         (lines, roughen(plain(64, (232, 230, 220)), rng, 0.06)),
     ]
+    return [surface for surface in surfaces if surface[0].triangles]
 
 
 def _dashes(mesh: Mesh, road: Road) -> None:
