@@ -7,6 +7,7 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from rich.progress import track
@@ -17,6 +18,7 @@ from benchmarks.localization.senses import Moment, label_of, moments
 from benchmarks.map_correction.measure import trajectory_error_m
 from benchmarks.report import Bar
 from datasets.mrclam import Numbers, Recording, Robot, read
+from services.codelets.path import ODOMETRY, POSE, STAMP, composed, step_between
 
 BARS = {
     "known_map_rmse_m": Bar(0.15),
@@ -59,32 +61,56 @@ def _told(recording: Recording) -> dict[str, float]:
 
 
 def judge(robot: Robot, landmarks: Landmarks) -> dict[str, float]:
-    """The errors of one robot, each the mean over SEEDS."""
+    """The errors of one robot, each the mean over SEEDS.
+
+    `slam_rmse_m` is of the path as the map has it in the end, as the smoother's is; `slam_online_rmse_m` of what was
+    believed at each moment, when no later sighting had corrected it.
+    """
     heard = list(moments(robot))
     stamps = np.array([moment.stamp_s for moment in heard])
     truth, judged = _truth(robot, stamps)
     even = judged & np.array([moment.tick for moment in heard])
     known = [_follow(heard, landmarks, tuple(_truth(robot, robot.odometry[:1, 0])[0][0]), seed) for seed in SEEDS]
     slam = [_follow(heard, {}, (0.0, 0.0, 0.0), seed) for seed in SEEDS]
-    smoothed = smoother.smooth(heard)
+
+    def aligned_m(path: Numbers) -> float:
+        return trajectory_error_m(path[judged, :2], truth[judged, :2])
+
     return {
-        "known_map_rmse_m": float(np.mean([_rmse(path[judged], truth[judged]) for path in known])),
-        "known_map_rmse_even_m": float(np.mean([_rmse(path[even], truth[even]) for path in known])),
-        "slam_rmse_m": float(np.mean([trajectory_error_m(path[judged, :2], truth[judged, :2]) for path in slam])),
-        "smoother_rmse_m": trajectory_error_m(smoothed[judged, :2], truth[judged, :2]),
+        "known_map_rmse_m": float(np.mean([_rmse(drive.online[judged], truth[judged]) for drive in known])),
+        "known_map_rmse_even_m": float(np.mean([_rmse(drive.online[even], truth[even]) for drive in known])),
+        "slam_rmse_m": float(np.mean([aligned_m(drive.corrected(stamps)) for drive in slam])),
+        "slam_online_rmse_m": float(np.mean([aligned_m(drive.online) for drive in slam])),
+        "smoother_rmse_m": aligned_m(smoother.smooth(heard)),
         "recovery_s": _recovery_s(robot, landmarks),
     }
 
 
-def _follow(heard: Iterable[Moment], landmarks: Landmarks, start: tuple[float, ...], seed: int) -> Numbers:
-    """(n, 3) poses that the codelets estimate at each moment."""
+class Drive(NamedTuple):
+    """What was believed of a drive: (n, 3) poses `online` and by path integration at each moment; `path` in the end."""
+
+    online: Numbers
+    odometry: Numbers
+    path: Numbers
+
+    def corrected(self, stamps_s: Numbers) -> Numbers:
+        """(n, 3) poses at the moments as the map has them in the end: each by the path's last place before it."""
+        places = (np.searchsorted(self.path[:, STAMP], stamps_s + 1e-6) - 1).clip(0)
+        steps = zip(self.path[places], self.odometry, strict=True)
+        return np.array([composed(place[POSE], step_between(place[ODOMETRY], now)) for place, now in steps])
+
+
+def _follow(heard: Iterable[Moment], landmarks: Landmarks, start: tuple[float, ...], seed: int) -> Drive:
+    """What the codelets make of what was heard."""
     mind = Mind((start[0], start[1], start[2]), seed=seed)
-    mind.learn({label_of(subject): where for subject, where in landmarks.items()}, surveyed=True)
-    poses = []
+    if landmarks:
+        mind.learn({label_of(subject): where for subject, where in landmarks.items()}, surveyed=True)
+    poses, odometry = [], []
     for moment in heard:
         mind.live(moment)
         poses.append(mind.pose)
-    return np.array(poses)
+        odometry.append(mind.odometry)
+    return Drive(np.array(poses), np.array(odometry), mind.path)
 
 
 def _recovery_s(robot: Robot, landmarks: Landmarks) -> float:
@@ -96,7 +122,7 @@ def _recovery_s(robot: Robot, landmarks: Landmarks) -> float:
     heard = [moment for moment in moments(robot, CARRIED_S) if moment.stamp_s < begin_s + 2 * CARRIED_S[1]]
     stamps = np.array([moment.stamp_s for moment in heard])
     truth, judged = _truth(robot, stamps)
-    path = _follow(heard, landmarks, tuple(_truth(robot, robot.odometry[:1, 0])[0][0]), 0)
+    path = _follow(heard, landmarks, tuple(_truth(robot, robot.odometry[:1, 0])[0][0]), 0).online
     seen = np.array([bool(moment.percepts) for moment in heard])
     after = np.flatnonzero(seen & judged & (stamps > begin_s + CARRIED_S[1]))
     if not len(after):

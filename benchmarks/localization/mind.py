@@ -1,4 +1,4 @@
-"""The workspace's localization and object phases and their codelets, without the rest of the mind."""
+"""The workspace's phases that localize, map and correct, and their codelets, without the rest of the mind."""
 
 from __future__ import annotations
 
@@ -6,28 +6,39 @@ import numpy as np
 
 from benchmarks.localization.senses import Moment
 from bus.graph import object_id
+from datasets.mrclam import Numbers
 from schemas.array import Array
 from schemas.graph import Node, Operation, Proposal
 from schemas.mind import Task
 from schemas.sensing import Percepts
 from services.codelets.module import Worker
+from services.codelets.path import odometry_of, rows_of
 from services.codelets.settings import Config
 from services.workspace.commit import Ledger
+from services.workspace.loops import correction_tasks, path_tasks, shift_tasks
 from services.workspace.scene import SELF, Scene
+from services.workspace.settings import Config as WorkspaceConfig
 from services.workspace.triggers import first_self, object_tasks, tasks_for
 
 # A robot whose senses nobody has calibrated, among landmarks no thicker than a finger: its gains may be off by what
 # sensory memory says of wheels and the paper of distances, and what it sees twice it sees in the same place.
+SPEED, TURN, DRIFT, SPACING_M = 0.1, 0.1, 0.05, 0.3
 CONFIG = Config(
     samples=1000,
     landmark_samples=1000,
     views_alike=1.0,
     landmark_jitter_m=0.003,
-    speed_gain_sd=0.1,
-    turn_gain_sd=0.1,
-    drift_rad_per_m=0.05,
+    speed_gain_sd=SPEED,
+    turn_gain_sd=TURN,
+    drift_rad_per_m=DRIFT,
     range_gain_sd=0.03,
+    correct="heading",
+    path_spacing_m=SPACING_M,
+    path_variance_per_m=SPEED**2,
+    heading_variance_per_m=DRIFT**2,
+    heading_variance_per_rad=TURN**2,
 )
+LOOPS = WorkspaceConfig(mode="lockstep", path_spacing_m=SPACING_M)
 CERTAIN_M = 1e-3
 KNOWN_WELL = 100
 NAME = "worker"
@@ -40,17 +51,14 @@ class Mind:
         self._ledger = Ledger(1.0)
         self._worker = Worker(config, NAME)
         self._cycle = seed * 1_000_000
+        self._surveyed = False
         first = first_self(config.samples)
         first.samples = Array.of(np.tile(np.array(start), (config.samples, 1)))
         self._ledger.commit(0, 0, "start", [first])
 
-    @property
-    def graph_nodes(self) -> dict[str, Node]:
-        """What is known, by name."""
-        return self._ledger.graph.nodes
-
     def learn(self, landmarks: dict[str, tuple[float, float]], surveyed: bool) -> None:
         """Put landmarks on the map, which stay for good where they are if that was surveyed."""
+        self._surveyed = surveyed
         spread = np.random.default_rng(0).normal(0.0, CERTAIN_M, (50, 2))
         nodes: list[Operation] = [
             Node(
@@ -81,30 +89,39 @@ class Mind:
         operations, names = self._ledger.judge(proposals)
         if len(names) < len(tasks):
             raise RuntimeError(f"{len(tasks) - len(names)} of {len(tasks)} answers do not hold: {proposals[0].failure}")
-        self._ledger.commit(tasks[0].stamp_ns if tasks else 0, self._cycle, phase, operations, names)
+        if operations:
+            self._ledger.commit(tasks[0].stamp_ns, self._cycle, phase, operations, names)
 
     def live(self, moment: Moment) -> None:
-        """One cycle: localization, then the landmarks in view."""
+        """One cycle: localization, then the landmarks in view; on a map that was not surveyed, loops close."""
         self.localize(moment)
+        loops = [] if self._surveyed else correction_tasks(self._scene(moment), self._ledger.graph, LOOPS)
         self.map(moment)
+        self._answer(loops, "correction")
+        self._answer(shift_tasks(self._scene(moment), self._ledger.graph), "shift")
 
     def localize(self, moment: Moment) -> None:
         """A new cycle: the self node moves, corrected by what is in view."""
         self._cycle += 1
-        self._answer(tasks_for("localization", self._scene(moment), self._ledger.graph, 1.0), "localization")
+        self._answer(tasks_for("localization", self._scene(moment), self._ledger.graph, SPACING_M), "localization")
 
     def map(self, moment: Moment) -> None:
-        """The landmarks in view, new or known."""
-        if moment.percepts:
-            self._answer(object_tasks(self._scene(moment), self._ledger.graph), "objects")
+        """The landmarks in view, new or known, and the path."""
+        scene, graph = self._scene(moment), self._ledger.graph
+        self._answer([*object_tasks(scene, graph), *path_tasks(scene, graph, SPACING_M)], "objects")
+
+    @property
+    def path(self) -> Numbers:
+        """(n, 7) rows of the path as it is on the map now: stamp_s, pose, and path integration's."""
+        return rows_of(self._ledger.graph.nodes.values())
+
+    @property
+    def odometry(self) -> Numbers:
+        """(3,): where path integration alone would have the agent."""
+        return odometry_of(self._ledger.graph.nodes[SELF])
 
     @property
     def pose(self) -> tuple[float, float, float]:
         """The mean of the self's samples."""
         facts = self._ledger.graph.nodes[SELF].attributes
         return float(facts["x_m"]), float(facts["y_m"]), float(facts["heading_rad"])
-
-    @property
-    def facts(self) -> dict[str, float | int | str | bool]:
-        """What the self node says of itself."""
-        return self._ledger.graph.nodes[SELF].attributes

@@ -125,8 +125,8 @@ class _Observer:
         """The map as it is now."""
         rows = rows_of(self.graph.nodes.values())
         stamps = np.rint(rows[:, STAMP] * 1e9).astype(np.int64).tolist()
-        objects = [self.graph.nodes[name] for name in sorted(self.graph.nodes) if self.graph.nodes[name].samples]
-        known = [node for node in objects if node.attributes.get("label") in self.landmarks]
+        objects = [node for _, node in sorted(self.graph.nodes.items()) if node.kind == "object"]
+        known = [node for node in objects if node.attributes["label"] in self.landmarks]
         cells = [
             np.argwhere(tile.columns["road"] > 0) + TILE_SIDE * np.array(at) for at, tile in self.graph.tiles.items()
         ]

@@ -19,13 +19,13 @@ from schemas.mind import Task
 from services.codelets.path import ODOMETRY_FACTS, composed, odometry_of, step_between
 from services.codelets.places import place_link
 from services.codelets.recovery import look_around
-from services.codelets.sampling import Samples, bearable, generator, mean_pose, refill, reject, spread, widened
+from services.codelets.sampling import Samples, bearable, centred, generator, mean_pose, refill, reject, spread, widened
 from services.codelets.senses import POSE_COLUMNS, RANGE, SPEED, TURN, move, path_integrated, with_gains
 from services.codelets.settings import Config
 from services.codelets.sightings import MOVING, Sighting, compare, log_likelihood, sightings
 
 WIDER, WIDENINGS = 1.5, 6
-ALONE = 4
+ALONE = 2
 STAGES = 5
 
 
@@ -123,12 +123,15 @@ def _stray(past: Found, seen: Sighting, config: Config, rng: np.random.Generator
     """Nothing fits: the agent is less sure of its pose than it took itself to be, the more the longer that goes on.
 
     One landmark that does not fit may stand elsewhere, or be another. Where several do not, for long, the agent is
-    elsewhere, and looks for itself as soon as what it sees tells where it may be: at two landmarks, or, later, at one.
+    elsewhere, and looks for itself as soon as what it sees tells where it may be: at two landmarks, or, later, at one;
+    and at once where it is less sure of its position than one look at a landmark makes it.
     """
     astray, missed = past.astray + 1, past.missed or seen.labels[0]
     others = past.others or any(label != missed for label in seen.labels)
     enough = config.astray if len(seen.labels) > 1 else ALONE * config.astray
-    if astray >= enough and others:
+    off_m = centred(past.samples[:, :2])[1]
+    unsure = float(np.square(off_m).sum(axis=1).mean()) > float(seen.range_m.min()) ** 2
+    if others and (unsure or astray >= enough):
         return Found(look_around(past.samples, seen, config, rng), 0.0, carried=True)
     less_sure = widened(past.samples, WIDER, rng) if others and astray <= WIDENINGS else past.samples
     return Found(less_sure, 0.0, astray, missed, others)
@@ -156,6 +159,7 @@ def _self_operations(task: Task, node: Node, found: Found, stands_ns: int, odome
         "stamp_ns": task.stamp_ns,
         "place": cell,
     }
-    samples = Array.of(found.samples)
+    gained = bool(found.samples[:, POSE_COLUMNS:].any())
+    samples = Array.of(found.samples if gained else found.samples[:, :POSE_COLUMNS])
     moved = Node(id=node.id, kind=node.kind, activation=1.0, base_level=1.0, attributes=attributes, samples=samples)
     return [moved, *place_link(node, cell)]

@@ -20,8 +20,10 @@ from services.codelets.pose_graph import Constraints, Floats, PoseGraph
 from services.codelets.replay import close_loops
 from services.codelets.revisits import KIND, constraints_of, found_again
 from services.codelets.settings import Config
+from services.codelets.sighted import Sightings
 
 CORRECTION = "correction"
+ROUNDS = 5
 
 
 def correct_map(task: Task, config: Config) -> tuple[list[Operation], Replay | None]:
@@ -43,7 +45,8 @@ def correct_map(task: Task, config: Config) -> tuple[list[Operation], Replay | N
     held = {node.id for node in judged if node.attributes["holds"]}
     if held == held_before:
         return written, None
-    new, replays = corrected(PoseGraph(graph.poses, graph.steps, loops.select(holds)), config)
+    seen = Sightings.of(task.nodes, rows[:, STAMP])
+    new, replays = corrected(PoseGraph(graph.poses, graph.steps, loops.select(holds)), seen, config)
     samples = Array.of(np.column_stack([rows[:, STAMP], old, new]))
     written.append(Node(id=CORRECTION, kind=CORRECTION, base_level=1.0, samples=samples))
     replay = _replay(rows, new, loops.select(holds), config)
@@ -52,16 +55,22 @@ def correct_map(task: Task, config: Config) -> tuple[list[Operation], Replay | N
     return written, replay
 
 
-def corrected(graph: PoseGraph, config: Config) -> tuple[Floats, int]:
+def corrected(graph: PoseGraph, seen: Sightings, config: Config) -> tuple[Floats, int]:
     """(n, 3) poses with all loops closed, by the paper's rule or with the headings, and how often the path replayed.
 
-    Where no loop is left, the path is as path integration has it.
+    Where no loop is left, the path is as path integration has it. With the headings, the path is also bound to what was
+    seen along it.
     """
     positions = close_loops(PoseGraph(graph.poses, _positions_only(graph), graph.closures))
     poses = np.column_stack([positions.positions_m, graph.poses[:, 2]])
     if config.correct == "positions":
         return poses, positions.replays
-    return correct_headings(PoseGraph(graph.poses, graph.steps, graph.closures)), positions.replays
+    poses = correct_headings(graph)
+    landmarks_m = seen.landmarks_m(poses)
+    for _ in range(ROUNDS if len(landmarks_m) else 0):
+        joint = correct_headings(seen.joined(PoseGraph(poses, graph.steps, graph.closures), landmarks_m))
+        poses, landmarks_m = joint[: len(poses)], joint[len(poses) :, :2]
+    return poses, positions.replays
 
 
 def _positions_only(graph: PoseGraph) -> Constraints:

@@ -23,6 +23,7 @@ from services.codelets.places import place_link
 from services.codelets.pose_graph import Floats
 from services.codelets.sampling import mean_pose, wrapped
 from services.codelets.settings import Config
+from services.codelets.sighted import Sightings
 
 COLUMNS = 7
 OLD, NEW = slice(1, 4), slice(4, 7)
@@ -37,22 +38,28 @@ def shift_map(task: Task, config: Config) -> list[Operation]:
     if correction.samples is None or correction.samples.shape[1:] != (COLUMNS,):
         raise MessageError(f"a correction whose rows are not {COLUMNS} numbers")
     rows = np.asarray(correction.samples.numpy(), np.float64)
-    operations: list[Operation] = [DropNode(id=CORRECTION), *_path(task, rows)]
+    path = _path(task, rows)
+    operations: list[Operation] = [DropNode(id=CORRECTION), *segments(path, _first_number(task))]
+    seen = Sightings.of(task.nodes, path[:, STAMP])
+    landmarks_m = dict(zip(seen.labels, seen.landmarks_m(path[:, POSE]), strict=True))
     for node in task.nodes:
         if node.kind == "self":
             operations += _self(task, node, rows[-1:])
         elif node.kind == "object":
-            operations += _object(task, node, rows)
+            operations += _object(task, node, rows, landmarks_m.get(str(node.attributes.get("label"))))
     return [*operations, *_road(task, rows)]
 
 
-def _path(task: Task, rows: Floats) -> list[Operation]:
+def _path(task: Task, rows: Floats) -> Floats:
     """The path with its places corrected."""
     path = rows_of(task.nodes)
-    number = min((int(node.attributes["number"]) for node in task.nodes if node.kind == PATH), default=0)
     at = np.searchsorted(rows[:, STAMP], path[:, STAMP]).clip(0, len(rows) - 1)
     path[:, POSE] = _poses(path[:, POSE], rows[at])
-    return segments(path, number) if len(path) else []
+    return path
+
+
+def _first_number(task: Task) -> int:
+    return min((int(node.attributes["number"]) for node in task.nodes if node.kind == PATH), default=0)
 
 
 def _poses(poses: Floats, rows: Floats) -> Floats:
@@ -71,11 +78,16 @@ def _self(task: Task, node: Node, last: Floats) -> list[Operation]:
     return _placed(task, node, moved, facts)
 
 
-def _object(task: Task, node: Node, rows: Floats) -> list[Operation]:
-    """An object moves with the place nearest to it of those from where it came to be known."""
+def _object(task: Task, node: Node, rows: Floats, seen_m: Floats | None) -> list[Operation]:
+    """An object moves to where it is seen from the corrected path: `seen_m` (2,).
+
+    One that was not recorded on the way moves with the place nearest to it of those from where it came to be known.
+    """
     if node.samples is None:
         return []
     samples = np.asarray(node.samples.numpy(), np.float64)
+    if seen_m is not None:
+        return _placed(task, node, samples + seen_m - samples.mean(axis=0), {})
     since_s, until_s = (int(node.attributes.get(key, 0)) * 1e-9 for key in ("since_ns", "stamp_ns"))
     known = np.flatnonzero((rows[:, STAMP] >= since_s) & (rows[:, STAMP] <= until_s))
     # One seen since the correction was computed goes with the path's last place.

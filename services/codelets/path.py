@@ -18,6 +18,8 @@ from schemas.mind import Task
 from services.codelets.pose_graph import Constraints, Floats, relative
 from services.codelets.sampling import mean_pose, wrapped
 from services.codelets.settings import Config
+from services.codelets.sighted import Outlook, recorded, seen_from, sighted_id
+from services.codelets.sightings import has_bearing, has_range
 
 KIND = "path"
 COLUMNS, ROWS = 7, 64
@@ -54,18 +56,36 @@ def _segment(number: int, rows: Floats) -> Node:
 
 
 def extend_path(task: Task, config: Config) -> list[Operation]:
-    """The place where the agent is now, added to the path's last node, which `task` has if there is any."""
+    """The place where the agent is now, added to the path's last node, and what landmarks are seen from there.
+
+    `task` has the last node, if there is any, and what was seen along it of the landmarks in its percepts. Where the
+    agent has hardly moved from the last place, they are seen from that.
+    """
     self_node = next(node for node in task.nodes if node.kind == "self")
     if self_node.samples is None:
         raise MessageError(f"task {task.task_id} has a self node without samples")
-    pose = mean_pose(np.asarray(self_node.samples.numpy(), np.float64))
     last = next((node for node in task.nodes if node.kind == KIND), None)
-    before = np.zeros((0, COLUMNS)) if last is None else rows_of([last])
-    row = np.concatenate([[task.stamp_ns * 1e-9], pose, odometry_of(self_node)])
+    rows = np.zeros((0, COLUMNS)) if last is None else rows_of([last])
     number = 0 if last is None else int(last.attributes["number"])
-    if len(before) < ROWS:
-        return segments(np.vstack([before, row]), number)
-    return segments(row[None], number + 1)
+    pose, odometry = mean_pose(np.asarray(self_node.samples.numpy(), np.float64)), odometry_of(self_node)
+    written: list[Operation] = []
+    if is_apart(rows, pose, config.path_spacing_m):
+        row = np.concatenate([[task.stamp_ns * 1e-9], pose, odometry])[None]
+        number, rows = (number + 1, row) if len(rows) >= ROWS else (number, np.vstack([rows, row]))
+        written += segments(rows, number)
+    stamp_s, step = float(rows[-1, STAMP]), step_between(rows[-1, ODOMETRY], odometry)
+    outlook = Outlook(number, stamp_s, step, float(self_node.attributes.get("range_gain", 0.0)))
+    before = {node.id: node for node in task.nodes}
+    for percept in task.percepts:
+        sightings = before.get(sighted_id(number, percept.label))
+        if has_range(percept) and has_bearing(percept) and not seen_from(sightings, stamp_s):
+            written.append(recorded(sightings, outlook, percept))
+    return written
+
+
+def is_apart(rows: Floats, pose: Floats, spacing_m: float) -> bool:
+    """Whether `pose` is `spacing_m` or more from the last of the (n, COLUMNS) rows, or there is none."""
+    return not len(rows) or bool(np.hypot(*(rows[-1, POSE][:2] - pose[:2])) >= spacing_m)
 
 
 def odometry_of(self_node: Node) -> Floats:

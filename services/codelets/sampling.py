@@ -10,6 +10,7 @@ import numpy.typing as npt
 Samples = npt.NDArray[np.float64]
 # How far samples that are all the same are spread where they must be: metres, metres, radians.
 BISECTIONS = 8
+TURN = 2 * np.pi
 HEAP = np.array([0.02, 0.02, 0.01])
 
 
@@ -33,6 +34,18 @@ def mean_pose(poses: Samples) -> Samples:
     """The mean of (n, 3) samples x_m, y_m, heading_rad, the heading's on the circle."""
     heading = np.arctan2(np.sin(poses[:, 2]).mean(), np.cos(poses[:, 2]).mean())
     return np.array([poses[:, 0].mean(), poses[:, 1].mean(), heading])
+
+
+def centred(samples: Samples) -> tuple[Samples, Samples]:
+    """The mean (d,) of (n, d) samples and how far each is off it; of three columns or more the third is a heading."""
+    number, columns = samples.shape
+    mean = np.full(number, 1 / number) @ samples
+    if columns > 2:
+        mean[2] = mean_pose(samples)[2]
+    off = samples - mean
+    if columns > 2:
+        off[:, 2] -= TURN * np.rint(off[:, 2] / TURN)
+    return mean, off
 
 
 def spread(samples: Samples, mean: Samples) -> Samples:
@@ -72,23 +85,19 @@ def smoothed(drawn: Samples, tell_apart: float, rng: np.random.Generator) -> Sam
     (Liu and West 2001). The third column may be a heading: it is taken on the circle.
     """
     number, columns = drawn.shape
-    mean = drawn.mean(axis=0)
-    if columns > 2:
-        mean[2] = mean_pose(drawn)[2]
-    off = drawn - mean
-    if columns > 2:
-        off[:, 2] = wrapped(off[:, 2])
+    mean, off = centred(drawn)
     width2 = min(0.9, (4 / ((columns + 2) * max(1.0, tell_apart))) ** (2 / (columns + 4)))
     values, vectors = np.linalg.eigh(off.T @ off / number)
     noise = standard(rng, *drawn.shape) @ (vectors * np.sqrt(values.clip(0.0) * width2)).T
-    result: Samples = off * np.sqrt(1 - width2) + noise
-    result += mean - noise.mean(axis=0)
-    return result
+    off *= np.sqrt(1 - width2)
+    off += noise
+    off += mean - np.full(number, 1 / number) @ noise
+    return off
 
 
 def bearable(log_likelihood: Samples, share: float) -> float:
     """The largest power of the likelihood, at most 1, that leaves a `share` of the samples by rejection."""
-    relative = log_likelihood - log_likelihood.max()
+    relative = (log_likelihood - log_likelihood.max()).astype(np.float32)
     low, high = 0.0, 1.0
     if np.exp(relative).mean() >= share:
         return high

@@ -18,6 +18,8 @@ LARGEST_SHARE = 0.5
 ENOUGH = 2
 MOVING = -1
 TURN = np.float32(2 * np.pi)
+# Squared deviations beyond which densities would be denormal numbers, by which everything is slow.
+IMPOSSIBLE = np.float32(150.0)
 
 
 class Sighting(NamedTuple):
@@ -127,7 +129,7 @@ def compare(samples: Samples, seen: Sighting) -> Comparison:
         else:
             squared[known] += (off * off * per_var)[known]
             sharp[known] *= (var * per_var)[known]
-    return Comparison(squared, np.exp(squared / -2) * np.sqrt(sharp))
+    return Comparison(squared, np.exp(np.minimum(squared, IMPOSSIBLE) / -2) * np.sqrt(sharp))
 
 
 def _single(numbers: Samples) -> Singles:

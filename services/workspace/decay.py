@@ -10,7 +10,7 @@ from schemas.graph import Activations, Cells, DropNode, Operation
 from services.workspace.settings import Config
 
 # What the agent knows of itself and its way is not a matter of activation.
-LASTING = frozenset({"self", "path", "closure", "correction"})
+LASTING = frozenset({"self", "path", "sighted", "closure", "correction"})
 
 
 def fade(graph: Graph, config: Config) -> list[Operation]:

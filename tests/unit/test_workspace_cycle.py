@@ -139,7 +139,7 @@ def test_a_known_object_is_located_and_an_unknown_one_is_placed() -> None:
     desk.drive(range(1), percept("a"))
     desk.see(1, percept("a"), percept("b"))
     desk.feed(answer(desk.take()[0]))
-    assert [asked.task_id for asked in desk.take()] == ["2/landmark/a", "2/object_place/b", "2/road_place"]
+    assert [asked.task_id for asked in desk.take()] == ["2/landmark/a", "2/object_place/b", "2/road_place", "2/path"]
 
 
 def test_a_percept_becomes_a_node_linked_to_the_object_that_it_is_an_instance_of() -> None:

@@ -109,14 +109,14 @@ def test_an_object_that_is_no_longer_seen_stays_on_the_map_and_its_percept_goes(
     desk = Desk("w1")
     desk.drive(range(3), percept("a"))
     desk.drive(range(3, 15))
-    assert {"self", "path:0", "object:a"} == set(desk.graph.nodes)
+    assert {"self", "path:0", "sighted:0:a", "object:a"} == set(desk.graph.nodes)
 
 
 def test_a_replica_fades_as_the_workspace_does() -> None:
     desk = Desk("w1", decay=0.3, base_level_decay=0.1)
     desk.drive(range(2), percept("a"), percept("b", 0.7))
     desk.drive(range(2, 12))
-    assert set(desk.graph.nodes) == {"self", "path:0"}
+    assert set(desk.graph.nodes) == {"self", "path:0", "sighted:0:a", "sighted:0:b"}
     assert desk.graph.digest() == desk.digest
 
 
