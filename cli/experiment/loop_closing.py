@@ -12,7 +12,15 @@ import click
 from cli.experiment import live, outcome
 from cli.experiment.options import cameras_option, json_option, live_option, out_option, processes_option, seed_option
 from cli.log.progress import bar
-from experiments.loop_closing.run import METHODS, MIND, drive, drive_by_cameras, figures, sections
+from experiments.loop_closing.run import (
+    METHODS,
+    MIND,
+    drive,
+    drive_by_cameras,
+    figures,
+    figures_of_rule,
+    sections,
+)
 from experiments.parallel import each
 
 NAME = "loop-closing"
@@ -36,12 +44,12 @@ def loop_closing(
     """Figure 6: a way round some blocks, before and after its loop is closed by reverse replay.
 
     Driven twice, with positions corrected, which is the paper's rule, and with headings too. Percepts are not drawn:
-    they err as perception was measured to. Takes about a minute.
+    they err as perception was measured to; --cameras drives once more and draws them. Takes about a minute, or two.
     """
     folder = outcome.folder_for(NAME, out)
     with bar("driving round the blocks") as progress:
         loops = dict(zip(METHODS, each(partial(drive, seed), METHODS, processes, progress), strict=True))
-    said = figures(loops)
+    said = figures(loops) | figures_of_rule(seed)
     if cameras:
         with bar("driving with cameras") as progress:
             seen = figures(drive_by_cameras(seed, progress))
