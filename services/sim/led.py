@@ -32,7 +32,7 @@ class Led:
         self.now_ns = 0
         self.progress = 0.0
         self.line = Line(np.array(way.line_m, float))
-        self._speed_m_s = way.speed_m_s
+        self._way = way
         self._at_m = 0.0
         self._frames = 0
 
@@ -48,10 +48,10 @@ class Led:
         self.progress = self._at_m / self.line.length_m
         return TruePose(stamp_ns=self.now_ns, pose=self._pose(), travelled_m=self._at_m, progress=self.progress)
 
-    def _go(self) -> list[Leg]:
-        """Let one tick pass; the legs that it leads over, none at the end."""
+    def _go(self, speed_m_s: float) -> list[Leg]:
+        """Let one tick pass; the legs that it leads over, none at rest and at the end."""
         from_m = self._at_m
-        self._at_m = min(from_m + self._speed_m_s * self.tick_ns / 1e9, self.line.length_m)
+        self._at_m = min(from_m + speed_m_s * self.tick_ns / 1e9, self.line.length_m)
         self.now_ns += self.tick_ns
         return self.line.legs(from_m, self._at_m) if self._at_m > from_m else []
 
@@ -73,7 +73,7 @@ class LedByPercepts(Led):
 
     def __init__(self, way: Way, noise: Noise, errors: PerceptErrors, frame_hz: int, seed: int) -> None:
         super().__init__(way, 1_000_000_000 // frame_hz, 1)
-        self._way, self._noise, self._seed = way, noise, seed
+        self._noise, self._seed = noise, seed
         self._sense = PerceptSense(errors, way.landmarks, seed)
         self._places = PlaceSense(errors, seed)
         self._rng = np.random.default_rng([seed, 0x1ED])
@@ -81,7 +81,7 @@ class LedByPercepts(Led):
 
     def step(self) -> list[Message]:
         """Let one tick pass; what the robot feels of it comes with the view."""
-        legs = self._go()
+        legs = self._go(self._way.speed_m_s)
         self._motions = self._felt(legs) if legs else self._at_rest()
         return []
 

@@ -1,4 +1,7 @@
-"""A robot that is led along a line, with cameras and wheels: pictures and odometry, as in a town."""
+"""A robot that is led along a line, with cameras and wheels: pictures and odometry, as in a town.
+
+It stands still until its first pictures are taken, so that all its way is seen.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,8 @@ class LedByCameras(Led):
 
     def step(self) -> list[Message]:
         """Let one tick pass, and say what the wheels report of it: of each straight and each turn on the spot."""
-        since_ns, legs = self.now_ns, self._go()
+        since_ns = self.now_ns
+        legs = self._go(self._way.speed_m_s if self._frames else 0.0)
         if not legs:
             return [Odometry(stamp_ns=self.now_ns, speed_m_s=0.0, turn_rate_rad_s=0.0, dt_s=self.tick_ns / 1e9)]
         pace_s, rows = self._pace_s(legs), []

@@ -21,7 +21,7 @@ from schemas import topics
 from schemas.mind import Action
 from schemas.sensing import MotorCommand, Percepts
 
-FRAMES = 4
+FRAMES = 5
 
 
 def _short() -> Sections:

@@ -47,10 +47,10 @@ def ride() -> list[list[Message]]:
     return _ride(_led(_way(), width_px=64, height_px=64))
 
 
-@pytest.fixture(scope="module")
-def far_world() -> Iterator[World]:
+@pytest.fixture(scope="module", params=[True, False], ids=["EGL", "TinyRenderer"])
+def far_world(request: pytest.FixtureRequest) -> Iterator[World]:
     line = [(0.0, 0.0), (3000.0, 1000.0)]
-    world = World(roadside.along(_way(line, [Landmark(name="bakery", x_m=3000.0, y_m=1014.0)]), 1))
+    world = World(roadside.along(_way(line, [Landmark(name="bakery", x_m=3000.0, y_m=1014.0)]), 1), request.param)
     yield world
     world.close()
 
@@ -67,7 +67,7 @@ def test_epam_recognises_a_landmark_by_its_name_in_the_pictures_of_a_led_robot()
         if isinstance(said, View)
     ]
     seen = [said for view in views for said in epam.feed(view) if isinstance(said, Percepts)]
-    assert len(seen) == 2
+    assert len(seen) == 3
     (percept,) = [each for each in seen[-1].objects if each.label == "bakery"]
     assert percept.range_m == pytest.approx(math.hypot(34.0, 14.0), rel=0.15)
     assert percept.bearing_rad == pytest.approx(math.atan2(14.0, 34.0), abs=0.1)
@@ -87,6 +87,11 @@ def test_wheels_without_noise_add_up_to_the_way_corners_and_all(ride: list[list[
         assert (x, y) == pytest.approx((truth.pose.x_m, truth.pose.y_m), abs=1e-9)
         assert math.remainder(heading - truth.pose.heading_rad, math.tau) == pytest.approx(0.0, abs=1e-9)
         assert heard_ns == frame[-1].stamp_ns
+
+
+def test_it_takes_its_first_pictures_before_it_goes(ride: list[list[Message]]) -> None:
+    travelled = [said.travelled_m for frame in ride[:2] for said in frame if isinstance(said, TruePose)]
+    assert travelled == [0.0, 3.0]
 
 
 def test_each_frame_ends_with_its_pictures_and_the_last_is_where_the_way_ends(ride: list[list[Message]]) -> None:
