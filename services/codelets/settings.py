@@ -42,9 +42,9 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     farthest_m: Positive = 50.0
     attention_base_level: Share = 1.0
     path_spacing_m: Positive = 1.0
-    path_variance_per_m: Positive = 0.01
-    heading_variance_per_m: Positive = 1e-4
-    heading_variance_per_rad: Positive = 2e-3
+    path_variance_per_m: Positive = 1e-4
+    heading_variance_per_m: Positive = 1e-6
+    heading_variance_per_rad: Positive = 1e-5
     correct: Literal["positions", "heading"] = "positions"
     place_match_sd_m: Positive = 2.0
     place_match_sd_rad: Positive = 0.2
