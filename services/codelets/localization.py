@@ -19,7 +19,7 @@ from schemas.mind import Task
 from services.codelets.path import ODOMETRY_FACTS, VARIANCE_FACTS, composed, odometry_of, step_between, variances_of
 from services.codelets.places import place_link
 from services.codelets.recovery import look_around, seen_before
-from services.codelets.sampling import Samples, bearable, centred, generator, mean_pose, refill, reject, spread, widened
+from services.codelets.sampling import Samples, bearable, centred, generator, mean_pose, refill, reject, widened
 from services.codelets.senses import POSE_COLUMNS, RANGE, SPEED, TURN, move, path_integrated, with_gains
 from services.codelets.settings import Config
 from services.codelets.sightings import MOVING, Sighting, compare, log_likelihood, sightings
@@ -149,10 +149,10 @@ def _look_around(lost: Found, task: Task, odometry: Samples, config: Config, rng
 
 
 def _self_operations(task: Task, node: Node, found: Found, stands_ns: int, odometry: Samples) -> list[Operation]:
-    mean = mean_pose(found.samples)
-    sd = spread(found.samples[:, :POSE_COLUMNS], mean)
+    mean, off = centred(found.samples)
+    sd = np.sqrt(np.square(off).mean(axis=0))
     cell = nearest_place(mean[0], mean[1], task.cell_m)
-    gains = found.samples[:, [SPEED, TURN, RANGE]].mean(axis=0).tolist()
+    gains = mean[[SPEED, TURN, RANGE]].tolist()
     missed_ns = int(node.attributes.get("missed_ns", 0))
     attributes: dict[str, Scalar] = node.attributes | {
         "x_m": float(mean[0]),
@@ -173,7 +173,7 @@ def _self_operations(task: Task, node: Node, found: Found, stands_ns: int, odome
         "stamp_ns": task.stamp_ns,
         "place": cell,
     }
-    gained = bool(found.samples[:, POSE_COLUMNS:].any())
+    gained = bool(sd[POSE_COLUMNS:].any())
     samples = Array.of(found.samples if gained else found.samples[:, :POSE_COLUMNS])
     moved = Node(id=node.id, kind=node.kind, activation=1.0, base_level=1.0, attributes=attributes, samples=samples)
     return [moved, *place_link(node, cell)]
