@@ -34,14 +34,18 @@ def figure(loops: dict[str, Loop], figures: dict[str, Any]) -> Figure:
         _draw_replay(shifts, positions.replays[0])
         _draw_synapses(synapses, positions.replays[0], figures)
         sheet.suptitle(
-            f"A loop of {len(positions.before.path_m)} places, {SENSING}", x=0.01, ha="left", color=INK, fontsize=12
+            f"A loop of {len(positions.before.path_m)} places, {SENSING}, wheels as the town's",
+            x=0.01,
+            ha="left",
+            color=INK,
+            fontsize=12,
         )
         sheet.draw_without_rendering()
     return sheet
 
 
 def _draw_map(axes: Axes, drawn: Map, colour: str, title: str) -> None:
-    axes.plot(*drawn.road_m.T, "s", ms=1.6, color=ROAD, alpha=0.35, mew=0, zorder=1, label="road")
+    axes.plot(*drawn.road_m.T, "s", ms=3.0, color=ROAD, alpha=0.4, mew=0, zorder=1, label="road")
     axes.plot(*drawn.true_path_m.T, color=TRUE, lw=1.0, ls=(0, (4, 2)), zorder=2, label="where the agent was")
     axes.plot(*drawn.path_m.T, color=colour, lw=1.8, zorder=3, label="where it takes itself to have been")
     lines = np.stack([drawn.true_objects_m, drawn.objects_m], axis=1)
@@ -73,14 +77,14 @@ def _draw_replay(axes: Axes, replay: Replayed) -> None:
 
 
 def _draw_synapses(axes: Axes, replay: Replayed, figures: dict[str, Any]) -> None:
-    axes.plot(replay.nearer_m, replay.strength_changes, ".", ms=5, color=SEVERAL[4], alpha=0.6)
-    slope = figures["strength_change_per_m"]
-    axes.set_title(
-        f"e   predicted change of synapses: {slope:.3f} a metre, r = {figures['strength_and_shift_correlation']:.2f}",
-        loc="left",
-        fontsize=10,
-    )
-    _label(axes, "by how much two place fields come nearer, m", "change of exp(-k d)")
+    """Pairs of place fields near one another; those brought together from afar lie far outside, near 1."""
+    nearer, changes = replay.nearer_m[replay.close], replay.strength_changes[replay.close]
+    slope, r = figures["strength_change_per_m_close_pairs"], figures["strength_and_shift_correlation_close_pairs"]
+    axes.axline((0.0, 0.0), slope=slope, color=FAINT, lw=1.0, ls=(0, (4, 2)))
+    axes.plot(nearer, changes, ".", ms=5, color=SEVERAL[4], alpha=0.6)
+    title = f"e   predicted change of synapses, fields under {1 / replay.decay_per_m:g} m apart"
+    axes.set_title(f"{title}: {slope:.3f} a metre, r = {r:.2f}", loc="left", fontsize=10)
+    _label(axes, "by how much two place fields come nearer, m", f"change of exp(-{replay.decay_per_m:g} d)")
 
 
 def _label(axes: Axes, x: str, y: str) -> None:

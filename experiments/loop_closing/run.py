@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,6 +15,9 @@ from bus.errors import CogmapError
 from bus.graph import TILE_SIDE, Graph
 from bus.house import House
 from bus.module import Module
+from experiments import rendered
+from experiments.loop_closing.rule import close_laps
+from experiments.parallel import Progress
 from schemas import topics
 from schemas.graph import Delta
 from schemas.mind import Replay
@@ -21,6 +25,7 @@ from schemas.sensing import TruePose
 from services import table
 from services.codelets.path import POSE, STAMP, rows_of
 from services.sim.odometry import Noise
+from services.sim.settings import Config
 
 Floats = npt.NDArray[np.float64]
 MIND = ("workspace", "codelets", "global_workspace", "action")
@@ -29,8 +34,11 @@ METHODS = ("positions", "heading")
 CORNERS_M = ((0.0, 0.0), (180.0, 0.0), (180.0, 70.0), (260.0, 70.0), (260.0, 220.0), (0.0, 220.0), (0.0, 0.0))
 AGAIN_M = (120.0, 0.0)
 ASIDE_M, APART_M = 14.0, 60.0
+CORNER_RAD, LAPS = np.pi / 2, 1000
 SPEED_M_S, FRAME_HZ, CELL_M = 5.0, 2, 3.0
-NOISE = Noise(speed=0.05, turn=0.03, drift_rad_per_sqrt_m=0.005)
+# The wheels of the town's robot, read ten times between two views: each reading's factors err anew, drift adds up.
+READINGS = Config().odometry_hz // FRAME_HZ
+NOISE = Noise(speed=Noise().speed / READINGS**0.5, turn=Noise().turn / READINGS**0.5)
 
 
 @dataclass(frozen=True)
@@ -66,13 +74,16 @@ class Map:
 class Replayed:
     """What a replay told: `shifts_m` (n,) of the place fields in its order, and how synapses change.
 
-    `nearer_m` (m,) is by how much the fields of each pair of place cells come nearer.
+    `nearer_m` (m,) is by how much the fields of each pair of place cells come nearer. `close` tells the pairs near
+    enough, before and after, for exp(-k d) to be about linear: less than 1/k apart.
     """
 
     passes: int
+    decay_per_m: float
     shifts_m: Floats
     nearer_m: Floats
     strength_changes: Floats
+    close: npt.NDArray[np.bool_]
 
     @classmethod
     def of(cls, told: Replay) -> Replayed:
@@ -81,7 +92,8 @@ class Replayed:
         pairs = np.asarray(told.pairs.numpy(), np.int64)
         apart = [np.hypot(*(where[pairs[:, 0]] - where[pairs[:, 1]]).T) for where in (positions, positions + shifts)]
         changes = np.asarray(told.strength_changes.numpy(), float)
-        return cls(told.replays, np.hypot(*shifts.T), apart[0] - apart[1], changes)
+        close = np.maximum(*apart) * told.decay_per_m < 1
+        return cls(told.replays, told.decay_per_m, np.hypot(*shifts.T), apart[0] - apart[1], changes, close)
 
 
 @dataclass(frozen=True)
@@ -167,7 +179,7 @@ def sections(seed: int, method: str) -> Sections:
             "path_spacing_m": step_m,
             "path_variance_per_m": NOISE.speed**2 * step_m,
             "heading_variance_per_m": NOISE.drift_rad_per_sqrt_m**2,
-            "heading_variance_per_rad": NOISE.turn**2,
+            "heading_variance_per_rad": NOISE.turn**2 * CORNER_RAD,
         },
         "action": {"mode": "lockstep"},
     }
@@ -180,11 +192,21 @@ def _plain(noise: Noise) -> dict[str, float]:
 def drive(seed: int, method: str) -> Loop:
     """Drive the loop once. Raises CogmapError where nothing was corrected, or a message was refused."""
     configured = sections(seed, method)
+    return driven(configured, [table.build(name, configured) for name in ("sim", *MIND)])
+
+
+def drive_by_cameras(seed: int, progress: Progress) -> dict[str, Loop]:
+    """As `drive`, by each of METHODS, with buildings that are drawn and recognised."""
+    return rendered.by_cameras({method: sections(seed, method) for method in METHODS}, MIND, driven, progress)
+
+
+def driven(configured: Sections, modules: Sequence[Module]) -> Loop:
+    """As `drive`, with these modules."""
     places = {item["name"]: (item["x_m"], item["y_m"]) for item in configured["sim"]["way"]["landmarks"]}
     observer = _Observer(places)
     watching = Module("observer").on(topics.DELTA, observer.on_delta).on(topics.TRUE_POSE, observer.on_pose)
     watching.on(topics.REPLAY, observer.on_replay)
-    house = House([*(table.build(name, configured) for name in ("sim", *MIND)), watching])
+    house = House([*modules, watching])
     try:
         house.run()
         for shell in house.shells:
@@ -193,7 +215,7 @@ def drive(seed: int, method: str) -> Loop:
     finally:
         house.close()
     if observer.before is None or observer.after is None:
-        raise CogmapError(f"no loop was closed on the way of seed {seed}")
+        raise CogmapError(f"no loop was closed on the way of seed {configured['sim']['seed']}")
     return Loop(observer.before, observer.after, observer.map(), observer.replays)
 
 
@@ -207,9 +229,27 @@ def figures(loops: dict[str, Loop]) -> dict[str, float]:
             said[f"{name}_error_in_the_end_m_{method}"] = getattr(loop.end, f"{name}_error_m")
         said[f"corrections_{method}"] = float(len(loop.replays))
         said[f"replays_of_the_first_{method}"] = float(loop.replays[0].passes)
-    nearer, changes = loops["positions"].replays[0].nearer_m, loops["positions"].replays[0].strength_changes
-    said["strength_change_per_m"] = float(np.polyfit(nearer, changes, 1)[0]) if len(nearer) > 1 else 0.0
-    said["strength_and_shift_correlation"] = float(np.corrcoef(nearer, changes)[0, 1]) if len(nearer) > 2 else 0.0
+    return said | _predicted(loops["positions"].replays[0])
+
+
+def _predicted(replay: Replayed) -> dict[str, float]:
+    """How the change of synapses goes with how much nearer place fields come: k a metre, where they are close."""
+    said = {"synapse_decay_per_m": replay.decay_per_m}
+    for name, pairs in (("close_pairs", replay.close), ("all_pairs", np.ones(len(replay.close), bool))):
+        nearer, changes = replay.nearer_m[pairs], replay.strength_changes[pairs]
+        enough = len(nearer) > 2 and bool(np.ptp(nearer) > 0)
+        said[name] = float(len(nearer))
+        said[f"strength_change_per_m_{name}"] = float(np.polyfit(nearer, changes, 1)[0]) if enough else 0.0
+        said[f"strength_and_shift_correlation_{name}"] = float(np.corrcoef(nearer, changes)[0, 1]) if enough else 0.0
+    return said
+
+
+def figures_of_rule(seed: int) -> dict[str, float]:
+    """What eq. 9 does for many laps of path integration alone, with the headings' noise and without."""
+    said = {}
+    for name, noise in (("", NOISE), ("_exact_headings", Noise(speed=NOISE.speed, turn=0.0, drift_rad_per_sqrt_m=0.0))):
+        laps = close_laps(CORNERS_M, SPEED_M_S / FRAME_HZ, noise, LAPS, seed)
+        said[f"rule_over_uncorrected{name}"], said[f"rule_helps_share{name}"] = laps.ratio, laps.helped
     return said
 
 

@@ -14,26 +14,20 @@ from services.codelets.pose_graph import (
     PoseGraph,
     cost,
     discrepancies,
-    relative,
-    rotations,
+    jacobians,
 )
 
 RELATIVE_DECREASE = 1e-5
 MOST_ITERATIONS = 100
-LEAST_DAMPING, MOST_DAMPING = 1e-6, 1e8
-# Symmetric and positive definite, and ordered beforehand: no pivoting.
-FACTORING = {"permc_spec": "NATURAL", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
-
-
-def jacobians(poses: Floats, constraints: Constraints) -> tuple[Floats, Floats]:
-    """(m, 3, 3) each: how the discrepancy of each constraint changes with its first and with its second pose."""
-    seen = relative(poses, constraints)
-    by_second = np.zeros((len(constraints), 3, 3))
-    by_second[:, :2, :2] = rotations(-poses[constraints.first, 2])
-    by_second[:, 2, 2] = 1.0
-    by_first = -by_second
-    by_first[:, 0, 2], by_first[:, 1, 2] = seen[:, 1], -seen[:, 0]
-    return by_first, by_second
+LEAST_DAMPING, MOST_DAMPING, DAMPING_FACTOR = 1e-9, 1e8, 10.0
+# Symmetric, positive definite and ordered beforehand: no pivoting. The three columns of a pose belong together.
+FACTORING = {
+    "permc_spec": "NATURAL",
+    "diag_pivot_thresh": 0.0,
+    "relax": 3,
+    "panel_size": 1,
+    "options": {"SymmetricMode": True},
+}
 
 
 class NormalEquations:
@@ -117,19 +111,22 @@ def factor(matrix: sparse.csc_matrix) -> SuperLU:
     return splu(matrix, **FACTORING)
 
 
-def correct_headings(graph: PoseGraph) -> Floats:
-    """(n, 3) poses that minimise eq. 7, headings and all, near those of `graph`. The first pose stays."""
+def correct_headings(graph: PoseGraph, most_iterations: int = MOST_ITERATIONS) -> Floats:
+    """(n, 3) poses that minimise eq. 7, headings and all, near those of `graph`. The first pose stays.
+
+    Where `most_iterations` do not do, they are nearer to the least than those of `graph`.
+    """
     poses, constraints = graph.poses, graph.constraints
     normal = NormalEquations(len(poses), constraints)
     damping, before = 0.0, cost(poses, constraints)
-    for _ in range(MOST_ITERATIONS):
+    for _ in range(most_iterations):
         matrix, gradient = normal.matrix(poses, constraints), normal.gradient(poses, constraints)
         damped = matrix + damping * sparse.diags(matrix.diagonal(), format="csc") if damping else matrix
         step = factor(damped).solve(gradient)
         moved = normal.moved(poses, -step)
         after = cost(moved, constraints)
         if after > before:
-            damping = max(LEAST_DAMPING, damping * 100)
+            damping = max(LEAST_DAMPING, damping * DAMPING_FACTOR)
             if damping > MOST_DAMPING:
                 break
             continue
@@ -139,5 +136,5 @@ def correct_headings(graph: PoseGraph) -> Floats:
         poses, before = moved, after
         if gained <= RELATIVE_DECREASE * after or (not damping and unforeseen <= RELATIVE_DECREASE * after):
             break
-        damping = damping / 10 if damping > LEAST_DAMPING else 0.0
+        damping = damping / DAMPING_FACTOR if damping > LEAST_DAMPING else 0.0
     return poses

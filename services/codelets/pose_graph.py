@@ -98,6 +98,29 @@ def cost(poses: Floats, constraints: Constraints) -> float:
     return float(squared(discrepancies(poses, constraints), constraints.information).sum())
 
 
+def jacobians(poses: Floats, constraints: Constraints) -> tuple[Floats, Floats]:
+    """(m, 3, 3) each: how the discrepancy of each constraint changes with its first and with its second pose."""
+    seen = relative(poses, constraints)
+    by_second = np.zeros((len(constraints), 3, 3))
+    by_second[:, :2, :2] = rotations(-poses[constraints.first, 2])
+    by_second[:, 2, 2] = 1.0
+    by_first = -by_second
+    by_first[:, 0, 2], by_first[:, 1, 2] = seen[:, 1], -seen[:, 0]
+    return by_first, by_second
+
+
+def roots(information: Floats) -> Floats:
+    """(m, 3, 3) whose products with their transposes are `information`, which may be singular."""
+    values, vectors = np.linalg.eigh(information)
+    result: Floats = vectors * np.sqrt(values.clip(0.0))[:, None, :]
+    return result
+
+
+def from_zero(steps: Floats) -> Floats:
+    """Running sums, a zero before the first."""
+    return np.concatenate([np.zeros((1, *steps.shape[1:])), np.cumsum(steps, axis=0)])
+
+
 def rotations(heading_rad: Floats) -> Floats:
     """(n, 2, 2): from a robot's frame to the world's."""
     cos, sin = np.cos(heading_rad), np.sin(heading_rad)

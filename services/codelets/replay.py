@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from services.codelets.pose_graph import Constraints, Floats, PoseGraph, discrepancies, rotations
+from services.codelets.pose_graph import Constraints, Floats, PoseGraph, discrepancies, from_zero, rotations
 
 CHECK_EVERY = 10
 
@@ -69,8 +69,8 @@ class Loops:
         step = displacements(graph.poses, graph.steps)
         self._closing_m = np.where(back[:, None], -known.off_m, known.off_m)
         self._closing_m2, self._step_m2 = known.covariance_m2, step.covariance_m2
-        self._integrated_m = graph.poses[0, :2] + _from_zero(step.off_m)
-        so_far_m2 = _from_zero(step.covariance_m2)
+        self._integrated_m = graph.poses[0, :2] + from_zero(step.off_m)
+        so_far_m2 = from_zero(step.covariance_m2)
         self.gain = np.linalg.inv(so_far_m2[self._end] - so_far_m2[self._start] + known.covariance_m2)
 
     @property
@@ -84,7 +84,7 @@ class Loops:
         entered = [np.bincount(self._end, forces[:, axis], count) for axis in (0, 1)]
         left = [np.bincount(self._start, forces[:, axis], count) for axis in (0, 1)]
         pull = np.cumsum((np.array(entered) - np.array(left)).T[::-1], axis=0)[::-1]
-        return _from_zero(np.einsum("kab,kb->ka", self._step_m2, pull[1:]))
+        return from_zero(np.einsum("kab,kb->ka", self._step_m2, pull[1:]))
 
     def yielded(self, forces: Floats) -> Floats:
         """(m, 2): by how much `forces` close each loop: the path gives way, and so does the closure."""
@@ -110,11 +110,6 @@ class Loops:
     def _across(self, positions: Floats) -> Floats:
         result: Floats = positions[self._end] - positions[self._start]
         return result
-
-
-def _from_zero(steps: Floats) -> Floats:
-    """Running sums, a zero before the first."""
-    return np.concatenate([np.zeros((1, *steps.shape[1:])), np.cumsum(steps, axis=0)])
 
 
 def close_loops(graph: PoseGraph, tolerance: float = 0.01, most_replays: int = 5000) -> Correction:

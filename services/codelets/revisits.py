@@ -36,7 +36,7 @@ def revisit(task: Task, config: Config) -> list[Operation]:
     then, makes one closure. What the map has the landmark at does not come into it: this pass may have moved it.
     """
     if not task.percepts and not task.matches:
-        raise MessageError(f"task {task.task_id} has nothing that is met again")
+        raise MessageError(f"task {task.task_id} has nothing that was met again")
     rows = rows_of(task.nodes)
     seen = Sightings.of(task.nodes, rows[:, STAMP])
     found: list[Operation] = []

@@ -4,24 +4,26 @@ from __future__ import annotations
 
 import numpy as np
 
-from services.codelets.least_squares import NormalEquations, correct_headings, factor, jacobians
-from services.codelets.pose_graph import Constraints, Floats, PoseGraph, cost, discrepancies
+from services.codelets.least_squares import MOST_ITERATIONS, NormalEquations, correct_headings, factor
+from services.codelets.pose_graph import Constraints, Floats, PoseGraph, cost, discrepancies, jacobians, roots
 
 TOLERANCE = 0.01
+ITERATIONS_A_CLOSURE = 10
 
 
 class Solved:
     """The factors of a path's normal equations, and the closures since, each of which changes them a little.
 
     A closure adds three columns (Woodbury's identity), and one step corrects the path: its turns are small. Where
-    eq. 7 then shows that they were not, the path is solved and factored anew.
+    eq. 7 then shows that they were not, the path is solved and factored anew, in bounded time: what some iterations
+    leave undone is left to the next closures, and to `settle`.
     """
 
     def __init__(self, graph: PoseGraph) -> None:
         self._settle(graph)
 
-    def _settle(self, graph: PoseGraph) -> None:
-        poses = correct_headings(graph)
+    def _settle(self, graph: PoseGraph, most_iterations: int = MOST_ITERATIONS) -> None:
+        poses = correct_headings(graph, most_iterations)
         self.graph = PoseGraph(poses, graph.steps, graph.closures)
         constraints = self.graph.constraints
         self._normal = NormalEquations(len(poses), constraints)
@@ -31,8 +33,7 @@ class Solved:
 
     def settle(self) -> None:
         """Take the closures that have come into the factors: for when there is time."""
-        if self._stiffer:
-            self._settle(self.graph)
+        self._settle(self.graph)
 
     def chi_square(self, closure: Constraints) -> float:
         """How badly one closure fits all that is known without it; its degrees of freedom are what it tells of."""
@@ -47,12 +48,12 @@ class Solved:
         self._stiffer.append(stiffer)
         self._cost += chi_square
         if cost(poses, self.graph.constraints) > (1 + TOLERANCE) * self._cost:
-            self._settle(self.graph)
+            self._settle(self.graph, ITERATIONS_A_CLOSURE)
         return self.graph.poses
 
     def _fit(self, closure: Constraints) -> tuple[Floats, float, Floats]:
         """The step that takes `closure` in, its chi-square, and by what the path answers less once it is in."""
-        root = _root(closure)
+        root = roots(closure.information)[0]
         pulls = np.zeros((3 * (len(self.graph.poses) - 1), 3))
         used = []
         for end, by_end in zip((closure.first, closure.second), jacobians(self.graph.poses, closure), strict=True):
@@ -67,10 +68,3 @@ class Solved:
         stiffer = np.linalg.solve(left, answers.T).T
         off = np.linalg.solve(left, root.T @ discrepancies(self.graph.poses, closure)[0])
         return stiffer @ off, float(off @ off), stiffer
-
-
-def _root(closure: Constraints) -> Floats:
-    """(3, 3) whose product with its transpose is the information, which may be singular."""
-    values, vectors = np.linalg.eigh(closure.information[0])
-    result: Floats = vectors * np.sqrt(values.clip(0.0))
-    return result

@@ -13,7 +13,16 @@ from services.codelets.module import Config as WorkerConfig
 STEP_M, SIDE_STEPS = 2.0, 20
 LAP = 4 * SIDE_STEPS
 SETTINGS = {"revisit_s": 5.0, "closure_spacing_s": 0.2}
-QUIET = WorkerConfig(samples=60, kept_samples=30, landmark_samples=40, largest_landmark_sd_m=1e-6)
+QUIET = WorkerConfig(
+    samples=60,
+    kept_samples=30,
+    landmark_samples=40,
+    largest_landmark_sd_m=1e-6,
+    correct="positions",
+    path_variance_per_m=0.01,
+    heading_variance_per_m=1e-4,
+    heading_variance_per_rad=2e-3,
+)
 SLIP = 0.1
 
 

@@ -19,7 +19,7 @@ def _rows() -> np.ndarray:
     between = np.column_stack([np.full(40, 100.0), np.arange(40.0) * 4.0, np.full(40, np.pi / 2)])
     again = once + np.array([-35.0, 22.0, 0.0])
     poses = np.vstack([once, between, again])
-    return np.column_stack([np.arange(len(poses), dtype=float), poses, poses])
+    return np.column_stack([np.arange(len(poses), dtype=float), poses, poses, np.zeros((len(poses), 2))])
 
 
 def _views(*pairs: tuple[int, int], off_m: float = 0.0) -> Views:
@@ -33,7 +33,8 @@ def _views(*pairs: tuple[int, int], off_m: float = 0.0) -> Views:
 
 
 def _agreeing(views: Views) -> list[bool]:
-    return agreeing(views, steps_of(_rows(), Config()), FALSE_CLOSURE).tolist()
+    agrees: list[bool] = agreeing(views, steps_of(_rows(), Config()), FALSE_CLOSURE).tolist()
+    return agrees
 
 
 def test_three_views_of_one_landmark_agree_wherever_path_integration_has_led_meanwhile() -> None:

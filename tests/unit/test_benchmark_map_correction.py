@@ -8,6 +8,8 @@ import pytest
 from benchmarks.map_correction import reference
 from benchmarks.map_correction.measure import measure, read_graph, trajectory_error_m
 from bus.errors import UsageError
+from services.codelets.pose_graph import cost
+from services.codelets.replay import close_loops, displacements, position_cost
 
 SQUARE = """VERTEX_SE2 0 0 0 0
 VERTEX_SE2 1 1 0 1.5
@@ -46,6 +48,25 @@ def test_a_graph_is_measured_against_exact_least_squares_and_gtsam(tmp_path: Pat
     assert figures["ate_m"] < figures["ate_uncorrected_m"]
     assert figures["ate_vs_gtsam"] == pytest.approx(1.0, abs=0.02)
     assert figures["incremental_closures"] == 1.0
+
+
+def test_where_gtsam_gives_up_at_once_it_is_held_against_by_its_slower_factors(tmp_path: Path) -> None:
+    pytest.importorskip("gtsam")
+    path = tmp_path / "certain.g2o"
+    path.write_text(SQUARE.replace("100 0 0 100 0 100", "1e20 0 0 1e20 0 1e-3"))
+    graph = read_graph(path)
+    peer = reference.Gtsam(graph.poses, graph.constraints)
+    assert peer.gives_up() and not peer.gives_up()
+    assert cost(peer.poses(peer.solve()), graph.constraints) < cost(graph.poses, graph.constraints)
+
+
+def test_the_best_positions_are_exact_where_a_loop_is_certain(tmp_path: Path) -> None:
+    path = tmp_path / "certain.g2o"
+    path.write_text(SQUARE.replace("EDGE_SE2 0 4 0 0 0 100 0 0 100", "EDGE_SE2 0 4 0 0 0 1e15 0 0 1e15"))
+    graph = read_graph(path)
+    known = displacements(graph.poses, graph.constraints)
+    exact = position_cost(reference.best_positions(graph), graph.constraints, known)
+    assert position_cost(close_loops(graph, 1e-9).positions_m, graph.constraints, known) >= exact * (1 - 1e-9)
 
 
 def test_without_gtsam_the_remedy_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -131,7 +131,7 @@ def test_without_noise_and_confusions_the_map_is_right_and_the_same_each_time() 
     configured = sections(environment, Tour(start=0, backward=True, seed=1), quiet, "none")
     configured["sim"]["way"]["line_m"] = configured["sim"]["way"]["line_m"][:12]
     configured["sim"]["percepts"] |= {"right_name": 1.0, "precision": 1.0, "place_precision": 1.0}
-    made, again = (traverse(configured, environment.names) for _ in range(2))
+    made, again = (traverse(configured) for _ in range(2))
     assert made.believed[:, :2] == pytest.approx(made.true[:, :2], abs=1.0)
     known = ~np.isnan(made.buildings_m[:, 0])
     assert known.any()
@@ -140,6 +140,6 @@ def test_without_noise_and_confusions_the_map_is_right_and_the_same_each_time() 
 
 
 def test_loops_are_closed_only_where_that_is_asked_for() -> None:
-    assert settings("none", NOISE, 5.0)["workspace"]["revisit_s"] > 1e6
-    assert "revisit_s" not in settings("positions", NOISE, 5.0)["workspace"]
-    assert settings("heading", NOISE, 5.0)["codelets"]["correct"] == "heading"
+    assert settings("none", 5.0)["workspace"]["revisit_s"] > 1e6
+    assert "revisit_s" not in settings("positions", 5.0)["workspace"]
+    assert settings("heading", 5.0)["codelets"]["correct"] == "heading"

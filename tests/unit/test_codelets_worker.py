@@ -8,7 +8,7 @@ from scenes import node, percept, task
 
 from bus.codec import encode
 from schemas.array import Array
-from schemas.base import Message, Scalar
+from schemas.base import Message
 from schemas.graph import Cells, Link, Node, Proposal
 from schemas.mind import Coalitions, Task
 from schemas.sensing import PlaceMatch
@@ -30,9 +30,14 @@ def _object(label: str = "house", sightings: int = 1) -> Node:
 
 
 def _path() -> Node:
-    rows = np.zeros((20, 7))
+    rows = np.zeros((20, 9))
     rows[:, 0] = rows[:, 1] = rows[:, 4] = np.arange(20)
     return node("path:0", rows, "path", number=0)
+
+
+def _closure() -> Node:
+    facts = {"ahead_m": 0.0, "left_m": 0.0, "range_m": 0.0, "bearing_rad": 0.0, "sd_m": 2.0, "sd_rad": 0.2}
+    return node("closure:1:view-0", None, "closure", from_ns=0, to_ns=15 * 10**9, by="view-0", **facts)
 
 
 def _correction() -> Node:
@@ -40,18 +45,6 @@ def _correction() -> Node:
     rows[:, 0] = rows[:, 1] = rows[:, 4] = np.arange(20)
     rows[:, 5] = np.arange(20) * 0.1
     return node("correction", rows, "correction")
-
-
-def _closure(number: int) -> Node:
-    facts: dict[str, Scalar] = {
-        "ahead_m": 0.0,
-        "left_m": 0.0,
-        "range_m": 0.0,
-        "bearing_rad": 0.0,
-        "by": f"view-{number}",
-    }
-    facts |= {"sd_m": 9.0, "sd_rad": 1.0, "from_ns": number * 10**9, "to_ns": (number + 12) * 10**9}
-    return node(f"closure:{number}", None, "closure", **facts)
 
 
 def _every_task() -> list[Task]:
@@ -65,7 +58,7 @@ def _every_task() -> list[Task]:
         task("path", _self(), _path()),
         task("revisit", _path(), matches=[PlaceMatch(frame=0, view_ns=0, score=0.9)]),
         task("map_shift", _self(), _path(), _object(), _correction()),
-        task("map_correction", _path(), *(_closure(number) for number in (1, 2, 3))),
+        task("map_correction", _path(), _closure()),
         task("attention", _self(), _object()),
     ]
 

@@ -294,7 +294,7 @@ def test_the_synapse_of_two_fields_of_one_place_grows_with_how_far_the_fields_sh
 @pytest.mark.parametrize(
     ("sent", "lacking"),
     [
-        (node("path:0", np.zeros((3, 7)), "path"), "number"),
+        (node("path:0", np.zeros((3, 9)), "path"), "number"),
         (node("closure:1", kind="closure", to_ns=3), "from_ns"),
         (node("correction", kind="correction"), "samples"),
         (node("correction", np.zeros((3, 3)), "correction"), "shape"),

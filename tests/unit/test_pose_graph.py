@@ -8,9 +8,10 @@ import pytest
 from benchmarks.map_correction.measure import trajectory_error_m
 from benchmarks.map_correction.reference import best_positions
 from bus.errors import MessageError
+from services.codelets import solved
 from services.codelets.closures import holding
-from services.codelets.least_squares import correct_headings, jacobians
-from services.codelets.pose_graph import Constraints, PoseGraph, cost, discrepancies, relative
+from services.codelets.least_squares import correct_headings
+from services.codelets.pose_graph import Constraints, PoseGraph, cost, discrepancies, jacobians, relative, roots
 from services.codelets.replay import Loops, close_loops, displacements, position_cost
 from services.codelets.solved import Solved
 
@@ -173,6 +174,26 @@ def test_a_closure_that_turns_the_path_far_is_solved_anew() -> None:
     poses = solved.close(far)
     together = correct_headings(PoseGraph(graph.poses, graph.steps, far))
     assert cost(poses, solved.graph.constraints) <= 1.02 * cost(together, solved.graph.constraints)
+
+
+def test_what_a_closure_leaves_undone_is_done_when_there_is_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    _, graph, _ = _laps(laps=2)
+    far = _between(np.array([0]), np.array([80]), np.array([[15.0, -15.0, 1.0]]), CLOSURE_SD / 10)
+    least = cost(correct_headings(PoseGraph(graph.poses, graph.steps, far)), graph.steps + far)
+    monkeypatch.setattr(solved, "ITERATIONS_A_CLOSURE", 1)
+    hasty = Solved(PoseGraph(graph.poses, graph.steps, graph.closures.select(slice(0, 0))))
+    poses = hasty.close(far)
+    assert cost(poses, graph.steps + far) > 1.1 * least
+    hasty.settle()
+    assert cost(hasty.graph.poses, graph.steps + far) == pytest.approx(least, rel=0.02)
+
+
+def test_a_root_times_its_transpose_is_the_information_though_nothing_is_known_of_the_heading() -> None:
+    random = np.random.default_rng(0).normal(size=(4, 3, 3))
+    information = random @ random.transpose(0, 2, 1)
+    information[2, 2, :] = information[2, :, 2] = 0.0
+    root = roots(information)
+    assert root @ root.transpose(0, 2, 1) == pytest.approx(information)
 
 
 def test_a_closures_chi_square_is_what_it_adds_to_the_cost() -> None:
