@@ -15,6 +15,7 @@ from cli.log.progress import bar
 from experiments.city_maps.drive import MIND
 from experiments.city_maps.environment import Environment, environments
 from experiments.city_maps.figures import camera_figures, figures
+from experiments.city_maps.fit import fitted
 from experiments.city_maps.measure import NOISE, TRAVERSALS, Effort, by_cameras, configurations, jobs, measure
 from experiments.city_maps.noise import Noise
 from experiments.city_maps.sources import folder, from_osm, grown
@@ -55,6 +56,9 @@ Examples:
     metavar="SPEED TURN DRIFT",
     help="Of self-motion: shares of speed and of turn, and radians of drift after a metre.",
 )
+@click.option(
+    "--fit", is_flag=True, help="Fit that noise first, so that maps err as people's do; takes many times as long."
+)
 @cameras_option
 @live_option
 @seed_option
@@ -67,6 +71,7 @@ def city_maps(
     maps: int | None,
     traversals: int,
     noise: tuple[float, float, float],
+    fit: bool,
     cameras: bool,
     goes_live: bool,
     seed: int,
@@ -82,6 +87,9 @@ def city_maps(
     where = outcome.folder_for(NAME, out)
     places = _places(osm, all_in, maps, seed)
     asked = Noise(*noise)
+    if fit:
+        with bar("fitting the noise") as progress:
+            asked = fitted(places, Effort(traversals, seed, processes, progress))
     with bar("traversals") as progress:
         found = measure(places, asked, Effort(traversals, seed, processes, progress))
     said, first = figures(found, asked), jobs(places, asked, 1, seed)[0]

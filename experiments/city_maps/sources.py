@@ -141,5 +141,8 @@ def folder(path: Path, seed: int) -> list[City]:
         elif file.name.endswith(street_graphs.SUFFIXES):
             cities += [from_street_graph(graph, seed) for graph in street_graphs.read(file)]
     if not cities:
-        raise UsageError(f"{path} has no cities: put OpenStreetMap extracts there, {', '.join(osm.SUFFIXES)}")
+        kinds = (
+            f"OpenStreetMap extracts ({osm.SUFFIXES[0]}) or street graphs ({street_graphs.SUFFIXES[0]}), packed or not"
+        )
+        raise UsageError(f"{path} has no cities: put {kinds}, there")
     return cities

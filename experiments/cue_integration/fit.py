@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TYPE_CHECKING, TypeVar
 
-from experiments.cue_integration.trial import Noise
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
+Noise = TypeVar("Noise", bound="DataclassInstance")
 # Many pairs fit as well as one another; small steps from the same start keep either from running ahead.
 FACTORS = (1.2, 1.1)
-Cost = Callable[[Noise], float]
 
 
-def coordinate_descent(cost: Cost, noise: Noise, factors: tuple[float, ...] = FACTORS) -> Noise:
+def coordinate_descent(cost: Callable[[Noise], float], noise: Noise, factors: tuple[float, ...] = FACTORS) -> Noise:
     """The noise that no step up or down in speed or in turn alone betters, steps growing finer by `factors`.
 
     `cost` must be the same for the same noise.
