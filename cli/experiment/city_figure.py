@@ -21,6 +21,7 @@ SHOWN = {"none": "uncorrected", "positions": "positions corrected (eq. 9)", "hea
 COLOURS = {"none": WHEELS, "positions": SEVERAL[1], "heading": ESTIMATE}
 MOST_SHEETS = 8
 MARGIN_M = 120.0
+SCALE_M = 200.0
 
 
 def figure(maps: Sequence[CityMap], figures: dict[str, Any]) -> Figure:
@@ -48,7 +49,7 @@ def figure(maps: Sequence[CityMap], figures: dict[str, Any]) -> Figure:
 
 def _title(maps: Sequence[CityMap], figures: dict[str, Any]) -> str:
     return (
-        f"Learned maps of {len(maps)} environments, {len(maps[0].learned)} traversals each, {SENSING}.\n"
+        f"Learned maps of {len(maps)} environments, traversed {len(maps[0].learned)} times each, {SENSING}.\n"
         f"Corrected over uncorrected error: {figures['error_corrected_over_uncorrected']:.2f} with headings, "
         f"{figures['error_positions_over_uncorrected']:.2f} positions only"
     )
@@ -79,7 +80,7 @@ def _draw_errors(axes: Axes, maps: Sequence[CityMap]) -> None:
         zorder=0,
         label=f"people, one SD, {published.SOURCE}",
     )
-    axes.set_xticks(places, [each.environment.name for each in maps], rotation=40, ha="right", fontsize=7.5)
+    axes.set_xticks(places, [_name(each) for each in maps], rotation=40, ha="right", fontsize=7.5)
     axes.set_ylim(0, axes.get_ylim()[1] * 1.45)
     axes.legend(frameon=False, fontsize=7.5, ncols=2, loc="upper left")
     axes.set_title("a   error of each map: sum of squared errors of its 8 buildings", loc="left", fontsize=10)
@@ -107,7 +108,7 @@ def _draw_maps(column: Sequence[Axes], each: CityMap) -> None:
     reach = [tour]
     _streets(column[0], each)
     column[0].plot(*tour.T, color=TRUE, lw=1.4)
-    column[0].set_title(f"{environment.name}, {environment.area_km2:.2f} km²", fontsize=9, color=INK)
+    column[0].set_title(f"{_name(each)}, {environment.area_km2:.2f} km²", fontsize=9, color=INK)
     for axes, method, label in ((column[1], "none", "uncorrected"), (column[2], "heading", "corrected")):
         _streets(axes, each)
         axes.plot(*one.road_m[method].T, ".", ms=1.2, color=COLOURS[method], alpha=0.5, zorder=2)
@@ -126,11 +127,18 @@ def _draw_maps(column: Sequence[Axes], each: CityMap) -> None:
         axes.set_xticks([])
         axes.set_yticks([])
         axes.set_facecolor(PAPER)
+    left, bottom = ends.min(axis=0) - 0.6 * MARGIN_M
+    column[0].plot([left, left + SCALE_M], [bottom, bottom], color=INK, lw=2)
+    column[0].text(left, bottom + 0.1 * MARGIN_M, f"{SCALE_M:g} m", fontsize=7.5, color=INK, va="bottom")
 
 
 def _streets(axes: Axes, each: CityMap) -> None:
     streets = each.environment.streets
     axes.add_collection(LineCollection(list(streets.points_m[streets.pieces]), colors=STREET, linewidths=0.9, zorder=0))
+
+
+def _name(each: CityMap) -> str:
+    return each.environment.name.replace("_", " ")
 
 
 def _label(axes: Axes, x: str, y: str) -> None:

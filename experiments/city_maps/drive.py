@@ -21,7 +21,9 @@ from schemas import topics
 from schemas.graph import Delta, Node
 from schemas.sensing import TruePose
 from services import table
-from services.codelets.path import POSE, rows_of
+from services.codelets.path import ODOMETRY, POSE, STAMP, rows_of
+from services.codelets.pose_graph import rotations
+from services.codelets.sighted import Sightings
 
 MIND = ("workspace", "codelets", "global_workspace", "action")
 SENSING = "percept-level sensing"
@@ -37,7 +39,8 @@ class Traversal:
     """What one agent made of one tour, in the true frame: (n, 3) poses believed and true, view by view.
 
     `path_m` (n, 2) is the way as the map has it in the end, `buildings_m` (8, 2) has NaN for one that is not on the
-    map, and `road_m` (k, 2) are the places that are road.
+    map, and `road_m` (k, 2) are the places that are road. `felt_m` (8, 2) is where the buildings were seen from the way
+    that path integration alone would have had.
     """
 
     believed: Points
@@ -45,6 +48,7 @@ class Traversal:
     path_m: Points
     buildings_m: Points
     road_m: Points
+    felt_m: Points
 
 
 class _Watcher:
@@ -123,6 +127,7 @@ def driven(configured: Sections, modules: Sequence[Module]) -> Traversal:
         path_m=_placed(rows_of(watcher.graph.nodes.values())[:, POSE], origin)[:, :2],
         buildings_m=_buildings(watcher.graph, names, origin),
         road_m=_roads(watcher.graph, origin),
+        felt_m=_felt(watcher.graph, names, origin),
     )
 
 
@@ -141,6 +146,21 @@ def _buildings(graph: Graph, names: tuple[str, ...], origin: Points) -> Points:
     own = [
         (np.nan, np.nan) if node is None else (float(node.attributes["x_m"]), float(node.attributes["y_m"]))
         for node in nodes
+    ]
+    return _placed(np.array(own), origin)
+
+
+def _felt(graph: Graph, names: tuple[str, ...], origin: Points) -> Points:
+    """The median of all sightings of each building, by path integration from the beginning."""
+    rows = rows_of(graph.nodes.values())
+    seen = Sightings.of(graph.nodes.values(), rows[:, STAMP])
+    poses = rows[:, ODOMETRY] - np.append(rows[0, ODOMETRY][:2] - rows[0, POSE][:2], 0.0)
+    stood = poses[seen.place]
+    where = stood[:, :2] + np.einsum("mab,mb->ma", rotations(stood[:, 2]), seen.where_m)
+    number = {label: index for index, label in enumerate(seen.labels)}
+    own = [
+        np.median(where[seen.landmark == number[name]], axis=0) if name in number else (np.nan, np.nan)
+        for name in names
     ]
     return _placed(np.array(own), origin)
 

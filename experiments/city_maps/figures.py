@@ -7,25 +7,26 @@ from collections.abc import Sequence
 import numpy as np
 
 from experiments.city_maps import published
-from experiments.city_maps.correction import METHODS
 from experiments.city_maps.drive import SENSING
-from experiments.city_maps.measure import CityMap, Learned
+from experiments.city_maps.measure import FELT, CityMap, Learned
 from experiments.city_maps.noise import Noise
 
-NAMES = {"none": "uncorrected", "positions": "positions", "heading": "corrected"}
+NAMES = {FELT: "path_integration", "none": "uncorrected", "positions": "positions", "heading": "corrected"}
 
 
 def figures(maps: Sequence[CityMap], noise: Noise) -> dict[str, float | str]:
     """Every figure that is printed or drawn.
 
     `error_corrected_over_uncorrected` is the mean over the maps of each one's ratio of mean errors. Corrected is with
-    headings, beyond the paper; `positions` is the paper's own rule.
+    headings, beyond the paper; `positions` is the paper's own rule. Uncorrected is the map of an agent that knows
+    landmarks again but closes no loops; `path_integration` what it would have if it did not even know them again.
     """
-    errors = {NAMES[method]: np.array([each.error_km2(method) for each in maps]) for method in METHODS}
+    errors = {name: np.array([each.error_km2(method) for each in maps]) for method, name in NAMES.items()}
     ratios = {name: errors[name] / errors["uncorrected"] for name in ("corrected", "positions")}
     found: dict[str, float | str] = {
         f"error_{name}_over_uncorrected": float(ratio.mean()) for name, ratio in ratios.items()
     }
+    found["error_corrected_over_path_integration"] = float((errors["corrected"] / errors["path_integration"]).mean())
     for name, values in errors.items():
         found[f"error_{name}_km2"] = float(values.mean())
         found[f"error_{name}_sd_km2"] = float(values.std())

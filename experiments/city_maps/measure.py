@@ -17,6 +17,7 @@ from experiments.city_maps.streets import Points
 from experiments.parallel import Progress, each
 
 TRAVERSALS = 12
+FELT = "felt"
 NOISE = Noise(speed=0.1, turn=0.1, drift_rad_per_sqrt_m=0.0)
 
 
@@ -42,7 +43,10 @@ class Effort:
 
 @dataclass(frozen=True, eq=False)
 class Learned:
-    """What one traversal left, by METHODS: error in km^2, buildings (8, 2), path (n, 2), road (k, 2)."""
+    """What one traversal left, by METHODS: error in km^2, buildings (8, 2), path (n, 2), road (k, 2).
+
+    The error is also that of path integration alone, by the name FELT.
+    """
 
     error_km2: dict[str, float]
     missing: int
@@ -97,7 +101,8 @@ def configurations(job: Job) -> dict[str, Sections]:
 def _learned(job: Job, maps: Mapping[str, Traversal]) -> Learned:
     true_m = job.environment.buildings_m
     return Learned(
-        error_km2={method: map_error_km2(one.buildings_m, true_m) for method, one in maps.items()},
+        error_km2={FELT: map_error_km2(maps["none"].felt_m, true_m)}
+        | {method: map_error_km2(one.buildings_m, true_m) for method, one in maps.items()},
         missing=sum(int(np.isnan(one.buildings_m[:, 0]).sum()) for one in maps.values()),
         buildings_m={method: one.buildings_m for method, one in maps.items()},
         path_m={method: one.path_m for method, one in maps.items()},

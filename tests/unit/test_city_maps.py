@@ -12,7 +12,7 @@ from experiments.city_maps.correction import settings
 from experiments.city_maps.drive import Tour, sections, traverse
 from experiments.city_maps.environment import BUILDINGS, MOST_KM2, City, environments
 from experiments.city_maps.figures import figures
-from experiments.city_maps.measure import NOISE, CityMap, Learned, map_error_km2
+from experiments.city_maps.measure import FELT, NOISE, CityMap, Learned, map_error_km2
 from experiments.city_maps.noise import Noise
 from experiments.city_maps.sources import from_osm, grown, plane_m
 from experiments.city_maps.streets import Streets, backwards
@@ -112,8 +112,8 @@ def test_the_error_is_the_sum_of_squares_in_square_kilometres() -> None:
 
 def test_the_ratio_is_the_mean_of_the_maps_own_ratios_and_all_figures_are_json() -> None:
     (environment,) = environments(grown(1), 1, 1)
-    nothing = dict.fromkeys(("none", "positions", "heading"), np.zeros((0, 2)))
-    errors = [(4.0, 2.0, 1.0), (2.0, 2.0, 1.0)]
+    nothing = dict.fromkeys((FELT, "none", "positions", "heading"), np.zeros((0, 2)))
+    errors = [(3.0, 4.0, 2.0, 1.0), (3.0, 2.0, 2.0, 1.0)]
     maps = [
         CityMap(environment, (Learned(dict(zip(nothing, error, strict=True)), 0, nothing, nothing, nothing),))
         for error in errors
@@ -136,6 +136,7 @@ def test_without_noise_and_confusions_the_map_is_right_and_the_same_each_time() 
     known = ~np.isnan(made.buildings_m[:, 0])
     assert known.any()
     assert np.hypot(*(made.buildings_m - environment.buildings_m)[known].T).max() < 5.0
+    assert np.hypot(*(made.felt_m - environment.buildings_m)[known].T).max() < 5.0
     assert made.believed.tolist() == again.believed.tolist()
 
 
