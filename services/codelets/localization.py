@@ -18,7 +18,7 @@ from schemas.graph import Node, Operation
 from schemas.mind import Task
 from services.codelets.path import ODOMETRY_FACTS, composed, odometry_of, step_between
 from services.codelets.places import place_link
-from services.codelets.recovery import look_around, seen_before
+from services.codelets.recovery import look_around, seen_before, turn_about
 from services.codelets.sampling import Samples, bearable, centred, generator, mean_pose, refill, reject, spread, widened
 from services.codelets.senses import POSE_COLUMNS, RANGE, SPEED, TURN, move, path_integrated, with_gains
 from services.codelets.settings import Config
@@ -27,6 +27,7 @@ from services.codelets.sightings import MOVING, Sighting, compare, log_likelihoo
 WIDER, WIDENINGS = 1.5, 6
 ALONE, SEVERAL = 3, 2
 STAGES = 5
+TURNED_RAD = 1.0
 
 
 @dataclass(frozen=True)
@@ -94,8 +95,11 @@ def _correct(past: Found, seen: Sighting, config: Config, rng: np.random.Generat
     """Reject by what is in view. Where that fits no sample, all of them stay, until the agent must be elsewhere.
 
     Where it would leave too few, the same is done in stages: each by a part of the likelihood, the product of all
-    parts being the whole, from samples as many as before, drawn around those that the stage before has left.
+    parts being the whole, from samples as many as before, drawn around those that the stage before has left. Stages
+    cannot follow a heading that may be any: there the landmarks say which headings are tried.
     """
+    if spread(past.samples[:, :POSE_COLUMNS], mean_pose(past.samples))[2] > TURNED_RAD and seen.has_bearing.any():
+        return Found(turn_about(past.samples, seen, config, rng), 0.0)
     compared = compare(past.samples, seen)
     if compared.squared.min() >= config.gate**2:
         return _stray(past, seen, config, rng)
