@@ -6,10 +6,13 @@ from collections.abc import Callable, Iterable
 
 from bus.codec import encode
 from bus.module import Module
+from schemas import topics
 from schemas.base import Message
-from schemas.topics import Topic
+from schemas.topics import About, Delivery, Topic
 
 NAME = "listener"
+# What the model says, and nobody may miss.
+MODEL = tuple(each for each in topics.ALL if each.about is About.MODEL and each.delivery is Delivery.NEVER_DROP)
 
 
 class Heard:
@@ -29,6 +32,10 @@ class Heard:
     def has_as_many_as(self, other: Heard) -> bool:
         """Whether it has heard at least as many messages of each topic."""
         return all(len(self.messages[name]) >= len(there) for name, there in other.messages.items())
+
+    def differs_from(self, other: Heard) -> list[str]:
+        """The topics on which other bytes were heard."""
+        return [name for name, there in other.messages.items() if self.messages[name] != there]
 
     def _keep(self, topic: Topic) -> Callable[[Message], None]:
         return lambda message: self.messages[topic.name].append(encode(message))

@@ -74,13 +74,14 @@ def views() -> int:
 
 def drive(memory: PlaceMemory, first_frame: int, seed: int, invented: int, tick: Tick) -> Iterator[Answer]:
     """Drive through the town of `seed` and ask `memory` at each view."""
-    world = World(_town(seed, invented))
+    place = _town(seed, invented)
+    world = World(place)
     try:
         camera, rng = StereoCamera(world, calibration()), np.random.default_rng([seed, 0x5F])
         straight = rectification(camera.calibration)
         stereo = DepthFromStereo(straight.calibration, NEAREST_M)
         frame = first_frame
-        for part in course(world.town):
+        for part in course(place):
             for pose in part.poses:
                 world.robot.place(pose)
                 left, right = straight.apply(*(eye.image for eye in camera.survey(part.light, rng)))

@@ -9,12 +9,13 @@ from typing import Any
 import click
 
 from bus.errors import UsageError
-from cli.experiment import outcome
-from cli.experiment.options import json_option, out_option, processes_option, seed_option
+from cli.experiment import live, outcome
+from cli.experiment.options import cameras_option, json_option, live_option, out_option, processes_option, seed_option
 from cli.log.progress import bar
+from experiments.city_maps.drive import MIND
 from experiments.city_maps.environment import Environment, environments
-from experiments.city_maps.figures import figures
-from experiments.city_maps.measure import NOISE, TRAVERSALS, Effort, measure
+from experiments.city_maps.figures import camera_figures, figures
+from experiments.city_maps.measure import NOISE, TRAVERSALS, Effort, by_cameras, configurations, jobs, measure
 from experiments.city_maps.noise import Noise
 from experiments.city_maps.sources import folder, from_osm, grown
 
@@ -54,6 +55,8 @@ Examples:
     metavar="SPEED TURN DRIFT",
     help="Of self-motion: shares of speed and of turn, and radians of drift after a metre.",
 )
+@cameras_option
+@live_option
 @seed_option
 @processes_option
 @out_option
@@ -64,6 +67,8 @@ def city_maps(
     maps: int | None,
     traversals: int,
     noise: tuple[float, float, float],
+    cameras: bool,
+    goes_live: bool,
     seed: int,
     processes: int,
     out: Path | None,
@@ -79,10 +84,17 @@ def city_maps(
     asked = Noise(*noise)
     with bar("traversals") as progress:
         found = measure(places, asked, Effort(traversals, seed, processes, progress))
-    said = figures(found, asked)
+    said, first = figures(found, asked), jobs(places, asked, 1, seed)[0]
+    if cameras:
+        with bar("with cameras") as progress:
+            said |= camera_figures(by_cameras(first, progress), found[0].learned[0])
+    differing = live.differing(configurations(first)["heading"], ("sim", *MIND)) if goes_live else []
+    if goes_live:
+        said["live_same"] = float(not differing)
     outcome.say(NAME, said)
     draw: Any = importlib.import_module("cli.experiment.city_figure")  # other commands have no use for matplotlib
     outcome.save(where, NAME, draw.figure(found, said), said, seed, json_path)
+    live.check(differing)
 
 
 def _places(osm: Path | None, all_in: Path | None, maps: int | None, seed: int) -> list[Environment]:

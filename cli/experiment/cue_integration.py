@@ -9,9 +9,9 @@ from typing import Any
 import click
 
 from cli.experiment import live, outcome
-from cli.experiment.options import json_option, out_option, processes_option, seed_option
+from cli.experiment.options import cameras_option, json_option, live_option, out_option, processes_option, seed_option
 from cli.log.progress import bar
-from experiments.cue_integration import mind
+from experiments.cue_integration import mind, pictured
 from experiments.cue_integration.run import FIT_TRIALS, FITTED, Effort, Session, fitted, measure
 from experiments.cue_integration.trial import Condition, Noise, Trial
 
@@ -36,7 +36,8 @@ Examples:
     help="Of distances to landmarks, and of directions in rad.",
 )
 @click.option("--fit", is_flag=True, help="Fit the noise of self-motion first; else take what a fit gave.")
-@click.option("--live", "goes_live", is_flag=True, help="Run one trial through real processes too, and compare bytes.")
+@cameras_option
+@live_option
 @seed_option
 @processes_option
 @out_option
@@ -45,6 +46,7 @@ def cue_integration(
     trials: int,
     distance_noise: float,
     fit: bool,
+    cameras: bool,
     goes_live: bool,
     seed: int,
     processes: int,
@@ -64,17 +66,23 @@ def cue_integration(
     with bar("trials") as progress:
         found = measure(noise, Effort(trials, seed, processes, progress))
     figures = found.figures()
+    if cameras:
+        with bar("trials with cameras") as progress:
+            figures |= pictured.figures(noise, seed, progress)
+    differing = _differing(Trial(Condition.CONFLICT, 0, noise, seed)) if goes_live else []
     if goes_live:
-        figures["live_same"] = float(_same_live(Trial(Condition.CONFLICT, 0, noise, seed)))
+        figures["live_same"] = float(not differing)
     outcome.say(NAME, figures)
     draw: Any = importlib.import_module("cli.experiment.cue_figure")  # other commands have no use for matplotlib
     outcome.save(folder, NAME, draw.figure(found), figures, seed, json_path)
+    live.check(differing)
 
 
-def _same_live(trial: Trial) -> bool:
-    """Whether `trial` says the same bytes on every topic, and gets the same response, through real processes."""
+def _differing(trial: Trial) -> list[str]:
+    """The topics on which `trial` says other bytes through real processes, and the response where that is another."""
     inside, outside = Session(trial), Session(trial)
     response = inside.run()
     minds = [("workspace", "workspace"), ("codelets", mind.WORKER)]
     live.run(mind.SECTIONS, minds, outside.bodies(), lambda: outside.heard.has_as_many_as(inside.heard))
-    return outside.room.response == response and outside.heard.messages == inside.heard.messages
+    answer = [] if outside.room.response == response else ["the response"]
+    return outside.heard.differs_from(inside.heard) + answer

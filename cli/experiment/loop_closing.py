@@ -9,34 +9,55 @@ from typing import Any
 
 import click
 
-from cli.experiment import outcome
-from cli.experiment.options import json_option, out_option, processes_option, seed_option
+from cli.experiment import live, outcome
+from cli.experiment.options import cameras_option, json_option, live_option, out_option, processes_option, seed_option
 from cli.log.progress import bar
-from experiments.loop_closing.run import METHODS, drive, figures, figures_of_rule
+from experiments.loop_closing.run import (
+    METHODS,
+    MIND,
+    drive,
+    drive_by_cameras,
+    figures,
+    figures_of_rule,
+    sections,
+)
 from experiments.parallel import each
 
 NAME = "loop-closing"
 _EPILOG = """\b
-Example:
+Examples:
   cogmap experiment loop-closing --seed 2 --json loop.json
+  cogmap experiment loop-closing --cameras --live
 """
 
 
 @click.command(name=NAME, epilog=_EPILOG)
+@cameras_option
+@live_option
 @seed_option
 @processes_option
 @out_option
 @json_option
-def loop_closing(seed: int, processes: int, out: Path | None, json_path: Path | None) -> None:
+def loop_closing(
+    cameras: bool, goes_live: bool, seed: int, processes: int, out: Path | None, json_path: Path | None
+) -> None:
     """Figure 6: a way round some blocks, before and after its loop is closed by reverse replay.
 
     Driven twice, with positions corrected, which is the paper's rule, and with headings too. Percepts are not drawn:
-    they err as perception was measured to. Takes about a minute.
+    they err as perception was measured to; --cameras drives once more and draws them. Takes about a minute, or two.
     """
     folder = outcome.folder_for(NAME, out)
     with bar("driving round the blocks") as progress:
         loops = dict(zip(METHODS, each(partial(drive, seed), METHODS, processes, progress), strict=True))
     said = figures(loops) | figures_of_rule(seed)
+    if cameras:
+        with bar("driving with cameras") as progress:
+            seen = figures(drive_by_cameras(seed, progress))
+        said |= {f"cameras_{key}": value for key, value in seen.items()}
+    differing = live.differing(sections(seed, "heading"), ("sim", *MIND)) if goes_live else []
+    if goes_live:
+        said["live_same"] = float(not differing)
     outcome.say(NAME, said)
     draw: Any = importlib.import_module("cli.experiment.loop_figure")  # other commands have no use for matplotlib
     outcome.save(folder, NAME, draw.figure(loops, said), said, seed, json_path)
+    live.check(differing)

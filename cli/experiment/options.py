@@ -37,3 +37,12 @@ json_option = click.option(
     metavar="FILE",
     help="Write the figures there too, as one flat object.",
 )
+live_option = click.option(
+    "--live",
+    "goes_live",
+    is_flag=True,
+    help="Run one more through real processes and compare bytes; code 1 where they differ.",
+)
+cameras_option = click.option(
+    "--cameras", is_flag=True, help="Run one more with cameras: what is told otherwise is drawn and recognised."
+)

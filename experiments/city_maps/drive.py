@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -97,10 +98,15 @@ def sections(environment: Environment, tour: Tour, noise: Noise, method: str) ->
     }
 
 
-def traverse(configured: Sections, names: tuple[str, ...]) -> Traversal:
+def traverse(configured: Sections) -> Traversal:
     """Drive one tour to its end. Raises CogmapError where a message was lost or refused."""
+    return driven(configured, [table.build(name, configured) for name in ("sim", *MIND)])
+
+
+def driven(configured: Sections, modules: Sequence[Module]) -> Traversal:
+    """As `traverse`, with these modules."""
     watcher = _Watcher()
-    house = House([*(table.build(name, configured) for name in ("sim", *MIND)), watcher.module()])
+    house = House([*modules, watcher.module()])
     try:
         house.run()
         for shell in house.shells:
@@ -109,6 +115,7 @@ def traverse(configured: Sections, names: tuple[str, ...]) -> Traversal:
     finally:
         house.close()
     (x, y), (ahead_x, ahead_y) = configured["sim"]["way"]["line_m"][:2]
+    names = tuple(each["name"] for each in configured["sim"]["way"]["landmarks"])
     origin = np.array([x, y, np.arctan2(ahead_y - y, ahead_x - x)])
     return Traversal(
         believed=_placed(np.array(watcher.believed), origin),

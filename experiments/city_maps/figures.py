@@ -9,7 +9,7 @@ import numpy as np
 from experiments.city_maps import published
 from experiments.city_maps.correction import METHODS
 from experiments.city_maps.drive import SENSING
-from experiments.city_maps.measure import CityMap
+from experiments.city_maps.measure import CityMap, Learned
 from experiments.city_maps.noise import Noise
 
 NAMES = {"none": "uncorrected", "positions": "positions", "heading": "corrected"}
@@ -51,6 +51,18 @@ def figures(maps: Sequence[CityMap], noise: Noise) -> dict[str, float | str]:
         }
         found |= {f"map_{number:02d}_error_{name}_km2": float(values[number - 1]) for name, values in errors.items()}
     return found
+
+
+def camera_figures(seen: Learned, told: Learned) -> dict[str, float | str]:
+    """Those of one traversal with cameras, and of the same one where it was told percepts."""
+    found: dict[str, float | str] = {"cameras_traversals": 1.0}
+    for method, name in NAMES.items():
+        found[f"cameras_error_{name}_km2"] = seen.error_km2[method]
+        found[f"cameras_same_traversal_by_percepts_error_{name}_km2"] = told.error_km2[method]
+    for name in ("corrected", "positions"):
+        ratio = found[f"cameras_error_{name}_km2"] / found["cameras_error_uncorrected_km2"]  # type: ignore[operator]
+        found[f"cameras_error_{name}_over_uncorrected"] = ratio
+    return found | {"cameras_buildings_missing": float(seen.missing)}
 
 
 def growth(maps: Sequence[CityMap], errors_km2: np.ndarray[tuple[int], np.dtype[np.float64]]) -> float:

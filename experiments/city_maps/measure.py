@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from bus.config import Sections
+from experiments import rendered
 from experiments.city_maps.correction import METHODS
-from experiments.city_maps.drive import Tour, sections, traverse
+from experiments.city_maps.drive import MIND, Tour, Traversal, driven, sections, traverse
 from experiments.city_maps.environment import BUILDINGS, Environment
 from experiments.city_maps.noise import Noise
 from experiments.city_maps.streets import Points
-from experiments.parallel import each
+from experiments.parallel import Progress, each
 
 TRAVERSALS = 12
 NOISE = Noise(speed=0.1, turn=0.1, drift_rad_per_sqrt_m=0.0)
@@ -77,12 +79,25 @@ def map_error_km2(learned_m: Points, true_m: Points) -> float:
 
 def traversed(job: Job) -> Learned:
     """Drive one tour from a building and in a direction drawn from the seed, with the same noise by each method."""
+    return _learned(job, {method: traverse(one) for method, one in configurations(job).items()})
+
+
+def by_cameras(job: Job, progress: Progress) -> Learned:
+    """As `traversed`, with buildings that are drawn and recognised."""
+    return _learned(job, rendered.by_cameras(configurations(job), MIND, driven, progress))
+
+
+def configurations(job: Job) -> dict[str, Sections]:
+    """That of every module for the tour of `job`, by each method."""
     rng = np.random.default_rng([job.seed, 0xCAFE, job.number])
     tour = Tour(int(rng.integers(BUILDINGS)), bool(rng.integers(2)), int(rng.integers(2**32)))
-    environment = job.environment
-    maps = {method: traverse(sections(environment, tour, job.noise, method), environment.names) for method in METHODS}
+    return {method: sections(job.environment, tour, job.noise, method) for method in METHODS}
+
+
+def _learned(job: Job, maps: Mapping[str, Traversal]) -> Learned:
+    true_m = job.environment.buildings_m
     return Learned(
-        error_km2={method: map_error_km2(one.buildings_m, environment.buildings_m) for method, one in maps.items()},
+        error_km2={method: map_error_km2(one.buildings_m, true_m) for method, one in maps.items()},
         missing=sum(int(np.isnan(one.buildings_m[:, 0]).sum()) for one in maps.values()),
         buildings_m={method: one.buildings_m for method, one in maps.items()},
         path_m={method: one.path_m for method, one in maps.items()},
@@ -90,15 +105,19 @@ def traversed(job: Job) -> Learned:
     )
 
 
+def jobs(environments: Sequence[Environment], noise: Noise, traversals: int, seed: int) -> list[Job]:
+    """All traversals of each environment, one environment after the other."""
+    return [
+        Job(environment, number, noise, seed * 1000 + place)
+        for place, environment in enumerate(environments)
+        for number in range(traversals)
+    ]
+
+
 def measure(environments: Sequence[Environment], noise: Noise, effort: Effort) -> list[CityMap]:
     """All environments, the same from the same seed whatever the number of processes."""
     number = effort.traversals
-    jobs = [
-        Job(environment, count, noise, effort.seed * 1000 + place)
-        for place, environment in enumerate(environments)
-        for count in range(number)
-    ]
-    learned = each(traversed, jobs, effort.processes, effort.progress)
+    learned = each(traversed, jobs(environments, noise, number, effort.seed), effort.processes, effort.progress)
     return [
         CityMap(environment, tuple(learned[place * number : (place + 1) * number]))
         for place, environment in enumerate(environments)

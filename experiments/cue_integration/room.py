@@ -67,6 +67,9 @@ class Room:
         self.response = Response(put.x_m, put.y_m, self._frame)
         return []
 
+    def close(self) -> None:
+        """Leave whatever is open for the trial."""
+
     def _follow(self) -> list[Message]:
         """The participant goes on to the post that is lit, and picks it up where it is within reach."""
         post = self._to_pick[0]

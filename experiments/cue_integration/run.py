@@ -31,9 +31,10 @@ class Session:
     """One trial to be run: the world, the participant's will, and who listens to what all say."""
 
     trial: Trial
+    kind: type[room.Room] = room.Room
 
     def __post_init__(self) -> None:
-        self.room = room.Room(self.trial)
+        self.room = self.kind(self.trial)
         self.heard = Heard(SAID)
 
     def bodies(self) -> list[Module]:

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from services.sim.led import Line
 from services.sim.odometry import Noise
+from services.sim.way import Line
 
 Floats = npt.NDArray[np.float64]
 

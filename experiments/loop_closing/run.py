@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,7 +15,9 @@ from bus.errors import CogmapError
 from bus.graph import TILE_SIDE, Graph
 from bus.house import House
 from bus.module import Module
+from experiments import rendered
 from experiments.loop_closing.rule import close_laps
+from experiments.parallel import Progress
 from schemas import topics
 from schemas.graph import Delta
 from schemas.mind import Replay
@@ -189,11 +192,21 @@ def _plain(noise: Noise) -> dict[str, float]:
 def drive(seed: int, method: str) -> Loop:
     """Drive the loop once. Raises CogmapError where nothing was corrected, or a message was refused."""
     configured = sections(seed, method)
+    return driven(configured, [table.build(name, configured) for name in ("sim", *MIND)])
+
+
+def drive_by_cameras(seed: int, progress: Progress) -> dict[str, Loop]:
+    """As `drive`, by each of METHODS, with buildings that are drawn and recognised."""
+    return rendered.by_cameras({method: sections(seed, method) for method in METHODS}, MIND, driven, progress)
+
+
+def driven(configured: Sections, modules: Sequence[Module]) -> Loop:
+    """As `drive`, with these modules."""
     places = {item["name"]: (item["x_m"], item["y_m"]) for item in configured["sim"]["way"]["landmarks"]}
     observer = _Observer(places)
     watching = Module("observer").on(topics.DELTA, observer.on_delta).on(topics.TRUE_POSE, observer.on_pose)
     watching.on(topics.REPLAY, observer.on_replay)
-    house = House([*(table.build(name, configured) for name in ("sim", *MIND)), watching])
+    house = House([*modules, watching])
     try:
         house.run()
         for shell in house.shells:
@@ -202,7 +215,7 @@ def drive(seed: int, method: str) -> Loop:
     finally:
         house.close()
     if observer.before is None or observer.after is None:
-        raise CogmapError(f"no loop was closed on the way of seed {seed}")
+        raise CogmapError(f"no loop was closed on the way of seed {configured['sim']['seed']}")
     return Loop(observer.before, observer.after, observer.map(), observer.replays)
 
 

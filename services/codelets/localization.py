@@ -28,6 +28,7 @@ WIDER, WIDENINGS = 1.5, 6
 ALONE, SEVERAL = 3, 2
 STAGES = 5
 TURNED_RAD = 1.0
+FORGOTTEN_S = 20.0
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class Found:
     """The samples that stay, the share of those tried that they are, and for how many views nothing has fitted.
 
     `missed` names the landmark that was the first not to fit; `others` says whether another did not fit since: then it
-    is the agent who is elsewhere, not the landmark. `carried` says that it was found anew, wherever it moved.
+    is the agent who is elsewhere, not the landmark. `carried` says that it was found where it cannot have gone.
     """
 
     samples: Samples
@@ -61,7 +62,7 @@ def localize(task: Task, config: Config) -> list[Operation]:
     moved = move(refill(before, config.samples, 0.0, rng), motions, config, rng)
     stands_ns = _stands_since(self_node, bool(motions[:, :2].any()))
     seen = sightings(task.percepts, task.nodes, config.largest_landmark_sd_m, stands_ns)
-    past = _past(self_node, moved)
+    past = _past(self_node, moved, task.stamp_ns)
     found = past if seen is None else _correct(past, seen, config, rng)
     odometry = path_integrated(odometry_of(self_node), motions, found.samples[:, POSE_COLUMNS:].mean(axis=0))
     if seen is not None and found.others:
@@ -80,8 +81,11 @@ def _stands_since(node: Node, moves: bool) -> int:
     return int(node.attributes.get("stamp_ns", 0)) if before == MOVING else before
 
 
-def _past(node: Node, moved: Samples) -> Found:
+def _past(node: Node, moved: Samples, stamp_ns: int) -> Found:
+    """What was found before; that something did not fit is forgotten where nothing has come of it for long."""
     facts = node.attributes
+    if stamp_ns > int(facts.get("missed_ns", 0)) + FORGOTTEN_S * 1e9:
+        return Found(moved)
     return Found(
         moved,
         1.0,
@@ -143,7 +147,7 @@ def _look_around(lost: Found, task: Task, odometry: Samples, config: Config, rng
     unsure = float(np.square(off_m).sum(axis=1).mean()) > float(seen.range_m.min()) ** 2
     if lost.astray < (SEVERAL if unsure else enough):
         return lost
-    return Found(look_around(lost.samples, seen, config, rng), 0.0, carried=True)
+    return Found(look_around(lost.samples, seen, config, rng), 0.0, carried=not unsure)
 
 
 def _self_operations(task: Task, node: Node, found: Found, stands_ns: int, odometry: Samples) -> list[Operation]:
@@ -151,6 +155,7 @@ def _self_operations(task: Task, node: Node, found: Found, stands_ns: int, odome
     sd = spread(found.samples[:, :POSE_COLUMNS], mean)
     cell = nearest_place(mean[0], mean[1], task.cell_m)
     gains = found.samples[:, [SPEED, TURN, RANGE]].mean(axis=0).tolist()
+    missed_ns = int(node.attributes.get("missed_ns", 0))
     attributes: dict[str, Scalar] = node.attributes | {
         "x_m": float(mean[0]),
         "y_m": float(mean[1]),
@@ -162,6 +167,7 @@ def _self_operations(task: Task, node: Node, found: Found, stands_ns: int, odome
         "astray": found.astray,
         "missed": found.missed,
         "others": found.others,
+        "missed_ns": task.stamp_ns if found.astray > int(node.attributes.get("astray", 0)) else missed_ns,
         "fits_ns": int(node.attributes.get("fits_ns", 0)) if found.astray else task.stamp_ns,
         "stands_ns": stands_ns,
         **dict(zip(("speed_gain", "turn_gain", "range_gain"), gains, strict=True)),

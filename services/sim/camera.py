@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from schemas.sensing import Calibration
+from schemas.array import Array
+from schemas.sensing import Calibration, StereoFrame
 from services.sim.light import Light, brightness, shadow_top, taken
 from services.sim.quiet import pybullet, quiet
 from services.sim.wall import Image
@@ -76,6 +77,17 @@ class StereoCamera:
         """The left and the right picture from where the robot is."""
         (left, left_at), (right, right_at) = self._stations()
         return self._expose(left, left_at, False, None).image, self._expose(right, right_at, False, None).image
+
+    def frame(self, stamp_ns: int, number: int) -> StereoFrame:
+        """As `shoot`, as it travels."""
+        left, right = self.shoot()
+        return StereoFrame(
+            stamp_ns=stamp_ns,
+            frame=number,
+            left=Array.of(left),
+            right=Array.of(right),
+            calibration=self.calibration,
+        )
 
     def survey(self, light: Light | None = None, rng: np.random.Generator | None = None) -> tuple[Exposure, Exposure]:
         """As `shoot`, with true depth and bodies, for learning and tests; in `light`, with noise from `rng`."""

@@ -8,9 +8,11 @@ from bus.module import Module
 from schemas import topics
 from schemas.base import Message
 from schemas.sensing import MotorCommand
-from services.sim.led import LedSimulation
+from services.sim.led import LedByPercepts
+from services.sim.led_cameras import LedByCameras
 from services.sim.settings import Config, check
 from services.sim.simulation import Simulation
+from services.sim.way import Way
 
 __all__ = ["Config", "build"]
 
@@ -26,7 +28,7 @@ _EMITS_LED = (*_TELLS, topics.SELF_MOTION, topics.SCAN, topics.PERCEPTS)
 class Lockstep:
     """Time goes on by one frame for each motor command that answers the last frame, until the route is complete."""
 
-    def __init__(self, simulation: Simulation | LedSimulation) -> None:
+    def __init__(self, simulation: Simulation | LedByPercepts | LedByCameras) -> None:
         self._simulation = simulation
         self._asked_ns: int | None = None
 
@@ -109,13 +111,11 @@ class RealTime:
 
 
 def build(config: Config, instance: str = "sim") -> Module:
-    """The simulation module. Raises ConfigError where the rates do not divide one another."""
+    """The simulation module. Raises ConfigError as `check` does."""
     check(config)
     awaits = config.awaits or {"sim": 1}
     if config.way is not None:
-        led = Lockstep(LedSimulation(config.way, config.noise, config.percepts, config.frame_hz, config.seed))
-        module = Module("sim", instance).on(topics.MOTOR_COMMAND, led.command, _EMITS_LED)
-        return module.starts(led.start, awaits, _EMITS_LED)
+        return _led(config, config.way, Module("sim", instance), awaits)
     simulation = Simulation(config)
     module = Module("sim", instance).journaling(topics.TRUE_POSE, simulation.resume, simulation.truth)
     if config.mode == "lockstep":
@@ -124,3 +124,12 @@ def build(config: Config, instance: str = "sim") -> Module:
     real_time = RealTime(simulation)
     module.on(topics.MOTOR_COMMAND, real_time.command).starts(real_time.start, awaits)
     return module.every(simulation.tick_ns, real_time.tick, _EMITS)
+
+
+def _led(config: Config, way: Way, module: Module, awaits: dict[str, int]) -> Module:
+    """`module` with a robot that is led along `way`."""
+    if way.sensing == "cameras":
+        cameras, says = Lockstep(LedByCameras(config, way)), _EMITS
+        return module.on(topics.MOTOR_COMMAND, cameras.command, says).starts(cameras.start, awaits, says)
+    led = Lockstep(LedByPercepts(way, config.noise, config.percepts, config.frame_hz, config.seed))
+    return module.on(topics.MOTOR_COMMAND, led.command, _EMITS_LED).starts(led.start, awaits, _EMITS_LED)

@@ -1,4 +1,4 @@
-"""What a town's ground plan is made of: roads along x or y, and buildings that front them. Pure."""
+"""What a ground plan is made of: roads, in a town along x or y, and buildings that front them. Pure."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from services.sim.catalogue import BuildingType
 
 STREET_WIDTH_M = 8.0
 PAVEMENT_WIDTH_M = 2.0
+LEVEL_M = 1e-6
 
 Point = tuple[float, float]
 Rectangle = tuple[float, float, float, float]
@@ -16,7 +17,7 @@ Rectangle = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class Road:
-    """A straight street along x or y: its centre line from `start` to `end`."""
+    """A straight street: its centre line from `start` to `end`."""
 
     name: str
     start: Point
@@ -32,13 +33,18 @@ class Road:
         """From start to end, counter-clockwise from x."""
         return math.atan2(self.end[1] - self.start[1], self.end[0] - self.start[0])
 
+    @property
+    def is_along_an_axis(self) -> bool:
+        """Whether it runs along x or y."""
+        return min(abs(self.end[0] - self.start[0]), abs(self.end[1] - self.start[1])) < LEVEL_M
+
     def point(self, along_m: float, left_m: float = 0.0) -> Point:
         """The point `along_m` from the start, `left_m` to the left of the centre line."""
         ux, uy = math.cos(self.heading_rad), math.sin(self.heading_rad)
         return self.start[0] + along_m * ux - left_m * uy, self.start[1] + along_m * uy + left_m * ux
 
     def area(self, reach_m: float) -> Rectangle:
-        """West, south, east, north of what lies within `reach_m` of the centre line, ends squared off."""
+        """West, south, east, north of a road along x or y, within `reach_m` of the centre line, ends squared off."""
         (ax, ay), (bx, by) = self.start, self.end
         return min(ax, bx) - reach_m, min(ay, by) - reach_m, max(ax, bx) + reach_m, max(ay, by) + reach_m
 

@@ -72,12 +72,13 @@ def _on_a_street(place: town.Town, rng: np.random.Generator) -> Pose:
 
 def render(seed: int, count: int, unknown: int = 0, each: Callable[[], None] = lambda: None) -> Views:
     """`count` labelled views of the town of `seed`, with `unknown` invented kinds; `each` is called after each view."""
-    world = World(town.generate(seed, kinds(seed, unknown)))
+    place = town.generate(seed, kinds(seed, unknown))
+    world = World(place)
     try:
         camera = StereoCamera(world, calibration())
         rng = np.random.default_rng([seed, 0xEE])
         views: dict[str, list[npt.ArrayLike]] = {}
-        for pose in viewpoints(world.town, count, rng):
+        for pose in viewpoints(place, count, rng):
             for key, value in labelled(world, camera, pose, rng).items():
                 views.setdefault(key, []).append(value)
             each()

@@ -12,34 +12,47 @@ from services.sim.mesh import Mesh, Vertex
 from services.sim.plan import PAVEMENT_WIDTH_M, STREET_WIDTH_M, Road
 from services.sim.wall import Image, plain, roughen
 
-GROUND_M = 200.0
+GROUND_M, GRASS_TILE_M = 200.0, 8.0
 _SKY_M, _SKY_TOP_M, _SEGMENTS = 140.0, 120.0, 24
 _PANORAMA_PX = (512, 2048)
 
 
 def ground(roads: tuple[Road, ...]) -> list[tuple[Mesh, Image]]:
-    """Grass, pavements, asphalt and the lines on it, from below upwards, each with its picture."""
+    """Grass, pavements, asphalt and the lines on it, from below upwards, each with its picture; none that is empty."""
     rng = np.random.default_rng(11)
     grass, pavement, asphalt, lines = Mesh(), Mesh(), Mesh(), Mesh()
-    grass.level((-GROUND_M, -GROUND_M, GROUND_M, GROUND_M), 0.0, 8.0, 20.0)
+    grass.level((-GROUND_M, -GROUND_M, GROUND_M, GROUND_M), 0.0, GRASS_TILE_M, 20.0)
     for road in roads:
-        pavement.level(road.area(STREET_WIDTH_M / 2 + PAVEMENT_WIDTH_M), 0.015, 4.0, 8.0)
-        asphalt.level(road.area(STREET_WIDTH_M / 2), 0.03, 8.0, 8.0)
+        _pave(pavement, road, STREET_WIDTH_M / 2 + PAVEMENT_WIDTH_M, 0.015, (4.0, 8.0))
+        _pave(asphalt, road, STREET_WIDTH_M / 2, 0.03, (8.0, 8.0))
         _dashes(lines, road)
     slabs = plain(128, (188, 180, 168))
     slabs[::32] = slabs[:, ::32] = (140, 134, 126)
-    return [
+    surfaces = [
         (grass, roughen(plain(512, (104, 138, 66)), rng, 0.2)),
         (pavement, roughen(slabs, rng, 0.1)),
         (asphalt, roughen(plain(512, (92, 92, 98)), rng, 0.15)),
         (lines, roughen(plain(64, (232, 230, 220)), rng, 0.06)),
     ]
+    return [surface for surface in surfaces if surface[0].triangles]
 
 
 def _dashes(mesh: Mesh, road: Road) -> None:
     for s in np.arange(STREET_WIDTH_M, road.length_m - STREET_WIDTH_M, 4.0).tolist():
-        (x0, y0), (x1, y1) = road.point(s), road.point(s + 2.0)
-        mesh.level((min(x0, x1) - 0.08, min(y0, y1) - 0.08, max(x0, x1) + 0.08, max(y0, y1) + 0.08), 0.045, 1.0, 4.0)
+        _pave(mesh, Road(road.name, road.point(s), road.point(s + 2.0)), 0.08, 0.045, (1.0, 4.0))
+
+
+def _pave(mesh: Mesh, road: Road, reach_m: float, z_m: float, grain_m: tuple[float, float]) -> None:
+    """Cover what lies within `reach_m` of a road, ends squared off; `grain_m`: as of tiles and cells in `Mesh`."""
+    if road.is_along_an_axis:
+        mesh.level(road.area(reach_m), z_m, *grain_m)
+        return
+    tile_m, cell_m = grain_m
+    length_m = road.length_m + 2 * reach_m
+    along = np.linspace(-reach_m, road.length_m + reach_m, math.ceil(length_m / cell_m) + 1).tolist()
+    for s0, s1 in itertools.pairwise(along):
+        corners = [road.point(s, t) for s, t in ((s0, -reach_m), (s1, -reach_m), (s1, reach_m), (s0, reach_m))]
+        mesh.polygon([(x, y, z_m) for x, y in corners], [(x / tile_m, -y / tile_m) for x, y in corners])
 
 
 def sky() -> tuple[Mesh, Image]:

@@ -7,9 +7,10 @@ from typing import Annotated, Literal
 import msgspec
 
 from bus.errors import ConfigError
-from services.sim.led import Way
+from services.sim.catalogue import CATALOGUE
 from services.sim.odometry import Noise
 from services.sim.percepts import PerceptErrors
+from services.sim.way import Way
 from services.sim.world import STEP_S
 
 Rate = Annotated[int, msgspec.Meta(ge=1, le=240)]
@@ -21,7 +22,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     """`awaits` are the modules, and how many instances of each, that must be ready before time begins.
 
     Without `egl` TinyRenderer draws the pictures even where EGL would. With a `way` the robot is led along that, in
-    lockstep, and the simulation says percepts that err as `percepts` tells, in place of pictures and wheels.
+    lockstep, and senses it as that says: where it has no cameras, its percepts err as `percepts` tells.
     """
 
     seed: Annotated[int, msgspec.Meta(ge=0, le=2**32)] = 1
@@ -39,12 +40,23 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
 
 
 def check(config: Config) -> None:
-    """Raise ConfigError where the rates do not divide one another."""
+    """Raise ConfigError where the rates do not divide one another, or a way cannot be led along as it is set up."""
     if config.odometry_hz % config.frame_hz:
         raise ConfigError(
             f"[sim] frame_hz is {config.frame_hz}: choose one that divides odometry_hz, {config.odometry_hz}"
         )
     if config.way is not None and config.mode != "lockstep":
         raise ConfigError('[sim] a robot that is led along a way waits for its mind: set mode to "lockstep"')
+    if config.way is not None and config.way.sensing == "cameras":
+        _check_names(config.way)
     if round(1 / STEP_S) % config.odometry_hz:
         raise ConfigError(f"[sim] odometry_hz is {config.odometry_hz}: choose one that divides {round(1 / STEP_S)}")
+
+
+def _check_names(way: Way) -> None:
+    known = [kind.name for kind in CATALOGUE]
+    for each in way.landmarks:
+        if each.name not in known:
+            raise ConfigError(
+                f"[sim] cameras see no {each.name!r}: name each landmark after its kind of building, {', '.join(known)}"
+            )

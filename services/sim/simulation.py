@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from schemas.array import Array
 from schemas.base import Message
 from schemas.process import Clock
 from schemas.sensing import MotorCommand, Odometry, StereoFrame, TruePose, TrueTown
@@ -24,10 +23,11 @@ class Simulation:
         self.tick_ns = 1_000_000_000 // config.odometry_hz
         self.ticks_per_frame = config.odometry_hz // config.frame_hz
         self.now_ns = 0
-        self.world = World(town.generate(config.seed), config.egl)
+        place = town.generate(config.seed)
+        self.world = World(place, config.egl)
         self.camera = StereoCamera(self.world, calibration(config.width_px, config.height_px))
         self._odometry = WheelOdometry(config.noise, config.seed)
-        self._progress = Progress(self.world.town.line(config.laps))
+        self._progress = Progress(place.line(config.laps))
         self._pose = self.world.pose()
         self._travelled_m = 0.0
         self._frames = 0
@@ -74,15 +74,8 @@ class Simulation:
 
     def frame(self) -> StereoFrame:
         """The next stereo frame, as of now."""
-        left, right = self.camera.shoot()
         number, self._frames = self._frames, self._frames + 1
-        return StereoFrame(
-            stamp_ns=self.now_ns,
-            frame=number,
-            left=Array.of(left),
-            right=Array.of(right),
-            calibration=self.camera.calibration,
-        )
+        return self.camera.frame(self.now_ns, number)
 
     def clock(self, rate: float) -> Clock:
         """Now, and how fast it goes by."""

@@ -21,17 +21,28 @@ Leg = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Town:
-    """Streets on a rectangular loop with stubs, buildings, and props such as trees along the streets.
-
-    The way leads from `start` to the `corners` in order.
-    """
+class Place:
+    """Streets, buildings, and props such as trees, and where the robot begins."""
 
     seed: int
     roads: tuple[Road, ...]
     plots: tuple[Plot, ...]
     props: tuple[Prop, ...]
     start: Pose
+
+    def message(self) -> TrueTown:
+        """The place as it travels."""
+        streets = [Street(name=r.name, line_m=[r.start, r.end], width_m=STREET_WIDTH_M) for r in self.roads]
+        return TrueTown(seed=self.seed, streets=streets, buildings=[_building(plot) for plot in self.plots])
+
+
+@dataclass(frozen=True)
+class Town(Place):
+    """Streets on a rectangular loop with stubs, and what stands along them.
+
+    The way leads from `start` to the `corners` in order.
+    """
+
     corners: tuple[Point, Point, Point, Point]
 
     @property
@@ -59,11 +70,6 @@ class Town:
                 return points
             points.append(corner)
             left_m -= length_m
-
-    def message(self) -> TrueTown:
-        """The town as it travels."""
-        streets = [Street(name=r.name, line_m=[r.start, r.end], width_m=STREET_WIDTH_M) for r in self.roads]
-        return TrueTown(seed=self.seed, streets=streets, buildings=[_building(plot) for plot in self.plots])
 
 
 def generate(seed: int, kinds: tuple[BuildingType, ...] = CATALOGUE) -> Town:

@@ -20,7 +20,7 @@ from services.sim.light import relief
 from services.sim.plan import Plot
 from services.sim.quiet import pybullet, quiet
 from services.sim.robot import Robot
-from services.sim.town import Town
+from services.sim.town import Place
 from services.sim.wall import Image
 
 STEP_S = 1 / 240
@@ -28,12 +28,12 @@ _log = logging.getLogger(__name__)
 
 
 class World:
-    """A town with a robot in it. Positions in metres, x east, y north, z up; close it when done.
+    """A place with a robot in it. Positions in metres, x east, y north, z up; close it when done.
 
     With `want_egl` EGL draws it where it works, and only in one world at a time in a process (else CogmapError).
     """
 
-    def __init__(self, town: Town, want_egl: bool = True) -> None:
+    def __init__(self, town: Place, want_egl: bool = True) -> None:
         self.town = town
         with quiet():
             self.client: int = pybullet.connect(pybullet.DIRECT)
@@ -59,6 +59,13 @@ class World:
         """Where the robot is."""
         return self.robot.pose()
 
+    def lead(self, pose: Pose) -> None:
+        """Put the robot there, at rest, with the ground under it and the sky around it, however far that is."""
+        self.robot.place(pose)
+        under = [round(where / scenery.GRASS_TILE_M) * scenery.GRASS_TILE_M for where in (pose.x_m, pose.y_m)]
+        for body, (x_m, y_m) in ((self._soil, under), (self.sky, (pose.x_m, pose.y_m))):
+            pybullet.resetBasePositionAndOrientation(body, (x_m, y_m, 0), (0, 0, 0, 1), physicsClientId=self.client)
+
     def close(self) -> None:
         """Leave pybullet; nothing of it stays."""
         self._leave()
@@ -72,8 +79,8 @@ class World:
             pybullet.GEOM_BOX, halfExtents=half, collisionFramePosition=[0, 0, -1.0], physicsClientId=client
         )
         grass, pavement, *street = scenery.ground(self.town.roads)
-        soil = self._add(*grass, floor)
-        pybullet.changeDynamics(soil, -1, lateralFriction=1.0, physicsClientId=client)
+        self._soil = self._add(*grass, floor)
+        pybullet.changeDynamics(self._soil, -1, lateralFriction=1.0, physicsClientId=client)
         self._add(*pavement)
         self.streets = [self._add(surface, picture) for surface, picture in street]
         self.sky = self._add(*scenery.sky())

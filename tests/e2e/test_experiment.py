@@ -32,3 +32,10 @@ def test_a_json_file_in_no_folder_is_one_sentence_and_code_2(tmp_path: Path) -> 
     done = _run("cue-integration", "--json", str(tmp_path / "nowhere" / "cue.json"))
     assert done.returncode == 2
     assert "there is no folder" in done.stderr and len(done.stderr.splitlines()) == 1
+
+
+def test_loop_closing_says_the_same_bytes_through_real_processes(tmp_path: Path) -> None:
+    chosen = tmp_path / "loop.json"
+    done = _run("loop-closing", "--live", "--out", str(tmp_path / "out"), "--json", str(chosen))
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert json.loads(chosen.read_text())["live_same"] == 1.0

@@ -8,10 +8,11 @@ import pytest
 from bus.errors import ConfigError
 from schemas import topics
 from schemas.sensing import MotorCommand, Percepts, Pose, SelfMotion, TruePose
-from services.sim.led import LedSimulation, Line, Way
+from services.sim.led import LedByPercepts
 from services.sim.module import Config, build
 from services.sim.odometry import Noise
 from services.sim.percepts import Landmark, PerceptErrors, PerceptSense, PlaceSense
+from services.sim.way import Line, Way
 
 SILENT = Noise(speed=0.0, turn=0.0, drift_rad_per_sqrt_m=0.0)
 EXACT = PerceptErrors(detected=1.0, right_name=1.0, precision=1.0, range_sd_share=0.0, bearing_sd_rad=1e-9)
@@ -23,11 +24,11 @@ def _landmarks(number: int) -> list[Landmark]:
     return [Landmark(name=f"house {k}", x_m=20.0 + k, y_m=0.0) for k in range(number)]
 
 
-def _led(line=SQUARE, noise: Noise = SILENT, errors: PerceptErrors = EXACT, seed: int = 1) -> LedSimulation:
-    return LedSimulation(Way(line_m=line, landmarks=[HOUSE], speed_m_s=3.0), noise, errors, 1, seed)
+def _led(line=SQUARE, noise: Noise = SILENT, errors: PerceptErrors = EXACT, seed: int = 1) -> LedByPercepts:
+    return LedByPercepts(Way(line_m=line, landmarks=[HOUSE], speed_m_s=3.0), noise, errors, 1, seed)
 
 
-def _ride(led: LedSimulation) -> list[tuple[TruePose, SelfMotion, Percepts]]:
+def _ride(led: LedByPercepts) -> list[tuple[TruePose, SelfMotion, Percepts]]:
     ride = []
     while led.progress < 1.0:
         led.step()
