@@ -91,6 +91,8 @@ def _table(folder: Path, name: str, columns: int, expected: str, positive: int |
     if path is None:
         raise UsageError(f"{folder} has no {name}.dat: give the folder of an MRCLAM set, with every file in it")
     text = _text(path)
+    if not any(line.partition("#")[0].strip() for line in text.splitlines()):
+        raise UsageError(f"{path} has no line with {expected}")
     try:
         rows = np.loadtxt(io.StringIO(text), comments="#", ndmin=2)
     except ValueError:
@@ -101,7 +103,7 @@ def _table(folder: Path, name: str, columns: int, expected: str, positive: int |
         content = line.partition("#")[0].split()
         if content and not _fits(content, columns, positive):
             raise wrong_line(path, number, line, expected)
-    raise UsageError(f"{path} has no line with {expected}")
+    raise UsageError(f"{path} has lines that are not {expected}")
 
 
 def _text(path: Path) -> str:

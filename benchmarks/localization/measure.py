@@ -70,8 +70,8 @@ def judge(robot: Robot, landmarks: Landmarks) -> dict[str, float]:
     stamps = np.array([moment.stamp_s for moment in heard])
     truth, judged = _truth(robot, stamps)
     even = judged & np.array([moment.tick for moment in heard])
-    known = [_follow(heard, landmarks, tuple(_truth(robot, robot.odometry[:1, 0])[0][0]), seed) for seed in SEEDS]
-    slam = [_follow(heard, {}, (0.0, 0.0, 0.0), seed) for seed in SEEDS]
+    known = [follow(heard, landmarks, tuple(_truth(robot, robot.odometry[:1, 0])[0][0]), seed) for seed in SEEDS]
+    slam = [follow(heard, {}, (0.0, 0.0, 0.0), seed) for seed in SEEDS]
 
     def aligned_m(path: Numbers) -> float:
         return trajectory_error_m(path[judged, :2], truth[judged, :2])
@@ -100,7 +100,7 @@ class Drive(NamedTuple):
         return np.array([composed(place[POSE], step_between(place[ODOMETRY], now)) for place, now in steps])
 
 
-def _follow(heard: Iterable[Moment], landmarks: Landmarks, start: tuple[float, ...], seed: int) -> Drive:
+def follow(heard: Iterable[Moment], landmarks: Landmarks, start: tuple[float, ...], seed: int) -> Drive:
     """What the codelets make of what was heard."""
     mind = Mind((start[0], start[1], start[2]), seed=seed)
     if landmarks:
@@ -122,7 +122,7 @@ def _recovery_s(robot: Robot, landmarks: Landmarks) -> float:
     heard = [moment for moment in moments(robot, CARRIED_S) if moment.stamp_s < begin_s + 2 * CARRIED_S[1]]
     stamps = np.array([moment.stamp_s for moment in heard])
     truth, judged = _truth(robot, stamps)
-    path = _follow(heard, landmarks, tuple(_truth(robot, robot.odometry[:1, 0])[0][0]), 0).online
+    path = follow(heard, landmarks, tuple(_truth(robot, robot.odometry[:1, 0])[0][0]), 0).online
     seen = np.array([bool(moment.percepts) for moment in heard])
     after = np.flatnonzero(seen & judged & (stamps > begin_s + CARRIED_S[1]))
     if not len(after):

@@ -16,8 +16,10 @@ def settings(method: str, noise: Noise, step_m: float) -> Sections:
 
     What map correction takes path integration to err by is what the self-motion's noise adds up to.
     """
+    # What is felt of a step varies: with half of it, each view has its place on the path.
+    spacing = {"path_spacing_m": step_m / 2}
     codelets = {
-        "path_spacing_m": step_m,
+        **spacing,
         "path_variance_per_m": max(noise.speed**2 * step_m, LEAST_VARIANCE_M),
         "heading_variance_per_m": max(noise.drift_rad_per_sqrt_m**2, LEAST_VARIANCE_RAD),
         "heading_variance_per_rad": max(noise.turn**2, LEAST_VARIANCE_RAD),
@@ -25,5 +27,5 @@ def settings(method: str, noise: Noise, step_m: float) -> Sections:
         "place_match_sd_rad": PLACE_SD_RAD,
     }
     if method == "none":
-        return {"workspace": {"path_spacing_m": step_m, "revisit_s": NEVER_S}, "codelets": codelets}
-    return {"workspace": {"path_spacing_m": step_m}, "codelets": codelets | {"correct": method}}
+        return {"workspace": spacing | {"revisit_s": NEVER_S}, "codelets": codelets}
+    return {"workspace": spacing, "codelets": codelets | {"correct": method}}

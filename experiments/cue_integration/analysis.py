@@ -11,6 +11,8 @@ import numpy as np
 from experiments.cue_integration.geometry import CONFLICT_RAD, Points
 from experiments.cue_integration.trial import Response, Trial
 
+FAR = 5.0
+
 
 def errors(trials: Sequence[Trial], responses: Sequence[Response]) -> Points:
     """Where the post was put, seen from where it stood: (n, 2) metres, along and inward.
@@ -46,6 +48,12 @@ def sd_m(errors_m: Points) -> float:
 def rmse_m(errors_m: Points) -> float:
     """The root mean squared distance from where the post stood."""
     return float(np.sqrt((errors_m**2).sum(axis=1).mean()))
+
+
+def lost(errors_m: Points) -> int:
+    """How many responses lie where no normal distribution has any: five times the median distance from the median."""
+    away_m = np.hypot(*(errors_m - np.median(errors_m, axis=0)).T)
+    return int((away_m > FAR * np.median(away_m)).sum())
 
 
 def landmark_weight(self_motion_sd_m: float, landmarks_sd_m: float) -> float:
@@ -86,19 +94,21 @@ def combined(first: Gaussian, second: Gaussian) -> Gaussian:
     return Gaussian(covariance @ (precisions[0] @ first.mean_m + precisions[1] @ second.mean_m), covariance)
 
 
-def alternation_log_likelihood(
+def alternation_log_densities(
     conflict_m: Points, self_motion: Gaussian, landmarks: Gaussian, landmarks_share: float
-) -> float:
-    """Of conflict errors where each response follows one cue alone: landmarks in `landmarks_share` of the trials."""
+) -> Points:
+    """The log densities (n,) of conflict errors where each response follows one cue alone: landmarks in that share."""
     with np.errstate(divide="ignore"):
         shares = np.log([landmarks_share, 1 - landmarks_share])
-    followed = np.logaddexp(
+    followed: Points = np.logaddexp(
         shares[0] + landmarks.log_density(conflict_m), shares[1] + self_motion.log_density(conflict_m)
     )
-    return float(followed.sum())
+    return followed
 
 
 def best_alternation_log_likelihood(conflict_m: Points, self_motion: Gaussian, landmarks: Gaussian) -> float:
     """The same, with the share that makes it most."""
     shares = np.linspace(0.0, 1.0, 201)
-    return max(alternation_log_likelihood(conflict_m, self_motion, landmarks, float(share)) for share in shares)
+    return max(
+        float(alternation_log_densities(conflict_m, self_motion, landmarks, float(share)).sum()) for share in shares
+    )

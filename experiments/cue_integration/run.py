@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
+import numpy as np
+
 from bus.errors import CogmapError
 from bus.house import House
 from bus.module import Module
@@ -78,6 +80,7 @@ class Outcome:
             name = condition.value
             figures[f"sd_{name}_m"] = self.sd_m(condition)
             figures[f"rmse_{name}_m"] = analysis.rmse_m(errors_m)
+            figures[f"lost_trials_{name}"] = float(analysis.lost(errors_m))
             figures[f"published_simulation_sd_{name}_m"] = published.SD_M[condition]
             figures[f"published_simulation_rmse_{name}_m"] = published.RMSE_M[condition]
         figures["sd_optimal_m"] = self.optimal_sd_m
@@ -100,17 +103,19 @@ class Outcome:
         own = Gaussian.of(self.errors_m[Condition.SELF_MOTION])
         seen = Gaussian.of(analysis.turned_errors(self.errors_m[Condition.LANDMARKS], self.shift_m))
         weight = analysis.landmark_weight(self.sd_m(Condition.SELF_MOTION), self.sd_m(Condition.LANDMARKS))
-        integrated = float(analysis.combined(own, seen).log_density(conflict_m).sum())
-        alternated = analysis.alternation_log_likelihood(conflict_m, own, seen, weight)
+        integrated = analysis.combined(own, seen).log_density(conflict_m)
+        alternated = analysis.alternation_log_densities(conflict_m, own, seen, weight)
         best = analysis.best_alternation_log_likelihood(conflict_m, own, seen)
         return {
             "landmark_weight": weight,
             "conflict_shift_m": self.shift_m,
             "conflict_followed_m": float(conflict_m[:, 0].mean()),
-            "integration_log_likelihood": integrated,
-            "alternation_log_likelihood": alternated,
-            "integration_over_alternation": integrated - alternated,
-            "integration_over_best_alternation": integrated - best,
+            "integration_log_likelihood": float(integrated.sum()),
+            "alternation_log_likelihood": float(alternated.sum()),
+            "integration_over_alternation": float((integrated - alternated).sum()),
+            "integration_over_alternation_median_of_a_trial": float(np.median(integrated - alternated)),
+            "integration_likelier_share": float((integrated > alternated).mean()),
+            "integration_over_best_alternation": float(integrated.sum()) - best,
         }
 
 

@@ -20,7 +20,8 @@ LEAST_WEIGHT = 1e-6
 
 def limits(closures: Constraints, false_closure: float) -> Floats:
     """(m,): the chi-square that a true closure exceeds with probability `false_closure`."""
-    degrees = (np.linalg.eigvalsh(closures.information) > 0).sum(axis=1)
+    known = np.linalg.eigvalsh(closures.information)
+    degrees = (known > 1e-9 * known[:, -1:]).sum(axis=1)
     result: Floats = chi2.isf(false_closure, degrees)
     return result
 

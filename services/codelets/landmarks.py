@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 from bus.errors import MessageError
@@ -13,12 +14,13 @@ from schemas.graph import Node, Operation
 from schemas.mind import Task
 from schemas.sensing import Percept
 from services.codelets.places import place_link
-from services.codelets.sampling import Samples, generator, keep, refill, spread, wrapped
-from services.codelets.senses import RANGE, with_gains
+from services.codelets.sampling import Samples, generator, keep, mean_pose, refill, spread, wrapped
+from services.codelets.senses import POSE_COLUMNS, RANGE, with_gains
 from services.codelets.settings import Config
 from services.codelets.sightings import MOVING, has_bearing, has_range, seen_from_here
 
 GAP = 3.0
+LOCAL_SHARE = 0.5
 
 
 class Record(NamedTuple):
@@ -47,7 +49,7 @@ def locate_landmark(task: Task, config: Config) -> list[Operation]:
     agreed, missed = (int(landmark.attributes.get(key, 0)) for key in ("sightings", "misses"))
     if _stays(self_node, landmark):
         return object_operations(task, landmark, before, percept, Record(agreed, missed))
-    selves = with_gains(np.array(self_node.samples.numpy(), np.float64), config, rng)
+    selves = near_by(with_gains(np.array(self_node.samples.numpy(), np.float64), config, rng), config)
     selves = rng.permutation(refill(selves, len(before), 0.0, rng))
     squared = _squared(before, selves, percept)
     if squared.min() < config.gate**2:
@@ -58,7 +60,24 @@ def locate_landmark(task: Task, config: Config) -> list[Operation]:
         return object_operations(task, landmark, kept, percept, Record(agreed + 1, 0))
     if missed + 1 < min(config.misses, agreed + 1):
         return object_operations(task, landmark, before, percept, Record(agreed, missed + 1))
-    return object_operations(task, landmark, first_sighting(selves, percept, config, rng), percept, FIRST)
+    anew = msgspec.structs.replace(landmark, attributes=landmark.attributes | {"since_ns": task.stamp_ns})
+    return object_operations(task, anew, first_sighting(selves, percept, config, rng), percept, FIRST)
+
+
+def near_by(selves: Samples, config: Config) -> Samples:
+    """(n, 7) samples of the self for where a landmark stands as seen from it, which is known however lost it is.
+
+    The paper's samples start from their mean at each step (§5.4), so that landmarks are as sure as the last step was.
+    Here the self's samples keep all that is unsure since the start; drawn together about their mean, they say the same.
+    """
+    mean = mean_pose(selves)
+    sd = spread(selves[:, :POSE_COLUMNS], mean)
+    share = min(1.0, LOCAL_SHARE * config.largest_landmark_sd_m / max(float(np.hypot(sd[0], sd[1])), 1e-9))
+    if share == 1.0:
+        return selves
+    off = selves[:, :POSE_COLUMNS] - mean
+    off[:, 2] = wrapped(off[:, 2])
+    return np.hstack([mean + share * off, selves[:, POSE_COLUMNS:]])
 
 
 def _stays(self_node: Node, landmark: Node) -> bool:

@@ -18,15 +18,16 @@ from schemas.graph import Node, Operation
 from schemas.mind import Task
 from services.codelets.path import ODOMETRY_FACTS, composed, odometry_of, step_between
 from services.codelets.places import place_link
-from services.codelets.recovery import look_around
+from services.codelets.recovery import look_around, seen_before
 from services.codelets.sampling import Samples, bearable, centred, generator, mean_pose, refill, reject, spread, widened
 from services.codelets.senses import POSE_COLUMNS, RANGE, SPEED, TURN, move, path_integrated, with_gains
 from services.codelets.settings import Config
 from services.codelets.sightings import MOVING, Sighting, compare, log_likelihood, sightings
 
 WIDER, WIDENINGS = 1.5, 6
-ALONE = 2
+ALONE, SEVERAL = 3, 2
 STAGES = 5
+FORGOTTEN_S = 20.0
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class Found:
     """The samples that stay, the share of those tried that they are, and for how many views nothing has fitted.
 
     `missed` names the landmark that was the first not to fit; `others` says whether another did not fit since: then it
-    is the agent who is elsewhere, not the landmark. `carried` says that it was found anew, wherever it moved.
+    is the agent who is elsewhere, not the landmark. `carried` says that it was found where it cannot have gone.
     """
 
     samples: Samples
@@ -59,23 +60,16 @@ def localize(task: Task, config: Config) -> list[Operation]:
     motions = np.asarray(task.motions.numpy(), np.float64)
     moved = move(refill(before, config.samples, 0.0, rng), motions, config, rng)
     stands_ns = _stands_since(self_node, bool(motions[:, :2].any()))
-    seen = sightings(task, config.largest_landmark_sd_m, stands_ns)
-    past = _past(self_node, moved)
+    seen = sightings(task.percepts, task.nodes, config.largest_landmark_sd_m, stands_ns)
+    past = _past(self_node, moved, task.stamp_ns)
     found = past if seen is None else _correct(past, seen, config, rng)
-    odometry = _odometry(self_node, motions, found, mean_pose(moved))
+    odometry = path_integrated(odometry_of(self_node), motions, found.samples[:, POSE_COLUMNS:].mean(axis=0))
+    if seen is not None and found.others:
+        found = _look_around(found, task, odometry, config, rng)
+    if found.carried:
+        # Who was carried away felt nothing of it: the way there counts as one that was gone.
+        odometry = composed(odometry, step_between(mean_pose(moved), mean_pose(found.samples)))
     return _self_operations(task, self_node, found, stands_ns, odometry)
-
-
-def _odometry(node: Node, motions: Samples, found: Found, moved: Samples) -> Samples:
-    """Where path integration alone would have the agent (3,), its senses' gains as they are believed to be.
-
-    Who was carried away felt nothing of it: the way there counts as one that was gone.
-    """
-    gains = found.samples[:, POSE_COLUMNS:].mean(axis=0)
-    odometry = path_integrated(odometry_of(node), motions, gains)
-    if not found.carried:
-        return odometry
-    return composed(odometry, step_between(moved, mean_pose(found.samples)))
 
 
 def _stands_since(node: Node, moves: bool) -> int:
@@ -86,8 +80,11 @@ def _stands_since(node: Node, moves: bool) -> int:
     return int(node.attributes.get("stamp_ns", 0)) if before == MOVING else before
 
 
-def _past(node: Node, moved: Samples) -> Found:
+def _past(node: Node, moved: Samples, stamp_ns: int) -> Found:
+    """What was found before; that something did not fit is forgotten where nothing has come of it for long."""
     facts = node.attributes
+    if stamp_ns > int(facts.get("missed_ns", 0)) + FORGOTTEN_S * 1e9:
+        return Found(moved)
     return Found(
         moved,
         1.0,
@@ -122,19 +119,31 @@ def _correct(past: Found, seen: Sighting, config: Config, rng: np.random.Generat
 def _stray(past: Found, seen: Sighting, config: Config, rng: np.random.Generator) -> Found:
     """Nothing fits: the agent is less sure of its pose than it took itself to be, the more the longer that goes on.
 
-    One landmark that does not fit may stand elsewhere, or be another. Where several do not, for long, the agent is
-    elsewhere, and looks for itself as soon as what it sees tells where it may be: at two landmarks, or, later, at one;
-    and at once where it is less sure of its position than one look at a landmark makes it.
+    But one landmark that does not fit may stand elsewhere, or be another.
     """
     astray, missed = past.astray + 1, past.missed or seen.labels[0]
     others = past.others or any(label != missed for label in seen.labels)
-    enough = config.astray if len(seen.labels) > 1 else ALONE * config.astray
-    off_m = centred(past.samples[:, :2])[1]
-    unsure = float(np.square(off_m).sum(axis=1).mean()) > float(seen.range_m.min()) ** 2
-    if others and (unsure or astray >= enough):
-        return Found(look_around(past.samples, seen, config, rng), 0.0, carried=True)
     less_sure = widened(past.samples, WIDER, rng) if others and astray <= WIDENINGS else past.samples
     return Found(less_sure, 0.0, astray, missed, others)
+
+
+def _look_around(lost: Found, task: Task, odometry: Samples, config: Config, rng: np.random.Generator) -> Found:
+    """Where several landmarks have not fitted for long, the agent is elsewhere: it looks for itself by all it has seen.
+
+    That is as soon as this tells where it may be: two landmarks, or, later, one; and at once where it is less sure of
+    its position than one look at a landmark makes it.
+    """
+    now = {percept.label for percept in task.percepts}
+    percepts = [*task.percepts, *(each for each in seen_before(task, odometry) if each.label not in now)]
+    seen = sightings(percepts, task.nodes, config.largest_landmark_sd_m, MOVING)
+    if seen is None:
+        return lost
+    enough = config.astray if len(seen.labels) > 1 else ALONE * config.astray
+    off_m = centred(lost.samples[:, :2])[1]
+    unsure = float(np.square(off_m).sum(axis=1).mean()) > float(seen.range_m.min()) ** 2
+    if lost.astray < (SEVERAL if unsure else enough):
+        return lost
+    return Found(look_around(lost.samples, seen, config, rng), 0.0, carried=not unsure)
 
 
 def _self_operations(task: Task, node: Node, found: Found, stands_ns: int, odometry: Samples) -> list[Operation]:
@@ -142,6 +151,7 @@ def _self_operations(task: Task, node: Node, found: Found, stands_ns: int, odome
     sd = spread(found.samples[:, :POSE_COLUMNS], mean)
     cell = nearest_place(mean[0], mean[1], task.cell_m)
     gains = found.samples[:, [SPEED, TURN, RANGE]].mean(axis=0).tolist()
+    missed_ns = int(node.attributes.get("missed_ns", 0))
     attributes: dict[str, Scalar] = node.attributes | {
         "x_m": float(mean[0]),
         "y_m": float(mean[1]),
@@ -153,6 +163,8 @@ def _self_operations(task: Task, node: Node, found: Found, stands_ns: int, odome
         "astray": found.astray,
         "missed": found.missed,
         "others": found.others,
+        "missed_ns": task.stamp_ns if found.astray > int(node.attributes.get("astray", 0)) else missed_ns,
+        "fits_ns": int(node.attributes.get("fits_ns", 0)) if found.astray else task.stamp_ns,
         "stands_ns": stands_ns,
         **dict(zip(("speed_gain", "turn_gain", "range_gain"), gains, strict=True)),
         **dict(zip(ODOMETRY_FACTS, odometry.tolist(), strict=True)),

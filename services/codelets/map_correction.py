@@ -13,46 +13,82 @@ import numpy.typing as npt
 from schemas.array import Array
 from schemas.graph import Node, Operation
 from schemas.mind import Replay, Task
+from services.codelets.agreement import Views, agreeing
 from services.codelets.closures import holding
 from services.codelets.least_squares import correct_headings
 from services.codelets.path import POSE, STAMP, rows_of, steps_of
-from services.codelets.pose_graph import Constraints, Floats, PoseGraph
+from services.codelets.pose_graph import Constraints, Floats, PoseGraph, discrepancies, rotations, squared
 from services.codelets.replay import close_loops
-from services.codelets.revisits import KIND, constraints_of, found_again
+from services.codelets.revisits import KIND, constraints_of, views_of
+from services.codelets.sampling import wrapped
 from services.codelets.settings import Config
 from services.codelets.sighted import Sightings
 
 CORRECTION = "correction"
+LEAST_ROWS, IMPOSSIBLE_SD = 10, 5.0
+MOST_ROUNDS, SAME_RAD = 3, 0.05
 ROUNDS = 5
 
 
 def correct_map(task: Task, config: Config) -> tuple[list[Operation], Replay | None]:
-    """The closures that `task` makes and what becomes of those before, the correction of the path, and its replay."""
+    """What becomes of the closures of `task`, those before and the new, the correction of the path, and its replay."""
     rows = rows_of(task.nodes)
-    before = [node for node in task.nodes if node.kind == KIND]
-    closures = before + found_again(task, rows, config)
-    if len(closures) == len(before):
+    closures = sorted(
+        (node for node in task.nodes if node.kind == KIND), key=lambda node: int(node.attributes["to_ns"])
+    )
+    if not closures or len(rows) < 2:
         return [], None
-    old = rows[:, POSE]
-    loops = constraints_of(closures, rows)
-    graph = PoseGraph(old, steps_of(rows, config), loops)
-    holds = holding(graph, config.false_closure)
-    judged = [_judged(node, bool(hold)) for node, hold in zip(closures, holds, strict=True)]
-    written: list[Operation] = [
-        node for node, was in zip(judged, [*before, *([None] * len(judged))], strict=False) if node != was
-    ]
-    held_before = {node.id for node in before if node.attributes["holds"]}
-    held = {node.id for node in judged if node.attributes["holds"]}
+    views, steps = views_of(closures, rows), steps_of(rows, config)
+    agrees = agreeing(views, steps, config.false_closure) & (views.second - views.first >= LEAST_ROWS)
+    graph, among = _holding(_start(rows[:, POSE], steps), steps, views.select(agrees), config)
+    holds = np.zeros(len(closures), bool)
+    holds[agrees] = among
+    written = _judged(closures, agrees, holds)
+    held_before = {node.id for node in closures if node.attributes.get("holds")}
+    held = {node.id for node, hold in zip(closures, holds, strict=True) if hold}
     if held == held_before:
         return written, None
     seen = Sightings.of(task.nodes, rows[:, STAMP])
-    new, replays = corrected(PoseGraph(graph.poses, graph.steps, loops.select(holds)), seen, config)
-    samples = Array.of(np.column_stack([rows[:, STAMP], old, new]))
+    new, replays = corrected(graph, seen, config)
+    samples = Array.of(np.column_stack([rows[:, STAMP], rows[:, POSE], new]))
     written.append(Node(id=CORRECTION, kind=CORRECTION, base_level=1.0, samples=samples))
-    replay = _replay(rows, new, loops.select(holds), config)
+    replay = _replay(rows, new, graph.closures, config)
     replay.stamp_ns, replay.cycle, replay.replays = task.stamp_ns, task.cycle, replays
     replay.closed, replay.undone = sorted(held), sorted(held_before - held)
     return written, replay
+
+
+def _start(poses: Floats, steps: Constraints) -> Floats:
+    """(n, 3) poses to correct from: those believed, but where no step could have led from one to the next.
+
+    There the path goes on as it was felt. Who was lost for a while believed what would lead astray for good.
+    """
+    believed = discrepancies(poses, steps)
+    possible = squared(believed, steps.information) <= IMPOSSIBLE_SD**2
+    measured = steps.measured + np.where(possible[:, None], believed, 0.0)
+    heading = poses[0, 2] + np.concatenate([[0.0], np.cumsum(measured[:, 2])])
+    moved = np.einsum("mab,mb->ma", rotations(heading[:-1]), measured[:, :2])
+    where = poses[0, :2] + np.vstack([np.zeros(2), np.cumsum(moved, axis=0)])
+    return np.column_stack([where, wrapped(heading)])
+
+
+def _holding(
+    poses: Floats, steps: Constraints, views: Views, config: Config
+) -> tuple[PoseGraph, npt.NDArray[np.bool_]]:
+    """The path with the loops that hold, and which of `views` those are.
+
+    What a landmark tells of where the agent stands is worked out again where its heading turns out to be another.
+    """
+    loops = constraints_of(views, poses)
+    for _ in range(MOST_ROUNDS):
+        holds = holding(PoseGraph(poses, steps, loops), config.false_closure)
+        graph = PoseGraph(poses, steps, loops.select(holds))
+        again = constraints_of(views, correct_headings(graph))
+        turned = np.abs(wrapped(again.measured[:, 2] - loops.measured[:, 2]))
+        if turned.max(initial=0.0) < SAME_RAD:
+            break
+        loops = again
+    return graph, holds
 
 
 def corrected(graph: PoseGraph, seen: Sightings, config: Config) -> tuple[Floats, int]:
@@ -61,7 +97,7 @@ def corrected(graph: PoseGraph, seen: Sightings, config: Config) -> tuple[Floats
     Where no loop is left, the path is as path integration has it. With the headings, the path is also bound to what was
     seen along it.
     """
-    positions = close_loops(PoseGraph(graph.poses, _positions_only(graph), graph.closures))
+    positions = close_loops(_positions_only(graph))
     poses = np.column_stack([positions.positions_m, graph.poses[:, 2]])
     if config.correct == "positions":
         return poses, positions.replays
@@ -73,25 +109,36 @@ def corrected(graph: PoseGraph, seen: Sightings, config: Config) -> tuple[Floats
     return poses, positions.replays
 
 
-def _positions_only(graph: PoseGraph) -> Constraints:
-    """The steps where headings are not corrected: what those are wrong by is left to the positions.
+def _positions_only(graph: PoseGraph) -> PoseGraph:
+    """The path where headings are not corrected: what those are wrong by is left to the positions.
 
-    A turn of variance h somewhere on a loop of length L moves its end by a variance of h L^2 / 3 on the mean.
+    A turn of variance h somewhere on a loop of length L moves its end by a variance of h L^2 / 3 on the mean. Where a
+    landmark is seen from, the headings of all the loop turn.
     """
     steps, loops = graph.steps, graph.closures
     if not len(loops):
-        return steps
+        return graph
     way_m = np.concatenate([[0.0], np.cumsum(np.hypot(steps.measured[:, 0], steps.measured[:, 1]))])
     lengths_m = np.abs(way_m[loops.second] - way_m[loops.first])
-    variance = 1 / steps.information[:, 0, 0] + (lengths_m**2).mean() / 3 / steps.information[:, 2, 2]
+    turning = 1 / steps.information[:, 2, 2]
+    variance = 1 / steps.information[:, 0, 0] + (lengths_m**2).mean() / 3 * turning
     information = np.zeros_like(steps.information)
     information[:, 0, 0] = information[:, 1, 1] = 1 / variance
     information[:, 2, 2] = steps.information[:, 2, 2]
-    return Constraints(steps.first, steps.second, steps.measured, information)
+    turned = np.concatenate([[0.0], np.cumsum(turning)])
+    levers = loops.information[:, :2, 2]
+    unsure = (levers**2).sum(axis=1) / loops.information[:, 0, 0] * np.abs(turned[loops.second] - turned[loops.first])
+    steps = Constraints(steps.first, steps.second, steps.measured, information)
+    return PoseGraph(graph.poses, steps, loops.weighted(1 / (1 + unsure)))
 
 
-def _judged(node: Node, holds: bool) -> Node:
-    return msgspec.structs.replace(node, attributes=node.attributes | {"holds": holds})
+def _judged(closures: list[Node], agrees: npt.NDArray[np.bool_], holds: npt.NDArray[np.bool_]) -> list[Operation]:
+    """The closures of which something else is to be said than before."""
+    said = [
+        msgspec.structs.replace(node, attributes=node.attributes | {"agrees": agree, "holds": hold})
+        for node, agree, hold in zip(closures, agrees.tolist(), holds.tolist(), strict=True)
+    ]
+    return [node for node, was in zip(said, closures, strict=True) if node != was]
 
 
 def _replay(rows: Floats, new: Floats, loops: Constraints, config: Config) -> Replay:

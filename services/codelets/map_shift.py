@@ -98,7 +98,7 @@ def _object(task: Task, node: Node, rows: Floats, seen_m: Floats | None) -> list
 
 
 def _first_pass(away: Floats) -> int:
-    """The nearest of the places where the path first passes by.
+    """The nearest of the places, by (n,) distances along the path, where it first passes by.
 
     Not the nearest of all: where a loop has drifted, its end may lie nearer than the beginning that an object is of.
     """

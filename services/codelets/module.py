@@ -17,6 +17,7 @@ from services.codelets.map_correction import correct_map
 from services.codelets.map_shift import shift_map
 from services.codelets.object_place import place_object, place_road
 from services.codelets.path import extend_path
+from services.codelets.revisits import revisit
 from services.codelets.settings import Config
 
 __all__ = ["Config", "Worker", "build"]
@@ -27,6 +28,7 @@ BUILDERS: dict[str, Callable[[Task, Config], list[Operation]]] = {
     "object_place": place_object,
     "road_place": place_road,
     "path": extend_path,
+    "revisit": revisit,
     "map_shift": shift_map,
 }
 ATTENTION, MAP_CORRECTION = "attention", "map_correction"

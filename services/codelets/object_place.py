@@ -10,7 +10,7 @@ from schemas.array import Array
 from schemas.base import Scalar
 from schemas.graph import Cells, Node, Operation
 from schemas.mind import Task
-from services.codelets.landmarks import FIRST, first_sighting, object_operations
+from services.codelets.landmarks import FIRST, first_sighting, near_by, object_operations
 from services.codelets.sampling import generator, mean_pose, refill
 from services.codelets.senses import with_gains
 from services.codelets.settings import Config
@@ -28,7 +28,7 @@ def place_object(task: Task, config: Config) -> list[Operation]:
     if self_node.attributes.get("others", False):
         return []
     rng, percept = generator(task.task_id), task.percepts[0]
-    selves = with_gains(np.array(self_node.samples.numpy(), np.float64), config, rng)
+    selves = near_by(with_gains(np.array(self_node.samples.numpy(), np.float64), config, rng), config)
     selves = refill(selves, config.landmark_samples, 0.0, rng)
     attributes: dict[str, Scalar] = {"label": percept.label, "since_ns": task.stamp_ns}
     node = Node(id=object_id(percept.label), kind="object", base_level=FIRST_BASE_LEVEL, attributes=attributes)

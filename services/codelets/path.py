@@ -69,7 +69,7 @@ def extend_path(task: Task, config: Config) -> list[Operation]:
     number = 0 if last is None else int(last.attributes["number"])
     pose, odometry = mean_pose(np.asarray(self_node.samples.numpy(), np.float64)), odometry_of(self_node)
     written: list[Operation] = []
-    if is_apart(rows, pose, config.path_spacing_m):
+    if is_apart(rows, odometry, config.path_spacing_m) or is_lost_since(rows, self_node):
         row = np.concatenate([[task.stamp_ns * 1e-9], pose, odometry])[None]
         number, rows = (number + 1, row) if len(rows) >= ROWS else (number, np.vstack([rows, row]))
         written += segments(rows, number)
@@ -83,9 +83,15 @@ def extend_path(task: Task, config: Config) -> list[Operation]:
     return written
 
 
-def is_apart(rows: Floats, pose: Floats, spacing_m: float) -> bool:
-    """Whether `pose` is `spacing_m` or more from the last of the (n, COLUMNS) rows, or there is none."""
-    return not len(rows) or bool(np.hypot(*(rows[-1, POSE][:2] - pose[:2])) >= spacing_m)
+def is_apart(rows: Floats, odometry: Floats, spacing_m: float) -> bool:
+    """Whether path integration leads `spacing_m` or more from the last of the (n, COLUMNS) rows, or there is none."""
+    return not len(rows) or bool(np.hypot(*(rows[-1, ODOMETRY][:2] - odometry[:2])) >= spacing_m)
+
+
+def is_lost_since(rows: Floats, self_node: Node) -> bool:
+    """Whether the agent has got lost since the last of the rows: what it sees now, it may see from elsewhere."""
+    facts = self_node.attributes
+    return bool(facts.get("others", False)) and float(rows[-1, STAMP]) <= int(facts.get("fits_ns", 0)) * 1e-9
 
 
 def odometry_of(self_node: Node) -> Floats:

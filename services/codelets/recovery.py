@@ -1,15 +1,60 @@
-"""Where an agent may be that was carried away: anywhere from where the landmarks in view look as they do."""
+"""Where an agent may be that was carried away: anywhere from where the landmarks that it sees look as they do."""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from schemas.mind import Task
+from schemas.sensing import Percept
+from services.codelets.path import ODOMETRY, STAMP, composed, rows_of, step_between
 from services.codelets.sampling import Samples
 from services.codelets.senses import COLUMNS, RANGE
 from services.codelets.settings import Config
+from services.codelets.sighted import Sightings
 from services.codelets.sightings import Sighting, compare, log_likelihood
 
 CANDIDATES = 16
+# What path integration may be off by since a landmark was seen, as a share of the way.
+DRIFT_SHARE = 0.05
+
+
+def seen_before(task: Task, odometry: Samples) -> list[Percept]:
+    """Landmarks that were seen since anything last fitted, as they would be in view now, each as it was seen last.
+
+    `task` has what was seen along the path since then; path integration alone has the agent at `odometry` (3,).
+    """
+    self_node = next(node for node in task.nodes if node.kind == "self")
+    rows = rows_of(task.nodes)
+    rows = rows[rows[:, STAMP] > int(self_node.attributes.get("fits_ns", 0)) * 1e-9]
+    seen = Sightings.of(task.nodes, rows[:, STAMP])
+    latest = {seen.labels[landmark]: index for index, landmark in enumerate(seen.landmark.tolist())}
+    percepts = []
+    for label, index in latest.items():
+        then = rows[seen.place[index], ODOMETRY]
+        place = composed(then, np.append(seen.where_m[index], 0.0))
+        forwards_m, left_m, _ = step_between(odometry, place).tolist()
+        variance = float(np.linalg.eigvalsh(np.linalg.inv(seen.information[index])).max())
+        drift_m = DRIFT_SHARE * float(np.hypot(*(then - odometry)[:2]))
+        percepts.append(_percept(label, forwards_m, left_m, math.sqrt(variance + drift_m**2)))
+    return percepts
+
+
+def _percept(label: str, forwards_m: float, left_m: float, sd_m: float) -> Percept:
+    range_m = max(math.hypot(forwards_m, left_m), 1e-3)
+    return Percept(
+        label=label,
+        activation=1.0,
+        bearing_rad=math.atan2(left_m, forwards_m),
+        range_m=range_m,
+        bearing_sd_rad=min(sd_m / range_m, math.pi),
+        range_sd_m=sd_m,
+        width_m=0.0,
+        height_m=0.0,
+        whole=False,
+        box_px=(0, 0, 0, 0),
+    )
 
 
 def look_around(gains: Samples, seen: Sighting, config: Config, rng: np.random.Generator) -> Samples:

@@ -1,121 +1,119 @@
-"""Loops that close: a landmark recognised again after long, or a place by the views that led to it (paper §5.6).
+"""Views that may close a loop: a landmark recognised again after long, or a place by the views that led to it (§5.6).
 
-A node of kind `closure` says where the agent was at `to_ns` as seen from where it was at `from_ns`; nothing is known
-of the heading where `sd_rad` is 0. `holds` is whether map correction believes it.
+A node of kind `closure` says that what stands `ahead_m` and `left_m` of where the agent was at `from_ns` was seen at
+`range_m` and `bearing_rad` at `to_ns`, to `sd_m`. Of a place met again, that is the place itself, and the heading there
+is known to `sd_rad`; a landmark tells none, and `sd_rad` is 0. Map correction says whether it `agrees` and `holds`.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from bus.errors import MessageError
-from bus.graph import object_id
 from schemas.base import Scalar
-from schemas.graph import Node
+from schemas.graph import Node, Operation
 from schemas.mind import Task
 from schemas.sensing import Percept, PlaceMatch
-from services.codelets.path import POSE, STAMP, step_between, steps_of
-from services.codelets.pose_graph import Constraints, Floats
-from services.codelets.sampling import mean_pose
+from services.codelets.agreement import AGREEING, Views
+from services.codelets.path import ODOMETRY, STAMP, rows_of
+from services.codelets.pose_graph import Constraints, Floats, Indices, relative, rotations
+from services.codelets.sampling import wrapped
 from services.codelets.settings import Config
+from services.codelets.sighted import Sightings
+from services.codelets.sightings import has_bearing, has_range
 
 KIND = "closure"
-LEAST_ROWS = 10
+SAME_M = 6.0
+
+_Facts = dict[str, Scalar]
 
 
-class Fix(NamedTuple):
-    """Where the agent stands, (3,), by what it was seen to be near at `before_ns`; `sd_rad` 0 is no word on heading."""
+def revisit(task: Task, config: Config) -> list[Operation]:
+    """A closure for each percept and match of `task`.
 
-    before_ns: int
-    stands: Floats
-    sd_m: float
-    sd_rad: float
-    by: str
-
-
-def found_again(task: Task, rows: Floats, config: Config) -> list[Node]:
-    """The closures that the percepts and matches of `task` make, with the path of (n, COLUMNS) `rows`."""
-    if len(rows) <= LEAST_ROWS:
-        return []
-    by_id = {node.id: node for node in task.nodes}
-    closures = []
+    It has the landmarks, or the newest closures that they have made on this pass, all sightings of them, and the path
+    along which these were made. Each view of a landmark is joined to a sighting of its own, so that one mistake, now or
+    then, makes one closure. What the map has the landmark at does not come into it: this pass may have moved it.
+    """
+    rows = rows_of(task.nodes)
+    seen = Sightings.of(task.nodes, rows[:, STAMP])
+    found: list[Operation] = []
     for percept in task.percepts:
-        landmark = by_id.get(object_id(percept.label))
-        if landmark is not None:
-            closures.append(_by_landmark(task, rows, landmark, percept, config))
-    closures += [_by_match(task, rows, match, config) for match in task.matches]
-    return [node for node in closures if _row(rows, node, "to_ns") - _row(rows, node, "from_ns") >= LEAST_ROWS]
+        begun = next(
+            node for node in task.nodes if percept.label in (node.attributes.get(key) for key in ("label", "by"))
+        )
+        before_ns, number = (int(begun.attributes.get(key, 0)) for key in ("before_ns", "view"))
+        before_ns = before_ns or int(begun.attributes["stamp_ns"])
+        there = _clearest(seen, percept.label, rows, before_ns)
+        if len(there) < AGREEING or not (has_bearing(percept) and has_range(percept)):
+            continue
+        facts = _joined(seen, int(there[number % len(there)]), rows, percept)
+        found.append(_closure(task, percept.label, facts | {"before_ns": before_ns, "view": number + 1}))
+    return found + [_closure(task, f"view-{match.frame}", _place(match, config)) for match in task.matches]
 
 
-def _pose(task: Task) -> Floats:
-    agent = next(node for node in task.nodes if node.kind == "self")
-    if agent.samples is None:
-        raise MessageError(f"task {task.task_id} has a self node without samples")
-    return mean_pose(np.asarray(agent.samples.numpy(), np.float64))
+def _clearest(seen: Sightings, label: str, rows: Floats, before_ns: int) -> Indices:
+    """The sightings of a landmark that most others agree with, up to `before_ns`, those from nearest first.
+
+    On one pass by, they lead to the same place by path integration alone.
+    """
+    known = np.flatnonzero(rows[seen.place, STAMP] <= before_ns * 1e-9 + 1e-6)
+    known = known[[seen.labels[index] == label for index in seen.landmark[known].tolist()]]
+    stood = rows[seen.place[known], ODOMETRY]
+    where = stood[:, :2] + np.einsum("mab,mb->ma", rotations(stood[:, 2]), seen.where_m[known])
+    same = np.hypot(*(where[:, None] - where).transpose(2, 0, 1)) <= SAME_M
+    chosen = known[same[same.sum(axis=1).argmax()]] if len(known) else known
+    order: Indices = chosen[np.argsort(np.hypot(*seen.where_m[chosen].T), kind="stable")]
+    return order
 
 
-def _by_landmark(task: Task, rows: Floats, landmark: Node, percept: Percept, config: Config) -> Node:
-    """The agent stands where the landmark is seen as it is; it was last seen when the path was at `from_ns`."""
-    before_ns = int(landmark.attributes["stamp_ns"])
-    pose = _pose(task)
-    bearing = pose[2] + percept.bearing_rad
-    where = np.array([float(landmark.attributes["x_m"]), float(landmark.attributes["y_m"])])
-    stands = where - percept.range_m * np.array([np.cos(bearing), np.sin(bearing)])
-    spread_m = np.hypot(float(landmark.attributes["x_sd_m"]), float(landmark.attributes["y_sd_m"]))
-    # How far it stands off to the side is as unsure as the heading has become on the way.
-    way = steps_of(rows[_nearest(rows, before_ns) :], config).information[:, 2, 2]
-    across_rad = float(np.sqrt(percept.bearing_sd_rad**2 + (1 / way).sum()))
-    sd_m = float(np.sqrt(spread_m**2 + percept.range_sd_m**2 + (percept.range_m * across_rad) ** 2))
-    fix = Fix(before_ns, np.array([*stands, pose[2]]), sd_m, 0.0, percept.label)
-    return _closure(task, rows, fix)
-
-
-def _by_match(task: Task, rows: Floats, match: PlaceMatch, config: Config) -> Node:
-    """The agent is where it was when it had the matching view, and looks the same way."""
-    there = rows[_nearest(rows, match.view_ns), POSE]
-    fix = Fix(match.view_ns, there, config.place_match_sd_m, config.place_match_sd_rad, f"view-{match.frame}")
-    return _closure(task, rows, fix)
-
-
-def _closure(task: Task, rows: Floats, fix: Fix) -> Node:
-    """From the path's place at that time to its last, if the agent stands there and not where it believes to be."""
-    last, stands, pose = rows[-1, POSE], fix.stands, _pose(task)
-    # The last place of the path is a step behind: it would have been as far from where the agent stands.
-    target = np.array([*(stands[:2] - pose[:2] + last[:2]), last[2] + stands[2] - pose[2]])
-    measured = step_between(rows[_nearest(rows, fix.before_ns), POSE], target)
-    attributes: dict[str, Scalar] = {
-        "from_ns": fix.before_ns,
-        "to_ns": task.stamp_ns,
-        "forwards_m": float(measured[0]),
-        "left_m": float(measured[1]),
-        "turn_rad": float(measured[2]),
-        "sd_m": fix.sd_m,
-        "sd_rad": fix.sd_rad,
-        "by": fix.by,
-        "holds": False,
+def _joined(seen: Sightings, there: int, rows: Floats, percept: Percept) -> _Facts:
+    ahead_m, left_m = seen.where_m[there].tolist()
+    there_m2 = 1 / float(np.linalg.eigvalsh(seen.information[there])[0])
+    here_m2 = percept.range_sd_m**2 + (percept.range_m * percept.bearing_sd_rad) ** 2
+    return {
+        "from_ns": round(float(rows[seen.place[there], STAMP]) * 1e9),
+        "ahead_m": ahead_m,
+        "left_m": left_m,
+        "range_m": percept.range_m,
+        "bearing_rad": percept.bearing_rad,
+        "sd_m": float(np.sqrt(there_m2 + here_m2)),
+        "sd_rad": 0.0,
     }
-    return Node(id=f"{KIND}:{task.cycle}:{fix.by}", kind=KIND, base_level=1.0, attributes=attributes)
 
 
-def constraints_of(closures: list[Node], rows: Floats) -> Constraints:
-    """The closures as constraints between rows of the path."""
-    facts = np.array(
-        [[float(node.attributes[key]) for key in ("forwards_m", "left_m", "turn_rad")] for node in closures]
-    )
-    spread = np.array([[float(node.attributes[key]) for key in ("sd_m", "sd_rad")] for node in closures]).reshape(-1, 2)
-    information = np.zeros((len(closures), 3, 3))
-    information[:, 0, 0] = information[:, 1, 1] = spread[:, 0].clip(1e-3) ** -2
-    known = spread[:, 1] > 0
-    information[known, 2, 2] = spread[known, 1] ** -2
-    ends = [np.array([_row(rows, node, key) for node in closures], np.int64) for key in ("from_ns", "to_ns")]
-    return Constraints(ends[0], ends[1], facts.reshape(-1, 3), information)
+def _place(match: PlaceMatch, config: Config) -> _Facts:
+    here = dict.fromkeys(("ahead_m", "left_m", "range_m", "bearing_rad"), 0.0)
+    return {"from_ns": match.view_ns, **here, "sd_m": config.place_match_sd_m, "sd_rad": config.place_match_sd_rad}
 
 
-def _row(rows: Floats, closure: Node, key: str) -> int:
-    return _nearest(rows, int(closure.attributes[key]))
+def _closure(task: Task, by: str, facts: _Facts) -> Node:
+    attributes = {**facts, "to_ns": task.stamp_ns, "by": by}
+    return Node(id=f"{KIND}:{task.cycle}:{by}", kind=KIND, base_level=1.0, attributes=attributes)
 
 
-def _nearest(rows: Floats, stamp_ns: int) -> int:
-    return int(np.abs(rows[:, STAMP] - stamp_ns * 1e-9).argmin())
+def views_of(closures: list[Node], rows: Floats) -> Views:
+    """The closures as views from rows of the path."""
+    keys = ("ahead_m", "left_m", "range_m", "bearing_rad", "sd_m", "sd_rad")
+    facts = np.array([[float(node.attributes[key]) for key in keys] for node in closures]).reshape(-1, len(keys))
+    seen = facts[:, 2:3] * np.column_stack([np.cos(facts[:, 3]), np.sin(facts[:, 3])])
+    stamps = np.array([[int(node.attributes[key]) for key in ("from_ns", "to_ns")] for node in closures]).reshape(-1, 2)
+    ends = np.abs(rows[:, STAMP] - stamps[..., None] * 1e-9).argmin(axis=2)
+    return Views(ends[:, 0], ends[:, 1], facts[:, :2], seen, facts[:, 4].clip(1e-3), facts[:, 5])
+
+
+def constraints_of(views: Views, poses: Floats) -> Constraints:
+    """The views as constraints between (n, 3) poses, near those.
+
+    A landmark tells where the agent stands but for its heading: who is turned further stands elsewhere around it.
+    """
+    nothing = np.empty(0)
+    turn = relative(poses, Constraints(views.first, views.second, nothing, nothing))[:, 2]
+    turn = np.where(views.sd_rad > 0, 0.0, wrapped(turn))
+    off = np.einsum("mab,mb->ma", rotations(turn), views.here_m)
+    by_pose = np.zeros((len(turn), 2, 3))
+    by_pose[:, 0, 0] = by_pose[:, 1, 1] = 1.0
+    by_pose[:, :, 2] = np.column_stack([-off[:, 1], off[:, 0]])
+    information = by_pose.transpose(0, 2, 1) @ by_pose / views.sd_m[:, None, None] ** 2
+    known = views.sd_rad > 0
+    information[known, 2, 2] += views.sd_rad[known] ** -2
+    return Constraints(views.first, views.second, np.column_stack([views.there_m - off, turn]), information)

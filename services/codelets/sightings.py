@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from schemas.graph import Node
-from schemas.mind import Task
 from schemas.sensing import Percept
 from services.codelets.sampling import Samples
 from services.codelets.senses import RANGE
@@ -62,16 +62,18 @@ def seen_from_here(landmark: Node, stands_ns: int) -> bool:
     return stands_ns != MOVING and int(landmark.attributes.get("stamp_ns", MOVING)) >= stands_ns
 
 
-def sightings(task: Task, largest_sd_m: float, stands_ns: int) -> Sighting | None:
-    """The percepts of `task` whose object is on the map well enough to tell something; None if there are none.
+def sightings(
+    percepts: Iterable[Percept], nodes: Iterable[Node], largest_sd_m: float, stands_ns: int
+) -> Sighting | None:
+    """The percepts whose object among `nodes` is known well enough to tell something; None if there are none.
 
     Well enough is within `largest_sd_m`, and within half of its distance, since samples on a ring around the agent have
     a mean where nothing is; and seen there more than once, since a first sighting may have had another's name. Who
     stands still sees the same again, and that makes nobody surer.
     """
-    known = {node.attributes.get("label"): node for node in task.nodes if node.kind == "object"}
+    known = {node.attributes.get("label"): node for node in nodes if node.kind == "object"}
     rows = []
-    for percept in task.percepts:
+    for percept in percepts:
         node = known.get(percept.label)
         if node is None or node.samples is None or _says_nothing(node, stands_ns):
             continue
@@ -84,9 +86,9 @@ def sightings(task: Task, largest_sd_m: float, stands_ns: int) -> Sighting | Non
             rows.append((mean, covariance, percept))
     if not rows:
         return None
-    means, covariances, percepts = zip(*rows, strict=True)
-    numbers = [(p.bearing_rad, p.range_m, p.bearing_sd_rad, p.range_sd_m) for p in percepts]
-    labels = tuple(percept.label for percept in percepts)
+    means, covariances, known_ones = zip(*rows, strict=True)
+    numbers = [(p.bearing_rad, p.range_m, p.bearing_sd_rad, p.range_sd_m) for p in known_ones]
+    labels = tuple(percept.label for percept in known_ones)
     return Sighting(labels, np.array(means), np.array(covariances), *np.array(numbers).T)
 
 

@@ -17,7 +17,7 @@ from services.workspace.commit import Ledger
 from services.workspace.correction import Correction
 from services.workspace.decay import fade
 from services.workspace.dispatch import Dispatch
-from services.workspace.loops import correction_tasks
+from services.workspace.loops import correction_tasks, revisit_tasks
 from services.workspace.scene import SELF, Scene
 from services.workspace.settings import Config
 from services.workspace.triggers import PHASES, first_self, percept_operations, recognised, tasks_for
@@ -157,8 +157,9 @@ class Workspace:
         graph, now_ns = self._ledger.graph, self._now_ns
         tasks = tasks_for(PHASES[self._phase], self._scene, graph, self._config.path_spacing_m)
         sent: list[Message] = []
-        if PHASES[self._phase] == "objects" and not self._correction.runs:
-            loops = correction_tasks(self._scene, graph, self._config)
+        if PHASES[self._phase] == "objects":
+            tasks += revisit_tasks(self._scene, graph, self._config)
+            loops = [] if self._correction.runs else correction_tasks(self._scene, graph, self._config)
             sent += self._correction.begin(loops, self._scene.cycle, now_ns)
         sent += self._dispatch.begin(tasks, now_ns)
         return sent if tasks else [*sent, *self._next_phase()]

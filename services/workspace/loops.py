@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
 from bus.graph import Graph, object_id
 from schemas.array import Array
 from schemas.graph import Node, PlaceTile
 from schemas.mind import Task
-from schemas.sensing import Percept
 from services.workspace.scene import SELF, Scene, task_of
 from services.workspace.settings import Config
 
 PATH, SIGHTED, CLOSURE, CORRECTION = "path", "sighted", "closure", "correction"
+MET = ""
+ODOMETRY, ODOMETRY_FACTS = slice(4, 6), ("odometry_x_m", "odometry_y_m")
 
 
 def path_tasks(scene: Scene, graph: Graph, spacing_m: float) -> list[Task]:
-    """One where the agent is `spacing_m` or more from the path's last place, or sees what it had not from there."""
-    agent, last = graph.nodes[SELF], _last(graph)
+    """One where the path grows, or the agent sees what it had not seen from the path's last place."""
+    agent, last, far = graph.nodes[SELF], _last(graph), _grows(graph, spacing_m)
     if last is None or last.samples is None:
         return [task_of(scene, graph, "path", [agent], scene.percepts.objects)]
-    number = int(last.attributes["number"])
-    stamp_s, x_m, y_m = last.samples.numpy()[-1, :3].tolist()
-    far = np.hypot(float(agent.attributes["x_m"]) - x_m, float(agent.attributes["y_m"]) - y_m) >= spacing_m
+    number, stamp_s = int(last.attributes["number"]), float(last.samples.numpy()[-1, 0])
     known = {each.label: graph.nodes.get(f"{SIGHTED}:{number}:{each.label}") for each in scene.percepts.objects}
     new = [each for each in scene.percepts.objects if far or not _seen_from(known[each.label], stamp_s)]
     if not far and not new:
@@ -31,9 +30,37 @@ def path_tasks(scene: Scene, graph: Graph, spacing_m: float) -> list[Task]:
     return [task_of(scene, graph, "path", [agent, last, *sighted], new)]
 
 
+def _grows(graph: Graph, spacing_m: float) -> bool:
+    """Whether the agent has gone `spacing_m` from the path's last place, or has got lost there.
+
+    That is by path integration alone: where it takes itself to be may jump, or hardly move while it is lost.
+    """
+    last = _last(graph)
+    if last is None or last.samples is None:
+        return True
+    facts = graph.nodes[SELF].attributes
+    if facts.get("others", False) and float(last.samples.numpy()[-1, 0]) <= int(facts.get("fits_ns", 0)) * 1e-9:
+        return True
+    before_m = last.samples.numpy()[-1, ODOMETRY].tolist()
+    return math.dist([float(facts.get(key, 0.0)) for key in ODOMETRY_FACTS], before_m) >= spacing_m
+
+
 def _seen_from(sighted: Node | None, stamp_s: float) -> bool:
     """Whether the last of a landmark's sightings is from the place of the path at `stamp_s`."""
     return sighted is not None and sighted.samples is not None and float(sighted.samples.numpy()[-1, 0]) >= stamp_s
+
+
+def seen_lately(graph: Graph) -> list[Node]:
+    """The end of the path, what was seen from there, and that: for an agent that is lost."""
+    last = _last(graph)
+    if last is None:
+        return []
+    number = int(last.attributes["number"])
+    found = [last]
+    for label in sorted(node.attributes["label"] for node in _of_kind(graph, "object")):
+        sighted = graph.nodes.get(f"{SIGHTED}:{number}:{label}")
+        found += [] if sighted is None else [sighted, graph.nodes[object_id(str(label))]]
+    return found
 
 
 def shift_tasks(scene: Scene, graph: Graph) -> list[Task]:
@@ -41,35 +68,69 @@ def shift_tasks(scene: Scene, graph: Graph) -> list[Task]:
     if CORRECTION not in graph.nodes:
         return []
     agent, correction = graph.nodes[SELF], graph.nodes[CORRECTION]
-    objects = [graph.nodes[name] for name in sorted(graph.nodes) if graph.nodes[name].kind == "object"]
-    way = [*_of_kind(graph, PATH), *_of_kind(graph, SIGHTED)]
-    task = task_of(scene, graph, "map_shift", [agent, correction, *way, *objects], [])
+    found = [node for kind in (PATH, SIGHTED, "object") for node in _of_kind(graph, kind)]
+    task = task_of(scene, graph, "map_shift", [agent, correction, *found], [])
     task.tiles = [tile for tile in _tiles(graph) if tile.road.numpy().any()]
     return [task]
 
 
-def correction_tasks(scene: Scene, graph: Graph, config: Config) -> list[Task]:
-    """One where a landmark or a view comes again that was away for long, unless a loop was closed just now."""
+def revisit_tasks(scene: Scene, graph: Graph, config: Config) -> list[Task]:
+    """One where the path grows and a landmark or a view comes again that was away for long, or is passed by since.
+
+    It gets the landmarks, or the newest closures that they have made on this pass, and all sightings of them before.
+    """
     percepts, now_ns = scene.percepts, scene.percepts.stamp_ns
-    long_ago_ns = now_ns - config.revisit_s * 1e9
-    again = [percept for percept in percepts.objects if _was_away(graph, percept, long_ago_ns)]
-    matches = [match for match in percepts.matches if match.view_ns <= long_ago_ns]
-    if CORRECTION in graph.nodes or not (again or matches):
+    known = [percept for percept in percepts.objects if percept.whole and object_id(percept.label) in graph.nodes]
+    if not (known or percepts.matches) or not _grows(graph, config.path_spacing_m):
         return []
-    closures = _of_kind(graph, CLOSURE)
-    newest_ns = max((int(node.attributes["to_ns"]) for node in closures), default=-(2**62))
-    if now_ns < newest_ns + config.closure_spacing_s * 1e9:
+    long_ago_ns, soon_ns = (now_ns - seconds * 1e9 for seconds in (config.revisit_s, config.closure_spacing_s))
+    newest = _newest_closures(graph)
+    again, nodes = [], []
+    for percept in known:
+        landmark, closure = graph.nodes[object_id(percept.label)], newest.get(percept.label)
+        if closure is not None and _until_ns(closure) > long_ago_ns:
+            begun = closure if _until_ns(closure) <= soon_ns else None
+        else:
+            begun = landmark if int(landmark.attributes.get("stamp_ns", 2**62)) <= long_ago_ns else None
+        if begun is not None:
+            again.append(percept)
+            nodes += [begun, *_seen_along(graph, percept.label)]
+    ready = MET not in newest or _until_ns(newest[MET]) <= soon_ns
+    matches = [match for match in percepts.matches if ready and match.view_ns <= long_ago_ns]
+    if not again and not matches:
         return []
-    known = [graph.nodes[object_id(percept.label)] for percept in again]
-    nodes = [graph.nodes[SELF], *known, *_of_kind(graph, PATH), *_of_kind(graph, SIGHTED), *closures]
-    task = task_of(scene, graph, "map_correction", nodes, again)
+    path = {int(node.attributes["number"]) for node in nodes if node.kind == SIGHTED}
+    nodes += [graph.nodes[f"{PATH}:{number}"] for number in sorted(path)]
+    task = task_of(scene, graph, "revisit", nodes, again)
     task.matches = matches
     return [task]
 
 
-def _was_away(graph: Graph, percept: Percept, long_ago_ns: float) -> bool:
-    node = graph.nodes.get(object_id(percept.label))
-    return percept.whole and node is not None and int(node.attributes.get("stamp_ns", 2**62)) <= long_ago_ns
+def _until_ns(closure: Node) -> int:
+    return int(closure.attributes["to_ns"])
+
+
+def correction_tasks(scene: Scene, graph: Graph, config: Config) -> list[Task]:
+    """One where there are closures that nobody has judged, unless some were judged just now."""
+    closures = _of_kind(graph, CLOSURE)
+    newest_ns = max((_until_ns(node) for node in closures if "holds" in node.attributes), default=-(2**62))
+    soon = scene.percepts.stamp_ns < newest_ns + config.closure_spacing_s * 1e9
+    if CORRECTION in graph.nodes or soon or all("holds" in node.attributes for node in closures):
+        return []
+    return [task_of(scene, graph, "map_correction", [*_of_kind(graph, PATH), *_of_kind(graph, SIGHTED), *closures], [])]
+
+
+def _newest_closures(graph: Graph) -> dict[str, Node]:
+    """The newest closure by each landmark, and that by a place met again."""
+    newest: dict[str, Node] = {}
+    for node in sorted(_of_kind(graph, CLOSURE), key=_until_ns):
+        newest[MET if float(node.attributes["sd_rad"]) else str(node.attributes["by"])] = node
+    return newest
+
+
+def _seen_along(graph: Graph, label: str) -> list[Node]:
+    """All sightings of a landmark."""
+    return [node for node in _of_kind(graph, SIGHTED) if node.attributes["landmark"] == label]
 
 
 def _last(graph: Graph) -> Node | None:
@@ -81,7 +142,7 @@ def _last(graph: Graph) -> Node | None:
 
 
 def _of_kind(graph: Graph, kind: str) -> list[Node]:
-    return [graph.nodes[name] for name in sorted(graph.nodes) if graph.nodes[name].kind == kind]
+    return sorted((node for node in graph.nodes.values() if node.kind == kind), key=lambda node: node.id)
 
 
 def _tiles(graph: Graph) -> list[PlaceTile]:

@@ -14,8 +14,8 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     """Lockstep waits for every answer; real time commits what there is at the deadline, counted from the frame.
 
     A percept is an object of the map where its total activation is over `recognition_threshold`.
-    A place seen again after `revisit_s` closes a loop, at most one every `closure_spacing_s`. Map correction goes on
-    meanwhile: lockstep waits for it at the end of the `correction_cycles`th cycle.
+    A view of what was away for `revisit_s` may close a loop, as may those that follow, one in `closure_spacing_s`. Map
+    correction goes on meanwhile: lockstep waits for it at the end of the `correction_cycles`th cycle.
     """
 
     mode: Literal["lockstep", "real_time"] = "real_time"

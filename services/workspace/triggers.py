@@ -10,7 +10,7 @@ from schemas.array import Array
 from schemas.graph import Links, Node, Operation
 from schemas.mind import Task
 from schemas.sensing import Percepts
-from services.workspace.loops import path_tasks, shift_tasks
+from services.workspace.loops import path_tasks, seen_lately, shift_tasks
 from services.workspace.scene import SELF, Scene, task_of
 
 PHASES = ("shift", "localization", "objects", "attention")
@@ -54,7 +54,9 @@ def tasks_for(phase: str, scene: Scene, graph: Graph, spacing_m: float) -> list[
     if phase == "shift":
         return shift_tasks(scene, graph)
     if phase == "localization":
-        return [task_of(scene, graph, "localization", [agent, *known], list(scene.percepts.objects))]
+        before = seen_lately(graph) if agent.attributes.get("others", False) else []
+        nodes = {node.id: node for node in (agent, *known, *before)}
+        return [task_of(scene, graph, "localization", list(nodes.values()), list(scene.percepts.objects))]
     if phase == "attention":
         bare = [_bare(node) for node in (agent, *known)]
         return [task_of(scene, graph, "attention", bare, [])]

@@ -136,6 +136,18 @@ def test_responses_between_the_cues_speak_for_integration_and_responses_at_eithe
     assert _outcome(either).figures()["integration_over_alternation"] < 0
 
 
+def test_one_lost_trial_turns_the_sum_of_likelihoods_but_not_the_median_nor_the_share_and_it_is_counted() -> None:
+    rng = np.random.default_rng(2)
+    weight = 0.35**2 / (0.35**2 + 0.28**2)
+    between = rng.normal((weight * 0.457, 0), 0.22, (400, 2))
+    between[7] = (9.0, 7.0)
+    figures = _outcome(between).figures()
+    assert figures["integration_over_alternation"] < 0
+    assert figures["integration_over_alternation_median_of_a_trial"] > 0
+    assert figures["integration_likelier_share"] > 0.5
+    assert figures["lost_trials_conflict"] == 1.0 and figures["lost_trials_both"] == 0.0
+
+
 def test_coordinate_descent_finds_the_lowest_cost() -> None:
     def cost(noise: Noise) -> float:
         return math.log(noise.speed / 0.3) ** 2 + math.log(noise.turn / 0.07) ** 2
