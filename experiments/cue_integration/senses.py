@@ -23,12 +23,16 @@ UNKNOWN: Rows = [
 
 
 def self_motion(turn_rad: float, forward_m: float, noise: Noise, rng: np.random.Generator) -> Rows:
-    """A turn on the spot, then a way straight on, as rows of SelfMotion: multiplied by Gaussians of mean one (§5.4)."""
-    turn_rate = turn_rad / HALF_S * float(rng.normal(1.0, noise.turn))
-    speed = forward_m / HALF_S * float(rng.normal(1.0, noise.speed))
+    """A turn on the spot, then a way straight on, as rows of SelfMotion: multiplied by Gaussians of mean one (§5.4).
+
+    They are as unsure as the movement was large that was made, not that was felt: a turn felt to be half of what it
+    was is no surer for that.
+    """
+    turn_rate, speed = turn_rad / HALF_S, forward_m / HALF_S
+    felt = turn_rate * float(rng.normal(1.0, noise.turn)), speed * float(rng.normal(1.0, noise.speed))
     return [
-        (0.0, turn_rate, HALF_S, 0.0, noise.turn * abs(turn_rate)),
-        (speed, 0.0, HALF_S, noise.speed * abs(speed), 0.0),
+        (0.0, felt[0], HALF_S, 0.0, noise.turn * abs(turn_rate)),
+        (felt[1], 0.0, HALF_S, noise.speed * abs(speed), 0.0),
     ]
 
 
