@@ -13,6 +13,8 @@ from services.workspace.settings import Config
 
 PATH, SIGHTED, CLOSURE, CORRECTION = "path", "sighted", "closure", "correction"
 MET = ""
+# Fewer views than that cannot agree: one alone may be of another place than it seems.
+ENOUGH = 3
 ODOMETRY, ODOMETRY_FACTS = slice(4, 6), ("odometry_x_m", "odometry_y_m")
 
 
@@ -112,13 +114,17 @@ def _until_ns(closure: Node) -> int:
 
 
 def correction_tasks(scene: Scene, graph: Graph, config: Config) -> list[Task]:
-    """One where there are closures that nobody has judged, unless some were judged just now."""
-    closures = graph.of_kind(CLOSURE)
-    newest_ns = max((_until_ns(node) for node in closures if "holds" in node.attributes), default=-(2**62))
-    soon = scene.percepts.stamp_ns < newest_ns + config.closure_spacing_s * 1e9
-    if CORRECTION in graph.nodes or soon or all("holds" in node.attributes for node in closures):
+    """One where there are closures not judged yet, and enough of late to agree; unless some were judged just now."""
+    closures, now_ns = graph.of_kind(CLOSURE), scene.percepts.stamp_ns
+    fresh = [node for node in closures if "holds" not in node.attributes]
+    late = [node for node in closures if _until_ns(node) > now_ns - config.revisit_s * 1e9]
+    if CORRECTION in graph.nodes or not fresh or len(late) < ENOUGH:
         return []
-    return [task_of(scene, graph, "map_correction", [*graph.of_kind(PATH), *graph.of_kind(SIGHTED), *closures], [])]
+    judged_ns = max((_until_ns(node) for node in closures if "holds" in node.attributes), default=-(2**62))
+    if now_ns < judged_ns + config.closure_spacing_s * 1e9:
+        return []
+    nodes = [*graph.of_kind(PATH), *graph.of_kind(SIGHTED), *closures]
+    return [task_of(scene, graph, "map_correction", nodes, [])]
 
 
 def _newest_closures(graph: Graph) -> dict[str, Node]:
