@@ -30,6 +30,7 @@ from schemas.graph import (
 )
 
 TILE_SIDE = 32
+LISTED = frozenset({"path", "sighted", "closure", "correction"})
 COLUMNS = {"activation": 0.0, "road": 0.0, "traversable": 1.0}
 _PLACE = "place"
 Weights = dict[str, dict[str, float]]
@@ -74,7 +75,7 @@ class Tile:
 class Graph:
     """Nodes, links and place tiles at one version. Place nodes are made with their tile, `cell_m` apart.
 
-    `links` holds weights by kind, source and target.
+    `links` holds weights by kind, source and target. Which nodes are of the kinds LISTED is known without a search.
     """
 
     def __init__(self, cell_m: float = 1.0) -> None:
@@ -84,6 +85,7 @@ class Graph:
         self.nodes: dict[str, Node] = {}
         self.links: defaultdict[str, Weights] = defaultdict(dict)
         self.tiles: dict[tuple[int, int], Tile] = {}
+        self._listed: defaultdict[str, set[str]] = defaultdict(set)
         self._appliers: dict[type, Callable[[Any], None]] = {
             Link: self._put_link,
             Links: self._put_links,
@@ -108,6 +110,8 @@ class Graph:
         for operation in operations:
             if type(operation) is Node:  # most are
                 nodes[operation.id] = operation
+                if operation.kind in LISTED:
+                    self._listed[operation.kind].add(operation.id)
             else:
                 appliers[type(operation)](operation)
 
@@ -126,8 +130,10 @@ class Graph:
         self.links[drop.kind].get(drop.source, {}).pop(drop.target, None)
 
     def _drop_node(self, drop: DropNode) -> None:
-        if self.nodes.pop(drop.id, None) is None:
+        node = self.nodes.pop(drop.id, None)
+        if node is None:
             return
+        self._listed[node.kind].discard(drop.id)
         for sources in self.links.values():
             sources.pop(drop.id, None)
             for weights in sources.values():
@@ -162,6 +168,11 @@ class Graph:
             mine = (tiles[:, 0] == x) & (tiles[:, 1] == y)
             tile = self.tiles.setdefault((x, y), Tile())
             tile.columns[cells.column][inside[mine, 0], inside[mine, 1]] = values[mine]
+
+    def of_kind(self, kind: str) -> list[Node]:
+        """All nodes of a kind, by name. Of a kind that is not LISTED it takes a look at every node."""
+        names = sorted(self._listed[kind] if kind in LISTED else self.nodes)
+        return [self.nodes[name] for name in names if self.nodes[name].kind == kind]
 
     def place(self, i: int, j: int) -> Node | None:
         """The place node of a cell, as a node like any other; None where no tile has come into being."""
@@ -208,6 +219,7 @@ class Graph:
         """Put `snapshot` in place of everything."""
         self.nodes, self.tiles = {}, {}
         self.links.clear()
+        self._listed.clear()
         self.change([*snapshot.nodes, *snapshot.links, *snapshot.tiles])
         self.version, self.cycle = snapshot.version, snapshot.cycle
 

@@ -1,10 +1,12 @@
 """Street graphs as JSON Lines, plain or packed by gzip, bzip2 or xz.
 
-A city a line: `city`, `nodes_lonlat`, and `edges` as [from, to, length_m, highway, name, polyline or null].
+A city a line: `city`, `nodes_lonlat`, and `edges_u_v_len_highway_name_geom`, or `edges` for short, each of them
+[from, to, length_m, highway, name, polyline or null].
 """
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -23,13 +25,20 @@ class StreetGraph(msgspec.Struct):
 
     city: str
     nodes_lonlat: list[tuple[Lon, Lat]]
-    edges: list[list[Any]]
+    edges: list[list[Any]] = []
+    edges_u_v_len_highway_name_geom: list[list[Any]] = []
+
+    def __post_init__(self) -> None:
+        self.edges = self.edges or self.edges_u_v_len_highway_name_geom
 
     def line(self, edge: list[Any]) -> list[tuple[float, float]]:
-        """An edge's points in degrees."""
-        polyline = edge[5] if len(edge) > 5 and edge[5] else None
-        ends = [self.nodes_lonlat[edge[0]], self.nodes_lonlat[edge[1]]]
-        return ends if polyline is None else [(float(lon), float(lat)) for lon, lat in polyline]
+        """An edge's points in degrees, its ends exactly as the nodes are, whichever way its polyline goes."""
+        start, end = self.nodes_lonlat[edge[0]], self.nodes_lonlat[edge[1]]
+        polyline = edge[5] if len(edge) > 5 and edge[5] else []
+        points = [(float(lon), float(lat)) for lon, lat in polyline]
+        if points and math.dist(points[0], start) > math.dist(points[-1], start):
+            points.reverse()
+        return [start, *points[1:-1], end]
 
 
 def read(path: Path) -> list[StreetGraph]:
@@ -44,6 +53,8 @@ def _graph(path: Path, number: int, line: str) -> StreetGraph:
     except (msgspec.DecodeError, msgspec.ValidationError) as error:
         raise wrong_line(path, number, line, f"a street graph ({error})") from None
     count = len(graph.nodes_lonlat)
+    if not graph.edges:
+        raise wrong_line(path, number, line, "a street graph with edges")
     for edge in graph.edges:
         if len(edge) < 2 or not all(isinstance(end, int) and 0 <= end < count for end in edge[:2]):
             raise wrong_line(path, number, str(edge), f"an edge between two of {count} nodes, by their numbers")

@@ -15,7 +15,7 @@ from services.codelets.module import Worker
 from services.codelets.path import odometry_of, rows_of
 from services.codelets.settings import Config
 from services.workspace.commit import Ledger
-from services.workspace.loops import correction_tasks, path_tasks, shift_tasks
+from services.workspace.loops import correction_tasks, path_tasks, revisit_tasks, shift_tasks
 from services.workspace.scene import SELF, Scene
 from services.workspace.settings import Config as WorkspaceConfig
 from services.workspace.triggers import first_self, object_tasks, tasks_for
@@ -108,7 +108,8 @@ class Mind:
     def map(self, moment: Moment) -> None:
         """The landmarks in view, new or known, and the path."""
         scene, graph = self._scene(moment), self._ledger.graph
-        self._answer([*object_tasks(scene, graph), *path_tasks(scene, graph, SPACING_M)], "objects")
+        again = [] if self._surveyed else revisit_tasks(scene, graph, LOOPS)
+        self._answer([*object_tasks(scene, graph), *path_tasks(scene, graph, SPACING_M), *again], "objects")
 
     @property
     def path(self) -> Numbers:

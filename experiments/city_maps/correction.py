@@ -3,29 +3,17 @@
 from __future__ import annotations
 
 from bus.config import Sections
-from experiments.city_maps.noise import Noise
 
 METHODS = ("none", "positions", "heading")
 NEVER_S = 1e9
 PLACE_SD_M, PLACE_SD_RAD = 2.5, 0.05
-LEAST_VARIANCE_M, LEAST_VARIANCE_RAD = 0.01, 1e-5
 
 
-def settings(method: str, noise: Noise, step_m: float) -> Sections:
-    """The keys of the workspace and its codelets for one of METHODS, where views are `step_m` apart.
-
-    What map correction takes path integration to err by is what the self-motion's noise adds up to.
-    """
+def settings(method: str, step_m: float) -> Sections:
+    """The keys of the workspace and its codelets for one of METHODS, where views are `step_m` apart."""
     # What is felt of a step varies: with half of it, each view has its place on the path.
     spacing = {"path_spacing_m": step_m / 2}
-    codelets = {
-        **spacing,
-        "path_variance_per_m": max(noise.speed**2 * step_m, LEAST_VARIANCE_M),
-        "heading_variance_per_m": max(noise.drift_rad_per_sqrt_m**2, LEAST_VARIANCE_RAD),
-        "heading_variance_per_rad": max(noise.turn**2, LEAST_VARIANCE_RAD),
-        "place_match_sd_m": PLACE_SD_M,
-        "place_match_sd_rad": PLACE_SD_RAD,
-    }
+    codelets = {**spacing, "place_match_sd_m": PLACE_SD_M, "place_match_sd_rad": PLACE_SD_RAD}
     if method == "none":
         return {"workspace": spacing | {"revisit_s": NEVER_S}, "codelets": codelets}
     return {"workspace": spacing, "codelets": codelets | {"correct": method}}

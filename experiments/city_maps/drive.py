@@ -89,7 +89,7 @@ def sections(environment: Environment, tour: Tour, noise: Noise, method: str) ->
     way = {"line_m": line.tolist(), "landmarks": landmarks, "speed_m_s": SPEED_M_S}
     senses = {"noise": asdict(noise), "percepts": {"field_of_view_rad": LOOKING_ABOUT_RAD}}
     rates = {"frame_hz": FRAME_HZ, "odometry_hz": FRAME_HZ, "awaits": dict.fromkeys(MIND, 1)}
-    correction = settings(method, noise, SPEED_M_S / FRAME_HZ)
+    correction = settings(method, SPEED_M_S / FRAME_HZ)
     return {
         "sim": {"mode": "lockstep", "seed": tour.seed, "way": way, **senses, **rates},
         "workspace": {"mode": "lockstep", "cell_m": CELL_M, "base_level_decay": 0.0, **correction["workspace"]},

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 from scipy import sparse
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from services.codelets.pose_graph import Constraints, Floats, Indices, rotations
 from services.codelets.sampling import wrapped
@@ -95,7 +95,7 @@ def _agree(one: Views, other: Views, way: _Way, false_closure: float) -> npt.NDA
     squared[turns] += (turned**2 / np.maximum(one.sd_rad**2 + other.sd_rad**2 + turning, 1e-12))[turns]
     degrees = np.where(turns, 3, 2)
     near = (unsure <= WIDEST_M**2) & (one.second != other.second)
-    agree: npt.NDArray[np.bool_] = near & (squared <= chi2.isf(false_closure, degrees))
+    agree: npt.NDArray[np.bool_] = near & (squared <= chdtri(degrees, false_closure))
     return agree
 
 

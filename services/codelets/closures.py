@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from services.codelets.least_squares import correct_headings
 from services.codelets.pose_graph import Constraints, Floats, PoseGraph, discrepancies, squared
@@ -22,7 +22,7 @@ def limits(closures: Constraints, false_closure: float) -> Floats:
     """(m,): the chi-square that a true closure exceeds with probability `false_closure`."""
     known = np.linalg.eigvalsh(closures.information)
     degrees = (known > 1e-9 * known[:, -1:]).sum(axis=1)
-    result: Floats = chi2.isf(false_closure, degrees)
+    result: Floats = chdtri(degrees, false_closure)
     return result
 
 

@@ -16,7 +16,7 @@ from schemas.array import Array
 from schemas.base import Scalar
 from schemas.graph import Node, Operation
 from schemas.mind import Task
-from services.codelets.path import ODOMETRY_FACTS, composed, odometry_of, step_between
+from services.codelets.path import ODOMETRY_FACTS, VARIANCE_FACTS, composed, odometry_of, step_between, variances_of
 from services.codelets.places import place_link
 from services.codelets.recovery import look_around, seen_before, turn_about
 from services.codelets.sampling import Samples, bearable, centred, generator, mean_pose, refill, reject, spread, widened
@@ -65,12 +65,14 @@ def localize(task: Task, config: Config) -> list[Operation]:
     past = _past(self_node, moved, task.stamp_ns)
     found = past if seen is None else _correct(past, seen, config, rng)
     odometry = path_integrated(odometry_of(self_node), motions, found.samples[:, POSE_COLUMNS:].mean(axis=0))
+    variances = variances_of(self_node) + np.square(motions[:, 3:5] * motions[:, 2:3]).sum(axis=0)
     if seen is not None and found.others:
         found = _look_around(found, task, odometry, config, rng)
     if found.carried:
-        # Who was carried away felt nothing of it: the way there counts as one that was gone.
+        # Who was carried away felt nothing of it: the way there counts as one that was gone, as sure as it is found.
         odometry = composed(odometry, step_between(mean_pose(moved), mean_pose(found.samples)))
-    return _self_operations(task, self_node, found, stands_ns, odometry)
+        variances += np.square(centred(found.samples)[1]).mean(axis=0)[1:POSE_COLUMNS]
+    return _self_operations(task, self_node, found, stands_ns, np.concatenate([odometry, variances]))
 
 
 def _stands_since(node: Node, moves: bool) -> int:
@@ -151,10 +153,10 @@ def _look_around(lost: Found, task: Task, odometry: Samples, config: Config, rng
 
 
 def _self_operations(task: Task, node: Node, found: Found, stands_ns: int, odometry: Samples) -> list[Operation]:
-    mean = mean_pose(found.samples)
-    sd = spread(found.samples[:, :POSE_COLUMNS], mean)
+    mean, off = centred(found.samples)
+    sd = np.sqrt(np.square(off).mean(axis=0))
     cell = nearest_place(mean[0], mean[1], task.cell_m)
-    gains = found.samples[:, [SPEED, TURN, RANGE]].mean(axis=0).tolist()
+    gains = mean[[SPEED, TURN, RANGE]].tolist()
     missed_ns = int(node.attributes.get("missed_ns", 0))
     attributes: dict[str, Scalar] = node.attributes | {
         "x_m": float(mean[0]),
@@ -171,11 +173,11 @@ def _self_operations(task: Task, node: Node, found: Found, stands_ns: int, odome
         "fits_ns": int(node.attributes.get("fits_ns", 0)) if found.astray else task.stamp_ns,
         "stands_ns": stands_ns,
         **dict(zip(("speed_gain", "turn_gain", "range_gain"), gains, strict=True)),
-        **dict(zip(ODOMETRY_FACTS, odometry.tolist(), strict=True)),
+        **dict(zip((*ODOMETRY_FACTS, *VARIANCE_FACTS), odometry.tolist(), strict=True)),
         "stamp_ns": task.stamp_ns,
         "place": cell,
     }
-    gained = bool(found.samples[:, POSE_COLUMNS:].any())
+    gained = bool(sd[POSE_COLUMNS:].any())
     samples = Array.of(found.samples if gained else found.samples[:, :POSE_COLUMNS])
     moved = Node(id=node.id, kind=node.kind, activation=1.0, base_level=1.0, attributes=attributes, samples=samples)
     return [moved, *place_link(node, cell)]

@@ -1,8 +1,9 @@
 """The path that the agent took, as nodes of the graph: what map correction corrects (paper §5.6).
 
 A node of kind `path` holds up to ROWS places on end. Each row of its samples is stamp_s, then x_m, y_m, heading_rad
-where the agent takes itself to have been, then the same where path integration alone would have had it. Landmarks and
-corrections change the former; the steps between the latter are what self-motion says, and nothing else.
+where the agent takes itself to have been, then the same where path integration alone would have had it, and by which
+variance, of the way in m^2 and of the heading in rad^2, summed up from the start. Landmarks and corrections change the
+agent's own belief; the steps between the latter are what self-motion says, and nothing else.
 """
 
 from __future__ import annotations
@@ -22,9 +23,10 @@ from services.codelets.sighted import Outlook, recorded, seen_from, sighted_id
 from services.codelets.sightings import has_bearing, has_range
 
 KIND = "path"
-COLUMNS, ROWS = 7, 64
-STAMP, POSE, ODOMETRY = 0, slice(1, 4), slice(4, 7)
+COLUMNS, ROWS = 9, 64
+STAMP, POSE, ODOMETRY, VARIANCES = 0, slice(1, 4), slice(4, 7), slice(7, 9)
 ODOMETRY_FACTS = ("odometry_x_m", "odometry_y_m", "odometry_heading_rad")
+VARIANCE_FACTS = ("odometry_variance_m2", "odometry_variance_rad2")
 
 
 def segment_id(number: int) -> str:
@@ -70,7 +72,7 @@ def extend_path(task: Task, config: Config) -> list[Operation]:
     pose, odometry = mean_pose(np.asarray(self_node.samples.numpy(), np.float64)), odometry_of(self_node)
     written: list[Operation] = []
     if is_apart(rows, odometry, config.path_spacing_m) or is_lost_since(rows, self_node):
-        row = np.concatenate([[task.stamp_ns * 1e-9], pose, odometry])[None]
+        row = np.concatenate([[task.stamp_ns * 1e-9], pose, odometry, variances_of(self_node)])[None]
         number, rows = (number + 1, row) if len(rows) >= ROWS else (number, np.vstack([rows, row]))
         written += segments(rows, number)
     stamp_s, step = float(rows[-1, STAMP]), step_between(rows[-1, ODOMETRY], odometry)
@@ -101,6 +103,11 @@ def odometry_of(self_node: Node) -> Floats:
     return np.array([float(facts.get(key, other)) for key, other in zip(ODOMETRY_FACTS, own, strict=True)])
 
 
+def variances_of(self_node: Node) -> Floats:
+    """(2,): the variance of the way, in m^2, and of the heading, in rad^2, by path integration since the start."""
+    return np.array([float(self_node.attributes.get(key, 0.0)) for key in VARIANCE_FACTS])
+
+
 def step_between(before: Floats, after: Floats) -> Floats:
     """(3,): one pose as seen from another."""
     nothing = np.empty(0)
@@ -118,16 +125,18 @@ def composed(pose: Floats, step: Floats) -> Floats:
 
 
 def steps_of(rows: Floats, config: Config) -> Constraints:
-    """What path integration says from each row to the next, less surely the longer the step."""
+    """What path integration says from each row to the next, as surely as self-motion says, or less, by the way."""
     at = np.arange(max(0, len(rows) - 1))
     nothing = np.empty(0)
     steps = relative(rows[:, ODOMETRY], Constraints(at, at + 1, nothing, nothing))
     steps[:, 2] = wrapped(steps[:, 2])
     length = np.hypot(steps[:, 0], steps[:, 1]).clip(config.path_spacing_m / 2)
     turned = np.abs(steps[:, 2])
+    said_m2, said_rad2 = np.diff(rows[:, VARIANCES], axis=0).T
+    least_rad2 = config.heading_variance_per_m * length + config.heading_variance_per_rad * turned
     information = np.zeros((len(length), 3, 3))
-    information[:, 0, 0] = information[:, 1, 1] = 1 / (config.path_variance_per_m * length)
-    information[:, 2, 2] = 1 / (config.heading_variance_per_m * length + config.heading_variance_per_rad * turned)
+    information[:, 0, 0] = information[:, 1, 1] = 1 / np.maximum(config.path_variance_per_m * length, said_m2)
+    information[:, 2, 2] = 1 / np.maximum(least_rad2, said_rad2)
     return Constraints(at, at + 1, steps, information)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from bus.errors import MessageError
 from schemas.base import Scalar
 from schemas.graph import Node, Operation
 from schemas.mind import Task
@@ -34,6 +35,8 @@ def revisit(task: Task, config: Config) -> list[Operation]:
     along which these were made. Each view of a landmark is joined to a sighting of its own, so that one mistake, now or
     then, makes one closure. What the map has the landmark at does not come into it: this pass may have moved it.
     """
+    if not task.percepts and not task.matches:
+        raise MessageError(f"task {task.task_id} has nothing that was met again")
     rows = rows_of(task.nodes)
     seen = Sightings.of(task.nodes, rows[:, STAMP])
     found: list[Operation] = []

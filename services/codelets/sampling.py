@@ -32,16 +32,17 @@ def wrapped(angle_rad: Samples) -> Samples:
 
 def mean_pose(poses: Samples) -> Samples:
     """The mean of (n, 3) samples x_m, y_m, heading_rad, the heading's on the circle."""
-    heading = np.arctan2(np.sin(poses[:, 2]).mean(), np.cos(poses[:, 2]).mean())
-    return np.array([poses[:, 0].mean(), poses[:, 1].mean(), heading])
+    return centred(poses)[0][:3]
 
 
 def centred(samples: Samples) -> tuple[Samples, Samples]:
     """The mean (d,) of (n, d) samples and how far each is off it; of three columns or more the third is a heading."""
     number, columns = samples.shape
-    mean = np.full(number, 1 / number) @ samples
+    average = np.full(number, 1 / number)
+    mean = average @ samples
     if columns > 2:
-        mean[2] = mean_pose(samples)[2]
+        heading = np.ascontiguousarray(samples[:, 2])
+        mean[2] = np.arctan2(average @ np.sin(heading), average @ np.cos(heading))
     off = samples - mean
     if columns > 2:
         off[:, 2] -= TURN * np.rint(off[:, 2] / TURN)

@@ -13,7 +13,7 @@ Share = Annotated[float, msgspec.Meta(ge=0, le=1)]
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """Numbers of samples, and what is believed of sightings. The noise of each sense comes with what it says.
 
-    `views_alike`: so many views of a landmark on end err alike and count for one, about 4 s of driving by. The
+    `views_alike`: so many views of a landmark on end err alike and count for one, those of driving by once. The
     paper takes each for independent (eq. 1); a landmark that is always seen a little too near then drags the agent.
     `correct`: the map's positions only, as in the paper, or its headings too. `false_closure`: closures that would
     be as wrong as they look with a smaller probability than this do not hold.
@@ -27,7 +27,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     kept_samples: Annotated[int, msgspec.Meta(ge=1, le=10_000)] = 200
     landmark_samples: Annotated[int, msgspec.Meta(ge=10, le=10_000)] = 200
     outlier_share: Share = 1e-3
-    views_alike: Annotated[float, msgspec.Meta(ge=1, le=1000)] = 20.0
+    views_alike: Annotated[float, msgspec.Meta(ge=1, le=1000)] = 60.0
     largest_landmark_sd_m: Positive = 4.0
     landmark_jitter_m: Positive = 0.03
     gate: Positive = 4.0
@@ -42,10 +42,10 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     farthest_m: Positive = 50.0
     attention_base_level: Share = 1.0
     path_spacing_m: Positive = 1.0
-    path_variance_per_m: Positive = 0.01
-    heading_variance_per_m: Positive = 1e-4
-    heading_variance_per_rad: Positive = 2e-3
-    correct: Literal["positions", "heading"] = "positions"
+    path_variance_per_m: Positive = 1e-4
+    heading_variance_per_m: Positive = 1e-6
+    heading_variance_per_rad: Positive = 1e-5
+    correct: Literal["positions", "heading"] = "heading"
     place_match_sd_m: Positive = 2.0
     place_match_sd_rad: Positive = 0.2
     false_closure: Annotated[float, msgspec.Meta(gt=0, lt=1)] = 1e-3

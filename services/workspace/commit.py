@@ -18,7 +18,7 @@ WRITABLE = (Node, Link, Links, DropLink, Cells, DropNode)
 SELF = "self"
 # The rows of the path and of its correction tell more than samples of a position do. Those of the self may hold
 # besides its pose what its senses are off by.
-COLUMNS_OF = {"path": (7,), "correction": (7,), "sighted": (6,), "self": (3, 7)}
+COLUMNS_OF = {"path": (9,), "correction": (7,), "sighted": (6,), "self": (3, 7)}
 NUMBERS_OF = {"path": ("number",), "sighted": ("number",), "closure": ("from_ns", "to_ns")}
 POSE = ("x_m", "y_m", "heading_rad", "stamp_ns")
 

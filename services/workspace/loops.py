@@ -13,6 +13,8 @@ from services.workspace.settings import Config
 
 PATH, SIGHTED, CLOSURE, CORRECTION = "path", "sighted", "closure", "correction"
 MET = ""
+# Fewer views than that cannot agree: one alone may be of another place than it seems.
+ENOUGH = 3
 ODOMETRY, ODOMETRY_FACTS = slice(4, 6), ("odometry_x_m", "odometry_y_m")
 
 
@@ -57,7 +59,7 @@ def seen_lately(graph: Graph) -> list[Node]:
         return []
     number = int(last.attributes["number"])
     found = [last]
-    for label in sorted(node.attributes["label"] for node in _of_kind(graph, "object")):
+    for label in sorted(node.attributes["label"] for node in graph.of_kind("object")):
         sighted = graph.nodes.get(f"{SIGHTED}:{number}:{label}")
         found += [] if sighted is None else [sighted, graph.nodes[object_id(str(label))]]
     return found
@@ -68,34 +70,35 @@ def shift_tasks(scene: Scene, graph: Graph) -> list[Task]:
     if CORRECTION not in graph.nodes:
         return []
     agent, correction = graph.nodes[SELF], graph.nodes[CORRECTION]
-    found = [node for kind in (PATH, SIGHTED, "object") for node in _of_kind(graph, kind)]
+    found = [node for kind in (PATH, SIGHTED, "object") for node in graph.of_kind(kind)]
     task = task_of(scene, graph, "map_shift", [agent, correction, *found], [])
     task.tiles = [tile for tile in _tiles(graph) if tile.road.numpy().any()]
     return [task]
 
 
 def revisit_tasks(scene: Scene, graph: Graph, config: Config) -> list[Task]:
-    """One where the path grows and a landmark or a view comes again that was away for long, or is passed by since.
+    """One where a landmark comes again that was away for long, or the path grows along it since, or along a known way.
 
     It gets the landmarks, or the newest closures that they have made on this pass, and all sightings of them before.
     """
     percepts, now_ns = scene.percepts, scene.percepts.stamp_ns
     known = [percept for percept in percepts.objects if percept.whole and object_id(percept.label) in graph.nodes]
-    if not (known or percepts.matches) or not _grows(graph, config.path_spacing_m):
+    if not (known or percepts.matches):
         return []
+    grows = _grows(graph, config.path_spacing_m)
     long_ago_ns, soon_ns = (now_ns - seconds * 1e9 for seconds in (config.revisit_s, config.closure_spacing_s))
     newest = _newest_closures(graph)
     again, nodes = [], []
     for percept in known:
         landmark, closure = graph.nodes[object_id(percept.label)], newest.get(percept.label)
         if closure is not None and _until_ns(closure) > long_ago_ns:
-            begun = closure if _until_ns(closure) <= soon_ns else None
+            begun = closure if grows and _until_ns(closure) <= soon_ns else None
         else:
             begun = landmark if int(landmark.attributes.get("stamp_ns", 2**62)) <= long_ago_ns else None
         if begun is not None:
             again.append(percept)
             nodes += [begun, *_seen_along(graph, percept.label)]
-    ready = MET not in newest or _until_ns(newest[MET]) <= soon_ns
+    ready = grows and (MET not in newest or _until_ns(newest[MET]) <= soon_ns)
     matches = [match for match in percepts.matches if ready and match.view_ns <= long_ago_ns]
     if not again and not matches:
         return []
@@ -111,26 +114,30 @@ def _until_ns(closure: Node) -> int:
 
 
 def correction_tasks(scene: Scene, graph: Graph, config: Config) -> list[Task]:
-    """One where there are closures that nobody has judged, unless some were judged just now."""
-    closures = _of_kind(graph, CLOSURE)
-    newest_ns = max((_until_ns(node) for node in closures if "holds" in node.attributes), default=-(2**62))
-    soon = scene.percepts.stamp_ns < newest_ns + config.closure_spacing_s * 1e9
-    if CORRECTION in graph.nodes or soon or all("holds" in node.attributes for node in closures):
+    """One where there are closures not judged yet, and enough of late to agree; unless some were judged just now."""
+    closures, now_ns = graph.of_kind(CLOSURE), scene.percepts.stamp_ns
+    fresh = [node for node in closures if "holds" not in node.attributes]
+    late = [node for node in closures if _until_ns(node) > now_ns - config.revisit_s * 1e9]
+    if CORRECTION in graph.nodes or not fresh or len(late) < ENOUGH:
         return []
-    return [task_of(scene, graph, "map_correction", [*_of_kind(graph, PATH), *_of_kind(graph, SIGHTED), *closures], [])]
+    judged_ns = max((_until_ns(node) for node in closures if "holds" in node.attributes), default=-(2**62))
+    if now_ns < judged_ns + config.closure_spacing_s * 1e9:
+        return []
+    nodes = [*graph.of_kind(PATH), *graph.of_kind(SIGHTED), *closures]
+    return [task_of(scene, graph, "map_correction", nodes, [])]
 
 
 def _newest_closures(graph: Graph) -> dict[str, Node]:
     """The newest closure by each landmark, and that by a place met again."""
     newest: dict[str, Node] = {}
-    for node in sorted(_of_kind(graph, CLOSURE), key=_until_ns):
+    for node in sorted(graph.of_kind(CLOSURE), key=_until_ns):
         newest[MET if float(node.attributes["sd_rad"]) else str(node.attributes["by"])] = node
     return newest
 
 
 def _seen_along(graph: Graph, label: str) -> list[Node]:
     """All sightings of a landmark."""
-    return [node for node in _of_kind(graph, SIGHTED) if node.attributes["landmark"] == label]
+    return [node for node in graph.of_kind(SIGHTED) if node.attributes["landmark"] == label]
 
 
 def _last(graph: Graph) -> Node | None:
@@ -139,10 +146,6 @@ def _last(graph: Graph) -> Node | None:
     while f"{PATH}:{number}" in graph.nodes:
         number += 1
     return graph.nodes.get(f"{PATH}:{number - 1}")
-
-
-def _of_kind(graph: Graph, kind: str) -> list[Node]:
-    return sorted((node for node in graph.nodes.values() if node.kind == kind), key=lambda node: node.id)
 
 
 def _tiles(graph: Graph) -> list[PlaceTile]:

@@ -12,8 +12,17 @@ from services.codelets.module import Config as WorkerConfig
 
 STEP_M, SIDE_STEPS = 2.0, 20
 LAP = 4 * SIDE_STEPS
-SETTINGS = {"revisit_s": 5.0, "closure_spacing_s": 1.0}
-QUIET = WorkerConfig(samples=60, kept_samples=30, landmark_samples=40, largest_landmark_sd_m=1e-6)
+SETTINGS = {"revisit_s": 5.0, "closure_spacing_s": 0.2}
+QUIET = WorkerConfig(
+    samples=60,
+    kept_samples=30,
+    landmark_samples=40,
+    largest_landmark_sd_m=1e-6,
+    correct="positions",
+    path_variance_per_m=0.01,
+    heading_variance_per_m=1e-4,
+    heading_variance_per_rad=2e-3,
+)
 SLIP = 0.1
 
 
@@ -67,6 +76,14 @@ class LoopDrive:
             self.desk.feed(view)
             self.desk.work(self.worker)
             self.frame += 1
+
+    def meet(self, frames: int, landmarks: dict[str, tuple[float, float]] | None = None, late: int = 0) -> None:
+        """Drive on where the robot has been a lap ago, and see `landmarks` again, or else match the views of then.
+
+        Those that match are `late` views later than they should be.
+        """
+        for _ in range(frames):
+            self.go(1, landmarks or {}, match=None if landmarks else self.frame - LAP + late)
 
     def error_m(self) -> float:
         """How far the agent takes itself to be from where it is."""

@@ -30,9 +30,14 @@ def _object(label: str = "house", sightings: int = 1) -> Node:
 
 
 def _path() -> Node:
-    rows = np.zeros((20, 7))
+    rows = np.zeros((20, 9))
     rows[:, 0] = rows[:, 1] = rows[:, 4] = np.arange(20)
     return node("path:0", rows, "path", number=0)
+
+
+def _closure() -> Node:
+    facts = {"ahead_m": 0.0, "left_m": 0.0, "range_m": 0.0, "bearing_rad": 0.0, "sd_m": 2.0, "sd_rad": 0.2}
+    return node("closure:1:view-0", None, "closure", from_ns=0, to_ns=15 * 10**9, by="view-0", **facts)
 
 
 def _correction() -> Node:
@@ -51,8 +56,9 @@ def _every_task() -> list[Task]:
         task("object_place", _self(sd=0.1), percepts=[percept("house")]),
         task("road_place", _self(), road_m=road_m),
         task("path", _self(), _path()),
+        task("revisit", _path(), matches=[PlaceMatch(frame=0, view_ns=0, score=0.9)]),
         task("map_shift", _self(), _path(), _object(), _correction()),
-        task("map_correction", _self(), _path(), matches=[PlaceMatch(frame=0, view_ns=0, score=0.9)]),
+        task("map_correction", _path(), _closure()),
         task("attention", _self(), _object()),
     ]
 
