@@ -98,7 +98,7 @@ def _past(node: Node, moved: Samples, stamp_ns: int) -> Found:
 
 
 def _correct(past: Found, seen: Sighting, config: Config, rng: np.random.Generator) -> Found:
-    """Reject by what is in view. Where that fits no sample, all of them stay, until the agent must be elsewhere.
+    """Reject by what is in view. Where most of that fits no sample, all stay, until the agent must be elsewhere.
 
     Where it would leave too few, the same is done in stages: each by a part of the likelihood, the product of all
     parts being the whole, from samples as many as before, drawn around those that the stage before has left. Stages
@@ -107,7 +107,8 @@ def _correct(past: Found, seen: Sighting, config: Config, rng: np.random.Generat
     if spread(past.samples[:, :POSE_COLUMNS], mean_pose(past.samples))[2] > TURNED_RAD and seen.has_bearing.any():
         return Found(turn_about(past.samples, seen, config, rng), 0.0)
     compared = compare(past.samples, seen)
-    if compared.squared.min() >= config.gate**2:
+    fitting = int((compared.squared < config.gate**2).sum(axis=0).max())
+    if 2 * fitting < len(seen.labels) or not fitting:
         return _stray(past, seen, config, rng)
     samples, left, share = past.samples, 1.0, 1.0
     for stage in range(STAGES):
