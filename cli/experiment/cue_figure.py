@@ -38,7 +38,7 @@ def figure(found: Outcome) -> Figure:
         ours["sd"] = {condition: found.sd_m(condition) for condition in Condition}
         for name, title in (("sd", "c   SD of the responses"), ("rmse", "d   RMSE of the responses")):
             _draw_bars(panels[name], ours[name], theirs[name], title)
-        panels["sd"].hlines(found.optimal_sd_m, 1.55, 2.45, color=OPTIMAL, lw=2, label="optimal combination of ours")
+        panels["sd"].hlines(found.optimal_sd_m, 1.6, 2.0, color=OPTIMAL, lw=2, label="optimal combination of ours")
         panels["sd"].legend(frameon=False, fontsize=8, loc="upper right")
         sheet.suptitle(_title(found), x=0.01, ha="left", color=INK, fontsize=12, fontweight="bold")
         sheet.draw_without_rendering()
@@ -96,7 +96,7 @@ def _draw_bars(axes: Axes, ours: dict[Condition, float], theirs: dict[Condition,
     ):
         heights = [values[condition] for condition in Condition]
         bars = axes.bar(places + offset, heights, 0.38, color=colour, label=label)
-        axes.bar_label(bars, fmt="%.2f", fontsize=7.5, color=INK)
+        axes.bar_label(bars, fmt="%.2f", fontsize=7.5, color=INK, padding=5)
     axes.set_xticks(places, [NAMES[condition] for condition in Condition])
     axes.set_ylim(0, 1.35 * max(*ours.values(), *theirs.values()))
     axes.set_title(title, loc="left", color=INK, fontsize=10)

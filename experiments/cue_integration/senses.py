@@ -23,13 +23,24 @@ UNKNOWN: Rows = [
 
 
 def self_motion(turn_rad: float, forward_m: float, noise: Noise, rng: np.random.Generator) -> Rows:
-    """A turn on the spot, then a way straight on, as rows of SelfMotion: multiplied by Gaussians of mean one (§5.4)."""
+    """A turn on the spot, then a way straight on, as rows of SelfMotion: multiplied by Gaussians of mean one (§5.4).
+
+    How unsure they are follows from what is felt, the only thing that a participant has to go by.
+    """
     turn_rate = turn_rad / HALF_S * float(rng.normal(1.0, noise.turn))
     speed = forward_m / HALF_S * float(rng.normal(1.0, noise.speed))
     return [
-        (0.0, turn_rate, HALF_S, 0.0, noise.turn * abs(turn_rate)),
-        (speed, 0.0, HALF_S, noise.speed * abs(speed), 0.0),
+        (0.0, turn_rate, HALF_S, 0.0, unsure(turn_rate, noise.turn)),
+        (speed, 0.0, HALF_S, unsure(speed, noise.speed), 0.0),
     ]
+
+
+def unsure(felt: float, noise: float) -> float:
+    """The standard deviation of what was, where that times a Gaussian of mean one was felt, to the fourth order.
+
+    It is more than that of the factor: who has felt little may have felt a fraction of much.
+    """
+    return abs(felt) * noise * float(np.sqrt(1 + 8 * noise**2))
 
 
 def sightings(pose: Pose, things: Mapping[str, Point], noise: Noise, rng: np.random.Generator) -> list[Percept]:

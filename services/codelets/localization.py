@@ -18,8 +18,8 @@ from schemas.graph import Node, Operation
 from schemas.mind import Task
 from services.codelets.path import ODOMETRY_FACTS, VARIANCE_FACTS, composed, odometry_of, step_between, variances_of
 from services.codelets.places import place_link
-from services.codelets.recovery import look_around, seen_before
-from services.codelets.sampling import Samples, bearable, centred, generator, mean_pose, refill, reject, widened
+from services.codelets.recovery import look_around, seen_before, turn_about
+from services.codelets.sampling import Samples, bearable, centred, generator, mean_pose, refill, reject, spread, widened
 from services.codelets.senses import POSE_COLUMNS, RANGE, SPEED, TURN, move, path_integrated, with_gains
 from services.codelets.settings import Config
 from services.codelets.sightings import MOVING, Sighting, compare, log_likelihood, sightings
@@ -27,6 +27,7 @@ from services.codelets.sightings import MOVING, Sighting, compare, log_likelihoo
 WIDER, WIDENINGS = 1.5, 6
 ALONE, SEVERAL = 3, 2
 STAGES = 5
+TURNED_RAD = 1.0
 FORGOTTEN_S = 20.0
 
 
@@ -97,13 +98,17 @@ def _past(node: Node, moved: Samples, stamp_ns: int) -> Found:
 
 
 def _correct(past: Found, seen: Sighting, config: Config, rng: np.random.Generator) -> Found:
-    """Reject by what is in view. Where that fits no sample, all of them stay, until the agent must be elsewhere.
+    """Reject by what is in view. Where most of that fits no sample, all stay, until the agent must be elsewhere.
 
     Where it would leave too few, the same is done in stages: each by a part of the likelihood, the product of all
-    parts being the whole, from samples as many as before, drawn around those that the stage before has left.
+    parts being the whole, from samples as many as before, drawn around those that the stage before has left. Stages
+    cannot follow a heading that may be any: there the landmarks say which headings are tried.
     """
+    if spread(past.samples[:, :POSE_COLUMNS], mean_pose(past.samples))[2] > TURNED_RAD and seen.has_bearing.any():
+        return Found(turn_about(past.samples, seen, config, rng), 0.0)
     compared = compare(past.samples, seen)
-    if compared.squared.min() >= config.gate**2:
+    fitting = int((compared.squared < config.gate**2).sum(axis=0).max())
+    if 2 * fitting < len(seen.labels) or not fitting:
         return _stray(past, seen, config, rng)
     samples, left, share = past.samples, 1.0, 1.0
     for stage in range(STAGES):

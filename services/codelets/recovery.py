@@ -85,6 +85,26 @@ def look_around(gains: Samples, seen: Sighting, config: Config, rng: np.random.G
     return candidates[rng.choice(number, size=len(gains), p=chances / chances.sum())]
 
 
+def turn_about(samples: Samples, seen: Sighting, config: Config, rng: np.random.Generator) -> Samples:
+    """(n, 7) samples of the self, who knows about where it stands but not how it is turned: turned by what is in view.
+
+    Each candidate stands as one of `samples`, turned to see one of the landmarks as it is seen, and is drawn with the
+    likelihood of all that is in view but that one's bearing.
+    """
+    candidates = np.tile(samples, (CANDIDATES, 1))
+    number = len(candidates)
+    which = rng.choice(np.flatnonzero(seen.has_bearing), size=number)
+    off = seen.mean_m[which] - candidates[:, :2]
+    drawn = rng.normal(0.0, 1.0, number)
+    bearing = seen.bearing_rad[which] + drawn * seen.bearing_sd_rad[which]
+    candidates[:, 2] = np.arctan2(off[:, 1], off[:, 0]) - bearing
+    density = compare(candidates, seen).density
+    density[which, np.arange(number)] *= np.exp(drawn**2 / 2)  # it was turned by that one's bearing
+    scores = log_likelihood(density, config.outlier_share)
+    chances = np.exp(scores - scores.max())
+    return candidates[rng.choice(number, size=len(samples), p=chances / chances.sum())]
+
+
 def _roots(covariances: Samples) -> Samples:
     """A square root of each (k, 2, 2) covariance, which may be singular."""
     values, vectors = np.linalg.eigh(covariances)

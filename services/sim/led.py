@@ -121,7 +121,10 @@ class LedByPercepts(Led):
         return TrueTown(stamp_ns=self.now_ns, seed=self._seed, streets=[street], buildings=buildings)
 
     def _felt(self, legs: list[Leg]) -> Points:
-        """Rows of self-motion: true speeds times noise of mean one, and drift with the root of the way."""
+        """Rows of self-motion: true speeds times noise of mean one, and drift with the root of the way.
+
+        How unsure they are follows from what is felt.
+        """
         noise, rows = self._noise, []
         pace_s = self._pace_s(legs)
         for length_m, turn_rad in legs:
@@ -132,10 +135,10 @@ class LedByPercepts(Led):
             if length_m:
                 dt = pace_s * length_m
                 felt = length_m * speed, drift * math.sqrt(length_m)
-                rows.append((felt[0] / dt, felt[1] / dt, dt, noise.speed * length_m / dt, drift_sd / dt))
+                rows.append((felt[0] / dt, felt[1] / dt, dt, noise.speed * abs(felt[0]) / dt, drift_sd / dt))
             if turn_rad:
                 dt = pace_s * TURN_AS_M * abs(turn_rad)
-                rows.append((0.0, turn_rad * turn / dt, dt, 0.0, noise.turn * abs(turn_rad) / dt))
+                rows.append((0.0, turn_rad * turn / dt, dt, 0.0, noise.turn * abs(turn_rad * turn) / dt))
         return np.array(rows).reshape(-1, 5)
 
     def _at_rest(self) -> Points:

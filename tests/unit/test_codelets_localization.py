@@ -182,6 +182,33 @@ def test_an_agent_that_stands_still_does_not_grow_surer_of_itself_by_looking() -
     assert looking(seen_ns=5) == pytest.approx(0.0, abs=0.05)
 
 
+@pytest.mark.parametrize("number", range(4))
+def test_an_agent_that_was_turned_about_knows_its_heading_again_by_three_landmarks(number: int) -> None:
+    rng = np.random.default_rng(number)
+    heading = rng.uniform(-math.pi, math.pi)
+    places = {"a": (2.5, 7.0), "b": (4.3, 4.8), "c": (0.7, 4.8)}
+    samples = np.column_stack([rng.normal((2.0, 1.0), 0.2, (200, 2)), rng.uniform(-math.pi, math.pi, 200)])
+    seen = [
+        percept(
+            name,
+            math.remainder(math.atan2(y - 1.0, x - 2.0) - heading, math.tau),
+            math.hypot(x - 2.0, y - 1.0),
+            bearing_sd_rad=0.03,
+            range_sd_m=0.15,
+        )
+        for name, (x, y) in places.items()
+    ]
+    found = _localized(
+        _self(samples),
+        *[_landmark(x, y, label=name) for name, (x, y) in places.items()],
+        config=Config(samples=800, views_alike=1.0),
+        percepts=seen,
+    )
+    x_m, y_m, heading_rad = _pose(found)
+    assert (x_m, y_m) == pytest.approx((2.0, 1.0), abs=0.2)
+    assert math.remainder(heading_rad - heading, math.tau) == pytest.approx(0.0, abs=0.06)
+
+
 def test_the_self_node_is_linked_to_the_place_of_its_mean_and_no_longer_to_the_one_before() -> None:
     asked = task("localization", _self(place="place:0:0"), motions=_rows((6.2, 0.0, 1.0, 0.0, 0.0)), cell_m=2.0)
     _, dropped, link = localize(asked, Config())

@@ -44,6 +44,15 @@ def test_self_motion_is_multiplied_by_noise_of_mean_one() -> None:
     assert (ways.mean(), ways.std()) == pytest.approx((0.5, 0.05), rel=0.05)
 
 
+def test_how_unsure_self_motion_is_follows_from_what_is_felt_and_from_nothing_else() -> None:
+    noise, seeds = Noise(0.2, 0.2), range(50)
+    one = np.array([self_motion(1.0, 0.5, noise, np.random.default_rng(seed)) for seed in seeds])
+    for row, column, felt in ((0, 4, 1), (1, 3, 0)):
+        share = one[:, row, column] / np.abs(one[:, row, felt])
+        assert share == pytest.approx(np.full(50, share[0]))
+        assert 0.2 < share[0] < 0.25
+
+
 def test_distances_err_by_three_percent_and_directions_by_as_much_across() -> None:
     rng = np.random.default_rng(3)
     seen = [sightings(Pose(0, 0, 0), {"star": (4.0, 0.0)}, Noise(0.1, 0.1), rng)[0] for _ in range(4000)]
