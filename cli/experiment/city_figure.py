@@ -15,10 +15,16 @@ from cli.log.paint import STYLE
 from cli.palette import ESTIMATE, FAINT, INK, KERB, OBJECT, PAPER, SEVERAL, STREET, TRUE, WHEELS
 from experiments.city_maps import published
 from experiments.city_maps.drive import SENSING
-from experiments.city_maps.measure import CityMap
+from experiments.city_maps.figures import NAMES
+from experiments.city_maps.measure import FELT, CityMap
 
-SHOWN = {"none": "uncorrected", "positions": "positions corrected (eq. 9)", "heading": "headings too"}
-COLOURS = {"none": WHEELS, "positions": SEVERAL[1], "heading": ESTIMATE}
+SHOWN = {
+    FELT: "path integration alone",
+    "none": "landmarks known again, no loop closed",
+    "positions": "positions corrected (eq. 9)",
+    "heading": "headings too",
+}
+COLOURS = {FELT: FAINT, "none": WHEELS, "positions": SEVERAL[1], "heading": ESTIMATE}
 MOST_SHEETS = 8
 MARGIN_M = 120.0
 SCALE_M = 200.0
@@ -48,8 +54,9 @@ def figure(maps: Sequence[CityMap], figures: dict[str, Any]) -> Figure:
 
 
 def _title(maps: Sequence[CityMap], figures: dict[str, Any]) -> str:
+    times = "once" if len(maps[0].learned) == 1 else f"{len(maps[0].learned)} times"
     return (
-        f"Learned maps of {len(maps)} environments, traversed {len(maps[0].learned)} times each, {SENSING}.\n"
+        f"Learned maps of {len(maps)} environments, traversed {times} each, {SENSING}.\n"
         f"Corrected over uncorrected error: {figures['error_corrected_over_uncorrected']:.2f} with headings, "
         f"{figures['error_positions_over_uncorrected']:.2f} positions only"
     )
@@ -64,8 +71,8 @@ def _spread(maps: Sequence[CityMap]) -> list[CityMap]:
 
 def _draw_errors(axes: Axes, maps: Sequence[CityMap]) -> None:
     places = np.arange(len(maps))
-    for offset, (method, label) in zip((-0.27, 0.0, 0.27), SHOWN.items(), strict=True):
-        axes.bar(places + offset, [each.error_km2(method) for each in maps], 0.26, color=COLOURS[method], label=label)
+    for offset, (method, label) in zip((-0.3, -0.1, 0.1, 0.3), SHOWN.items(), strict=True):
+        axes.bar(places + offset, [each.error_km2(method) for each in maps], 0.19, color=COLOURS[method], label=label)
     for mean, style, who in (
         (published.HUMAN_MEAN_KM2, "-", "people"),
         (published.MODEL_MEAN_KM2, (0, (4, 2)), "the paper's model"),
@@ -89,7 +96,7 @@ def _draw_errors(axes: Axes, maps: Sequence[CityMap]) -> None:
 
 def _draw_growth(axes: Axes, maps: Sequence[CityMap], figures: dict[str, Any]) -> None:
     length = np.array([each.environment.tour_m / 1e3 for each in maps])
-    for method, name in (("none", "uncorrected"), ("positions", "positions"), ("heading", "corrected")):
+    for method, name in NAMES.items():
         error = np.array([each.error_km2(method) for each in maps])
         slope = figures[f"growth_{name}_km2_per_km"]
         axes.plot(length, error, "o", ms=5, color=COLOURS[method], mec="white")

@@ -18,6 +18,7 @@ from experiments.parallel import each
 
 FIT_TRAVERSALS = 2
 FACTORS = (1.4, 1.15)
+MOST = 1.0
 OTHERS = 500_000
 
 
@@ -29,6 +30,8 @@ def fitted(environments: Sequence[Environment], effort: Effort) -> Noise:
 
     @cache
     def cost(noise: Noise) -> float:
+        if max(noise.speed, noise.turn) > MOST:
+            return float("inf")
         tried = jobs(environments, noise, min(effort.traversals, FIT_TRAVERSALS), effort.seed + OTHERS)
         errors_km2 = each(positions_error_km2, tried, effort.processes, effort.progress)
         return float(np.mean(errors_km2) - published.HUMAN_MEAN_KM2) ** 2
