@@ -25,6 +25,7 @@ from services.workspace.triggers import first_self, object_tasks, tasks_for
 SPEED, TURN, DRIFT, SPACING_M = 0.1, 0.1, 0.05, 0.3
 CONFIG = Config(
     samples=1000,
+    kept_samples=100,
     landmark_samples=1000,
     views_alike=1.0,
     landmark_jitter_m=0.003,

@@ -19,15 +19,16 @@ from schemas.mind import Task
 from services.codelets.path import ODOMETRY_FACTS, VARIANCE_FACTS, composed, odometry_of, step_between, variances_of
 from services.codelets.places import place_link
 from services.codelets.recovery import look_around, seen_before, turn_about
-from services.codelets.sampling import Samples, bearable, centred, generator, mean_pose, refill, reject, spread, widened
+from services.codelets.sampling import Samples, bearable, centred, generator, mean_pose, refill, reject, widened
 from services.codelets.senses import POSE_COLUMNS, RANGE, SPEED, TURN, move, path_integrated, with_gains
 from services.codelets.settings import Config
 from services.codelets.sightings import MOVING, Sighting, compare, log_likelihood, sightings
 
 WIDER, WIDENINGS = 1.5, 6
 ALONE, SEVERAL = 3, 2
-STAGES = 5
-TURNED_RAD = 1.0
+STAGES = 3
+# Headings a radian apart, and those whose mean direction is no longer than that of a spread of one.
+TURNED_RAD, ALIKE = 1.0, 0.6
 FORGOTTEN_S = 20.0
 
 
@@ -104,10 +105,10 @@ def _correct(past: Found, seen: Sighting, config: Config, rng: np.random.Generat
     parts being the whole, from samples as many as before, drawn around those that the stage before has left. Stages
     cannot follow a heading that may be any: there the landmarks say which headings are tried.
     """
-    if spread(past.samples[:, :POSE_COLUMNS], mean_pose(past.samples))[2] > TURNED_RAD and seen.has_bearing.any():
+    if _may_be_turned(past.samples[:, 2]) and seen.has_bearing.any():
         return Found(turn_about(past.samples, seen, config, rng), 0.0)
     compared = compare(past.samples, seen)
-    fitting = int((compared.squared < config.gate**2).sum(axis=0).max())
+    fitting = int(np.add.reduce(compared.squared < config.gate**2, axis=0, dtype=np.uint8).max())
     if 2 * fitting < len(seen.labels) or not fitting:
         return _stray(past, seen, config, rng)
     samples, left, share = past.samples, 1.0, 1.0
@@ -121,6 +122,12 @@ def _correct(past: Found, seen: Sighting, config: Config, rng: np.random.Generat
         samples = refill(chosen, len(samples), 0.0, rng)
         compared = compare(samples, seen)
     return Found(chosen, share)
+
+
+def _may_be_turned(headings_rad: Samples) -> bool:
+    """Whether the headings (n,) are so far apart that nearly any may be the agent's."""
+    apart = np.ptp(headings_rad) > TURNED_RAD
+    return bool(apart and np.hypot(np.cos(headings_rad).mean(), np.sin(headings_rad).mean()) < ALIKE)
 
 
 def _stray(past: Found, seen: Sighting, config: Config, rng: np.random.Generator) -> Found:
@@ -155,7 +162,7 @@ def _look_around(lost: Found, task: Task, odometry: Samples, config: Config, rng
 
 def _self_operations(task: Task, node: Node, found: Found, stands_ns: int, odometry: Samples) -> list[Operation]:
     mean, off = centred(found.samples)
-    sd = np.sqrt(np.square(off).mean(axis=0))
+    sd = np.sqrt(np.einsum("nd,nd->d", off, off) / len(off))
     cell = nearest_place(mean[0], mean[1], task.cell_m)
     gains = mean[[SPEED, TURN, RANGE]].tolist()
     missed_ns = int(node.attributes.get("missed_ns", 0))

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 Samples = npt.NDArray[np.float64]
 # How far samples that are all the same are spread where they must be: metres, metres, radians.
-BISECTIONS = 8
+STRAIGHTS = 4
 TURN = 2 * np.pi
 HEAP = np.array([0.02, 0.02, 0.01])
 
@@ -97,15 +97,19 @@ def smoothed(drawn: Samples, tell_apart: float, rng: np.random.Generator) -> Sam
 
 
 def bearable(log_likelihood: Samples, share: float) -> float:
-    """The largest power of the likelihood, at most 1, that leaves a `share` of the samples by rejection."""
+    """About the largest power of the likelihood, at most 1, that leaves a `share` of the samples by rejection.
+
+    What is left falls with the power, ever more slowly in its logarithm: a straight line from the start leads to a
+    power that is a little too large, and from there on ever nearer.
+    """
     relative = (log_likelihood - log_likelihood.max()).astype(np.float32)
-    low, high = 0.0, 1.0
-    if np.exp(relative).mean() >= share:
-        return high
-    for _ in range(BISECTIONS):
-        middle = (low + high) / 2
-        low, high = (middle, high) if np.exp(middle * relative).mean() >= share else (low, middle)
-    return max(low, 2.0**-BISECTIONS)
+    power, aimed = 1.0, float(np.log(share))
+    for _ in range(STRAIGHTS):
+        left = float(np.log(np.exp(power * relative).mean()))
+        if left >= aimed:
+            break
+        power *= aimed / left
+    return power
 
 
 def reject(samples: Samples, log_likelihood: Samples, fewest: int, rng: np.random.Generator) -> tuple[Samples, float]:

@@ -108,30 +108,41 @@ class Comparison(NamedTuple):
 
 
 def compare(samples: Samples, seen: Sighting) -> Comparison:
-    """Each of (n, 7) samples of the self against what is seen."""
+    """Each of (n, 7) samples of the self against what is seen.
+
+    How unsure a landmark's own place makes its range and its bearing is worked out for the middle of the samples.
+    """
+    middle = np.full(len(samples), 1 / len(samples)) @ samples[:, :2]
+    bearing_var, range_var = _variances(seen, seen.mean_m - middle)
+    sharp = np.where(seen.has_bearing, seen.bearing_sd_rad**2 / bearing_var, 1.0)
+    sharp *= np.where(seen.has_range, seen.range_sd_m**2 / range_var, 1.0)
+    per_turned, per_away = _single(seen.has_bearing / bearing_var), _single(seen.has_range / range_var)
     east, north = (_single(seen.mean_m[:, axis, None] - samples[:, axis]) for axis in (0, 1))
-    xx, xy, yy = (_single(seen.covariance_m2[:, i, j, None]) for i, j in ((0, 0), (0, 1), (1, 1)))
-    bearing_var, range_var = (_single(sd[:, None] ** 2) for sd in (seen.bearing_sd_rad, seen.range_sd_m))
-    east2, north2 = east * east, north * north
-    square = np.maximum(east2 + north2, np.float32(1e-6))
-    per_square = 1 / square
-    radial_var = (east2 * xx + north2 * yy + east * north * (2 * xy)) * per_square
-    bearing_per_var = 1 / (bearing_var + np.maximum(xx + yy - radial_var, 0) * per_square)
-    range_per_var = 1 / (range_var + radial_var)
-    turned = np.arctan2(north, east) - _single(samples[:, 2]) - _single(seen.bearing_rad[:, None])
+    turned = np.arctan2(north, east)
+    turned -= _single(samples[:, 2])
+    turned -= _single(seen.bearing_rad)[:, None]
     turned -= TURN * np.rint(turned / TURN)
-    away = np.sqrt(square) * _single(1 + samples[:, RANGE]) - _single(seen.range_m[:, None])
-    squared, sharp = np.zeros_like(square), np.ones_like(square)
-    for known, off, per_var, var in (
-        (seen.has_bearing, turned, bearing_per_var, bearing_var),
-        (seen.has_range, away, range_per_var, range_var),
-    ):
-        if known.all():
-            squared, sharp = squared + off * off * per_var, sharp * var * per_var
-        else:
-            squared[known] += (off * off * per_var)[known]
-            sharp[known] *= (var * per_var)[known]
-    return Comparison(squared, np.exp(np.minimum(squared, IMPOSSIBLE) / -2) * np.sqrt(sharp))
+    turned *= turned
+    turned *= per_turned[:, None]
+    east *= east
+    north *= north
+    away = np.sqrt(np.add(east, north, out=east), out=east)
+    away *= _single(1 + samples[:, RANGE])
+    away -= _single(seen.range_m)[:, None]
+    away *= away
+    away *= per_away[:, None]
+    squared = np.add(turned, away, out=away)
+    density = np.exp(np.minimum(squared, IMPOSSIBLE, out=turned) / -2)
+    density *= _single(np.sqrt(sharp))[:, None]
+    return Comparison(squared, density)
+
+
+def _variances(seen: Sighting, off_m: Samples) -> tuple[Samples, Samples]:
+    """(k,) of bearing and of range, of landmarks that are (k, 2) off."""
+    square = np.maximum((off_m**2).sum(axis=1), 1e-6)
+    radial = np.einsum("ka,kab,kb->k", off_m, seen.covariance_m2, off_m) / square
+    across = np.maximum(np.trace(seen.covariance_m2, axis1=1, axis2=2) - radial, 0.0)
+    return seen.bearing_sd_rad**2 + across / square, seen.range_sd_m**2 + radial
 
 
 def _single(numbers: Samples) -> Singles:
