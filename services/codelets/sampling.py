@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 Samples = npt.NDArray[np.float64]
-# How far samples that are all the same are spread where they must be: metres, metres, radians.
 STRAIGHTS = 4
 TURN = 2 * np.pi
+# How far samples that are all the same are spread where they must be: metres, metres, radians.
 HEAP = np.array([0.02, 0.02, 0.01])
 
 
