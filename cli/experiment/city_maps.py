@@ -17,8 +17,8 @@ from experiments.city_maps.environment import Environment, environments
 from experiments.city_maps.figures import camera_figures, figures
 from experiments.city_maps.fit import fitted
 from experiments.city_maps.measure import NOISE, TRAVERSALS, Effort, by_cameras, configurations, jobs, measure
-from experiments.city_maps.noise import Noise
 from experiments.city_maps.sources import folder, from_osm, grown
+from services.sim.odometry import Noise
 
 NAME = "city-maps"
 MAPS = 8
@@ -86,7 +86,7 @@ def city_maps(
     """
     where = outcome.folder_for(NAME, out)
     places = _places(osm, all_in, maps, seed)
-    asked = Noise(*noise)
+    asked = Noise(speed=noise[0], turn=noise[1], drift_rad_per_sqrt_m=noise[2])
     if fit:
         with bar("fitting the noise") as progress:
             asked = fitted(places, Effort(traversals, seed, processes, progress))

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 
 from bus.config import Sections
 from bus.errors import CogmapError
 from bus.graph import TILE_SIDE, Graph, object_id
-from bus.house import House
 from bus.module import Module
+from experiments import in_memory
 from experiments.city_maps.correction import settings
 from experiments.city_maps.environment import Environment
-from experiments.city_maps.noise import Noise
 from experiments.city_maps.streets import Points
 from schemas import topics
 from schemas.graph import Delta, Node
@@ -24,6 +24,7 @@ from services import table
 from services.codelets.path import ODOMETRY, POSE, STAMP, rows_of
 from services.codelets.pose_graph import rotations
 from services.codelets.sighted import Sightings
+from services.sim.odometry import Noise
 
 MIND = ("workspace", "codelets", "global_workspace", "action")
 SENSING = "percept-level sensing"
@@ -91,7 +92,7 @@ def sections(environment: Environment, tour: Tour, noise: Noise, method: str) ->
         for name, (x, y) in zip(environment.names, environment.buildings_m, strict=True)
     ]
     way = {"line_m": line.tolist(), "landmarks": landmarks, "speed_m_s": SPEED_M_S}
-    senses = {"noise": asdict(noise), "percepts": {"field_of_view_rad": LOOKING_ABOUT_RAD}}
+    senses = {"noise": msgspec.structs.asdict(noise), "percepts": {"field_of_view_rad": LOOKING_ABOUT_RAD}}
     rates = {"frame_hz": FRAME_HZ, "odometry_hz": FRAME_HZ, "awaits": dict.fromkeys(MIND, 1)}
     correction = settings(method, SPEED_M_S / FRAME_HZ)
     return {
@@ -110,14 +111,7 @@ def traverse(configured: Sections) -> Traversal:
 def driven(configured: Sections, modules: Sequence[Module]) -> Traversal:
     """As `traverse`, with these modules."""
     watcher = _Watcher()
-    house = House([*modules, watcher.module()])
-    try:
-        house.run()
-        for shell in house.shells:
-            if shell.intake.rejected:
-                raise CogmapError(f"{shell.module.name} refused messages: {dict(shell.intake.rejected)}")
-    finally:
-        house.close()
+    in_memory.run([*modules, watcher.module()])
     (x, y), (ahead_x, ahead_y) = configured["sim"]["way"]["line_m"][:2]
     names = tuple(each["name"] for each in configured["sim"]["way"]["landmarks"])
     origin = np.array([x, y, np.arctan2(ahead_y - y, ahead_x - x)])

@@ -14,7 +14,7 @@ from experiments.city_maps.tour import shortest_tour
 
 BUILDINGS = 8
 MOST_KM2 = 4.0
-LEAST_SIDE_M, MOST_SIDE_M = 400.0, 2000.0
+LEAST_SIDE_M, MOST_SIDE_M = 400.0, 1e3 * MOST_KM2**0.5
 LEAST_APART = 0.12
 FROM_STREET_M = (4.0, 35.0)
 TRIES = 400

@@ -9,7 +9,7 @@ import numpy as np
 from experiments.city_maps import published
 from experiments.city_maps.drive import SENSING
 from experiments.city_maps.measure import FELT, CityMap, Learned
-from experiments.city_maps.noise import Noise
+from services.sim.odometry import Noise
 
 NAMES = {FELT: "path_integration", "none": "uncorrected", "positions": "positions", "heading": "corrected"}
 

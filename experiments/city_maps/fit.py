@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -12,9 +11,9 @@ from experiments.city_maps import published
 from experiments.city_maps.drive import traverse
 from experiments.city_maps.environment import Environment
 from experiments.city_maps.measure import NOISE, Effort, Job, configurations, jobs, map_error_km2
-from experiments.city_maps.noise import Noise
 from experiments.cue_integration.fit import coordinate_descent
 from experiments.parallel import each
+from services.sim.odometry import Noise
 
 FIT_TRAVERSALS = 2
 FACTORS = (1.4, 1.15)
@@ -36,7 +35,7 @@ def fitted(environments: Sequence[Environment], effort: Effort) -> Noise:
         errors_km2 = each(positions_error_km2, tried, effort.processes, effort.progress)
         return float(np.mean(errors_km2) - published.HUMAN_MEAN_KM2) ** 2
 
-    return coordinate_descent(cost, replace(NOISE), FACTORS)
+    return coordinate_descent(cost, NOISE, FACTORS)
 
 
 def positions_error_km2(job: Job) -> float:

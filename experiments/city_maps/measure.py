@@ -12,9 +12,9 @@ from experiments import rendered
 from experiments.city_maps.correction import METHODS
 from experiments.city_maps.drive import MIND, Tour, Traversal, driven, sections, traverse
 from experiments.city_maps.environment import BUILDINGS, Environment
-from experiments.city_maps.noise import Noise
 from experiments.city_maps.streets import Points
 from experiments.parallel import Progress, each
+from services.sim.odometry import Noise
 
 TRAVERSALS = 12
 FELT = "felt"

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
+import msgspec
 
-Noise = TypeVar("Noise", bound="DataclassInstance")
+Noise = TypeVar("Noise", bound=msgspec.Struct)
 # Many pairs fit as well as one another; small steps from the same start keep either from running ahead.
 FACTORS = (1.2, 1.1)
 
@@ -26,7 +24,7 @@ def coordinate_descent(cost: Callable[[Noise], float], noise: Noise, factors: tu
             improved = False
             for name in ("speed", "turn"):
                 for step in (factor, 1 / factor):
-                    tried = replace(noise, **{name: getattr(noise, name) * step})
+                    tried = msgspec.structs.replace(noise, **{name: getattr(noise, name) * step})
                     if (found := cost(tried)) < lowest:
                         noise, lowest, improved = tried, found, True
                         break

@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 
 from experiments.cue_integration.geometry import CONFLICT_RAD, POSTS, ROUTES, Point, turned
@@ -19,8 +20,7 @@ class Condition(enum.Enum):
     CONFLICT = "conflict"
 
 
-@dataclass(frozen=True)
-class Noise:
+class Noise(msgspec.Struct, frozen=True):
     """Standard deviations as shares of what is sensed: of speed, of turn rate (fitted), and of distance.
 
     Directions to landmarks are off by as much across as distances are along.

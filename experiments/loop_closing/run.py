@@ -7,15 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 
 from bus.config import Sections
 from bus.errors import CogmapError
 from bus.graph import TILE_SIDE, Graph
-from bus.house import House
 from bus.module import Module
-from experiments import rendered
+from experiments import in_memory, rendered
 from experiments.loop_closing.rule import close_laps
 from experiments.parallel import Progress
 from schemas import topics
@@ -172,7 +172,7 @@ def sections(seed: int, method: str) -> Sections:
     rates = {"frame_hz": FRAME_HZ, "odometry_hz": FRAME_HZ, "awaits": dict.fromkeys(MIND, 1)}
     step_m = SPEED_M_S / FRAME_HZ
     return {
-        "sim": {"mode": "lockstep", "seed": seed, "noise": _plain(NOISE), "way": way(), **rates},
+        "sim": {"mode": "lockstep", "seed": seed, "noise": msgspec.structs.asdict(NOISE), "way": way(), **rates},
         "workspace": {"mode": "lockstep", "cell_m": CELL_M, "base_level_decay": 0.0, "path_spacing_m": step_m},
         "codelets": {
             "correct": method,
@@ -183,10 +183,6 @@ def sections(seed: int, method: str) -> Sections:
         },
         "action": {"mode": "lockstep"},
     }
-
-
-def _plain(noise: Noise) -> dict[str, float]:
-    return {name: getattr(noise, name) for name in noise.__struct_fields__}
 
 
 def drive(seed: int, method: str) -> Loop:
@@ -206,14 +202,7 @@ def driven(configured: Sections, modules: Sequence[Module]) -> Loop:
     observer = _Observer(places)
     watching = Module("observer").on(topics.DELTA, observer.on_delta).on(topics.TRUE_POSE, observer.on_pose)
     watching.on(topics.REPLAY, observer.on_replay)
-    house = House([*modules, watching])
-    try:
-        house.run()
-        for shell in house.shells:
-            if shell.intake.rejected:
-                raise CogmapError(f"{shell.module.name} refused messages: {dict(shell.intake.rejected)}")
-    finally:
-        house.close()
+    in_memory.run([*modules, watching])
     if observer.before is None or observer.after is None:
         raise CogmapError(f"no loop was closed on the way of seed {configured['sim']['seed']}")
     return Loop(observer.before, observer.after, observer.map(), observer.replays)

@@ -13,10 +13,10 @@ from experiments.city_maps.drive import Tour, sections, traverse
 from experiments.city_maps.environment import BUILDINGS, MOST_KM2, City, environments
 from experiments.city_maps.figures import figures
 from experiments.city_maps.measure import FELT, NOISE, CityMap, Learned, map_error_km2
-from experiments.city_maps.noise import Noise
 from experiments.city_maps.sources import from_osm, grown, plane_m
 from experiments.city_maps.streets import Streets, backwards
 from experiments.city_maps.tour import shortest_tour
+from services.sim.odometry import Noise
 
 CROSS = Streets(np.array([(0.0, 0.0), (100.0, 0.0), (-100.0, 0.0), (0.0, 100.0)]), np.array([(0, 1), (0, 2), (0, 3)]))
 
