@@ -38,7 +38,7 @@ test: setup ## every test but the one of the containers
 test-compose: setup ## build the containers and test them as they run
 	$(BIN)/python -m pytest tests/compose -m compose --timeout 1200
 
-lint: train-setup ## style, types, and who imports whom, torch for the types of training
+lint: setup ## style, types, and who imports whom
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy

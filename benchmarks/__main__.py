@@ -10,19 +10,19 @@ from typing import Any
 
 import click
 
-from benchmarks import cycle, deltas, losses
+from benchmarks import cycle, deltas, message_loss
 from benchmarks.localization import measure as localization
 from benchmarks.map_correction import measure as map_correction
 from benchmarks.perception import measure as perception
 from benchmarks.perception import stereo as perception_stereo
 from benchmarks.report import Bar, publish
 from benchmarks.spiking import measure as spiking
-from bus.command import run_command
-from bus.session import free_endpoint
 from cli.experiment.outcome import save_figure
 from cli.log.progress import bar
-from services.epam.camvid import camvid_iou
-from services.epam.road import DEFAULT_PATH as ROAD_WEIGHTS
+from cogmap.bus.session import free_endpoint
+from cogmap.runtime.command import run_command
+from services.epam.layout.road import DEFAULT_PATH as ROAD_WEIGHTS
+from training.photographs import camvid_iou
 
 BUS_BARS = {"delta_rate_ratio": Bar(0.5, at_least=True), "never_drop_lost": Bar(0)}
 
@@ -65,8 +65,8 @@ def benchmarks() -> None:
 def cycle_command(json_path: Path | None) -> None:
     """The cycle's latency, the bus's share of it, the speed of a replay, the error of the estimate.
 
-    Drives a lap of the demo's town in real time, every module a process, records it, and replays the log through
-    sensory, epam, workspace and codelets. Takes about a minute and a half.
+    Drives a lap of the demo's town in real time, every module a process, records it, and replays
+    the log through sensory, epam, workspace and codelets. Takes about a minute and a half.
     """
     with tempfile.TemporaryDirectory() as folder:
         publish("cycle", cycle.measure(Path(folder), _tell), cycle.BARS, json_path)
@@ -80,19 +80,26 @@ def cycle_command(json_path: Path | None) -> None:
     show_default=True,
     help="How often to measure both rates, one right after the other; the ratio is the median.",
 )
-@click.option("--deltas", "number", type=click.IntRange(100, 100_000), default=3000, show_default=True, help="Of each.")
+@click.option(
+    "--deltas",
+    "number",
+    type=click.IntRange(100, 100_000),
+    default=3000,
+    show_default=True,
+    help="Of each.",
+)
 @json_option
 def bus_command(pairs: int, number: int, json_path: Path | None) -> None:
     """The rate of committed deltas against raw Zenoh puts, and what is lost in a minute.
 
-    A workspace commits deltas of 31 KB that three replicas receive, validate and apply; the peer puts the same bytes
-    through the same router to three subscribers. Then the whole system drives for 60 s, recorded. Takes about two
-    minutes.
+    A workspace commits deltas of 31 KB that three replicas receive, validate and apply; the peer
+    puts the same bytes through the same router to three subscribers. Then the whole system drives
+    for 60 s, recorded. Takes about two minutes.
     """
     figures = deltas.measure(free_endpoint(), number, pairs, _tell)
     with tempfile.TemporaryDirectory() as folder:
-        _tell(f"driving for {losses.RUN_S:g} s, counting what is lost")
-        figures |= losses.measure(Path(folder))
+        _tell(f"driving for {message_loss.RUN_S:g} s, counting what is lost")
+        figures |= message_loss.measure(Path(folder))
     publish("bus", figures, BUS_BARS, json_path)
 
 
@@ -105,7 +112,12 @@ def bus_command(pairs: int, number: int, json_path: Path | None) -> None:
     help="Measure only the stereo matching, on a rectified pair of yours: its images, and the true disparities of the "
     "left one, as an image of --scale times the pixels, 0 where unknown.",
 )
-@click.option("--scale", type=click.FloatRange(0, min_open=True), metavar="N", help="Of --stereo; 1 if not given.")
+@click.option(
+    "--scale",
+    type=click.FloatRange(0, min_open=True),
+    metavar="N",
+    help="Of --stereo; 1 if not given.",
+)
 @click.option(
     "--camvid-test",
     nargs=2,
@@ -118,7 +130,7 @@ def bus_command(pairs: int, number: int, json_path: Path | None) -> None:
     "--road-weights",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Of --camvid-test: the road network, as python -m services.epam.train road --camvid wrote it; "
+    help="Of --camvid-test: the road network, as python -m training road --camvid wrote it; "
     "that of the running system if not given.",
 )
 @json_option
@@ -129,15 +141,18 @@ def perception_command(
     road_weights: Path | None,
     json_path: Path | None,
 ) -> None:
-    """What perception makes of towns that it never saw: names, new buildings, roads, depth, places, and how fast.
+    """What perception makes of towns that it never saw: names, new buildings, roads, depth, places,
+    and how fast.
 
-    Draws them, with light, noise and clutter, and looks at them with the modules of the running system, in two
-    processes. Takes four to five minutes on two cores; leave both to it.
+    Draws them, with light, noise and clutter, and looks at them with the modules of the running
+    system, in two processes. Takes four to five minutes on two cores; leave both to it.
     """
     if scale is not None and not stereo:
         raise click.BadParameter("it belongs to --stereo: give that too", param_hint="--scale")
     if road_weights is not None and not camvid_test:
-        raise click.BadParameter("it belongs to --camvid-test: give that too", param_hint="--road-weights")
+        raise click.BadParameter(
+            "it belongs to --camvid-test: give that too", param_hint="--road-weights"
+        )
     if not stereo and not camvid_test:
         publish("perception", perception.measure(), perception.BARS, json_path)
         return
@@ -160,14 +175,20 @@ def perception_command(
     metavar="DIR",
     help="A folder of the UTIAS MRCLAM sets, as published, its files packed with xz or not.",
 )
-@click.option("--processes", type=click.IntRange(1, 256), default=os.cpu_count() or 1, help="[default: one a core]")
+@click.option(
+    "--processes",
+    type=click.IntRange(1, 256),
+    default=os.cpu_count() or 1,
+    help="[default: one a core]",
+)
 @json_option
 def localization_command(folder: Path, processes: int, json_path: Path | None) -> None:
-    """How well real robots know where they are, on a map that is known and on one that they make; and how fast.
+    """How well real robots know where they are, on a map that is known and on one that they make;
+    and how fast.
 
-    Each of the set's robots alone, by the town's codelets: its sightings of other robots are left out. The map that
-    it makes is turned to fit the truth, and held against gtsam's batch smoother, which `make bench-setup` installs.
-    Takes some minutes.
+    Each of the set's robots alone, by the town's codelets: its sightings of other robots are left
+    out. The map that it makes is turned to fit the truth, and held against gtsam's batch smoother,
+    which `make bench-setup` installs. Takes some minutes.
     """
     publish("localization", localization.measure(folder, processes), localization.BARS, json_path)
 
@@ -189,11 +210,13 @@ def localization_command(folder: Path, processes: int, json_path: Path | None) -
     help="Its true poses, a line each: x, y and heading, with an index before them or not.",
 )
 @json_option
-def map_correction_command(graph_path: Path, truth_path: Path | None, json_path: Path | None) -> None:
+def map_correction_command(
+    graph_path: Path, truth_path: Path | None, json_path: Path | None
+) -> None:
     """How well and how fast loops are closed, on a pose graph that was recorded elsewhere.
 
-    By the paper's rule, for positions only, against exact least squares; with headings too, against gtsam, which
-    `make bench-setup` installs; and one closure at a time. Takes up to half a minute.
+    By the paper's rule, for positions only, against exact least squares; with headings too, against
+    gtsam, which `make bench-setup` installs; and one closure at a time. Takes up to half a minute.
     """
     figures = map_correction.measure(graph_path, truth_path)
     bars = {key: bar for key, bar in map_correction.BARS.items() if key in figures}
@@ -201,8 +224,15 @@ def map_correction_command(graph_path: Path, truth_path: Path | None, json_path:
 
 
 @benchmarks.command(name="spiking")
-@click.option("--seed", type=click.IntRange(0, 2**16), default=1, show_default=True, help="Which scenes.")
-@click.option("--processes", type=click.IntRange(1, 256), default=os.cpu_count() or 1, help="[default: one a core]")
+@click.option(
+    "--seed", type=click.IntRange(0, 2**16), default=1, show_default=True, help="Which scenes."
+)
+@click.option(
+    "--processes",
+    type=click.IntRange(1, 256),
+    default=os.cpu_count() or 1,
+    help="[default: one a core]",
+)
 @click.option(
     "--figure",
     "folder",
@@ -212,10 +242,12 @@ def map_correction_command(graph_path: Path, truth_path: Path | None, json_path:
 )
 @json_option
 def spiking_command(seed: int, processes: int, folder: Path | None, json_path: Path | None) -> None:
-    """The posterior that spikes of place cells give, against the exact one; and that by rejection of samples.
+    """The posterior that spikes of place cells give, against the exact one; and that by rejection
+    of samples.
 
-    Scenes with cues drawn at random: what path integration says of a position, and the distance to one or two walls.
-    A ratio is of standard deviations along x and y, an error is of the mean in exact standard deviations.
+    Scenes with cues drawn at random: what path integration says of a position, and the distance to
+    one or two walls. A ratio is of standard deviations along x and y, an error is of the mean in
+    exact standard deviations.
     """
     with bar("recording") as progress:
         scenes = spiking.measure(seed, processes, progress)

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from benchmarks.drive import drive
 from benchmarks.report import Bar
-from cli.run.drive import ROUTE_COMPLETE
-from cli.run.plan import LOG_NAME
-from logs.replay import replay_into
-from services import table
+from cli.launch.drive import ROUTE_COMPLETE
+from cli.launch.plan import LOG_NAME
+from cogmap.recording.replaying.replay import replay_into
+from services import registry
 
 REPLAYED = ("sensory", "epam", "workspace", "codelets")
 BARS = {
@@ -27,7 +27,7 @@ def measure(folder: Path, tell: Callable[[str], None]) -> dict[str, float]:
     tell("driving one lap in real time")
     figures, _ = drive(folder)
     tell(f"replaying it through {', '.join(REPLAYED)}")
-    replay = replay_into(folder / LOG_NAME, REPLAYED, table.build)
+    replay = replay_into(folder / LOG_NAME, REPLAYED, registry.build)
     if not replay.same:
         tell(f"the replay differs: {replay.first}")
     return {

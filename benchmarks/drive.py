@@ -9,29 +9,33 @@ from pathlib import Path
 import msgspec
 from rich.console import Console
 
-from bus.errors import CogmapError
-from bus.runner import Stop
-from bus.session import free_endpoint
+from cli.launch.drive import INTERRUPTED, Drive
+from cli.launch.metrics import Figures
+from cli.launch.observer import Errors, Observer
+from cli.launch.plan import LOG_NAME, Choices, effective, everybody
+from cli.launch.watch import Watch
 from cli.run import display, summary
 from cli.run.display import Display
-from cli.run.drive import INTERRUPTED, Drive
-from cli.run.figures import Figures
-from cli.run.observer import Errors, Observer
-from cli.run.plan import LOG_NAME, Choices, effective, everybody
-from cli.run.watch import Watch
-from logs.format import SUMMARY
-from logs.reader import LogReader
-from logs.recorder import Summary
+from cogmap.bus.session import free_endpoint
+from cogmap.errors import CogmapError
+from cogmap.recording.recorder import Summary
+from cogmap.recording.storage.format import SUMMARY
+from cogmap.recording.storage.reader import LogReader
+from cogmap.runtime.process import Stop
 
 PATIENCE_S = 180.0
 
 
 class Course(Stop):
-    """Asked to end after `seconds` of driving, too; it learns of them as a display, and shows them on another."""
+    """Asked to end after `seconds` of driving, too; it learns of them as a display, and shows them
+    on another.
+    """
 
     def __init__(self, shown_on: Display, seconds: float) -> None:
         super().__init__()
-        self._shown_on, self._seconds, self._elapsed_s = shown_on, seconds, 0.0
+        self._shown_on = shown_on
+        self._seconds = seconds
+        self._elapsed_s = 0.0
 
     @property
     def asked(self) -> bool:
@@ -62,8 +66,11 @@ class Course(Stop):
 
 
 def drive(folder: Path, laps: float = 1.0, seconds: float = PATIENCE_S) -> tuple[Figures, Watch]:
-    """Drive `laps`, at most `seconds`, leaving the files of `cogmap run` in `folder`. Ctrl-C ends the benchmark."""
-    began_s, choices = time.monotonic(), Choices(laps=laps)
+    """Drive `laps`, at most `seconds`, leaving the files of `cogmap run` in `folder`. Ctrl-C ends
+    the benchmark.
+    """
+    began_s = time.monotonic()
+    choices = Choices(laps=laps)
     sections = effective({}, choices, everybody(choices, observer=True))
     course = Course(display.on(Console(stderr=True)), seconds)
     run = Drive(folder, free_endpoint(), "agent", choices, sections, began_s)
@@ -80,8 +87,12 @@ def drive(folder: Path, laps: float = 1.0, seconds: float = PATIENCE_S) -> tuple
 
 
 def recording(folder: Path) -> Summary:
-    """What the recorder said of the drive in `folder`. Raises CogmapError where it did not come to its end."""
+    """What the recorder said of the drive in `folder`. Raises CogmapError where it did not come to
+    its end.
+    """
     about = LogReader(folder / LOG_NAME).about(SUMMARY)
     if not about:
-        raise CogmapError("the recorder was killed before it had finished: run the benchmark on an idle machine")
+        raise CogmapError(
+            "the recorder was killed before it had finished: run the benchmark on an idle machine"
+        )
     return msgspec.json.decode(about["json"], type=Summary)

@@ -1,4 +1,6 @@
-"""Benchmarks print a table and write flat JSON: every key with its value and the bar it is held against."""
+"""Benchmarks print a table and write flat JSON: every key with its value and the bar it is held
+against.
+"""
 
 from __future__ import annotations
 
@@ -30,8 +32,12 @@ class Bar:
         return f"{'≥' if self.at_least else '≤'} {self.limit:g}"
 
 
-def publish(title: str, figures: dict[str, float], bars: dict[str, Bar], json_path: Path | None) -> bool:
-    """Print and write `figures`; whether every bar holds. Figures without a bar tell how they came about."""
+def publish(
+    title: str, figures: dict[str, float], bars: dict[str, Bar], json_path: Path | None
+) -> bool:
+    """Print and write `figures`; whether every bar holds. Figures without a bar tell how they came
+    about.
+    """
     table = Table(title=title)
     for heading in ("key", "measured", "bar", ""):
         table.add_column(heading, justify="left" if heading == "key" else "right")

@@ -6,10 +6,10 @@ import json
 
 import click
 
-from bus.discovery import Process, Role, System
-from bus.errors import UsageError
 from cli.options import agent_option, connect_option, json_option
 from cli.topic.observing import look
+from cogmap.bus.discovery import Process, Role, System
+from cogmap.errors import UsageError
 from schemas.topics import Topic
 
 _VERBS = {Role.PUBLISHES: "publishes", Role.SUBSCRIBES: "subscribes", Role.ANSWERS: "answers"}
@@ -84,5 +84,8 @@ def to_dot(system: System) -> str:
     for process, roles in uses_of(system).items():
         lines += [f'  "{process.name}" -> "{topic.name}";' for topic in roles[Role.PUBLISHES]]
         lines += [f'  "{topic.name}" -> "{process.name}";' for topic in roles[Role.SUBSCRIBES]]
-        lines += [f'  "{topic.name}" -> "{process.name}" [dir=both, style=dashed];' for topic in roles[Role.ANSWERS]]
+        lines += [
+            f'  "{topic.name}" -> "{process.name}" [dir=both, style=dashed];'
+            for topic in roles[Role.ANSWERS]
+        ]
     return "\n".join([*lines, "}"])

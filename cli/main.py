@@ -8,10 +8,10 @@ from pathlib import Path
 
 import click
 
-from bus import config, runner
-from bus.command import run_command
 from cli.options import agent_option, config_option, connect_option, set_option
-from services import table
+from cogmap.runtime import config, process
+from cogmap.runtime.command import run_command
+from services import registry
 
 COMMANDS = {
     "architecture": "cli.architecture:architecture",
@@ -26,7 +26,9 @@ COMMANDS = {
 
 
 class _Commands(click.Group):
-    """Imports a command of COMMANDS when it is asked for: a module's process has no use for the others."""
+    """Imports a command of COMMANDS when it is asked for: a module's process has no use for the
+    others.
+    """
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return sorted([*super().list_commands(ctx), *COMMANDS])
@@ -44,14 +46,18 @@ class _Commands(click.Group):
 def cogmap(verbose: bool) -> None:
     """Cogmap: LIDA's cognitive cycle with spatial memory, every module a process on a message bus."""
     logging.basicConfig(
-        level=logging.DEBUG if verbose else logging.INFO, format="%(asctime)s %(message)s", datefmt="%H:%M:%S"
+        level=logging.DEBUG if verbose else logging.INFO,
+        format="%(asctime)s %(message)s",
+        datefmt="%H:%M:%S",
     )
 
 
 @cogmap.command()
 @click.argument("name", metavar="NAME")
 @click.option("--instance", default="", help="Its own name, where several of one module run.")
-@click.option("--state", type=click.Path(path_type=Path), help="A folder for what it must not lose.")
+@click.option(
+    "--state", type=click.Path(path_type=Path), help="A folder for what it must not lose."
+)
 @click.option("--tied", is_flag=True, help="End when standard input ends.")
 @connect_option
 @agent_option
@@ -68,8 +74,8 @@ def module(
     settings: tuple[str, ...],
 ) -> None:
     """Run one module as this process."""
-    built = table.build(name, config.load(config_path, settings), instance)
-    runner.run_module(built, connect, agent, state, runner.Stop(tied))
+    built = registry.build(name, config.load(config_path, settings), instance)
+    process.run_module(built, connect, agent, state, process.Stop(tied))
 
 
 @cogmap.command()
@@ -77,7 +83,7 @@ def module(
 @connect_option
 def router(tied: bool, connect: str) -> None:
     """Run the router that all modules meet at."""
-    runner.run_router(connect, runner.Stop(tied))
+    process.run_router(connect, process.Stop(tied))
 
 
 def main() -> None:

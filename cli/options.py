@@ -6,10 +6,14 @@ from pathlib import Path
 
 import click
 
-from bus.session import DEFAULT_ENDPOINT
+from cogmap.bus.session import DEFAULT_ENDPOINT
 
 connect_option = click.option(
-    "--connect", default=DEFAULT_ENDPOINT, show_default=True, envvar="COGMAP_CONNECT", help="The router's endpoint."
+    "--connect",
+    default=DEFAULT_ENDPOINT,
+    show_default=True,
+    envvar="COGMAP_CONNECT",
+    help="The router's endpoint.",
 )
 agent_option = click.option(
     "--agent",
@@ -26,6 +30,12 @@ config_option = click.option(
     help="A TOML file, a section a module.",
 )
 set_option = click.option(
-    "--set", "settings", multiple=True, metavar="MODULE.KEY=VALUE", help="Override one key; repeat at will."
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="MODULE.KEY=VALUE",
+    help="Override one key; repeat at will.",
 )
-json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON, for other programs.")
+json_option = click.option(
+    "--json", "as_json", is_flag=True, help="Print JSON, for other programs."
+)

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from bus.errors import CogmapError
-from bus.house import House
-from bus.module import Module
+from cogmap.errors import CogmapError
+from cogmap.runtime.in_process import House
+from cogmap.runtime.module import Module
 
 
 def run(modules: Iterable[Module]) -> None:
-    """Run them until nobody has anything left to do. Raises CogmapError where one refused a message."""
+    """Run them until nobody has anything left to do. Raises CogmapError where one refused a
+    message.
+    """
     house = House(modules)
     try:
         house.run()
         for shell in house.shells:
             if shell.intake.rejected:
-                raise CogmapError(f"{shell.module.name} refused messages: {dict(shell.intake.rejected)}")
+                raise CogmapError(
+                    f"{shell.module.name} refused messages: {dict(shell.intake.rejected)}"
+                )
     finally:
         house.close()

@@ -16,7 +16,10 @@ Progress = Callable[[float], None]
 
 
 def each(
-    work: Callable[[Job], Result], jobs: Sequence[Job], processes: int, progress: Progress = lambda share: None
+    work: Callable[[Job], Result],
+    jobs: Sequence[Job],
+    processes: int,
+    progress: Progress = lambda share: None,
 ) -> list[Result]:
     """`work` of every job, in the order of the jobs. `progress` is told the share done.
 

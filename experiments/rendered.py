@@ -1,4 +1,6 @@
-"""Runs with cameras: what other runs are told as percepts is drawn here, and seen by sensory memory and EPAM."""
+"""Runs with cameras: what other runs are told as percepts is drawn here, and seen by sensory memory
+and EPAM.
+"""
 
 from __future__ import annotations
 
@@ -7,15 +9,15 @@ import gc
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
-from bus.config import Sections
-from bus.errors import CogmapError
-from bus.module import Module
+from cogmap.errors import CogmapError
+from cogmap.runtime.config import Sections
+from cogmap.runtime.module import Module
 from experiments.parallel import Progress
 from schemas import topics
 from schemas.base import Message
 from schemas.sensing import MotorCommand, TruePose
-from services import table
-from services.sim.catalogue import CATALOGUE
+from services import registry
+from services.sim.rendering.catalogue import CATALOGUE
 
 # Of the time that all runs take.
 DRAWN_SHARE = 0.9
@@ -25,9 +27,11 @@ Result = TypeVar("Result")
 
 
 def with_cameras(sections: Sections) -> Sections:
-    """The configuration of a led robot that senses by cameras, from that of one that is told percepts.
+    """The configuration of a led robot that senses by cameras, from that of one that is told
+    percepts.
 
-    Its landmarks, in their order, become the buildings of the catalogue. Raises CogmapError where they are more.
+    Its landmarks, in their order, become the buildings of the catalogue. Raises CogmapError where
+    they are more.
     """
     changed: dict[str, Any] = copy.deepcopy(dict(sections))
     sim = changed["sim"]
@@ -46,7 +50,9 @@ def with_cameras(sections: Sections) -> Sections:
 def named(landmarks: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """`landmarks` by names of the catalogue. Raises CogmapError where it has too few."""
     if len(landmarks) > len(CATALOGUE):
-        raise CogmapError(f"cameras know {len(CATALOGUE)} kinds of building apart, too few for {len(landmarks)}")
+        raise CogmapError(
+            f"cameras know {len(CATALOGUE)} kinds of building apart, too few for {len(landmarks)}"
+        )
     return [
         {"name": kind.name, "x_m": each["x_m"], "y_m": each["y_m"]}
         for kind, each in zip(CATALOGUE, landmarks, strict=False)
@@ -54,7 +60,9 @@ def named(landmarks: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 class Tape:
-    """What was sensed in a run, frame by frame, to be given to other minds: a led robot senses whatever they think."""
+    """What was sensed in a run, frame by frame, to be given to other minds: a led robot senses
+    whatever they think.
+    """
 
     def __init__(self, progress: Progress = lambda share: None) -> None:
         self._frames: dict[int, list[Message]] = {}
@@ -94,19 +102,24 @@ def by_cameras(
 ) -> dict[str, Result]:
     """What `drive` gives for each of `configured`, which differ in their minds alone.
 
-    `drive` is given a configuration and the modules to run. The first run has everything; what was sensed in it is
-    given to the other minds, so that nothing is drawn or recognised twice.
+    `drive` is given a configuration and the modules to run. The first run has everything; what was
+    sensed in it is given to the other minds, so that nothing is drawn or recognised twice.
     """
-    tape, results = Tape(lambda share: progress(DRAWN_SHARE * share)), dict[str, Result]()
+    tape = Tape(lambda share: progress(DRAWN_SHARE * share))
+    results = dict[str, Result]()
     for name, sections in configured.items():
         seeing = with_cameras(sections)
-        minds = [table.build(module, seeing) for module in mind]
+        minds = [registry.build(module, seeing) for module in mind]
         if results:
             senses = [tape.player()]
         else:
-            senses = [*(table.build(module, seeing) for module in ("sim", *SENSES)), tape.recorder()]
+            senses = [
+                *(registry.build(module, seeing) for module in ("sim", *SENSES)),
+                tape.recorder(),
+            ]
         results[name] = drive(seeing, [*senses, *minds])
-        # A process has one renderer at a time, which goes with its module: now, not whenever that is found unused.
+        # A process has one renderer at a time, which goes with its module: now, not whenever that
+        # is found unused.
         del senses
         gc.collect()
     progress(1.0)

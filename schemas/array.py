@@ -14,7 +14,8 @@ MAX_DIMENSIONS = 4
 class Array(msgspec.Struct, frozen=True, eq=False, gc=False):
     """An n-dimensional array; floats in it are finite.
 
-    `data` is a view of the buffer it was decoded from or made of: encoding copies it once, decoding never.
+    `data` is a view of the buffer it was decoded from or made of: encoding copies it once, decoding
+    never.
     """
 
     dtype: str
@@ -24,13 +25,17 @@ class Array(msgspec.Struct, frozen=True, eq=False, gc=False):
     def __post_init__(self) -> None:
         expected = _ITEM_BYTES.get(self.dtype, 0)
         if not expected:
-            raise ValueError(f"array dtype {self.dtype!r} is none of {', '.join(sorted(_ITEM_BYTES))}")
+            raise ValueError(
+                f"array dtype {self.dtype!r} is none of {', '.join(sorted(_ITEM_BYTES))}"
+            )
         for side in self.shape:
             expected *= side if side >= 0 else 0
         if len(self.shape) > MAX_DIMENSIONS or min(self.shape, default=0) < 0:
             raise ValueError(f"array shape {self.shape} is not one of up to {MAX_DIMENSIONS} sizes")
         if len(self.data) != expected:
-            raise ValueError(f"array of shape {self.shape} needs {expected} bytes, got {len(self.data)}")
+            raise ValueError(
+                f"array of shape {self.shape} needs {expected} bytes, got {len(self.data)}"
+            )
         if self.dtype[1] == "f" and not np.isfinite(np.frombuffer(self.data, self.dtype)).all():
             raise ValueError("array holds NaN or infinity")
 

@@ -24,8 +24,8 @@ class Part(msgspec.Struct, kw_only=True, gc=False):
 class Message(Part, kw_only=True, gc=False):
     """What travels on a topic.
 
-    `stamp_ns` is the time of the sensing that it derives from; `seq` counts the messages of one `source` on
-    one topic from 0. The module that emits it fills in `seq` and `source`.
+    `stamp_ns` is the time of the sensing that it derives from; `seq` counts the messages of one
+    `source` on one topic from 0. The module that emits it fills in `seq` and `source`.
     """
 
     stamp_ns: Count = 0

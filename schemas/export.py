@@ -1,8 +1,9 @@
-"""The messages for other languages: `python -m schemas.export DIR` writes a JSON Schema for every topic.
+"""The messages for other languages: `python -m schemas.export DIR` writes a JSON Schema for every
+topic.
 
 With `--golden` it writes the golden bytes instead, which is how they are changed on purpose:
-`python -m schemas.export --golden schemas/golden`. JSON Schema has no bytes: `data` of an array, a base64 string
-there, is msgpack's bin.
+`python -m schemas.export --golden schemas/golden`. JSON Schema has no bytes: `data` of an array, a
+base64 string there, is msgpack's bin.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Any
 import msgspec
 
 from schemas import topics
-from schemas.samples import samples
+from schemas.examples import samples
 from schemas.topics import Topic
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -27,14 +28,18 @@ def file_name(topic: Topic, suffix: str) -> str:
 
 def json_schema(topic: Topic) -> dict[str, Any]:
     """The JSON Schema (2020-12) of what `topic` carries."""
-    about = {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": f"cogmap/{topic.name}"}
+    about = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": f"cogmap/{topic.name}",
+    }
     return about | msgspec.json.schema(topic.type)
 
 
 def export_schemas(folder: Path) -> list[Path]:
     """Write a JSON Schema for every topic into `folder`; the files written."""
     files = {
-        file_name(topic, ".json"): msgspec.json.format(msgspec.json.encode(json_schema(topic))) + b"\n"
+        file_name(topic, ".json"): msgspec.json.format(msgspec.json.encode(json_schema(topic)))
+        + b"\n"
         for topic in topics.ALL
     }
     return _write(folder, files)
@@ -43,7 +48,10 @@ def export_schemas(folder: Path) -> list[Path]:
 def export_golden(folder: Path) -> list[Path]:
     """Write the bytes of one message of every type into `folder`; the files written."""
     encode = msgspec.msgpack.encode
-    return _write(folder, {file_name(topics.of(message), ".msgpack"): encode(message) for message in samples()})
+    return _write(
+        folder,
+        {file_name(topics.of(message), ".msgpack"): encode(message) for message in samples()},
+    )
 
 
 def _write(folder: Path, files: dict[str, bytes]) -> list[Path]:

@@ -1,4 +1,5 @@
-"""The Current Situational Model as it travels: nodes, links, place tiles, operations, deltas, snapshots.
+"""The Current Situational Model as it travels: nodes, links, place tiles, operations, deltas,
+snapshots.
 
 Every operation states a result, never a change to one, so applying it twice is applying it once.
 """
@@ -15,9 +16,11 @@ from schemas.sensing import Unit
 
 
 class Node(Part, kw_only=True, tag="node"):
-    """A node of the graph. `samples`: float64 (n, d), positions (x_m, y_m) or poses (x_m, y_m, heading_rad).
+    """A node of the graph. `samples`: float64 (n, d), positions (x_m, y_m) or poses (x_m, y_m,
+    heading_rad).
 
-    Nodes of the kinds `path` and `correction` have rows of their own there: see services.codelets.path.
+    Nodes of the kinds `path` and `correction` have rows of their own there: see
+    services.codelets.mapping.path.
     """
 
     id: Name
@@ -45,10 +48,12 @@ class Links(Part, kw_only=True, tag="links"):
 
 
 class PlaceTile(Part, kw_only=True, tag="tile"):
-    """A square of place nodes in bulk: `side` x `side` cells of `cell_m`, row-major from (`x`, `y`) in tiles.
+    """A square of place nodes in bulk: `side` x `side` cells of `cell_m`, row-major from (`x`, `y`)
+    in tiles.
 
-    Cell (i, j) of the whole plane is the node `place:i:j`. `activation`, `road` and `traversable` are float32
-    (side, side); each cell links to its eight neighbours with the mean of the two cells' `traversable`.
+    Cell (i, j) of the whole plane is the node `place:i:j`. `activation`, `road` and `traversable`
+    are float32 (side, side); each cell links to its eight neighbours with the mean of the two
+    cells' `traversable`.
     """
 
     x: int
@@ -75,7 +80,9 @@ class DropLink(Part, kw_only=True, tag="drop_link"):
 
 
 class Activations(Part, kw_only=True, tag="activations"):
-    """New activations and base-levels of many nodes, float32 (n,): decay in bulk. An unknown node is passed over."""
+    """New activations and base-levels of many nodes, float32 (n,): decay in bulk. An unknown node
+    is passed over.
+    """
 
     ids: list[Name]
     values: Array
@@ -83,7 +90,9 @@ class Activations(Part, kw_only=True, tag="activations"):
 
 
 class Cells(Part, kw_only=True, tag="cells"):
-    """New values of some place nodes: int32 (n, 2) cells and a column float32 (n,). Unknown tiles come into being."""
+    """New values of some place nodes: int32 (n, 2) cells and a column float32 (n,). Unknown tiles
+    come into being.
+    """
 
     column: Name
     cells: Array
@@ -105,9 +114,11 @@ class Proposal(Message, kw_only=True):
 
 
 class Delta(Message, kw_only=True):
-    """A numbered commit. `version` follows the one before by 1; `tasks` are those whose proposals are in it.
+    """A numbered commit. `version` follows the one before by 1; `tasks` are those whose proposals
+    are in it.
 
-    `dropped` counts the answers since the delta before that are in none, and `refused` says why, of the first few.
+    `dropped` counts the answers since the delta before that are in none, and `refused` says why, of
+    the first few.
     """
 
     version: Count

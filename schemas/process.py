@@ -21,7 +21,9 @@ class Presence(Message, kw_only=True):
 
 
 class Health(Message, kw_only=True):
-    """How one process fares: counts since it started and, over the last second, what time and memory it took."""
+    """How one process fares: counts since it started and, over the last second, what time and
+    memory it took.
+    """
 
     module: Name
     instance: Name

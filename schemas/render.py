@@ -14,8 +14,8 @@ _NAMED = (msgspec.Struct, dict)
 def to_jsonable(message: Any, full: bool = False) -> Any:
     """`message`, or a part of one, as dicts, lists and scalars.
 
-    An array becomes its dtype, shape, least and greatest value (None where it is empty); with `full`, its dtype,
-    shape and nested lists of all values.
+    An array becomes its dtype, shape, least and greatest value (None where it is empty); with
+    `full`, its dtype, shape and nested lists of all values.
     """
     if isinstance(message, Array):
         return _array(message, full)
@@ -64,13 +64,17 @@ def _step(value: Any, step: str, path: str) -> Any:
         fields = _fields(value) if isinstance(value, msgspec.Struct) else value
         if step in fields:
             return fields[step]
-        raise LookupError(f"no {step!r} on the way to {path!r}: there are {', '.join(map(str, fields)) or 'no fields'}")
+        raise LookupError(
+            f"no {step!r} on the way to {path!r}: there are {', '.join(map(str, fields)) or 'no fields'}"
+        )
     if not isinstance(value, list | tuple | Array):
         raise LookupError(f"nothing is inside {value!r}, so no {step!r} on the way to {path!r}")
     try:
         return _element(value, int(step))
     except ValueError:
-        raise LookupError(f"{step!r} on the way to {path!r} is not a number, which an element needs") from None
+        raise LookupError(
+            f"{step!r} on the way to {path!r} is not a number, which an element needs"
+        ) from None
     except IndexError:
         raise LookupError(f"no element {step} on the way to {path!r}") from None
 
@@ -106,7 +110,11 @@ def _item(part: Any, full: bool) -> list[str]:
 
 
 def _is_nested(part: Any) -> bool:
-    return isinstance(part, (*_NAMED, list, tuple)) and not isinstance(part, Array) and _has_parts(part)
+    return (
+        isinstance(part, (*_NAMED, list, tuple))
+        and not isinstance(part, Array)
+        and _has_parts(part)
+    )
 
 
 def _has_parts(part: Any) -> bool:
@@ -122,7 +130,9 @@ def _array_line(array: Array, full: bool) -> str:
     shape = " x ".join(map(str, array.shape)) or "scalar"
     if full:
         return f"{array.dtype} {shape} {facts['data']}"
-    return f"{array.dtype} {shape}" + (f", {facts['min']} to {facts['max']}" if facts["min"] is not None else ", empty")
+    return f"{array.dtype} {shape}" + (
+        f", {facts['min']} to {facts['max']}" if facts["min"] is not None else ", empty"
+    )
 
 
 def _scalar(value: Any) -> str:

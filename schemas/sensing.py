@@ -15,10 +15,11 @@ Metres = Annotated[float, msgspec.Meta(ge=0, le=1e6)]
 
 
 class Calibration(Part, kw_only=True):
-    """A stereo camera: pinhole intrinsics in pixels, right camera relative to the left, mount on the robot.
+    """A stereo camera: pinhole intrinsics in pixels, right camera relative to the left, mount on
+    the robot.
 
-    `right_rotation_rad` is the rotation vector of the right camera in the left one's frame (x right, y down,
-    z forward); distortions are OpenCV's k1, k2, p1, p2, k3.
+    `right_rotation_rad` is the rotation vector of the right camera in the left one's frame (x
+    right, y down, z forward); distortions are OpenCV's k1, k2, p1, p2, k3.
     """
 
     width_px: Annotated[int, msgspec.Meta(ge=16, le=8192)]
@@ -36,7 +37,9 @@ class Calibration(Part, kw_only=True):
 
 
 class StereoFrame(Message, kw_only=True):
-    """A pair of RGB images, uint8 (height, width, 3), as the cameras gave them. `frame` counts from 0."""
+    """A pair of RGB images, uint8 (height, width, 3), as the cameras gave them. `frame` counts from
+    0.
+    """
 
     frame: Count
     left: Array
@@ -64,7 +67,9 @@ class SelfMotion(Message, kw_only=True):
 
 
 class View(Message, kw_only=True):
-    """The rectified left image, uint8 (h, w, 3), and depth along the optical axis, float32 (h, w); 0 is unknown."""
+    """The rectified left image, uint8 (h, w, 3), and depth along the optical axis, float32 (h, w);
+    0 is unknown.
+    """
 
     frame: Count
     image: Array
@@ -83,9 +88,9 @@ class RangeScan(Message, kw_only=True):
 class Percept(Part, kw_only=True):
     """One recognised object: a PAM node over threshold, and where it stands as seen from the robot.
 
-    Bearing (left positive) and range point to the object's estimated centre; `whole` says that neither
-    image border nor another object cuts it. `box_px` is left, top, width, height in the view; `outline_px` are the
-    corners, column and row, of a polygon around what is seen of it.
+    Bearing (left positive) and range point to the object's estimated centre; `whole` says that
+    neither image border nor another object cuts it. `box_px` is left, top, width, height in the
+    view; `outline_px` are the corners, column and row, of a polygon around what is seen of it.
     """
 
     label: Name
@@ -119,8 +124,8 @@ def _no_points() -> Array:
 class Percepts(Message, kw_only=True):
     """All that was recognised in one view.
 
-    `road_m` and `road_boundary_m`: float32 (n, 2), ground points seen as road, and where it ends, in the robot's
-    frame, x forward, y left. `matches` has at most one remembered view.
+    `road_m` and `road_boundary_m`: float32 (n, 2), ground points seen as road, and where it ends,
+    in the robot's frame, x forward, y left. `matches` has at most one remembered view.
     """
 
     frame: Count
@@ -131,14 +136,18 @@ class Percepts(Message, kw_only=True):
 
 
 class LearnedObject(Part, kw_only=True):
-    """A PAM node that one encounter gave: its label, and what the object looks like, float32 (n,) of length 1."""
+    """A PAM node that one encounter gave: its label, and what the object looks like, float32 (n,)
+    of length 1.
+    """
 
     label: Name
     embedding: Array
 
 
 class RememberedView(Part, kw_only=True):
-    """A view to recognise a place by: its `frame` and stamp, and `code`, uint8 (n,), for EPAM to compare."""
+    """A view to recognise a place by: its `frame` and stamp, and `code`, uint8 (n,), for EPAM to
+    compare.
+    """
 
     frame: Count
     view_ns: Count

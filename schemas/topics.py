@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
-from schemas import graph, mind, process, sensing
+from schemas import cognition, graph, process, sensing
 from schemas.base import Message
 
 KIB = 1024
@@ -13,7 +13,9 @@ MIB = 1024 * KIB
 
 
 class Delivery(enum.Enum):
-    """LATEST_WINS: a slow subscriber sees the newest. NEVER_DROP: every subscriber gets every message, in order."""
+    """LATEST_WINS: a slow subscriber sees the newest. NEVER_DROP: every subscriber gets every
+    message, in order.
+    """
 
     LATEST_WINS = "latest wins"
     NEVER_DROP = "never drop"
@@ -23,7 +25,8 @@ class Delivery(enum.Enum):
 class About(enum.Enum):
     """MODEL: what the agent senses, thinks and does, the same bytes for the same seed in lockstep.
 
-    PROCESS: how the processes fare, which differs from run to run. TRUTH: the simulator's; no module may subscribe.
+    PROCESS: how the processes fare, which differs from run to run. TRUTH: the simulator's; no
+    module may subscribe.
     """
 
     MODEL = "model"
@@ -33,9 +36,11 @@ class About(enum.Enum):
 
 @dataclass(frozen=True, eq=False)
 class Topic:
-    """A row of the table: `rate_hz` as in the default configuration, 0 where it depends on what happens.
+    """A row of the table: `rate_hz` as in the default configuration, 0 where it depends on what
+    happens.
 
-    Latency is counted from the messages that are `sensed`: they derive from the world, not from other messages.
+    Latency is counted from the messages that are `sensed`: they derive from the world, not from
+    other messages.
     """
 
     name: str
@@ -52,7 +57,9 @@ class Topic:
         return f"cogmap/{agent}/{self.name}"
 
 
-_LATEST, _NEVER, _REQUEST = Delivery.LATEST_WINS, Delivery.NEVER_DROP, Delivery.ON_REQUEST
+_LATEST = Delivery.LATEST_WINS
+_NEVER = Delivery.NEVER_DROP
+_REQUEST = Delivery.ON_REQUEST
 
 CLOCK = Topic("clock", process.Clock, 20, _LATEST, sensed=True)
 STEREO = Topic("camera/stereo", sensing.StereoFrame, 5, _LATEST, max_bytes=32 * MIB, sensed=True)
@@ -62,23 +69,25 @@ VIEW = Topic("sensory/view", sensing.View, 5, _LATEST, max_bytes=64 * MIB)
 SCAN = Topic("sensory/scan", sensing.RangeScan, 5, _LATEST)
 PERCEPTS = Topic("epam/percepts", sensing.Percepts, 5, _NEVER)
 LEARNED = Topic("epam/learned", sensing.Learned, 0, _NEVER, max_bytes=64 * MIB)
-TASK = Topic("workspace/task", mind.Task, 0, _NEVER, max_bytes=16 * MIB)
+TASK = Topic("workspace/task", cognition.Task, 0, _NEVER, max_bytes=16 * MIB)
 PROPOSAL = Topic("codelets/proposal", graph.Proposal, 0, _NEVER, max_bytes=16 * MIB)
 DELTA = Topic("workspace/delta", graph.Delta, 0, _NEVER, max_bytes=64 * MIB)
 SNAPSHOT = Topic("workspace/snapshot", graph.Snapshot, 0, _REQUEST, max_bytes=512 * MIB)
 SNAPSHOT_REQUEST = Topic("workspace/snapshot_request", graph.SnapshotRequest, 0, _REQUEST)
-REPLAY = Topic("codelets/replay", mind.Replay, 0, _NEVER, max_bytes=16 * MIB)
-COALITIONS = Topic("codelets/coalitions", mind.Coalitions, 5, _NEVER)
-COMPETITION = Topic("global_workspace/competition", mind.Competition, 5, _NEVER)
-BROADCAST = Topic("global_workspace/broadcast", mind.Broadcast, 0, _NEVER)
-ACTION = Topic("action/selected", mind.Action, 0, _NEVER)
+REPLAY = Topic("codelets/replay", cognition.Replay, 0, _NEVER, max_bytes=16 * MIB)
+COALITIONS = Topic("codelets/coalitions", cognition.Coalitions, 5, _NEVER)
+COMPETITION = Topic("global_workspace/competition", cognition.Competition, 5, _NEVER)
+BROADCAST = Topic("global_workspace/broadcast", cognition.Broadcast, 0, _NEVER)
+ACTION = Topic("action/selected", cognition.Action, 0, _NEVER)
 MOTOR_COMMAND = Topic("motor/command", sensing.MotorCommand, 5, _NEVER)
 TRUE_POSE = Topic("truth/pose", sensing.TruePose, 20, _LATEST, About.TRUTH, sensed=True)
 TRUE_TOWN = Topic("truth/town", sensing.TrueTown, 0.2, _NEVER, About.TRUTH, sensed=True)
 PRESENCE = Topic("presence", process.Presence, 0, _NEVER, About.PROCESS)
 HEALTH = Topic("health", process.Health, 0, _LATEST, About.PROCESS)
 
-ALL: tuple[Topic, ...] = tuple(value for value in list(globals().values()) if isinstance(value, Topic))
+ALL: tuple[Topic, ...] = tuple(
+    value for value in list(globals().values()) if isinstance(value, Topic)
+)
 BY_NAME: dict[str, Topic] = {topic.name: topic for topic in ALL}
 BY_TYPE: dict[type[Message], Topic] = {topic.type: topic for topic in ALL}
 

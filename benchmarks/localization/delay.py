@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from datasets.mrclam import Numbers
+from cogmap.data.mrclam import Numbers
 
 LAGS_S = np.arange(0.0, 0.525, 0.025)
 TOGETHER_S = 0.6
@@ -14,7 +14,8 @@ ENOUGH = 30
 
 
 class Delay:
-    """Compares how a landmark's bearing changes with how the wheels were told to turn, at each of `LAGS_S`.
+    """Compares how a landmark's bearing changes with how the wheels were told to turn, at each of
+    `LAGS_S`.
 
     The lag at which the two agree best, so far.
     """
@@ -35,6 +36,8 @@ class Delay:
             before = self._last.get(subject)
             if before is not None and 0 < stamp - before[0] < TOGETHER_S:
                 turned = heading_rad(stamp - LAGS_S) - heading_rad(before[0] - LAGS_S)
-                self._off += np.abs(np.remainder(bearing - before[1] + turned + np.pi, 2 * np.pi) - np.pi)
+                self._off += np.abs(
+                    np.remainder(bearing - before[1] + turned + np.pi, 2 * np.pi) - np.pi
+                )
                 self._pairs += 1
             self._last[subject] = (stamp, bearing)

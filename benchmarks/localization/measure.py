@@ -13,12 +13,12 @@ import numpy as np
 from rich.progress import track
 
 from benchmarks.localization import smoother, speed
-from benchmarks.localization.mind import Mind
+from benchmarks.localization.loop import Mind
 from benchmarks.localization.senses import Moment, label_of, moments
 from benchmarks.map_correction.measure import trajectory_error_m
 from benchmarks.report import Bar
-from datasets.mrclam import Numbers, Recording, Robot, read
-from services.codelets.path import ODOMETRY, POSE, STAMP, composed, step_between
+from cogmap.data.mrclam import Numbers, Recording, Robot, read
+from services.codelets.mapping.path import ODOMETRY, POSE, STAMP, composed, step_between
 
 BARS = {
     "known_map_rmse_m": Bar(0.15),
@@ -35,7 +35,9 @@ Landmarks = dict[int, tuple[float, float]]
 
 
 def measure(folder: Path, processes: int) -> dict[str, float]:
-    """Every figure of BARS, and others that tell how it came about. Raises UsageError where `folder` is no set."""
+    """Every figure of BARS, and others that tell how it came about. Raises UsageError where
+    `folder` is no set.
+    """
     smoother.check_installed()
     recording = read(folder)
     figures = speed.measure()
@@ -55,7 +57,9 @@ def measure(folder: Path, processes: int) -> dict[str, float]:
 
 def _told(recording: Recording) -> dict[str, float]:
     return {
-        "landmark_sightings": float(sum(len(robot.landmark_sightings) for robot in recording.robots)),
+        "landmark_sightings": float(
+            sum(len(robot.landmark_sightings) for robot in recording.robots)
+        ),
         "unread_barcodes": float(sum(robot.unread for robot in recording.robots)),
     }
 
@@ -63,22 +67,30 @@ def _told(recording: Recording) -> dict[str, float]:
 def judge(robot: Robot, landmarks: Landmarks) -> dict[str, float]:
     """The errors of one robot, each the mean over SEEDS.
 
-    `slam_rmse_m` is of the path as the map has it in the end, as the smoother's is; `slam_online_rmse_m` of what was
-    believed at each moment, when no later sighting had corrected it.
+    `slam_rmse_m` is of the path as the map has it in the end, as the smoother's is;
+    `slam_online_rmse_m` of what was believed at each moment, when no later sighting had corrected
+    it.
     """
     heard = list(moments(robot))
     stamps = np.array([moment.stamp_s for moment in heard])
     truth, judged = _truth(robot, stamps)
     even = judged & np.array([moment.tick for moment in heard])
-    known = [follow(heard, landmarks, tuple(_truth(robot, robot.odometry[:1, 0])[0][0]), seed) for seed in SEEDS]
+    known = [
+        follow(heard, landmarks, tuple(_truth(robot, robot.odometry[:1, 0])[0][0]), seed)
+        for seed in SEEDS
+    ]
     slam = [follow(heard, {}, (0.0, 0.0, 0.0), seed) for seed in SEEDS]
 
     def aligned_m(path: Numbers) -> float:
         return trajectory_error_m(path[judged, :2], truth[judged, :2])
 
     return {
-        "known_map_rmse_m": float(np.mean([_rmse(drive.online[judged], truth[judged]) for drive in known])),
-        "known_map_rmse_even_m": float(np.mean([_rmse(drive.online[even], truth[even]) for drive in known])),
+        "known_map_rmse_m": float(
+            np.mean([_rmse(drive.online[judged], truth[judged]) for drive in known])
+        ),
+        "known_map_rmse_even_m": float(
+            np.mean([_rmse(drive.online[even], truth[even]) for drive in known])
+        ),
         "slam_rmse_m": float(np.mean([aligned_m(drive.corrected(stamps)) for drive in slam])),
         "slam_online_rmse_m": float(np.mean([aligned_m(drive.online) for drive in slam])),
         "smoother_rmse_m": aligned_m(smoother.smooth(heard)),
@@ -87,25 +99,36 @@ def judge(robot: Robot, landmarks: Landmarks) -> dict[str, float]:
 
 
 class Drive(NamedTuple):
-    """What was believed of a drive: (n, 3) poses `online` and by path integration at each moment; `path` in the end."""
+    """What was believed of a drive: (n, 3) poses `online` and by path integration at each moment;
+    `path` in the end.
+    """
 
     online: Numbers
     odometry: Numbers
     path: Numbers
 
     def corrected(self, stamps_s: Numbers) -> Numbers:
-        """(n, 3) poses at the moments as the map has them in the end: each by the path's last place before it."""
+        """(n, 3) poses at the moments as the map has them in the end: each by the path's last place
+        before it.
+        """
         places = (np.searchsorted(self.path[:, STAMP], stamps_s + 1e-6) - 1).clip(0)
         steps = zip(self.path[places], self.odometry, strict=True)
-        return np.array([composed(place[POSE], step_between(place[ODOMETRY], now)) for place, now in steps])
+        return np.array(
+            [composed(place[POSE], step_between(place[ODOMETRY], now)) for place, now in steps]
+        )
 
 
-def follow(heard: Iterable[Moment], landmarks: Landmarks, start: tuple[float, ...], seed: int) -> Drive:
+def follow(
+    heard: Iterable[Moment], landmarks: Landmarks, start: tuple[float, ...], seed: int
+) -> Drive:
     """What the codelets make of what was heard."""
     mind = Mind((start[0], start[1], start[2]), seed=seed)
     if landmarks:
-        mind.learn({label_of(subject): where for subject, where in landmarks.items()}, surveyed=True)
-    poses, odometry = [], []
+        mind.learn(
+            {label_of(subject): where for subject, where in landmarks.items()}, surveyed=True
+        )
+    poses = []
+    odometry = []
     for moment in heard:
         mind.live(moment)
         poses.append(mind.pose)
@@ -114,12 +137,18 @@ def follow(heard: Iterable[Moment], landmarks: Landmarks, start: tuple[float, ..
 
 
 def _recovery_s(robot: Robot, landmarks: Landmarks) -> float:
-    """How long after it was carried away it takes the robot to know, within FOUND_M and for good, where it is.
+    """How long after it was carried away it takes the robot to know, within FOUND_M and for good,
+    where it is.
 
-    A minute of its log never reaches it: neither that it moved nor what it saw. Counted from its next sighting on.
+    A minute of its log never reaches it: neither that it moved nor what it saw. Counted from its
+    next sighting on.
     """
     begin_s = float(robot.odometry[0, 0])
-    heard = [moment for moment in moments(robot, CARRIED_S) if moment.stamp_s < begin_s + 2 * CARRIED_S[1]]
+    heard = [
+        moment
+        for moment in moments(robot, CARRIED_S)
+        if moment.stamp_s < begin_s + 2 * CARRIED_S[1]
+    ]
     stamps = np.array([moment.stamp_s for moment in heard])
     truth, judged = _truth(robot, stamps)
     path = follow(heard, landmarks, tuple(_truth(robot, robot.odometry[:1, 0])[0][0]), 0).online
@@ -138,7 +167,9 @@ def _rmse(path: Numbers, truth: Numbers) -> float:
 
 
 def _truth(robot: Robot, stamps_s: Numbers) -> tuple[Numbers, np.ndarray]:
-    """(n, 3) true poses at `stamps_s`, and where motion capture saw the robot just before and just after."""
+    """(n, 3) true poses at `stamps_s`, and where motion capture saw the robot just before and just
+    after.
+    """
     known_s = robot.truth[:, 0]
     columns = (robot.truth[:, 1], robot.truth[:, 2], np.unwrap(robot.truth[:, 3]))
     poses = np.column_stack([np.interp(stamps_s, known_s, column) for column in columns])

@@ -1,4 +1,6 @@
-"""An MRCLAM robot's log as percepts and self-motion: what EPAM and sensory memory are to the town's agent."""
+"""An MRCLAM robot's log as percepts and self-motion: what EPAM and sensory memory are to the town's
+agent.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.localization.delay import Delay
-from datasets.mrclam import Numbers, Robot
+from cogmap.data.mrclam import Numbers, Robot
 from schemas.sensing import Percept
 from services.sensory.module import Config as SensoryConfig
 
@@ -20,7 +22,9 @@ WHEELS = SensoryConfig()
 
 @dataclass(frozen=True)
 class Moment:
-    """What came in up to `stamp_s`: rows of self-motion as in SelfMotion, and percepts; `tick` comes at even times."""
+    """What came in up to `stamp_s`: rows of self-motion as in SelfMotion, and percepts; `tick`
+    comes at even times.
+    """
 
     stamp_s: float
     motions: Numbers
@@ -34,11 +38,14 @@ def label_of(subject: int) -> str:
 
 
 def percept_of(row: Numbers) -> Percept:
-    """A sighting (stamp, subject, range, bearing) as a percept: noise 3 % of the distance, as the paper's, and 1°.
+    """A sighting (stamp, subject, range, bearing) as a percept: noise 3 % of the distance, as the
+    paper's, and 1°.
 
-    What a set calls range is how high an upright barcode looks, which is its depth along the camera's axis.
+    What a set calls range is how high an upright barcode looks, which is its depth along the
+    camera's axis.
     """
-    depth_m, bearing_rad = float(row[2]), float(row[3])
+    depth_m = float(row[2])
+    bearing_rad = float(row[3])
     range_m = depth_m / max(np.cos(bearing_rad), 0.1)
     return Percept(
         label=label_of(int(row[1])),
@@ -55,10 +62,11 @@ def percept_of(row: Numbers) -> Percept:
 
 
 class Wheels:
-    """The odometry's commands as self-motion, with the noise that the town's sensory memory gives its own wheels.
+    """The odometry's commands as self-motion, with the noise that the town's sensory memory gives
+    its own wheels.
 
-    The paper's noise multiplies the speeds of a movement: here of a second's, so that the rate of the log does not
-    matter.
+    The paper's noise multiplies the speeds of a movement: here of a second's, so that the rate of
+    the log does not matter.
     """
 
     def __init__(self, odometry: Numbers) -> None:
@@ -79,10 +87,13 @@ class Wheels:
         if until_s <= max(since_s, self._stamps[0]):
             return np.empty((0, 5))
         speeds = self._speeds[first:last]
-        edges = np.concatenate([[max(since_s, self._stamps[0])], self._stamps[first + 1 : last], [until_s]])
+        edges = np.concatenate(
+            [[max(since_s, self._stamps[0])], self._stamps[first + 1 : last], [until_s]]
+        )
         begins = np.flatnonzero(np.append(True, (speeds[1:] != speeds[:-1]).any(axis=1)))
         lasts_s = np.diff(np.append(edges[begins], until_s))
-        begins, lasts_s = begins[lasts_s > 0], lasts_s[lasts_s > 0]
+        begins = begins[lasts_s > 0]
+        lasts_s = lasts_s[lasts_s > 0]
         speed, turn_rate = speeds[begins].T
         speed_sd = WHEELS.speed_noise * np.abs(speed) / np.sqrt(lasts_s)
         drift_var = WHEELS.drift_rad_per_sqrt_m**2 * np.abs(speed)
@@ -95,16 +106,20 @@ def moments(robot: Robot, skipped_s: tuple[float, float] | None = None) -> Itera
 
     Between `skipped_s`, seconds after its start, nothing reaches it: it is carried away.
     """
-    begin_s, end_s = float(robot.odometry[0, 0]), float(robot.odometry[-1, 0])
+    begin_s = float(robot.odometry[0, 0])
+    end_s = float(robot.odometry[-1, 0])
     seen = robot.landmark_sightings
     seen = seen[(seen[:, 0] > begin_s) & (seen[:, 0] <= end_s)]
     ticks = np.arange(begin_s + TICK_S, end_s, TICK_S)
     stamps = np.union1d(ticks, seen[:, 0])
     is_tick = np.isin(stamps, ticks)
-    wheels, delay = Wheels(robot.odometry), Delay()
+    wheels = Wheels(robot.odometry)
+    delay = Delay()
     moved_until_s = begin_s
     for stamp, tick in zip(stamps.tolist(), is_tick.tolist(), strict=True):
-        here = seen[np.searchsorted(seen[:, 0], stamp, "left") : np.searchsorted(seen[:, 0], stamp, "right")]
+        here = seen[
+            np.searchsorted(seen[:, 0], stamp, "left") : np.searchsorted(seen[:, 0], stamp, "right")
+        ]
         delay.see(here, wheels.heading_rad)
         sensed_s = max(moved_until_s, stamp - delay.lag_s)
         if skipped_s is not None and skipped_s[0] <= stamp - begin_s < skipped_s[1]:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.localization.senses import Moment
-from bus.errors import UsageError
-from datasets.mrclam import Numbers
+from cogmap.data.mrclam import Numbers
+from cogmap.errors import UsageError
 
 gtsam: Any
 try:
@@ -26,23 +26,29 @@ CAUCHY = 2.0
 def check_installed() -> None:
     """Raise UsageError where gtsam is not installed."""
     if gtsam is None:
-        raise UsageError("gtsam is not installed, and this benchmark measures against it: run make bench-setup")
+        raise UsageError(
+            "gtsam is not installed, and this benchmark measures against it: run make bench-setup"
+        )
 
 
 def smooth(moments: list[Moment]) -> Numbers:
-    """(n, 3) poses at the moments that fit all percepts and motions best, landmarks unknown, the start at 0.
+    """(n, 3) poses at the moments that fit all percepts and motions best, landmarks unknown, the
+    start at 0.
 
-    Levenberg-Marquardt on the same percepts, motions and noise that the codelets get; Cauchy's weights, so that a
-    landmark taken for another does not count for much.
+    Levenberg-Marquardt on the same percepts, motions and noise that the codelets get; Cauchy's
+    weights, so that a landmark taken for another does not count for much.
     """
-    graph, start = gtsam.NonlinearFactorGraph(), gtsam.Values()
+    graph = gtsam.NonlinearFactorGraph()
+    start = gtsam.Values()
     pose = gtsam.Pose2(0.0, 0.0, 0.0)
     start.insert(_pose(0), pose)
     graph.add(gtsam.PriorFactorPose2(_pose(0), pose, gtsam.noiseModel.Constrained.All(3)))
     for index, moment in enumerate(moments, 1):
         way, sd = _step(moment.motions)
         noise = gtsam.noiseModel.Diagonal.Sigmas(sd)
-        graph.add(gtsam.BetweenFactorPose2(_pose(index - 1), _pose(index), gtsam.Pose2(*way), noise))
+        graph.add(
+            gtsam.BetweenFactorPose2(_pose(index - 1), _pose(index), gtsam.Pose2(*way), noise)
+        )
         pose = pose.compose(gtsam.Pose2(*way))
         start.insert(_pose(index), pose)
         _add_percepts(graph, start, index, pose, moment)
@@ -62,12 +68,18 @@ def _add_percepts(graph: Any, start: Any, index: int, pose: Any, moment: Moment)
     robust = gtsam.noiseModel.mEstimator.Cauchy.Create(CAUCHY)
     for percept in moment.percepts:
         landmark = gtsam.symbol("l", int(percept.label.rpartition("-")[2]))
-        sd = gtsam.noiseModel.Diagonal.Sigmas(np.array([percept.bearing_sd_rad, percept.range_sd_m]))
+        sd = gtsam.noiseModel.Diagonal.Sigmas(
+            np.array([percept.bearing_sd_rad, percept.range_sd_m])
+        )
         bearing = gtsam.Rot2(percept.bearing_rad)
         noise = gtsam.noiseModel.Robust.Create(robust, sd)
-        graph.add(gtsam.BearingRangeFactor2D(_pose(index), landmark, bearing, percept.range_m, noise))
+        graph.add(
+            gtsam.BearingRangeFactor2D(_pose(index), landmark, bearing, percept.range_m, noise)
+        )
         if not start.exists(landmark):
-            ahead = percept.range_m * np.array([np.cos(percept.bearing_rad), np.sin(percept.bearing_rad)])
+            ahead = percept.range_m * np.array(
+                [np.cos(percept.bearing_rad), np.sin(percept.bearing_rad)]
+            )
             start.insert(landmark, pose.transformFrom(ahead))
 
 
@@ -78,5 +90,7 @@ def _step(rows: Numbers) -> tuple[Numbers, Numbers]:
     heading = np.cumsum(turn) - turn / 2
     way_sd = float(np.sqrt(np.square(speed_sd * dt).sum()))
     turn_sd = float(np.sqrt(np.square(turn_rate_sd * dt).sum()))
-    way = np.array([(speed * dt * np.cos(heading)).sum(), (speed * dt * np.sin(heading)).sum(), turn.sum()])
+    way = np.array(
+        [(speed * dt * np.cos(heading)).sum(), (speed * dt * np.sin(heading)).sum(), turn.sum()]
+    )
     return way, np.array([way_sd, SIDEWAYS_SHARE * way_sd, turn_sd]) + LEAST_SD

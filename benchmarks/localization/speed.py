@@ -7,20 +7,25 @@ import time
 
 import numpy as np
 
-from benchmarks.localization.mind import Mind
+from benchmarks.localization.loop import Mind
 from benchmarks.localization.senses import BEARING_SD_RAD, RANGE_NOISE, Moment, label_of
 from schemas.sensing import Percept
 
 IN_VIEW = 10
-SMALL, LARGE = 100, 100_000
+SMALL = 100
+LARGE = 100_000
 UPDATES = 600
 WARM_UP = 50
-STEP_S, SPEED_M_S, TURN_RATE = 0.2, 1.0, 0.1
+STEP_S = 0.2
+SPEED_M_S = 1.0
+TURN_RATE = 0.1
 SEED = 11
 
 
 class Round:
-    """A robot on a circle among landmarks, of which it has always the ten nearest in view, and others far away."""
+    """A robot on a circle among landmarks, of which it has always the ten nearest in view, and
+    others far away.
+    """
 
     def __init__(self, landmarks: int) -> None:
         rng = np.random.default_rng(SEED)
@@ -31,7 +36,10 @@ class Round:
         self._rng = rng
         self._time_s = 0.0
         self.mind = Mind((float(self._pose[0]), float(self._pose[1]), 0.0))
-        self.mind.learn({label_of(i): (float(x), float(y)) for i, (x, y) in enumerate(np.vstack([near, far]))}, False)
+        self.mind.learn(
+            {label_of(i): (float(x), float(y)) for i, (x, y) in enumerate(np.vstack([near, far]))},
+            False,
+        )
 
     def next(self) -> Moment:
         """It drives on for a step, and looks."""
@@ -47,7 +55,9 @@ class Round:
         return Moment(self._time_s, motions, percepts, True)
 
     def _percept(self, index: int, distance: float, offset: np.ndarray) -> Percept:
-        bearing = float(np.arctan2(offset[1], offset[0]) - self._pose[2] + self._rng.normal(0.0, BEARING_SD_RAD))
+        bearing = float(
+            np.arctan2(offset[1], offset[0]) - self._pose[2] + self._rng.normal(0.0, BEARING_SD_RAD)
+        )
         return Percept(
             label=label_of(index),
             activation=1.0,
@@ -77,7 +87,10 @@ def measure() -> dict[str, float]:
             each.mind.map(moment)
             times[size].append((localized - began, time.perf_counter() - began))
     gc.unfreeze()
-    own, whole = (np.array([column[WARM_UP:] for column in zip(*times[size], strict=True)]) * 1e3 for size in rounds)
+    own, whole = (
+        np.array([column[WARM_UP:] for column in zip(*times[size], strict=True)]) * 1e3
+        for size in rounds
+    )
     return {
         "update_ms_p50": float(np.median(own[0])),
         "update_ms_p99": float(np.quantile(own[0], 0.99)),

@@ -13,14 +13,14 @@ from rich.progress import track
 
 from benchmarks.map_correction.reference import Gtsam, best_positions
 from benchmarks.report import Bar
-from bus.errors import MessageError, UsageError
-from datasets.g2o import read_g2o
-from datasets.pose_graph import PoseGraphFile, read_true_positions
-from datasets.toro import read_toro
-from services.codelets.least_squares import correct_headings
-from services.codelets.pose_graph import Constraints, Floats, PoseGraph, cost
-from services.codelets.replay import close_loops, displacements, position_cost
-from services.codelets.solved import Solved
+from cogmap.data.g2o import read_g2o
+from cogmap.data.pose_graph import PoseGraphFile, read_true_positions
+from cogmap.data.toro import read_toro
+from cogmap.errors import MessageError, UsageError
+from services.codelets.correction.incremental import Solved
+from services.codelets.correction.least_squares import correct_headings
+from services.codelets.correction.pose_graph import Constraints, Floats, PoseGraph, cost
+from services.codelets.correction.reverse_replay import close_loops, displacements, position_cost
 
 BARS = {
     "positions_cost_ratio": Bar(1.05),
@@ -30,14 +30,17 @@ BARS = {
 }
 READERS = {".g2o": read_g2o, ".graph": read_toro, ".toro": read_toro}
 PAIRS = 7
-NEW_CLOSURES, HELD_OUT_AT_MOST = 200, 0.5
+NEW_CLOSURES = 200
+HELD_OUT_AT_MOST = 0.5
 SETTLE_EVERY = 20
 SEED = 4
 T = TypeVar("T")
 
 
 def read_graph(path: Path) -> PoseGraph:
-    """The path of a pose graph file, its kind told by its name. Raises UsageError where it cannot be read."""
+    """The path of a pose graph file, its kind told by its name. Raises UsageError where it cannot
+    be read.
+    """
     suffix = Path(path.stem).suffix if path.suffix == ".xz" else path.suffix
     if suffix not in READERS:
         raise UsageError(f"{path} is none of {', '.join(READERS)}, or one of them packed as .xz")
@@ -50,26 +53,36 @@ def read_graph(path: Path) -> PoseGraph:
 
 
 def trajectory_error_m(positions_m: Floats, truth_m: Floats) -> float:
-    """Root mean square distance of (n, 2) positions from the true ones, once turned and moved to fit them best."""
-    found, true = positions_m - positions_m.mean(axis=0), truth_m - truth_m.mean(axis=0)
+    """Root mean square distance of (n, 2) positions from the true ones, once turned and moved to
+    fit them best.
+    """
+    found = positions_m - positions_m.mean(axis=0)
+    true = truth_m - truth_m.mean(axis=0)
     left, _, right = np.linalg.svd(found.T @ true)
     turn = left @ np.diag([1.0, np.linalg.det(left @ right)]) @ right
     return float(np.sqrt(np.square(found @ turn - true).sum(axis=1).mean()))
 
 
 def measure(graph_path: Path, truth_path: Path | None) -> dict[str, float]:
-    """Every figure of BARS, and others that tell how it came about; errors only where there is a truth."""
+    """Every figure of BARS, and others that tell how it came about; errors only where there is a
+    truth.
+    """
     graph = read_graph(graph_path)
     truth_m = None if truth_path is None else read_true_positions(truth_path)
     if truth_m is not None and len(truth_m) != len(graph.poses):
-        raise UsageError(f"{truth_path} has {len(truth_m)} poses, {graph_path} has {len(graph.poses)}")
+        raise UsageError(
+            f"{truth_path} has {len(truth_m)} poses, {graph_path} has {len(graph.poses)}"
+        )
     peer = Gtsam(graph.poses, graph.constraints)
     figures = {"poses": float(len(graph.poses)), "closures": float(len(graph.closures))}
     positions_m, told = _positions(graph)
     poses, peers_poses, times = _headings(graph, peer)
     figures |= told | times
     if truth_m is not None:
-        errors = [trajectory_error_m(found[:, :2], truth_m) for found in (graph.poses, positions_m, poses, peers_poses)]
+        errors = [
+            trajectory_error_m(found[:, :2], truth_m)
+            for found in (graph.poses, positions_m, poses, peers_poses)
+        ]
         names = ("ate_uncorrected_m", "ate_positions_m", "ate_m", "ate_gtsam_m")
         figures |= dict(zip(names, errors, strict=True)) | {"ate_vs_gtsam": errors[2] / errors[3]}
     return figures | _incremental(graph, cost(poses, graph.constraints))
@@ -90,7 +103,8 @@ def _positions(graph: PoseGraph) -> tuple[Floats, dict[str, float]]:
 
 def _headings(graph: PoseGraph, peer: Gtsam) -> tuple[Floats, Floats, dict[str, float]]:
     """Both from the same poses, each once to warm up, then in turn; each one's median time."""
-    by_qr, poses = peer.gives_up(), correct_headings(graph)
+    by_qr = peer.gives_up()
+    poses = correct_headings(graph)
     peers_poses = peer.poses(peer.solve())
     rounds = [
         (_timed(lambda: correct_headings(graph))[0], _timed(peer.solve)[0])
@@ -110,13 +124,18 @@ def _headings(graph: PoseGraph, peer: Gtsam) -> tuple[Floats, Floats, dict[str, 
 
 
 def _incremental(graph: PoseGraph, batch_cost: float) -> dict[str, float]:
-    """Closures left out at random come one at a time; factoring anew, as between two closures, is timed apart."""
+    """Closures left out at random come one at a time; factoring anew, as between two closures, is
+    timed apart.
+    """
     count = min(NEW_CLOSURES, int(HELD_OUT_AT_MOST * len(graph.closures)))
     held_out = np.random.default_rng(SEED).permutation(len(graph.closures))[:count]
     rest = np.setdiff1d(np.arange(len(graph.closures)), held_out)
     solved = Solved(PoseGraph(graph.poses, graph.steps, graph.closures.select(rest)))
-    took_s, settling_s = [], []
-    for number, index in enumerate(track(held_out.tolist(), "closing one more loop", transient=True), 1):
+    took_s = []
+    settling_s = []
+    for number, index in enumerate(
+        track(held_out.tolist(), "closing one more loop", transient=True), 1
+    ):
         closure = graph.closures.select(np.array([index]))
         took_s.append(_timed(partial(solved.close, closure))[0])
         if number % SETTLE_EVERY == 0:

@@ -9,9 +9,9 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from bus.errors import UsageError
-from services.codelets.pose_graph import Constraints, Floats, PoseGraph
-from services.codelets.replay import displacements
+from cogmap.errors import UsageError
+from services.codelets.correction.pose_graph import Constraints, Floats, PoseGraph
+from services.codelets.correction.reverse_replay import displacements
 
 gtsam: Any
 try:
@@ -21,8 +21,11 @@ except ImportError:
 
 
 def best_positions(graph: PoseGraph) -> Floats:
-    """(n, 2) positions that minimise eq. 7 exactly, the headings and the first position as they are."""
-    constraints, count = graph.constraints, len(graph.poses)
+    """(n, 2) positions that minimise eq. 7 exactly, the headings and the first position as they
+    are.
+    """
+    constraints = graph.constraints
+    count = len(graph.poses)
     known = displacements(graph.poses, constraints)
     edges = np.arange(len(constraints))
     signs = np.repeat([1.0, -1.0], len(constraints))
@@ -30,7 +33,8 @@ def best_positions(graph: PoseGraph) -> Floats:
     across = sparse.csr_matrix((signs, (np.tile(edges, 2), ends)), shape=(len(constraints), count))
     differences = sparse.kron(across[:, 1:], sparse.identity(2), format="csc")
     covariance = sparse.block_diag(known.covariance_m2, format="csc")
-    # Forces and positions together: the normal equations lose what a certain constraint leaves to uncertain ones.
+    # Forces and positions together: the normal equations lose what a certain constraint leaves to
+    # uncertain ones.
     both = sparse.bmat([[covariance, differences], [differences.T, None]], format="csc")
     found = spsolve(both, np.concatenate([known.off_m.reshape(-1), np.zeros(differences.shape[1])]))
     positions = found[differences.shape[0] :].reshape(-1, 2)
@@ -43,7 +47,9 @@ class Gtsam:
 
     def __init__(self, poses: Floats, constraints: Constraints) -> None:
         if gtsam is None:
-            raise UsageError("gtsam is not installed, and this benchmark measures against it: run make bench-setup")
+            raise UsageError(
+                "gtsam is not installed, and this benchmark measures against it: run make bench-setup"
+            )
         self._count = len(poses)
         self._start, self._graph = gtsam.Values(), gtsam.NonlinearFactorGraph()
         self._parameters = gtsam.LevenbergMarquardtParams()
@@ -52,16 +58,22 @@ class Gtsam:
         fixed = gtsam.noiseModel.Constrained.All(3)
         self._graph.add(gtsam.PriorFactorPose2(0, gtsam.Pose2(*poses[0]), fixed))
         columns = (constraints.first.tolist(), constraints.second.tolist(), constraints.measured)
-        for first, second, measured, information in zip(*columns, constraints.information, strict=True):
+        for first, second, measured, information in zip(
+            *columns, constraints.information, strict=True
+        ):
             noise = gtsam.noiseModel.Gaussian.Information(information)
             self._graph.add(gtsam.BetweenFactorPose2(first, second, gtsam.Pose2(*measured), noise))
 
     def solve(self) -> Any:
         """Levenberg and Marquardt's method, as gtsam has it by default; `poses` reads the result."""
-        return gtsam.LevenbergMarquardtOptimizer(self._graph, self._start, self._parameters).optimize()
+        return gtsam.LevenbergMarquardtOptimizer(
+            self._graph, self._start, self._parameters
+        ).optimize()
 
     def gives_up(self) -> bool:
-        """Whether gtsam's default, factoring by Cholesky, leaves all as it was; `solve` factors by QR from then on."""
+        """Whether gtsam's default, factoring by Cholesky, leaves all as it was; `solve` factors by
+        QR from then on.
+        """
         gives_up = bool(self._graph.error(self.solve()) >= self._graph.error(self._start))
         if gives_up:
             self._parameters.setLinearSolverType("MULTIFRONTAL_QR")

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.perception.eyes import PERIOD_S, Eyes
+from benchmarks.perception.pipeline import PERIOD_S, Eyes
 from benchmarks.perception.scenes import drawn, drive
 
-STEP_M, WARM_UP = 0.3, 20
+STEP_M = 0.3
+WARM_UP = 20
 
 
 def took_ms(seed: int, frames: int) -> list[float]:
@@ -21,4 +22,7 @@ def took_ms(seed: int, frames: int) -> list[float]:
 
 def figures(times_ms: list[float]) -> dict[str, float]:
     """Their median and their 99th percentile."""
-    return {"frame_ms_p50": float(np.percentile(times_ms, 50)), "frame_ms_p99": float(np.percentile(times_ms, 99))}
+    return {
+        "frame_ms_p50": float(np.percentile(times_ms, 50)),
+        "frame_ms_p99": float(np.percentile(times_ms, 99)),
+    }

@@ -9,16 +9,16 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.perception import depth, road, streets
-from benchmarks.perception.eyes import Bystander, Eyes
 from benchmarks.perception.novel import Meeting, Memory, remembered
 from benchmarks.perception.objects import Claim, Sight, claims, right_or_not, sight
+from benchmarks.perception.pipeline import Bystander, Eyes
 from benchmarks.perception.scenes import Scene, anywhere, drawn, encounter, later, side_and_range
 from schemas.sensing import Pose
-from services.epam.road import load
-from services.sim.catalogue import CATALOGUE
+from services.epam.layout.road import load
 from services.sim.plan import STREET_WIDTH_M
-from services.sim.renderings import KINDS
+from services.sim.rendering.catalogue import CATALOGUE
 from services.sim.town import Town
+from training.rendering.towns import KINDS
 
 TRAINED = frozenset(kind.name for kind in CATALOGUE)
 NOVEL = 20
@@ -29,8 +29,9 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """One town: what was seen of its buildings, `judged` pairs of activation and rightness, and errors of each point,
-    and of one pixel in EVERY."""
+    """One town: what was seen of its buildings, `judged` pairs of activation and rightness, and
+    errors of each point, and of one pixel in EVERY.
+    """
 
     sights: list[Sight]
     judged: list[tuple[float, bool]]
@@ -43,22 +44,34 @@ class Look:
 
 def town_look(seed: int, invented: int, views: int, tick: Tick) -> Look:
     """Look at the town of `seed` from `views` places, with fresh eyes."""
-    sights, candidates, masks, surfaces, off, missed, depths = [], [], [], [], [], [], []
-    roads, bystander = load(), Bystander()
+    sights = []
+    candidates = []
+    masks = []
+    surfaces = []
+    off = []
+    missed = []
+    depths = []
+    roads = load()
+    bystander = Bystander()
     with drawn(seed, invented, anywhere(views)) as (place, camera, scenes):
         eyes = Eyes(camera)
         edges = streets.edges([each.area(STREET_WIDTH_M / 2) for each in place.roads])
         for scene in scenes:
             glance = eyes.see(scene.left, scene.right)
-            view, percepts = glance.view, glance.percepts
+            view = glance.view
+            percepts = glance.percepts
             sights.append(_sight(claims(percepts.objects, scene.label.shape), place, scene))
             candidates.append(_sight(bystander.candidates(glance), place, scene))
             masks.append(roads.mask(view.image.numpy().astype(np.uint8, copy=False)))
             surfaces.append(scene.surface)
             boundary_m = percepts.road_boundary_m.numpy()
             off.append(streets.distances_m(streets.in_town(boundary_m, scene.pose), edges))
-            missed.append(road.road_edges_missed_m(boundary_m, scene.surface, scene.depth_m, camera))
-            depths.append(depth.errors(view.depth_m.numpy().astype(np.float32, copy=False), scene.depth_m))
+            missed.append(
+                road.road_edges_missed_m(boundary_m, scene.surface, scene.depth_m, camera)
+            )
+            depths.append(
+                depth.errors(view.depth_m.numpy().astype(np.float32, copy=False), scene.depth_m)
+            )
             tick()
     return Look(
         sights=sights,
@@ -72,7 +85,9 @@ def town_look(seed: int, invented: int, views: int, tick: Tick) -> Look:
 
 
 def novel_look(seed: int, sightings: int, tick: Tick) -> Memory:
-    """Meet NOVEL invented buildings of the town of `seed` once each, then see each up to `sightings` times more."""
+    """Meet NOVEL invented buildings of the town of `seed` once each, then see each up to
+    `sightings` times more.
+    """
 
     def poses(place: Town, rng: np.random.Generator) -> list[Pose]:
         first = [encounter(place, target, rng) for target in range(NOVEL)]
@@ -81,7 +96,8 @@ def novel_look(seed: int, sightings: int, tick: Tick) -> Memory:
         return first + [pose for pose in again if pose is not None]
 
     with drawn(seed, KINDS, poses, NOVEL) as (place, camera, scenes):
-        eyes, meetings = Eyes(camera), []
+        eyes = Eyes(camera)
+        meetings = []
         for scene in scenes:
             percepts = eyes.see(scene.left, scene.right).percepts.objects
             seen = _sight(claims(percepts, scene.label.shape), place, scene)

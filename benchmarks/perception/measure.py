@@ -36,7 +36,8 @@ WORKERS = 2
 # Of each town, up to how many of its kinds are invented.
 TOWNS = (0, 0, 14, 0, 0, 14, 0, 0)
 VIEWS = 90
-NOVEL_TOWNS, SIGHTINGS = 3, 7
+NOVEL_TOWNS = 3
+SIGHTINGS = 7
 FRAMES = 150
 RANGES_M = ((5.0, 15.0), (15.0, 30.0), (30.0, 60.0))
 LARGER_SHARE = 0.03
@@ -48,7 +49,10 @@ def measure() -> dict[str, float]:
     # Two processes, each on a core of its own: no library should start threads.
     os.environ.update(OMP_NUM_THREADS="1", LP_NUM_THREADS="1")
     seeds = range(FIRST_SEED, FIRST_SEED + len(TOWNS) + NOVEL_TOWNS)
-    towns = [partial(town_look, seed, invented, VIEWS) for seed, invented in zip(seeds, TOWNS, strict=False)]
+    towns = [
+        partial(town_look, seed, invented, VIEWS)
+        for seed, invented in zip(seeds, TOWNS, strict=False)
+    ]
     novel = [partial(novel_look, seed, SIGHTINGS) for seed in seeds[len(TOWNS) :]]
     spawning = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(WORKERS, spawning) as pool:
@@ -69,7 +73,9 @@ def _looked(pool: ProcessPoolExecutor, *tasks: Sequence[Callable[[Tick], Any]]) 
     with Progress() as progress, multiprocessing.Manager() as manager:
         ticks = manager.Queue()
         task = progress.add_task("views of held-out towns", total=views)
-        running = [[pool.submit(each, partial(ticks.put, None)) for each in group] for group in tasks]
+        running = [
+            [pool.submit(each, partial(ticks.put, None)) for each in group] for group in tasks
+        ]
         left = {future for group in running for future in group}
         while left:
             done, left = wait(left, POLL_S, FIRST_EXCEPTION)

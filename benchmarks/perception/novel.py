@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from benchmarks.perception.objects import Sight
 from benchmarks.perception.scenes import LEAST_TURN_RAD, other_distance
-from services.workspace.settings import Config
+from services.workspace.config import Config
 
 RECOGNISED = Config().recognition_threshold
 Floats = npt.NDArray[np.float64]
@@ -19,8 +19,9 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Meeting:
-    """One view: what was seen, and for each building of the town in which direction of it the robot was, and how far
-    away, (buildings, 2)."""
+    """One view: what was seen, and for each building of the town in which direction of it the robot
+    was, and how far away, (buildings, 2).
+    """
 
     sight: Sight
     from_where: Floats
@@ -28,10 +29,12 @@ class Meeting:
 
 @dataclass(frozen=True)
 class Memory:
-    """What became of the buildings, of which `met` got a name of their own: of `later` sightings so many were `right`.
+    """What became of the buildings, of which `met` got a name of their own: of `later` sightings so
+    many were `right`.
 
-    `merges` are sightings by the name of another building, and buildings met that were given the name of one before;
-    `splits` are sightings by a name that is new, though the building was met; `mistaken` ones by a trained class's.
+    `merges` are sightings by the name of another building, and buildings met that were given the
+    name of one before; `splits` are sightings by a name that is new, though the building was met;
+    `mistaken` ones by a trained class's.
     """
 
     met: int
@@ -42,13 +45,17 @@ class Memory:
     mistaken: int
 
 
-def remembered(encounters: Sequence[Meeting], afterwards: Sequence[Meeting], trained: frozenset[str]) -> Memory:
-    """How the buildings of a town, all novel, were known again, in views from other sides and distances.
+def remembered(
+    encounters: Sequence[Meeting], afterwards: Sequence[Meeting], trained: frozenset[str]
+) -> Memory:
+    """How the buildings of a town, all novel, were known again, in views from other sides and
+    distances.
 
-    Each was to be met in the encounter of its number. Sides and distances are other than in that one, and in every one
-    that it was seen in by the way. Its name is the first that it was recognised by, with an activation over RECOGNISED.
-    A building that they gave no name, or that of a trained class or of another building, has none: no later sighting of
-    it is right. Of later sightings all count, however low their activation.
+    Each was to be met in the encounter of its number. Sides and distances are other than in that
+    one, and in every one that it was seen in by the way. Its name is the first that it was
+    recognised by, with an activation over RECOGNISED. A building that they gave no name, or that of
+    a trained class or of another building, has none: no later sighting of it is right. Of later
+    sightings all count, however low their activation.
     """
     names: dict[int, str] = {}
     places = {number: [meeting.from_where[number]] for number, meeting in enumerate(encounters)}
@@ -75,7 +82,9 @@ def remembered(encounters: Sequence[Meeting], afterwards: Sequence[Meeting], tra
 def _sightings(meeting: Meeting) -> list[tuple[int, str, float]]:
     """The buildings that a segment matches, what it is called, and how surely."""
     segments = meeting.sight.segments
-    return [(each.building.number, each.label, each.activation) for each in segments if each.building]
+    return [
+        (each.building.number, each.label, each.activation) for each in segments if each.building
+    ]
 
 
 def _elsewhere(now: Floats, then: Floats) -> bool:

@@ -22,7 +22,9 @@ Claim = tuple[str, float, Bools]
 
 @dataclass(frozen=True)
 class Building:
-    """A true building in a view: which of the town's, of what kind, how much of the image it covers, how far it is."""
+    """A true building in a view: which of the town's, of what kind, how much of the image it
+    covers, how far it is.
+    """
 
     number: int
     kind: str
@@ -32,8 +34,9 @@ class Building:
 
 @dataclass(frozen=True)
 class Segment:
-    """A claim: its name and activation, how much of the image it covers, which building it matches, if any, and which
-    it shows: the one that half of its pixels are of."""
+    """A claim: its name and activation, how much of the image it covers, which building it matches,
+    if any, and which it shows: the one that half of its pixels are of.
+    """
 
     label: str
     activation: float
@@ -50,8 +53,12 @@ class Sight:
     segments: tuple[Segment, ...]
 
 
-def sight(claims: Sequence[Claim], label: Bytes, kinds: Sequence[str], range_m: Sequence[float]) -> Sight:
-    """What is claimed of a view against its true `label` (h, w): 0 or 1 + place in `kinds` and `range_m`."""
+def sight(
+    claims: Sequence[Claim], label: Bytes, kinds: Sequence[str], range_m: Sequence[float]
+) -> Sight:
+    """What is claimed of a view against its true `label` (h, w): 0 or 1 + place in `kinds` and
+    `range_m`.
+    """
     numbers, counts = np.unique(label[label > 0], return_counts=True)
     buildings = tuple(
         Building(number - 1, kinds[number - 1], count / label.size, range_m[number - 1])
@@ -62,9 +69,15 @@ def sight(claims: Sequence[Claim], label: Bytes, kinds: Sequence[str], range_m: 
     segments = []
     for (name, activation, mask), place in zip(claims, matched, strict=True):
         shown = np.bincount(label[mask], minlength=1)
-        most = [each for each in buildings if each.number + 1 < len(shown) and 2 * shown[each.number + 1] >= mask.sum()]
+        most = [
+            each
+            for each in buildings
+            if each.number + 1 < len(shown) and 2 * shown[each.number + 1] >= mask.sum()
+        ]
         matching = None if place is None else buildings[place]
-        segments.append(Segment(name, activation, float(mask.mean()), matching, most[0] if most else None))
+        segments.append(
+            Segment(name, activation, float(mask.mean()), matching, most[0] if most else None)
+        )
     return Sight(buildings, tuple(segments))
 
 
@@ -81,8 +94,12 @@ def filled(percept: Percept, shape: tuple[int, ...]) -> Bools:
     return mask > 0
 
 
-def overlaps(found: Sequence[Bools], label: Bytes, numbers: Sequence[int]) -> npt.NDArray[np.float64]:
-    """Intersection over union of each mask with the pixels of each number in `label`, (masks, numbers)."""
+def overlaps(
+    found: Sequence[Bools], label: Bytes, numbers: Sequence[int]
+) -> npt.NDArray[np.float64]:
+    """Intersection over union of each mask with the pixels of each number in `label`, (masks,
+    numbers).
+    """
     iou = np.zeros((len(found), len(numbers)))
     for column, number in enumerate(numbers):
         true = label == number
@@ -93,7 +110,9 @@ def overlaps(found: Sequence[Bools], label: Bytes, numbers: Sequence[int]) -> np
 
 
 def match(iou: npt.NDArray[np.float64]) -> list[int | None]:
-    """For each row the column that it matches at MATCH_IOU or better, the best pairs first, none twice."""
+    """For each row the column that it matches at MATCH_IOU or better, the best pairs first, none
+    twice.
+    """
     matched: list[int | None] = [None] * iou.shape[0]
     left = iou.copy()
     while left.size and left.max() >= MATCH_IOU:
@@ -103,18 +122,28 @@ def match(iou: npt.NDArray[np.float64]) -> list[int | None]:
     return matched
 
 
-def named(sights: Iterable[Sight], trained: frozenset[str], least_m: float, most_m: float) -> list[bool]:
-    """Of each segment that matches a building of a trained kind so far away, whether its label is right."""
+def named(
+    sights: Iterable[Sight], trained: frozenset[str], least_m: float, most_m: float
+) -> list[bool]:
+    """Of each segment that matches a building of a trained kind so far away, whether its label is
+    right.
+    """
     return [
         segment.label == segment.building.kind
         for each in sights
         for segment in each.segments
-        if segment.building and segment.building.kind in trained and least_m <= segment.building.range_m <= most_m
+        if segment.building
+        and segment.building.kind in trained
+        and least_m <= segment.building.range_m <= most_m
     ]
 
 
-def detection(sights: Iterable[Sight], least_share: float = LARGE_SHARE) -> tuple[int, int, int, int]:
-    """Of large buildings how many were found, and how many there are; of large segments how many match, and all."""
+def detection(
+    sights: Iterable[Sight], least_share: float = LARGE_SHARE
+) -> tuple[int, int, int, int]:
+    """Of large buildings how many were found, and how many there are; of large segments how many
+    match, and all.
+    """
     found = there = right = said = 0
     for each in sights:
         matched = {segment.building.number for segment in each.segments if segment.building}
@@ -130,16 +159,19 @@ def detection(sights: Iterable[Sight], least_share: float = LARGE_SHARE) -> tupl
 def right_or_not(
     candidates: Iterable[Sight], percepts: Iterable[Sight], trained: frozenset[str]
 ) -> list[tuple[float, bool]]:
-    """Activation of each candidate, and whether its label is right, over the views of one pair of eyes in order.
+    """Activation of each candidate, and whether its label is right, over the views of one pair of
+    eyes in order.
 
-    That of a trained class is right where the building is of that kind, that of a node that was learned where the
-    building is the one whose percept it was first given to, and no label where there is no building, or one that has
-    none yet.
+    That of a trained class is right where the building is of that kind, that of a node that was
+    learned where the building is the one whose percept it was first given to, and no label where
+    there is no building, or one that has none yet.
     """
     owner: dict[str, int | None] = {}
     judged: list[tuple[float, bool]] = []
     for before, after in zip(candidates, percepts, strict=True):
-        judged += [(segment.activation, _right(segment, owner, trained)) for segment in before.segments]
+        judged += [
+            (segment.activation, _right(segment, owner, trained)) for segment in before.segments
+        ]
         for segment in (each for each in after.segments if each.label not in trained):
             owner.setdefault(segment.label, segment.shows.number if segment.shows else None)
     return judged
@@ -157,7 +189,9 @@ def _right(segment: Segment, owner: dict[str, int | None], trained: frozenset[st
 
 
 def calibration_error(judged: Sequence[tuple[float, bool]]) -> float:
-    """Expected calibration error (Naeini, Cooper and Hauskrecht 2015): BINS bins of equal width, NaN of nothing."""
+    """Expected calibration error (Naeini, Cooper and Hauskrecht 2015): BINS bins of equal width,
+    NaN of nothing.
+    """
     if not judged:
         return float("nan")
     sure, right = (np.asarray(values, np.float64) for values in zip(*judged, strict=True))

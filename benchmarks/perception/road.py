@@ -7,8 +7,10 @@ import numpy.typing as npt
 
 from schemas.sensing import Calibration
 
-GROUND, ROAD = 1, 2
-WITHIN_M, BEYOND_M = 15.0, 3.0
+GROUND = 1
+ROAD = 2
+WITHIN_M = 15.0
+BEYOND_M = 3.0
 Bools = npt.NDArray[np.bool_]
 Bytes = npt.NDArray[np.uint8]
 Floats = npt.NDArray[np.float64]
@@ -16,7 +18,8 @@ Floats32 = npt.NDArray[np.float32]
 
 
 def road_iou(found: Bools, surface: Bytes) -> float:
-    """Of all pixels that are road or taken for it, the share that are both; masks and surfaces are (…, h, w).
+    """Of all pixels that are road or taken for it, the share that are both; masks and surfaces are
+    (…, h, w).
 
     `surface` is 2 where there is road. NaN where there is none at all.
     """
@@ -28,7 +31,8 @@ def road_iou(found: Bools, surface: Bytes) -> float:
 def road_edge_errors_m(
     boundary_m: npt.ArrayLike, surface: Bytes, depth_m: Floats32, camera: Calibration
 ) -> npt.NDArray[np.float64]:
-    """How far each point of `boundary_m` (n, 2), in the robot's frame, is from the nearest true one of the view.
+    """How far each point of `boundary_m` (n, 2), in the robot's frame, is from the nearest true one
+    of the view.
 
     `surface` and true `depth_m` are (h, w). Infinite where no road ends in the view.
     """
@@ -39,7 +43,9 @@ def road_edge_errors_m(
 def road_edges_missed_m(
     boundary_m: npt.ArrayLike, surface: Bytes, depth_m: Floats32, camera: Calibration
 ) -> npt.NDArray[np.float64]:
-    """How far each true point where road ends within WITHIN_M is from the nearest one that was found."""
+    """How far each true point where road ends within WITHIN_M is from the nearest one that was
+    found.
+    """
     points = np.asarray(boundary_m, np.float64).reshape(-1, 2)
     return _nearest_m(true_boundary_m(surface, depth_m, camera, WITHIN_M), points)
 
@@ -50,15 +56,19 @@ def road_edge_error_m(errors_m: list[npt.NDArray[np.float64]]) -> float:
     return float(np.median(every)) if every.size else float("nan")
 
 
-def true_boundary_m(surface: Bytes, depth_m: Floats32, camera: Calibration, within_m: float) -> Floats:
-    """Where road and other ground are neighbours in the image: points half way between, (n, 2), in the robot's frame.
+def true_boundary_m(
+    surface: Bytes, depth_m: Floats32, camera: Calibration, within_m: float
+) -> Floats:
+    """Where road and other ground are neighbours in the image: points half way between, (n, 2), in
+    the robot's frame.
 
     Where something upright hides the ground, or the image ends, nobody can see the road end.
     """
     ground = _ground_m(depth_m, camera)
     points = []
     for here, there in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
-        one, other = surface[here], surface[there]
+        one = surface[here]
+        other = surface[there]
         ends = ((one == ROAD) & (other == GROUND)) | ((one == GROUND) & (other == ROAD))
         points.append((ground[here][ends] + ground[there][ends]) / 2)
     every = np.concatenate(points)

@@ -1,7 +1,9 @@
-"""Places recognised by the views that lead to them: loops in held-out towns driven twice, each time in another light.
+"""Places recognised by the views that lead to them: loops in held-out towns driven twice, each time
+in another light.
 
-The second lap has another speed, does not keep to the line and does not look straight ahead. One memory sees all laps
-and all towns, which share most kinds of building, and a side street between the laps: so there is much to mistake.
+The second lap has another speed, does not keep to the line and does not look straight ahead. One
+memory sees all laps and all towns, which share most kinds of building, and a side street between
+the laps: so there is much to mistake.
 """
 
 from __future__ import annotations
@@ -14,14 +16,15 @@ import numpy as np
 import numpy.typing as npt
 
 from schemas.sensing import PlaceMatch, Pose
-from services.epam.places import PlaceMemory
+from services.epam.places.recognizer import PlaceMemory
 from services.sensory.disparity import DepthFromStereo
 from services.sensory.rectify import rectification
-from services.sim import renderings, town
-from services.sim.camera import StereoCamera, calibration
-from services.sim.light import Light, some_light
+from services.sim import town
 from services.sim.plan import Point
+from services.sim.rendering.camera import StereoCamera, calibration
+from services.sim.rendering.light import Light, some_light
 from services.sim.world import World
+from training.rendering import towns
 
 Floats = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -30,12 +33,18 @@ Tick = Callable[[], None]
 # The last town is built of kinds that nobody was taught alone: no landmark in any view.
 TOWNS = ((3201, 0), (3202, 0), (3203, 28))
 FIRST_LAP, SIDE_STREET, SECOND_LAP = range(3)
-STEP_M, STEPS_M = (0.8, 0.8), (0.6, 1.1)
-OFFSET_M, TURN_RAD = 0.5, math.radians(3)
-CORNER_M, SPACING_M = 6.0, 0.1
-SPEED_CHANGES_M, OFFSET_CHANGES_M, TURN_CHANGES_M = 10.0, 8.0, 4.0
+STEP_M = (0.8, 0.8)
+STEPS_M = (0.6, 1.1)
+OFFSET_M = 0.5
+TURN_RAD = math.radians(3)
+CORNER_M = 6.0
+SPACING_M = 0.1
+SPEED_CHANGES_M = 10.0
+OFFSET_CHANGES_M = 8.0
+TURN_CHANGES_M = 4.0
 NEAREST_M = 2.5
-SAME_M, SAME_RAD = 3.0, math.radians(30)
+SAME_M = 3.0
+SAME_RAD = math.radians(30)
 PRECISION = 0.99
 FRAME_NS = 400_000_000
 
@@ -51,7 +60,9 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Answer:
-    """Where a view was taken, in which town and on which part of the drive, and what it was said to match."""
+    """Where a view was taken, in which town and on which part of the drive, and what it was said to
+    match.
+    """
 
     seed: int
     part: int
@@ -61,7 +72,8 @@ class Answer:
 
 def measure(tick: Tick = lambda: None) -> dict[str, float]:
     """The figures; `tick` is called after each of the `views()`."""
-    memory, answers = PlaceMemory(), list[Answer]()
+    memory = PlaceMemory()
+    answers = list[Answer]()
     for seed, invented in TOWNS:
         answers += drive(memory, len(answers), seed, invented, tick)
     return figures(answers)
@@ -69,15 +81,20 @@ def measure(tick: Tick = lambda: None) -> dict[str, float]:
 
 def views() -> int:
     """How many there are."""
-    return sum(len(part.poses) for seed, invented in TOWNS for part in course(_town(seed, invented)))
+    return sum(
+        len(part.poses) for seed, invented in TOWNS for part in course(_town(seed, invented))
+    )
 
 
-def drive(memory: PlaceMemory, first_frame: int, seed: int, invented: int, tick: Tick) -> Iterator[Answer]:
+def drive(
+    memory: PlaceMemory, first_frame: int, seed: int, invented: int, tick: Tick
+) -> Iterator[Answer]:
     """Drive through the town of `seed` and ask `memory` at each view."""
     place = _town(seed, invented)
     world = World(place)
     try:
-        camera, rng = StereoCamera(world, calibration()), np.random.default_rng([seed, 0x5F])
+        camera = StereoCamera(world, calibration())
+        rng = np.random.default_rng([seed, 0x5F])
         straight = rectification(camera.calibration)
         stereo = DepthFromStereo(straight.calibration, NEAREST_M)
         frame = first_frame
@@ -96,7 +113,8 @@ def drive(memory: PlaceMemory, first_frame: int, seed: int, invented: int, tick:
 def course(place: town.Town) -> list[Stretch]:
     """A lap, a side street, and the lap again in another light."""
     rng = np.random.default_rng([place.seed, 0x5E])
-    light, other = some_light(rng), some_light(rng)
+    light = some_light(rng)
+    other = some_light(rng)
     side = place.roads[4]
     return [
         Stretch(FIRST_LAP, light, poses(place.line(), rng, STEP_M)),
@@ -112,34 +130,50 @@ def poses(
     offset_m: float = 0.0,
     turn_rad: float = 0.0,
 ) -> list[Pose]:
-    """Poses along `line`, its corners rounded, at steps between `steps_m`, off the line and off its direction.
+    """Poses along `line`, its corners rounded, at steps between `steps_m`, off the line and off its
+    direction.
 
-    How long a step is and how far off the robot is, up to `offset_m` and `turn_rad`, changes slowly along the way.
+    How long a step is and how far off the robot is, up to `offset_m` and `turn_rad`, changes slowly
+    along the way.
     """
     at_m, points = _rounded(line)
     step = _slowly(rng, at_m, SPEED_CHANGES_M, 1.0)
-    offset, turn = _slowly(rng, at_m, OFFSET_CHANGES_M, offset_m), _slowly(rng, at_m, TURN_CHANGES_M, turn_rad)
+    offset = _slowly(rng, at_m, OFFSET_CHANGES_M, offset_m)
+    turn = _slowly(rng, at_m, TURN_CHANGES_M, turn_rad)
     heading = np.unwrap(np.arctan2(*np.gradient(points, axis=0).T[::-1]))
-    middle, range_m = sum(steps_m) / 2, (steps_m[1] - steps_m[0]) / 2
-    found, here_m = [], 0.0
+    middle = sum(steps_m) / 2
+    range_m = (steps_m[1] - steps_m[0]) / 2
+    found = []
+    here_m = 0.0
     while here_m <= at_m[-1]:
         x, y, along, left, by, speed = (
-            float(np.interp(here_m, at_m, values)) for values in (*points.T, heading, offset, turn, step)
+            float(np.interp(here_m, at_m, values))
+            for values in (*points.T, heading, offset, turn, step)
         )
-        found.append(Pose(x_m=x - left * math.sin(along), y_m=y + left * math.cos(along), heading_rad=along + by))
+        found.append(
+            Pose(
+                x_m=x - left * math.sin(along),
+                y_m=y + left * math.cos(along),
+                heading_rad=along + by,
+            )
+        )
         here_m += middle + range_m * speed
     return found
 
 
 def _rounded(line: Sequence[Point]) -> tuple[Floats, Floats]:
-    """Points (n, 2) close to each other along `line`, and how far from its start each is; corners are cut smoothly."""
+    """Points (n, 2) close to each other along `line`, and how far from its start each is; corners
+    are cut smoothly.
+    """
     corners = np.asarray(line, np.float64)
     far_m = _far(corners)
     every = np.linspace(0, far_m[-1], math.ceil(far_m[-1] / SPACING_M))
     half = round(CORNER_M / SPACING_M / 2)
     window = np.full(2 * half + 1, 1 / (2 * half + 1))
     rows = (np.interp(every, far_m, values) for values in corners.T)
-    points = np.stack([np.convolve(np.pad(row, half, mode="edge"), window, mode="valid") for row in rows], axis=1)
+    points = np.stack(
+        [np.convolve(np.pad(row, half, mode="edge"), window, mode="valid") for row in rows], axis=1
+    )
     return _far(points), points
 
 
@@ -156,7 +190,12 @@ def _slowly(rng: np.random.Generator, at_m: Floats, every_m: float, most: float)
 def figures(answers: Sequence[Answer]) -> dict[str, float]:
     """Recall at 99 % precision, and what the answers are worth as they were given."""
     score = np.array([answer.match.score if answer.match else 0.0 for answer in answers])
-    right = np.array([answer.match is not None and same(answer, answers[answer.match.frame]) for answer in answers])
+    right = np.array(
+        [
+            answer.match is not None and same(answer, answers[answer.match.frame])
+            for answer in answers
+        ]
+    )
     again = np.array([answer.part == SECOND_LAP for answer in answers])
     first = [answer for answer in answers if answer.part == FIRST_LAP]
     wanted = again & np.array([any(same(answer, other) for other in first) for answer in answers])
@@ -171,7 +210,8 @@ def figures(answers: Sequence[Answer]) -> dict[str, float]:
 
 
 def recall(score: Floats, right: Flags, wanted: Flags, precision: float) -> float:
-    """The share of `wanted` views that are matched rightly, at the lowest score that gives at least `precision`.
+    """The share of `wanted` views that are matched rightly, at the lowest score that gives at least
+    `precision`.
 
     0 where no score does; a view of score 0 is not matched.
     """
@@ -190,4 +230,4 @@ def same(one: Answer, other: Answer) -> bool:
 
 
 def _town(seed: int, invented: int) -> town.Town:
-    return town.generate(seed, renderings.kinds(seed, invented))
+    return town.generate(seed, towns.kinds(seed, invented))

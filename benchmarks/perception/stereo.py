@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.report import Bar
-from bus.errors import UsageError
+from cogmap.errors import UsageError
 from services.sensory.disparity import STEPS_PER_PIXEL, StereoMatcher
 
 OFF_PX = (1, 3)
@@ -20,18 +20,25 @@ Bytes = npt.NDArray[np.uint8]
 Floats32 = npt.NDArray[np.float32]
 
 
-def measure(left: Path, right: Path, disparity: Path, scale: float) -> tuple[dict[str, float], dict[str, Bar]]:
+def measure(
+    left: Path, right: Path, disparity: Path, scale: float
+) -> tuple[dict[str, float], dict[str, Bar]]:
     """The shares of pixels that are off, and bars: ours no worse than plain.
 
-    Of all pixels whose truth is known; a pixel without a match counts as wrong, for all. `together_` is of the pixels
-    only that ours and plain both match. Raises UsageError where a file is missing, no image, or of another size.
+    Of all pixels whose truth is known; a pixel without a match counts as wrong, for all.
+    `together_` is of the pixels only that ours and plain both match. Raises UsageError where a file
+    is missing, no image, or of another size.
     """
     pair = (_read(left, cv2.IMREAD_COLOR), _read(right, cv2.IMREAD_COLOR))
     true_px = _truth(disparity, scale)
     for path, size in ((right, pair[1].shape[:2]), (disparity, true_px.shape)):
         if size != pair[0].shape[:2]:
-            raise UsageError(f"{path} is {_size(size)}, but {left} {_size(pair[0].shape)}: they must be of one size")
-    rgb = tuple(cv2.cvtColor(image, cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False) for image in pair)
+            raise UsageError(
+                f"{path} is {_size(size)}, but {left} {_size(pair[0].shape)}: they must be of one size"
+            )
+    rgb = tuple(
+        cv2.cvtColor(image, cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False) for image in pair
+    )
     most_px = float(true_px.max())
     matcher = StereoMatcher(most_px)
     ours = matcher.disparity_px(rgb[0], rgb[1])
@@ -50,7 +57,9 @@ def _off(name: str, found_px: Floats32, true_px: Floats32) -> dict[str, float]:
 
 
 def off_share(found_px: Floats32, true_px: Floats32, most_px: float) -> float:
-    """Of the pixels with a true disparity, over 0, the share that is off by more than `most_px`, or not found, 0."""
+    """Of the pixels with a true disparity, over 0, the share that is off by more than `most_px`, or
+    not found, 0.
+    """
     known = true_px > 0
     wrong = (found_px <= 0) | (np.abs(found_px - true_px) > most_px)
     return float(wrong[known].mean()) if known.any() else math.nan
@@ -62,7 +71,9 @@ def unmatched(found_px: Floats32, true_px: Floats32) -> float:
 
 
 def plain_sgbm(left: Bytes, right: Bytes, most_px: float) -> Floats32:
-    """StereoSGBM as OpenCV's documentation sets it up, on grey images: disparities, float32 (h, w), 0 unmatched."""
+    """StereoSGBM as OpenCV's documentation sets it up, on grey images: disparities, float32 (h, w),
+    0 unmatched.
+    """
     area = PLAIN_BLOCK_PX**2
     matcher = cv2.StereoSGBM.create(
         minDisparity=0,
@@ -85,19 +96,27 @@ def _read(path: Path, flags: int) -> npt.NDArray[Any]:
     data = np.frombuffer(path.read_bytes(), np.uint8)
     image = cv2.imdecode(data, flags) if data.size else None
     if image is None:
-        raise UsageError(f"{path} is no image that can be read: give a PNG or another common format")
+        raise UsageError(
+            f"{path} is no image that can be read: give a PNG or another common format"
+        )
     return image
 
 
 def _truth(path: Path, scale: float) -> Floats32:
     values = _read(path, cv2.IMREAD_UNCHANGED)
     if values.ndim != 2:
-        raise UsageError(f"{path} is a colour image: give the disparities as one channel, 0 where unknown")
+        raise UsageError(
+            f"{path} is a colour image: give the disparities as one channel, 0 where unknown"
+        )
     true_px = values.astype(np.float32) / np.float32(scale)
     if not np.isfinite(true_px).all() or not (true_px > 0).any():
-        raise UsageError(f"{path} holds no disparity over 0: give --scale times the left image's disparities")
+        raise UsageError(
+            f"{path} holds no disparity over 0: give --scale times the left image's disparities"
+        )
     if true_px.max() >= values.shape[1]:
-        raise UsageError(f"{path} holds disparities wider than the image: give the --scale that it was written with")
+        raise UsageError(
+            f"{path} holds disparities wider than the image: give the --scale that it was written with"
+        )
     return true_px
 
 

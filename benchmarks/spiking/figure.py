@@ -11,9 +11,17 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
 from benchmarks.spiking.measure import SIDE_M, Scene, recording
-from cli.log.paint import STYLE
-from cli.palette import ESTIMATE, FAINT, INK, KERB, OBJECT, PAPER, TRUE
-from experiments.spiking.cells import GAMMA_S, PLACE_M, SPACINGS_M, BorderCells, GridModule, Spikes, Values
+from cli.plots.paint import STYLE
+from cli.plots.palette import ESTIMATE, FAINT, INK, KERB, OBJECT, PAPER, TRUE
+from experiments.spiking.cells import (
+    GAMMA_S,
+    PLACE_M,
+    SPACINGS_M,
+    BorderCells,
+    GridModule,
+    Spikes,
+    Values,
+)
 from experiments.spiking.network import Posterior, Recording
 
 SHOWN_S = 2.0
@@ -21,9 +29,12 @@ MOSAIC: Any = [["grid", "border", "place"], ["raster", "raster", "agreement"]]
 
 
 def figure(scenes: list[Scene], seeds: list[int]) -> Figure:
-    """The sheet: the first scene with two walls in detail, and all of `scenes` (their `seeds`) against Bayes' rule."""
+    """The sheet: the first scene with two walls in detail, and all of `scenes` (their `seeds`)
+    against Bayes' rule.
+    """
     chosen = next(number for number, scene in enumerate(scenes) if len(scene.cues.borders) == 2)
-    scene, spikes = scenes[chosen], recording(seeds[chosen])
+    scene = scenes[chosen]
+    spikes = recording(seeds[chosen])
     with mpl.rc_context(STYLE):
         sheet = Figure(figsize=(13, 8), dpi=130, facecolor=PAPER, layout="constrained")
         panels = sheet.subplot_mosaic(MOSAIC, height_ratios=[1.25, 1])
@@ -47,7 +58,9 @@ def figure(scenes: list[Scene], seeds: list[int]) -> Figure:
 
 
 def _inputs(spikes: Recording) -> tuple[Values, Values]:
-    """How often the grid cells of each place cell fired together, and how often its border cells did."""
+    """How often the grid cells of each place cell fired together, and how often its border cells
+    did.
+    """
     grid = np.full_like(spikes.place, 255)
     for spacing_m, fired in zip(SPACINGS_M, spikes.grid, strict=True):
         grid &= fired[GridModule(spacing_m).nearest(spikes.centres_m)]
@@ -67,7 +80,9 @@ def _draw_inputs(panels: dict[str, Axes], scene: Scene, spikes: Recording) -> No
     _show(panels["border"], border, "b   border cells: distances to two walls, the likelihood")
     prior = Posterior(np.array(scene.cues.mean_m), np.array(scene.cues.covariance_m2))
     sensed = scene.cues.borders
-    walls = Posterior(np.array([each.sensed_m for each in sensed]), np.diag([each.sd_m**2 for each in sensed]))
+    walls = Posterior(
+        np.array([each.sensed_m for each in sensed]), np.diag([each.sd_m**2 for each in sensed])
+    )
     _draw_ellipse(panels["grid"], prior, TRUE, "-", "prior, 2 SD")
     _draw_ellipse(panels["border"], walls, TRUE, "-", "likelihood, 2 SD")
     for name in ("grid", "border"):
@@ -77,18 +92,29 @@ def _draw_inputs(panels: dict[str, Axes], scene: Scene, spikes: Recording) -> No
 def _show(axes: Axes, counts: Values, title: str) -> None:
     """Spikes by place, the room from above."""
     number = round(SIDE_M / PLACE_M)
-    axes.imshow(counts.reshape(number, number).T, origin="lower", extent=(0, SIDE_M, 0, SIDE_M), cmap="YlGnBu")
+    axes.imshow(
+        counts.reshape(number, number).T,
+        origin="lower",
+        extent=(0, SIDE_M, 0, SIDE_M),
+        cmap="YlGnBu",
+    )
     axes.set_title(title, loc="left", color=INK, fontsize=10)
     axes.tick_params(colors=FAINT, length=3)
     axes.set_xlabel("metres from the west wall", color=FAINT)
 
 
-def _draw_ellipse(axes: Axes, of: Posterior, colour: str, style: str | tuple[int, tuple[int, int]], label: str) -> None:
+def _draw_ellipse(
+    axes: Axes, of: Posterior, colour: str, style: str | tuple[int, tuple[int, int]], label: str
+) -> None:
     values, vectors = np.linalg.eigh(of.covariance_m2)
     width, height = 4 * np.sqrt(values[::-1])
     angle = float(np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1])))
     where = (float(of.mean_m[0]), float(of.mean_m[1]))
-    axes.add_patch(Ellipse(where, width, height, angle=angle, fill=False, ec=colour, lw=1.6, ls=style, label=label))
+    axes.add_patch(
+        Ellipse(
+            where, width, height, angle=angle, fill=False, ec=colour, lw=1.6, ls=style, label=label
+        )
+    )
 
 
 def _draw_raster(axes: Axes, spikes: Recording) -> None:
@@ -111,13 +137,18 @@ def _draw_raster(axes: Axes, spikes: Recording) -> None:
     for height, (_, packed, colour) in enumerate(rows):
         fired = np.flatnonzero(np.unpackbits(packed)[from_cycle : from_cycle + shown]) * GAMMA_S
         axes.vlines(fired, height - 0.4, height + 0.4, color=colour, lw=1.4)
-    for coincidence in np.flatnonzero(np.unpackbits(rows[0][1])[from_cycle : from_cycle + shown]) * GAMMA_S:
+    for coincidence in (
+        np.flatnonzero(np.unpackbits(rows[0][1])[from_cycle : from_cycle + shown]) * GAMMA_S
+    ):
         axes.axvline(coincidence, color=ESTIMATE, lw=6, alpha=0.15, zorder=0)
     axes.set_yticks(range(len(rows)), [name for name, _, _ in rows])
     axes.set_xlim(0, SHOWN_S)
     axes.set_xlabel("seconds", color=FAINT)
     axes.set_title(
-        "d   a place cell and its inputs: it fires where all fire together", loc="left", color=INK, fontsize=10
+        "d   a place cell and its inputs: it fires where all fire together",
+        loc="left",
+        color=INK,
+        fontsize=10,
     )
     axes.set_facecolor(PAPER)
 
@@ -129,7 +160,9 @@ def _draw_agreement(axes: Axes, scenes: list[Scene]) -> None:
     axes.plot(limits, limits, color=KERB, lw=1.2)
     axes.plot(exact, spiking, "o", ms=4.5, mfc=ESTIMATE, mec="white", mew=0.5)
     axes.set(xlim=limits, ylim=limits, aspect="equal")
-    axes.set_title(f"e   SD along x and y, {len(scenes)} scenes", loc="left", color=INK, fontsize=10)
+    axes.set_title(
+        f"e   SD along x and y, {len(scenes)} scenes", loc="left", color=INK, fontsize=10
+    )
     axes.set_xlabel("exact, metres", color=FAINT)
     axes.set_ylabel("of the spikes, metres", color=FAINT)
     axes.tick_params(colors=FAINT, length=3)

@@ -10,12 +10,13 @@ from benchmarks.report import Bar
 from experiments.parallel import Progress, each
 from experiments.spiking.cells import Values
 from experiments.spiking.network import Border, Cues, Posterior, Recording, exact, record
-from services.codelets.sampling import keep
+from services.codelets.localization.sampling import keep
 
 SIDE_M = 5.0
 RECORDED_S = 600.0
 SCENES = 40
-PRIOR_SD_M, BORDER_SD_M = (0.25, 0.5), (0.15, 0.4)
+PRIOR_SD_M = (0.25, 0.5)
+BORDER_SD_M = (0.15, 0.4)
 BARS = {
     "posterior_sd_ratio": Bar(1.1, least=0.9),
     "posterior_mean_error": Bar(0.1),
@@ -24,7 +25,9 @@ BARS = {
 
 @dataclass(frozen=True)
 class Scene:
-    """Cues, what the exact posterior is, what place cells' spikes say, and what rejection of samples says."""
+    """Cues, what the exact posterior is, what place cells' spikes say, and what rejection of
+    samples says.
+    """
 
     cues: Cues
     exact: Posterior
@@ -34,16 +37,22 @@ class Scene:
 
 
 def cues(seed: int) -> Cues:
-    """A walk's end somewhere in the middle of a room, and one or two walls whose distance is sensed."""
+    """A walk's end somewhere in the middle of a room, and one or two walls whose distance is
+    sensed.
+    """
     rng = np.random.default_rng([seed, 0])
     mean = rng.uniform(1.6, 3.4, 2)
-    sds, correlation = rng.uniform(*PRIOR_SD_M, 2), rng.uniform(-0.6, 0.6)
+    sds = rng.uniform(*PRIOR_SD_M, 2)
+    correlation = rng.uniform(-0.6, 0.6)
     across = float(correlation * sds[0] * sds[1])
     covariance = ((float(sds[0] ** 2), across), (across, float(sds[1] ** 2)))
     true_m = rng.multivariate_normal(mean, covariance)
     axes = ((0,), (1,), (0, 1))[seed % 3]
     sd_m = rng.uniform(*BORDER_SD_M, 2)
-    borders = tuple(Border(axis, float(rng.normal(true_m[axis], sd_m[axis])), float(sd_m[axis])) for axis in axes)
+    borders = tuple(
+        Border(axis, float(rng.normal(true_m[axis], sd_m[axis])), float(sd_m[axis]))
+        for axis in axes
+    )
     return Cues((float(mean[0]), float(mean[1])), covariance, borders)
 
 
@@ -54,8 +63,11 @@ def recording(seed: int) -> Recording:
 
 def scene(seed: int) -> Scene:
     """One scene, recorded and compared."""
-    given, spikes = cues(seed), recording(seed)
-    return Scene(given, exact(given), spikes.posterior, _rejection(given, seed), int(spikes.counts.sum()))
+    given = cues(seed)
+    spikes = recording(seed)
+    return Scene(
+        given, exact(given), spikes.posterior, _rejection(given, seed), int(spikes.counts.sum())
+    )
 
 
 def _rejection(given: Cues, seed: int) -> Posterior:
@@ -78,11 +90,15 @@ def measure(seed: int, processes: int, progress: Progress = lambda share: None) 
 
 
 def figures(scenes: list[Scene]) -> dict[str, float]:
-    """Every figure: ratios of standard deviations, along x and y; errors of means in exact standard deviations."""
+    """Every figure: ratios of standard deviations, along x and y; errors of means in exact standard
+    deviations.
+    """
     found: dict[str, float] = {}
     for name in ("spiking", "rejection"):
         posteriors = [getattr(scene, name) for scene in scenes]
-        ratios: Values = np.array([p.sd_m / s.exact.sd_m for p, s in zip(posteriors, scenes, strict=True)])
+        ratios: Values = np.array(
+            [p.sd_m / s.exact.sd_m for p, s in zip(posteriors, scenes, strict=True)]
+        )
         errors = [s.exact.off(p.mean_m) for p, s in zip(posteriors, scenes, strict=True)]
         prefix = "posterior" if name == "spiking" else name
         found |= {
@@ -93,4 +109,8 @@ def figures(scenes: list[Scene]) -> dict[str, float]:
             f"{prefix}_mean_error_most": float(np.max(errors)),
         }
     spikes = float(np.median([scene.spikes for scene in scenes]))
-    return found | {"place_spikes_a_scene": spikes, "recorded_s": RECORDED_S, "scenes": float(len(scenes))}
+    return found | {
+        "place_spikes_a_scene": spikes,
+        "recorded_s": RECORDED_S,
+        "scenes": float(len(scenes)),
+    }

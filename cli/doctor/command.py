@@ -10,20 +10,20 @@ from pathlib import Path
 import click
 import msgspec
 
-from bus.discovery import discover
-from bus.errors import NoRouterError
-from bus.inbox import Inbox
-from bus.intake import Intake
-from bus.interface import Arrival, Member
-from bus.zenoh_bus import ZenohBus
 from cli.doctor import installation, system
 from cli.doctor.finding import Finding
 from cli.doctor.system import Observed
 from cli.options import agent_option, connect_option, json_option
 from cli.topic.observing import observing
+from cogmap.bus.discovery import discover
+from cogmap.bus.interface import Arrival, Member
+from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.errors import NoRouterError
+from cogmap.runtime.inbox import Inbox
+from cogmap.runtime.intake import Intake
 from schemas import topics
 from schemas.process import Clock, Health
-from services import table
+from services import registry
 
 LOOK_S = 3.3
 RUNS = Path("runs")
@@ -39,7 +39,10 @@ def doctor(as_json: bool, connect: str, agent: str) -> None:
     if as_json:
         click.echo(json.dumps([msgspec.to_builtins(finding) for finding in found]))
     else:
-        click.echo("\n".join(map(str, found)) or "all is well, with the installation and with the system that runs")
+        click.echo(
+            "\n".join(map(str, found))
+            or "all is well, with the installation and with the system that runs"
+        )
     sys.exit(1 if found else 0)
 
 
@@ -47,16 +50,22 @@ def _running(connect: str, agent: str) -> list[Finding]:
     try:
         with observing(connect, agent, "doctor") as bus:
             observed = observe(bus, LOOK_S)
-            return system.examine(table.MODULES, observed, discover(bus.session, agent))
+            return system.examine(registry.MODULES, observed, discover(bus.session, agent))
     except NoRouterError:
         return [
-            Finding("router", f"none answers at {connect}", "start one with `cogmap run`, or name it with --connect")
+            Finding(
+                "router",
+                f"none answers at {connect}",
+                "start one with `cogmap run`, or name it with --connect",
+            )
         ]
 
 
 def observe(bus: ZenohBus, duration_s: float) -> Observed:
     """Listen for so long to who is there and how they fare."""
-    observed, inbox, intake = Observed(), Inbox(), Intake()
+    observed = Observed()
+    inbox = Inbox()
+    intake = Intake()
 
     def on_change(member: Member, alive: bool) -> None:
         inbox.call(lambda: (observed.ready.add if alive else observed.ready.discard)(member))

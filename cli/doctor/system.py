@@ -1,4 +1,6 @@
-"""What is wrong with a running system, judged by what its processes say of themselves for a few seconds."""
+"""What is wrong with a running system, judged by what its processes say of themselves for a few
+seconds.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +8,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from bus.discovery import Role, System
-from bus.interface import Member
 from cli.doctor.finding import Finding
+from cogmap.bus.discovery import Role, System
+from cogmap.bus.interface import Member
 from schemas import topics
 from schemas.process import Health
 from schemas.topics import About
@@ -21,7 +23,9 @@ FEWEST_REPORTS = 2
 
 @dataclass
 class Observed:
-    """What was seen. `health` has each instance's reports in order; `clock_rate` is None where no clock was heard."""
+    """What was seen. `health` has each instance's reports in order; `clock_rate` is None where no
+    clock was heard.
+    """
 
     ready: set[Member] = field(default_factory=set)
     health: dict[str, list[Health]] = field(default_factory=dict)
@@ -45,7 +49,9 @@ def absent(expected: Iterable[str], observed: Observed) -> Iterator[Finding]:
     for name in expected:
         if name not in there:
             yield Finding(
-                name, "no instance of it is on the bus: it is dead or was never started", _start(name, "see its log")
+                name,
+                "no instance of it is on the bus: it is dead or was never started",
+                _start(name, "see its log"),
             )
 
 
@@ -54,7 +60,11 @@ def silent(expected: Iterable[str], observed: Observed) -> Iterator[Finding]:
     modules = set(expected)
     for member in sorted(observed.ready):
         if member.module in modules and member.instance not in observed.health:
-            yield Finding(member.instance, "it is on the bus but tells nothing", "see its log, it hangs or is stopped")
+            yield Finding(
+                member.instance,
+                "it is on the bus but tells nothing",
+                "see its log, it hangs or is stopped",
+            )
     for instance, reports in sorted(observed.health.items()):
         if not reports[-1].ready:
             yield Finding(instance, "it is not ready", "start the modules that it waits for")
@@ -74,7 +84,9 @@ def _told(observed: Observed) -> Iterator[Finding]:
         for name, number in sorted(last.rejected.items()):
             if number:
                 yield Finding(
-                    instance, f"it rejected {number} messages of {name}", "its log names them: mend who publishes them"
+                    instance,
+                    f"it rejected {number} messages of {name}",
+                    "its log names them: mend who publishes them",
                 )
         queued = [report.queued for report in reports]
         if queued[-1] >= LONG_QUEUE and all(later > earlier for earlier, later in pairwise(queued)):
@@ -93,7 +105,11 @@ def off_rate(observed: Observed, system: System) -> Iterator[Finding]:
         return
     measured = rates_hz(observed.health.values())
     for topic in topics.ALL:
-        if topic.rate_hz < SLOWEST_HZ or not system.doing(Role.PUBLISHES, topic) or topic.name not in measured:
+        if (
+            topic.rate_hz < SLOWEST_HZ
+            or not system.doing(Role.PUBLISHES, topic)
+            or topic.name not in measured
+        ):
             continue
         expected_hz = topic.rate_hz * (observed.clock_rate or 1.0)
         if abs(measured[topic.name] - expected_hz) > TOLERANCE * expected_hz:
@@ -105,10 +121,13 @@ def off_rate(observed: Observed, system: System) -> Iterator[Finding]:
 
 
 def rates_hz(reports_of: Iterable[list[Health]]) -> dict[str, float]:
-    """The rate of each topic that somebody publishes, between the first and the last report of each instance."""
+    """The rate of each topic that somebody publishes, between the first and the last report of each
+    instance.
+    """
     rates: dict[str, float] = {}
     for reports in reports_of:
-        first, last = reports[0], reports[-1]
+        first = reports[0]
+        last = reports[-1]
         span_s = last.uptime_s - first.uptime_s
         if len(reports) < FEWEST_REPORTS or span_s <= 0:
             continue
@@ -124,7 +143,11 @@ def truth_leaks(expected: Iterable[str], system: System) -> Iterator[Finding]:
         if topic.about is About.TRUTH:
             for process in system.doing(Role.SUBSCRIBES, topic):
                 if process.member is not None and process.member.module in modules:
-                    yield Finding(process.name, f"it subscribes to {topic.name}", "no module may see the truth")
+                    yield Finding(
+                        process.name,
+                        f"it subscribes to {topic.name}",
+                        "no module may see the truth",
+                    )
 
 
 def _start(name: str, else_: str) -> str:

@@ -1,4 +1,6 @@
-"""One run of an experiment through real processes on a real bus, as the demo's: it must say the same bytes."""
+"""One run of an experiment through real processes on a real bus, as the demo's: it must say the
+same bytes.
+"""
 
 from __future__ import annotations
 
@@ -8,18 +10,18 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from bus.config import Sections
-from bus.errors import CogmapError
-from bus.house import House
-from bus.module import Module
-from bus.session import free_endpoint
-from bus.shell import Shell
-from bus.zenoh_bus import ZenohBus
-from cli.run.plan import CONFIG_NAME, ROUTER, to_toml
-from cli.run.supervisor import Program, Supervisor, cogmap_command
-from experiments import heard
-from experiments.heard import Heard
-from services import table
+from cli.launch.plan import CONFIG_NAME, ROUTER, to_toml
+from cli.launch.supervisor import Program, Supervisor, cogmap_command
+from cogmap.bus.session import free_endpoint
+from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.errors import CogmapError
+from cogmap.runtime.config import Sections
+from cogmap.runtime.in_process import House
+from cogmap.runtime.module import Module
+from cogmap.runtime.shell import Shell
+from experiments import transcript
+from experiments.transcript import Heard
+from services import registry
 
 PUMP_S = 0.005
 PATIENCE_S = 60.0
@@ -28,29 +30,47 @@ AGENT = "agent"
 
 
 def differing(sections: Sections, modules: Sequence[str]) -> list[str]:
-    """The topics on which `modules` say other bytes as real processes than on the in-memory bus, where the simulation
-    is one of them and leads its robot: nothing else has to be there."""
-    awaits = {**sections["sim"]["awaits"], heard.NAME: 1}
+    """The topics on which `modules` say other bytes as real processes than on the in-memory bus,
+    where the simulation is one of them and leads its robot: nothing else has to be there.
+    """
+    awaits = {**sections["sim"]["awaits"], transcript.NAME: 1}
     sections = {**sections, "sim": {**sections["sim"], "awaits": awaits}}
-    inside, outside = Heard(heard.MODEL), Heard(heard.MODEL)
-    house = House([*(table.build(name, sections) for name in modules), inside.module()])
+    inside = Heard(transcript.MODEL)
+    outside = Heard(transcript.MODEL)
+    house = House([*(registry.build(name, sections) for name in modules), inside.module()])
     house.run()
     house.close()
-    run(sections, [(name, name) for name in modules], [outside.module()], lambda: outside.has_as_many_as(inside))
+    run(
+        sections,
+        [(name, name) for name in modules],
+        [outside.module()],
+        lambda: outside.has_as_many_as(inside),
+    )
     return outside.differs_from(inside)
 
 
 def check(differing: Sequence[str]) -> None:
-    """Raise CogmapError where topics differ: the command then ends with code 1, its figures written."""
+    """Raise CogmapError where topics differ: the command then ends with code 1, its figures
+    written.
+    """
     if differing:
-        raise CogmapError(f"through real processes the run said other bytes on {', '.join(differing)}")
+        raise CogmapError(
+            f"through real processes the run said other bytes on {', '.join(differing)}"
+        )
 
 
-def run(sections: Sections, minds: Sequence[tuple[str, str]], here: Sequence[Module], done: Callable[[], bool]) -> None:
-    """Run `minds` (module, instance) as processes, configured by `sections`, and the modules `here`, until `done`,
-    or nothing was said for PATIENCE_S: what was not said by then is missing."""
+def run(
+    sections: Sections,
+    minds: Sequence[tuple[str, str]],
+    here: Sequence[Module],
+    done: Callable[[], bool],
+) -> None:
+    """Run `minds` (module, instance) as processes, configured by `sections`, and the modules
+    `here`, until `done`, or nothing was said for PATIENCE_S: what was not said by then is missing.
+    """
     with tempfile.TemporaryDirectory() as name, ExitStack() as stack:
-        folder, endpoint = Path(name), free_endpoint()
+        folder = Path(name)
+        endpoint = free_endpoint()
         (folder / CONFIG_NAME).write_text(to_toml(sections))
         supervisor = Supervisor(folder)
         stack.callback(lambda: supervisor.end(list(supervisor.children), GRACE_S))

@@ -10,7 +10,14 @@ from typing import Any
 import click
 
 from cli.experiment import live, outcome
-from cli.experiment.options import cameras_option, json_option, live_option, out_option, processes_option, seed_option
+from cli.experiment.options import (
+    cameras_option,
+    json_option,
+    live_option,
+    out_option,
+    processes_option,
+    seed_option,
+)
 from cli.log.progress import bar
 from experiments.loop_closing.run import (
     METHODS,
@@ -39,16 +46,24 @@ Examples:
 @out_option
 @json_option
 def loop_closing(
-    cameras: bool, goes_live: bool, seed: int, processes: int, out: Path | None, json_path: Path | None
+    cameras: bool,
+    goes_live: bool,
+    seed: int,
+    processes: int,
+    out: Path | None,
+    json_path: Path | None,
 ) -> None:
     """Figure 6: a way round some blocks, before and after its loop is closed by reverse replay.
 
-    Driven twice, with positions corrected, which is the paper's rule, and with headings too. Percepts are not drawn:
-    they err as perception was measured to; --cameras drives once more and draws them. Takes about a minute, or two.
+    Driven twice, with positions corrected, which is the paper's rule, and with headings too.
+    Percepts are not drawn: they err as perception was measured to; --cameras drives once more and
+    draws them. Takes about a minute, or two.
     """
     folder = outcome.folder_for(NAME, out)
     with bar("driving round the blocks") as progress:
-        loops = dict(zip(METHODS, each(partial(drive, seed), METHODS, processes, progress), strict=True))
+        loops = dict(
+            zip(METHODS, each(partial(drive, seed), METHODS, processes, progress), strict=True)
+        )
     said = figures(loops) | figures_of_rule(seed)
     if cameras:
         with bar("driving with cameras") as progress:
@@ -58,6 +73,8 @@ def loop_closing(
     if goes_live:
         said["live_same"] = float(not differing)
     outcome.say(NAME, said)
-    draw: Any = importlib.import_module("cli.experiment.loop_figure")  # other commands have no use for matplotlib
+    draw: Any = importlib.import_module(
+        "cli.plots.loop_closing"
+    )  # other commands have no use for matplotlib
     outcome.save(folder, NAME, draw.figure(loops, said), said, seed, json_path)
     live.check(differing)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from bus.errors import UsageError
+from cogmap.errors import UsageError
 
 
 def _writable(context: click.Context, parameter: click.Parameter, path: Path | None) -> Path | None:
@@ -18,7 +18,11 @@ def _writable(context: click.Context, parameter: click.Parameter, path: Path | N
 
 
 seed_option = click.option(
-    "--seed", type=click.IntRange(0, 2**32), default=1, show_default=True, help="Which noise; the same, the same bytes."
+    "--seed",
+    type=click.IntRange(0, 2**32),
+    default=1,
+    show_default=True,
+    help="Which noise; the same, the same bytes.",
 )
 processes_option = click.option(
     "--processes",
@@ -44,5 +48,7 @@ live_option = click.option(
     help="Run one more through real processes and compare bytes; code 1 where they differ.",
 )
 cameras_option = click.option(
-    "--cameras", is_flag=True, help="Run one more with cameras: what is told otherwise is drawn and recognised."
+    "--cameras",
+    is_flag=True,
+    help="Run one more with cameras: what is told otherwise is drawn and recognised.",
 )

@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
 
-from bus.errors import UsageError
-from cli.palette import PAPER
+from cli.plots.palette import PAPER
+from cogmap.errors import UsageError
 
 # Without the time of day in it, the same run gives the same bytes.
 _UNDATED: dict[str, dict[str, Any]] = {"pdf": {"CreationDate": None}}
@@ -26,7 +26,9 @@ def folder_for(name: str, out: Path | None) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise UsageError(f"cannot make the folder {folder} ({error.strerror}): name another with --out") from None
+        raise UsageError(
+            f"cannot make the folder {folder} ({error.strerror}): name another with --out"
+        ) from None
     return folder
 
 
@@ -48,10 +50,19 @@ def save_figure(folder: Path, name: str, sheet: Figure) -> list[Path]:
 
 def save_json(path: Path, figures: dict[str, Any], seed: int) -> None:
     """Write `figures`, one flat object, with the seed and the exact command."""
-    path.write_text(json.dumps({**figures, "seed": seed, "command": command_line()}, indent=2) + "\n")
+    path.write_text(
+        json.dumps({**figures, "seed": seed, "command": command_line()}, indent=2) + "\n"
+    )
 
 
-def save(folder: Path, name: str, sheet: Figure, figures: dict[str, Any], seed: int, json_path: Path | None) -> None:
+def save(
+    folder: Path,
+    name: str,
+    sheet: Figure,
+    figures: dict[str, Any],
+    seed: int,
+    json_path: Path | None,
+) -> None:
     """Write the figure, and the JSON beside it and at `json_path`; say where."""
     paths = [*save_figure(folder, name, sheet), folder / f"{name}.json"]
     paths += [json_path] if json_path is not None else []

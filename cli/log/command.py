@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from cli.log.look import cat, diff, info, recover
+from cli.log.inspect import cat, diff, info, recover
 from cli.log.pictures import image, perception
 from cli.log.record import record
 from cli.log.replay import replay
@@ -21,7 +21,9 @@ A first session, with `cogmap run` going on in another terminal:
 
 @click.group(epilog=_EPILOG)
 def log() -> None:
-    """Record what travels on the bus; look at it, draw what was seen, play it back, compare it, recover it."""
+    """Record what travels on the bus; look at it, draw what was seen, play it back, compare it,
+    recover it.
+    """
 
 
 for _command in (record, info, cat, image, perception, replay, diff, recover):

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 
 import click
 
-from bus.runner import Stop
+from cogmap.runtime.process import Stop
 
 
 class Keys:

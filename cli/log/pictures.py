@@ -10,18 +10,19 @@ from typing import Any
 import click
 import msgspec
 
-from bus.errors import LogError, UsageError
-from cli.log import text
+from cli.log import formatting
 from cli.log.progress import bar
 from cli.options import json_option
-from logs import views
-from logs.reader import LogReader
-from logs.views import Sight
+from cogmap.errors import LogError, UsageError
+from cogmap.recording import views
+from cogmap.recording.storage.reader import LogReader
+from cogmap.recording.views import Sight
 from schemas import topics
 from schemas.sensing import Percepts, StereoFrame, View
 from schemas.topics import Topic
 
-IMAGES, FIGURES = (".png", ".jpg", ".jpeg"), (".png", ".pdf")
+IMAGES = (".png", ".jpg", ".jpeg")
+FIGURES = (".png", ".pdf")
 _IMAGE_EPILOG = """\b
 Examples:
   cogmap log image drive.mcap                          the view in the middle of the log
@@ -38,7 +39,9 @@ _Command = Callable[..., None]
 
 
 class Picture(msgspec.Struct, frozen=True):
-    """A file that was written, and which frame of the log it shows; `at_s` counts from the log's first message."""
+    """A file that was written, and which frame of the log it shows; `at_s` counts from the log's
+    first message.
+    """
 
     path: str
     topic: str
@@ -52,9 +55,22 @@ def _which(command: _Command) -> _Command:
     """The options that say which frame, and where to."""
     for option in (
         json_option,
-        click.option("-o", "--output", type=click.Path(path_type=Path), help="The file; named by the frame otherwise."),
-        click.option("--at", "at_s", type=click.FloatRange(min=0), metavar="SECONDS", help="Nearest to this time."),
-        click.option("--frame", type=click.IntRange(min=0), metavar="N", help="The frame with this number."),
+        click.option(
+            "-o",
+            "--output",
+            type=click.Path(path_type=Path),
+            help="The file; named by the frame otherwise.",
+        ),
+        click.option(
+            "--at",
+            "at_s",
+            type=click.FloatRange(min=0),
+            metavar="SECONDS",
+            help="Nearest to this time.",
+        ),
+        click.option(
+            "--frame", type=click.IntRange(min=0), metavar="N", help="The frame with this number."
+        ),
         click.argument("log", type=click.Path(path_type=Path)),
     ):
         command = option(command)
@@ -62,7 +78,9 @@ def _which(command: _Command) -> _Command:
 
 
 @click.command(epilog=_IMAGE_EPILOG)
-@click.option("--camera", type=click.Choice(["left", "right"]), help="As this camera gave it, not rectified.")
+@click.option(
+    "--camera", type=click.Choice(["left", "right"]), help="As this camera gave it, not rectified."
+)
 @click.option("--depth", is_flag=True, help="Its depth, in colours, with a scale.")
 @click.option("--percepts", is_flag=True, help="Outline and name what was recognised in it.")
 @_which
@@ -78,8 +96,9 @@ def image(
 ) -> None:
     """Save a view in LOG as an image file: a recorded pixel a pixel, as PNG or JPEG.
 
-    That is the rectified left image, of which depth and percepts are; --camera has it as a camera gave it. Unless
-    --frame or --at says which, it is the one in the middle. With --depth or --percepts each pixel is several wide.
+    That is the rectified left image, of which depth and percepts are; --camera has it as a camera
+    gave it. Unless --frame or --at says which, it is the one in the middle. With --depth or
+    --percepts each pixel is several wide.
     """
     if camera and (depth or percepts):
         raise click.UsageError(
@@ -98,25 +117,34 @@ def image(
 
 @click.command(epilog=_PERCEPTION_EPILOG)
 @_which
-def perception(log: Path, frame: int | None, at_s: float | None, output: Path | None, as_json: bool) -> None:
+def perception(
+    log: Path, frame: int | None, at_s: float | None, output: Path | None, as_json: bool
+) -> None:
     """Draw what perception made of a view in LOG: figure 3 of the paper, as PNG or PDF.
 
-    Camera image, depth, segments with their names, the road in the image, and from above the projected road with
-    the objects where they stand. Unless --frame or --at says which, it is the view in which most is recognised.
+    Camera image, depth, segments with their names, the road in the image, and from above the
+    projected road with the objects where they stand. Unless --frame or --at says which, it is the
+    view in which most is recognised.
     """
     reader = LogReader(log)
     found = _sights(reader, topics.VIEW, True)
     sight = _chosen(reader, found, frame, at_s) or max(found, key=lambda sight: sight.objects)
     path = _output(output, log, sight, "perception", FIGURES)
     said = views.percepts(reader, sight)
-    view, named = views.message(reader, sight.record), f"{log}, frame {sight.frame}"
+    view = views.message(reader, sight.record)
+    named = f"{log}, frame {sight.frame}"
     assert isinstance(view, View)
     assert said is not None
     if min(view.calibration.fx_px, view.calibration.fy_px) < 1:
-        raise LogError(f"{named}: its calibration's focal lengths must be at least 1 pixel: choose another frame")
-    pixels, depth_m = views.image(view.image, named), views.depth(view.depth_m, named)
+        raise LogError(
+            f"{named}: its calibration's focal lengths must be at least 1 pixel: choose another frame"
+        )
+    pixels = views.image(view.image, named)
+    depth_m = views.depth(view.depth_m, named)
     title = f"What was perceived in frame {sight.frame}, {sight.at_s:.1f} s into {log.name}"
-    draw: Any = importlib.import_module("cli.log.figure")  # other commands have no use for matplotlib
+    draw: Any = importlib.import_module(
+        "cli.plots.perception"
+    )  # other commands have no use for matplotlib
     path.write_bytes(draw.figure(view, pixels, depth_m, said, title, path.suffix.lower()))
     _say(path, log, topics.VIEW, sight, said, as_json)
 
@@ -127,7 +155,9 @@ def _sights(reader: LogReader, topic: Topic, told: bool) -> list[Sight]:
     return views.recognised(reader, found) if told else found
 
 
-def _chosen(reader: LogReader, found: list[Sight], frame: int | None, at_s: float | None) -> Sight | None:
+def _chosen(
+    reader: LogReader, found: list[Sight], frame: int | None, at_s: float | None
+) -> Sight | None:
     if frame is not None and at_s is not None:
         raise click.UsageError("--frame and --at both say which view: leave one out")
     if frame is not None:
@@ -135,8 +165,12 @@ def _chosen(reader: LogReader, found: list[Sight], frame: int | None, at_s: floa
     return None if at_s is None else views.at_time(found, at_s, reader)
 
 
-def _output(output: Path | None, log: Path, sight: Sight, kind: str, suffixes: tuple[str, ...]) -> Path:
-    """Where to write. Raises UsageError where that cannot be a file of one of the kinds in `suffixes`."""
+def _output(
+    output: Path | None, log: Path, sight: Sight, kind: str, suffixes: tuple[str, ...]
+) -> Path:
+    """Where to write. Raises UsageError where that cannot be a file of one of the kinds in
+    `suffixes`.
+    """
     path = output or Path(f"{log.stem}-frame-{sight.frame}-{kind}{suffixes[0]}")
     if path.suffix.lower() not in suffixes:
         raise UsageError(f"-o {path}: name a file that ends in {' or '.join(suffixes)}")
@@ -146,10 +180,16 @@ def _output(output: Path | None, log: Path, sight: Sight, kind: str, suffixes: t
 
 
 def _image(
-    reader: LogReader, sight: Sight, camera: str | None, depth: bool, percepts: Percepts | None, suffix: str
+    reader: LogReader,
+    sight: Sight,
+    camera: str | None,
+    depth: bool,
+    percepts: Percepts | None,
+    suffix: str,
 ) -> bytes:
-    message, named = views.message(reader, sight.record), f"{reader.path}, frame {sight.frame}"
-    paint: Any = importlib.import_module("cli.log.paint")
+    message = views.message(reader, sight.record)
+    named = f"{reader.path}, frame {sight.frame}"
+    paint: Any = importlib.import_module("cli.plots.paint")
     if isinstance(message, StereoFrame):
         side = message.left if camera == "left" else message.right
         return bytes(paint.encoded(views.image(side, named), suffix))
@@ -157,14 +197,20 @@ def _image(
     pixels = views.image(message.image, named)
     if depth or percepts is not None:
         depth_m = views.depth(message.depth_m, named) if depth else None
-        pixels = paint.drawn(pixels, depth_m, message.calibration, percepts.objects if percepts else [])
+        pixels = paint.drawn(
+            pixels, depth_m, message.calibration, percepts.objects if percepts else []
+        )
     return bytes(paint.encoded(pixels, suffix))
 
 
-def _say(path: Path, log: Path, topic: Topic, sight: Sight, percepts: Percepts | None, as_json: bool) -> None:
+def _say(
+    path: Path, log: Path, topic: Topic, sight: Sight, percepts: Percepts | None, as_json: bool
+) -> None:
     objects = None if percepts is None else [percept.label for percept in percepts.objects]
     if as_json:
-        text.say_json(Picture(str(path), topic.name, sight.frame, sight.stamp_ns, sight.at_s, objects))
+        formatting.say_json(
+            Picture(str(path), topic.name, sight.frame, sight.stamp_ns, sight.at_s, objects)
+        )
         return
     shown = "" if objects is None else f", with {', '.join(objects) or 'nothing recognised'}"
     click.echo(f"{path}: {topic.name}, frame {sight.frame} at {sight.at_s:.3f} s of {log}{shown}")

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.progress import Progress
 
-from logs import reader
+from cogmap.recording.storage import reader
 
 SHOWN_AFTER_S = 2.0
 
@@ -19,7 +19,9 @@ SHOWN_AFTER_S = 2.0
 def bar(label: str) -> Iterator[reader.Progress]:
     """Takes the share done, and shows it on a terminal once it has taken SHOWN_AFTER_S."""
     began_s = time.monotonic()
-    progress = Progress(console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty())
+    progress = Progress(
+        console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()
+    )
     task = progress.add_task(label, total=1.0)
     started = False
 

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import click
 
-from bus import config
-from bus.runner import Stop
-from bus.zenoh_bus import ZenohBus
-from cli.log import text
+from cli.log import formatting
 from cli.options import agent_option, config_option, connect_option, json_option, set_option
-from logs import recorder, selection
+from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.recording import recorder, selection
+from cogmap.runtime import config
+from cogmap.runtime.process import Stop
 
 _EPILOG = """\b
 Examples:
@@ -26,12 +26,29 @@ Examples:
 
 @click.command(epilog=_EPILOG)
 @click.argument("topics", nargs=-1)
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="The file; named by the time unless given.")
-@click.option("-a", "--all", "everything", is_flag=True, help="Every topic: so it is unless some are chosen.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    help="The file; named by the time unless given.",
+)
+@click.option(
+    "-a", "--all", "everything", is_flag=True, help="Every topic: so it is unless some are chosen."
+)
 @click.option("-e", "--regex", default="", help="Topics that match this, besides those named.")
 @click.option("-x", "--exclude", default="", help="Leave out topics that match this.")
-@click.option("-d", "--max-duration", type=click.FloatRange(min=0, min_open=True), help="End after so many seconds.")
-@click.option("--instance", default=recorder.MODULE, show_default=True, help="Its own name, where several record.")
+@click.option(
+    "-d",
+    "--max-duration",
+    type=click.FloatRange(min=0, min_open=True),
+    help="End after so many seconds.",
+)
+@click.option(
+    "--instance",
+    default=recorder.MODULE,
+    show_default=True,
+    help="Its own name, where several record.",
+)
 @click.option("--tied", is_flag=True, help="End when standard input ends.")
 @connect_option
 @agent_option
@@ -55,18 +72,20 @@ def record(
 ) -> None:
     """Record what travels on the bus into an MCAP file, until Ctrl-C.
 
-    The file is flushed four times a second, so a kill loses no more than that. At the end, and in the file, every
-    gap in the numbers of any source is told. The configuration goes into the file too: replay uses it.
+    The file is flushed four times a second, so a kill loses no more than that. At the end, and in
+    the file, every gap in the numbers of any source is told. The configuration goes into the file
+    too: replay uses it.
     """
     if everything and (topics or regex):
         raise click.UsageError("--all records every topic: leave it out, or the choice of topics")
     chosen = selection.to_record(topics, regex, exclude)
     about = {"agent": agent, "config": json.dumps(config.load(config_path, settings))}
     path = output or Path(f"cogmap_{time.strftime('%Y_%m_%d-%H_%M_%S')}.mcap")
-    bus, stop = ZenohBus(connect, agent), Stop(tied)
+    bus = ZenohBus(connect, agent)
+    stop = Stop(tied)
     recording = recorder.Recorder(bus, path, chosen, about, instance=instance)
     summary = recorder.run(recording, lambda: stop.asked, max_duration)
     if as_json:
-        text.say_json(summary)
+        formatting.say_json(summary)
     else:
-        text.say_summary(summary)
+        formatting.say_summary(summary)

@@ -7,18 +7,18 @@ from pathlib import Path
 
 import click
 
-from bus import config
-from bus.runner import Stop
-from bus.zenoh_bus import ZenohBus
-from cli.log import text
+from cli.log import formatting
 from cli.log.keys import Keys
 from cli.log.progress import bar
 from cli.options import agent_option, config_option, connect_option, json_option, set_option
-from logs import selection
-from logs.player import Choices, Player
-from logs.reader import LogReader
-from logs.replay import replay_into
-from services import table
+from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.recording import selection
+from cogmap.recording.replaying.player import Choices, Player
+from cogmap.recording.replaying.replay import replay_into
+from cogmap.recording.storage.reader import LogReader
+from cogmap.runtime import config
+from cogmap.runtime.process import Stop
+from services import registry
 
 CLOCK_HZ = 40.0
 _EPILOG = """\b
@@ -33,11 +33,17 @@ Examples:
 
 @click.command(epilog=_EPILOG)
 @click.argument("log", type=click.Path(path_type=Path))
-@click.option("-r", "--rate", type=click.FloatRange(min=0, min_open=True), help="So many times as fast.")
+@click.option(
+    "-r", "--rate", type=click.FloatRange(min=0, min_open=True), help="So many times as fast."
+)
 @click.option("--topics", multiple=True, metavar="TOPIC", help="Only this one; repeat at will.")
-@click.option("--start-offset", type=click.FloatRange(min=0), help="Begin so many seconds into the log.")
+@click.option(
+    "--start-offset", type=click.FloatRange(min=0), help="Begin so many seconds into the log."
+)
 @click.option("-l", "--loop", is_flag=True, help="Begin again at the end.")
-@click.option("--start-paused", is_flag=True, help="Begin at rest; the space bar goes on and pauses.")
+@click.option(
+    "--start-paused", is_flag=True, help="Begin at rest; the space bar goes on and pauses."
+)
 @click.option(
     "--clock",
     "clock_hz",
@@ -47,7 +53,9 @@ Examples:
     metavar="[HZ]",
     help=f"Say on the clock how far it is, so often a second ({CLOCK_HZ:g} unless given).",
 )
-@click.option("--into", multiple=True, metavar="MODULE", help="Feed this module and compare; repeat at will.")
+@click.option(
+    "--into", multiple=True, metavar="MODULE", help="Feed this module and compare; repeat at will."
+)
 @connect_option
 @agent_option
 @config_option
@@ -72,14 +80,16 @@ def replay(
 ) -> None:
     """Play LOG back onto the bus, or feed it to modules with --into.
 
-    With --into, each recorded instance of the module takes in what it took in then, in the same order and with the
-    recorded configuration, and what it says is held against what it said: exit code 1, and the first difference in
-    words, where a byte differs.
+    With --into, each recorded instance of the module takes in what it took in then, in the same
+    order and with the recorded configuration, and what it says is held against what it said: exit
+    code 1, and the first difference in words, where a byte differs.
     """
     overrides = config.load(config_path, settings)
     if into:
         if rate or topics or start_offset or loop or start_paused or clock_hz:
-            raise click.UsageError("--into replays everything as fast as it goes: leave the options of playing out")
+            raise click.UsageError(
+                "--into replays everything as fast as it goes: leave the options of playing out"
+            )
         _into(log, into, overrides, as_json)
         return
     if overrides:
@@ -96,24 +106,26 @@ def replay(
 
 def _into(log: Path, modules: tuple[str, ...], overrides: config.Sections, as_json: bool) -> None:
     for name in modules:
-        table.config_type(name)
+        registry.config_type(name)
     with bar(f"replaying {', '.join(modules)}") as progress:
-        report = replay_into(log, modules, table.build, overrides=overrides, progress=progress)
+        report = replay_into(log, modules, registry.build, overrides=overrides, progress=progress)
     if as_json:
-        text.say_json(report)
+        formatting.say_json(report)
     else:
-        text.say_report(report)
+        formatting.say_report(report)
     if not report.same:
         sys.exit(1)
 
 
-def _onto_bus(reader: LogReader, choices: Choices, bus: ZenohBus, start_paused: bool, as_json: bool) -> None:
+def _onto_bus(
+    reader: LogReader, choices: Choices, bus: ZenohBus, start_paused: bool, as_json: bool
+) -> None:
     try:
         with Keys(Stop(), start_paused).listening() as keys:
             played = Player(reader, bus, choices, keys).play()
     finally:
         bus.close()
     if as_json:
-        text.say_json(played)
+        formatting.say_json(played)
     else:
-        text.say_played(played)
+        formatting.say_played(played)

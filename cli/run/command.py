@@ -11,19 +11,23 @@ import click
 import msgspec
 from rich.console import Console
 
-from bus import config
-from bus.errors import ConfigError
-from bus.runner import Stop
-from bus.session import check_free
+from cli.launch.drive import INTERRUPTED, Drive
+from cli.launch.plan import Choices, effective, everybody, to_toml
 from cli.options import agent_option, config_option, connect_option, set_option
 from cli.run import display, summary
-from cli.run.drive import INTERRUPTED, Drive
-from cli.run.plan import Choices, effective, everybody, to_toml
+from cogmap.bus.session import check_free
+from cogmap.errors import ConfigError
+from cogmap.runtime import config
+from cogmap.runtime.process import Stop
 
 FINISH_S = 4.0
 
-seed_option = click.option("--seed", type=click.IntRange(0, 2**32), help="Which town, and which noise.  [default: 1]")
-laps_option = click.option("--laps", type=click.FloatRange(0, 1000, min_open=True), help="How far.  [default: 1]")
+seed_option = click.option(
+    "--seed", type=click.IntRange(0, 2**32), help="Which town, and which noise.  [default: 1]"
+)
+laps_option = click.option(
+    "--laps", type=click.FloatRange(0, 1000, min_open=True), help="How far.  [default: 1]"
+)
 codelets_option = click.option(
     "--codelets", type=click.IntRange(1, 64), default=1, show_default=True, help="How many workers."
 )
@@ -38,8 +42,14 @@ lockstep_option = click.option(
 @laps_option
 @lockstep_option
 @codelets_option
-@click.option("--out", type=click.Path(path_type=Path), help="A new folder for its files.  [default: runs/TIME]")
-@click.option("--record/--no-record", default=True, help="Whether to keep a log of all that travels.")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    help="A new folder for its files.  [default: runs/TIME]",
+)
+@click.option(
+    "--record/--no-record", default=True, help="Whether to keep a log of all that travels."
+)
 @click.option(
     "--time-limit",
     type=click.FloatRange(5, None),
@@ -69,13 +79,17 @@ def run(
 ) -> None:
     """Drive the robot around a loop of streets in a simulated town.
 
-    Starts a router and every module as a process of its own, shows how the drive goes, and leaves a folder with the
-    log, a map and a summary. Ends with 0 where the route was completed, 130 after Ctrl-C, else with 1.
+    Starts a router and every module as a process of its own, shows how the drive goes, and leaves a
+    folder with the log, a map and a summary. Ends with 0 where the route was completed, 130 after
+    Ctrl-C, else with 1.
     """
     began_s = time.monotonic()
-    stop, console = Stop(), Console(stderr=as_json)
+    stop = Stop()
+    console = Console(stderr=as_json)
     choices = Choices(seed=seed, laps=laps, lockstep=lockstep, codelets=codelets, record=record)
-    sections = effective(config.load(config_path, settings), choices, everybody(choices, observer=True))
+    sections = effective(
+        config.load(config_path, settings), choices, everybody(choices, observer=True)
+    )
     check_free(connect)
     drive = Drive(_new_folder(out), connect, agent, choices, sections, began_s)
     screen = display.on(console)
@@ -98,7 +112,9 @@ def run(
 @lockstep_option
 @codelets_option
 @click.option("--record/--no-record", default=True, help="Whether the drive waits for a recorder.")
-@click.option("-o", "--output", type=click.File("w", atomic=True), default="-", help="Where to write it.")
+@click.option(
+    "-o", "--output", type=click.File("w", atomic=True), default="-", help="Where to write it."
+)
 @config_option
 @set_option
 def print_config(
@@ -113,12 +129,16 @@ def print_config(
 ) -> None:
     """Write the whole configuration of a drive as TOML: for modules that are started one by one."""
     choices = Choices(seed=seed, laps=laps, lockstep=lockstep, codelets=codelets, record=record)
-    sections = effective(config.load(config_path, settings), choices, everybody(choices, observer=False))
+    sections = effective(
+        config.load(config_path, settings), choices, everybody(choices, observer=False)
+    )
     output.write(to_toml(sections))
 
 
 def _new_folder(out: Path | None) -> Path:
-    """`out`, or a folder named after the time. Raises ConfigError where it exists or cannot be made."""
+    """`out`, or a folder named after the time. Raises ConfigError where it exists or cannot be
+    made.
+    """
     name = time.strftime("%Y-%m-%d-%H%M%S")
     folder = out if out is not None else Path("runs") / name
     try:
@@ -126,5 +146,7 @@ def _new_folder(out: Path | None) -> Path:
     except FileExistsError:
         raise ConfigError(f"{folder} exists already: name another with --out") from None
     except OSError as error:
-        raise ConfigError(f"cannot make the folder {folder} ({error.strerror}): name another with --out") from None
+        raise ConfigError(
+            f"cannot make the folder {folder} ({error.strerror}): name another with --out"
+        ) from None
     return folder

@@ -8,7 +8,7 @@ from typing import Protocol
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
-from cli.run.observer import Errors, Observer
+from cli.launch.observer import Errors, Observer
 
 PLAIN_PERIOD_S = 5.0
 
@@ -30,7 +30,9 @@ class Display(Protocol):
 
 
 def _drive_line(observer: Observer, errors: Errors) -> str:
-    estimate_m, integration_m = ((each[-1] if each.size else 0.0) for each in (errors.estimate_m, errors.integration_m))
+    estimate_m, integration_m = (
+        (each[-1] if each.size else 0.0) for each in (errors.estimate_m, errors.integration_m)
+    )
     return (
         f"{observer.elapsed_s:5.1f} s  {observer.travelled_m:6.1f} m  "
         f"{estimate_m:.2f} m off, path integration alone {integration_m:.2f} m"
@@ -55,7 +57,9 @@ class LiveDisplay:
         self._progress.console.print(sentence, highlight=False)
 
     def waiting(self, names: list[str]) -> None:
-        self._progress.update(self._task, description=f"waiting for {', '.join(names)}" if names else "starting")
+        self._progress.update(
+            self._task, description=f"waiting for {', '.join(names)}" if names else "starting"
+        )
 
     def driving(self, observer: Observer, errors: Errors) -> None:
         line = _drive_line(observer, errors)

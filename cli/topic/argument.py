@@ -6,7 +6,7 @@ import difflib
 
 import click
 
-from bus.errors import UsageError
+from cogmap.errors import UsageError
 from schemas import topics
 from schemas.topics import Delivery, Topic
 
@@ -17,14 +17,19 @@ def topic_named(name: str) -> Topic:
     if found is not None:
         return found
     close = difflib.get_close_matches(name, topics.BY_NAME, 1)
-    raise UsageError(f"no topic {name!r}: " + (f"did you mean {close[0]!r}?" if close else "see `cogmap topic list`"))
+    raise UsageError(
+        f"no topic {name!r}: "
+        + (f"did you mean {close[0]!r}?" if close else "see `cogmap topic list`")
+    )
 
 
 def streamed(name: str) -> Topic:
     """The topic called so, which must be one that is published. Raises UsageError."""
     topic = topic_named(name)
     if topic.delivery is Delivery.ON_REQUEST:
-        raise UsageError(f"{topic.name} is answered on request and never published: there is nothing to watch")
+        raise UsageError(
+            f"{topic.name} is answered on request and never published: there is nothing to watch"
+        )
     return topic
 
 

@@ -11,14 +11,14 @@ from typing import Any
 import click
 import msgspec
 
-from bus.errors import UsageError
-from bus.inbox import Inbox
-from bus.intake import Intake
-from bus.interface import Arrival
-from bus.runner import Stop
 from cli.options import agent_option, connect_option, json_option
 from cli.topic.argument import streamed_argument
 from cli.topic.observing import TICK_S, observing
+from cogmap.bus.interface import Arrival
+from cogmap.errors import UsageError
+from cogmap.runtime.inbox import Inbox
+from cogmap.runtime.intake import Intake
+from cogmap.runtime.process import Stop
 from schemas.array import Array
 from schemas.base import Message
 from schemas.render import field as field_at
@@ -55,8 +55,11 @@ def echo(
     if as_csv and as_json:
         raise UsageError("--csv and --json exclude each other: choose one")
     show = shower(field, full_length, no_arr, "csv" if as_csv else "json" if as_json else "text")
-    stop, inbox, intake = Stop(), Inbox(), Intake()
-    number, limit = 0, 1 if once else times
+    stop = Stop()
+    inbox = Inbox()
+    intake = Intake()
+    number = 0
+    limit = 1 if once else times
     with observing(connect, agent, "topic echo") as bus:
         bus.subscribe(topic, inbox.put, intake.lose)
         while not stop.asked and number != limit:
@@ -66,8 +69,13 @@ def echo(
                 click.echo(show(message))
                 number += 1
     if stop.asked:
-        refused, lost, skipped = intake.rejected[topic.name], intake.gaps[topic.name], inbox.superseded[topic.name]
-        click.echo(f"{number} messages, {refused} rejected, {lost} lost, {skipped} superseded by newer ones", err=True)
+        refused = intake.rejected[topic.name]
+        lost = intake.gaps[topic.name]
+        skipped = inbox.superseded[topic.name]
+        click.echo(
+            f"{number} messages, {refused} rejected, {lost} lost, {skipped} superseded by newer ones",
+            err=True,
+        )
 
 
 def shower(path: str | None, full: bool, no_arrays: bool, style: str) -> Show:

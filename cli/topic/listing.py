@@ -7,10 +7,10 @@ from typing import Any
 
 import click
 
-from bus.discovery import Process, Role, System
 from cli.options import agent_option, connect_option, json_option
 from cli.topic.argument import topic_argument
 from cli.topic.observing import look
+from cogmap.bus.discovery import Process, Role, System
 from schemas import topics
 from schemas.topics import Delivery, Topic
 
@@ -28,7 +28,9 @@ _ROLES = {
 @json_option
 @connect_option
 @agent_option
-def listing(show_types: bool, count_topics: bool, verbose: bool, as_json: bool, connect: str, agent: str) -> None:
+def listing(
+    show_types: bool, count_topics: bool, verbose: bool, as_json: bool, connect: str, agent: str
+) -> None:
     """The topics in use."""
     system = look(connect, agent)
     if as_json:
@@ -55,7 +57,9 @@ def info(topic: Topic, verbose: bool, as_json: bool, connect: str, agent: str) -
         click.echo(json.dumps(_described(system, topic)))
         return
     click.echo(f"Type: {topic.type.__name__}")
-    click.echo(f"Delivery: {topic.delivery.value}" + (f", {topic.rate_hz:g} Hz" if topic.rate_hz else ""))
+    click.echo(
+        f"Delivery: {topic.delivery.value}" + (f", {topic.rate_hz:g} Hz" if topic.rate_hz else "")
+    )
     for title, role in _columns(topic):
         found = system.doing(role, topic)
         click.echo(f"{title} count: {len(found)}")
@@ -86,7 +90,11 @@ def _typed(topic: Topic) -> str:
 def _verbose(system: System, role: Role) -> str:
     title, noun = _ROLES[role]
     counts = [(topic, len(system.doing(role, topic))) for topic in system.topics()]
-    lines = [f" * {_typed(topic)} {number} {noun}{'s' * (number > 1)}" for topic, number in counts if number]
+    lines = [
+        f" * {_typed(topic)} {number} {noun}{'s' * (number > 1)}"
+        for topic, number in counts
+        if number
+    ]
     return "\n".join([title, *lines])
 
 
@@ -110,5 +118,8 @@ def _described(system: System, topic: Topic) -> dict[str, Any]:
         "type": topic.type.__name__,
         "delivery": topic.delivery.value,
         "rate_hz": topic.rate_hz,
-        **{role.name.lower(): [process.name for process in system.doing(role, topic)] for role in Role},
+        **{
+            role.name.lower(): [process.name for process in system.doing(role, topic)]
+            for role in Role
+        },
     }

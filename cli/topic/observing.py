@@ -10,11 +10,11 @@ from queue import Empty, SimpleQueue
 
 import zenoh
 
-from bus.codec import Envelope
-from bus.discovery import System, discover
-from bus.interface import Arrival, Member
-from bus.session import open_client
-from bus.zenoh_bus import ZenohBus
+from cogmap.bus.codec import Envelope
+from cogmap.bus.discovery import System, discover
+from cogmap.bus.interface import Arrival, Member
+from cogmap.bus.session import open_client
+from cogmap.bus.zenoh_bus import ZenohBus
 from schemas.topics import Topic
 
 TICK_S = 0.1
@@ -37,7 +37,9 @@ class Sights:
 
     def __init__(self, bus: ZenohBus, topic: Topic) -> None:
         self._queue: SimpleQueue[Sight] = SimpleQueue()
-        bus.subscribe(topic, lambda arrival: self._queue.put(Sight(arrival)), lambda name, number: None)
+        bus.subscribe(
+            topic, lambda arrival: self._queue.put(Sight(arrival)), lambda name, number: None
+        )
 
     def take(self, timeout_s: float) -> Sight | None:
         """The next one; None where there is none within `timeout_s`."""
@@ -49,7 +51,9 @@ class Sights:
 
 @contextmanager
 def observing(connect: str, agent: str, what: str) -> Iterator[ZenohBus]:
-    """A bus that others see as `cli what`; it is left in the end, also where nobody reads the output any more."""
+    """A bus that others see as `cli what`; it is left in the end, also where nobody reads the
+    output any more.
+    """
     bus = ZenohBus(connect, agent)
     try:
         bus.identify(Member(CLI, f"{CLI} {what}"))

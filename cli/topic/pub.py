@@ -6,14 +6,14 @@ import time
 
 import click
 
-from bus.codec import Envelope, decode, encode
-from bus.errors import MessageError, UsageError
-from bus.runner import Stop
-from bus.zenoh_bus import ZenohBus
 from cli.options import agent_option, connect_option
 from cli.topic.argument import streamed_argument
 from cli.topic.observing import CLI, observing
-from cli.topic.written import parse
+from cli.topic.parse import parse
+from cogmap.bus.codec import Envelope, decode, encode
+from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.errors import MessageError, UsageError
+from cogmap.runtime.process import Stop
 from schemas.base import Message
 from schemas.topics import Topic
 
@@ -21,16 +21,26 @@ from schemas.topics import Topic
 @click.command()
 @streamed_argument
 @click.argument("message", default="{}")
-@click.option("-r", "--rate", type=click.FloatRange(min=0, min_open=True), default=1.0, show_default=True, help="Hz.")
+@click.option(
+    "-r",
+    "--rate",
+    type=click.FloatRange(min=0, min_open=True),
+    default=1.0,
+    show_default=True,
+    help="Hz.",
+)
 @click.option("-1", "--once", is_flag=True, help="Publish once and end.")
 @click.option("-t", "--times", type=click.IntRange(min=1), help="Publish so many times and end.")
 @connect_option
 @agent_option
-def pub(topic: Topic, message: str, rate: float, once: bool, times: int | None, connect: str, agent: str) -> None:
+def pub(
+    topic: Topic, message: str, rate: float, once: bool, times: int | None, connect: str, agent: str
+) -> None:
     """Publish MESSAGE, written in JSON or YAML, until Ctrl-C."""
     said = parse(topic, message)
     _check(topic, said)
-    stop, speaker = Stop(), Speaker(topic, said)
+    stop = Stop()
+    speaker = Speaker(topic, said)
     limit = 1 if once else times
     with observing(connect, agent, "topic pub") as bus:
         bus.declare(topic)
@@ -56,7 +66,8 @@ class Speaker:
 
     def __init__(self, topic: Topic, message: Message) -> None:
         self.number = 0
-        self._topic, self._message = topic, message
+        self._topic = topic
+        self._message = message
         self._incarnation = time.time_ns()
         message.source = CLI
 

@@ -1,4 +1,6 @@
-"""`cogmap topic hz`, `bw` and `delay`: a line a second until Ctrl-C, which ends with the figures so far."""
+"""`cogmap topic hz`, `bw` and `delay`: a line a second until Ctrl-C, which ends with the figures so
+far.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +11,11 @@ from typing import Any, TypeVar
 
 import click
 
-from bus.runner import Stop
 from cli.options import agent_option, connect_option, json_option
 from cli.topic.argument import streamed_argument
-from cli.topic.figures import BandwidthFigures, DelayFigures, Figures, RateFigures
+from cli.topic.metrics import BandwidthFigures, DelayFigures, Figures, RateFigures
 from cli.topic.observing import TICK_S, Sights, observing
+from cogmap.runtime.process import Stop
 from schemas.topics import Topic
 
 REPORT_S = 1.0
@@ -23,11 +25,18 @@ F = TypeVar("F", bound=Callable[..., Any])
 def window_option(default: int) -> Callable[[F], F]:
     """How many messages the figures are about."""
     return click.option(
-        "-w", "--window", type=click.IntRange(min=2), default=default, show_default=True, help="Over so many messages."
+        "-w",
+        "--window",
+        type=click.IntRange(min=2),
+        default=default,
+        show_default=True,
+        help="Over so many messages.",
     )
 
 
-def watch(connect: str, agent: str, what: str, topic: Topic, figures: Figures, as_json: bool) -> None:
+def watch(
+    connect: str, agent: str, what: str, topic: Topic, figures: Figures, as_json: bool
+) -> None:
     """Print the figures of `topic` every second until asked to stop, and once more then."""
     stop = Stop()
     with observing(connect, agent, f"topic {what}") as bus:
@@ -49,7 +58,9 @@ def _print(figures: Figures, topic: Topic, number: int, as_json: bool, fresh: bo
     if as_json:
         click.echo(json.dumps({"topic": topic.name, "messages": number, **figures.plain()}))
     else:
-        click.echo(figures.text() if fresh and figures.text() else f"no new messages of {topic.name}")
+        click.echo(
+            figures.text() if fresh and figures.text() else f"no new messages of {topic.name}"
+        )
 
 
 @click.command()

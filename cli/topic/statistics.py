@@ -9,7 +9,7 @@ from collections.abc import Iterable
 import msgspec
 import numpy as np
 
-from bus.codec import Stage
+from cogmap.bus.codec import Stage
 
 
 class Spread(msgspec.Struct, frozen=True):
@@ -25,7 +25,13 @@ class Spread(msgspec.Struct, frozen=True):
     def of(cls, values: Iterable[float]) -> Spread:
         """The spread of values, at least one."""
         array = np.fromiter(values, np.float64)
-        return cls(float(array.mean()), float(array.min()), float(array.max()), float(array.std()), len(array))
+        return cls(
+            float(array.mean()),
+            float(array.min()),
+            float(array.max()),
+            float(array.std()),
+            len(array),
+        )
 
 
 class Rate:
@@ -39,7 +45,9 @@ class Rate:
         self._times_ns.append(at_ns)
 
     def periods_s(self) -> Spread | None:
-        """The times between messages; the rate is one over their mean. None before the second message."""
+        """The times between messages; the rate is one over their mean. None before the second
+        message.
+        """
         periods = np.diff(np.fromiter(self._times_ns, np.int64)) / 1e9
         return Spread.of(periods) if len(periods) else None
 
@@ -74,7 +82,9 @@ class Delay:
         self._stages: deque[list[Stage]] = deque(maxlen=window)
 
     def add(self, born_ns: int, sent_ns: int, received_ns: int, stages: list[Stage]) -> None:
-        """Take note of a message that derives from the sensing at `born_ns`, sent and received then."""
+        """Take note of a message that derives from the sensing at `born_ns`, sent and received
+        then.
+        """
         self._ages_s.append((received_ns - born_ns) / 1e9)
         self._last_leg_s.append((received_ns - sent_ns) / 1e9)
         self._stages.append(stages)
@@ -88,12 +98,17 @@ class Delay:
         return Spread.of(self._last_leg_s) if self._last_leg_s else None
 
     def stages_s(self) -> dict[str, tuple[float, float]]:
-        """For each module on the way, mean times of computing and of all else (encoding, transport, queues)."""
+        """For each module on the way, mean times of computing and of all else (encoding, transport,
+        queues).
+        """
         times: dict[str, list[tuple[int, int]]] = {}
         for stages in self._stages:
             for module, compute_ns, rest_ns in stages:
                 times.setdefault(module, []).append((compute_ns, rest_ns))
         return {
-            module: (statistics.fmean(c for c, _ in spent) / 1e9, statistics.fmean(r for _, r in spent) / 1e9)
+            module: (
+                statistics.fmean(c for c, _ in spent) / 1e9,
+                statistics.fmean(r for _, r in spent) / 1e9,
+            )
             for module, spent in times.items()
         }

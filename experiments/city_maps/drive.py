@@ -1,4 +1,6 @@
-"""One traversal: the modules that drive the town, on the in-memory bus, led along a tour; what they then believe."""
+"""One traversal: the modules that drive the town, on the in-memory bus, led along a tour; what they
+then believe.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +11,10 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
-from bus.config import Sections
-from bus.errors import CogmapError
-from bus.graph import TILE_SIDE, Graph, object_id
-from bus.module import Module
+from cogmap.errors import CogmapError
+from cogmap.graph.graph import TILE_SIDE, Graph, object_id
+from cogmap.runtime.config import Sections
+from cogmap.runtime.module import Module
 from experiments import in_memory
 from experiments.city_maps.correction import settings
 from experiments.city_maps.environment import Environment
@@ -20,28 +22,32 @@ from experiments.city_maps.streets import Points
 from schemas import topics
 from schemas.graph import Delta, Node
 from schemas.sensing import TruePose
-from services import table
-from services.codelets.path import ODOMETRY, POSE, STAMP, rows_of
-from services.codelets.pose_graph import rotations
-from services.codelets.sighted import Sightings
+from services import registry
+from services.codelets.correction.pose_graph import rotations
+from services.codelets.mapping.observations import Sightings
+from services.codelets.mapping.path import ODOMETRY, POSE, STAMP, rows_of
 from services.sim.odometry import Noise
 
 MIND = ("workspace", "codelets", "global_workspace", "action")
 SENSING = "percept-level sensing"
-SPEED_M_S, FRAME_HZ = 5.0, 1
-LEAD_M, OVERRUN_M = 70.0, 100.0
+SPEED_M_S = 5.0
+FRAME_HZ = 1
+LEAD_M = 70.0
+OVERRUN_M = 100.0
 CELL_M = 5.0
-# Who walks through a city looks about: to the sides too, where a camera that is fixed looks ahead alone.
+# Who walks through a city looks about: to the sides too, where a camera that is fixed looks ahead
+# alone.
 LOOKING_ABOUT_RAD = math.pi
 
 
 @dataclass(frozen=True, eq=False)
 class Traversal:
-    """What one agent made of one tour, in the true frame: (n, 3) poses believed and true, view by view.
+    """What one agent made of one tour, in the true frame: (n, 3) poses believed and true, view by
+    view.
 
-    `path_m` (n, 2) is the way as the map has it in the end, `buildings_m` (8, 2) has NaN for one that is not on the
-    map, and `road_m` (k, 2) are the places that are road. `felt_m` (8, 2) is where the buildings were seen from the way
-    that path integration alone would have had.
+    `path_m` (n, 2) is the way as the map has it in the end, `buildings_m` (8, 2) has NaN for one
+    that is not on the map, and `road_m` (k, 2) are the places that are road. `felt_m` (8, 2) is
+    where the buildings were seen from the way that path integration alone would have had.
     """
 
     believed: Points
@@ -77,7 +83,9 @@ class _Watcher:
 
 @dataclass(frozen=True)
 class Tour:
-    """One way through an environment: from which building, in which direction; the seed of all its noise."""
+    """One way through an environment: from which building, in which direction; the seed of all its
+    noise.
+    """
 
     start: int
     backward: bool
@@ -92,12 +100,20 @@ def sections(environment: Environment, tour: Tour, noise: Noise, method: str) ->
         for name, (x, y) in zip(environment.names, environment.buildings_m, strict=True)
     ]
     way = {"line_m": line.tolist(), "landmarks": landmarks, "speed_m_s": SPEED_M_S}
-    senses = {"noise": msgspec.structs.asdict(noise), "percepts": {"field_of_view_rad": LOOKING_ABOUT_RAD}}
+    senses = {
+        "noise": msgspec.structs.asdict(noise),
+        "percepts": {"field_of_view_rad": LOOKING_ABOUT_RAD},
+    }
     rates = {"frame_hz": FRAME_HZ, "odometry_hz": FRAME_HZ, "awaits": dict.fromkeys(MIND, 1)}
     correction = settings(method, SPEED_M_S / FRAME_HZ)
     return {
         "sim": {"mode": "lockstep", "seed": tour.seed, "way": way, **senses, **rates},
-        "workspace": {"mode": "lockstep", "cell_m": CELL_M, "base_level_decay": 0.0, **correction["workspace"]},
+        "workspace": {
+            "mode": "lockstep",
+            "cell_m": CELL_M,
+            "base_level_decay": 0.0,
+            **correction["workspace"],
+        },
         "codelets": correction["codelets"],
         "action": {"mode": "lockstep"},
     }
@@ -105,7 +121,7 @@ def sections(environment: Environment, tour: Tour, noise: Noise, method: str) ->
 
 def traverse(configured: Sections) -> Traversal:
     """Drive one tour to its end. Raises CogmapError where a message was lost or refused."""
-    return driven(configured, [table.build(name, configured) for name in ("sim", *MIND)])
+    return driven(configured, [registry.build(name, configured) for name in ("sim", *MIND)])
 
 
 def driven(configured: Sections, modules: Sequence[Module]) -> Traversal:
@@ -126,8 +142,11 @@ def driven(configured: Sections, modules: Sequence[Module]) -> Traversal:
 
 
 def _placed(own: Points, origin: Points) -> Points:
-    """Positions or poses in the agent's own frame, (n, 2) or (n, 3), in the frame where that begins at `origin`."""
-    cos, sin = np.cos(origin[2]), np.sin(origin[2])
+    """Positions or poses in the agent's own frame, (n, 2) or (n, 3), in the frame where that begins
+    at `origin`.
+    """
+    cos = np.cos(origin[2])
+    sin = np.sin(origin[2])
     placed = np.array(own, float)
     placed[:, :2] = own[:, :2] @ np.array([[cos, sin], [-sin, cos]]) + origin[:2]
     if own.shape[1] == 3:
@@ -138,7 +157,9 @@ def _placed(own: Points, origin: Points) -> Points:
 def _buildings(graph: Graph, names: tuple[str, ...], origin: Points) -> Points:
     nodes: list[Node | None] = [graph.nodes.get(object_id(name)) for name in names]
     own = [
-        (np.nan, np.nan) if node is None else (float(node.attributes["x_m"]), float(node.attributes["y_m"]))
+        (np.nan, np.nan)
+        if node is None
+        else (float(node.attributes["x_m"]), float(node.attributes["y_m"]))
         for node in nodes
     ]
     return _placed(np.array(own), origin)
@@ -153,7 +174,9 @@ def _felt(graph: Graph, names: tuple[str, ...], origin: Points) -> Points:
     where = stood[:, :2] + np.einsum("mab,mb->ma", rotations(stood[:, 2]), seen.where_m)
     number = {label: index for index, label in enumerate(seen.labels)}
     own = [
-        np.median(where[seen.landmark == number[name]], axis=0) if name in number else (np.nan, np.nan)
+        np.median(where[seen.landmark == number[name]], axis=0)
+        if name in number
+        else (np.nan, np.nan)
         for name in names
     ]
     return _placed(np.array(own), origin)
@@ -161,7 +184,8 @@ def _felt(graph: Graph, names: tuple[str, ...], origin: Points) -> Points:
 
 def _roads(graph: Graph, origin: Points) -> Points:
     cells = [
-        np.argwhere(graph.tiles[key].columns["road"] > 0) + np.array(key) * TILE_SIDE for key in sorted(graph.tiles)
+        np.argwhere(graph.tiles[key].columns["road"] > 0) + np.array(key) * TILE_SIDE
+        for key in sorted(graph.tiles)
     ]
     where = np.vstack(cells) if cells else np.zeros((0, 2))
     return _placed(where * graph.cell_m, origin)

@@ -1,4 +1,6 @@
-"""An environment of the experiment: streets, eight buildings, and the shortest tour past all of them."""
+"""An environment of the experiment: streets, eight buildings, and the shortest tour past all of
+them.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from bus.errors import UsageError
+from cogmap.errors import UsageError
 from experiments.city_maps.streets import Points, Streets, backwards
 from experiments.city_maps.tour import shortest_tour
 
 BUILDINGS = 8
 MOST_KM2 = 4.0
-LEAST_SIDE_M, MOST_SIDE_M = 400.0, 1e3 * MOST_KM2**0.5
+LEAST_SIDE_M = 400.0
+MOST_SIDE_M = 1e3 * MOST_KM2**0.5
 LEAST_APART = 0.12
 FROM_STREET_M = (4.0, 35.0)
 TRIES = 400
@@ -32,7 +35,9 @@ class City:
 
 @dataclass(frozen=True, eq=False)
 class Environment:
-    """`buildings_m` (8, 2) in the order of the tour; `legs_m[i]` is the line from building i to the next."""
+    """`buildings_m` (8, 2) in the order of the tour; `legs_m[i]` is the line from building i to the
+    next.
+    """
 
     name: str
     streets: Streets
@@ -53,7 +58,8 @@ class Environment:
     def line(self, start: int, backward: bool, lead_m: float, overrun_m: float) -> Points:
         """The tour past building `start`, all others and `start` again.
 
-        It begins `lead_m` before `start`, so that one comes up to it, and goes on `overrun_m` beyond where it began.
+        It begins `lead_m` before `start`, so that one comes up to it, and goes on `overrun_m`
+        beyond where it began.
         """
         legs = [self.legs_m[(start + k) % len(self.legs_m)] for k in range(len(self.legs_m))]
         whole = _joined([leg[::-1] for leg in reversed(legs)] if backward else legs)
@@ -64,7 +70,8 @@ class Environment:
 def environments(city: City, number: int, seed: int) -> list[Environment]:
     """`number` environments of `city`, from seeds of their own.
 
-    Raises UsageError where the city has no eight buildings that lie far enough apart along its streets.
+    Raises UsageError where the city has no eight buildings that lie far enough apart along its
+    streets.
     """
     streets = city.streets.connected()
     _, feet = streets.nearest(city.buildings_m)
@@ -83,16 +90,24 @@ def environments(city: City, number: int, seed: int) -> list[Environment]:
     return made
 
 
-def _choose(buildings_m: Points, usable: npt.NDArray[np.intp], rng: np.random.Generator) -> list[int] | None:
-    """Eight buildings in a square of random size at a random place, none too near to another; or None."""
+def _choose(
+    buildings_m: Points, usable: npt.NDArray[np.intp], rng: np.random.Generator
+) -> list[int] | None:
+    """Eight buildings in a square of random size at a random place, none too near to another; or
+    None.
+    """
     if len(usable) < BUILDINGS:
         return None
     extent = np.ptp(buildings_m[usable], axis=0)
     largest = min(MOST_SIDE_M, max(LEAST_SIDE_M, float(extent.max())))
     for _ in range(TRIES):
         side = float(rng.uniform(LEAST_SIDE_M, largest))
-        corner = buildings_m[usable].min(axis=0) + rng.uniform(0, 1, 2) * np.maximum(extent - side, 0)
-        inside = usable[((buildings_m[usable] >= corner) & (buildings_m[usable] <= corner + side)).all(axis=1)]
+        corner = buildings_m[usable].min(axis=0) + rng.uniform(0, 1, 2) * np.maximum(
+            extent - side, 0
+        )
+        inside = usable[
+            ((buildings_m[usable] >= corner) & (buildings_m[usable] <= corner + side)).all(axis=1)
+        ]
         chosen: list[int] = []
         for candidate in rng.permutation(inside).tolist():
             apart = np.hypot(*(buildings_m[chosen] - buildings_m[candidate]).T)
@@ -112,7 +127,9 @@ def _environment(name: str, city: City, streets: Streets, chosen: Sequence[int])
         for a, b in zip(order, [*order[1:], order[0]], strict=True)
     ]
     where = city.buildings_m[[chosen[place] for place in order]]
-    return Environment(name, streets, tuple(city.names[chosen[place]] for place in order), where, tuple(legs))
+    return Environment(
+        name, streets, tuple(city.names[chosen[place]] for place in order), where, tuple(legs)
+    )
 
 
 def _joined(lines: Sequence[Points]) -> Points:

@@ -1,4 +1,6 @@
-"""The noise of self-motion, fitted as the paper did: so that learned maps err as much as people's (paper §6.2)."""
+"""The noise of self-motion, fitted as the paper did: so that learned maps err as much as people's
+(paper §6.2).
+"""
 
 from __future__ import annotations
 
@@ -22,16 +24,20 @@ OTHERS = 500_000
 
 
 def fitted(environments: Sequence[Environment], effort: Effort) -> Noise:
-    """Speed and turn noise by which maps corrected by the paper's rule err as people's do, by coordinate descent.
+    """Speed and turn noise by which maps corrected by the paper's rule err as people's do, by
+    coordinate descent.
 
-    One mean for two noises: others would fit as well. The traversals are others than those measured with the same seed.
+    One mean for two noises: others would fit as well. The traversals are others than those measured
+    with the same seed.
     """
 
     @cache
     def cost(noise: Noise) -> float:
         if max(noise.speed, noise.turn) > MOST:
             return float("inf")
-        tried = jobs(environments, noise, min(effort.traversals, FIT_TRAVERSALS), effort.seed + OTHERS)
+        tried = jobs(
+            environments, noise, min(effort.traversals, FIT_TRAVERSALS), effort.seed + OTHERS
+        )
         errors_km2 = each(positions_error_km2, tried, effort.processes, effort.progress)
         return float(np.mean(errors_km2) - published.HUMAN_MEAN_KM2) ** 2
 
@@ -40,4 +46,6 @@ def fitted(environments: Sequence[Environment], effort: Effort) -> Noise:
 
 def positions_error_km2(job: Job) -> float:
     """The error of the map of one traversal, positions corrected."""
-    return map_error_km2(traverse(configurations(job)["positions"]).buildings_m, job.environment.buildings_m)
+    return map_error_km2(
+        traverse(configurations(job)["positions"]).buildings_m, job.environment.buildings_m
+    )

@@ -1,4 +1,6 @@
-"""Every environment traversed often, and how far the learned maps are off, with and without correction."""
+"""Every environment traversed often, and how far the learned maps are off, with and without
+correction.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bus.config import Sections
+from cogmap.runtime.config import Sections
 from experiments import rendered
 from experiments.city_maps.correction import METHODS
 from experiments.city_maps.drive import MIND, Tour, Traversal, driven, sections, traverse
@@ -43,7 +45,8 @@ class Effort:
 
 @dataclass(frozen=True, eq=False)
 class Learned:
-    """What one traversal left, by METHODS: error in km^2, buildings (8, 2), path (n, 2), road (k, 2).
+    """What one traversal left, by METHODS: error in km^2, buildings (8, 2), path (n, 2), road (k,
+    2).
 
     The error is also that of path integration alone, by the name FELT.
     """
@@ -74,15 +77,18 @@ class CityMap:
 
 
 def map_error_km2(learned_m: Points, true_m: Points) -> float:
-    """The sum of squared errors of the positions in km^2, as the paper has it; one that is missing errs as the others
-    do on average, and nothing known is NaN."""
+    """The sum of squared errors of the positions in km^2, as the paper has it; one that is missing
+    errs as the others do on average, and nothing known is NaN.
+    """
     squared = ((learned_m - true_m) ** 2).sum(axis=1)
     known = squared[~np.isnan(squared)]
     return float(known.mean() * len(squared) / 1e6) if len(known) else float("nan")
 
 
 def traversed(job: Job) -> Learned:
-    """Drive one tour from a building and in a direction drawn from the seed, with the same noise by each method."""
+    """Drive one tour from a building and in a direction drawn from the seed, with the same noise by
+    each method.
+    """
     return _learned(job, {method: traverse(one) for method, one in configurations(job).items()})
 
 
@@ -110,7 +116,9 @@ def _learned(job: Job, maps: Mapping[str, Traversal]) -> Learned:
     )
 
 
-def jobs(environments: Sequence[Environment], noise: Noise, traversals: int, seed: int) -> list[Job]:
+def jobs(
+    environments: Sequence[Environment], noise: Noise, traversals: int, seed: int
+) -> list[Job]:
     """All traversals of each environment, one environment after the other."""
     return [
         Job(environment, number, noise, seed * 1000 + place)
@@ -122,7 +130,9 @@ def jobs(environments: Sequence[Environment], noise: Noise, traversals: int, see
 def measure(environments: Sequence[Environment], noise: Noise, effort: Effort) -> list[CityMap]:
     """All environments, the same from the same seed whatever the number of processes."""
     number = effort.traversals
-    learned = each(traversed, jobs(environments, noise, number, effort.seed), effort.processes, effort.progress)
+    learned = each(
+        traversed, jobs(environments, noise, number, effort.seed), effort.processes, effort.progress
+    )
     return [
         CityMap(environment, tuple(learned[place * number : (place + 1) * number]))
         for place, environment in enumerate(environments)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-HUMAN_MEAN_KM2, HUMAN_SD_KM2 = 1.07, 0.85
-MODEL_MEAN_KM2, MODEL_SD_KM2 = 1.08, 1.39
-MAPS, CITIES = 28, 21
+HUMAN_MEAN_KM2 = 1.07
+HUMAN_SD_KM2 = 0.85
+MODEL_MEAN_KM2 = 1.08
+MODEL_SD_KM2 = 1.39
+MAPS = 28
+CITIES = 21
 SOURCE = "published (Madl et al. 2016)"

@@ -1,4 +1,6 @@
-"""Cities to take environments from: OpenStreetMap extracts, street graphs, and cities grown from a seed."""
+"""Cities to take environments from: OpenStreetMap extracts, street graphs, and cities grown from a
+seed.
+"""
 
 from __future__ import annotations
 
@@ -7,28 +9,42 @@ from pathlib import Path
 
 import numpy as np
 
-from bus.errors import UsageError
-from datasets import osm, street_graphs
-from datasets.osm import Extract, Tags, Way
-from datasets.street_graphs import StreetGraph
+from cogmap.data import osm, street_graphs
+from cogmap.data.osm import Extract, Tags, Way
+from cogmap.data.street_graphs import StreetGraph
+from cogmap.errors import UsageError
 from experiments.city_maps.environment import City
 from experiments.city_maps.streets import Points, Streets
 
 EARTH_M = 6_371_008.8
 STREETS = frozenset(
-    f"{kind}{link}" for kind in ("trunk", "primary", "secondary", "tertiary") for link in ("", "_link")
+    f"{kind}{link}"
+    for kind in ("trunk", "primary", "secondary", "tertiary")
+    for link in ("", "_link")
 ) | {"unclassified", "residential", "living_street", "pedestrian", "road", "service"}
 KNOWN_BY = ("amenity", "shop", "tourism", "historic", "leisure", "office")
-GRID_SIDE, BLOCK_M = 20, (80.0, 170.0)
-JITTER, STREETS_LEFT, FRONT_M, EVERY_M = 0.18, 0.82, 14.0, 45.0
+GRID_SIDE = 20
+BLOCK_M = (80.0, 170.0)
+JITTER = 0.18
+STREETS_LEFT = 0.82
+FRONT_M = 14.0
+EVERY_M = 45.0
 
 
 def from_osm(path: Path) -> City:
-    """The streets and buildings of an extract. Raises UsageError where it lacks either, or a line is wrong."""
+    """The streets and buildings of an extract. Raises UsageError where it lacks either, or a line
+    is wrong.
+    """
     extract = osm.read(path)
-    ways = [way for way in extract.ways if way.tags.get("highway") in STREETS and way.tags.get("area") != "yes"]
+    ways = [
+        way
+        for way in extract.ways
+        if way.tags.get("highway") in STREETS and way.tags.get("area") != "yes"
+    ]
     if not ways or not extract.nodes:
-        raise UsageError(f"{path} has no streets: give an extract with ways that are tagged highway=…")
+        raise UsageError(
+            f"{path} has no streets: give an extract with ways that are tagged highway=…"
+        )
     middle = np.array(list(extract.nodes.values())).mean(axis=0)
     names, where = _buildings(extract)
     city = _name(path)
@@ -36,20 +52,26 @@ def from_osm(path: Path) -> City:
 
 
 def plane_m(lonlat: Points, middle: Points) -> Points:
-    """Metres east and north of `middle`, (n, 2), from degrees: good to a thousandth within some kilometres."""
+    """Metres east and north of `middle`, (n, 2), from degrees: good to a thousandth within some
+    kilometres.
+    """
     scale = np.array([np.cos(np.radians(middle[1])), 1.0]) * np.radians(1.0) * EARTH_M
     return np.asarray((lonlat.reshape(-1, 2) - middle) * scale)
 
 
 def grown(seed: int) -> City:
-    """A city from a seed: a bent grid of blocks of many sizes, some streets missing, houses along the others."""
+    """A city from a seed: a bent grid of blocks of many sizes, some streets missing, houses along
+    the others.
+    """
     rng = np.random.default_rng([seed, 0xC17])
     lines = [np.cumsum(rng.uniform(*BLOCK_M, GRID_SIDE)) for _ in range(2)]
     x, y = np.meshgrid(*lines, indexing="ij")
     points = np.column_stack([x.ravel(), y.ravel()])
     points += rng.normal(0, JITTER * BLOCK_M[0], points.shape)
     turn = float(rng.uniform(0, np.pi))
-    points = (points - points.mean(axis=0)) @ np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    points = (points - points.mean(axis=0)) @ np.array(
+        [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]
+    )
     number = np.arange(GRID_SIDE**2).reshape(GRID_SIDE, GRID_SIDE)
     pieces = np.vstack(
         [
@@ -87,7 +109,9 @@ def _streets(extract: Extract, ways: list[Way], middle: Points) -> Streets:
 
 
 def _buildings(extract: Extract) -> tuple[tuple[str, ...], Points]:
-    """What people would know by name first: named places and buildings; where these are few, any building."""
+    """What people would know by name first: named places and buildings; where these are few, any
+    building.
+    """
     found: dict[str, tuple[float, float]] = {}
     unnamed: dict[str, tuple[float, float]] = {}
     for node, tags in extract.node_tags.items():
@@ -125,13 +149,17 @@ def from_street_graph(graph: StreetGraph, seed: int) -> City:
     for edge in graph.edges:
         line = [number.setdefault(point, len(number)) for point in graph.line(edge)]
         pieces += [[a, b] for a, b in itertools.pairwise(line) if a != b]
-    streets = Streets(plane_m(np.array(list(number)), middle), np.array(pieces, np.intp)).connected()
+    streets = Streets(
+        plane_m(np.array(list(number)), middle), np.array(pieces, np.intp)
+    ).connected()
     where = _along(streets, np.random.default_rng([seed, 0xA10]))
     return City(graph.city, streets, tuple(f"house {k + 1}" for k in range(len(where))), where)
 
 
 def folder(path: Path, seed: int) -> list[City]:
-    """Every city in a folder, in the order of the files' names. Raises UsageError where there is none."""
+    """Every city in a folder, in the order of the files' names. Raises UsageError where there is
+    none.
+    """
     if not path.is_dir():
         raise UsageError(f"there is no folder {path}")
     cities = []
@@ -141,8 +169,6 @@ def folder(path: Path, seed: int) -> list[City]:
         elif file.name.endswith(street_graphs.SUFFIXES):
             cities += [from_street_graph(graph, seed) for graph in street_graphs.read(file)]
     if not cities:
-        kinds = (
-            f"OpenStreetMap extracts ({osm.SUFFIXES[0]}) or street graphs ({street_graphs.SUFFIXES[0]}), packed or not"
-        )
+        kinds = f"OpenStreetMap extracts ({osm.SUFFIXES[0]}) or street graphs ({street_graphs.SUFFIXES[0]}), packed or not"
         raise UsageError(f"{path} has no cities: put {kinds}, there")
     return cities

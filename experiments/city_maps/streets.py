@@ -1,4 +1,6 @@
-"""A street network: points, and straight pieces between them. Where it is nearest to something, and the ways on it."""
+"""A street network: points, and straight pieces between them. Where it is nearest to something, and
+the ways on it.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,9 @@ class Streets:
         return float(self._lengths_m().sum())
 
     def connected(self) -> Streets:
-        """The part with the most points from where each can be reached from every other, and no others."""
+        """The part with the most points from where each can be reached from every other, and no
+        others.
+        """
         _, part = connected_components(self._graph(), directed=False)
         kept = np.flatnonzero(part == np.bincount(part).argmax())
         number = np.full(len(self.points_m), -1)
@@ -41,7 +45,8 @@ class Streets:
         start = self.points_m[self.pieces[:, 0]]
         along = self.points_m[self.pieces[:, 1]] - start
         squared = np.maximum((along**2).sum(1), 1e-9)
-        found, feet = [], []
+        found = []
+        feet = []
         for position in np.array_split(positions_m, range(_CHUNK, len(positions_m), _CHUNK)):
             share = (((position[:, None] - start) * along).sum(2) / squared).clip(0, 1)
             foot = start + share[..., None] * along
@@ -51,14 +56,19 @@ class Streets:
         return np.concatenate(found), np.concatenate(feet)
 
     def with_points(self, positions_m: Points) -> tuple[Streets, Indices]:
-        """The network with a point of its own where each of (k, 2) positions is nearest to it; those points' numbers.
+        """The network with a point of its own where each of (k, 2) positions is nearest to it;
+        those points' numbers.
 
         The pieces that are cut are replaced.
         """
         found, feet = self.nearest(positions_m)
         numbers = len(self.points_m) + np.arange(len(feet))
         points = np.vstack([self.points_m, feet])
-        pieces = [piece for place, piece in enumerate(self.pieces.tolist()) if place not in set(found.tolist())]
+        pieces = [
+            piece
+            for place, piece in enumerate(self.pieces.tolist())
+            if place not in set(found.tolist())
+        ]
         for place in np.unique(found).tolist():
             a, b = self.pieces[place].tolist()
             on_it = numbers[found == place]
@@ -68,9 +78,12 @@ class Streets:
         return Streets(points, np.array(pieces, np.intp)), numbers
 
     def ways(self, from_points: Indices) -> tuple[Points, Indices]:
-        """Distances along the streets from each of k points to all, (k, n), infinite where there is no way, and the
-        point before each on the shortest way, (k, n)."""
-        distance, before = dijkstra(self._graph(), directed=False, indices=from_points, return_predecessors=True)
+        """Distances along the streets from each of k points to all, (k, n), infinite where there is
+        no way, and the point before each on the shortest way, (k, n).
+        """
+        distance, before = dijkstra(
+            self._graph(), directed=False, indices=from_points, return_predecessors=True
+        )
         return distance, before
 
     def _lengths_m(self) -> Points:
@@ -78,7 +91,8 @@ class Streets:
         return np.asarray(np.hypot(along[:, 0], along[:, 1]))
 
     def _graph(self) -> csr_array:
-        # An explicit zero would be no edge at all; of two pieces between the same points the sum would be taken.
+        # An explicit zero would be no edge at all; of two pieces between the same points the sum
+        # would be taken.
         ends = np.sort(self.pieces, axis=1)
         ends, first = np.unique(ends, axis=0, return_index=True)
         weights = np.maximum(self._lengths_m()[first], 1e-6)

@@ -17,27 +17,35 @@ FAR = 5.0
 def errors(trials: Sequence[Trial], responses: Sequence[Response]) -> Points:
     """Where the post was put, seen from where it stood: (n, 2) metres, along and inward.
 
-    Along is the way that turned landmarks move the target, whether or not they did, inward is across it, on the side
-    of post 8: trials of every route, and of landmarks turned either way, then fall together.
+    Along is the way that turned landmarks move the target, whether or not they did, inward is
+    across it, on the side of post 8: trials of every route, and of landmarks turned either way,
+    then fall together.
     """
     targets = np.array([trial.target for trial in trials])
     moved = np.array([trial.turned_target for trial in trials]) - targets
     along = moved / np.hypot(*moved.T)[:, None]
-    inward = np.column_stack([-along[:, 1], along[:, 0]]) * np.array([[trial.side] for trial in trials])
+    inward = np.column_stack([-along[:, 1], along[:, 0]]) * np.array(
+        [[trial.side] for trial in trials]
+    )
     off = np.array([(response.x_m, response.y_m) for response in responses]) - targets
     return np.column_stack([(off * along).sum(axis=1), (off * inward).sum(axis=1)])
 
 
 def turned_errors(errors_m: Points, shift: float) -> Points:
-    """Errors about the target as they are about the turned one, `shift` metres along: turned by 15° with all else."""
-    cos, sin = math.cos(CONFLICT_RAD), math.sin(CONFLICT_RAD)
+    """Errors about the target as they are about the turned one, `shift` metres along: turned by 15°
+    with all else.
+    """
+    cos = math.cos(CONFLICT_RAD)
+    sin = math.sin(CONFLICT_RAD)
     turned: Points = errors_m @ np.array([[cos, sin], [-sin, cos]]) + np.array([shift, 0.0])
     return turned
 
 
 def shift_m(trials: Sequence[Trial]) -> float:
     """How far turned landmarks move the target."""
-    return float(np.mean([np.hypot(*(np.array(trial.turned_target) - trial.target)) for trial in trials]))
+    return float(
+        np.mean([np.hypot(*(np.array(trial.turned_target) - trial.target)) for trial in trials])
+    )
 
 
 def sd_m(errors_m: Points) -> float:
@@ -51,7 +59,9 @@ def rmse_m(errors_m: Points) -> float:
 
 
 def lost(errors_m: Points) -> int:
-    """How many responses lie where no normal distribution has any: five times the median distance from the median."""
+    """How many responses lie where no normal distribution has any: five times the median distance
+    from the median.
+    """
     away_m = np.hypot(*(errors_m - np.median(errors_m, axis=0)).T)
     return int((away_m > FAR * np.median(away_m)).sum())
 
@@ -83,7 +93,9 @@ class Gaussian:
         """The log of the density at (n, 2) points."""
         off = points_m - self.mean_m
         squared = np.einsum("ni,ij,nj->n", off, np.linalg.inv(self.covariance_m2), off)
-        result: Points = -squared / 2 - np.log(2 * np.pi) - np.log(np.linalg.det(self.covariance_m2)) / 2
+        result: Points = (
+            -squared / 2 - np.log(2 * np.pi) - np.log(np.linalg.det(self.covariance_m2)) / 2
+        )
         return result
 
 
@@ -91,24 +103,32 @@ def combined(first: Gaussian, second: Gaussian) -> Gaussian:
     """The optimal combination, direction by direction: precisions add, means weigh by them."""
     precisions = [np.linalg.inv(each.covariance_m2) for each in (first, second)]
     covariance = np.linalg.inv(precisions[0] + precisions[1])
-    return Gaussian(covariance @ (precisions[0] @ first.mean_m + precisions[1] @ second.mean_m), covariance)
+    return Gaussian(
+        covariance @ (precisions[0] @ first.mean_m + precisions[1] @ second.mean_m), covariance
+    )
 
 
 def alternation_log_densities(
     conflict_m: Points, self_motion: Gaussian, landmarks: Gaussian, landmarks_share: float
 ) -> Points:
-    """The log densities (n,) of conflict errors where each response follows one cue alone: landmarks in that share."""
+    """The log densities (n,) of conflict errors where each response follows one cue alone:
+    landmarks in that share.
+    """
     with np.errstate(divide="ignore"):
         shares = np.log([landmarks_share, 1 - landmarks_share])
     followed: Points = np.logaddexp(
-        shares[0] + landmarks.log_density(conflict_m), shares[1] + self_motion.log_density(conflict_m)
+        shares[0] + landmarks.log_density(conflict_m),
+        shares[1] + self_motion.log_density(conflict_m),
     )
     return followed
 
 
-def best_alternation_log_likelihood(conflict_m: Points, self_motion: Gaussian, landmarks: Gaussian) -> float:
+def best_alternation_log_likelihood(
+    conflict_m: Points, self_motion: Gaussian, landmarks: Gaussian
+) -> float:
     """The same, with the share that makes it most."""
     shares = np.linspace(0.0, 1.0, 201)
     return max(
-        float(alternation_log_densities(conflict_m, self_motion, landmarks, float(share)).sum()) for share in shares
+        float(alternation_log_densities(conflict_m, self_motion, landmarks, float(share)).sum())
+        for share in shares
     )

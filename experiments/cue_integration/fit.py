@@ -8,12 +8,16 @@ from typing import TypeVar
 import msgspec
 
 Noise = TypeVar("Noise", bound=msgspec.Struct)
-# Many pairs fit as well as one another; small steps from the same start keep either from running ahead.
+# Many pairs fit as well as one another; small steps from the same start keep either from running
+# ahead.
 FACTORS = (1.2, 1.1)
 
 
-def coordinate_descent(cost: Callable[[Noise], float], noise: Noise, factors: tuple[float, ...] = FACTORS) -> Noise:
-    """The noise that no step up or down in speed or in turn alone betters, steps growing finer by `factors`.
+def coordinate_descent(
+    cost: Callable[[Noise], float], noise: Noise, factors: tuple[float, ...] = FACTORS
+) -> Noise:
+    """The noise that no step up or down in speed or in turn alone betters, steps growing finer by
+    `factors`.
 
     `cost` must be the same for the same noise.
     """
@@ -26,6 +30,8 @@ def coordinate_descent(cost: Callable[[Noise], float], noise: Noise, factors: tu
                 for step in (factor, 1 / factor):
                     tried = msgspec.structs.replace(noise, **{name: getattr(noise, name) * step})
                     if (found := cost(tried)) < lowest:
-                        noise, lowest, improved = tried, found, True
+                        noise = tried
+                        lowest = found
+                        improved = True
                         break
     return noise

@@ -1,6 +1,8 @@
-"""Nardini's room, in metres: where the landmarks and posts are, and how a walker steps from one to the other.
+"""Nardini's room, in metres: where the landmarks and posts are, and how a walker steps from one to
+the other.
 
-The positions are those published with Kessler et al. (2024) for the experiment of Nardini et al. (2008).
+The positions are those published with Kessler et al. (2024) for the experiment of Nardini et al.
+(2008).
 """
 
 from __future__ import annotations
@@ -40,7 +42,8 @@ ROUTES: tuple[tuple[int, int, int], ...] = (
 )
 CONFLICT_RAD = math.radians(15)
 
-STEP_M, STEP_RAD = 0.5, math.radians(60)
+STEP_M = 0.5
+STEP_RAD = math.radians(60)
 WHILE_TURNING_M = 0.1
 REACH_M = 0.3
 
@@ -56,24 +59,37 @@ class Pose:
     def after(self, turn_rad: float, forward_m: float) -> Pose:
         """Turned on the spot, then walked straight on."""
         heading_rad = self.heading_rad + turn_rad
-        x_m, y_m = self.x_m + forward_m * math.cos(heading_rad), self.y_m + forward_m * math.sin(heading_rad)
+        x_m = self.x_m + forward_m * math.cos(heading_rad)
+        y_m = self.y_m + forward_m * math.sin(heading_rad)
         return Pose(x_m, y_m, heading_rad)
 
     def towards(self, goal: Point) -> tuple[float, float]:
         """Bearing, left positive, and distance of `goal`."""
-        dx_m, dy_m = goal[0] - self.x_m, goal[1] - self.y_m
-        return math.remainder(math.atan2(dy_m, dx_m) - self.heading_rad, math.tau), math.hypot(dx_m, dy_m)
+        dx_m = goal[0] - self.x_m
+        dy_m = goal[1] - self.y_m
+        return math.remainder(math.atan2(dy_m, dx_m) - self.heading_rad, math.tau), math.hypot(
+            dx_m, dy_m
+        )
 
 
 def step(bearing_rad: float, distance_m: float) -> tuple[float, float]:
-    """The next movement, until a goal is within reach: a turn, and a way forward, short while it is not yet ahead."""
+    """The next movement, until a goal is within reach: a turn, and a way forward, short while it is
+    not yet ahead.
+    """
     turn_rad = max(-STEP_RAD, min(STEP_RAD, bearing_rad))
     longest_m = STEP_M if turn_rad == bearing_rad else WHILE_TURNING_M
     return turn_rad, max(0.0, min(distance_m - REACH_M, longest_m))
 
 
-def turned(points: tuple[Point, ...], angle_rad: float, about: Point = POSTS[8]) -> tuple[Point, ...]:
-    """`points` turned counter-clockwise about another; by 15° about post 8, the targets move 0.457 m."""
-    cos, sin = math.cos(angle_rad), math.sin(angle_rad)
+def turned(
+    points: tuple[Point, ...], angle_rad: float, about: Point = POSTS[8]
+) -> tuple[Point, ...]:
+    """`points` turned counter-clockwise about another; by 15° about post 8, the targets move 0.457
+    m.
+    """
+    cos = math.cos(angle_rad)
+    sin = math.sin(angle_rad)
     off = [(x_m - about[0], y_m - about[1]) for x_m, y_m in points]
-    return tuple((about[0] + cos * x_m - sin * y_m, about[1] + sin * x_m + cos * y_m) for x_m, y_m in off)
+    return tuple(
+        (about[0] + cos * x_m - sin * y_m, about[1] + sin * x_m + cos * y_m) for x_m, y_m in off
+    )

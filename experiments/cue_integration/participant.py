@@ -1,30 +1,33 @@
-"""The participant's will as a module: it goes where the map in its workspace says that the first post stood."""
+"""The participant's will as a module: it goes where the map in its workspace says that the first
+post stood.
+"""
 
 from __future__ import annotations
 
-from bus.errors import MessageError
-from bus.graph import Graph, object_id
-from bus.module import Module
+from cogmap.errors import MessageError
+from cogmap.graph.graph import Graph, object_id
+from cogmap.runtime.module import Module
 from experiments.cue_integration.geometry import REACH_M, Point, Pose, step
 from experiments.cue_integration.room import FOLLOW, STOP, WAIT, WALK
 from schemas import topics
 from schemas.base import Scalar
+from schemas.cognition import Action
 from schemas.graph import Delta, Node
-from schemas.mind import Action
 
 POSTS_CARRIED = 3
 NEAR_M = 0.1
 MOST_MOVEMENTS = 24
 LOST_RAD = 0.8
-LOOK_M, MOST_LOOKS = 0.25, 3
+LOOK_M = 0.25
+MOST_LOOKS = 3
 
 
 class Participant:
-    """Follows until three posts are picked up, waits once, then walks to where it believes the first was, and puts it
-    there as soon as that is within reach.
+    """Follows until three posts are picked up, waits once, then walks to where it believes the
+    first was, and puts it there as soon as that is within reach.
 
-    It knows what is in the workspace and nothing else. While it does not know where it faces it takes a short step
-    and looks.
+    It knows what is in the workspace and nothing else. While it does not know where it faces it
+    takes a short step and looks.
     """
 
     def __init__(self) -> None:
@@ -37,7 +40,9 @@ class Participant:
     def on_delta(self, delta: Delta) -> Action | None:
         """An action for each cycle that has ended. Raises MessageError where a delta is missing."""
         if not self._graph.apply(delta):
-            raise MessageError(f"delta {delta.version} after version {self._graph.version}: a commit is missing")
+            raise MessageError(
+                f"delta {delta.version} after version {self._graph.version}: a commit is missing"
+            )
         if delta.phase != "decay" or self._has_stopped:
             return None
         pose = self._pose()
@@ -45,7 +50,13 @@ class Participant:
             if name.startswith("percept:post-"):
                 self._pick_up(str(node.attributes["label"]), node, pose)
         scheme, parameters = self._choose(pose)
-        return Action(stamp_ns=delta.stamp_ns, cycle=delta.cycle, scheme=scheme, activation=1.0, parameters=parameters)
+        return Action(
+            stamp_ns=delta.stamp_ns,
+            cycle=delta.cycle,
+            scheme=scheme,
+            activation=1.0,
+            parameters=parameters,
+        )
 
     def _pose(self) -> Pose:
         own = self._graph.nodes["self"].attributes
@@ -64,7 +75,11 @@ class Participant:
             return WAIT, {}
         label, in_mind = next(iter(self._carried.items()))
         node = self._graph.nodes.get(object_id(label))
-        on_map = in_mind if node is None else (float(node.attributes["x_m"]), float(node.attributes["y_m"]))
+        on_map = (
+            in_mind
+            if node is None
+            else (float(node.attributes["x_m"]), float(node.attributes["y_m"]))
+        )
         return self._go_back(pose, on_map)
 
     def _go_back(self, pose: Pose, goal: Point) -> tuple[str, dict[str, Scalar]]:

@@ -1,4 +1,6 @@
-"""The room as a module: it moves the participant as asked, and says what the participant senses of it."""
+"""The room as a module: it moves the participant as asked, and says what the participant senses of
+it.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +9,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from bus.module import Module
-from experiments import heard
+from cogmap.runtime.module import Module
+from experiments import transcript
 from experiments.cue_integration import senses
 from experiments.cue_integration.geometry import (
     CONFLICT_RAD,
@@ -27,18 +29,23 @@ from experiments.cue_integration.trial import Condition, Response, Trial
 from schemas import topics
 from schemas.array import Array
 from schemas.base import Message
-from schemas.mind import Action
+from schemas.cognition import Action
 from schemas.sensing import Percept, Percepts, SelfMotion
 
 PERIOD_NS = 500_000_000
 TOLERANCE_M = 1e-6
-FOLLOW, WAIT, WALK, STOP = "follow", "wait", "walk", "stop"
+FOLLOW = "follow"
+WAIT = "wait"
+WALK = "walk"
+STOP = "stop"
 NOTHING: Mapping[str, Point] = {}
-AWAITS = {"workspace": 1, "codelets": 1, "participant": 1, heard.NAME: 1}
+AWAITS = {"workspace": 1, "codelets": 1, "participant": 1, transcript.NAME: 1}
 
 
 class Room:
-    """One trial's world. It knows where everything is, and tells the participant only what is sensed, with noise."""
+    """One trial's world. It knows where everything is, and tells the participant only what is
+    sensed, with noise.
+    """
 
     def __init__(self, trial: Trial) -> None:
         self._trial = trial
@@ -60,7 +67,8 @@ class Room:
             return self._follow()
         if action.scheme == WAIT:
             return self._change()
-        turn_rad, forward_m = float(action.parameters["turn_rad"]), float(action.parameters["forward_m"])
+        turn_rad = float(action.parameters["turn_rad"])
+        forward_m = float(action.parameters["forward_m"])
         if action.scheme == WALK:
             return self._walk(turn_rad, forward_m)
         put = self._pose.after(turn_rad, forward_m)
@@ -71,7 +79,9 @@ class Room:
         """Leave whatever is open for the trial."""
 
     def _follow(self) -> list[Message]:
-        """The participant goes on to the post that is lit, and picks it up where it is within reach."""
+        """The participant goes on to the post that is lit, and picks it up where it is within
+        reach.
+        """
         post = self._to_pick[0]
         turn_rad, forward_m = step(*self._pose.towards(POSTS[post]))
         if self._pose.after(turn_rad, forward_m).towards(POSTS[post])[1] > REACH_M + TOLERANCE_M:
@@ -88,26 +98,40 @@ class Room:
         if condition is not Condition.LANDMARKS:
             return self._say(senses.STANDING, [])
         self._knows_motion = False
-        self._pose = Pose(self._pose.x_m, self._pose.y_m, float(self._rng.uniform(-math.pi, math.pi)))
+        self._pose = Pose(
+            self._pose.x_m, self._pose.y_m, float(self._rng.uniform(-math.pi, math.pi))
+        )
         return self._say(senses.DISORIENTED, [])
 
-    def _walk(self, turn_rad: float, forward_m: float, picked: Mapping[str, Point] = NOTHING) -> list[Message]:
+    def _walk(
+        self, turn_rad: float, forward_m: float, picked: Mapping[str, Point] = NOTHING
+    ) -> list[Message]:
         self._pose = self._pose.after(turn_rad, forward_m)
         moved = senses.self_motion(turn_rad, forward_m, self._trial.noise, self._rng)
         return self._say(moved if self._knows_motion else senses.UNKNOWN, self._seen(picked))
 
     def _seen(self, picked: Mapping[str, Point]) -> list[Percept]:
         """The landmarks that are lit, and what is being picked up."""
-        lit = {f"landmark-{number}": where for number, where in enumerate(self._landmarks)} if self._are_lit else {}
+        lit = (
+            {f"landmark-{number}": where for number, where in enumerate(self._landmarks)}
+            if self._are_lit
+            else {}
+        )
         return senses.sightings(self._pose, {**lit, **picked}, self._trial.noise, self._rng)
 
     def _say(self, rows: Rows, objects: list[Percept]) -> list[Message]:
-        since_ns, frame = self._frame * PERIOD_NS, self._frame
+        since_ns = self._frame * PERIOD_NS
+        frame = self._frame
         self._frame += 1
         stamp_ns = self._frame * PERIOD_NS
         nothing = Array.of(np.zeros((0, 2), np.float32))
         return [
-            SelfMotion(stamp_ns=stamp_ns, frame=frame, since_ns=since_ns, motions=Array.of(np.array(rows, np.float64))),
+            SelfMotion(
+                stamp_ns=stamp_ns,
+                frame=frame,
+                since_ns=since_ns,
+                motions=Array.of(np.array(rows, np.float64)),
+            ),
             Percepts(stamp_ns=stamp_ns, frame=frame, objects=objects, road_m=nothing),
         ]
 
@@ -115,4 +139,8 @@ class Room:
 def build(room: Room) -> Module:
     """The module `room`, which begins when everybody is there, and somebody listens."""
     says = (topics.SELF_MOTION, topics.PERCEPTS)
-    return Module("room").on(topics.ACTION, room.act, emits=says).starts(room.begin, AWAITS, emits=says)
+    return (
+        Module("room")
+        .on(topics.ACTION, room.act, emits=says)
+        .starts(room.begin, AWAITS, emits=says)
+    )

@@ -8,21 +8,28 @@ from functools import cache
 
 import numpy as np
 
-from bus.errors import CogmapError
-from bus.house import House
-from bus.module import Module
-from experiments.cue_integration import analysis, mind, participant, published, room
+from cogmap.errors import CogmapError
+from cogmap.runtime.in_process import House
+from cogmap.runtime.module import Module
+from experiments.cue_integration import agent, analysis, participant, published, room
 from experiments.cue_integration.analysis import Gaussian
 from experiments.cue_integration.fit import coordinate_descent
 from experiments.cue_integration.geometry import Points
 from experiments.cue_integration.trial import Condition, Noise, Response, Trial
-from experiments.heard import Heard
 from experiments.parallel import Progress, each
+from experiments.transcript import Heard
 from schemas import topics
 
 # What `fitted` gives with the seed and effort that the command has by default, rounded.
 FITTED = Noise(speed=0.3, turn=0.173)
-SAID = (topics.SELF_MOTION, topics.PERCEPTS, topics.TASK, topics.PROPOSAL, topics.DELTA, topics.ACTION)
+SAID = (
+    topics.SELF_MOTION,
+    topics.PERCEPTS,
+    topics.TASK,
+    topics.PROPOSAL,
+    topics.DELTA,
+    topics.ACTION,
+)
 FIT_TRIALS = 64
 
 
@@ -43,7 +50,7 @@ class Session:
 
     def run(self) -> Response:
         """Run it on the in-memory bus. Raises CogmapError where no response comes."""
-        house = House([*mind.modules(self.trial.number), *self.bodies()])
+        house = House([*agent.modules(self.trial.number), *self.bodies()])
         house.run()
         house.close()
         if self.room.response is None:
@@ -71,7 +78,9 @@ class Outcome:
     @property
     def optimal_sd_m(self) -> float:
         """That of both cues, were they combined optimally."""
-        return analysis.optimal_sd_m(self.sd_m(Condition.SELF_MOTION), self.sd_m(Condition.LANDMARKS))
+        return analysis.optimal_sd_m(
+            self.sd_m(Condition.SELF_MOTION), self.sd_m(Condition.LANDMARKS)
+        )
 
     def figures(self) -> dict[str, float]:
         """Every figure, flat; lengths in metres."""
@@ -94,15 +103,18 @@ class Outcome:
         }
 
     def _conflict(self) -> dict[str, float]:
-        """How likely the conflict's responses are where cues are integrated, and where they alternate.
+        """How likely the conflict's responses are where cues are integrated, and where they
+        alternate.
 
-        Both predictions follow from the conditions with one cue, with nothing left to fit; the best alternation has
-        the share of landmarks that suits it most.
+        Both predictions follow from the conditions with one cue, with nothing left to fit; the best
+        alternation has the share of landmarks that suits it most.
         """
         conflict_m = self.errors_m[Condition.CONFLICT]
         own = Gaussian.of(self.errors_m[Condition.SELF_MOTION])
         seen = Gaussian.of(analysis.turned_errors(self.errors_m[Condition.LANDMARKS], self.shift_m))
-        weight = analysis.landmark_weight(self.sd_m(Condition.SELF_MOTION), self.sd_m(Condition.LANDMARKS))
+        weight = analysis.landmark_weight(
+            self.sd_m(Condition.SELF_MOTION), self.sd_m(Condition.LANDMARKS)
+        )
         integrated = analysis.combined(own, seen).log_density(conflict_m)
         alternated = analysis.alternation_log_densities(conflict_m, own, seen, weight)
         best = analysis.best_alternation_log_likelihood(conflict_m, own, seen)
@@ -113,7 +125,9 @@ class Outcome:
             "integration_log_likelihood": float(integrated.sum()),
             "alternation_log_likelihood": float(alternated.sum()),
             "integration_over_alternation": float((integrated - alternated).sum()),
-            "integration_over_alternation_median_of_a_trial": float(np.median(integrated - alternated)),
+            "integration_over_alternation_median_of_a_trial": float(
+                np.median(integrated - alternated)
+            ),
             "integration_likelier_share": float((integrated > alternated).mean()),
             "integration_over_best_alternation": float(integrated.sum()) - best,
         }
@@ -121,7 +135,9 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Effort:
-    """How many trials of each condition, with what seed, on how many processes, and who is told of the progress."""
+    """How many trials of each condition, with what seed, on how many processes, and who is told of
+    the progress.
+    """
 
     trials: int
     seed: int
@@ -129,10 +145,16 @@ class Effort:
     progress: Progress = lambda share: None
 
 
-def measure(noise: Noise, effort: Effort, conditions: Sequence[Condition] = tuple(Condition)) -> Outcome:
+def measure(
+    noise: Noise, effort: Effort, conditions: Sequence[Condition] = tuple(Condition)
+) -> Outcome:
     """Trials of each condition. The same whatever the number of processes."""
     trials = effort.trials
-    jobs = [Trial(condition, number, noise, effort.seed) for condition in conditions for number in range(trials)]
+    jobs = [
+        Trial(condition, number, noise, effort.seed)
+        for condition in conditions
+        for number in range(trials)
+    ]
     responses = each(respond, jobs, effort.processes, effort.progress)
     errors_m = {}
     for place, condition in enumerate(conditions):
@@ -142,13 +164,16 @@ def measure(noise: Noise, effort: Effort, conditions: Sequence[Condition] = tupl
 
 
 def fitted(distance: float, effort: Effort) -> Noise:
-    """Speed and turn noise that bring self-motion's SD and RMSE nearest to those published, by coordinate descent.
+    """Speed and turn noise that bring self-motion's SD and RMSE nearest to those published, by
+    coordinate descent.
 
-    Only self-motion's: with distances at 3 %, no noise of self-motion makes landmarks as poor a cue as in the
-    published simulation, and a fit to all would make up for that with noise that it does not have. The other conditions
-    are predictions then. The trials are others than those that `measure` runs with the same seed.
+    Only self-motion's: with distances at 3 %, no noise of self-motion makes landmarks as poor a cue
+    as in the published simulation, and a fit to all would make up for that with noise that it does
+    not have. The other conditions are predictions then. The trials are others than those that
+    `measure` runs with the same seed.
     """
-    effort, own = replace(effort, seed=effort.seed + 1), Condition.SELF_MOTION
+    effort = replace(effort, seed=effort.seed + 1)
+    own = Condition.SELF_MOTION
 
     @cache
     def cost(noise: Noise) -> float:

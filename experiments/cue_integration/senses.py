@@ -23,7 +23,8 @@ UNKNOWN: Rows = [
 
 
 def self_motion(turn_rad: float, forward_m: float, noise: Noise, rng: np.random.Generator) -> Rows:
-    """A turn on the spot, then a way straight on, as rows of SelfMotion: multiplied by Gaussians of mean one (§5.4).
+    """A turn on the spot, then a way straight on, as rows of SelfMotion: multiplied by Gaussians of
+    mean one (§5.4).
 
     How unsure they are follows from what is felt, the only thing that a participant has to go by.
     """
@@ -36,14 +37,17 @@ def self_motion(turn_rad: float, forward_m: float, noise: Noise, rng: np.random.
 
 
 def unsure(felt: float, noise: float) -> float:
-    """The standard deviation of what was, where that times a Gaussian of mean one was felt, to the fourth order.
+    """The standard deviation of what was, where that times a Gaussian of mean one was felt, to the
+    fourth order.
 
     It is more than that of the factor: who has felt little may have felt a fraction of much.
     """
     return abs(felt) * noise * float(np.sqrt(1 + 8 * noise**2))
 
 
-def sightings(pose: Pose, things: Mapping[str, Point], noise: Noise, rng: np.random.Generator) -> list[Percept]:
+def sightings(
+    pose: Pose, things: Mapping[str, Point], noise: Noise, rng: np.random.Generator
+) -> list[Percept]:
     """All things, by label, wherever the participant faces: it looks around."""
     seen = []
     for label, where in things.items():
@@ -54,7 +58,9 @@ def sightings(pose: Pose, things: Mapping[str, Point], noise: Noise, rng: np.ran
     return seen
 
 
-def _percept(label: str, bearing_rad: float, range_m: float, bearing_sd_rad: float, range_sd_m: float) -> Percept:
+def _percept(
+    label: str, bearing_rad: float, range_m: float, bearing_sd_rad: float, range_sd_m: float
+) -> Percept:
     """A small glowing thing."""
     return Percept(
         label=label,

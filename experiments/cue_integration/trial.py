@@ -21,7 +21,8 @@ class Condition(enum.Enum):
 
 
 class Noise(msgspec.Struct, frozen=True):
-    """Standard deviations as shares of what is sensed: of speed, of turn rate (fitted), and of distance.
+    """Standard deviations as shares of what is sensed: of speed, of turn rate (fitted), and of
+    distance.
 
     Directions to landmarks are off by as much across as distances are along.
     """
@@ -52,7 +53,9 @@ class Trial:
 
     def generator(self) -> np.random.Generator:
         """The world's own noise in this trial."""
-        return np.random.default_rng([self.seed, list(Condition).index(self.condition), self.number])
+        return np.random.default_rng(
+            [self.seed, list(Condition).index(self.condition), self.number]
+        )
 
     @property
     def target(self) -> Point:

@@ -1,6 +1,8 @@
-"""What eq. 9 can do for a way whose headings err: many laps of path integration alone, each closed exactly.
+"""What eq. 9 can do for a way whose headings err: many laps of path integration alone, each closed
+exactly.
 
-Without landmarks or minds: the rule itself, its positions shifted by the share of the loop that lies before them.
+Without landmarks or minds: the rule itself, its positions shifted by the share of the loop that
+lies before them.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from services.sim.odometry import Noise
-from services.sim.way import Line
+from services.sim.scripted.trajectory import Line
 
 Floats = npt.NDArray[np.float64]
 
@@ -36,20 +38,33 @@ class Laps:
         return float((self.after_m < self.before_m).mean())
 
 
-def close_laps(corners_m: Sequence[tuple[float, float]], step_m: float, noise: Noise, laps: int, seed: int) -> Laps:
-    """`laps` times once round `corners_m`, which end where they begin, in steps of `step_m`, with `noise` each."""
+def close_laps(
+    corners_m: Sequence[tuple[float, float]], step_m: float, noise: Noise, laps: int, seed: int
+) -> Laps:
+    """`laps` times once round `corners_m`, which end where they begin, in steps of `step_m`, with
+    `noise` each.
+    """
     line = Line(np.array(corners_m, float))
     stops = np.append(np.arange(0.0, line.length_m, step_m), line.length_m)
     # Straight on, then turn on the spot: with drift on the way, and noise in proportion to both.
-    legs = np.array([leg for pair in itertools.pairwise(stops.tolist()) for leg in line.legs(*pair)])
+    legs = np.array(
+        [leg for pair in itertools.pairwise(stops.tolist()) for leg in line.legs(*pair)]
+    )
     rng = np.random.default_rng(seed)
     speed, drift, turn = rng.normal(0.0, 1.0, (3, laps, len(legs)))
     way, turned = legs.T
     heading = line.heading_rad[0] + np.cumsum(turned) - turned
     drifted = noise.drift_rad_per_sqrt_m * drift * np.sqrt(way)
-    off = np.cumsum(drifted + noise.turn * turn * turned, axis=1) - noise.turn * turn * turned - drifted / 2
+    off = (
+        np.cumsum(drifted + noise.turn * turn * turned, axis=1)
+        - noise.turn * turn * turned
+        - drifted / 2
+    )
     felt = way * (1 + noise.speed * speed)
-    errors = [np.cumsum(felt * part(heading + off) - way * part(heading), axis=1) for part in (np.cos, np.sin)]
+    errors = [
+        np.cumsum(felt * part(heading + off) - way * part(heading), axis=1)
+        for part in (np.cos, np.sin)
+    ]
     error = np.stack(errors, axis=-1)
     share = (np.cumsum(way) / way.sum())[:, None]
     return Laps(_rms(error), _rms(error - share * error[:, -1:]))

@@ -1,4 +1,6 @@
-"""One loop, driven by the modules of the town on the in-memory bus, and what its corrections made of the map."""
+"""One loop, driven by the modules of the town on the in-memory bus, and what its corrections made
+of the map.
+"""
 
 from __future__ import annotations
 
@@ -11,32 +13,45 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from bus.config import Sections
-from bus.errors import CogmapError
-from bus.graph import TILE_SIDE, Graph
-from bus.module import Module
+from cogmap.errors import CogmapError
+from cogmap.graph.graph import TILE_SIDE, Graph
+from cogmap.runtime.config import Sections
+from cogmap.runtime.module import Module
 from experiments import in_memory, rendered
 from experiments.loop_closing.rule import close_laps
 from experiments.parallel import Progress
 from schemas import topics
+from schemas.cognition import Replay
 from schemas.graph import Delta
-from schemas.mind import Replay
 from schemas.sensing import TruePose
-from services import table
-from services.codelets.path import POSE, STAMP, rows_of
+from services import registry
+from services.codelets.mapping.path import POSE, STAMP, rows_of
+from services.sim.config import Config
 from services.sim.odometry import Noise
-from services.sim.settings import Config
 
 Floats = npt.NDArray[np.float64]
 MIND = ("workspace", "codelets", "global_workspace", "action")
 SENSING = "percept-level sensing"
 METHODS = ("positions", "heading")
-CORNERS_M = ((0.0, 0.0), (180.0, 0.0), (180.0, 70.0), (260.0, 70.0), (260.0, 220.0), (0.0, 220.0), (0.0, 0.0))
+CORNERS_M = (
+    (0.0, 0.0),
+    (180.0, 0.0),
+    (180.0, 70.0),
+    (260.0, 70.0),
+    (260.0, 220.0),
+    (0.0, 220.0),
+    (0.0, 0.0),
+)
 AGAIN_M = (120.0, 0.0)
-ASIDE_M, APART_M = 14.0, 60.0
-CORNER_RAD, LAPS = np.pi / 2, 1000
-SPEED_M_S, FRAME_HZ, CELL_M = 5.0, 2, 3.0
-# The wheels of the town's robot, read ten times between two views: each reading's factors err anew, drift adds up.
+ASIDE_M = 14.0
+APART_M = 60.0
+CORNER_RAD = np.pi / 2
+LAPS = 1000
+SPEED_M_S = 5.0
+FRAME_HZ = 2
+CELL_M = 3.0
+# The wheels of the town's robot, read ten times between two views: each reading's factors err anew,
+# drift adds up.
 READINGS = Config().odometry_hz // FRAME_HZ
 NOISE = Noise(speed=Noise().speed / READINGS**0.5, turn=Noise().turn / READINGS**0.5)
 
@@ -45,7 +60,8 @@ NOISE = Noise(speed=Noise().speed / READINGS**0.5, turn=Noise().turn / READINGS*
 class Map:
     """What the agent believes at one time, in its own frame, which begins as the true one does.
 
-    (n, 2) `path_m` and where it truly was then, (k, 2) objects and where they truly stand, and `road_m`.
+    (n, 2) `path_m` and where it truly was then, (k, 2) objects and where they truly stand, and
+    `road_m`.
     """
 
     path_m: Floats
@@ -72,10 +88,11 @@ class Map:
 
 @dataclass(frozen=True)
 class Replayed:
-    """What a replay told: `shifts_m` (n,) of the place fields in its order, and how synapses change.
+    """What a replay told: `shifts_m` (n,) of the place fields in its order, and how synapses
+    change.
 
-    `nearer_m` (m,) is by how much the fields of each pair of place cells come nearer. `close` tells the pairs near
-    enough, before and after, for exp(-k d) to be about linear: less than 1/k apart.
+    `nearer_m` (m,) is by how much the fields of each pair of place cells come nearer. `close` tells
+    the pairs near enough, before and after, for exp(-k d) to be about linear: less than 1/k apart.
     """
 
     passes: int
@@ -88,17 +105,25 @@ class Replayed:
     @classmethod
     def of(cls, told: Replay) -> Replayed:
         """From the event on the bus."""
-        positions, shifts = np.asarray(told.positions_m.numpy(), float), np.asarray(told.shifts_m.numpy(), float)
+        positions = np.asarray(told.positions_m.numpy(), float)
+        shifts = np.asarray(told.shifts_m.numpy(), float)
         pairs = np.asarray(told.pairs.numpy(), np.int64)
-        apart = [np.hypot(*(where[pairs[:, 0]] - where[pairs[:, 1]]).T) for where in (positions, positions + shifts)]
+        apart = [
+            np.hypot(*(where[pairs[:, 0]] - where[pairs[:, 1]]).T)
+            for where in (positions, positions + shifts)
+        ]
         changes = np.asarray(told.strength_changes.numpy(), float)
         close = np.maximum(*apart) * told.decay_per_m < 1
-        return cls(told.replays, told.decay_per_m, np.hypot(*shifts.T), apart[0] - apart[1], changes, close)
+        return cls(
+            told.replays, told.decay_per_m, np.hypot(*shifts.T), apart[0] - apart[1], changes, close
+        )
 
 
 @dataclass(frozen=True)
 class Loop:
-    """The map before the first correction was carried out, right after it, and in the end; and all replays."""
+    """The map before the first correction was carried out, right after it, and in the end; and all
+    replays.
+    """
 
     before: Map
     after: Map
@@ -137,13 +162,18 @@ class _Observer:
         objects = [node for _, node in sorted(self.graph.nodes.items()) if node.kind == "object"]
         known = [node for node in objects if node.attributes["label"] in self.landmarks]
         cells = [
-            np.argwhere(tile.columns["road"] > 0) + TILE_SIDE * np.array(at) for at, tile in self.graph.tiles.items()
+            np.argwhere(tile.columns["road"] > 0) + TILE_SIDE * np.array(at)
+            for at, tile in self.graph.tiles.items()
         ]
         return Map(
             path_m=rows[:, POSE][:, :2],
             true_path_m=np.array([self._true(stamp) for stamp in stamps]),
-            objects_m=np.array([(node.attributes["x_m"], node.attributes["y_m"]) for node in known], float),
-            true_objects_m=np.array([self.landmarks[str(node.attributes["label"])] for node in known]),
+            objects_m=np.array(
+                [(node.attributes["x_m"], node.attributes["y_m"]) for node in known], float
+            ),
+            true_objects_m=np.array(
+                [self.landmarks[str(node.attributes["label"])] for node in known]
+            ),
             road_m=np.vstack([np.zeros((0, 2)), *cells]) * CELL_M,
         )
 
@@ -155,13 +185,16 @@ class _Observer:
 def way() -> dict[str, Any]:
     """A line round some blocks and a bit of it again, and landmarks beside it."""
     corners = np.array(CORNERS_M)
-    landmarks, number = [], 0
+    landmarks = []
+    number = 0
     for start, end in itertools.pairwise(corners):
         length = float(np.hypot(*(end - start)))
         along = (end - start) / length
         beside = np.array([along[1], -along[0]])
         for way_m in np.arange(APART_M / 2, length, APART_M):
-            x_m, y_m = (start + way_m * along + beside * ASIDE_M * (1 if number % 2 else -1)).tolist()
+            x_m, y_m = (
+                start + way_m * along + beside * ASIDE_M * (1 if number % 2 else -1)
+            ).tolist()
             landmarks.append({"name": f"building-{number:02d}", "x_m": x_m, "y_m": y_m})
             number += 1
     return {"line_m": [*CORNERS_M, AGAIN_M], "landmarks": landmarks, "speed_m_s": SPEED_M_S}
@@ -172,8 +205,19 @@ def sections(seed: int, method: str) -> Sections:
     rates = {"frame_hz": FRAME_HZ, "odometry_hz": FRAME_HZ, "awaits": dict.fromkeys(MIND, 1)}
     step_m = SPEED_M_S / FRAME_HZ
     return {
-        "sim": {"mode": "lockstep", "seed": seed, "noise": msgspec.structs.asdict(NOISE), "way": way(), **rates},
-        "workspace": {"mode": "lockstep", "cell_m": CELL_M, "base_level_decay": 0.0, "path_spacing_m": step_m},
+        "sim": {
+            "mode": "lockstep",
+            "seed": seed,
+            "noise": msgspec.structs.asdict(NOISE),
+            "way": way(),
+            **rates,
+        },
+        "workspace": {
+            "mode": "lockstep",
+            "cell_m": CELL_M,
+            "base_level_decay": 0.0,
+            "path_spacing_m": step_m,
+        },
         "codelets": {
             "correct": method,
             "path_spacing_m": step_m,
@@ -186,21 +230,31 @@ def sections(seed: int, method: str) -> Sections:
 
 
 def drive(seed: int, method: str) -> Loop:
-    """Drive the loop once. Raises CogmapError where nothing was corrected, or a message was refused."""
+    """Drive the loop once. Raises CogmapError where nothing was corrected, or a message was
+    refused.
+    """
     configured = sections(seed, method)
-    return driven(configured, [table.build(name, configured) for name in ("sim", *MIND)])
+    return driven(configured, [registry.build(name, configured) for name in ("sim", *MIND)])
 
 
 def drive_by_cameras(seed: int, progress: Progress) -> dict[str, Loop]:
     """As `drive`, by each of METHODS, with buildings that are drawn and recognised."""
-    return rendered.by_cameras({method: sections(seed, method) for method in METHODS}, MIND, driven, progress)
+    return rendered.by_cameras(
+        {method: sections(seed, method) for method in METHODS}, MIND, driven, progress
+    )
 
 
 def driven(configured: Sections, modules: Sequence[Module]) -> Loop:
     """As `drive`, with these modules."""
-    places = {item["name"]: (item["x_m"], item["y_m"]) for item in configured["sim"]["way"]["landmarks"]}
+    places = {
+        item["name"]: (item["x_m"], item["y_m"]) for item in configured["sim"]["way"]["landmarks"]
+    }
     observer = _Observer(places)
-    watching = Module("observer").on(topics.DELTA, observer.on_delta).on(topics.TRUE_POSE, observer.on_pose)
+    watching = (
+        Module("observer")
+        .on(topics.DELTA, observer.on_delta)
+        .on(topics.TRUE_POSE, observer.on_pose)
+    )
     watching.on(topics.REPLAY, observer.on_replay)
     in_memory.run([*modules, watching])
     if observer.before is None or observer.after is None:
@@ -209,7 +263,9 @@ def driven(configured: Sections, modules: Sequence[Module]) -> Loop:
 
 
 def figures(loops: dict[str, Loop]) -> dict[str, float]:
-    """What is printed: errors before the first correction and in the end, by method, and what its replay predicts."""
+    """What is printed: errors before the first correction and in the end, by method, and what its
+    replay predicts.
+    """
     said: dict[str, float] = {}
     for method, loop in loops.items():
         for name in ("path", "object", "end"):
@@ -222,23 +278,41 @@ def figures(loops: dict[str, Loop]) -> dict[str, float]:
 
 
 def _predicted(replay: Replayed) -> dict[str, float]:
-    """How the change of synapses goes with how much nearer place fields come: k a metre, where they are close."""
+    """How the change of synapses goes with how much nearer place fields come: k a metre, where they
+    are close.
+    """
     said = {"synapse_decay_per_m": replay.decay_per_m}
-    for name, pairs in (("close_pairs", replay.close), ("all_pairs", np.ones(len(replay.close), bool))):
-        nearer, changes = replay.nearer_m[pairs], replay.strength_changes[pairs]
+    for name, pairs in (
+        ("close_pairs", replay.close),
+        ("all_pairs", np.ones(len(replay.close), bool)),
+    ):
+        nearer = replay.nearer_m[pairs]
+        changes = replay.strength_changes[pairs]
         enough = len(nearer) > 2 and bool(np.ptp(nearer) > 0)
         said[name] = float(len(nearer))
-        said[f"strength_change_per_m_{name}"] = float(np.polyfit(nearer, changes, 1)[0]) if enough else 0.0
-        said[f"strength_and_shift_correlation_{name}"] = float(np.corrcoef(nearer, changes)[0, 1]) if enough else 0.0
+        said[f"strength_change_per_m_{name}"] = (
+            float(np.polyfit(nearer, changes, 1)[0]) if enough else 0.0
+        )
+        said[f"strength_and_shift_correlation_{name}"] = (
+            float(np.corrcoef(nearer, changes)[0, 1]) if enough else 0.0
+        )
     return said
 
 
 def figures_of_rule(seed: int) -> dict[str, float]:
-    """What eq. 9 does for many laps of path integration alone, with the headings' noise and without."""
+    """What eq. 9 does for many laps of path integration alone, with the headings' noise and
+    without.
+    """
     said = {}
-    for name, noise in (("", NOISE), ("_exact_headings", Noise(speed=NOISE.speed, turn=0.0, drift_rad_per_sqrt_m=0.0))):
+    for name, noise in (
+        ("", NOISE),
+        ("_exact_headings", Noise(speed=NOISE.speed, turn=0.0, drift_rad_per_sqrt_m=0.0)),
+    ):
         laps = close_laps(CORNERS_M, SPEED_M_S / FRAME_HZ, noise, LAPS, seed)
-        said[f"rule_over_uncorrected{name}"], said[f"rule_helps_share{name}"] = laps.ratio, laps.helped
+        said[f"rule_over_uncorrected{name}"], said[f"rule_helps_share{name}"] = (
+            laps.ratio,
+            laps.helped,
+        )
     return said
 
 

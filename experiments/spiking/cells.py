@@ -1,6 +1,7 @@
 """Grid, border and place cells as generators of spikes.
 
-Time goes in gamma cycles of 25 ms; a cell spikes at most once in a cycle, and spikes of one cycle coincide.
+Time goes in gamma cycles of 25 ms; a cell spikes at most once in a cycle, and spikes of one cycle
+coincide.
 """
 
 from __future__ import annotations
@@ -19,13 +20,16 @@ PEAK = 0.8
 PHASES = 12
 PLACE_M = 0.1
 BORDER_M = 0.05
-# From one module to the next by the square root of e, so that the fields of all fall together in one place only.
+# From one module to the next by the square root of e, so that the fields of all fall together in
+# one place only.
 SPACINGS_M = (0.5, 0.82, 1.36, 2.24, 3.7)
 SHARPNESS = 1.5
 
 
 def generate(share: npt.NDArray[np.float32], rng: np.random.Generator) -> Spikes:
-    """Spikes where a cell fires at `share` of its peak, (cells, cycles), as bits packed by eight cycles."""
+    """Spikes where a cell fires at `share` of its peak, (cells, cycles), as bits packed by eight
+    cycles.
+    """
     return np.packbits(rng.random(share.shape, np.float32) < PEAK * share, axis=1)
 
 
@@ -41,12 +45,22 @@ class GridModule:
         return self.spacing_m * np.array([[1.0, 0.5], [0.0, np.sqrt(3) / 2]])
 
     def tuning(self, where_m: Values) -> npt.NDArray[np.float32]:
-        """How much of its peak each cell fires at positions (n, 2): (cells, n), 1 in the middle of a field."""
-        steps = np.stack(np.meshgrid(np.arange(PHASES), np.arange(PHASES), indexing="ij"), axis=-1).reshape(-1, 2)
+        """How much of its peak each cell fires at positions (n, 2): (cells, n), 1 in the middle of
+        a field.
+        """
+        steps = np.stack(
+            np.meshgrid(np.arange(PHASES), np.arange(PHASES), indexing="ij"), axis=-1
+        ).reshape(-1, 2)
         centres_m = steps / PHASES @ self.lattice_m.T
         angles = np.radians([30, 90, 150])
-        waves = 4 * np.pi / (np.sqrt(3) * self.spacing_m) * np.column_stack([np.cos(angles), np.sin(angles)])
-        own, there = (centres_m @ waves.T).astype(np.float32), (where_m @ waves.T).astype(np.float32)
+        waves = (
+            4
+            * np.pi
+            / (np.sqrt(3) * self.spacing_m)
+            * np.column_stack([np.cos(angles), np.sin(angles)])
+        )
+        own = (centres_m @ waves.T).astype(np.float32)
+        there = (where_m @ waves.T).astype(np.float32)
         total = np.full((len(own), len(there)), -3.0, np.float32)
         for wave in range(3):
             total += np.cos(there[None, :, wave] - own[:, None, wave])
@@ -55,7 +69,9 @@ class GridModule:
 
     def nearest(self, centres_m: Values) -> Indices:
         """Of positions (n, 2), the cell that has a field there."""
-        steps = np.rint(centres_m @ np.linalg.inv(self.lattice_m).T * PHASES).astype(np.intp) % PHASES
+        steps = (
+            np.rint(centres_m @ np.linalg.inv(self.lattice_m).T * PHASES).astype(np.intp) % PHASES
+        )
         nearest: Indices = steps[:, 0] * PHASES + steps[:, 1]
         return nearest
 

@@ -1,9 +1,10 @@
-"""A place cell fires when its grid cells and its border cells fire together: Bayes' rule, by coincidence.
+"""A place cell fires when its grid cells and its border cells fire together: Bayes' rule, by
+coincidence.
 
-Path integration moves grid cells: in each cycle they stand for one position out of its distribution, the prior.
-Border cells fire as likely as the sensed distance to a wall is from where they prefer to be. A place cell that
-fires on the coincidence of all its inputs fires in proportion to the product: its spikes are samples of the
-posterior (paper eq. 2, figure 4).
+Path integration moves grid cells: in each cycle they stand for one position out of its
+distribution, the prior. Border cells fire as likely as the sensed distance to a wall is from where
+they prefer to be. A place cell that fires on the coincidence of all its inputs fires in proportion
+to the product: its spikes are samples of the posterior (paper eq. 2, figure 4).
 """
 
 from __future__ import annotations
@@ -23,12 +24,15 @@ from experiments.spiking.cells import (
     place_centres_m,
 )
 
-WEST, SOUTH = 0, 1
+WEST = 0
+SOUTH = 1
 
 
 @dataclass(frozen=True)
 class Border:
-    """A sensed distance to a wall: `axis` 0 to the west wall (along x), 1 to the south wall (along y)."""
+    """A sensed distance to a wall: `axis` 0 to the west wall (along x), 1 to the south wall (along
+    y).
+    """
 
     axis: int
     sensed_m: float
@@ -75,7 +79,8 @@ def exact(cues: Cues) -> Posterior:
 
 @dataclass(frozen=True)
 class Recording:
-    """Spikes as bits packed by eight cycles: of grid cells by module, of border cells by border, of place cells.
+    """Spikes as bits packed by eight cycles: of grid cells by module, of border cells by border, of
+    place cells.
 
     `centres_m` (n, 2) is where place cell i has its field.
     """
@@ -92,12 +97,16 @@ class Recording:
 
     @property
     def posterior(self) -> Posterior:
-        """Of the samples that place cells' spikes are. Raises ValueError where there are fewer than two."""
+        """Of the samples that place cells' spikes are. Raises ValueError where there are fewer than
+        two.
+        """
         counts = self.counts
         if counts.sum() < 2:
             raise ValueError("place cells hardly fire: record for longer")
         mean = counts @ self.centres_m / counts.sum()
-        return Posterior(mean, np.cov(self.centres_m, rowvar=False, fweights=counts.astype(np.int64)))
+        return Posterior(
+            mean, np.cov(self.centres_m, rowvar=False, fweights=counts.astype(np.int64))
+        )
 
 
 def record(cues: Cues, side_m: float, seconds: float, rng: np.random.Generator) -> Recording:
@@ -105,7 +114,8 @@ def record(cues: Cues, side_m: float, seconds: float, rng: np.random.Generator) 
     cycles = round(seconds / GAMMA_S)
     centres_m = place_centres_m(side_m)
     integrated_m = rng.multivariate_normal(cues.mean_m, cues.covariance_m2, cycles)
-    grid, border = [], []
+    grid = []
+    border = []
     place: Spikes = np.full((len(centres_m), -(-cycles // 8)), 255, np.uint8)
     for spacing_m in SPACINGS_M:
         module = GridModule(spacing_m)

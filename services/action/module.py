@@ -5,17 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from bus.errors import MessageError
-from bus.module import Module
+from cogmap.errors import MessageError
+from cogmap.runtime.module import Module
 from schemas import topics
 from schemas.base import Message
+from schemas.cognition import Action, Broadcast, Competition
 from schemas.graph import Delta, Node
-from schemas.mind import Action, Broadcast, Competition
 from schemas.sensing import MotorCommand, Pose, RangeScan
+from services.action.config import Config
 from services.action.motor import SensoryMotorMemory, obstacle_ahead_m
 from services.action.route import Route
 from services.action.selection import HALT, ActionSelection
-from services.action.settings import Config
 
 __all__ = ["ActionModule", "Config", "build"]
 
@@ -23,7 +23,8 @@ SELF = "self"
 
 
 class ActionModule:
-    """Broadcasts choose the action; each new estimate of the self node's pose brings a motor command.
+    """Broadcasts choose the action; each new estimate of the self node's pose brings a motor
+    command.
 
     In lockstep the command waits for the view's scan and for the competition of the cycle before,
     so that it depends on nothing but what was sensed.
@@ -31,7 +32,9 @@ class ActionModule:
 
     def __init__(self, config: Config) -> None:
         self._config = config
-        self._route = Route(config.route, config.corner_radius_m, config.overrun_m) if config.route else None
+        self._route = (
+            Route(config.route, config.corner_radius_m, config.overrun_m) if config.route else None
+        )
         self._selection = ActionSelection(config)
         self._motor = None if self._route is None else SensoryMotorMemory(config, self._route)
         self._scheme = ""
@@ -47,7 +50,8 @@ class ActionModule:
         """Take up the action that was selected last, and the route from where it was then."""
         for message in past:
             if isinstance(message, Action):
-                self._chosen, self._scheme = message, message.scheme
+                self._chosen = message
+                self._scheme = message.scheme
         if self._chosen is not None and self._route is not None:
             self._route.resume(float(self._chosen.parameters.get("travelled_m", 0.0)))
 
@@ -69,7 +73,11 @@ class ActionModule:
         if delta.phase not in {"localization", "late"} or not nodes:
             return None
         place = nodes[-1].attributes
-        pose = Pose(x_m=float(place["x_m"]), y_m=float(place["y_m"]), heading_rad=float(place["heading_rad"]))
+        pose = Pose(
+            x_m=float(place["x_m"]),
+            y_m=float(place["y_m"]),
+            heading_rad=float(place["heading_rad"]),
+        )
         self._waiting = (delta, pose)
         return self._command()
 
@@ -81,12 +89,15 @@ class ActionModule:
     def on_broadcast(self, broadcast: Broadcast) -> list[Message]:
         """Select an action by what has become conscious."""
         self._heard = broadcast.cycle
-        return [message for message in (self._select(broadcast), self._command()) if message is not None]
+        return [
+            message for message in (self._select(broadcast), self._command()) if message is not None
+        ]
 
     def _select(self, broadcast: Broadcast) -> Action | None:
         ended = self._route is None or self._route.left_m <= 0.0
         chosen = self._selection.select(
-            broadcast.coalition.content, {"route_end": float(ended), "route_ahead": float(not ended)}
+            broadcast.coalition.content,
+            {"route_end": float(ended), "route_ahead": float(not ended)},
         )
         if chosen is None:
             return None
@@ -106,7 +117,12 @@ class ActionModule:
             return {}
         leg = self._route.leg
         length_m, turn_rad = self._config.route[leg]
-        return {"leg": leg, "length_m": length_m, "turn_rad": turn_rad, "travelled_m": self._route.travelled_m}
+        return {
+            "leg": leg,
+            "length_m": length_m,
+            "turn_rad": turn_rad,
+            "travelled_m": self._route.travelled_m,
+        }
 
     def _command(self) -> MotorCommand | None:
         """The command for the newest pose, once everything that it depends on has come."""
@@ -120,7 +136,10 @@ class ActionModule:
         self._waiting = None
         if self._motor is None:
             return MotorCommand(
-                stamp_ns=delta.stamp_ns, left_wheel_rad_s=0.0, right_wheel_rad_s=0.0, halted_by="no route"
+                stamp_ns=delta.stamp_ns,
+                left_wheel_rad_s=0.0,
+                right_wheel_rad_s=0.0,
+                halted_by="no route",
             )
         moving = self._scheme not in {"", HALT}
         return self._motor.command(delta.stamp_ns, pose, self._clear_m, moving)

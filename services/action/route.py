@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from services.action.settings import Leg
+from services.action.config import Leg
 
 STEP_M = 0.25
 SEARCH_M = 6.0
@@ -22,7 +22,9 @@ class Route:
             corners.append(corners[-1] + length_m * np.array([np.cos(heading), np.sin(heading)]))
             heading += turn_rad
         self.length_m = sum(length_m for length_m, _ in legs)
-        corners.append(corners[-1] + max(overrun_m, STEP_M) * np.array([np.cos(heading), np.sin(heading)]))
+        corners.append(
+            corners[-1] + max(overrun_m, STEP_M) * np.array([np.cos(heading), np.sin(heading)])
+        )
         line = _rounded(corners, corner_radius_m)
         along_m = _along(line)
         self.leg_ends_m = along_m[ARC // 2 + 1 : -1 : ARC]
@@ -46,7 +48,10 @@ class Route:
     @property
     def leg(self) -> int:
         """The leg that the agent is on."""
-        return min(int(np.searchsorted(self.leg_ends_m, self.travelled_m, "right")), len(self.leg_ends_m) - 1)
+        return min(
+            int(np.searchsorted(self.leg_ends_m, self.travelled_m, "right")),
+            len(self.leg_ends_m) - 1,
+        )
 
     def advance(self, x_m: float, y_m: float) -> None:
         """Find the point nearest to the agent, never going back."""
@@ -66,17 +71,23 @@ class Route:
 
     def sharpest(self, distance_m: float) -> float:
         """The sharpest curvature within so far ahead."""
-        return float(self.curvature_per_m[self._at : self._at + round(distance_m / STEP_M) + 1].max())
+        return float(
+            self.curvature_per_m[self._at : self._at + round(distance_m / STEP_M) + 1].max()
+        )
 
 
 def _rounded(corners: list[npt.NDArray[np.float64]], radius_m: float) -> npt.NDArray[np.float64]:
     """The polyline with an arc of ARC points in place of each corner, as wide as its legs allow."""
     points = [corners[0]]
     for before, corner, after in zip(corners, corners[1:], corners[2:], strict=False):
-        into, out = corner - before, after - corner
+        into = corner - before
+        out = after - corner
         turn = np.arctan2(into[0] * out[1] - into[1] * out[0], into @ out)
-        reach = min(radius_m * abs(np.tan(turn / 2)), np.linalg.norm(into) / 2, np.linalg.norm(out) / 2)
-        start, end = corner - into / np.linalg.norm(into) * reach, corner + out / np.linalg.norm(out) * reach
+        reach = min(
+            radius_m * abs(np.tan(turn / 2)), np.linalg.norm(into) / 2, np.linalg.norm(out) / 2
+        )
+        start = corner - into / np.linalg.norm(into) * reach
+        end = corner + out / np.linalg.norm(out) * reach
         share = np.linspace(0, 1, ARC)[:, None]
         points.extend((1 - share) ** 2 * start + 2 * share * (1 - share) * corner + share**2 * end)
     return np.vstack([*points, corners[-1]])
@@ -87,7 +98,11 @@ def _along(points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
 
 
-def _resampled(points: npt.NDArray[np.float64], along_m: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+def _resampled(
+    points: npt.NDArray[np.float64], along_m: npt.NDArray[np.float64]
+) -> npt.NDArray[np.float64]:
     """The same line with a point every STEP_M."""
     at = np.arange(0.0, along_m[-1], STEP_M)
-    return np.column_stack([np.interp(at, along_m, points[:, 0]), np.interp(at, along_m, points[:, 1])])
+    return np.column_stack(
+        [np.interp(at, along_m, points[:, 0]), np.interp(at, along_m, points[:, 1])]
+    )

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from bus.errors import MessageError
-from bus.module import Module
+from cogmap.errors import MessageError
+from cogmap.runtime.module import Module
 from schemas import topics
 from schemas.base import Message
+from schemas.cognition import Coalitions, Task
 from schemas.graph import Operation, Proposal
-from schemas.mind import Coalitions, Task
 from services.codelets.attention import attend
-from services.codelets.landmarks import locate_landmark
-from services.codelets.localization import localize
-from services.codelets.map_correction import correct_map
-from services.codelets.map_shift import shift_map
-from services.codelets.object_place import place_object, place_road
-from services.codelets.path import extend_path
-from services.codelets.revisits import revisit
-from services.codelets.settings import Config
+from services.codelets.config import Config
+from services.codelets.correction.apply_correction import shift_map
+from services.codelets.correction.map_correction import correct_map
+from services.codelets.localization.landmarks import locate_landmark
+from services.codelets.localization.localization import localize
+from services.codelets.mapping.loop_detection import revisit
+from services.codelets.mapping.object_place import place_object, place_road
+from services.codelets.mapping.path import extend_path
 
 __all__ = ["Config", "Worker", "build"]
 
@@ -31,7 +31,8 @@ BUILDERS: dict[str, Callable[[Task, Config], list[Operation]]] = {
     "revisit": revisit,
     "map_shift": shift_map,
 }
-ATTENTION, MAP_CORRECTION = "attention", "map_correction"
+ATTENTION = "attention"
+MAP_CORRECTION = "map_correction"
 
 
 class Worker:
@@ -42,7 +43,9 @@ class Worker:
         self._instance = instance
 
     def work(self, task: Task) -> list[Message] | None:
-        """A proposal for a task, before it what attention found or replay tells; a failure is said, not kept back."""
+        """A proposal for a task, before it what attention found or replay tells; a failure is said,
+        not kept back.
+        """
         if task.worker != self._instance:
             return None
         said: list[Message] = []

@@ -7,25 +7,30 @@ from pathlib import Path
 
 import cv2
 
-from bus.module import Module
+from cogmap.runtime.module import Module
 from schemas import topics
 from schemas.base import Message
 from schemas.sensing import Learned, View
-from services.epam import objects, road, segments
+from services.epam.config import Config
+from services.epam.layout import road
 from services.epam.pam import ExtendedPam
-from services.epam.places import PlaceMemory
-from services.epam.settings import Config
+from services.epam.places.recognizer import PlaceMemory
+from services.epam.recognition import objects, segments
 from services.epam.view import pixels
 
 __all__ = ["Config", "build"]
 
 
 class Perception:
-    """Turns each view into percepts. Between views it keeps what it learned: new buildings, and ways that it went."""
+    """Turns each view into percepts. Between views it keeps what it learned: new buildings, and
+    ways that it went.
+    """
 
     def __init__(self, config: Config, pam: ExtendedPam, places: PlaceMemory) -> None:
-        self._pam, self._places = pam, places
-        self._frame, self._stamp_ns = 0, 0
+        self._pam = pam
+        self._places = places
+        self._frame = 0
+        self._stamp_ns = 0
 
     def see(self, view: View) -> list[Message]:
         """What is in `view`, perhaps nothing, after what was learned from it.
@@ -38,21 +43,29 @@ class Perception:
         percepts.matches = matches
         if not met and not remembered:
             return [percepts]
-        self._stamp_ns, self._frame = view.stamp_ns, view.frame
-        return [Learned(stamp_ns=view.stamp_ns, frame=view.frame, objects=met, views=remembered), percepts]
+        self._stamp_ns = view.stamp_ns
+        self._frame = view.frame
+        return [
+            Learned(stamp_ns=view.stamp_ns, frame=view.frame, objects=met, views=remembered),
+            percepts,
+        ]
 
     def recall(self, past: Iterable[Message]) -> None:
         """Know again what was learned before a restart."""
         for message in past:
             if isinstance(message, Learned):
-                self._stamp_ns, self._frame = message.stamp_ns, message.frame
+                self._stamp_ns = message.stamp_ns
+                self._frame = message.frame
                 self._pam.recall(message.objects)
                 self._places.recall(message.views)
 
     def everything(self) -> Learned:
         """All that was learned, as one message."""
         return Learned(
-            stamp_ns=self._stamp_ns, frame=self._frame, objects=self._pam.learned, views=list(self._places.all)
+            stamp_ns=self._stamp_ns,
+            frame=self._frame,
+            objects=self._pam.learned,
+            views=list(self._places.all),
         )
 
 
@@ -66,7 +79,9 @@ def build(config: Config, instance: str) -> Module:
         road.load(_path(config.road_weights, road.DEFAULT_PATH)),
     )
     perception = Perception(config, pam, PlaceMemory())
-    module = Module("epam", instance).on(topics.VIEW, perception.see, emits=(topics.PERCEPTS, topics.LEARNED))
+    module = Module("epam", instance).on(
+        topics.VIEW, perception.see, emits=(topics.PERCEPTS, topics.LEARNED)
+    )
     return module.journaling(topics.LEARNED, perception.recall, perception.everything)
 
 

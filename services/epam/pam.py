@@ -12,14 +12,14 @@ import numpy as np
 
 from schemas.array import Array
 from schemas.sensing import Calibration, LearnedObject, Percept, Percepts, View
-from services.epam.candidate import Candidate, beside, height_m, joined, outline_px
-from services.epam.geometry import Place, locate
-from services.epam.objects import Look, Recogniser
-from services.epam.road import Roads
-from services.epam.segments import Segmenter
-from services.epam.settings import Config
+from services.epam.config import Config
+from services.epam.layout.footprint_fit import Place, locate
+from services.epam.layout.road import Roads
+from services.epam.layout.walls import walls
+from services.epam.recognition.candidate import Candidate, beside, height_m, joined, outline_px
+from services.epam.recognition.objects import Look, Recogniser
+from services.epam.recognition.segments import Segmenter
 from services.epam.view import Seen
-from services.epam.walls import walls
 
 NEW_LABEL = "new-building-{}"
 LIKELIER_THAN_NOT = 0.5
@@ -28,9 +28,13 @@ LIKELIER_THAN_NOT = 0.5
 class ExtendedPam:
     """Knows the nodes that were taught, and those learned since."""
 
-    def __init__(self, config: Config, segmenter: Segmenter, recogniser: Recogniser, roads: Roads) -> None:
+    def __init__(
+        self, config: Config, segmenter: Segmenter, recogniser: Recogniser, roads: Roads
+    ) -> None:
         self._config = config
-        self._segmenter, self._recogniser, self._roads = segmenter, recogniser, roads
+        self._segmenter = segmenter
+        self._recogniser = recogniser
+        self._roads = roads
 
     def perceive(self, view: View, seen: Seen) -> tuple[Percepts, list[LearnedObject]]:
         """The percepts of `view`, and the nodes that it gave."""
@@ -38,7 +42,9 @@ class ExtendedPam:
         found, met = self._named(self.candidates(seen, camera), seen)
         places = self._places(found, camera)
         objects = [self._percept(*pair, camera) for pair in zip(found, places, strict=True)]
-        road_m, boundary_m = self._roads.project(self._roads.likelihood(seen.image), seen.depth_m, camera)
+        road_m, boundary_m = self._roads.project(
+            self._roads.likelihood(seen.image), seen.depth_m, camera
+        )
         percepts = Percepts(
             stamp_ns=view.stamp_ns,
             frame=view.frame,
@@ -57,7 +63,9 @@ class ExtendedPam:
             for segment, wall in standing
             if wall is not None and segment.box_px[2] >= self._config.narrowest_px
         ]
-        looks = self._recogniser.looks(seen.image, seen.depth_m, [segment for segment, _ in wide], camera)
+        looks = self._recogniser.looks(
+            seen.image, seen.depth_m, [segment for segment, _ in wide], camera
+        )
         return [
             Candidate(segment, wall, self._recogniser.recognise(look))
             for (segment, wall), look in zip(wide, looks, strict=True)
@@ -71,10 +79,17 @@ class ExtendedPam:
     @property
     def learned(self) -> list[LearnedObject]:
         """Every node learned since the teaching."""
-        return [LearnedObject(label=label, embedding=Array.of(vector)) for label, vector in self._recogniser.learned]
+        return [
+            LearnedObject(label=label, embedding=Array.of(vector))
+            for label, vector in self._recogniser.learned
+        ]
 
-    def _named(self, candidates: list[Candidate], seen: Seen) -> tuple[list[Candidate], list[LearnedObject]]:
-        """What is surely a building, one of each node, with new nodes for what has none, and what was learned."""
+    def _named(
+        self, candidates: list[Candidate], seen: Seen
+    ) -> tuple[list[Candidate], list[LearnedObject]]:
+        """What is surely a building, one of each node, with new nodes for what has none, and what
+        was learned.
+        """
         pieces: dict[str, list[Candidate]] = {}
         met: list[LearnedObject] = []
         for first in sorted(candidates, key=lambda one: -one.recognition.activation):
@@ -94,7 +109,10 @@ class ExtendedPam:
 
     def _again(self, candidate: Candidate, apart_from: Container[str] = ()) -> Candidate:
         """Recognised by all that is known by now, except by those names."""
-        return replace(candidate, recognition=self._recogniser.recognise(candidate.recognition.look, apart_from))
+        return replace(
+            candidate,
+            recognition=self._recogniser.recognise(candidate.recognition.look, apart_from),
+        )
 
     def _apart(self, candidate: Candidate, pieces: Mapping[str, list[Candidate]]) -> Candidate:
         """Recognised as none of those seen elsewhere in the same view: nothing is in two places."""
@@ -102,8 +120,11 @@ class ExtendedPam:
         return candidate if beside(there[0], candidate) else self._again(candidate, pieces)
 
     def _is_new(self, candidate: Candidate) -> bool:
-        """Whether it is seen well, and likelier a building that is none of those known than all else together."""
-        recognition, segment = candidate.recognition, candidate.segment
+        """Whether it is seen well, and likelier a building that is none of those known than all
+        else together.
+        """
+        recognition = candidate.recognition
+        segment = candidate.segment
         large = segment.area_px >= self._config.learned_share * segment.mask.size
         whole = recognition.look.whole > self._config.percept_threshold
         return large and whole and recognition.new > LIKELIER_THAN_NOT
@@ -127,7 +148,8 @@ class ExtendedPam:
         fitting = [
             (number, candidate.walls.outline(candidate.recognition.size_m[:2]))
             for number, candidate in enumerate(found)
-            if candidate.recognition.size_m is not None and (candidate.walls.left_true or candidate.walls.right_true)
+            if candidate.recognition.size_m is not None
+            and (candidate.walls.left_true or candidate.walls.right_true)
         ]
         places = [candidate.walls.roughly(camera) for candidate in found]
         fitted = locate([outline for _, outline in fitting], camera)
@@ -138,7 +160,8 @@ class ExtendedPam:
         return places
 
     def _percept(self, candidate: Candidate, place: Place, camera: Calibration) -> Percept:
-        segment, size_m = candidate.segment, candidate.recognition.size_m
+        segment = candidate.segment
+        size_m = candidate.recognition.size_m
         return Percept(
             label=candidate.recognition.label,
             activation=self._total(candidate),

@@ -7,13 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from bus.errors import MessageError
+from cogmap.errors import MessageError
 from schemas.sensing import View
 
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """The image uint8 (h, w, 3), and depth in metres and disparity in pixels, float32 (h, w), 0 where unknown."""
+    """The image uint8 (h, w, 3), and depth in metres and disparity in pixels, float32 (h, w), 0
+    where unknown.
+    """
 
     image: npt.NDArray[np.uint8]
     depth_m: npt.NDArray[np.float32]
@@ -25,9 +27,13 @@ def pixels(view: View) -> Seen:
     camera = view.calibration
     size = (camera.height_px, camera.width_px)
     if (view.image.dtype, view.image.shape) != ("|u1", (*size, 3)):
-        raise MessageError(f"view: expected a uint8 image {(*size, 3)}, got {view.image.dtype} {view.image.shape}")
+        raise MessageError(
+            f"view: expected a uint8 image {(*size, 3)}, got {view.image.dtype} {view.image.shape}"
+        )
     if (view.depth_m.dtype, view.depth_m.shape) != ("<f4", size):
-        raise MessageError(f"view: expected float32 depth {size}, got {view.depth_m.dtype} {view.depth_m.shape}")
+        raise MessageError(
+            f"view: expected float32 depth {size}, got {view.depth_m.dtype} {view.depth_m.shape}"
+        )
     depth_m = view.depth_m.numpy().astype(np.float32, copy=False)
     if min(camera.fx_px, camera.fy_px) < 1.0:
         raise MessageError("view: its calibration's focal lengths must be at least 1 pixel")

@@ -1,4 +1,6 @@
-"""The global workspace: coalitions compete for consciousness, and the winner is broadcast (LIDA's framework)."""
+"""The global workspace: coalitions compete for consciousness, and the winner is broadcast (LIDA's
+framework).
+"""
 
 from __future__ import annotations
 
@@ -6,12 +8,12 @@ import math
 from collections import deque
 from dataclasses import dataclass
 
-from bus.errors import MessageError
-from bus.module import Module
+from cogmap.errors import MessageError
+from cogmap.runtime.module import Module
 from schemas import topics
 from schemas.base import Message
-from schemas.mind import Broadcast, Coalition, Coalitions, Competition
-from services.global_workspace.settings import Config
+from schemas.cognition import Broadcast, Coalition, Coalitions, Competition
+from services.global_workspace.config import Config
 
 __all__ = ["Config", "GlobalWorkspace", "build"]
 
@@ -38,7 +40,8 @@ class GlobalWorkspace:
         self._had: deque[tuple[int, int]] = deque(maxlen=REMEMBERED_CYCLES)
 
     def compete(self, coalitions: Coalitions) -> list[Message]:
-        """Take in a cycle's coalitions; a competition is always reported, a broadcast where a trigger fires.
+        """Take in a cycle's coalitions; a competition is always reported, a broadcast where a
+        trigger fires.
 
         Raises MessageError where they came before: a task that one worker lost is answered by two.
         """
@@ -52,10 +55,15 @@ class GlobalWorkspace:
             if coalition.codelet not in self._contenders:
                 self._new_ns = self._stamp_ns
             self._contenders[coalition.codelet] = Contender(coalition, coalition.activation)
-        contenders = {name: contender.activation for name, contender in sorted(self._contenders.items())}
+        contenders = {
+            name: contender.activation for name, contender in sorted(self._contenders.items())
+        }
         trigger = self._trigger()
         competition = Competition(
-            stamp_ns=coalitions.stamp_ns, cycle=coalitions.cycle, contenders=contenders, trigger=trigger
+            stamp_ns=coalitions.stamp_ns,
+            cycle=coalitions.cycle,
+            contenders=contenders,
+            trigger=trigger,
         )
         if not trigger:
             return [competition]
@@ -63,7 +71,10 @@ class GlobalWorkspace:
         self._broadcast_ns = self._stamp_ns
         coalition = self._contenders.pop(winner).coalition
         broadcast = Broadcast(
-            stamp_ns=coalitions.stamp_ns, cycle=coalitions.cycle, trigger=trigger, coalition=coalition
+            stamp_ns=coalitions.stamp_ns,
+            cycle=coalitions.cycle,
+            trigger=trigger,
+            coalition=coalition,
         )
         return [broadcast, competition]
 
@@ -71,24 +82,32 @@ class GlobalWorkspace:
         lost = self._config.decay * self._ticks(passed_ns) / self._config.ticks_per_decay
         for contender in self._contenders.values():
             contender.activation -= lost
-        self._contenders = {name: left for name, left in self._contenders.items() if left.activation > 0}
+        self._contenders = {
+            name: left for name, left in self._contenders.items() if left.activation > 0
+        }
 
     def _ticks(self, duration_ns: int) -> float:
         return duration_ns / 1e6 / self._config.tick_ms
 
     def _trigger(self) -> str:
         """The name of the first trigger that fires, empty where none does."""
-        config, activations = self._config, [contender.activation for contender in self._contenders.values()]
+        config = self._config
+        activations = [contender.activation for contender in self._contenders.values()]
         if not activations:
             return ""
-        silent = math.inf if self._broadcast_ns is None else self._ticks(self._stamp_ns - self._broadcast_ns)
+        silent = (
+            math.inf
+            if self._broadcast_ns is None
+            else self._ticks(self._stamp_ns - self._broadcast_ns)
+        )
         if silent < config.refractory_ticks:
             return ""
         triggers = {
             "one coalition over threshold": max(activations) > config.coalition_above,
             "aggregate activation over threshold": sum(activations) > config.aggregate_above,
             "no broadcast for long": silent >= config.no_broadcast_ticks,
-            "no new coalition for long": self._ticks(self._stamp_ns - self._new_ns) >= config.no_new_coalition_ticks,
+            "no new coalition for long": self._ticks(self._stamp_ns - self._new_ns)
+            >= config.no_new_coalition_ticks,
         }
         return next((name for name, fires in triggers.items() if fires), "")
 
@@ -96,5 +115,7 @@ class GlobalWorkspace:
 def build(config: Config, instance: str) -> Module:
     """The module `global_workspace`."""
     return Module("global_workspace", instance).on(
-        topics.COALITIONS, GlobalWorkspace(config).compete, emits=[topics.COMPETITION, topics.BROADCAST]
+        topics.COALITIONS,
+        GlobalWorkspace(config).compete,
+        emits=[topics.COMPETITION, topics.BROADCAST],
     )

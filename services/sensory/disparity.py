@@ -1,7 +1,9 @@
-"""Depth from stereo: semi-global matching (Hirschmüller 2008, OpenCV's StereoSGBM), then refined on the images.
+"""Depth from stereo: semi-global matching (Hirschmüller 2008, OpenCV's StereoSGBM), then refined on
+the images.
 
-The matcher's cost does not care about half a pixel (Birchfield and Tomasi 1998), so its disparities lean towards
-whole pixels by up to 0.3: 8 % of the depth at 30 m. Gauss-Newton steps (Lucas and Kanade 1981) take that away.
+The matcher's cost does not care about half a pixel (Birchfield and Tomasi 1998), so its disparities
+lean towards whole pixels by up to 0.3: 8 % of the depth at 30 m. Gauss-Newton steps (Lucas and
+Kanade 1981) take that away.
 """
 
 from __future__ import annotations
@@ -27,7 +29,9 @@ NOISE_GRADIENT = 1.0
 
 
 class StereoMatcher:
-    """Finds disparities up to `most_px`, rounded up to a multiple of 16, in rectified pairs of any size."""
+    """Finds disparities up to `most_px`, rounded up to a multiple of 16, in rectified pairs of any
+    size.
+    """
 
     def __init__(self, most_px: float) -> None:
         self._disparities = max(16, 16 * math.ceil(most_px / 16))
@@ -46,12 +50,16 @@ class StereoMatcher:
         )
 
     def disparity_px(self, left: Bytes, right: Bytes, refine: bool = True) -> Floats:
-        """How far left each pixel of `left`, RGB (h, w, 3), is in `right`: float32 (h, w), 0 where no match is sure.
+        """How far left each pixel of `left`, RGB (h, w, 3), is in `right`: float32 (h, w), 0 where
+        no match is sure.
 
-        The matcher leaves out a strip as wide as its search at the left border, so both images are padded there.
+        The matcher leaves out a strip as wide as its search at the left border, so both images are
+        padded there.
         """
         grey_left, grey_right = (cv2.cvtColor(image, cv2.COLOR_RGB2GRAY) for image in (left, right))
-        steps = self._matcher.compute(self._padded(grey_left), self._padded(grey_right))[:, self._disparities :]
+        steps = self._matcher.compute(self._padded(grey_left), self._padded(grey_right))[
+            :, self._disparities :
+        ]
         disparity = steps.astype(np.float32) / np.float32(STEPS_PER_PIXEL)
         if refine:
             disparity = refined(disparity, _floats(grey_left), _floats(grey_right))
@@ -71,7 +79,9 @@ class DepthFromStereo:
         self._matcher = StereoMatcher(min(self._focal_baseline / nearest_m, most))
 
     def depth_m(self, left: Bytes, right: Bytes) -> Floats:
-        """Depth along the optical axis for each pixel of `left`, float32 (h, w), 0 where no match is sure."""
+        """Depth along the optical axis for each pixel of `left`, float32 (h, w), 0 where no match
+        is sure.
+        """
         disparity = self._matcher.disparity_px(left, right)
         depth = np.zeros(disparity.shape, np.float32)
         np.divide(np.float32(self._focal_baseline), disparity, out=depth, where=disparity > 0)
@@ -79,12 +89,15 @@ class DepthFromStereo:
 
 
 def refined(disparity: Floats, left: Floats, right: Floats) -> Floats:
-    """Disparity moved to where `left` and the shifted `right`, both grey, differ least around each pixel.
+    """Disparity moved to where `left` and the shifted `right`, both grey, differ least around each
+    pixel.
 
     Brightness is compared without its local mean, since two cameras seldom agree on it.
     """
     columns, rows = np.meshgrid(*(np.arange(n, dtype=np.float32) for n in disparity.shape[::-1]))
-    left_slope, right_slope = (cv2.Sobel(grey, cv2.CV_32F, 1, 0, ksize=3, scale=1 / 8) for grey in (left, right))
+    left_slope, right_slope = (
+        cv2.Sobel(grey, cv2.CV_32F, 1, 0, ksize=3, scale=1 / 8) for grey in (left, right)
+    )
     result = disparity
     for _ in range(REFINEMENTS):
         there = columns - result

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from bus.errors import MessageError
+from cogmap.errors import MessageError
 from schemas.array import Array
 from schemas.sensing import Calibration
 
@@ -14,8 +14,12 @@ Floats = npt.NDArray[np.float32]
 
 
 def colour_image(array: Array, calibration: Calibration, name: str) -> Bytes:
-    """The RGB image in `array`, (height, width, 3). Raises MessageError where it is not of the calibration's size."""
+    """The RGB image in `array`, (height, width, 3). Raises MessageError where it is not of the
+    calibration's size.
+    """
     expected = (calibration.height_px, calibration.width_px, 3)
     if array.dtype != "|u1" or array.shape != expected:
-        raise MessageError(f"{name} image: expected uint8 {expected} as calibrated, got {array.dtype} {array.shape}")
+        raise MessageError(
+            f"{name} image: expected uint8 {expected} as calibrated, got {array.dtype} {array.shape}"
+        )
     return array.numpy().astype(np.uint8, copy=False)

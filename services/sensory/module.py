@@ -8,26 +8,28 @@ import cv2
 import msgspec
 import numpy as np
 
-from bus.module import Module
+from cogmap.runtime.module import Module
 from schemas import topics
 from schemas.array import Array
 from schemas.base import Message
 from schemas.sensing import Calibration, Odometry, RangeScan, SelfMotion, StereoFrame, View
 from services.sensory.disparity import DepthFromStereo
-from services.sensory.flow import VisualMotion
 from services.sensory.image import colour_image
 from services.sensory.motion import OdometryBuffer
 from services.sensory.rectify import rectification
 from services.sensory.scan import scan as range_scan
+from services.sensory.visual_odometry import VisualMotion
 from services.sensory.wheels import WheelNoise, fuse
 
 Share = Annotated[float, msgspec.Meta(ge=0, le=1)]
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """`nearest_m` is the least depth that is looked for; a stamp more than `longest_gap_s` ahead is not believed.
+    """`nearest_m` is the least depth that is looked for; a stamp more than `longest_gap_s` ahead is
+    not believed.
 
-    The wheels' noise multiplies both speeds (paper §5.4); wheels that differ a little also drift with the way.
+    The wheels' noise multiplies both speeds (paper §5.4); wheels that differ a little also drift
+    with the way.
     """
 
     nearest_m: Annotated[float, msgspec.Meta(ge=0.1, le=100)] = 2.5
@@ -41,9 +43,9 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
 class SensoryMemory:
     """Turns stereo frames and odometry into self-motion, range scans and views, in step.
 
-    A frame waits until the odometry up to its stamp has come, whichever of the two comes first, so what is said
-    does not depend on how they interleave. A newer frame takes the place of a waiting one; the motion then covers
-    both, so none is lost.
+    A frame waits until the odometry up to its stamp has come, whichever of the two comes first, so
+    what is said does not depend on how they interleave. A newer frame takes the place of a waiting
+    one; the motion then covers both, so none is lost.
     """
 
     def __init__(self, config: Config) -> None:
@@ -57,7 +59,9 @@ class SensoryMemory:
         self._depth: tuple[Calibration, DepthFromStereo] | None = None
 
     def see(self, frame: StereoFrame) -> list[Message]:
-        """Take in a frame. Raises MessageError where its images and its calibration do not fit together."""
+        """Take in a frame. Raises MessageError where its images and its calibration do not fit
+        together.
+        """
         colour_image(frame.left, frame.calibration, "left")
         colour_image(frame.right, frame.calibration, "right")
         rectification(frame.calibration)
@@ -85,22 +89,34 @@ class SensoryMemory:
         began_ns, motions = self._odometry.take(frame.stamp_ns)
         if self._last_ns is None:
             self._last_ns = frame.stamp_ns if began_ns is None else began_ns
-        since_ns, self._last_ns = self._last_ns, frame.stamp_ns
-        image, depth_m = view.image.numpy().astype(np.uint8, copy=False), view.depth_m.numpy().astype(np.float32)
+        since_ns = self._last_ns
+        self._last_ns = frame.stamp_ns
+        image = view.image.numpy().astype(np.uint8, copy=False)
+        depth_m = view.depth_m.numpy().astype(np.float32)
         wheels = self._noise.total(motions)
         fused = fuse(motions, self._flow.fuse(image, depth_m, view.calibration, wheels), wheels)
-        return SelfMotion(stamp_ns=frame.stamp_ns, frame=frame.frame, since_ns=since_ns, motions=Array.of(fused))
+        return SelfMotion(
+            stamp_ns=frame.stamp_ns, frame=frame.frame, since_ns=since_ns, motions=Array.of(fused)
+        )
 
     def _views(self, frame: StereoFrame) -> tuple[RangeScan, View]:
         rectified = rectification(frame.calibration)
         left, right = rectified.apply(
-            colour_image(frame.left, frame.calibration, "left"), colour_image(frame.right, frame.calibration, "right")
+            colour_image(frame.left, frame.calibration, "left"),
+            colour_image(frame.right, frame.calibration, "right"),
         )
         calibration = rectified.calibration
         depth_m = self._matcher(calibration).depth_m(left, right)
         bearing_rad, range_m = range_scan(depth_m, calibration, self._config.scan_sectors)
-        ranges = RangeScan(frame=frame.frame, bearing_rad=Array.of(bearing_rad), range_m=Array.of(range_m))
-        view = View(frame=frame.frame, image=Array.of(left), depth_m=Array.of(depth_m), calibration=calibration)
+        ranges = RangeScan(
+            frame=frame.frame, bearing_rad=Array.of(bearing_rad), range_m=Array.of(range_m)
+        )
+        view = View(
+            frame=frame.frame,
+            image=Array.of(left),
+            depth_m=Array.of(depth_m),
+            calibration=calibration,
+        )
         ranges.stamp_ns = view.stamp_ns = frame.stamp_ns
         return ranges, view
 
@@ -115,4 +131,6 @@ def build(config: Config, instance: str) -> Module:
     memory = SensoryMemory(config)
     says = (topics.SELF_MOTION, topics.SCAN, topics.VIEW)
     module = Module("sensory", instance)
-    return module.on(topics.STEREO, memory.see, emits=says).on(topics.ODOMETRY, memory.roll, emits=says)
+    return module.on(topics.STEREO, memory.see, emits=says).on(
+        topics.ODOMETRY, memory.roll, emits=says
+    )

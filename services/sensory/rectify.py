@@ -1,4 +1,6 @@
-"""Rectification: both images as two ideal pinhole cameras, side by side and parallel, would have given them."""
+"""Rectification: both images as two ideal pinhole cameras, side by side and parallel, would have
+given them.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,7 @@ import cv2
 import msgspec
 import numpy as np
 
-from bus.errors import MessageError
+from cogmap.errors import MessageError
 from schemas.sensing import Calibration
 from services.sensory.image import Bytes, Floats
 
@@ -19,10 +21,12 @@ _UNDISTORTED = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, eq=False)
 class Rectification:
-    """The look-up maps of one calibration, each a pair for `cv2.remap`; None where the images are rectified already.
+    """The look-up maps of one calibration, each a pair for `cv2.remap`; None where the images are
+    rectified already.
 
-    `calibration` is that of the rectified pair. The baseline runs along the left camera's x axis by definition
-    (see Calibration), so the left view keeps its orientation, level on its mount, and only the right one is turned.
+    `calibration` is that of the rectified pair. The baseline runs along the left camera's x axis by
+    definition (see Calibration), so the left view keeps its orientation, level on its mount, and
+    only the right one is turned.
     """
 
     calibration: Calibration
@@ -36,7 +40,10 @@ class Rectification:
 
 def rectification(calibration: Calibration) -> Rectification:
     """The rectification for `calibration`. Raises MessageError where it describes no camera."""
-    if min(calibration.fx_px, calibration.fy_px) < 1.0 or max(calibration.fx_px, calibration.fy_px) > 1e5:
+    if (
+        min(calibration.fx_px, calibration.fy_px) < 1.0
+        or max(calibration.fx_px, calibration.fy_px) > 1e5
+    ):
         raise MessageError("calibration: the focal lengths must be between 1 and 100000 pixels")
     if calibration.cx_px > calibration.width_px or calibration.cy_px > calibration.height_px:
         raise MessageError("calibration: the principal point must lie in the image")
@@ -47,7 +54,10 @@ def rectification(calibration: Calibration) -> Rectification:
 def _cached(encoded: bytes) -> Rectification:
     given = msgspec.msgpack.decode(encoded, type=Calibration)
     plain = msgspec.structs.replace(
-        given, right_rotation_rad=_STRAIGHT, left_distortion=_UNDISTORTED, right_distortion=_UNDISTORTED
+        given,
+        right_rotation_rad=_STRAIGHT,
+        left_distortion=_UNDISTORTED,
+        right_distortion=_UNDISTORTED,
     )
     left = _maps(given, given.left_distortion, _STRAIGHT)
     right = _maps(given, given.right_distortion, given.right_rotation_rad)
@@ -55,7 +65,9 @@ def _cached(encoded: bytes) -> Rectification:
 
 
 def _maps(
-    calibration: Calibration, distortion: tuple[float, ...], rotation_rad: tuple[float, float, float]
+    calibration: Calibration,
+    distortion: tuple[float, ...],
+    rotation_rad: tuple[float, float, float],
 ) -> tuple[Floats, Floats] | None:
     if distortion == _UNDISTORTED and rotation_rad == _STRAIGHT:
         return None
@@ -68,11 +80,17 @@ def _maps(
     )
     to_left, _ = cv2.Rodrigues(np.array(rotation_rad))
     size = (calibration.width_px, calibration.height_px)
-    maps = cv2.initUndistortRectifyMap(camera, np.array(distortion), to_left, camera, size, cv2.CV_32FC1)
+    maps = cv2.initUndistortRectifyMap(
+        camera, np.array(distortion), to_left, camera, size, cv2.CV_32FC1
+    )
     if not all(np.isfinite(part).all() for part in maps):
         raise MessageError("calibration: its distortion maps pixels to infinity")
     return maps[0].astype(np.float32, copy=False), maps[1].astype(np.float32, copy=False)
 
 
 def _remap(image: Bytes, maps: tuple[Floats, Floats] | None) -> Bytes:
-    return image if maps is None else cv2.remap(image, maps[0], maps[1], cv2.INTER_LINEAR).astype(np.uint8, copy=False)
+    return (
+        image
+        if maps is None
+        else cv2.remap(image, maps[0], maps[1], cv2.INTER_LINEAR).astype(np.uint8, copy=False)
+    )

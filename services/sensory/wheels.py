@@ -1,4 +1,6 @@
-"""What the wheels say of the motion between two views, how sure that is, and what becomes of it with what was seen."""
+"""What the wheels say of the motion between two views, how sure that is, and what becomes of it
+with what was seen.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from services.sensory.flow import Matrix, Motion
+from services.sensory.visual_odometry import Matrix, Motion
 
 STILL_M = 1e-3
 
@@ -21,9 +23,11 @@ class WheelNoise:
 
     def total(self, rows: Matrix) -> Motion:
         """The motion that (n, 3) rows of speed, turn rate and duration add up to."""
-        way, turn = rows[:, 0] * rows[:, 2], rows[:, 1] * rows[:, 2]
+        way = rows[:, 0] * rows[:, 2]
+        turn = rows[:, 1] * rows[:, 2]
         turn_var = (self.turn * turn) ** 2 + self.drift_rad_per_sqrt_m**2 * np.abs(way)
-        way_sd, turn_sd = np.sqrt(((self.speed * way) ** 2).sum()), np.sqrt(turn_var.sum())
+        way_sd = np.sqrt(((self.speed * way) ** 2).sum())
+        turn_sd = np.sqrt(turn_var.sum())
         return Motion(float(way.sum()), float(turn.sum()), float(way_sd), float(turn_sd))
 
 
@@ -39,4 +43,6 @@ def fuse(rows: Matrix, motion: Motion, wheels: Motion) -> Matrix:
         speed = speed * motion.way_m / wheels.way_m
     turn_rate = turn_rate + (motion.turn_rad - wheels.turn_rad) / dt.sum()
     share = 1 / (dt * np.sqrt(len(rows)))
-    return np.column_stack([speed, turn_rate, dt, motion.way_sd_m * share, motion.turn_sd_rad * share])
+    return np.column_stack(
+        [speed, turn_rate, dt, motion.way_sd_m * share, motion.turn_sd_rad * share]
+    )

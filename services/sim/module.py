@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections import deque
 
-from bus.module import Module
+from cogmap.runtime.module import Module
 from schemas import topics
 from schemas.base import Message
 from schemas.sensing import MotorCommand
-from services.sim.led import LedByPercepts
-from services.sim.led_cameras import LedByCameras
-from services.sim.settings import Config, check
+from services.sim.config import Config, check
+from services.sim.scripted.cameras import LedByCameras
+from services.sim.scripted.scripted import LedByPercepts
+from services.sim.scripted.trajectory import Way
 from services.sim.simulation import Simulation
-from services.sim.way import Way
 
 __all__ = ["Config", "build"]
 
@@ -26,7 +26,9 @@ _EMITS_LED = (*_TELLS, topics.SELF_MOTION, topics.SCAN, topics.PERCEPTS)
 
 
 class Lockstep:
-    """Time goes on by one frame for each motor command that answers the last frame, until the route is complete."""
+    """Time goes on by one frame for each motor command that answers the last frame, until the route
+    is complete.
+    """
 
     def __init__(self, simulation: Simulation | LedByPercepts | LedByCameras) -> None:
         self._simulation = simulation
@@ -37,7 +39,9 @@ class Lockstep:
         return [self._simulation.town(), *self._advance()]
 
     def command(self, command: MotorCommand) -> list[Message] | None:
-        """The next frame and what led to it, if `command` answers the last one; else it is passed over."""
+        """The next frame and what led to it, if `command` answers the last one; else it is passed
+        over.
+        """
         if command.stamp_ns != self._asked_ns or self._simulation.progress >= 1.0:
             return None
         self._simulation.drive(command)
@@ -51,7 +55,9 @@ class Lockstep:
 
 
 class RealTime:
-    """Time goes on as the wall's does, but slips where more than CATCH_UP_NS would have to be caught up."""
+    """Time goes on as the wall's does, but slips where more than CATCH_UP_NS would have to be
+    caught up.
+    """
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
@@ -59,7 +65,8 @@ class RealTime:
         self._owed_ns = 0
         self._seen_ns: int | None = None
         self._history: deque[tuple[int, int]] = deque()
-        self._command_ns, self._heard_ns = -1, 0
+        self._command_ns = -1
+        self._heard_ns = 0
 
     def start(self) -> None:
         """Time begins with the next tick."""
@@ -69,7 +76,8 @@ class RealTime:
         """Drive as the newest command says; an older one that comes late is passed over."""
         if command.stamp_ns > self._simulation.now_ns or command.stamp_ns < self._command_ns:
             return
-        self._command_ns, self._heard_ns = command.stamp_ns, self._simulation.now_ns
+        self._command_ns = command.stamp_ns
+        self._heard_ns = self._simulation.now_ns
         self._simulation.drive(command)
 
     def tick(self, wall_ns: int) -> list[Message]:
@@ -79,7 +87,9 @@ class RealTime:
         first = self._seen_ns is None
         since_ns = wall_ns - (wall_ns if self._seen_ns is None else self._seen_ns)
         self._seen_ns = wall_ns
-        self._owed_ns = self._simulation.tick_ns if first else min(self._owed_ns + since_ns, CATCH_UP_NS)
+        self._owed_ns = (
+            self._simulation.tick_ns if first else min(self._owed_ns + since_ns, CATCH_UP_NS)
+        )
         said: list[Message] = []
         frame_due = False
         while self._owed_ns >= self._simulation.tick_ns:
@@ -117,10 +127,14 @@ def build(config: Config, instance: str = "sim") -> Module:
     if config.way is not None:
         return _led(config, config.way, Module("sim", instance), awaits)
     simulation = Simulation(config)
-    module = Module("sim", instance).journaling(topics.TRUE_POSE, simulation.resume, simulation.truth)
+    module = Module("sim", instance).journaling(
+        topics.TRUE_POSE, simulation.resume, simulation.truth
+    )
     if config.mode == "lockstep":
         lockstep = Lockstep(simulation)
-        return module.on(topics.MOTOR_COMMAND, lockstep.command, _EMITS).starts(lockstep.start, awaits, _EMITS)
+        return module.on(topics.MOTOR_COMMAND, lockstep.command, _EMITS).starts(
+            lockstep.start, awaits, _EMITS
+        )
     real_time = RealTime(simulation)
     module.on(topics.MOTOR_COMMAND, real_time.command).starts(real_time.start, awaits)
     return module.every(simulation.tick_ns, real_time.tick, _EMITS)
@@ -129,7 +143,12 @@ def build(config: Config, instance: str = "sim") -> Module:
 def _led(config: Config, way: Way, module: Module, awaits: dict[str, int]) -> Module:
     """`module` with a robot that is led along `way`."""
     if way.sensing == "cameras":
-        cameras, says = Lockstep(LedByCameras(config, way)), _EMITS
-        return module.on(topics.MOTOR_COMMAND, cameras.command, says).starts(cameras.start, awaits, says)
+        cameras = Lockstep(LedByCameras(config, way))
+        says = _EMITS
+        return module.on(topics.MOTOR_COMMAND, cameras.command, says).starts(
+            cameras.start, awaits, says
+        )
     led = Lockstep(LedByPercepts(way, config.noise, config.percepts, config.frame_hz, config.seed))
-    return module.on(topics.MOTOR_COMMAND, led.command, _EMITS_LED).starts(led.start, awaits, _EMITS_LED)
+    return module.on(topics.MOTOR_COMMAND, led.command, _EMITS_LED).starts(
+        led.start, awaits, _EMITS_LED
+    )

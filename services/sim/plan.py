@@ -1,11 +1,13 @@
-"""What a ground plan is made of: roads, in a town along x or y, and buildings that front them. Pure."""
+"""What a ground plan is made of: roads, in a town along x or y, and buildings that front them.
+Pure.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
-from services.sim.catalogue import BuildingType
+from services.sim.rendering.catalogue import BuildingType
 
 STREET_WIDTH_M = 8.0
 PAVEMENT_WIDTH_M = 2.0
@@ -40,18 +42,30 @@ class Road:
 
     def point(self, along_m: float, left_m: float = 0.0) -> Point:
         """The point `along_m` from the start, `left_m` to the left of the centre line."""
-        ux, uy = math.cos(self.heading_rad), math.sin(self.heading_rad)
-        return self.start[0] + along_m * ux - left_m * uy, self.start[1] + along_m * uy + left_m * ux
+        ux = math.cos(self.heading_rad)
+        uy = math.sin(self.heading_rad)
+        return self.start[0] + along_m * ux - left_m * uy, self.start[
+            1
+        ] + along_m * uy + left_m * ux
 
     def area(self, reach_m: float) -> Rectangle:
-        """West, south, east, north of a road along x or y, within `reach_m` of the centre line, ends squared off."""
+        """West, south, east, north of a road along x or y, within `reach_m` of the centre line,
+        ends squared off.
+        """
         (ax, ay), (bx, by) = self.start, self.end
-        return min(ax, bx) - reach_m, min(ay, by) - reach_m, max(ax, bx) + reach_m, max(ay, by) + reach_m
+        return (
+            min(ax, bx) - reach_m,
+            min(ay, by) - reach_m,
+            max(ax, bx) + reach_m,
+            max(ay, by) + reach_m,
+        )
 
 
 @dataclass(frozen=True)
 class Plot:
-    """A building where it stands. Its front looks to the right of `heading_rad`; that heading runs along its width."""
+    """A building where it stands. Its front looks to the right of `heading_rad`; that heading runs
+    along its width.
+    """
 
     kind: BuildingType
     x_m: float
@@ -61,11 +75,16 @@ class Plot:
     @property
     def footprint(self) -> Rectangle:
         """West, south, east, north in metres."""
-        along, across = self.kind.width_m / 2, self.kind.depth_m / 2
-        half_x, half_y = (across, along) if abs(math.sin(self.heading_rad)) > 0.5 else (along, across)
+        along = self.kind.width_m / 2
+        across = self.kind.depth_m / 2
+        half_x, half_y = (
+            (across, along) if abs(math.sin(self.heading_rad)) > 0.5 else (along, across)
+        )
         return self.x_m - half_x, self.y_m - half_y, self.x_m + half_x, self.y_m + half_y
 
 
 def overlap(a: Rectangle, b: Rectangle, gap_m: float = 0.0) -> bool:
     """Whether the rectangles come closer than `gap_m`."""
-    return a[0] < b[2] + gap_m and b[0] < a[2] + gap_m and a[1] < b[3] + gap_m and b[1] < a[3] + gap_m
+    return (
+        a[0] < b[2] + gap_m and b[0] < a[2] + gap_m and a[1] < b[3] + gap_m and b[1] < a[3] + gap_m
+    )

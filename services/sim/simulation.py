@@ -8,10 +8,10 @@ from schemas.base import Message
 from schemas.process import Clock
 from schemas.sensing import MotorCommand, Odometry, StereoFrame, TruePose, TrueTown
 from services.sim import town
-from services.sim.camera import StereoCamera, calibration
+from services.sim.config import Config
 from services.sim.odometry import WheelOdometry
 from services.sim.progress import Progress
-from services.sim.settings import Config
+from services.sim.rendering.camera import StereoCamera, calibration
 from services.sim.world import World
 
 
@@ -40,7 +40,9 @@ class Simulation:
             last = message
         if isinstance(last, TruePose):
             self.world.robot.place(last.pose)
-            self._pose, self._travelled_m, self.now_ns = self.world.pose(), last.travelled_m, last.stamp_ns
+            self._pose = self.world.pose()
+            self._travelled_m = last.travelled_m
+            self.now_ns = last.stamp_ns
             self._frames = self.now_ns // self.tick_ns // self.ticks_per_frame
             self._progress.resume(last.progress)
 
@@ -59,7 +61,9 @@ class Simulation:
         self.world.step(dt_s)
         self.now_ns += self.tick_ns
         self._pose = self.world.pose()
-        self._travelled_m += ((self._pose.x_m - before.x_m) ** 2 + (self._pose.y_m - before.y_m) ** 2) ** 0.5
+        self._travelled_m += (
+            (self._pose.x_m - before.x_m) ** 2 + (self._pose.y_m - before.y_m) ** 2
+        ) ** 0.5
         odometry = self._odometry.measure(before, self._pose, dt_s)
         odometry.stamp_ns = self.now_ns
         return odometry
@@ -74,7 +78,8 @@ class Simulation:
 
     def frame(self) -> StereoFrame:
         """The next stereo frame, as of now."""
-        number, self._frames = self._frames, self._frames + 1
+        number = self._frames
+        self._frames = self._frames + 1
         return self.camera.frame(self.now_ns, number)
 
     def clock(self, rate: float) -> Clock:
@@ -84,7 +89,12 @@ class Simulation:
     def truth(self) -> TruePose:
         """Where the robot is now."""
         self.progress = self._progress.advance(self._pose.x_m, self._pose.y_m)
-        return TruePose(stamp_ns=self.now_ns, pose=self._pose, travelled_m=self._travelled_m, progress=self.progress)
+        return TruePose(
+            stamp_ns=self.now_ns,
+            pose=self._pose,
+            travelled_m=self._travelled_m,
+            progress=self.progress,
+        )
 
     def town(self) -> TrueTown:
         """The town, as of now."""

@@ -9,9 +9,17 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from schemas.sensing import Building, Pose, Street, TrueTown
-from services.sim.catalogue import CATALOGUE, BuildingType
-from services.sim.furniture import Prop, furnish
-from services.sim.plan import PAVEMENT_WIDTH_M, STREET_WIDTH_M, Plot, Point, Rectangle, Road, overlap
+from services.sim.plan import (
+    PAVEMENT_WIDTH_M,
+    STREET_WIDTH_M,
+    Plot,
+    Point,
+    Rectangle,
+    Road,
+    overlap,
+)
+from services.sim.rendering.catalogue import CATALOGUE, BuildingType
+from services.sim.rendering.furniture import Prop, furnish
 
 MIN_BUILDINGS = 21
 _REACH_M = STREET_WIDTH_M / 2 + PAVEMENT_WIDTH_M
@@ -32,8 +40,12 @@ class Place:
 
     def message(self) -> TrueTown:
         """The place as it travels."""
-        streets = [Street(name=r.name, line_m=[r.start, r.end], width_m=STREET_WIDTH_M) for r in self.roads]
-        return TrueTown(seed=self.seed, streets=streets, buildings=[_building(plot) for plot in self.plots])
+        streets = [
+            Street(name=r.name, line_m=[r.start, r.end], width_m=STREET_WIDTH_M) for r in self.roads
+        ]
+        return TrueTown(
+            seed=self.seed, streets=streets, buildings=[_building(plot) for plot in self.plots]
+        )
 
 
 @dataclass(frozen=True)
@@ -51,7 +63,9 @@ class Town(Place):
         return sum(math.dist(self.corners[i - 1], self.corners[i]) for i in range(4))
 
     def route(self, laps: float = 1.0) -> list[Leg]:
-        """The legs (length_m, turn_rad at its end, left positive) of `laps` laps from the start; the last turn is 0."""
+        """The legs (length_m, turn_rad at its end, left positive) of `laps` laps from the start;
+        the last turn is 0.
+        """
         points = self.line(laps)
         headings = [math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in itertools.pairwise(points)]
         turns = [math.remainder(b - a, math.tau) for a, b in itertools.pairwise(headings)]
@@ -73,14 +87,16 @@ class Town(Place):
 
 
 def generate(seed: int, kinds: tuple[BuildingType, ...] = CATALOGUE) -> Town:
-    """The town of `seed`: the same every time, with at least MIN_BUILDINGS buildings, none on a street or another.
+    """The town of `seed`: the same every time, with at least MIN_BUILDINGS buildings, none on a
+    street or another.
 
     It has each of `kinds` once at most; there should be some more of them than MIN_BUILDINGS.
     """
     rng = np.random.default_rng([seed, 0x70])
     plots: list[Plot] = []
     while len(plots) < MIN_BUILDINGS:
-        half_x, half_y = float(rng.uniform(23, 28)), float(rng.uniform(18, 21))
+        half_x = float(rng.uniform(23, 28))
+        half_y = float(rng.uniform(18, 21))
         roads = _roads(rng, half_x, half_y)
         settlement = _Settlement(rng, [road.area(_REACH_M) for road in roads], kinds)
         for road in (roads[0], roads[2], roads[1], roads[3]):
@@ -102,7 +118,9 @@ class _Settlement:
     plots: list[Plot] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.kinds: list[BuildingType] = [self.choice[i] for i in self.rng.permutation(len(self.choice))]
+        self.kinds: list[BuildingType] = [
+            self.choice[i] for i in self.rng.permutation(len(self.choice))
+        ]
 
     def line(self, road: Road, left: bool) -> None:
         """Go along one side of `road` and build wherever something fits."""
@@ -135,7 +153,8 @@ class _Settlement:
 def _roads(rng: np.random.Generator, half_x: float, half_y: float) -> list[Road]:
     east, north = rng.choice([-1.0, 1.0], 2).tolist()
     stub_m = float(rng.uniform(14, 20))
-    corner, opposite = (east * half_x, north * half_y), (-east * half_x, -north * half_y)
+    corner = (east * half_x, north * half_y)
+    opposite = (-east * half_x, -north * half_y)
     return [
         Road("South Street", (-half_x, -half_y), (half_x, -half_y)),
         Road("East Street", (half_x, -half_y), (half_x, half_y)),

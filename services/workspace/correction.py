@@ -1,17 +1,20 @@
-"""Map correction beside the cycle: it may take several, and its answer is committed at the end of one."""
+"""Map correction beside the cycle: it may take several, and its answer is committed at the end of
+one.
+"""
 
 from __future__ import annotations
 
+from schemas.cognition import Task
 from schemas.graph import Proposal
-from schemas.mind import Task
+from services.workspace.config import Config
 from services.workspace.dispatch import Dispatch
-from services.workspace.settings import Config
 
 
 class Correction:
     """The one correction that is being computed, if any.
 
-    In lockstep its answer is committed at the end of a cycle that is set beforehand, whenever it comes.
+    In lockstep its answer is committed at the end of a cycle that is set beforehand, whenever it
+    comes.
     """
 
     def __init__(self, config: Config) -> None:
@@ -38,8 +41,14 @@ class Correction:
         return self._lockstep and due and not self.dispatch.complete
 
     def collect(self, cycle: int) -> tuple[list[Proposal], list[str]]:
-        """Its answer, where it is to be committed at the end of `cycle`, and the tasks that were given up."""
-        if self._due_cycle is None or not self.dispatch.complete or (self._lockstep and cycle < self._due_cycle):
+        """Its answer, where it is to be committed at the end of `cycle`, and the tasks that were
+        given up.
+        """
+        if (
+            self._due_cycle is None
+            or not self.dispatch.complete
+            or (self._lockstep and cycle < self._due_cycle)
+        ):
             return [], []
         self._due_cycle = None
         failed = self.dispatch.failed

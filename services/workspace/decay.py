@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from bus.graph import TILE_SIDE, Graph
+from cogmap.graph.graph import TILE_SIDE, Graph
 from schemas.array import Array
 from schemas.graph import Activations, Cells, DropNode, Operation
-from services.workspace.settings import Config
+from services.workspace.config import Config
 
 # What the agent knows of itself and its way is not a matter of activation.
 LASTING = frozenset({"self", "path", "sighted", "closure", "correction"})
@@ -36,7 +36,8 @@ def fade(graph: Graph, config: Config) -> list[Operation]:
 
 def _fade_places(graph: Graph, config: Config) -> list[Operation]:
     """Place nodes fade too: the trace of where the agent has just been."""
-    cells, values = [], []
+    cells = []
+    values = []
     for x, y in sorted(graph.tiles):
         column = graph.tiles[x, y].columns["activation"]
         i, j = np.nonzero(column)
@@ -45,4 +46,10 @@ def _fade_places(graph: Graph, config: Config) -> list[Operation]:
     if not cells or not sum(map(len, cells)):
         return []
     where = np.vstack(cells).astype(np.int32)
-    return [Cells(column="activation", cells=Array.of(where), values=Array.of(np.concatenate(values), "<f4"))]
+    return [
+        Cells(
+            column="activation",
+            cells=Array.of(where),
+            values=Array.of(np.concatenate(values), "<f4"),
+        )
+    ]

@@ -8,13 +8,14 @@ from dataclasses import dataclass
 
 import msgspec
 
+from schemas.cognition import Task
 from schemas.graph import Proposal
-from schemas.mind import Task
 
 
 @dataclass
 class Lease:
-    """A task that a worker holds until `until_ns`; it waits for a worker while `task.worker` is its placeholder.
+    """A task that a worker holds until `until_ns`; it waits for a worker while `task.worker` is its
+    placeholder.
 
     `lost_by` had it before.
     """
@@ -30,9 +31,11 @@ BUSY = 1000
 
 
 class Dispatch:
-    """Gives tasks to the least loaded worker, but not again to the one that lost it where there is another.
+    """Gives tasks to the least loaded worker, but not again to the one that lost it where there is
+    another.
 
-    The same workers and tasks give the same choice. Whoever is at a task of the dispatch `beside` counts as busy.
+    The same workers and tasks give the same choice. Whoever is at a task of the dispatch `beside`
+    counts as busy.
     """
 
     def __init__(self, lease_ns: int, attempts: int, beside: Dispatch | None = None) -> None:
@@ -43,7 +46,9 @@ class Dispatch:
         self._leases: dict[str, Lease] = {}
 
     def begin(self, tasks: list[Task], now_ns: int) -> list[Task]:
-        """Take on `tasks` and return those to be sent now; where there is no worker they wait for one."""
+        """Take on `tasks` and return those to be sent now; where there is no worker they wait for
+        one.
+        """
         for task in tasks:
             self._leases[task.task_id] = Lease(task, now_ns)
         return self._assign(now_ns)
@@ -58,12 +63,18 @@ class Dispatch:
         return self._assign(now_ns)
 
     def expire(self, now_ns: int) -> list[Task]:
-        """Tasks to send to somebody else, since their lease has ended; where there is nobody else, they stay."""
-        self._take_back(lambda lease: now_ns > lease.until_ns and not self._workers <= {lease.task.worker})
+        """Tasks to send to somebody else, since their lease has ended; where there is nobody else,
+        they stay.
+        """
+        self._take_back(
+            lambda lease: now_ns > lease.until_ns and not self._workers <= {lease.task.worker}
+        )
         return self._assign(now_ns)
 
     def answer(self, proposal: Proposal) -> bool:
-        """Take in a proposal. False where nobody waits for it: it was answered before, or is of another time."""
+        """Take in a proposal. False where nobody waits for it: it was answered before, or is of
+        another time.
+        """
         lease = self._leases.get(proposal.task_id)
         if lease is None or lease.proposal is not None:
             return False
@@ -73,7 +84,9 @@ class Dispatch:
     @property
     def complete(self) -> bool:
         """Whether every task is answered, or given up."""
-        return all(lease.proposal is not None or self._has_failed(lease) for lease in self._leases.values())
+        return all(
+            lease.proposal is not None or self._has_failed(lease) for lease in self._leases.values()
+        )
 
     @property
     def failed(self) -> list[str]:
@@ -82,21 +95,30 @@ class Dispatch:
 
     def collect(self) -> tuple[list[Proposal], list[Task]]:
         """The answers, in the order of the tasks, and the tasks without one; all are done with now."""
-        leases, self._leases = self._leases, {}
+        leases = self._leases
+        self._leases = {}
         answers = [lease.proposal for lease in leases.values() if lease.proposal is not None]
         return answers, [lease.task for lease in leases.values() if lease.proposal is None]
 
     def _has_failed(self, lease: Lease) -> bool:
-        return lease.proposal is None and lease.task.worker == NOBODY and lease.task.attempt >= self._attempts
+        return (
+            lease.proposal is None
+            and lease.task.worker == NOBODY
+            and lease.task.attempt >= self._attempts
+        )
 
     def _take_back(self, lost: Callable[[Lease], bool]) -> None:
         for lease in self._leases.values():
             if lease.proposal is None and lease.task.worker != NOBODY and lost(lease):
                 lease.lost_by = lease.task.worker
-                lease.task = msgspec.structs.replace(lease.task, worker=NOBODY, attempt=lease.task.attempt + 1)
+                lease.task = msgspec.structs.replace(
+                    lease.task, worker=NOBODY, attempt=lease.task.attempt + 1
+                )
 
     def _load(self) -> Counter[str]:
-        return Counter(lease.task.worker for lease in self._leases.values() if lease.proposal is None)
+        return Counter(
+            lease.task.worker for lease in self._leases.values() if lease.proposal is None
+        )
 
     def _assign(self, now_ns: int) -> list[Task]:
         load = self._load()

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from bus.module import Module
+from cogmap.runtime.module import Module
 from schemas import topics
+from services.workspace.config import Config
 from services.workspace.cycle import Workspace
-from services.workspace.settings import Config
 
 __all__ = ["Config", "Workspace", "build"]
 
@@ -22,5 +22,7 @@ def build(config: Config, instance: str) -> Module:
         .on(topics.PRESENCE, workspace.on_presence, emits=says)
         .on(topics.CLOCK, workspace.on_clock, emits=says)
         .answering(topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, workspace.snapshot)
-        .journaling(topics.DELTA, workspace.restore, workspace.snapshot, catches_up=[topics.SELF_MOTION])
+        .journaling(
+            topics.DELTA, workspace.restore, workspace.snapshot, catches_up=[topics.SELF_MOTION]
+        )
     )

@@ -13,14 +13,23 @@ from pathlib import Path
 
 import pytest
 
-from bus.interface import Member
-from bus.zenoh_bus import ZenohBus
-from cli.run.watch import Watch
+from cli.launch.watch import Watch
+from cogmap.bus.interface import Member
+from cogmap.bus.zenoh_bus import ZenohBus
 
 pytestmark = pytest.mark.compose
 
 ROOT = Path(__file__).parents[2]
-MODULES = ("sim", "sensory", "epam", "workspace", "codelets", "global_workspace", "action", "recorder")
+MODULES = (
+    "sim",
+    "sensory",
+    "epam",
+    "workspace",
+    "codelets",
+    "global_workspace",
+    "action",
+    "recorder",
+)
 PATIENCE_S = 60.0
 
 
@@ -38,7 +47,9 @@ class Compose:
 
     def __call__(self, *arguments: str) -> str:
         command = ["docker", "compose", *arguments]
-        done = subprocess.run(command, cwd=ROOT, env=self._environment, capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            command, cwd=ROOT, env=self._environment, capture_output=True, text=True, check=False
+        )
         assert done.returncode == 0, f"{' '.join(command)}:\n{(done.stdout + done.stderr)[-3000:]}"
         return done.stdout
 
@@ -47,14 +58,19 @@ class Compose:
 
 
 def docker(*arguments: str) -> str:
-    return subprocess.run(["docker", *arguments], capture_output=True, text=True, check=True).stdout.strip()
+    return subprocess.run(
+        ["docker", *arguments], capture_output=True, text=True, check=True
+    ).stdout.strip()
 
 
 def there_is_docker() -> bool:
     if shutil.which("docker") is None:
         return False
     asked = [["docker", "info"], ["docker", "compose", "version"]]
-    return all(subprocess.run(command, capture_output=True, check=False).returncode == 0 for command in asked)
+    return all(
+        subprocess.run(command, capture_output=True, check=False).returncode == 0
+        for command in asked
+    )
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +108,10 @@ def test_frames_lead_to_commands_that_move_the_robot(watch: Watch) -> None:
 
 
 def test_each_worker_has_a_name_of_its_own(watch: Watch, compose: Compose) -> None:
-    named = {Member("codelets", f"codelets-{container[:12]}") for container in compose.containers("codelets")}
+    named = {
+        Member("codelets", f"codelets-{container[:12]}")
+        for container in compose.containers("codelets")
+    }
     assert len(named) == 2
     wait_until(watch, lambda: named <= watch.present)
 
@@ -107,7 +126,9 @@ def test_no_process_in_a_container_is_roots(compose: Compose, service: str) -> N
 def test_the_logs_say_which_module_says_what(compose: Compose) -> None:
     lines = compose("logs", "--no-color").splitlines()
     for service in ("sensory", "workspace", "action"):
-        assert any(line.startswith(f"{service}-1 ") and f"{service} is ready" in line for line in lines)
+        assert any(
+            line.startswith(f"{service}-1 ") and f"{service} is ready" in line for line in lines
+        )
 
 
 def test_the_recorder_writes_a_log(compose: Compose) -> None:
@@ -117,7 +138,9 @@ def test_the_recorder_writes_a_log(compose: Compose) -> None:
 
 
 def test_the_log_has_what_the_workspace_says_from_its_first_message_on(compose: Compose) -> None:
-    said = compose("exec", "-T", "recorder", "sh", "-c", "cogmap log cat *.mcap presence -n 1 --json")
+    said = compose(
+        "exec", "-T", "recorder", "sh", "-c", "cogmap log cat *.mcap presence -n 1 --json"
+    )
     assert json.loads(said.splitlines()[0])["message"]["seq"] == 0
 
 
@@ -130,7 +153,9 @@ def test_a_container_that_is_killed_comes_back_and_the_drive_goes_on(
     (container,) = compose.containers(service)
     pid = docker("inspect", "--format", "{{.State.Pid}}", container)
     kill = f"kill -9 {pid}"
-    docker("run", "--rm", "--pid", "host", "--user", "0", "--entrypoint", "sh", "cogmap", "-c", kill)
+    docker(
+        "run", "--rm", "--pid", "host", "--user", "0", "--entrypoint", "sh", "cogmap", "-c", kill
+    )
     wait_until(watch, lambda: member not in watch.present)
     wait_until(watch, lambda: member in watch.present)
     commands = len(watch.cycle_ms)

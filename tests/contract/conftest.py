@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from networks import InMemory, Network, OverZenoh, routed
+
+from tests.support.networks import InMemory, Network, OverZenoh, routed
 
 
 @pytest.fixture(scope="session")
@@ -17,7 +18,9 @@ def endpoint() -> Iterator[str]:
 
 @pytest.fixture(params=["memory", "zenoh"])
 def network(request: pytest.FixtureRequest) -> Iterator[Network]:
-    joined = InMemory() if request.param == "memory" else OverZenoh(request.getfixturevalue("endpoint"))
+    joined = (
+        InMemory() if request.param == "memory" else OverZenoh(request.getfixturevalue("endpoint"))
+    )
     yield joined
     joined.close()
 

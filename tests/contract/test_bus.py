@@ -6,23 +6,25 @@ import threading
 from queue import SimpleQueue
 
 import pytest
-from networks import PATIENCE_S, Network, Peer, meet, publish
 
-from bus.codec import decode
-from bus.errors import NoAnswerError
-from bus.interface import Job, Member
+from cogmap.bus.codec import decode
+from cogmap.bus.interface import Job, Member
+from cogmap.errors import NoAnswerError
 from schemas import topics
+from schemas.examples import samples
 from schemas.process import Clock
-from schemas.samples import samples
 from schemas.sensing import Odometry
 from schemas.topics import Delivery
+from tests.support.networks import PATIENCE_S, Network, Peer, meet, publish
 
 MESSAGES = {topics.of(message): message for message in samples()}
 TRAVELLING = [topic for topic in topics.ALL if topic.delivery is not Delivery.ON_REQUEST]
 
 
 def odometry(seq: int, source: str = "sim") -> Odometry:
-    return Odometry(speed_m_s=1.0, turn_rate_rad_s=0.0, dt_s=0.05, seq=seq, source=source, stamp_ns=seq)
+    return Odometry(
+        speed_m_s=1.0, turn_rate_rad_s=0.0, dt_s=0.05, seq=seq, source=source, stamp_ns=seq
+    )
 
 
 def clock(seq: int) -> Clock:
@@ -31,7 +33,8 @@ def clock(seq: int) -> Clock:
 
 @pytest.mark.parametrize("topic", TRAVELLING, ids=lambda topic: topic.name)
 def test_a_message_of_every_topic_arrives_whole(network: Network, topic: topics.Topic) -> None:
-    publisher, subscriber = network.join(), network.join()
+    publisher = network.join()
+    subscriber = network.join()
     publisher.declare(topic)
     peer = Peer(subscriber, topic)
     meet(publisher, subscriber)
@@ -41,10 +44,15 @@ def test_a_message_of_every_topic_arrives_whole(network: Network, topic: topics.
     (arrival,) = peer.take(1)
     assert decode(topic, arrival.payload) == MESSAGES[topic]
     assert arrival.envelope is not None
-    assert (arrival.envelope.source, arrival.envelope.seq) == (MESSAGES[topic].source, MESSAGES[topic].seq)
+    assert (arrival.envelope.source, arrival.envelope.seq) == (
+        MESSAGES[topic].source,
+        MESSAGES[topic].seq,
+    )
 
 
-def test_2000_quick_messages_that_must_not_be_dropped_arrive_in_order_at_every_subscriber(network: Network) -> None:
+def test_2000_quick_messages_that_must_not_be_dropped_arrive_in_order_at_every_subscriber(
+    network: Network,
+) -> None:
     publisher, *subscribers = (network.join() for _ in range(4))
     publisher.declare(topics.ODOMETRY)
     peers = [Peer(subscriber, topics.ODOMETRY) for subscriber in subscribers]
@@ -53,12 +61,15 @@ def test_2000_quick_messages_that_must_not_be_dropped_arrive_in_order_at_every_s
     publish(publisher, *(odometry(seq) for seq in range(2000)))
 
     for peer in peers:
-        assert [arrival.envelope.seq for arrival in peer.take(2000) if arrival.envelope] == list(range(2000))
+        assert [arrival.envelope.seq for arrival in peer.take(2000) if arrival.envelope] == list(
+            range(2000)
+        )
         assert len(peer.inbox) == 0
 
 
 def test_a_slow_subscriber_sees_the_newest_and_counts_what_it_replaced(network: Network) -> None:
-    publisher, subscriber = network.join(), network.join()
+    publisher = network.join()
+    subscriber = network.join()
     publisher.declare(topics.CLOCK)
     peer = Peer(subscriber, topics.CLOCK)
     meet(publisher, subscriber)
@@ -73,7 +84,8 @@ def test_a_slow_subscriber_sees_the_newest_and_counts_what_it_replaced(network: 
 
 
 def test_the_newest_of_one_source_does_not_replace_that_of_another(network: Network) -> None:
-    publisher, subscriber = network.join(), network.join()
+    publisher = network.join()
+    subscriber = network.join()
     publisher.declare(topics.CLOCK)
     peer = Peer(subscriber, topics.CLOCK)
     meet(publisher, subscriber)
@@ -81,11 +93,16 @@ def test_the_newest_of_one_source_does_not_replace_that_of_another(network: Netw
     publish(publisher, Clock(source="left"), Clock(source="right"), Clock(source="left", seq=1))
     peer.wait_for(3)
 
-    assert [(a.envelope.source, a.envelope.seq) for a in peer.take(2) if a.envelope] == [("left", 1), ("right", 0)]
+    assert [(a.envelope.source, a.envelope.seq) for a in peer.take(2) if a.envelope] == [
+        ("left", 1),
+        ("right", 0),
+    ]
 
 
 def test_a_publisher_does_not_wait_for_a_subscriber_that_takes_nothing_in(network: Network) -> None:
-    publisher, idle, busy = network.join(), network.join(), network.join()
+    publisher = network.join()
+    idle = network.join()
+    busy = network.join()
     publisher.declare(topics.ODOMETRY)
     Peer(idle, topics.ODOMETRY)
     peer = Peer(busy, topics.ODOMETRY)
@@ -97,7 +114,8 @@ def test_a_publisher_does_not_wait_for_a_subscriber_that_takes_nothing_in(networ
 
 
 def test_who_comes_late_gets_nothing_of_what_was_said_before(network: Network) -> None:
-    publisher, early = network.join(), network.join()
+    publisher = network.join()
+    early = network.join()
     publisher.declare(topics.ODOMETRY)
     peer = Peer(early, topics.ODOMETRY)
     meet(publisher, early)
@@ -113,7 +131,8 @@ def test_who_comes_late_gets_nothing_of_what_was_said_before(network: Network) -
 
 
 def test_who_asks_for_the_past_gets_the_last_of_it_first_and_then_goes_on(network: Network) -> None:
-    publishers, early = [network.join(), network.join()], network.join()
+    publishers = [network.join(), network.join()]
+    early = network.join()
     peer = Peer(early, topics.ODOMETRY)
     for publisher in publishers:
         publisher.declare(topics.ODOMETRY)
@@ -135,7 +154,8 @@ def test_who_asks_for_the_past_gets_the_last_of_it_first_and_then_goes_on(networ
 
 
 def test_the_past_of_somebody_who_left_is_gone_with_it(network: Network) -> None:
-    gone, early = network.join(), network.join()
+    gone = network.join()
+    early = network.join()
     gone.declare(topics.ODOMETRY)
     peer = Peer(early, topics.ODOMETRY)
     meet(gone, early)
@@ -151,7 +171,8 @@ def work(job: Job) -> None:
 
 
 def test_a_query_is_answered(network: Network) -> None:
-    asker, answerer = network.join(), network.join()
+    asker = network.join()
+    answerer = network.join()
     answerer.answer(topics.SNAPSHOT_REQUEST, lambda payload: payload * 2, work)
     meet(asker, answerer)
 
@@ -162,7 +183,8 @@ def test_an_error_of_whoever_answers_comes_back_in_words(network: Network) -> No
     def refuse(payload: bytes) -> bytes:
         raise ValueError("no such version")
 
-    asker, answerer = network.join(), network.join()
+    asker = network.join()
+    answerer = network.join()
     answerer.answer(topics.SNAPSHOT_REQUEST, refuse, work)
     meet(asker, answerer)
 
@@ -176,7 +198,8 @@ def test_a_query_that_nobody_answers_says_so(network: Network) -> None:
 
 
 def test_a_query_to_somebody_who_left_says_so(network: Network) -> None:
-    asker, answerer = network.join(), network.join()
+    asker = network.join()
+    answerer = network.join()
     answerer.answer(topics.SNAPSHOT_REQUEST, lambda payload: payload, work)
     gone: SimpleQueue[tuple[Member, bool]] = SimpleQueue()
     meet(asker, answerer)
@@ -189,9 +212,12 @@ def test_a_query_to_somebody_who_left_says_so(network: Network) -> None:
 
 
 def test_members_are_told_of_who_is_there_comes_and_goes(network: Network) -> None:
-    watcher, early, late = network.join(), network.join(), network.join()
+    watcher = network.join()
+    early = network.join()
+    late = network.join()
     changes: SimpleQueue[tuple[Member, bool]] = SimpleQueue()
-    first, second = Member("codelets", "codelets-1"), Member("codelets", "codelets-2")
+    first = Member("codelets", "codelets-1")
+    second = Member("codelets", "codelets-2")
 
     early.announce(first)
     watcher.watch(lambda member, alive: changes.put((member, alive)))

@@ -7,8 +7,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from bus import config
-from bus.errors import ConfigError
+from cogmap.errors import ConfigError
+from cogmap.runtime import config
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -30,11 +30,14 @@ def test_a_setting_overrides_the_file(tmp_path: Path) -> None:
 
     sections = config.load(tmp_path / "c.toml", ["action.seed=11"])
 
-    assert config.typed(sections, "action", Config) == Config(speed_m_s=1.5, seed=11, turns=["left"])
+    assert config.typed(sections, "action", Config) == Config(
+        speed_m_s=1.5, seed=11, turns=["left"]
+    )
 
 
 @pytest.mark.parametrize(
-    ("setting", "value"), [("action.turns=['left', 'right']", ["left", "right"]), ("action.turns=[]", [])]
+    ("setting", "value"),
+    [("action.turns=['left', 'right']", ["left", "right"]), ("action.turns=[]", [])],
 )
 def test_a_setting_is_read_as_toml(setting: str, value: list[str]) -> None:
     assert typed(setting).turns == value
@@ -45,7 +48,10 @@ def test_a_setting_is_read_as_toml(setting: str, value: list[str]) -> None:
     [
         ("action.sped_m_s=3", r"unknown key 'sped_m_s' in \[action\]: did you mean 'speed_m_s'\?"),
         ("action.colour=3", r"unknown key 'colour' in \[action\]: it has speed_m_s, turns, seed"),
-        ("action.speed_m_s=fast", r"\[action\] Expected `float`, got `str` - at `action.speed_m_s`"),
+        (
+            "action.speed_m_s=fast",
+            r"\[action\] Expected `float`, got `str` - at `action.speed_m_s`",
+        ),
         ("action.turns=[1]", r"\[action\] Expected `str`, got `int` - at `action.turns\[0\]`"),
         ("speed_m_s=3", r"--set speed_m_s=3: write it as module.key=value"),
         ("action.speed_m_s", r"--set action.speed_m_s: write it as module.key=value"),
@@ -87,7 +93,9 @@ def test_a_file_that_is_no_toml_names_itself(tmp_path: Path, content: bytes) -> 
 
 
 def test_a_missing_file_names_itself_and_the_remedy(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"no configuration file .*none\.toml: name one that exists"):
+    with pytest.raises(
+        ConfigError, match=r"no configuration file .*none\.toml: name one that exists"
+    ):
         config.load(tmp_path / "none.toml")
 
 

@@ -6,16 +6,16 @@ import json
 from collections.abc import Callable
 
 import pytest
-from networks import PATIENCE_S, OverZenoh, Peer, meet
 
-from bus.discovery import Process, Role, System, discover, read
-from bus.interface import Member
-from bus.session import open_client
-from bus.shell import Shell
 from cli.graph import to_dot, to_json, to_tree
+from cogmap.bus.discovery import Process, Role, System, discover, read
+from cogmap.bus.interface import Member
+from cogmap.bus.session import open_client
+from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.topics import About
-from services import table
+from services import registry
+from tests.support.networks import PATIENCE_S, OverZenoh, Peer, meet
 
 
 def discovered(network: OverZenoh) -> System:
@@ -53,14 +53,19 @@ def test_every_process_is_found_by_name_with_all_that_it_does(over_zenoh: OverZe
 
 
 def test_no_module_subscribes_to_the_truth_on_the_live_system(over_zenoh: OverZenoh) -> None:
-    shells = [Shell(table.build(name, {"sim": {"egl": False}}), over_zenoh.join()) for name in table.MODULES]
+    shells = [
+        Shell(registry.build(name, {"sim": {"egl": False}}), over_zenoh.join())
+        for name in registry.MODULES
+    ]
     for shell in shells:
         shell.open()
     meet(over_zenoh.join(), *(shell.bus for shell in shells))
 
     system = discovered(over_zenoh)
 
-    assert {process.member.module for process in system.processes if process.member} >= set(table.MODULES)
+    assert {process.member.module for process in system.processes if process.member} >= set(
+        registry.MODULES
+    )
     assert names(system, Role.PUBLISHES, topics.TRUE_POSE) == ["sim"]
     for topic in topics.ALL:
         if topic.about is About.TRUTH:
@@ -68,11 +73,15 @@ def test_no_module_subscribes_to_the_truth_on_the_live_system(over_zenoh: OverZe
 
 
 ZIDS = {"aa": Member("sim", "sim"), "bb": Member("recorder", "recorder")}
-TOKENS = [f"cogmap/agent/@session/{zid}/{member.module}/{member.instance}" for zid, member in ZIDS.items()]
+TOKENS = [
+    f"cogmap/agent/@session/{zid}/{member.module}/{member.instance}" for zid, member in ZIDS.items()
+]
 
 
 def fact(router: str, role: str, key: str, *zids: str) -> tuple[str, bytes]:
-    return f"@/{router}/router/{role}/{key}", json.dumps({"routers": [], "peers": [], "clients": zids}).encode()
+    return f"@/{router}/router/{role}/{key}", json.dumps(
+        {"routers": [], "peers": [], "clients": zids}
+    ).encode()
 
 
 FACTS = [
@@ -92,12 +101,16 @@ def system() -> System:
     return read("agent", TOKENS, FACTS, "own")
 
 
-def test_what_several_routers_tell_is_put_together_and_the_nameless_keep_their_session(system: System) -> None:
+def test_what_several_routers_tell_is_put_together_and_the_nameless_keep_their_session(
+    system: System,
+) -> None:
     assert names(system, Role.PUBLISHES, topics.ODOMETRY) == ["?cc", "sim"]
     assert system.doing(Role.PUBLISHES, topics.ODOMETRY)[0] == Process("cc")
 
 
-def test_one_on_many_topics_at_once_counts_for_each_and_whoever_asks_for_none(system: System) -> None:
+def test_one_on_many_topics_at_once_counts_for_each_and_whoever_asks_for_none(
+    system: System,
+) -> None:
     assert names(system, Role.SUBSCRIBES, topics.TRUE_POSE) == ["recorder"]
     assert names(system, Role.SUBSCRIBES, topics.TRUE_TOWN) == ["recorder"]
     assert names(system, Role.SUBSCRIBES, topics.ODOMETRY) == []
@@ -108,7 +121,9 @@ def test_keys_that_are_no_topics_are_named(system: System) -> None:
 
 
 @pytest.mark.parametrize("show", [to_tree, to_json, to_dot])
-def test_the_graph_shows_every_process_and_what_it_does(system: System, show: Callable[[System], str]) -> None:
+def test_the_graph_shows_every_process_and_what_it_does(
+    system: System, show: Callable[[System], str]
+) -> None:
     shown = show(system)
 
     assert all(name in shown for name in ("sim", "recorder", "?cc", "odometry", "truth/pose"))
@@ -119,7 +134,8 @@ def test_the_graph_of_nobody_says_so() -> None:
 
 
 def test_a_process_that_left_is_not_found(over_zenoh: OverZenoh) -> None:
-    watcher, leaver = over_zenoh.join(), over_zenoh.join()
+    watcher = over_zenoh.join()
+    leaver = over_zenoh.join()
     leaver.declare(topics.ODOMETRY)
     meet(watcher, leaver)
     gone = Peer(watcher)

@@ -13,28 +13,30 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from networks import PATIENCE_S, OverZenoh, Peer, publish
 
-from bus.codec import decode, encode
-from bus.errors import MessageError
-from bus.house import House
-from bus.interface import Arrival, Member
-from bus.memory import MemoryBus
-from bus.module import Module
+from cogmap.bus.codec import decode, encode
+from cogmap.bus.interface import Arrival, Member
+from cogmap.bus.memory import MemoryBus
+from cogmap.errors import MessageError
+from cogmap.runtime.in_process import House
+from cogmap.runtime.module import Module
 from schemas import topics
 from schemas.array import Array
+from schemas.cognition import Task
 from schemas.graph import Node, Proposal
-from schemas.mind import Task
 from schemas.sensing import MotorCommand, RangeScan, TruePose
 from services.codelets import module as codelets
 from services.workspace.commit import Ledger
+from tests.support.networks import PATIENCE_S, OverZenoh, Peer, publish
 
 PAGE = Path(__file__).parents[2] / "docs" / "modules.md"
 
 
 def example(name: str) -> str:
     """The code of an example on the page."""
-    found = re.findall(rf"<!-- example: {name} -->\n```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
+    found = re.findall(
+        rf"<!-- example: {name} -->\n```python\n(.*?)```", PAGE.read_text(), re.DOTALL
+    )
     assert len(found) == 1, f"{name}: {len(found)} examples of that name"
     return found[0]
 
@@ -59,16 +61,24 @@ def loaded() -> Iterator[Any]:
 def _scan(range_m: float, seq: int = 0) -> RangeScan:
     bearing = Array.of(np.linspace(-0.5, 0.5, 5, dtype=np.float32))
     ranges = Array.of(np.full(5, range_m, np.float32))
-    return RangeScan(stamp_ns=7, seq=seq, source="sensory", frame=seq, bearing_rad=bearing, range_m=ranges)
+    return RangeScan(
+        stamp_ns=7, seq=seq, source="sensory", frame=seq, bearing_rad=bearing, range_m=ranges
+    )
 
 
-def test_the_module_goes_straight_where_the_way_is_clear_and_turns_left_where_it_is_not(loaded: Any) -> None:
+def test_the_module_goes_straight_where_the_way_is_clear_and_turns_left_where_it_is_not(
+    loaded: Any,
+) -> None:
     page = loaded("module")
     module: Module = page.build(page.Config(), "action")
     for range_m, left_rad_s in ((20.0, 10.0), (0.0, 10.0), (2.0, 0.0)):
         (command,) = module.feed(_scan(range_m))
         assert isinstance(command, MotorCommand)
-        assert (command.left_wheel_rad_s, command.right_wheel_rad_s, command.stamp_ns) == (left_rad_s, 10.0, 7)
+        assert (command.left_wheel_rad_s, command.right_wheel_rad_s, command.stamp_ns) == (
+            left_rad_s,
+            10.0,
+            7,
+        )
 
 
 def test_the_module_refuses_a_scan_that_makes_no_sense(loaded: Any) -> None:
@@ -97,10 +107,16 @@ def test_the_module_drives_the_robot_in_a_house(loaded: Any) -> None:
 
 
 def test_the_foreign_module_answers_scans_over_zenoh(loaded: Any, over_zenoh: OverZenoh) -> None:
-    page, stop = loaded("foreign module"), threading.Event()
+    page = loaded("foreign module")
+    stop = threading.Event()
     here = over_zenoh.join()
-    peer, ready = Peer(here, topics.MOTOR_COMMAND), threading.Event()
-    here.watch(lambda member, alive: ready.set() if alive and member == Member("action", "action") else None)
+    peer = Peer(here, topics.MOTOR_COMMAND)
+    ready = threading.Event()
+    here.watch(
+        lambda member, alive: (
+            ready.set() if alive and member == Member("action", "action") else None
+        )
+    )
     here.declare(topics.SCAN)
     thread = threading.Thread(target=page.run, args=(over_zenoh.endpoint, over_zenoh.agent, stop))
     thread.start()
@@ -111,7 +127,11 @@ def test_the_foreign_module_answers_scans_over_zenoh(loaded: Any, over_zenoh: Ov
             (arrival,) = peer.take(1)
             command = decode(topics.MOTOR_COMMAND, arrival.payload)
             assert isinstance(command, MotorCommand)
-            assert (command.left_wheel_rad_s, command.seq, command.source) == (0.0 if seq else 10.0, seq, "action")
+            assert (command.left_wheel_rad_s, command.seq, command.source) == (
+                0.0 if seq else 10.0,
+                seq,
+                "action",
+            )
             assert arrival.envelope is not None
             assert (arrival.envelope.source, arrival.envelope.seq) == ("action", seq)
     finally:
@@ -120,7 +140,8 @@ def test_the_foreign_module_answers_scans_over_zenoh(loaded: Any, over_zenoh: Ov
 
 
 def test_the_foreign_module_says_what_ours_does(loaded: Any) -> None:
-    ours, foreign = loaded("module"), loaded("foreign module")
+    ours = loaded("module")
+    foreign = loaded("foreign module")
     page = ours.build(ours.Config(), "action")
     for seq, range_m in enumerate((20.0, 2.0)):
         scan = _scan(range_m, seq)
@@ -129,8 +150,11 @@ def test_the_foreign_module_says_what_ours_does(loaded: Any) -> None:
         assert decode(topics.MOTOR_COMMAND, msgspec.msgpack.encode(said)) == expected
 
 
-def test_the_codelet_counts_the_way_over_two_cycles(loaded: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    page, ledger = loaded("codelet"), Ledger(1.0)
+def test_the_codelet_counts_the_way_over_two_cycles(
+    loaded: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = loaded("codelet")
+    ledger = Ledger(1.0)
     monkeypatch.setitem(codelets.BUILDERS, "count_way", page.count_way)
     worker = codelets.build(codelets.Config(), "w")
     for cycle in (1, 2):

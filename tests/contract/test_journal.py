@@ -6,21 +6,24 @@ from pathlib import Path
 
 import pytest
 
-from bus.codec import encode
-from bus.errors import UsageError
-from bus.journal import Journal
+from cogmap.bus.codec import encode
+from cogmap.errors import UsageError
+from cogmap.runtime.journal import Journal
 from schemas.base import Message
 from schemas.graph import Delta, Link, Snapshot
 
 
 def delta(version: int) -> Delta:
     operations = [Link(source="self", target=f"place:{version}:0", weight=0.5)]
-    return Delta(version=version, cycle=version, phase="collect", tasks=[], operations=list(operations))
+    return Delta(
+        version=version, cycle=version, phase="collect", tasks=[], operations=list(operations)
+    )
 
 
 def written(path: Path, *messages: Message) -> list[int]:
     """Write `messages`; the size of the file after each."""
-    journal, sizes = Journal(path), []
+    journal = Journal(path)
+    sizes = []
     assert list(journal.messages()) == []
     for message in messages:
         journal.append(message, encode(message))

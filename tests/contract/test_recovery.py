@@ -7,17 +7,17 @@ import sys
 from collections.abc import Iterator
 
 import pytest
-from networks import OverZenoh, Peer, meet, publish, pump_until, working
 
-from bus.graph import Graph
-from bus.interface import CACHED_MESSAGES
-from bus.module import Module
-from bus.replica import Replica, snapshot_over
-from bus.session import free_endpoint
-from bus.shell import Shell
+from cogmap.bus.interface import CACHED_MESSAGES
+from cogmap.bus.session import free_endpoint
+from cogmap.graph.graph import Graph
+from cogmap.graph.replica import Replica, snapshot_over
+from cogmap.runtime.module import Module
+from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.graph import Delta, Node
 from schemas.sensing import Odometry
+from tests.support.networks import OverZenoh, Peer, meet, publish, pump_until, working
 
 
 class Router:
@@ -29,7 +29,9 @@ class Router:
 
     def start(self) -> None:
         command = [sys.executable, "-m", "cli.main", "router", "--tied", "--connect", self.endpoint]
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
         assert self._process.stderr is not None
         assert "router listens" in self._process.stderr.readline()
 
@@ -46,11 +48,15 @@ def router() -> Iterator[Router]:
 
 
 def odometry(seq: int) -> Odometry:
-    return Odometry(speed_m_s=1.0, turn_rate_rad_s=0.0, dt_s=0.05, seq=seq, source="sim", stamp_ns=seq)
+    return Odometry(
+        speed_m_s=1.0, turn_rate_rad_s=0.0, dt_s=0.05, seq=seq, source="sim", stamp_ns=seq
+    )
 
 
 @pytest.mark.parametrize("afterwards", [0, 20], ids=["nothing said since", "more said since"])
-def test_what_is_said_while_the_router_is_dead_arrives_when_it_is_back(router: Router, afterwards: int) -> None:
+def test_what_is_said_while_the_router_is_dead_arrives_when_it_is_back(
+    router: Router, afterwards: int
+) -> None:
     network = OverZenoh(router.endpoint)
     publisher, *subscribers = (network.join() for _ in range(3))
     publisher.declare(topics.ODOMETRY)
@@ -71,10 +77,17 @@ def test_what_is_said_while_the_router_is_dead_arrives_when_it_is_back(router: R
     network.close()
 
 
-def test_of_more_than_the_cache_holds_the_loss_is_counted_and_a_replica_is_mended_by_a_snapshot(router: Router) -> None:
-    graph, network, lost = Graph(), OverZenoh(router.endpoint), 50
-    keeper = Module("workspace").answering(topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, lambda request: graph.snapshot())
-    publisher, reader = network.join(), network.join()
+def test_of_more_than_the_cache_holds_the_loss_is_counted_and_a_replica_is_mended_by_a_snapshot(
+    router: Router,
+) -> None:
+    graph = Graph()
+    network = OverZenoh(router.endpoint)
+    lost = 50
+    keeper = Module("workspace").answering(
+        topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, lambda request: graph.snapshot()
+    )
+    publisher = network.join()
+    reader = network.join()
     publisher.declare(topics.DELTA)
     replica = Replica(snapshot_over(reader))
     follower = Shell(Module("follower").on(topics.DELTA, replica.follow), reader, health=False)
@@ -82,9 +95,12 @@ def test_of_more_than_the_cache_holds_the_loss_is_counted_and_a_replica_is_mende
 
     def commit() -> None:
         node = Node(id=f"building-{graph.version}", kind="object", activation=0.5)
-        delta = Delta(version=graph.version + 1, cycle=1, phase="objects", tasks=[], operations=[node])
+        delta = Delta(
+            version=graph.version + 1, cycle=1, phase="objects", tasks=[], operations=[node]
+        )
         graph.apply(delta)
-        delta.source, delta.seq = "workspace", delta.version
+        delta.source = "workspace"
+        delta.seq = delta.version
         publish(publisher, delta)
 
     with working(Shell(keeper, network.join(), health=False)):

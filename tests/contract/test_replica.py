@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from networks import Network, meet, working
-
-from bus.graph import Graph
-from bus.module import Module
-from bus.replica import Replica, snapshot_over
-from bus.shell import Shell
+from cogmap.graph.graph import Graph
+from cogmap.graph.replica import Replica, snapshot_over
+from cogmap.runtime.module import Module
+from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.graph import Delta, Link, Node
+from tests.support.networks import Network, meet, working
 
 
 def delta(version: int) -> Delta:
@@ -20,12 +19,15 @@ def delta(version: int) -> Delta:
 
 def keeper(network: Network, graph: Graph) -> Shell:
     """The shell of a module that answers for `graph`."""
-    module = Module("workspace").answering(topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, lambda request: graph.snapshot())
+    module = Module("workspace").answering(
+        topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, lambda request: graph.snapshot()
+    )
     return Shell(module, network.join(), health=False)
 
 
 def test_deltas_in_order_make_the_same_graph(network: Network) -> None:
-    graph, replica = Graph(), Replica(snapshot_over(network.join()))
+    graph = Graph()
+    replica = Replica(snapshot_over(network.join()))
     for version in range(1, 20):
         assert graph.apply(delta(version))
         assert replica.follow(delta(version))
@@ -35,7 +37,8 @@ def test_deltas_in_order_make_the_same_graph(network: Network) -> None:
 
 
 def test_a_gap_is_mended_by_a_snapshot(network: Network) -> None:
-    graph, bus = Graph(), network.join()
+    graph = Graph()
+    bus = network.join()
     for version in range(1, 11):
         graph.apply(delta(version))
     replica = Replica(snapshot_over(bus))
@@ -51,7 +54,8 @@ def test_a_gap_is_mended_by_a_snapshot(network: Network) -> None:
 
 
 def test_a_delta_that_the_snapshot_held_already_changes_nothing(network: Network) -> None:
-    graph, bus = Graph(), network.join()
+    graph = Graph()
+    bus = network.join()
     for version in range(1, 6):
         graph.apply(delta(version))
     replica = Replica(snapshot_over(bus))

@@ -10,15 +10,15 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from damage import golden
 from msgspec.inspect import FloatType
 
-from bus.codec import decode, encode
+from cogmap.bus.codec import decode, encode
 from schemas import topics
 from schemas.base import Message
+from schemas.examples import samples
 from schemas.export import GOLDEN, export_golden, export_schemas, file_name, json_schema
-from schemas.samples import samples
 from schemas.topics import About, Delivery, Topic
+from tests.support.damage import golden
 
 BY_TOPIC = {topics.of(message): message for message in samples()}
 each_topic = pytest.mark.parametrize("topic", topics.ALL, ids=lambda topic: topic.name)
@@ -60,17 +60,24 @@ def test_the_json_schema_names_every_field_and_what_it_means(topic: Topic) -> No
 
 
 def test_every_golden_file_belongs_to_a_topic() -> None:
-    assert {path.name for path in GOLDEN.iterdir()} == {file_name(topic, ".msgpack") for topic in topics.ALL}
+    assert {path.name for path in GOLDEN.iterdir()} == {
+        file_name(topic, ".msgpack") for topic in topics.ALL
+    }
 
 
 def test_golden_bytes_are_written_the_same_every_time(tmp_path: Path) -> None:
     for path in export_golden(tmp_path):
-        assert path.read_bytes() == (GOLDEN / path.name).read_bytes(), f"{path.name} differs: export it on purpose"
+        assert path.read_bytes() == (GOLDEN / path.name).read_bytes(), (
+            f"{path.name} differs: export it on purpose"
+        )
 
 
 def test_every_export_is_one_command(tmp_path: Path) -> None:
     run = subprocess.run(
-        [sys.executable, "-m", "schemas.export", str(tmp_path)], capture_output=True, text=True, check=True
+        [sys.executable, "-m", "schemas.export", str(tmp_path)],
+        capture_output=True,
+        text=True,
+        check=True,
     )
 
     assert run.stdout.startswith(f"{len(topics.ALL)} files")
@@ -116,6 +123,10 @@ def test_every_field_of_a_sample_differs_from_its_default(topic: Topic) -> None:
     sample = BY_TOPIC[topic]
     defaults = sample.__struct_defaults__
     optional = sample.__struct_fields__[-len(defaults) :]
-    same = [name for name, default in zip(optional, defaults, strict=True) if getattr(sample, name) == default]
+    same = [
+        name
+        for name, default in zip(optional, defaults, strict=True)
+        if getattr(sample, name) == default
+    ]
 
     assert same in ([], ["seq"])

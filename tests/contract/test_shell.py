@@ -6,26 +6,41 @@ import logging
 import time
 
 import pytest
-from damage import damaged, golden
-from networks import PATIENCE_S, Network, Peer, envelope_of, meet, publish, pump_until, working
 
-from bus.codec import Cause, Envelope, decode, encode
-from bus.errors import MessageError, NoAnswerError
-from bus.interface import Member
-from bus.module import Module
-from bus.shell import MANY_CAUSES, Shell
+from cogmap.bus.codec import Cause, Envelope, decode, encode
+from cogmap.bus.interface import Member
+from cogmap.errors import MessageError, NoAnswerError
+from cogmap.runtime.module import Module
+from cogmap.runtime.shell import MANY_CAUSES, Shell
 from schemas import topics
 from schemas.base import Message
 from schemas.graph import Snapshot, SnapshotRequest
 from schemas.process import Clock, Health, Presence
 from schemas.sensing import MotorCommand, Odometry
 from schemas.topics import Delivery, Topic
+from tests.support.damage import damaged, golden
+from tests.support.networks import (
+    PATIENCE_S,
+    Network,
+    Peer,
+    envelope_of,
+    meet,
+    publish,
+    pump_until,
+    working,
+)
 
-TAKEN_IN = [topic for topic in topics.ALL if topic.delivery is not Delivery.ON_REQUEST and topic is not topics.PRESENCE]
+TAKEN_IN = [
+    topic
+    for topic in topics.ALL
+    if topic.delivery is not Delivery.ON_REQUEST and topic is not topics.PRESENCE
+]
 
 
 def odometry(seq: int, source: str = "sim") -> Odometry:
-    return Odometry(speed_m_s=1.0, turn_rate_rad_s=0.0, dt_s=0.05, seq=seq, source=source, stamp_ns=seq)
+    return Odometry(
+        speed_m_s=1.0, turn_rate_rad_s=0.0, dt_s=0.05, seq=seq, source=source, stamp_ns=seq
+    )
 
 
 def command(odometry: Odometry) -> MotorCommand:
@@ -48,7 +63,9 @@ def test_bad_input_is_counted_and_changes_nothing_else(network: Network, topic: 
     proper = encode(envelope_of(whole))
     stranger = encode(Envelope("stranger", whole.seq, 1, 0, 0))
     arrivals = [(payload, proper) for payload in damaged(topic).values()]
-    arrivals += [(golden(topic), attachment) for attachment in (None, b"", b"\xc1garbage", stranger)]
+    arrivals += [
+        (golden(topic), attachment) for attachment in (None, b"", b"\xc1garbage", stranger)
+    ]
 
     for number, (payload, attachment) in enumerate(arrivals, 1):
         network.put(topic, payload, attachment)
@@ -65,7 +82,9 @@ def test_bad_input_is_counted_and_changes_nothing_else(network: Network, topic: 
     shell.close()
 
 
-def test_bad_input_is_named_once_a_second_at_most(network: Network, caplog: pytest.LogCaptureFixture) -> None:
+def test_bad_input_is_named_once_a_second_at_most(
+    network: Network, caplog: pytest.LogCaptureFixture
+) -> None:
     shell = listener(network, topics.ODOMETRY, [])
     meet(network.join(), shell.bus)
     began_s = time.monotonic()
@@ -84,7 +103,8 @@ def test_bad_input_is_named_once_a_second_at_most(network: Network, caplog: pyte
 
 def test_a_message_that_comes_twice_is_taken_in_once(network: Network) -> None:
     heard: list[Message] = []
-    shell, publisher = listener(network, topics.ODOMETRY, heard), network.join()
+    shell = listener(network, topics.ODOMETRY, heard)
+    publisher = network.join()
     publisher.declare(topics.ODOMETRY)
     meet(publisher, shell.bus)
 
@@ -98,7 +118,8 @@ def test_a_message_that_comes_twice_is_taken_in_once(network: Network) -> None:
 
 def test_a_source_that_starts_anew_counts_from_the_beginning(network: Network) -> None:
     heard: list[Message] = []
-    shell, publisher = listener(network, topics.ODOMETRY, heard), network.join()
+    shell = listener(network, topics.ODOMETRY, heard)
+    publisher = network.join()
     publisher.declare(topics.ODOMETRY)
     meet(publisher, shell.bus)
 
@@ -113,7 +134,8 @@ def test_a_source_that_starts_anew_counts_from_the_beginning(network: Network) -
 
 def test_a_gap_in_the_numbers_of_a_source_is_counted(network: Network) -> None:
     heard: list[Message] = []
-    shell, publisher = listener(network, topics.ODOMETRY, heard), network.join()
+    shell = listener(network, topics.ODOMETRY, heard)
+    publisher = network.join()
     publisher.declare(topics.ODOMETRY)
     meet(publisher, shell.bus)
 
@@ -126,7 +148,8 @@ def test_a_gap_in_the_numbers_of_a_source_is_counted(network: Network) -> None:
 
 def test_a_loss_that_the_bus_tells_of_and_the_numbers_show_counts_once(network: Network) -> None:
     heard: list[Message] = []
-    shell, publisher = listener(network, topics.ODOMETRY, heard), network.join()
+    shell = listener(network, topics.ODOMETRY, heard)
+    publisher = network.join()
     publisher.declare(topics.ODOMETRY)
     meet(publisher, shell.bus)
 
@@ -141,7 +164,9 @@ def test_a_loss_that_the_bus_tells_of_and_the_numbers_show_counts_once(network: 
     shell.close()
 
 
-@pytest.mark.parametrize("error", [MessageError("image of the wrong shape"), ZeroDivisionError("division by zero")])
+@pytest.mark.parametrize(
+    "error", [MessageError("image of the wrong shape"), ZeroDivisionError("division by zero")]
+)
 def test_a_module_whose_handler_raises_goes_on(network: Network, error: Exception) -> None:
     def think(message: Odometry) -> MotorCommand:
         if message.seq == 1:
@@ -149,7 +174,8 @@ def test_a_module_whose_handler_raises_goes_on(network: Network, error: Exceptio
         return command(message)
 
     module = Module("action").on(topics.ODOMETRY, think, emits=[topics.MOTOR_COMMAND])
-    shell, observer = Shell(module, network.join(), health=False), network.join()
+    shell = Shell(module, network.join(), health=False)
+    observer = network.join()
     observer.declare(topics.ODOMETRY)
     peer = Peer(observer, topics.MOTOR_COMMAND)
     shell.open()
@@ -159,7 +185,10 @@ def test_a_module_whose_handler_raises_goes_on(network: Network, error: Exceptio
     pump_until(lambda: peer.arrived == 2, shell)
 
     answers = [decode(topics.MOTOR_COMMAND, arrival.payload) for arrival in peer.take(2)]
-    assert [(answer.stamp_ns, answer.seq, answer.source) for answer in answers] == [(0, 0, "action"), (2, 1, "action")]
+    assert [(answer.stamp_ns, answer.seq, answer.source) for answer in answers] == [
+        (0, 0, "action"),
+        (2, 1, "action"),
+    ]
     assert shell.intake.rejected["odometry"] == 1
     assert shell.meter.faults == (0 if isinstance(error, MessageError) else 1)
     shell.close()
@@ -169,7 +198,8 @@ def test_what_led_to_a_message_and_the_time_it_took_travel_with_it(network: Netw
     module = Module("action").on(
         topics.ODOMETRY, lambda m: command(m) if m.seq % 2 else None, emits=[topics.MOTOR_COMMAND]
     )
-    shell, observer = Shell(module, network.join(), health=False), network.join()
+    shell = Shell(module, network.join(), health=False)
+    observer = network.join()
     observer.declare(topics.ODOMETRY)
     peer = Peer(observer, topics.MOTOR_COMMAND)
     shell.open()
@@ -187,9 +217,14 @@ def test_what_led_to_a_message_and_the_time_it_took_travel_with_it(network: Netw
     shell.close()
 
 
-def test_what_a_silent_module_took_in_is_told_with_its_health_before_it_grows_long(network: Network) -> None:
-    module = Module("codelets", "codelets-2").on(topics.ODOMETRY, lambda odometry: None, emits=[topics.MOTOR_COMMAND])
-    shell, observer = Shell(module, network.join()), network.join()
+def test_what_a_silent_module_took_in_is_told_with_its_health_before_it_grows_long(
+    network: Network,
+) -> None:
+    module = Module("codelets", "codelets-2").on(
+        topics.ODOMETRY, lambda odometry: None, emits=[topics.MOTOR_COMMAND]
+    )
+    shell = Shell(module, network.join())
+    observer = network.join()
     observer.declare(topics.ODOMETRY)
     peer = Peer(observer, topics.HEALTH)
     shell.open()
@@ -200,7 +235,12 @@ def test_what_a_silent_module_took_in_is_told_with_its_health_before_it_grows_lo
     told: list[Cause] = []
     while not told:
         pump_until(lambda: len(peer.inbox) > 0, shell)
-        told += [cause for arrival in peer.take(1) if arrival.envelope for cause in arrival.envelope.causes]
+        told += [
+            cause
+            for arrival in peer.take(1)
+            if arrival.envelope
+            for cause in arrival.envelope.causes
+        ]
 
     assert told == [("odometry", "sim", seq) for seq in range(MANY_CAUSES + 1)]
     shell.close()
@@ -208,7 +248,8 @@ def test_what_a_silent_module_took_in_is_told_with_its_health_before_it_grows_lo
 
 def test_health_is_published_and_says_what_was_taken_in_and_refused(network: Network) -> None:
     module = Module("action", "action-1").on(topics.ODOMETRY, command, emits=[topics.MOTOR_COMMAND])
-    shell, observer = Shell(module, network.join()), network.join()
+    shell = Shell(module, network.join())
+    observer = network.join()
     observer.declare(topics.ODOMETRY)
     peer = Peer(observer, topics.HEALTH)
     shell.open()
@@ -220,8 +261,17 @@ def test_health_is_published_and_says_what_was_taken_in_and_refused(network: Net
 
     health = decode(topics.HEALTH, peer.take(1)[0].payload)
     assert isinstance(health, Health)
-    assert (health.module, health.instance, health.source, health.ready) == ("action", "action-1", "action-1", True)
-    assert (health.received, health.rejected, health.gaps) == ({"odometry": 2}, {"odometry": 1}, {"odometry": 1})
+    assert (health.module, health.instance, health.source, health.ready) == (
+        "action",
+        "action-1",
+        "action-1",
+        True,
+    )
+    assert (health.received, health.rejected, health.gaps) == (
+        {"odometry": 2},
+        {"odometry": 1},
+        {"odometry": 1},
+    )
     assert health.emitted == {"motor/command": 2}
     assert health.memory_mb > 1
     shell.close()
@@ -229,7 +279,8 @@ def test_health_is_published_and_says_what_was_taken_in_and_refused(network: Net
 
 def test_a_module_that_waits_for_others_is_not_ready_and_says_so(network: Network) -> None:
     module = Module("sim").starts(lambda: None, awaits={"action": 1})
-    shell, observer = Shell(module, network.join()), network.join()
+    shell = Shell(module, network.join())
+    observer = network.join()
     peer = Peer(observer, topics.HEALTH)
     shell.open()
     meet(observer, shell.bus)
@@ -251,7 +302,9 @@ def test_nothing_is_missed_by_those_that_a_start_awaits(network: Network) -> Non
     starting.open()
     waiting = [
         Shell(
-            Module("listener", name).on(topics.ODOMETRY, lambda m, name=name: heard[name].append(m.seq)),
+            Module("listener", name).on(
+                topics.ODOMETRY, lambda m, name=name: heard[name].append(m.seq)
+            ),
             network.join(),
             health=False,
         )
@@ -271,7 +324,11 @@ def test_nothing_is_missed_by_those_that_a_start_awaits(network: Network) -> Non
 
 def test_a_start_happens_once_though_one_that_it_awaited_goes_and_comes(network: Network) -> None:
     started: list[int] = []
-    shell = Shell(Module("sim").starts(lambda: started.append(1), awaits={"action": 1}), network.join(), health=False)
+    shell = Shell(
+        Module("sim").starts(lambda: started.append(1), awaits={"action": 1}),
+        network.join(),
+        health=False,
+    )
     shell.open()
     for _ in range(2):
         action = Shell(Module("action"), network.join(), health=False)
@@ -287,7 +344,8 @@ def test_a_start_happens_once_though_one_that_it_awaited_goes_and_comes(network:
 def test_a_module_that_asks_is_told_who_comes_and_goes(network: Network) -> None:
     told: list[Presence] = []
     module = Module("workspace").on(topics.PRESENCE, told.append, emits=[topics.PRESENCE])
-    shell, worker = Shell(module, network.join(), health=False), network.join()
+    shell = Shell(module, network.join(), health=False)
+    worker = network.join()
     shell.open()
 
     worker.announce(Member("codelets", "codelets-1"))
@@ -304,12 +362,19 @@ def test_a_module_that_asks_is_told_who_comes_and_goes(network: Network) -> None
 
 def test_a_question_that_makes_no_sense_is_refused_and_counted(network: Network) -> None:
     empty = Snapshot(version=0, cycle=0, nodes=[], links=[], tiles=[])
-    module = Module("workspace").answering(topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, lambda request: empty)
-    shell, asker = Shell(module, network.join(), health=False), network.join()
+    module = Module("workspace").answering(
+        topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, lambda request: empty
+    )
+    shell = Shell(module, network.join(), health=False)
+    asker = network.join()
     with working(shell):
         meet(asker, shell.bus)
         with pytest.raises(NoAnswerError, match="stamp_ns"):
-            asker.query(topics.SNAPSHOT_REQUEST, encode(SnapshotRequest()).replace(b"\x00", b"\xff", 1), PATIENCE_S)
+            asker.query(
+                topics.SNAPSHOT_REQUEST,
+                encode(SnapshotRequest()).replace(b"\x00", b"\xff", 1),
+                PATIENCE_S,
+            )
         answer = asker.query(topics.SNAPSHOT_REQUEST, encode(SnapshotRequest()), PATIENCE_S)
 
     assert decode(topics.SNAPSHOT, answer) == empty
@@ -318,7 +383,8 @@ def test_a_question_that_makes_no_sense_is_refused_and_counted(network: Network)
 
 def test_a_clock_that_is_older_than_the_newest_is_never_thought_about(network: Network) -> None:
     heard: list[Message] = []
-    shell, publisher = listener(network, topics.CLOCK, heard), network.join()
+    shell = listener(network, topics.CLOCK, heard)
+    publisher = network.join()
     publisher.declare(topics.CLOCK)
     meet(publisher, shell.bus)
     peer = Peer(network.join(), topics.CLOCK)

@@ -9,19 +9,35 @@ from pathlib import Path
 
 from cli.experiment import live
 from experiments.loop_closing.run import MIND, driven, sections
-from services import table
+from services import registry
 
 COGMAP = [sys.executable, "-m", "cli.main", "experiment"]
 PATIENCE_S = 110.0
 
 
 def _run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([*COGMAP, *arguments], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+    return subprocess.run(
+        [*COGMAP, *arguments], capture_output=True, text=True, timeout=PATIENCE_S, check=False
+    )
 
 
-def test_cue_integration_leaves_figures_and_json_and_says_the_same_bytes_through_real_processes(tmp_path: Path) -> None:
-    out, chosen = tmp_path / "out", tmp_path / "cue.json"
-    done = _run("cue-integration", "--trials", "8", "--live", "--seed", "3", "--out", str(out), "--json", str(chosen))
+def test_cue_integration_leaves_figures_and_json_and_says_the_same_bytes_through_real_processes(
+    tmp_path: Path,
+) -> None:
+    out = tmp_path / "out"
+    chosen = tmp_path / "cue.json"
+    done = _run(
+        "cue-integration",
+        "--trials",
+        "8",
+        "--live",
+        "--seed",
+        "3",
+        "--out",
+        str(out),
+        "--json",
+        str(chosen),
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     figures = json.loads(chosen.read_text())
     assert figures["live_same"] == 1.0
@@ -40,7 +56,14 @@ def test_a_json_file_in_no_folder_is_one_sentence_and_code_2(tmp_path: Path) -> 
 
 def test_a_loop_is_closed_with_the_same_bytes_through_real_processes() -> None:
     configured = sections(1, "heading")
-    configured["sim"]["way"]["line_m"] = [(0.0, 0.0), (60.0, 0.0), (60.0, 40.0), (0.0, 40.0), (0.0, 0.0), (60.0, 0.0)]
+    configured["sim"]["way"]["line_m"] = [
+        (0.0, 0.0),
+        (60.0, 0.0),
+        (60.0, 40.0),
+        (0.0, 40.0),
+        (0.0, 0.0),
+        (60.0, 0.0),
+    ]
     modules = ("sim", *MIND)
-    assert driven(configured, [table.build(name, configured) for name in modules]).replays
+    assert driven(configured, [registry.build(name, configured) for name in modules]).replays
     assert live.differing(configured, modules) == []

@@ -1,4 +1,6 @@
-"""Two drives of one seed in lockstep, through real processes, Zenoh and two workers: the same bytes on every topic."""
+"""Two drives of one seed in lockstep, through real processes, Zenoh and two workers: the same bytes
+on every topic.
+"""
 
 from __future__ import annotations
 
@@ -7,15 +9,33 @@ import subprocess
 import sys
 from pathlib import Path
 
-from bus.session import free_endpoint
-from logs.diff import diff
+from cogmap.bus.session import free_endpoint
+from cogmap.recording.diff import diff
 
 PATIENCE_S = 90.0
 
 
 def _drive(folder: Path, workers: int) -> Path:
-    command = [sys.executable, "-m", "cli.main", "run", "--lockstep", "--laps", "0.04", "--seed", "6"]
-    whole = [*command, "--codelets", str(workers), "--out", str(folder), "--connect", free_endpoint()]
+    command = [
+        sys.executable,
+        "-m",
+        "cli.main",
+        "run",
+        "--lockstep",
+        "--laps",
+        "0.04",
+        "--seed",
+        "6",
+    ]
+    whole = [
+        *command,
+        "--codelets",
+        str(workers),
+        "--out",
+        str(folder),
+        "--connect",
+        free_endpoint(),
+    ]
     done = subprocess.run(whole, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     assert json.loads((folder / "summary.json").read_text())["gaps_total"] == 0

@@ -15,19 +15,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
-from networks import routed
 
-from bus.codec import Envelope, encode
-from bus.errors import UsageError
-from bus.zenoh_bus import ZenohBus
 from cli.main import cogmap
-from logs.diff import diff
-from logs.format import topics_to_record
-from logs.recorder import Recorder
-from logs.writer import LogWriter
+from cogmap.bus.codec import Envelope, encode
+from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.errors import UsageError
+from cogmap.recording.diff import diff
+from cogmap.recording.recorder import Recorder
+from cogmap.recording.storage.format import topics_to_record
+from cogmap.recording.storage.writer import LogWriter
 from schemas import topics
 from schemas.array import Array
 from schemas.sensing import Odometry, RangeScan
+from tests.support.networks import routed
 
 COUNT = 5
 PATIENCE_S = 30.0
@@ -40,8 +40,17 @@ def write(path: Path, speed_m_s: float = 1.0, without: int | None = None) -> Pat
         if seq == without:
             continue
         at_ns = 10**9 * (seq + 1)
-        row = Odometry(stamp_ns=at_ns, seq=seq, source="sim", speed_m_s=speed_m_s, turn_rate_rad_s=0.0, dt_s=0.05)
-        scan = RangeScan(stamp_ns=at_ns, seq=seq, source="sensory", frame=seq, bearing_rad=values, range_m=values)
+        row = Odometry(
+            stamp_ns=at_ns,
+            seq=seq,
+            source="sim",
+            speed_m_s=speed_m_s,
+            turn_rate_rad_s=0.0,
+            dt_s=0.05,
+        )
+        scan = RangeScan(
+            stamp_ns=at_ns, seq=seq, source="sensory", frame=seq, bearing_rad=values, range_m=values
+        )
         for message in (row, scan):
             envelope = Envelope(message.source, seq, 5, at_ns, at_ns)
             writer.write(topics.of(message), encode(message), envelope, at_ns)
@@ -65,11 +74,22 @@ def run() -> Callable[..., Result]:
     return invoke
 
 
-def test_info_says_how_much_of_each_topic_came_from_whom(run: Callable[..., Result], path: Path) -> None:
+def test_info_says_how_much_of_each_topic_came_from_whom(
+    run: Callable[..., Result], path: Path
+) -> None:
     found = json.loads(run("info", path, "--json").stdout)
     odometry = next(topic for topic in found["topics"] if topic["topic"] == "odometry")
-    assert (found["agent"], found["messages"], found["duration_s"], found["gaps"]) == ("a", 2 * COUNT, 4.0, [])
-    assert (odometry["count"], odometry["rate_hz"], odometry["sources"]) == (COUNT, 1.25, {"sim": COUNT})
+    assert (found["agent"], found["messages"], found["duration_s"], found["gaps"]) == (
+        "a",
+        2 * COUNT,
+        4.0,
+        [],
+    )
+    assert (odometry["count"], odometry["rate_hz"], odometry["sources"]) == (
+        COUNT,
+        1.25,
+        {"sim": COUNT},
+    )
     text = run("info", path).stdout
     assert "sim:5" in text
     assert "its recorder did not end it" in text.lower()
@@ -83,7 +103,10 @@ def test_info_names_a_gap(run: Callable[..., Result], tmp_path: Path) -> None:
 def test_cat_prints_the_messages_of_the_topics_named_and_no_more_than_asked(
     run: Callable[..., Result], path: Path
 ) -> None:
-    lines = [json.loads(line) for line in run("cat", path, "odometry", "-n", "3", "--json").stdout.splitlines()]
+    lines = [
+        json.loads(line)
+        for line in run("cat", path, "odometry", "-n", "3", "--json").stdout.splitlines()
+    ]
     assert [line["message"]["seq"] for line in lines] == [0, 1, 2]
     assert {line["topic"] for line in lines} == {"odometry"}
     assert lines[0]["envelope"]["source"] == "sim"
@@ -101,21 +124,29 @@ def test_cat_begins_at_the_offset(run: Callable[..., Result], path: Path) -> Non
 def test_diff_ends_with_0_for_the_same_and_1_with_words_for_a_difference(
     run: Callable[..., Result], path: Path, tmp_path: Path
 ) -> None:
-    same, other = write(tmp_path / "same.mcap"), write(tmp_path / "other.mcap", speed_m_s=2.0)
+    same = write(tmp_path / "same.mcap")
+    other = write(tmp_path / "other.mcap", speed_m_s=2.0)
     assert run("diff", path, same).exit_code == 0
     result = run("diff", path, other)
     assert result.exit_code == 1
-    assert "First difference: odometry number 0 of sim (stamp 1.000 s): speed_m_s is 1.0 in log.mcap" in result.stdout
+    assert (
+        "First difference: odometry number 0 of sim (stamp 1.000 s): speed_m_s is 1.0 in log.mcap"
+        in result.stdout
+    )
     assert run("diff", path, other, "sensory/scan").exit_code == 0
     assert json.loads(run("diff", path, other, "--json").stdout)["same"] is False
 
 
-def test_recover_says_what_it_saved_and_what_is_lost(run: Callable[..., Result], path: Path, tmp_path: Path) -> None:
+def test_recover_says_what_it_saved_and_what_is_lost(
+    run: Callable[..., Result], path: Path, tmp_path: Path
+) -> None:
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(path.read_bytes()[:-1500])
     result = run("recover", cut, tmp_path / "saved.mcap", "--json")
     assert json.loads(result.stdout)["messages"] == 2 * COUNT
-    assert json.loads(run("info", tmp_path / "saved.mcap", "--json").stdout)["messages"] == 2 * COUNT
+    assert (
+        json.loads(run("info", tmp_path / "saved.mcap", "--json").stdout)["messages"] == 2 * COUNT
+    )
     assert "messages saved from" in run("recover", cut, tmp_path / "again.mcap").stdout
 
 
@@ -125,7 +156,10 @@ def test_recover_says_what_it_saved_and_what_is_lost(run: Callable[..., Result],
         (["info", "absent.mcap"], "no log absent.mcap"),
         (["cat", "LOG", "odometer"], "did you mean odometry"),
         (["replay", "LOG", "--into", "cerebellum"], "no module 'cerebellum'"),
-        (["replay", "LOG", "--into", "action"], "nothing that module action said: there are sensory, sim"),
+        (
+            ["replay", "LOG", "--into", "action"],
+            "nothing that module action said: there are sensory, sim",
+        ),
         (["record", "-x", "."], "no topic is left"),
         (["record", "-e", "("], "not a regular expression"),
         (["recover", "LOG", "LOG"], "exists already"),
@@ -146,11 +180,14 @@ def endpoint() -> Iterator[str]:
         yield address
 
 
-def test_what_is_played_onto_zenoh_and_recorded_again_says_the_same(endpoint: str, path: Path, tmp_path: Path) -> None:
+def test_what_is_played_onto_zenoh_and_recorded_again_says_the_same(
+    endpoint: str, path: Path, tmp_path: Path
+) -> None:
     again = tmp_path / "again.mcap"
     recorder = Recorder(ZenohBus(endpoint, "played"), again, topics_to_record(), {})
     recorder.open()
-    observer, here = ZenohBus(endpoint, "played"), threading.Event()
+    observer = ZenohBus(endpoint, "played")
+    here = threading.Event()
     observer.watch(lambda member, alive: here.set())
     assert here.wait(PATIENCE_S)
     observer.close()
@@ -162,24 +199,45 @@ def test_what_is_played_onto_zenoh_and_recorded_again_says_the_same(endpoint: st
         while sum(recorder.received.values()) < 2 * COUNT and time.monotonic() < deadline_s:
             recorder.pump(0.1)
         assert player.stdout is not None
-        assert json.loads(player.stdout.read())["messages"] == {"odometry": COUNT, "sensory/scan": COUNT}
+        assert json.loads(player.stdout.read())["messages"] == {
+            "odometry": COUNT,
+            "sensory/scan": COUNT,
+        }
     assert recorder.close().never_drop_whole
     assert diff(path, again).same
 
 
 def test_the_space_bar_lets_a_replay_go_on_that_began_paused(endpoint: str, path: Path) -> None:
-    observer, here = ZenohBus(endpoint, "paused"), threading.Event()
+    observer = ZenohBus(endpoint, "paused")
+    here = threading.Event()
     observer.watch(lambda member, alive: here.set())
     terminal, other = pty.openpty()
-    command = [sys.executable, "-m", "cli.main", "log", "replay", str(path), "-r", "1000", "--start-paused", "--json"]
+    command = [
+        sys.executable,
+        "-m",
+        "cli.main",
+        "log",
+        "replay",
+        str(path),
+        "-r",
+        "1000",
+        "--start-paused",
+        "--json",
+    ]
     with subprocess.Popen(
-        [*command, "--connect", endpoint, "--agent", "paused"], stdin=other, stdout=subprocess.PIPE, text=True
+        [*command, "--connect", endpoint, "--agent", "paused"],
+        stdin=other,
+        stdout=subprocess.PIPE,
+        text=True,
     ) as player:
         assert here.wait(PATIENCE_S)
         assert player.poll() is None
         os.write(terminal, b" ")
         assert player.stdout is not None
-        assert json.loads(player.stdout.read())["messages"] == {"odometry": COUNT, "sensory/scan": COUNT}
+        assert json.loads(player.stdout.read())["messages"] == {
+            "odometry": COUNT,
+            "sensory/scan": COUNT,
+        }
     observer.close()
     os.close(terminal)
     os.close(other)

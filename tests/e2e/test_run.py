@@ -16,10 +16,10 @@ from pathlib import Path
 
 import pytest
 
-from bus.module import Module
-from bus.session import check_free, free_endpoint
-from bus.shell import Shell
-from bus.zenoh_bus import ZenohBus
+from cogmap.bus.session import check_free, free_endpoint
+from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.runtime.module import Module
+from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.sensing import MotorCommand
 
@@ -42,7 +42,9 @@ def processes_at(endpoint: str, words: str = "") -> list[int]:
 
 
 def shared_memory() -> set[Path]:
-    """Files in shared memory, but for those of Python's own pools of processes, which are none of ours."""
+    """Files in shared memory, but for those of Python's own pools of processes, which are none of
+    ours.
+    """
     return {path for path in Path("/dev/shm").iterdir() if not path.name.startswith("sem.mp-")}
 
 
@@ -76,8 +78,12 @@ class Run:
         wait_until(said)
 
     def pid_of(self, instance: str) -> int | None:
-        """The process of a module's instance, or of the router or the recorder; None where it does not run."""
-        words = {"router": "\0router\0", "recorder": "\0log\0record\0"}.get(instance, f"\0--instance\0{instance}\0")
+        """The process of a module's instance, or of the router or the recorder; None where it does
+        not run.
+        """
+        words = {"router": "\0router\0", "recorder": "\0log\0record\0"}.get(
+            instance, f"\0--instance\0{instance}\0"
+        )
         return next(iter(processes_at(self.endpoint, words)), None)
 
     def close(self) -> None:
@@ -100,7 +106,9 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Run]]:
         run.close()
 
 
-def test_a_short_drive_ends_by_itself_and_leaves_a_log_a_map_and_a_summary(start: Callable[..., Run]) -> None:
+def test_a_short_drive_ends_by_itself_and_leaves_a_log_a_map_and_a_summary(
+    start: Callable[..., Run],
+) -> None:
     run = start("--lockstep", "--laps", "0.05", "--codelets", "2")
     assert run.end() == 0, run.output()
     summary = json.loads((run.folder / "summary.json").read_text())
@@ -127,7 +135,9 @@ def test_ctrl_c_ends_a_drive_cleanly(start: Callable[..., Run]) -> None:
     assert run.end() == 130, run.output()
     assert json.loads((run.folder / "summary.json").read_text())["ended_by"] == "interrupted"
     assert (run.folder / "log.mcap").read_bytes().endswith(b"\x89MCAP0\r\n")
-    assert "Traceback" not in run.output() + "".join(log.read_text() for log in run.folder.glob("*.log"))
+    assert "Traceback" not in run.output() + "".join(
+        log.read_text() for log in run.folder.glob("*.log")
+    )
     assert processes_at(run.endpoint) == []
 
 
@@ -152,11 +162,15 @@ KILLED_TOGETHER = (
 @pytest.fixture
 def commands() -> Iterator[Callable[[str], list[MotorCommand]]]:
     """Gives the list of the commands that move the wheels of the robot at an endpoint, which grows."""
-    ended, shells, threads = threading.Event(), [], []
+    ended = threading.Event()
+    shells = []
+    threads = []
 
     def listen(endpoint: str) -> list[MotorCommand]:
         heard: list[MotorCommand] = []
-        keep = Module("listener").on(topics.MOTOR_COMMAND, lambda command: command.halted_by or heard.append(command))
+        keep = Module("listener").on(
+            topics.MOTOR_COMMAND, lambda command: command.halted_by or heard.append(command)
+        )
         shells.append(Shell(keep, ZenohBus(endpoint, "agent")))
         shells[-1].open()
         threads.append(threading.Thread(target=work, args=shells[-1:]))
@@ -186,20 +200,26 @@ def test_whatever_is_killed_is_started_again_and_the_robot_is_moved_on(
         pids = {instance: run.pid_of(instance) for instance in together}
         for pid in pids.values():
             os.kill(pid, signal.SIGKILL)
-        wait_until(lambda pids=pids: all(run.pid_of(name) not in (pid, None) for name, pid in pids.items()))
+        wait_until(
+            lambda pids=pids: all(run.pid_of(name) not in (pid, None) for name, pid in pids.items())
+        )
         enough = len(heard) + 5
         wait_until(lambda enough=enough: len(heard) >= enough)
     run.process.send_signal(signal.SIGINT)
     assert run.end() == 130, run.output()
     summary = json.loads((run.folder / "summary.json").read_text())
-    assert summary["restarts"] == {instance: 1 for together in KILLED_TOGETHER for instance in together}
+    assert summary["restarts"] == {
+        instance: 1 for together in KILLED_TOGETHER for instance in together
+    }
     assert (run.folder / "log-2.mcap").read_bytes().endswith(b"\x89MCAP0\r\n")
     assert processes_at(run.endpoint) == []
     assert shared_memory() <= before
     check_free(run.endpoint)
 
 
-def test_a_port_in_use_is_one_sentence_and_code_2(start: Callable[..., Run], tmp_path: Path) -> None:
+def test_a_port_in_use_is_one_sentence_and_code_2(
+    start: Callable[..., Run], tmp_path: Path
+) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()

@@ -12,12 +12,12 @@ from collections.abc import Iterator
 
 import pytest
 
-from bus.module import Module
-from bus.session import free_endpoint, open_router
-from bus.shell import Shell
-from bus.zenoh_bus import ZenohBus
+from cogmap.bus.session import free_endpoint, open_router
+from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.runtime.module import Module
+from cogmap.runtime.shell import Shell
 from schemas import topics
-from schemas.samples import samples
+from schemas.examples import samples
 from schemas.sensing import MotorCommand, Odometry
 
 PATIENCE_S = 30.0
@@ -32,7 +32,9 @@ class System:
         self.got_command, self._ended = threading.Event(), threading.Event()
         self._router = open_router(endpoint)
         sim = Module("sim").every(20_000_000, self._odometry, emits=[topics.ODOMETRY])
-        sim.every(20_000_000, lambda now_ns: SAMPLES[topics.SELF_MOTION], emits=[topics.SELF_MOTION])
+        sim.every(
+            20_000_000, lambda now_ns: SAMPLES[topics.SELF_MOTION], emits=[topics.SELF_MOTION]
+        )
         self._shell = Shell(sim.on(topics.MOTOR_COMMAND, self._obey), ZenohBus(endpoint, "agent"))
         self._shell.open()
         self._thread = threading.Thread(target=self._work)
@@ -101,7 +103,9 @@ def test_info_names_the_processes(system: System, endpoint: str) -> None:
     output, _ = said(endpoint, "topic", "info", "-v", "odometry")
 
     assert "Type: Odometry" in output
-    assert "Publisher count: 1\n\nProcess name: sim\nModule: sim\nEndpoint type: PUBLISHER" in output
+    assert (
+        "Publisher count: 1\n\nProcess name: sim\nModule: sim\nEndpoint type: PUBLISHER" in output
+    )
     assert "Subscription count: 0" in output
 
 
@@ -114,9 +118,12 @@ def test_echo_prints_so_many_messages_and_ends(system: System, endpoint: str) ->
 
 
 @pytest.mark.parametrize(
-    ("command", "figure"), [("hz", "average rate: "), ("bw", "/s from "), ("delay", "average delay: ")]
+    ("command", "figure"),
+    [("hz", "average rate: "), ("bw", "/s from "), ("delay", "average delay: ")],
 )
-def test_ctrl_c_ends_with_the_figures(system: System, endpoint: str, command: str, figure: str) -> None:
+def test_ctrl_c_ends_with_the_figures(
+    system: System, endpoint: str, command: str, figure: str
+) -> None:
     process = start(endpoint, "topic", command, "sensory/motion")
     assert process.stdout is not None
     assert figure in process.stdout.readline()
@@ -134,14 +141,22 @@ def test_pub_is_obeyed(system: System, endpoint: str) -> None:
     said(endpoint, "topic", "pub", "-t", "2", "-r", "20", "motor/command", written)
 
     assert system.got_command.wait(PATIENCE_S)
-    assert system.commands[0] == MotorCommand(left_wheel_rad_s=1.5, right_wheel_rad_s=2.0, source="cli")
+    assert system.commands[0] == MotorCommand(
+        left_wheel_rad_s=1.5, right_wheel_rad_s=2.0, source="cli"
+    )
 
 
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
         (
-            ("topic", "pub", "-1", "motor/command", '{"left_wheel_rad_s": "x", "right_wheel_rad_s": 1}'),
+            (
+                "topic",
+                "pub",
+                "-1",
+                "motor/command",
+                '{"left_wheel_rad_s": "x", "right_wheel_rad_s": 1}',
+            ),
             "got `str` - at",
         ),
         (("topic", "echo", "odometri"), "did you mean 'odometry'?"),
@@ -174,7 +189,9 @@ def test_graph_shows_the_process_and_its_topics(system: System, endpoint: str) -
     assert sim["publishes"] == ["odometry", "sensory/motion", "health"]
 
 
-def test_doctor_names_what_is_missing_and_what_is_off_its_rate(system: System, endpoint: str) -> None:
+def test_doctor_names_what_is_missing_and_what_is_off_its_rate(
+    system: System, endpoint: str
+) -> None:
     found = json.loads(said(endpoint, "doctor", "--json", code=1)[0])
 
     about = {finding["about"] for finding in found}

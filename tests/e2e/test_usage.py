@@ -1,4 +1,6 @@
-"""What the user can mend is one sentence that names it and the remedy, and exit code 2, whatever the command."""
+"""What the user can mend is one sentence that names it and the remedy, and exit code 2, whatever
+the command.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from networks import routed
+
+from tests.support.networks import routed
 
 PATIENCE_S = 30.0
 NOBODY = "tcp/127.0.0.1:1"
@@ -37,32 +40,72 @@ def endpoint() -> Iterator[str]:
 @pytest.mark.parametrize(
     ("arguments", "named", "remedy"),
     [
-        (["module", "workspace", "--set", "workspace.deca=0.1"], "unknown key 'deca'", "did you mean 'decay'?"),
-        (["module", "workspace", "--set", "workspac.decay=0.1"], "[workspac]", "did you mean 'workspace'?"),
-        (["module", "workspace", "--set", "workspace.decay=lots"], "`workspace.decay`", "Expected `float`, got `str`"),
-        (["module", "workspace", "--set", "workspace.decay=2"], "`workspace.decay`", "Expected `float` <= 1"),
+        (
+            ["module", "workspace", "--set", "workspace.deca=0.1"],
+            "unknown key 'deca'",
+            "did you mean 'decay'?",
+        ),
+        (
+            ["module", "workspace", "--set", "workspac.decay=0.1"],
+            "[workspac]",
+            "did you mean 'workspace'?",
+        ),
+        (
+            ["module", "workspace", "--set", "workspace.decay=lots"],
+            "`workspace.decay`",
+            "Expected `float`, got `str`",
+        ),
+        (
+            ["module", "workspace", "--set", "workspace.decay=2"],
+            "`workspace.decay`",
+            "Expected `float` <= 1",
+        ),
         (["module", "workspace", "--set", "decay"], "--set decay", "write it as module.key=value"),
-        (["module", "workspace", "--config", "nowhere.toml"], "nowhere.toml", "name one that exists"),
+        (
+            ["module", "workspace", "--config", "nowhere.toml"],
+            "nowhere.toml",
+            "name one that exists",
+        ),
         (["module", "workspace", "--config", "/"], "cannot read / as TOML", "Is a directory"),
         (["module", "memory-of-tomorrow"], "'memory-of-tomorrow'", "there are sim, sensory"),
-        (["module", "workspace", "--connect", "localhost"], "'localhost'", "write it as tcp/HOST:PORT"),
-        (["module", "workspace", "--state", "/dev/null/x", "--connect", NOBODY], "/dev/null/x", "with --state"),
+        (
+            ["module", "workspace", "--connect", "localhost"],
+            "'localhost'",
+            "write it as tcp/HOST:PORT",
+        ),
+        (
+            ["module", "workspace", "--state", "/dev/null/x", "--connect", NOBODY],
+            "/dev/null/x",
+            "with --state",
+        ),
         (["router", "--connect", "tcp/127.0.0.1:99999"], "99999", "a port of at most 65535"),
         (["run", "--out", "/dev/null/x", "--connect", FREE], "/dev/null/x", "another with --out"),
         (["topic", "echo", "clok"], "'clok'", "did you mean 'clock'?"),
-        (["log", "info", "nowhere.mcap"], "nowhere.mcap", "name a file that `cogmap log record` wrote"),
-        (["log", "record", "-o", "/dev/null/x.mcap", "--connect", "ROUTER"], "/dev/null/x.mcap", "-o"),
+        (
+            ["log", "info", "nowhere.mcap"],
+            "nowhere.mcap",
+            "name a file that `cogmap log record` wrote",
+        ),
+        (
+            ["log", "record", "-o", "/dev/null/x.mcap", "--connect", "ROUTER"],
+            "/dev/null/x.mcap",
+            "-o",
+        ),
         (["router", "--connect", "ROUTER"], "ROUTER", "choose another port with --connect"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else None,
 )
-def test_what_is_wrong_is_named_with_the_remedy(endpoint: str, arguments: list[str], named: str, remedy: str) -> None:
+def test_what_is_wrong_is_named_with_the_remedy(
+    endpoint: str, arguments: list[str], named: str, remedy: str
+) -> None:
     said = sentence_of(start(*(argument.replace("ROUTER", endpoint) for argument in arguments)))
     assert named.replace("ROUTER", endpoint) in said
     assert remedy in said
 
 
-def test_a_router_that_does_not_answer_within_five_seconds_is_named_by_whoever_looks_for_it(tmp_path: Path) -> None:
+def test_a_router_that_does_not_answer_within_five_seconds_is_named_by_whoever_looks_for_it(
+    tmp_path: Path,
+) -> None:
     commands = (
         ["module", "workspace"],
         ["module", "codelets"],
@@ -72,5 +115,7 @@ def test_a_router_that_does_not_answer_within_five_seconds_is_named_by_whoever_l
     )
     for process in [start(*command, "--connect", NOBODY) for command in commands]:
         said = sentence_of(process)
-        assert said.startswith(f"cogmap: no router at {NOBODY} within 5 s: start one with `cogmap run`")
+        assert said.startswith(
+            f"cogmap: no router at {NOBODY} within 5 s: start one with `cogmap run`"
+        )
     assert not (tmp_path / "log.mcap").exists()

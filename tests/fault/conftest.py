@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from live import Feeder, System, Witness, shared_memory
-from networks import working
 
-from bus.session import check_free
+from cogmap.bus.session import check_free
+from tests.support.live import Feeder, System, Witness, shared_memory
+from tests.support.networks import working
 
 
 @pytest.fixture
@@ -24,11 +24,16 @@ def system(tmp_path: Path) -> Iterator[System]:
 
 
 @pytest.fixture
-def mind(request: pytest.FixtureRequest, system: System) -> Iterator[tuple[System, Feeder, Witness]]:
-    """The workspace and two workers, with the settings in the fixture's parameter, fed and followed."""
+def mind(
+    request: pytest.FixtureRequest, system: System
+) -> Iterator[tuple[System, Feeder, Witness]]:
+    """The workspace and two workers, with the settings in the fixture's parameter, fed and
+    followed.
+    """
     system.router()
     system.modules("workspace", "codelets-1", "codelets-2", settings=getattr(request, "param", ()))
-    feeder, witness = Feeder(system.bus()), Witness(system.bus())
+    feeder = Feeder(system.bus())
+    witness = Witness(system.bus())
     with working(witness.shell), working(feeder.shell):
         witness.goes_on(3)
         yield system, feeder, witness

@@ -1,4 +1,6 @@
-"""In lockstep the graph is the same to the byte whatever strangers put on the topics between the messages."""
+"""In lockstep the graph is the same to the byte whatever strangers put on the topics between the
+messages.
+"""
 
 from __future__ import annotations
 
@@ -7,19 +9,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from damage import damaged
-from live import AGENT, System, Witness, wait_until
-from networks import working
 
-from bus.module import Module
-from bus.session import open_client
-from bus.shell import Shell
+from cogmap.bus.session import open_client
+from cogmap.runtime.module import Module
+from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.array import Array
 from schemas.base import Message
 from schemas.graph import Delta
 from schemas.sensing import Percept, Percepts, SelfMotion
 from schemas.topics import Delivery
+from tests.support.damage import damaged
+from tests.support.live import AGENT, System, Witness, wait_until
+from tests.support.networks import working
 
 TRAVELLING = [topic for topic in topics.ALL if topic.delivery is not Delivery.ON_REQUEST]
 VIEWS = len(TRAVELLING)
@@ -27,13 +29,18 @@ PERIOD_NS = 200_000_000
 
 
 class Turns:
-    """Stands in for body and perception: the next view comes when the cycle of the last one has ended."""
+    """Stands in for body and perception: the next view comes when the cycle of the last one has
+    ended.
+    """
 
     def __init__(self, before: Callable[[int], None]) -> None:
-        self._views, self._before = 0, before
+        self._views = 0
+        self._before = before
         says = (topics.SELF_MOTION, topics.PERCEPTS)
         awaits = {"workspace": 1, "codelets": 2, "witness": 1}
-        self.module = Module("turns").on(topics.DELTA, self._on_delta, says).starts(self._view, awaits, says)
+        self.module = (
+            Module("turns").on(topics.DELTA, self._on_delta, says).starts(self._view, awaits, says)
+        )
 
     def _on_delta(self, delta: Delta) -> list[Message]:
         return self._view() if delta.phase == "decay" and self._views < VIEWS else []
@@ -57,7 +64,9 @@ class Turns:
         )
         road_m = Array.of(np.array([[3.0, 0.0], [4.0, 1.0]], np.float32))
         return [
-            SelfMotion(stamp_ns=stamp_ns, frame=self._views, since_ns=stamp_ns - PERIOD_NS, motions=motion),
+            SelfMotion(
+                stamp_ns=stamp_ns, frame=self._views, since_ns=stamp_ns - PERIOD_NS, motions=motion
+            ),
             Percepts(stamp_ns=stamp_ns, frame=self._views, objects=[house], road_m=road_m),
         ]
 
@@ -74,9 +83,13 @@ def other(tmp_path: Path) -> Iterator[System]:
 def drive(system: System, before: Callable[[int], None] = lambda view: None) -> Witness:
     """The witness of all views."""
     system.modules("workspace", "codelets-1", "codelets-2", settings=("workspace.mode=lockstep",))
-    witness, turns = Witness(system.bus()), Turns(before)
+    witness = Witness(system.bus())
+    turns = Turns(before)
     with working(witness.shell), working(Shell(turns.module, system.bus())):
-        wait_until(lambda: witness.replica.graph.cycle == VIEWS and witness.deltas[-1].phase == "decay", "all views")
+        wait_until(
+            lambda: witness.replica.graph.cycle == VIEWS and witness.deltas[-1].phase == "decay",
+            "all views",
+        )
     return witness
 
 
@@ -89,7 +102,8 @@ def test_what_is_no_message_changes_no_byte_of_the_graph(system: System, other: 
         for payload in damaged(topic).values():
             stranger.put(topic.key(AGENT), payload, attachment=b"no envelope")
 
-    left_alone, molested = drive(system), drive(other, molest)
+    left_alone = drive(system)
+    molested = drive(other, molest)
     stranger.close()  # type: ignore[no-untyped-call]
 
     assert molested.replica.graph.digest() == left_alone.replica.graph.digest()

@@ -1,4 +1,6 @@
-"""A recorder as its own process on Zenoh: what is in its file when it is killed, and when it is asked to end."""
+"""A recorder as its own process on Zenoh: what is in its file when it is killed, and when it is
+asked to end.
+"""
 
 from __future__ import annotations
 
@@ -12,19 +14,20 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from networks import routed
 
-from bus.codec import Envelope, encode
-from bus.interface import Member
-from bus.zenoh_bus import ZenohBus
-from logs.reader import LogReader
-from logs.recover import recover
+from cogmap.bus.codec import Envelope, encode
+from cogmap.bus.interface import Member
+from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.recording.storage.reader import LogReader
+from cogmap.recording.storage.recover import recover
 from schemas import topics
 from schemas.sensing import Odometry
+from tests.support.networks import routed
 
 PATIENCE_S = 30.0
 AGENT = "recorded"
-FLUSH_S, SLACK_S = 0.25, 0.5
+FLUSH_S = 0.25
+SLACK_S = 0.5
 
 
 @pytest.fixture
@@ -51,14 +54,24 @@ class Speaker:
 
     def speak(self) -> None:
         now_ns = time.time_ns()
-        message = Odometry(seq=self.count, stamp_ns=now_ns, source="sim", speed_m_s=1.0, turn_rate_rad_s=0.0, dt_s=0.05)
-        self.bus.publish(topics.ODOMETRY, encode(message), Envelope("sim", self.count, 2**62, now_ns, now_ns))
+        message = Odometry(
+            seq=self.count,
+            stamp_ns=now_ns,
+            source="sim",
+            speed_m_s=1.0,
+            turn_rate_rad_s=0.0,
+            dt_s=0.05,
+        )
+        self.bus.publish(
+            topics.ODOMETRY, encode(message), Envelope("sim", self.count, 2**62, now_ns, now_ns)
+        )
         self.count += 1
         self._pause.wait(0.002)
 
     def speak_until_it_grows(self, path: Path, times: int) -> None:
         """Go on until the file has grown so often."""
-        size, deadline_s = path.stat().st_size, time.monotonic() + PATIENCE_S
+        size = path.stat().st_size
+        deadline_s = time.monotonic() + PATIENCE_S
         while times:
             assert time.monotonic() < deadline_s, "the file does not grow"
             self.speak()
@@ -75,9 +88,22 @@ def speaker(endpoint: str) -> Iterator[Speaker]:
 
 
 def start(endpoint: str, path: Path, *options: str) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "cli.main", "log", "record", "-o", str(path), "--connect", endpoint]
+    command = [
+        sys.executable,
+        "-m",
+        "cli.main",
+        "log",
+        "record",
+        "-o",
+        str(path),
+        "--connect",
+        endpoint,
+    ]
     return subprocess.Popen(
-        [*command, "--agent", AGENT, *options], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        [*command, "--agent", AGENT, *options],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
     )
 
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import signal
 
-from live import Feeder, System, Witness, wait_until
+from tests.support.live import Feeder, System, Witness, wait_until
 
 
 def test_every_delta_arrives_in_order_though_the_router_was_killed_and_the_cycle_goes_on(
     mind: tuple[System, Feeder, Witness],
 ) -> None:
     system, feeder, witness = mind
-    last, views = witness.versions[-1], feeder.views
+    last = witness.versions[-1]
+    views = feeder.views
     system.processes["router"].end(signal.SIGKILL)
     wait_until(lambda: feeder.views >= views + 5, "views go on without a router")
     system.router()

@@ -1,4 +1,6 @@
-"""A stranger's bytes on every topic while the modules run: counted and named, and nothing else changes."""
+"""A stranger's bytes on every topic while the modules run: counted and named, and nothing else
+changes.
+"""
 
 from __future__ import annotations
 
@@ -8,31 +10,37 @@ from collections import Counter
 
 import pytest
 import zenoh
-from damage import damaged, golden
-from live import AGENT, Feeder, System, Witness, wait_until
-from networks import working
 
-from bus.codec import Envelope, encode
-from bus.errors import NoAnswerError
-from bus.module import Module
-from bus.session import open_client
-from bus.shell import Shell
+from cogmap.bus.codec import Envelope, encode
+from cogmap.bus.session import open_client
+from cogmap.errors import NoAnswerError
+from cogmap.runtime.module import Module
+from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.base import Message
 from schemas.topics import Delivery, Topic
-from services import table
+from services import registry
+from tests.support.damage import damaged, golden
+from tests.support.live import AGENT, Feeder, System, Witness, wait_until
+from tests.support.networks import working
 
 MODULES = ("sensory", "epam", "global_workspace", "action")
 CARRIED = tuple(
-    topic for topic in topics.ALL if topic.delivery is not Delivery.ON_REQUEST and topic is not topics.PRESENCE
+    topic
+    for topic in topics.ALL
+    if topic.delivery is not Delivery.ON_REQUEST and topic is not topics.PRESENCE
 )
 # Every field of a request has a default, so that an object of another type is one too.
-NO_REQUESTS = [bad for what, bad in damaged(topics.SNAPSHOT_REQUEST).items() if what != "wrong type"]
+NO_REQUESTS = [
+    bad for what, bad in damaged(topics.SNAPSHOT_REQUEST).items() if what != "wrong type"
+]
 BLOCK = zenoh.CongestionControl.BLOCK
 
 
 class Stranger:
-    """A foreign session that puts bytes on topics, each from a source of its own so that none replaces another."""
+    """A foreign session that puts bytes on topics, each from a source of its own so that none
+    replaces another.
+    """
 
     def __init__(self, endpoint: str) -> None:
         self.session = open_client(endpoint)
@@ -41,7 +49,9 @@ class Stranger:
     def damage(self, topic: Topic) -> None:
         """Put everything on `topic` that is no message of it."""
         for payload in damaged(topic).values():
-            self._put(topic, payload, encode(Envelope(f"stranger-{self.put[topic.name]}", 0, 1, 1, 1)))
+            self._put(
+                topic, payload, encode(Envelope(f"stranger-{self.put[topic.name]}", 0, 1, 1, 1))
+            )
         self._put(topic, golden(topic), b"\xc1 no envelope")
 
     def _put(self, topic: Topic, payload: bytes, attachment: bytes) -> None:
@@ -63,7 +73,7 @@ def _pass_over(message: Message) -> None:
 
 def taken_in(instance: str) -> set[str]:
     """The topics whose messages come to an instance."""
-    handlers = table.build(instance.partition("-")[0], {}).handlers
+    handlers = registry.build(instance.partition("-")[0], {}).handlers
     return {topic.name for topic in handlers if topic is not topics.PRESENCE}
 
 
@@ -72,7 +82,9 @@ def test_bytes_that_are_no_message_are_counted_and_named_and_the_mind_goes_on(
 ) -> None:
     system, feeder, witness = mind
     system.modules(*MODULES)
-    auditing, stranger, began_s = Shell(auditor(), system.bus()), Stranger(system.endpoint), time.monotonic()
+    auditing = Shell(auditor(), system.bus())
+    stranger = Stranger(system.endpoint)
+    began_s = time.monotonic()
     with working(auditing):
         for topic in CARRIED:
             stranger.damage(topic)
@@ -100,6 +112,8 @@ def test_bytes_that_are_no_message_are_counted_and_named_and_the_mind_goes_on(
         assert system.processes[instance].is_alive
         assert not witness.health[instance].notes
         assert not witness.health[instance].gaps
-        named = Counter(re.findall(r"rejected ([\w/]+): ", "\n".join(system.processes[instance].said())))
+        named = Counter(
+            re.findall(r"rejected ([\w/]+): ", "\n".join(system.processes[instance].said()))
+        )
         assert set(named) == set(counts)
         assert max(named.values()) <= lasted_s + 1

@@ -1,4 +1,6 @@
-"""A subscriber that is stopped for five seconds: the others do not notice, and nothing is lost for good."""
+"""A subscriber that is stopped for five seconds: the others do not notice, and nothing is lost for
+good.
+"""
 
 from __future__ import annotations
 
@@ -10,18 +12,18 @@ from itertools import pairwise
 import msgspec
 import numpy as np
 import pytest
-from live import AGENT, Feeder, System, Witness, wait_until
-from networks import working
 
-from bus.module import Module
-from bus.shell import Shell
-from logs.reader import LogReader
+from cogmap.recording.storage.reader import LogReader
+from cogmap.runtime.module import Module
+from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.array import Array
 from schemas.base import Message
-from schemas.samples import samples
+from schemas.examples import samples
 from schemas.sensing import StereoFrame
 from schemas.topics import Topic
+from tests.support.live import AGENT, Feeder, System, Witness, wait_until
+from tests.support.networks import working
 
 STOPPED_S = 5.0
 LONGEST_GAP_S = 0.5
@@ -30,7 +32,9 @@ FRAME_PERIOD_NS = 100_000_000
 
 
 def camera() -> Module:
-    """Says 460 KB ten times a second: 46 MB while the subscriber is stopped, more than what is on the way can hold."""
+    """Says 460 KB ten times a second: 46 MB while the subscriber is stopped, more than what is on
+    the way can hold.
+    """
     image = Array.of(np.zeros((240, 320, 3), np.uint8))
     sample = next(message for message in samples() if isinstance(message, StereoFrame))
 
@@ -54,7 +58,10 @@ class Listener:
 
     def longest_gap_s(self, topic: Topic, since_s: float) -> float:
         """The longest time without a message since then."""
-        return max(later - earlier for earlier, later in pairwise([s for s in self.came_s[topic] if s >= since_s]))
+        return max(
+            later - earlier
+            for earlier, later in pairwise([s for s in self.came_s[topic] if s >= since_s])
+        )
 
 
 @pytest.fixture
@@ -79,7 +86,10 @@ def test_others_see_no_gap_memory_stays_bounded_and_nothing_is_lost_for_good(
         system.processes["recorder"].send(signal.SIGSTOP)
         stopped_s = time.monotonic()
         wait_until(lambda: time.monotonic() > stopped_s + STOPPED_S, "five seconds pass")
-        grown_mb = [process.memory_mb() - before for process, before in zip(looked_at, before_mb, strict=True)]
+        grown_mb = [
+            process.memory_mb() - before
+            for process, before in zip(looked_at, before_mb, strict=True)
+        ]
         gaps_s = {topic.name: listener.longest_gap_s(topic, stopped_s) for topic in listener.came_s}
         system.processes["recorder"].send(signal.SIGCONT)
         witness.goes_on(20)
@@ -91,5 +101,7 @@ def test_others_see_no_gap_memory_stays_bounded_and_nothing_is_lost_for_good(
     assert not witness.shell.intake.gaps
     summary = json.loads("{" + "\n".join(system.processes["recorder"].said()).partition("{")[2])
     assert summary["never_drop_whole"], summary
-    deltas = [record.sequence for record in LogReader(system.folder / "log.mcap").records({topics.DELTA})]
+    deltas = [
+        record.sequence for record in LogReader(system.folder / "log.mcap").records({topics.DELTA})
+    ]
     assert deltas == list(range(deltas[0], witness.deltas[-1].seq + 1))

@@ -6,20 +6,23 @@ import signal
 from collections import Counter
 
 import pytest
-from live import Feeder, System, Witness, wait_until
-from networks import working
 
-from bus.module import Module
-from bus.shell import Shell
+from cogmap.runtime.module import Module
+from cogmap.runtime.shell import Shell
 from schemas import topics
+from schemas.cognition import Task
 from schemas.graph import Proposal
-from schemas.mind import Task
+from tests.support.live import Feeder, System, Witness, wait_until
+from tests.support.networks import working
 
 PATIENT = ("workspace.deadline_ms=20000", "workspace.lease_ms=20000")
-STOPPED, OTHER = "codelets-1", "codelets-2"
+STOPPED = "codelets-1"
+OTHER = "codelets-2"
 
 
-@pytest.mark.parametrize("mind", [PATIENT], indirect=True, ids=["only its death takes back what it holds"])
+@pytest.mark.parametrize(
+    "mind", [PATIENT], indirect=True, ids=["only its death takes back what it holds"]
+)
 def test_the_task_of_a_worker_killed_amid_it_is_done_by_another_and_committed_once(
     mind: tuple[System, Feeder, Witness],
 ) -> None:
@@ -28,7 +31,9 @@ def test_the_task_of_a_worker_killed_amid_it_is_done_by_another_and_committed_on
     answers: list[Proposal] = []
     looking = Module("looking").on(topics.TASK, tasks.append).on(topics.PROPOSAL, answers.append)
     with working(Shell(looking, system.bus())):
-        wait_until(lambda: any(task.worker == STOPPED for task in tasks), f"{STOPPED} is given tasks")
+        wait_until(
+            lambda: any(task.worker == STOPPED for task in tasks), f"{STOPPED} is given tasks"
+        )
         system.processes[STOPPED].send(signal.SIGSTOP)
         held = _held(tasks, answers)
         system.processes[STOPPED].end(signal.SIGKILL)
@@ -44,14 +49,17 @@ def test_the_task_of_a_worker_killed_amid_it_is_done_by_another_and_committed_on
 
 
 def _held(tasks: list[Task], answers: list[Proposal]) -> Task:
-    """The task that the stopped worker has not answered: twice in a row, as an answer may be on its way."""
+    """The task that the stopped worker has not answered: twice in a row, as an answer may be on its
+    way.
+    """
     open_before: set[str] = set()
 
     def holds() -> bool:
         nonlocal open_before
         answered = {answer.task_id for answer in answers}
         still_open = {task.task_id for task in tasks if task.worker == STOPPED} - answered
-        both, open_before = open_before & still_open, still_open
+        both = open_before & still_open
+        open_before = still_open
         return bool(both)
 
     wait_until(holds, f"{STOPPED} holds a task")

@@ -5,9 +5,9 @@ from __future__ import annotations
 import signal
 
 import pytest
-from live import Feeder, System, Witness, wait_until
 
 from services.workspace.triggers import SELF
+from tests.support.live import Feeder, System, Witness, wait_until
 
 
 def where(witness: Witness) -> tuple[float, int]:
@@ -24,7 +24,9 @@ def test_a_restarted_workspace_takes_up_its_graph_and_the_way_that_was_gone_whil
     system.processes["workspace"].end(signal.SIGKILL)
     views = feeder.views
     wait_until(lambda: feeder.views >= views + 10, "views go on without a workspace")
-    seen, version, cycle = len(witness.deltas), witness.replica.graph.version, witness.replica.graph.cycle
+    seen = len(witness.deltas)
+    version = witness.replica.graph.version
+    cycle = witness.replica.graph.cycle
     system.modules("workspace")
     witness.goes_on(5)
     feeder.pause()
@@ -34,4 +36,6 @@ def test_a_restarted_workspace_takes_up_its_graph_and_the_way_that_was_gone_whil
     versions = witness.versions[seen:]
     assert versions == list(range(versions[0], versions[0] + len(versions)))
     ended_m, ended_ns = where(witness)
-    assert ended_m - began_m == pytest.approx(feeder.driven_m(ended_ns) - feeder.driven_m(began_ns), abs=0.3)
+    assert ended_m - began_m == pytest.approx(
+        feeder.driven_m(ended_ns) - feeder.driven_m(began_ns), abs=0.3
+    )

@@ -1,4 +1,6 @@
-"""Bytes changed at random: decoding takes them for a message or says why not, and never believes a wild number."""
+"""Bytes changed at random: decoding takes them for a message or says why not, and never believes a
+wild number.
+"""
 
 from __future__ import annotations
 
@@ -10,15 +12,30 @@ import msgspec
 import numpy as np
 import pytest
 
-from bus.codec import Envelope, decode, decode_envelope, encode
-from bus.errors import MessageError
+from cogmap.bus.codec import Envelope, decode, decode_envelope, encode
+from cogmap.errors import MessageError
 from schemas import topics
 from schemas.array import Array
 from schemas.export import GOLDEN, file_name
 from schemas.topics import Topic
 
 ROUNDS = 1500
-WILD = [math.nan, math.inf, -math.inf, 1e308, -0.0, 2**64 - 1, -(2**63), None, "", "x" * 300, b"", [], {}, True]
+WILD = [
+    math.nan,
+    math.inf,
+    -math.inf,
+    1e308,
+    -0.0,
+    2**64 - 1,
+    -(2**63),
+    None,
+    "",
+    "x" * 300,
+    b"",
+    [],
+    {},
+    True,
+]
 
 
 def flipped(data: bytearray, rng: random.Random) -> None:
@@ -37,7 +54,9 @@ def grown(data: bytearray, rng: random.Random) -> None:
 
 def poisoned(data: bytearray, rng: random.Random) -> None:
     """Put NaN or infinity over eight or four bytes, where a float may be."""
-    poison = np.array([rng.choice([math.nan, math.inf, -math.inf])], rng.choice(["<f8", ">f8", "<f4", ">f4"])).tobytes()
+    poison = np.array(
+        [rng.choice([math.nan, math.inf, -math.inf])], rng.choice(["<f8", ">f8", "<f4", ">f4"])
+    ).tobytes()
     start = rng.randrange(len(data))
     data[start : start + len(poison)] = poison
 
@@ -55,7 +74,11 @@ def rewritten(value: Any, rng: random.Random, odds: float) -> Any:
     if rng.random() < odds:
         return rng.choice(WILD)
     if isinstance(value, dict):
-        return {key: rewritten(item, rng, odds) for key, item in value.items() if rng.random() > odds / 4}
+        return {
+            key: rewritten(item, rng, odds)
+            for key, item in value.items()
+            if rng.random() > odds / 4
+        }
     if isinstance(value, list):
         return [rewritten(item, rng, odds) for item in value] * (2 if rng.random() < odds else 1)
     return value
@@ -77,7 +100,9 @@ def numbers(value: Any) -> list[float]:
 
 
 def judge(topic: Topic, payload: bytes) -> bool:
-    """Whether `payload` is taken for a message; whatever is, has finite numbers and can be said again."""
+    """Whether `payload` is taken for a message; whatever is, has finite numbers and can be said
+    again.
+    """
     try:
         message = decode(topic, payload)
     except MessageError as error:
@@ -100,11 +125,15 @@ def test_mutated_bytes_are_refused_by_name_or_are_a_finite_message(topic: Topic)
 
 
 @pytest.mark.parametrize("topic", topics.ALL, ids=lambda topic: topic.name)
-def test_wellformed_bytes_of_the_wrong_content_are_refused_or_are_a_finite_message(topic: Topic) -> None:
+def test_wellformed_bytes_of_the_wrong_content_are_refused_or_are_a_finite_message(
+    topic: Topic,
+) -> None:
     rng = random.Random(topic.name)
     plain = msgspec.msgpack.decode((GOLDEN / file_name(topic, ".msgpack")).read_bytes())
 
-    taken = [judge(topic, msgspec.msgpack.encode(rewritten(plain, rng, 0.1))) for _ in range(ROUNDS)]
+    taken = [
+        judge(topic, msgspec.msgpack.encode(rewritten(plain, rng, 0.1))) for _ in range(ROUNDS)
+    ]
 
     assert False in taken
 
@@ -117,7 +146,9 @@ def test_every_byte_string_up_to_two_bytes_is_refused_or_an_envelope() -> None:
 
 def test_mutated_envelopes_are_refused_or_can_be_said_again() -> None:
     rng = random.Random(7)
-    whole = encode(Envelope("sim", 7, 1, 2**60, 2**60, [("sensory", 10, 20)], [("odometry", "sim", 3)]))
+    whole = encode(
+        Envelope("sim", 7, 1, 2**60, 2**60, [("sensory", 10, 20)], [("odometry", "sim", 3)])
+    )
     for _ in range(ROUNDS * 3):
         try:
             envelope = decode_envelope(mutated(whole, rng))

@@ -8,15 +8,15 @@ import sys
 from pathlib import Path
 
 import pytest
-from reference import Said, drive, graph
 
-from bus.codec import decode
+from cogmap.bus.codec import decode
 from schemas import topics
 from schemas.graph import Delta, Node, Proposal
 from schemas.topics import About, Delivery
+from tests.support.reference import Said, drive, graph
 
 FRAMES = 8
-HERE = Path(__file__).parent
+ROOT = Path(__file__).parents[2]
 BY_WORKER = {topic.name for topic in (topics.TASK, topics.PROPOSAL, topics.COALITIONS)}
 
 
@@ -55,10 +55,11 @@ def test_two_lockstep_drives_of_one_seed_give_the_same_bytes_on_every_topic(firs
 
 
 def test_another_process_with_other_hashes_of_strings_says_the_same(first: Said) -> None:
-    script = "import sys, reference; sys.stdout.buffer.write(b''.join(reference.drive(3)['motor/command']))"
-    path = os.pathsep.join([str(HERE), str(HERE.parents[1])])
-    environment = os.environ | {"PYTHONHASHSEED": "4711", "PYTHONPATH": path}
-    done = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, check=True)
+    script = "import sys; from tests.support import reference; sys.stdout.buffer.write(b''.join(reference.drive(3)['motor/command']))"
+    environment = os.environ | {"PYTHONHASHSEED": "4711", "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-c", script], env=environment, capture_output=True, check=True
+    )
     assert done.stdout == b"".join(first[topics.MOTOR_COMMAND.name][:3])
 
 
@@ -72,7 +73,10 @@ def test_three_workers_give_the_deltas_and_the_graph_of_one_to_the_byte(first: S
     three = drive(FRAMES, workers=3)
     _check_that_all_is_the_same(first, three, frozenset(BY_WORKER))
     proposals = [decode(topics.PROPOSAL, payload) for payload in three[topics.PROPOSAL.name]]
-    shares = [sum(isinstance(p, Proposal) and p.worker == f"codelets-{n}" for p in proposals) for n in (1, 2, 3)]
+    shares = [
+        sum(isinstance(p, Proposal) and p.worker == f"codelets-{n}" for p in proposals)
+        for n in (1, 2, 3)
+    ]
     assert min(shares) > 0
     assert graph(_deltas(three)).digest() == graph(_deltas(first)).digest()
 
@@ -81,7 +85,9 @@ def test_what_three_workers_propose_for_a_task_is_what_one_does(first: Said) -> 
     def proposed(said: Said) -> dict[str, list[Node]]:
         proposals = [decode(topics.PROPOSAL, payload) for payload in said[topics.PROPOSAL.name]]
         return {
-            proposal.task_id: [operation for operation in proposal.operations if isinstance(operation, Node)]
+            proposal.task_id: [
+                operation for operation in proposal.operations if isinstance(operation, Node)
+            ]
             for proposal in proposals
             if isinstance(proposal, Proposal)
         }

@@ -1,4 +1,6 @@
-"""In real time too the workspace is replayed to its bytes: what it refused or dropped is part of what it took in."""
+"""In real time too the workspace is replayed to its bytes: what it refused or dropped is part of
+what it took in.
+"""
 
 from __future__ import annotations
 
@@ -8,21 +10,21 @@ from pathlib import Path
 
 import numpy as np
 
-from bus.codec import Envelope, decode, encode
-from bus.interface import Arrival, Member
-from bus.memory import MemoryBus, MemoryNetwork
-from bus.shell import Shell
-from logs.recorder import Recorder
-from logs.replay import replay_into
-from logs.selection import to_record
+from cogmap.bus.codec import Envelope, decode, encode
+from cogmap.bus.interface import Arrival, Member
+from cogmap.bus.memory import MemoryBus, MemoryNetwork
+from cogmap.recording.recorder import Recorder
+from cogmap.recording.replaying.replay import replay_into
+from cogmap.recording.selection import to_record
+from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.array import Array
 from schemas.base import Message
+from schemas.cognition import Task
 from schemas.graph import Delta, Node, Proposal
-from schemas.mind import Task
 from schemas.process import Clock
 from schemas.sensing import Percepts, SelfMotion
-from services import table
+from services import registry
 
 MS = 1_000_000
 SECTIONS = {"workspace": {"mode": "real_time", "deadline_ms": 180.0, "lease_ms": 120.0}}
@@ -33,14 +35,16 @@ class Session:
 
     def __init__(self, path: Path) -> None:
         network = MemoryNetwork()
-        self.recorder = Recorder(MemoryBus(network), path, to_record(), {"config": json.dumps(SECTIONS)})
+        self.recorder = Recorder(
+            MemoryBus(network), path, to_record(), {"config": json.dumps(SECTIONS)}
+        )
         self.recorder.open()
         self.bus = MemoryBus(network)
         self.tasks: list[Task] = []
         self.deltas: list[Delta] = []
         self.bus.subscribe(topics.TASK, self._keep, lambda name, number: None)
         self.bus.subscribe(topics.DELTA, self._keep, lambda name, number: None)
-        self.shell = Shell(table.build("workspace", SECTIONS), MemoryBus(network), health=False)
+        self.shell = Shell(registry.build("workspace", SECTIONS), MemoryBus(network), health=False)
         self.shell.open()
         self.bus.announce(Member("codelets", "w"))
         self._numbers: Counter[str] = Counter()
@@ -54,16 +58,20 @@ class Session:
 
     def say(self, message: Message) -> None:
         topic = topics.of(message)
-        message.source, message.seq = "everyone", self._numbers[topic.name]
+        message.source = "everyone"
+        message.seq = self._numbers[topic.name]
         self._numbers[topic.name] += 1
         now_ns = 10**9 + sum(self._numbers.values())
-        self.bus.publish(topic, encode(message), Envelope(message.source, message.seq, 1, now_ns, now_ns))
+        self.bus.publish(
+            topic, encode(message), Envelope(message.source, message.seq, 1, now_ns, now_ns)
+        )
         while self.shell.pump():
             pass
 
     def see(self, frame: int) -> Task:
         """A view with the motion up to it; what is asked then."""
-        stamp_ns, since_ns = (frame + 1) * 200 * MS, frame * 200 * MS
+        stamp_ns = (frame + 1) * 200 * MS
+        since_ns = frame * 200 * MS
         motions = Array.of(np.array([[1.0, 0.0, 0.2, 0.1, 0.1]]))
         self.say(SelfMotion(stamp_ns=stamp_ns, frame=frame, since_ns=since_ns, motions=motions))
         road_m = Array.of(np.zeros((0, 2), np.float32))
@@ -72,8 +80,19 @@ class Session:
 
     def answer(self, task: Task, samples: Array) -> None:
         where = {"x_m": 1.0, "y_m": 0.0, "heading_rad": 0.0, "stamp_ns": task.stamp_ns}
-        me = Node(id="self", kind="self", activation=1.0, base_level=1.0, attributes=where, samples=samples)
-        facts = {"task_id": task.task_id, "codelet": task.codelet, "base_version": task.base_version}
+        me = Node(
+            id="self",
+            kind="self",
+            activation=1.0,
+            base_level=1.0,
+            attributes=where,
+            samples=samples,
+        )
+        facts = {
+            "task_id": task.task_id,
+            "codelet": task.codelet,
+            "base_version": task.base_version,
+        }
         self.say(Proposal(stamp_ns=task.stamp_ns, worker="w", operations=[me], **facts))  # type: ignore[arg-type]
 
     def end(self) -> None:
@@ -81,8 +100,11 @@ class Session:
         self.recorder.close()
 
 
-def test_answers_that_came_late_were_dropped_or_were_refused_are_replayed_to_the_same_deltas(tmp_path: Path) -> None:
-    session, samples = Session(tmp_path / "log.mcap"), Array.of(np.zeros((10, 3)))
+def test_answers_that_came_late_were_dropped_or_were_refused_are_replayed_to_the_same_deltas(
+    tmp_path: Path,
+) -> None:
+    session = Session(tmp_path / "log.mcap")
+    samples = Array.of(np.zeros((10, 3)))
     late = session.see(0)
     session.say(Clock(stamp_ns=200 * MS + 181 * MS))
     second = session.see(1)
@@ -95,8 +117,11 @@ def test_answers_that_came_late_were_dropped_or_were_refused_are_replayed_to_the
     session.answer(session.see(3), Array.of(np.zeros(10)))
     session.say(Clock(stamp_ns=800 * MS + 181 * MS))
     session.end()
-    assert [(delta.cycle, delta.phase) for delta in session.deltas if delta.tasks] == [(2, "late"), (3, "localization")]
+    assert [(delta.cycle, delta.phase) for delta in session.deltas if delta.tasks] == [
+        (2, "late"),
+        (3, "localization"),
+    ]
     assert sum(delta.dropped for delta in session.deltas) == 2
-    report = replay_into(tmp_path / "log.mcap", ["workspace"], table.build, processes=1)
+    report = replay_into(tmp_path / "log.mcap", ["workspace"], registry.build, processes=1)
     assert report.same, report.first
     assert report.outcomes[0].same >= len(session.deltas) + len(session.tasks)

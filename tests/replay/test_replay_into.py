@@ -11,18 +11,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bus.codec import Envelope, encode
-from bus.errors import LogError
-from bus.interface import Member
-from bus.journal import Journal
-from bus.memory import MemoryBus, MemoryNetwork
-from bus.module import Module
-from bus.shell import Shell
-from logs.reader import LogReader
-from logs.recorder import Recorder
-from logs.replay import Build, Report, replay_into
-from logs.selection import to_record
-from logs.writer import LogWriter
+from cogmap.bus.codec import Envelope, encode
+from cogmap.bus.interface import Member
+from cogmap.bus.memory import MemoryBus, MemoryNetwork
+from cogmap.errors import LogError
+from cogmap.recording.recorder import Recorder
+from cogmap.recording.replaying.replay import Build, Report, replay_into
+from cogmap.recording.selection import to_record
+from cogmap.recording.storage.reader import LogReader
+from cogmap.recording.storage.writer import LogWriter
+from cogmap.runtime.journal import Journal
+from cogmap.runtime.module import Module
+from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.array import Array
 from schemas.base import Message
@@ -36,7 +36,9 @@ class Mixer:
     """What it says depends on everything it took in, and on the order."""
 
     def __init__(self, start: float, every: int) -> None:
-        self._state, self._taken, self._every = start, 0, every
+        self._state = start
+        self._taken = 0
+        self._every = every
 
     def take(self, message: Message) -> list[Message]:
         self._state = (self._state * 0.7 + message.seq + len(type(message).__name__)) % 1000
@@ -46,7 +48,9 @@ class Mixer:
         range_m = Array.of(np.full((4, 2), self._state, np.float32))
         return [
             RangeScan(stamp_ns=message.stamp_ns, frame=0, bearing_rad=range_m, range_m=range_m),
-            MotorCommand(stamp_ns=message.stamp_ns, left_wheel_rad_s=self._state, right_wheel_rad_s=0.0),
+            MotorCommand(
+                stamp_ns=message.stamp_ns, left_wheel_rad_s=self._state, right_wheel_rad_s=0.0
+            ),
         ]
 
     def begin(self) -> MotorCommand:
@@ -68,8 +72,12 @@ class Mixer:
 def build(name: str, sections: Sections, instance: str) -> Module:
     mixer = Mixer(sections.get(name, {}).get("start", 1.0), sections.get(name, {}).get("every", 3))
     says = (topics.SCAN, topics.MOTOR_COMMAND)
-    module = Module(name, instance).on(topics.ODOMETRY, mixer.take, says).on(topics.CLOCK, mixer.take)
-    module.starts(mixer.begin, {"sim": 1}).journaling(topics.MOTOR_COMMAND, mixer.restore, mixer.condense)
+    module = (
+        Module(name, instance).on(topics.ODOMETRY, mixer.take, says).on(topics.CLOCK, mixer.take)
+    )
+    module.starts(mixer.begin, {"sim": 1}).journaling(
+        topics.MOTOR_COMMAND, mixer.restore, mixer.condense
+    )
     return module.every(10**15, mixer.tick) if sections.get(name, {}).get("timer") else module
 
 
@@ -77,7 +85,8 @@ class Session:
     """Shells around mixers on the in-memory bus, a recorder, and a bus to feed them on."""
 
     def __init__(self, path: Path, sections: Sections | None = None) -> None:
-        self.network, self.sections = MemoryNetwork(), sections or {}
+        self.network = MemoryNetwork()
+        self.sections = sections or {}
         about = {"config": json.dumps(self.sections)}
         self.recorder = Recorder(MemoryBus(self.network), path, to_record(exclude="health"), about)
         self.recorder.open()
@@ -87,7 +96,9 @@ class Session:
         self.now_ns = time.time_ns() + 10**9
 
     def enter(self, instance: str = "mixer", journal: Journal | None = None) -> Shell:
-        shell = Shell(build("mixer", self.sections, instance), MemoryBus(self.network), journal, health=False)
+        shell = Shell(
+            build("mixer", self.sections, instance), MemoryBus(self.network), journal, health=False
+        )
         self.shells[instance] = shell
         shell.open()
         return shell
@@ -120,7 +131,9 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "log.mcap"
 
 
-def record(path: Path, sections: Sections | None = None, instances: Iterable[str] = ("mixer",)) -> None:
+def record(
+    path: Path, sections: Sections | None = None, instances: Iterable[str] = ("mixer",)
+) -> None:
     """Thirty odometry messages, the clock in between; log time runs backwards within each three."""
     session = Session(path, sections)
     for instance in instances:
@@ -159,8 +172,11 @@ def test_every_instance_is_replayed_by_itself(path: Path) -> None:
 
 def test_processes_give_the_same_report_as_one(path: Path) -> None:
     record(path, instances=("mixer-1", "mixer-2"))
-    one, two = replay(path, processes=1), replay(path, processes=2)
-    assert [(o.instance, o.same) for o in one.outcomes] == [(o.instance, o.same) for o in two.outcomes]
+    one = replay(path, processes=1)
+    two = replay(path, processes=2)
+    assert [(o.instance, o.same) for o in one.outcomes] == [
+        (o.instance, o.same) for o in two.outcomes
+    ]
 
 
 def test_the_recorded_configuration_is_used_unless_it_is_overridden(path: Path) -> None:
@@ -185,7 +201,9 @@ def test_what_a_timer_made_a_module_say_is_replayed_with_the_timers_time(path: P
     assert report.outcomes[0].same > 7
 
 
-def test_a_restarted_module_is_replayed_from_what_its_journal_held(path: Path, tmp_path: Path) -> None:
+def test_a_restarted_module_is_replayed_from_what_its_journal_held(
+    path: Path, tmp_path: Path
+) -> None:
     session = Session(path)
     journal = tmp_path / "mixer.journal"
     for life in range(3):
@@ -232,7 +250,9 @@ def _shifted(name: str, sections: Sections, instance: str) -> Module:
     return module
 
 
-def test_the_first_difference_is_told_in_words_with_topic_number_stamp_field_and_both_values(path: Path) -> None:
+def test_the_first_difference_is_told_in_words_with_topic_number_stamp_field_and_both_values(
+    path: Path,
+) -> None:
     record(path)
     report = replay(path, _shifted)
     assert not report.same
@@ -268,12 +288,16 @@ def _refusing(name: str, sections: Sections, instance: str) -> Module:
 
 def test_an_input_that_is_refused_now_is_named(path: Path) -> None:
     record(path)
-    assert replay(path, _refusing).first == "clock: mixer refuses what it took in: ZeroDivisionError: division by zero"
+    assert (
+        replay(path, _refusing).first
+        == "clock: mixer refuses what it took in: ZeroDivisionError: division by zero"
+    )
 
 
 def test_inputs_that_the_log_lacks_are_counted_by_topic(path: Path, tmp_path: Path) -> None:
     record(path)
-    thinner, reader = tmp_path / "thinner.mcap", LogReader(path)
+    thinner = tmp_path / "thinner.mcap"
+    reader = LogReader(path)
     writer = LogWriter(thinner, to_record(), {"config": "{}"})
     for r in reader.records():
         if r.topic is not topics.CLOCK:
@@ -295,7 +319,8 @@ def test_without_envelopes_inputs_are_fed_in_the_order_of_log_time_channel_and_s
         session.say(odometry(seq), 10 * seq)
         session.settle()
     session.end()
-    bare, reader = tmp_path / "bare.mcap", LogReader(path)
+    bare = tmp_path / "bare.mcap"
+    reader = LogReader(path)
     writer = LogWriter(bare, to_record(), {"config": "{}"})
     for r in reader.records():
         writer.write(r.topic, reader.payload(r), None, r.log_time_ns)
@@ -303,7 +328,9 @@ def test_without_envelopes_inputs_are_fed_in_the_order_of_log_time_channel_and_s
     report = replay(bare)
     assert report.same, report.first
     assert report.outcomes[0].same == 27
-    assert report.outcomes[0].notes == ["the log has no envelopes: inputs were fed in the order of the log"]
+    assert report.outcomes[0].notes == [
+        "the log has no envelopes: inputs were fed in the order of the log"
+    ]
 
 
 def test_a_module_that_said_nothing_is_named_with_those_that_did(path: Path) -> None:

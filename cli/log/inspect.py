@@ -1,0 +1,135 @@
+"""`cogmap log info`, `cat`, `diff` and `recover`."""
+
+from __future__ import annotations
+
+import os
+import sys
+from itertools import islice
+from pathlib import Path
+
+import click
+import msgspec
+
+from cli.log import formatting
+from cli.log.progress import bar
+from cli.options import json_option
+from cogmap.errors import MessageError
+from cogmap.recording import diff as differ
+from cogmap.recording import info as informer
+from cogmap.recording import selection
+from cogmap.recording.storage import recover as rescuer
+from cogmap.recording.storage.reader import LogReader, Record
+from schemas.render import to_jsonable, to_text
+
+_CAT_EPILOG = """\b
+Examples:
+  cogmap log cat drive.mcap action/selected
+  cogmap log cat drive.mcap odometry -n 3
+  cogmap log cat drive.mcap --json --full sensory/scan | jq .message.range_m
+"""
+_DIFF_EPILOG = """\b
+Examples:
+  cogmap log diff monday.mcap tuesday.mcap
+  cogmap log diff a.mcap b.mcap workspace/delta
+"""
+_log_argument = click.argument("log", type=click.Path(path_type=Path))
+
+
+@click.command()
+@_log_argument
+@json_option
+def info(log: Path, as_json: bool) -> None:
+    """Say what is in LOG: how long, how big, how much of what from whom, and what lacks."""
+    with bar(f"reading {log.name}") as progress:
+        found = informer.info(log, progress)
+    if as_json:
+        formatting.say_json(found)
+    else:
+        formatting.say_info(found)
+
+
+@click.command(epilog=_CAT_EPILOG)
+@_log_argument
+@click.argument("topics", nargs=-1)
+@click.option("-n", "number", type=click.IntRange(min=1), help="So many messages and no more.")
+@click.option(
+    "--start-offset",
+    type=click.FloatRange(min=0),
+    default=0.0,
+    help="Begin so many seconds into the log.",
+)
+@click.option("--full", is_flag=True, help="Print every value of arrays.")
+@json_option
+def cat(
+    log: Path,
+    topics: tuple[str, ...],
+    number: int | None,
+    start_offset: float,
+    full: bool,
+    as_json: bool,
+) -> None:
+    """Print the messages in LOG, of all topics or of those named. With --json, a line each."""
+    reader = LogReader(log)
+    start_ns = reader.span_ns[0] + int(start_offset * 1e9)
+    chosen = reader.records(selection.named(topics) or None)
+    records = islice((record for record in chosen if record.log_time_ns >= start_ns), number)
+    try:
+        for record in records:
+            click.echo(_one_line(reader, record, full) if as_json else _lines(reader, record, full))
+    except BrokenPipeError:  # whoever read it has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+@click.command(epilog=_DIFF_EPILOG)
+@click.argument("left", type=click.Path(path_type=Path))
+@click.argument("right", type=click.Path(path_type=Path))
+@click.argument("topics", nargs=-1)
+@json_option
+def diff(left: Path, right: Path, topics: tuple[str, ...], as_json: bool) -> None:
+    """Compare what two logs say, message by message, on all topics about the model or on those
+    named.
+
+    Exit code 1, and the first difference in words, where a byte differs. How messages travelled is
+    not compared.
+    """
+    with bar("comparing") as progress:
+        found = differ.diff(left, right, selection.named(topics) or None, progress)
+    if as_json:
+        formatting.say_json(found)
+    else:
+        formatting.say_diff(found)
+    if not found.same:
+        sys.exit(1)
+
+
+@click.command()
+@click.argument("source", metavar="IN", type=click.Path(path_type=Path))
+@click.argument("target", metavar="OUT", type=click.Path(path_type=Path))
+@json_option
+def recover(source: Path, target: Path, as_json: bool) -> None:
+    """Save into OUT what can be read of IN, a log that was cut off or damaged."""
+    with bar(f"recovering {source.name}") as progress:
+        recovery = rescuer.recover(source, target, progress)
+    if as_json:
+        formatting.say_json(recovery)
+    else:
+        formatting.say_recovery(recovery)
+
+
+def _one_line(reader: LogReader, record: Record, full: bool) -> str:
+    facts = {"topic": record.topic_name, "log_time_ns": record.log_time_ns}
+    if record.envelope is not None:
+        facts["envelope"] = to_jsonable(record.envelope)
+    try:
+        facts["message"] = to_jsonable(reader.message(record), full)
+    except MessageError as error:
+        facts["error"] = str(error)
+    return msgspec.json.encode(facts).decode()
+
+
+def _lines(reader: LogReader, record: Record, full: bool) -> str:
+    head = f"--- {record.topic_name} at {(record.log_time_ns - reader.span_ns[0]) / 1e9:.3f} s"
+    try:
+        return f"{head}\n{to_text(reader.message(record), full)}"
+    except MessageError as error:
+        return f"{head}\n# {error}"

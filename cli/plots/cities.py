@@ -1,0 +1,207 @@
+"""Figure 8 of the paper, from our own runs: errors of all maps, and true and learned streets side
+by side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+
+from cli.plots.paint import STYLE
+from cli.plots.palette import (
+    ESTIMATE,
+    FAINT,
+    INK,
+    KERB,
+    OBJECT,
+    PAPER,
+    SEVERAL,
+    STREET,
+    TRUE,
+    WHEELS,
+)
+from experiments.city_maps import published
+from experiments.city_maps.drive import SENSING
+from experiments.city_maps.figures import NAMES
+from experiments.city_maps.measure import FELT, CityMap
+
+SHOWN = {
+    FELT: "path integration alone",
+    "none": "landmarks known again, no loop closed",
+    "positions": "positions corrected (eq. 9)",
+    "heading": "headings too",
+}
+COLOURS = {FELT: FAINT, "none": WHEELS, "positions": SEVERAL[1], "heading": ESTIMATE}
+MOST_SHEETS = 8
+MARGIN_M = 120.0
+SCALE_M = 200.0
+
+
+def figure(maps: Sequence[CityMap], figures: dict[str, Any]) -> Figure:
+    """The sheet: errors on top, below true and learned maps, a column each, of at most MOST_SHEETS
+    of them.
+    """
+    chosen = _spread(maps)
+    columns = max(2, len(chosen))
+    with mpl.rc_context(STYLE):
+        sheet = Figure(
+            figsize=(max(11.0, 2.9 * columns), 12.5), dpi=110, facecolor=PAPER, layout="constrained"
+        )
+        above = sheet.add_gridspec(2, 1, height_ratios=(1, 2.1))
+        top, below = (sheet.add_subfigure(above[row]) for row in (0, 1))
+        top.set_facecolor(PAPER)
+        below.set_facecolor(PAPER)
+        errors, sizes = top.subplots(1, 2, width_ratios=(2.2, 1))
+        _draw_errors(errors, maps)
+        _draw_growth(sizes, maps, figures)
+        panels = below.subplots(3, columns, squeeze=False)
+        for column, each in enumerate(chosen):
+            _draw_maps(panels[:, column].tolist(), each)
+        for panel in panels[:, len(chosen) :].ravel():
+            panel.axis("off")
+        sheet.suptitle(
+            _title(maps, figures), x=0.01, ha="left", color=INK, fontsize=12, fontweight="bold"
+        )
+        sheet.draw_without_rendering()
+    return sheet
+
+
+def _title(maps: Sequence[CityMap], figures: dict[str, Any]) -> str:
+    times = "once" if len(maps[0].learned) == 1 else f"{len(maps[0].learned)} times"
+    return (
+        f"Learned maps of {len(maps)} environments, traversed {times} each, {SENSING}.\n"
+        f"Corrected over uncorrected error: {figures['error_corrected_over_uncorrected']:.2f} with headings, "
+        f"{figures['error_positions_over_uncorrected']:.2f} positions only"
+    )
+
+
+def _spread(maps: Sequence[CityMap]) -> list[CityMap]:
+    """MOST_SHEETS of the maps, from the shortest tour to the longest."""
+    ordered = sorted(maps, key=lambda each: each.environment.tour_m)
+    picks = np.unique(
+        np.linspace(0, len(ordered) - 1, min(MOST_SHEETS, len(ordered))).round().astype(int)
+    )
+    return [ordered[pick] for pick in picks.tolist()]
+
+
+def _draw_errors(axes: Axes, maps: Sequence[CityMap]) -> None:
+    places = np.arange(len(maps))
+    for offset, (method, label) in zip((-0.3, -0.1, 0.1, 0.3), SHOWN.items(), strict=True):
+        axes.bar(
+            places + offset,
+            [each.error_km2(method) for each in maps],
+            0.19,
+            color=COLOURS[method],
+            label=label,
+        )
+    for mean, style, who in (
+        (published.HUMAN_MEAN_KM2, "-", "people"),
+        (published.MODEL_MEAN_KM2, (0, (4, 2)), "the paper's model"),
+    ):
+        axes.axhline(
+            mean,
+            color=TRUE,
+            lw=1.2,
+            ls=style,
+            label=f"{who}, mean {mean:g} km², {published.SOURCE}",
+        )
+    axes.axhspan(
+        max(published.HUMAN_MEAN_KM2 - published.HUMAN_SD_KM2, 0.0),
+        published.HUMAN_MEAN_KM2 + published.HUMAN_SD_KM2,
+        color=KERB,
+        alpha=0.35,
+        lw=0,
+        zorder=0,
+        label=f"people, one SD, {published.SOURCE}",
+    )
+    axes.set_xticks(places, [_name(each) for each in maps], rotation=40, ha="right", fontsize=7.5)
+    axes.set_ylim(0, axes.get_ylim()[1] * 1.45)
+    axes.legend(frameon=False, fontsize=7.5, ncols=2, loc="upper left")
+    axes.set_title(
+        "a   error of each map: sum of squared errors of its 8 buildings", loc="left", fontsize=10
+    )
+    _label(axes, "", "km²")
+
+
+def _draw_growth(axes: Axes, maps: Sequence[CityMap], figures: dict[str, Any]) -> None:
+    length = np.array([each.environment.tour_m / 1e3 for each in maps])
+    for method, name in NAMES.items():
+        error = np.array([each.error_km2(method) for each in maps])
+        slope = figures[f"growth_{name}_km2_per_km"]
+        axes.plot(length, error, "o", ms=5, color=COLOURS[method], mec="white")
+        ends = np.array([length.min(), length.max()])
+        axes.plot(
+            ends,
+            error.mean() + slope * (ends - length.mean()),
+            color=COLOURS[method],
+            label=f"{slope:+.2f}/km",
+        )
+    axes.set_ylim(bottom=0)
+    axes.legend(frameon=False, fontsize=8, title="km² for a km of tour", title_fontsize=8)
+    axes.set_title("b   growth with map size", loc="left", fontsize=10)
+    _label(axes, "tour, km", "km²")
+
+
+def _draw_maps(column: Sequence[Axes], each: CityMap) -> None:
+    """The truth, the map as it was learned, and with its loop closed, of the median traversal."""
+    one = each.typical
+    environment = each.environment
+    tour = np.vstack(environment.legs_m)
+    reach = [tour]
+    _streets(column[0], each)
+    column[0].plot(*tour.T, color=TRUE, lw=1.4)
+    column[0].set_title(f"{_name(each)}, {environment.area_km2:.2f} km²", fontsize=9, color=INK)
+    for axes, method, label in (
+        (column[1], "none", "uncorrected"),
+        (column[2], "heading", "corrected"),
+    ):
+        _streets(axes, each)
+        axes.plot(*one.road_m[method].T, ".", ms=1.2, color=COLOURS[method], alpha=0.5, zorder=2)
+        axes.plot(*one.path_m[method].T, color=COLOURS[method], lw=1.2, zorder=3)
+        axes.plot(*one.buildings_m[method].T, "s", ms=6, color=OBJECT, mec="white", zorder=5)
+        lines = np.stack([environment.buildings_m, one.buildings_m[method]], axis=1)
+        axes.add_collection(
+            LineCollection(list(lines), colors=OBJECT, linewidths=0.8, linestyles="dotted")
+        )
+        axes.set_title(f"{label}: {one.error_km2[method]:.2f} km²", fontsize=9, color=INK)
+        reach.append(one.path_m[method])
+    ends = np.vstack(reach)
+    for axes in column:
+        axes.plot(*environment.buildings_m.T, "s", ms=5, color=TRUE, mec="white", zorder=4)
+        axes.set_xlim(ends[:, 0].min() - MARGIN_M, ends[:, 0].max() + MARGIN_M)
+        axes.set_ylim(ends[:, 1].min() - MARGIN_M, ends[:, 1].max() + MARGIN_M)
+        axes.set_aspect("equal", adjustable="box")
+        axes.set_xticks([])
+        axes.set_yticks([])
+        axes.set_facecolor(PAPER)
+    left, bottom = ends.min(axis=0) - 0.6 * MARGIN_M
+    column[0].plot([left, left + SCALE_M], [bottom, bottom], color=INK, lw=2)
+    column[0].text(
+        left, bottom + 0.1 * MARGIN_M, f"{SCALE_M:g} m", fontsize=7.5, color=INK, va="bottom"
+    )
+
+
+def _streets(axes: Axes, each: CityMap) -> None:
+    streets = each.environment.streets
+    axes.add_collection(
+        LineCollection(
+            list(streets.points_m[streets.pieces]), colors=STREET, linewidths=0.9, zorder=0
+        )
+    )
+
+
+def _name(each: CityMap) -> str:
+    return each.environment.name.replace("_", " ")
+
+
+def _label(axes: Axes, x: str, y: str) -> None:
+    axes.set_xlabel(x, color=FAINT)
+    axes.set_ylabel(y, color=FAINT)
+    axes.tick_params(colors=FAINT, length=3)
+    axes.set_facecolor(PAPER)

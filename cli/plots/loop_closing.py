@@ -1,0 +1,127 @@
+"""Figure 6 of the paper, from our own run: a loop before and after it is closed, and what the
+replay predicts.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+
+from cli.plots.paint import STYLE
+from cli.plots.palette import ESTIMATE, FAINT, INK, OBJECT, PAPER, ROAD, SEVERAL, TRUE, WHEELS
+from experiments.loop_closing.run import SENSING, Loop, Map, Replayed
+
+
+def figure(loops: dict[str, Loop], figures: dict[str, Any]) -> Figure:
+    """The sheet: the map before, right after, and in the end with headings; below, the first
+    replay.
+    """
+    positions = loops["positions"]
+    heading = loops["heading"]
+    with mpl.rc_context(STYLE):
+        sheet = Figure(figsize=(14.0, 9.0), dpi=110, facecolor=PAPER, layout="constrained")
+        parts: Any = sheet.subfigures(2, 1, height_ratios=(1.5, 1))
+        maps, below = parts
+        for part in (maps, below):
+            part.set_facecolor(PAPER)
+        panels = maps.subplots(1, 3, sharex=True, sharey=True)
+        _draw_map(panels[0], positions.before, WHEELS, "a   before")
+        _draw_map(
+            panels[1],
+            positions.after,
+            SEVERAL[1],
+            "b   after the first replay, positions only (eq. 9)",
+        )
+        _draw_map(panels[2], heading.end, ESTIMATE, "c   in the end, headings corrected too")
+        _draw_shifts(panels[1], positions.before, positions.after)
+        maps.legend(
+            *panels[0].get_legend_handles_labels(), frameon=False, ncols=4, loc="outside upper left"
+        )
+        shifts, synapses = below.subplots(1, 2)
+        _draw_replay(shifts, positions.replays[0])
+        _draw_synapses(synapses, positions.replays[0], figures)
+        sheet.suptitle(
+            f"A loop of {len(positions.before.path_m)} places, {SENSING}, wheels as the town's",
+            x=0.01,
+            ha="left",
+            color=INK,
+            fontsize=12,
+        )
+        sheet.draw_without_rendering()
+    return sheet
+
+
+def _draw_map(axes: Axes, drawn: Map, colour: str, title: str) -> None:
+    axes.plot(*drawn.road_m.T, "s", ms=3.0, color=ROAD, alpha=0.4, mew=0, zorder=1, label="road")
+    axes.plot(
+        *drawn.true_path_m.T,
+        color=TRUE,
+        lw=1.0,
+        ls=(0, (4, 2)),
+        zorder=2,
+        label="where the agent was",
+    )
+    axes.plot(
+        *drawn.path_m.T, color=colour, lw=1.8, zorder=3, label="where it takes itself to have been"
+    )
+    lines = np.stack([drawn.true_objects_m, drawn.objects_m], axis=1)
+    axes.add_collection(
+        LineCollection(list(lines), colors=OBJECT, linewidths=0.8, linestyles="dotted")
+    )
+    axes.plot(*drawn.true_objects_m.T, "s", ms=4.5, color=TRUE, mec="white", zorder=4)
+    axes.plot(
+        *drawn.objects_m.T, "s", ms=5.5, color=OBJECT, mec="white", zorder=5, label="buildings"
+    )
+    axes.plot(*drawn.path_m[0], "o", ms=8, color=ROAD, mec="white", zorder=6)
+    axes.plot(*drawn.path_m[-1], "o", ms=8, color=colour, mec="white", zorder=6)
+    axes.set_aspect("equal", adjustable="box")
+    axes.set_title(title, loc="left", fontsize=10)
+    said = f"error: path {drawn.path_error_m:.1f} m, buildings {drawn.object_error_m:.1f} m, end {drawn.end_error_m:.1f} m"
+    _label(axes, said, "m")
+
+
+def _draw_shifts(axes: Axes, before: Map, after: Map) -> None:
+    """From where some places were taken to be, to where they are now."""
+    count = min(len(before.path_m), len(after.path_m))
+    lines = np.stack([before.path_m[:count], after.path_m[:count]], axis=1)[:: max(1, count // 40)]
+    axes.add_collection(LineCollection(list(lines), colors=FAINT, linewidths=0.7, zorder=2))
+
+
+def _draw_replay(axes: Axes, replay: Replayed) -> None:
+    axes.plot(np.arange(len(replay.shifts_m)), replay.shifts_m, color=SEVERAL[1], lw=1.8)
+    axes.set_ylim(bottom=0)
+    axes.set_title(
+        "d   how far each place field shifts, in the order of the replay", loc="left", fontsize=10
+    )
+    _label(axes, "places, from the one met again backwards", "m")
+
+
+def _draw_synapses(axes: Axes, replay: Replayed, figures: dict[str, Any]) -> None:
+    """Pairs of place fields near one another; those brought together from afar lie far outside,
+    near 1.
+    """
+    nearer = replay.nearer_m[replay.close]
+    changes = replay.strength_changes[replay.close]
+    slope = figures["strength_change_per_m_close_pairs"]
+    r = figures["strength_and_shift_correlation_close_pairs"]
+    axes.axline((0.0, 0.0), slope=slope, color=FAINT, lw=1.0, ls=(0, (4, 2)))
+    axes.plot(nearer, changes, ".", ms=5, color=SEVERAL[4], alpha=0.6)
+    title = f"e   predicted change of synapses, fields under {1 / replay.decay_per_m:g} m apart"
+    axes.set_title(f"{title}: {slope:.3f} a metre, r = {r:.2f}", loc="left", fontsize=10)
+    _label(
+        axes,
+        "by how much two place fields come nearer, m",
+        f"change of exp(-{replay.decay_per_m:g} d)",
+    )
+
+
+def _label(axes: Axes, x: str, y: str) -> None:
+    axes.set_xlabel(x, color=FAINT)
+    axes.set_ylabel(y, color=FAINT)
+    axes.tick_params(colors=FAINT, length=3)
+    axes.set_facecolor(PAPER)

@@ -1,0 +1,143 @@
+"""Draws map.png: the town as it is, and as the agent has come to know it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from cli.launch.metrics import Figures
+from cli.launch.observer import Observer
+from cli.plots import map_layers as layers
+from cli.plots import palette
+from cli.plots.palette import ESTIMATE, FAINT, INK, PAPER, TRUE, WHEELS
+from cogmap.graph.graph import Graph
+
+MARGIN_M = 5.0
+
+
+def draw(path: Path, observer: Observer, graph: Graph, figures: Figures) -> None:
+    """Write the map to `path` as a PNG."""
+    with mpl.rc_context(
+        {"font.family": "sans-serif", "font.size": 9, "axes.edgecolor": palette.KERB}
+    ):
+        figure = Figure(figsize=(11, 10), dpi=130, facecolor=PAPER, layout="constrained")
+        axes = figure.add_subplot()
+        axes.set_facecolor(PAPER)
+        layers.draw_town(axes, observer)
+        layers.draw_road(axes, observer, graph)
+        layers.draw_objects(axes, observer, graph)
+        _draw_paths(axes, observer)
+        _dress(axes, observer, figures)
+        figure.savefig(path, facecolor=PAPER)
+
+
+def _draw_paths(axes: Axes, observer: Observer) -> None:
+    axes.plot(*observer.integrated_path_m.T, color=WHEELS, lw=1.6, ls=(0, (4, 2)), zorder=8)
+    axes.plot(
+        *observer.true_path_m.T, color=TRUE, lw=3.2, alpha=0.9, solid_capstyle="round", zorder=9
+    )
+    axes.plot(*observer.estimated_path_m.T, color=ESTIMATE, lw=1.5, zorder=10)
+    if observer.start is not None:
+        axes.plot(
+            observer.start.x_m,
+            observer.start.y_m,
+            "o",
+            ms=9,
+            mfc="white",
+            mec=TRUE,
+            mew=2,
+            zorder=11,
+        )
+
+
+def _dress(axes: Axes, observer: Observer, figures: Figures) -> None:
+    """Limits, scale, title and legend."""
+    town = observer.town
+    corners = [point for street in (town.streets if town else []) for point in street.line_m]
+    for building in town.buildings if town else []:
+        reach_m = max(building.width_m, building.depth_m) / 2
+        corners += [
+            (building.pose.x_m + side * reach_m, building.pose.y_m + side * reach_m)
+            for side in (-1, 1)
+        ]
+    every = np.vstack(
+        [np.array(corners).reshape(-1, 2), observer.true_path_m, observer.integrated_path_m]
+    )
+    if len(every):
+        (west, south), (east, north) = every.min(axis=0) - MARGIN_M, every.max(axis=0) + MARGIN_M
+        axes.set_xlim(west, east)
+        axes.set_ylim(south, north)
+        _draw_scale(axes, west + 2.0, south + 2.0)
+    axes.set_aspect("equal")
+    axes.tick_params(colors=FAINT, length=3)
+    axes.set_xlabel("x, metres east", color=FAINT)
+    axes.set_ylabel("y, metres north", color=FAINT)
+    _title(axes, figures)
+    axes.legend(
+        handles=_legend(),
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.06),
+        ncols=4,
+        frameon=False,
+        fontsize=8.5,
+    )
+
+
+def _draw_scale(axes: Axes, west_m: float, south_m: float, length_m: float = 10.0) -> None:
+    axes.plot(
+        [west_m, west_m + length_m],
+        [south_m, south_m],
+        color=INK,
+        lw=3,
+        solid_capstyle="butt",
+        zorder=12,
+    )
+    axes.text(
+        west_m + length_m / 2, south_m + 0.7, f"{length_m:g} m", ha="center", color=INK, zorder=12
+    )
+
+
+def _title(axes: Axes, figures: Figures) -> None:
+    driven = f"Town {figures.seed}, driven through for {figures.distance_m:.0f} m in {figures.drive_s:.0f} s"
+    learned = f"{figures.objects} buildings and {figures.road_m2:.0f} m² of street learned"
+    errors = (
+        f"position off by {figures.estimate.mean_m:.2f} m on average, "
+        f"{figures.path_integration.mean_m:.2f} m by path integration alone"
+    )
+    axes.set_title(f"{driven}\n\n", loc="left", color=INK, fontsize=14, fontweight="bold")
+    axes.text(
+        0,
+        1.012,
+        f"{learned}\n{errors}",
+        transform=axes.transAxes,
+        color=INK,
+        va="bottom",
+        linespacing=1.5,
+    )
+
+
+def _legend() -> list[Patch | Line2D]:
+    return [
+        Patch(fc=palette.STREET, ec=palette.KERB, label="street"),
+        Patch(fc=palette.HOUSE, ec=palette.WALL, label="building"),
+        Line2D([], [], color=TRUE, lw=3.2, label="true path"),
+        Line2D([], [], color=ESTIMATE, lw=1.5, label="estimated path"),
+        Line2D([], [], color=WHEELS, lw=1.6, ls=(0, (4, 2)), label="path integration alone"),
+        Patch(fc=palette.ROAD, alpha=palette.ROAD_OPACITY, label="learned street"),
+        Line2D(
+            [],
+            [],
+            marker="o",
+            ls="",
+            mfc=palette.OBJECT,
+            mec="white",
+            label="learned building, its samples and 2 SD",
+        ),
+        Line2D([], [], color=palette.OBJECT, lw=1.0, label="its error"),
+    ]

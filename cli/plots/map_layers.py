@@ -1,0 +1,156 @@
+"""The layers of the map: the town as it is, and what the agent has learned of it."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Any
+
+import matplotlib.patheffects as outlines
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.patches import Ellipse, Rectangle
+from matplotlib.transforms import Affine2D, Transform
+
+from cli.launch.metrics import objects, position_m
+from cli.launch.observer import Observer
+from cli.plots.palette import HOUSE, KERB, NAME, OBJECT, ROAD, ROAD_OPACITY, STREET, WALL
+from cogmap.graph.graph import TILE_SIDE, Graph
+from schemas.graph import Node
+from schemas.sensing import Building, Pose
+
+
+def draw_town(axes: Axes, observer: Observer) -> None:
+    if observer.town is None:
+        return
+    for wider_m, colour, order in ((1.0, KERB, 1.0), (0.0, STREET, 1.1)):
+        for street in observer.town.streets:
+            line = np.array(street.line_m)
+            for start, end in pairwise(line):
+                _band(axes, start, end, street.width_m + wider_m, colour, order)
+    for building in observer.town.buildings:
+        _draw_building(axes, building)
+
+
+def _band(
+    axes: Axes,
+    start: npt.NDArray[np.float64],
+    end: npt.NDArray[np.float64],
+    width_m: float,
+    colour: str,
+    order: float,
+) -> None:
+    """A stretch of street, its ends reaching half a width further, so that corners close."""
+    along = end - start
+    length_m = float(np.hypot(*along)) + width_m
+    heading = float(np.arctan2(along[1], along[0]))
+    _box(
+        axes, (start + end) / 2, length_m, width_m, heading, {"facecolor": colour, "zorder": order}
+    )
+
+
+def _box(
+    axes: Axes,
+    middle: npt.NDArray[np.float64],
+    width_m: float,
+    depth_m: float,
+    heading_rad: float,
+    style: dict[str, Any],
+) -> None:
+    turned = (
+        Affine2D().rotate(heading_rad).translate(float(middle[0]), float(middle[1]))
+        + axes.transData
+    )
+    axes.add_patch(
+        Rectangle((-width_m / 2, -depth_m / 2), width_m, depth_m, transform=turned, **style)
+    )
+
+
+def _draw_building(axes: Axes, building: Building) -> None:
+    pose = building.pose
+    style = {"facecolor": HOUSE, "edgecolor": WALL, "linewidth": 0.8, "zorder": 2}
+    _box(
+        axes,
+        np.array([pose.x_m, pose.y_m]),
+        building.width_m,
+        building.depth_m,
+        pose.heading_rad,
+        style,
+    )
+    half_m = abs(building.width_m * math.sin(pose.heading_rad)) + abs(
+        building.depth_m * math.cos(pose.heading_rad)
+    )
+    place = (pose.x_m, pose.y_m - half_m / 2 + 0.6)
+    name = axes.text(
+        *place, building.name.replace("_", " "), ha="center", va="bottom", fontsize=6.5, color=NAME
+    )
+    name.set(zorder=6, path_effects=[outlines.withStroke(linewidth=1.8, foreground=HOUSE)])
+
+
+def _agent_frame(axes: Axes, start: Pose | None) -> Transform:
+    pose = start or Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)
+    return Affine2D().rotate(pose.heading_rad).translate(pose.x_m, pose.y_m) + axes.transData
+
+
+def draw_road(axes: Axes, observer: Observer, graph: Graph) -> None:
+    """The place nodes' road column, cell by cell."""
+    red, green, blue = to_rgb(ROAD)
+    frame = _agent_frame(axes, observer.start)
+    for (x, y), tile in sorted(graph.tiles.items()):
+        road = np.clip(tile.columns["road"].T, 0, 1)
+        image = np.empty((*road.shape, 4))
+        image[..., :3], image[..., 3] = (red, green, blue), ROAD_OPACITY * road
+        west, south = ((n * TILE_SIDE - 0.5) * graph.cell_m for n in (x, y))
+        side_m = TILE_SIDE * graph.cell_m
+        extent = (west, west + side_m, south, south + side_m)
+        axes.imshow(
+            image, extent=extent, origin="lower", interpolation="nearest", transform=frame, zorder=3
+        )
+
+
+def draw_objects(axes: Axes, observer: Observer, graph: Graph) -> None:
+    """Each object node with its samples, twice their standard deviation, and a line to the building
+    of its name.
+    """
+    buildings = (
+        {building.name: building.pose for building in observer.town.buildings}
+        if observer.town
+        else {}
+    )
+    for node in objects(graph):
+        middle = observer.to_world(np.array([position_m(node)]))[0]
+        true = buildings.get(str(node.attributes.get("label", "")))
+        if true is not None:
+            axes.plot(
+                [middle[0], true.x_m],
+                [middle[1], true.y_m],
+                color=OBJECT,
+                lw=1.0,
+                alpha=0.8,
+                zorder=4,
+            )
+        _draw_samples(axes, observer, node)
+        axes.plot(*middle, "o", ms=5, mfc=OBJECT, mec="white", mew=0.8, zorder=7)
+
+
+def _draw_samples(axes: Axes, observer: Observer, node: Node) -> None:
+    if node.samples is None or node.samples.shape[0] < 3:
+        return
+    points = observer.to_world(np.asarray(node.samples.numpy(), np.float64)[:, :2])
+    axes.plot(*points.T, ".", ms=1.6, color=OBJECT, alpha=0.35, zorder=4)
+    spread, directions = np.linalg.eigh(np.cov(points.T))
+    width, height = 4 * np.sqrt(np.maximum(spread, 0))
+    angle = np.degrees(np.arctan2(directions[1, 0], directions[0, 0]))
+    ellipse = Ellipse(
+        points.mean(axis=0).tolist(),
+        width,
+        height,
+        angle=angle,
+        fill=False,
+        ec=OBJECT,
+        lw=1.1,
+        zorder=5,
+    )
+    axes.add_patch(ellipse)

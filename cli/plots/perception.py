@@ -1,0 +1,95 @@
+"""The figure of perception (paper, figure 3): camera image, depth, segments, road, and the ground
+from above.
+"""
+
+from __future__ import annotations
+
+from io import BytesIO
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from cli.plots import ground, paint
+from cli.plots.palette import ESTIMATE, FAINT, INK, KERB, OBJECT, PAPER, ROAD, ROAD_OPACITY
+from cogmap.recording.views import Depth, Image
+from schemas.sensing import Percepts, View
+
+PALER = 0.55
+# Without the time of day in it, the same log gives the same bytes.
+_UNDATED: dict[str, dict[str, Any]] = {".pdf": {"CreationDate": None}}
+MOSAIC: Any = [["camera", "depth", "plan"], ["segments", "road", "plan"]]
+
+
+def figure(
+    view: View, image: Image, depth_m: Depth, percepts: Percepts, title: str, suffix: str
+) -> bytes:
+    """The file, of the kind that `suffix` names."""
+    with mpl.rc_context(paint.STYLE):
+        layout = ConstrainedLayoutEngine(h_pad=0.08, w_pad=0.05)
+        sheet = Figure(figsize=(13, 7.3), dpi=130, facecolor=PAPER, layout=layout)
+        panels = sheet.subplot_mosaic(MOSAIC, width_ratios=[1, 1, 0.92])
+        paint.show(panels["camera"], image)
+        shown = paint.show_depth(panels["depth"], depth_m, view.calibration)
+        paint.add_scale(panels["depth"].inset_axes((1.02, 0.0, 0.035, 0.9)), shown)
+        pale = _paler(image)
+        paint.show(panels["segments"], pale)
+        paint.draw_objects(panels["segments"], percepts.objects, 0.5)
+        paint.show(panels["road"], pale)
+        ground.draw_road_in_image(panels["road"], percepts, view.calibration)
+        ground.draw_plan(panels["plan"], percepts, view.calibration)
+        _dress(sheet, panels, percepts, title)
+        sheet.draw_without_rendering()
+        sheet.set_layout_engine("none")
+        ground.fit_plan(panels["plan"], percepts)
+        paint.name_objects(panels["segments"], percepts.objects, 7.5)
+        ground.name_in_plan(panels["plan"], percepts.objects, 8.5)
+        file = BytesIO()
+        sheet.savefig(file, format=suffix[1:], facecolor=PAPER, metadata=_UNDATED.get(suffix))
+    return file.getvalue()
+
+
+def _paler(image: Image) -> Image:
+    """Greyer and lighter, so that what is drawn over it stands out."""
+    grey = image.mean(axis=2, keepdims=True)
+    return np.asarray(255 - PALER * (255 - (0.75 * grey + 0.25 * image)), np.uint8)
+
+
+def _dress(sheet: Figure, panels: dict[str, Axes], percepts: Percepts, title: str) -> None:
+    """Titles, ticks and the legend."""
+    places = [
+        f", a place seen in frame {match.frame} ({match.score:.2f})" for match in percepts.matches
+    ]
+    captions = {
+        "camera": "camera image" + "".join(places),
+        "depth": "depth",
+        "segments": "segments with names",
+        "road": "road in the image",
+        "plan": "road and objects on the ground",
+    }
+    for letter, (name, caption) in zip("abcde", captions.items(), strict=True):
+        panels[name].set_title(f"{letter}   {caption}", loc="left", color=INK, fontsize=10)
+        if name != "plan":
+            panels[name].set(xticks=[], yticks=[])
+    panels["plan"].tick_params(colors=FAINT, length=3)
+    panels["plan"].set_xlabel("metres right of the robot", color=FAINT)
+    panels["plan"].set_ylabel("metres ahead", color=FAINT)
+    panels["plan"].set_facecolor(PAPER)
+    sheet.suptitle(title, x=0.01, ha="left", color=INK, fontsize=14, fontweight="bold")
+    sheet.legend(handles=_legend(), loc="outside lower left", ncols=4, frameon=False, fontsize=8.5)
+
+
+def _legend() -> list[Patch | Line2D]:
+    return [
+        Patch(fc=KERB, label="depth unknown"),
+        Patch(fc=ROAD, alpha=ROAD_OPACITY, label="road"),
+        Line2D([], [], marker="o", ls="", ms=4, mfc=ESTIMATE, mec="white", label="where it ends"),
+        Line2D(
+            [], [], marker="o", ls="", mfc=OBJECT, mec="white", label="object's centre and 2 SD"
+        ),
+    ]

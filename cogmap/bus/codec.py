@@ -1,0 +1,87 @@
+"""Messages to bytes and back, and the envelope that carries what is not part of a message."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Annotated
+
+import msgspec
+import numpy as np
+
+from cogmap.errors import MessageError
+from schemas.base import Message
+from schemas.topics import Topic
+
+Cause = tuple[str, str, int]
+Stage = tuple[str, int, int]
+
+
+class Envelope(msgspec.Struct, array_like=True):
+    """Facts of transport, beside the message so that its bytes depend on nothing but what it says.
+
+    `born_ns` is the wall time of the sensing, `sent_ns` of the sending; `stages` are the modules
+    passed since, each with nanoseconds of computing and of everything else (encoding, transport,
+    queues). `causes` are the inputs (topic, source, seq) that the sender took in since its previous
+    output: replay feeds them in that order.
+    """
+
+    source: Annotated[str, msgspec.Meta(max_length=200)]
+    seq: int
+    incarnation: int
+    sent_ns: int
+    born_ns: int
+    stages: list[Stage] = []
+    causes: list[Cause] = []
+
+    def follow(self, cause: Envelope, module: str, compute_ns: int) -> None:
+        """Count on from `cause`, the envelope of the message that `module` answers after computing
+        so long.
+        """
+        self.born_ns = cause.born_ns
+        passed_ns = sum(compute + rest for _, compute, rest in cause.stages)
+        rest_ns = self.sent_ns - cause.born_ns - passed_ns - compute_ns
+        self.stages = [*cause.stages, (module, compute_ns, max(0, rest_ns))]
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, np.generic):
+        return value.item()
+    raise NotImplementedError(f"a message cannot hold {type(value).__name__}")
+
+
+_encoder = msgspec.msgpack.Encoder(enc_hook=_plain)
+_envelope_decoder = msgspec.msgpack.Decoder(Envelope)
+
+
+@cache
+def _decoder(kind: type[Message]) -> msgspec.msgpack.Decoder[Message]:
+    return msgspec.msgpack.Decoder(kind)
+
+
+def encode(message: msgspec.Struct) -> bytes:
+    """The msgpack bytes of a message or an envelope."""
+    return _encoder.encode(message)
+
+
+def decode(topic: Topic, payload: bytes | memoryview) -> Message:
+    """The message in `payload`, validated. Raises MessageError naming the topic, what was expected
+    and where.
+    """
+    if len(payload) > topic.max_bytes:
+        raise MessageError(
+            f"{topic.name}: {len(payload)} bytes, at most {topic.max_bytes} are taken"
+        )
+    try:
+        return _decoder(topic.type).decode(payload)
+    except (msgspec.DecodeError, ValueError, OverflowError, RecursionError) as error:
+        raise MessageError(f"{topic.name}: {error}") from error
+
+
+def decode_envelope(data: bytes | memoryview | None) -> Envelope:
+    """The envelope in a Zenoh attachment. Raises MessageError where it is missing or not one."""
+    if data is None:
+        raise MessageError("no envelope")
+    try:
+        return _envelope_decoder.decode(data)
+    except (msgspec.DecodeError, ValueError, OverflowError) as error:
+        raise MessageError(f"envelope: {error}") from error

@@ -1,0 +1,114 @@
+"""The one place that opens a Zenoh session: clients with an explicit endpoint, and the router they
+meet at.
+"""
+
+from __future__ import annotations
+
+import json
+import socket
+
+import zenoh
+
+from cogmap.bus.interface import Member
+from cogmap.errors import NoRouterError, PortInUseError, UsageError
+
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+CONNECT_TIMEOUT_S = 5.0
+LAST_PORT = 65535
+# How long a link that is full holds up the others before it loses a message, which the publisher's
+# cache then mends. Once it has, it loses the next at once until it has room: a subscriber that has
+# stopped costs this long once.
+PATIENCE_US = 100_000
+# A stereo frame is seven batches: where only two find room, a busy machine drops it before it is
+# under way.
+QUEUE_BATCHES = 16
+_QUEUES = ("data_high", "data", "data_low")
+
+
+def ready_key(agent: str, member: Member) -> str:
+    """The key of the liveliness token that says that `member` is ready."""
+    return f"cogmap/{agent}/@ready/{member.module}/{member.instance}"
+
+
+def _config(mode: str, **settings: object) -> zenoh.Config:
+    config = zenoh.Config()
+    settings |= {
+        "mode": mode,
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": False,
+        "transport/shared_memory/enabled": False,
+        "transport/link/tx/queue/size": dict.fromkeys(_QUEUES, QUEUE_BATCHES),
+        "transport/link/tx/queue/congestion_control/drop": {
+            "wait_before_drop": PATIENCE_US,
+            "max_wait_before_drop_fragments": PATIENCE_US,
+        },
+    }
+    for key, value in settings.items():
+        config.insert_json5(key, json.dumps(value))
+    return config
+
+
+def free_endpoint() -> str:
+    """An endpoint on this machine where nothing listens."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+def open_client(endpoint: str, timeout_s: float = CONNECT_TIMEOUT_S) -> zenoh.Session:
+    """A session with the router at `endpoint`. Raises NoRouterError if none answers within
+    `timeout_s`.
+    """
+    _address(endpoint)
+    settings = {
+        "connect/endpoints": [endpoint],
+        "connect/timeout_ms": int(timeout_s * 1000),
+        "connect/exit_on_failure": True,
+        "connect/retry": {
+            "period_init_ms": 50,
+            "period_max_ms": 500,
+            "period_increase_factor": 1.5,
+        },
+    }
+    try:
+        return zenoh.open(_config("client", **settings))
+    except zenoh.ZError:
+        raise NoRouterError(
+            f"no router at {endpoint} within {timeout_s:g} s: start one with `cogmap run` or `cogmap router`, "
+            f"or name its endpoint with --connect"
+        ) from None
+
+
+def check_free(endpoint: str) -> None:
+    """Raise PortInUseError where something listens at `endpoint` already, or nothing can."""
+    host, port = _address(endpoint)
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except OSError as error:
+            raise PortInUseError(
+                f"cannot listen at {endpoint} ({error.strerror}): stop what listens there, "
+                f"or choose another port with --connect tcp/{host}:PORT"
+            ) from None
+
+
+def open_router(endpoint: str) -> zenoh.Session:
+    """A router that listens at `endpoint`. Raises PortInUseError where something else does."""
+    check_free(endpoint)
+    settings = {
+        "listen/endpoints": [endpoint],
+        "adminspace/enabled": True,
+        "adminspace/permissions": {"read": True, "write": False},
+    }
+    return zenoh.open(_config("router", **settings))
+
+
+def _address(endpoint: str) -> tuple[str, int]:
+    protocol, _, address = endpoint.partition("/")
+    host, _, port = address.rpartition(":")
+    if protocol != "tcp" or not host or not port.isdecimal() or int(port) > LAST_PORT:
+        raise UsageError(
+            f"endpoint {endpoint!r}: write it as tcp/HOST:PORT, with a port of at most {LAST_PORT}"
+        )
+    return host.strip("[]"), int(port)

@@ -1,0 +1,182 @@
+"""The Zenoh bus: one session as a client of a router."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from datetime import timedelta
+from typing import Any, Protocol
+
+import zenoh
+from zenoh import ext
+
+from cogmap.bus.codec import Envelope, decode_envelope, encode
+from cogmap.bus.discovery import identify
+from cogmap.bus.interface import CACHED_MESSAGES, Arrival, Job, Member
+from cogmap.bus.session import open_client, ready_key
+from cogmap.errors import MessageError, NoAnswerError
+from schemas.topics import About, Delivery, Topic
+
+# Zenoh delivers on a thread of its own, which at Python's default would wait 5 ms for a module that
+# computes.
+SWITCH_S = 5e-5
+RECOVERY_PERIOD = timedelta(seconds=0.5)
+_LARGE_BYTES = 8 * 2**20
+
+
+class _Closable(Protocol):
+    def undeclare(self) -> None: ...
+
+
+def _priority(topic: Topic) -> zenoh.Priority:
+    """Images and facts about processes give way to what the cycle waits for."""
+    behind = topic.max_bytes > _LARGE_BYTES and topic.delivery is Delivery.LATEST_WINS
+    return (
+        zenoh.Priority.DATA_LOW
+        if behind or topic.about is not About.MODEL
+        else zenoh.Priority.DATA_HIGH
+    )
+
+
+class ZenohBus:
+    """Connects to the router at `endpoint` as `agent`. Raises NoRouterError where none answers in
+    time.
+    """
+
+    def __init__(self, endpoint: str, agent: str) -> None:
+        sys.setswitchinterval(SWITCH_S)
+        self._agent = agent
+        self._session = open_client(endpoint)
+        self._publishers: dict[Topic, Any] = {}
+        self._declared: list[_Closable] = []
+        self._is_named = False
+
+    @property
+    def session(self) -> zenoh.Session:
+        """The session itself, for observers."""
+        return self._session
+
+    def declare(self, topic: Topic) -> None:
+        if topic in self._publishers:
+            return
+        key = topic.key(self._agent)
+        if topic.delivery is Delivery.NEVER_DROP:
+            # Dropped on a congested link, a message is mended from the cache; blocking would stall
+            # every subscriber.
+            self._publishers[topic] = ext.declare_advanced_publisher(
+                self._session,
+                key,
+                congestion_control=zenoh.CongestionControl.DROP,
+                cache=ext.CacheConfig(max_samples=CACHED_MESSAGES),
+                sample_miss_detection=ext.MissDetectionConfig(
+                    heartbeat=None, sporadic_heartbeat=None
+                ),
+                publisher_detection=True,
+                priority=_priority(topic),
+                express=True,
+            )
+        else:
+            self._publishers[topic] = self._session.declare_publisher(
+                key,
+                congestion_control=zenoh.CongestionControl.DROP,
+                priority=_priority(topic),
+                express=True,
+            )
+
+    def publish(self, topic: Topic, payload: bytes, envelope: Envelope) -> None:
+        self._publishers[topic].put(payload, attachment=encode(envelope))
+
+    def subscribe(
+        self,
+        topic: Topic,
+        deliver: Callable[[Arrival], None],
+        on_gap: Callable[[str, int], None],
+        history: int = 0,
+    ) -> None:
+        def receive(sample: zenoh.Sample) -> None:
+            now_ns = time.time_ns()
+            try:
+                envelope = decode_envelope(
+                    None if sample.attachment is None else bytes(sample.attachment)
+                )
+            except MessageError:
+                envelope = None
+            deliver(Arrival(topic, bytes(sample.payload), envelope, now_ns))
+
+        key = topic.key(self._agent)
+        if topic.delivery is not Delivery.NEVER_DROP:
+            self._declared.append(self._session.declare_subscriber(key, receive))
+            return
+        # Heartbeats will not do: they hand a late subscriber the whole cache, and tell nothing
+        # after a lost link.
+        recovery = ext.RecoveryConfig(periodic_queries=RECOVERY_PERIOD, heartbeat=None)  # type: ignore[arg-type]
+        past = ext.HistoryConfig(max_samples=history) if history else None
+        subscriber = ext.declare_advanced_subscriber(
+            self._session, key, receive, history=past, recovery=recovery
+        )
+        self._declared.append(
+            subscriber.sample_miss_listener(lambda miss: on_gap(topic.name, miss.nb))
+        )
+        self._declared.append(subscriber)
+
+    def answer(
+        self, topic: Topic, handler: Callable[[bytes], bytes], enqueue: Callable[[Job], None]
+    ) -> None:
+        def reply(query: zenoh.Query) -> None:
+            with query:
+                try:
+                    answer = handler(b"" if query.payload is None else bytes(query.payload))
+                except (
+                    Exception
+                ) as error:  # it goes back to whoever asked: an empty reply would hide it
+                    query.reply_err(str(error).encode())
+                else:
+                    query.reply(query.key_expr, answer)
+
+        key = topic.key(self._agent)
+        self._declared.append(
+            self._session.declare_queryable(key, lambda query: enqueue(lambda: reply(query)))
+        )
+
+    def query(self, topic: Topic, payload: bytes, timeout_s: float) -> bytes:
+        for reply in self._session.get(topic.key(self._agent), payload=payload, timeout=timeout_s):
+            if reply.ok is not None:
+                return bytes(reply.ok.payload)
+            reason = "" if reply.err is None else bytes(reply.err.payload).decode(errors="replace")
+            raise NoAnswerError(f"{topic.name}: {reason}")
+        raise NoAnswerError(
+            f"nobody answers {topic.name} within {timeout_s:g} s: is the module that does running?"
+        )
+
+    def announce(self, member: Member) -> None:
+        self.identify(member)
+        self._declared.append(
+            self._session.liveliness().declare_token(ready_key(self._agent, member))
+        )
+
+    def identify(self, member: Member) -> None:
+        """Tell observers who this is, without being one of those that others wait for; the first
+        name holds.
+        """
+        if self._is_named:
+            return
+        self._is_named = True
+        self._declared.append(identify(self._session, self._agent, member))
+
+    def watch(self, on_change: Callable[[Member, bool], None]) -> None:
+        def changed(sample: zenoh.Sample) -> None:
+            *_, module, instance = str(sample.key_expr).split("/")
+            on_change(Member(module, instance), sample.kind == zenoh.SampleKind.PUT)
+
+        every = ready_key(self._agent, Member("*", "*"))
+        self._declared.append(
+            self._session.liveliness().declare_subscriber(every, changed, history=True)
+        )
+
+    def close(self) -> None:
+        while self._declared:
+            self._declared.pop().undeclare()
+        while self._publishers:
+            self._publishers.popitem()[1].undeclare()
+        self._session.close()  # type: ignore[no-untyped-call]

@@ -1,0 +1,72 @@
+"""Street graphs as JSON Lines, plain or packed by gzip, bzip2 or xz.
+
+A city a line: `city`, `nodes_lonlat`, and `edges_u_v_len_highway_name_geom`, or `edges` for short,
+each of them [from, to, length_m, highway, name, polyline or null].
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+
+from cogmap.data.lines import wrong_line
+from cogmap.data.packed import lines
+
+SUFFIXES = (".jsonl", ".jsonl.gz", ".jsonl.xz", ".jsonl.bz2")
+Lon = Annotated[float, msgspec.Meta(ge=-180, le=180)]
+Lat = Annotated[float, msgspec.Meta(ge=-90, le=90)]
+
+
+class StreetGraph(msgspec.Struct):
+    """A city's streets: nodes as (longitude, latitude) in degrees, edges between two of them by
+    their numbers.
+    """
+
+    city: str
+    nodes_lonlat: list[tuple[Lon, Lat]]
+    edges: list[list[Any]] = []
+    edges_u_v_len_highway_name_geom: list[list[Any]] = []
+
+    def __post_init__(self) -> None:
+        self.edges = self.edges or self.edges_u_v_len_highway_name_geom
+
+    def line(self, edge: list[Any]) -> list[tuple[float, float]]:
+        """An edge's points in degrees, its ends exactly as the nodes are, whichever way its
+        polyline goes.
+        """
+        start = self.nodes_lonlat[edge[0]]
+        end = self.nodes_lonlat[edge[1]]
+        polyline = edge[5] if len(edge) > 5 and edge[5] else []
+        points = [(float(lon), float(lat)) for lon, lat in polyline]
+        if points and math.dist(points[0], start) > math.dist(points[-1], start):
+            points.reverse()
+        return [start, *points[1:-1], end]
+
+
+def read(path: Path) -> list[StreetGraph]:
+    """Every city in a file. Raises UsageError that names file, line and what was expected there."""
+    numbered = enumerate(lines(path, "street graphs as JSON Lines"), start=1)
+    return [
+        _graph(path, number, line.decode("utf-8", "replace"))
+        for number, line in numbered
+        if line.strip()
+    ]
+
+
+def _graph(path: Path, number: int, line: str) -> StreetGraph:
+    try:
+        graph = msgspec.json.decode(line, type=StreetGraph)
+    except (msgspec.DecodeError, msgspec.ValidationError) as error:
+        raise wrong_line(path, number, line, f"a street graph ({error})") from None
+    count = len(graph.nodes_lonlat)
+    if not graph.edges:
+        raise wrong_line(path, number, line, "a street graph with edges")
+    for edge in graph.edges:
+        if len(edge) < 2 or not all(isinstance(end, int) and 0 <= end < count for end in edge[:2]):
+            raise wrong_line(
+                path, number, str(edge), f"an edge between two of {count} nodes, by their numbers"
+            )
+    return graph

@@ -1,0 +1,114 @@
+"""Writes a log: MCAP in chunks that are finished and flushed often, so that a kill loses only the
+last one.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from mcap.writer import CompressionType, Writer
+
+from cogmap.bus.codec import Envelope, encode
+from cogmap.errors import LogError
+from cogmap.recording.storage import format as layout
+from cogmap.recording.storage.format import EnvelopeRecord
+from schemas.topics import Topic
+
+FLUSH_S = 0.25
+CHUNK_BYTES = 4 * 2**20
+_UNBOUNDED = 2**62
+
+
+class LogWriter:
+    """A log being written at `path`, with a channel for each of `topics` in that order.
+
+    `about` is what the file says of the recording. A chunk ends with a call of `flush`, which
+    `write` makes by itself after CHUNK_BYTES. Every method raises LogError where the disk refuses.
+    """
+
+    def __init__(self, path: Path, topics: Iterable[Topic], about: Mapping[str, str]) -> None:
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = path.open("xb")
+        except FileExistsError:
+            raise LogError(f"{path} exists already: remove it, or name another with -o") from None
+        except OSError as error:
+            raise LogError(f"cannot write {path}: {error.strerror}") from None
+        self.path = path
+        self._writer = Writer(self._file, chunk_size=_UNBOUNDED, compression=CompressionType.LZ4)
+        self._writer.start(layout.PROFILE, layout.software())
+        self.note(layout.RECORDING, about)
+        self._envelopes = self._channel(layout.ENVELOPES, layout.envelope_schema(), {})
+        self._channels = {topic: self._topic_channel(topic) for topic in topics}
+        self._unflushed_bytes = 0
+        self._file.flush()
+
+    def write(
+        self, topic: Topic, payload: bytes | memoryview, envelope: Envelope | None, log_time_ns: int
+    ) -> None:
+        """Add the message that travelled as `payload` on `topic`."""
+        log_time_ns = layout.time_field(log_time_ns)
+        sent_ns = log_time_ns
+        sequence = 0
+        if envelope is not None:
+            sent_ns = layout.time_field(envelope.sent_ns)
+            sequence = layout.sequence_field(envelope.seq)
+            record = encode(EnvelopeRecord.of(topic, envelope))
+            self._writer.add_message(self._envelopes, log_time_ns, record, sent_ns, sequence)
+        self._writer.add_message(
+            self._channels[topic], log_time_ns, bytes(payload), sent_ns, sequence
+        )
+        self._unflushed_bytes += len(payload)
+        if self._unflushed_bytes >= CHUNK_BYTES:
+            self.flush()
+
+    def note(self, name: str, facts: Mapping[str, str]) -> None:
+        """Add a metadata record; it is in the file at once."""
+        with self._on_disk():
+            self._writer.add_metadata(name, dict(facts))
+            self._file.flush()
+
+    def flush(self) -> None:
+        """Finish the chunk: what was written so far survives this process."""
+        with self._on_disk():
+            self._writer.flush()  # type: ignore[no-untyped-call]
+        self._unflushed_bytes = 0
+
+    def close(self) -> None:
+        """Finish the file, with an index at its end."""
+        with self._on_disk():
+            self._writer.finish()  # type: ignore[no-untyped-call]
+            self._file.close()
+
+    @contextmanager
+    def _on_disk(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise LogError(f"cannot go on writing {self.path}: {error.strerror}") from None
+
+    def _topic_channel(self, topic: Topic) -> int:
+        facts = {"delivery": topic.delivery.name, "about": topic.about.name}
+        return self._channel(topic.name, layout.schema_of(topic), facts)
+
+    def _channel(self, name: str, schema: bytes, facts: dict[str, str]) -> int:
+        identifier = self._writer.register_schema(name, layout.SCHEMA_ENCODING, schema)
+        return self._writer.register_channel(name, layout.MESSAGE_ENCODING, identifier, facts)
+
+
+class Pulse:
+    """When to flush next: FLUSH_S after the last time."""
+
+    def __init__(self) -> None:
+        self._next_s = time.monotonic() + FLUSH_S
+
+    def due_in_s(self) -> float:
+        """Seconds until it is time to flush, 0 where it is."""
+        return max(0.0, self._next_s - time.monotonic())
+
+    def reset(self) -> None:
+        """Note that it has just been done."""
+        self._next_s = time.monotonic() + FLUSH_S

@@ -1,0 +1,60 @@
+"""What came and has not been taken in yet."""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter
+from queue import Empty, SimpleQueue
+
+from cogmap.bus.interface import Arrival, Job
+from schemas.topics import Delivery
+
+_Slot = tuple[str, str]
+
+
+class Inbox:
+    """Arrivals in order. Of a LATEST_WINS topic only each source's newest stays, in the place of
+    the one it replaced.
+
+    What was replaced is counted.
+    """
+
+    def __init__(self) -> None:
+        self._waiting: SimpleQueue[Arrival | Job | _Slot] = SimpleQueue()
+        self._newest: dict[_Slot, Arrival] = {}
+        self._replacing = threading.Lock()
+        self.superseded: Counter[str] = Counter()
+
+    def put(self, arrival: Arrival) -> None:
+        """Enqueue; called from the bus's threads."""
+        if arrival.topic.delivery is not Delivery.LATEST_WINS:
+            self._waiting.put(arrival)
+            return
+        slot = (arrival.topic.name, arrival.envelope.source if arrival.envelope else "")
+        with self._replacing:
+            replaced = slot in self._newest
+            self._newest[slot] = arrival
+        if replaced:
+            self.superseded[arrival.topic.name] += 1
+        else:
+            self._waiting.put(slot)
+
+    def call(self, job: Job) -> None:
+        """Enqueue something to do on the module's own thread, between messages."""
+        self._waiting.put(job)
+
+    def take(self, timeout_s: float | None) -> Arrival | Job | None:
+        """The oldest arrival or job; None if there is none within `timeout_s` (None waits for
+        ever).
+        """
+        try:
+            item = self._waiting.get(timeout_s != 0, timeout_s)
+        except Empty:
+            return None
+        if not isinstance(item, tuple):
+            return item
+        with self._replacing:
+            return self._newest.pop(item)
+
+    def __len__(self) -> int:
+        return self._waiting.qsize()

@@ -1,0 +1,81 @@
+"""The one runner of modules: a process with one module in it."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import sys
+import threading
+import time
+from pathlib import Path
+from types import FrameType
+
+from cogmap.bus.session import open_router
+from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.runtime.journal import Journal
+from cogmap.runtime.module import Module
+from cogmap.runtime.shell import Shell
+
+log = logging.getLogger("cogmap")
+IDLE_S = 0.25
+ORPHAN_GRACE_S = 10.0
+
+
+class Stop:
+    """Whether this process has been asked to end: by a signal or, where it is `tied`, by the end of
+    its parent.
+    """
+
+    def __init__(self, tied: bool = False) -> None:
+        self._asked = threading.Event()
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, self._on_signal)
+        if tied:
+            threading.Thread(target=self._watch_parent, daemon=True).start()
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        self._asked.set()
+
+    def _watch_parent(self) -> None:
+        while os.read(
+            sys.stdin.fileno(), 4096
+        ):  # not sys.stdin.read(): its lock would outlive the main thread
+            pass
+        self._asked.set()
+        time.sleep(ORPHAN_GRACE_S)
+        os._exit(1)  # it hangs, and nobody is left to end it
+
+    @property
+    def asked(self) -> bool:
+        """Whether to end."""
+        return self._asked.is_set()
+
+    def wait(self, timeout_s: float | None = None) -> bool:
+        """Wait until asked; False after `timeout_s`."""
+        return self._asked.wait(timeout_s)
+
+
+def run_module(module: Module, endpoint: str, agent: str, state: Path | None, stop: Stop) -> None:
+    """Run `module` until `stop` is asked. Raises NoRouterError; `state` is the folder of its
+    journal.
+    """
+    journal = (
+        Journal(state / f"{module.instance}.journal")
+        if state is not None and module.journal
+        else None
+    )
+    shell = Shell(module, ZenohBus(endpoint, agent), journal)
+    shell.open()
+    log.info("%s is ready", module.instance)
+    while not stop.asked:
+        shell.pump(IDLE_S)
+    shell.close()
+
+
+def run_router(endpoint: str, stop: Stop) -> None:
+    """Run a router until `stop` is asked. Raises PortInUseError."""
+    session = open_router(endpoint)
+    log.info("router listens at %s", endpoint)
+    stop.wait()
+    session.close()  # type: ignore[no-untyped-call]

@@ -1,0 +1,219 @@
+"""The shell around a module: takes messages off a bus, lets the module think, sends what it says."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Iterable
+
+from cogmap.bus.codec import Cause, Envelope, decode, encode
+from cogmap.bus.interface import CACHED_MESSAGES, Arrival, Bus, Member
+from cogmap.errors import MessageError
+from cogmap.runtime.health import Meter
+from cogmap.runtime.inbox import Inbox
+from cogmap.runtime.intake import Intake
+from cogmap.runtime.journal import Journal
+from cogmap.runtime.module import Module, Reply
+from cogmap.runtime.timers import Timers
+from schemas import topics
+from schemas.base import Message
+from schemas.process import Presence
+
+log = logging.getLogger("cogmap")
+HEALTH_PERIOD_NS = 1_000_000_000
+MANY_CAUSES = 1000
+MANY_JOURNEYS = 32
+START = "@start"
+TIMER = "@timer"
+
+
+class Shell:
+    """Runs `module` on `bus`. `open()` it, then `pump()` it from one thread; `close()` ends it."""
+
+    def __init__(
+        self, module: Module, bus: Bus, journal: Journal | None = None, health: bool = True
+    ) -> None:
+        self.module, self.bus, self.inbox, self.intake = module, bus, Inbox(), Intake()
+        self.meter = Meter(module)
+        self._journal = journal
+        self._health = health
+        self._incarnation = time.time_ns()
+        self._causes: list[Cause] = []
+        self._journeys: dict[int, Envelope] = {}
+        self._present: set[Member] = set()
+        self._started = module.start is None
+        self._timers = Timers(
+            [(timer.period_ns, self._on_timer(timer.handler)) for timer in module.timers]
+            + ([(HEALTH_PERIOD_NS, self._say_health)] if health else [])
+        )
+
+    def open(self) -> None:
+        """Take up the journal, join the bus, and tell everybody: all that is sent from now on
+        arrives here.
+        """
+        missed: frozenset[topics.Topic] = frozenset()
+        if self._journal is not None and self.module.restore is not None:
+            self.module.restore(self._journal.messages())
+            missed = frozenset() if self._journal.is_empty else self.module.catches_up
+        for topic in sorted(self.module.emits, key=lambda topic: topic.name):
+            self.bus.declare(topic)
+        if self._health:
+            self.bus.declare(topics.HEALTH)
+        for topic in self.module.handlers:
+            if topic is not topics.PRESENCE:
+                history = CACHED_MESSAGES if topic in missed else 0
+                self.bus.subscribe(topic, self.inbox.put, self.intake.lose, history)
+        for request in self.module.answers:
+            self.bus.answer(request, self._answerer(request), self.inbox.call)
+        self.bus.announce(Member(self.module.name, self.module.instance))
+        if self.module.awaits or topics.PRESENCE in self.module.handlers:
+            self.bus.watch(
+                lambda member, alive: self.inbox.call(lambda: self._on_presence(member, alive))
+            )
+
+    def pump(self, timeout_s: float | None = 0.0) -> bool:
+        """Do what is due: a timer, or the oldest arrival within `timeout_s`. False if there was
+        nothing.
+        """
+        due_s = self._timers.run_due()
+        wait_s = (
+            due_s if timeout_s is None else timeout_s if due_s is None else min(timeout_s, due_s)
+        )
+        item = self.inbox.take(wait_s)
+        if isinstance(item, Arrival):
+            self._take_in(item)
+        elif item is not None:
+            item()
+        return item is not None
+
+    def say(self, messages: Iterable[Message]) -> None:
+        """Send what the module says of its own accord, numbered."""
+        self._send(messages, None, 0, time.time_ns())
+
+    def close(self) -> None:
+        """Leave the bus."""
+        self.bus.close()
+        if self._journal is not None:
+            self._journal.close()
+
+    def _take_in(self, arrival: Arrival) -> None:
+        started_ns = time.time_ns()
+        message = self.intake.accept(arrival)
+        if message is None or arrival.envelope is None:
+            return
+        self._remember(message.stamp_ns, arrival.envelope)
+        cause = (arrival.topic.name, arrival.envelope.source, arrival.envelope.seq)
+        self._think(lambda: self.module.feed(message), cause, arrival.envelope, started_ns)
+
+    def _remember(self, stamp_ns: int, envelope: Envelope) -> None:
+        """What is said with that stamp follows `envelope`, also where it is said while another
+        message is taken in.
+        """
+        self._journeys.pop(stamp_ns, None)
+        self._journeys[stamp_ns] = envelope
+        if len(self._journeys) > MANY_JOURNEYS:
+            del self._journeys[next(iter(self._journeys))]
+
+    def _think(
+        self, think: Callable[[], list[Message]], cause: Cause, of: Envelope | None, started_ns: int
+    ) -> None:
+        """Let the module think; a message that it cannot make sense of changes nothing but a count."""
+        thinking_ns = time.time_ns()
+        try:
+            messages = think()
+        except MessageError as error:
+            self.intake.reject(cause[0], str(error))
+            return
+        except Exception as error:
+            self.meter.faults += 1
+            self.intake.reject(cause[0], f"{cause[0]}: {type(error).__name__}: {error}")
+            log.debug("fault in %s", self.module.instance, exc_info=True)
+            return
+        done_ns = time.time_ns()
+        if self.module.emits:
+            self._causes.append(cause)
+        if messages:
+            self._send(messages, of, done_ns - thinking_ns, thinking_ns)
+        self.meter.count(done_ns - thinking_ns, time.time_ns() - started_ns)
+
+    def _send(
+        self, messages: Iterable[Message], of: Envelope | None, compute_ns: int, thinking_ns: int
+    ) -> None:
+        """Send `messages`, with what led to them; the journal has them first."""
+        for message in messages:
+            topic = topics.of(message)
+            payload = encode(message)
+            if topic is self.module.journal and self._journal is not None:
+                self._journal.append(message, payload)
+            now_ns = time.time_ns()
+            envelope = Envelope(
+                message.source, message.seq, self._incarnation, now_ns, thinking_ns + compute_ns
+            )
+            cause = None if of is None or topic.sensed else self._journeys.get(message.stamp_ns)
+            if cause is not None:
+                envelope.follow(cause, self.module.name, compute_ns)
+            envelope.causes = self._causes
+            self._causes = []
+            self.bus.publish(topic, payload, envelope)
+            self.meter.emitted[topic.name] += 1
+        if self._journal is not None and self._journal.is_long and self.module.condense is not None:
+            self._journal.condense(self.module.condense())
+
+    def _on_timer(self, handler: Callable[[int], Reply]) -> Callable[[int], None]:
+        def due(now_ns: int) -> None:
+            cause = (TIMER, self.module.instance, now_ns)
+            self._think(lambda: self.module.stamp(handler(now_ns)), cause, None, time.time_ns())
+
+        return due
+
+    def _answerer(self, request: topics.Topic) -> Callable[[bytes], bytes]:
+        _, handler = self.module.answers[request]
+
+        def answer(payload: bytes) -> bytes:
+            try:
+                return encode(handler(decode(request, payload)))
+            except MessageError as error:
+                self.intake.reject(request.name, str(error))
+                raise
+
+        return answer
+
+    def _on_presence(self, member: Member, alive: bool) -> None:
+        (self._present.add if alive else self._present.discard)(member)
+        if topics.PRESENCE in self.module.handlers:
+            presence = Presence(
+                module=member.module,
+                instance=member.instance,
+                alive=alive,
+                observer=self.module.instance,
+            )
+            self.say(self.module.stamp(presence))
+            cause = (topics.PRESENCE.name, presence.source, presence.seq)
+            self._think(lambda: self.module.feed(presence), cause, None, time.time_ns())
+        if not self._started and not self.missing:
+            self._started = True
+            start = self.module.start
+            if start is not None:
+                cause = (START, self.module.instance, 0)
+                self._think(lambda: self.module.stamp(start()), cause, None, time.time_ns())
+
+    @property
+    def missing(self) -> dict[str, int]:
+        """The modules that it waits for, and how many instances of each are not ready yet."""
+        ready = [member.module for member in self._present]
+        lacking = {name: number - ready.count(name) for name, number in self.module.awaits.items()}
+        return {name: number for name, number in lacking.items() if number > 0}
+
+    def _say_health(self, now_ns: int) -> None:
+        health = self.meter.report(self.intake, self.inbox, not self.missing)
+        health.source = self.module.instance
+        health.seq = self.meter.reports - 1
+        sent_ns = time.time_ns()
+        health.stamp_ns = sent_ns
+        envelope = Envelope(health.source, health.seq, self._incarnation, sent_ns, sent_ns)
+        if (
+            len(self._causes) > MANY_CAUSES
+        ):  # whoever says little else would remember all that it ever took in
+            envelope.causes = self._causes
+            self._causes = []
+        self.bus.publish(topics.HEALTH, encode(health), envelope)

@@ -1,0 +1,32 @@
+"""The mind of the participant: the workspace and the codelets that drive the town, as they are."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from cogmap.runtime.module import Module
+from schemas.graph import Snapshot
+from services import registry
+
+# Distances err anew with each look here, so each counts (eq. 1); the room is small, and so are its
+# places.
+SECTIONS: dict[str, dict[str, Any]] = {
+    "workspace": {"mode": "lockstep", "cell_m": 0.25},
+    "codelets": {"views_alike": 1.0},
+}
+WORKER = "codelets-1"
+CYCLES_A_TRIAL = 1000
+
+
+def modules(number: int) -> list[Module]:
+    """Workspace and one worker for trial `number`.
+
+    Codelets draw their samples by the number of the cycle: each trial has cycles of its own, as if
+    others had gone before, or chance would be the same in all.
+    """
+    workspace = registry.build("workspace", SECTIONS, "workspace")
+    if number and workspace.restore is not None:
+        workspace.restore(
+            [Snapshot(version=0, cycle=number * CYCLES_A_TRIAL, nodes=[], links=[], tiles=[])]
+        )
+    return [workspace, registry.build("codelets", SECTIONS, WORKER)]

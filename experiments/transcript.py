@@ -1,0 +1,45 @@
+"""Everything that is said about the model in a run, as bytes: what two runs are compared by."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+from cogmap.bus.codec import encode
+from cogmap.runtime.module import Module
+from schemas import topics
+from schemas.base import Message
+from schemas.topics import About, Delivery, Topic
+
+NAME = "listener"
+# What the model says, and nobody may miss.
+MODEL = tuple(
+    each
+    for each in topics.ALL
+    if each.about is About.MODEL and each.delivery is Delivery.NEVER_DROP
+)
+
+
+class Heard:
+    """Keeps the bytes of the messages on some topics, in the order in which they came on each."""
+
+    def __init__(self, topics: Iterable[Topic]) -> None:
+        self.messages: dict[str, list[bytes]] = {topic.name: [] for topic in topics}
+        self._topics = tuple(topics)
+
+    def module(self) -> Module:
+        """The module `listener`."""
+        module = Module(NAME)
+        for topic in self._topics:
+            module.on(topic, self._keep(topic))
+        return module
+
+    def has_as_many_as(self, other: Heard) -> bool:
+        """Whether it has heard at least as many messages of each topic."""
+        return all(len(self.messages[name]) >= len(there) for name, there in other.messages.items())
+
+    def differs_from(self, other: Heard) -> list[str]:
+        """The topics on which other bytes were heard."""
+        return [name for name, there in other.messages.items() if self.messages[name] != there]
+
+    def _keep(self, topic: Topic) -> Callable[[Message], None]:
+        return lambda message: self.messages[topic.name].append(encode(message))

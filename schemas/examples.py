@@ -1,0 +1,229 @@
+"""One message of every type, always the same: what the golden bytes are made of."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from schemas import cognition, graph, process, sensing
+from schemas.array import Array
+from schemas.base import Message
+
+_STAMP_NS = 1_200_000_000
+
+
+def _ramp(*shape: int, dtype: str) -> Array:
+    """The numbers 0, 1, 2 … in that shape, scaled into [0, 1) where they are floats."""
+    count = int(np.prod(shape))
+    ramp = np.arange(count, dtype=np.float64) / (count if dtype[1] == "f" else 1)
+    return Array.of(ramp.astype(dtype).reshape(shape))
+
+
+def _calibration() -> sensing.Calibration:
+    return sensing.Calibration(
+        width_px=320,
+        height_px=240,
+        fx_px=240.0,
+        fy_px=241.0,
+        cx_px=160.5,
+        cy_px=120.5,
+        baseline_m=0.4,
+        mount_height_m=1.6,
+        mount_forward_m=0.25,
+        right_rotation_rad=(0.001, -0.002, 0.003),
+        left_distortion=(0.1, -0.2, 0.001, 0.002, 0.05),
+        right_distortion=(0.11, -0.21, 0.0, 0.0, 0.06),
+    )
+
+
+def _percept() -> sensing.Percept:
+    return sensing.Percept(
+        label="building-07",
+        activation=0.875,
+        bearing_rad=-0.25,
+        range_m=18.5,
+        bearing_sd_rad=0.01,
+        range_sd_m=0.55,
+        width_m=9.0,
+        height_m=6.5,
+        whole=True,
+        box_px=(12, 34, 56, 78),
+        outline_px=[(12, 34), (68, 34), (68, 112)],
+    )
+
+
+def _node() -> graph.Node:
+    return graph.Node(
+        id="self",
+        kind="self",
+        activation=0.5,
+        base_level=0.125,
+        attributes={"x_m": 1.5, "count": 3, "name": "Häuserzeile", "moving": True},
+        samples=_ramp(4, 3, dtype="<f8"),
+    )
+
+
+def _operations() -> list[graph.Operation]:
+    return [
+        _node(),
+        graph.Link(source="self", target="place:3:-4", kind="at", weight=0.75),
+        _tile(),
+        graph.Links(
+            kind="instance", weights={"percept:07": {"building-07": 1.0, "building-08": 0.25}}
+        ),
+        graph.DropNode(id="building-03"),
+        graph.DropLink(source="self", target="place:2:-4", kind="at"),
+        graph.Activations(
+            ids=["self", "building-07"],
+            values=_ramp(2, dtype="<f4"),
+            base_levels=_ramp(2, dtype="<f4"),
+        ),
+        graph.Cells(column="road", cells=_ramp(3, 2, dtype="<i4"), values=_ramp(3, dtype="<f4")),
+    ]
+
+
+def _tile() -> graph.PlaceTile:
+    columns = {name: _ramp(2, 2, dtype="<f4") for name in ("activation", "road", "traversable")}
+    return graph.PlaceTile(x=-1, y=2, side=2, cell_m=1.5, **columns)
+
+
+def _sensing() -> list[Message]:
+    image = _ramp(2, 3, 3, dtype="|u1")
+    depth = _ramp(2, 3, dtype="<f4")
+    pose = sensing.Pose(x_m=3.5, y_m=-1.25, heading_rad=0.5)
+    street = sensing.Street(name="ring", line_m=[(0.0, 0.0), (60.0, 0.5)], width_m=8.0)
+    house = sensing.Building(name="building-07", pose=pose, width_m=9.0, depth_m=8.0, height_m=6.5)
+    return [
+        sensing.StereoFrame(frame=6, left=image, right=image, calibration=_calibration()),
+        sensing.Odometry(speed_m_s=2.5, turn_rate_rad_s=-0.125, dt_s=0.05),
+        sensing.SelfMotion(frame=6, since_ns=1_000_000_000, motions=_ramp(4, 3, dtype="<f8")),
+        sensing.View(frame=6, image=image, depth_m=depth, calibration=_calibration()),
+        sensing.RangeScan(
+            frame=6, bearing_rad=_ramp(5, dtype="<f4"), range_m=_ramp(5, dtype="<f4")
+        ),
+        sensing.Percepts(
+            frame=6,
+            objects=[_percept()],
+            road_m=_ramp(3, 2, dtype="<f4"),
+            road_boundary_m=_ramp(2, 2, dtype="<f4"),
+            matches=[sensing.PlaceMatch(frame=2, view_ns=400_000_000, score=0.75)],
+        ),
+        sensing.MotorCommand(left_wheel_rad_s=10.5, right_wheel_rad_s=-9.5, halted_by="obstacle"),
+        sensing.TruePose(pose=pose, travelled_m=12.5, progress=0.25),
+        sensing.TrueTown(seed=7, streets=[street], buildings=[house]),
+    ]
+
+
+def _mind() -> list[Message]:
+    coalition = cognition.Coalition(codelet="attention", activation=0.375, content=[_node()])
+    return [
+        graph.Proposal(
+            task_id="6:localization",
+            worker="codelets-2",
+            codelet="localization",
+            base_version=41,
+            operations=_operations(),
+            failure="too few samples",
+        ),
+        graph.Delta(
+            version=42,
+            cycle=6,
+            phase="collect",
+            tasks=["6:localization"],
+            operations=_operations(),
+            dropped=1,
+            refused=["proposal 6:landmark failed: too few samples"],
+        ),
+        graph.Snapshot(
+            version=42,
+            cycle=6,
+            nodes=[_node()],
+            links=[graph.Link(source="self", target="a")],
+            tiles=[_tile()],
+        ),
+        graph.SnapshotRequest(at_least=41),
+        cognition.Task(
+            task_id="6:localization",
+            codelet="localization",
+            worker="codelets-2",
+            attempt=1,
+            cycle=6,
+            base_version=41,
+            nodes=[_node()],
+            percepts=[_percept()],
+            motions=_ramp(4, 3, dtype="<f8"),
+            cell_m=1.5,
+            road_m=_ramp(3, 2, dtype="<f4"),
+            matches=[sensing.PlaceMatch(frame=2, view_ns=400_000_000, score=0.75)],
+            tiles=[_tile()],
+        ),
+        cognition.Coalitions(cycle=6, coalitions=[coalition]),
+        cognition.Competition(
+            cycle=6, contenders={"attention": 0.375, "road": 0.25}, trigger="aggregate"
+        ),
+        cognition.Broadcast(cycle=6, trigger="aggregate", coalition=coalition),
+        cognition.Action(
+            cycle=6,
+            scheme="follow-route",
+            activation=0.5,
+            parameters={"speed_m_s": 3.0, "turn": "left"},
+        ),
+    ]
+
+
+def _process() -> list[Message]:
+    return [
+        process.Clock(rate=0.5),
+        process.Presence(
+            module="codelets", instance="codelets-2", alive=True, observer="workspace"
+        ),
+        process.Health(
+            module="workspace",
+            instance="workspace",
+            ready=True,
+            uptime_s=61.5,
+            received={"epam/percepts": 300},
+            emitted={"workspace/delta": 900},
+            rejected={"epam/percepts": 1},
+            superseded={"camera/stereo": 2},
+            gaps={"odometry": 3},
+            queued=4,
+            busy=0.25,
+            compute_p50_ms=1.5,
+            compute_p99_ms=7.25,
+            memory_mb=96.5,
+            notes=["1 faults: run with --verbose to see them"],
+        ),
+    ]
+
+
+def _learned() -> sensing.Learned:
+    return sensing.Learned(
+        frame=6,
+        objects=[sensing.LearnedObject(label="building-08", embedding=_ramp(4, dtype="<f4"))],
+        views=[sensing.RememberedView(frame=2, view_ns=400_000_000, code=_ramp(4, dtype="|u1"))],
+    )
+
+
+def _replay() -> cognition.Replay:
+    return cognition.Replay(
+        cycle=6,
+        replays=4,
+        closed=["closure:0"],
+        undone=["closure:1"],
+        stamps_ns=_ramp(3, dtype="<i8"),
+        positions_m=_ramp(3, 2, dtype="<f8"),
+        shifts_m=_ramp(3, 2, dtype="<f8"),
+        pairs=_ramp(1, 2, dtype="<i4"),
+        strength_changes=_ramp(1, dtype="<f8"),
+        decay_per_m=0.2,
+    )
+
+
+def samples() -> list[Message]:
+    """A message of every type in the table of topics, every field of it other than its default."""
+    messages = [*_sensing(), *_mind(), *_process(), _learned(), _replay()]
+    for seq, message in enumerate(messages):
+        message.stamp_ns = _STAMP_NS
+        message.seq = seq
+        message.source = "sample"
+    return messages

@@ -1,0 +1,88 @@
+"""The EGL plugin, which draws several times faster than TinyRenderer, where it works."""
+
+from __future__ import annotations
+
+import ctypes
+import importlib.util
+import subprocess
+import sys
+import threading
+from functools import cache
+
+from cogmap.errors import CogmapError
+from services.sim.stdio import pybullet, quiet
+
+_PROBE = """
+import importlib.util, pybullet
+pybullet.connect(pybullet.DIRECT)
+plugin = importlib.util.find_spec("eglRenderer").origin
+raise SystemExit(pybullet.loadPlugin(plugin, "_eglRendererPlugin") < 0)
+"""
+_PROBE_S = 20.0
+
+
+class Egl:
+    """The plugin in one pybullet client.
+
+    Its OpenGL context belongs to the thread that loaded it, and loading another takes that thread
+    from it: a process has one at a time, or pictures would silently show something else.
+    """
+
+    _loaded = False
+
+    def __init__(self, client: int, plugin: int) -> None:
+        self._client = client
+        self._plugin = plugin
+        self._thread = threading.get_ident()
+
+    @classmethod
+    def load(cls, client: int) -> Egl | None:
+        """The plugin, loaded into `client`; None if there is none. Raises CogmapError if one is
+        loaded already.
+        """
+        if cls._loaded:
+            raise CogmapError(
+                "a simulated world is open in this process: close it before opening another"
+            )
+        found = importlib.util.find_spec("eglRenderer")
+        if found is None or found.origin is None:
+            return None
+        with quiet():
+            plugin = int(
+                pybullet.loadPlugin(found.origin, "_eglRendererPlugin", physicsClientId=client)
+            )
+        if plugin < 0:
+            return None
+        cls._loaded = True
+        return cls(client, plugin)
+
+    def check(self) -> None:
+        """Raise CogmapError on another thread than the one that loaded it."""
+        if threading.get_ident() != self._thread:
+            raise CogmapError(
+                "pictures are taken on the thread that opened the simulated world: open it on that one"
+            )
+
+    def unload(self) -> None:
+        """Leave the client without it."""
+        pybullet.unloadPlugin(self._plugin, physicsClientId=self._client)
+        type(self)._loaded = False
+
+
+@cache
+def works() -> bool:
+    """Whether the plugin loads here, tried in a process of its own: where there is no driver, it
+    exits.
+    """
+    try:
+        ctypes.CDLL("libEGL.so.1")
+    except OSError:
+        return False
+    command = [sys.executable, "-c", _PROBE]
+    try:
+        return (
+            subprocess.run(command, capture_output=True, timeout=_PROBE_S, check=False).returncode
+            == 0
+        )
+    except subprocess.TimeoutExpired:
+        return False

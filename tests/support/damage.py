@@ -1,0 +1,78 @@
+"""Ways in which bytes that claim to be a message are none."""
+
+from __future__ import annotations
+
+import math
+import random
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from schemas import topics
+from schemas.export import GOLDEN, file_name
+from schemas.topics import Topic
+
+
+def golden(topic: Topic) -> bytes:
+    return (GOLDEN / file_name(topic, ".msgpack")).read_bytes()
+
+
+def poisoned(value: Any, poison: float) -> Any:
+    """`value` with `poison` in place of its first float, in an array or not; unchanged where it has
+    none.
+    """
+    return _poison(value, poison, [False])
+
+
+def _poison(value: Any, poison: float, done: list[bool]) -> Any:
+    if done[0]:
+        return value
+    if isinstance(value, float):
+        done[0] = True
+        return poison
+    if isinstance(value, list):
+        return [_poison(item, poison, done) for item in value]
+    if isinstance(value, dict) and str(value.get("dtype")).startswith("<f"):
+        done[0] = True
+        values = np.frombuffer(value["data"], value["dtype"]).copy()
+        values[-1] = poison
+        return {**value, "data": values.tobytes()}
+    if isinstance(value, dict):
+        return {key: _poison(item, poison, done) for key, item in value.items()}
+    return value
+
+
+def stretched(value: Any) -> Any:
+    """`value` with every array claiming to be far larger than it is."""
+    if isinstance(value, list):
+        return [stretched(item) for item in value]
+    if isinstance(value, dict):
+        return {
+            key: [2**62, 2**62] if key == "shape" else stretched(item)
+            for key, item in value.items()
+        }
+    return value
+
+
+def damaged(topic: Topic) -> dict[str, bytes]:
+    """Payloads that `topic` must not carry, by what is wrong with them."""
+    whole = golden(topic)
+    plain = msgspec.msgpack.decode(whole)
+    encode = msgspec.msgpack.encode
+    other = topics.MOTOR_COMMAND if topic is not topics.MOTOR_COMMAND else topics.CLOCK
+    payloads = {
+        "random": random.Random(topic.name).randbytes(200),
+        "empty": b"",
+        "truncated": whole[:-3],
+        "wrong type": golden(other) if other is not topics.CLOCK else encode([1, 2, 3]),
+        "a number": encode(7),
+        "NaN": encode(poisoned(plain, math.nan)),
+        "infinity": encode(poisoned(plain, -math.inf)),
+        "stretched arrays": encode(stretched(plain)),
+        "negative number": encode({**plain, "seq": -1}),
+        "huge number": encode({**plain, "stamp_ns": 2**63}),
+        "deep nesting": b"\x91" * 100_000,
+        "huge": whole + bytes(topic.max_bytes),
+    }
+    return {what: payload for what, payload in payloads.items() if payload != whole}

@@ -1,0 +1,186 @@
+"""What the contract tests share: networks of both kinds, peers on them, and ways to wait without
+sleeping.
+"""
+
+from __future__ import annotations
+
+import itertools
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Protocol
+
+import zenoh
+
+from cogmap.bus.codec import Envelope, decode_envelope, encode
+from cogmap.bus.interface import Arrival, Bus, Member
+from cogmap.bus.memory import MemoryBus, MemoryNetwork
+from cogmap.bus.session import free_endpoint, open_client, open_router
+from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.errors import MessageError
+from cogmap.runtime.inbox import Inbox
+from cogmap.runtime.shell import Shell
+from schemas import topics
+from schemas.base import Message
+from schemas.topics import Topic
+
+PATIENCE_S = 20.0
+INCARNATION = 1
+BLOCK = zenoh.CongestionControl.BLOCK
+_numbers = itertools.count()
+
+
+@contextmanager
+def routed() -> Iterator[str]:
+    """The endpoint of a router that is there meanwhile."""
+    address = free_endpoint()
+    router = open_router(address)
+    try:
+        yield address
+    finally:
+        router.close()  # type: ignore[no-untyped-call]
+
+
+class Network(Protocol):
+    """Where the members of one test meet."""
+
+    def join(self) -> Bus: ...
+
+    def put(self, topic: Topic, payload: bytes, attachment: bytes | None) -> None:
+        """Send bytes past every check, as a stranger would."""
+
+    def close(self) -> None: ...
+
+
+class InMemory:
+    def __init__(self) -> None:
+        self.network = MemoryNetwork()
+        self.buses: list[MemoryBus] = []
+
+    def join(self) -> MemoryBus:
+        self.buses.append(MemoryBus(self.network))
+        return self.buses[-1]
+
+    def put(self, topic: Topic, payload: bytes, attachment: bytes | None) -> None:
+        try:
+            envelope = decode_envelope(attachment)
+        except MessageError:
+            envelope = None
+        for deliver, _ in self.network.subscribers.get(topic, ()):
+            deliver(Arrival(topic, payload, envelope, time.time_ns()))
+
+    def close(self) -> None:
+        for bus in self.buses:
+            bus.close()
+
+
+class OverZenoh:
+    def __init__(self, endpoint: str) -> None:
+        self.endpoint, self.agent = endpoint, f"contract{next(_numbers)}"
+        self.buses: list[ZenohBus] = []
+        self.stranger: zenoh.Session | None = None
+
+    def join(self) -> ZenohBus:
+        self.buses.append(ZenohBus(self.endpoint, self.agent))
+        return self.buses[-1]
+
+    def put(self, topic: Topic, payload: bytes, attachment: bytes | None) -> None:
+        self.stranger = self.stranger or open_client(self.endpoint)
+        self.stranger.put(
+            topic.key(self.agent), payload, attachment=attachment, congestion_control=BLOCK
+        )
+
+    def close(self) -> None:
+        for bus in self.buses:
+            bus.close()
+        if self.stranger is not None:
+            self.stranger.close()
+
+
+class Peer:
+    """A member that takes in what it subscribed to only when asked."""
+
+    def __init__(self, bus: Bus, *subscribed: Topic, history: int = 0) -> None:
+        self.bus, self.inbox, self.arrived = bus, Inbox(), 0
+        self._changed = threading.Condition()
+        for topic in subscribed:
+            bus.subscribe(topic, self._deliver, lambda topic, number: None, history)
+
+    def _deliver(self, arrival: Arrival) -> None:
+        self.inbox.put(arrival)
+        with self._changed:
+            self.arrived += 1
+            self._changed.notify_all()
+
+    def wait_for(self, number: int) -> None:
+        """Wait until so many have arrived, taken in or not."""
+        with self._changed:
+            assert self._changed.wait_for(lambda: self.arrived >= number, PATIENCE_S), (
+                f"{self.arrived} of {number}"
+            )
+
+    def take(self, number: int) -> list[Arrival]:
+        """The next `number` arrivals."""
+        taken = [self.inbox.take(PATIENCE_S) for _ in range(number)]
+        assert all(isinstance(arrival, Arrival) for arrival in taken)
+        return [arrival for arrival in taken if isinstance(arrival, Arrival)]
+
+
+def meet(here: Bus, *others: Bus) -> None:
+    """Wait until `here` knows that the others are ready: what it publishes from now on reaches
+    them.
+    """
+    expected = {Member("peer", f"peer{next(_numbers)}") for _ in others}
+    seen = set()
+    done = threading.Event()
+
+    def changed(member: Member, alive: bool) -> None:
+        seen.add(member)
+        if expected <= seen:
+            done.set()
+
+    here.watch(changed)
+    for member, other in zip(sorted(expected), others, strict=True):
+        other.announce(member)
+    assert done.wait(PATIENCE_S)
+
+
+def pump_until(condition: Callable[[], bool], *shells: Shell) -> None:
+    """Let the shells work until `condition` holds."""
+    deadline_s = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < deadline_s, "the condition never held"
+        for shell in shells:
+            shell.pump(0.01)
+
+
+@contextmanager
+def working(shell: Shell) -> Iterator[None]:
+    """Let `shell` work on a thread of its own."""
+    ended = threading.Event()
+
+    def work() -> None:
+        while not ended.is_set():
+            shell.pump(0.01)
+
+    shell.open()
+    thread = threading.Thread(target=work, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+        shell.close()
+
+
+def envelope_of(message: Message, incarnation: int = INCARNATION) -> Envelope:
+    now_ns = time.time_ns()
+    return Envelope(message.source, message.seq, incarnation, now_ns, now_ns)
+
+
+def publish(bus: Bus, *messages: Message, incarnation: int = INCARNATION) -> None:
+    """Publish messages that are numbered already."""
+    for message in messages:
+        bus.publish(topics.of(message), encode(message), envelope_of(message, incarnation))

@@ -1,0 +1,185 @@
+"""The reference: a small drive in lockstep, its log committed, against which every later version is
+held.
+
+`python -m tests.support.reference --update` records it anew, which is how behaviour is changed on
+purpose, and says what has changed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import platform
+import sys
+import tempfile
+from collections import defaultdict
+from collections.abc import Iterable
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from cli.launch.plan import Choices, effective
+from cogmap.bus.interface import Arrival
+from cogmap.bus.memory import MemoryBus
+from cogmap.graph.graph import Graph
+from cogmap.recording.diff import Diff, diff
+from cogmap.recording.recorder import Recorder
+from cogmap.recording.selection import to_record
+from cogmap.recording.storage import format as layout
+from cogmap.recording.storage.reader import LogReader
+from cogmap.runtime.config import Sections
+from cogmap.runtime.in_process import House
+from schemas import topics
+from schemas.graph import Delta
+from schemas.topics import About
+from services import registry
+
+REFERENCE = Path(__file__).parents[1] / "replay" / "reference.mcap"
+FRAMES = 10
+SMALL: Sections = {
+    "sim": {"width_px": 96, "height_px": 72, "egl": False},
+    "workspace": {"first_samples": 40},
+    "codelets": {"samples": 100, "kept_samples": 40, "landmark_samples": 40},
+}
+Said = dict[str, list[bytes]]
+
+
+def sections(seed: int = 1) -> Sections:
+    """The configuration of a small town drive in lockstep."""
+    return effective(SMALL, Choices(seed=seed, lockstep=True), {"sim": 1})
+
+
+def drive(frames: int = FRAMES, seed: int = 1, workers: int = 1, log: Path | None = None) -> Said:
+    """Drive with every module in this process, until so many motor commands were said; log it where
+    `log` is given.
+
+    Returns the bytes of every message of the model and of the truth, by topic.
+    """
+    configured = sections(seed)
+    names = [f"codelets-{number}" for number in range(1, workers + 1)]
+    instances = [(name, name) for name in registry.MODULES if name != "codelets"] + [
+        ("codelets", name) for name in names
+    ]
+    house = House([registry.build(name, configured, instance) for name, instance in instances])
+    said: Said = defaultdict(list)
+    bus = MemoryBus(house.network)
+    for topic in topics.ALL:
+        if topic.about is not About.PROCESS:
+            bus.subscribe(topic, lambda arrival: _keep(said, arrival), lambda name, number: None)
+    recorder = None if log is None else _recorder(MemoryBus(house.network), log, configured)
+    house.run(lambda: len(said[topics.MOTOR_COMMAND.name]) >= frames)
+    house.close()
+    if recorder is not None:
+        recorder.close()
+    return dict(said)
+
+
+def _keep(said: Said, arrival: Arrival) -> None:
+    said[arrival.topic.name].append(bytes(arrival.payload))
+
+
+def _recorder(bus: MemoryBus, log: Path, configured: Sections) -> Recorder:
+    about = {"config": json.dumps(configured), "arithmetic": json.dumps(arithmetic())}
+    recorder = Recorder(bus, log, to_record(), about)
+    recorder.open()
+    return recorder
+
+
+def graph(deltas: Iterable[Delta]) -> Graph:
+    """The graph that `deltas` make, which are all there were."""
+    made = Graph()
+    for delta in deltas:
+        if not made.apply(delta):
+            raise ValueError(f"delta {delta.version} follows version {made.version}")
+    return made
+
+
+@cache
+def arithmetic() -> dict[str, str]:
+    """All that decides how the libraries round: they choose their code by the processor, and may
+    differ in a last bit.
+
+    numpy, OpenCV and BLAS each have variants of a function for each generation of processors; sines
+    and exponentials come from the C library, which has variants too.
+    """
+    found = np.show_config(mode="dicts")["SIMD Extensions"]
+    return {
+        "machine": platform.machine(),
+        "processor": _processor(),
+        "code of opencv": cv2.getCPUFeaturesLine(),
+        "code of numpy": " ".join([*found["baseline"], *found.get("found", [])]),
+        "libc": " ".join(platform.libc_ver()),
+        **{name: version(name) for name in ("numpy", "opencv-python-headless", "pybullet")},
+    }
+
+
+def _processor() -> str:
+    """Vendor, family and model, by which BLAS chooses."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor()
+    facts = dict(line.replace("\t", "").split(":", 1) for line in lines if ":" in line)
+    return " ".join(facts.get(name, "").strip() for name in ("vendor_id", "cpu family", "model"))
+
+
+def other_arithmetic(log: Path = REFERENCE) -> str:
+    """What this machine rounds differently with than the one that recorded `log`; empty where
+    nothing.
+    """
+    recorded = json.loads(LogReader(log).about(layout.RECORDING)["arithmetic"])
+    here = arithmetic()
+    differing = [
+        f"{name} {here.get(name)!r}, there {recorded.get(name)!r}"
+        for name in here | recorded
+        if here.get(name) != recorded.get(name)
+    ]
+    return "; ".join(differing)
+
+
+def compared(left: Path, right: Path) -> Diff:
+    """How two drives compare, the truth included."""
+    return diff(left, right, [topic for topic in topics.ALL if topic.about is not About.PROCESS])
+
+
+def update() -> Diff | None:
+    """Record the reference anew; how it compares with the old one, None where there was none."""
+    with tempfile.TemporaryDirectory() as folder:
+        fresh = Path(folder) / "recorded anew"
+        drive(log=fresh)
+        changed = compared(REFERENCE, fresh) if REFERENCE.exists() else None
+        if changed is None or not changed.same or other_arithmetic():
+            REFERENCE.write_bytes(fresh.read_bytes())
+    return changed
+
+
+def in_words(changed: Diff | None) -> str:
+    """What an update has changed."""
+    if changed is None:
+        return f"{REFERENCE.name} is new"
+    if changed.same:
+        return f"every message in {REFERENCE.name} is as it was"
+    lines = [
+        f"{topic.topic}: {topic.same} the same, {topic.different} changed, {topic.left_only} gone, "
+        f"{topic.right_only} new\n  {topic.first}"
+        for topic in changed.topics
+        if topic.first
+    ]
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """The command."""
+    parser = argparse.ArgumentParser(prog="python -m tests.support.reference", description=__doc__)
+    parser.add_argument(
+        "--update", action="store_true", required=True, help="record it anew and say what changed"
+    )
+    parser.parse_args()
+    sys.stdout.write(f"{in_words(update())}\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,34 @@
+"""Rendered towns as sensory memory sees them."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+
+from schemas.array import Array
+from schemas.sensing import Calibration, View
+from services.sensory.disparity import DepthFromStereo
+from services.sensory.rectify import rectification
+from training.rendering.towns import Views
+
+PERIOD_NS = 200_000_000
+
+
+def seen(views: Views) -> list[View]:
+    """The views of a town, one every 200 ms."""
+    calibration = msgspec.json.decode(views["calibration"].tobytes(), type=Calibration)
+    rectified = rectification(calibration)
+    matcher = DepthFromStereo(rectified.calibration, 2.5)
+    result = []
+    for number, pair in enumerate(zip(views["left"], views["right"], strict=True)):
+        left, right = rectified.apply(*(np.asarray(image, np.uint8) for image in pair))
+        result.append(
+            View(
+                stamp_ns=(number + 1) * PERIOD_NS,
+                frame=number,
+                image=Array.of(left),
+                depth_m=Array.of(matcher.depth_m(left, right)),
+                calibration=rectified.calibration,
+            )
+        )
+    return result

@@ -1,0 +1,333 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from cogmap.errors import MessageError
+from cogmap.runtime.module import Module
+from schemas.array import Array
+from schemas.base import Message
+from schemas.cognition import Action, Broadcast, Coalition, Competition
+from schemas.graph import Delta, Node
+from schemas.sensing import MotorCommand, Pose, RangeScan
+from services.action.module import Config, build
+from services.action.motor import SensoryMotorMemory, obstacle_ahead_m
+from services.action.route import Route
+from services.action.selection import FOLLOW_ROUTE, HALT, ActionSelection, Scheme
+
+PERIOD_NS = 200_000_000
+QUARTER = math.pi / 2
+
+
+def _nodes(**activations: float) -> list[Node]:
+    return [
+        Node(id=kind, kind=kind, activation=activation) for kind, activation in activations.items()
+    ]
+
+
+def _scan(*obstacles: tuple[float, float], cycle: int = 1) -> RangeScan:
+    bearing_rad, range_m = np.array(obstacles, np.float32).reshape(-1, 2).T
+    return RangeScan(
+        stamp_ns=cycle * PERIOD_NS,
+        frame=cycle,
+        bearing_rad=Array.of(bearing_rad),
+        range_m=Array.of(range_m),
+    )
+
+
+# Procedural memory and action selection
+
+
+def test_a_schemes_activation_is_its_mean_context_and_its_mean_salience_at_most_one() -> None:
+    scheme = Scheme("s", context=("a", "b"), adding={"c": 0.2, "d": -0.4})
+    assert scheme.activation({"a": 0.3, "b": 0.1}) == pytest.approx(0.2 + 0.3)
+    assert scheme.activation({"a": 1.0, "b": 1.0}) == 1.0
+
+
+def test_a_scheme_of_whose_context_a_part_is_missing_is_not_active_at_all() -> None:
+    assert Scheme("s", context=("a", "b"), adding={"c": 1.0}).activation({"a": 1.0}) == 0.0
+
+
+def test_the_threshold_falls_by_a_tenth_with_each_attempt_that_selects_none_until_one_does() -> (
+    None
+):
+    selection = ActionSelection(Config())
+    route = {"route_ahead": 0.5}
+    attempts = [selection.select(_nodes(self=0.4), route) for _ in range(10)]
+    chosen = [number for number, attempt in enumerate(attempts) if attempt is not None]
+    assert chosen == [3, 7]  # 0.45 + 0.2 is under 0.9, 0.8 and 0.7, and not under 0.6
+
+
+def test_a_scheme_less_active_than_is_instantiated_is_never_selected() -> None:
+    selection = ActionSelection(Config(instantiation=0.8))
+    assert [selection.select(_nodes(self=0.4), {"route_ahead": 0.5}) for _ in range(20)] == [
+        None
+    ] * 20
+
+
+def test_following_the_route_needs_an_agent_that_knows_where_it_is() -> None:
+    selection = ActionSelection(Config(selection_threshold=0.0))
+    assert selection.select(_nodes(object=1.0), {"route_ahead": 1.0, "route_end": 0.0}) is None
+
+
+def test_the_end_of_the_route_calls_for_a_halt() -> None:
+    chosen = ActionSelection(Config()).select(
+        _nodes(self=1.0), {"route_ahead": 0.0, "route_end": 1.0}
+    )
+    assert chosen is not None
+    assert chosen[0].name == HALT
+
+
+# Sensory-motor memory
+
+
+def _command(
+    pose: Pose, clear_m: float = math.inf, legs: tuple[tuple[float, float], ...] = ((50.0, 0.0),)
+) -> MotorCommand:
+    config = Config()
+    route = Route([*legs], config.corner_radius_m, config.overrun_m)
+    for x_m in np.arange(0.0, pose.x_m, 1.0):
+        route.advance(x_m, 0.0)
+    motor = SensoryMotorMemory(config, route)
+    return motor.command(7, pose, clear_m, moving=True)
+
+
+def _at(x_m: float = 0.0, y_m: float = 0.0, heading_rad: float = 0.0) -> Pose:
+    return Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad)
+
+
+def test_on_the_line_and_along_it_both_wheels_turn_at_cruising_speed() -> None:
+    command = _command(_at(5.0))
+    config = Config()
+    assert (
+        command.left_wheel_rad_s
+        == command.right_wheel_rad_s
+        == config.cruise_m_s / config.wheel_radius_m
+    )
+    assert (command.halted_by, command.stamp_ns) == ("", 7)
+
+
+@pytest.mark.parametrize("pose", [_at(5.0, 1.0), _at(5.0, 0.0, 0.3), _at(5.0, 0.5, 2 * math.pi)])
+def test_left_of_the_line_or_headed_left_of_it_the_robot_turns_right(pose: Pose) -> None:
+    command = _command(pose)
+    assert command.left_wheel_rad_s > command.right_wheel_rad_s
+
+
+@pytest.mark.parametrize(
+    "pose", [_at(5.0, -1.0), _at(5.0, 0.0, -0.3), _at(5.0, -0.5, -4 * math.pi)]
+)
+def test_right_of_the_line_or_headed_right_of_it_the_robot_turns_left(pose: Pose) -> None:
+    command = _command(pose)
+    assert command.left_wheel_rad_s < command.right_wheel_rad_s
+
+
+def test_a_robot_that_looks_backwards_turns_slowly_on_the_spot_almost() -> None:
+    command = _command(_at(5.0, 0.0, 3.0))
+    mean_m_s = (command.left_wheel_rad_s + command.right_wheel_rad_s) / 2 * Config().wheel_radius_m
+    assert mean_m_s == pytest.approx(0.5)
+    assert command.left_wheel_rad_s > command.right_wheel_rad_s
+
+
+def test_the_arc_of_pure_pursuit_leads_through_the_point_ahead() -> None:
+    config = Config()
+    command = _command(_at(10.0, 1.0))
+    speed_m_s = (command.left_wheel_rad_s + command.right_wheel_rad_s) / 2 * config.wheel_radius_m
+    turn_rad_s = (
+        (command.right_wheel_rad_s - command.left_wheel_rad_s)
+        * config.wheel_radius_m
+        / config.track_m
+    )
+    radius_m = speed_m_s / turn_rad_s
+    centre = (10.0, 1.0 + radius_m)
+    assert math.dist(centre, (10.0 + config.lookahead_m, 0.0)) == pytest.approx(
+        abs(radius_m), rel=1e-6
+    )
+
+
+def test_the_robot_slows_down_before_a_bend_for_the_sake_of_lateral_acceleration() -> None:
+    legs = ((50.0, QUARTER), (50.0, 0.0))
+    speeds = [_driven(_command(_at(x_m), legs=legs)) for x_m in (10.0, 49.0)]
+    assert speeds[0] == Config().cruise_m_s
+    assert speeds[1] < math.sqrt(Config().lateral_m_s2 * 3.5) + 0.1
+
+
+def _driven(command: MotorCommand) -> float:
+    return (command.left_wheel_rad_s + command.right_wheel_rad_s) / 2 * Config().wheel_radius_m
+
+
+def test_the_robot_slows_down_before_an_obstacle_and_stops_at_its_clearance() -> None:
+    speeds = [_driven(_command(_at(5.0), clear_m)) for clear_m in (20.0, 4.0, 2.0)]
+    assert speeds == sorted(speeds, reverse=True)
+    assert speeds[0] == Config().cruise_m_s
+    assert speeds[2] == pytest.approx(math.sqrt(2 * 2.5 * 0.5))
+    stopped = _command(_at(5.0), 1.5)
+    assert (stopped.left_wheel_rad_s, stopped.right_wheel_rad_s, stopped.halted_by) == (
+        0.0,
+        0.0,
+        "obstacle",
+    )
+
+
+def test_what_stands_beside_the_way_behind_it_or_alone_is_no_obstacle() -> None:
+    assert obstacle_ahead_m(_scan((0.0, 8.0), (0.05, 8.2)), 0.7) == pytest.approx(8.2, abs=0.05)
+    assert obstacle_ahead_m(_scan((0.0, 8.0)), 0.7) == math.inf
+    assert obstacle_ahead_m(_scan((0.5, 8.0), (0.55, 8.0)), 0.7) == math.inf
+    assert obstacle_ahead_m(_scan((3.1, 8.0), (3.14, 8.0)), 0.7) == math.inf
+    assert obstacle_ahead_m(_scan((0.0, 0.0), (0.05, 0.0)), 0.7) == math.inf
+
+
+def test_a_scan_whose_bearings_and_ranges_do_not_pair_is_refused() -> None:
+    scan = _scan((0.0, 8.0), (0.1, 8.0))
+    scan.range_m = Array.of(np.ones(3, np.float32))
+    with pytest.raises(MessageError, match="2,\\) bearings and \\(3"):
+        obstacle_ahead_m(scan, 0.7)
+
+
+# The module
+
+
+def _module(
+    mode: str = "real_time", route: tuple[tuple[float, float], ...] = ((20.0, 0.0),)
+) -> Module:
+    return build(Config(mode=mode, route=[*route]), "action")  # type: ignore[arg-type]
+
+
+def _delta(cycle: int = 1, x_m: float = 0.0, phase: str = "localization") -> Delta:
+    attributes = {"x_m": x_m, "y_m": 0.0, "heading_rad": 0.0, "stamp_ns": cycle * PERIOD_NS}
+    me = Node(id="self", kind="self", activation=1.0, attributes=attributes)
+    return Delta(
+        stamp_ns=cycle * PERIOD_NS,
+        version=cycle,
+        cycle=cycle,
+        phase=phase,
+        tasks=[],
+        operations=[me],
+    )
+
+
+def _broadcast(cycle: int = 1) -> Broadcast:
+    coalition = Coalition(codelet="whereabouts", activation=0.5, content=_nodes(self=1.0))
+    return Broadcast(stamp_ns=cycle * PERIOD_NS, cycle=cycle, trigger="t", coalition=coalition)
+
+
+def _competition(cycle: int = 1, trigger: str = "") -> Competition:
+    return Competition(stamp_ns=cycle * PERIOD_NS, cycle=cycle, contenders={}, trigger=trigger)
+
+
+def _commands(said: list[Message]) -> list[MotorCommand]:
+    return [message for message in said if isinstance(message, MotorCommand)]
+
+
+def test_before_any_broadcast_the_robot_does_not_move() -> None:
+    (command,) = _commands(_module().feed(_delta()))
+    assert (command.left_wheel_rad_s, command.halted_by) == (0.0, "no action")
+
+
+def test_a_broadcast_selects_an_action_and_the_next_pose_moves_the_robot() -> None:
+    module = _module()
+    (action,) = module.feed(_broadcast())
+    assert isinstance(action, Action)
+    assert (action.scheme, action.cycle) == (FOLLOW_ROUTE, 1)
+    assert action.parameters == {"leg": 0, "length_m": 20.0, "turn_rad": 0.0, "travelled_m": 0.0}
+    (command,) = _commands(module.feed(_delta()))
+    assert command.left_wheel_rad_s > 0
+    assert command.stamp_ns == PERIOD_NS
+
+
+def test_at_the_end_of_the_route_a_broadcast_halts_the_robot() -> None:
+    module = _module(route=((3.0, 0.0),))
+    module.feed(_broadcast())
+    for cycle in range(1, 20):
+        module.feed(_delta(cycle, 0.5 * cycle))
+    (action,) = module.feed(_broadcast(20))
+    assert isinstance(action, Action)
+    assert action.scheme == HALT
+    (command,) = _commands(module.feed(_delta(20, 9.0)))
+    assert (command.left_wheel_rad_s, command.right_wheel_rad_s, command.halted_by) == (
+        0.0,
+        0.0,
+        "no action",
+    )
+
+
+def test_without_a_route_the_robot_is_halted_for_want_of_one() -> None:
+    module = _module(route=())
+    module.feed(_broadcast())
+    assert [command.halted_by for command in _commands(module.feed(_delta()))] == ["no route"]
+
+
+def test_an_obstacle_in_the_scan_halts_the_robot_until_it_has_gone() -> None:
+    module = _module()
+    module.feed(_broadcast())
+    module.feed(_scan((0.0, 1.2), (0.05, 1.2)))
+    assert [command.halted_by for command in _commands(module.feed(_delta(1)))] == ["obstacle"]
+    module.feed(_scan(cycle=2))
+    assert [command.halted_by for command in _commands(module.feed(_delta(2)))] == [""]
+
+
+@pytest.mark.parametrize("phase", ["percepts", "objects", "decay"])
+def test_deltas_that_tell_of_no_new_pose_bring_no_command(phase: str) -> None:
+    assert _module().feed(_delta(phase=phase)) == []
+
+
+def test_a_pose_that_was_committed_late_brings_a_command_too() -> None:
+    assert len(_commands(_module().feed(_delta(phase="late")))) == 1
+
+
+def test_in_lockstep_the_command_waits_for_the_views_scan_and_for_the_competition_of_the_cycle_before() -> (
+    None
+):
+    inputs = {"delta": _delta(2), "scan": _scan(cycle=2), "competition": _competition(1)}
+    for last, last_message in inputs.items():
+        module = _module("lockstep")
+        for name, message in inputs.items():
+            if name != last:
+                assert module.feed(message) == []
+        assert len(_commands(module.feed(last_message))) == 1
+
+
+def test_in_lockstep_the_command_waits_for_the_broadcast_that_the_competition_tells_of() -> None:
+    module = _module("lockstep")
+    module.feed(_scan(cycle=2))
+    module.feed(_competition(1, "no broadcast for long"))
+    assert module.feed(_delta(2)) == []
+    action, command = module.feed(_broadcast(1))
+    assert isinstance(action, Action)
+    assert isinstance(command, MotorCommand)
+    assert command.left_wheel_rad_s > 0
+
+
+def test_in_lockstep_the_first_cycle_waits_for_no_competition() -> None:
+    module = _module("lockstep")
+    module.feed(_scan())
+    assert len(_commands(module.feed(_delta(1)))) == 1
+
+
+def test_each_pose_brings_one_command() -> None:
+    module = _module("lockstep")
+    said = [
+        module.feed(message)
+        for message in (_scan(), _delta(1), _scan(), _competition(1), _competition(1))
+    ]
+    assert [len(_commands(messages)) for messages in said] == [0, 1, 0, 0, 0]
+
+
+def test_an_action_module_that_was_killed_goes_on_along_the_route_from_its_last_action() -> None:
+    legs = ((20.0, 0.0), (20.0, 0.0))
+    before = _module(route=legs)
+    after = _module(route=legs)
+    said = before.feed(_broadcast())
+    for cycle in range(1, 13):
+        said += before.feed(_delta(cycle, 2.0 * cycle))
+    said += before.feed(_broadcast(12))
+    assert before.condense is not None
+    assert after.restore is not None
+    assert before.condense() == said[-1]
+    after.restore([message for message in said if isinstance(message, Action)])
+    (command,) = _commands(after.feed(_delta(13, 25.0)))
+    assert command.left_wheel_rad_s > 0
+    (action,) = after.feed(_broadcast(14))
+    assert isinstance(action, Action)
+    assert action.parameters == {"leg": 1, "length_m": 20.0, "turn_rad": 0.0, "travelled_m": 25.0}

@@ -1,0 +1,95 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.map_correction import reference
+from benchmarks.map_correction.measure import measure, read_graph, trajectory_error_m
+from cogmap.errors import UsageError
+from services.codelets.correction.pose_graph import cost
+from services.codelets.correction.reverse_replay import close_loops, displacements, position_cost
+
+SQUARE = """VERTEX_SE2 0 0 0 0
+VERTEX_SE2 1 1 0 1.5
+VERTEX_SE2 2 1 1 3.1
+VERTEX_SE2 3 0 1 -1.6
+VERTEX_SE2 4 0.2 0.1 0
+EDGE_SE2 0 1 1 0 1.5 100 0 0 100 0 100
+EDGE_SE2 1 2 1 0 1.6 100 0 0 100 0 100
+EDGE_SE2 2 3 1 0 1.6 100 0 0 100 0 100
+EDGE_SE2 3 4 1 0 1.6 100 0 0 100 0 100
+EDGE_SE2 0 4 0 0 0 100 0 0 100 0 100
+EDGE_SE2 0 3 0 1 -1.57 100 0 0 100 0 100
+"""
+
+
+def _square(folder: Path, without: str = "") -> Path:
+    path = folder / "square.g2o"
+    path.write_text("".join(f"{line}\n" for line in SQUARE.splitlines() if line != without))
+    return path
+
+
+def test_an_error_does_not_depend_on_where_the_frame_is_but_on_its_scale() -> None:
+    truth = np.random.default_rng(0).normal(0.0, 10.0, (50, 2))
+    turned = truth @ np.array([[0.6, 0.8], [-0.8, 0.6]]) + (3.0, -5.0)
+    assert trajectory_error_m(turned, truth) == pytest.approx(0.0, abs=1e-9)
+    assert trajectory_error_m(truth * (-1, 1), truth) > 5.0
+    assert trajectory_error_m(1.1 * truth, truth) > 0.5
+
+
+def test_a_graph_is_measured_against_exact_least_squares_and_gtsam(tmp_path: Path) -> None:
+    pytest.importorskip("gtsam")
+    truth = tmp_path / "truth.txt"
+    truth.write_text("0 0 0\n1 0 1.57\n1 1 3.14\n0 1 -1.57\n0 0 0\n")
+    figures = measure(_square(tmp_path), truth)
+    assert figures["positions_cost_ratio"] <= 1.05
+    assert figures["ate_m"] < figures["ate_uncorrected_m"]
+    assert figures["ate_vs_gtsam"] == pytest.approx(1.0, abs=0.02)
+    assert figures["incremental_closures"] == 1.0
+
+
+def test_where_gtsam_gives_up_at_once_it_is_held_against_by_its_slower_factors(
+    tmp_path: Path,
+) -> None:
+    pytest.importorskip("gtsam")
+    path = tmp_path / "certain.g2o"
+    path.write_text(SQUARE.replace("100 0 0 100 0 100", "1e20 0 0 1e20 0 1e-3"))
+    graph = read_graph(path)
+    peer = reference.Gtsam(graph.poses, graph.constraints)
+    assert peer.gives_up() and not peer.gives_up()
+    assert cost(peer.poses(peer.solve()), graph.constraints) < cost(graph.poses, graph.constraints)
+
+
+def test_the_best_positions_are_exact_where_a_loop_is_certain(tmp_path: Path) -> None:
+    path = tmp_path / "certain.g2o"
+    path.write_text(
+        SQUARE.replace("EDGE_SE2 0 4 0 0 0 100 0 0 100", "EDGE_SE2 0 4 0 0 0 1e15 0 0 1e15")
+    )
+    graph = read_graph(path)
+    known = displacements(graph.poses, graph.constraints)
+    exact = position_cost(reference.best_positions(graph), graph.constraints, known)
+    assert position_cost(
+        close_loops(graph, 1e-9).positions_m, graph.constraints, known
+    ) >= exact * (1 - 1e-9)
+
+
+def test_without_gtsam_the_remedy_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reference, "gtsam", None)
+    with pytest.raises(UsageError, match="run make bench-setup"):
+        measure(_square(tmp_path), None)
+
+
+def test_a_file_of_another_kind_or_a_path_with_a_gap_is_said_so(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"none of \.g2o, \.graph, \.toro"):
+        read_graph(tmp_path / "a.csv")
+    with pytest.raises(UsageError, match="from pose 2 to the next"):
+        read_graph(_square(tmp_path, without="EDGE_SE2 2 3 1 0 1.6 100 0 0 100 0 100"))
+
+
+def test_a_truth_of_another_length_is_refused(tmp_path: Path) -> None:
+    truth = tmp_path / "truth.txt"
+    truth.write_text("0 0 0\n")
+    with pytest.raises(UsageError, match="has 1 poses"):
+        measure(_square(tmp_path), truth)

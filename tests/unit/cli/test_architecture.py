@@ -1,0 +1,80 @@
+"""docs/architecture.md says what the topic table and the modules say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from cli.architecture import architecture, diagram, renewed, topic_table
+from cogmap.errors import CogmapError, UsageError
+from cogmap.runtime.module import Module
+from schemas import topics
+from schemas.topics import About
+
+PAGE = Path(__file__).parents[3] / "docs" / "architecture.md"
+
+
+def _modules() -> list[Module]:
+    camera = Module("camera", emits={topics.STEREO, topics.ODOMETRY})
+    memory = (
+        Module("memory", emits={topics.VIEW}).on(topics.STEREO, print).on(topics.ODOMETRY, print)
+    )
+    return [camera, memory.answering(topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, print)]  # type: ignore[arg-type]
+
+
+def test_the_page_is_what_the_code_says() -> None:
+    assert renewed(PAGE.read_text()) == PAGE.read_text(), "write it anew with `cogmap architecture`"
+
+
+def test_modules_are_boxes_and_topics_are_arrows_by_their_delivery() -> None:
+    drawn = diagram(_modules())
+    assert '    camera["camera"]\n' in drawn
+    assert '    camera -->|"camera/stereo"| memory\n' in drawn
+    assert '    camera ==>|"odometry"| memory\n' in drawn
+    assert '    memory -->|"sensory/view"| observers\n' in drawn
+    assert '    observers -.->|"workspace/snapshot_request"| memory\n' in drawn
+
+
+def test_the_table_has_a_row_for_each_topic() -> None:
+    rows = topic_table(_modules()).splitlines()[2:]
+    assert [row.split("`")[1] for row in rows] == [topic.name for topic in topics.ALL]
+    assert (
+        "| `camera/stereo` | StereoFrame | 5 Hz | latest wins | model | camera | memory |" in rows
+    )
+
+
+def test_the_page_shows_no_arrow_of_the_truth_into_a_module() -> None:
+    truth = [topic.name for topic in topics.ALL if topic.about is About.TRUTH]
+    arrows = [
+        line
+        for line in PAGE.read_text().splitlines()
+        if "|" in line and any(name in line for name in truth)
+    ]
+    assert arrows
+    assert all(line.rstrip(" |").endswith("observers") for line in arrows)
+
+
+def test_a_page_that_is_out_of_date_fails_the_check_and_is_mended_without_it(
+    tmp_path: Path,
+) -> None:
+    page = tmp_path / "page.md"
+    page.write_text(PAGE.read_text().replace("sensory/view", "sensory/sight"))
+    run = CliRunner().invoke(architecture, ["--check", str(page)])
+    assert isinstance(run.exception, CogmapError)
+    assert "cogmap architecture" in str(run.exception)
+    assert CliRunner().invoke(architecture, [str(page)]).exit_code == 0
+    assert page.read_text() == PAGE.read_text()
+
+
+@pytest.mark.parametrize("text", ["", "<!-- diagram: generated -->\n<!-- end of diagram -->"])
+def test_a_page_without_a_place_for_a_part_is_named(text: str) -> None:
+    with pytest.raises(UsageError, match="has no place for its"):
+        renewed(text)
+
+
+def test_a_page_that_is_not_there_is_named_with_the_remedy(tmp_path: Path) -> None:
+    run = CliRunner().invoke(architecture, [str(tmp_path / "none.md")])
+    assert isinstance(run.exception, UsageError)
+    assert "call this in the sources" in str(run.exception)

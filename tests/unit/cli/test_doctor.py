@@ -1,0 +1,151 @@
+"""What the doctor makes of what it sees."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from cli.doctor import installation
+from cli.doctor.system import Observed, examine
+from cogmap.bus.discovery import Process, Role, System, Use
+from cogmap.bus.interface import Member
+from schemas import topics
+from schemas.process import Health
+from schemas.topics import Topic
+
+SENSORY = Member("sensory", "sensory")
+
+
+def health(at_s: float, **changes: object) -> Health:
+    facts = {
+        "module": "sensory",
+        "instance": "sensory",
+        "ready": True,
+        "uptime_s": at_s,
+        "received": {},
+        "emitted": {"sensory/scan": round(5 * at_s)},
+        "rejected": {},
+        "superseded": {},
+        "gaps": {},
+        "queued": 0,
+        "busy": 0.2,
+        "compute_p50_ms": 1.0,
+        "compute_p99_ms": 2.0,
+        "memory_mb": 50.0,
+    }
+    return Health(**(facts | changes))  # type: ignore[arg-type]
+
+
+def system(role: Role = Role.PUBLISHES, topic: Topic = topics.SCAN) -> System:
+    process = Process("1", SENSORY)
+    return System("agent", (process,), (Use(topic.key("agent"), role, process),))
+
+
+def findings(observed: Observed, on: System | None = None) -> list[str]:
+    return [str(finding) for finding in examine(["sensory"], observed, on or system())]
+
+
+def observed(*reports: Health, clock_rate: float | None = 1.0) -> Observed:
+    return Observed({SENSORY}, {"sensory": list(reports)} if reports else {}, clock_rate)
+
+
+def test_a_system_that_is_well_has_no_findings() -> None:
+    assert findings(observed(health(10), health(11), health(12))) == []
+
+
+def test_a_module_that_is_not_there_is_named() -> None:
+    (finding,) = findings(Observed(set(), {}, 1.0))
+
+    assert finding.startswith("sensory: no instance of it is on the bus")
+
+
+def test_a_module_that_says_nothing_is_named() -> None:
+    (finding,) = findings(observed())
+
+    assert finding.startswith("sensory: it is on the bus but tells nothing")
+
+
+def test_a_module_that_is_not_ready_is_named() -> None:
+    (finding,) = findings(observed(health(10, ready=False), health(12, ready=False)))
+
+    assert finding.startswith("sensory: it is not ready")
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"gaps": {"odometry": 3}}, "sensory: 3 messages of odometry never reached it"),
+        ({"rejected": {"camera/stereo": 2}}, "sensory: it rejected 2 messages of camera/stereo"),
+        ({"notes": ["1 faults"]}, "sensory: 1 faults"),
+    ],
+)
+def test_what_a_module_complains_of_is_said(changes: dict[str, object], sentence: str) -> None:
+    (finding,) = findings(observed(health(10), health(12, **changes)))
+
+    assert finding.startswith(sentence)
+
+
+def test_a_queue_that_grows_is_named_and_one_that_is_worked_off_is_not() -> None:
+    growing = [health(10 + i, queued=queued) for i, queued in enumerate((5, 20, 40))]
+    falling = [health(10 + i, queued=queued) for i, queued in enumerate((5, 40, 20))]
+
+    assert findings(observed(*falling)) == []
+    (finding,) = findings(observed(*growing))
+    assert finding.startswith("sensory: its queue grows, to 40 messages")
+
+
+@pytest.mark.parametrize(
+    ("number", "is_off"), [(8, False), (10, False), (12, False), (6, True), (14, True), (0, True)]
+)
+def test_a_topic_is_named_that_is_off_its_rate_by_more_than_a_third(
+    number: int, is_off: bool
+) -> None:
+    first = health(10, emitted={"sensory/scan": 50})
+    last = health(12, emitted={"sensory/scan": 50 + number})
+
+    found = findings(observed(first, last))
+
+    assert [
+        finding.startswith(f"sensory/scan: {number / 2:.1f} Hz, the table has 5 Hz")
+        for finding in found
+    ] == [True] * is_off
+
+
+def test_rates_mean_nothing_in_lockstep_and_follow_the_clock_otherwise() -> None:
+    slow = [health(10, emitted={"sensory/scan": 0}), health(12, emitted={"sensory/scan": 5})]
+
+    assert findings(observed(*slow, clock_rate=0.0)) == []
+    assert findings(observed(*slow, clock_rate=0.5)) == []
+    assert len(findings(observed(*slow, clock_rate=1.0))) == 1
+
+
+def test_a_module_that_sees_the_truth_is_named() -> None:
+    found = findings(observed(health(10), health(12)), system(Role.SUBSCRIBES, topics.TRUE_POSE))
+
+    assert found == ["sensory: it subscribes to truth/pose: no module may see the truth"]
+
+
+def test_an_old_python_is_named() -> None:
+    assert [str(finding) for finding in installation.python_version((3, 10))] == [
+        "Python: this is 3.10: install Python 3.11 or newer and run `make setup`"
+    ]
+    assert list(installation.python_version((3, 12))) == []
+
+
+def test_a_dependency_that_is_missing_or_of_another_version_is_named() -> None:
+    found = installation.dependencies({"numpy": "0.0.1", "no-such-package-here": "1.0"})
+
+    assert [finding.about for finding in found] == ["numpy", "no-such-package-here"]
+
+
+def test_every_pinned_dependency_of_this_project_is_known() -> None:
+    assert {"eclipse-zenoh", "numpy", "msgspec", "pybullet"} <= set(installation.pins())
+
+
+def test_a_place_for_runs_that_cannot_be_written_to_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+
+    assert list(installation.write_access(tmp_path / "runs")) == []
+    (finding,) = installation.write_access(tmp_path / "file" / "runs")
+    assert "is a file" in finding.wrong

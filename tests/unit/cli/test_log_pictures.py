@@ -1,0 +1,327 @@
+"""Pictures out of logs: a view as it was recorded, its depth, what was recognised in it, and the
+figure of it all.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+import pytest
+from click import UsageError as ClickUsageError
+from click.testing import CliRunner, Result
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
+
+from cli.main import cogmap
+from cli.plots import ground, paint
+from cli.plots.labels import Label, place
+from cli.plots.palette import KERB, SEVERAL
+from cogmap.bus.codec import Envelope, encode
+from cogmap.errors import LogError, UsageError
+from cogmap.recording.storage.format import topics_to_record
+from cogmap.recording.storage.writer import LogWriter
+from schemas import topics
+from schemas.array import Array
+from schemas.base import Message
+from schemas.sensing import Percept, Percepts, StereoFrame, View
+from tests.support.blocks import ASPHALT, CAMERA, GRASS, Block, painted
+
+SECOND_NS = 10**9
+FRAMES = 5
+FIRST = 3
+RECOGNISED = {4: 1, 5: 2, 7: 1}
+REFERENCE = Path(__file__).parents[2] / "replay" / "reference.mcap"
+HOUSE = Block(
+    x_m=12.0, y_m=5.0, turn_rad=0.0, sides_m=(6.0, 6.0), height_m=6.0, colour=(180, 60, 40)
+)
+SCENE, DEPTH_M, _ = painted([HOUSE])
+OUTLINE = [(40, 60), (120, 70), (120, 150), (40, 160)]
+Pixels = npt.NDArray[np.uint8]
+
+
+def shade(frame: int) -> Pixels:
+    """The image of a frame: no two are the same."""
+    return np.asarray(SCENE.astype(int) * (10 + frame) // 20, np.uint8)
+
+
+def percept(number: int) -> Percept:
+    return Percept(
+        label=f"town_hall_{number}",
+        activation=0.9,
+        bearing_rad=0.3 - 0.5 * number,
+        range_m=12.0,
+        bearing_sd_rad=0.02,
+        range_sd_m=0.4,
+        width_m=6.0,
+        height_m=6.0,
+        whole=True,
+        box_px=(40 + 100 * number, 60, 80, 100),
+        outline_px=OUTLINE if number == 0 else [],
+    )
+
+
+def view(frame: int, image: Pixels | None = None) -> View:
+    pixels = Array.of(shade(frame) if image is None else image)
+    return View(
+        stamp_ns=frame, frame=frame, image=pixels, depth_m=Array.of(DEPTH_M), calibration=CAMERA
+    )
+
+
+def answer(frame: int) -> Percepts:
+    road_m = np.array(
+        [(x, y) for x in np.arange(3.2, 14, 0.5) for y in np.arange(-3.7, 4, 0.5)], np.float32
+    )
+    objects = [percept(number) for number in range(RECOGNISED[frame])]
+    ends_m = np.array([(x, side * 4.0) for x in range(5, 14) for side in (-1, 1)], np.float32)
+    return Percepts(
+        stamp_ns=frame,
+        frame=frame,
+        objects=objects,
+        road_m=Array.of(road_m),
+        road_boundary_m=Array.of(ends_m),
+    )
+
+
+def write(path: Path, messages: list[Message]) -> Path:
+    """A log with a message every second."""
+    writer = LogWriter(path, topics_to_record(), {"agent": "a", "config": "{}", "began_ns": "1"})
+    for number, message in enumerate(messages):
+        at_ns = (1 + number) * SECOND_NS
+        writer.write(
+            topics.of(message),
+            encode(message),
+            Envelope(message.source, number, 1, at_ns, at_ns),
+            at_ns,
+        )
+    writer.close()
+    return path
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Views 3 to 7, a second each, of which 4, 5 and 7 have percepts half a second later."""
+    messages: list[Message] = []
+    for frame in range(FIRST, FIRST + FRAMES):
+        right = Array.of(255 - shade(frame))
+        pair = StereoFrame(
+            frame=frame,
+            stamp_ns=frame,
+            left=Array.of(shade(frame)),
+            right=right,
+            calibration=CAMERA,
+        )
+        messages += [view(frame), pair, *([answer(frame)] if frame in RECOGNISED else [])]
+    return write(tmp_path_factory.mktemp("pictures") / "drive.mcap", messages)
+
+
+@pytest.fixture
+def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
+    monkeypatch.chdir(tmp_path)
+
+    def invoke(*arguments: str | Path) -> Result:
+        result = CliRunner().invoke(cogmap, ["log", *map(str, arguments)], standalone_mode=False)
+        if result.exception is not None:
+            raise result.exception
+        return result
+
+    return invoke
+
+
+def read(path: str | Path) -> Pixels:
+    image = cv2.imread(str(path))
+    assert image is not None
+    return np.asarray(image[..., ::-1], np.uint8)
+
+
+def test_an_image_has_the_pixels_of_the_view_one_for_one(
+    run: Callable[..., Result], drive: Path
+) -> None:
+    said = run("image", drive, "--frame", "4").stdout
+    assert said == f"drive-frame-4-view.png: sensory/view, frame 4 at 2.000 s of {drive}\n"
+    assert np.array_equal(read("drive-frame-4-view.png"), shade(4))
+
+
+def test_without_a_choice_it_is_the_view_in_the_middle_and_with_a_time_the_nearest(
+    run: Callable[..., Result], drive: Path
+) -> None:
+    middle = json.loads(run("image", drive, "--json").stdout)
+    assert (middle["frame"], middle["topic"], middle["objects"]) == (5, "sensory/view", None)
+    near = json.loads(run("image", drive, "--json", "--at", "3.2").stdout)
+    assert (near["frame"], near["at_s"], near["stamp_ns"]) == (4, 2.0, 4)
+    assert np.array_equal(read(near["path"]), shade(4))
+
+
+def test_a_camera_is_shown_as_it_gave_its_image(run: Callable[..., Result], drive: Path) -> None:
+    run("image", drive, "--frame", "6", "--camera", "right", "-o", "right.png")
+    assert np.array_equal(read("right.png"), 255 - shade(6))
+    run("image", drive, "--frame", "6", "--camera", "left", "-o", "left.JPG")
+    assert np.abs(read("left.JPG").astype(int) - shade(6)).mean() < 6
+
+
+def test_depth_is_coloured_by_distance_grey_where_unknown_and_has_a_scale(
+    run: Callable[..., Result], drive: Path
+) -> None:
+    run("image", drive, "--frame", "6", "--depth", "-o", "depth.png")
+    shown = read("depth.png")
+    assert shown.shape == (3 * 240, 3 * 320 + paint.SCALE_PX, 3)
+    pixels = shown[1 : 3 * 240 : 3, 1 : 3 * 320 : 3].astype(int)
+    grey = np.round(np.array(to_rgb(KERB)) * 255)
+    assert np.array_equal(np.abs(pixels - grey).max(-1) <= 1, DEPTH_M == 0)
+    rows = pixels[130:, 310]
+    assert len(np.unique(rows, axis=0)) > 50
+    assert (np.diff(rows[:, 1]) >= 0).all()
+    assert np.ptp(shown[:, 3 * 320 :].astype(int)) > 100
+
+
+def test_percepts_are_outlined_where_they_are_and_leave_the_rest_of_the_view(
+    run: Callable[..., Result], drive: Path
+) -> None:
+    facts = json.loads(run("image", drive, "--frame", "5", "--percepts", "--json").stdout)
+    assert facts["objects"] == ["town_hall_0", "town_hall_1"]
+    shown = read(facts["path"])[1::3, 1::3].astype(int)
+    assert shown.shape == (240, 320, 3)
+    for (column, row), colour in (((40, 110), SEVERAL[0]), ((219, 110), SEVERAL[1])):
+        assert np.abs(shown[row, column] - np.array(to_rgb(colour)) * 255).max() < 12
+    changed = np.abs(shown - shade(5)).max(-1) > 1
+    assert changed[75:145, 45:115].all()
+    assert not changed[:, :20].any()
+    assert not changed[165:].any()
+
+
+def test_with_percepts_only_views_that_were_answered_are_chosen(
+    run: Callable[..., Result], drive: Path
+) -> None:
+    assert (
+        json.loads(run("image", drive, "--percepts", "--json", "--at", "7.4").stdout)["frame"] == 5
+    )
+    with pytest.raises(
+        UsageError, match=r"no frame 6 in .*: there are 3, from 4 to 7, and 5 is the nearest"
+    ):
+        run("image", drive, "--percepts", "--frame", "6")
+
+
+def test_the_figure_is_of_the_view_with_the_most_percepts_and_the_same_bytes_each_time(
+    run: Callable[..., Result], drive: Path
+) -> None:
+    facts = json.loads(run("perception", drive, "--json").stdout)
+    assert (facts["path"], facts["frame"]) == ("drive-frame-5-perception.png", 5)
+    assert facts["objects"] == ["town_hall_0", "town_hall_1"]
+    assert read(facts["path"]).shape == (949, 1690, 3)
+    for name in ("first.pdf", "second.pdf"):
+        run("perception", drive, "--frame", "4", "-o", name)
+    assert Path("first.pdf").read_bytes().startswith(b"%PDF")
+    assert Path("first.pdf").read_bytes() == Path("second.pdf").read_bytes()
+
+
+def test_a_view_in_which_nothing_was_recognised_has_a_figure_too(
+    run: Callable[..., Result], tmp_path: Path
+) -> None:
+    empty = Array.of(np.empty((0, 2), np.float32))
+    unknown = view(0)
+    unknown.depth_m = Array.of(np.zeros((240, 320), np.float32))
+    log = write(tmp_path / "empty.mcap", [unknown, Percepts(frame=0, objects=[], road_m=empty)])
+    run("perception", log, "-o", "figure.png")
+    assert read("figure.png").shape == (949, 1690, 3)
+    assert "with nothing recognised" in run("image", log, "--percepts", "--depth").stdout
+
+
+def test_the_reference_drive_has_its_figure(run: Callable[..., Result]) -> None:
+    facts = json.loads(run("perception", REFERENCE, "-o", "reference.png", "--json").stdout)
+    assert facts["objects"]
+
+
+def test_ground_is_laid_into_the_image_where_the_camera_sees_it() -> None:
+    image = painted([])[0].astype(int)
+    ahead = np.arange(4.0, 15.0, 0.5)
+    for y_m, colour in (
+        (0.0, ASPHALT),
+        (3.8, ASPHALT),
+        (-3.8, ASPHALT),
+        (4.2, GRASS),
+        (-4.2, GRASS),
+    ):
+        pixels = np.rint(
+            ground.to_image(np.stack([ahead, np.full_like(ahead, y_m)], axis=1), CAMERA)
+        ).astype(int)
+        column, row = pixels[((pixels >= 0) & (pixels < (320, 240))).all(axis=1)].T
+        assert len(row) > 10
+        assert np.abs(image[row, column] - colour).max() < 20
+
+
+def test_labels_stay_inside_and_hide_none_of_the_others() -> None:
+    axes, boxes = placed([Label(f"number {n}", 9.7, 0.1 * n, "#000000") for n in range(6)])
+    inside = axes.get_window_extent()
+    for number, box in enumerate(boxes):
+        assert inside.x0 <= box.x0 < box.x1 <= inside.x1
+        assert inside.y0 <= box.y0 < box.y1 <= inside.y1
+        assert not any(box.overlaps(other) for other in boxes[:number])
+
+
+def placed(labels: list[Label]) -> tuple[Axes, list[Bbox]]:
+    figure = Figure(figsize=(4, 3))
+    axes = figure.add_axes((0, 0, 1, 1))
+    axes.set(xlim=(0, 10), ylim=(0, 10))
+    place(axes, labels, size=9)
+    canvas = FigureCanvasAgg(figure)
+    return axes, [text.get_window_extent(canvas.get_renderer()) for text in axes.texts]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (
+            ["image", "--frame", "99"],
+            r"no frame 99 in .*: there are 5, from 3 to 7, and 7 is the nearest",
+        ),
+        (["image", "--at", "60"], r"lasts 12.000 s: choose a time before that, not 60 s"),
+        (
+            ["image", "-o", "view.gif"],
+            r"-o view.gif: name a file that ends in .png or .jpg or .jpeg",
+        ),
+        (["perception", "-o", "figure"], r"-o figure: name a file that ends in .png or .pdf"),
+        (["image", "-o", "nowhere/view.png"], r"there is no folder nowhere: make it first"),
+        (
+            ["image", "--frame", "4", "--at", "1"],
+            r"--frame and --at both say which view: leave one out",
+        ),
+        (
+            ["image", "--camera", "left", "--depth"],
+            r"leave --camera out, or --depth and --percepts",
+        ),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_what_is_wrong_is_named_with_the_remedy(
+    run: Callable[..., Result], drive: Path, arguments: list[str], words: str
+) -> None:
+    with pytest.raises((UsageError, ClickUsageError), match=words):
+        run(arguments[0], drive, *arguments[1:])
+    assert not list(Path().iterdir())
+
+
+def test_a_log_without_views_or_percepts_says_how_to_see_what_it_holds(
+    run: Callable[..., Result], tmp_path: Path
+) -> None:
+    with pytest.raises(
+        LogError, match=r"holds no sensory/view: `cogmap log info .*` says what it holds"
+    ):
+        run("image", write(tmp_path / "none.mcap", [answer(4)]))
+    with pytest.raises(LogError, match=r"holds no epam/percepts of any of its 1 frames"):
+        run("perception", write(tmp_path / "views.mcap", [view(4)]))
+
+
+def test_a_view_whose_image_is_none_is_named(run: Callable[..., Result], tmp_path: Path) -> None:
+    log = write(tmp_path / "grey.mcap", [view(4, SCENE[..., 0]), answer(4)])
+    for command in ("image", "perception"):
+        with pytest.raises(
+            LogError, match=r"grey.mcap, frame 4: expected a uint8 image \(height, width, 3\), got"
+        ):
+            run(command, log)

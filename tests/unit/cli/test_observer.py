@@ -1,0 +1,130 @@
+"""What the launcher measures of a drive."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from cli.launch.observer import Observer, Track
+from schemas.cognition import Competition
+from schemas.graph import Delta, DropNode, Node
+from schemas.sensing import Odometry, Pose, TruePose
+
+TICK_NS = 50_000_000
+
+
+def true_pose(tick: int, x_m: float, y_m: float, heading_rad: float = 0.0) -> TruePose:
+    pose = Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad)
+    return TruePose(stamp_ns=tick * TICK_NS, pose=pose, travelled_m=x_m, progress=0.5)
+
+
+def odometry(tick: int, speed_m_s: float, turn_rate_rad_s: float = 0.0) -> Odometry:
+    return Odometry(
+        stamp_ns=tick * TICK_NS, speed_m_s=speed_m_s, turn_rate_rad_s=turn_rate_rad_s, dt_s=0.05
+    )
+
+
+def estimate(tick: int, x_m: float, y_m: float, version: int = 1) -> Delta:
+    node = Node(id="self", kind="self", attributes={"x_m": x_m, "y_m": y_m, "heading_rad": 0.0})
+    operations = [DropNode(id="object:inn"), node]
+    return Delta(
+        stamp_ns=tick * TICK_NS,
+        version=version,
+        cycle=1,
+        phase="localization",
+        tasks=[],
+        operations=operations,
+    )
+
+
+def straight_drive(observer: Observer, ticks: int, wheel_speed_m_s: float) -> None:
+    """1 m/s along x in truth."""
+    observer.take(true_pose(0, 0.0, 0.0))
+    for tick in range(1, ticks + 1):
+        observer.take(odometry(tick, wheel_speed_m_s))
+        observer.take(true_pose(tick, 0.05 * tick, 0.0))
+
+
+def test_errors_are_distances_from_the_truth_of_the_same_stamp() -> None:
+    observer = Observer()
+    straight_drive(observer, 20, wheel_speed_m_s=1.2)
+    observer.take(estimate(10, 0.5, 0.03))
+    observer.take(estimate(20, 1.0, -0.05))
+    errors = observer.errors()
+    assert errors.stamps_ns.tolist() == [10 * TICK_NS, 20 * TICK_NS]
+    assert errors.estimate_m == pytest.approx([0.03, 0.05])
+    assert errors.integration_m == pytest.approx([0.1, 0.2])
+    assert errors.ratio == pytest.approx(0.04 / 0.15)
+
+
+def test_truth_between_two_poses_is_interpolated() -> None:
+    observer = Observer()
+    for tick in (0, 4):
+        observer.take(true_pose(tick, float(tick), 2.0 * tick))
+    observer.take(odometry(1, 0.0))
+    observer.take(odometry(4, 0.0))
+    observer.take(estimate(3, 3.0, 6.0))
+    assert observer.errors().estimate_m == pytest.approx([0.0])
+
+
+def test_an_estimate_that_no_truth_surrounds_does_not_count() -> None:
+    observer = Observer()
+    straight_drive(observer, 4, wheel_speed_m_s=1.0)
+    observer.take(estimate(5, 0.25, 0.0))
+    assert observer.errors().stamps_ns.size == 0
+    assert observer.errors().ratio == 1.0
+
+
+def test_the_last_of_several_estimates_of_one_stamp_counts() -> None:
+    observer = Observer()
+    straight_drive(observer, 4, wheel_speed_m_s=1.0)
+    observer.take(estimate(4, 9.0, 9.0, version=1))
+    observer.take(estimate(4, 0.2, 0.0, version=2))
+    assert observer.errors().estimate_m == pytest.approx([0.0], abs=1e-12)
+
+
+def test_the_agents_frame_starts_in_the_first_true_pose() -> None:
+    observer = Observer()
+    observer.take(true_pose(0, 5.0, -2.0, math.pi / 2))
+    observer.take(true_pose(1, 5.0, -1.0, math.pi / 2))
+    assert observer.to_world(np.array([[1.0, 0.0], [0.0, 2.0]])) == pytest.approx(
+        np.array([[5.0, -1.0], [3.0, -2.0]])
+    )
+
+
+def test_path_integration_of_a_circle_by_midpoints_closes_it() -> None:
+    observer = Observer()
+    observer.take(true_pose(0, 0.0, 0.0))
+    steps = 200
+    for tick in range(1, steps + 1):
+        observer.take(odometry(tick, 1.0, math.tau / (steps * 0.05)))
+    path_m = observer.integrated_path_m
+    assert path_m[-1] == pytest.approx([0.0, 0.0], abs=1e-9)
+    radius_m = steps * 0.05 / math.tau
+    assert path_m[:, 1].max() == pytest.approx(2 * radius_m, rel=1e-3)
+
+
+def test_distance_progress_and_time_are_those_of_the_newest_pose() -> None:
+    observer = Observer()
+    straight_drive(observer, 20, wheel_speed_m_s=1.0)
+    assert (observer.travelled_m, observer.progress, observer.elapsed_s) == (1.0, 0.5, 1.0)
+
+
+def test_other_messages_and_senseless_nodes_change_nothing() -> None:
+    observer = Observer()
+    straight_drive(observer, 4, wheel_speed_m_s=1.0)
+    observer.take(Competition(stamp_ns=4, cycle=1, contenders={}))
+    observer.take(
+        Delta(version=1, cycle=1, phase="x", tasks=[], operations=[Node(id="self", kind="self")])
+    )
+    assert len(observer.estimated_path_m) == 0
+
+
+def test_a_track_keeps_its_order_when_an_old_position_comes_late() -> None:
+    track = Track()
+    for stamp_ns in (1, 3, 2):
+        track.add(stamp_ns, float(stamp_ns), 0.0)
+    assert track.stamps_ns.tolist() == [1, 3]
+    assert track.covers(np.array([0, 1, 2, 3, 4])).tolist() == [False, True, True, True, False]

@@ -1,0 +1,85 @@
+"""What a run consists of: configuration and processes."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from cli.launch.plan import OBSERVER, RECORDER, Choices, effective, everybody, programs, to_toml
+from cogmap.errors import ConfigError
+from services import registry
+from services.sim.town import generate
+
+
+def configured(choices: Choices, **sections: dict[str, object]) -> dict[str, dict[str, object]]:
+    return effective(sections, choices, everybody(choices, observer=True))
+
+
+def test_the_configuration_reads_back_from_toml_to_the_same() -> None:
+    sections = configured(Choices(seed=7), epam={}, workspace={"cell_m": 0.5})
+    assert tomllib.loads(to_toml(sections)) == sections
+    assert sections["workspace"]["cell_m"] == 0.5
+
+
+def test_every_module_gets_its_whole_configuration() -> None:
+    sections = configured(Choices())
+    assert list(sections) == list(registry.MODULES)
+    for name in registry.MODULES:
+        of_type = registry.config_type(name)
+        unset = {field for field in of_type.__struct_fields__ if getattr(of_type(), field) is None}
+        assert set(sections[name]) == set(of_type.__struct_fields__) - unset
+
+
+def test_the_route_is_that_of_the_town_and_the_laps() -> None:
+    sections = configured(Choices(seed=3, laps=1.5))
+    assert sections["action"]["route"] == [list(leg) for leg in generate(3).route(1.5)]
+    assert (sections["sim"]["seed"], sections["sim"]["laps"]) == (3, 1.5)
+
+
+def test_a_route_of_ones_own_stays() -> None:
+    assert configured(Choices(), action={"route": [[12.0, 0.0]]})["action"]["route"] == [
+        (12.0, 0.0)
+    ]
+
+
+def test_lockstep_is_the_mode_of_all_that_have_one() -> None:
+    sections = configured(Choices(lockstep=True))
+    assert {sections[name]["mode"] for name in ("sim", "workspace", "action")} == {"lockstep"}
+
+
+def test_the_drive_waits_for_every_module_every_worker_and_whoever_watches() -> None:
+    awaits = configured(Choices(codelets=3))["sim"]["awaits"]
+    assert awaits == {
+        "sensory": 1,
+        "epam": 1,
+        "workspace": 1,
+        "codelets": 3,
+        "global_workspace": 1,
+        "action": 1,
+        RECORDER: 1,
+        OBSERVER: 1,
+    }
+    assert everybody(Choices(record=False), observer=False).keys().isdisjoint({RECORDER, OBSERVER})
+
+
+def test_a_section_of_no_module_is_named() -> None:
+    with pytest.raises(ConfigError, match=r"unknown section \[acton\]: did you mean 'action'\?"):
+        configured(Choices(), acton={})
+
+
+def test_each_module_is_a_process_and_each_worker_one_more(tmp_path: Path) -> None:
+    first, rest = programs(tmp_path, "tcp/127.0.0.1:1", "agent", Choices(codelets=2))
+    instances = [program.instance for program in [*first, *rest]]
+    assert instances[0] == "router"
+    assert sorted(instances[1:]) == sorted(
+        {*registry.MODULES, "codelets-1", "codelets-2", RECORDER} - {"codelets"}
+    )
+
+
+def test_a_recorder_that_is_started_again_writes_another_log(tmp_path: Path) -> None:
+    first, _ = programs(tmp_path, "tcp/127.0.0.1:1", "agent", Choices())
+    (recorder,) = [program for program in first if program.instance == RECORDER]
+    assert str(tmp_path / "log.mcap") in recorder.command(0)
+    assert str(tmp_path / "log-2.mcap") in recorder.command(1)

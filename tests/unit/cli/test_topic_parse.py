@@ -1,0 +1,110 @@
+"""Messages as a user writes them on the command line, and as `echo` shows them."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from cli.topic.argument import streamed, topic_named
+from cli.topic.echo import shower
+from cli.topic.parse import parse
+from cogmap.errors import UsageError
+from schemas import topics
+from schemas.examples import samples
+from schemas.sensing import MotorCommand, Odometry
+from schemas.topics import Topic
+
+BY_TOPIC = {topics.of(message): message for message in samples()}
+ODOMETRY = Odometry(speed_m_s=1.5, turn_rate_rad_s=0.0, dt_s=0.05, stamp_ns=7, seq=3, source="sim")
+
+
+def test_a_message_is_read_from_json() -> None:
+    said = parse(topics.MOTOR_COMMAND, '{"left_wheel_rad_s": 1, "right_wheel_rad_s": -2.5}')
+
+    assert said == MotorCommand(left_wheel_rad_s=1.0, right_wheel_rad_s=-2.5)
+
+
+@pytest.mark.parametrize("topic", topics.ALL, ids=lambda topic: topic.name)
+def test_what_echo_prints_in_full_can_be_published_again(topic: Topic) -> None:
+    printed = shower(None, True, False, "json")(BY_TOPIC[topic])
+
+    assert parse(topic, printed) == BY_TOPIC[topic]
+
+
+@pytest.mark.parametrize(
+    ("written", "sentence"),
+    [
+        (
+            '{"left_wheel_rad_s": "fast", "right_wheel_rad_s": 1}',
+            r"Expected `float`, got `str` - at `left_wheel_rad_s`",
+        ),
+        (
+            '{"left_wheel_rad_s": 1e4, "right_wheel_rad_s": 1}',
+            r"Expected `float` <= 1000.0 - at `left_wheel_rad_s`",
+        ),
+        ('{"right_wheel_rad_s": 1}', r"missing required field `left_wheel_rad_s`"),
+        (
+            '{"left_wheel_rad_s": 1, "right_wheel_rad_s": 1, "halted": "x"}',
+            r"no field 'halted' .*mean 'halted_by'\?",
+        ),
+        ("[1]", r"Expected `object`, got `array`"),
+    ],
+)
+def test_a_wrong_field_is_named_with_what_was_expected(written: str, sentence: str) -> None:
+    with pytest.raises(UsageError, match=sentence):
+        parse(topics.MOTOR_COMMAND, written)
+
+
+def test_a_wrong_field_deep_inside_is_named_with_its_place() -> None:
+    plain = json.loads(shower(None, True, False, "json")(BY_TOPIC[topics.PERCEPTS]))
+    plain["objects"][0]["labell"] = "x"
+
+    with pytest.raises(
+        UsageError, match=r"no field 'labell' at objects\[0\]: did you mean 'label'\?"
+    ):
+        parse(topics.PERCEPTS, json.dumps(plain))
+
+
+def test_an_array_whose_data_do_not_fit_its_shape_is_refused() -> None:
+    array = '{"dtype": "<f8", "shape": [2, 3], "data": [[1, 2, 3]]}'
+
+    with pytest.raises(UsageError, match=r"needs 48 bytes, got 24 - at `motions`"):
+        parse(topics.SELF_MOTION, f'{{"frame": 0, "since_ns": 0, "motions": {array}}}')
+
+
+def test_a_topic_is_found_with_or_without_a_slash_and_a_wrong_one_names_the_nearest() -> None:
+    assert topic_named("/odometry") is topic_named("odometry") is topics.ODOMETRY
+    with pytest.raises(UsageError, match=r"no topic 'odometri': did you mean 'odometry'\?"):
+        topic_named("odometri")
+
+
+def test_what_is_answered_on_request_cannot_be_watched() -> None:
+    with pytest.raises(UsageError, match="answered on request"):
+        streamed("workspace/snapshot")
+
+
+def test_echo_shows_one_field_or_says_which_there_are() -> None:
+    assert shower("speed_m_s", False, False, "text")(ODOMETRY) == "1.5\n---"
+    with pytest.raises(UsageError, match=r"--field speed: no 'speed' .*speed_m_s"):
+        shower("speed", False, False, "text")(ODOMETRY)
+
+
+def test_echo_prints_a_line_of_csv_a_message() -> None:
+    assert shower(None, False, False, "csv")(ODOMETRY) == "7,3,sim,1.5,0.0,0.05"
+
+
+def test_echo_leaves_the_numbers_of_arrays_out_where_asked() -> None:
+    assert "motions: '<array type: <f8[4, 3]>'" in shower(None, False, True, "text")(
+        BY_TOPIC[topics.SELF_MOTION]
+    )
+
+
+def test_a_message_may_be_written_as_yaml_as_for_ros2_topic_pub() -> None:
+    message = parse(topics.MOTOR_COMMAND, "{left_wheel_rad_s: 1.5, right_wheel_rad_s: -2}")
+    assert message == MotorCommand(left_wheel_rad_s=1.5, right_wheel_rad_s=-2.0)
+
+
+def test_what_is_neither_json_nor_yaml_is_named() -> None:
+    with pytest.raises(UsageError, match="neither JSON nor YAML"):
+        parse(topics.MOTOR_COMMAND, "{left_wheel_rad_s: [")

@@ -1,0 +1,178 @@
+"""What localization makes of one sense alone, of senses that are off, and of being carried away."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+import pytest
+
+from benchmarks.localization.loop import Mind
+from benchmarks.localization.senses import Moment
+from schemas.array import Array
+from schemas.graph import Node
+from schemas.sensing import Percept
+from services.codelets.localization.landmarks import locate_landmark
+from services.codelets.localization.localization import localize
+from services.codelets.mapping.object_place import place_object
+from services.codelets.module import Config
+from tests.support.scenes import node, percept, task
+
+PLACES = {"mill": (20.0, 0.0), "tower": (0.0, 25.0), "church": (-15.0, -10.0), "inn": (30.0, 30.0)}
+Pose = tuple[float, float, float]
+UNKNOWN_BEARING = {"bearing_sd_rad": 2 * math.pi}
+
+
+def _agent(
+    pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    sd: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> Node:
+    samples = np.random.default_rng(3).normal(pose, sd, (1000, 3))
+    return node("self", samples, "self", x_m=pose[0], y_m=pose[1], heading_rad=pose[2], stamp_ns=0)
+
+
+def _known(*labels: str) -> list[Node]:
+    rng = np.random.default_rng(4)
+    return [
+        node(f"object:{k}", rng.normal(PLACES[k], 0.01, (200, 2)), label=k, sightings=50)
+        for k in labels
+    ]
+
+
+def _seen(pose: Pose, label: str, **facts: float) -> Percept:
+    off = np.array(PLACES[label]) - pose[:2]
+    bearing = math.remainder(math.atan2(off[1], off[0]) - pose[2], math.tau)
+    return percept(label, bearing, float(np.hypot(*off)), **facts)
+
+
+def _move(
+    agent: Node, number: int, landmarks: list[Node], seen: Iterable[Percept], config: Config
+) -> Node:
+    """The agent after a step of a metre and a look."""
+    motions = Array.of(np.array([[1.0, 0.0, 1.0, 0.1, 0.0]]))
+    facts = {"motions": motions, "percepts": list(seen), "stamp_ns": number}
+    found = localize(
+        task("localization", agent, *landmarks, identifier=f"{number}/l", **facts), config
+    )
+    return next(operation for operation in found if isinstance(operation, Node))
+
+
+def _off_m(agent: Node, true: Pose) -> float:
+    return math.hypot(
+        float(agent.attributes["x_m"]) - true[0], float(agent.attributes["y_m"]) - true[1]
+    )
+
+
+CONFIG = Config(views_alike=1.0)
+
+
+def test_an_agent_that_is_carried_away_finds_itself_by_the_landmarks_that_it_sees_there() -> None:
+    agent = _agent()
+    labels = ("mill", "tower", "church")
+    true = (60.0, -40.0, 2.0)
+    for number in range(1, 30):
+        true = (true[0] + math.cos(true[2]), true[1] + math.sin(true[2]), true[2])
+        agent = _move(
+            agent, number, _known(*labels), [_seen(true, label) for label in labels[:2]], CONFIG
+        )
+    assert _off_m(agent, true) < 1.0
+    assert not agent.attributes["others"]
+
+
+def test_an_agent_that_is_carried_away_finds_itself_by_landmarks_that_it_sees_one_at_a_time() -> (
+    None
+):
+    mind = Mind((0.0, 0.0, 0.0), CONFIG)
+    labels = tuple(PLACES)
+    mind.learn(PLACES, surveyed=False)
+    true = (60.0, -40.0, 2.0)
+    for number in range(1, 30):
+        true = (true[0] + math.cos(true[2]), true[1] + math.sin(true[2]), true[2])
+        motions = np.array([[1.0, 0.0, 1.0, 0.1, 0.0]])
+        mind.live(Moment(float(number), motions, [_seen(true, labels[number % 4])], True))
+    assert math.dist(mind.pose[:2], true[:2]) < 2.0
+
+
+def test_the_way_that_an_agent_was_carried_counts_as_a_step_of_its_path() -> None:
+    agent = _agent()
+    labels = ("mill", "tower")
+    true = (-20.0, 30.0, 2.0)
+    for number in range(1, 12):
+        true = (true[0] + math.cos(true[2]), true[1] + math.sin(true[2]), true[2])
+        agent = _move(
+            agent, number, _known(*labels), [_seen(true, label) for label in labels], CONFIG
+        )
+    facts = agent.attributes
+    assert _off_m(agent, true) < 0.5
+    assert (facts["odometry_x_m"], facts["odometry_y_m"]) == pytest.approx(
+        (facts["x_m"], facts["y_m"]), abs=5.0
+    )
+
+
+def test_ranges_alone_to_three_landmarks_tell_the_position() -> None:
+    true = (1.5, 0.8, 0.0)
+    labels = ("mill", "tower", "church")
+    agent = _agent((0.0, 0.0, 0.0), (1.0, 1.0, 0.01))
+    seen = [_seen(true, label, **UNKNOWN_BEARING) for label in labels]
+    found = _move(agent, 1, _known(*labels), seen, CONFIG)
+    assert _off_m(found, true) < 0.4
+
+
+def test_bearings_alone_to_three_landmarks_tell_the_position() -> None:
+    true = (1.5, 0.8, 0.0)
+    labels = ("mill", "tower", "church")
+    agent = _agent((0.0, 0.0, 0.0), (1.0, 1.0, 0.01))
+    seen = [_seen(true, label, range_sd_m=1e3) for label in labels]
+    found = _move(agent, 1, _known(*labels), seen, CONFIG)
+    assert _off_m(found, true) < 0.5
+
+
+@pytest.mark.parametrize("alone", [UNKNOWN_BEARING, {"range_sd_m": 1e3}], ids=["range", "bearing"])
+def test_a_new_landmark_that_is_seen_by_one_sense_alone_is_found_from_several_places(
+    alone: dict[str, float],
+) -> None:
+    config = Config(views_alike=1.0, landmark_samples=4000)
+    landmark: Node | None = None
+    for number, (x_m, y_m) in enumerate(
+        ((0.0, 0.0), (4.0, 3.0), (8.0, 2.0), (12.0, 6.0), (8.0, 9.0), (4.0, 12.0))
+    ):
+        pose = (x_m, y_m, 0.0)
+        agent = _agent(pose, (0.01, 0.01, 0.002))
+        seen = [_seen(pose, "mill", **alone)]
+        agent.attributes["stamp_ns"] = number
+        nodes = [agent] if landmark is None else [agent, landmark]
+        asked = task(
+            "landmark", *nodes, percepts=seen, identifier=f"{number}/mill", stamp_ns=number
+        )
+        found = place_object(asked, config) if landmark is None else locate_landmark(asked, config)
+        landmark = next(operation for operation in found if isinstance(operation, Node))
+    assert landmark is not None
+    assert (landmark.attributes["x_m"], landmark.attributes["y_m"]) == pytest.approx(
+        PLACES["mill"], abs=1.5
+    )
+
+
+def test_wheels_that_slip_all_the_time_are_found_out_by_landmarks() -> None:
+    def off_m(speed_gain_sd: float) -> float:
+        config = Config(
+            samples=1000, views_alike=1.0, speed_gain_sd=speed_gain_sd, gait_memory_s=1000.0
+        )
+        agent = _agent()
+        true = (0.0, 0.0, 0.0)
+        for number in range(1, 60):
+            true = (true[0] + 0.8, 0.0, 0.0)  # where self-motion says a metre
+            seen = [_seen(true, label) for label in ("mill", "tower")] if number <= 30 else []
+            agent = _move(agent, number, _known("mill", "tower"), seen, config)
+        return _off_m(agent, true)
+
+    assert off_m(0.0) > 4.0
+    assert off_m(0.2) < 2.5
+
+
+def test_what_is_not_seen_costs_nothing() -> None:
+    agent = _agent()
+    true = (1.0, 0.0, 0.0)
+    few = _move(agent, 1, _known("mill"), [_seen(true, "mill")], CONFIG)
+    many = _move(agent, 1, _known("mill", "tower", "church", "inn"), [_seen(true, "mill")], CONFIG)
+    assert few == many

@@ -1,0 +1,68 @@
+"""A segment as the network sees it: itself, what is around it, and the light."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from services.epam.recognition.crop import CHANNELS, SIDE_PX, colours, crop, surroundings
+from services.epam.recognition.segments import Segment
+from tests.support.blocks import CAMERA, painted
+
+SIZE = (240, 320)
+MIDDLE = SIDE_PX // 2
+NOTHING = np.zeros(6, np.float32)
+
+
+def _segment(left: int, top: int) -> Segment:
+    mask = np.zeros(SIZE, np.bool_)
+    mask[top : top + 40, left : left + 80] = True
+    return Segment(mask, (left, top, 80, 40))
+
+
+def test_a_crop_shows_the_segment_alone_and_how_large_it_is() -> None:
+    image = np.full((*SIZE, 3), 200, np.uint8)
+    segment = _segment(50, 100)
+    near, far = (
+        crop(image, np.full(SIZE, depth_m, np.float32), segment, NOTHING, 200.0)
+        for depth_m in (10.0, 40.0)
+    )
+
+    assert near.shape == (CHANNELS, SIDE_PX, SIDE_PX)
+    assert near[3, MIDDLE, MIDDLE] == 1.0
+    assert not near[:4, :8].any()
+    assert near[0, MIDDLE, MIDDLE] == pytest.approx(200 / 64 - 2)
+    assert near[5, 0, 0] < far[5, 0, 0]
+
+
+def test_a_crop_shows_what_lies_farther_and_what_is_nearer_than_the_segment() -> None:
+    image = np.full((*SIZE, 3), 200, np.uint8)
+    depth_m = np.full(SIZE, 20.0, np.float32)
+    depth_m[40:, :40], depth_m[40:, 40:] = 15.0, 40.0
+    relief = crop(image, depth_m, _segment(0, 0), NOTHING, 200.0)[4]
+
+    assert relief[MIDDLE, MIDDLE] == 0.0
+    assert relief[-5, MIDDLE - 10] < -0.9
+    assert relief[-5, MIDDLE + 10] > 0.9
+    assert not relief[0].any()
+
+
+def test_the_light_is_known_by_the_colours_of_ground_and_sky() -> None:
+    image, depth_m, _ = painted([])
+    around = surroundings(image, depth_m, CAMERA)
+    darker = surroundings((image * 0.5).astype(np.uint8), depth_m, CAMERA)
+
+    np.testing.assert_allclose(
+        around[3:], colours(np.median(image[:60].reshape(-1, 3), axis=0)), atol=0.02
+    )
+    np.testing.assert_allclose(darker + 2, (around + 2) / 2, atol=0.02)
+    assert (
+        crop(image, depth_m, _segment(50, 100), around, 200.0)[6:] == around[:, None, None]
+    ).all()
+
+
+def test_what_is_not_in_view_has_no_colour() -> None:
+    image, _, _ = painted([])
+    walled = surroundings(image, np.full(SIZE, 4.0, np.float32), CAMERA)
+    assert not walled[3:].any()
+    assert not surroundings(image, np.full(SIZE, 0.01, np.float32), CAMERA).any()

@@ -1,0 +1,175 @@
+"""The extended PAM as a module: an answer to every view, nothing believed of a senseless one,
+nothing forgotten.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cogmap.bus import codec
+from cogmap.errors import ConfigError, MessageError
+from cogmap.runtime.journal import Journal
+from cogmap.runtime.module import Module
+from schemas import topics
+from schemas.array import Array
+from schemas.sensing import Learned, Percepts, View
+from services.epam.module import Config, build
+from tests.support.blocks import CAMERA
+from tests.support.rendered import seen
+from training.rendering.towns import render
+
+STRANGERS = 4005
+
+
+@pytest.fixture(scope="module")
+def views() -> list[View]:
+    """Views of a town that has buildings nobody was taught."""
+    return seen(render(STRANGERS, 8, 28))
+
+
+def _percepts(module: Module, view: View) -> Percepts:
+    (said,) = (message for message in module.feed(view) if isinstance(message, Percepts))
+    return said
+
+
+def _view(image: np.ndarray, depth_m: np.ndarray) -> View:
+    return View(
+        stamp_ns=5, frame=3, image=Array.of(image), depth_m=Array.of(depth_m), calibration=CAMERA
+    )
+
+
+def test_every_view_is_answered_by_percepts_even_where_nothing_is_seen() -> None:
+    blank = _view(np.zeros((240, 320, 3), np.uint8), np.zeros((240, 320), np.float32))
+    said = build(Config(), "epam").feed(blank)
+
+    assert len(said) == 1
+    percepts = said[0]
+    assert isinstance(percepts, Percepts)
+    assert (percepts.objects, percepts.matches) == ([], [])
+    assert (percepts.road_m.shape, percepts.road_boundary_m.shape) == ((0, 2), (0, 2))
+    assert (percepts.stamp_ns, percepts.frame) == (5, 3)
+
+
+def test_what_is_hardly_a_building_is_no_percept(views: list[View]) -> None:
+    some, fewer, none = (
+        sum(
+            len(_percepts(build(Config(percept_threshold=threshold), "epam"), view).objects)
+            for view in views
+        )
+        for threshold in (0.0, 0.9, 1.0)
+    )
+    assert some > fewer > none == 0
+
+
+def test_base_level_activation_adds_to_the_current_one(views: list[View]) -> None:
+    bare, raised = (
+        [
+            percept.activation
+            for percept in _percepts(build(Config(base_level=level), "epam"), views[1]).objects
+        ]
+        for level in (0.0, 0.3)
+    )
+    assert raised == pytest.approx([min(1.0, activation + 0.3) for activation in bare])
+
+
+def test_a_percept_is_outlined_boxed_and_measured(views: list[View]) -> None:
+    module = build(Config(), "epam")
+    found = [percept for view in views for percept in _percepts(module, view).objects]
+
+    assert len(found) > 5
+    for percept in found:
+        columns, rows = np.array(percept.outline_px).T
+        left, top, wide, high = percept.box_px
+        assert left - 1 <= columns.min() <= columns.max() <= left + wide
+        assert top - 1 <= rows.min() <= rows.max() <= top + high
+        assert percept.height_m > 1.0
+        assert percept.width_m > 1.0
+
+
+def test_of_each_node_there_is_one_percept_in_a_view(views: list[View]) -> None:
+    module = build(Config(), "epam")
+    for view in views:
+        labels = [percept.label for percept in _percepts(module, view).objects]
+        assert len(labels) == len(set(labels))
+
+
+def test_the_same_views_give_the_same_bytes(views: list[View]) -> None:
+    answers = []
+    for _ in range(2):
+        module = build(Config(), "epam")
+        answers.append([codec.encode(said) for view in views for said in module.feed(view)])
+
+    assert answers[0] == answers[1]
+
+
+def test_what_was_learned_is_known_again_after_a_restart(views: list[View], tmp_path: Path) -> None:
+    first = build(Config(), "epam")
+    journal = Journal(tmp_path / "epam")
+    assert list(journal.messages()) == []
+    for view in views:
+        for said in first.feed(view):
+            if isinstance(said, Learned):
+                journal.append(said, codec.encode(said))
+    journal.close()
+    again = build(Config(), "epam")
+    assert again.restore is not None
+    again.restore(Journal(tmp_path / "epam").messages())
+
+    assert first.journal is topics.LEARNED
+    assert first.condense is not None
+    assert again.condense is not None
+    assert codec.encode(again.condense()) == codec.encode(first.condense())
+    labels = {percept.label for percept in _percepts(first, views[1]).objects}
+    assert any(label.startswith("new-building-") for label in labels)
+    assert {percept.label for percept in _percepts(again, views[1]).objects} == labels
+
+
+def test_one_message_stands_for_all_that_was_learned(views: list[View]) -> None:
+    module = build(Config(), "epam")
+    objects = [
+        known
+        for view in views
+        for said in module.feed(view)
+        if isinstance(said, Learned)
+        for known in said.objects
+    ]
+    assert module.condense is not None
+    everything = module.condense()
+
+    assert isinstance(everything, Learned)
+    assert everything.objects == objects
+    assert len(objects) > 3
+
+
+@pytest.mark.parametrize(
+    ("image", "depth"),
+    [
+        (np.zeros((240, 319, 3), np.uint8), np.zeros((240, 320), np.float32)),
+        (np.zeros((240, 320), np.uint8), np.zeros((240, 320), np.float32)),
+        (np.zeros((240, 320, 3), np.float32), np.zeros((240, 320), np.float32)),
+        (np.zeros((240, 320, 3), np.uint8), np.zeros((240, 320), np.float64)),
+        (np.zeros((240, 320, 3), np.uint8), np.full((240, 320), -1, np.float32)),
+    ],
+)
+def test_a_view_that_makes_no_sense_is_refused(image: np.ndarray, depth: np.ndarray) -> None:
+    with pytest.raises(MessageError, match="view"):
+        build(Config(), "epam").feed(_view(image, depth))
+
+
+def test_noise_for_a_view_is_taken_in_and_gives_sound_messages() -> None:
+    module = build(Config(), "epam")
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        image = rng.integers(0, 256, (240, 320, 3), np.uint8)
+        depth_m = (10.0 ** rng.uniform(-30, 30, (240, 320))).astype(np.float32)
+        for said in module.feed(_view(image, depth_m)):
+            codec.decode(topics.of(said), codec.encode(said))
+
+
+@pytest.mark.parametrize("weights", ["segments_weights", "object_weights", "road_weights"])
+def test_missing_weights_are_named_with_the_remedy(weights: str, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"nowhere\.onnx.*python -m training"):
+        build(Config(**{weights: str(tmp_path / "nowhere.onnx")}), "epam")

@@ -1,0 +1,117 @@
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import pytest
+
+from cli.experiment import live
+from cogmap.errors import CogmapError
+from cogmap.runtime.config import Sections
+from cogmap.runtime.in_process import House
+from cogmap.runtime.module import Module
+from experiments.cue_integration.camera_level import PicturedRoom
+from experiments.cue_integration.geometry import LANDMARKS
+from experiments.cue_integration.run import FITTED
+from experiments.cue_integration.trial import Condition, Trial
+from experiments.loop_closing.run import MIND, sections
+from experiments.rendered import by_cameras, named, with_cameras
+from experiments.transcript import MODEL, Heard
+from schemas import topics
+from schemas.cognition import Action
+from schemas.sensing import MotorCommand, Percepts
+
+FRAMES = 5
+
+
+def _short() -> Sections:
+    """The way of figure 6, as far as its first building."""
+    configured = sections(1, "heading")
+    way = configured["sim"]["way"]
+    way["line_m"] = [(0.0, 0.0), (10.0, 0.0)]
+    return configured
+
+
+def _heard(configured: Sections, modules: Sequence[Module]) -> Heard:
+    heard = Heard(MODEL)
+    house = House([*modules, heard.module()])
+    house.run()
+    house.close()
+    return heard
+
+
+def test_another_mind_that_is_given_what_was_sensed_says_what_it_would_with_the_senses_themselves() -> (
+    None
+):
+    shares: list[float] = []
+    both = by_cameras({"first": _short(), "again": _short()}, MIND, _heard, shares.append)
+    names = [each.name for each in (topics.PERCEPTS, topics.DELTA, topics.MOTOR_COMMAND)]
+    first, again = (both[name].messages for name in ("first", "again"))
+    assert [len(first[name]) for name in (names[0], names[2])] == [FRAMES, FRAMES]
+    assert first[names[1]] == again[names[1]]
+    assert first[names[2]] == again[names[2]]
+    assert shares == sorted(shares) and shares[-1] == 1.0
+
+
+def test_with_cameras_landmarks_become_buildings_of_the_catalogue_and_nobody_is_told_percepts() -> (
+    None
+):
+    told = sections(1, "heading")
+    seeing = with_cameras(told)
+    assert [each["name"] for each in seeing["sim"]["way"]["landmarks"][:2]] == ["bakery", "library"]
+    assert "percepts" not in seeing["sim"] and seeing["sim"]["way"]["sensing"] == "cameras"
+    assert seeing["sim"]["awaits"] == {**told["sim"]["awaits"], "sensory": 1, "epam": 1}
+    assert "sensing" not in told["sim"]["way"]
+
+
+def test_more_landmarks_than_there_are_kinds_of_building_are_refused() -> None:
+    with pytest.raises(CogmapError, match="too few for 25"):
+        named([{"x_m": 20.0 * k, "y_m": 14.0} for k in range(25)])
+
+
+def test_the_room_with_cameras_sees_its_landmarks_where_they_are() -> None:
+    room = PicturedRoom(Trial(Condition.BOTH, 0, FITTED, 1))
+    try:
+        _, percepts = room.begin()
+    finally:
+        room.close()
+    assert isinstance(percepts, Percepts)
+    seen = {each.label: each for each in percepts.objects}
+    for name, (x_m, y_m) in zip(("bakery", "library", "town_hall"), LANDMARKS, strict=True):
+        forward_m = y_m - 0.0
+        left_m = 2.5 - x_m
+        assert seen[name].range_m == pytest.approx(math.hypot(forward_m, left_m), rel=0.1)
+        assert seen[name].bearing_rad == pytest.approx(math.atan2(left_m, forward_m), abs=0.05)
+
+
+def test_nothing_is_seen_in_the_dark() -> None:
+    room = PicturedRoom(Trial(Condition.SELF_MOTION, 0, FITTED, 1))
+    try:
+        room.act(Action(stamp_ns=1, cycle=1, scheme="wait", activation=1.0, parameters={}))
+        _, percepts = room.act(
+            Action(
+                stamp_ns=2,
+                cycle=2,
+                scheme="walk",
+                activation=1.0,
+                parameters={"turn_rad": 0.0, "forward_m": 0.1},
+            )
+        )
+    finally:
+        room.close()
+    assert isinstance(percepts, Percepts)
+    assert percepts.objects == []
+
+
+def test_bytes_that_differ_are_named_by_their_topic_and_end_the_command() -> None:
+    one = Heard([topics.MOTOR_COMMAND, topics.DELTA])
+    other = Heard([topics.MOTOR_COMMAND, topics.DELTA])
+    for heard, speed_rad_s in ((one, 1.0), (other, 2.0)):
+        heard.module().feed(
+            MotorCommand(stamp_ns=1, left_wheel_rad_s=speed_rad_s, right_wheel_rad_s=1.0)
+        )
+    assert one.has_as_many_as(other)
+    assert one.differs_from(other) == ["motor/command"]
+    live.check(one.differs_from(one))
+    with pytest.raises(CogmapError, match="other bytes on motor/command"):
+        live.check(one.differs_from(other))

@@ -1,0 +1,168 @@
+"""Comparing two logs, and the words for their first difference."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cogmap.bus.codec import Envelope, encode
+from cogmap.recording.diff import Diff, diff
+from cogmap.recording.replaying.compare import difference, in_words
+from cogmap.recording.storage.format import topics_to_record
+from cogmap.recording.storage.writer import LogWriter
+from schemas import topics
+from schemas.array import Array
+from schemas.base import Message
+from schemas.graph import Delta, DropNode, Link, Node
+from schemas.sensing import Odometry, RangeScan
+
+Change = Callable[[list[Message]], object]
+
+
+def said() -> list[Message]:
+    """Ten rows of odometry and scans of two sources."""
+    messages: list[Message] = []
+    for seq in range(10):
+        row = Odometry(
+            seq=seq,
+            stamp_ns=seq * 10**8,
+            source="sim",
+            speed_m_s=2.0,
+            turn_rate_rad_s=0.0,
+            dt_s=0.05,
+        )
+        values = Array.of(np.arange(6, dtype=np.float32).reshape(2, 3) + seq)
+        scan = RangeScan(
+            seq=seq,
+            stamp_ns=seq * 10**8,
+            source="sensory",
+            frame=seq,
+            bearing_rad=values,
+            range_m=values,
+        )
+        messages += [row, scan]
+    return messages
+
+
+def written(
+    path: Path, messages: Iterable[Message], delay_ns: int = 0, incarnation: int = 1
+) -> Path:
+    writer = LogWriter(path, topics_to_record(), {})
+    for n, message in enumerate(messages):
+        at_ns = 1000 * n + delay_ns
+        writer.write(
+            topics.of(message),
+            encode(message),
+            Envelope(message.source, message.seq, incarnation, at_ns, at_ns),
+            at_ns,
+        )
+    writer.close()
+    return path
+
+
+def compared(folder: Path, change: Change, delay_ns: int = 0, incarnation: int = 1) -> Diff:
+    other = said()
+    change(other)
+    left = written(folder / "a.mcap", said())
+    return diff(left, written(folder / "b.mcap", other, delay_ns, incarnation))
+
+
+def test_logs_of_the_same_messages_are_the_same_however_they_travelled(tmp_path: Path) -> None:
+    found = compared(
+        tmp_path, lambda messages: messages.sort(key=lambda m: m.source), delay_ns=77, incarnation=9
+    )
+    assert (found.same, found.first) == (True, "")
+    assert [(t.topic, t.same) for t in found.topics] == [("odometry", 10), ("sensory/scan", 10)]
+
+
+def test_a_changed_value_is_found_and_named(tmp_path: Path) -> None:
+    def change(messages: list[Message]) -> None:
+        messages[8].speed_m_s = 2.5
+        messages[12].speed_m_s = 9.0
+
+    found = compared(tmp_path, change)
+    assert found.first == (
+        "odometry number 4 of sim (stamp 0.400 s): speed_m_s is 2.0 in a.mcap, 2.5 in b.mcap"
+    )
+    assert [(t.topic, t.different) for t in found.topics] == [("odometry", 2), ("sensory/scan", 0)]
+
+
+def test_a_changed_value_in_an_array_is_named_with_its_index(tmp_path: Path) -> None:
+    def change(messages: list[Message]) -> None:
+        values = np.arange(6, dtype=np.float32).reshape(2, 3) + 1
+        values[1, 0] = 0.5
+        messages[3].range_m = Array.of(values)
+
+    assert compared(tmp_path, change).first == (
+        "sensory/scan number 1 of sensory (stamp 0.100 s): range_m.1.0 is 4.0 in a.mcap, 0.5 in b.mcap "
+        "(1 of 6 values differ)"
+    )
+
+
+def test_a_message_in_one_log_only_is_named(tmp_path: Path) -> None:
+    found = compared(tmp_path, lambda messages: messages.pop(18))
+    assert found.first == "odometry number 9 of sim (stamp 0.900 s) is in a.mcap and not in b.mcap"
+    assert (found.topics[0].left, found.topics[0].right, found.topics[0].left_only) == (10, 9, 1)
+
+
+def test_only_the_chosen_topics_are_compared(tmp_path: Path) -> None:
+    left = written(tmp_path / "a.mcap", said())
+    right = written(tmp_path / "b.mcap", [m for m in said() if isinstance(m, RangeScan)])
+    assert not diff(left, right).same
+    assert diff(left, right, [topics.SCAN]).same
+
+
+def _delta(*operations: Node | Link | DropNode) -> Delta:
+    return Delta(version=1, cycle=1, phase="x", tasks=["t"], operations=list(operations))
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "words"),
+    [
+        (
+            _delta(DropNode(id="a")),
+            _delta(DropNode(id="b")),
+            "operations.0.id is 'a' in A, 'b' in B",
+        ),
+        (_delta(DropNode(id="a")), _delta(), "the length of operations is 1 in A, 0 in B"),
+        (
+            _delta(DropNode(id="a")),
+            _delta(Node(id="a", kind="k")),
+            "operations.0 is DropNode in A, Node in B",
+        ),
+        (
+            _delta(Node(id="a", kind="k", attributes={"x": 1.0})),
+            _delta(Node(id="a", kind="k", attributes={"y": 1.0})),
+            "operations.0.attributes.x is 1.0 in A, absent in B",
+        ),
+        (
+            _delta(Node(id="a", kind="k", samples=Array.of(np.zeros((2, 2))))),
+            _delta(Node(id="a", kind="k", samples=Array.of(np.zeros((3, 2))))),
+            "the kind of operations.0.samples is <f8 (2, 2) in A, <f8 (3, 2) in B",
+        ),
+        (
+            _delta(Node(id="a", kind="k", samples=Array.of(np.array([0.0, -0.0])))),
+            _delta(Node(id="a", kind="k", samples=Array.of(np.array([0.0, 0.0])))),
+            "operations.0.samples.1 is -0.0 in A, 0.0 in B (1 of 2 values differ)",
+        ),
+    ],
+)
+def test_a_difference_deep_in_a_message_is_put_in_words(
+    left: Delta, right: Delta, words: str
+) -> None:
+    found = difference(left, right)
+    assert found is not None
+    assert found.in_words(("A", "B")) == words
+
+
+def test_the_same_values_in_other_bytes_are_told_by_the_first_byte() -> None:
+    row = Odometry(speed_m_s=2.0, turn_rate_rad_s=0.0, dt_s=0.05)
+    left = encode(row)
+    right = left.replace(b"\xcb\x40\x00\x00\x00\x00\x00\x00\x00", b"\x02")
+    assert left != right
+    assert "the same values in other bytes, from byte" in in_words(
+        topics.ODOMETRY, left, right, ("A", "B")
+    )

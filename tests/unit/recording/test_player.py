@@ -1,0 +1,173 @@
+"""Playing a log back onto the in-memory bus."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+
+from cogmap.bus.codec import Envelope, encode
+from cogmap.bus.interface import Arrival, Member
+from cogmap.bus.memory import MemoryBus, MemoryNetwork
+from cogmap.errors import UsageError
+from cogmap.recording.replaying.player import Choices, Played, Player
+from cogmap.recording.storage.format import topics_to_record
+from cogmap.recording.storage.reader import LogReader
+from cogmap.recording.storage.writer import LogWriter
+from cogmap.runtime.intake import Intake
+from schemas import topics
+from schemas.base import Message
+from schemas.process import Clock, Presence
+from schemas.sensing import Odometry
+
+MILLISECOND_NS = 10**6
+COUNT = 10
+FAST = 1e6
+
+
+class Script:
+    """Never waits; ends after so many calls, and pauses or goes on at those in `pauses`."""
+
+    def __init__(self, end_after: int | None = None, pauses: tuple[int, ...] = ()) -> None:
+        self.calls = 0
+        self.paused = False
+        self._end_after = end_after
+        self._pauses = pauses
+
+    @property
+    def asked(self) -> bool:
+        return self._end_after is not None and self.calls >= self._end_after
+
+    def wait(self, timeout_s: float) -> bool:
+        self.calls += 1
+        if self.calls in self._pauses:
+            self.paused = not self.paused
+        return self.asked
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    path = tmp_path / "log.mcap"
+    writer = LogWriter(path, topics_to_record(), {})
+    for seq in range(COUNT):
+        at_ns = 10**9 + 10 * seq * MILLISECOND_NS
+        messages: list[Message] = [
+            Odometry(
+                seq=seq, stamp_ns=seq, source="sim", speed_m_s=1.0, turn_rate_rad_s=0.0, dt_s=0.05
+            ),
+            Clock(seq=seq, stamp_ns=seq, source="sim"),
+            Presence(
+                seq=seq,
+                source="workspace",
+                module="m",
+                instance="m",
+                alive=True,
+                observer="workspace",
+            ),
+        ]
+        for message in messages:
+            envelope = Envelope(
+                message.source, seq, 7, at_ns, at_ns - 5 * MILLISECOND_NS, [("sim", 1, 2)]
+            )
+            writer.write(topics.of(message), encode(message), envelope, at_ns)
+    writer.close()
+    return path
+
+
+class Listener:
+    """Everything that comes, judged as a module would."""
+
+    def __init__(self, network: MemoryNetwork) -> None:
+        self.intake, self.arrivals = Intake(), list[Arrival]()
+        bus = MemoryBus(network)
+        for topic in topics_to_record():
+            bus.subscribe(topic, self.arrivals.append, self.intake.lose)
+
+    def of(self, topic: topics.Topic) -> list[Message]:
+        accepted = [
+            self.intake.accept(arrival) for arrival in self.arrivals if arrival.topic is topic
+        ]
+        assert not self.intake.rejected
+        return [message for message in accepted if message is not None]
+
+
+def play(path: Path, choices: Choices, script: Script | None = None) -> tuple[Listener, Played]:
+    network = MemoryNetwork()
+    listener = Listener(network)
+    return listener, Player(LogReader(path), MemoryBus(network), choices, script or Script()).play()
+
+
+def test_what_the_model_said_is_played_in_order_with_its_own_numbers_and_age(path: Path) -> None:
+    listener, played = play(path, Choices(rate=FAST))
+    assert [message.seq for message in listener.of(topics.ODOMETRY)] == list(range(COUNT))
+    assert played.messages == {"odometry": COUNT, "clock": COUNT}
+    envelope = listener.arrivals[0].envelope
+    assert envelope is not None
+    assert (envelope.source, envelope.stages) == ("sim", [("sim", 1, 2)])
+    assert envelope.sent_ns - envelope.born_ns == 5 * MILLISECOND_NS
+    assert abs(time.time_ns() - envelope.sent_ns) < 60 * 10**9
+
+
+def test_only_the_chosen_topics_are_played_even_those_about_processes(path: Path) -> None:
+    _, played = play(path, Choices(rate=FAST, topics=[topics.PRESENCE]))
+    assert played.messages == {"presence": COUNT}
+
+
+def test_a_start_offset_leaves_out_what_was_before_it(path: Path) -> None:
+    listener, _ = play(path, Choices(rate=FAST, start_offset_s=0.045))
+    assert [message.seq for message in listener.of(topics.ODOMETRY)] == list(range(5, COUNT))
+
+
+def test_each_round_of_a_loop_is_believed_although_its_numbers_begin_anew(path: Path) -> None:
+    network = MemoryNetwork()
+    listener = Listener(network)
+
+    class Rounds(Script):
+        @property
+        def asked(self) -> bool:
+            return len(listener.arrivals) >= 6 * COUNT
+
+    played = Player(
+        LogReader(path), MemoryBus(network), Choices(rate=FAST, loop=True), Rounds()
+    ).play()
+    assert played.rounds >= 3
+    assert [message.seq for message in listener.of(topics.ODOMETRY)] == 3 * list(range(COUNT))
+
+
+@pytest.mark.parametrize("rate", [1.0, 3.0])
+def test_the_rate_sets_the_pace(path: Path, rate: float) -> None:
+    _, played = play(path, Choices(rate=rate))
+    assert played.wall_s >= 0.090 / rate
+
+
+def test_a_pause_stops_time_and_nothing_is_skipped(path: Path) -> None:
+    listener, _ = play(path, Choices(rate=1.0), Script(pauses=(3, 2000)))
+    assert len(listener.of(topics.ODOMETRY)) == COUNT
+
+
+def test_it_ends_when_asked(path: Path) -> None:
+    listener, played = play(path, Choices(rate=1e-3), Script(end_after=50))
+    assert len(listener.of(topics.ODOMETRY)) == 1
+    assert played.rounds == 1
+
+
+def test_the_clock_tells_the_newest_stamp_in_place_of_the_recorded_clock(path: Path) -> None:
+    listener, _ = play(path, Choices(rate=1.0, clock_hz=500.0))
+    clocks = listener.of(topics.CLOCK)
+    stamps = [clock.stamp_ns for clock in clocks]
+    assert {clock.source for clock in clocks} == {"replay"}
+    assert stamps == sorted(stamps)
+    assert stamps[-1] >= COUNT - 2
+    assert [clock.seq for clock in clocks] == list(range(len(clocks)))
+
+
+def test_others_see_that_a_replay_is_there(path: Path) -> None:
+    network = MemoryNetwork()
+    Player(LogReader(path), MemoryBus(network), Choices(rate=FAST), Script()).play()
+    assert Member("replay", "replay") in network.members
+
+
+def test_a_rate_that_stands_still_is_refused(path: Path) -> None:
+    with pytest.raises(UsageError, match="rate 0"):
+        Player(LogReader(path), MemoryBus(MemoryNetwork()), Choices(rate=0.0), Script())

@@ -1,0 +1,215 @@
+"""Recording on the in-memory bus: what the file says afterwards."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cogmap.bus.codec import Envelope, encode
+from cogmap.bus.interface import Member
+from cogmap.bus.memory import MemoryBus, MemoryNetwork
+from cogmap.errors import LogError
+from cogmap.recording.recorder import Recorder, Summary
+from cogmap.recording.selection import to_record
+from cogmap.recording.storage.reader import LogReader
+from schemas import topics
+from schemas.array import Array
+from schemas.base import Message
+from schemas.sensing import Odometry, RangeScan
+
+SECOND_NS = 10**9
+
+
+def odometry(seq: int, source: str = "sim", speed_m_s: float = 1.0) -> Odometry:
+    return Odometry(
+        stamp_ns=seq * SECOND_NS,
+        seq=seq,
+        source=source,
+        speed_m_s=speed_m_s,
+        turn_rate_rad_s=0.0,
+        dt_s=0.05,
+    )
+
+
+def scan(seq: int) -> RangeScan:
+    values = Array.of(np.full(8, seq, np.float32))
+    return RangeScan(
+        stamp_ns=seq * SECOND_NS,
+        seq=seq,
+        source="sensory",
+        frame=seq,
+        bearing_rad=values,
+        range_m=values,
+    )
+
+
+class Town:
+    """A network with a recorder on it, and a bus to say things on."""
+
+    def __init__(self, path: Path, limit_bytes: int = 2**20) -> None:
+        self.network = MemoryNetwork()
+        self.bus = MemoryBus(self.network)
+        self.recorder = Recorder(
+            MemoryBus(self.network),
+            path,
+            to_record(),
+            {"agent": "a", "config": "{}"},
+            limit_bytes=limit_bytes,
+        )
+        self.recorder.open()
+
+    def say(self, message: Message, at_ns: int, incarnation: int = 1) -> bytes:
+        payload = encode(message)
+        self.say_bytes(
+            topics.of(message),
+            payload,
+            Envelope(message.source, message.seq, incarnation, at_ns, at_ns),
+        )
+        return payload
+
+    def say_bytes(self, topic: topics.Topic, payload: bytes, envelope: Envelope) -> None:
+        self.bus.publish(topic, payload, envelope)
+
+    def end(self) -> Summary:
+        return self.recorder.close()
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "log.mcap"
+
+
+def test_the_log_gives_back_the_same_bytes_times_and_envelopes_in_order_of_arrival(
+    path: Path,
+) -> None:
+    town = Town(path)
+    said = [
+        town.say(message, 100 + n)
+        for n, message in enumerate([odometry(0), scan(0), odometry(1), scan(1)])
+    ]
+    envelope = Envelope("sim", 2, 1, 105, 90, [("sim", 3, 4)], [("motor/command", "action", 7)])
+    said.append(encode(odometry(2)))
+    town.say_bytes(topics.ODOMETRY, said[-1], envelope)
+    town.end()
+    reader = LogReader(path)
+    records = list(reader.records())
+    assert [reader.payload(record) for record in records] == said
+    assert [record.log_time_ns for record in records] == [100, 101, 102, 103, 105]
+    assert [record.sequence for record in records] == [0, 0, 1, 1, 2]
+    assert records[-1].envelope == envelope
+    assert reader.about("recording")["agent"] == "a"
+
+
+def test_a_summary_says_how_many_messages_of_each_topic_came_and_that_none_lacks(
+    path: Path,
+) -> None:
+    town = Town(path)
+    town.say(odometry(0), 1)
+    town.say(scan(0), 2)
+    summary = town.end()
+    assert summary.messages == {"odometry": 1, "sensory/scan": 1}
+    assert summary.never_drop_whole
+    assert (summary.gaps, summary.rejected, summary.size_bytes) == ([], {}, path.stat().st_size)
+
+
+def test_a_gap_is_named_with_its_source_and_its_numbers(path: Path) -> None:
+    town = Town(path)
+    for seq in (0, 1, 4, 5, 7):
+        town.say(odometry(seq), seq)
+    summary = town.end()
+    assert summary.lost == {"odometry": 3}
+    assert summary.gaps == ["odometry (never drop): 3 of sim lacking, number 2 to 3, 6"]
+    assert not summary.never_drop_whole
+
+
+def test_a_gap_in_a_latest_wins_topic_is_named_and_leaves_the_never_drop_topics_whole(
+    path: Path,
+) -> None:
+    town = Town(path)
+    town.say(scan(0), 0)
+    town.say(scan(3), 1)
+    summary = town.end()
+    assert summary.gaps == ["sensory/scan (latest wins): 2 of sensory lacking, number 1 to 2"]
+    assert summary.never_drop_whole
+
+
+def test_a_source_that_began_after_the_recorder_should_be_there_from_its_first_message(
+    path: Path,
+) -> None:
+    town = Town(path)
+    town.say(odometry(5), 1, incarnation=1)
+    town.say(odometry(2, source="later"), 2, incarnation=2**62)
+    summary = town.end()
+    assert summary.gaps == ["odometry (never drop): 2 of later lacking, number 0 to 1"]
+
+
+def test_a_restarted_source_begins_anew_and_that_is_no_gap(path: Path) -> None:
+    town = Town(path)
+    for incarnation in (1, 2):
+        for seq in (0, 1):
+            town.say(odometry(seq), seq, incarnation)
+    assert town.end().gaps == []
+
+
+def test_what_is_no_message_is_counted_and_not_written(path: Path) -> None:
+    town = Town(path)
+    town.say(odometry(0), 1)
+    town.say_bytes(topics.ODOMETRY, b"\xc1", Envelope("sim", 1, 1, 2, 2))
+    town.say_bytes(topics.ODOMETRY, encode(odometry(1)), Envelope("mallory", 1, 1, 3, 3))
+    summary = town.end()
+    assert summary.rejected == {"odometry": 2}
+    assert len(list(LogReader(path).records())) == 1
+
+
+def test_numbers_that_mcap_has_no_room_for_are_kept_in_the_envelope(path: Path) -> None:
+    town = Town(path)
+    far = scan(0)
+    far.seq = 2**40 + 3
+    town.say_bytes(topics.SCAN, encode(far), Envelope("sensory", far.seq, 1, -5, -5))
+    town.end()
+    (record,) = LogReader(path).records()
+    assert (record.sequence, record.publish_ns, record.log_time_ns) == (3, 0, 0)
+    assert record.envelope is not None
+    assert (record.envelope.seq, record.envelope.sent_ns) == (2**40 + 3, -5)
+
+
+def test_what_finds_no_room_is_counted_by_topic_and_never_drop_topics_have_more_of_it(
+    path: Path,
+) -> None:
+    town = Town(path, limit_bytes=40_000)
+    for seq in range(50):
+        town.say(scan(seq), seq)
+    for seq in range(5):
+        town.say(odometry(seq), seq)
+    summary = town.end()
+    assert summary.messages["odometry"] == 5
+    assert 0 < summary.messages["sensory/scan"] < 50
+    assert summary.dropped == {"sensory/scan": 50 - summary.messages["sensory/scan"]}
+    assert summary.never_drop_whole
+
+
+def test_latest_wins_messages_are_all_recorded_however_late_the_recorder_gets_to_them(
+    path: Path,
+) -> None:
+    town = Town(path)
+    for seq in range(20):
+        town.say(scan(seq), seq)
+    assert town.end().messages == {"sensory/scan": 20}
+
+
+def test_others_can_wait_for_the_recorder_and_it_notes_who_is_there(path: Path) -> None:
+    town = Town(path)
+    assert Member("recorder", "recorder") in town.network.members
+    town.bus.announce(Member("codelets", "codelets-1"))
+    town.end()
+    members = [facts["instance"] for name, facts in LogReader(path).metadata if name == "member"]
+    assert members[:2] == ["recorder", "codelets-1"]
+
+
+def test_an_existing_file_is_never_overwritten(path: Path) -> None:
+    path.write_text("precious")
+    with pytest.raises(LogError, match="exists already"):
+        Town(path)
+    assert path.read_text() == "precious"

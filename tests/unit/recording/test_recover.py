@@ -1,0 +1,162 @@
+"""What is left of a log that was cut off or damaged."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.opcode import Opcode
+
+from cogmap.bus.codec import Envelope, encode
+from cogmap.errors import LogError
+from cogmap.recording.storage.chunks import LogFile
+from cogmap.recording.storage.reader import LogReader
+from cogmap.recording.storage.recover import recover
+from cogmap.recording.storage.writer import LogWriter
+from schemas import topics
+from schemas.sensing import Odometry
+
+CHUNKS = 6
+EACH = 5
+
+
+def _message(seq: int) -> bytes:
+    speed_m_s = float(np.random.default_rng(seq).normal())
+    return encode(
+        Odometry(seq=seq, source="sim", speed_m_s=speed_m_s, turn_rate_rad_s=0.0, dt_s=0.05)
+    )
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("log") / "whole.mcap"
+    writer = LogWriter(path, [topics.ODOMETRY, topics.SCAN], {"agent": "a"})
+    for seq in range(CHUNKS * EACH):
+        writer.write(topics.ODOMETRY, _message(seq), Envelope("sim", seq, 1, seq, seq), seq)
+        if seq % EACH == EACH - 1:
+            writer.flush()
+    writer.close()
+    return path
+
+
+def _chunks(path: Path) -> list[tuple[int, int]]:
+    return [
+        (frame.offset, frame.end)
+        for frame in LogFile(path).frames()
+        if frame.opcode == Opcode.CHUNK
+    ]
+
+
+def _numbers(path: Path) -> list[int]:
+    reader = LogReader(path)
+    records = list(reader.records())
+    assert all(reader.payload(record) == _message(record.sequence) for record in records)
+    assert all(
+        record.envelope is not None and record.envelope.seq == record.sequence for record in records
+    )
+    return [record.sequence for record in records]
+
+
+def _altered(whole: Path, folder: Path, content: bytes) -> Path:
+    path = folder / "altered.mcap"
+    path.write_bytes(content)
+    return path
+
+
+def test_a_file_cut_at_any_byte_keeps_every_chunk_that_was_finished(
+    whole: Path, tmp_path: Path
+) -> None:
+    content = whole.read_bytes()
+    chunks = _chunks(whole)
+    for cut in [
+        *range(chunks[0][0], len(content) - 40, 97),
+        *(end for _, end in chunks),
+        len(content) - 40,
+    ]:
+        path = _altered(whole, tmp_path, content[:cut])
+        finished = sum(end <= cut for _, end in chunks)
+        assert _numbers(path) == list(range(finished * EACH))
+        target = tmp_path / f"{cut}.mcap"
+        recovery = recover(path, target)
+        assert (recovery.messages, recovery.chunks, recovery.whole) == (
+            finished * EACH,
+            finished,
+            False,
+        )
+        assert _numbers(target) == list(range(finished * EACH))
+
+
+def test_a_cut_file_says_how_many_bytes_at_its_end_are_lost(whole: Path, tmp_path: Path) -> None:
+    start, end = _chunks(whole)[3]
+    path = _altered(whole, tmp_path, whole.read_bytes()[: end - 10])
+    assert LogReader(path).cut_bytes == end - 10 - start
+    recovery = recover(path, tmp_path / "out.mcap")
+    assert recovery.lost_bytes == end - 10 - start
+    assert recovery.damaged == [f"bytes {start} to {end - 10}: the file is cut off here"]
+
+
+@pytest.mark.parametrize("number", range(CHUNKS))
+def test_a_damaged_chunk_is_passed_over_and_the_messages_in_it_are_counted(
+    whole: Path, tmp_path: Path, number: int
+) -> None:
+    start, end = _chunks(whole)[number]
+    content = bytearray(whole.read_bytes())
+    content[end - 20] ^= 0xFF
+    path = _altered(whole, tmp_path, bytes(content))
+    with pytest.raises(LogError, match="cogmap log recover"):
+        list(LogReader(path).records())
+    recovery = recover(path, tmp_path / "out.mcap")
+    lost = range(number * EACH, (number + 1) * EACH)
+    assert (recovery.lost_bytes, recovery.messages) == (end - start, (CHUNKS - 1) * EACH)
+    assert recovery.lost_messages == EACH
+    assert _numbers(tmp_path / "out.mcap") == [
+        seq for seq in range(CHUNKS * EACH) if seq not in lost
+    ]
+
+
+@pytest.mark.parametrize("length", [0, 7, 3000, 2**50])
+def test_a_record_with_a_wrong_length_costs_only_its_own_chunk(
+    whole: Path, tmp_path: Path, length: int
+) -> None:
+    start, _ = _chunks(whole)[2]
+    content = bytearray(whole.read_bytes())
+    struct.pack_into("<Q", content, start + 1, length)
+    recover(_altered(whole, tmp_path, bytes(content)), tmp_path / "out.mcap")
+    assert set(_numbers(tmp_path / "out.mcap")) >= set(range(CHUNKS * EACH)) - set(
+        range(2 * EACH, 3 * EACH)
+    )
+
+
+def test_a_whole_file_is_copied_as_it_is(whole: Path, tmp_path: Path) -> None:
+    recovery = recover(whole, tmp_path / "out.mcap")
+    assert (recovery.whole, recovery.lost_bytes) == (True, 0)
+    assert _numbers(tmp_path / "out.mcap") == list(range(CHUNKS * EACH))
+    assert LogReader(tmp_path / "out.mcap").about("recording") == LogReader(whole).about(
+        "recording"
+    )
+
+
+def test_random_bytes_after_the_first_record_never_break_recovery(
+    whole: Path, tmp_path: Path
+) -> None:
+    content = whole.read_bytes()
+    generator = np.random.default_rng(3)
+    for trial in range(30):
+        altered = bytearray(content)
+        at = int(generator.integers(8, len(content) - 64))
+        altered[at : at + 64] = generator.bytes(64)
+        target = tmp_path / f"{trial}.mcap"
+        recovery = recover(_altered(whole, tmp_path, bytes(altered)), target)
+        assert recovery.messages >= (CHUNKS - 2) * EACH
+        assert len(_numbers(target)) == recovery.messages
+
+
+def test_a_missing_file_and_a_foreign_one_are_named(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match=r"no log .*absent.mcap"):
+        LogReader(tmp_path / "absent.mcap")
+    for content in (b"", b"not a log at all"):
+        with pytest.raises(LogError, match=r"foreign.mcap"):
+            (tmp_path / "foreign.mcap").write_bytes(content)
+            LogReader(tmp_path / "foreign.mcap")

@@ -1,0 +1,175 @@
+from __future__ import annotations
+
+from typing import TypeVar
+
+import numpy as np
+import pytest
+
+from cogmap.bus.codec import encode
+from cogmap.errors import ConfigError
+from cogmap.runtime.module import Module
+from schemas.base import Message
+from schemas.process import Clock
+from schemas.sensing import MotorCommand, Odometry, StereoFrame, TruePose, TrueTown
+from services.sim.module import Config, build
+
+M = TypeVar("M", bound=Message)
+TICK_NS = 50_000_000
+SMALL = {"width_px": 64, "height_px": 64}
+
+
+def _command(stamp_ns: int, left_rad_s: float = 15.0, right_rad_s: float = 15.0) -> MotorCommand:
+    return MotorCommand(
+        stamp_ns=stamp_ns, left_wheel_rad_s=left_rad_s, right_wheel_rad_s=right_rad_s
+    )
+
+
+def _start(module: Module) -> list[Message]:
+    assert module.start is not None
+    return module.stamp(module.start())
+
+
+def _lockstep(frames: int) -> list[Message]:
+    module = build(Config(mode="lockstep", **SMALL))
+    said = _start(module)
+    for number in range(frames):
+        said += module.feed(_command(said[-1].stamp_ns, 15.0, 15.0 + number))
+    return said
+
+
+def _real_time(
+    module: Module, ticks: int, first_ns: int = 10**12, answer: bool = True
+) -> list[Message]:
+    said: list[Message] = []
+    for number in range(ticks):
+        new = module.stamp(module.timers[0].handler(first_ns + number * TICK_NS))
+        said += new
+        if answer and new and isinstance(new[-1], StereoFrame):
+            module.feed(_command(new[-1].stamp_ns))
+    return said
+
+
+def _of(kind: type[M], said: list[Message]) -> list[M]:
+    return [message for message in said if isinstance(message, kind)]
+
+
+def _check_that_frames_follow_their_odometry(said: list[Message]) -> None:
+    heard_ns = 0
+    for message in said:
+        if isinstance(message, Odometry):
+            assert message.stamp_ns == heard_ns + TICK_NS
+            heard_ns = message.stamp_ns
+        elif isinstance(message, StereoFrame):
+            assert message.stamp_ns == heard_ns
+
+
+def test_two_lockstep_runs_of_one_seed_give_the_same_bytes() -> None:
+    assert [encode(message) for message in _lockstep(5)] == [
+        encode(message) for message in _lockstep(5)
+    ]
+
+
+def test_lockstep_moves_by_one_frame_for_each_answer_to_the_last_one() -> None:
+    said = _lockstep(4)
+    assert isinstance(said[0], TrueTown)
+    assert [frame.frame for frame in _of(StereoFrame, said)] == [0, 1, 2, 3, 4]
+    assert {clock.rate for clock in _of(Clock, said)} == {0.0}
+    _check_that_frames_follow_their_odometry(said)
+
+
+def test_lockstep_passes_over_commands_that_answer_another_frame() -> None:
+    module = build(Config(mode="lockstep", **SMALL))
+    stamp_ns = _start(module)[-1].stamp_ns
+    assert module.feed(_command(stamp_ns + 1)) == []
+    assert module.feed(_command(stamp_ns))
+    assert module.feed(_command(stamp_ns)) == []
+
+
+def test_real_time_says_nothing_before_it_is_started() -> None:
+    module = build(Config(**SMALL))
+    assert _real_time(module, 3) == []
+    _start(module)
+    assert _real_time(module, 1)
+
+
+def test_real_time_keeps_its_rates_and_frames_follow_their_odometry() -> None:
+    module = build(Config(**SMALL))
+    _start(module)
+    said = _real_time(module, 120)
+    counts = {
+        kind.__name__: len(_of(kind, said))
+        for kind in (Clock, Odometry, TruePose, StereoFrame, TrueTown)
+    }
+    assert counts == {
+        "Clock": 120,
+        "Odometry": 120,
+        "TruePose": 120,
+        "StereoFrame": 30,
+        "TrueTown": 2,
+    }
+    assert _of(Clock, said)[-1].rate == pytest.approx(1.0)
+    _check_that_frames_follow_their_odometry(said)
+    poses = _of(TruePose, said)
+    assert 12.0 < poses[-1].travelled_m < 18.0
+    assert 0.05 < poses[-1].progress < 0.15
+
+
+def test_real_time_slips_where_more_than_a_quarter_second_would_have_to_be_caught_up() -> None:
+    module = build(Config(**SMALL))
+    _start(module)
+    _real_time(module, 1)
+    late = module.stamp(module.timers[0].handler(10**12 + 60 * TICK_NS))
+    assert len(_of(Odometry, late)) == 5
+    assert len(_of(StereoFrame, late)) == 1
+    assert _of(Clock, late)[-1].rate < 0.2
+
+
+def test_a_robot_that_hears_no_command_for_a_second_brakes() -> None:
+    module = build(Config(**SMALL))
+    _start(module)
+    moving = _real_time(module, 60)
+    standing = _real_time(module, 60, 10**12 + 60 * TICK_NS, answer=False)
+    speeds = [abs(odometry.speed_m_s) for odometry in _of(Odometry, moving + standing)]
+    assert np.mean(speeds[50:60]) > 2.0
+    assert np.mean(speeds[-10:]) < 0.05
+
+
+def test_an_older_command_that_comes_late_does_not_replace_a_newer_one() -> None:
+    module = build(Config(**SMALL))
+    _start(module)
+    said = _real_time(module, 20)
+    module.feed(_command(said[-1].stamp_ns - 4 * TICK_NS, -15.0, -15.0))
+    assert (
+        _of(Odometry, _real_time(module, 10, 10**12 + 20 * TICK_NS, answer=False))[-1].speed_m_s
+        > 1.0
+    )
+
+
+@pytest.mark.parametrize("wrong", [{"frame_hz": 6}, {"odometry_hz": 35, "frame_hz": 5}])
+def test_rates_that_do_not_divide_one_another_are_refused_by_name(wrong: dict[str, int]) -> None:
+    with pytest.raises(ConfigError, match="choose one that divides"):
+        build(Config(**wrong))
+
+
+@pytest.mark.parametrize("mode", ["real_time", "lockstep"])
+def test_a_world_that_was_killed_goes_on_from_where_and_when_it_was_with_the_robot_at_rest(
+    mode: str,
+) -> None:
+    config = Config(mode=mode, egl=False, **SMALL)  # type: ignore[arg-type]
+    before = build(config)
+    after = build(config)
+    said = _start(before)
+    said += (
+        before.feed(_command(said[-1].stamp_ns)) if mode == "lockstep" else _real_time(before, 90)
+    )
+    told = _of(TruePose, said)
+    last = _of(StereoFrame, said)[-1]
+    assert after.restore is not None
+    after.restore(told)
+    again = _start(after)
+    again += [] if mode == "lockstep" else _real_time(after, 4)
+    assert _of(Odometry, again)[0].stamp_ns == told[-1].stamp_ns + TICK_NS
+    assert _of(StereoFrame, again)[0].frame == last.frame + 1
+    assert _of(TruePose, again)[0].pose.x_m == pytest.approx(told[-1].pose.x_m, abs=0.1)
+    assert _of(TruePose, again)[0].travelled_m == pytest.approx(told[-1].travelled_m, abs=0.1)
+    assert _of(TruePose, again)[0].progress == pytest.approx(told[-1].progress, abs=0.005)

@@ -1,0 +1,259 @@
+"""Workers that go, leases that end, deadlines, and answers that come late."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from schemas.cognition import Task
+from schemas.graph import Delta, Node
+from schemas.process import Presence
+from tests.support.scenes import PERIOD_NS, Desk, answer, motion, node, percept, percepts, stamp_ns
+
+MS = 1_000_000
+
+
+def _moved_self(frame: int, x_m: float = 1.0) -> Node:
+    where = {"x_m": x_m, "y_m": 0.0, "heading_rad": 0.0, "stamp_ns": stamp_ns(frame)}
+    return node("self", np.zeros((10, 3)), "self", **where)
+
+
+def _real_time(*workers: str) -> tuple[Desk, Task]:
+    """A workspace in real time that has just asked for a localization, and what it asked."""
+    desk = Desk(*workers, mode="real_time", lease_ms=100.0, deadline_ms=180.0)
+    desk.clock(stamp_ns(0))
+    desk.see(0)
+    (asked,) = desk.take()
+    return desk, asked
+
+
+def _committed(desk: Desk, asked: Task) -> int:
+    return sum(asked.task_id in delta.tasks for delta in desk.deltas)
+
+
+def test_tasks_wait_where_there_is_no_worker_and_go_out_when_one_comes() -> None:
+    desk = Desk()
+    desk.see(0)
+    assert desk.tasks == []
+    desk.presence("w1")
+    (asked,) = desk.take()
+    assert (asked.worker, asked.attempt) == ("w1", 0)
+
+
+def test_tasks_of_one_phase_are_spread_over_the_workers() -> None:
+    desk = Desk("w1", "w2", "w3")
+    desk.see(0, percept("a"), percept("b"), percept("c"), percept("d"), percept("e"))
+    desk.feed(answer(desk.take()[0]))
+    assert sorted(asked.worker for asked in desk.take()) == [
+        "w1",
+        "w1",
+        "w1",
+        "w2",
+        "w2",
+        "w3",
+        "w3",
+    ]
+
+
+def test_the_task_of_a_worker_that_goes_is_given_to_another_and_committed_once() -> None:
+    desk = Desk("w1", "w2")
+    desk.see(0)
+    (asked,) = desk.take()
+    desk.presence(asked.worker, alive=False)
+    (again,) = desk.take()
+    assert (again.task_id, again.attempt) == (asked.task_id, 1)
+    assert {asked.worker, again.worker} == {"w1", "w2"}
+    desk.feed(answer(again, [_moved_self(0)]))
+    desk.feed(answer(asked, [_moved_self(0, 7.0)]))
+    assert _committed(desk, asked) == 1
+    assert desk.graph.nodes["self"].attributes["x_m"] == 1.0
+
+
+def test_a_worker_that_goes_without_a_task_changes_nothing() -> None:
+    desk = Desk("w1", "w2", "w3")
+    desk.see(0)
+    (asked,) = desk.take()
+    idle = next(worker for worker in ("w1", "w2", "w3") if worker != asked.worker)
+    assert desk.presence(idle, alive=False) == []
+
+
+def test_presence_of_other_modules_is_nothing_to_the_dispatch() -> None:
+    desk = Desk()
+    desk.see(0)
+    assert (
+        desk.feed(Presence(module="epam", instance="epam", alive=True, observer="workspace"))[1:]
+        == []
+    )
+    assert desk.tasks == []
+
+
+def test_with_its_only_worker_gone_a_task_waits_for_the_next_one() -> None:
+    desk = Desk("w1")
+    desk.see(0)
+    desk.take()
+    assert not [said for said in desk.presence("w1", alive=False) if isinstance(said, Task)]
+    desk.presence("w9")
+    assert [(asked.worker, asked.attempt) for asked in desk.tasks] == [("w9", 1)]
+
+
+@pytest.mark.parametrize("workers", [("w1", "w2"), ("w2", "w1"), ("a", "b", "c")])
+def test_in_real_time_a_task_whose_lease_has_ended_goes_to_another_worker_and_is_committed_once(
+    workers: tuple[str, ...],
+) -> None:
+    desk, asked = _real_time(*workers)
+    assert desk.clock(stamp_ns(0) + 100 * MS) == []
+    desk.clock(stamp_ns(0) + 101 * MS)
+    (again,) = desk.take()
+    assert (again.task_id, again.attempt) == (asked.task_id, 1)
+    assert again.worker != asked.worker
+    desk.feed(answer(asked, [_moved_self(0)]))
+    desk.feed(answer(again, [_moved_self(0, 7.0)]))
+    assert _committed(desk, asked) == 1
+
+
+def test_the_only_worker_keeps_its_task_when_the_lease_has_ended_until_there_is_another() -> None:
+    desk, asked = _real_time("w1")
+    assert desk.clock(stamp_ns(0) + 101 * MS) == []
+    desk.presence("w2")
+    desk.clock(stamp_ns(0) + 102 * MS)
+    assert [(again.task_id, again.worker) for again in desk.take()] == [(asked.task_id, "w2")]
+
+
+def test_a_task_that_nobody_has_is_given_to_the_first_worker_however_long_it_has_waited() -> None:
+    desk = Desk(mode="real_time", deadline_ms=10_000.0)
+    desk.see(0)
+    desk.clock(stamp_ns(0) + 5_000 * MS)
+    desk.presence("w1")
+    assert [(asked.worker, asked.attempt) for asked in desk.take()] == [("w1", 0)]
+
+
+def test_a_task_that_is_lost_as_often_as_it_may_be_given_out_is_given_up_and_the_cycle_goes_on() -> (
+    None
+):
+    desk = Desk("w1", "w2", mode="real_time", lease_ms=10.0, deadline_ms=10_000.0, attempts=3)
+    desk.clock(stamp_ns(0))
+    desk.see(0)
+    for ms in (11, 22, 33):
+        desk.clock(stamp_ns(0) + ms * MS)
+    *localization, road, _ = desk.take()
+    assert [(asked.codelet, asked.attempt) for asked in localization] == [
+        ("localization", n) for n in range(3)
+    ]
+    assert (road.codelet, road.attempt) == ("road_place", 0)
+
+
+def test_in_lockstep_a_task_that_kills_every_worker_is_given_up_and_told_of() -> None:
+    desk = Desk(attempts=3)
+    desk.see(0)
+    for number in range(3):
+        assert not any(delta.phase == "decay" for delta in desk.deltas)
+        desk.presence(f"w{number}")
+        desk.presence(f"w{number}", alive=False)
+    desk.presence("steady")
+    desk.work()
+    assert desk.deltas[-1].phase == "decay"
+    assert [delta.refused for delta in desk.deltas if delta.dropped] == [
+        ["task 1/localization was given to 3 workers and lost each time"]
+    ]
+
+
+def test_in_lockstep_neither_lease_nor_deadline_ends() -> None:
+    desk = Desk("w1")
+    desk.see(0)
+    assert desk.clock(stamp_ns(1000)) == []
+
+
+def test_at_its_deadline_a_cycle_commits_what_has_come_and_the_next_one_begins() -> None:
+    desk, asked = _real_time("w1", "w2")
+    desk.feed(answer(asked, [_moved_self(0)]))
+    road, *_ = desk.take()
+    desk.clock(stamp_ns(0) + 180 * MS)
+    assert desk.deltas[-1].phase == "localization"
+    desk.feed(motion(1))
+    desk.feed(percepts(1))
+    desk.clock(stamp_ns(0) + 181 * MS)
+    assert [delta.phase for delta in desk.deltas] == [
+        "percepts",
+        "localization",
+        "decay",
+        "percepts",
+    ]
+    assert _committed(desk, road) == 0
+
+
+def test_a_clock_that_once_ran_far_ahead_spoils_no_later_cycle() -> None:
+    desk, _ = _real_time("w1", "w2")
+    desk.clock(stamp_ns(1000))
+    assert desk.deltas[-1].phase == "decay"
+    desk.clock(stamp_ns(1))
+    desk.see(1)
+    desk.clock(stamp_ns(1) + 50 * MS)
+    assert desk.deltas[-1].phase == "percepts"
+
+
+def test_a_part_of_the_answers_is_committed_at_the_deadline() -> None:
+    desk = Desk("w1", "w2", mode="real_time")
+    desk.see(0, percept("a"), percept("b"))
+    desk.feed(answer(desk.take()[0], [_moved_self(0)]))
+    first, second, *_ = desk.take()
+    desk.feed(answer(second, [node("object:b")]))
+    desk.clock(stamp_ns(0) + 500 * MS)
+    assert [delta.tasks for delta in desk.deltas if delta.phase == "objects"] == [[second.task_id]]
+    assert _committed(desk, first) == 0
+
+
+def test_a_late_answer_is_committed_in_the_next_cycle_if_it_still_applies() -> None:
+    desk, asked = _real_time("w1", "w2")
+    desk.clock(stamp_ns(0) + 181 * MS)
+    desk.see(1)
+    desk.feed(answer(asked, [_moved_self(0)]))
+    late = desk.deltas[-1]
+    assert (late.phase, late.tasks, late.cycle, late.dropped) == ("late", [asked.task_id], 2, 0)
+    assert desk.graph.nodes["self"].attributes["stamp_ns"] == stamp_ns(0)
+
+
+def test_a_late_answer_is_committed_between_two_cycles_too() -> None:
+    desk, asked = _real_time("w1", "w2")
+    desk.clock(stamp_ns(0) + 181 * MS)
+    desk.feed(answer(asked, [_moved_self(0)]))
+    assert desk.deltas[-1].tasks == [asked.task_id]
+
+
+def test_a_late_answer_about_a_node_that_has_changed_since_is_dropped_and_the_next_delta_counts_it() -> (
+    None
+):
+    desk, asked = _real_time("w1", "w2")
+    desk.clock(stamp_ns(0) + 181 * MS)
+    desk.see(1)
+    (newer,) = desk.take()
+    desk.feed(answer(newer, [_moved_self(1, 3.0)]))
+    before = len(desk.deltas)
+    assert desk.feed(answer(asked, [_moved_self(0)])) == []
+    assert _committed(desk, asked) == 0
+    desk.clock(stamp_ns(1) + 181 * MS)
+    assert [delta.dropped for delta in desk.deltas[before:]] == [1]
+    assert desk.graph.nodes["self"].attributes["x_m"] == 3.0
+
+
+def test_a_late_answer_is_taken_once() -> None:
+    desk, asked = _real_time("w1", "w2")
+    desk.clock(stamp_ns(0) + 181 * MS)
+    assert desk.feed(answer(asked, [node("object:a")]))
+    assert desk.feed(answer(asked, [node("object:a")])) == []
+
+
+def test_motion_that_no_answer_has_used_is_given_to_the_next_cycles_localization() -> None:
+    desk, _ = _real_time("w1", "w2")
+    desk.clock(stamp_ns(0) + 181 * MS)
+    desk.see(1)
+    (asked,) = desk.take()
+    assert asked.motions.shape == (2, 5)
+
+
+def test_workers_that_never_answer_leave_the_deltas_without_a_gap() -> None:
+    desk = Desk("w1", mode="real_time")
+    for frame in range(5):
+        desk.see(frame, percept("a"))
+        desk.clock(stamp_ns(frame) + PERIOD_NS)
+    assert [delta.version for delta in desk.deltas] == list(range(1, 11))
+    assert all(isinstance(delta, Delta) and not delta.tasks for delta in desk.deltas)
