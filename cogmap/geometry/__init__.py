@@ -1,0 +1,1 @@
+"""Geometry of the plane: array types, poses (SE(2)) and polylines."""

@@ -1,0 +1,74 @@
+"""Polylines: (n, 2) points in the plane, joined by straight pieces."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cogmap.geometry.arrays import Floats, Indices
+
+CHUNK = 4096
+
+
+class Nearest(NamedTuple):
+    """Of k points: the piece nearest to each, (k,), and the point of it that is nearest, (k, 2)."""
+
+    piece: Indices
+    foot_m: Floats
+
+
+def distances_along(points_m: Floats) -> Floats:
+    """(n,): how far along a polyline each of its points is, in metres."""
+    lengths_m = np.hypot(*np.diff(points_m, axis=0).T)
+    return np.concatenate([[0.0], np.cumsum(lengths_m)])
+
+
+def points_at(points_m: Floats, along_m: Floats) -> Floats:
+    """(k, 2): the points of a polyline at distances along it; beyond its ends, the ends."""
+    known_m = distances_along(points_m)
+    return interpolate(known_m, points_m, along_m)
+
+
+def interpolate(known: Floats, values: Floats, at: Floats) -> Floats:
+    """(k, d): each column of (n, d) `values`, known at increasing `known` (n,), at `at` (k,)."""
+    columns = [np.interp(at, known, column) for column in values.T]
+    return np.column_stack(columns)
+
+
+def resample(points_m: Floats, spacing_m: float) -> Floats:
+    """The same polyline with a point every `spacing_m` from its first, (k, 2). Its last point is
+    left out unless it is due.
+    """
+    length_m = distances_along(points_m)[-1]
+    return points_at(points_m, np.arange(0.0, length_m, spacing_m))
+
+
+def nearest_on_line(line_m: Floats, points_m: Floats) -> Nearest:
+    """The nearest of a polyline to each of (k, 2) points."""
+    return nearest_on_pieces(line_m[:-1], line_m[1:], points_m)
+
+
+def nearest_on_pieces(starts_m: Floats, ends_m: Floats, points_m: Floats) -> Nearest:
+    """The nearest of m straight pieces, from (m, 2) `starts_m` to `ends_m`, to each of (k, 2)
+    points.
+    """
+    found = [
+        _nearest(starts_m, ends_m, points_m[start : start + CHUNK])
+        for start in range(0, max(1, len(points_m)), CHUNK)
+    ]
+    pieces, feet_m = zip(*found, strict=True)
+    return Nearest(np.concatenate(pieces), np.concatenate(feet_m))
+
+
+def _nearest(starts_m: Floats, ends_m: Floats, points_m: Floats) -> Nearest:
+    along = ends_m - starts_m
+    squared_m2 = np.maximum((along**2).sum(axis=1), 1e-9)
+
+    dots = ((points_m[:, None] - starts_m) * along).sum(axis=2)
+    share = (dots / squared_m2).clip(0.0, 1.0)
+    feet_m = starts_m + share[..., None] * along
+
+    away_m2 = ((points_m[:, None] - feet_m) ** 2).sum(axis=2)
+    nearest = away_m2.argmin(axis=1)
+    return Nearest(nearest, feet_m[np.arange(len(points_m)), nearest])
