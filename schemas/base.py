@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from typing import Annotated
 
@@ -12,6 +13,16 @@ Name = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
 # msgpack carries NaN and infinity; a bounded type refuses both, at no cost.
 Finite = Annotated[float, msgspec.Meta(ge=-sys.float_info.max, le=sys.float_info.max)]
 Scalar = Finite | int | str | bool
+
+# Quantities of settings, bounded against infinite and absurd values. A key adds its description:
+# Annotated[Share, msgspec.Meta(description="...")].
+Share = Annotated[float, msgspec.Meta(ge=0, le=1)]
+PositiveShare = Annotated[float, msgspec.Meta(gt=0, le=1)]
+PositiveMetres = Annotated[float, msgspec.Meta(gt=0, le=1e4)]
+PositiveSeconds = Annotated[float, msgspec.Meta(gt=0, le=3600)]
+PositiveRadians = Annotated[float, msgspec.Meta(gt=0, le=math.tau)]
+PositiveSpeed = Annotated[float, msgspec.Meta(gt=0, le=100)]
+PositiveAcceleration = Annotated[float, msgspec.Meta(gt=0, le=100)]
 
 
 class Part(msgspec.Struct, kw_only=True, gc=False):
