@@ -18,7 +18,8 @@ from benchmarks.localization.senses import Moment, label_of, moments
 from benchmarks.map_correction.measure import trajectory_error_m
 from benchmarks.report import Bar
 from cogmap.data.mrclam import Numbers, Recording, Robot, read
-from services.codelets.mapping.path import ODOMETRY, POSE, STAMP, composed, step_between
+from cogmap.geometry.se2 import compose, relative
+from services.codelets.mapping.path import ODOMETRY, POSE, STAMP
 
 BARS = {
     "known_map_rmse_m": Bar(0.15),
@@ -114,7 +115,7 @@ class Drive(NamedTuple):
         places = (np.searchsorted(self.path[:, STAMP], stamps_s + 1e-6) - 1).clip(0)
         steps = zip(self.path[places], self.odometry, strict=True)
         return np.array(
-            [composed(place[POSE], step_between(place[ODOMETRY], now)) for place, now in steps]
+            [compose(place[POSE], relative(place[ODOMETRY], now)) for place, now in steps]
         )
 
 

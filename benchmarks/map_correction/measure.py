@@ -17,9 +17,10 @@ from cogmap.data.g2o import read_g2o
 from cogmap.data.pose_graph import PoseGraphFile, read_true_positions
 from cogmap.data.toro import read_toro
 from cogmap.errors import MessageError, UsageError
-from services.codelets.correction.incremental import Solved
-from services.codelets.correction.least_squares import correct_headings
-from services.codelets.correction.pose_graph import Constraints, Floats, PoseGraph, cost
+from cogmap.geometry.arrays import Floats
+from services.codelets.correction.incremental import IncrementalSolver
+from services.codelets.correction.least_squares import optimize
+from services.codelets.correction.pose_graph import Constraints, PoseGraph, cost
 from services.codelets.correction.reverse_replay import close_loops, displacements, position_cost
 
 BARS = {
@@ -45,7 +46,7 @@ def read_graph(path: Path) -> PoseGraph:
     if suffix not in READERS:
         raise UsageError(f"{path} is none of {', '.join(READERS)}, or one of them packed as .xz")
     file: PoseGraphFile = READERS[suffix](path)
-    constraints = Constraints(file.first, file.second, file.measured, file.information)
+    constraints = Constraints(file.i, file.j, file.measurement, file.information)
     try:
         return PoseGraph.of(file.poses, constraints)
     except MessageError as error:
@@ -104,10 +105,10 @@ def _positions(graph: PoseGraph) -> tuple[Floats, dict[str, float]]:
 def _headings(graph: PoseGraph, peer: Gtsam) -> tuple[Floats, Floats, dict[str, float]]:
     """Both from the same poses, each once to warm up, then in turn; each one's median time."""
     by_qr = peer.gives_up()
-    poses = correct_headings(graph)
+    poses = optimize(graph)
     peers_poses = peer.poses(peer.solve())
     rounds = [
-        (_timed(lambda: correct_headings(graph))[0], _timed(peer.solve)[0])
+        (_timed(lambda: optimize(graph))[0], _timed(peer.solve)[0])
         for _ in track(range(PAIRS), "correcting headings, and gtsam the same", transient=True)
     ]
     ours_s, peers_s = np.median(rounds, axis=0).tolist()
@@ -130,16 +131,16 @@ def _incremental(graph: PoseGraph, batch_cost: float) -> dict[str, float]:
     count = min(NEW_CLOSURES, int(HELD_OUT_AT_MOST * len(graph.closures)))
     held_out = np.random.default_rng(SEED).permutation(len(graph.closures))[:count]
     rest = np.setdiff1d(np.arange(len(graph.closures)), held_out)
-    solved = Solved(PoseGraph(graph.poses, graph.steps, graph.closures.select(rest)))
+    solved = IncrementalSolver(PoseGraph(graph.poses, graph.steps, graph.closures.select(rest)))
     took_s = []
     settling_s = []
     for number, index in enumerate(
         track(held_out.tolist(), "closing one more loop", transient=True), 1
     ):
         closure = graph.closures.select(np.array([index]))
-        took_s.append(_timed(partial(solved.close, closure))[0])
+        took_s.append(_timed(partial(solved.add, closure))[0])
         if number % SETTLE_EVERY == 0:
-            settling_s.append(_timed(solved.settle)[0])
+            settling_s.append(_timed(solved.relinearize)[0])
     if not took_s:
         return {}
     return {

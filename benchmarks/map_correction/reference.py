@@ -10,7 +10,8 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from cogmap.errors import UsageError
-from services.codelets.correction.pose_graph import Constraints, Floats, PoseGraph
+from cogmap.geometry.arrays import Floats
+from services.codelets.correction.pose_graph import Constraints, PoseGraph
 from services.codelets.correction.reverse_replay import displacements
 
 gtsam: Any
@@ -29,7 +30,7 @@ def best_positions(graph: PoseGraph) -> Floats:
     known = displacements(graph.poses, constraints)
     edges = np.arange(len(constraints))
     signs = np.repeat([1.0, -1.0], len(constraints))
-    ends = np.concatenate([constraints.second, constraints.first])
+    ends = np.concatenate([constraints.j, constraints.i])
     across = sparse.csr_matrix((signs, (np.tile(edges, 2), ends)), shape=(len(constraints), count))
     differences = sparse.kron(across[:, 1:], sparse.identity(2), format="csc")
     covariance = sparse.block_diag(known.covariance_m2, format="csc")
@@ -57,7 +58,7 @@ class Gtsam:
             self._start.insert(index, gtsam.Pose2(*pose))
         fixed = gtsam.noiseModel.Constrained.All(3)
         self._graph.add(gtsam.PriorFactorPose2(0, gtsam.Pose2(*poses[0]), fixed))
-        columns = (constraints.first.tolist(), constraints.second.tolist(), constraints.measured)
+        columns = (constraints.i.tolist(), constraints.j.tolist(), constraints.measurement)
         for first, second, measured, information in zip(
             *columns, constraints.information, strict=True
         ):

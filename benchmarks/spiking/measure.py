@@ -10,7 +10,7 @@ from benchmarks.report import Bar
 from experiments.parallel import Progress, each
 from experiments.spiking.cells import Values
 from experiments.spiking.network import Border, Cues, Posterior, Recording, exact, record
-from services.codelets.localization.sampling import keep
+from services.codelets.localization.sampling import rejection_mask
 
 SIDE_M = 5.0
 RECORDED_S = 600.0
@@ -75,7 +75,7 @@ def _rejection(given: Cues, seed: int) -> Posterior:
     rng = np.random.default_rng([seed, 2])
     samples = rng.multivariate_normal(given.mean_m, given.covariance_m2, 20_000)
     squared = [((samples[:, each.axis] - each.sensed_m) / each.sd_m) ** 2 for each in given.borders]
-    kept = samples[keep(-np.sum(squared, axis=0) / 2, rng)]
+    kept = samples[rejection_mask(-np.sum(squared, axis=0) / 2, rng)]
     return Posterior(kept.mean(axis=0), np.cov(kept, rowvar=False))
 
 

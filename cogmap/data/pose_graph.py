@@ -27,18 +27,18 @@ NUMBERS = {POSE: (1, 4), EDGE: (2, 11)}
 
 @dataclass(frozen=True)
 class PoseGraphFile:
-    """`poses` (n, 3) in the order of `ids`; edge k measures pose `second[k]` as seen from
-    `first[k]`, both indices.
+    """`poses` (n, 3) in the order of `ids`; edge k measures pose `j[k]` as seen from
+    `i[k]`, both indices.
 
-    `measured` (m, 3) is metres, metres, radians; `information` (m, 3, 3) the inverse of its
+    `measurement` (m, 3) is metres, metres, radians; `information` (m, 3, 3) the inverse of its
     covariance.
     """
 
     ids: Indices
     poses: Floats
-    first: Indices
-    second: Indices
-    measured: Floats
+    i: Indices
+    j: Indices
+    measurement: Floats
     information: Floats
 
 

@@ -86,19 +86,26 @@ def integrate(start: Floats, steps: Floats) -> Floats:
     """(n + 1, 3): the poses that (n, 3) steps lead through from `start`, each step in the frame of
     the pose before it. Headings are not wrapped, so that turns can be counted.
     """
-    headings_rad = start[2] + running_sum(steps[:, 2])
+    headings_rad = start[2] + cumulative(steps[:, 2])
     moved_m = rotate(steps[:, :2], headings_rad[:-1])
-    positions_m = start[:2] + running_sum(moved_m)
+    positions_m = start[:2] + cumulative(moved_m)
     return np.column_stack([positions_m, headings_rad])
 
 
 def mean_pose(poses: Floats) -> Floats:
-    """(3,): the mean of (n, 3) poses, of the headings the mean direction."""
-    position_m = poses[:, :2].mean(axis=0)
-    return np.append(position_m, mean_angle(poses[:, 2]))
+    """(3,): the mean of n poses, of the headings the mean direction. Columns after those of the
+    pose are ignored, (n, 3 or more).
+    """
+    # A product with weights takes a fraction of the time of mean().
+    weights = np.full(len(poses), 1 / len(poses))
+    mean: Floats = (weights @ poses)[:3]
+
+    headings_rad = np.ascontiguousarray(poses[:, 2])
+    mean[2] = np.arctan2(weights @ np.sin(headings_rad), weights @ np.cos(headings_rad))
+    return mean
 
 
-def running_sum(values: Floats) -> Floats:
+def cumulative(values: Floats) -> Floats:
     """(n + 1, ...): sums of the first 0, 1, ... n of (n, ...) values."""
     nothing = np.zeros((1, *values.shape[1:]))
     return np.concatenate([nothing, np.cumsum(values, axis=0)])

@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 
 from cogmap.errors import CogmapError
+from cogmap.geometry.se2 import rotation_matrices
 from cogmap.graph.graph import TILE_SIDE, Graph, object_id
 from cogmap.runtime.config import Sections
 from cogmap.runtime.module import Module
@@ -23,7 +24,6 @@ from schemas import topics
 from schemas.graph import Delta, Node
 from schemas.sensing import TruePose
 from services import registry
-from services.codelets.correction.pose_graph import rotations
 from services.codelets.mapping.observations import Sightings
 from services.codelets.mapping.path import ODOMETRY, POSE, STAMP, rows_of
 from services.sim.odometry import Noise
@@ -171,7 +171,7 @@ def _felt(graph: Graph, names: tuple[str, ...], origin: Points) -> Points:
     seen = Sightings.of(graph.nodes.values(), rows[:, STAMP])
     poses = rows[:, ODOMETRY] - np.append(rows[0, ODOMETRY][:2] - rows[0, POSE][:2], 0.0)
     stood = poses[seen.place]
-    where = stood[:, :2] + np.einsum("mab,mb->ma", rotations(stood[:, 2]), seen.where_m)
+    where = stood[:, :2] + np.einsum("mab,mb->ma", rotation_matrices(stood[:, 2]), seen.where_m)
     number = {label: index for index, label in enumerate(seen.labels)}
     own = [
         np.median(where[seen.landmark == number[name]], axis=0)

@@ -12,7 +12,7 @@ from services import registry
 # places.
 SECTIONS: dict[str, dict[str, Any]] = {
     "workspace": {"mode": "lockstep", "cell_m": 0.25},
-    "codelets": {"views_alike": 1.0},
+    "codelets": {"correlated_views": 1.0},
 }
 WORKER = "codelets-1"
 CYCLES_A_TRIAL = 1000

@@ -14,7 +14,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     """Numbers of samples, and what is believed of sightings. The noise of each sense comes with
     what it says.
 
-    `views_alike`: so many views of a landmark on end err alike and count for one, those of driving
+    `correlated_views`: so many views of a landmark on end err alike and count for one, those of driving
     by once. The paper takes each for independent (eq. 1); a landmark that is always seen a little
     too near then drags the agent. `correct`: the map's positions only, as in the paper, or its
     headings too. `false_closure`: closures that would be as wrong as they look with a smaller
@@ -29,7 +29,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     kept_samples: Annotated[int, msgspec.Meta(ge=1, le=10_000)] = 200
     landmark_samples: Annotated[int, msgspec.Meta(ge=10, le=10_000)] = 200
     outlier_share: Share = 1e-3
-    views_alike: Annotated[float, msgspec.Meta(ge=1, le=1000)] = 60.0
+    correlated_views: Annotated[float, msgspec.Meta(ge=1, le=1000)] = 60.0
     largest_landmark_sd_m: Positive = 4.0
     landmark_jitter_m: Positive = 0.03
     gate: Positive = 4.0
@@ -37,9 +37,9 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     speed_gain_sd: Share = 0.0
     turn_gain_sd: Share = 0.0
     drift_rad_per_m: Share = 0.0
-    gait_memory_s: Positive = 30.0
+    motion_bias_time_s: Positive = 30.0
     range_gain_sd: Share = 0.0
-    range_memory_s: Positive = 300.0
+    range_bias_time_s: Positive = 300.0
     astray: Annotated[int, msgspec.Meta(ge=2)] = 8
     farthest_m: Positive = 50.0
     attention_base_level: Share = 1.0

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import msgspec
 import numpy as np
-import numpy.typing as npt
 
 from cogmap.errors import MessageError
+from cogmap.geometry.arrays import Floats, Indices
+from cogmap.geometry.se2 import mean_pose, move_with, wrap_angle
 from cogmap.graph.graph import TILE_SIDE, nearest_place
 from schemas.array import Array
 from schemas.base import Scalar
@@ -20,11 +21,9 @@ from schemas.cognition import Task
 from schemas.graph import Cells, DropNode, Node, Operation
 from services.codelets.config import Config
 from services.codelets.correction.map_correction import CORRECTION
-from services.codelets.correction.pose_graph import Floats
-from services.codelets.localization.sampling import mean_pose, wrapped
 from services.codelets.mapping.observations import Sightings
 from services.codelets.mapping.path import KIND as PATH
-from services.codelets.mapping.path import POSE, STAMP, rows_of, segments, shifted
+from services.codelets.mapping.path import POSE, STAMP, rows_of, segments
 from services.codelets.mapping.places import place_link
 
 COLUMNS = 7
@@ -70,8 +69,8 @@ def _first_number(task: Task) -> int:
 
 
 def _poses(poses: Floats, rows: Floats) -> Floats:
-    heading = wrapped(poses[:, 2] + rows[:, NEW][:, 2] - rows[:, OLD][:, 2])
-    return np.column_stack([shifted(poses[:, :2], rows[:, OLD], rows[:, NEW]), heading])
+    heading = wrap_angle(poses[:, 2] + rows[:, NEW][:, 2] - rows[:, OLD][:, 2])
+    return np.column_stack([move_with(poses[:, :2], rows[:, OLD], rows[:, NEW]), heading])
 
 
 def _self(task: Task, node: Node, last: Floats) -> list[Operation]:
@@ -102,7 +101,7 @@ def _object(task: Task, node: Node, rows: Floats, seen_m: Floats | None) -> list
     near = rows[known] if len(known) else rows[[int(np.abs(rows[:, STAMP] - since_s).argmin())]]
     away = np.hypot(*(near[:, OLD][:, :2] - samples[:, :2].mean(axis=0)).T)
     row = near[[_first_pass(away)]]
-    return _placed(task, node, shifted(samples, row[:, OLD], row[:, NEW]), {})
+    return _placed(task, node, move_with(samples, row[:, OLD], row[:, NEW]), {})
 
 
 def _first_pass(away: Floats) -> int:
@@ -153,7 +152,7 @@ def _road(task: Task, rows: Floats) -> list[Operation]:
     return _cells(changed)
 
 
-def _pairs(cells: npt.NDArray[np.int64]) -> list[tuple[int, int]]:
+def _pairs(cells: Indices) -> list[tuple[int, int]]:
     return [(i, j) for i, j in cells.tolist()]
 
 
@@ -172,7 +171,7 @@ def _cells(values: dict[tuple[int, int], float]) -> list[Operation]:
     ]
 
 
-def _road_cells(task: Task) -> tuple[npt.NDArray[np.int64], Floats]:
+def _road_cells(task: Task) -> tuple[Indices, Floats]:
     """(k, 2) cells that are road, and how surely."""
     cells = [np.zeros((0, 2), np.int64)]
     values = [np.zeros(0)]
@@ -192,5 +191,5 @@ def _moved(points: Floats, old: Floats, new: Floats) -> Floats:
     for start in range(0, len(points), AT_ONCE):
         some = points[start : start + AT_ONCE]
         nearest = ((some[:, None, :] - old[None, :, :2]) ** 2).sum(axis=2).argmin(axis=1)
-        result[start : start + AT_ONCE] = shifted(some, old[nearest], new[nearest])
+        result[start : start + AT_ONCE] = move_with(some, old[nearest], new[nearest])
     return result

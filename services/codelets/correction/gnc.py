@@ -9,17 +9,16 @@ are then held against all that hold.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import chdtri
 
-from services.codelets.correction.incremental import Solved
-from services.codelets.correction.least_squares import correct_headings
+from cogmap.geometry.arrays import Booleans, Floats
+from services.codelets.correction.incremental import IncrementalSolver
+from services.codelets.correction.least_squares import optimize
 from services.codelets.correction.pose_graph import (
     Constraints,
-    Floats,
     PoseGraph,
-    discrepancies,
-    squared,
+    mahalanobis2,
+    residuals,
 )
 
 STEEPER = 1.4
@@ -35,24 +34,22 @@ def limits(closures: Constraints, false_closure: float) -> Floats:
     return result
 
 
-def holding(graph: PoseGraph, false_closure: float) -> npt.NDArray[np.bool_]:
+def inliers(graph: PoseGraph, false_closure: float) -> Booleans:
     """(m,): which of the closures of `graph` hold, heading and all."""
     closures = graph.closures
     if not len(closures):
         return np.zeros(0, bool)
     limit = limits(closures, false_closure)
     hold = _by_weights(graph, limit)
-    return _readmitted(graph, hold, limit)
+    return _readmit(graph, hold, limit)
 
 
-def _by_weights(graph: PoseGraph, limit: Floats) -> npt.NDArray[np.bool_]:
+def _by_weights(graph: PoseGraph, limit: Floats) -> Booleans:
     weights = np.ones(len(limit))
     convexity = 0.0
     for _ in range(MOST_ROUNDS):
-        poses = correct_headings(
-            PoseGraph(graph.poses, graph.steps, graph.closures.weighted(weights))
-        )
-        excess = squared(discrepancies(poses, graph.closures), graph.closures.information) / limit
+        poses = optimize(PoseGraph(graph.poses, graph.steps, graph.closures.weighted(weights)))
+        excess = mahalanobis2(residuals(poses, graph.closures), graph.closures.information) / limit
         if not convexity:
             if excess.max() <= 1:
                 break
@@ -66,17 +63,15 @@ def _by_weights(graph: PoseGraph, limit: Floats) -> npt.NDArray[np.bool_]:
     return weights > 0.5
 
 
-def _readmitted(
-    graph: PoseGraph, hold: npt.NDArray[np.bool_], limit: Floats
-) -> npt.NDArray[np.bool_]:
+def _readmit(graph: PoseGraph, hold: Booleans, limit: Floats) -> Booleans:
     """A closure that came to be left out may yet agree with those that hold, since the path is long
     between them.
     """
-    solved = Solved(PoseGraph(graph.poses, graph.steps, graph.closures.select(hold)))
+    solved = IncrementalSolver(PoseGraph(graph.poses, graph.steps, graph.closures.select(hold)))
     hold = hold.copy()
     for index in np.flatnonzero(~hold):
         closure = graph.closures.select(np.array([index]))
         if solved.chi_square(closure) <= limit[index]:
-            solved.close(closure)
+            solved.add(closure)
             hold[index] = True
     return hold

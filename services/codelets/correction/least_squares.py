@@ -5,18 +5,16 @@ sparse.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
+from cogmap.geometry.arrays import Booleans, Floats, Indices
 from services.codelets.correction.pose_graph import (
     Constraints,
-    Floats,
-    Indices,
     PoseGraph,
     cost,
-    discrepancies,
     jacobians,
+    residuals,
 )
 
 RELATIVE_DECREASE = 1e-5
@@ -45,8 +43,8 @@ class NormalEquations:
         self._order = _elimination_order(count, constraints)
         self._at = np.full(count, -1)
         self._at[self._order] = np.arange(count - 1)
-        first = self._at[constraints.first]
-        second = self._at[constraints.second]
+        first = self._at[constraints.i]
+        second = self._at[constraints.j]
         rows = np.concatenate([first, first, second, second])
         columns = np.concatenate([first, second, first, second])
         used = np.flatnonzero((rows >= 0) & (columns >= 0))
@@ -82,14 +80,12 @@ class NormalEquations:
     def gradient(self, poses: Floats, constraints: Constraints) -> Floats:
         """J' S^-1 d at `poses`."""
         by_first, by_second = jacobians(poses, constraints)
-        weighed = np.einsum(
-            "mab,mb->ma", constraints.information, discrepancies(poses, constraints)
-        )
+        weighed = np.einsum("mab,mb->ma", constraints.information, residuals(poses, constraints))
         ends = [np.einsum("mba,mb->ma", by_end, weighed) for by_end in (by_first, by_second)]
         result: Floats = (self._sum_ends @ np.concatenate(ends)).reshape(-1)
         return result
 
-    def unknowns(self, pose: Indices) -> tuple[Indices, npt.NDArray[np.bool_]]:
+    def unknowns(self, pose: Indices) -> tuple[Indices, Booleans]:
         """(k, 3) which unknowns some poses are, and which of the poses are any: the first is none."""
         known = self._at[pose] >= 0
         return 3 * self._at[pose][:, None] + np.arange(3), known
@@ -104,8 +100,8 @@ class NormalEquations:
 def _elimination_order(count: int, constraints: Constraints) -> Indices:
     """The poses but the first, in an order of little fill (minimum degree)."""
     ends = (
-        np.concatenate([constraints.first, constraints.second]),
-        np.concatenate([constraints.second, constraints.first]),
+        np.concatenate([constraints.i, constraints.j]),
+        np.concatenate([constraints.j, constraints.i]),
     )
     touching = sparse.csc_matrix((np.ones(len(ends[0])), ends), shape=(count, count))[1:, 1:]
     touching.data[:] = 1.0
@@ -127,7 +123,7 @@ def factor(matrix: sparse.csc_matrix) -> SuperLU:
     return splu(matrix, **FACTORING)
 
 
-def correct_headings(graph: PoseGraph, most_iterations: int = MOST_ITERATIONS) -> Floats:
+def optimize(graph: PoseGraph, most_iterations: int = MOST_ITERATIONS) -> Floats:
     """(n, 3) poses that minimise eq. 7, headings and all, near those of `graph`. The first pose
     stays.
 

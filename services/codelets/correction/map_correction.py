@@ -10,25 +10,23 @@ from __future__ import annotations
 
 import msgspec
 import numpy as np
-import numpy.typing as npt
 
+from cogmap.geometry.arrays import Booleans, Floats, Indices
+from cogmap.geometry.se2 import rotation_matrices, wrap_angle
 from schemas.array import Array
 from schemas.cognition import Replay, Task
 from schemas.graph import Node, Operation
 from services.codelets.config import Config
-from services.codelets.correction.gnc import holding
-from services.codelets.correction.least_squares import correct_headings
-from services.codelets.correction.pairwise_consistency import Views, agreeing
+from services.codelets.correction.gnc import inliers
+from services.codelets.correction.least_squares import optimize
+from services.codelets.correction.pairwise_consistency import Views, consistent
 from services.codelets.correction.pose_graph import (
     Constraints,
-    Floats,
     PoseGraph,
-    discrepancies,
-    rotations,
-    squared,
+    mahalanobis2,
+    residuals,
 )
 from services.codelets.correction.reverse_replay import close_loops
-from services.codelets.localization.sampling import wrapped
 from services.codelets.mapping.loop_detection import KIND, constraints_of, views_of
 from services.codelets.mapping.observations import Sightings
 from services.codelets.mapping.path import POSE, STAMP, rows_of, steps_of
@@ -54,9 +52,7 @@ def correct_map(task: Task, config: Config) -> tuple[list[Operation], Replay | N
         return [], None
     views = views_of(closures, rows)
     steps = steps_of(rows, config)
-    agrees = agreeing(views, steps, config.false_closure) & (
-        views.second - views.first >= LEAST_ROWS
-    )
+    agrees = consistent(views, steps, config.false_closure) & (views.j - views.i >= LEAST_ROWS)
     graph, among = _holding(_start(rows[:, POSE], steps), steps, views.select(agrees), config)
     holds = np.zeros(len(closures), bool)
     holds[agrees] = among
@@ -84,18 +80,18 @@ def _start(poses: Floats, steps: Constraints) -> Floats:
     There the path goes on as it was felt. Who was lost for a while believed what would lead astray
     for good.
     """
-    believed = discrepancies(poses, steps)
-    possible = squared(believed, steps.information) <= IMPOSSIBLE_SD**2
-    measured = steps.measured + np.where(possible[:, None], believed, 0.0)
+    believed = residuals(poses, steps)
+    possible = mahalanobis2(believed, steps.information) <= IMPOSSIBLE_SD**2
+    measured = steps.measurement + np.where(possible[:, None], believed, 0.0)
     heading = poses[0, 2] + np.concatenate([[0.0], np.cumsum(measured[:, 2])])
-    moved = np.einsum("mab,mb->ma", rotations(heading[:-1]), measured[:, :2])
+    moved = np.einsum("mab,mb->ma", rotation_matrices(heading[:-1]), measured[:, :2])
     where = poses[0, :2] + np.vstack([np.zeros(2), np.cumsum(moved, axis=0)])
-    return np.column_stack([where, wrapped(heading)])
+    return np.column_stack([where, wrap_angle(heading)])
 
 
 def _holding(
     poses: Floats, steps: Constraints, views: Views, config: Config
-) -> tuple[PoseGraph, npt.NDArray[np.bool_]]:
+) -> tuple[PoseGraph, Booleans]:
     """The path with the loops that hold, and which of `views` those are.
 
     What a landmark tells of where the agent stands is worked out again where its heading turns out
@@ -103,10 +99,10 @@ def _holding(
     """
     loops = constraints_of(views, poses)
     for _ in range(MOST_ROUNDS):
-        holds = holding(PoseGraph(poses, steps, loops), config.false_closure)
+        holds = inliers(PoseGraph(poses, steps, loops), config.false_closure)
         graph = PoseGraph(poses, steps, loops.select(holds))
-        again = constraints_of(views, correct_headings(graph))
-        turned = np.abs(wrapped(again.measured[:, 2] - loops.measured[:, 2]))
+        again = constraints_of(views, optimize(graph))
+        turned = np.abs(wrap_angle(again.measurement[:, 2] - loops.measurement[:, 2]))
         if turned.max(initial=0.0) < SAME_RAD:
             break
         loops = again
@@ -124,12 +120,10 @@ def corrected(graph: PoseGraph, seen: Sightings, config: Config) -> tuple[Floats
     poses = np.column_stack([positions.positions_m, graph.poses[:, 2]])
     if config.correct == "positions":
         return poses, positions.replays
-    poses = correct_headings(graph)
+    poses = optimize(graph)
     landmarks_m = seen.landmarks_m(poses)
     for _ in range(ROUNDS if len(landmarks_m) else 0):
-        joint = correct_headings(
-            seen.joined(PoseGraph(poses, graph.steps, graph.closures), landmarks_m)
-        )
+        joint = optimize(seen.joined(PoseGraph(poses, graph.steps, graph.closures), landmarks_m))
         poses, landmarks_m = joint[: len(poses)], joint[len(poses) :, :2]
     return poses, positions.replays
 
@@ -144,8 +138,10 @@ def _positions_only(graph: PoseGraph) -> PoseGraph:
     loops = graph.closures
     if not len(loops):
         return graph
-    way_m = np.concatenate([[0.0], np.cumsum(np.hypot(steps.measured[:, 0], steps.measured[:, 1]))])
-    lengths_m = np.abs(way_m[loops.second] - way_m[loops.first])
+    way_m = np.concatenate(
+        [[0.0], np.cumsum(np.hypot(steps.measurement[:, 0], steps.measurement[:, 1]))]
+    )
+    lengths_m = np.abs(way_m[loops.j] - way_m[loops.i])
     turning = 1 / steps.information[:, 2, 2]
     variance = 1 / steps.information[:, 0, 0] + (lengths_m**2).mean() / 3 * turning
     information = np.zeros_like(steps.information)
@@ -156,15 +152,13 @@ def _positions_only(graph: PoseGraph) -> PoseGraph:
     unsure = (
         (levers**2).sum(axis=1)
         / loops.information[:, 0, 0]
-        * np.abs(turned[loops.second] - turned[loops.first])
+        * np.abs(turned[loops.j] - turned[loops.i])
     )
-    steps = Constraints(steps.first, steps.second, steps.measured, information)
+    steps = Constraints(steps.i, steps.j, steps.measurement, information)
     return PoseGraph(graph.poses, steps, loops.weighted(1 / (1 + unsure)))
 
 
-def _judged(
-    closures: list[Node], agrees: npt.NDArray[np.bool_], holds: npt.NDArray[np.bool_]
-) -> list[Operation]:
+def _judged(closures: list[Node], agrees: Booleans, holds: Booleans) -> list[Operation]:
     """The closures of which something else is to be said than before."""
     said = [
         msgspec.structs.replace(node, attributes=node.attributes | {"agrees": agree, "holds": hold})
@@ -175,7 +169,7 @@ def _judged(
 
 def _replay(rows: Floats, new: Floats, loops: Constraints, config: Config) -> Replay:
     """What is told of it, the newest place first, from where the loops begin."""
-    first = int(min(loops.first.min(), loops.second.min())) if len(loops) else 0
+    first = int(min(loops.i.min(), loops.j.min())) if len(loops) else 0
     backwards = slice(None, first - 1 if first else None, -1)
     before = rows[backwards, POSE][:, :2]
     after = new[backwards, :2]
@@ -199,12 +193,12 @@ def _replay(rows: Floats, new: Floats, loops: Constraints, config: Config) -> Re
     )
 
 
-def _pairs(after: Floats, loops: Constraints, count: int, config: Config) -> npt.NDArray[np.int64]:
+def _pairs(after: Floats, loops: Constraints, count: int, config: Config) -> Indices:
     """Place cells whose synapse changes most: those of one place, met on different ways; and
     neighbours on the way.
     """
     neighbours = np.column_stack([np.arange(len(after) - 1), np.arange(1, len(after))])
-    ends = np.column_stack([count - 1 - loops.second, count - 1 - loops.first])
+    ends = np.column_stack([count - 1 - loops.j, count - 1 - loops.i])
     reach = 1 / config.synapse_decay_per_m
     near = [
         (here, there)
@@ -213,5 +207,5 @@ def _pairs(after: Floats, loops: Constraints, count: int, config: Config) -> npt
         if abs(here - one) < abs(here - there)
     ]
     pairs = np.vstack([neighbours, np.array(near, np.int64).reshape(-1, 2)])
-    result: npt.NDArray[np.int64] = np.unique(pairs, axis=0)
+    result: Indices = np.unique(pairs, axis=0)
     return result

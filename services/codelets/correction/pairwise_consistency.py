@@ -12,47 +12,47 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy import sparse
 from scipy.special import chdtri
 
-from services.codelets.correction.pose_graph import Constraints, Floats, Indices, rotations
-from services.codelets.localization.sampling import wrapped
+from cogmap.geometry.arrays import Booleans, Floats, Indices
+from cogmap.geometry.se2 import rotation_matrices, wrap_angle
+from services.codelets.correction.pose_graph import Constraints
 
-AGREEING = 3
+MIN_AGREEING = 3
 # Views further apart than that on the way say nothing of one another: anything would agree.
 WIDEST_M = 5.0
 NEXT = 32
 
 
 class Views(NamedTuple):
-    """View k, from row `second[k]` of the path, of what stands at `there_m` (m, 2) as seen from row
-    `first[k]`.
+    """View k, from row `j[k]` of the path, of what stands at `there_m` (m, 2) as seen from row
+    `i[k]`.
 
     It is seen at `here_m` (m, 2), x forward, y left, to `sd_m`; how the two rows are turned is
     known to `sd_rad`, or, where that is 0, not.
     """
 
-    first: Indices
-    second: Indices
+    i: Indices
+    j: Indices
     there_m: Floats
     here_m: Floats
     sd_m: Floats
     sd_rad: Floats
 
-    def select(self, chosen: npt.NDArray[np.bool_] | Indices) -> Views:
+    def select(self, chosen: Booleans | Indices) -> Views:
         """Some of them."""
-        ends = (self.first[chosen], self.second[chosen])
+        ends = (self.i[chosen], self.j[chosen])
         points = (self.there_m[chosen], self.here_m[chosen])
         return Views(*ends, *points, self.sd_m[chosen], self.sd_rad[chosen])
 
 
-def agreeing(views: Views, steps: Constraints, false_closure: float) -> npt.NDArray[np.bool_]:
-    """(m,): which of the views are among AGREEING that agree with one another, on a path of
+def consistent(views: Views, steps: Constraints, false_closure: float) -> Booleans:
+    """(m,): which of the views are among MIN_AGREEING that agree with one another, on a path of
     `steps`.
     """
-    count = len(views.first)
-    order = np.lexsort((np.arange(count), views.second))
+    count = len(views.i)
+    order = np.lexsort((np.arange(count), views.j))
     way = _Way(steps)
     pairs = [
         np.column_stack([order[:-apart], order[apart:]]) for apart in range(1, min(NEXT, count))
@@ -65,7 +65,7 @@ def agreeing(views: Views, steps: Constraints, false_closure: float) -> npt.NDAr
         (np.ones(2 * len(one)), (np.r_[one, other], np.r_[other, one])), shape=(count, count)
     )
     triangles = (touching @ touching).multiply(touching).sum(axis=1)
-    result: npt.NDArray[np.bool_] = np.asarray(triangles).ravel() > 0
+    result: Booleans = np.asarray(triangles).ravel() > 0
     return result
 
 
@@ -73,17 +73,19 @@ class _Way:
     """A path as path integration alone has it, from where it begins, and how unsure that becomes."""
 
     def __init__(self, steps: Constraints) -> None:
-        self.heading = np.concatenate([[0.0], np.cumsum(steps.measured[:, 2])])
-        moved = np.einsum("mab,mb->ma", rotations(self.heading[:-1]), steps.measured[:, :2])
+        self.heading = np.concatenate([[0.0], np.cumsum(steps.measurement[:, 2])])
+        moved = np.einsum(
+            "mab,mb->ma", rotation_matrices(self.heading[:-1]), steps.measurement[:, :2]
+        )
         self.where = np.vstack([np.zeros(2), np.cumsum(moved, axis=0)])
-        self.length = np.concatenate([[0.0], np.cumsum(np.hypot(*steps.measured[:, :2].T))])
+        self.length = np.concatenate([[0.0], np.cumsum(np.hypot(*steps.measurement[:, :2].T))])
         self.variance = np.concatenate([[0.0], np.cumsum(1 / steps.information[:, 0, 0])])
         self.turning = np.concatenate([[0.0], np.cumsum(1 / steps.information[:, 2, 2])])
 
     def seen(self, rows: Indices, off_m: Floats) -> Floats:
         """(m, 2): where things are that are seen from rows."""
         result: Floats = self.where[rows] + np.einsum(
-            "mab,mb->ma", rotations(self.heading[rows]), off_m
+            "mab,mb->ma", rotation_matrices(self.heading[rows]), off_m
         )
         return result
 
@@ -97,25 +99,23 @@ class _Way:
         return result
 
 
-def _agree(one: Views, other: Views, way: _Way, false_closure: float) -> npt.NDArray[np.bool_]:
-    there = np.hypot(*(way.seen(one.first, one.there_m) - way.seen(other.first, other.there_m)).T)
-    here = np.hypot(*(way.seen(one.second, one.here_m) - way.seen(other.second, other.here_m)).T)
-    unsure = way.unsure_m2(one.first, other.first, _lever(one.there_m, other.there_m))
-    unsure += way.unsure_m2(one.second, other.second, _lever(one.here_m, other.here_m))
+def _agree(one: Views, other: Views, way: _Way, false_closure: float) -> Booleans:
+    there = np.hypot(*(way.seen(one.i, one.there_m) - way.seen(other.i, other.there_m)).T)
+    here = np.hypot(*(way.seen(one.j, one.here_m) - way.seen(other.j, other.here_m)).T)
+    unsure = way.unsure_m2(one.i, other.i, _lever(one.there_m, other.there_m))
+    unsure += way.unsure_m2(one.j, other.j, _lever(one.here_m, other.here_m))
     squared = (there - here) ** 2 / (one.sd_m**2 + other.sd_m**2 + unsure)
     turns = (one.sd_rad > 0) & (other.sd_rad > 0)
     heading = way.heading
-    turned = wrapped(
-        heading[one.second] - heading[other.second] - heading[one.first] + heading[other.first]
-    )
-    turning = np.abs(way.turning[one.first] - way.turning[other.first])
-    turning += np.abs(way.turning[one.second] - way.turning[other.second])
+    turned = wrap_angle(heading[one.j] - heading[other.j] - heading[one.i] + heading[other.i])
+    turning = np.abs(way.turning[one.i] - way.turning[other.i])
+    turning += np.abs(way.turning[one.j] - way.turning[other.j])
     squared[turns] += (turned**2 / np.maximum(one.sd_rad**2 + other.sd_rad**2 + turning, 1e-12))[
         turns
     ]
     degrees = np.where(turns, 3, 2)
-    near = (unsure <= WIDEST_M**2) & (one.second != other.second)
-    agree: npt.NDArray[np.bool_] = near & (squared <= chdtri(degrees, false_closure))
+    near = (unsure <= WIDEST_M**2) & (one.j != other.j)
+    agree: Booleans = near & (squared <= chdtri(degrees, false_closure))
     return agree
 
 

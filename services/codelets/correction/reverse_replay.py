@@ -17,13 +17,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cogmap.geometry.arrays import Floats
+from cogmap.geometry.se2 import cumulative, rotation_matrices
 from services.codelets.correction.pose_graph import (
     Constraints,
-    Floats,
     PoseGraph,
-    discrepancies,
-    from_zero,
-    rotations,
+    residuals,
 )
 
 CHECK_EVERY = 10
@@ -54,21 +53,21 @@ class Displacements:
 
 def displacements(poses: Floats, constraints: Constraints) -> Displacements:
     """What `constraints` say of positions once the headings of `poses` are taken as they are."""
-    turn = rotations(poses[constraints.first, 2])
-    off_rad = discrepancies(poses, constraints)[:, 2]
+    turn = rotation_matrices(poses[constraints.i, 2])
+    off_rad = residuals(poses, constraints)[:, 2]
     covariance = np.linalg.inv(constraints.information[:, :2, :2])
     # A measured distance that goes with the measured heading changes with how wrong that heading
     # turned out to be.
     along = np.einsum(
         "mab,mb->ma", covariance, constraints.information[:, :2, 2] * off_rad[:, None]
     )
-    off_m = np.einsum("mab,mb->ma", turn, constraints.measured[:, :2] - along)
+    off_m = np.einsum("mab,mb->ma", turn, constraints.measurement[:, :2] - along)
     return Displacements(off_m, turn @ covariance @ turn.transpose(0, 2, 1))
 
 
 def position_cost(positions_m: Floats, constraints: Constraints, known: Displacements) -> float:
     """Eq. 7 for (n, 2) positions."""
-    off = positions_m[constraints.second] - positions_m[constraints.first] - known.off_m
+    off = positions_m[constraints.j] - positions_m[constraints.i] - known.off_m
     return float(
         np.einsum("ma,ma->", off, np.linalg.solve(known.covariance_m2, off[..., None])[..., 0])
     )
@@ -78,16 +77,16 @@ class Loops:
     """The loops of one path, and the forces by which they hold it together."""
 
     def __init__(self, graph: PoseGraph) -> None:
-        back = graph.closures.first > graph.closures.second
-        self._start = np.where(back, graph.closures.second, graph.closures.first)
-        self._end = np.where(back, graph.closures.first, graph.closures.second)
+        back = graph.closures.i > graph.closures.j
+        self._start = np.where(back, graph.closures.j, graph.closures.i)
+        self._end = np.where(back, graph.closures.i, graph.closures.j)
         known = displacements(graph.poses, graph.closures)
         step = displacements(graph.poses, graph.steps)
         self._closing_m = np.where(back[:, None], -known.off_m, known.off_m)
         self._closing_m2 = known.covariance_m2
         self._step_m2 = step.covariance_m2
-        self._integrated_m = graph.poses[0, :2] + from_zero(step.off_m)
-        so_far_m2 = from_zero(step.covariance_m2)
+        self._integrated_m = graph.poses[0, :2] + cumulative(step.off_m)
+        so_far_m2 = cumulative(step.covariance_m2)
         self.gain = np.linalg.inv(
             so_far_m2[self._end] - so_far_m2[self._start] + known.covariance_m2
         )
@@ -105,7 +104,7 @@ class Loops:
         entered = [np.bincount(self._end, forces[:, axis], count) for axis in (0, 1)]
         left = [np.bincount(self._start, forces[:, axis], count) for axis in (0, 1)]
         pull = np.cumsum((np.array(entered) - np.array(left)).T[::-1], axis=0)[::-1]
-        return from_zero(np.einsum("kab,kb->ka", self._step_m2, pull[1:]))
+        return cumulative(np.einsum("kab,kb->ka", self._step_m2, pull[1:]))
 
     def yielded(self, forces: Floats) -> Floats:
         """(m, 2): by how much `forces` close each loop: the path gives way, and so does the

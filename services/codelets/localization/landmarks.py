@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 
 from cogmap.errors import MessageError
+from cogmap.geometry.se2 import mean_pose, wrap_angle
 from cogmap.graph.graph import nearest_place
 from schemas.array import Array
 from schemas.cognition import Task
@@ -24,11 +25,9 @@ from services.codelets.localization.motion_model import POSE_COLUMNS, RANGE, wit
 from services.codelets.localization.sampling import (
     Samples,
     generator,
-    keep,
-    mean_pose,
-    refill,
+    rejection_mask,
+    resample,
     spread,
-    wrapped,
 )
 from services.codelets.mapping.places import place_link
 
@@ -70,16 +69,16 @@ def locate_landmark(task: Task, config: Config) -> list[Operation]:
     selves = near_by(
         with_gains(np.array(self_node.samples.numpy(), np.float64), config, rng), config
     )
-    selves = rng.permutation(refill(selves, len(before), 0.0, rng))
+    selves = rng.permutation(resample(selves, len(before), 0.0, rng))
     squared = _squared(before, selves, percept)
     if squared.min() < config.gate**2:
-        kept = before[keep(-squared / 2 / config.views_alike, rng)]
+        kept = before[rejection_mask(-squared / 2 / config.correlated_views, rng)]
         # Few that are left stand for all between them: of a ring or a ray, the next view must find
         # some again.
         jitter_m = np.maximum(
             config.landmark_jitter_m, GAP * spread(kept, kept.mean(axis=0)) / len(kept)
         )
-        kept = refill(kept, len(before), jitter_m, rng)
+        kept = resample(kept, len(before), jitter_m, rng)
         return object_operations(task, landmark, kept, percept, Record(agreed + 1, 0))
     if missed + 1 < min(config.misses, agreed + 1):
         return object_operations(task, landmark, before, percept, Record(agreed, missed + 1))
@@ -107,7 +106,7 @@ def near_by(selves: Samples, config: Config) -> Samples:
     if share == 1.0:
         return selves
     off = selves[:, :POSE_COLUMNS] - mean
-    off[:, 2] = wrapped(off[:, 2])
+    off[:, 2] = wrap_angle(off[:, 2])
     return np.hstack([mean + share * off, selves[:, POSE_COLUMNS:]])
 
 
@@ -125,7 +124,9 @@ def _squared(where_m: Samples, selves: Samples, percept: Percept) -> Samples:
     offset = where_m - selves[:, :2]
     squared = np.zeros(len(offset))
     if has_bearing(percept):
-        off = wrapped(np.arctan2(offset[:, 1], offset[:, 0]) - selves[:, 2] - percept.bearing_rad)
+        off = wrap_angle(
+            np.arctan2(offset[:, 1], offset[:, 0]) - selves[:, 2] - percept.bearing_rad
+        )
         squared += (off / percept.bearing_sd_rad) ** 2
     if has_range(percept):
         distance = np.hypot(offset[:, 0], offset[:, 1]) * (1 + selves[:, RANGE])

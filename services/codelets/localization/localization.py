@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cogmap.errors import MessageError
+from cogmap.geometry.se2 import compose, mean_pose, relative
 from cogmap.graph.graph import nearest_place
 from schemas.array import Array
 from schemas.base import Scalar
@@ -30,27 +31,24 @@ from services.codelets.localization.motion_model import (
     RANGE,
     SPEED,
     TURN,
+    dead_reckon,
     move,
-    path_integrated,
     with_gains,
 )
 from services.codelets.localization.recovery import look_around, seen_before, turn_about
 from services.codelets.localization.sampling import (
     Samples,
-    bearable,
     centred,
     generator,
-    mean_pose,
-    refill,
-    reject,
-    widened,
+    inflate,
+    rejection_resample,
+    resample,
+    tempering_exponent,
 )
 from services.codelets.mapping.path import (
     ODOMETRY_FACTS,
     VARIANCE_FACTS,
-    composed,
     odometry_of,
-    step_between,
     variances_of,
 )
 from services.codelets.mapping.places import place_link
@@ -98,12 +96,12 @@ def localize(task: Task, config: Config) -> list[Operation]:
     rng = generator(task.task_id)
     before = with_gains(np.array(self_node.samples.numpy(), np.float64), config, rng)
     motions = np.asarray(task.motions.numpy(), np.float64)
-    moved = move(refill(before, config.samples, 0.0, rng), motions, config, rng)
+    moved = move(resample(before, config.samples, 0.0, rng), motions, config, rng)
     stands_ns = _stands_since(self_node, bool(motions[:, :2].any()))
     seen = sightings(task.percepts, task.nodes, config.largest_landmark_sd_m, stands_ns)
     past = _past(self_node, moved, task.stamp_ns)
     found = past if seen is None else _correct(past, seen, config, rng)
-    odometry = path_integrated(
+    odometry = dead_reckon(
         odometry_of(self_node), motions, found.samples[:, POSE_COLUMNS:].mean(axis=0)
     )
     variances = variances_of(self_node) + np.square(motions[:, 3:5] * motions[:, 2:3]).sum(axis=0)
@@ -112,7 +110,7 @@ def localize(task: Task, config: Config) -> list[Operation]:
     if found.carried:
         # Who was carried away felt nothing of it: the way there counts as one that was gone, as
         # sure as it is found.
-        odometry = composed(odometry, step_between(mean_pose(moved), mean_pose(found.samples)))
+        odometry = compose(odometry, relative(mean_pose(moved), mean_pose(found.samples)))
         variances += np.square(centred(found.samples)[1]).mean(axis=0)[1:POSE_COLUMNS]
     return _self_operations(
         task, self_node, found, stands_ns, np.concatenate([odometry, variances])
@@ -162,18 +160,18 @@ def _correct(past: Found, seen: Sighting, config: Config, rng: np.random.Generat
     left = 1.0
     share = 1.0
     for stage in range(STAGES):
-        scores = log_likelihood(compared.density, config.outlier_share) / config.views_alike
+        scores = log_likelihood(compared.density, config.outlier_share) / config.correlated_views
         part = (
             left
             if stage == STAGES - 1
-            else min(left, bearable(scores, config.kept_samples / len(scores)))
+            else min(left, tempering_exponent(scores, config.kept_samples / len(scores)))
         )
-        chosen, kept = reject(samples, part * scores, config.kept_samples, rng)
+        chosen, kept = rejection_resample(samples, part * scores, config.kept_samples, rng)
         share = share * kept
         left = left - part
         if left <= 0:
             break
-        samples = refill(chosen, len(samples), 0.0, rng)
+        samples = resample(chosen, len(samples), 0.0, rng)
         compared = compare(samples, seen)
     return Found(chosen, share)
 
@@ -196,7 +194,7 @@ def _stray(past: Found, seen: Sighting, config: Config, rng: np.random.Generator
     missed = past.missed or seen.labels[0]
     others = past.others or any(label != missed for label in seen.labels)
     less_sure = (
-        widened(past.samples, WIDER, rng) if others and astray <= WIDENINGS else past.samples
+        inflate(past.samples, WIDER, rng) if others and astray <= WIDENINGS else past.samples
     )
     return Found(less_sure, 0.0, astray, missed, others)
 

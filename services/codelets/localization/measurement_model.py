@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from cogmap.geometry.arrays import Booleans
 from schemas.graph import Node
 from schemas.sensing import Percept
 from services.codelets.localization.motion_model import RANGE
@@ -38,12 +39,12 @@ class Sighting(NamedTuple):
     range_sd_m: Samples
 
     @property
-    def has_bearing(self) -> npt.NDArray[np.bool_]:
+    def has_bearing(self) -> Booleans:
         """Of which the bearing is known."""
         return self.bearing_sd_rad < np.pi
 
     @property
-    def has_range(self) -> npt.NDArray[np.bool_]:
+    def has_range(self) -> Booleans:
         """Of which the range is known."""
         return self.range_sd_m < self.range_m
 

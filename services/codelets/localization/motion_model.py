@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from cogmap.geometry.se2 import wrap_angle
 from services.codelets.config import Config
-from services.codelets.localization.sampling import Samples, standard, wrapped
+from services.codelets.localization.sampling import Samples, standard_normal
 
 POSE_COLUMNS = 3
 SPEED = 3
@@ -41,7 +42,9 @@ def with_gains(samples: Samples, config: Config, rng: np.random.Generator) -> Sa
     )
 
 
-def wander(samples: Samples, duration_s: float, config: Config, rng: np.random.Generator) -> None:
+def propagate_bias(
+    samples: Samples, duration_s: float, config: Config, rng: np.random.Generator
+) -> None:
     """Let the gains of (n, 7) samples wander in place, about nothing, as they do in `duration_s`.
 
     An Ornstein-Uhlenbeck process: its spread stays that of `spreads`, its memory is the configured
@@ -50,9 +53,9 @@ def wander(samples: Samples, duration_s: float, config: Config, rng: np.random.G
     sds = spreads(config)
     if not duration_s or not sds.any():
         return
-    times_s = np.array([config.gait_memory_s] * 3 + [config.range_memory_s])
+    times_s = np.array([config.motion_bias_time_s] * 3 + [config.range_bias_time_s])
     stays = np.exp(-duration_s / times_s)
-    fresh = standard(rng, len(samples), 4) * (sds * np.sqrt(1 - stays**2))
+    fresh = standard_normal(rng, len(samples), 4) * (sds * np.sqrt(1 - stays**2))
     samples[:, POSE_COLUMNS:] = samples[:, POSE_COLUMNS:] * stays + fresh
 
 
@@ -61,25 +64,25 @@ def move(start: Samples, motions: Samples, config: Config, rng: np.random.Genera
     and noise.
     """
     samples = start.copy()
-    wander(samples, float(motions[:, 2].sum()), config, rng)
+    propagate_bias(samples, float(motions[:, 2].sum()), config, rng)
     speed, turn_rate, _, speed_sd, turn_rate_sd = (column[:, None] for column in motions.T)
     shape = (len(motions), len(samples))
     noisy = (
-        speed + speed_sd * standard(rng, *shape),
-        turn_rate + turn_rate_sd * standard(rng, *shape),
+        speed + speed_sd * standard_normal(rng, *shape),
+        turn_rate + turn_rate_sd * standard_normal(rng, *shape),
     )
     _advance(samples, *noisy, motions[:, 2])
     return samples
 
 
-def path_integrated(pose: Samples, motions: Samples, gains: Samples) -> Samples:
+def dead_reckon(pose: Samples, motions: Samples, gains: Samples) -> Samples:
     """The pose (3,) after (m, 5) rows of motion, without noise, for senses whose gains (4,) are
     known.
     """
     sample = np.concatenate([pose, gains])[None]
     _advance(sample, motions[:, :1], motions[:, 1:2], motions[:, 2])
     after: Samples = sample[0, :POSE_COLUMNS]
-    after[2] = wrapped(after[2])
+    after[2] = wrap_angle(after[2])
     return after
 
 

@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 
+from cogmap.geometry.se2 import compose, relative
 from schemas.cognition import Task
 from schemas.sensing import Percept
 from services.codelets.config import Config
@@ -15,7 +16,7 @@ from services.codelets.localization.measurement_model import Sighting, compare, 
 from services.codelets.localization.motion_model import COLUMNS, RANGE
 from services.codelets.localization.sampling import Samples
 from services.codelets.mapping.observations import Sightings
-from services.codelets.mapping.path import ODOMETRY, STAMP, composed, rows_of, step_between
+from services.codelets.mapping.path import ODOMETRY, STAMP, rows_of
 
 CANDIDATES = 16
 # What path integration may be off by since a landmark was seen, as a share of the way.
@@ -37,8 +38,8 @@ def seen_before(task: Task, odometry: Samples) -> list[Percept]:
     percepts = []
     for label, index in latest.items():
         then = rows[seen.place[index], ODOMETRY]
-        place = composed(then, np.append(seen.where_m[index], 0.0))
-        forwards_m, left_m, _ = step_between(odometry, place).tolist()
+        place = compose(then, np.append(seen.where_m[index], 0.0))
+        forwards_m, left_m, _ = relative(odometry, place).tolist()
         variance = float(np.linalg.eigvalsh(np.linalg.inv(seen.information[index])).max())
         drift_m = DRIFT_SHARE * float(np.hypot(*(then - odometry)[:2]))
         percepts.append(_percept(label, forwards_m, left_m, math.sqrt(variance + drift_m**2)))

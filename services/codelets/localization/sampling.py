@@ -5,9 +5,11 @@ from __future__ import annotations
 import hashlib
 
 import numpy as np
-import numpy.typing as npt
 
-Samples = npt.NDArray[np.float64]
+from cogmap.geometry.arrays import Booleans, Floats
+from cogmap.geometry.se2 import mean_pose, wrap_angle
+
+Samples = Floats
 STRAIGHTS = 4
 TURN = 2 * np.pi
 # How far samples that are all the same are spread where they must be: metres, metres, radians.
@@ -23,20 +25,9 @@ def generator(identifier: str) -> np.random.Generator:
     )
 
 
-def standard(rng: np.random.Generator, *shape: int) -> Samples:
+def standard_normal(rng: np.random.Generator, *shape: int) -> Samples:
     """Standard normal numbers, of single precision: they cost half, and noise needs no more."""
     return rng.standard_normal(shape, np.float32).astype(np.float64)
-
-
-def wrapped(angle_rad: Samples) -> Samples:
-    """Angles in (-pi, pi]."""
-    result: Samples = np.pi - (np.pi - angle_rad) % (2 * np.pi)
-    return result
-
-
-def mean_pose(poses: Samples) -> Samples:
-    """The mean of (n, 3) samples x_m, y_m, heading_rad, the heading's on the circle."""
-    return centred(poses)[0][:3]
 
 
 def centred(samples: Samples) -> tuple[Samples, Samples]:
@@ -59,35 +50,35 @@ def spread(samples: Samples, mean: Samples) -> Samples:
     """Standard deviation of each column about `mean`; a third column is a heading."""
     off = samples - mean
     if samples.shape[1] == 3:
-        off[:, 2] = wrapped(off[:, 2])
+        off[:, 2] = wrap_angle(off[:, 2])
     sd: Samples = np.sqrt((off**2).mean(axis=0))
     return sd
 
 
-def keep(log_likelihood: Samples, rng: np.random.Generator) -> npt.NDArray[np.bool_]:
+def rejection_mask(log_likelihood: Samples, rng: np.random.Generator) -> Booleans:
     """Rejection sampling: each sample stays with a probability proportional to its likelihood.
 
     The likeliest always stays, so that something does even where all are unlikely.
     """
     relative = np.exp(log_likelihood - log_likelihood.max())
-    kept: npt.NDArray[np.bool_] = rng.random(len(relative)) < relative
+    kept: Booleans = rng.random(len(relative)) < relative
     kept[int(np.argmax(relative))] = True
     return kept
 
 
-def widened(poses: Samples, factor: float, rng: np.random.Generator) -> Samples:
+def inflate(poses: Samples, factor: float, rng: np.random.Generator) -> Samples:
     """Samples whose first three columns are `factor` times as far about their mean, and those of a
     heap a little.
     """
     result = poses.copy()
     mean = mean_pose(poses)
     off = poses[:, :3] - mean
-    off[:, 2] = wrapped(off[:, 2])
+    off[:, 2] = wrap_angle(off[:, 2])
     result[:, :3] = mean + factor * off + rng.normal(0.0, 1.0, off.shape) * HEAP
     return result
 
 
-def smoothed(drawn: Samples, tell_apart: float, rng: np.random.Generator) -> Samples:
+def kernel_smooth(drawn: Samples, tell_apart: float, rng: np.random.Generator) -> Samples:
     """Samples in place of `drawn`, in which few stand for many, with the same mean and covariance.
 
     A Gaussian kernel as wide as Silverman's rule has it for `tell_apart` samples, shrunk to the
@@ -98,14 +89,14 @@ def smoothed(drawn: Samples, tell_apart: float, rng: np.random.Generator) -> Sam
     mean, off = centred(drawn)
     width2 = min(0.9, (4 / ((columns + 2) * max(1.0, tell_apart))) ** (2 / (columns + 4)))
     values, vectors = np.linalg.eigh(off.T @ off / number)
-    noise = standard(rng, *drawn.shape) @ (vectors * np.sqrt(values.clip(0.0) * width2)).T
+    noise = standard_normal(rng, *drawn.shape) @ (vectors * np.sqrt(values.clip(0.0) * width2)).T
     off *= np.sqrt(1 - width2)
     off += noise
     off += mean - np.full(number, 1 / number) @ noise
     return off
 
 
-def bearable(log_likelihood: Samples, share: float) -> float:
+def tempering_exponent(log_likelihood: Samples, share: float) -> float:
     """About the largest power of the likelihood, at most 1, that leaves a `share` of the samples by
     rejection.
 
@@ -123,7 +114,7 @@ def bearable(log_likelihood: Samples, share: float) -> float:
     return power
 
 
-def reject(
+def rejection_resample(
     samples: Samples, log_likelihood: Samples, fewest: int, rng: np.random.Generator
 ) -> tuple[Samples, float]:
     """What rejection leaves of (n, d) samples, with a little about each, and the share that it is.
@@ -140,12 +131,12 @@ def reject(
     chances *= max(1.0, fewest / chances.sum())
     copies = np.diff(np.floor(np.cumsum(chances) + rng.random()), prepend=0.0).astype(np.int64)
     chosen = samples[np.repeat(order, copies)]
-    return smoothed(
+    return kernel_smooth(
         chosen if len(chosen) else samples[[int(log_likelihood.argmax())]], tell_apart, rng
     ), share
 
 
-def refill(
+def resample(
     kept: Samples, number: int, jitter: float | Samples, rng: np.random.Generator
 ) -> Samples:
     """`number` samples of those kept, of each as many as of the next, moved a little so that none
@@ -154,4 +145,4 @@ def refill(
     whole, rest = divmod(number, len(kept))
     evenly = np.arange(rest) * len(kept) // max(1, rest)
     moved: Samples = np.concatenate([kept] * whole + [kept[evenly]])
-    return moved + standard(rng, *moved.shape) * jitter if np.any(jitter) else moved
+    return moved + standard_normal(rng, *moved.shape) * jitter if np.any(jitter) else moved

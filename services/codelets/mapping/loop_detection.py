@@ -12,21 +12,18 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.errors import MessageError
+from cogmap.geometry.arrays import Floats, Indices
+from cogmap.geometry.se2 import relative, rotation_matrices
 from schemas.base import Scalar
 from schemas.cognition import Task
 from schemas.graph import Node, Operation
 from schemas.sensing import Percept, PlaceMatch
 from services.codelets.config import Config
-from services.codelets.correction.pairwise_consistency import AGREEING, Views
+from services.codelets.correction.pairwise_consistency import MIN_AGREEING, Views
 from services.codelets.correction.pose_graph import (
     Constraints,
-    Floats,
-    Indices,
-    relative,
-    rotations,
 )
 from services.codelets.localization.measurement_model import has_bearing, has_range
-from services.codelets.localization.sampling import wrapped
 from services.codelets.mapping.observations import Sightings
 from services.codelets.mapping.path import ODOMETRY, STAMP, rows_of
 
@@ -58,7 +55,7 @@ def revisit(task: Task, config: Config) -> list[Operation]:
         before_ns, number = (int(begun.attributes.get(key, 0)) for key in ("before_ns", "view"))
         before_ns = before_ns or int(begun.attributes["stamp_ns"])
         there = _clearest(seen, percept.label, rows, before_ns)
-        if len(there) < AGREEING or not (has_bearing(percept) and has_range(percept)):
+        if len(there) < MIN_AGREEING or not (has_bearing(percept) and has_range(percept)):
             continue
         facts = _joined(seen, int(there[number % len(there)]), rows, percept)
         found.append(
@@ -78,7 +75,9 @@ def _clearest(seen: Sightings, label: str, rows: Floats, before_ns: int) -> Indi
     known = np.flatnonzero(rows[seen.place, STAMP] <= before_ns * 1e-9 + 1e-6)
     known = known[[seen.labels[index] == label for index in seen.landmark[known].tolist()]]
     stood = rows[seen.place[known], ODOMETRY]
-    where = stood[:, :2] + np.einsum("mab,mb->ma", rotations(stood[:, 2]), seen.where_m[known])
+    where = stood[:, :2] + np.einsum(
+        "mab,mb->ma", rotation_matrices(stood[:, 2]), seen.where_m[known]
+    )
     same = np.hypot(*(where[:, None] - where).transpose(2, 0, 1)) <= SAME_M
     chosen = known[same[same.sum(axis=1).argmax()]] if len(known) else known
     order: Indices = chosen[np.argsort(np.hypot(*seen.where_m[chosen].T), kind="stable")]
@@ -135,16 +134,13 @@ def constraints_of(views: Views, poses: Floats) -> Constraints:
     A landmark tells where the agent stands but for its heading: who is turned further stands
     elsewhere around it.
     """
-    nothing = np.empty(0)
-    turn = relative(poses, Constraints(views.first, views.second, nothing, nothing))[:, 2]
-    turn = np.where(views.sd_rad > 0, 0.0, wrapped(turn))
-    off = np.einsum("mab,mb->ma", rotations(turn), views.here_m)
+    turn = relative(poses[views.i], poses[views.j])[:, 2]
+    turn = np.where(views.sd_rad > 0, 0.0, turn)
+    off = np.einsum("mab,mb->ma", rotation_matrices(turn), views.here_m)
     by_pose = np.zeros((len(turn), 2, 3))
     by_pose[:, 0, 0] = by_pose[:, 1, 1] = 1.0
     by_pose[:, :, 2] = np.column_stack([-off[:, 1], off[:, 0]])
     information = by_pose.transpose(0, 2, 1) @ by_pose / views.sd_m[:, None, None] ** 2
     known = views.sd_rad > 0
     information[known, 2, 2] += views.sd_rad[known] ** -2
-    return Constraints(
-        views.first, views.second, np.column_stack([views.there_m - off, turn]), information
-    )
+    return Constraints(views.i, views.j, np.column_stack([views.there_m - off, turn]), information)

@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.errors import MessageError
+from cogmap.geometry.se2 import mean_pose
 from cogmap.graph.graph import object_id
 from schemas.array import Array
 from schemas.base import Scalar
@@ -20,7 +21,7 @@ from services.codelets.localization.landmarks import (
     object_operations,
 )
 from services.codelets.localization.motion_model import with_gains
-from services.codelets.localization.sampling import generator, mean_pose, refill
+from services.codelets.localization.sampling import generator, resample
 
 FIRST_BASE_LEVEL = 0.2
 ROAD_REACH_M = 12.0
@@ -41,7 +42,7 @@ def place_object(task: Task, config: Config) -> list[Operation]:
     selves = near_by(
         with_gains(np.array(self_node.samples.numpy(), np.float64), config, rng), config
     )
-    selves = refill(selves, config.landmark_samples, 0.0, rng)
+    selves = resample(selves, config.landmark_samples, 0.0, rng)
     attributes: dict[str, Scalar] = {"label": percept.label, "since_ns": task.stamp_ns}
     node = Node(
         id=object_id(percept.label),

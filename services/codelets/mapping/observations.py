@@ -16,16 +16,15 @@ from typing import NamedTuple
 import numpy as np
 
 from cogmap.errors import MessageError
+from cogmap.geometry.arrays import Floats, Indices
+from cogmap.geometry.se2 import rotation_matrices
 from schemas.array import Array
 from schemas.base import Scalar
 from schemas.graph import Node
 from schemas.sensing import Percept
 from services.codelets.correction.pose_graph import (
     Constraints,
-    Floats,
-    Indices,
     PoseGraph,
-    rotations,
 )
 
 KIND = "sighted"
@@ -116,7 +115,7 @@ class Sightings(NamedTuple):
             else np.zeros(len(rows), bool)
         )
         rows = rows[known]
-        turn = rotations(rows[:, DIRECTION])
+        turn = rotation_matrices(rows[:, DIRECTION])
         information = turn * (rows[:, None, SPREAD].clip(1e-3) ** -2) @ turn.transpose(0, 2, 1)
         return cls(labels, after[known], landmark[known], rows[:, WHERE], information)
 
@@ -124,7 +123,7 @@ class Sightings(NamedTuple):
         """(m,) how much each counts, the path being at (n, 3) `poses` and landmarks at (k, 2):
         Cauchy's weights.
         """
-        turn = rotations(poses[self.place, 2])
+        turn = rotation_matrices(poses[self.place, 2])
         seen = np.einsum("mba,mb->ma", turn, landmarks_m[self.landmark] - poses[self.place, :2])
         off = seen - self.where_m
         squared = np.einsum("ma,mab,mb->m", off, self.information, off)
@@ -133,7 +132,7 @@ class Sightings(NamedTuple):
 
     def landmarks_m(self, poses: Floats) -> Floats:
         """(k, 2): where the landmarks are most likely, the path being at (n, 3) `poses`."""
-        turn = rotations(poses[self.place, 2])
+        turn = rotation_matrices(poses[self.place, 2])
         seen = poses[self.place, :2] + np.einsum("mab,mb->ma", turn, self.where_m)
         information = turn @ self.information @ turn.transpose(0, 2, 1)
         count = len(self.labels)

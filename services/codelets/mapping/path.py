@@ -14,13 +14,14 @@ from collections.abc import Iterable
 import numpy as np
 
 from cogmap.errors import MessageError
+from cogmap.geometry.arrays import Floats
+from cogmap.geometry.se2 import mean_pose, relative
 from schemas.array import Array
 from schemas.cognition import Task
 from schemas.graph import Node, Operation
 from services.codelets.config import Config
-from services.codelets.correction.pose_graph import Constraints, Floats, relative
+from services.codelets.correction.pose_graph import Constraints
 from services.codelets.localization.measurement_model import has_bearing, has_range
-from services.codelets.localization.sampling import mean_pose, wrapped
 from services.codelets.mapping.observations import Outlook, recorded, seen_from, sighted_id
 
 KIND = "path"
@@ -94,7 +95,7 @@ def extend_path(task: Task, config: Config) -> list[Operation]:
         number, rows = (number + 1, row) if len(rows) >= ROWS else (number, np.vstack([rows, row]))
         written += segments(rows, number)
     stamp_s = float(rows[-1, STAMP])
-    step = step_between(rows[-1, ODOMETRY], odometry)
+    step = relative(rows[-1, ODOMETRY], odometry)
     outlook = Outlook(number, stamp_s, step, float(self_node.attributes.get("range_gain", 0.0)))
     before = {node.id: node for node in task.nodes}
     for percept in task.percepts:
@@ -140,32 +141,13 @@ def variances_of(self_node: Node) -> Floats:
     return np.array([float(self_node.attributes.get(key, 0.0)) for key in VARIANCE_FACTS])
 
 
-def step_between(before: Floats, after: Floats) -> Floats:
-    """(3,): one pose as seen from another."""
-    nothing = np.empty(0)
-    both = Constraints(np.array([0]), np.array([1]), nothing, nothing)
-    step: Floats = relative(np.vstack([before, after]), both)[0]
-    step[2] = wrapped(step[2])
-    return step
-
-
-def composed(pose: Floats, step: Floats) -> Floats:
-    """(3,): the pose that is `step` as seen from `pose`."""
-    cos = np.cos(pose[2])
-    sin = np.sin(pose[2])
-    x_m = pose[0] + cos * step[0] - sin * step[1]
-    y_m = pose[1] + sin * step[0] + cos * step[1]
-    return np.array([x_m, y_m, float(wrapped(pose[2] + step[2]))])
-
-
 def steps_of(rows: Floats, config: Config) -> Constraints:
     """What path integration says from each row to the next, as surely as self-motion says, or less,
     by the way.
     """
     at = np.arange(max(0, len(rows) - 1))
-    nothing = np.empty(0)
-    steps = relative(rows[:, ODOMETRY], Constraints(at, at + 1, nothing, nothing))
-    steps[:, 2] = wrapped(steps[:, 2])
+    odometry = rows[:, ODOMETRY]
+    steps = relative(odometry[:-1], odometry[1:])
     length = np.hypot(steps[:, 0], steps[:, 1]).clip(config.path_spacing_m / 2)
     turned = np.abs(steps[:, 2])
     said_m2, said_rad2 = np.diff(rows[:, VARIANCES], axis=0).T
@@ -176,14 +158,3 @@ def steps_of(rows: Floats, config: Config) -> Constraints:
     )
     information[:, 2, 2] = 1 / np.maximum(least_rad2, said_rad2)
     return Constraints(at, at + 1, steps, information)
-
-
-def shifted(points: Floats, old: Floats, new: Floats) -> Floats:
-    """(k, 2) points that stand to (k, 3) poses `new` as they stood to `old`."""
-    turn = new[:, 2] - old[:, 2]
-    off = points - old[:, :2]
-    cos = np.cos(turn)
-    sin = np.sin(turn)
-    moved = np.column_stack([cos * off[:, 0] - sin * off[:, 1], sin * off[:, 0] + cos * off[:, 1]])
-    result: Floats = new[:, :2] + moved
-    return result

@@ -7,6 +7,7 @@ import numpy.typing as npt
 import pytest
 
 from cogmap.errors import MessageError
+from cogmap.geometry.se2 import mean_pose, wrap_angle
 from schemas.array import Array
 from schemas.cognition import Task
 from schemas.graph import DropLink, Link, Node, Operation
@@ -14,17 +15,15 @@ from services.codelets.localization.landmarks import locate_landmark
 from services.codelets.localization.localization import localize
 from services.codelets.localization.sampling import (
     generator,
-    keep,
-    mean_pose,
-    refill,
+    rejection_mask,
+    resample,
     spread,
-    wrapped,
 )
 from services.codelets.module import Config
 from tests.support.scenes import node, percept, task
 
 Samples = npt.NDArray[np.float64]
-EXACT = Config(samples=4000, kept_samples=2000, outlier_share=1e-9, views_alike=1.0)
+EXACT = Config(samples=4000, kept_samples=2000, outlier_share=1e-9, correlated_views=1.0)
 
 
 def _self(samples: Samples | None = None, **facts: float | str) -> Node:
@@ -252,7 +251,7 @@ def test_an_agent_that_was_turned_about_knows_its_heading_again_by_three_landmar
     found = _localized(
         _self(samples),
         *[_landmark(x, y, label=name) for name, (x, y) in places.items()],
-        config=Config(samples=800, views_alike=1.0),
+        config=Config(samples=800, correlated_views=1.0),
         percepts=seen,
     )
     x_m, y_m, heading_rad = _pose(found)
@@ -293,7 +292,7 @@ def test_a_task_without_a_self_node_or_without_its_samples_is_refused() -> None:
             localize(task("localization", *nodes), Config())
 
 
-LANDMARK = Config(misses=3, views_alike=1.0)
+LANDMARK = Config(misses=3, correlated_views=1.0)
 
 
 def _landmark_task(landmark: Node, bearing_rad: float, range_m: float, number: int = 0) -> Task:
@@ -324,7 +323,7 @@ def test_a_landmarks_samples_become_the_exact_gaussian_posterior_of_eq_4() -> No
     sensed = 1 / 0.4**2
     samples = np.random.default_rng(6).normal((10.0, 0.0), (1.0, 0.01), (8000, 2))
     landmark = node("object:house", samples, label="house")
-    config = Config(landmark_jitter_m=1e-6, views_alike=1.0)
+    config = Config(landmark_jitter_m=1e-6, correlated_views=1.0)
     found = _moved(locate_landmark(_landmark_task(landmark, 0.0, 11.0), config))
     assert found.attributes["x_m"] == pytest.approx(
         (prior * 10 + sensed * 11) / (prior + sensed), abs=0.03
@@ -375,9 +374,9 @@ def test_the_same_task_gives_the_same_samples_and_another_task_gives_others() ->
 
 def test_rejection_keeps_samples_in_proportion_to_their_likelihood_and_never_none() -> None:
     rng = generator("a test")
-    kept = keep(np.log(np.repeat([1.0, 0.5, 0.1], 20_000)), rng)
+    kept = rejection_mask(np.log(np.repeat([1.0, 0.5, 0.1], 20_000)), rng)
     assert kept.reshape(3, -1).mean(axis=1) == pytest.approx([1.0, 0.5, 0.1], abs=0.02)
-    assert keep(np.array([-1e300, -1e301]), rng).tolist() == [True, False]
+    assert rejection_mask(np.array([-1e300, -1e301]), rng).tolist() == [True, False]
 
 
 def test_means_and_spreads_of_headings_are_taken_on_the_circle() -> None:
@@ -385,18 +384,18 @@ def test_means_and_spreads_of_headings_are_taken_on_the_circle() -> None:
     mean = mean_pose(poses)
     assert abs(mean[2]) == pytest.approx(math.pi)
     assert spread(poses, mean) == pytest.approx([1.0, 0.0, 0.1])
-    assert wrapped(np.array([3 * math.pi, -0.5, math.pi])) == pytest.approx(
+    assert wrap_angle(np.array([3 * math.pi, -0.5, math.pi])) == pytest.approx(
         [math.pi, -0.5, math.pi]
     )
 
 
 def test_refilling_draws_from_those_kept_and_jitters_each() -> None:
     kept = np.array([[1.0, 2.0], [3.0, 4.0]])
-    assert {tuple(row) for row in refill(kept, 50, 0.0, generator("a")).tolist()} == {
+    assert {tuple(row) for row in resample(kept, 50, 0.0, generator("a")).tolist()} == {
         (1.0, 2.0),
         (3.0, 4.0),
     }
-    assert len({tuple(row) for row in refill(kept, 50, 0.1, generator("a")).tolist()}) == 50
+    assert len({tuple(row) for row in resample(kept, 50, 0.1, generator("a")).tolist()}) == 50
 
 
 def test_a_landmark_that_was_seen_but_once_and_then_twice_elsewhere_starts_anew_there() -> None:

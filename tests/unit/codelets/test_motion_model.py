@@ -64,7 +64,7 @@ def _off_m(agent: Node, true: Pose) -> float:
     )
 
 
-CONFIG = Config(views_alike=1.0)
+CONFIG = Config(correlated_views=1.0)
 
 
 def test_an_agent_that_is_carried_away_finds_itself_by_the_landmarks_that_it_sees_there() -> None:
@@ -132,7 +132,7 @@ def test_bearings_alone_to_three_landmarks_tell_the_position() -> None:
 def test_a_new_landmark_that_is_seen_by_one_sense_alone_is_found_from_several_places(
     alone: dict[str, float],
 ) -> None:
-    config = Config(views_alike=1.0, landmark_samples=4000)
+    config = Config(correlated_views=1.0, landmark_samples=4000)
     landmark: Node | None = None
     for number, (x_m, y_m) in enumerate(
         ((0.0, 0.0), (4.0, 3.0), (8.0, 2.0), (12.0, 6.0), (8.0, 9.0), (4.0, 12.0))
@@ -156,7 +156,10 @@ def test_a_new_landmark_that_is_seen_by_one_sense_alone_is_found_from_several_pl
 def test_wheels_that_slip_all_the_time_are_found_out_by_landmarks() -> None:
     def off_m(speed_gain_sd: float) -> float:
         config = Config(
-            samples=1000, views_alike=1.0, speed_gain_sd=speed_gain_sd, gait_memory_s=1000.0
+            samples=1000,
+            correlated_views=1.0,
+            speed_gain_sd=speed_gain_sd,
+            motion_bias_time_s=1000.0,
         )
         agent = _agent()
         true = (0.0, 0.0, 0.0)

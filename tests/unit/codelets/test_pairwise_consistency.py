@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from services.codelets.config import Config
-from services.codelets.correction.pairwise_consistency import Views, agreeing
+from services.codelets.correction.pairwise_consistency import Views, consistent
 from services.codelets.mapping.loop_detection import constraints_of
 from services.codelets.mapping.path import steps_of
 
@@ -35,7 +35,7 @@ def _views(*pairs: tuple[int, int], off_m: float = 0.0) -> Views:
 
 
 def _agreeing(views: Views) -> list[bool]:
-    agrees: list[bool] = agreeing(views, steps_of(_rows(), Config()), FALSE_CLOSURE).tolist()
+    agrees: list[bool] = consistent(views, steps_of(_rows(), Config()), FALSE_CLOSURE).tolist()
     return agrees
 
 

@@ -11,17 +11,16 @@ from benchmarks.map_correction.measure import trajectory_error_m
 from benchmarks.map_correction.reference import best_positions
 from cogmap.errors import MessageError
 from services.codelets.correction import incremental
-from services.codelets.correction.gnc import holding
-from services.codelets.correction.incremental import Solved
-from services.codelets.correction.least_squares import correct_headings
+from services.codelets.correction.gnc import inliers
+from services.codelets.correction.incremental import IncrementalSolver
+from services.codelets.correction.least_squares import optimize
 from services.codelets.correction.pose_graph import (
     Constraints,
     PoseGraph,
     cost,
-    discrepancies,
     jacobians,
-    relative,
-    roots,
+    residuals,
+    sqrt_information,
 )
 from services.codelets.correction.reverse_replay import (
     Loops,
@@ -144,12 +143,12 @@ def test_a_loop_told_backwards_is_the_same_loop() -> None:
     headings = graph.poses[:, 2]
     ends = graph.closures
     here = displacements(graph.poses, ends)
-    turned = Constraints(ends.second, ends.first, np.zeros((len(ends), 3)), ends.information)
-    cos = np.cos(headings[ends.second])
-    sin = np.sin(headings[ends.second])
+    turned = Constraints(ends.j, ends.i, np.zeros((len(ends), 3)), ends.information)
+    cos = np.cos(headings[ends.j])
+    sin = np.sin(headings[ends.j])
     off = -here.off_m
-    turned.measured[:, 0] = cos * off[:, 0] + sin * off[:, 1]
-    turned.measured[:, 1] = cos * off[:, 1] - sin * off[:, 0]
+    turned.measurement[:, 0] = cos * off[:, 0] + sin * off[:, 1]
+    turned.measurement[:, 1] = cos * off[:, 1] - sin * off[:, 0]
     backwards = close_loops(PoseGraph(graph.poses, graph.steps, turned), 1e-6)
     assert backwards.positions_m == pytest.approx(close_loops(graph, 1e-6).positions_m, abs=1e-2)
 
@@ -159,7 +158,7 @@ def test_headings_and_the_first_position_stay_and_without_loops_all_does() -> No
     assert close_loops(graph).positions_m[0] == pytest.approx(graph.poses[0, :2])
     alone = PoseGraph(graph.poses, graph.steps, graph.closures.select(slice(0, 0)))
     assert close_loops(alone).positions_m == pytest.approx(graph.poses[:, :2])
-    assert correct_headings(alone) == pytest.approx(graph.poses)
+    assert optimize(alone) == pytest.approx(graph.poses)
 
 
 def test_a_path_that_lacks_a_step_is_refused() -> None:
@@ -174,20 +173,20 @@ def test_the_jacobians_are_those_of_finite_differences() -> None:
     loops = graph.closures
     by_first, by_second = jacobians(graph.poses, loops)
     for index in (0, 5):
-        for by_end, end in ((by_first, loops.first), (by_second, loops.second)):
+        for by_end, end in ((by_first, loops.i), (by_second, loops.j)):
             for axis in range(3):
                 there = graph.poses.copy()
                 back = graph.poses.copy()
                 there[end[index], axis] += 1e-6
                 back[end[index], axis] -= 1e-6
-                slope = (relative(there, loops) - relative(back, loops))[index] / 2e-6
+                slope = (residuals(there, loops) - residuals(back, loops))[index] / 2e-6
                 assert by_end[index][:, axis] == pytest.approx(slope, abs=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_correcting_headings_too_comes_nearer_to_the_truth_and_to_a_minimum(seed: int) -> None:
     truth, graph, _ = _laps(seed=seed)
-    poses = correct_headings(graph)
+    poses = optimize(graph)
     assert trajectory_error_m(poses[:, :2], truth[:, :2]) < 0.5 * trajectory_error_m(
         graph.poses[:, :2], truth[:, :2]
     )
@@ -203,22 +202,22 @@ def test_one_more_closure_is_taken_in_as_if_all_had_been_solved_together() -> No
     _, graph, _ = _laps()
     apart = graph.closures.select(np.arange(len(graph.closures)) % 3 == 0)
     before = graph.closures.select(np.arange(len(graph.closures)) % 3 != 0)
-    solved = Solved(PoseGraph(graph.poses, graph.steps, before))
+    solved = IncrementalSolver(PoseGraph(graph.poses, graph.steps, before))
     for index in range(len(apart)):
-        poses = solved.close(apart.select(np.array([index])))
-    together = correct_headings(PoseGraph(graph.poses, graph.steps, before + apart))
+        poses = solved.add(apart.select(np.array([index])))
+    together = optimize(PoseGraph(graph.poses, graph.steps, before + apart))
     assert cost(poses, graph.constraints) <= 1.01 * cost(together, graph.constraints)
-    solved.settle()
+    solved.relinearize()
     assert solved.graph.poses == pytest.approx(together, abs=2e-2)
 
 
 def test_a_closure_that_turns_the_path_far_is_solved_anew() -> None:
     _, graph, _ = _laps(laps=2)
     alone = PoseGraph(graph.poses, graph.steps, graph.closures.select(slice(0, 0)))
-    solved = Solved(alone)
+    solved = IncrementalSolver(alone)
     far = _between(np.array([0]), np.array([80]), np.array([[15.0, -15.0, 1.0]]), CLOSURE_SD / 10)
-    poses = solved.close(far)
-    together = correct_headings(PoseGraph(graph.poses, graph.steps, far))
+    poses = solved.add(far)
+    together = optimize(PoseGraph(graph.poses, graph.steps, far))
     assert cost(poses, solved.graph.constraints) <= 1.02 * cost(together, solved.graph.constraints)
 
 
@@ -227,12 +226,14 @@ def test_what_a_closure_leaves_undone_is_done_when_there_is_time(
 ) -> None:
     _, graph, _ = _laps(laps=2)
     far = _between(np.array([0]), np.array([80]), np.array([[15.0, -15.0, 1.0]]), CLOSURE_SD / 10)
-    least = cost(correct_headings(PoseGraph(graph.poses, graph.steps, far)), graph.steps + far)
+    least = cost(optimize(PoseGraph(graph.poses, graph.steps, far)), graph.steps + far)
     monkeypatch.setattr(incremental, "ITERATIONS_A_CLOSURE", 1)
-    hasty = Solved(PoseGraph(graph.poses, graph.steps, graph.closures.select(slice(0, 0))))
-    poses = hasty.close(far)
+    hasty = IncrementalSolver(
+        PoseGraph(graph.poses, graph.steps, graph.closures.select(slice(0, 0)))
+    )
+    poses = hasty.add(far)
     assert cost(poses, graph.steps + far) > 1.1 * least
-    hasty.settle()
+    hasty.relinearize()
     assert cost(hasty.graph.poses, graph.steps + far) == pytest.approx(least, rel=0.02)
 
 
@@ -242,18 +243,20 @@ def test_a_root_times_its_transpose_is_the_information_though_nothing_is_known_o
     random = np.random.default_rng(0).normal(size=(4, 3, 3))
     information = random @ random.transpose(0, 2, 1)
     information[2, 2, :] = information[2, :, 2] = 0.0
-    root = roots(information)
+    root = sqrt_information(information)
     assert root @ root.transpose(0, 2, 1) == pytest.approx(information)
 
 
 def test_a_closures_chi_square_is_what_it_adds_to_the_cost() -> None:
     _, graph, _ = _laps()
-    solved = Solved(PoseGraph(graph.poses, graph.steps, graph.closures.select(slice(0, 6))))
+    solved = IncrementalSolver(
+        PoseGraph(graph.poses, graph.steps, graph.closures.select(slice(0, 6)))
+    )
     before = cost(solved.graph.poses, solved.graph.constraints)
     one = graph.closures.select(slice(6, 7))
     chi_square = solved.chi_square(one)
-    solved.close(one)
-    solved.settle()
+    solved.add(one)
+    solved.relinearize()
     assert cost(solved.graph.poses, solved.graph.constraints) - before == pytest.approx(
         chi_square, rel=0.05
     )
@@ -266,14 +269,13 @@ def test_false_closures_are_undone_and_the_true_ones_hold(false: int, headings: 
         truth, graph, true = _laps(seed=seed, false=false)
         if not headings:
             graph.closures.information[:, 2, :] = 0.0
-        hold = holding(graph, 1e-3)
+        hold = inliers(graph, 1e-3)
         assert not hold[~true].any()
         assert hold[true].mean() > 0.9
         kept = PoseGraph(graph.poses, graph.steps, graph.closures.select(hold))
         best = PoseGraph(graph.poses, graph.steps, graph.closures.select(true))
         errors = [
-            trajectory_error_m(correct_headings(which)[:, :2], truth[:, :2])
-            for which in (kept, best)
+            trajectory_error_m(optimize(which)[:, :2], truth[:, :2]) for which in (kept, best)
         ]
         assert errors[0] < 1.2 * errors[1] + 0.05
 
@@ -282,10 +284,10 @@ def test_a_lone_true_closure_after_a_long_way_holds_and_one_beyond_all_drift_doe
     _, graph, _ = _laps(laps=2)
     for off_m, holds in ((0.0, True), (60.0, False)):
         closure = _between(np.array([0]), np.array([80]), np.array([[off_m, 0.0, 0.0]]), CLOSURE_SD)
-        assert holding(PoseGraph(graph.poses, graph.steps, closure), 1e-3).tolist() == [holds]
+        assert inliers(PoseGraph(graph.poses, graph.steps, closure), 1e-3).tolist() == [holds]
 
 
 def test_discrepancies_of_headings_are_the_short_way_round() -> None:
     poses = np.array([[0.0, 0.0, 3.0], [0.0, 0.0, -3.0]])
     known = _between(np.array([0]), np.array([1]), np.zeros((1, 3)), np.ones(3))
-    assert discrepancies(poses, known)[0, 2] == pytest.approx(2 * np.pi - 6.0)
+    assert residuals(poses, known)[0, 2] == pytest.approx(2 * np.pi - 6.0)

@@ -33,7 +33,7 @@ def _file(folder: Path, text: str, name: str = "a.g2o") -> Path:
 def test_a_g2o_file_is_read_with_the_upper_triangle_row_by_row(tmp_path: Path) -> None:
     graph = read_g2o(_file(tmp_path, G2O))
     assert graph.poses.tolist() == [[0, 0, 0], [1.5, -2, 0.25]]
-    assert (graph.first.tolist(), graph.second.tolist(), graph.measured.tolist()) == (
+    assert (graph.i.tolist(), graph.j.tolist(), graph.measurement.tolist()) == (
         [0],
         [1],
         [[1, 2, 0.5]],
@@ -45,7 +45,7 @@ def test_a_toro_file_is_read_in_its_own_order_of_information_and_ids_become_indi
     tmp_path: Path,
 ) -> None:
     graph = read_toro(_file(tmp_path, TORO))
-    assert (graph.ids.tolist(), graph.first.tolist(), graph.second.tolist()) == ([0, 7], [1], [0])
+    assert (graph.ids.tolist(), graph.i.tolist(), graph.j.tolist()) == ([0, 7], [1], [0])
     assert graph.information[0].tolist() == SYMMETRIC
 
 
