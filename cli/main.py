@@ -2,49 +2,123 @@
 
 from __future__ import annotations
 
-import importlib
 import logging
-from pathlib import Path
+from collections.abc import Callable
+from typing import Any
 
 import click
 
-from cli.options import agent_option, config_option, connect_option, set_option
-from cogmap.runtime import config, process
 from cogmap.runtime.command import run_command
-from services import registry
 
-COMMANDS = {
-    "architecture": "cli.architecture:architecture",
-    "config": "cli.run.command:print_config",
-    "doctor": "cli.doctor.command:doctor",
-    "experiment": "cli.experiment.command:experiment",
-    "graph": "cli.graph:graph",
-    "log": "cli.log.command:log",
-    "run": "cli.run.command:run",
-    "topic": "cli.topic.command:topic",
+Loader = Callable[[], click.Command]
+
+
+def _architecture() -> click.Command:
+    """Write the generated parts of docs/architecture.md."""
+    from cli.architecture import architecture
+
+    return architecture
+
+
+def _config() -> click.Command:
+    """Print every setting of every module, as TOML."""
+    from cli.config import print_config
+
+    return print_config
+
+
+def _doctor() -> click.Command:
+    """Report what is wrong, and what to do about it."""
+    from cli.doctor.command import doctor
+
+    return doctor
+
+
+def _experiment() -> click.Command:
+    """Run the paper's experiments."""
+    from cli.experiment.command import experiment
+
+    return experiment
+
+
+def _graph() -> click.Command:
+    """Show which process publishes and subscribes what."""
+    from cli.graph import graph
+
+    return graph
+
+
+def _log() -> click.Command:
+    """Record, inspect, draw, replay and compare logs."""
+    from cli.log.command import log
+
+    return log
+
+
+def _module() -> click.Command:
+    """Run one module as this process."""
+    from cli.processes import module
+
+    return module
+
+
+def _router() -> click.Command:
+    """Run the router that all modules connect to."""
+    from cli.processes import router
+
+    return router
+
+
+def _run() -> click.Command:
+    """Drive the robot around a simulated town."""
+    from cli.run.command import run
+
+    return run
+
+
+def _topic() -> click.Command:
+    """Watch topics of a running system, or publish on them."""
+    from cli.topic.command import topic
+
+    return topic
+
+
+COMMANDS: dict[str, Loader] = {
+    "architecture": _architecture,
+    "config": _config,
+    "doctor": _doctor,
+    "experiment": _experiment,
+    "graph": _graph,
+    "log": _log,
+    "module": _module,
+    "router": _router,
+    "run": _run,
+    "topic": _topic,
 }
 
 
-class _Commands(click.Group):
-    """Imports a command of COMMANDS when it is asked for: a module's process has no use for the
-    others.
-    """
+class LazyCommand(click.Command):
+    """A command that is imported when it is called: help and modules need none of the others."""
 
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        return sorted([*super().list_commands(ctx), *COMMANDS])
+    def __init__(self, name: str, load: Loader) -> None:
+        super().__init__(name, help=load.__doc__)
+        self._load = load
 
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in COMMANDS:
-            return super().get_command(ctx, cmd_name)
-        path, _, name = COMMANDS[cmd_name].partition(":")
-        command: click.Command = getattr(importlib.import_module(path), name)
-        return command
+    def make_context(
+        self,
+        info_name: str | None,
+        args: list[str],
+        parent: click.Context | None = None,
+        **extra: Any,
+    ) -> click.Context:
+        return self._load().make_context(info_name, args, parent, **extra)
 
 
-@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
-@click.option("--verbose", is_flag=True, help="Say more of what goes on.")
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="cogmap", message="cogmap %(version)s")
+@click.option("--verbose", is_flag=True, help="Log more.")
 def cogmap(verbose: bool) -> None:
-    """Cogmap: LIDA's cognitive cycle with spatial memory, every module a process on a message bus."""
+    """LIDA's cognitive cycle with spatial memory, every module a process on a message bus."""
     logging.basicConfig(
         level=logging.DEBUG if verbose else logging.INFO,
         format="%(asctime)s %(message)s",
@@ -52,38 +126,8 @@ def cogmap(verbose: bool) -> None:
     )
 
 
-@cogmap.command()
-@click.argument("name", metavar="NAME")
-@click.option("--instance", default="", help="Its own name, where several of one module run.")
-@click.option(
-    "--state", type=click.Path(path_type=Path), help="A folder for what it must not lose."
-)
-@click.option("--tied", is_flag=True, help="End when standard input ends.")
-@connect_option
-@agent_option
-@config_option
-@set_option
-def module(
-    name: str,
-    instance: str,
-    state: Path | None,
-    tied: bool,
-    connect: str,
-    agent: str,
-    config_path: Path | None,
-    settings: tuple[str, ...],
-) -> None:
-    """Run one module as this process."""
-    built = registry.build(name, config.load(config_path, settings), instance)
-    process.run_module(built, connect, agent, state, process.Stop(tied))
-
-
-@cogmap.command()
-@click.option("--tied", is_flag=True, help="End when standard input ends.")
-@connect_option
-def router(tied: bool, connect: str) -> None:
-    """Run the router that all modules meet at."""
-    process.run_router(connect, process.Stop(tied))
+for _name, _load in COMMANDS.items():
+    cogmap.add_command(LazyCommand(_name, _load))
 
 
 def main() -> None:

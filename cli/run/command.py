@@ -5,14 +5,13 @@ from __future__ import annotations
 import sys
 import time
 from pathlib import Path
-from typing import IO
 
 import click
 import msgspec
 from rich.console import Console
 
 from cli.launch.drive import INTERRUPTED, Drive
-from cli.launch.plan import Choices, effective, everybody, to_toml
+from cli.launch.plan import Choices, effective, everybody
 from cli.options import agent_option, config_option, connect_option, set_option
 from cli.run import display, summary
 from cogmap.bus.session import check_free
@@ -104,35 +103,6 @@ def run(
     else:
         console.print(summary.table(figures, drive.folder))
     sys.exit(0 if figures.completed else 130 if figures.ended_by == INTERRUPTED else 1)
-
-
-@click.command(name="config")
-@seed_option
-@laps_option
-@lockstep_option
-@codelets_option
-@click.option("--record/--no-record", default=True, help="Whether the drive waits for a recorder.")
-@click.option(
-    "-o", "--output", type=click.File("w", atomic=True), default="-", help="Where to write it."
-)
-@config_option
-@set_option
-def print_config(
-    seed: int | None,
-    laps: float | None,
-    lockstep: bool,
-    codelets: int,
-    record: bool,
-    output: IO[str],
-    config_path: Path | None,
-    settings: tuple[str, ...],
-) -> None:
-    """Write the whole configuration of a drive as TOML: for modules that are started one by one."""
-    choices = Choices(seed=seed, laps=laps, lockstep=lockstep, codelets=codelets, record=record)
-    sections = effective(
-        config.load(config_path, settings), choices, everybody(choices, observer=False)
-    )
-    output.write(to_toml(sections))
 
 
 def _new_folder(out: Path | None) -> Path:

@@ -1,0 +1,48 @@
+"""`cogmap module` and `cogmap router`: what runs until it is stopped."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from cli.options import agent_option, config_option, connect_option, set_option
+from cogmap.runtime import config, process
+from services import registry
+
+tied_option = click.option("--tied", is_flag=True, help="End when standard input ends.")
+
+
+@click.command()
+@click.argument("name", metavar="NAME")
+@click.option("--instance", default="", help="Its own name, where several of one module run.")
+@click.option(
+    "--state", type=click.Path(path_type=Path), help="A folder for what it must not lose."
+)
+@tied_option
+@connect_option
+@agent_option
+@config_option
+@set_option
+def module(
+    name: str,
+    instance: str,
+    state: Path | None,
+    tied: bool,
+    connect: str,
+    agent: str,
+    config_path: Path | None,
+    settings: tuple[str, ...],
+) -> None:
+    """Run one module as this process."""
+    sections = config.load(config_path, settings)
+    built = registry.build(name, sections, instance)
+    process.run_module(built, connect, agent, state, process.Stop(tied))
+
+
+@click.command()
+@tied_option
+@connect_option
+def router(tied: bool, connect: str) -> None:
+    """Run the router that all modules connect to."""
+    process.run_router(connect, process.Stop(tied))

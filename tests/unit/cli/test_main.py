@@ -1,0 +1,60 @@
+"""The `cogmap` command itself: its version, its help, what it imports."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from importlib import metadata
+
+import click
+import pytest
+from click.testing import CliRunner
+
+from cli.main import COMMANDS, cogmap
+
+HEAVY = {"matplotlib", "cv2", "pybullet", "scipy"}
+
+
+def test_version_is_that_of_the_installed_package() -> None:
+    result = CliRunner().invoke(cogmap, ["--version"])
+
+    assert result.output == f"cogmap {metadata.version('cogmap')}\n"
+
+
+def test_help_lists_every_command_and_imports_none_of_them() -> None:
+    script = (
+        "import sys\n"
+        "from cli.main import cogmap\n"
+        "cogmap(['--help'], standalone_mode=False)\n"
+        "print(*sys.modules, file=sys.stderr)\n"
+    )
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+
+    listed = {line.split()[0] for line in run.stdout.splitlines() if line.startswith("  ")}
+    imported = set(run.stderr.split())
+    assert set(COMMANDS) <= listed
+    assert imported & HEAVY == set()
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_each_name_is_that_of_the_command_it_imports(name: str) -> None:
+    command = COMMANDS[name]()
+
+    assert isinstance(command, click.Command)
+    assert command.name == name
+
+
+@pytest.mark.parametrize(
+    ("arguments", "meant"),
+    [
+        (["topi", "list"], "topic"),
+        (["topic", "ech"], "echo"),
+        (["log", "inf"], "info"),
+        (["experiment", "city-map"], "city-maps"),
+    ],
+)
+def test_a_mistyped_verb_names_the_nearest(arguments: list[str], meant: str) -> None:
+    result = CliRunner().invoke(cogmap, arguments)
+
+    assert result.exit_code == 2
+    assert f"Did you mean '{meant}'?" in result.output
