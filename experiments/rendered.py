@@ -17,7 +17,7 @@ from schemas import topics
 from schemas.base import Message
 from schemas.sensing import MotorCommand, TruePose
 from services import registry
-from services.sim.rendering.catalogue import CATALOGUE
+from services.sim.layout.catalogue import CATALOGUE
 
 # Of the time that all runs take.
 DRAWN_SHARE = 0.9

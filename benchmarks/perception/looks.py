@@ -15,9 +15,9 @@ from benchmarks.perception.pipeline import Bystander, Eyes
 from benchmarks.perception.scenes import Scene, anywhere, drawn, encounter, later, side_and_range
 from schemas.sensing import Pose
 from services.epam.layout.road import load
-from services.sim.plan import STREET_WIDTH_M
-from services.sim.rendering.catalogue import CATALOGUE
-from services.sim.town import Town
+from services.sim.layout.catalogue import CATALOGUE
+from services.sim.layout.plan import STREET_WIDTH_M
+from services.sim.layout.town import Town
 from training.rendering.towns import KINDS
 
 TRAINED = frozenset(kind.name for kind in CATALOGUE)

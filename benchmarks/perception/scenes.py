@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from schemas.sensing import Calibration, Pose
-from services.sim import town
+from services.sim.layout import town
 from services.sim.rendering.camera import StereoCamera, calibration
 from services.sim.world import World
 from training.rendering import towns

@@ -19,8 +19,8 @@ from schemas.sensing import PlaceMatch, Pose
 from services.epam.places.recognizer import PlaceMemory
 from services.sensory.disparity import DepthFromStereo
 from services.sensory.rectify import rectification
-from services.sim import town
-from services.sim.plan import Point
+from services.sim.layout import town
+from services.sim.layout.plan import Point
 from services.sim.rendering.camera import StereoCamera, calibration
 from services.sim.rendering.light import Light, some_light
 from services.sim.world import World

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from schemas.sensing import Pose
-from services.sim.plan import Rectangle
+from services.sim.layout.plan import Rectangle
 
 Floats = npt.NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from cli.launch.supervisor import Program, cogmap_command
 from cogmap.runtime import config
 from cogmap.runtime.config import Sections
 from services import registry
-from services.sim.town import generate
+from services.sim.layout.town import generate
 
 OBSERVER = "observer"
 RECORDER = "recorder"

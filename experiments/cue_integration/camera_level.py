@@ -24,7 +24,7 @@ from experiments.rendered import SENSES, named
 from schemas import sensing
 from schemas.sensing import Odometry, Percept, Percepts, View
 from services import registry
-from services.sim.rendering import roadside
+from services.sim.layout import roadside
 from services.sim.rendering.camera import StereoCamera, calibration
 from services.sim.scripted.trajectory import Way
 from services.sim.world import World

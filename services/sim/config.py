@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 import msgspec
 
 from cogmap.errors import ConfigError
+from services.sim.layout.catalogue import CATALOGUE
 from services.sim.odometry import Noise
-from services.sim.rendering.catalogue import CATALOGUE
 from services.sim.scripted.percepts import PerceptErrors
 from services.sim.scripted.trajectory import Way
 from services.sim.world import STEP_S

@@ -9,8 +9,8 @@ from schemas import topics
 from schemas.base import Message
 from schemas.sensing import MotorCommand
 from services.sim.config import Config, check
-from services.sim.scripted.cameras import LedByCameras
-from services.sim.scripted.scripted import LedByPercepts
+from services.sim.scripted.camera_level import CameraLevelSim
+from services.sim.scripted.percept_level import PerceptLevelSim
 from services.sim.scripted.trajectory import Way
 from services.sim.simulation import Simulation
 
@@ -30,7 +30,7 @@ class Lockstep:
     is complete.
     """
 
-    def __init__(self, simulation: Simulation | LedByPercepts | LedByCameras) -> None:
+    def __init__(self, simulation: Simulation | PerceptLevelSim | CameraLevelSim) -> None:
         self._simulation = simulation
         self._asked_ns: int | None = None
 
@@ -143,12 +143,14 @@ def build(config: Config, instance: str = "sim") -> Module:
 def _led(config: Config, way: Way, module: Module, awaits: dict[str, int]) -> Module:
     """`module` with a robot that is led along `way`."""
     if way.sensing == "cameras":
-        cameras = Lockstep(LedByCameras(config, way))
+        cameras = Lockstep(CameraLevelSim(config, way))
         says = _EMITS
         return module.on(topics.MOTOR_COMMAND, cameras.command, says).starts(
             cameras.start, awaits, says
         )
-    led = Lockstep(LedByPercepts(way, config.noise, config.percepts, config.frame_hz, config.seed))
+    led = Lockstep(
+        PerceptLevelSim(way, config.noise, config.percepts, config.frame_hz, config.seed)
+    )
     return module.on(topics.MOTOR_COMMAND, led.command, _EMITS_LED).starts(
         led.start, awaits, _EMITS_LED
     )

@@ -7,10 +7,10 @@ from collections.abc import Iterable
 from schemas.base import Message
 from schemas.process import Clock
 from schemas.sensing import MotorCommand, Odometry, StereoFrame, TruePose, TrueTown
-from services.sim import town
 from services.sim.config import Config
+from services.sim.layout import town
+from services.sim.layout.progress import Progress
 from services.sim.odometry import WheelOdometry
-from services.sim.progress import Progress
 from services.sim.rendering.camera import StereoCamera, calibration
 from services.sim.world import World
 

@@ -13,7 +13,8 @@ import cv2
 import numpy as np
 
 from schemas.sensing import Pose
-from services.sim.plan import Plot
+from services.sim.layout.plan import Plot
+from services.sim.layout.town import Place
 from services.sim.rendering import mesh, prop_shapes, scenery
 from services.sim.rendering.egl import Egl
 from services.sim.rendering.egl import works as egl_works
@@ -21,7 +22,6 @@ from services.sim.rendering.light import relief
 from services.sim.rendering.wall import Image
 from services.sim.robot import Robot
 from services.sim.stdio import pybullet, quiet
-from services.sim.town import Place
 
 STEP_S = 1 / 240
 _log = logging.getLogger(__name__)

@@ -21,9 +21,9 @@ import numpy.typing as npt
 from rich.progress import Progress
 
 from schemas.sensing import Pose
-from services.sim import plan, town
+from services.sim.layout import plan, town
+from services.sim.layout.catalogue import CATALOGUE, BuildingType, invented
 from services.sim.rendering.camera import Exposure, StereoCamera, calibration
-from services.sim.rendering.catalogue import CATALOGUE, BuildingType, invented
 from services.sim.rendering.light import some_light
 from services.sim.world import World
 

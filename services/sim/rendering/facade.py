@@ -8,7 +8,7 @@ import zlib
 
 import numpy as np
 
-from services.sim.rendering.catalogue import BuildingType, Colour
+from services.sim.layout.catalogue import BuildingType, Colour
 from services.sim.rendering.patterns import PAINT, STOREY_M
 from services.sim.rendering.wall import PX_PER_M, Image, Wall, roughen, shaded
 

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from services.sim.plan import Rectangle
+from services.sim.layout.plan import Rectangle
 from services.sim.rendering.wall import Image
 
 Matrix = npt.NDArray[np.float64]

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from services.sim.layout.catalogue import BuildingType
 from services.sim.rendering import facade
-from services.sim.rendering.catalogue import BuildingType
 from services.sim.rendering.wall import PX_PER_M, Image
 
 Vertex = tuple[float, float, float]

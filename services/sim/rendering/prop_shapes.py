@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 import cv2
 import numpy as np
 
-from services.sim.rendering.catalogue import Colour
-from services.sim.rendering.furniture import Prop
+from services.sim.layout.catalogue import Colour
+from services.sim.layout.furniture import Prop
 from services.sim.rendering.mesh import Mesh, Vertex
 from services.sim.rendering.wall import Image, roughen
 

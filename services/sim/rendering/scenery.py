@@ -8,7 +8,7 @@ import math
 import cv2
 import numpy as np
 
-from services.sim.plan import PAVEMENT_WIDTH_M, STREET_WIDTH_M, Road
+from services.sim.layout.plan import PAVEMENT_WIDTH_M, STREET_WIDTH_M, Road
 from services.sim.rendering.mesh import Mesh, Vertex
 from services.sim.rendering.wall import Image, plain, roughen
 

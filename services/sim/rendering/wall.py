@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from services.sim.rendering.catalogue import BuildingType, Colour
+from services.sim.layout.catalogue import BuildingType, Colour
 
 PX_PER_M = 20
 Image = npt.NDArray[np.uint8]

@@ -21,7 +21,7 @@ from benchmarks.perception.novel import Meeting, remembered
 from benchmarks.perception.objects import Building, Segment, Sight
 from cogmap.errors import UsageError
 from schemas.sensing import Percept, Pose
-from services.sim import town
+from services.sim.layout import town
 from training.rendering import towns
 
 TRAINED = frozenset({"bakery", "bank"})

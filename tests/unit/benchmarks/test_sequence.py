@@ -23,7 +23,7 @@ from benchmarks.perception.sequence import (
     recall,
 )
 from schemas.sensing import PlaceMatch, Pose
-from services.sim import town
+from services.sim.layout import town
 
 LINE = [(0.0, 0.0), (40.0, 0.0), (40.0, 30.0)]
 

@@ -10,7 +10,7 @@ import pytest
 from cli.launch.plan import OBSERVER, RECORDER, Choices, effective, everybody, programs, to_toml
 from cogmap.errors import ConfigError
 from services import registry
-from services.sim.town import generate
+from services.sim.layout.town import generate
 
 
 def configured(choices: Choices, **sections: dict[str, object]) -> dict[str, dict[str, object]]:

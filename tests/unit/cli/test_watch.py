@@ -18,7 +18,7 @@ from schemas.base import Message
 from schemas.graph import Cells, Delta, Node
 from schemas.process import Health
 from schemas.sensing import MotorCommand, Odometry, TruePose
-from services.sim.town import generate
+from services.sim.layout.town import generate
 
 MS = 1_000_000
 

@@ -21,7 +21,7 @@ from services.epam.recognition.objects import (
     load,
     posteriors,
 )
-from services.sim.rendering.catalogue import CATALOGUE
+from services.sim.layout.catalogue import CATALOGUE
 
 
 def _direction(number: int, towards: int = 0, share: float = 0.0) -> np.ndarray:

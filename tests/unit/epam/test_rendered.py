@@ -10,7 +10,7 @@ import pytest
 from schemas import topics
 from schemas.sensing import Building, Learned, Percept, Percepts
 from services.epam.module import Config, build
-from services.sim import town
+from services.sim.layout import town
 from tests.support.rendered import seen
 from training.rendering.towns import Views, render
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from schemas.sensing import Pose
-from services.sim import town
+from services.sim.layout import town
 from services.sim.odometry import Noise, WheelOdometry
 
 DT_S = 0.05

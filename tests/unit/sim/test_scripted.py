@@ -10,8 +10,8 @@ from schemas import topics
 from schemas.sensing import MotorCommand, Percepts, Pose, SelfMotion, TruePose
 from services.sim.module import Config, build
 from services.sim.odometry import Noise
+from services.sim.scripted.percept_level import PerceptLevelSim
 from services.sim.scripted.percepts import Landmark, PerceptErrors, PerceptSense, PlaceSense
-from services.sim.scripted.scripted import LedByPercepts
 from services.sim.scripted.trajectory import Line, Way
 
 SILENT = Noise(speed=0.0, turn=0.0, drift_rad_per_sqrt_m=0.0)
@@ -28,11 +28,13 @@ def _landmarks(number: int) -> list[Landmark]:
 
 def _led(
     line=SQUARE, noise: Noise = SILENT, errors: PerceptErrors = EXACT, seed: int = 1
-) -> LedByPercepts:
-    return LedByPercepts(Way(line_m=line, landmarks=[HOUSE], speed_m_s=3.0), noise, errors, 1, seed)
+) -> PerceptLevelSim:
+    return PerceptLevelSim(
+        Way(line_m=line, landmarks=[HOUSE], speed_m_s=3.0), noise, errors, 1, seed
+    )
 
 
-def _ride(led: LedByPercepts) -> list[tuple[TruePose, SelfMotion, Percepts]]:
+def _ride(led: PerceptLevelSim) -> list[tuple[TruePose, SelfMotion, Percepts]]:
     ride = []
     while led.progress < 1.0:
         led.step()

@@ -20,9 +20,9 @@ from schemas.sensing import (
     View,
 )
 from services import registry
+from services.sim.layout import roadside
 from services.sim.module import Config, build
 from services.sim.odometry import Noise
-from services.sim.rendering import roadside
 from services.sim.rendering.camera import StereoCamera, calibration
 from services.sim.scripted.percepts import Landmark
 from services.sim.scripted.trajectory import Way

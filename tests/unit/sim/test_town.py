@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from cogmap.bus.codec import encode
-from services.sim import town
-from services.sim.plan import PAVEMENT_WIDTH_M, STREET_WIDTH_M, overlap
-from services.sim.progress import Progress
+from services.sim.layout import town
+from services.sim.layout.catalogue import CATALOGUE, invented
+from services.sim.layout.plan import PAVEMENT_WIDTH_M, STREET_WIDTH_M, overlap
+from services.sim.layout.progress import Progress
 from services.sim.rendering import facade, mesh
-from services.sim.rendering.catalogue import CATALOGUE, invented
 
 SEEDS = range(25)
 TOWNS = [town.generate(seed) for seed in SEEDS]

@@ -12,7 +12,7 @@ import pytest
 
 from cogmap.errors import CogmapError
 from schemas.sensing import Pose
-from services.sim import town
+from services.sim.layout import town
 from services.sim.rendering.camera import StereoCamera, calibration
 from services.sim.robot import TRACK_M, WHEEL_RADIUS_M
 from services.sim.world import World

@@ -16,7 +16,7 @@ from click.testing import CliRunner
 from cogmap.errors import UsageError
 from services.epam.layout.road import load
 from services.epam.recognition import objects, segments
-from services.sim.rendering.catalogue import CATALOGUE
+from services.sim.layout.catalogue import CATALOGUE
 from tests.support.blocks import CAMERA, painted
 from training.__main__ import train
 from training.rendering.dataset import Job, render

@@ -8,17 +8,17 @@ from __future__ import annotations
 from schemas.base import Message
 from schemas.sensing import Odometry, Pose, TrueTown
 from services.sim.config import Config
+from services.sim.layout import roadside
 from services.sim.odometry import WheelOdometry
-from services.sim.rendering import roadside
 from services.sim.rendering.camera import StereoCamera, calibration
-from services.sim.scripted.scripted import TURN_AS_M, Led
+from services.sim.scripted.percept_level import TURN_AS_M, Led
 from services.sim.scripted.trajectory import Way
 from services.sim.world import World
 
 _HERE = Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)
 
 
-class LedByCameras(Led):
+class CameraLevelSim(Led):
     """Says what its cameras see and what its wheels report, which no engine turns: it is put where
     it is led.
     """

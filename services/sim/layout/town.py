@@ -9,7 +9,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from schemas.sensing import Building, Pose, Street, TrueTown
-from services.sim.plan import (
+from services.sim.layout.catalogue import CATALOGUE, BuildingType
+from services.sim.layout.furniture import Prop, furnish
+from services.sim.layout.plan import (
     PAVEMENT_WIDTH_M,
     STREET_WIDTH_M,
     Plot,
@@ -18,8 +20,6 @@ from services.sim.plan import (
     Road,
     overlap,
 )
-from services.sim.rendering.catalogue import CATALOGUE, BuildingType
-from services.sim.rendering.furniture import Prop, furnish
 
 MIN_BUILDINGS = 21
 _REACH_M = STREET_WIDTH_M / 2 + PAVEMENT_WIDTH_M

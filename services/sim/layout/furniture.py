@@ -8,7 +8,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from services.sim.plan import PAVEMENT_WIDTH_M, STREET_WIDTH_M, Plot, Rectangle, Road, overlap
+from services.sim.layout.plan import (
+    PAVEMENT_WIDTH_M,
+    STREET_WIDTH_M,
+    Plot,
+    Rectangle,
+    Road,
+    overlap,
+)
 
 _SPACING_M = 5.0
 _SCATTERED = 30

@@ -10,10 +10,10 @@ import math
 import numpy as np
 
 from cogmap.errors import ConfigError
-from services.sim.plan import Plot, Road
-from services.sim.rendering.catalogue import CATALOGUE
+from services.sim.layout.catalogue import CATALOGUE
+from services.sim.layout.plan import Plot, Road
+from services.sim.layout.town import Place
 from services.sim.scripted.trajectory import Line, Way
-from services.sim.town import Place
 
 CLEAR_M = 1.0
 _KINDS = {kind.name: kind for kind in CATALOGUE}

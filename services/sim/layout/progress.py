@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from services.sim.plan import Point
+from services.sim.layout.plan import Point
 
 _STEP_M = 0.25
 _WINDOW_M = 8.0

@@ -87,7 +87,7 @@ class Led:
         return self._frames - 1
 
 
-class LedByPercepts(Led):
+class PerceptLevelSim(Led):
     """Says what sensory memory and EPAM would say."""
 
     def __init__(
