@@ -11,7 +11,7 @@ import msgspec
 
 from cogmap.recording.storage import format as layout
 from cogmap.recording.storage.reader import LogReader, Progress
-from cogmap.recording.storage.sequences import Continuity
+from cogmap.recording.storage.sequences import SequenceTracker
 from schemas.topics import BY_NAME
 
 
@@ -63,7 +63,7 @@ def info(path: Path, progress: Progress | None = None) -> Info:
     reader = LogReader(path)
     about = reader.about(layout.RECORDING)
     began_ns = int(about.get("began_ns", "0"))
-    continuity = Continuity(began_ns or None)
+    sequences = SequenceTracker(since_ns=began_ns or None)
     names = [channel.topic for channel in reader.channels.values()]
     tallies = {name: _Tally() for name in names if name in BY_NAME}
     for record in reader.records(progress=progress):
@@ -73,8 +73,8 @@ def info(path: Path, progress: Progress | None = None) -> Info:
         source = "?" if record.envelope is None else record.envelope.source
         tally.sources[source] = tally.sources.get(source, 0) + 1
         if record.envelope is not None:
-            continuity.follow(record.topic, record.envelope)
-    lost = continuity.lost()
+            sequences.follow(record.topic, record.envelope)
+    lost = sequences.lost()
     return Info(
         path=str(path),
         software=about.get("software", ""),
@@ -85,7 +85,7 @@ def info(path: Path, progress: Progress | None = None) -> Info:
         messages=sum(tally.count for tally in tallies.values()),
         finished=bool(reader.about(layout.SUMMARY)),
         cut_bytes=reader.cut_bytes,
-        gaps=continuity.gaps(),
+        gaps=sequences.gaps(),
         unknown=sorted(name for name in names if name not in BY_NAME and name != layout.ENVELOPES),
         config=json.loads(about.get("config", "{}")),
         topics=[

@@ -97,7 +97,7 @@ def test_info_says_how_much_of_each_topic_came_from_whom(
 
 def test_info_names_a_gap(run: Callable[..., Result], tmp_path: Path) -> None:
     thin = write(tmp_path / "thin.mcap", without=2)
-    assert "gap: odometry (never drop): 1 of sim lacking, number 2" in run("info", thin).stdout
+    assert "gap: odometry (never drop): 1 of sim missing, number 2" in run("info", thin).stdout
 
 
 def test_cat_prints_the_messages_of_the_topics_named_and_no_more_than_asked(

@@ -1,24 +1,28 @@
-"""How a log is laid out in MCAP: a channel for each topic, one for the envelopes, metadata about
-the recording.
+"""How a log is laid out in MCAP: a channel for each topic, one for envelopes, and metadata.
 
-A message's record holds its bytes as they travelled: log time is when it was received, publish time
-when it was sent, sequence its number. The record before it, on the channel `_envelope`, tells the
-facts of its transport.
+A message's record holds the bytes that travelled. Its log time is when it was received, its publish
+time when it was sent, its sequence the sender's number. The record before it, on the channel
+`_envelope`, holds its envelope. Log times never decrease: where the wall clock was set back, a
+message has its predecessor's time.
+
+A schema is called by the message's type, is encoded as `jsonschema`, and describes bytes encoded as
+`msgpack`; both names are of MCAP's registry. MCAP's registry has no profile for such logs, so it is
+left empty: a log of ours is known by its library, or by the `software` of its recording, where a tool
+has written it anew.
 """
 
 from __future__ import annotations
 
-from functools import cache
-from importlib.metadata import PackageNotFoundError, version
-
 import msgspec
 
 from cogmap.bus.codec import Cause, Envelope, Stage
+from cogmap.version import VERSION
 from schemas import topics
 from schemas.export import json_schema
 from schemas.topics import Delivery, Topic
 
-PROFILE = "cogmap"
+PROFILE = ""
+SOFTWARE = f"cogmap {VERSION}"
 MESSAGE_ENCODING = "msgpack"
 SCHEMA_ENCODING = "jsonschema"
 ENVELOPES = "_envelope"
@@ -30,7 +34,7 @@ _MAX_SEQUENCE = 2**32 - 1
 
 
 class EnvelopeRecord(msgspec.Struct, kw_only=True):
-    """What the channel `_envelope` carries: the envelope of the message that the next record holds."""
+    """The envelope of the message that the next record holds, with that message's topic."""
 
     topic: str
     source: str
@@ -44,14 +48,13 @@ class EnvelopeRecord(msgspec.Struct, kw_only=True):
     @classmethod
     def of(cls, topic: Topic, envelope: Envelope) -> EnvelopeRecord:
         """The record of `envelope`, which came with a message on `topic`."""
-        return cls(
-            topic=topic.name,
-            **{name: getattr(envelope, name) for name in Envelope.__struct_fields__},
-        )
+        facts = {name: getattr(envelope, name) for name in Envelope.__struct_fields__}
+        return cls(topic=topic.name, **facts)
 
     def envelope(self) -> Envelope:
         """The envelope that it was made of."""
-        return Envelope(**{name: getattr(self, name) for name in Envelope.__struct_fields__})
+        facts = {name: getattr(self, name) for name in Envelope.__struct_fields__}
+        return Envelope(**facts)
 
 
 def topics_to_record() -> list[Topic]:
@@ -63,30 +66,23 @@ def topics_to_record() -> list[Topic]:
     ]
 
 
-def schema_of(topic: Topic) -> bytes:
-    """The JSON Schema that goes into the file for `topic`."""
-    return msgspec.json.encode(json_schema(topic))
+def schema_of(topic: Topic) -> tuple[str, bytes]:
+    """The name and the JSON Schema of what `topic` carries."""
+    schema = msgspec.json.encode(json_schema(topic))
+    return topic.type.__name__, schema
 
 
-def envelope_schema() -> bytes:
-    """The JSON Schema of the channel of envelopes."""
-    return msgspec.json.encode(msgspec.json.schema(EnvelopeRecord))
+def envelope_schema() -> tuple[str, bytes]:
+    """The name and the JSON Schema of what the channel of envelopes carries."""
+    schema = msgspec.json.encode(msgspec.json.schema(EnvelopeRecord))
+    return EnvelopeRecord.__name__, schema
 
 
 def time_field(time_ns: int) -> int:
-    """`time_ns` within what MCAP has room for; the exact one is in the envelope."""
+    """`time_ns` limited to MCAP's range; the exact time is in the envelope."""
     return min(max(time_ns, 0), MAX_TIME_NS)
 
 
 def sequence_field(seq: int) -> int:
-    """`seq` within what MCAP has room for; the exact one is in the envelope and the message."""
+    """The low 32 bits of `seq`, as MCAP keeps it; the number itself is in envelope and message."""
     return seq & _MAX_SEQUENCE
-
-
-@cache
-def software() -> str:
-    """The name and version that a log names as its writer."""
-    try:
-        return f"cogmap {version('cogmap')}"
-    except PackageNotFoundError:
-        return "cogmap"

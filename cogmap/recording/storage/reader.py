@@ -1,6 +1,4 @@
-"""The one reader of logs: messages in (log time, channel, sequence) order, from a whole file or a
-cut one.
-"""
+"""The one reader of logs: messages in order of log time, from a finished file or a cut one."""
 
 from __future__ import annotations
 
@@ -8,16 +6,24 @@ from collections import OrderedDict
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import msgspec
-from mcap.opcode import Opcode
-from mcap.records import Channel, Header, Metadata
+from mcap.records import Message as Written
 
 from cogmap.bus.codec import Envelope, decode
 from cogmap.errors import LogError
 from cogmap.recording.storage import format as layout
-from cogmap.recording.storage.chunks import DamageError, Frame, LogFile, Piece, channels_in, pieces
 from cogmap.recording.storage.format import EnvelopeRecord
+from cogmap.recording.storage.index import (
+    ChunkSpan,
+    DamageError,
+    channels_in,
+    messages_in,
+    read_chunk,
+    read_index,
+)
+from cogmap.recording.storage.versions import check_readable
 from schemas.base import Message
 from schemas.topics import BY_NAME, Topic
 
@@ -29,7 +35,11 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """A message in a log: where its bytes are, and all that is known without decoding them."""
+    """A message in a log, not decoded: all that is known of it but its bytes.
+
+    `chunk` and `position` name it within the log, by the number of its chunk in order of time and
+    of itself in the chunk; `size` is its bytes.
+    """
 
     topic_name: str
     channel: int
@@ -38,53 +48,49 @@ class Record:
     publish_ns: int
     envelope: Envelope | None
     chunk: int
-    start: int
-    end: int
+    position: int
+    size: int
 
     @property
     def topic(self) -> Topic:
         """The row of the table that it travelled on."""
         return BY_NAME[self.topic_name]
 
-    @property
-    def size(self) -> int:
-        """Its bytes."""
-        return self.end - self.start
-
 
 class LogReader:
-    """The log at `path`. `cut_bytes` at its end make no sense: it was cut off, or is being written.
+    """The log at `path`. `cut_bytes` at its end belong to no whole record: it was cut off, or is
+    being written.
 
-    Raises LogError where it is missing, foreign or, while it is read, damaged.
+    Raises LogError where it is missing, foreign, of a version that is not read here, or damaged;
+    damage is found when the chunk concerned is read.
     """
 
     def __init__(self, path: Path) -> None:
-        self.file = LogFile(path)
+        index = read_index(path)
         self.path = path
-        self.size_bytes = self.file.size
-        self.metadata: list[tuple[str, dict[str, str]]] = []
-        self.channels: dict[int, Channel] = {}
-        self._chunks: list[Frame] = []
-        self._cache: OrderedDict[int, bytes] = OrderedDict()
-        self.cut_bytes = 0
-        try:
-            self._survey()
-        except DamageError as error:
-            raise LogError(
-                f"{path} is damaged: {error}; `cogmap log recover {path} OUT` saves what it can"
-            ) from None
+        self.size_bytes = path.stat().st_size
+        self.channels = index.channels
+        self.metadata = index.metadata
+        self.cut_bytes = index.unreadable_bytes
+        self._chunks = index.chunks
+        self._cache: OrderedDict[int, list[Written]] = OrderedDict()
+        check_readable(path, index.library, self.about(layout.RECORDING).get("software", ""))
 
     def about(self, name: str) -> dict[str, str]:
         """The last metadata record called `name`, empty where there is none."""
-        return next((facts for found, facts in reversed(self.metadata) if found == name), {})
+        for found, facts in reversed(self.metadata):
+            if found == name:
+                return facts
+        return {}
 
     @property
     def span_ns(self) -> tuple[int, int]:
         """The log times of the first and the last message, (0, 0) where there is none."""
-        times = [self.file.times_ns(chunk) for chunk in self._chunks]
-        return (
-            (min(first for first, _ in times), max(last for _, last in times)) if times else (0, 0)
-        )
+        if not self._chunks:
+            return 0, 0
+        first_ns = min(chunk.first_ns for chunk in self._chunks)
+        last_ns = max(chunk.last_ns for chunk in self._chunks)
+        return first_ns, last_ns
 
     @property
     def span_s(self) -> float:
@@ -95,147 +101,133 @@ class LogReader:
     def records(
         self, topics: Collection[Topic] | None = None, progress: Progress | None = None
     ) -> Iterator[Record]:
-        """Messages on `topics`, all known ones where it is None, in order; `progress` is told the
-        share done.
+        """Messages on `topics`, on all known ones where it is None, in order of log time.
+
+        Those of one time come as they were written. `progress` is called with the share of chunks
+        that have been read. Raises LogError.
         """
         waiting: list[Record] = []
-        starts_ns = [self.file.times_ns(chunk)[0] for chunk in self._chunks]
-        for index in range(len(self._chunks)):
-            waiting += self._in_chunk(index, topics)
-            waiting.sort(key=_order)
-            later_ns = (
-                starts_ns[index + 1] if index + 1 < len(starts_ns) else layout.MAX_TIME_NS + 1
-            )
-            ready = next(
-                (n for n, record in enumerate(waiting) if record.log_time_ns >= later_ns),
-                len(waiting),
-            )
+        for number in range(len(self._chunks)):
+            waiting += self._records_of(number, topics)
+            waiting.sort(key=lambda record: record.log_time_ns)
+
+            ready = _count_before(waiting, self._start_ns(number + 1))
             yield from waiting[:ready]
             del waiting[:ready]
+
             if progress is not None:
-                progress((index + 1) / len(self._chunks))
+                progress((number + 1) / len(self._chunks))
 
     def payload(self, record: Record) -> bytes:
-        """The bytes of a message, as they travelled. Quick where records are asked for roughly in
-        order.
+        """The bytes of a message, as they travelled.
+
+        Quick where records are asked for roughly in order: the last few chunks are kept. Raises
+        LogError.
         """
-        return self._data(record.chunk)[record.start : record.end]
+        message = self._messages(record.chunk)[record.position]
+        data: bytes = message.data
+        return data
 
     def message(self, record: Record) -> Message:
-        """The message, decoded. Raises MessageError where it is not what its topic carries."""
+        """The message, decoded. Raises LogError; MessageError where it does not fit its topic."""
         return decode(record.topic, self.payload(record))
 
     def stub(self, record: Record) -> Message:
-        """What every message has, of this one: its stamp, number and source. Raises LogError where
-        it has not.
-        """
+        """What every message has: its stamp, number and source. Raises LogError."""
         try:
             return _stub_decoder.decode(self.payload(record))
         except msgspec.DecodeError as error:
-            raise LogError(
-                f"{self.path}: a message of {record.topic.name} cannot be read: {error}"
-            ) from None
+            topic = record.topic_name
+            raise LogError(f"{self.path}: a message of {topic} cannot be read: {error}") from None
 
-    def _survey(self) -> None:
-        end = 0
-        for frame in self.file.frames():
-            end = frame.end
-            if frame.opcode == Opcode.CHUNK:
-                self._chunks.append(frame)
-            record = self.file.parse(frame)
-            if isinstance(record, Header) and record.profile != layout.PROFILE:
-                raise LogError(
-                    f"{self.path} is not one of our logs: its profile is {record.profile!r}"
-                )
-            if isinstance(record, Channel):
-                self.channels[record.id] = record
-            elif isinstance(record, Metadata):
-                self.metadata.append((record.name, record.metadata))
-            if frame.opcode == Opcode.FOOTER:
-                end = self.size_bytes
-        self.cut_bytes = self.size_bytes - end
-        self._chunks.sort(key=lambda chunk: (self.file.times_ns(chunk), chunk.offset))
-        if self._chunks and not self.channels:
-            first = min(range(len(self._chunks)), key=lambda index: self._chunks[index].offset)
-            self._declare(self._data(first))
+    def _start_ns(self, number: int) -> int:
+        """The first log time in a chunk; later than any where there is no such chunk."""
+        if number < len(self._chunks):
+            return self._chunks[number].first_ns
+        return layout.MAX_TIME_NS + 1
 
-    def _declare(self, data: bytes) -> None:
-        self.channels |= {channel.id: channel for channel in channels_in(data)}
-
-    def _in_chunk(self, index: int, topics: Collection[Topic] | None) -> Iterator[Record]:
+    def _records_of(self, number: int, topics: Collection[Topic] | None) -> Iterator[Record]:
         """The messages of one chunk, each with the envelope that was written just before it."""
-        data = self._data(index, check=True)
-        told: tuple[Piece, EnvelopeRecord] | None = None
-        for piece in self._pieces(index, data):
-            if piece.channel not in self.channels:
-                self._declare(data)
-            channel = self.channels.get(piece.channel)
-            name = "" if channel is None else channel.topic
+        before: Written | None = None
+        for position, message in enumerate(self._messages(number)):
+            name = self._topic_name(message)
             if name == layout.ENVELOPES:
-                told = _told(piece, data)
+                before = message
                 continue
+
             topic = BY_NAME.get(name)
             if topic is not None and (topics is None or topic in topics):
-                yield Record(
-                    name,
-                    piece.channel,
-                    piece.sequence,
-                    piece.log_time_ns,
-                    piece.publish_ns,
-                    _matching(told, piece, name),
-                    index,
-                    piece.start,
-                    piece.end,
-                )
-            told = None
+                envelope = _matching(before, message, name)
+                yield _record(message, name, envelope, (number, position))
+            before = None
 
-    def _pieces(self, index: int, data: bytes) -> Iterator[Piece]:
+    def _topic_name(self, message: Written) -> str:
+        """The topic of a message's channel, empty where nothing declares that channel."""
+        channel = self.channels.get(message.channel_id)
+        return "" if channel is None else channel.topic
+
+    def _messages(self, number: int) -> list[Written]:
+        """The messages in a chunk, envelopes among them, from the cache where they are there."""
+        cached = self._cache.get(number)
+        if cached is not None:
+            self._cache.move_to_end(number)
+            return cached
+
+        chunk = self._chunks[number]
         try:
-            yield from pieces(data)
+            contents = read_chunk(self.path, chunk)
         except DamageError as error:
-            raise self._damaged(index, error) from None
+            raise self._damaged(chunk, error) from None
 
-    def _damaged(self, index: int, error: DamageError) -> LogError:
+        self.channels |= channels_in(contents)
+        messages = messages_in(contents)
+        self._cache[number] = messages
+        if len(self._cache) > _CACHED_CHUNKS:
+            self._cache.popitem(last=False)
+        return messages
+
+    def _damaged(self, chunk: ChunkSpan, error: DamageError) -> LogError:
         return LogError(
-            f"{self.path}: the chunk at byte {self._chunks[index].offset} is damaged ({error}): "
+            f"{self.path}: the chunk at byte {chunk.offset} is damaged ({error}): "
             f"`cogmap log recover {self.path} OUT` saves the rest"
         )
 
-    def _data(self, index: int, check: bool = False) -> bytes:
-        cached = self._cache.get(index)
-        if cached is not None:
-            self._cache.move_to_end(index)
-            return cached
-        try:
-            data = self.file.data(self._chunks[index], check)
-        except DamageError as error:
-            raise self._damaged(index, error) from None
-        self._cache[index] = data
-        if len(self._cache) > _CACHED_CHUNKS:
-            self._cache.popitem(last=False)
-        return data
+
+def _count_before(records: list[Record], time_ns: int) -> int:
+    """How many of the records, which are in order, were received before `time_ns`."""
+    for number, record in enumerate(records):
+        if record.log_time_ns >= time_ns:
+            return number
+    return len(records)
 
 
-def _order(record: Record) -> tuple[int, int, int]:
-    return record.log_time_ns, record.channel, record.sequence
+def _record(
+    message: Written, name: str, envelope: Envelope | None, place: tuple[int, int]
+) -> Record:
+    chunk, position = place
+    return Record(
+        topic_name=name,
+        channel=message.channel_id,
+        sequence=message.sequence,
+        log_time_ns=message.log_time,
+        publish_ns=message.publish_time,
+        envelope=envelope,
+        chunk=chunk,
+        position=position,
+        size=len(message.data),
+    )
 
 
-def _told(piece: Piece, data: bytes) -> tuple[Piece, EnvelopeRecord] | None:
+def _matching(before: Written | None, message: Written, name: str) -> Envelope | None:
+    """The envelope in the record `before` a message; None where that is not this message's."""
+    if before is None or _key(before) != _key(message):
+        return None
     try:
-        return piece, _envelope_decoder.decode(data[piece.start : piece.end])
+        record = _envelope_decoder.decode(before.data)
     except msgspec.DecodeError:
         return None
+    return record.envelope() if record.topic == name else None
 
 
-def _matching(
-    told: tuple[Piece, EnvelopeRecord] | None, piece: Piece, name: str
-) -> Envelope | None:
-    if told is None:
-        return None
-    before, record = told
-    same = (before.log_time_ns, before.sequence, record.topic) == (
-        piece.log_time_ns,
-        piece.sequence,
-        name,
-    )
-    return record.envelope() if same else None
+def _key(message: Written) -> tuple[Any, Any]:
+    return message.log_time, message.sequence

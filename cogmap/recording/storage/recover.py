@@ -2,38 +2,34 @@
 
 from __future__ import annotations
 
-import struct
 from pathlib import Path
 
 import msgspec
 from mcap.opcode import Opcode
-from mcap.records import Channel, Metadata, Schema
+from mcap.records import (
+    Channel,
+    Chunk,
+    Header,
+    McapRecord,
+    Message,
+    MessageIndex,
+    Metadata,
+    Schema,
+)
 from mcap.writer import CompressionType, Writer
 
-from cogmap.errors import LogError
 from cogmap.recording.storage import format as layout
-from cogmap.recording.storage.chunks import (
-    DamageError,
-    Frame,
-    LogFile,
-    Piece,
-    channels_in,
-    pieces,
-    schemas_in,
-)
+from cogmap.recording.storage.index import DamageError, channels_in, messages_in, open_chunk
 from cogmap.recording.storage.reader import Progress
-from cogmap.recording.storage.resync import all_frames
-
-_UNBOUNDED = 2**62
-_INDEX = struct.Struct("<HI")
-_INDEX_ENTRY_BYTES = 16
+from cogmap.recording.storage.resync import LogBytes, RecordSpan
+from cogmap.recording.storage.writer import UNBOUNDED, cannot_write
 
 
 class Recovery(msgspec.Struct, kw_only=True):
     """What was saved and what was not.
 
-    `lost_messages` are those of damaged chunks whose index tells how many they held; a chunk that
-    was cut off tells nothing. `damaged` says which bytes of the old file, and why.
+    `lost_messages` are those of damaged chunks whose index names them; of a chunk that was cut off
+    nothing is known. `damaged` names bytes of the old file, and why they cannot be read.
     """
 
     messages: int = 0
@@ -53,81 +49,95 @@ def recover(source: Path, target: Path, progress: Progress | None = None) -> Rec
 
     Raises LogError where there is no log at `source`, or `target` exists or cannot be written.
     """
-    file = LogFile(source)
+    found = LogBytes(source)
     try:
         with target.open("xb") as stream:
-            writer = Writer(stream, chunk_size=_UNBOUNDED, compression=CompressionType.LZ4)
-            return _Rescue(file, writer).run(progress)
-    except FileExistsError:
-        raise LogError(f"{target} exists already: remove it, or name another") from None
+            writer = Writer(stream, chunk_size=UNBOUNDED, compression=CompressionType.LZ4)
+            return _Rescue(found, writer, source.name).run(progress)
     except OSError as error:
-        raise LogError(f"cannot write {target}: {error.strerror}") from None
+        raise cannot_write(target, error) from None
 
 
 class _Rescue:
-    """Copies messages from `file` to `writer`, counting what it cannot read."""
+    """Copies messages from `source` to `writer`, counting what it cannot read."""
 
-    def __init__(self, file: LogFile, writer: Writer) -> None:
-        self._file, self._writer, self._recovery = file, writer, Recovery()
+    def __init__(self, source: LogBytes, writer: Writer, name: str) -> None:
+        self._source = source
+        self._writer = writer
+        self._name = name
+        self._recovery = Recovery()
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
         self._written: dict[int, int] = {}
         self._last_chunk_lost = False
 
     def run(self, progress: Progress | None) -> Recovery:
-        self._writer.start(layout.PROFILE, layout.software())
-        for frame in all_frames(self._file, self._lose):
-            try:
-                self._take(frame)
-            except DamageError as error:
-                self._lose(frame.offset, frame.end, str(error))
-                self._last_chunk_lost = frame.opcode == Opcode.CHUNK
+        """Copy all; what was saved."""
+        self._writer.start(layout.PROFILE, self._library())
+        for span in self._source.all_records(self._lose):
+            self._try_to_copy(span)
             if progress is not None:
-                progress(frame.end / self._file.size)
-        facts = {"from": self._file.path.name, "lost_bytes": str(self._recovery.lost_bytes)}
+                progress(span.end / self._source.size)
+
+        facts = {"from": self._name, "lost_bytes": str(self._recovery.lost_bytes)}
         self._writer.add_metadata("recovered", facts)
         self._writer.finish()  # type: ignore[no-untyped-call]
         return self._recovery
 
-    def _take(self, frame: Frame) -> None:
-        if frame.opcode == Opcode.CHUNK:
-            self._take_chunk(self._file.data(frame))
-            self._last_chunk_lost = False
-        elif frame.opcode == Opcode.MESSAGE_INDEX and self._last_chunk_lost:
-            self._count_lost(frame)
-        record = self._file.parse(frame)
-        if isinstance(record, Metadata):
-            self._writer.add_metadata(record.name, record.metadata)
+    def _library(self) -> str:
+        """The program that wrote the log, which says what its messages are; ours if damaged."""
+        for span in self._source.all_records(_ignore):
+            header = self._parsed(span)
+            return header.library if isinstance(header, Header) else layout.SOFTWARE
+        return layout.SOFTWARE
 
-    def _take_chunk(self, data: bytes) -> None:
-        found = list(pieces(data))
-        self._schemas |= {schema.id: schema for schema in schemas_in(data)}
-        self._channels |= {channel.id: channel for channel in channels_in(data)}
-        self._check_channels(found)
+    def _try_to_copy(self, span: RecordSpan) -> None:
+        try:
+            self._copy(self._source.parse(span))
+        except DamageError as error:
+            self._lose(span.offset, span.end, str(error))
+            self._last_chunk_lost = span.opcode == Opcode.CHUNK
+
+    def _copy(self, record: McapRecord | None) -> None:
+        """Copy what a record holds. Raises DamageError."""
+        match record:
+            case Chunk():
+                self._copy_chunk(open_chunk(record))
+                self._last_chunk_lost = False
+            case MessageIndex() if self._last_chunk_lost:
+                self._count_lost(record)
+            case Metadata():
+                self._writer.add_metadata(record.name, record.metadata)
+
+    def _copy_chunk(self, contents: list[McapRecord]) -> None:
+        messages = messages_in(contents)
+        self._schemas |= {record.id: record for record in contents if isinstance(record, Schema)}
+        self._channels |= channels_in(contents)
+        self._check_channels(messages)
+
         for identifier in sorted(self._channels.keys() - self._written.keys()):
             self._write_channel(self._channels[identifier])
-        for piece in found:
-            payload = data[piece.start : piece.end]
+        for message in messages:
             self._writer.add_message(
-                self._written[piece.channel],
-                piece.log_time_ns,
-                payload,
-                piece.publish_ns,
-                piece.sequence,
+                self._written[message.channel_id],
+                message.log_time,
+                message.data,
+                message.publish_time,
+                message.sequence,
             )
+            is_envelope = self._channels[message.channel_id].topic == layout.ENVELOPES
+            self._recovery.messages += not is_envelope
+
         self._writer.flush()  # type: ignore[no-untyped-call]
-        self._recovery.messages += sum(
-            self._channels[piece.channel].topic != layout.ENVELOPES for piece in found
-        )
         self._recovery.chunks += 1
 
-    def _check_channels(self, found: list[Piece]) -> None:
+    def _check_channels(self, messages: list[Message]) -> None:
         """Raise DamageError where no readable part of the file declares the channel of a message."""
-        if any(piece.channel not in self._channels for piece in found):
+        used = {message.channel_id for message in messages}
+        if not used <= self._channels.keys():
             self._read_summary()
-        for piece in found:
-            if piece.channel not in self._channels:
-                raise DamageError(f"nothing that can be read declares its channel {piece.channel}")
+        for channel in sorted(used - self._channels.keys()):
+            raise DamageError(f"nothing that can be read declares its channel {channel}")
 
     def _write_channel(self, channel: Channel) -> None:
         schema = self._schemas.get(channel.schema_id)
@@ -139,24 +149,32 @@ class _Rescue:
         )
 
     def _read_summary(self) -> None:
-        """Take channels and schemas from the end of the file: the chunk that declared them is
-        damaged.
-        """
-        for frame in all_frames(self._file, lambda *_: None):
-            record = self._file.parse(frame)
+        """Take channels and schemas from the file's end: the chunk that declared them is damaged."""
+        for span in self._source.all_records(_ignore):
+            record = self._parsed(span)
             if isinstance(record, Channel):
                 self._channels[record.id] = record
             elif isinstance(record, Schema):
                 self._schemas[record.id] = record
 
-    def _count_lost(self, index: Frame) -> None:
-        channel, length = _INDEX.unpack_from(self._file.bytes, index.start)
-        if channel not in self._channels:
+    def _parsed(self, span: RecordSpan) -> McapRecord | None:
+        """A record's content, None where it is damaged."""
+        try:
+            return self._source.parse(span)
+        except DamageError:
+            return None
+
+    def _count_lost(self, index: MessageIndex) -> None:
+        if index.channel_id not in self._channels:
             self._read_summary()
-        known = self._channels.get(channel)
+        known = self._channels.get(index.channel_id)
         if known is None or known.topic != layout.ENVELOPES:
-            self._recovery.lost_messages += length // _INDEX_ENTRY_BYTES
+            self._recovery.lost_messages += len(index.records)
 
     def _lose(self, start: int, end: int, reason: str) -> None:
         self._recovery.lost_bytes += end - start
         self._recovery.damaged.append(f"bytes {start} to {end}: {reason}")
+
+
+def _ignore(_start: int, _end: int, _reason: str) -> None:
+    """What is lost was counted already."""

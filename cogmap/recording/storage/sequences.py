@@ -1,4 +1,4 @@
-"""Whether a log is whole, from the numbers that each source puts on its messages."""
+"""Whether a log is complete, from the numbers that each source puts on its messages."""
 
 from __future__ import annotations
 
@@ -7,11 +7,16 @@ from dataclasses import dataclass, field
 from cogmap.bus.codec import Envelope
 from schemas.topics import Delivery, Topic
 
+_MAX_SPANS = 4
+Span = tuple[int, int]
+Key = tuple[str, str, int]
+
 
 @dataclass
-class Thread:
-    """The numbers of one source on one topic in one incarnation: `first`, `last` and those between
-    that lack.
+class Stream:
+    """The numbers of one source on one topic in one incarnation.
+
+    `missing` are spans [start, end) of numbers between `first` and `last` that have not come.
     """
 
     topic: Topic
@@ -20,88 +25,94 @@ class Thread:
     first: int
     last: int
     count: int = 1
-    lacking: list[tuple[int, int]] = field(default_factory=list)
+    missing: list[Span] = field(default_factory=list)
 
     @property
     def lost(self) -> int:
-        """How many numbers lack."""
-        return sum(end - start for start, end in self.lacking)
+        """How many numbers are missing."""
+        return sum(end - start for start, end in self.missing)
 
     def follow(self, seq: int) -> None:
         """Take note of the next number; one that was thought lost may come late."""
         self.count += 1
         if seq > self.last + 1:
-            self.lacking.append((self.last + 1, seq))
+            self.missing.append((self.last + 1, seq))
         elif seq <= self.last:
-            self.lacking = [part for span in self.lacking for part in _without(span, seq)]
+            self._found(seq)
         self.last = max(self.last, seq)
 
+    def _found(self, seq: int) -> None:
+        """Take one number out of the missing ones."""
+        spans: list[Span] = []
+        for start, end in self.missing:
+            if start <= seq < end:
+                parts = (start, seq), (seq + 1, end)
+                spans += [part for part in parts if part[0] < part[1]]
+            else:
+                spans.append((start, end))
+        self.missing = spans
 
-def _without(span: tuple[int, int], seq: int) -> list[tuple[int, int]]:
-    start, end = span
-    if not start <= seq < end:
-        return [span]
-    return [part for part in ((start, seq), (seq + 1, end)) if part[0] < part[1]]
 
+class SequenceTracker:
+    """Follows the numbers of every source on every topic.
 
-class Continuity:
-    """Follows every source on every topic. `since_ns`: whoever began after it should be there from
-    number 0.
+    A source whose incarnation began after `since_ns` should be there from number 0.
     """
 
     def __init__(self, since_ns: int | None = None) -> None:
         self._since_ns = since_ns
-        self._threads: dict[tuple[str, str, int], Thread] = {}
+        self._streams: dict[Key, Stream] = {}
 
     def follow(self, topic: Topic, envelope: Envelope) -> None:
         """Take note of one message."""
         key = (topic.name, envelope.source, envelope.incarnation)
-        thread = self._threads.get(key)
-        if thread is not None:
-            thread.follow(envelope.seq)
-            return
-        thread = self._threads[key] = Thread(
-            topic, envelope.source, envelope.incarnation, envelope.seq, envelope.seq
-        )
-        if (
-            self._since_ns is not None
-            and envelope.incarnation > self._since_ns
-            and envelope.seq > 0
-        ):
-            thread.lacking.append((0, envelope.seq))
+        stream = self._streams.get(key)
+        if stream is None:
+            self._streams[key] = self._begun(topic, envelope)
+        else:
+            stream.follow(envelope.seq)
+
+    def _begun(self, topic: Topic, envelope: Envelope) -> Stream:
+        """The stream that begins with a message, what came before it missing if it should be there."""
+        seq = envelope.seq
+        stream = Stream(topic, envelope.source, envelope.incarnation, first=seq, last=seq)
+        is_new = self._since_ns is not None and envelope.incarnation > self._since_ns
+        if is_new and seq > 0:
+            stream.missing.append((0, seq))
+        return stream
 
     @property
-    def threads(self) -> list[Thread]:
+    def streams(self) -> list[Stream]:
         """All, by topic, source and incarnation."""
-        return [self._threads[key] for key in sorted(self._threads)]
+        return [self._streams[key] for key in sorted(self._streams)]
 
     def gaps(self) -> list[str]:
-        """A sentence for each gap, those of NEVER_DROP topics first."""
-        broken = sorted(
-            (t for t in self.threads if t.lacking), key=lambda t: t.topic.delivery is not _NEVER
-        )
-        return [_sentence(thread) for thread in broken]
+        """A sentence for each stream that misses numbers, those of NEVER_DROP topics first."""
+        broken = [stream for stream in self.streams if stream.missing]
+        broken.sort(key=lambda stream: stream.topic.delivery is not Delivery.NEVER_DROP)
+        return [_sentence(stream) for stream in broken]
 
     def lost(self) -> dict[str, int]:
-        """How many messages lack, by topic."""
+        """How many messages are missing, by topic."""
         lost: dict[str, int] = {}
-        for thread in self.threads:
-            if thread.lacking:
-                lost[thread.topic.name] = lost.get(thread.topic.name, 0) + thread.lost
+        for stream in self.streams:
+            if stream.missing:
+                name = stream.topic.name
+                lost[name] = lost.get(name, 0) + stream.lost
         return lost
 
 
-_NEVER = Delivery.NEVER_DROP
-_SHOWN = 4
-
-
-def _sentence(thread: Thread) -> str:
-    spans = [
-        f"{start}" if end == start + 1 else f"{start} to {end - 1}"
-        for start, end in thread.lacking[:_SHOWN]
-    ]
-    more = f" and {len(thread.lacking) - _SHOWN} more spans" if len(thread.lacking) > _SHOWN else ""
+def _sentence(stream: Stream) -> str:
+    spans = [_numbers(span) for span in stream.missing[:_MAX_SPANS]]
+    rest = len(stream.missing) - _MAX_SPANS
+    more = f" and {rest} more spans" if rest > 0 else ""
+    topic = stream.topic
     return (
-        f"{thread.topic.name} ({thread.topic.delivery.value}): {thread.lost} of {thread.source} lacking, "
+        f"{topic.name} ({topic.delivery.value}): {stream.lost} of {stream.source} missing, "
         f"number {', '.join(spans)}{more}"
     )
+
+
+def _numbers(span: Span) -> str:
+    start, end = span
+    return f"{start}" if end == start + 1 else f"{start} to {end - 1}"

@@ -12,9 +12,8 @@ LIMIT_BYTES = 256 * 2**20
 _OVERHEAD_BYTES = 1024
 
 
-class Backlog:
-    """Arrivals in order, every one kept, up to `limit_bytes` in all; what finds no room is counted
-    by topic.
+class WriteQueue:
+    """Arrivals in order, every one kept, up to `limit_bytes` in all; the rest is counted by topic.
 
     LATEST_WINS topics, which the images are, may fill half of it: the rest is for what must never
     be dropped.
@@ -30,9 +29,10 @@ class Backlog:
 
     def put(self, arrival: Arrival) -> None:
         """Enqueue; called from the bus's threads."""
-        size = len(arrival.payload) + _OVERHEAD_BYTES
+        size = _size(arrival)
         never_drop = arrival.topic.delivery is Delivery.NEVER_DROP
         room = self._limit_bytes if never_drop else self._limit_bytes // 2
+
         with self._changed:
             if self._bytes + size > room:
                 self.dropped[arrival.topic.name] += 1
@@ -49,15 +49,18 @@ class Backlog:
             self._changed.notify()
 
     def take(self, timeout_s: float | None) -> Arrival | Job | None:
-        """The oldest arrival or job; None if there is none within `timeout_s` (None waits for
-        ever).
-        """
+        """The oldest arrival or job; None where none comes within `timeout_s` (None: no limit)."""
         with self._changed:
             if not self._waiting and timeout_s != 0:
                 self._changed.wait_for(lambda: bool(self._waiting), timeout_s)
             if not self._waiting:
                 return None
+
             item = self._waiting.popleft()
             if isinstance(item, Arrival):
-                self._bytes -= len(item.payload) + _OVERHEAD_BYTES
+                self._bytes -= _size(item)
             return item
+
+
+def _size(arrival: Arrival) -> int:
+    return len(arrival.payload) + _OVERHEAD_BYTES

@@ -1,12 +1,11 @@
-"""Writes a log: MCAP in chunks that are finished and flushed often, so that a kill loses only the
-last one.
-"""
+"""Writes a log: MCAP in chunks that are flushed often, so that a kill loses only the last one."""
 
 from __future__ import annotations
 
+import errno
 import time
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from mcap.writer import CompressionType, Writer
@@ -19,48 +18,56 @@ from schemas.topics import Topic
 
 FLUSH_S = 0.25
 CHUNK_BYTES = 4 * 2**20
-_UNBOUNDED = 2**62
+UNBOUNDED = 2**62
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 class LogWriter:
     """A log being written at `path`, with a channel for each of `topics` in that order.
 
-    `about` is what the file says of the recording. A chunk ends with a call of `flush`, which
-    `write` makes by itself after CHUNK_BYTES. Every method raises LogError where the disk refuses.
+    `about` goes into the file as the facts of the recording. A chunk ends with a call of `flush`,
+    which `write` makes by itself after CHUNK_BYTES. Every method raises LogError where the disk
+    refuses; the log holds what was flushed before, and the writer is of no more use.
     """
 
     def __init__(self, path: Path, topics: Iterable[Topic], about: Mapping[str, str]) -> None:
+        self.path = path
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = path.open("xb")
-        except FileExistsError:
-            raise LogError(f"{path} exists already: remove it, or name another with -o") from None
         except OSError as error:
-            raise LogError(f"cannot write {path}: {error.strerror}") from None
-        self.path = path
-        self._writer = Writer(self._file, chunk_size=_UNBOUNDED, compression=CompressionType.LZ4)
-        self._writer.start(layout.PROFILE, layout.software())
-        self.note(layout.RECORDING, about)
+            raise cannot_write(path, error) from None
+
+        self._last_log_ns = 0
+        self._unflushed_bytes = 0
+        self._writer = Writer(self._file, chunk_size=UNBOUNDED, compression=CompressionType.LZ4)
+        with self._on_disk():
+            self._writer.start(layout.PROFILE, layout.SOFTWARE)
+        self.note(layout.RECORDING, {"software": layout.SOFTWARE, **about})
+
         self._envelopes = self._channel(layout.ENVELOPES, layout.envelope_schema(), {})
         self._channels = {topic: self._topic_channel(topic) for topic in topics}
-        self._unflushed_bytes = 0
-        self._file.flush()
 
     def write(
-        self, topic: Topic, payload: bytes | memoryview, envelope: Envelope | None, log_time_ns: int
+        self, topic: Topic, payload: bytes | memoryview, envelope: Envelope | None, received_ns: int
     ) -> None:
-        """Add the message that travelled as `payload` on `topic`."""
-        log_time_ns = layout.time_field(log_time_ns)
+        """Add the message that travelled as `payload` on `topic`.
+
+        Its log time is `received_ns`, or that of the message before where the clock was set back.
+        """
+        log_time_ns = max(self._last_log_ns, layout.time_field(received_ns))
+        self._last_log_ns = log_time_ns
         sent_ns = log_time_ns
         sequence = 0
+
         if envelope is not None:
             sent_ns = layout.time_field(envelope.sent_ns)
             sequence = layout.sequence_field(envelope.seq)
             record = encode(EnvelopeRecord.of(topic, envelope))
             self._writer.add_message(self._envelopes, log_time_ns, record, sent_ns, sequence)
-        self._writer.add_message(
-            self._channels[topic], log_time_ns, bytes(payload), sent_ns, sequence
-        )
+
+        channel = self._channels[topic]
+        self._writer.add_message(channel, log_time_ns, bytes(payload), sent_ns, sequence)
         self._unflushed_bytes += len(payload)
         if self._unflushed_bytes >= CHUNK_BYTES:
             self.flush()
@@ -88,18 +95,21 @@ class LogWriter:
         try:
             yield
         except OSError as error:
-            raise LogError(f"cannot go on writing {self.path}: {error.strerror}") from None
+            with suppress(OSError):
+                self._file.close()
+            raise cannot_write(self.path, error) from None
 
     def _topic_channel(self, topic: Topic) -> int:
         facts = {"delivery": topic.delivery.name, "about": topic.about.name}
         return self._channel(topic.name, layout.schema_of(topic), facts)
 
-    def _channel(self, name: str, schema: bytes, facts: dict[str, str]) -> int:
-        identifier = self._writer.register_schema(name, layout.SCHEMA_ENCODING, schema)
-        return self._writer.register_channel(name, layout.MESSAGE_ENCODING, identifier, facts)
+    def _channel(self, topic: str, schema: tuple[str, bytes], facts: dict[str, str]) -> int:
+        name, text = schema
+        identifier = self._writer.register_schema(name, layout.SCHEMA_ENCODING, text)
+        return self._writer.register_channel(topic, layout.MESSAGE_ENCODING, identifier, facts)
 
 
-class Pulse:
+class FlushTimer:
     """When to flush next: FLUSH_S after the last time."""
 
     def __init__(self) -> None:
@@ -110,5 +120,16 @@ class Pulse:
         return max(0.0, self._next_s - time.monotonic())
 
     def reset(self) -> None:
-        """Note that it has just been done."""
+        """Count from now on."""
         self._next_s = time.monotonic() + FLUSH_S
+
+
+def cannot_write(path: Path, error: OSError) -> LogError:
+    """The error for a file that the disk did not take, with what to do about it."""
+    if isinstance(error, FileExistsError):
+        return LogError(f"{path} exists already: remove it, or name another file")
+    if error.errno in _FULL:
+        remedy = "free some space, or write to another disk"
+    else:
+        remedy = "name a file in a folder that can be written to"
+    return LogError(f"cannot write {path} ({error.strerror}): {remedy}")

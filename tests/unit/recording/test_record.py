@@ -120,7 +120,7 @@ def test_a_gap_is_named_with_its_source_and_its_numbers(path: Path) -> None:
         town.say(odometry(seq), seq)
     summary = town.end()
     assert summary.lost == {"odometry": 3}
-    assert summary.gaps == ["odometry (never drop): 3 of sim lacking, number 2 to 3, 6"]
+    assert summary.gaps == ["odometry (never drop): 3 of sim missing, number 2 to 3, 6"]
     assert not summary.never_drop_whole
 
 
@@ -131,7 +131,7 @@ def test_a_gap_in_a_latest_wins_topic_is_named_and_leaves_the_never_drop_topics_
     town.say(scan(0), 0)
     town.say(scan(3), 1)
     summary = town.end()
-    assert summary.gaps == ["sensory/scan (latest wins): 2 of sensory lacking, number 1 to 2"]
+    assert summary.gaps == ["sensory/scan (latest wins): 2 of sensory missing, number 1 to 2"]
     assert summary.never_drop_whole
 
 
@@ -142,7 +142,7 @@ def test_a_source_that_began_after_the_recorder_should_be_there_from_its_first_m
     town.say(odometry(5), 1, incarnation=1)
     town.say(odometry(2, source="later"), 2, incarnation=2**62)
     summary = town.end()
-    assert summary.gaps == ["odometry (never drop): 2 of later lacking, number 0 to 1"]
+    assert summary.gaps == ["odometry (never drop): 2 of later missing, number 0 to 1"]
 
 
 def test_a_restarted_source_begins_anew_and_that_is_no_gap(path: Path) -> None:

@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap.opcode import Opcode
+from mcap.writer import MCAP0_MAGIC
 
 from cogmap.bus.codec import Envelope, encode
 from cogmap.errors import LogError
-from cogmap.recording.storage.chunks import LogFile
 from cogmap.recording.storage.reader import LogReader
 from cogmap.recording.storage.recover import recover
+from cogmap.recording.storage.resync import LogBytes
 from cogmap.recording.storage.writer import LogWriter
 from schemas import topics
 from schemas.sensing import Odometry
@@ -42,11 +43,8 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def _chunks(path: Path) -> list[tuple[int, int]]:
-    return [
-        (frame.offset, frame.end)
-        for frame in LogFile(path).frames()
-        if frame.opcode == Opcode.CHUNK
-    ]
+    spans = LogBytes(path).records_from(len(MCAP0_MAGIC))
+    return [(span.offset, span.end) for span in spans if span.opcode == Opcode.CHUNK]
 
 
 def _numbers(path: Path) -> list[int]:

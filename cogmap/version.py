@@ -1,0 +1,5 @@
+"""The version of Cogmap, and of what it publishes and records."""
+
+from __future__ import annotations
+
+VERSION = "0.2.0"
