@@ -132,7 +132,7 @@ def _commit(race: Race) -> None:
     with race.at_work():
         race.go.wait()
         for number in range(race.number):
-            shell.say(publisher.feed(Clock(stamp_ns=number)))
+            shell.publish(publisher.feed(Clock(stamp_ns=number)))
         race.end.wait()
     shell.close()
 

@@ -22,6 +22,14 @@ class Arrival:
     received_ns: int
 
 
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """The answer to a query: still bytes, with the envelope of whoever answered, if it sent one."""
+
+    payload: bytes
+    envelope: Envelope | None = None
+
+
 Job = Callable[[], None]
 CACHED_MESSAGES = 1024
 
@@ -59,16 +67,21 @@ class Bus(Protocol):
         come first.
         """
 
-    def answer(
-        self, topic: Topic, handler: Callable[[bytes], bytes], enqueue: Callable[[Job], None]
+    def serve(
+        self,
+        request: Topic,
+        reply: Topic,
+        handler: Callable[[bytes], Answer],
+        enqueue: Callable[[Job], None],
     ) -> None:
-        """Answer queries on `topic`; an exception in `handler` goes back as an error.
+        """Answer queries for `request` with what `handler` returns, a message of `reply`.
 
-        A bus with threads of its own hands the work to `enqueue`, for the member's own thread.
+        An exception in `handler` goes back as an error. A bus with threads of its own hands the
+        work to `enqueue`, for the member's own thread.
         """
 
-    def query(self, topic: Topic, payload: bytes, timeout_s: float) -> bytes:
-        """Ask on `topic`. Raises NoAnswerError."""
+    def query(self, request: Topic, payload: bytes, timeout_s: float) -> Answer:
+        """Send a query and wait for its answer. Raises NoAnswerError."""
 
     def announce(self, member: Member) -> None:
         """Tell everybody that `member` is ready; it holds until this bus closes or dies."""

@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable
 
 from cogmap.bus.codec import Envelope
-from cogmap.bus.interface import CACHED_MESSAGES, Arrival, Job, Member
+from cogmap.bus.interface import CACHED_MESSAGES, Answer, Arrival, Job, Member
 from cogmap.errors import NoAnswerError
 from schemas.topics import Delivery, Topic
 
@@ -20,7 +20,7 @@ class MemoryNetwork:
 
     def __init__(self) -> None:
         self.subscribers: dict[Topic, list[_Subscriber]] = {}
-        self.answers: dict[Topic, Callable[[bytes], bytes]] = {}
+        self.servers: dict[Topic, Callable[[bytes], Answer]] = {}
         self.members: dict[Member, MemoryBus] = {}
         self.buses: list[MemoryBus] = []
         self.watchers: list[Callable[[Member, bool], None]] = []
@@ -43,7 +43,7 @@ class MemoryBus:
         self.said: dict[Topic, deque[Arrival]] = {}
         network.buses.append(self)
         self._subscriptions: list[tuple[Topic, _Subscriber]] = []
-        self._answers: list[Topic] = []
+        self._served: list[Topic] = []
 
     def declare(self, topic: Topic) -> None:
         if topic.delivery is Delivery.NEVER_DROP:
@@ -70,20 +70,24 @@ class MemoryBus:
         self._network.subscribers.setdefault(topic, []).append(subscriber)
         self._subscriptions.append((topic, subscriber))
 
-    def answer(
-        self, topic: Topic, handler: Callable[[bytes], bytes], enqueue: Callable[[Job], None]
+    def serve(
+        self,
+        request: Topic,
+        reply: Topic,
+        handler: Callable[[bytes], Answer],
+        enqueue: Callable[[Job], None],
     ) -> None:
-        self._network.answers[topic] = handler
-        self._answers.append(topic)
+        self._network.servers[request] = handler
+        self._served.append(request)
 
-    def query(self, topic: Topic, payload: bytes, timeout_s: float) -> bytes:
-        handler = self._network.answers.get(topic)
+    def query(self, request: Topic, payload: bytes, timeout_s: float) -> Answer:
+        handler = self._network.servers.get(request)
         if handler is None:
-            raise NoAnswerError(f"nobody answers {topic.name}")
+            raise NoAnswerError(f"nobody answers {request.name}")
         try:
             return handler(payload)
         except Exception as error:
-            raise NoAnswerError(f"{topic.name}: {error}") from error
+            raise NoAnswerError(f"{request.name}: {error}") from error
 
     def announce(self, member: Member) -> None:
         self._network.change(member, self)
@@ -97,8 +101,8 @@ class MemoryBus:
         while self._subscriptions:
             topic, subscriber = self._subscriptions.pop()
             self._network.subscribers[topic].remove(subscriber)
-        while self._answers:
-            self._network.answers.pop(self._answers.pop(), None)
+        while self._served:
+            self._network.servers.pop(self._served.pop(), None)
         if self in self._network.buses:
             self._network.buses.remove(self)
         for member in [m for m, bus in self._network.members.items() if bus is self]:

@@ -13,7 +13,7 @@ from zenoh import ext
 
 from cogmap.bus.codec import Envelope, decode_envelope, encode
 from cogmap.bus.discovery import identify
-from cogmap.bus.interface import CACHED_MESSAGES, Arrival, Job, Member
+from cogmap.bus.interface import CACHED_MESSAGES, Answer, Arrival, Job, Member
 from cogmap.bus.session import open_client, ready_key
 from cogmap.errors import MessageError, NoAnswerError
 from schemas.topics import About, Delivery, Topic
@@ -37,6 +37,16 @@ def _priority(topic: Topic) -> zenoh.Priority:
         if behind or topic.about is not About.MODEL
         else zenoh.Priority.DATA_HIGH
     )
+
+
+def _envelope(sample: zenoh.Sample) -> Envelope | None:
+    """The envelope in a sample's attachment, None where there is none that can be decoded."""
+    if sample.attachment is None:
+        return None
+    try:
+        return decode_envelope(bytes(sample.attachment))
+    except MessageError:
+        return None
 
 
 class ZenohBus:
@@ -96,13 +106,7 @@ class ZenohBus:
     ) -> None:
         def receive(sample: zenoh.Sample) -> None:
             now_ns = time.time_ns()
-            try:
-                envelope = decode_envelope(
-                    None if sample.attachment is None else bytes(sample.attachment)
-                )
-            except MessageError:
-                envelope = None
-            deliver(Arrival(topic, bytes(sample.payload), envelope, now_ns))
+            deliver(Arrival(topic, bytes(sample.payload), _envelope(sample), now_ns))
 
         key = topic.key(self._agent)
         if topic.delivery is not Delivery.NEVER_DROP:
@@ -120,33 +124,38 @@ class ZenohBus:
         )
         self._declared.append(subscriber)
 
-    def answer(
-        self, topic: Topic, handler: Callable[[bytes], bytes], enqueue: Callable[[Job], None]
+    def serve(
+        self,
+        request: Topic,
+        reply: Topic,
+        handler: Callable[[bytes], Answer],
+        enqueue: Callable[[Job], None],
     ) -> None:
-        def reply(query: zenoh.Query) -> None:
+        def respond(query: zenoh.Query) -> None:
             with query:
                 try:
                     answer = handler(b"" if query.payload is None else bytes(query.payload))
-                except (
-                    Exception
-                ) as error:  # it goes back to whoever asked: an empty reply would hide it
+                except Exception as error:  # whoever asked gets it: an empty reply would hide it
                     query.reply_err(str(error).encode())
-                else:
-                    query.reply(query.key_expr, answer)
+                    return
+                attachment = None if answer.envelope is None else encode(answer.envelope)
+                query.reply(query.key_expr, answer.payload, attachment=attachment)
 
-        key = topic.key(self._agent)
+        key = request.key(self._agent)
         self._declared.append(
-            self._session.declare_queryable(key, lambda query: enqueue(lambda: reply(query)))
+            self._session.declare_queryable(key, lambda query: enqueue(lambda: respond(query)))
         )
 
-    def query(self, topic: Topic, payload: bytes, timeout_s: float) -> bytes:
-        for reply in self._session.get(topic.key(self._agent), payload=payload, timeout=timeout_s):
+    def query(self, request: Topic, payload: bytes, timeout_s: float) -> Answer:
+        key = request.key(self._agent)
+        for reply in self._session.get(key, payload=payload, timeout=timeout_s):
             if reply.ok is not None:
-                return bytes(reply.ok.payload)
+                return Answer(bytes(reply.ok.payload), _envelope(reply.ok))
             reason = "" if reply.err is None else bytes(reply.err.payload).decode(errors="replace")
-            raise NoAnswerError(f"{topic.name}: {reason}")
+            raise NoAnswerError(f"{request.name}: {reason}")
         raise NoAnswerError(
-            f"nobody answers {topic.name} within {timeout_s:g} s: is the module that does running?"
+            f"nobody answers {request.name} within {timeout_s:g} s: "
+            f"is the module that does running?"
         )
 
     def announce(self, member: Member) -> None:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from cogmap.bus.codec import decode, encode
 from cogmap.bus.interface import Bus
-from cogmap.errors import CogmapError, NoAnswerError
+from cogmap.errors import MessageError, NoAnswerError
 from cogmap.graph.graph import Graph
 from schemas import topics
 from schemas.graph import Delta, Snapshot, SnapshotRequest
@@ -14,41 +15,131 @@ from schemas.graph import Delta, Snapshot, SnapshotRequest
 SNAPSHOT_TIMEOUT_S = 2.0
 
 
+@dataclass(frozen=True, slots=True)
+class Fetched:
+    """A snapshot with the instance that answered and its incarnation, None where it gave none."""
+
+    snapshot: Snapshot
+    source: str = ""
+    incarnation: int | None = None
+
+
+Fetch = Callable[[SnapshotRequest], Fetched]
+
+
 class Replica:
-    """Applies deltas in order. A gap is mended by a snapshot, which `fetch` asks for; until then
-    the graph stays.
+    """Applies deltas to `graph` in order of their version.
+
+    Where a delta is missing, or the workspace was restarted, the graph stays at its version
+    (`is_behind`) until `fetch` returns a snapshot; `mended` counts those. `on_load` is called with
+    each snapshot that replaced the graph.
     """
 
     def __init__(
-        self, fetch: Callable[[SnapshotRequest], Snapshot], graph: Graph | None = None
+        self,
+        fetch: Fetch,
+        graph: Graph | None = None,
+        on_load: Callable[[Fetched], None] | None = None,
     ) -> None:
-        self.graph = graph or Graph()
+        self.graph = Graph() if graph is None else graph
         self.mended = 0
+        self.is_behind = False
         self._fetch = fetch
+        self._on_load = on_load
+        self._incarnation: int | None = None
+        self._ended: set[int] = set()
+        self._wanted_version = 0
 
-    def follow(self, delta: Delta) -> bool:
-        """Take in `delta`. False while the graph is behind it: no snapshot could be had yet."""
-        if delta.version > self.graph.version + 1:
-            try:
-                snapshot = self._fetch(SnapshotRequest(at_least=delta.version - 1))
-            except NoAnswerError:
-                return False
-            if snapshot.version > self.graph.version:
-                self.graph.load(snapshot)
-                self.mended += 1
-        return self.graph.apply(delta) or self.graph.version >= delta.version
+    def join(self) -> None:
+        """Load the graph as it is now. It stays empty where no workspace answers."""
+        try:
+            fetched = self._fetch(SnapshotRequest())
+        except NoAnswerError:
+            return
+
+        self._incarnation = fetched.incarnation
+        if fetched.snapshot.version > 0:
+            self._load(fetched)
+
+    def follow(self, delta: Delta, incarnation: int | None = None) -> bool:
+        """Apply `delta`, published by that incarnation of the workspace.
+
+        Returns whether the graph holds it: False where a snapshot is needed and none was to be had,
+        or where the delta is of an incarnation that has ended.
+        """
+        if incarnation in self._ended:
+            return False
+
+        if self._is_other(incarnation):
+            self.is_behind = True
+            self._wanted_version = 0
+        elif delta.version > self.graph.version + 1:
+            self.is_behind = True
+            self._wanted_version = max(self._wanted_version, delta.version - 1)
+
+        if self.is_behind and not self.mend():
+            return False
+        if self._is_other(incarnation):
+            self._end_if_older(incarnation)
+            return False
+
+        self._incarnation = incarnation
+        self.graph.apply(delta)
+        return self.graph.version >= delta.version
+
+    def mend(self) -> bool:
+        """Load a snapshot that is new enough. Returns whether there was one."""
+        try:
+            fetched = self._fetch(SnapshotRequest(at_least=self._wanted_version))
+        except NoAnswerError:
+            return False
+        if fetched.snapshot.version < self._wanted_version:
+            return False
+
+        if self._is_other(fetched.incarnation) and self._incarnation is not None:
+            self._ended.add(self._incarnation)
+        self._incarnation = fetched.incarnation
+        self._load(fetched)
+        self.mended += 1
+        self.is_behind = False
+        self._wanted_version = 0
+        return True
+
+    def _end_if_older(self, incarnation: int | None) -> None:
+        """Ignore, from now on, an incarnation that began before the graph's."""
+        if incarnation is None or self._incarnation is None:
+            return
+        if incarnation < self._incarnation:
+            self._ended.add(incarnation)
+
+    def _is_other(self, incarnation: int | None) -> bool:
+        """Whether it is known to be another incarnation than the graph's."""
+        if incarnation is None or self._incarnation is None:
+            return False
+        return incarnation != self._incarnation
+
+    def _load(self, fetched: Fetched) -> None:
+        self.graph.load(fetched.snapshot)
+        if self._on_load is not None:
+            self._on_load(fetched)
 
 
-def snapshot_over(
-    bus: Bus, timeout_s: float = SNAPSHOT_TIMEOUT_S
-) -> Callable[[SnapshotRequest], Snapshot]:
-    """Asks the workspace on `bus` for its graph. Raises NoAnswerError."""
+def snapshot_over(bus: Bus, timeout_s: float = SNAPSHOT_TIMEOUT_S) -> Fetch:
+    """Returns a function that asks the workspace on `bus` for its graph.
 
-    def fetch(request: SnapshotRequest) -> Snapshot:
+    That function raises NoAnswerError where there is no answer, or one that is not a snapshot.
+    """
+
+    def fetch(request: SnapshotRequest) -> Fetched:
         answer = bus.query(topics.SNAPSHOT_REQUEST, encode(request), timeout_s)
-        snapshot = decode(topics.SNAPSHOT, answer)
-        if not isinstance(snapshot, Snapshot):
-            raise CogmapError(f"{topics.SNAPSHOT.name} carries {type(snapshot).__name__}")
-        return snapshot
+        try:
+            snapshot = decode(topics.SNAPSHOT, answer.payload)
+        except MessageError as error:
+            raise NoAnswerError(f"the answer is no snapshot: {error}") from error
+
+        assert isinstance(snapshot, Snapshot)
+        if answer.envelope is None:
+            return Fetched(snapshot)
+        return Fetched(snapshot, answer.envelope.source, answer.envelope.incarnation)
 
     return fetch

@@ -43,7 +43,7 @@ class Meter:
         self._compute_ns.append(compute_ns)
         self._busy_ns += busy_ns
 
-    def report(self, intake: Intake, inbox: Inbox, ready: bool) -> Health:
+    def report(self, intake: Intake, inbox: Inbox, ready: bool, notes: list[str]) -> Health:
         """The counts so far; the busy share since the last report."""
         now_s = time.monotonic()
         busy = self._busy_ns / 1e9 / max(1e-9, now_s - self._reported_s)
@@ -66,5 +66,5 @@ class Meter:
             compute_p50_ms=compute_ms[len(compute_ms) // 2],
             compute_p99_ms=compute_ms[int(len(compute_ms) * 0.99)],
             memory_mb=memory_mb(),
-            notes=[f"{self.faults} faults: run with --verbose to see them"] if self.faults else [],
+            notes=notes,
         )

@@ -8,12 +8,18 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from cogmap.errors import CogmapError
+from cogmap.graph.graph import Graph
 from schemas import topics
 from schemas.base import Message
+from schemas.graph import Delta
 from schemas.topics import Topic
 
 Reply = Message | Iterable[Message] | None
 Handler = Callable[[Any], Reply]
+
+
+def _ignore(message: Message) -> None:
+    """A handler for a topic that matters only to the shell."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +50,8 @@ class Module:
     restore: Callable[[Iterable[Message]], None] | None = None
     condense: Callable[[], Message] | None = None
     catches_up: frozenset[Topic] = frozenset()
+    graph: Graph | None = None
+    on_load: Callable[[], Reply] | None = None
     _next_seq: Counter[Topic] = field(default_factory=Counter)
 
     def __post_init__(self) -> None:
@@ -54,6 +62,24 @@ class Module:
         self.handlers[topic] = handler
         self.emits.update(emits)
         return self
+
+    def following(
+        self,
+        graph: Graph,
+        on_delta: Handler | None = None,
+        emits: Iterable[Topic] = (),
+        on_load: Callable[[], Reply] | None = None,
+    ) -> Module:
+        """Keep `graph` the same as the workspace's: a replica.
+
+        Each delta is applied before the module receives any later message; then `on_delta`, if
+        given, receives it. A delta that cannot be applied yet is not handed over. `on_load` is
+        called after a snapshot has replaced the whole graph: when the module joins a running
+        system, when deltas were lost, and when the workspace was restarted.
+        """
+        self.graph = graph
+        self.on_load = on_load
+        return self.on(topics.DELTA, on_delta or _ignore, emits)
 
     def every(
         self, period_ns: int, handler: Callable[[int], Reply], emits: Iterable[Topic] = ()
@@ -72,7 +98,7 @@ class Module:
         self.emits.update(emits)
         return self
 
-    def answering(self, request: Topic, reply: Topic, handler: Callable[[Any], Message]) -> Module:
+    def serve(self, request: Topic, reply: Topic, handler: Callable[[Any], Message]) -> Module:
         """Answer queries for `request` with a message of `reply`."""
         self.answers[request] = (reply, handler)
         return self
@@ -99,7 +125,13 @@ class Module:
 
     def feed(self, message: Message) -> list[Message]:
         """Let it take in `message`, and return what it says, numbered."""
+        if self.graph is not None and isinstance(message, Delta):
+            self.graph.apply(message)
         return self.stamp(self.handlers[topics.of(message)](message))
+
+    def loaded(self) -> list[Message]:
+        """Call `on_load`, and return what it publishes, numbered."""
+        return [] if self.on_load is None else self.stamp(self.on_load())
 
     def stamp(self, reply: Reply) -> list[Message]:
         """Number what a handler returned and put this instance's name on it."""

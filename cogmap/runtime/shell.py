@@ -5,22 +5,27 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Iterable
+from typing import Any
 
 from cogmap.bus.codec import Cause, Envelope, decode, encode
-from cogmap.bus.interface import CACHED_MESSAGES, Arrival, Bus, Member
+from cogmap.bus.interface import CACHED_MESSAGES, Answer, Arrival, Bus, Member
 from cogmap.errors import MessageError
+from cogmap.graph.replica import Fetched
+from cogmap.runtime.follower import Follower
 from cogmap.runtime.health import Meter
 from cogmap.runtime.inbox import Inbox
 from cogmap.runtime.intake import Intake
 from cogmap.runtime.journal import Journal
 from cogmap.runtime.module import Module, Reply
-from cogmap.runtime.timers import Timers
+from cogmap.runtime.timers import Due, Timers
 from schemas import topics
 from schemas.base import Message
+from schemas.graph import Delta
 from schemas.process import Presence
 
 log = logging.getLogger("cogmap")
 HEALTH_PERIOD_NS = 1_000_000_000
+RETRY_PERIOD_NS = 500_000_000
 MANY_CAUSES = 1000
 MANY_JOURNEYS = 32
 START = "@start"
@@ -42,10 +47,18 @@ class Shell:
         self._journeys: dict[int, Envelope] = {}
         self._present: set[Member] = set()
         self._started = module.start is None
-        self._timers = Timers(
-            [(timer.period_ns, self._on_timer(timer.handler)) for timer in module.timers]
-            + ([(HEALTH_PERIOD_NS, self._say_health)] if health else [])
-        )
+        self._follower: Follower | None = None
+        if module.graph is not None:
+            self._follower = Follower(module.graph, bus, self._on_load)
+        self._timers = Timers(self._jobs())
+
+    def _jobs(self) -> list[tuple[int, Due]]:
+        jobs = [(timer.period_ns, self._on_timer(timer.handler)) for timer in self.module.timers]
+        if self._health:
+            jobs.append((HEALTH_PERIOD_NS, self._say_health))
+        if self._follower is not None:
+            jobs.append((RETRY_PERIOD_NS, self._retry))
+        return jobs
 
     def open(self) -> None:
         """Take up the journal, join the bus, and tell everybody: all that is sent from now on
@@ -63,8 +76,10 @@ class Shell:
             if topic is not topics.PRESENCE:
                 history = CACHED_MESSAGES if topic in missed else 0
                 self.bus.subscribe(topic, self.inbox.put, self.intake.lose, history)
-        for request in self.module.answers:
-            self.bus.answer(request, self._answerer(request), self.inbox.call)
+        for request, (reply, handler) in self.module.answers.items():
+            self.bus.serve(request, reply, self._server(request, handler), self.inbox.call)
+        if self._follower is not None:
+            self._follower.join()
         self.bus.announce(Member(self.module.name, self.module.instance))
         if self.module.awaits or topics.PRESENCE in self.module.handlers:
             self.bus.watch(
@@ -86,7 +101,7 @@ class Shell:
             item()
         return item is not None
 
-    def say(self, messages: Iterable[Message]) -> None:
+    def publish(self, messages: Iterable[Message]) -> None:
         """Send what the module says of its own accord, numbered."""
         self._send(messages, None, 0, time.time_ns())
 
@@ -101,6 +116,10 @@ class Shell:
         message = self.intake.accept(arrival)
         if message is None or arrival.envelope is None:
             return
+        if self._follower is not None and isinstance(message, Delta):
+            is_held = self._follower.follow(message, arrival.envelope.incarnation)
+            if not is_held:
+                return
         self._remember(message.stamp_ns, arrival.envelope)
         cause = (arrival.topic.name, arrival.envelope.source, arrival.envelope.seq)
         self._think(lambda: self.module.feed(message), cause, arrival.envelope, started_ns)
@@ -166,17 +185,29 @@ class Shell:
 
         return due
 
-    def _answerer(self, request: topics.Topic) -> Callable[[bytes], bytes]:
-        _, handler = self.module.answers[request]
-
-        def answer(payload: bytes) -> bytes:
+    def _server(
+        self, request: topics.Topic, handler: Callable[[Any], Message]
+    ) -> Callable[[bytes], Answer]:
+        def answer(payload: bytes) -> Answer:
             try:
-                return encode(handler(decode(request, payload)))
+                reply = handler(decode(request, payload))
             except MessageError as error:
                 self.intake.reject(request.name, str(error))
                 raise
+            now_ns = time.time_ns()
+            source = self.module.instance
+            return Answer(encode(reply), Envelope(source, 0, self._incarnation, now_ns, now_ns))
 
         return answer
+
+    def _retry(self, now_ns: int) -> None:
+        if self._follower is not None:
+            self._follower.retry()
+
+    def _on_load(self, fetched: Fetched) -> None:
+        """Record that a snapshot replaced the graph, as what led to all that is published next."""
+        cause = (topics.SNAPSHOT.name, fetched.source, fetched.snapshot.version)
+        self._think(self.module.loaded, cause, None, time.time_ns())
 
     def _on_presence(self, member: Member, alive: bool) -> None:
         (self._present.add if alive else self._present.discard)(member)
@@ -187,7 +218,7 @@ class Shell:
                 alive=alive,
                 observer=self.module.instance,
             )
-            self.say(self.module.stamp(presence))
+            self.publish(self.module.stamp(presence))
             cause = (topics.PRESENCE.name, presence.source, presence.seq)
             self._think(lambda: self.module.feed(presence), cause, None, time.time_ns())
         if not self._started and not self.missing:
@@ -204,8 +235,16 @@ class Shell:
         lacking = {name: number - ready.count(name) for name, number in self.module.awaits.items()}
         return {name: number for name, number in lacking.items() if number > 0}
 
+    @property
+    def notes(self) -> list[str]:
+        """What its health reports in words."""
+        notes = [] if self._follower is None else self._follower.notes()
+        if self.meter.faults:
+            notes.append(f"{self.meter.faults} faults: run with --verbose to see them")
+        return notes
+
     def _say_health(self, now_ns: int) -> None:
-        health = self.meter.report(self.intake, self.inbox, not self.missing)
+        health = self.meter.report(self.intake, self.inbox, not self.missing, self.notes)
         health.source = self.module.instance
         health.seq = self.meter.reports - 1
         sent_ns = time.time_ns()

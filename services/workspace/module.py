@@ -21,7 +21,7 @@ def build(config: Config, instance: str) -> Module:
         .on(topics.PROPOSAL, workspace.on_proposal, emits=says)
         .on(topics.PRESENCE, workspace.on_presence, emits=says)
         .on(topics.CLOCK, workspace.on_clock, emits=says)
-        .answering(topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, workspace.snapshot)
+        .serve(topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, workspace.snapshot)
         .journaling(
             topics.DELTA, workspace.restore, workspace.snapshot, catches_up=[topics.SELF_MOTION]
         )

@@ -7,8 +7,8 @@ from queue import SimpleQueue
 
 import pytest
 
-from cogmap.bus.codec import decode
-from cogmap.bus.interface import Job, Member
+from cogmap.bus.codec import Envelope, decode
+from cogmap.bus.interface import Answer, Job, Member
 from cogmap.errors import NoAnswerError
 from schemas import topics
 from schemas.examples import samples
@@ -19,6 +19,8 @@ from tests.support.networks import PATIENCE_S, Network, Peer, meet, publish
 
 MESSAGES = {topics.of(message): message for message in samples()}
 TRAVELLING = [topic for topic in topics.ALL if topic.delivery is not Delivery.ON_REQUEST]
+SNAPSHOTS = (topics.SNAPSHOT_REQUEST, topics.SNAPSHOT)
+ENVELOPE = Envelope("workspace", 0, 7, 2, 1)
 
 
 def odometry(seq: int, source: str = "sim") -> Odometry:
@@ -173,19 +175,21 @@ def work(job: Job) -> None:
 def test_a_query_is_answered(network: Network) -> None:
     asker = network.join()
     answerer = network.join()
-    answerer.answer(topics.SNAPSHOT_REQUEST, lambda payload: payload * 2, work)
+    answerer.serve(*SNAPSHOTS, lambda payload: Answer(payload * 2, ENVELOPE), work)
     meet(asker, answerer)
 
-    assert asker.query(topics.SNAPSHOT_REQUEST, b"once", PATIENCE_S) == b"onceonce"
+    answer = asker.query(topics.SNAPSHOT_REQUEST, b"once", PATIENCE_S)
+
+    assert answer == Answer(b"onceonce", ENVELOPE)
 
 
 def test_an_error_of_whoever_answers_comes_back_in_words(network: Network) -> None:
-    def refuse(payload: bytes) -> bytes:
+    def refuse(payload: bytes) -> Answer:
         raise ValueError("no such version")
 
     asker = network.join()
     answerer = network.join()
-    answerer.answer(topics.SNAPSHOT_REQUEST, refuse, work)
+    answerer.serve(*SNAPSHOTS, refuse, work)
     meet(asker, answerer)
 
     with pytest.raises(NoAnswerError, match="no such version"):
@@ -200,7 +204,7 @@ def test_a_query_that_nobody_answers_says_so(network: Network) -> None:
 def test_a_query_to_somebody_who_left_says_so(network: Network) -> None:
     asker = network.join()
     answerer = network.join()
-    answerer.answer(topics.SNAPSHOT_REQUEST, lambda payload: payload, work)
+    answerer.serve(*SNAPSHOTS, Answer, work)
     gone: SimpleQueue[tuple[Member, bool]] = SimpleQueue()
     meet(asker, answerer)
     asker.watch(lambda member, alive: None if alive else gone.put((member, alive)))

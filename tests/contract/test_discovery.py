@@ -9,7 +9,7 @@ import pytest
 
 from cli.graph import to_dot, to_json, to_tree
 from cogmap.bus.discovery import Process, Role, System, discover, read
-from cogmap.bus.interface import Member
+from cogmap.bus.interface import Answer, Member
 from cogmap.bus.session import open_client
 from cogmap.runtime.shell import Shell
 from schemas import topics
@@ -35,7 +35,7 @@ def test_every_process_is_found_by_name_with_all_that_it_does(over_zenoh: OverZe
     sim.declare(topics.VIEW)
     for bus in (first, second):
         Peer(bus, topics.ODOMETRY)
-    first.answer(topics.SNAPSHOT_REQUEST, lambda payload: payload, lambda job: job())
+    first.serve(topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, Answer, lambda job: job())
     sim.announce(Member("sim", "sim"))
     first.announce(Member("workspace", "workspace"))
     second.announce(Member("codelets", "codelets-2"))

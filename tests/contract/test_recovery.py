@@ -11,7 +11,6 @@ import pytest
 from cogmap.bus.interface import CACHED_MESSAGES
 from cogmap.bus.session import free_endpoint
 from cogmap.graph.graph import Graph
-from cogmap.graph.replica import Replica, snapshot_over
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
 from schemas import topics
@@ -83,14 +82,14 @@ def test_of_more_than_the_cache_holds_the_loss_is_counted_and_a_replica_is_mende
     graph = Graph()
     network = OverZenoh(router.endpoint)
     lost = 50
-    keeper = Module("workspace").answering(
+    keeper = Module("workspace").serve(
         topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, lambda request: graph.snapshot()
     )
     publisher = network.join()
     reader = network.join()
     publisher.declare(topics.DELTA)
-    replica = Replica(snapshot_over(reader))
-    follower = Shell(Module("follower").on(topics.DELTA, replica.follow), reader, health=False)
+    replica = Graph()
+    follower = Shell(Module("follower").following(replica), reader, health=False)
     follower.open()
 
     def commit() -> None:
@@ -106,14 +105,14 @@ def test_of_more_than_the_cache_holds_the_loss_is_counted_and_a_replica_is_mende
     with working(Shell(keeper, network.join(), health=False)):
         meet(publisher, reader)
         commit()
-        pump_until(lambda: replica.graph.version == 1, follower)
+        pump_until(lambda: replica.version == 1, follower)
         router.kill()
         for _ in range(CACHED_MESSAGES + lost):
             commit()
         router.start()
-        pump_until(lambda: replica.graph.version == graph.version, follower)
+        pump_until(lambda: replica.version == graph.version, follower)
 
-    assert replica.graph.digest() == graph.digest()
-    assert replica.mended == 1
+    assert replica.digest() == graph.digest()
+    assert follower.notes == ["gaps of the graph that a snapshot mended: 1"]
     assert dict(follower.intake.gaps) == {topics.DELTA.name: lost}
     follower.close()

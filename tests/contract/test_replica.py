@@ -19,7 +19,7 @@ def delta(version: int) -> Delta:
 
 def keeper(network: Network, graph: Graph) -> Shell:
     """The shell of a module that answers for `graph`."""
-    module = Module("workspace").answering(
+    module = Module("workspace").serve(
         topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, lambda request: graph.snapshot()
     )
     return Shell(module, network.join(), health=False)
@@ -75,5 +75,6 @@ def test_without_an_answer_the_graph_stays_as_it_is_and_says_so(network: Network
     before = replica.graph.digest()
 
     assert not replica.follow(delta(3))
+    assert replica.is_behind
 
     assert (replica.graph.digest(), replica.mended) == (before, 0)

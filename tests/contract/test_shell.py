@@ -362,7 +362,7 @@ def test_a_module_that_asks_is_told_who_comes_and_goes(network: Network) -> None
 
 def test_a_question_that_makes_no_sense_is_refused_and_counted(network: Network) -> None:
     empty = Snapshot(version=0, cycle=0, nodes=[], links=[], tiles=[])
-    module = Module("workspace").answering(
+    module = Module("workspace").serve(
         topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, lambda request: empty
     )
     shell = Shell(module, network.join(), health=False)
@@ -377,7 +377,7 @@ def test_a_question_that_makes_no_sense_is_refused_and_counted(network: Network)
             )
         answer = asker.query(topics.SNAPSHOT_REQUEST, encode(SnapshotRequest()), PATIENCE_S)
 
-    assert decode(topics.SNAPSHOT, answer) == empty
+    assert decode(topics.SNAPSHOT, answer.payload) == empty
     assert shell.intake.rejected == {"workspace/snapshot_request": 1}
 
 

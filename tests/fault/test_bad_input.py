@@ -87,7 +87,7 @@ def drive(system: System, before: Callable[[int], None] = lambda view: None) -> 
     turns = Turns(before)
     with working(witness.shell), working(Shell(turns.module, system.bus())):
         wait_until(
-            lambda: witness.replica.graph.cycle == VIEWS and witness.deltas[-1].phase == "decay",
+            lambda: witness.graph.cycle == VIEWS and witness.deltas[-1].phase == "decay",
             "all views",
         )
     return witness
@@ -106,6 +106,6 @@ def test_what_is_no_message_changes_no_byte_of_the_graph(system: System, other: 
     molested = drive(other, molest)
     stranger.close()  # type: ignore[no-untyped-call]
 
-    assert molested.replica.graph.digest() == left_alone.replica.graph.digest()
+    assert molested.graph.digest() == left_alone.graph.digest()
     assert molested.versions == left_alone.versions
     assert not molested.shell.intake.gaps

@@ -12,7 +12,7 @@ from tests.support.live import Feeder, System, Witness, wait_until
 
 def where(witness: Witness) -> tuple[float, int]:
     """The self node's x and the view that it is of."""
-    attributes = witness.replica.graph.nodes[SELF].attributes
+    attributes = witness.graph.nodes[SELF].attributes
     return float(attributes["x_m"]), int(attributes["stamp_ns"])
 
 
@@ -25,8 +25,8 @@ def test_a_restarted_workspace_takes_up_its_graph_and_the_way_that_was_gone_whil
     views = feeder.views
     wait_until(lambda: feeder.views >= views + 10, "views go on without a workspace")
     seen = len(witness.deltas)
-    version = witness.replica.graph.version
-    cycle = witness.replica.graph.cycle
+    version = witness.graph.version
+    cycle = witness.graph.cycle
     system.modules("workspace")
     witness.goes_on(5)
     feeder.pause()

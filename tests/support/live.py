@@ -19,7 +19,6 @@ from cogmap.bus.session import free_endpoint
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.errors import NoAnswerError
 from cogmap.graph.graph import Graph
-from cogmap.graph.replica import Replica, snapshot_over
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
 from schemas import topics
@@ -221,7 +220,7 @@ class Witness:
     """Follows the graph, and keeps what else it has seen."""
 
     def __init__(self, bus: ZenohBus) -> None:
-        self.replica = Replica(snapshot_over(bus))
+        self.graph = Graph()
         self.deltas: list[Delta] = []
         self.commands: list[MotorCommand] = []
         self.health: dict[str, Health] = {}
@@ -229,15 +228,14 @@ class Witness:
         self._bus = bus
         module = (
             Module("witness")
-            .on(topics.DELTA, self._follow)
+            .following(self.graph, self._keep_delta)
             .on(topics.MOTOR_COMMAND, self.commands.append)
         )
         self.shell = Shell(module.on(topics.HEALTH, self._keep), bus)
 
-    def _follow(self, delta: Delta) -> None:
+    def _keep_delta(self, delta: Delta) -> None:
         self.deltas.append(delta)
         self.tasks_done += delta.tasks
-        self.replica.follow(delta)
 
     def _keep(self, health: Health) -> None:
         self.health[health.instance] = health
@@ -258,7 +256,7 @@ class Witness:
     def agrees(self) -> None:
         """Wait until the graph here is that of the workspace. What feeds it must have paused."""
         wait_until(
-            lambda: self._truth().digest() == self.replica.graph.digest(),
+            lambda: self._truth().digest() == self.graph.digest(),
             "the replica is the workspace's graph",
         )
 
@@ -268,7 +266,7 @@ class Witness:
             answer = self._bus.query(topics.SNAPSHOT_REQUEST, encode(SnapshotRequest()), 2.0)
         except NoAnswerError:
             return graph
-        snapshot = decode(topics.SNAPSHOT, answer)
+        snapshot = decode(topics.SNAPSHOT, answer.payload)
         assert isinstance(snapshot, Snapshot)
         graph.load(snapshot)
         return graph

@@ -16,7 +16,7 @@ from cogmap.errors import LogError
 from cogmap.recording.storage import format as layout
 from cogmap.recording.storage.reader import LogReader, Progress, Record
 from cogmap.runtime.shell import START, TIMER
-from schemas.topics import PRESENCE, About
+from schemas.topics import PRESENCE, SNAPSHOT, About
 
 
 class Kind(enum.Enum):
@@ -25,17 +25,19 @@ class Kind(enum.Enum):
     FEED = enum.auto()
     START = enum.auto()
     TIMER = enum.auto()
+    SNAPSHOT = enum.auto()
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One thing that happened to a module: a message it took in, its start, or its timer at
-    `at_ns`.
+    """One event in a module's life: a received message, its start, its timer at `at_ns`, or that
+    the graph it follows was loaded at `version`, before `at_ns`.
     """
 
     kind: Kind
     record: Record | None = None
     at_ns: int = 0
+    version: int = 0
 
 
 @dataclass
@@ -161,6 +163,9 @@ class _Exact:
                     job.steps.append(Step(Kind.START))
                 elif name == TIMER:
                     job.steps.append(Step(Kind.TIMER, at_ns=seq))
+                elif name == SNAPSHOT.name:
+                    before_ns = _envelope(record).sent_ns
+                    job.steps.append(Step(Kind.SNAPSHOT, at_ns=before_ns, version=seq))
                 elif (found := inputs.find(cause)) is not None:
                     job.steps.append(Step(Kind.FEED, _bare(found)))
                 else:

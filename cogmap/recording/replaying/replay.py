@@ -17,11 +17,13 @@ import msgspec
 from cogmap.bus.codec import encode
 from cogmap.errors import LogError, MessageError
 from cogmap.recording.replaying import compare
+from cogmap.recording.replaying.logged_graph import LoggedGraph
 from cogmap.recording.replaying.plan import Job, Kind, Step, jobs, recorded_sections
 from cogmap.recording.storage.reader import LogReader, Progress
 from cogmap.runtime.module import Module
 from schemas import topics
 from schemas.base import Message
+from schemas.graph import Delta
 
 Sections = dict[str, dict[str, Any]]
 Build = Callable[[str, Sections, str], Module]
@@ -163,6 +165,7 @@ class _Run:
         self._reader = reader
         self._job = job
         self._module = module
+        self._logged_graph = LoggedGraph(reader)
         self._untimed = 0
         self._said: dict[str, set[int]] = {name: set() for name in job.expected}
         self.outcome = Outcome(
@@ -211,13 +214,33 @@ class _Run:
                     raise MessageError("it does not take in this topic")
                 return []
             self.outcome.fed += 1
-            return module.feed(self._reader.message(step.record))
+            return self._feed(self._reader.message(step.record))
+        if step.kind is Kind.SNAPSHOT:
+            return self._load(step)
         if step.kind is Kind.START:
             return module.stamp(module.start()) if module.start is not None else []
         if len(module.timers) != 1:
             self._untimed += 1
             return []
         return module.stamp(module.timers[0].handler(step.at_ns))
+
+    def _feed(self, message: Message) -> list[Message]:
+        """Let the module receive a message. Raises LogError where its graph lacks earlier deltas."""
+        said = self._module.feed(message)
+        graph = self._module.graph
+        if graph is not None and isinstance(message, Delta) and graph.version < message.version:
+            raise LogError(
+                f"{self._reader.path}: {self._job.instance} follows the graph, and the log lacks "
+                f"the deltas {graph.version + 1} to {message.version - 1}: "
+                f"record from the start of the workspace"
+            )
+        return said
+
+    def _load(self, step: Step) -> list[Message]:
+        if self._module.graph is None:
+            raise MessageError("it does not follow the graph")
+        self._module.graph.load(self._logged_graph.at(step.version, step.at_ns))
+        return self._module.loaded()
 
     def _hold(self, message: Message) -> None:
         """Hold what was said against the message of that number in the log."""
