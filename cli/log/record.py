@@ -11,6 +11,7 @@ import click
 from cli.log import formatting
 from cli.options import agent_option, config_option, connect_option, json_option, set_option
 from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.errors import LogError
 from cogmap.recording import recorder, selection
 from cogmap.runtime import config
 from cogmap.runtime.process import Stop
@@ -83,7 +84,11 @@ def record(
     path = output or Path(f"cogmap_{time.strftime('%Y_%m_%d-%H_%M_%S')}.mcap")
     bus = ZenohBus(connect, agent)
     stop = Stop(tied)
-    recording = recorder.Recorder(bus, path, chosen, about, instance=instance)
+    try:
+        recording = recorder.Recorder(bus, path, chosen, about, instance=instance)
+    except LogError:
+        bus.close()
+        raise
     summary = recorder.run(recording, lambda: stop.asked, max_duration)
     if as_json:
         formatting.say_json(summary)

@@ -22,12 +22,14 @@ from cogmap.recording.storage.reader import LogReader
 from cogmap.recording.storage.recover import recover
 from schemas import topics
 from schemas.sensing import Odometry
+from tests.support.disks import full_after
 from tests.support.networks import routed
 
 PATIENCE_S = 30.0
 AGENT = "recorded"
 FLUSH_S = 0.25
 SLACK_S = 0.5
+FULL_BYTES = 100_000
 
 
 @pytest.fixture
@@ -88,21 +90,13 @@ def speaker(endpoint: str) -> Iterator[Speaker]:
 
 
 def start(endpoint: str, path: Path, *options: str) -> subprocess.Popen[str]:
-    command = [
-        sys.executable,
-        "-m",
-        "cli.main",
-        "log",
-        "record",
-        "-o",
-        str(path),
-        "--connect",
-        endpoint,
-    ]
+    program = [sys.executable, "-m", "cli.main", "log", "record"]
+    target = ["-o", str(path), "--connect", endpoint, "--agent", AGENT]
     return subprocess.Popen(
-        [*command, "--agent", AGENT, *options],
+        [*program, *target, *options],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         text=True,
     )
 
@@ -150,3 +144,22 @@ def test_a_recorder_that_is_asked_to_end_has_every_message_and_says_so(
     assert summary["messages"]["odometry"] == len(numbers(path))
     assert summary["messages"]["odometry"] > 0
     assert LogReader(path).about("summary")
+
+
+def test_a_recorder_on_a_full_disk_ends_with_one_sentence(
+    endpoint: str, speaker: Speaker, tmp_path: Path
+) -> None:
+    path = tmp_path / "log.mcap"
+    with full_after(FULL_BYTES):
+        recorder = start(endpoint, path)
+    speaker.await_recorder()
+    deadline_s = time.monotonic() + PATIENCE_S
+    while recorder.poll() is None:
+        assert time.monotonic() < deadline_s, "the recorder goes on"
+        speaker.speak()
+    _, errors = recorder.communicate()
+    assert recorder.returncode == 2
+    assert "Traceback" not in errors
+    last = errors.strip().splitlines()[-1]
+    assert last.startswith(f"cogmap: cannot write {path} (")
+    assert last.endswith("free some space, or write to another disk")

@@ -22,7 +22,7 @@ from cogmap.recording.storage import format as layout
 from cogmap.recording.storage.index import DamageError, channels_in, messages_in, open_chunk
 from cogmap.recording.storage.reader import Progress
 from cogmap.recording.storage.resync import LogBytes, RecordSpan
-from cogmap.recording.storage.writer import UNBOUNDED, cannot_write
+from cogmap.recording.storage.writer import UNBOUNDED, cannot_write, open_new
 
 
 class Recovery(msgspec.Struct, kw_only=True):
@@ -50,8 +50,9 @@ def recover(source: Path, target: Path, progress: Progress | None = None) -> Rec
     Raises LogError where there is no log at `source`, or `target` exists or cannot be written.
     """
     found = LogBytes(source)
+    stream = open_new(target)
     try:
-        with target.open("xb") as stream:
+        with stream:
             writer = Writer(stream, chunk_size=UNBOUNDED, compression=CompressionType.LZ4)
             return _Rescue(found, writer, source.name).run(progress)
     except OSError as error:

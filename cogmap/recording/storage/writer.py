@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import BinaryIO
 
 from mcap.writer import CompressionType, Writer
 
@@ -32,12 +33,7 @@ class LogWriter:
 
     def __init__(self, path: Path, topics: Iterable[Topic], about: Mapping[str, str]) -> None:
         self.path = path
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = path.open("xb")
-        except OSError as error:
-            raise cannot_write(path, error) from None
-
+        self._file = open_new(path)
         self._last_log_ns = 0
         self._unflushed_bytes = 0
         self._writer = Writer(self._file, chunk_size=UNBOUNDED, compression=CompressionType.LZ4)
@@ -124,10 +120,23 @@ class FlushTimer:
         self._next_s = time.monotonic() + FLUSH_S
 
 
+def open_new(path: Path) -> BinaryIO:
+    """A new file to write to, in a folder made where there is none. Raises LogError."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise cannot_write(path, error) from None
+
+    try:
+        return path.open("xb")
+    except FileExistsError:
+        raise LogError(f"{path} exists already: remove it, or name another file") from None
+    except OSError as error:
+        raise cannot_write(path, error) from None
+
+
 def cannot_write(path: Path, error: OSError) -> LogError:
     """The error for a file that the disk did not take, with what to do about it."""
-    if isinstance(error, FileExistsError):
-        return LogError(f"{path} exists already: remove it, or name another file")
     if error.errno in _FULL:
         remedy = "free some space, or write to another disk"
     else:

@@ -1,0 +1,161 @@
+"""Reads a log from Python: typed messages by topic and time, and the graph as it was at a time."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cogmap.bus.codec import Envelope
+from cogmap.errors import LogError, MessageError
+from cogmap.graph.graph import Graph
+from cogmap.recording import selection
+from cogmap.recording.storage import format as layout
+from cogmap.recording.storage.reader import LogReader, Record
+from schemas import topics as table
+from schemas.base import Message
+from schemas.graph import Delta
+from schemas.topics import Topic
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A message in a log.
+
+    `time_s` is when it was received, in seconds since the log's first message; `log_time_ns` the
+    same on the recorder's wall clock. `envelope` is None where the log holds none.
+    """
+
+    topic: str
+    message: Message
+    time_s: float
+    log_time_ns: int
+    envelope: Envelope | None
+
+
+class Log:
+    """A recorded log. Made by `open_log`; reads the file as messages are asked for."""
+
+    def __init__(self, reader: LogReader) -> None:
+        self._reader = reader
+        self._start_ns = reader.span_ns[0]
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self._reader.path
+
+    @property
+    def duration_s(self) -> float:
+        """Seconds from the first message to the last."""
+        return self._reader.span_s
+
+    @property
+    def software(self) -> str:
+        """The program that recorded it, such as `cogmap 0.2.0`."""
+        return self._about().get("software", "")
+
+    @property
+    def agent(self) -> str:
+        """Whose topics these are."""
+        return self._about().get("agent", "")
+
+    @property
+    def config(self) -> dict[str, dict[str, Any]]:
+        """The configuration that it was recorded with, by module and key. Raises LogError."""
+        return recorded_config(self._reader)
+
+    @property
+    def topics(self) -> list[str]:
+        """The topics that it has a channel for, in the order of the table; some may be empty."""
+        recorded = {channel.topic for channel in self._reader.channels.values()}
+        return [topic.name for topic in table.ALL if topic.name in recorded]
+
+    def messages(
+        self, *topics: str, start_s: float = 0.0, end_s: float | None = None
+    ) -> Iterator[Entry]:
+        """Messages on `topics`, on all where none is named, in the order in which they were
+        received.
+
+        Those from `start_s` (inclusive) to `end_s` (exclusive) into the log. Raises UsageError for
+        an unknown topic; LogError where the log is damaged or a message does not fit its topic.
+        """
+        chosen = selection.named(topics) or None
+        for record in self._between(chosen, start_s, end_s):
+            yield Entry(
+                topic=record.topic_name,
+                message=self._message(record),
+                time_s=(record.log_time_ns - self._start_ns) / 1e9,
+                log_time_ns=record.log_time_ns,
+                envelope=record.envelope,
+            )
+
+    def graph_at(self, time_s: float) -> Graph:
+        """The workspace's graph after every delta received up to `time_s` into the log.
+
+        Raises LogError where the log lacks a delta before that, as one does that was begun in the
+        middle of a drive.
+        """
+        graph = Graph(self._cell_m())
+        for record in self._between([table.DELTA], 0.0, None):
+            if record.log_time_ns - self._start_ns > time_s * 1e9:
+                break
+            delta = self._message(record)
+            assert isinstance(delta, Delta)
+            if not graph.apply(delta) and delta.version > graph.version:
+                raise LogError(
+                    f"{self.path} holds delta {delta.version} after delta {graph.version}, not "
+                    "every one between: no graph can be had of it, record a whole drive"
+                )
+        return graph
+
+    def _between(
+        self, chosen: Iterable[Topic] | None, start_s: float, end_s: float | None
+    ) -> Iterator[Record]:
+        first_ns = self._start_ns + round(start_s * 1e9)
+        end_ns = None if end_s is None else self._start_ns + round(end_s * 1e9)
+        for record in self._reader.records(None if chosen is None else list(chosen)):
+            if end_ns is not None and record.log_time_ns >= end_ns:
+                return
+            if record.log_time_ns >= first_ns:
+                yield record
+
+    def _message(self, record: Record) -> Message:
+        try:
+            return self._reader.message(record)
+        except MessageError as error:
+            raise LogError(f"{self.path}: a message cannot be read: {error}") from None
+
+    def _about(self) -> dict[str, str]:
+        return self._reader.about(layout.RECORDING)
+
+    def _cell_m(self) -> float:
+        return float(self.config.get("workspace", {}).get("cell_m", 1.0))
+
+
+def open_log(path: Path | str) -> Log:
+    """Open the log at `path` for reading.
+
+    Raises LogError where there is none, or it is foreign, damaged or of a version that is not read.
+
+        log = open_log("drive.mcap")
+        for entry in log.messages("odometry", start_s=2.0, end_s=4.0):
+            print(entry.time_s, entry.message.speed_m_s)
+        print(len(log.graph_at(4.0).nodes))
+    """
+    return Log(LogReader(Path(path)))
+
+
+def recorded_config(reader: LogReader) -> dict[str, dict[str, Any]]:
+    """The configuration that a log was recorded with. Raises LogError where it cannot be read."""
+    try:
+        sections = json.loads(reader.about(layout.RECORDING).get("config", "{}"))
+    except json.JSONDecodeError as error:
+        raise LogError(
+            f"{reader.path} holds a configuration that cannot be read: {error}"
+        ) from None
+    if not isinstance(sections, dict):
+        raise LogError(f"{reader.path} holds a configuration without sections")
+    return sections
