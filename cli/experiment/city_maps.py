@@ -57,7 +57,7 @@ Examples:
     "all_in",
     type=click.Path(path_type=Path),
     metavar="DIR",
-    help="Every extract (.osm, packed or not) and street graph (.jsonl, packed or not) in a folder.",
+    help="Every extract (.osm, packed or not, .osm.pbf) and street graph (.jsonl, packed or not) in a folder.",
 )
 @click.option(
     "--maps",

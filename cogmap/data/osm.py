@@ -1,24 +1,35 @@
-"""OpenStreetMap extracts: XML as JOSM, Overpass and the API write it, plain or packed by gzip,
-bzip2 or xz.
+"""OpenStreetMap extracts, read by libosmium: XML as JOSM, Overpass and the API write it, plain or
+packed by gzip, bzip2 or xz, and PBF as Geofabrik distributes it.
 """
 
 from __future__ import annotations
 
+import lzma
 from dataclasses import dataclass, field
 from pathlib import Path
-from xml.parsers import expat
 
-from cogmap.data.lines import wrong_line
-from cogmap.data.packed import lines
+import osmium
+from osmium.osm import Node
+from osmium.osm import Way as ReadWay
 
-SUFFIXES = (".osm", ".osm.gz", ".osm.xz", ".osm.bz2")
+from cogmap.errors import UsageError
 
+SUFFIXES = (".osm", ".osm.gz", ".osm.xz", ".osm.bz2", ".osm.pbf")
+_REMEDY = "give an OpenStreetMap extract, as XML (plain or packed) or as PBF"
+_LIBRARY_ERRORS = (
+    osmium.InvalidLocationError,
+    RuntimeError,
+    ValueError,
+    OSError,
+    EOFError,
+    lzma.LZMAError,
+)
 Tags = dict[str, str]
 
 
 @dataclass
 class Way:
-    """A way: the nodes that it leads over, in order, and what it is said to be."""
+    """A way: the nodes along it, in order, and its tags."""
 
     id: int
     nodes: list[int] = field(default_factory=list)
@@ -27,10 +38,10 @@ class Way:
 
 @dataclass
 class Extract:
-    """What is in a file: nodes as (longitude, latitude) in degrees by id, the tags of those that
-    have some, ways.
+    """The contents of a file: nodes as (longitude, latitude) in degrees by id, the tags of those
+    that have any, and ways.
 
-    A way may name nodes that the extract cuts off.
+    A way may name nodes that lie outside the extract.
     """
 
     nodes: dict[int, tuple[float, float]] = field(default_factory=dict)
@@ -38,95 +49,43 @@ class Extract:
     ways: list[Way] = field(default_factory=list)
 
 
-class _WrongError(Exception):
-    """What was expected where the parser stands."""
-
-
-class _Reader:
-    """Takes elements as they come; raises _WrongError where one is not what OSM XML has there."""
-
-    def __init__(self) -> None:
-        self.extract = Extract()
-        self._depth = 0
-        self._node: int | None = None
-        self._way: Way | None = None
-
-    def start(self, name: str, has: Tags) -> None:
-        if self._depth == 0 and name != "osm":
-            raise _WrongError("the element <osm>, the root of OpenStreetMap XML")
-        self._depth += 1
-        if name == "node":
-            self._node = _whole(has, "node", "id")
-            self.extract.nodes[self._node] = (
-                _degrees(has, "lon", 180.0),
-                _degrees(has, "lat", 90.0),
-            )
-        elif name == "way":
-            self._way = Way(_whole(has, "way", "id"))
-        elif name == "nd" and self._way is not None:
-            self._way.nodes.append(_whole(has, "nd", "ref"))
-        elif name == "tag":
-            self._tag(has)
-
-    def _tag(self, has: Tags) -> None:
-        if "k" not in has or "v" not in has:
-            raise _WrongError("a <tag> with k and v")
-        if self._way is not None:
-            self._way.tags[has["k"]] = has["v"]
-        elif self._node is not None:
-            self.extract.node_tags.setdefault(self._node, {})[has["k"]] = has["v"]
-
-    def end(self, name: str) -> None:
-        self._depth -= 1
-        if name == "node":
-            self._node = None
-        elif name == "way" and self._way is not None:
-            self.extract.ways.append(self._way)
-            self._way = None
-
-
 def read(path: Path) -> Extract:
-    """The extract in a file. Raises UsageError that names file, line and what was expected there."""
-    reader = _Reader()
-    parser = expat.ParserCreate()
-    parser.StartElementHandler = reader.start
-    parser.EndElementHandler = reader.end
-    parser.EntityDeclHandler = _refuse_entities
-    number = 1
-    line = b""
+    """The extract in a file. Raises UsageError naming the file and the element that is wrong, or the
+    line where its XML is.
+    """
+    extract = Extract()
+    kinds = osmium.osm.NODE | osmium.osm.WAY
     try:
-        for read_so_far, line in enumerate(lines(path, "an OpenStreetMap extract"), start=1):
-            number = read_so_far
-            parser.Parse(line, False)
-        parser.Parse(b"", True)
-    except _WrongError as error:
-        raise wrong_line(path, number, _text(line), str(error)) from None
-    except expat.ExpatError as error:
-        expected = f"well-formed XML ({expat.ErrorString(error.code)})"
-        raise wrong_line(path, number, _text(line), expected) from None
-    return reader.extract
+        for element in osmium.FileProcessor(_source(path), kinds):
+            if isinstance(element, Node):
+                _add_node(extract, path, element)
+            elif isinstance(element, ReadWay):
+                _add_way(extract, path, element)
+    except _LIBRARY_ERRORS as error:
+        raise UsageError(f"{path} cannot be read ({error}): {_REMEDY}") from None
+    return extract
 
 
-def _refuse_entities(*declared: object) -> None:
-    raise _WrongError("no entity declarations")
+def _source(path: Path) -> str | osmium.io.FileBuffer:
+    """What libosmium reads: the file, or its content where that is packed as it does not know."""
+    if path.suffix == ".xz":
+        return osmium.io.FileBuffer(lzma.decompress(path.read_bytes()), "osm")
+    return str(path)
 
 
-def _text(line: bytes) -> str:
-    return line.decode("utf-8", "replace")
+def _add_node(extract: Extract, path: Path, node: Node) -> None:
+    if not node.location.valid():
+        raise UsageError(
+            f"{path}, node {node.id}: expected lon in degrees from -180 to 180 and lat from -90 to 90"
+        )
+    extract.nodes[node.id] = (node.lon, node.lat)
+    tags = dict(node.tags)
+    if tags:
+        extract.node_tags[node.id] = tags
 
 
-def _whole(has: Tags, element: str, name: str) -> int:
-    try:
-        return int(has[name])
-    except (KeyError, ValueError):
-        raise _WrongError(f"a <{element}> with a whole number for {name}") from None
-
-
-def _degrees(has: Tags, name: str, most: float) -> float:
-    try:
-        value = float(has[name])
-    except (KeyError, ValueError):
-        value = most + 1
-    if not -most <= value <= most:
-        raise _WrongError(f"a <node> with {name} in degrees, from {-most:g} to {most:g}")
-    return value
+def _add_way(extract: Extract, path: Path, way: ReadWay) -> None:
+    nodes = [node.ref for node in way.nodes]
+    if 0 in nodes:
+        raise UsageError(f"{path}, way {way.id}: expected a node's id in each <nd>, as ref")
+    extract.ways.append(Way(way.id, nodes, dict(way.tags)))

@@ -115,7 +115,7 @@ def test_degrees_become_metres() -> None:
 
 def test_an_extract_without_streets_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "sea.osm"
-    path.write_text('<osm><node id="1" lat="1" lon="1"/></osm>')
+    path.write_text('<osm version="0.6"><node id="1" lat="1" lon="1"/></osm>')
     with pytest.raises(UsageError, match="has no streets"):
         from_osm(path)
 
