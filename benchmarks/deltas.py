@@ -124,11 +124,11 @@ def _commit(race: Race) -> None:
         lambda clock: ledger.commit(clock.stamp_ns, 1, "objects", operations),
         emits=[topics.DELTA],
     )
-    publisher.awaits = {"replica": REPLICAS}
+    publisher.requires = {"replica": REPLICAS}
     shell = Shell(publisher, ZenohBus(race.endpoint, AGENT), health=False)
     shell.open()
     while shell.missing:
-        shell.pump(1.0)
+        shell.spin_once(1.0)
     with race.at_work():
         race.go.wait()
         for number in range(race.number):
@@ -148,7 +148,7 @@ def _replicate(race: Race) -> None:
     shell.open()
     with race.at_work():
         while replica.graph.version < race.number:
-            shell.pump(1.0)
+            shell.spin_once(1.0)
         race.done.release()
     shell.close()
 

@@ -108,11 +108,11 @@ def topic_table(modules: list[Module]) -> str:
 def _ends(topic: Topic, modules: list[Module]) -> tuple[list[str], list[str]]:
     """Who says `topic`, and who takes it in: modules by name, else the observers."""
     if topic.delivery is Delivery.ON_REQUEST:
-        asked = [module.name for module in modules if topic in module.answers]
+        asked = [module.name for module in modules if topic in module.served]
         replying = [
             module.name
             for module in modules
-            if topic in [reply for reply, _ in module.answers.values()]
+            if topic in [reply for reply, _ in module.served.values()]
         ]
         return replying or [OBSERVERS], asked or [OBSERVERS]
     takers = [module.name for module in modules if topic in module.handlers]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from cogmap.errors import CogmapError
-from cogmap.runtime.in_process import House
+from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
 
 
@@ -13,13 +13,13 @@ def run(modules: Iterable[Module]) -> None:
     """Run them until nobody has anything left to do. Raises CogmapError where one refused a
     message.
     """
-    house = House(modules)
+    runner = InProcessRunner(modules)
     try:
-        house.run()
-        for shell in house.shells:
+        runner.run()
+        for shell in runner.shells:
             if shell.intake.rejected:
                 raise CogmapError(
                     f"{shell.module.name} refused messages: {dict(shell.intake.rejected)}"
                 )
     finally:
-        house.close()
+        runner.close()

@@ -84,7 +84,7 @@ class Tape:
 
         says = (topics.TRUE_POSE, *_SENSED)
         module = Module("sim").on(topics.MOTOR_COMMAND, answer, says)
-        return module.starts(lambda: next(frames), {"action": 1}, says)
+        return module.on_start(lambda: next(frames), {"action": 1}, says)
 
     def _keep(self, message: Message) -> None:
         self._frames.setdefault(message.stamp_ns, []).append(message)

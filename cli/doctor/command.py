@@ -72,7 +72,7 @@ def observe(bus: ZenohBus, duration_s: float) -> Observed:
 
     bus.watch(on_change)
     for topic in (topics.HEALTH, topics.CLOCK):
-        bus.subscribe(topic, inbox.put, intake.lose)
+        bus.subscribe(topic, inbox.put, intake.count_lost)
     end_s = time.monotonic() + duration_s
     while (left_s := end_s - time.monotonic()) > 0:
         item = inbox.take(left_s)

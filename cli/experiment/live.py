@@ -16,7 +16,7 @@ from cogmap.bus.session import free_endpoint
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.errors import CogmapError
 from cogmap.runtime.config import Sections
-from cogmap.runtime.in_process import House
+from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
 from experiments import transcript
@@ -37,9 +37,11 @@ def differing(sections: Sections, modules: Sequence[str]) -> list[str]:
     sections = {**sections, "sim": {**sections["sim"], "awaits": awaits}}
     inside = Heard(transcript.MODEL)
     outside = Heard(transcript.MODEL)
-    house = House([*(registry.build(name, sections) for name in modules), inside.module()])
-    house.run()
-    house.close()
+    runner = InProcessRunner(
+        [*(registry.build(name, sections) for name in modules), inside.module()]
+    )
+    runner.run()
+    runner.close()
     run(
         sections,
         [(name, name) for name in modules],
@@ -82,7 +84,7 @@ def run(
             shell.open()
         until_s = time.monotonic() + PATIENCE_S
         while not done() and time.monotonic() < until_s:
-            news = [shell.pump(PUMP_S) for shell in shells]
+            news = [shell.spin_once(PUMP_S) for shell in shells]
             if any(news):
                 until_s = time.monotonic() + PATIENCE_S
             supervisor.check()

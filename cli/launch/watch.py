@@ -50,7 +50,7 @@ class Watch:
         self._busy: dict[str, list[float]] = {}
         self._bus, self._inbox, self._intake = bus, Inbox(), Intake()
         for topic in FOLLOWED:
-            bus.subscribe(topic, self._inbox.put, self._intake.lose)
+            bus.subscribe(topic, self._inbox.put, self._intake.count_lost)
         bus.watch(lambda member, alive: self._inbox.call(lambda: self._on_presence(member, alive)))
         bus.announce(Member(OBSERVER, OBSERVER))
 
@@ -63,7 +63,7 @@ class Watch:
         while item is not None:
             if isinstance(item, Arrival):
                 moved |= item.topic is not topics.HEALTH
-                self._take_in(item)
+                self._receive(item)
             else:
                 item()
             item = self._inbox.take(0.0)
@@ -79,7 +79,7 @@ class Watch:
     def _on_presence(self, member: Member, alive: bool) -> None:
         (self.present.add if alive else self.present.discard)(member)
 
-    def _take_in(self, arrival: Arrival) -> None:
+    def _receive(self, arrival: Arrival) -> None:
         message = self._intake.accept(arrival)
         if message is None or arrival.envelope is None:
             return

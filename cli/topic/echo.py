@@ -61,7 +61,7 @@ def echo(
     number = 0
     limit = 1 if once else times
     with observing(connect, agent, "topic echo") as bus:
-        bus.subscribe(topic, inbox.put, intake.lose)
+        bus.subscribe(topic, inbox.put, intake.count_lost)
         while not stop.asked and number != limit:
             arrival = inbox.take(TICK_S)
             message = intake.accept(arrival) if isinstance(arrival, Arrival) else None

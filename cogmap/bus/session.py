@@ -18,7 +18,7 @@ LAST_PORT = 65535
 # How long a link that is full holds up the others before it loses a message, which the publisher's
 # cache then mends. Once it has, it loses the next at once until it has room: a subscriber that has
 # stopped costs this long once.
-PATIENCE_US = 100_000
+WAIT_BEFORE_DROP_US = 100_000
 # A stereo frame is seven batches: where only two find room, a busy machine drops it before it is
 # under way.
 QUEUE_BATCHES = 16
@@ -39,8 +39,8 @@ def _config(mode: str, **settings: object) -> zenoh.Config:
         "transport/shared_memory/enabled": False,
         "transport/link/tx/queue/size": dict.fromkeys(_QUEUES, QUEUE_BATCHES),
         "transport/link/tx/queue/congestion_control/drop": {
-            "wait_before_drop": PATIENCE_US,
-            "max_wait_before_drop_fragments": PATIENCE_US,
+            "wait_before_drop": WAIT_BEFORE_DROP_US,
+            "max_wait_before_drop_fragments": WAIT_BEFORE_DROP_US,
         },
     }
     for key, value in settings.items():

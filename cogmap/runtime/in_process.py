@@ -9,7 +9,7 @@ from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
 
 
-class House:
+class InProcessRunner:
     """Runs modules in turn on one thread, each message to its end, so that a run depends on its
     seeds alone.
     """
@@ -25,7 +25,7 @@ class House:
         while not until():
             idle = True
             for shell in self.shells:
-                while shell.pump(0.0):
+                while shell.spin_once(0.0):
                     idle = False
             if idle:
                 return

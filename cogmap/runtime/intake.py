@@ -13,7 +13,7 @@ from schemas.base import Message
 from schemas.topics import Delivery, Topic
 
 log = logging.getLogger("cogmap")
-QUIET_S = 1.0
+LOG_INTERVAL_S = 1.0
 
 
 class Intake:
@@ -27,7 +27,7 @@ class Intake:
         self._given_up: Counter[str] = Counter()
         self._last: dict[tuple[Topic, str], tuple[int, int]] = {}
         self._quiet_until: dict[str, float] = {}
-        self._unsaid: Counter[str] = Counter()
+        self._suppressed: Counter[str] = Counter()
 
     def accept(self, arrival: Arrival) -> Message | None:
         """The message in `arrival`, or None where it is not one or came before."""
@@ -64,7 +64,7 @@ class Intake:
                 self._count_gaps(arrival.topic.name)
         self._last[key] = (envelope.incarnation, message.seq)
 
-    def lose(self, topic: str, number: int) -> None:
+    def count_lost(self, topic: str, number: int) -> None:
         """Take note that the bus gave up `number` messages of `topic`; called from its threads."""
         self._given_up[topic] += number
         self._count_gaps(topic)
@@ -84,8 +84,8 @@ class Intake:
     def _say(self, topic: str, sentence: str) -> None:
         now = time.monotonic()
         if now < self._quiet_until.get(topic, 0.0):
-            self._unsaid[topic] += 1
+            self._suppressed[topic] += 1
             return
-        more = self._unsaid.pop(topic, 0)
+        more = self._suppressed.pop(topic, 0)
         log.warning("%s%s", sentence[:500], f" (and {more} more since)" if more else "")
-        self._quiet_until[topic] = now + QUIET_S
+        self._quiet_until[topic] = now + LOG_INTERVAL_S

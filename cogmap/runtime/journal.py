@@ -14,7 +14,7 @@ from schemas import topics
 from schemas.base import Message
 
 _HEAD = struct.Struct("<IIH")
-CONDENSE_BYTES = 64 * 2**20
+COMPACT_BYTES = 64 * 2**20
 
 
 class Journal:
@@ -34,7 +34,7 @@ class Journal:
                 f"cannot write {path} ({error.strerror}): name another folder with --state"
             ) from None
         self._size = 0
-        self._limit = CONDENSE_BYTES
+        self._limit = COMPACT_BYTES
 
     def messages(self) -> Iterator[Message]:
         """Everything written so far, oldest first. Raises UsageError at a whole record that cannot
@@ -80,7 +80,7 @@ class Journal:
         """Whether it is time to put one message in place of all."""
         return self._size > self._limit
 
-    def condense(self, message: Message) -> None:
+    def compact(self, message: Message) -> None:
         """Put `message` in place of everything, at once or not at all."""
         fresh = Journal(self._path.with_suffix(".new"))
         os.ftruncate(fresh._file, 0)
@@ -89,7 +89,7 @@ class Journal:
         os.close(self._file)
         self._file = fresh._file
         self._size = fresh._size
-        self._limit = max(CONDENSE_BYTES, 4 * self._size)
+        self._limit = max(COMPACT_BYTES, 4 * self._size)
 
     def close(self) -> None:
         """Close the file; what is in it stays."""

@@ -1,4 +1,4 @@
-"""A module: what a cognitive process is, apart from how its messages travel."""
+"""A module: what a cognitive process does, apart from how its messages travel."""
 
 from __future__ import annotations
 
@@ -18,15 +18,9 @@ Reply = Message | Iterable[Message] | None
 Handler = Callable[[Any], Reply]
 
 
-def _ignore(message: Message) -> None:
-    """A handler for a topic that matters only to the shell."""
-
-
 @dataclass(frozen=True)
 class Timer:
-    """A handler that is called with the time in ns every `period_ns`, for modules that start things
-    by themselves.
-    """
+    """A handler that is called with the time in ns every `period_ns`."""
 
     period_ns: int
     handler: Callable[[int], Reply]
@@ -34,22 +28,25 @@ class Timer:
 
 @dataclass
 class Module:
-    """Messages in, messages out. It has no clock, no bus, no thread and no file: the shell around
-    it has.
+    """Messages in, messages out.
+
+    It has no clock, no bus, no thread and no file: the shell around it has. `name` is what it is,
+    `instance` which one of them. A handler returns what to publish: None, a message, or several. A
+    message that it cannot make sense of makes it raise MessageError, before it has changed anything.
     """
 
     name: str
     instance: str = ""
     handlers: dict[Topic, Handler] = field(default_factory=dict)
     emits: set[Topic] = field(default_factory=set)
-    answers: dict[Topic, tuple[Topic, Callable[[Any], Message]]] = field(default_factory=dict)
+    served: dict[Topic, tuple[Topic, Callable[[Any], Message]]] = field(default_factory=dict)
     timers: list[Timer] = field(default_factory=list)
-    awaits: dict[str, int] = field(default_factory=dict)
+    requires: dict[str, int] = field(default_factory=dict)
     start: Callable[[], Reply] | None = None
     journal: Topic | None = None
     restore: Callable[[Iterable[Message]], None] | None = None
-    condense: Callable[[], Message] | None = None
-    catches_up: frozenset[Topic] = frozenset()
+    compact: Callable[[], Message] | None = None
+    backfill: frozenset[Topic] = frozenset()
     graph: Graph | None = None
     on_load: Callable[[], Reply] | None = None
     _next_seq: Counter[Topic] = field(default_factory=Counter)
@@ -58,7 +55,7 @@ class Module:
         self.instance = self.instance or self.name
 
     def on(self, topic: Topic, handler: Handler, emits: Iterable[Topic] = ()) -> Module:
-        """Take in `topic`; `handler` returns what to say: nothing, a message, or several."""
+        """Receive `topic`; `handler` may return messages of `emits`."""
         self.handlers[topic] = handler
         self.emits.update(emits)
         return self
@@ -89,58 +86,75 @@ class Module:
         self.emits.update(emits)
         return self
 
-    def starts(
-        self, handler: Callable[[], Reply], awaits: dict[str, int], emits: Iterable[Topic] = ()
+    def on_start(
+        self, handler: Callable[[], Reply], requires: dict[str, int], emits: Iterable[Topic] = ()
     ) -> Module:
-        """Call `handler` once, as soon as `awaits` (module: how many instances) are all ready."""
+        """Call `handler` once, when `requires` (module: how many instances) are all ready."""
         self.start = handler
-        self.awaits = awaits
+        self.requires = requires
         self.emits.update(emits)
         return self
 
     def serve(self, request: Topic, reply: Topic, handler: Callable[[Any], Message]) -> Module:
         """Answer queries for `request` with a message of `reply`."""
-        self.answers[request] = (reply, handler)
+        self.served[request] = (reply, handler)
         return self
 
     def journaling(
         self,
         topic: Topic,
         restore: Callable[[Iterable[Message]], None],
-        condense: Callable[[], Message],
-        catches_up: Iterable[Topic] = (),
+        compact: Callable[[], Message],
+        backfill: Iterable[Topic] = (),
     ) -> Module:
-        """Write down what it says on `topic` before it is sent, and give it back to `restore` after
-        a restart.
+        """Write what it publishes on `topic` to a journal first; `restore` gets it after a restart.
 
-        `condense` returns one message that stands for all that was said. On the topics that it
-        `catches_up` with, it is given after a restart what was said before: of what it had, and of
-        what was said while it was away.
+        `compact` returns one message that stands for all of them. On the topics in `backfill` it
+        receives, after a restart, also what was published before: what it has received already,
+        and what was published while it was away.
         """
         self.journal = topic
         self.restore = restore
-        self.condense = condense
-        self.catches_up = frozenset(catches_up)
+        self.compact = compact
+        self.backfill = frozenset(backfill)
         return self
 
     def feed(self, message: Message) -> list[Message]:
-        """Let it take in `message`, and return what it says, numbered."""
+        """Hand `message` to its handler, and return what that publishes, numbered."""
         if self.graph is not None and isinstance(message, Delta):
             self.graph.apply(message)
         return self.stamp(self.handlers[topics.of(message)](message))
 
     def loaded(self) -> list[Message]:
-        """Call `on_load`, and return what it publishes, numbered."""
+        """Call `on_load`, and return what that publishes, numbered."""
         return [] if self.on_load is None else self.stamp(self.on_load())
 
     def stamp(self, reply: Reply) -> list[Message]:
-        """Number what a handler returned and put this instance's name on it."""
-        messages = [] if reply is None else [reply] if isinstance(reply, Message) else list(reply)
+        """Put this instance's name and the next numbers on what a handler returned.
+
+        Raises CogmapError for a message of a topic that the module does not declare.
+        """
+        messages = _as_list(reply)
         for message in messages:
             topic = topics.of(message)
             if topic not in self.emits:
-                raise CogmapError(f"{self.name} says {topic.name}, which it does not declare")
+                raise CogmapError(
+                    f"{self.name} publishes {topic.name}, which it does not declare: "
+                    f"name it in `emits`"
+                )
             message.source = self.instance
             message.seq = self._next_seq[topic]
             self._next_seq[topic] += 1
         return messages
+
+
+def _as_list(reply: Reply) -> list[Message]:
+    if reply is None:
+        return []
+    if isinstance(reply, Message):
+        return [reply]
+    return list(reply)
+
+
+def _ignore(message: Message) -> None:
+    """The handler of a topic that only the shell uses."""

@@ -69,7 +69,7 @@ def run_module(module: Module, endpoint: str, agent: str, state: Path | None, st
     shell.open()
     log.info("%s is ready", module.instance)
     while not stop.asked:
-        shell.pump(IDLE_S)
+        shell.spin_once(IDLE_S)
     shell.close()
 
 

@@ -26,14 +26,14 @@ from schemas.process import Presence
 log = logging.getLogger("cogmap")
 HEALTH_PERIOD_NS = 1_000_000_000
 RETRY_PERIOD_NS = 500_000_000
-MANY_CAUSES = 1000
-MANY_JOURNEYS = 32
+MAX_CAUSES = 1000
+MAX_TRACES = 32
 START = "@start"
 TIMER = "@timer"
 
 
 class Shell:
-    """Runs `module` on `bus`. `open()` it, then `pump()` it from one thread; `close()` ends it."""
+    """Runs `module` on `bus`. `open()` it, then `spin_once()` it from one thread; `close()` ends it."""
 
     def __init__(
         self, module: Module, bus: Bus, journal: Journal | None = None, health: bool = True
@@ -44,7 +44,7 @@ class Shell:
         self._health = health
         self._incarnation = time.time_ns()
         self._causes: list[Cause] = []
-        self._journeys: dict[int, Envelope] = {}
+        self._traces: dict[int, Envelope] = {}
         self._present: set[Member] = set()
         self._started = module.start is None
         self._follower: Follower | None = None
@@ -67,7 +67,7 @@ class Shell:
         missed: frozenset[topics.Topic] = frozenset()
         if self._journal is not None and self.module.restore is not None:
             self.module.restore(self._journal.messages())
-            missed = frozenset() if self._journal.is_empty else self.module.catches_up
+            missed = frozenset() if self._journal.is_empty else self.module.backfill
         for topic in sorted(self.module.emits, key=lambda topic: topic.name):
             self.bus.declare(topic)
         if self._health:
@@ -75,18 +75,18 @@ class Shell:
         for topic in self.module.handlers:
             if topic is not topics.PRESENCE:
                 history = CACHED_MESSAGES if topic in missed else 0
-                self.bus.subscribe(topic, self.inbox.put, self.intake.lose, history)
-        for request, (reply, handler) in self.module.answers.items():
+                self.bus.subscribe(topic, self.inbox.put, self.intake.count_lost, history)
+        for request, (reply, handler) in self.module.served.items():
             self.bus.serve(request, reply, self._server(request, handler), self.inbox.call)
         if self._follower is not None:
             self._follower.join()
         self.bus.announce(Member(self.module.name, self.module.instance))
-        if self.module.awaits or topics.PRESENCE in self.module.handlers:
+        if self.module.requires or topics.PRESENCE in self.module.handlers:
             self.bus.watch(
                 lambda member, alive: self.inbox.call(lambda: self._on_presence(member, alive))
             )
 
-    def pump(self, timeout_s: float | None = 0.0) -> bool:
+    def spin_once(self, timeout_s: float | None = 0.0) -> bool:
         """Do what is due: a timer, or the oldest arrival within `timeout_s`. False if there was
         nothing.
         """
@@ -96,7 +96,7 @@ class Shell:
         )
         item = self.inbox.take(wait_s)
         if isinstance(item, Arrival):
-            self._take_in(item)
+            self._receive(item)
         elif item is not None:
             item()
         return item is not None
@@ -111,7 +111,7 @@ class Shell:
         if self._journal is not None:
             self._journal.close()
 
-    def _take_in(self, arrival: Arrival) -> None:
+    def _receive(self, arrival: Arrival) -> None:
         started_ns = time.time_ns()
         message = self.intake.accept(arrival)
         if message is None or arrival.envelope is None:
@@ -122,18 +122,18 @@ class Shell:
                 return
         self._remember(message.stamp_ns, arrival.envelope)
         cause = (arrival.topic.name, arrival.envelope.source, arrival.envelope.seq)
-        self._think(lambda: self.module.feed(message), cause, arrival.envelope, started_ns)
+        self._invoke(lambda: self.module.feed(message), cause, arrival.envelope, started_ns)
 
     def _remember(self, stamp_ns: int, envelope: Envelope) -> None:
         """What is said with that stamp follows `envelope`, also where it is said while another
         message is taken in.
         """
-        self._journeys.pop(stamp_ns, None)
-        self._journeys[stamp_ns] = envelope
-        if len(self._journeys) > MANY_JOURNEYS:
-            del self._journeys[next(iter(self._journeys))]
+        self._traces.pop(stamp_ns, None)
+        self._traces[stamp_ns] = envelope
+        if len(self._traces) > MAX_TRACES:
+            del self._traces[next(iter(self._traces))]
 
-    def _think(
+    def _invoke(
         self, think: Callable[[], list[Message]], cause: Cause, of: Envelope | None, started_ns: int
     ) -> None:
         """Let the module think; a message that it cannot make sense of changes nothing but a count."""
@@ -168,20 +168,20 @@ class Shell:
             envelope = Envelope(
                 message.source, message.seq, self._incarnation, now_ns, thinking_ns + compute_ns
             )
-            cause = None if of is None or topic.sensed else self._journeys.get(message.stamp_ns)
+            cause = None if of is None or topic.sensed else self._traces.get(message.stamp_ns)
             if cause is not None:
                 envelope.follow(cause, self.module.name, compute_ns)
             envelope.causes = self._causes
             self._causes = []
             self.bus.publish(topic, payload, envelope)
             self.meter.emitted[topic.name] += 1
-        if self._journal is not None and self._journal.is_long and self.module.condense is not None:
-            self._journal.condense(self.module.condense())
+        if self._journal is not None and self._journal.is_long and self.module.compact is not None:
+            self._journal.compact(self.module.compact())
 
     def _on_timer(self, handler: Callable[[int], Reply]) -> Callable[[int], None]:
         def due(now_ns: int) -> None:
             cause = (TIMER, self.module.instance, now_ns)
-            self._think(lambda: self.module.stamp(handler(now_ns)), cause, None, time.time_ns())
+            self._invoke(lambda: self.module.stamp(handler(now_ns)), cause, None, time.time_ns())
 
         return due
 
@@ -207,7 +207,7 @@ class Shell:
     def _on_load(self, fetched: Fetched) -> None:
         """Record that a snapshot replaced the graph, as what led to all that is published next."""
         cause = (topics.SNAPSHOT.name, fetched.source, fetched.snapshot.version)
-        self._think(self.module.loaded, cause, None, time.time_ns())
+        self._invoke(self.module.loaded, cause, None, time.time_ns())
 
     def _on_presence(self, member: Member, alive: bool) -> None:
         (self._present.add if alive else self._present.discard)(member)
@@ -220,19 +220,21 @@ class Shell:
             )
             self.publish(self.module.stamp(presence))
             cause = (topics.PRESENCE.name, presence.source, presence.seq)
-            self._think(lambda: self.module.feed(presence), cause, None, time.time_ns())
+            self._invoke(lambda: self.module.feed(presence), cause, None, time.time_ns())
         if not self._started and not self.missing:
             self._started = True
             start = self.module.start
             if start is not None:
                 cause = (START, self.module.instance, 0)
-                self._think(lambda: self.module.stamp(start()), cause, None, time.time_ns())
+                self._invoke(lambda: self.module.stamp(start()), cause, None, time.time_ns())
 
     @property
     def missing(self) -> dict[str, int]:
         """The modules that it waits for, and how many instances of each are not ready yet."""
         ready = [member.module for member in self._present]
-        lacking = {name: number - ready.count(name) for name, number in self.module.awaits.items()}
+        lacking = {
+            name: number - ready.count(name) for name, number in self.module.requires.items()
+        }
         return {name: number for name, number in lacking.items() if number > 0}
 
     @property
@@ -251,7 +253,7 @@ class Shell:
         health.stamp_ns = sent_ns
         envelope = Envelope(health.source, health.seq, self._incarnation, sent_ns, sent_ns)
         if (
-            len(self._causes) > MANY_CAUSES
+            len(self._causes) > MAX_CAUSES
         ):  # whoever says little else would remember all that it ever took in
             envelope.causes = self._causes
             self._causes = []

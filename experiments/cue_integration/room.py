@@ -142,5 +142,5 @@ def build(room: Room) -> Module:
     return (
         Module("room")
         .on(topics.ACTION, room.act, emits=says)
-        .starts(room.begin, AWAITS, emits=says)
+        .on_start(room.begin, AWAITS, emits=says)
     )

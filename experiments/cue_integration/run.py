@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 
 from cogmap.errors import CogmapError
-from cogmap.runtime.in_process import House
+from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
 from experiments.cue_integration import agent, analysis, participant, published, room
 from experiments.cue_integration.analysis import Gaussian
@@ -50,9 +50,9 @@ class Session:
 
     def run(self) -> Response:
         """Run it on the in-memory bus. Raises CogmapError where no response comes."""
-        house = House([*agent.modules(self.trial.number), *self.bodies()])
-        house.run()
-        house.close()
+        runner = InProcessRunner([*agent.modules(self.trial.number), *self.bodies()])
+        runner.run()
+        runner.close()
         if self.room.response is None:
             raise CogmapError(f"no response in {self.trial}")
         return self.room.response

@@ -132,11 +132,11 @@ def build(config: Config, instance: str = "sim") -> Module:
     )
     if config.mode == "lockstep":
         lockstep = Lockstep(simulation)
-        return module.on(topics.MOTOR_COMMAND, lockstep.command, _EMITS).starts(
+        return module.on(topics.MOTOR_COMMAND, lockstep.command, _EMITS).on_start(
             lockstep.start, awaits, _EMITS
         )
     real_time = RealTime(simulation)
-    module.on(topics.MOTOR_COMMAND, real_time.command).starts(real_time.start, awaits)
+    module.on(topics.MOTOR_COMMAND, real_time.command).on_start(real_time.start, awaits)
     return module.every(simulation.tick_ns, real_time.tick, _EMITS)
 
 
@@ -145,12 +145,12 @@ def _led(config: Config, way: Way, module: Module, awaits: dict[str, int]) -> Mo
     if way.sensing == "cameras":
         cameras = Lockstep(CameraLevelSim(config, way))
         says = _EMITS
-        return module.on(topics.MOTOR_COMMAND, cameras.command, says).starts(
+        return module.on(topics.MOTOR_COMMAND, cameras.command, says).on_start(
             cameras.start, awaits, says
         )
     led = Lockstep(
         PerceptLevelSim(way, config.noise, config.percepts, config.frame_hz, config.seed)
     )
-    return module.on(topics.MOTOR_COMMAND, led.command, _EMITS_LED).starts(
+    return module.on(topics.MOTOR_COMMAND, led.command, _EMITS_LED).on_start(
         led.start, awaits, _EMITS_LED
     )

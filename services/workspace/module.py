@@ -23,6 +23,6 @@ def build(config: Config, instance: str) -> Module:
         .on(topics.CLOCK, workspace.on_clock, emits=says)
         .serve(topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, workspace.snapshot)
         .journaling(
-            topics.DELTA, workspace.restore, workspace.snapshot, catches_up=[topics.SELF_MOTION]
+            topics.DELTA, workspace.restore, workspace.snapshot, backfill=[topics.SELF_MOTION]
         )
     )

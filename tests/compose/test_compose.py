@@ -30,7 +30,7 @@ MODULES = (
     "action",
     "recorder",
 )
-PATIENCE_S = 60.0
+TIMEOUT_S = 60.0
 
 
 class Compose:
@@ -97,7 +97,7 @@ def watch(compose: Compose) -> Iterator[Watch]:
 
 
 def wait_until(watch: Watch, condition: Callable[[], bool]) -> None:
-    deadline_s = time.monotonic() + PATIENCE_S
+    deadline_s = time.monotonic() + TIMEOUT_S
     while not condition():
         assert time.monotonic() < deadline_s, f"it never happened; present: {sorted(watch.present)}"
         watch.pump(0.1)

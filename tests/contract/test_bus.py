@@ -15,7 +15,7 @@ from schemas.examples import samples
 from schemas.process import Clock
 from schemas.sensing import Odometry
 from schemas.topics import Delivery
-from tests.support.networks import PATIENCE_S, Network, Peer, meet, publish
+from tests.support.networks import TIMEOUT_S, Network, Peer, meet, publish
 
 MESSAGES = {topics.of(message): message for message in samples()}
 TRAVELLING = [topic for topic in topics.ALL if topic.delivery is not Delivery.ON_REQUEST]
@@ -178,7 +178,7 @@ def test_a_query_is_answered(network: Network) -> None:
     answerer.serve(*SNAPSHOTS, lambda payload: Answer(payload * 2, ENVELOPE), work)
     meet(asker, answerer)
 
-    answer = asker.query(topics.SNAPSHOT_REQUEST, b"once", PATIENCE_S)
+    answer = asker.query(topics.SNAPSHOT_REQUEST, b"once", TIMEOUT_S)
 
     assert answer == Answer(b"onceonce", ENVELOPE)
 
@@ -193,7 +193,7 @@ def test_an_error_of_whoever_answers_comes_back_in_words(network: Network) -> No
     meet(asker, answerer)
 
     with pytest.raises(NoAnswerError, match="no such version"):
-        asker.query(topics.SNAPSHOT_REQUEST, b"", PATIENCE_S)
+        asker.query(topics.SNAPSHOT_REQUEST, b"", TIMEOUT_S)
 
 
 def test_a_query_that_nobody_answers_says_so(network: Network) -> None:
@@ -209,7 +209,7 @@ def test_a_query_to_somebody_who_left_says_so(network: Network) -> None:
     meet(asker, answerer)
     asker.watch(lambda member, alive: None if alive else gone.put((member, alive)))
     answerer.close()
-    gone.get(timeout=PATIENCE_S)
+    gone.get(timeout=TIMEOUT_S)
 
     with pytest.raises(NoAnswerError):
         asker.query(topics.SNAPSHOT_REQUEST, b"", 1.0)
@@ -225,9 +225,9 @@ def test_members_are_told_of_who_is_there_comes_and_goes(network: Network) -> No
 
     early.announce(first)
     watcher.watch(lambda member, alive: changes.put((member, alive)))
-    assert changes.get(timeout=PATIENCE_S) == (first, True)
+    assert changes.get(timeout=TIMEOUT_S) == (first, True)
     late.announce(second)
-    assert changes.get(timeout=PATIENCE_S) == (second, True)
+    assert changes.get(timeout=TIMEOUT_S) == (second, True)
     early.close()
-    assert changes.get(timeout=PATIENCE_S) == (first, False)
+    assert changes.get(timeout=TIMEOUT_S) == (first, False)
     assert changes.empty()

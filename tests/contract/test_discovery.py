@@ -15,7 +15,7 @@ from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.topics import About
 from services import registry
-from tests.support.networks import PATIENCE_S, OverZenoh, Peer, meet
+from tests.support.networks import TIMEOUT_S, OverZenoh, Peer, meet
 
 
 def discovered(network: OverZenoh) -> System:
@@ -141,6 +141,6 @@ def test_a_process_that_left_is_not_found(over_zenoh: OverZenoh) -> None:
     gone = Peer(watcher)
     watcher.watch(lambda member, alive: gone.inbox.call(lambda: None) if not alive else None)
     leaver.close()
-    assert gone.inbox.take(PATIENCE_S) is not None
+    assert gone.inbox.take(TIMEOUT_S) is not None
 
     assert names(discovered(over_zenoh), Role.PUBLISHES, topics.ODOMETRY) == []

@@ -18,7 +18,7 @@ from cogmap.bus.codec import decode, encode
 from cogmap.bus.interface import Arrival, Member
 from cogmap.bus.memory import MemoryBus
 from cogmap.errors import MessageError
-from cogmap.runtime.in_process import House
+from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
 from schemas import topics
 from schemas.array import Array
@@ -27,7 +27,7 @@ from schemas.graph import Node, Proposal
 from schemas.sensing import MotorCommand, RangeScan, TruePose
 from services.codelets import module as codelets
 from services.workspace.commit import Ledger
-from tests.support.networks import PATIENCE_S, OverZenoh, Peer, publish
+from tests.support.networks import TIMEOUT_S, OverZenoh, Peer, publish
 
 PAGE = Path(__file__).parents[2] / "docs" / "modules.md"
 
@@ -89,10 +89,10 @@ def test_the_module_refuses_a_scan_that_makes_no_sense(loaded: Any) -> None:
         page.build(page.Config(), "action").feed(bad)
 
 
-def test_the_module_drives_the_robot_in_a_house(loaded: Any) -> None:
+def test_the_module_drives_the_robot_in_one_process(loaded: Any) -> None:
     page = loaded("module")
-    exec(example("house"), page.__dict__)
-    house: House = page.house
+    exec(example("runner"), page.__dict__)
+    runner: InProcessRunner = page.runner
     poses: list[TruePose] = []
 
     def keep(arrival: Arrival) -> None:
@@ -100,9 +100,9 @@ def test_the_module_drives_the_robot_in_a_house(loaded: Any) -> None:
         assert isinstance(pose, TruePose)
         poses.append(pose)
 
-    MemoryBus(house.network).subscribe(topics.TRUE_POSE, keep, lambda name, number: None)
-    house.run(lambda: len(poses) >= 4)
-    house.close()
+    MemoryBus(runner.network).subscribe(topics.TRUE_POSE, keep, lambda name, number: None)
+    runner.run(lambda: len(poses) >= 4)
+    runner.close()
     assert poses[-1].travelled_m > poses[1].travelled_m > 0
 
 
@@ -121,7 +121,7 @@ def test_the_foreign_module_answers_scans_over_zenoh(loaded: Any, over_zenoh: Ov
     thread = threading.Thread(target=page.run, args=(over_zenoh.endpoint, over_zenoh.agent, stop))
     thread.start()
     try:
-        assert ready.wait(PATIENCE_S)
+        assert ready.wait(TIMEOUT_S)
         for seq, range_m in enumerate((20.0, 2.0)):
             publish(here, _scan(range_m, seq))
             (arrival,) = peer.take(1)

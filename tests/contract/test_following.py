@@ -16,7 +16,7 @@ from schemas.base import Message
 from schemas.graph import Delta, DropNode, Link, Node, Operation, SnapshotRequest
 from schemas.process import Health
 from schemas.sensing import MotorCommand, Odometry
-from tests.support.networks import Network, Peer, meet, publish, pump_until, working
+from tests.support.networks import Network, Peer, meet, publish, spin_until, working
 
 
 class Workspace:
@@ -86,8 +86,8 @@ class Followed:
 
     def catch_up(self, workspace: Workspace, version: int) -> None:
         """Work until both are at `version`."""
-        pump_until(lambda: workspace.graph.version == version, self.shell)
-        pump_until(lambda: self.graph.version == version, self.shell)
+        spin_until(lambda: workspace.graph.version == version, self.shell)
+        spin_until(lambda: self.graph.version == version, self.shell)
 
     def agrees_with(self, workspace: Workspace) -> bool:
         return self.graph.digest() == workspace.graph.digest()
@@ -120,7 +120,7 @@ def test_a_follower_that_joins_late_begins_with_a_snapshot(
 
     with workspace.running():
         workspace.commit(10)
-        pump_until(lambda: workspace.graph.version == 10)
+        spin_until(lambda: workspace.graph.version == 10)
         follower.shell.open()
         assert follower.graph.version == 10
         meet(workspace.shell.bus, follower.shell.bus)
@@ -157,7 +157,7 @@ def test_a_gap_without_an_answer_is_mended_once_there_is_one(
         silent.commit(2)
         silent.commit(1, lost=True)
         silent.commit(2)
-        pump_until(lambda: follower.shell.intake.received["workspace/delta"] == 4, follower.shell)
+        spin_until(lambda: follower.shell.intake.received["workspace/delta"] == 4, follower.shell)
         assert follower.graph.version == 2
         assert follower.versions == [1, 2]
 
@@ -180,7 +180,7 @@ def test_a_follower_that_restarts_has_the_graph_again(network: Network) -> None:
         first.catch_up(workspace, 6)
         first.shell.close()
         workspace.commit(6)
-        pump_until(lambda: workspace.graph.version == 12)
+        spin_until(lambda: workspace.graph.version == 12)
         second = Followed(network)
         second.shell.open()
         meet(workspace.shell.bus, second.shell.bus)
@@ -228,12 +228,12 @@ def test_a_delta_is_applied_before_any_later_message_is_received(network: Networ
         meet(sim, follower.bus)
         for version in range(1, 6):
             workspace.commit()
-            pump_until(lambda: graph.version == version, follower)  # noqa: B023
+            spin_until(lambda: graph.version == version, follower)  # noqa: B023
             odometry = Odometry(
                 speed_m_s=0.0, turn_rate_rad_s=0.0, dt_s=0.1, seq=version - 1, source="sim"
             )
             publish(sim, odometry)
-            pump_until(lambda: len(seen) == version, follower)  # noqa: B023
+            spin_until(lambda: len(seen) == version, follower)  # noqa: B023
 
     assert seen == [1, 2, 3, 4, 5]
     follower.close()
@@ -245,7 +245,7 @@ def test_a_snapshot_is_named_among_the_causes(network: Network, follower: Follow
 
     with workspace.running():
         workspace.commit(4)
-        pump_until(lambda: workspace.graph.version == 4)
+        spin_until(lambda: workspace.graph.version == 4)
         follower.shell.open()
         meet(workspace.shell.bus, follower.shell.bus)
         meet(follower.shell.bus, peer.bus)
@@ -271,9 +271,9 @@ def test_health_reports_a_graph_that_is_behind(network: Network) -> None:
         silent.commit(1)
         silent.commit(1, lost=True)
         silent.commit(1)
-        pump_until(lambda: bool(follower.shell.notes), follower.shell)
+        spin_until(lambda: bool(follower.shell.notes), follower.shell)
         reports = peer.arrived
-        pump_until(lambda: peer.arrived > reports, follower.shell)
+        spin_until(lambda: peer.arrived > reports, follower.shell)
 
     (arrival,) = peer.take(1)
     health = decode(topics.HEALTH, arrival.payload)

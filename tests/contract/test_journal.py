@@ -89,7 +89,7 @@ def test_one_message_stands_for_all_after_condensing(tmp_path: Path) -> None:
         journal.append(delta(version), encode(delta(version)))
     snapshot = Snapshot(version=49, cycle=49, nodes=[], links=[], tiles=[])
 
-    journal.condense(snapshot)
+    journal.compact(snapshot)
     journal.append(delta(50), encode(delta(50)))
     journal.close()
 
@@ -105,7 +105,7 @@ def test_a_kill_while_condensing_leaves_the_old_journal(tmp_path: Path) -> None:
 
     journal = Journal(tmp_path / "j")
     snapshot = Snapshot(version=2, cycle=2, nodes=[], links=[], tiles=[])
-    journal.condense(snapshot)
+    journal.compact(snapshot)
     journal.close()
     assert restored(tmp_path / "j") == [snapshot]
 

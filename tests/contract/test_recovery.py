@@ -16,7 +16,7 @@ from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.graph import Delta, Node
 from schemas.sensing import Odometry
-from tests.support.networks import OverZenoh, Peer, meet, publish, pump_until, working
+from tests.support.networks import OverZenoh, Peer, meet, publish, spin_until, working
 
 
 class Router:
@@ -105,12 +105,12 @@ def test_of_more_than_the_cache_holds_the_loss_is_counted_and_a_replica_is_mende
     with working(Shell(keeper, network.join(), health=False)):
         meet(publisher, reader)
         commit()
-        pump_until(lambda: replica.version == 1, follower)
+        spin_until(lambda: replica.version == 1, follower)
         router.kill()
         for _ in range(CACHED_MESSAGES + lost):
             commit()
         router.start()
-        pump_until(lambda: replica.version == graph.version, follower)
+        spin_until(lambda: replica.version == graph.version, follower)
 
     assert replica.digest() == graph.digest()
     assert follower.notes == ["gaps of the graph that a snapshot mended: 1"]

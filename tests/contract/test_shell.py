@@ -11,7 +11,7 @@ from cogmap.bus.codec import Cause, Envelope, decode, encode
 from cogmap.bus.interface import Member
 from cogmap.errors import MessageError, NoAnswerError
 from cogmap.runtime.module import Module
-from cogmap.runtime.shell import MANY_CAUSES, Shell
+from cogmap.runtime.shell import MAX_CAUSES, Shell
 from schemas import topics
 from schemas.base import Message
 from schemas.graph import Snapshot, SnapshotRequest
@@ -20,13 +20,13 @@ from schemas.sensing import MotorCommand, Odometry
 from schemas.topics import Delivery, Topic
 from tests.support.damage import damaged, golden
 from tests.support.networks import (
-    PATIENCE_S,
+    TIMEOUT_S,
     Network,
     Peer,
     envelope_of,
     meet,
     publish,
-    pump_until,
+    spin_until,
     working,
 )
 
@@ -69,11 +69,11 @@ def test_bad_input_is_counted_and_changes_nothing_else(network: Network, topic: 
 
     for number, (payload, attachment) in enumerate(arrivals, 1):
         network.put(topic, payload, attachment)
-        pump_until(lambda: shell.intake.rejected[topic.name] == number, shell)  # noqa: B023
+        spin_until(lambda: shell.intake.rejected[topic.name] == number, shell)  # noqa: B023
     assert heard == []
 
     network.put(topic, golden(topic), proper)
-    pump_until(lambda: bool(heard), shell)
+    spin_until(lambda: bool(heard), shell)
     assert heard == [whole]
     assert dict(shell.intake.rejected) == {topic.name: len(arrivals)}
     assert dict(shell.intake.received) == {topic.name: 1}
@@ -92,7 +92,7 @@ def test_bad_input_is_named_once_a_second_at_most(
     with caplog.at_level(logging.WARNING, "cogmap"):
         for _ in range(200):
             network.put(topics.ODOMETRY, b"\x80", encode(envelope_of(odometry(0))))
-        pump_until(lambda: shell.intake.rejected["odometry"] == 200, shell)
+        spin_until(lambda: shell.intake.rejected["odometry"] == 200, shell)
 
     said = [record.getMessage() for record in caplog.records]
     assert "odometry" in said[0]
@@ -109,7 +109,7 @@ def test_a_message_that_comes_twice_is_taken_in_once(network: Network) -> None:
     meet(publisher, shell.bus)
 
     publish(publisher, odometry(0), odometry(1), odometry(1), odometry(0), odometry(2))
-    pump_until(lambda: len(heard) == 3, shell)
+    spin_until(lambda: len(heard) == 3, shell)
 
     assert [message.seq for message in heard] == [0, 1, 2]
     assert (shell.intake.received["odometry"], shell.intake.rejected["odometry"]) == (3, 2)
@@ -125,7 +125,7 @@ def test_a_source_that_starts_anew_counts_from_the_beginning(network: Network) -
 
     publish(publisher, odometry(0), odometry(1))
     publish(publisher, odometry(0), odometry(1), incarnation=2)
-    pump_until(lambda: len(heard) == 4, shell)
+    spin_until(lambda: len(heard) == 4, shell)
 
     assert not shell.intake.rejected
     assert not shell.intake.gaps
@@ -140,7 +140,7 @@ def test_a_gap_in_the_numbers_of_a_source_is_counted(network: Network) -> None:
     meet(publisher, shell.bus)
 
     publish(publisher, odometry(0), odometry(4), odometry(0, "other"), odometry(5))
-    pump_until(lambda: len(heard) == 4, shell)
+    spin_until(lambda: len(heard) == 4, shell)
 
     assert dict(shell.intake.gaps) == {"odometry": 3}
     shell.close()
@@ -154,11 +154,11 @@ def test_a_loss_that_the_bus_tells_of_and_the_numbers_show_counts_once(network: 
     meet(publisher, shell.bus)
 
     publish(publisher, odometry(0))
-    pump_until(lambda: len(heard) == 1, shell)
-    shell.intake.lose("odometry", 2)
+    spin_until(lambda: len(heard) == 1, shell)
+    shell.intake.count_lost("odometry", 2)
     assert dict(shell.intake.gaps) == {"odometry": 2}
     publish(publisher, odometry(3))
-    pump_until(lambda: len(heard) == 2, shell)
+    spin_until(lambda: len(heard) == 2, shell)
 
     assert dict(shell.intake.gaps) == {"odometry": 2}
     shell.close()
@@ -182,7 +182,7 @@ def test_a_module_whose_handler_raises_goes_on(network: Network, error: Exceptio
     meet(observer, shell.bus)
 
     publish(observer, odometry(0), odometry(1), odometry(2))
-    pump_until(lambda: peer.arrived == 2, shell)
+    spin_until(lambda: peer.arrived == 2, shell)
 
     answers = [decode(topics.MOTOR_COMMAND, arrival.payload) for arrival in peer.take(2)]
     assert [(answer.stamp_ns, answer.seq, answer.source) for answer in answers] == [
@@ -206,7 +206,7 @@ def test_what_led_to_a_message_and_the_time_it_took_travel_with_it(network: Netw
     meet(observer, shell.bus)
 
     publish(observer, *(odometry(seq) for seq in range(4)))
-    pump_until(lambda: peer.arrived == 2, shell)
+    spin_until(lambda: peer.arrived == 2, shell)
 
     for arrival, causes in zip(peer.take(2), ([0, 1], [2, 3]), strict=True):
         assert arrival.envelope is not None
@@ -230,11 +230,11 @@ def test_what_a_silent_module_took_in_is_told_with_its_health_before_it_grows_lo
     shell.open()
     meet(observer, shell.bus)
 
-    publish(observer, *(odometry(seq) for seq in range(MANY_CAUSES + 1)))
-    pump_until(lambda: shell.intake.received["odometry"] == MANY_CAUSES + 1, shell)
+    publish(observer, *(odometry(seq) for seq in range(MAX_CAUSES + 1)))
+    spin_until(lambda: shell.intake.received["odometry"] == MAX_CAUSES + 1, shell)
     told: list[Cause] = []
     while not told:
-        pump_until(lambda: len(peer.inbox) > 0, shell)
+        spin_until(lambda: len(peer.inbox) > 0, shell)
         told += [
             cause
             for arrival in peer.take(1)
@@ -242,7 +242,7 @@ def test_what_a_silent_module_took_in_is_told_with_its_health_before_it_grows_lo
             for cause in arrival.envelope.causes
         ]
 
-    assert told == [("odometry", "sim", seq) for seq in range(MANY_CAUSES + 1)]
+    assert told == [("odometry", "sim", seq) for seq in range(MAX_CAUSES + 1)]
     shell.close()
 
 
@@ -256,8 +256,8 @@ def test_health_is_published_and_says_what_was_taken_in_and_refused(network: Net
     meet(observer, shell.bus)
 
     publish(observer, odometry(0), odometry(0), odometry(2))
-    pump_until(lambda: shell.intake.received["odometry"] == 2, shell)
-    pump_until(lambda: peer.arrived > 0, shell)
+    spin_until(lambda: shell.intake.received["odometry"] == 2, shell)
+    spin_until(lambda: peer.arrived > 0, shell)
 
     health = decode(topics.HEALTH, peer.take(1)[0].payload)
     assert isinstance(health, Health)
@@ -278,14 +278,14 @@ def test_health_is_published_and_says_what_was_taken_in_and_refused(network: Net
 
 
 def test_a_module_that_waits_for_others_is_not_ready_and_says_so(network: Network) -> None:
-    module = Module("sim").starts(lambda: None, awaits={"action": 1})
+    module = Module("sim").on_start(lambda: None, requires={"action": 1})
     shell = Shell(module, network.join())
     observer = network.join()
     peer = Peer(observer, topics.HEALTH)
     shell.open()
     meet(observer, shell.bus)
 
-    pump_until(lambda: peer.arrived > 0, shell)
+    spin_until(lambda: peer.arrived > 0, shell)
 
     health = decode(topics.HEALTH, peer.take(1)[0].payload)
     assert isinstance(health, Health)
@@ -294,10 +294,10 @@ def test_a_module_that_waits_for_others_is_not_ready_and_says_so(network: Networ
     shell.close()
 
 
-def test_nothing_is_missed_by_those_that_a_start_awaits(network: Network) -> None:
+def test_nothing_is_missed_by_those_that_a_start_requires(network: Network) -> None:
     heard: dict[str, list[int]] = {"one": [], "two": []}
     first = [odometry(seq) for seq in range(20)]
-    sim = Module("sim").starts(lambda: first, awaits={"listener": 2}, emits=[topics.ODOMETRY])
+    sim = Module("sim").on_start(lambda: first, requires={"listener": 2}, emits=[topics.ODOMETRY])
     starting = Shell(sim, network.join(), health=False)
     starting.open()
     waiting = [
@@ -312,10 +312,10 @@ def test_nothing_is_missed_by_those_that_a_start_awaits(network: Network) -> Non
     ]
 
     waiting[0].open()
-    pump_until(lambda: starting.missing == {"listener": 1}, starting)
+    spin_until(lambda: starting.missing == {"listener": 1}, starting)
     assert heard == {"one": [], "two": []}
     waiting[1].open()
-    pump_until(lambda: all(len(seqs) == 20 for seqs in heard.values()), starting, *waiting)
+    spin_until(lambda: all(len(seqs) == 20 for seqs in heard.values()), starting, *waiting)
 
     assert heard == {name: list(range(20)) for name in heard}
     for shell in (starting, *waiting):
@@ -325,7 +325,7 @@ def test_nothing_is_missed_by_those_that_a_start_awaits(network: Network) -> Non
 def test_a_start_happens_once_though_one_that_it_awaited_goes_and_comes(network: Network) -> None:
     started: list[int] = []
     shell = Shell(
-        Module("sim").starts(lambda: started.append(1), awaits={"action": 1}),
+        Module("sim").on_start(lambda: started.append(1), requires={"action": 1}),
         network.join(),
         health=False,
     )
@@ -333,9 +333,9 @@ def test_a_start_happens_once_though_one_that_it_awaited_goes_and_comes(network:
     for _ in range(2):
         action = Shell(Module("action"), network.join(), health=False)
         action.open()
-        pump_until(lambda: not shell.missing, shell)
+        spin_until(lambda: not shell.missing, shell)
         action.close()
-        pump_until(lambda: bool(shell.missing), shell)
+        spin_until(lambda: bool(shell.missing), shell)
 
     assert started == [1]
     shell.close()
@@ -349,9 +349,9 @@ def test_a_module_that_asks_is_told_who_comes_and_goes(network: Network) -> None
     shell.open()
 
     worker.announce(Member("codelets", "codelets-1"))
-    pump_until(lambda: any(presence.module == "codelets" for presence in told), shell)
+    spin_until(lambda: any(presence.module == "codelets" for presence in told), shell)
     worker.close()
-    pump_until(lambda: any(not presence.alive for presence in told), shell)
+    spin_until(lambda: any(not presence.alive for presence in told), shell)
 
     assert [(p.instance, p.alive) for p in told if p.module == "codelets"] == [
         ("codelets-1", True),
@@ -373,9 +373,9 @@ def test_a_question_that_makes_no_sense_is_refused_and_counted(network: Network)
             asker.query(
                 topics.SNAPSHOT_REQUEST,
                 encode(SnapshotRequest()).replace(b"\x00", b"\xff", 1),
-                PATIENCE_S,
+                TIMEOUT_S,
             )
-        answer = asker.query(topics.SNAPSHOT_REQUEST, encode(SnapshotRequest()), PATIENCE_S)
+        answer = asker.query(topics.SNAPSHOT_REQUEST, encode(SnapshotRequest()), TIMEOUT_S)
 
     assert decode(topics.SNAPSHOT, answer.payload) == empty
     assert shell.intake.rejected == {"workspace/snapshot_request": 1}
@@ -392,7 +392,7 @@ def test_a_clock_that_is_older_than_the_newest_is_never_thought_about(network: N
 
     publish(publisher, *(Clock(seq=seq, source="sim") for seq in range(100)))
     peer.wait_for(100)
-    pump_until(lambda: bool(heard) and heard[-1].seq == 99, shell)
+    spin_until(lambda: bool(heard) and heard[-1].seq == 99, shell)
 
     assert shell.inbox.superseded["clock"] + len(heard) == 100
     shell.close()

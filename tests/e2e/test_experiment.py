@@ -12,12 +12,12 @@ from experiments.loop_closing.run import MIND, driven, sections
 from services import registry
 
 COGMAP = [sys.executable, "-m", "cli.main", "experiment"]
-PATIENCE_S = 110.0
+TIMEOUT_S = 110.0
 
 
 def _run(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [*COGMAP, *arguments], capture_output=True, text=True, timeout=PATIENCE_S, check=False
+        [*COGMAP, *arguments], capture_output=True, text=True, timeout=TIMEOUT_S, check=False
     )
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from cogmap.bus.session import free_endpoint
 from cogmap.recording.diff import diff
 
-PATIENCE_S = 90.0
+TIMEOUT_S = 90.0
 
 
 def _drive(folder: Path, workers: int) -> Path:
@@ -36,7 +36,7 @@ def _drive(folder: Path, workers: int) -> Path:
         "--connect",
         free_endpoint(),
     ]
-    done = subprocess.run(whole, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+    done = subprocess.run(whole, capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     assert json.loads((folder / "summary.json").read_text())["gaps_total"] == 0
     return folder / "log.mcap"

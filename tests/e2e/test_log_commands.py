@@ -30,7 +30,7 @@ from schemas.sensing import Odometry, RangeScan
 from tests.support.networks import routed
 
 COUNT = 5
-PATIENCE_S = 30.0
+TIMEOUT_S = 30.0
 
 
 def write(path: Path, speed_m_s: float = 1.0, without: int | None = None) -> Path:
@@ -189,13 +189,13 @@ def test_what_is_played_onto_zenoh_and_recorded_again_says_the_same(
     observer = ZenohBus(endpoint, "played")
     here = threading.Event()
     observer.watch(lambda member, alive: here.set())
-    assert here.wait(PATIENCE_S)
+    assert here.wait(TIMEOUT_S)
     observer.close()
     command = [sys.executable, "-m", "cli.main", "log", "replay", str(path), "-r", "1000", "--json"]
     with subprocess.Popen(
         [*command, "--connect", endpoint, "--agent", "played"], stdout=subprocess.PIPE, text=True
     ) as player:
-        deadline_s = time.monotonic() + PATIENCE_S
+        deadline_s = time.monotonic() + TIMEOUT_S
         while sum(recorder.received.values()) < 2 * COUNT and time.monotonic() < deadline_s:
             recorder.pump(0.1)
         assert player.stdout is not None
@@ -230,7 +230,7 @@ def test_the_space_bar_lets_a_replay_go_on_that_began_paused(endpoint: str, path
         stdout=subprocess.PIPE,
         text=True,
     ) as player:
-        assert here.wait(PATIENCE_S)
+        assert here.wait(TIMEOUT_S)
         assert player.poll() is None
         os.write(terminal, b" ")
         assert player.stdout is not None

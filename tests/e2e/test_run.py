@@ -24,7 +24,7 @@ from schemas import topics
 from schemas.sensing import MotorCommand
 
 COGMAP = [sys.executable, "-m", "cli.main"]
-PATIENCE_S = 60.0
+TIMEOUT_S = 60.0
 
 
 def processes_at(endpoint: str, words: str = "") -> list[int]:
@@ -49,7 +49,7 @@ def shared_memory() -> set[Path]:
 
 
 def wait_until(condition: Callable[[], bool]) -> None:
-    deadline_s = time.monotonic() + PATIENCE_S
+    deadline_s = time.monotonic() + TIMEOUT_S
     while not condition():
         assert time.monotonic() < deadline_s, "it never happened"
         select.select([], [], [], 0.02)
@@ -68,7 +68,7 @@ class Run:
         return Path(self._output.name).read_text()
 
     def end(self) -> int:
-        return self.process.wait(PATIENCE_S)
+        return self.process.wait(TIMEOUT_S)
 
     def wait_for(self, sentence: str) -> None:
         def said() -> bool:
@@ -179,7 +179,7 @@ def commands() -> Iterator[Callable[[str], list[MotorCommand]]]:
 
     def work(shell: Shell) -> None:
         while not ended.is_set():
-            shell.pump(0.05)
+            shell.spin_once(0.05)
 
     yield listen
     ended.set()

@@ -20,7 +20,7 @@ from schemas import topics
 from schemas.examples import samples
 from schemas.sensing import MotorCommand, Odometry
 
-PATIENCE_S = 30.0
+TIMEOUT_S = 30.0
 SAMPLES = {topics.of(message): message for message in samples()}
 
 
@@ -49,7 +49,7 @@ class System:
 
     def _work(self) -> None:
         while not self._ended.is_set():
-            self._shell.pump(0.01)
+            self._shell.spin_once(0.01)
 
     def close(self) -> None:
         self._ended.set()
@@ -83,7 +83,7 @@ def start(endpoint: str, *arguments: str) -> subprocess.Popen[str]:
 def said(endpoint: str, *arguments: str, code: int = 0) -> tuple[str, str]:
     """What a command prints, to its output and its errors."""
     process = start(endpoint, *arguments)
-    output, errors = process.communicate(timeout=PATIENCE_S)
+    output, errors = process.communicate(timeout=TIMEOUT_S)
     assert process.returncode == code, errors
     return output, errors
 
@@ -128,7 +128,7 @@ def test_ctrl_c_ends_with_the_figures(
     assert process.stdout is not None
     assert figure in process.stdout.readline()
     process.send_signal(signal.SIGINT)
-    output, errors = process.communicate(timeout=PATIENCE_S)
+    output, errors = process.communicate(timeout=TIMEOUT_S)
 
     assert (process.returncode, errors) == (0, "")
     assert figure in output
@@ -140,7 +140,7 @@ def test_pub_is_obeyed(system: System, endpoint: str) -> None:
 
     said(endpoint, "topic", "pub", "-t", "2", "-r", "20", "motor/command", written)
 
-    assert system.got_command.wait(PATIENCE_S)
+    assert system.got_command.wait(TIMEOUT_S)
     assert system.commands[0] == MotorCommand(
         left_wheel_rad_s=1.5, right_wheel_rad_s=2.0, source="cli"
     )

@@ -13,7 +13,7 @@ import pytest
 
 from tests.support.networks import routed
 
-PATIENCE_S = 30.0
+TIMEOUT_S = 30.0
 NOBODY = "tcp/127.0.0.1:1"
 FREE = "tcp/127.0.0.1:0"
 
@@ -25,7 +25,7 @@ def start(*arguments: str) -> subprocess.Popen[str]:
 
 def sentence_of(process: subprocess.Popen[str]) -> str:
     """What a command that ends with code 2 says, in one line and nothing else."""
-    output, errors = process.communicate(timeout=PATIENCE_S)
+    output, errors = process.communicate(timeout=TIMEOUT_S)
     assert (process.returncode, output, errors.count("\n")) == (2, "", 1), output + errors
     assert errors.startswith("cogmap: ")
     return errors

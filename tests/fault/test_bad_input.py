@@ -39,7 +39,9 @@ class Turns:
         says = (topics.SELF_MOTION, topics.PERCEPTS)
         awaits = {"workspace": 1, "codelets": 2, "witness": 1}
         self.module = (
-            Module("turns").on(topics.DELTA, self._on_delta, says).starts(self._view, awaits, says)
+            Module("turns")
+            .on(topics.DELTA, self._on_delta, says)
+            .on_start(self._view, awaits, says)
         )
 
     def _on_delta(self, delta: Delta) -> list[Message]:

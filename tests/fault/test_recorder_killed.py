@@ -25,7 +25,7 @@ from schemas.sensing import Odometry
 from tests.support.disks import full_after
 from tests.support.networks import routed
 
-PATIENCE_S = 30.0
+TIMEOUT_S = 30.0
 AGENT = "recorded"
 FLUSH_S = 0.25
 SLACK_S = 0.5
@@ -52,7 +52,7 @@ class Speaker:
             self._here.set()
 
     def await_recorder(self) -> None:
-        assert self._here.wait(PATIENCE_S)
+        assert self._here.wait(TIMEOUT_S)
 
     def speak(self) -> None:
         now_ns = time.time_ns()
@@ -73,7 +73,7 @@ class Speaker:
     def speak_until_it_grows(self, path: Path, times: int) -> None:
         """Go on until the file has grown so often."""
         size = path.stat().st_size
-        deadline_s = time.monotonic() + PATIENCE_S
+        deadline_s = time.monotonic() + TIMEOUT_S
         while times:
             assert time.monotonic() < deadline_s, "the file does not grow"
             self.speak()

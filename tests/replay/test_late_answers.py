@@ -65,7 +65,7 @@ class Session:
         self.bus.publish(
             topic, encode(message), Envelope(message.source, message.seq, 1, now_ns, now_ns)
         )
-        while self.shell.pump():
+        while self.shell.spin_once():
             pass
 
     def see(self, frame: int) -> Task:

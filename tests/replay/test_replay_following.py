@@ -80,7 +80,7 @@ class Session:
 
     def _settle(self) -> None:
         for shell in self._shells:
-            while shell.pump():
+            while shell.spin_once():
                 pass
 
     def _snapshot(self, request: object) -> Snapshot:

@@ -65,7 +65,7 @@ class Mixer:
             if isinstance(message, MotorCommand):
                 self._state = (self._state + message.left_wheel_rad_s) % 1000
 
-    def condense(self) -> MotorCommand:
+    def compact(self) -> MotorCommand:
         return MotorCommand(left_wheel_rad_s=self._state, right_wheel_rad_s=0.0)
 
 
@@ -75,8 +75,8 @@ def build(name: str, sections: Sections, instance: str) -> Module:
     module = (
         Module(name, instance).on(topics.ODOMETRY, mixer.take, says).on(topics.CLOCK, mixer.take)
     )
-    module.starts(mixer.begin, {"sim": 1}).journaling(
-        topics.MOTOR_COMMAND, mixer.restore, mixer.condense
+    module.on_start(mixer.begin, {"sim": 1}).journaling(
+        topics.MOTOR_COMMAND, mixer.restore, mixer.compact
     )
     return module.every(10**15, mixer.tick) if sections.get(name, {}).get("timer") else module
 
@@ -110,7 +110,7 @@ class Session:
 
     def settle(self) -> None:
         for shell in self.shells.values():
-            while shell.pump():
+            while shell.spin_once():
                 pass
 
     def end(self) -> None:

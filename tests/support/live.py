@@ -28,7 +28,7 @@ from schemas.graph import Delta, Snapshot, SnapshotRequest
 from schemas.process import Clock, Health
 from schemas.sensing import MotorCommand, Percept, Percepts, SelfMotion
 
-PATIENCE_S = 40.0
+TIMEOUT_S = 40.0
 AGENT = "fault"
 PERIOD_NS = 100_000_000
 SPEED_M_S = 1.0
@@ -36,7 +36,7 @@ SPEED_M_S = 1.0
 
 def wait_until(condition: Callable[[], bool], what: str) -> None:
     """Look every 20 ms whether `condition` holds."""
-    deadline_s = time.monotonic() + PATIENCE_S
+    deadline_s = time.monotonic() + TIMEOUT_S
     pause = threading.Event()
     while not condition():
         assert time.monotonic() < deadline_s, f"it never happened: {what}"
@@ -81,7 +81,7 @@ class Process:
         self.send(how)
         self.send(signal.SIGCONT)
         with self._process as process:
-            return process.wait(PATIENCE_S)
+            return process.wait(TIMEOUT_S)
 
     @property
     def is_alive(self) -> bool:

@@ -25,7 +25,7 @@ from schemas import topics
 from schemas.base import Message
 from schemas.topics import Topic
 
-PATIENCE_S = 20.0
+TIMEOUT_S = 20.0
 INCARNATION = 1
 BLOCK = zenoh.CongestionControl.BLOCK
 _numbers = itertools.count()
@@ -116,13 +116,13 @@ class Peer:
     def wait_for(self, number: int) -> None:
         """Wait until so many have arrived, taken in or not."""
         with self._changed:
-            assert self._changed.wait_for(lambda: self.arrived >= number, PATIENCE_S), (
+            assert self._changed.wait_for(lambda: self.arrived >= number, TIMEOUT_S), (
                 f"{self.arrived} of {number}"
             )
 
     def take(self, number: int) -> list[Arrival]:
         """The next `number` arrivals."""
-        taken = [self.inbox.take(PATIENCE_S) for _ in range(number)]
+        taken = [self.inbox.take(TIMEOUT_S) for _ in range(number)]
         assert all(isinstance(arrival, Arrival) for arrival in taken)
         return [arrival for arrival in taken if isinstance(arrival, Arrival)]
 
@@ -143,16 +143,16 @@ def meet(here: Bus, *others: Bus) -> None:
     here.watch(changed)
     for member, other in zip(sorted(expected), others, strict=True):
         other.announce(member)
-    assert done.wait(PATIENCE_S)
+    assert done.wait(TIMEOUT_S)
 
 
-def pump_until(condition: Callable[[], bool], *shells: Shell) -> None:
+def spin_until(condition: Callable[[], bool], *shells: Shell) -> None:
     """Let the shells work until `condition` holds."""
-    deadline_s = time.monotonic() + PATIENCE_S
+    deadline_s = time.monotonic() + TIMEOUT_S
     while not condition():
         assert time.monotonic() < deadline_s, "the condition never held"
         for shell in shells:
-            shell.pump(0.01)
+            shell.spin_once(0.01)
 
 
 @contextmanager
@@ -162,7 +162,7 @@ def working(shell: Shell) -> Iterator[None]:
 
     def work() -> None:
         while not ended.is_set():
-            shell.pump(0.01)
+            shell.spin_once(0.01)
 
     shell.open()
     thread = threading.Thread(target=work, daemon=True)

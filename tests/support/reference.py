@@ -31,7 +31,7 @@ from cogmap.recording.selection import to_record
 from cogmap.recording.storage import format as layout
 from cogmap.recording.storage.reader import LogReader
 from cogmap.runtime.config import Sections
-from cogmap.runtime.in_process import House
+from cogmap.runtime.in_process import InProcessRunner
 from schemas import topics
 from schemas.graph import Delta
 from schemas.topics import About
@@ -63,15 +63,17 @@ def drive(frames: int = FRAMES, seed: int = 1, workers: int = 1, log: Path | Non
     instances = [(name, name) for name in registry.MODULES if name != "codelets"] + [
         ("codelets", name) for name in names
     ]
-    house = House([registry.build(name, configured, instance) for name, instance in instances])
+    runner = InProcessRunner(
+        [registry.build(name, configured, instance) for name, instance in instances]
+    )
     said: Said = defaultdict(list)
-    bus = MemoryBus(house.network)
+    bus = MemoryBus(runner.network)
     for topic in topics.ALL:
         if topic.about is not About.PROCESS:
             bus.subscribe(topic, lambda arrival: _keep(said, arrival), lambda name, number: None)
-    recorder = None if log is None else _recorder(MemoryBus(house.network), log, configured)
-    house.run(lambda: len(said[topics.MOTOR_COMMAND.name]) >= frames)
-    house.close()
+    recorder = None if log is None else _recorder(MemoryBus(runner.network), log, configured)
+    runner.run(lambda: len(said[topics.MOTOR_COMMAND.name]) >= frames)
+    runner.close()
     if recorder is not None:
         recorder.close()
     return dict(said)

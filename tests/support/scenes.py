@@ -176,6 +176,6 @@ class Desk:
     def digest(self) -> str:
         """The digest of the workspace's own graph."""
         graph = Graph()
-        reply, handler = self.module.answers[topics.SNAPSHOT_REQUEST]
+        reply, handler = self.module.served[topics.SNAPSHOT_REQUEST]
         graph.load(decode(reply, encode(handler(None))))  # type: ignore[arg-type]
         return graph.digest()

@@ -322,9 +322,9 @@ def test_an_action_module_that_was_killed_goes_on_along_the_route_from_its_last_
     for cycle in range(1, 13):
         said += before.feed(_delta(cycle, 2.0 * cycle))
     said += before.feed(_broadcast(12))
-    assert before.condense is not None
+    assert before.compact is not None
     assert after.restore is not None
-    assert before.condense() == said[-1]
+    assert before.compact() == said[-1]
     after.restore([message for message in said if isinstance(message, Action)])
     (command,) = _commands(after.feed(_delta(13, 25.0)))
     assert command.left_wheel_rad_s > 0

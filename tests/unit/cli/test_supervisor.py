@@ -18,7 +18,7 @@ import pytest
 from cli.launch.supervisor import Program, Supervisor
 from cogmap.errors import UsageError
 
-PATIENCE_S = 20.0
+TIMEOUT_S = 20.0
 
 
 def python(instance: str, code: str) -> Program:
@@ -26,7 +26,7 @@ def python(instance: str, code: str) -> Program:
 
 
 def wait_until(condition: Callable[[], bool]) -> None:
-    deadline_s = time.monotonic() + PATIENCE_S
+    deadline_s = time.monotonic() + TIMEOUT_S
     while not condition():
         assert time.monotonic() < deadline_s, "it never happened"
         select.select([], [], [], 0.01)

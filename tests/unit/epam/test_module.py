@@ -119,9 +119,9 @@ def test_what_was_learned_is_known_again_after_a_restart(views: list[View], tmp_
     again.restore(Journal(tmp_path / "epam").messages())
 
     assert first.journal is topics.LEARNED
-    assert first.condense is not None
-    assert again.condense is not None
-    assert codec.encode(again.condense()) == codec.encode(first.condense())
+    assert first.compact is not None
+    assert again.compact is not None
+    assert codec.encode(again.compact()) == codec.encode(first.compact())
     labels = {percept.label for percept in _percepts(first, views[1]).objects}
     assert any(label.startswith("new-building-") for label in labels)
     assert {percept.label for percept in _percepts(again, views[1]).objects} == labels
@@ -136,8 +136,8 @@ def test_one_message_stands_for_all_that_was_learned(views: list[View]) -> None:
         if isinstance(said, Learned)
         for known in said.objects
     ]
-    assert module.condense is not None
-    everything = module.condense()
+    assert module.compact is not None
+    everything = module.compact()
 
     assert isinstance(everything, Learned)
     assert everything.objects == objects

@@ -8,7 +8,7 @@ import pytest
 from cli.experiment import live
 from cogmap.errors import CogmapError
 from cogmap.runtime.config import Sections
-from cogmap.runtime.in_process import House
+from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
 from experiments.cue_integration.camera_level import PicturedRoom
 from experiments.cue_integration.geometry import LANDMARKS
@@ -34,9 +34,9 @@ def _short() -> Sections:
 
 def _heard(configured: Sections, modules: Sequence[Module]) -> Heard:
     heard = Heard(MODEL)
-    house = House([*modules, heard.module()])
-    house.run()
-    house.close()
+    runner = InProcessRunner([*modules, heard.module()])
+    runner.run()
+    runner.close()
     return heard
 
 

@@ -82,7 +82,7 @@ class Listener:
         self.intake, self.arrivals = Intake(), list[Arrival]()
         bus = MemoryBus(network)
         for topic in topics_to_record():
-            bus.subscribe(topic, self.arrivals.append, self.intake.lose)
+            bus.subscribe(topic, self.arrivals.append, self.intake.count_lost)
 
     def of(self, topic: topics.Topic) -> list[Message]:
         accepted = [

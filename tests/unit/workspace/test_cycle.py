@@ -208,8 +208,8 @@ def test_a_workspace_restored_from_its_deltas_or_from_a_snapshot_has_the_same_gr
 ):
     desk = Desk("w1")
     desk.drive(range(4), percept("a"), percept("b", 0.5))
-    assert desk.module.condense is not None
-    snapshot = desk.module.condense()
+    assert desk.module.compact is not None
+    snapshot = desk.module.compact()
     restored = [
         _restored([*desk.deltas]),
         _restored([snapshot]),
@@ -240,7 +240,7 @@ def test_replicas_that_apply_the_deltas_equal_the_workspace() -> None:
 def test_a_snapshot_of_a_version_that_is_not_committed_yet_is_refused() -> None:
     desk = Desk("w1")
     desk.drive(range(1))
-    _, handler = desk.module.answers[topics.SNAPSHOT_REQUEST]
+    _, handler = desk.module.served[topics.SNAPSHOT_REQUEST]
     newest = desk.deltas[-1].version
     assert handler(SnapshotRequest(at_least=newest)).version == newest
     with pytest.raises(MessageError, match="not committed yet"):
