@@ -153,7 +153,7 @@ def test_a_recorder_on_a_full_disk_ends_with_one_sentence(
     with full_after(FULL_BYTES):
         recorder = start(endpoint, path)
     speaker.await_recorder()
-    deadline_s = time.monotonic() + PATIENCE_S
+    deadline_s = time.monotonic() + TIMEOUT_S
     while recorder.poll() is None:
         assert time.monotonic() < deadline_s, "the recorder goes on"
         speaker.speak()
