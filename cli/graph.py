@@ -7,7 +7,7 @@ import json
 import click
 
 from cli.options import agent_option, connect_option, json_option
-from cli.topic.observing import look
+from cli.topic.observing import inspect_system
 from cogmap.bus.discovery import Process, Role, System
 from cogmap.errors import UsageError
 from schemas.topics import Topic
@@ -24,7 +24,7 @@ def graph(dot: bool, as_json: bool, connect: str, agent: str) -> None:
     """Show which process publishes and subscribes what."""
     if dot and as_json:
         raise UsageError("--dot and --json exclude each other: choose one")
-    system = look(connect, agent)
+    system = inspect_system(connect, agent)
     click.echo(to_dot(system) if dot else to_json(system) if as_json else to_tree(system))
 
 

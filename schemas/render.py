@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import msgspec
+import yaml
 
 from schemas.array import Array
 
 _NAMED = (msgspec.Struct, dict)
+_ONE_LINE = 2**31 - 1
 
 
 def to_jsonable(message: Any, full: bool = False) -> Any:
@@ -29,8 +31,18 @@ def to_jsonable(message: Any, full: bool = False) -> Any:
 
 
 def to_text(message: Any, full: bool = False) -> str:
-    """`message` in YAML's manner, a line a field, without a line break at its end."""
-    return "\n".join(_lines(message, full))
+    """`message`, or a part of one, as YAML without a line break at its end.
+
+    An array becomes one line: its dtype, shape, least and greatest value, or with `full` all values.
+    """
+    text: str = yaml.dump(
+        _arrays_as_text(message, full),
+        Dumper=yaml.CSafeDumper,
+        sort_keys=False,
+        allow_unicode=True,
+        width=_ONE_LINE,
+    )
+    return text.removesuffix("...\n").rstrip("\n")
 
 
 def field(message: Any, path: str) -> Any:
@@ -86,58 +98,26 @@ def _element(value: Any, index: int) -> Any:
     return Array.of(part) if part.ndim else part.item()
 
 
-def _lines(value: Any, full: bool) -> list[str]:
+def _arrays_as_text(value: Any, full: bool) -> Any:
     if isinstance(value, Array):
-        return [_array_line(value, full)]
-    if isinstance(value, _NAMED):
-        fields = _fields(value) if isinstance(value, msgspec.Struct) else value
-        return [line for name, part in fields.items() for line in _named(str(name), part, full)]
+        return _array_line(value, full)
+    if isinstance(value, msgspec.Struct):
+        value = _fields(value)
+
+    if isinstance(value, dict):
+        return {str(name): _arrays_as_text(part, full) for name, part in value.items()}
     if isinstance(value, list | tuple):
-        return [line for part in value for line in _item(part, full)]
-    return [_scalar(value)]
-
-
-def _named(name: str, part: Any, full: bool) -> list[str]:
-    if not _is_nested(part):
-        return [f"{name}: {_lines(part, full)[0] if _has_parts(part) else _empty(part)}"]
-    indent = "" if isinstance(part, list | tuple) else "  "
-    return [f"{name}:", *(indent + line for line in _lines(part, full))]
-
-
-def _item(part: Any, full: bool) -> list[str]:
-    first, *rest = _lines(part, full) if _has_parts(part) else [_empty(part)]
-    return [f"- {first}", *(f"  {line}" for line in rest)]
-
-
-def _is_nested(part: Any) -> bool:
-    return (
-        isinstance(part, (*_NAMED, list, tuple))
-        and not isinstance(part, Array)
-        and _has_parts(part)
-    )
-
-
-def _has_parts(part: Any) -> bool:
-    return not isinstance(part, dict | list | tuple) or bool(part)
-
-
-def _empty(part: Any) -> str:
-    return "{}" if isinstance(part, dict) else "[]"
+        return [_arrays_as_text(part, full) for part in value]
+    return value
 
 
 def _array_line(array: Array, full: bool) -> str:
     facts = _array(array, full)
     shape = " x ".join(map(str, array.shape)) or "scalar"
+    described = f"{array.dtype} {shape}"
+
     if full:
-        return f"{array.dtype} {shape} {facts['data']}"
-    return f"{array.dtype} {shape}" + (
-        f", {facts['min']} to {facts['max']}" if facts["min"] is not None else ", empty"
-    )
-
-
-def _scalar(value: Any) -> str:
-    if value is None:
-        return "null"
-    if isinstance(value, bool):
-        return str(value).lower()
-    return repr(value) if isinstance(value, str) else str(value)
+        return f"{described} {facts['data']}"
+    if facts["min"] is None:
+        return f"{described}, empty"
+    return f"{described}, {facts['min']} to {facts['max']}"

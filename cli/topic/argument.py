@@ -1,4 +1,4 @@
-"""The TOPIC that a command is about."""
+"""The TOPIC argument of a command."""
 
 from __future__ import annotations
 
@@ -12,19 +12,18 @@ from schemas.topics import Delivery, Topic
 
 
 def topic_named(name: str) -> Topic:
-    """The topic called so, with or without a slash before it. Raises UsageError naming the nearest."""
+    """The topic `name`, which may begin with a slash. Raises UsageError naming the nearest."""
     found = topics.BY_NAME.get(name.strip("/"))
     if found is not None:
         return found
+
     close = difflib.get_close_matches(name, topics.BY_NAME, 1)
-    raise UsageError(
-        f"no topic {name!r}: "
-        + (f"did you mean {close[0]!r}?" if close else "see `cogmap topic list`")
-    )
+    hint = f"did you mean {close[0]!r}?" if close else "see `cogmap topic list`"
+    raise UsageError(f"no topic {name!r}: {hint}")
 
 
-def streamed(name: str) -> Topic:
-    """The topic called so, which must be one that is published. Raises UsageError."""
+def streamed_topic(name: str) -> Topic:
+    """The topic `name`, which must be one that is published. Raises UsageError."""
     topic = topic_named(name)
     if topic.delivery is Delivery.ON_REQUEST:
         raise UsageError(
@@ -38,7 +37,7 @@ def _convert(context: click.Context, parameter: click.Parameter, value: str) -> 
 
 
 def _convert_streamed(context: click.Context, parameter: click.Parameter, value: str) -> Topic:
-    return streamed(value)
+    return streamed_topic(value)
 
 
 topic_argument = click.argument("topic", metavar="TOPIC", callback=_convert)

@@ -1,4 +1,4 @@
-"""`cogmap topic`: looks at topics, and speaks on them, while a system runs."""
+"""`cogmap topic`: watches topics of a running system, and publishes on them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`cogmap topic echo`: messages as they come."""
+"""`cogmap topic echo`: prints messages as they arrive."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import msgspec
 
 from cli.options import agent_option, connect_option, json_option
 from cli.topic.argument import streamed_argument
-from cli.topic.observing import TICK_S, observing
+from cli.topic.observing import TICK_S, RouterWatch, observing
 from cogmap.bus.interface import Arrival
 from cogmap.errors import UsageError
 from cogmap.runtime.inbox import Inbox
@@ -25,17 +25,17 @@ from schemas.render import field as field_at
 from schemas.render import to_jsonable, to_text
 from schemas.topics import Topic
 
-Show = Callable[[Message], str]
+Format = Callable[[Message], str]
 
 
 @click.command()
 @streamed_argument
 @click.option("--once", is_flag=True, help="End after one message.")
-@click.option("-n", "--times", type=click.IntRange(min=1), help="End after so many messages.")
+@click.option("-n", "--times", type=click.IntRange(min=1), help="End after this many messages.")
 @click.option("--field", metavar="PATH", help="Only this part, such as objects.0.label.")
-@click.option("-f", "--full-length", is_flag=True, help="All numbers of every array.")
-@click.option("--csv", "as_csv", is_flag=True, help="A line a message, values separated by commas.")
-@click.option("--no-arr", is_flag=True, help="Nothing of arrays but their type and shape.")
+@click.option("-f", "--full-length", is_flag=True, help="All values of every array.")
+@click.option("--csv", "as_csv", is_flag=True, help="One line a message, separated by commas.")
+@click.option("--no-arr", is_flag=True, help="Of arrays, only their type and shape.")
 @json_option
 @connect_option
 @agent_option
@@ -54,49 +54,84 @@ def echo(
     """Print messages until Ctrl-C."""
     if as_csv and as_json:
         raise UsageError("--csv and --json exclude each other: choose one")
-    show = shower(field, full_length, no_arr, "csv" if as_csv else "json" if as_json else "text")
+
+    style = "csv" if as_csv else "json" if as_json else "text"
+    show = formatter(field, full_length, no_arr, style)
     stop = Stop()
-    inbox = Inbox()
-    intake = Intake()
-    number = 0
-    limit = 1 if once else times
     with observing(connect, agent, "topic echo") as bus:
-        bus.subscribe(topic, inbox.put, intake.count_lost)
-        while not stop.asked and number != limit:
-            arrival = inbox.take(TICK_S)
-            message = intake.accept(arrival) if isinstance(arrival, Arrival) else None
-            if message is not None:
+        messages = _Messages(topic)
+        bus.subscribe(topic, messages.inbox.put, messages.intake.count_lost)
+        router = RouterWatch(bus.session, connect)
+        limit = 1 if once else times
+        while not stop.asked and messages.number != limit:
+            message = messages.take(TICK_S)
+            if message is None:
+                router.check()
+            else:
                 click.echo(show(message))
-                number += 1
+
     if stop.asked:
-        refused = intake.rejected[topic.name]
-        lost = intake.gaps[topic.name]
-        skipped = inbox.superseded[topic.name]
-        click.echo(
-            f"{number} messages, {refused} rejected, {lost} lost, {skipped} superseded by newer ones",
-            err=True,
+        click.echo(messages.counts(), err=True)
+
+
+class _Messages:
+    """The valid messages of `topic`, and counts of the others."""
+
+    def __init__(self, topic: Topic) -> None:
+        self.inbox = Inbox()
+        self.intake = Intake()
+        self.number = 0
+        self._topic = topic
+
+    def take(self, timeout_s: float) -> Message | None:
+        """The next one; None where there is none within `timeout_s`."""
+        arrival = self.inbox.take(timeout_s)
+        if not isinstance(arrival, Arrival):
+            return None
+
+        message = self.intake.accept(arrival)
+        self.number += message is not None
+        return message
+
+    def counts(self) -> str:
+        """How many were printed, and how many were not and why."""
+        rejected = self.intake.rejected[self._topic.name]
+        lost = self.intake.gaps[self._topic.name]
+        superseded = self.inbox.superseded[self._topic.name]
+        return (
+            f"{self.number} messages, {rejected} rejected, {lost} lost, "
+            f"{superseded} superseded by newer ones"
         )
 
 
-def shower(path: str | None, full: bool, no_arrays: bool, style: str) -> Show:
-    """What turns a message, or the part of it at `path`, into text, JSON or CSV.
+def formatter(path: str | None, full: bool, no_arrays: bool, style: str) -> Format:
+    """A function that turns a message, or the part of it at `path`, into text, JSON or CSV.
 
     It raises UsageError where the message has no such part.
     """
 
-    def show(message: Message) -> str:
-        try:
-            part = message if path is None else field_at(message, path)
-        except LookupError as error:
-            raise UsageError(f"--field {path}: {error.args[0]}") from None
-        part = without_arrays(part) if no_arrays else part
+    def format_part(message: Message) -> str:
+        part = _part_of(message, path)
+        if no_arrays:
+            part = without_arrays(part)
+
         if style == "json":
             return json.dumps(to_jsonable(part, full))
         if style == "csv":
-            return comma_separated(to_jsonable(part, full) if full else without_arrays(part))
+            plain = to_jsonable(part, full) if full else without_arrays(part)
+            return comma_separated(plain)
         return f"{to_text(part, full)}\n---"
 
-    return show
+    return format_part
+
+
+def _part_of(message: Message, path: str | None) -> Any:
+    if path is None:
+        return message
+    try:
+        return field_at(message, path)
+    except LookupError as error:
+        raise UsageError(f"--field {path}: {error.args[0]}") from None
 
 
 def without_arrays(part: Any) -> Any:
@@ -104,7 +139,9 @@ def without_arrays(part: Any) -> Any:
     if isinstance(part, Array):
         return f"<array type: {part.dtype}{list(part.shape)}>"
     if isinstance(part, msgspec.Struct):
-        return without_arrays({name: getattr(part, name) for name in part.__struct_fields__})
+        fields = {name: getattr(part, name) for name in part.__struct_fields__}
+        return without_arrays(fields)
+
     if isinstance(part, dict):
         return {name: without_arrays(value) for name, value in part.items()}
     if isinstance(part, list | tuple):
@@ -113,7 +150,7 @@ def without_arrays(part: Any) -> Any:
 
 
 def comma_separated(part: Any) -> str:
-    """All that is in `part`, in order, as one line of CSV."""
+    """All scalars in `part`, in order, as one line of CSV."""
     line = io.StringIO()
     csv.writer(line, lineterminator="").writerow(_leaves(part))
     return line.getvalue()
@@ -122,6 +159,10 @@ def comma_separated(part: Any) -> str:
 def _leaves(part: Any) -> list[Any]:
     if isinstance(part, dict):
         part = list(part.values())
-    if isinstance(part, list | tuple):
-        return [leaf for item in part for leaf in _leaves(item)]
-    return [part]
+    if not isinstance(part, list | tuple):
+        return [part]
+
+    leaves = []
+    for item in part:
+        leaves += _leaves(item)
+    return leaves

@@ -1,4 +1,4 @@
-"""`cogmap topic list`, `info`, `type` and `find`: which topics there are and who is on them."""
+"""`cogmap topic list`, `info`, `type` and `find`: the topics in use, and who uses them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import click
 
 from cli.options import agent_option, connect_option, json_option
 from cli.topic.argument import topic_argument
-from cli.topic.observing import look
+from cli.topic.observing import inspect_system
 from cogmap.bus.discovery import Process, Role, System
 from schemas import topics
 from schemas.topics import Delivery, Topic
@@ -23,24 +23,26 @@ _ROLES = {
 
 @click.command("list")
 @click.option("-t", "--show-types", is_flag=True, help="Show each topic's type.")
-@click.option("-c", "--count-topics", is_flag=True, help="Only say how many there are.")
-@click.option("-v", "--verbose", is_flag=True, help="Say how many publish and how many subscribe.")
+@click.option("-c", "--count-topics", is_flag=True, help="Only print how many there are.")
+@click.option("-v", "--verbose", is_flag=True, help="Count publishers and subscribers.")
 @json_option
 @connect_option
 @agent_option
 def listing(
     show_types: bool, count_topics: bool, verbose: bool, as_json: bool, connect: str, agent: str
 ) -> None:
-    """The topics in use."""
-    system = look(connect, agent)
+    """List the topics in use."""
+    system = inspect_system(connect, agent)
+    used = system.topics()
+
     if as_json:
-        click.echo(json.dumps([_described(system, topic) for topic in system.topics()]))
+        click.echo(json.dumps([_facts(system, topic) for topic in used]))
     elif count_topics:
-        click.echo(len(system.topics()))
+        click.echo(len(used))
     elif verbose:
-        click.echo("\n\n".join(_verbose(system, role) for role in Role))
+        click.echo("\n\n".join(_counts(system, role) for role in Role))
     else:
-        for topic in system.topics():
+        for topic in used:
             click.echo(_typed(topic) if show_types else topic.name)
 
 
@@ -51,15 +53,16 @@ def listing(
 @connect_option
 @agent_option
 def info(topic: Topic, verbose: bool, as_json: bool, connect: str, agent: str) -> None:
-    """A topic's type, and who publishes and subscribes it."""
-    system = look(connect, agent)
+    """Show a topic's type, its publishers and its subscribers."""
+    system = inspect_system(connect, agent)
     if as_json:
-        click.echo(json.dumps(_described(system, topic)))
+        click.echo(json.dumps(_facts(system, topic)))
         return
+
+    rate = f", {topic.rate_hz:g} Hz" if topic.rate_hz else ""
     click.echo(f"Type: {topic.type.__name__}")
-    click.echo(
-        f"Delivery: {topic.delivery.value}" + (f", {topic.rate_hz:g} Hz" if topic.rate_hz else "")
-    )
+    click.echo(f"Delivery: {topic.delivery.value}{rate}")
+
     for title, role in _columns(topic):
         found = system.doing(role, topic)
         click.echo(f"{title} count: {len(found)}")
@@ -70,14 +73,14 @@ def info(topic: Topic, verbose: bool, as_json: bool, connect: str, agent: str) -
 @click.command("type")
 @topic_argument
 def type_(topic: Topic) -> None:
-    """The type of a topic's messages."""
+    """Print the type of a topic's messages."""
     click.echo(topic.type.__name__)
 
 
 @click.command()
 @click.argument("type_name", metavar="TYPE")
 def find(type_name: str) -> None:
-    """The topics that carry a type."""
+    """List the topics that carry a type."""
     for topic in topics.ALL:
         if topic.type.__name__.lower() == type_name.lower():
             click.echo(topic.name)
@@ -87,15 +90,15 @@ def _typed(topic: Topic) -> str:
     return f"{topic.name} [{topic.type.__name__}]"
 
 
-def _verbose(system: System, role: Role) -> str:
+def _counts(system: System, role: Role) -> str:
     title, noun = _ROLES[role]
-    counts = [(topic, len(system.doing(role, topic))) for topic in system.topics()]
-    lines = [
-        f" * {_typed(topic)} {number} {noun}{'s' * (number > 1)}"
-        for topic, number in counts
-        if number
-    ]
-    return "\n".join([title, *lines])
+    lines = [title]
+    for topic in system.topics():
+        number = len(system.doing(role, topic))
+        if number:
+            plural = "s" if number > 1 else ""
+            lines.append(f" * {_typed(topic)} {number} {noun}{plural}")
+    return "\n".join(lines)
 
 
 def _columns(topic: Topic) -> list[tuple[str, Role]]:
@@ -106,20 +109,23 @@ def _columns(topic: Topic) -> list[tuple[str, Role]]:
 
 def _endpoint(process: Process, role: Role) -> str:
     module = process.member.module if process.member else "unknown"
-    return (
-        f"\nProcess name: {process.name}\nModule: {module}\nEndpoint type: {role.value.upper()}\n"
-        f"Zenoh id: {process.zid}\n\n"
-    )
+    lines = [
+        "",
+        f"Process name: {process.name}",
+        f"Module: {module}",
+        f"Endpoint type: {role.value.upper()}",
+        f"Zenoh id: {process.zid}",
+    ]
+    return "\n".join(lines) + "\n\n"
 
 
-def _described(system: System, topic: Topic) -> dict[str, Any]:
-    return {
+def _facts(system: System, topic: Topic) -> dict[str, Any]:
+    facts: dict[str, Any] = {
         "topic": topic.name,
         "type": topic.type.__name__,
         "delivery": topic.delivery.value,
         "rate_hz": topic.rate_hz,
-        **{
-            role.name.lower(): [process.name for process in system.doing(role, topic)]
-            for role in Role
-        },
     }
+    for role in Role:
+        facts[role.name.lower()] = [process.name for process in system.doing(role, topic)]
+    return facts

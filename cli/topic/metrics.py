@@ -1,4 +1,4 @@
-"""What `cogmap topic hz`, `bw` and `delay` say of the messages they saw."""
+"""What `cogmap topic hz`, `bw` and `delay` print of the messages they received."""
 
 from __future__ import annotations
 
@@ -8,112 +8,123 @@ from typing import Any
 
 import msgspec
 
-from cli.topic.observing import Sight
+from cli.topic.observing import Reception
 from cli.topic.statistics import Bandwidth, Delay, Rate
 
+MIN_PERIOD_S = 1e-9
 
-class Figures(ABC):
-    """What one of the commands makes of what it sees."""
+
+class Metrics(ABC):
+    """What one of the commands computes from receptions."""
 
     @abstractmethod
-    def add(self, sight: Sight) -> None:
-        """Take note of one message."""
+    def add(self, reception: Reception) -> None:
+        """Count one message."""
 
     @abstractmethod
     def text(self) -> str:
-        """The figures so far, as people read them; empty where there are none."""
+        """The metrics so far, as people read them; empty where there are none."""
 
     @abstractmethod
     def plain(self) -> dict[str, Any]:
-        """The figures so far, as programs read them."""
+        """The metrics so far, as programs read them."""
 
 
-class RateFigures(Figures):
-    """How often messages come."""
+class RateMetrics(Metrics):
+    """How often messages arrive."""
 
     def __init__(self, window: int) -> None:
         self._rate = Rate(window)
 
-    def add(self, sight: Sight) -> None:
-        self._rate.add(sight.received_ns)
+    def add(self, reception: Reception) -> None:
+        self._rate.add(reception.received_ns)
 
     def text(self) -> str:
-        spread = self._rate.periods_s()
-        if spread is None:
+        period = self._rate.periods_s()
+        if period is None:
             return ""
+
+        rate_hz = 1 / max(MIN_PERIOD_S, period.mean)
         return (
-            f"average rate: {1 / max(1e-9, spread.mean):.3f}\n\tmin: {spread.least:.3f}s max: {spread.greatest:.3f}s "
-            f"std dev: {spread.deviation:.5f}s window: {spread.window + 1}"
+            f"average rate: {rate_hz:.3f}\n"
+            f"\tmin: {period.least:.3f}s max: {period.greatest:.3f}s "
+            f"std dev: {period.deviation:.5f}s window: {period.window + 1}"
         )
 
     def plain(self) -> dict[str, Any]:
-        spread = self._rate.periods_s()
-        return {
-            "rate_hz": 1 / max(1e-9, spread.mean) if spread else None,
-            "period_s": _plain(spread),
-        }
+        period = self._rate.periods_s()
+        rate_hz = 1 / max(MIN_PERIOD_S, period.mean) if period else None
+        return {"rate_hz": rate_hz, "period_s": _plain(period)}
 
 
-class BandwidthFigures(Figures):
-    """How many bytes come in a second."""
+class BandwidthMetrics(Metrics):
+    """How many bytes arrive in a second."""
 
     def __init__(self, window: int) -> None:
         self._bandwidth = Bandwidth(window)
 
-    def add(self, sight: Sight) -> None:
-        self._bandwidth.add(sight.received_ns, sight.size_bytes)
+    def add(self, reception: Reception) -> None:
+        self._bandwidth.add(reception.received_ns, reception.size_bytes)
 
     def text(self) -> str:
         sizes = self._bandwidth.sizes_bytes()
         if sizes is None:
             return ""
-        mean, least, greatest = (
-            in_bytes(value) for value in (sizes.mean, sizes.least, sizes.greatest)
-        )
+
         per_second = in_bytes(self._bandwidth.bytes_per_s(time.time_ns()))
-        return f"{per_second}/s from {sizes.window} messages\n\tMessage size mean: {mean} min: {least} max: {greatest}"
+        mean = in_bytes(sizes.mean)
+        least = in_bytes(sizes.least)
+        greatest = in_bytes(sizes.greatest)
+        return (
+            f"{per_second}/s from {sizes.window} messages\n"
+            f"\tMessage size mean: {mean} min: {least} max: {greatest}"
+        )
 
     def plain(self) -> dict[str, Any]:
         sizes = self._bandwidth.sizes_bytes()
-        return {
-            "bytes_per_s": self._bandwidth.bytes_per_s(time.time_ns()),
-            "size_bytes": _plain(sizes),
-        }
+        bytes_per_s = self._bandwidth.bytes_per_s(time.time_ns())
+        return {"bytes_per_s": bytes_per_s, "size_bytes": _plain(sizes)}
 
 
-class DelayFigures(Figures):
-    """How old messages are as they come."""
+class DelayMetrics(Metrics):
+    """How old messages are when they arrive."""
 
     def __init__(self, window: int) -> None:
         self._delay = Delay(window)
 
-    def add(self, sight: Sight) -> None:
-        if (envelope := sight.envelope) is not None:
-            self._delay.add(envelope.born_ns, envelope.sent_ns, sight.received_ns, envelope.stages)
+    def add(self, reception: Reception) -> None:
+        envelope = reception.envelope
+        if envelope is not None:
+            self._delay.add(
+                envelope.born_ns, envelope.sent_ns, reception.received_ns, envelope.stages
+            )
 
     def text(self) -> str:
-        ages = self._delay.ages_s()
+        age = self._delay.ages_s()
         last_leg = self._delay.last_leg_s()
-        if ages is None or last_leg is None:
+        if age is None or last_leg is None:
             return ""
-        stages = [
-            f"\n\t{module}: {compute:.5f}s computing, {rest:.5f}s getting there"
-            for module, (compute, rest) in self._delay.stages_s().items()
+
+        lines = [
+            f"average delay: {age.mean:.5f}",
+            f"\tmin: {age.least:.5f}s max: {age.greatest:.5f}s "
+            f"std dev: {age.deviation:.5f}s window: {age.window}",
         ]
-        return (
-            f"average delay: {ages.mean:.5f}\n\tmin: {ages.least:.5f}s max: {ages.greatest:.5f}s "
-            f"std dev: {ages.deviation:.5f}s window: {ages.window}{''.join(stages)}"
-            f"\n\tfrom its sending to here: {last_leg.mean:.5f}s"
-        )
+        for module, (compute_s, rest_s) in self._delay.stages_s().items():
+            lines.append(f"\t{module}: {compute_s:.5f}s computing, {rest_s:.5f}s in transport")
+        lines.append(f"\tfrom its last publisher: {last_leg.mean:.5f}s")
+        return "\n".join(lines)
 
     def plain(self) -> dict[str, Any]:
-        stages = {
-            module: {"compute_s": c, "rest_s": r}
-            for module, (c, r) in self._delay.stages_s().items()
+        stages = {}
+        for module, (compute_s, rest_s) in self._delay.stages_s().items():
+            stages[module] = {"compute_s": compute_s, "rest_s": rest_s}
+
+        return {
+            "delay_s": _plain(self._delay.ages_s()),
+            "last_leg_s": _plain(self._delay.last_leg_s()),
+            "stages": stages,
         }
-        ages = self._delay.ages_s()
-        last_leg = self._delay.last_leg_s()
-        return {"delay_s": _plain(ages), "last_leg_s": _plain(last_leg), "stages": stages}
 
 
 def _plain(spread: msgspec.Struct | None) -> Any:
@@ -121,9 +132,12 @@ def _plain(spread: msgspec.Struct | None) -> Any:
 
 
 def in_bytes(size: float) -> str:
-    """`size` bytes with a unit that leaves it three digits before the point at most."""
-    for unit in ("B", "KB", "MB"):
-        if abs(size) < 1000:
-            return f"{size:.0f} {unit}" if unit == "B" else f"{size:.2f} {unit}"
+    """`size` bytes with the unit that leaves at most three digits before the point."""
+    if abs(size) < 1000:
+        return f"{size:.0f} B"
+
+    for unit in ("KB", "MB"):
         size /= 1000
-    return f"{size:.2f} GB"
+        if abs(size) < 1000:
+            return f"{size:.2f} {unit}"
+    return f"{size / 1000:.2f} GB"

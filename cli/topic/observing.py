@@ -1,9 +1,10 @@
-"""A look at a running system from outside: what arrives on a topic, and who is there."""
+"""An observer of a running system: what arrives on a topic, and which processes there are."""
 
 from __future__ import annotations
 
 import os
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from queue import Empty, SimpleQueue
@@ -13,16 +14,17 @@ import zenoh
 from cogmap.bus.codec import Envelope
 from cogmap.bus.discovery import System, discover
 from cogmap.bus.interface import Arrival, Member
-from cogmap.bus.session import open_client
+from cogmap.bus.session import CONNECT_TIMEOUT_S, open_client
 from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.errors import NoRouterError
 from schemas.topics import Topic
 
 TICK_S = 0.1
 CLI = "cli"
 
 
-class Sight:
-    """What is worth knowing of an arrival whose payload nobody reads."""
+class Reception:
+    """Size, envelope and time of one arrival, without its payload."""
 
     __slots__ = ("envelope", "received_ns", "size_bytes")
 
@@ -32,16 +34,17 @@ class Sight:
         self.received_ns = arrival.received_ns
 
 
-class Sights:
+class Receptions:
     """Every arrival on a topic, in order."""
 
     def __init__(self, bus: ZenohBus, topic: Topic) -> None:
-        self._queue: SimpleQueue[Sight] = SimpleQueue()
-        bus.subscribe(
-            topic, lambda arrival: self._queue.put(Sight(arrival)), lambda name, number: None
-        )
+        self._queue: SimpleQueue[Reception] = SimpleQueue()
+        bus.subscribe(topic, self._put, lambda name, number: None)
 
-    def take(self, timeout_s: float) -> Sight | None:
+    def _put(self, arrival: Arrival) -> None:
+        self._queue.put(Reception(arrival))
+
+    def take(self, timeout_s: float) -> Reception | None:
         """The next one; None where there is none within `timeout_s`."""
         try:
             return self._queue.get(timeout=timeout_s)
@@ -49,10 +52,38 @@ class Sights:
             return None
 
 
+class RouterWatch:
+    """Whether the router that `session` found at `endpoint` is still there."""
+
+    def __init__(
+        self, session: zenoh.Session, endpoint: str, timeout_s: float = CONNECT_TIMEOUT_S
+    ) -> None:
+        self._session = session
+        self._endpoint = endpoint
+        self._timeout_s = timeout_s
+        self._missing_since_s: float | None = None
+
+    def check(self) -> None:
+        """Raise NoRouterError where the checks of the last `timeout_s` found no router."""
+        if self._session.info.routers_zid():
+            self._missing_since_s = None
+            return
+
+        now_s = time.monotonic()
+        if self._missing_since_s is None:
+            self._missing_since_s = now_s
+        if now_s - self._missing_since_s >= self._timeout_s:
+            raise NoRouterError(
+                f"no router at {self._endpoint} for {self._timeout_s:g} s: "
+                f"start one with `cogmap run` or `cogmap router`"
+            )
+
+
 @contextmanager
 def observing(connect: str, agent: str, what: str) -> Iterator[ZenohBus]:
-    """A bus that others see as `cli what`; it is left in the end, also where nobody reads the
-    output any more.
+    """A bus on which others see this process as `cli what`. Raises NoRouterError.
+
+    The bus is closed in the end, also where the reader of the output has closed it.
     """
     bus = ZenohBus(connect, agent)
     try:
@@ -65,9 +96,9 @@ def observing(connect: str, agent: str, what: str) -> Iterator[ZenohBus]:
         bus.close()
 
 
-def look(connect: str, agent: str) -> System:
+def inspect_system(connect: str, agent: str) -> System:
     """What the processes of `agent` do at this moment. Raises NoRouterError."""
-    session: zenoh.Session = open_client(connect)
+    session = open_client(connect)
     try:
         return discover(session, agent)
     finally:

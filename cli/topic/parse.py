@@ -1,13 +1,15 @@
-"""A message as a user writes it, in JSON or YAML, turned into one."""
+"""Parses a message that a user wrote as JSON or YAML."""
 
 from __future__ import annotations
 
 import contextlib
 import difflib
+from collections.abc import Iterator
 from typing import Any
 
 import msgspec
 import numpy as np
+import yaml
 
 from cogmap.errors import UsageError
 from schemas.array import DTYPES
@@ -16,18 +18,17 @@ from schemas.topics import Topic
 
 
 def parse(topic: Topic, text: str) -> Message:
-    """The message of `topic` that `text` states; an array is `{dtype, shape, data}` with nested
-    lists for data.
+    """The message of `topic` in `text`; an array is `{dtype, shape, data}`, data as nested lists.
 
-    Raises UsageError naming what was expected, what came, and where.
+    Raises UsageError naming what was expected, what was found, and where.
     """
-    plain = _arrays_packed(_read(text))
+    plain = _pack_arrays(_read(text))
     try:
         message = msgspec.convert(plain, topic.type)
     except msgspec.ValidationError as error:
-        raise UsageError(
-            f"{topic.name}: {error}".replace("`$.", "`").replace("`$`", "the top")
-        ) from None
+        reason = str(error).replace("`$.", "`").replace("`$`", "the top")
+        raise UsageError(f"{topic.name}: {reason}") from None
+
     unknown = _unknown(plain, msgspec.to_builtins(message), "")
     if unknown is not None:
         raise UsageError(f"{topic.name}: {unknown}")
@@ -35,46 +36,61 @@ def parse(topic: Topic, text: str) -> Message:
 
 
 def _read(text: str) -> Any:
+    """JSON comes first: YAML reads 1e4 as a string."""
     with contextlib.suppress(msgspec.DecodeError):
         return msgspec.json.decode(text)
     try:
-        return msgspec.yaml.decode(text)
-    except msgspec.DecodeError as error:
-        raise UsageError(
-            f"{text!r} is neither JSON nor YAML: {' '.join(str(error).split())}"
-        ) from None
+        return yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        reason = " ".join(str(error).split())
+        raise UsageError(f"{text!r} is neither JSON nor YAML: {reason}") from None
 
 
-def _arrays_packed(value: Any) -> Any:
+def _pack_arrays(value: Any) -> Any:
     if isinstance(value, list):
-        return [_arrays_packed(item) for item in value]
+        return [_pack_arrays(item) for item in value]
     if not isinstance(value, dict):
         return value
+
     if isinstance(value.get("data"), list) and value.get("dtype") in DTYPES:
-        try:
-            numbers = np.array(value["data"], value["dtype"])
-        except (ValueError, TypeError, OverflowError) as error:
-            raise UsageError(f"data of an array of {value['dtype']}: {error}") from None
-        return {"shape": list(numbers.shape), **value, "data": numbers.tobytes()}
-    return {key: _arrays_packed(item) for key, item in value.items()}
+        return _packed(value)
+    return {key: _pack_arrays(item) for key, item in value.items()}
 
 
-def _unknown(given: Any, understood: Any, where: str) -> str | None:
-    """A sentence about the first key in `given` that nothing was made of."""
-    if isinstance(given, list) and isinstance(understood, list | tuple):
-        pairs = [
-            (item, other, f"{where}[{i}]")
-            for i, (item, other) in enumerate(zip(given, understood, strict=True))
-        ]
-    elif isinstance(given, dict) and isinstance(understood, dict):
+def _packed(array: dict[str, Any]) -> dict[str, Any]:
+    dtype = array["dtype"]
+    try:
+        numbers = np.array(array["data"], dtype)
+    except (ValueError, TypeError, OverflowError) as error:
+        raise UsageError(f"data of an array of {dtype}: {error}") from None
+    return {"shape": list(numbers.shape), **array, "data": numbers.tobytes()}
+
+
+def _unknown(given: Any, parsed: Any, where: str) -> str | None:
+    """A sentence about the first key in `given` that the message has no field for."""
+    if isinstance(given, dict) and isinstance(parsed, dict):
         for key in given:
-            if key not in understood:
-                close = difflib.get_close_matches(key, understood, 1)
-                hint = (
-                    f"did you mean {close[0]!r}?" if close else f"there are {', '.join(understood)}"
-                )
-                return f"no field {key!r} at {where.lstrip('.') or 'the top'}: {hint}"
-        pairs = [(item, understood[key], f"{where}.{key}") for key, item in given.items()]
-    else:
-        return None
-    return next((found for pair in pairs if (found := _unknown(*pair)) is not None), None)
+            if key not in parsed:
+                return _no_field(key, list(parsed), where)
+
+    for part, parsed_part, place in _parts(given, parsed, where):
+        found = _unknown(part, parsed_part, place)
+        if found is not None:
+            return found
+    return None
+
+
+def _parts(given: Any, parsed: Any, where: str) -> Iterator[tuple[Any, Any, str]]:
+    if isinstance(given, list) and isinstance(parsed, list | tuple):
+        for index, (part, parsed_part) in enumerate(zip(given, parsed, strict=True)):
+            yield part, parsed_part, f"{where}[{index}]"
+    elif isinstance(given, dict) and isinstance(parsed, dict):
+        for key, part in given.items():
+            yield part, parsed[key], f"{where}.{key}"
+
+
+def _no_field(key: str, fields: list[str], where: str) -> str:
+    place = where.lstrip(".") or "the top"
+    close = difflib.get_close_matches(key, fields, 1)
+    hint = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(fields)}"
+    return f"no field {key!r} at {place}: {hint}"

@@ -1,4 +1,4 @@
-"""How often, how much and how late: figures over the last messages of a topic."""
+"""Rate, bandwidth and delay over the last messages of a topic."""
 
 from __future__ import annotations
 
@@ -11,9 +11,11 @@ import numpy as np
 
 from cogmap.bus.codec import Stage
 
+MIN_SPAN_S = 1e-9
+
 
 class Spread(msgspec.Struct, frozen=True):
-    """Mean, least, greatest and standard deviation of `window` values."""
+    """Mean, minimum, maximum and standard deviation of `window` values."""
 
     mean: float
     least: float
@@ -23,14 +25,14 @@ class Spread(msgspec.Struct, frozen=True):
 
     @classmethod
     def of(cls, values: Iterable[float]) -> Spread:
-        """The spread of values, at least one."""
+        """The spread of `values`, at least one."""
         array = np.fromiter(values, np.float64)
         return cls(
-            float(array.mean()),
-            float(array.min()),
-            float(array.max()),
-            float(array.std()),
-            len(array),
+            mean=float(array.mean()),
+            least=float(array.min()),
+            greatest=float(array.max()),
+            deviation=float(array.std()),
+            window=len(array),
         )
 
 
@@ -41,40 +43,45 @@ class Rate:
         self._times_ns: deque[int] = deque(maxlen=window + 1)
 
     def add(self, at_ns: int) -> None:
-        """Take note of a message that came then."""
+        """Count a message that arrived at `at_ns`."""
         self._times_ns.append(at_ns)
 
     def periods_s(self) -> Spread | None:
-        """The times between messages; the rate is one over their mean. None before the second
-        message.
-        """
-        periods = np.diff(np.fromiter(self._times_ns, np.int64)) / 1e9
-        return Spread.of(periods) if len(periods) else None
+        """The times between messages; None before the second. The rate is one over their mean."""
+        times_ns = np.fromiter(self._times_ns, np.int64)
+        periods_s = np.diff(times_ns) / 1e9
+        return Spread.of(periods_s) if len(periods_s) else None
 
 
 class Bandwidth:
     """Bytes per second over the last `window` messages."""
 
     def __init__(self, window: int) -> None:
-        self._seen: deque[tuple[int, int]] = deque(maxlen=window)
+        self._arrivals: deque[tuple[int, int]] = deque(maxlen=window)
 
     def add(self, at_ns: int, size_bytes: int) -> None:
-        """Take note of a message that came then."""
-        self._seen.append((at_ns, size_bytes))
+        """Count a message that arrived at `at_ns`."""
+        self._arrivals.append((at_ns, size_bytes))
 
     def bytes_per_s(self, now_ns: int) -> float:
-        """What has come, over the time since the first of it."""
-        if not self._seen:
+        """The bytes in the window over the time since its first message."""
+        if not self._arrivals:
             return 0.0
-        return sum(size for _, size in self._seen) / max(1e-9, (now_ns - self._seen[0][0]) / 1e9)
+
+        total_bytes = sum(size for _, size in self._arrivals)
+        first_ns, _ = self._arrivals[0]
+        span_s = (now_ns - first_ns) / 1e9
+        return total_bytes / max(MIN_SPAN_S, span_s)
 
     def sizes_bytes(self) -> Spread | None:
         """The sizes of messages. None before the first one."""
-        return Spread.of(size for _, size in self._seen) if self._seen else None
+        if not self._arrivals:
+            return None
+        return Spread.of(size for _, size in self._arrivals)
 
 
 class Delay:
-    """Ages of the last `window` messages as they came, and where the time went."""
+    """Ages of the last `window` messages on arrival, and where the time went."""
 
     def __init__(self, window: int) -> None:
         self._ages_s: deque[float] = deque(maxlen=window)
@@ -82,9 +89,7 @@ class Delay:
         self._stages: deque[list[Stage]] = deque(maxlen=window)
 
     def add(self, born_ns: int, sent_ns: int, received_ns: int, stages: list[Stage]) -> None:
-        """Take note of a message that derives from the sensing at `born_ns`, sent and received
-        then.
-        """
+        """Count a message that derives from the sensing at `born_ns`."""
         self._ages_s.append((received_ns - born_ns) / 1e9)
         self._last_leg_s.append((received_ns - sent_ns) / 1e9)
         self._stages.append(stages)
@@ -94,21 +99,21 @@ class Delay:
         return Spread.of(self._ages_s) if self._ages_s else None
 
     def last_leg_s(self) -> Spread | None:
-        """From the sending to here. None before the first message."""
+        """From the last publisher to here. None before the first message."""
         return Spread.of(self._last_leg_s) if self._last_leg_s else None
 
     def stages_s(self) -> dict[str, tuple[float, float]]:
-        """For each module on the way, mean times of computing and of all else (encoding, transport,
-        queues).
-        """
-        times: dict[str, list[tuple[int, int]]] = {}
+        """For each module passed, mean times of computing and of encoding, transport and queues."""
+        computing_ns: dict[str, list[int]] = {}
+        resting_ns: dict[str, list[int]] = {}
         for stages in self._stages:
             for module, compute_ns, rest_ns in stages:
-                times.setdefault(module, []).append((compute_ns, rest_ns))
-        return {
-            module: (
-                statistics.fmean(c for c, _ in spent) / 1e9,
-                statistics.fmean(r for _, r in spent) / 1e9,
-            )
-            for module, spent in times.items()
-        }
+                computing_ns.setdefault(module, []).append(compute_ns)
+                resting_ns.setdefault(module, []).append(rest_ns)
+
+        means = {}
+        for module, computed_ns in computing_ns.items():
+            compute_s = statistics.fmean(computed_ns) / 1e9
+            rest_s = statistics.fmean(resting_ns[module]) / 1e9
+            means[module] = (compute_s, rest_s)
+        return means

@@ -6,11 +6,14 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from cogmap.bus.discovery import discover
+from cogmap.bus.session import open_client
 from tests.support.networks import routed
 
 TIMEOUT_S = 30.0
@@ -119,3 +122,26 @@ def test_a_router_that_does_not_answer_within_five_seconds_is_named_by_whoever_l
             f"cogmap: no router at {NOBODY} within 5 s: start one with `cogmap run`"
         )
     assert not (tmp_path / "log.mcap").exists()
+
+
+def wait_for_processes(endpoint: str, names: set[str]) -> None:
+    """Return once processes of all `names` are on the bus."""
+    session = open_client(endpoint)
+    deadline_s = time.monotonic() + PATIENCE_S
+    seen: set[str] = set()
+    while not names <= seen and time.monotonic() < deadline_s:
+        seen = {process.name for process in discover(session, "agent").processes}
+    session.close()  # type: ignore[no-untyped-call]
+    assert names <= seen
+
+
+def test_a_router_that_ends_is_named_by_whoever_watches_a_topic() -> None:
+    commands = ("echo", "hz")
+    with routed() as endpoint:
+        watching = [start("topic", name, "clock", "--connect", endpoint) for name in commands]
+        wait_for_processes(endpoint, {f"cli topic {name}" for name in commands})
+
+    for process in watching:
+        _, errors = process.communicate(timeout=PATIENCE_S)
+        assert process.returncode == 2
+        assert errors.startswith(f"cogmap: no router at {endpoint} for 5 s: start one with")

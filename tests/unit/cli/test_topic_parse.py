@@ -6,8 +6,8 @@ import json
 
 import pytest
 
-from cli.topic.argument import streamed, topic_named
-from cli.topic.echo import shower
+from cli.topic.argument import streamed_topic, topic_named
+from cli.topic.echo import formatter
 from cli.topic.parse import parse
 from cogmap.errors import UsageError
 from schemas import topics
@@ -27,7 +27,7 @@ def test_a_message_is_read_from_json() -> None:
 
 @pytest.mark.parametrize("topic", topics.ALL, ids=lambda topic: topic.name)
 def test_what_echo_prints_in_full_can_be_published_again(topic: Topic) -> None:
-    printed = shower(None, True, False, "json")(BY_TOPIC[topic])
+    printed = formatter(None, True, False, "json")(BY_TOPIC[topic])
 
     assert parse(topic, printed) == BY_TOPIC[topic]
 
@@ -57,7 +57,7 @@ def test_a_wrong_field_is_named_with_what_was_expected(written: str, sentence: s
 
 
 def test_a_wrong_field_deep_inside_is_named_with_its_place() -> None:
-    plain = json.loads(shower(None, True, False, "json")(BY_TOPIC[topics.PERCEPTS]))
+    plain = json.loads(formatter(None, True, False, "json")(BY_TOPIC[topics.PERCEPTS]))
     plain["objects"][0]["labell"] = "x"
 
     with pytest.raises(
@@ -81,21 +81,21 @@ def test_a_topic_is_found_with_or_without_a_slash_and_a_wrong_one_names_the_near
 
 def test_what_is_answered_on_request_cannot_be_watched() -> None:
     with pytest.raises(UsageError, match="answered on request"):
-        streamed("workspace/snapshot")
+        streamed_topic("workspace/snapshot")
 
 
 def test_echo_shows_one_field_or_says_which_there_are() -> None:
-    assert shower("speed_m_s", False, False, "text")(ODOMETRY) == "1.5\n---"
+    assert formatter("speed_m_s", False, False, "text")(ODOMETRY) == "1.5\n---"
     with pytest.raises(UsageError, match=r"--field speed: no 'speed' .*speed_m_s"):
-        shower("speed", False, False, "text")(ODOMETRY)
+        formatter("speed", False, False, "text")(ODOMETRY)
 
 
 def test_echo_prints_a_line_of_csv_a_message() -> None:
-    assert shower(None, False, False, "csv")(ODOMETRY) == "7,3,sim,1.5,0.0,0.05"
+    assert formatter(None, False, False, "csv")(ODOMETRY) == "7,3,sim,1.5,0.0,0.05"
 
 
 def test_echo_leaves_the_numbers_of_arrays_out_where_asked() -> None:
-    assert "motions: '<array type: <f8[4, 3]>'" in shower(None, False, True, "text")(
+    assert "motions: '<array type: <f8[4, 3]>'" in formatter(None, False, True, "text")(
         BY_TOPIC[topics.SELF_MOTION]
     )
 

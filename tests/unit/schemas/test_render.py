@@ -49,26 +49,26 @@ def test_an_empty_array_has_no_least_value() -> None:
     assert to_jsonable(Array.of(np.zeros((0, 2))))["min"] is None
 
 
-def test_text_has_a_line_a_field_in_yamls_manner() -> None:
+def test_text_is_yaml_with_a_line_a_field() -> None:
     assert to_text(DELTA).splitlines() == [
         "stamp_ns: 5",
         "seq: 0",
-        "source: 'workspace'",
+        "source: workspace",
         "version: 1",
         "cycle: 2",
-        "phase: 'codelets'",
+        "phase: codelets",
         "tasks: []",
         "operations:",
-        "- type: 'node'",
-        "  id: 'self'",
-        "  kind: 'self'",
+        "- type: node",
+        "  id: self",
+        "  kind: self",
         "  activation: 0.0",
         "  base_level: 0.0",
         "  attributes:",
         "    x_m: 1.5",
         "  samples: <f8 3 x 2, 0.0 to 5.0",
-        "- type: 'drop_node'",
-        "  id: 'tree'",
+        "- type: drop_node",
+        "  id: tree",
         "dropped: 0",
         "refused: []",
     ]
