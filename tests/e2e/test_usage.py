@@ -127,7 +127,7 @@ def test_a_router_that_does_not_answer_within_five_seconds_is_named_by_whoever_l
 def wait_for_processes(endpoint: str, names: set[str]) -> None:
     """Return once processes of all `names` are on the bus."""
     session = open_client(endpoint)
-    deadline_s = time.monotonic() + PATIENCE_S
+    deadline_s = time.monotonic() + TIMEOUT_S
     seen: set[str] = set()
     while not names <= seen and time.monotonic() < deadline_s:
         seen = {process.name for process in discover(session, "agent").processes}
@@ -142,6 +142,6 @@ def test_a_router_that_ends_is_named_by_whoever_watches_a_topic() -> None:
         wait_for_processes(endpoint, {f"cli topic {name}" for name in commands})
 
     for process in watching:
-        _, errors = process.communicate(timeout=PATIENCE_S)
+        _, errors = process.communicate(timeout=TIMEOUT_S)
         assert process.returncode == 2
         assert errors.startswith(f"cogmap: no router at {endpoint} for 5 s: start one with")
