@@ -23,17 +23,18 @@ from cogmap.recording.storage.format import SUMMARY
 from cogmap.recording.storage.reader import LogReader
 from cogmap.runtime.process import Stop
 
-PATIENCE_S = 180.0
+TIMEOUT_S = 180.0
 
 
-class Course(Stop):
-    """Asked to end after `seconds` of driving, too; it learns of them as a display, and shows them
-    on another.
+class TimedStop(Stop):
+    """A stop that is also asked for after `seconds` of driving.
+
+    It learns of the driving as a display does, and passes everything on to `display`.
     """
 
-    def __init__(self, shown_on: Display, seconds: float) -> None:
+    def __init__(self, display: Display, seconds: float) -> None:
         super().__init__()
-        self._shown_on = shown_on
+        self._display = display
         self._seconds = seconds
         self._elapsed_s = 0.0
 
@@ -44,55 +45,60 @@ class Course(Stop):
 
     @property
     def interrupted(self) -> bool:
-        """Whether a signal came."""
+        """Whether a signal asked for the end."""
         return super().asked
 
     def say(self, sentence: str) -> None:
         """Show a sentence that stays."""
-        self._shown_on.say(sentence)
+        self._display.say(sentence)
 
     def waiting(self, names: list[str]) -> None:
-        """Show whom the drive waits for."""
-        self._shown_on.waiting(names)
+        """Show which modules the drive waits for."""
+        self._display.waiting(names)
 
     def driving(self, observer: Observer, errors: Errors) -> None:
-        """Show how far it has come."""
+        """Show how far the drive is."""
         self._elapsed_s = observer.elapsed_s
-        self._shown_on.driving(observer, errors)
+        self._display.driving(observer, errors)
 
     def close(self) -> None:
         """Leave the screen as it should stay."""
-        self._shown_on.close()
+        self._display.close()
 
 
-def drive(folder: Path, laps: float = 1.0, seconds: float = PATIENCE_S) -> tuple[Figures, Watch]:
-    """Drive `laps`, at most `seconds`, leaving the files of `cogmap run` in `folder`. Ctrl-C ends
-    the benchmark.
+def drive(folder: Path, laps: float = 1.0, seconds: float = TIMEOUT_S) -> tuple[Figures, Watch]:
+    """Drive `laps`, at most `seconds`, leaving the files of `cogmap run` in `folder`.
+
+    Ctrl-C ends the process. Raises CogmapError where the robot never moved.
     """
     began_s = time.monotonic()
     choices = Choices(laps=laps)
     sections = effective({}, choices, everybody(choices, observer=True))
-    course = Course(display.on(Console(stderr=True)), seconds)
+    stop = TimedStop(display.on(Console(stderr=True)), seconds)
     run = Drive(folder, free_endpoint(), "agent", choices, sections, began_s)
+
     try:
-        watch = run.run(began_s + PATIENCE_S, course, course)
+        watch = run.run(began_s + TIMEOUT_S, stop, stop)
     finally:
-        course.close()
-    if run.ended_by == INTERRUPTED and course.interrupted:
+        stop.close()
+
+    if run.ended_by == INTERRUPTED and stop.interrupted:
         sys.exit(130)
-    figures = summary.finish(run, watch)
-    if not figures.commands:
-        raise CogmapError("the drive gave no motor command: `cogmap doctor` says what is wrong")
-    return figures, watch
+
+    driven = summary.finish(run, watch)
+    if not driven.commands:
+        raise CogmapError("the drive gave no motor command: `cogmap doctor` finds the reason")
+
+    return driven, watch
 
 
 def recording(folder: Path) -> Summary:
-    """What the recorder said of the drive in `folder`. Raises CogmapError where it did not come to
-    its end.
-    """
+    """The recorder's summary of the drive in `folder`. Raises CogmapError where it has none."""
     about = LogReader(folder / LOG_NAME).about(SUMMARY)
+
     if not about:
         raise CogmapError(
             "the recorder was killed before it had finished: run the benchmark on an idle machine"
         )
+
     return msgspec.json.decode(about["json"], type=Summary)

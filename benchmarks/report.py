@@ -1,51 +1,88 @@
-"""Benchmarks print a table and write flat JSON: every key with its value and the bar it is held
-against.
-"""
+"""The table that a benchmark prints, and the flat JSON that it writes."""
 
 from __future__ import annotations
 
 import json
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
+
+from benchmarks.threshold import Threshold
+
+Metrics = dict[str, float]
+HEADINGS = ("key", "measured", "threshold", "")
 
 
 @dataclass(frozen=True)
-class Bar:
-    """What a figure should be: at most, or at least, `limit`; or from `least` to `limit`."""
+class Outcome:
+    """What one benchmark measured, by key; `failure` is why it could not, or empty."""
 
-    limit: float
-    at_least: bool = False
-    least: float | None = None
+    benchmark: str
+    thresholds: Mapping[str, Threshold]
+    metrics: Mapping[str, float]
+    failure: str = ""
 
-    def holds(self, value: float) -> bool:
-        """Whether `value` meets it."""
-        if self.least is not None and value < self.least:
-            return False
-        return value >= self.limit if self.at_least else value <= self.limit
-
-    def __str__(self) -> str:
-        if self.least is not None:
-            return f"{self.least:g}-{self.limit:g}"
-        return f"{'≥' if self.at_least else '≤'} {self.limit:g}"
+    @property
+    def missed(self) -> list[str]:
+        """The keys whose threshold is missed, or that were not measured."""
+        return [
+            key
+            for key, threshold in self.thresholds.items()
+            if not threshold.is_met(self.metrics.get(key, math.nan))
+        ]
 
 
-def publish(
-    title: str, figures: dict[str, float], bars: dict[str, Bar], json_path: Path | None
-) -> bool:
-    """Print and write `figures`; whether every bar holds. Figures without a bar tell how they came
-    about.
-    """
-    table = Table(title=title)
-    for heading in ("key", "measured", "bar", ""):
-        table.add_column(heading, justify="left" if heading == "key" else "right")
-    for key, value in figures.items():
-        bar = bars.get(key)
-        verdict = "" if bar is None else "[green]met" if bar.holds(value) else "[red]missed"
-        table.add_row(key, f"{value:.4g}", str(bar or ""), verdict)
+def report(outcome: Outcome, json_path: Path | None) -> None:
+    """Print the metrics of one benchmark, and write them to `json_path`."""
+    table = _table(outcome.benchmark)
+    _add_rows(table, outcome)
     Console().print(table)
+
     if json_path is not None:
-        json_path.write_text(json.dumps(figures, indent=2) + "\n")
-    return all(bar.holds(figures[key]) for key, bar in bars.items())
+        write(json_path, outcome.metrics)
+
+
+def summary(outcomes: list[Outcome]) -> Table:
+    """One table of all benchmarks, a section each."""
+    table = _table("all benchmarks")
+
+    for outcome in outcomes:
+        table.add_row(f"[bold]{outcome.benchmark}", "", "", "")
+        if outcome.failure:
+            table.add_row(escape(outcome.failure), "", "", "[red]failed")
+        _add_rows(table, outcome)
+        table.add_section()
+
+    return table
+
+
+def write(path: Path, metrics: Mapping[str, float]) -> None:
+    """Write `metrics` to `path` as one flat JSON object."""
+    path.write_text(json.dumps(dict(metrics), indent=2) + "\n")
+
+
+def _table(title: str) -> Table:
+    table = Table(title=title)
+
+    for heading in HEADINGS:
+        table.add_column(heading, justify="left" if heading == "key" else "right")
+
+    return table
+
+
+def _add_rows(table: Table, outcome: Outcome) -> None:
+    """Keys with a threshold come first; those without one tell how the others came about."""
+    for key, threshold in outcome.thresholds.items():
+        value = outcome.metrics.get(key)
+        measured = "" if value is None else f"{value:.4g}"
+        verdict = "[red]missed" if key in outcome.missed else "[green]met"
+        table.add_row(key, measured, str(threshold), verdict)
+
+    for key, value in outcome.metrics.items():
+        if key not in outcome.thresholds:
+            table.add_row(key, f"{value:.4g}", "", "")

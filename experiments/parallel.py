@@ -1,51 +1,58 @@
-"""Many runs at once, a process a core; what comes of them does not depend on how many."""
+"""Independent jobs spread over processes; the results do not depend on how many processes there are."""
 
 from __future__ import annotations
 
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context, parent_process
 from typing import TypeVar
+
+from joblib import Parallel, delayed
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
+POLL_S = 0.5
 Progress = Callable[[float], None]
 
 
-def each(
+def parallel_map(
     work: Callable[[Job], Result],
     jobs: Sequence[Job],
     processes: int,
     progress: Progress = lambda share: None,
 ) -> list[Result]:
-    """`work` of every job, in the order of the jobs. `progress` is told the share done.
+    """Return `work` of every job, in the order of `jobs`; `progress` is called with the share done.
 
-    `work` and the jobs travel to the processes, so `work` is a function of a module.
+    `work` is pickled. One process, or one job, runs in the calling process.
     """
-    results = []
-    if processes == 1 or len(jobs) < 2:
-        for job in jobs:
-            results.append(work(job))
-            progress(len(results) / len(jobs))
-        return results
-    with ProcessPoolExecutor(min(processes, len(jobs)), get_context("spawn"), _tie) as pool:
-        for result in pool.map(work, jobs):
-            results.append(result)
-            progress(len(results) / len(jobs))
+    count = max(1, min(processes, len(jobs)))
+    pool = Parallel(
+        n_jobs=count,
+        backend="loky",
+        initializer=_end_with,
+        initargs=(os.getpid(),),
+        return_as="generator",
+    )
+    results: list[Result] = []
+
+    for result in pool(delayed(work)(job) for job in jobs):
+        results.append(result)
+        progress(len(results) / len(jobs))
+
     return results
 
 
-def _tie() -> None:
-    """Let a Ctrl-C end the parent alone, which ends its processes; end with it however it ends."""
+def _end_with(parent: int) -> None:
+    """Leave Ctrl-C to the parent process, and exit when it exits, even amid a job."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    threading.Thread(target=_watch, args=(parent,), daemon=True).start()
 
 
-def _end_with_parent() -> None:
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
+def _watch(parent: int) -> None:
+    """A process whose parent has ended is given another one."""
+    while os.getppid() == parent:
+        time.sleep(POLL_S)
+
     os._exit(1)

@@ -59,7 +59,7 @@ def named(landmarks: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     ]
 
 
-class Tape:
+class SensorLog:
     """What was sensed in a run, frame by frame, to be given to other minds: a led robot senses
     whatever they think.
     """
@@ -70,7 +70,7 @@ class Tape:
 
     def recorder(self) -> Module:
         """The module that listens in the first run."""
-        module = Module("tape").on(topics.TRUE_POSE, self._keep_pose)
+        module = Module("sensor_log").on(topics.TRUE_POSE, self._keep_pose)
         for topic in _SENSED:
             module.on(topic, self._keep)
         return module
@@ -105,17 +105,17 @@ def by_cameras(
     `drive` is given a configuration and the modules to run. The first run has everything; what was
     sensed in it is given to the other minds, so that nothing is drawn or recognised twice.
     """
-    tape = Tape(lambda share: progress(DRAWN_SHARE * share))
+    sensor_log = SensorLog(lambda share: progress(DRAWN_SHARE * share))
     results = dict[str, Result]()
     for name, sections in configured.items():
         seeing = with_cameras(sections)
         minds = [registry.build(module, seeing) for module in mind]
         if results:
-            senses = [tape.player()]
+            senses = [sensor_log.player()]
         else:
             senses = [
                 *(registry.build(module, seeing) for module in ("sim", *SENSES)),
-                tape.recorder(),
+                sensor_log.recorder(),
             ]
         results[name] = drive(seeing, [*senses, *minds])
         # A process has one renderer at a time, which goes with its module: now, not whenever that

@@ -19,7 +19,7 @@ MODEL = tuple(
 )
 
 
-class Heard:
+class Transcript:
     """Keeps the bytes of the messages on some topics, in the order in which they came on each."""
 
     def __init__(self, topics: Iterable[Topic]) -> None:
@@ -33,11 +33,11 @@ class Heard:
             module.on(topic, self._keep(topic))
         return module
 
-    def has_as_many_as(self, other: Heard) -> bool:
+    def has_as_many_as(self, other: Transcript) -> bool:
         """Whether it has heard at least as many messages of each topic."""
         return all(len(self.messages[name]) >= len(there) for name, there in other.messages.items())
 
-    def differs_from(self, other: Heard) -> list[str]:
+    def differs_from(self, other: Transcript) -> list[str]:
         """The topics on which other bytes were heard."""
         return [name for name, there in other.messages.items() if self.messages[name] != there]
 

@@ -16,17 +16,17 @@ from benchmarks.localization import smoother, speed
 from benchmarks.localization.loop import Mind
 from benchmarks.localization.senses import Moment, label_of, moments
 from benchmarks.map_correction.measure import trajectory_error_m
-from benchmarks.report import Bar
+from benchmarks.threshold import at_most
 from cogmap.data.mrclam import Numbers, Recording, Robot, read
 from cogmap.geometry.se2 import compose, relative
 from services.codelets.mapping.path import ODOMETRY, POSE, STAMP
 
-BARS = {
-    "known_map_rmse_m": Bar(0.15),
-    "slam_rmse_m": Bar(0.25),
-    "slam_vs_smoother": Bar(1.5),
-    "update_ms_p99": Bar(2.0),
-    "map_size_ratio": Bar(1.2),
+THRESHOLDS = {
+    "known_map_rmse_m": at_most(0.15),
+    "slam_rmse_m": at_most(0.25),
+    "slam_vs_smoother": at_most(1.5),
+    "update_ms_p99": at_most(2.0),
+    "map_size_ratio": at_most(1.2),
 }
 SEEDS = (0, 1)
 TRUTH_GAP_S = 0.5
@@ -36,7 +36,7 @@ Landmarks = dict[int, tuple[float, float]]
 
 
 def measure(folder: Path, processes: int) -> dict[str, float]:
-    """Every figure of BARS, and others that tell how it came about. Raises UsageError where
+    """Every figure of THRESHOLDS, and others that tell how it came about. Raises UsageError where
     `folder` is no set.
     """
     smoother.check_installed()

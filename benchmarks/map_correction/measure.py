@@ -12,7 +12,7 @@ import numpy as np
 from rich.progress import track
 
 from benchmarks.map_correction.reference import Gtsam, best_positions
-from benchmarks.report import Bar
+from benchmarks.threshold import at_most
 from cogmap.data.g2o import read_g2o
 from cogmap.data.pose_graph import PoseGraphFile, read_true_positions
 from cogmap.data.toro import read_toro
@@ -23,11 +23,11 @@ from services.codelets.correction.least_squares import optimize
 from services.codelets.correction.pose_graph import Constraints, PoseGraph, cost
 from services.codelets.correction.reverse_replay import close_loops, displacements, position_cost
 
-BARS = {
-    "positions_cost_ratio": Bar(1.05),
-    "ate_vs_gtsam": Bar(1.10),
-    "time_vs_gtsam": Bar(1.0),
-    "incremental_ms_p99": Bar(20.0),
+THRESHOLDS = {
+    "positions_cost_ratio": at_most(1.05),
+    "ate_vs_gtsam": at_most(1.10),
+    "time_vs_gtsam": at_most(1.0),
+    "incremental_ms_p99": at_most(20.0),
 }
 READERS = {".g2o": read_g2o, ".graph": read_toro, ".toro": read_toro}
 PAIRS = 7
@@ -65,7 +65,7 @@ def trajectory_error_m(positions_m: Floats, truth_m: Floats) -> float:
 
 
 def measure(graph_path: Path, truth_path: Path | None) -> dict[str, float]:
-    """Every figure of BARS, and others that tell how it came about; errors only where there is a
+    """Every figure of THRESHOLDS, and others that tell how it came about; errors only where there is a
     truth.
     """
     graph = read_graph(graph_path)

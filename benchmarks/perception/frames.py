@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.perception.pipeline import PERIOD_S, Eyes
+from benchmarks.perception.pipeline import PERIOD_S, PerceptionPipeline
 from benchmarks.perception.scenes import drawn, drive
 
 STEP_M = 0.3
@@ -15,9 +15,9 @@ def took_ms(seed: int, frames: int) -> list[float]:
     """Of so many `frames` of a drive through the town of `seed`, after a few to warm up."""
     with drawn(seed, 0, drive((WARM_UP + frames) * STEP_M, STEP_M)) as (_, camera, scenes):
         pairs = [(scene.left, scene.right) for scene in scenes]
-    eyes = Eyes(camera)
-    glances = [eyes.see(left, right, STEP_M / PERIOD_S) for left, right in pairs]
-    return [glance.took_ms for glance in glances[WARM_UP:]]
+    eyes = PerceptionPipeline(camera)
+    results = [eyes.see(left, right, STEP_M / PERIOD_S) for left, right in pairs]
+    return [result.took_ms for result in results[WARM_UP:]]
 
 
 def figures(times_ms: list[float]) -> dict[str, float]:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from benchmarks.perception import depth, road, streets
 from benchmarks.perception.novel import Meeting, Memory, remembered
 from benchmarks.perception.objects import Claim, Sight, claims, right_or_not, sight
-from benchmarks.perception.pipeline import Bystander, Eyes
+from benchmarks.perception.pipeline import CandidateProbe, PerceptionPipeline
 from benchmarks.perception.scenes import Scene, anywhere, drawn, encounter, later, side_and_range
 from schemas.sensing import Pose
 from services.epam.layout.road import load
@@ -52,16 +52,16 @@ def town_look(seed: int, invented: int, views: int, tick: Tick) -> Look:
     missed = []
     depths = []
     roads = load()
-    bystander = Bystander()
+    probe = CandidateProbe()
     with drawn(seed, invented, anywhere(views)) as (place, camera, scenes):
-        eyes = Eyes(camera)
+        eyes = PerceptionPipeline(camera)
         edges = streets.edges([each.area(STREET_WIDTH_M / 2) for each in place.roads])
         for scene in scenes:
-            glance = eyes.see(scene.left, scene.right)
-            view = glance.view
-            percepts = glance.percepts
+            result = eyes.see(scene.left, scene.right)
+            view = result.view
+            percepts = result.percepts
             sights.append(_sight(claims(percepts.objects, scene.label.shape), place, scene))
-            candidates.append(_sight(bystander.candidates(glance), place, scene))
+            candidates.append(_sight(probe.candidates(result), place, scene))
             masks.append(roads.mask(view.image.numpy().astype(np.uint8, copy=False)))
             surfaces.append(scene.surface)
             boundary_m = percepts.road_boundary_m.numpy()
@@ -96,7 +96,7 @@ def novel_look(seed: int, sightings: int, tick: Tick) -> Memory:
         return first + [pose for pose in again if pose is not None]
 
     with drawn(seed, KINDS, poses, NOVEL) as (place, camera, scenes):
-        eyes = Eyes(camera)
+        eyes = PerceptionPipeline(camera)
         meetings = []
         for scene in scenes:
             percepts = eyes.see(scene.left, scene.right).percepts.objects

@@ -18,19 +18,19 @@ from benchmarks.perception.novel import Memory
 from benchmarks.perception.objects import calibration_error, detection, named
 from benchmarks.perception.road import road_edge_error_m
 from benchmarks.perception.scenes import FARTHEST_M, FIRST_SEED, NEAREST_M
-from benchmarks.report import Bar
+from benchmarks.threshold import at_least, at_most
 
-BARS = {
-    "top1": Bar(0.97, at_least=True),
-    "ece": Bar(0.05),
-    "detect_recall": Bar(0.95, at_least=True),
-    "detect_precision": Bar(0.95, at_least=True),
-    "novel_top1": Bar(0.85, at_least=True),
-    "road_iou": Bar(0.93, at_least=True),
-    "road_edge_error_m": Bar(0.25),
-    "depth_error": Bar(0.04),
-    "sequence_recall_at_99p": Bar(0.80, at_least=True),
-    "frame_ms_p50": Bar(60),
+THRESHOLDS = {
+    "top1": at_least(0.97),
+    "ece": at_most(0.05),
+    "detect_recall": at_least(0.95),
+    "detect_precision": at_least(0.95),
+    "novel_top1": at_least(0.85),
+    "road_iou": at_least(0.93),
+    "road_edge_error_m": at_most(0.25),
+    "depth_error": at_most(0.04),
+    "sequence_recall_at_99p": at_least(0.80),
+    "frame_ms_p50": at_most(60),
 }
 WORKERS = 2
 # Of each town, up to how many of its kinds are invented.
@@ -45,7 +45,7 @@ POLL_S = 0.2
 
 
 def measure() -> dict[str, float]:
-    """Every figure of BARS, and others that tell how it came about."""
+    """Every figure of THRESHOLDS, and others that tell how it came about."""
     # Two processes, each on a core of its own: no library should start threads.
     os.environ.update(OMP_NUM_THREADS="1", LP_NUM_THREADS="1")
     seeds = range(FIRST_SEED, FIRST_SEED + len(TOWNS) + NOVEL_TOWNS)

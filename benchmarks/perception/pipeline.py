@@ -32,7 +32,7 @@ Bytes = npt.NDArray[np.uint8]
 
 
 @dataclass(frozen=True, eq=False)
-class Glance:
+class Result:
     """What was made of one frame: the view, the percepts, the objects learned from it, and how long
     it took.
     """
@@ -43,7 +43,7 @@ class Glance:
     took_ms: float
 
 
-class Eyes:
+class PerceptionPipeline:
     """Both modules, fresh: what they learn, they learn from the frames of `see`."""
 
     def __init__(self, calibration: Calibration) -> None:
@@ -52,7 +52,7 @@ class Eyes:
         self._epam = epam.build(epam.Config(), "epam")
         self._frame = 0
 
-    def see(self, left: Bytes, right: Bytes, speed_m_s: float = 0.0) -> Glance:
+    def see(self, left: Bytes, right: Bytes, speed_m_s: float = 0.0) -> Result:
         """What sensory memory and then EPAM make of the next frame, PERIOD_S after the last."""
         stamp_ns = round((self._frame + 1) * PERIOD_S * 1e9)
         odometry = Odometry(
@@ -74,7 +74,7 @@ class Eyes:
         learned = [
             known for message in said if isinstance(message, Learned) for known in message.objects
         ]
-        return Glance(
+        return Result(
             view,
             next(message for message in said if isinstance(message, Percepts)),
             learned,
@@ -82,7 +82,7 @@ class Eyes:
         )
 
 
-class Bystander:
+class CandidateProbe:
     """An extended PAM that sees the same views, learns the same, and tells its candidates of any
     activation.
     """
@@ -90,12 +90,12 @@ class Bystander:
     def __init__(self) -> None:
         self._pam = ExtendedPam(epam.Config(), segments.load(), objects.load(), road.load())
 
-    def candidates(self, glance: Glance) -> list[tuple[str, float, npt.NDArray[np.bool_]]]:
+    def candidates(self, result: Result) -> list[tuple[str, float, npt.NDArray[np.bool_]]]:
         """Label, empty for none that it knows, activation, and pixels (h, w) of each, before it
         learns from them.
         """
-        found = self._pam.candidates(pixels(glance.view), glance.view.calibration)
-        self._pam.recall(glance.learned)
+        found = self._pam.candidates(pixels(result.view), result.view.calibration)
+        self._pam.recall(result.learned)
         return [(*_said(each.recognition), each.segment.mask) for each in found]
 
 

@@ -10,49 +10,64 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.report import Bar
+from benchmarks.report import Metrics
+from benchmarks.threshold import at_most
 from cogmap.errors import UsageError
 from services.sensory.disparity import STEPS_PER_PIXEL, StereoMatcher
 
 OFF_PX = (1, 3)
 PLAIN_BLOCK_PX = 3
+SMALLEST_SHARE = 1e-9
+THRESHOLDS = {f"stereo_off_{px}px_over_plain": at_most(1.0) for px in OFF_PX}
 Bytes = npt.NDArray[np.uint8]
 Floats32 = npt.NDArray[np.float32]
 
 
-def measure(
-    left: Path, right: Path, disparity: Path, scale: float
-) -> tuple[dict[str, float], dict[str, Bar]]:
-    """The shares of pixels that are off, and bars: ours no worse than plain.
+def measure(left: Path, right: Path, disparity: Path, scale: float) -> Metrics:
+    """The shares of pixels whose disparity errs by more than OFF_PX, ours and plain StereoSGBM's.
 
-    Of all pixels whose truth is known; a pixel without a match counts as wrong, for all.
-    `together_` is of the pixels only that ours and plain both match. Raises UsageError where a file
-    is missing, no image, or of another size.
+    Of all pixels whose truth is known; a pixel without a match counts as wrong, for both.
+    `*_together_*` is of the pixels only that both match. Raises UsageError where a file is missing,
+    no image, or of another size.
     """
     pair = (_read(left, cv2.IMREAD_COLOR), _read(right, cv2.IMREAD_COLOR))
     true_px = _truth(disparity, scale)
-    for path, size in ((right, pair[1].shape[:2]), (disparity, true_px.shape)):
-        if size != pair[0].shape[:2]:
-            raise UsageError(
-                f"{path} is {_size(size)}, but {left} {_size(pair[0].shape)}: they must be of one size"
-            )
-    rgb = tuple(
-        cv2.cvtColor(image, cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False) for image in pair
-    )
+    _check_sizes(left, pair[0].shape[:2], {right: pair[1].shape[:2], disparity: true_px.shape})
+    left_rgb, right_rgb = (_rgb(image) for image in pair)
+
     most_px = float(true_px.max())
     matcher = StereoMatcher(most_px)
-    ours = matcher.disparity_px(rgb[0], rgb[1])
-    plain = plain_sgbm(rgb[0], rgb[1], most_px)
-    both = np.where((ours > 0) & (plain > 0), true_px, 0.0).astype(np.float32)
-    figures = _off("stereo", ours, true_px) | _off("plain", plain, true_px)
-    figures |= _off("unrefined", matcher.disparity_px(rgb[0], rgb[1], refine=False), true_px)
-    figures |= _off("stereo_together", ours, both) | _off("plain_together", plain, both)
-    figures["stereo_unmatched"] = unmatched(ours, true_px)
-    figures["plain_unmatched"] = unmatched(plain, true_px)
-    return figures, {f"stereo_off_{px}px": Bar(figures[f"plain_off_{px}px"]) for px in OFF_PX}
+    ours = matcher.disparity_px(left_rgb, right_rgb)
+    unrefined = matcher.disparity_px(left_rgb, right_rgb, refine=False)
+    plain = plain_sgbm(left_rgb, right_rgb, most_px)
+    in_both = np.where((ours > 0) & (plain > 0), true_px, 0.0).astype(np.float32)
+
+    metrics = _off("stereo", ours, true_px) | _off("plain", plain, true_px)
+    metrics |= _off("unrefined", unrefined, true_px)
+    metrics |= _off("stereo_together", ours, in_both) | _off("plain_together", plain, in_both)
+    metrics["stereo_unmatched"] = unmatched(ours, true_px)
+    metrics["plain_unmatched"] = unmatched(plain, true_px)
+
+    for px in OFF_PX:
+        plain_share = max(metrics[f"plain_off_{px}px"], SMALLEST_SHARE)
+        metrics[f"stereo_off_{px}px_over_plain"] = metrics[f"stereo_off_{px}px"] / plain_share
+
+    return metrics
 
 
-def _off(name: str, found_px: Floats32, true_px: Floats32) -> dict[str, float]:
+def _check_sizes(left: Path, shape: tuple[int, ...], others: dict[Path, tuple[int, ...]]) -> None:
+    for path, other in others.items():
+        if other != shape:
+            raise UsageError(
+                f"{path} is {_size(other)}, but {left} {_size(shape)}: they must be of one size"
+            )
+
+
+def _rgb(image: npt.NDArray[Any]) -> Bytes:
+    return cv2.cvtColor(image, cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)
+
+
+def _off(name: str, found_px: Floats32, true_px: Floats32) -> Metrics:
     return {f"{name}_off_{px}px": off_share(found_px, true_px, px) for px in OFF_PX}
 
 

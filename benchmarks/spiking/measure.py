@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.report import Bar
-from experiments.parallel import Progress, each
+from benchmarks.threshold import at_most, within
+from experiments.parallel import Progress, parallel_map
 from experiments.spiking.cells import Values
 from experiments.spiking.network import Border, Cues, Posterior, Recording, exact, record
 from services.codelets.localization.sampling import rejection_mask
@@ -15,11 +15,12 @@ from services.codelets.localization.sampling import rejection_mask
 SIDE_M = 5.0
 RECORDED_S = 600.0
 SCENES = 40
+SEED = 1
 PRIOR_SD_M = (0.25, 0.5)
 BORDER_SD_M = (0.15, 0.4)
-BARS = {
-    "posterior_sd_ratio": Bar(1.1, least=0.9),
-    "posterior_mean_error": Bar(0.1),
+THRESHOLDS = {
+    "posterior_sd_ratio": within(0.9, 1.1),
+    "posterior_mean_error": at_most(0.1),
 }
 
 
@@ -86,10 +87,10 @@ def seeds(seed: int) -> list[int]:
 
 def measure(seed: int, processes: int, progress: Progress = lambda share: None) -> list[Scene]:
     """SCENES scenes, the same for the same seed."""
-    return each(scene, seeds(seed), processes, progress)
+    return parallel_map(scene, seeds(seed), processes, progress)
 
 
-def figures(scenes: list[Scene]) -> dict[str, float]:
+def metrics(scenes: list[Scene]) -> dict[str, float]:
     """Every figure: ratios of standard deviations, along x and y; errors of means in exact standard
     deviations.
     """

@@ -26,7 +26,7 @@ from experiments.city_maps.fit import fitted
 from experiments.city_maps.measure import (
     NOISE,
     TRAVERSALS,
-    Effort,
+    Budget,
     by_cameras,
     configurations,
     jobs,
@@ -117,9 +117,9 @@ def city_maps(
     asked = Noise(speed=noise[0], turn=noise[1], drift_rad_per_sqrt_m=noise[2])
     if fit:
         with bar("fitting the noise") as progress:
-            asked = fitted(places, Effort(traversals, seed, processes, progress))
+            asked = fitted(places, Budget(traversals, seed, processes, progress))
     with bar("traversals") as progress:
-        found = measure(places, asked, Effort(traversals, seed, processes, progress))
+        found = measure(places, asked, Budget(traversals, seed, processes, progress))
     said = figures(found, asked)
     first = jobs(places, asked, 1, seed)[0]
     if cameras:

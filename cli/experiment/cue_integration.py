@@ -19,7 +19,7 @@ from cli.experiment.options import (
 )
 from cli.log.progress import bar
 from experiments.cue_integration import agent, camera_level
-from experiments.cue_integration.run import FIT_TRIALS, FITTED, Effort, Session, fitted, measure
+from experiments.cue_integration.run import FIT_TRIALS, FITTED, Budget, Session, fitted, measure
 from experiments.cue_integration.trial import Condition, Noise, Trial
 
 NAME = "cue-integration"
@@ -77,9 +77,9 @@ def cue_integration(
     noise = Noise(FITTED.speed, FITTED.turn, distance_noise)
     if fit:
         with bar("fitting the noise") as progress:
-            noise = fitted(distance_noise, Effort(FIT_TRIALS, seed, processes, progress))
+            noise = fitted(distance_noise, Budget(FIT_TRIALS, seed, processes, progress))
     with bar("trials") as progress:
-        found = measure(noise, Effort(trials, seed, processes, progress))
+        found = measure(noise, Budget(trials, seed, processes, progress))
     figures = found.figures()
     if cameras:
         with bar("trials with cameras") as progress:
@@ -104,7 +104,10 @@ def _differing(trial: Trial) -> list[str]:
     response = inside.run()
     minds = [("workspace", "workspace"), ("codelets", agent.WORKER)]
     live.run(
-        agent.SECTIONS, minds, outside.bodies(), lambda: outside.heard.has_as_many_as(inside.heard)
+        agent.SECTIONS,
+        minds,
+        outside.bodies(),
+        lambda: outside.transcript.has_as_many_as(inside.transcript),
     )
     answer = [] if outside.room.response == response else ["the response"]
-    return outside.heard.differs_from(inside.heard) + answer
+    return outside.transcript.differs_from(inside.transcript) + answer

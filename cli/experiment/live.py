@@ -20,7 +20,7 @@ from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
 from experiments import transcript
-from experiments.transcript import Heard
+from experiments.transcript import Transcript
 from services import registry
 
 PUMP_S = 0.005
@@ -35,8 +35,8 @@ def differing(sections: Sections, modules: Sequence[str]) -> list[str]:
     """
     awaits = {**sections["sim"]["awaits"], transcript.NAME: 1}
     sections = {**sections, "sim": {**sections["sim"], "awaits": awaits}}
-    inside = Heard(transcript.MODEL)
-    outside = Heard(transcript.MODEL)
+    inside = Transcript(transcript.MODEL)
+    outside = Transcript(transcript.MODEL)
     runner = InProcessRunner(
         [*(registry.build(name, sections) for name in modules), inside.module()]
     )

@@ -28,7 +28,7 @@ from experiments.loop_closing.run import (
     figures_of_rule,
     sections,
 )
-from experiments.parallel import each
+from experiments.parallel import parallel_map
 
 NAME = "loop-closing"
 _EPILOG = """\b
@@ -62,7 +62,11 @@ def loop_closing(
     folder = outcome.folder_for(NAME, out)
     with bar("driving round the blocks") as progress:
         loops = dict(
-            zip(METHODS, each(partial(drive, seed), METHODS, processes, progress), strict=True)
+            zip(
+                METHODS,
+                parallel_map(partial(drive, seed), METHODS, processes, progress),
+                strict=True,
+            )
         )
     said = figures(loops) | figures_of_rule(seed)
     if cameras:

@@ -12,9 +12,9 @@ import numpy as np
 from experiments.city_maps import published
 from experiments.city_maps.drive import traverse
 from experiments.city_maps.environment import Environment
-from experiments.city_maps.measure import NOISE, Effort, Job, configurations, jobs, map_error_km2
+from experiments.city_maps.measure import NOISE, Budget, Job, configurations, jobs, map_error_km2
 from experiments.cue_integration.fit import coordinate_descent
-from experiments.parallel import each
+from experiments.parallel import parallel_map
 from services.sim.odometry import Noise
 
 FIT_TRAVERSALS = 2
@@ -23,7 +23,7 @@ MOST = 1.0
 OTHERS = 500_000
 
 
-def fitted(environments: Sequence[Environment], effort: Effort) -> Noise:
+def fitted(environments: Sequence[Environment], budget: Budget) -> Noise:
     """Speed and turn noise by which maps corrected by the paper's rule err as people's do, by
     coordinate descent.
 
@@ -36,9 +36,9 @@ def fitted(environments: Sequence[Environment], effort: Effort) -> Noise:
         if max(noise.speed, noise.turn) > MOST:
             return float("inf")
         tried = jobs(
-            environments, noise, min(effort.traversals, FIT_TRAVERSALS), effort.seed + OTHERS
+            environments, noise, min(budget.traversals, FIT_TRAVERSALS), budget.seed + OTHERS
         )
-        errors_km2 = each(positions_error_km2, tried, effort.processes, effort.progress)
+        errors_km2 = parallel_map(positions_error_km2, tried, budget.processes, budget.progress)
         return float(np.mean(errors_km2) - published.HUMAN_MEAN_KM2) ** 2
 
     return coordinate_descent(cost, NOISE, FACTORS)

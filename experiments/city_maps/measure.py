@@ -15,7 +15,7 @@ from experiments.city_maps.correction import METHODS
 from experiments.city_maps.drive import MIND, Tour, Traversal, driven, sections, traverse
 from experiments.city_maps.environment import BUILDINGS, Environment
 from experiments.city_maps.streets import Points
-from experiments.parallel import Progress, each
+from experiments.parallel import Progress, parallel_map
 from services.sim.odometry import Noise
 
 TRAVERSALS = 12
@@ -34,7 +34,7 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Effort:
+class Budget:
     """How often each environment is traversed, and how."""
 
     traversals: int
@@ -127,11 +127,11 @@ def jobs(
     ]
 
 
-def measure(environments: Sequence[Environment], noise: Noise, effort: Effort) -> list[CityMap]:
+def measure(environments: Sequence[Environment], noise: Noise, budget: Budget) -> list[CityMap]:
     """All environments, the same from the same seed whatever the number of processes."""
-    number = effort.traversals
-    learned = each(
-        traversed, jobs(environments, noise, number, effort.seed), effort.processes, effort.progress
+    number = budget.traversals
+    learned = parallel_map(
+        traversed, jobs(environments, noise, number, budget.seed), budget.processes, budget.progress
     )
     return [
         CityMap(environment, tuple(learned[place * number : (place + 1) * number]))

@@ -16,11 +16,11 @@ from experiments.cue_integration.analysis import Gaussian
 from experiments.cue_integration.fit import coordinate_descent
 from experiments.cue_integration.geometry import Points
 from experiments.cue_integration.trial import Condition, Noise, Response, Trial
-from experiments.parallel import Progress, each
-from experiments.transcript import Heard
+from experiments.parallel import Progress, parallel_map
+from experiments.transcript import Transcript
 from schemas import topics
 
-# What `fitted` gives with the seed and effort that the command has by default, rounded.
+# What `fitted` gives with the seed and budget that the command has by default, rounded.
 FITTED = Noise(speed=0.3, turn=0.173)
 SAID = (
     topics.SELF_MOTION,
@@ -42,11 +42,11 @@ class Session:
 
     def __post_init__(self) -> None:
         self.room = self.kind(self.trial)
-        self.heard = Heard(SAID)
+        self.transcript = Transcript(SAID)
 
     def bodies(self) -> list[Module]:
         """All that is not the mind. The room is the last, for it begins."""
-        return [self.heard.module(), participant.build(), room.build(self.room)]
+        return [self.transcript.module(), participant.build(), room.build(self.room)]
 
     def run(self) -> Response:
         """Run it on the in-memory bus. Raises CogmapError where no response comes."""
@@ -134,7 +134,7 @@ class Outcome:
 
 
 @dataclass(frozen=True)
-class Effort:
+class Budget:
     """How many trials of each condition, with what seed, on how many processes, and who is told of
     the progress.
     """
@@ -146,16 +146,16 @@ class Effort:
 
 
 def measure(
-    noise: Noise, effort: Effort, conditions: Sequence[Condition] = tuple(Condition)
+    noise: Noise, budget: Budget, conditions: Sequence[Condition] = tuple(Condition)
 ) -> Outcome:
     """Trials of each condition. The same whatever the number of processes."""
-    trials = effort.trials
+    trials = budget.trials
     jobs = [
-        Trial(condition, number, noise, effort.seed)
+        Trial(condition, number, noise, budget.seed)
         for condition in conditions
         for number in range(trials)
     ]
-    responses = each(respond, jobs, effort.processes, effort.progress)
+    responses = parallel_map(respond, jobs, budget.processes, budget.progress)
     errors_m = {}
     for place, condition in enumerate(conditions):
         mine = slice(place * trials, (place + 1) * trials)
@@ -163,7 +163,7 @@ def measure(
     return Outcome(noise, errors_m, analysis.shift_m(jobs))
 
 
-def fitted(distance: float, effort: Effort) -> Noise:
+def fitted(distance: float, budget: Budget) -> Noise:
     """Speed and turn noise that bring self-motion's SD and RMSE nearest to those published, by
     coordinate descent.
 
@@ -172,12 +172,12 @@ def fitted(distance: float, effort: Effort) -> Noise:
     not have. The other conditions are predictions then. The trials are others than those that
     `measure` runs with the same seed.
     """
-    effort = replace(effort, seed=effort.seed + 1)
+    budget = replace(budget, seed=budget.seed + 1)
     own = Condition.SELF_MOTION
 
     @cache
     def cost(noise: Noise) -> float:
-        errors_m = measure(noise, effort, (own,)).errors_m[own]
+        errors_m = measure(noise, budget, (own,)).errors_m[own]
         sd_off_m = analysis.sd_m(errors_m) - published.SD_M[own]
         return sd_off_m**2 + (analysis.rmse_m(errors_m) - published.RMSE_M[own]) ** 2
 

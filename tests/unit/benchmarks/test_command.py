@@ -1,4 +1,4 @@
-"""The benchmarks' command and what it measures with, short of the minutes that they take."""
+"""The benchmarks' commands and what they measure with, short of the minutes that they take."""
 
 from __future__ import annotations
 
@@ -9,35 +9,50 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from benchmarks import deltas
-from benchmarks.__main__ import BUS_BARS, benchmarks
-from benchmarks.cycle import BARS
-from benchmarks.report import Bar, publish
+from benchmarks import machine, suite
+from benchmarks.bus import deltas
+from benchmarks.bus import measure as bus
+from benchmarks.commands import benchmarks
+from benchmarks.cycle import measure as cycle
+from benchmarks.report import Metrics, Outcome, report
+from benchmarks.suite import Benchmark, Setting
+from benchmarks.threshold import at_least, at_most, more_than, within
 from cogmap.bus.codec import encode
+from cogmap.errors import UsageError
 from schemas.graph import Links, Node
 from services.workspace.commit import Ledger
 
 
-def test_the_bars_are_those_of_the_keys_promised() -> None:
-    bars = {name: str(bar) for name, bar in (BARS | BUS_BARS).items()}
+def test_the_thresholds_are_those_of_the_keys_promised() -> None:
+    thresholds = {key: str(limit) for key, limit in (cycle.THRESHOLDS | bus.THRESHOLDS).items()}
 
-    assert bars == {
+    assert thresholds == {
         "cycle_p50_ms": "≤ 100",
         "cycle_p99_ms": "≤ 260",
         "bus_share": "≤ 0.25",
         "replay_speed": "≥ 5",
         "error_ratio": "≤ 0.33",
+        "error_over_fused": "≤ 0.6",
         "delta_rate_ratio": "≥ 0.5",
         "never_drop_lost": "≤ 0",
     }
 
 
-def test_a_report_tells_what_is_met_and_missed_and_writes_flat_json(
+def test_a_threshold_is_met_up_to_its_limits_and_by_no_nan() -> None:
+    assert at_most(2).is_met(2.0) and not at_most(2).is_met(2.1)
+    assert at_least(2).is_met(2.0) and not at_least(2).is_met(1.9)
+    assert more_than(0).is_met(0.1) and not more_than(0).is_met(0.0)
+    assert within(0.9, 1.1).is_met(0.9) and not within(0.9, 1.1).is_met(1.2)
+    assert not at_most(2).is_met(float("nan"))
+
+
+def test_a_report_shows_what_is_met_and_missed_and_writes_flat_json(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = tmp_path / "figures.json"
+    path = tmp_path / "metrics.json"
+    thresholds = {"low": at_most(2), "high": at_most(2)}
 
-    publish("speed", {"low": 1.0, "high": 3.0, "why": 7.0}, {"low": Bar(2), "high": Bar(2)}, path)
+    report(Outcome("speed", thresholds, {"low": 1.0, "high": 3.0, "why": 7.0}), path)
 
     lines = {
         line.split()[1]: line
@@ -48,6 +63,95 @@ def test_a_report_tells_what_is_met_and_missed_and_writes_flat_json(
     assert "missed" in lines["high"]
     assert "7" in lines["why"]
     assert json.loads(path.read_text()) == {"low": 1.0, "high": 3.0, "why": 7.0}
+
+
+def _suite(monkeypatch: pytest.MonkeyPatch, *more: Benchmark) -> None:
+    """Replace the minutes of the real suite by benchmarks that return at once."""
+
+    def slow(setting: Setting) -> Metrics:
+        return {"slow_ms": 3.0, "runs": 2.0}
+
+    def fast(setting: Setting) -> Metrics:
+        return {"fast_ms": 1.0, "runs": 5.0}
+
+    benchmarks_there = (
+        Benchmark("cycle", {"slow_ms": at_most(2)}, slow),
+        Benchmark("bus", {"fast_ms": at_most(2)}, fast),
+        *more,
+    )
+    monkeypatch.setattr(suite, "SUITE", benchmarks_there)
+
+
+def test_all_ends_with_1_where_a_threshold_is_missed_and_writes_every_key(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _suite(monkeypatch)
+    path = tmp_path / "all.json"
+
+    result = CliRunner().invoke(benchmarks, ["all", "--json", str(path)])
+
+    assert result.exit_code == 1
+    assert "missed" in result.output
+    metrics = json.loads(path.read_text())
+    assert metrics["slow_ms"] == 3.0 and metrics["fast_ms"] == 1.0
+    assert metrics["runs"] == 2.0 and metrics["bus_runs"] == 5.0
+    assert metrics["machine_unit_ms"] > 0
+
+
+def test_all_ends_with_0_where_every_threshold_chosen_is_met(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    _suite(monkeypatch)
+
+    assert CliRunner().invoke(benchmarks, ["all", "--only", "bus"]).exit_code == 0
+    assert CliRunner().invoke(benchmarks, ["all", "--skip", "cycle"]).exit_code == 0
+
+
+def test_a_benchmark_that_fails_is_a_row_with_its_reason_and_others_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(setting: Setting) -> Metrics:
+        raise UsageError("gtsam is not installed")
+
+    def crashes(setting: Setting) -> Metrics:
+        raise ZeroDivisionError("nothing was measured")
+
+    _suite(
+        monkeypatch,
+        Benchmark("localization", {"rmse_m": at_most(1)}, fails),
+        Benchmark("spiking", {}, crashes),
+    )
+    path = tmp_path / "all.json"
+    arguments = ["all", "--skip", "cycle", "--json", str(path)]
+
+    result = CliRunner().invoke(benchmarks, arguments, env={"COLUMNS": "200"})
+
+    assert result.exit_code == 1
+    assert "gtsam is not installed" in result.output
+    assert "ZeroDivisionError: nothing was measured" in result.output
+    assert json.loads(path.read_text())["fast_ms"] == 1.0
+
+
+def test_a_benchmark_of_a_set_that_is_not_there_names_its_folder(tmp_path: Path) -> None:
+    outcome = suite.run(
+        next(each for each in suite.SUITE if each.name == "cones"),
+        Setting(tmp_path, 1, tmp_path, lambda sentence: None),
+    )
+
+    assert f"there is no folder {tmp_path / 'stereo_cones'}" in outcome.failure
+
+
+def test_no_two_benchmarks_have_a_threshold_of_the_same_key() -> None:
+    keys = [key for each in suite.SUITE for key in each.thresholds]
+
+    assert len(keys) == len(set(keys))
+
+
+def test_the_unit_of_a_machine_is_repeatable() -> None:
+    first, second = machine.machine_unit_ms(), machine.machine_unit_ms()
+
+    assert 0 < first < 1000
+    assert second == pytest.approx(first, rel=0.5)
 
 
 def test_a_typical_delta_has_50_nodes_200_links_and_31_kb() -> None:
@@ -66,17 +170,17 @@ def test_a_typical_delta_has_50_nodes_200_links_and_31_kb() -> None:
     )
 
 
-def test_every_delta_reaches_every_replica_and_both_rates_are_told() -> None:
+def test_every_delta_reaches_every_replica_and_both_rates_are_measured() -> None:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
-    figures = deltas.measure(endpoint, number=100, pairs=1, tell=lambda sentence: None)
+    metrics = deltas.measure(endpoint, number=100, pairs=1, announce=lambda sentence: None)
 
-    assert figures["delta_rate_ratio"] == pytest.approx(
-        figures["delta_rate_hz"] / figures["raw_put_rate_hz"]
+    assert metrics["delta_rate_ratio"] == pytest.approx(
+        metrics["delta_rate_hz"] / metrics["raw_put_rate_hz"]
     )
-    assert min(figures.values()) > 0
+    assert min(metrics.values()) > 0
 
 
 @pytest.mark.parametrize("command", ["cycle", "bus"])
@@ -84,7 +188,7 @@ def test_a_folder_that_is_not_there_is_named_before_anything_is_measured(
     command: str, tmp_path: Path
 ) -> None:
     result = CliRunner().invoke(
-        benchmarks, [command, "--json", str(tmp_path / "nowhere" / "figures.json")]
+        benchmarks, [command, "--json", str(tmp_path / "nowhere" / "metrics.json")]
     )
 
     assert result.exit_code == 2

@@ -17,7 +17,7 @@ from experiments.cue_integration.geometry import (
     step,
     turned,
 )
-from experiments.cue_integration.run import Effort, Outcome, Session, measure
+from experiments.cue_integration.run import Budget, Outcome, Session, measure
 from experiments.cue_integration.senses import self_motion, sightings
 from experiments.cue_integration.trial import Condition, Noise, Response, Trial
 
@@ -98,14 +98,14 @@ def test_landmarks_that_are_turned_lead_to_where_they_say() -> None:
 def test_a_trial_says_the_same_bytes_each_time_and_others_in_another() -> None:
     sessions = [Session(_trial(Condition.BOTH, number)) for number in (4, 4, 12)]
     responses = [session.run() for session in sessions]
-    first, again, other = (session.heard.messages for session in sessions)
+    first, again, other = (session.transcript.messages for session in sessions)
     assert responses[0] == responses[1] and first == again
     assert first["workspace/delta"] and first["workspace/delta"] != other["workspace/delta"]
 
 
 def test_the_figures_do_not_depend_on_the_number_of_processes() -> None:
     few = (Condition.SELF_MOTION,)
-    one, two = (measure(NOISY, Effort(2, 7, processes), few) for processes in (1, 2))
+    one, two = (measure(NOISY, Budget(2, 7, processes), few) for processes in (1, 2))
     assert np.array_equal(one.errors_m[few[0]], two.errors_m[few[0]])
 
 

@@ -7,15 +7,15 @@ import sys
 import time
 from pathlib import Path
 
-from experiments.parallel import each
+from experiments.parallel import parallel_map
 
 SLOW = """
 import sys, time
-from experiments.parallel import each
+from experiments.parallel import parallel_map
 if __name__ == "__main__":
-    each(print, ["there"] * 2, 2)
+    parallel_map(print, ["there"] * 2, 2)
     print("waiting", flush=True)
-    each(time.sleep, [60.0] * 4, 2)
+    parallel_map(time.sleep, [60.0] * 4, 2)
 """
 
 
@@ -40,7 +40,7 @@ def _alive(pid: int) -> bool:
 
 def test_results_come_in_the_order_of_the_jobs_and_progress_reaches_one() -> None:
     shares: list[float] = []
-    assert each(abs, [-3, 2, -1], 2, shares.append) == [3, 2, 1]
+    assert parallel_map(abs, [-3, 2, -1], 2, shares.append) == [3, 2, 1]
     assert shares[-1] == 1.0 and shares == sorted(shares)
 
 

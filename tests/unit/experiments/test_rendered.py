@@ -16,7 +16,7 @@ from experiments.cue_integration.run import FITTED
 from experiments.cue_integration.trial import Condition, Trial
 from experiments.loop_closing.run import MIND, sections
 from experiments.rendered import by_cameras, named, with_cameras
-from experiments.transcript import MODEL, Heard
+from experiments.transcript import MODEL, Transcript
 from schemas import topics
 from schemas.cognition import Action
 from schemas.sensing import MotorCommand, Percepts
@@ -32,8 +32,8 @@ def _short() -> Sections:
     return configured
 
 
-def _heard(configured: Sections, modules: Sequence[Module]) -> Heard:
-    heard = Heard(MODEL)
+def _heard(configured: Sections, modules: Sequence[Module]) -> Transcript:
+    heard = Transcript(MODEL)
     runner = InProcessRunner([*modules, heard.module()])
     runner.run()
     runner.close()
@@ -104,8 +104,8 @@ def test_nothing_is_seen_in_the_dark() -> None:
 
 
 def test_bytes_that_differ_are_named_by_their_topic_and_end_the_command() -> None:
-    one = Heard([topics.MOTOR_COMMAND, topics.DELTA])
-    other = Heard([topics.MOTOR_COMMAND, topics.DELTA])
+    one = Transcript([topics.MOTOR_COMMAND, topics.DELTA])
+    other = Transcript([topics.MOTOR_COMMAND, topics.DELTA])
     for heard, speed_rad_s in ((one, 1.0), (other, 2.0)):
         heard.module().feed(
             MotorCommand(stamp_ns=1, left_wheel_rad_s=speed_rad_s, right_wheel_rad_s=1.0)

@@ -70,7 +70,7 @@ def test_a_border_moves_the_estimate_along_it_where_the_prior_is_slanted() -> No
 
 def test_spikes_are_samples_of_the_posterior() -> None:
     scenes = [spiking.scene(seed) for seed in range(4)]
-    figures = spiking.figures(scenes)
+    figures = spiking.metrics(scenes)
     assert figures["posterior_sd_ratio"] == pytest.approx(1.0, abs=0.1)
     assert figures["posterior_mean_error"] < 0.1
 

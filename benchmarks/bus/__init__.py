@@ -1,0 +1,1 @@
+"""The message bus: the rate of committed deltas, and the messages lost."""

@@ -1,0 +1,201 @@
+"""Committed deltas that reach three replicas, and raw puts of the same bytes by the same router."""
+
+from __future__ import annotations
+
+import threading
+import time
+import timeit
+from collections.abc import Callable
+from statistics import median
+
+import numpy as np
+import zenoh
+
+from benchmarks.bus.race import REPLICAS, Race, pace
+from benchmarks.report import Metrics
+from cogmap.bus.codec import decode, encode
+from cogmap.bus.session import open_client, open_router
+from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.graph.graph import Graph
+from cogmap.graph.replica import Replica, snapshot_over
+from cogmap.runtime.module import Module
+from cogmap.runtime.shell import Shell
+from schemas import topics
+from schemas.array import Array
+from schemas.graph import Delta, Links, Node, Operation
+from schemas.process import Clock
+from services.workspace.commit import Ledger
+
+AGENT = "benchmark"
+COST_ROUNDS = 400
+COST_REPEATS = 5
+RAW_KEY = "benchmark/raw"
+NODES = 50
+LINKS = 200
+SAMPLES = 730
+SEED = 31
+
+
+def typical_operations() -> list[Operation]:
+    """50 nodes, 200 links and one cloud of samples: 31 KB, in operations of the workspace."""
+    rng = np.random.default_rng(SEED)
+    cloud = Array.of(rng.normal(size=(SAMPLES, 3)))
+    nodes = [_node(number, cloud if number == 0 else None) for number in range(NODES)]
+    weights = {nodes[number].id: _links(number) for number in range(NODES)}
+    return [*nodes, Links(weights=weights)]
+
+
+def _node(number: int, samples: Array | None) -> Node:
+    label = f"building_{number}"
+    return Node(
+        id=f"object:{label}",
+        kind="object",
+        activation=0.75,
+        base_level=0.25,
+        attributes={
+            "label": label,
+            "x_m": number * 1.5,
+            "y_m": number * 0.5,
+            "sightings": number,
+        },
+        samples=samples,
+    )
+
+
+def _links(number: int) -> dict[str, float]:
+    return {f"place:{at}:{-at}": 0.5 for at in range(number, LINKS, NODES)}
+
+
+def measure(endpoint: str, number: int, pairs: int, announce: Callable[[str], None]) -> Metrics:
+    """The rates of both, in turn, through one router at `endpoint`; the ratio is the median."""
+    router = open_router(endpoint)
+    ours = []
+    raw = []
+
+    for pair in range(1, pairs + 1):
+        announce(f"deltas and raw puts, pair {pair} of {pairs}")
+        raw.append(pace(endpoint, number, _put, _receive))
+        ours.append(pace(endpoint, number, _commit, _replicate))
+
+    router.close()  # type: ignore[no-untyped-call]
+    ratios = [our.rate_hz / peer.rate_hz for our, peer in zip(ours, raw, strict=True)]
+    rates = {
+        "delta_rate_ratio": median(ratios),
+        "delta_rate_hz": median(our.rate_hz for our in ours),
+        "raw_put_rate_hz": median(peer.rate_hz for peer in raw),
+        "delta_cpu_us": median(our.cpu_us for our in ours),
+        "raw_put_cpu_us": median(peer.cpu_us for peer in raw),
+    }
+    return rates | costs()
+
+
+def costs() -> Metrics:
+    """The CPU time of each step that a delta takes, where nothing else runs, and its size."""
+    ledger = Ledger(1.0)
+    replica = Graph()
+    operations = typical_operations()
+    payload = encode(ledger.commit(0, 1, "objects", operations))
+    delta = decode(topics.DELTA, payload)
+    assert isinstance(delta, Delta)
+
+    return {
+        "delta_commit_us": _cost_us(lambda: ledger.commit(0, 1, "objects", operations)),
+        "delta_encode_us": _cost_us(lambda: encode(delta)),
+        "delta_decode_us": _cost_us(lambda: decode(topics.DELTA, payload)),
+        "delta_apply_us": _cost_us(lambda: replica.change(delta.operations)),
+        "delta_bytes": float(len(payload)),
+    }
+
+
+def _cost_us(work: Callable[[], object]) -> float:
+    rounds = timeit.repeat(work, repeat=COST_REPEATS, number=COST_ROUNDS, timer=time.process_time)
+    return 1e6 * min(rounds) / COST_ROUNDS
+
+
+def _commit(race: Race) -> None:
+    """The workspace's part: commit, encode, publish."""
+    ledger = Ledger(1.0)
+    operations = typical_operations()
+    publisher = Module("workspace").on(
+        topics.CLOCK,
+        lambda clock: ledger.commit(clock.stamp_ns, 1, "objects", operations),
+        emits=[topics.DELTA],
+    )
+    publisher.requires = {"replica": REPLICAS}
+    shell = Shell(publisher, ZenohBus(race.endpoint, AGENT), health=False)
+    shell.open()
+
+    while shell.missing:
+        shell.spin_once(1.0)
+
+    with race.timed():
+        race.go.wait()
+        for number in range(race.number):
+            shell.publish(publisher.feed(Clock(stamp_ns=number)))
+        race.end.wait()
+
+    shell.close()
+
+
+def _replicate(race: Race) -> None:
+    """A replica's part: receive, validate, apply."""
+    bus = ZenohBus(race.endpoint, AGENT)
+    replica = Replica(snapshot_over(bus))
+
+    def follow(delta: Delta) -> None:
+        replica.follow(delta)
+
+    follower = Module("replica", f"replica-{time.time_ns()}").on(topics.DELTA, follow)
+    shell = Shell(follower, bus, health=False)
+    shell.open()
+
+    with race.timed():
+        while replica.graph.version < race.number:
+            shell.spin_once(1.0)
+        race.done.release()
+
+    shell.close()
+
+
+def _put(race: Race) -> None:
+    """The peer: the same bytes put on a plain publisher."""
+    payload = encode(Ledger(1.0).commit(0, 1, "objects", typical_operations()))
+    session = open_client(race.endpoint)
+    publisher = session.declare_publisher(RAW_KEY, congestion_control=zenoh.CongestionControl.BLOCK)
+    receivers = session.liveliness().declare_subscriber(f"{RAW_KEY}/*", history=True)
+
+    for _ in range(REPLICAS):
+        receivers.recv()
+
+    with race.timed():
+        race.go.wait()
+        for _ in range(race.number):
+            publisher.put(payload)
+        race.end.wait()
+
+    session.close()  # type: ignore[no-untyped-call]
+
+
+def _receive(race: Race) -> None:
+    """The peer: the bytes received, nothing made of them."""
+    session = open_client(race.endpoint)
+    received = [0]
+    complete = threading.Event()
+
+    def count(sample: zenoh.Sample) -> None:
+        bytes(sample.payload)
+        received[0] += 1
+
+        if received[0] == race.number:
+            complete.set()
+
+    subscriber = session.declare_subscriber(RAW_KEY, count)
+    token = session.liveliness().declare_token(f"{RAW_KEY}/{session.zid()}")
+
+    with race.timed():
+        complete.wait()
+        race.done.release()
+
+    token.undeclare()  # type: ignore[no-untyped-call]
+    subscriber.undeclare()  # type: ignore[no-untyped-call]
+    session.close()  # type: ignore[no-untyped-call]

@@ -1,0 +1,320 @@
+"""The commands of `python -m benchmarks`."""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+import click
+from rich.console import Console
+
+from benchmarks import suite
+from benchmarks.bus import measure as bus
+from benchmarks.cycle import measure as cycle
+from benchmarks.localization import measure as localization
+from benchmarks.map_correction import measure as map_correction
+from benchmarks.perception import measure as perception
+from benchmarks.perception import photographs, stereo
+from benchmarks.report import Metrics, report, summary, write
+from benchmarks.spiking import measure as spiking
+from benchmarks.threshold import Thresholds
+from cli.experiment.outcome import save_figure
+from cli.log.progress import bar
+from services.epam.layout.road import DEFAULT_PATH as ROAD_WEIGHTS
+from training.photographs import camvid_iou
+
+
+def _writable(context: click.Context, parameter: click.Parameter, path: Path | None) -> Path | None:
+    """Refuse a file that cannot be written before minutes of measuring."""
+    if path is not None and not path.parent.is_dir():
+        raise click.BadParameter(f"there is no folder {path.parent}: make it first")
+
+    return path
+
+
+json_option = click.option(
+    "--json",
+    "json_path",
+    type=click.Path(dir_okay=False, writable=True, path_type=Path),
+    callback=_writable,
+    metavar="FILE",
+    help="Write the metrics there too, as one flat object.",
+)
+processes_option = click.option(
+    "--processes",
+    type=click.IntRange(1, 256),
+    default=os.cpu_count() or 1,
+    help="How many run at once.  [default: one a core]",
+)
+
+
+def _announce(sentence: str) -> None:
+    click.echo(sentence, err=True)
+
+
+def _report(name: str, thresholds: Thresholds, metrics: Metrics, json_path: Path | None) -> None:
+    measured = {key: limit for key, limit in thresholds.items() if key in metrics}
+    report(suite.completed(name, measured, metrics), json_path)
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+def benchmarks() -> None:
+    """Measure Cogmap on this machine.
+
+    Each prints a table of what was measured, the threshold beside it, and whether it is met; only
+    `all` ends with code 1 where one is missed. Ratios are measured in one run. Timings stand beside
+    machine_unit_ms, the time of one stereo matching, so that two machines can be compared. Leave
+    the machine alone meanwhile.
+
+    \b
+    python -m benchmarks all --data DIR --json all.json
+    python -m benchmarks cycle --json cycle.json
+    python -m benchmarks map_correction --graph manhattan.g2o --json map_correction.json
+    """
+
+
+@benchmarks.command(name="all")
+@click.option(
+    "--data",
+    type=click.Path(exists=True, file_okay=False, path_type=Path),
+    metavar="DIR",
+    help="Sets that others published: mrclam6, pose_graphs, stereo_cones and camvid, a folder each.",
+)
+@click.option(
+    "--only", type=click.Choice(suite.NAMES), multiple=True, help="Just this one; repeatable."
+)
+@click.option(
+    "--skip", type=click.Choice(suite.NAMES), multiple=True, help="Not this one; repeatable."
+)
+@processes_option
+@json_option
+def all_command(
+    data: Path | None,
+    only: tuple[str, ...],
+    skip: tuple[str, ...],
+    processes: int,
+    json_path: Path | None,
+) -> None:
+    """Every benchmark and experiment that has a threshold, in one table.
+
+    Ends with code 1 where a threshold is missed. A benchmark that fails is a row with its reason,
+    and counts as missed. Takes about an hour on two cores.
+    """
+    chosen = suite.selected(only, skip)
+    outcomes = []
+
+    with tempfile.TemporaryDirectory() as folder:
+        setting = suite.Setting(Path(folder), processes, data, _announce)
+
+        for number, benchmark in enumerate(chosen, start=1):
+            _announce(f"[{number}/{len(chosen)}] {benchmark.name}")
+            outcomes.append(suite.run(benchmark, setting))
+
+            if json_path is not None:
+                write(json_path, suite.merged(outcomes))
+
+    Console().print(summary(outcomes))
+
+    if any(outcome.failure or outcome.missed for outcome in outcomes):
+        sys.exit(1)
+
+
+@benchmarks.command(name="cycle")
+@processes_option
+@json_option
+def cycle_command(processes: int, json_path: Path | None) -> None:
+    """The cycle's latency, the bus's share of it, the speed of a replay, the error of the estimate.
+
+    Drives a lap of the demo's town in real time, every module a process, records it, and replays
+    the log through sensory, epam, workspace and codelets. Then it drives three laps of three towns
+    in lockstep, to compare the estimate with fused self-motion alone. Takes about six minutes.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        metrics = cycle.measure(Path(folder), processes, _announce)
+
+    _report("cycle", cycle.THRESHOLDS, metrics, json_path)
+
+
+@benchmarks.command(name="bus")
+@click.option(
+    "--pairs",
+    type=click.IntRange(1, 99),
+    default=bus.PAIRS,
+    show_default=True,
+    help="How often to measure both rates, one right after the other; the ratio is the median.",
+)
+@click.option(
+    "--deltas",
+    "number",
+    type=click.IntRange(100, 100_000),
+    default=bus.DELTAS,
+    show_default=True,
+    help="Of each.",
+)
+@json_option
+def bus_command(pairs: int, number: int, json_path: Path | None) -> None:
+    """The rate of committed deltas against raw Zenoh puts, and what is lost in a minute.
+
+    A workspace commits deltas of 31 KB that three replicas receive, validate and apply; the peer
+    puts the same bytes through the same router to three subscribers. Then the whole system drives
+    for 60 s, recorded. Takes about two minutes.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        metrics = bus.measure(Path(folder), _announce, number, pairs)
+
+    _report("bus", bus.THRESHOLDS, metrics, json_path)
+
+
+@benchmarks.command(name="perception")
+@click.option(
+    "--stereo",
+    "pair",
+    nargs=3,
+    type=click.Path(path_type=Path),
+    metavar="LEFT RIGHT DISPARITY",
+    help="Measure only the stereo matching, on a rectified pair of yours: its images, and the true disparities of the "
+    "left one, as an image of --scale times the pixels, 0 where unknown.",
+)
+@click.option(
+    "--scale",
+    type=click.FloatRange(0, min_open=True),
+    metavar="N",
+    help="Of --stereo; 1 if not given.",
+)
+@click.option(
+    "--camvid-test",
+    nargs=2,
+    type=click.Path(path_type=Path),
+    metavar="IMAGES LABELS",
+    help="Measure only how well road is found in street photographs: two folders of PNG files with the same names, "
+    "labelled as CamVid's 12 classes are.",
+)
+@click.option(
+    "--road-weights",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Of --camvid-test: the road network, as python -m training road --camvid wrote it; "
+    "that of the running system if not given.",
+)
+@json_option
+def perception_command(
+    pair: tuple[Path, Path, Path] | None,
+    scale: float | None,
+    camvid_test: tuple[Path, Path] | None,
+    road_weights: Path | None,
+    json_path: Path | None,
+) -> None:
+    """What perception makes of towns that it never saw: names, new buildings, roads, depth, places,
+    and how fast.
+
+    Draws them, with light, noise and clutter, and looks at them with the modules of the running
+    system, in two processes. Takes four to five minutes on two cores; leave both to it.
+    """
+    if scale is not None and not pair:
+        raise click.BadParameter("it belongs to --stereo: give that too", param_hint="--scale")
+    if road_weights is not None and not camvid_test:
+        raise click.BadParameter(
+            "it belongs to --camvid-test: give that too", param_hint="--road-weights"
+        )
+
+    metrics: Metrics = {}
+    if pair:
+        metrics |= stereo.measure(*pair, scale or 1.0)
+    if camvid_test:
+        metrics["camvid_iou"] = camvid_iou(road_weights or ROAD_WEIGHTS, *camvid_test)
+    if not pair and not camvid_test:
+        metrics = perception.measure()
+
+    thresholds = perception.THRESHOLDS | stereo.THRESHOLDS | photographs.THRESHOLDS
+    _report("perception", thresholds, metrics, json_path)
+
+
+@benchmarks.command(name="localization")
+@click.option(
+    "--mrclam",
+    "folder",
+    required=True,
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="A folder of the UTIAS MRCLAM sets, as published, its files packed with xz or not.",
+)
+@processes_option
+@json_option
+def localization_command(folder: Path, processes: int, json_path: Path | None) -> None:
+    """How well real robots localize, on a map that is known and on one that they make; how fast.
+
+    Each of the set's robots alone, through the town's workspace and codelets; observations of other
+    robots are left out. The map that it makes is aligned with the truth, and compared with gtsam's
+    batch smoother, which `make bench-setup` installs. Takes some minutes.
+    """
+    metrics = localization.measure(folder, processes)
+    _report("localization", localization.THRESHOLDS, metrics, json_path)
+
+
+@benchmarks.command(name="map_correction")
+@click.option(
+    "--graph",
+    "graph_path",
+    required=True,
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="A pose graph in the plane of yours: .g2o, or TORO's .graph; packed as .xz or not.",
+)
+@click.option(
+    "--truth",
+    "truth_path",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Its true poses, a line each: x, y and heading, with an index before them or not.",
+)
+@json_option
+def map_correction_command(
+    graph_path: Path, truth_path: Path | None, json_path: Path | None
+) -> None:
+    """How well and how fast loops are closed, on a pose graph that was recorded elsewhere.
+
+    By the paper's rule, for positions only, against exact least squares; with headings too, against
+    gtsam, which `make bench-setup` installs; and one closure at a time. Takes up to half a minute.
+    """
+    metrics = map_correction.measure(graph_path, truth_path)
+    _report("map correction", map_correction.THRESHOLDS, metrics, json_path)
+
+
+@benchmarks.command(name="spiking")
+@click.option(
+    "--seed",
+    type=click.IntRange(0, 2**16),
+    default=spiking.SEED,
+    show_default=True,
+    help="Which scenes.",
+)
+@processes_option
+@click.option(
+    "--figure",
+    "folder",
+    type=click.Path(file_okay=False, exists=True, path_type=Path),
+    metavar="FOLDER",
+    help="Draw figure 4 there too, spiking.png and spiking.pdf.",
+)
+@json_option
+def spiking_command(seed: int, processes: int, folder: Path | None, json_path: Path | None) -> None:
+    """The posterior that spikes of place cells give, and that by rejection sampling, against the
+    exact one.
+
+    Scenes with cues drawn at random: a position by path integration, and the distance to one or two
+    walls. A ratio is of standard deviations along x and y, an error is of the mean in exact
+    standard deviations.
+    """
+    with bar("recording") as progress:
+        scenes = spiking.measure(seed, processes, progress)
+
+    _report("spiking", spiking.THRESHOLDS, spiking.metrics(scenes), json_path)
+    if folder is None:
+        return
+
+    from benchmarks.spiking.figure import figure  # matplotlib takes long to import
+
+    for path in save_figure(folder, "spiking", figure(scenes, spiking.seeds(seed))):
+        _announce(str(path))

@@ -1,0 +1,57 @@
+"""The cognitive cycle on a drive of the demo's loop, the replay of its log, and the agent's error."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from benchmarks.cycle.position_error import TOWNS, over_fused
+from benchmarks.drive import drive
+from benchmarks.report import Metrics
+from benchmarks.threshold import at_least, at_most
+from cli.launch.drive import ROUTE_COMPLETE
+from cli.launch.plan import LOG_NAME
+from cogmap.recording.replaying.replay import replay_into
+from services import registry
+
+REPLAYED = ("sensory", "epam", "workspace", "codelets")
+THRESHOLDS = {
+    "cycle_p50_ms": at_most(100),
+    "cycle_p99_ms": at_most(260),
+    "bus_share": at_most(0.25),
+    "replay_speed": at_least(5),
+    "error_ratio": at_most(0.33),
+    "error_over_fused": at_most(0.6),
+}
+
+
+def measure(folder: Path, processes: int, announce: Callable[[str], None]) -> Metrics:
+    """The metrics of THRESHOLDS, and others that explain them; `folder` holds the drive's log.
+
+    `error_ratio` is over raw wheels, on one lap; `error_over_fused` is over fused self-motion, on
+    three. `replay_same` and `route_complete` are 1 where it is so.
+    """
+    announce("driving one lap in real time")
+    driven, _ = drive(folder)
+
+    announce(f"replaying it through {', '.join(REPLAYED)}")
+    replay = replay_into(folder / LOG_NAME, REPLAYED, registry.build)
+
+    if not replay.same:
+        announce(f"the replay differs: {replay.first}")
+
+    announce(f"driving three laps of {len(TOWNS)} towns in lockstep")
+    errors = over_fused(processes)
+
+    metrics = {
+        "cycle_p50_ms": driven.cycle_p50_ms,
+        "cycle_p99_ms": driven.cycle_p99_ms,
+        "bus_share": driven.bus_share,
+        "replay_speed": replay.speed,
+        "error_ratio": driven.error_ratio,
+        "replay_same": float(replay.same),
+        "route_complete": float(driven.ended_by == ROUTE_COMPLETE),
+        "drive_s": driven.drive_s,
+        "cycles": float(driven.commands),
+    }
+    return metrics | errors

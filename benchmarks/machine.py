@@ -1,0 +1,48 @@
+"""The unit by which timings of two machines are compared."""
+
+from __future__ import annotations
+
+import time
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+ROUNDS = 50
+HEIGHT_PX = 240
+WIDTH_PX = 320
+DISPARITIES_PX = 64
+BLOCK_PX = 5
+SHIFT_PX = 12
+SEED = 320
+Image = npt.NDArray[np.uint8]
+
+
+def machine_unit_ms() -> float:
+    """The CPU time of one StereoSGBM on a fixed image, 320 x 240 with 64 disparities in blocks of 5.
+
+    It is the least of ROUNDS runs on one thread, so that other load on the machine hardly counts.
+    """
+    left, right = _pair()
+    matcher = cv2.StereoSGBM.create(numDisparities=DISPARITIES_PX, blockSize=BLOCK_PX)
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+
+    try:
+        return min(_cpu_ms(matcher, left, right) for _ in range(ROUNDS))
+    finally:
+        cv2.setNumThreads(threads)
+
+
+def _pair() -> tuple[Image, Image]:
+    """Smoothed noise, the same on every machine, and the same moved by SHIFT_PX."""
+    noise = np.random.default_rng(SEED).integers(0, 256, (HEIGHT_PX, WIDTH_PX), np.uint8)
+    left = np.asarray(cv2.GaussianBlur(noise, (5, 5), 0), np.uint8)
+    right = np.roll(left, -SHIFT_PX, axis=1)
+    return left, right
+
+
+def _cpu_ms(matcher: cv2.StereoSGBM, left: Image, right: Image) -> float:
+    began_s = time.process_time()
+    matcher.compute(left, right)
+    return 1e3 * (time.process_time() - began_s)

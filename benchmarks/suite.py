@@ -1,0 +1,158 @@
+"""Every benchmark and experiment that has a threshold, and how all of them are run in one go."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks import paper
+from benchmarks.bus import measure as bus
+from benchmarks.cycle import measure as cycle
+from benchmarks.localization import measure as localization
+from benchmarks.machine import machine_unit_ms
+from benchmarks.map_correction import measure as map_correction
+from benchmarks.perception import measure as perception
+from benchmarks.perception import photographs, stereo
+from benchmarks.report import Metrics, Outcome
+from benchmarks.spiking import measure as spiking
+from benchmarks.threshold import Thresholds
+from cogmap.errors import CogmapError, UsageError
+
+MACHINE_UNIT = "machine_unit_ms"
+CONES_SCALE = 4.0
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What benchmarks are run with: `folder` is for their files, `data` has a user's own sets."""
+
+    folder: Path
+    processes: int
+    data: Path | None
+    announce: Callable[[str], None]
+
+    def set_of(self, name: str) -> Path:
+        """The folder of one set in `data`. Raises UsageError where it is missing."""
+        if self.data is None:
+            raise UsageError(f"it measures on the set {name}: give its folder with --data")
+
+        path = self.data / name
+        if not path.is_dir():
+            raise UsageError(f"there is no folder {path}: put the set there")
+
+        return path
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """A benchmark by its name on the command line; `measure` returns its metrics by key."""
+
+    name: str
+    thresholds: Thresholds
+    measure: Callable[[Setting], Metrics]
+
+
+def _cycle(setting: Setting) -> Metrics:
+    return cycle.measure(_subfolder(setting, "cycle"), setting.processes, setting.announce)
+
+
+def _bus(setting: Setting) -> Metrics:
+    return bus.measure(_subfolder(setting, "bus"), setting.announce)
+
+
+def _perception(setting: Setting) -> Metrics:
+    return perception.measure()
+
+
+def _cones(setting: Setting) -> Metrics:
+    folder = setting.set_of("stereo_cones")
+    return stereo.measure(folder / "im2.png", folder / "im6.png", folder / "disp2.png", CONES_SCALE)
+
+
+def _camvid(setting: Setting) -> Metrics:
+    return photographs.measure(setting.set_of("camvid"), _subfolder(setting, "camvid"))
+
+
+def _spiking(setting: Setting) -> Metrics:
+    return spiking.metrics(spiking.measure(spiking.SEED, setting.processes))
+
+
+def _localization(setting: Setting) -> Metrics:
+    return localization.measure(setting.set_of("mrclam6"), setting.processes)
+
+
+def _map_correction(setting: Setting) -> Metrics:
+    folder = setting.set_of("pose_graphs")
+    graph = folder / "manhattanOlson3500_OlsonInit.g2o.xz"
+    truth = folder / "manhattanOlson3500_nodes_groundTruth.dat.xz"
+    return map_correction.measure(graph, truth)
+
+
+def _cue_integration(setting: Setting) -> Metrics:
+    return paper.measure_cue_integration(setting.processes)
+
+
+def _city_maps(setting: Setting) -> Metrics:
+    return paper.measure_city_maps(setting.processes)
+
+
+SUITE = (
+    Benchmark("cycle", cycle.THRESHOLDS, _cycle),
+    Benchmark("bus", bus.THRESHOLDS, _bus),
+    Benchmark("perception", perception.THRESHOLDS, _perception),
+    Benchmark("cones", stereo.THRESHOLDS, _cones),
+    Benchmark("camvid", photographs.THRESHOLDS, _camvid),
+    Benchmark("spiking", spiking.THRESHOLDS, _spiking),
+    Benchmark("localization", localization.THRESHOLDS, _localization),
+    Benchmark("map_correction", map_correction.THRESHOLDS, _map_correction),
+    Benchmark("cue-integration", paper.CUE_INTEGRATION_THRESHOLDS, _cue_integration),
+    Benchmark("city-maps", paper.CITY_MAPS_THRESHOLDS, _city_maps),
+)
+NAMES = tuple(benchmark.name for benchmark in SUITE)
+
+
+def selected(only: Sequence[str], skip: Sequence[str]) -> list[Benchmark]:
+    """The benchmarks of `only`, all where it is empty, without those of `skip`."""
+    wanted = set(only or NAMES) - set(skip)
+    return [benchmark for benchmark in SUITE if benchmark.name in wanted]
+
+
+def run(benchmark: Benchmark, setting: Setting) -> Outcome:
+    """Measure one benchmark. A failure of any kind is its outcome, so that others still run."""
+    setting.announce(f"{benchmark.name} …")
+    metrics: Metrics = {}
+    failure = ""
+
+    try:
+        metrics = benchmark.measure(setting)
+    except CogmapError as error:
+        failure = str(error)
+    except Exception as error:
+        failure = f"{type(error).__name__}: {error}"
+
+    return completed(benchmark.name, benchmark.thresholds, metrics, failure)
+
+
+def completed(name: str, thresholds: Thresholds, metrics: Metrics, failure: str = "") -> Outcome:
+    """The outcome of a benchmark that has just run, with the unit of this machine's speed."""
+    unit = {} if failure else {MACHINE_UNIT: machine_unit_ms()}
+    return Outcome(name, thresholds, metrics | unit, failure)
+
+
+def merged(outcomes: Sequence[Outcome]) -> Metrics:
+    """All metrics under their own keys; a key that an earlier benchmark has gets its name before."""
+    found: Metrics = {}
+
+    for outcome in outcomes:
+        for key, value in outcome.metrics.items():
+            unique = key if key not in found else f"{outcome.benchmark}_{key}"
+            found[unique] = value
+
+    return found
+
+
+def _subfolder(setting: Setting, name: str) -> Path:
+    folder = setting.folder / name
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder

@@ -1,0 +1,54 @@
+"""Thresholds that a metric must meet, declared once, beside the benchmark that measures it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Threshold:
+    """The values of a metric that meet its requirement, from `minimum` to `maximum`."""
+
+    minimum: float = -math.inf
+    maximum: float = math.inf
+    exclusive: bool = False
+
+    def is_met(self, value: float) -> bool:
+        """Whether `value` lies within the limits, or between them where they are exclusive."""
+        if self.exclusive:
+            return self.minimum < value < self.maximum
+
+        return self.minimum <= value <= self.maximum
+
+    def __str__(self) -> str:
+        if math.isinf(self.minimum):
+            return f"{'<' if self.exclusive else '≤'} {self.maximum:g}"
+
+        if math.isinf(self.maximum):
+            return f"{'>' if self.exclusive else '≥'} {self.minimum:g}"
+
+        return f"{self.minimum:g}-{self.maximum:g}"
+
+
+Thresholds = dict[str, Threshold]
+
+
+def at_most(limit: float) -> Threshold:
+    """Met by `limit` and less."""
+    return Threshold(maximum=limit)
+
+
+def at_least(limit: float) -> Threshold:
+    """Met by `limit` and more."""
+    return Threshold(minimum=limit)
+
+
+def more_than(limit: float) -> Threshold:
+    """Met by more than `limit`."""
+    return Threshold(minimum=limit, exclusive=True)
+
+
+def within(minimum: float, maximum: float) -> Threshold:
+    """Met by both limits and what lies between."""
+    return Threshold(minimum, maximum)
