@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from services.epam.layout.road import HEIGHT_PX, WIDTH_PX, Image
+from services.epam.layout.road import HEIGHT_PX, WIDTH_PX
 
 Bytes = npt.NDArray[np.uint8]
 Floats = npt.NDArray[np.float32]
@@ -44,7 +44,7 @@ class Sample:
     of it is known.
     """
 
-    image: Image
+    image: Bytes
     road: Bytes
     known: Bytes
 
@@ -92,7 +92,7 @@ def _warp(
     return np.column_stack([linear, to])
 
 
-def _relit(image: Floats, how: Augmentation, rng: np.random.Generator) -> Image:
+def _relit(image: Floats, how: Augmentation, rng: np.random.Generator) -> Bytes:
     """Another light, another camera."""
     if rng.random() < how.blur_share:
         image = cv2.GaussianBlur(image, (3, 3), rng.uniform(0.4, 1.0)).astype(

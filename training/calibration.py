@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from services.epam.recognition.objects import Names, posteriors, probability
+from services.epam.recognition.objects import Prototypes, posteriors, probability
 from training.crops import Crops
 
 Floats = npt.NDArray[np.float32]
@@ -26,7 +26,7 @@ NEVER = -10.0
 class Calibrated:
     """The names with their constants, and the figures on the same towns."""
 
-    names: Names
+    names: Prototypes
     figures: dict[str, float]
 
 
@@ -40,20 +40,20 @@ class Trial:
     met: Floats
     wanted: Rows
 
-    def posteriors(self, names: Names) -> npt.NDArray[np.float64]:
+    def posteriors(self, names: Prototypes) -> npt.NDArray[np.float64]:
         """Of buildings, as these segments are."""
         return posteriors(self.taught, self.met, np.ones(len(self.wanted)), names)
 
-    def cost(self, names: Names) -> float:
+    def cost(self, names: Prototypes) -> float:
         """Negative log likelihood."""
         return _surprise(self.posteriors(names)[np.arange(len(self.wanted)), self.wanted])
 
-    def right(self, names: Names) -> npt.NDArray[np.bool_]:
+    def right(self, names: Prototypes) -> npt.NDArray[np.bool_]:
         """Which of the segments are recognised."""
         return np.asarray(self.posteriors(names).argmax(1) == self.wanted)
 
 
-def calibrate(seen: Floats, odds: Floats, of: Crops, names: Names) -> Calibrated:
+def calibrate(seen: Floats, odds: Floats, of: Crops, names: Prototypes) -> Calibrated:
     """`names` with the likeliest constants, for embeddings `seen` (n, d) and log `odds` (n, 2) of
     the segments `of` held-out towns.
     """
@@ -69,7 +69,7 @@ def calibrate(seen: Floats, odds: Floats, of: Crops, names: Names) -> Calibrated
     first = Trial(cosines[building], np.empty((len(building), 0), np.float32), column[building])
     names = _likeliest(names, [first], "sharpness", "unknown")
     known, strangers = _meetings(seen, cosines, of)
-    names = _likeliest(names, [*known, *strangers], "met_sharpness", "met_unknown")
+    names = _likeliest(names, [*known, *strangers], "novel_sharpness", "novel_unknown")
     posterior = posteriors(
         cosines, np.empty((len(seen), 0), np.float32), probability(odds, names)[:, 0], names
     )
@@ -78,7 +78,7 @@ def calibrate(seen: Floats, odds: Floats, of: Crops, names: Names) -> Calibrated
     )
 
 
-def _likeliest(names: Names, trials: list[Trial], sharpness: str, unknown: str) -> Names:
+def _likeliest(names: Prototypes, trials: list[Trial], sharpness: str, unknown: str) -> Prototypes:
     tried = (
         msgspec.structs.replace(names, **{sharpness: sharp, unknown: at})
         for sharp, at in itertools.product(SHARPNESS, UNKNOWN)
@@ -106,7 +106,7 @@ def _figures(
     }
 
 
-def _met_figures(names: Names, known: list[Trial], strangers: list[Trial]) -> dict[str, float]:
+def _met_figures(names: Prototypes, known: list[Trial], strangers: list[Trial]) -> dict[str, float]:
     return {
         key: float(np.concatenate([trial.right(names) for trial in trials]).mean())
         if trials

@@ -17,7 +17,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from services.epam.recognition.crop import CHANNELS, SIDE_PX
-from services.epam.recognition.objects import DIMENSIONS, GIVES, TAKES, Names
+from services.epam.recognition.objects import DIMENSIONS, INPUT_SHAPE, OUTPUT_SHAPES, Prototypes
 from services.epam.recognition.segments import load as load_segmenter
 from training import calibration
 from training.crops import Crops, crops
@@ -121,20 +121,20 @@ def train_on_renderings(
     return found.figures
 
 
-def _taught(folder: Path, names: list[str], directions: Tensor) -> Names:
+def _taught(folder: Path, names: list[str], directions: Tensor) -> Prototypes:
     """Those of `names` that belong to the catalogue, before calibration."""
     rows = [number for number, name in enumerate(names) if not name.startswith("invented-")]
     taught = [names[row] for row in rows]
     sizes = sizes_m(folder, names)
     unit = functional.normalize(directions).detach().numpy()[rows]
-    return Names(
+    return Prototypes(
         names=taught,
         directions=unit.astype(float).round(5).tolist(),
         size_m=[sizes[name] for name in taught],
         sharpness=1.0,
         unknown=0.0,
-        met_sharpness=1.0,
-        met_unknown=0.0,
+        novel_sharpness=1.0,
+        novel_unknown=0.0,
         evidence=1.0,
     )
 
@@ -223,5 +223,7 @@ def export(net: nn.Module, out: Path) -> None:
     """Write `net` as an ONNX file."""
     out.parent.mkdir(parents=True, exist_ok=True)
     net.eval()
-    names = {"input_names": ["seen"], "output_names": list(GIVES)}
-    torch.onnx.export(net, (torch.zeros(TAKES),), str(out), dynamo=False, opset_version=13, **names)
+    names = {"input_names": ["seen"], "output_names": list(OUTPUT_SHAPES)}
+    torch.onnx.export(
+        net, (torch.zeros(INPUT_SHAPE),), str(out), dynamo=False, opset_version=13, **names
+    )

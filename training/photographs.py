@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.errors import UsageError
-from services.epam.layout.road import Image, load
+from cogmap.geometry.arrays import Bytes
+from services.epam.layout.road import load
 
 ROAD = 3
 UNLABELLED = 11
@@ -27,7 +28,7 @@ class Photograph:
     """
 
     name: str
-    image: Image
+    image: Bytes
     road: npt.NDArray[np.bool_]
     known: npt.NDArray[np.bool_]
 

@@ -12,7 +12,14 @@ import torch
 from rich.progress import track
 from torch import Tensor, nn
 
-from services.epam.layout.road import CHANNELS, GIVES, PADDING_PX, TAKES, load, pixels
+from services.epam.layout.road import (
+    CHANNELS,
+    INPUT_SHAPE,
+    OUTPUT_SHAPES,
+    PADDING_PX,
+    load,
+    network_input,
+)
 from training.augment import Augmentation, Bytes, Sample, plain, varied
 from training.renderings import files, read
 from training.unet import UNet, unet
@@ -92,7 +99,7 @@ def loss(network: UNet, batch: Sequence[Sample]) -> Tensor:
     """The mean cross entropy between what `network` says of the known pixels of `batch` and what
     they show.
     """
-    values = torch.from_numpy(pixels(np.stack([sample.image for sample in batch])))
+    values = torch.from_numpy(network_input(np.stack([sample.image for sample in batch])))
     said = network(values.to(memory_format=torch.channels_last))[:, 0, PADDING_PX:-PADDING_PX]
     road, known = (
         torch.from_numpy(np.stack(parts).astype(np.float32) / 255)
@@ -105,7 +112,7 @@ def loss(network: UNet, batch: Sequence[Sample]) -> Tensor:
 def export(network: UNet, path: Path) -> None:
     """Write `network` to `path`, as `services.epam.layout.road` takes it."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    example = (torch.zeros(TAKES),)
+    example = (torch.zeros(INPUT_SHAPE),)
     torch.onnx.export(
         network.eval(),
         example,
@@ -113,7 +120,7 @@ def export(network: UNet, path: Path) -> None:
         dynamo=False,
         opset_version=13,
         input_names=["image"],
-        output_names=[*GIVES],
+        output_names=[*OUTPUT_SHAPES],
     )
 
 

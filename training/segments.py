@@ -16,14 +16,14 @@ from torch.nn import functional
 
 from services.epam.recognition.segments import (
     CHANNELS,
-    GIVES,
     HEIGHT_PX,
+    INPUT_SHAPE,
     OFFSET_PX,
+    OUTPUT_SHAPES,
     PADDING_PX,
-    TAKES,
     WIDTH_PX,
-    channels,
     load,
+    network_input,
     padded,
 )
 from training.crops import LEAST_OVERLAP, overlap
@@ -78,7 +78,7 @@ def examples(towns: Iterable[Town]) -> Examples:
             )
             depth = cv2.resize(depth_m, (WIDTH_PX, HEIGHT_PX), interpolation=cv2.INTER_NEAREST)
             seen.append(
-                channels(small, np.asarray(depth, np.float32), town.calibration).astype(_HALF)
+                network_input(small, np.asarray(depth, np.float32), town.calibration).astype(_HALF)
             )
             label.append(cv2.resize(labels, (WIDTH_PX, HEIGHT_PX), interpolation=cv2.INTER_NEAREST))
     return Examples(np.asarray(seen), np.asarray(label, np.uint8))
@@ -206,5 +206,7 @@ def export(net: nn.Module, out: Path) -> None:
     """Write `net` as an ONNX file."""
     out.parent.mkdir(parents=True, exist_ok=True)
     net.eval()
-    names = {"input_names": ["seen"], "output_names": list(GIVES)}
-    torch.onnx.export(net, (torch.zeros(TAKES),), str(out), dynamo=False, opset_version=13, **names)
+    names = {"input_names": ["seen"], "output_names": list(OUTPUT_SHAPES)}
+    torch.onnx.export(
+        net, (torch.zeros(INPUT_SHAPE),), str(out), dynamo=False, opset_version=13, **names
+    )

@@ -24,7 +24,7 @@ from services.epam import module as epam
 from services.epam.layout import road
 from services.epam.pam import ExtendedPam
 from services.epam.recognition import objects, segments
-from services.epam.view import pixels
+from services.epam.view import view_arrays
 from services.sensory import module as sensory
 
 PERIOD_S = 0.2
@@ -94,8 +94,8 @@ class CandidateProbe:
         """Label, empty for none that it knows, activation, and pixels (h, w) of each, before it
         learns from them.
         """
-        found = self._pam.candidates(pixels(result.view), result.view.calibration)
-        self._pam.recall(result.learned)
+        found = self._pam.candidates(view_arrays(result.view), result.view.calibration)
+        self._pam.restore(result.learned)
         return [(*_said(each.recognition), each.segment.mask) for each in found]
 
 
@@ -105,4 +105,4 @@ def _said(recognition: objects.Recognition) -> tuple[str, float]:
     """
     if recognition.known:
         return recognition.label, recognition.activation
-    return "", recognition.new + recognition.nothing
+    return "", recognition.unknown + recognition.background

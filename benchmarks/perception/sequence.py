@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from schemas.sensing import PlaceMatch, Pose
-from services.epam.places.recognizer import PlaceMemory
+from services.epam.places.recognizer import PlaceRecognizer
 from services.sensory.disparity import DepthFromStereo
 from services.sensory.rectify import rectification
 from services.sim.layout import town
@@ -72,7 +72,7 @@ class Answer:
 
 def measure(tick: Tick = lambda: None) -> dict[str, float]:
     """The figures; `tick` is called after each of the `views()`."""
-    memory = PlaceMemory()
+    memory = PlaceRecognizer()
     answers = list[Answer]()
     for seed, invented in TOWNS:
         answers += drive(memory, len(answers), seed, invented, tick)
@@ -87,7 +87,7 @@ def views() -> int:
 
 
 def drive(
-    memory: PlaceMemory, first_frame: int, seed: int, invented: int, tick: Tick
+    memory: PlaceRecognizer, first_frame: int, seed: int, invented: int, tick: Tick
 ) -> Iterator[Answer]:
     """Drive through the town of `seed` and ask `memory` at each view."""
     place = _town(seed, invented)
@@ -102,7 +102,9 @@ def drive(
             for pose in part.poses:
                 world.robot.place(pose)
                 left, right = straight.apply(*(eye.image for eye in camera.survey(part.light, rng)))
-                matches, _ = memory.see(frame, frame * FRAME_NS, left, stereo.depth_m(left, right))
+                matches, _ = memory.observe(
+                    frame, frame * FRAME_NS, left, stereo.depth_m(left, right)
+                )
                 yield Answer(seed, part.part, pose, matches[0] if matches else None)
                 frame += 1
                 tick()

@@ -1,4 +1,4 @@
-"""How perception is configured."""
+"""Settings of perception."""
 
 from __future__ import annotations
 
@@ -6,29 +6,79 @@ from typing import Annotated
 
 import msgspec
 
-from schemas.sensing import Unit
+from schemas.base import PositiveShare, Share
 
-Positive = Annotated[float, msgspec.Meta(gt=0)]
+WeightsPath = Annotated[str, msgspec.Meta(max_length=4096)]
+Pixels = Annotated[int, msgspec.Meta(ge=4, le=1000)]
+Deviations = Annotated[float, msgspec.Meta(gt=0, le=100)]
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """The weights are ONNX files, those in this package where empty.
+    """Weights, thresholds of percepts and of learning, and limits of a footprint's fit.
 
-    What is a building with a probability over `percept_threshold` becomes a percept, by the name of
-    the node that is likeliest, and with that node's total activation, base level and current. A
-    building of no known node gets one where it covers `learned_share` of the view; another look of
-    it is learned where it is recognised with an activation over `sure`. What fits its known size
-    worse than `worst_misfit` deviations, or stands nobody knows where, is placed as a building of
-    the usual size would be.
+    A segment that shows a building with a probability over `percept_threshold` is a percept,
+    labelled as the likeliest PAM node, with the total activation of that node: base level and
+    current activation.
     """
 
-    segments_weights: str = ""
-    object_weights: str = ""
-    road_weights: str = ""
-    base_level: Unit = 0.0
-    percept_threshold: Unit = 0.7
-    learned_share: Unit = 0.03
-    sure: Unit = 0.95
-    narrowest_px: Annotated[int, msgspec.Meta(ge=4, le=1000)] = 8
-    worst_misfit: Positive = 2.0
-    worst_range_sd_share: Positive = 0.15
+    segments_weights: Annotated[
+        WeightsPath,
+        msgspec.Meta(description="ONNX file of the segmentation network; empty: the built-in one"),
+    ] = ""
+    object_weights: Annotated[
+        WeightsPath,
+        msgspec.Meta(
+            description="ONNX file of the embedding network, with its prototypes in a .json file "
+            "beside it; empty: the built-in one"
+        ),
+    ] = ""
+    road_weights: Annotated[
+        WeightsPath,
+        msgspec.Meta(description="ONNX file of the road network; empty: the built-in one"),
+    ] = ""
+    base_level: Annotated[
+        Share,
+        msgspec.Meta(
+            description="base-level activation added to the current activation of every percept, "
+            "0 to 1"
+        ),
+    ] = 0.0
+    percept_threshold: Annotated[
+        Share,
+        msgspec.Meta(
+            description="a segment is a percept if it shows a building with a higher probability, "
+            "0 to 1"
+        ),
+    ] = 0.7
+    learned_share: Annotated[
+        Share,
+        msgspec.Meta(
+            description="smallest share of the view's pixels, 0 to 1, that an unknown building "
+            "covers when it gets a PAM node"
+        ),
+    ] = 0.03
+    sure: Annotated[
+        Share,
+        msgspec.Meta(
+            description="a learned object gets another appearance if it is recognized with a "
+            "higher activation, 0 to 1"
+        ),
+    ] = 0.95
+    narrowest_px: Annotated[
+        Pixels,
+        msgspec.Meta(description="narrowest segment that is recognized, in pixels, 4 to 1000"),
+    ] = 8
+    worst_misfit: Annotated[
+        Deviations,
+        msgspec.Meta(
+            description="largest misfit of a fitted footprint, in standard deviations, over 0, at "
+            "most 100; beyond it the object is placed as one of the usual size"
+        ),
+    ] = 2.0
+    worst_range_sd_share: Annotated[
+        PositiveShare,
+        msgspec.Meta(
+            description="largest standard deviation of a fitted range, as a share of the range, "
+            "over 0, at most 1; beyond it the object is placed as one of the usual size"
+        ),
+    ] = 0.15

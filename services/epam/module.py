@@ -1,4 +1,4 @@
-"""Extended PAM as a module: views in, percepts out, and what was learned from them."""
+"""Extended PAM as a module: receives views, publishes percepts and what was learned from them."""
 
 from __future__ import annotations
 
@@ -6,71 +6,91 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import cv2
+import msgspec
 
 from cogmap.runtime.module import Module
 from schemas import topics
+from schemas.array import Array
 from schemas.base import Message
-from schemas.sensing import Learned, View
+from schemas.sensing import Learned, Percepts, View
 from services.epam.config import Config
 from services.epam.layout import road
 from services.epam.pam import ExtendedPam
-from services.epam.places.recognizer import PlaceMemory
+from services.epam.places.recognizer import PlaceRecognizer
 from services.epam.recognition import objects, segments
-from services.epam.view import pixels
+from services.epam.view import view_arrays
 
 __all__ = ["Config", "build"]
 
 
 class Perception:
-    """Turns each view into percepts. Between views it keeps what it learned: new buildings, and
-    ways that it went.
+    """Turns each view into percepts. Between views it keeps what it learned: nodes of new
+    buildings, and views to recognize places by.
     """
 
-    def __init__(self, config: Config, pam: ExtendedPam, places: PlaceMemory) -> None:
+    def __init__(self, pam: ExtendedPam, places: PlaceRecognizer) -> None:
         self._pam = pam
         self._places = places
-        self._frame = 0
-        self._stamp_ns = 0
+        self._last_percepts: Percepts | None = None
+        self._last_learned: Learned | None = None
 
-    def see(self, view: View) -> list[Message]:
-        """What is in `view`, perhaps nothing, after what was learned from it.
+    def on_view(self, view: View) -> list[Message]:
+        """Return the percepts of `view`, perhaps empty ones, after what was learned from it.
 
-        Raises MessageError where image, depth and calibration do not fit.
+        The last view may be published again, after another module or this one was restarted: its
+        percepts are returned again, and nothing is learned from it twice. Raises MessageError if
+        image, depth and calibration do not fit each other.
         """
-        seen = pixels(view)
-        percepts, met = self._pam.perceive(view, seen)
-        matches, remembered = self._places.see(view.frame, view.stamp_ns, seen.image, seen.depth_m)
-        percepts.matches = matches
-        if not met and not remembered:
+        arrays = view_arrays(view)
+        if self._last_percepts is not None and _same_view(view, self._last_percepts):
+            return [msgspec.structs.replace(self._last_percepts)]
+
+        learning = self._last_learned is None or not _same_view(view, self._last_learned)
+        perceived = self._pam.perceive(arrays, view.calibration, learning)
+        matches, remembered = self._places.observe(
+            view.frame, view.stamp_ns, arrays.image, arrays.depth_m, learning
+        )
+        percepts = Percepts(
+            stamp_ns=view.stamp_ns,
+            frame=view.frame,
+            objects=perceived.objects,
+            road_m=Array.of(perceived.road_m),
+            road_boundary_m=Array.of(perceived.road_boundary_m),
+            matches=matches,
+        )
+        self._last_percepts = percepts
+        if not perceived.learned and not remembered:
             return [percepts]
-        self._stamp_ns = view.stamp_ns
-        self._frame = view.frame
-        return [
-            Learned(stamp_ns=view.stamp_ns, frame=view.frame, objects=met, views=remembered),
-            percepts,
-        ]
 
-    def recall(self, past: Iterable[Message]) -> None:
+        self._last_learned = Learned(
+            stamp_ns=view.stamp_ns,
+            frame=view.frame,
+            objects=perceived.learned,
+            views=remembered,
+        )
+        return [self._last_learned, percepts]
+
+    def restore(self, messages: Iterable[Message]) -> None:
         """Know again what was learned before a restart."""
-        for message in past:
+        for message in messages:
             if isinstance(message, Learned):
-                self._stamp_ns = message.stamp_ns
-                self._frame = message.frame
-                self._pam.recall(message.objects)
-                self._places.recall(message.views)
+                self._last_learned = message
+                self._pam.restore(message.objects)
+                self._places.restore(message.views)
 
-    def everything(self) -> Learned:
-        """All that was learned, as one message."""
+    def snapshot(self) -> Learned:
+        """Return all that was learned, as one message with the stamp of the last."""
+        last = self._last_learned or Learned(frame=0)
         return Learned(
-            stamp_ns=self._stamp_ns,
-            frame=self._frame,
+            stamp_ns=last.stamp_ns,
+            frame=last.frame,
             objects=self._pam.learned,
             views=list(self._places.all),
         )
 
 
 def build(config: Config, instance: str) -> Module:
-    """The extended PAM as a module. Raises ConfigError where its networks cannot be read."""
+    """Build the extended PAM as a module. Raises ConfigError if its networks cannot be read."""
     cv2.setNumThreads(1)
     pam = ExtendedPam(
         config,
@@ -78,11 +98,15 @@ def build(config: Config, instance: str) -> Module:
         objects.load(_path(config.object_weights, objects.DEFAULT_PATH)),
         road.load(_path(config.road_weights, road.DEFAULT_PATH)),
     )
-    perception = Perception(config, pam, PlaceMemory())
-    module = Module("epam", instance).on(
-        topics.VIEW, perception.see, emits=(topics.PERCEPTS, topics.LEARNED)
-    )
-    return module.journaling(topics.LEARNED, perception.recall, perception.everything)
+    perception = Perception(pam, PlaceRecognizer())
+
+    module = Module("epam", instance)
+    module.on(topics.VIEW, perception.on_view, emits=(topics.PERCEPTS, topics.LEARNED))
+    return module.journaling(topics.LEARNED, perception.restore, perception.snapshot)
+
+
+def _same_view(view: View, message: Percepts | Learned) -> bool:
+    return (view.stamp_ns, view.frame) == (message.stamp_ns, message.frame)
 
 
 def _path(given: str, default: Path) -> Path:

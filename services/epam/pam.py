@@ -1,177 +1,229 @@
-"""Objects and road recognised in a view (paper §5.1): PAM nodes over threshold become percepts.
+"""Objects and road recognized in a view (paper section 5.1): PAM nodes over threshold become
+percepts.
 
-Beyond the paper, a building of no known node gets one at the first sight, by what it looks like.
+Beyond the paper, a building without a node gets one in the first encounter, by its appearance.
 """
 
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cogmap.geometry.arrays import Singles
 from schemas.array import Array
-from schemas.sensing import Calibration, LearnedObject, Percept, Percepts, View
+from schemas.sensing import Calibration, LearnedObject, Percept
 from services.epam.config import Config
-from services.epam.layout.footprint_fit import Place, locate
-from services.epam.layout.road import Roads
+from services.epam.layout.footprint_fit import ObjectPose, Silhouette, locate
+from services.epam.layout.ground import project
+from services.epam.layout.road import RoadSegmenter
 from services.epam.layout.walls import walls
-from services.epam.recognition.candidate import Candidate, beside, height_m, joined, outline_px
-from services.epam.recognition.objects import Look, Recogniser
+from services.epam.recognition.candidate import (
+    Candidate,
+    height_m,
+    is_beside,
+    joined,
+    outline_px,
+)
+from services.epam.recognition.objects import Appearance, ObjectRecognizer, Recognition
 from services.epam.recognition.segments import Segmenter
-from services.epam.view import Seen
+from services.epam.view import ViewArrays
 
 NEW_LABEL = "new-building-{}"
 LIKELIER_THAN_NOT = 0.5
 
 
+@dataclass(frozen=True, eq=False)
+class Perceived:
+    """The objects of a view, its road and the road's boundary as ground points in the robot's
+    frame, float32 (n, 2), and the nodes learned from it.
+    """
+
+    objects: list[Percept]
+    road_m: Singles
+    road_boundary_m: Singles
+    learned: list[LearnedObject]
+
+
 class ExtendedPam:
-    """Knows the nodes that were taught, and those learned since."""
+    """The PAM nodes that were taught, and those learned since."""
 
     def __init__(
-        self, config: Config, segmenter: Segmenter, recogniser: Recogniser, roads: Roads
+        self,
+        config: Config,
+        segmenter: Segmenter,
+        recognizer: ObjectRecognizer,
+        road_segmenter: RoadSegmenter,
     ) -> None:
         self._config = config
         self._segmenter = segmenter
-        self._recogniser = recogniser
-        self._roads = roads
+        self._recognizer = recognizer
+        self._road_segmenter = road_segmenter
 
-    def perceive(self, view: View, seen: Seen) -> tuple[Percepts, list[LearnedObject]]:
-        """The percepts of `view`, and the nodes that it gave."""
-        camera = view.calibration
-        found, met = self._named(self.candidates(seen, camera), seen)
-        places = self._places(found, camera)
-        objects = [self._percept(*pair, camera) for pair in zip(found, places, strict=True)]
-        road_m, boundary_m = self._roads.project(
-            self._roads.likelihood(seen.image), seen.depth_m, camera
-        )
-        percepts = Percepts(
-            stamp_ns=view.stamp_ns,
-            frame=view.frame,
-            objects=objects,
-            road_m=Array.of(road_m),
-            road_boundary_m=Array.of(boundary_m),
-        )
-        return percepts, met
-
-    def candidates(self, seen: Seen, camera: Calibration) -> list[Candidate]:
-        """Every segment wide enough, whatever its activation, from left to right."""
-        segments = self._segmenter.segments(seen.image, seen.depth_m, camera)
-        standing = [(segment, walls(segment, seen.disparity_px)) for segment in segments]
-        wide = [
-            (segment, wall)
-            for segment, wall in standing
-            if wall is not None and segment.box_px[2] >= self._config.narrowest_px
+    def perceive(self, view: ViewArrays, camera: Calibration, learning: bool = True) -> Perceived:
+        """Return what is recognized in `view`; with `learning`, new buildings get nodes."""
+        found, learned = self._labelled(self.candidates(view, camera), view, learning)
+        poses = self._poses(found, camera)
+        objects = [
+            self._percept(candidate, pose, camera)
+            for candidate, pose in zip(found, poses, strict=True)
         ]
-        looks = self._recogniser.looks(
-            seen.image, seen.depth_m, [segment for segment, _ in wide], camera
-        )
+
+        likelihood = self._road_segmenter.likelihood(view.image)
+        road_m, road_boundary_m = project(likelihood, view.depth_m, camera)
+        return Perceived(objects, road_m, road_boundary_m, learned)
+
+    def candidates(self, view: ViewArrays, camera: Calibration) -> list[Candidate]:
+        """Return every segment that is wide enough and has known depth, whatever its activation,
+        from left to right.
+        """
+        segments = []
+        standing = []
+        for segment in self._segmenter.segments(view.image, view.depth_m, camera):
+            _, _, width, _ = segment.box_px
+            of_segment = walls(segment, view.disparity_px)
+            if of_segment is not None and width >= self._config.narrowest_px:
+                segments.append(segment)
+                standing.append(of_segment)
+
+        appearances = self._recognizer.appearances(view.image, view.depth_m, segments, camera)
         return [
-            Candidate(segment, wall, self._recogniser.recognise(look))
-            for (segment, wall), look in zip(wide, looks, strict=True)
+            Candidate(segment, of_segment, self._recognizer.recognize(appearance))
+            for segment, of_segment, appearance in zip(segments, standing, appearances, strict=True)
         ]
 
-    def recall(self, objects: Iterable[LearnedObject]) -> None:
-        """Know these nodes again."""
+    def restore(self, objects: Iterable[LearnedObject]) -> None:
+        """Recognize these nodes again."""
         for known in objects:
-            self._recogniser.learn(known.label, known.embedding.numpy().astype(np.float32))
+            self._recognizer.learn(known.label, known.embedding.numpy().astype(np.float32))
 
     @property
     def learned(self) -> list[LearnedObject]:
         """Every node learned since the teaching."""
-        return [
-            LearnedObject(label=label, embedding=Array.of(vector))
-            for label, vector in self._recogniser.learned
-        ]
+        return [_learned(label, embedding) for label, embedding in self._recognizer.learned]
 
-    def _named(
-        self, candidates: list[Candidate], seen: Seen
+    def _labelled(
+        self, candidates: list[Candidate], view: ViewArrays, learning: bool
     ) -> tuple[list[Candidate], list[LearnedObject]]:
-        """What is surely a building, one of each node, with new nodes for what has none, and what
-        was learned.
+        """The percepts, at most one of each label, from left to right, and what was learned.
+
+        Candidates are labelled in the order of their activation, so that of two with one label the
+        likelier one has it.
         """
         pieces: dict[str, list[Candidate]] = {}
-        met: list[LearnedObject] = []
-        for first in sorted(candidates, key=lambda one: -one.recognition.activation):
-            candidate = self._apart(self._again(first), pieces)
+        learned: list[LearnedObject] = []
+
+        for first in sorted(candidates, key=_activation, reverse=True):
+            candidate = self._in_one_place(self._recognized(first), pieces)
             recognition = candidate.recognition
-            if 1 - recognition.nothing <= self._config.percept_threshold:
+            if 1 - recognition.background <= self._config.percept_threshold:
                 continue
-            if self._is_new(candidate):
-                label = NEW_LABEL.format(1 + len({known for known, _ in self._recogniser.learned}))
-                met.append(self._learn(label, recognition.look))
-                candidate = self._again(candidate)
-            elif recognition.label not in pieces and self._is_another_look(candidate):
-                met.append(self._learn(recognition.label, recognition.look))
+
+            if learning and self._is_new(candidate):
+                learned.append(self._learn(self._next_label(), recognition.appearance))
+                candidate = self._recognized(candidate)
+            elif learning and recognition.label not in pieces and self._looks_new(recognition):
+                learned.append(self._learn(recognition.label, recognition.appearance))
+
             pieces.setdefault(candidate.recognition.label, []).append(candidate)
-        found = [joined(some, seen.disparity_px) for some in pieces.values()]
-        return sorted(found, key=lambda one: one.walls.left), met
 
-    def _again(self, candidate: Candidate, apart_from: Container[str] = ()) -> Candidate:
-        """Recognised by all that is known by now, except by those names."""
-        return replace(
-            candidate,
-            recognition=self._recogniser.recognise(candidate.recognition.look, apart_from),
-        )
+        found = [joined(parts, view.disparity_px) for parts in pieces.values()]
+        return sorted(found, key=lambda candidate: candidate.walls.left), learned
 
-    def _apart(self, candidate: Candidate, pieces: Mapping[str, list[Candidate]]) -> Candidate:
-        """Recognised as none of those seen elsewhere in the same view: nothing is in two places."""
-        there = pieces.get(candidate.recognition.label, [candidate])
-        return candidate if beside(there[0], candidate) else self._again(candidate, pieces)
+    def _recognized(self, candidate: Candidate, excluded: Container[str] = ()) -> Candidate:
+        """`candidate` recognized by all that is known by now, except by labels `excluded`."""
+        recognition = self._recognizer.recognize(candidate.recognition.appearance, excluded)
+        return replace(candidate, recognition=recognition)
+
+    def _in_one_place(
+        self, candidate: Candidate, pieces: Mapping[str, list[Candidate]]
+    ) -> Candidate:
+        """`candidate`, recognized as nothing that is elsewhere in the same view: no object is in
+        two places.
+        """
+        same = pieces.get(candidate.recognition.label)
+        if same is None or is_beside(same[0], candidate):
+            return candidate
+        return self._recognized(candidate, excluded=pieces)
 
     def _is_new(self, candidate: Candidate) -> bool:
-        """Whether it is seen well, and likelier a building that is none of those known than all
-        else together.
-        """
+        """Whether it is well visible, and likelier an unknown building than anything else."""
         recognition = candidate.recognition
         segment = candidate.segment
         large = segment.area_px >= self._config.learned_share * segment.mask.size
-        whole = recognition.look.whole > self._config.percept_threshold
-        return large and whole and recognition.new > LIKELIER_THAN_NOT
+        whole = recognition.appearance.whole > self._config.percept_threshold
+        return large and whole and recognition.unknown > LIKELIER_THAN_NOT
 
-    def _is_another_look(self, candidate: Candidate) -> bool:
-        """Whether it is surely a building that was learned, as it was not seen before."""
+    def _looks_new(self, recognition: Recognition) -> bool:
+        """Whether it is surely a learned building, in an appearance that was not learned."""
+        certainty = min(recognition.activation, recognition.appearance.whole)
+        return certainty > self._config.sure and self._recognizer.is_new_appearance(recognition)
+
+    def _next_label(self) -> str:
+        labels = {label for label, _ in self._recognizer.learned}
+        return NEW_LABEL.format(1 + len(labels))
+
+    def _learn(self, label: str, appearance: Appearance) -> LearnedObject:
+        self._recognizer.learn(label, appearance.embedding)
+        return _learned(label, appearance.embedding)
+
+    def _poses(self, found: list[Candidate], camera: Calibration) -> list[ObjectPose]:
+        """The pose of each: by its known footprint if that fits what is seen, else as a building of
+        the usual size.
+        """
+        silhouettes = [_silhouette(candidate) for candidate in found]
+        fitted = locate([each for each in silhouettes if each is not None], camera)
+        remaining = iter(fitted)
+
+        poses = []
+        for candidate, silhouette in zip(found, silhouettes, strict=True):
+            pose = next(remaining) if silhouette is not None else None
+            if pose is None or not self._is_credible(pose):
+                pose = candidate.walls.usual_pose(camera)
+            poses.append(pose)
+        return poses
+
+    def _is_credible(self, pose: ObjectPose) -> bool:
+        precise = pose.range_sd_m <= self._config.worst_range_sd_share * pose.range_m
+        return precise and pose.misfit <= self._config.worst_misfit
+
+    def _percept(self, candidate: Candidate, pose: ObjectPose, camera: Calibration) -> Percept:
         recognition = candidate.recognition
-        sure = min(recognition.activation, recognition.look.whole) > self._config.sure
-        return sure and self._recogniser.is_another(recognition)
+        if recognition.size_m is None:
+            width_m = candidate.walls.width_m(camera)
+            top_m = height_m(candidate, camera)
+        else:
+            longer_m, shorter_m, top_m = recognition.size_m
+            width_m = (longer_m + shorter_m) / 2
 
-    def _learn(self, label: str, look: Look) -> LearnedObject:
-        self._recogniser.learn(label, look.embedding)
-        return LearnedObject(label=label, embedding=Array.of(look.embedding))
-
-    def _total(self, candidate: Candidate) -> float:
-        """Total activation: base level and current."""
-        return min(1.0, self._config.base_level + candidate.recognition.activation)
-
-    def _places(self, found: list[Candidate], camera: Calibration) -> list[Place]:
-        """Where each stands: by its known size where that fits what is seen, else as of usual size."""
-        fitting = [
-            (number, candidate.walls.outline(candidate.recognition.size_m[:2]))
-            for number, candidate in enumerate(found)
-            if candidate.recognition.size_m is not None
-            and (candidate.walls.left_true or candidate.walls.right_true)
-        ]
-        places = [candidate.walls.roughly(camera) for candidate in found]
-        fitted = locate([outline for _, outline in fitting], camera)
-        for (number, _), place in zip(fitting, fitted, strict=True):
-            sure = place.range_sd_m <= self._config.worst_range_sd_share * place.range_m
-            if sure and place.misfit <= self._config.worst_misfit:
-                places[number] = place
-        return places
-
-    def _percept(self, candidate: Candidate, place: Place, camera: Calibration) -> Percept:
-        segment = candidate.segment
-        size_m = candidate.recognition.size_m
         return Percept(
-            label=candidate.recognition.label,
-            activation=self._total(candidate),
-            bearing_rad=place.bearing_rad,
-            range_m=place.range_m,
-            bearing_sd_rad=place.bearing_sd_rad,
-            range_sd_m=place.range_sd_m,
-            width_m=candidate.walls.width_m(camera) if size_m is None else sum(size_m[:2]) / 2,
-            height_m=height_m(candidate, camera) if size_m is None else size_m[2],
+            label=recognition.label,
+            activation=min(1.0, self._config.base_level + recognition.activation),
+            bearing_rad=pose.bearing_rad,
+            range_m=pose.range_m,
+            bearing_sd_rad=pose.bearing_sd_rad,
+            range_sd_m=pose.range_sd_m,
+            width_m=width_m,
+            height_m=top_m,
             whole=candidate.walls.whole,
-            box_px=segment.box_px,
-            outline_px=outline_px(segment),
+            box_px=candidate.segment.box_px,
+            outline_px=outline_px(candidate.segment),
         )
+
+
+def _activation(candidate: Candidate) -> float:
+    return candidate.recognition.activation
+
+
+def _silhouette(candidate: Candidate) -> Silhouette | None:
+    """None unless the size is known and at least one true end is seen."""
+    size_m = candidate.recognition.size_m
+    if size_m is None or not (candidate.walls.left_true or candidate.walls.right_true):
+        return None
+    longer_m, shorter_m, _ = size_m
+    return candidate.walls.silhouette((longer_m, shorter_m))
+
+
+def _learned(label: str, embedding: Singles) -> LearnedObject:
+    return LearnedObject(label=label, embedding=Array.of(embedding))

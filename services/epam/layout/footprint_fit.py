@@ -1,10 +1,10 @@
-"""Where an object's centre is: its learned ground plan laid under the walls that are seen.
+"""Where an object's centre is: its learned footprint fitted to the walls that are seen.
 
 A rectangle of known sides has three unknowns: its centre (x right, z forward of the camera) and its
-turn. It is fitted to the disparity of each column and to the columns where the object truly begins
-and ends, by damped least squares (Levenberg 1944, Marquardt 1963) from several turns at once. So
-the centre does not depend on which walls are in view, and the fit says how sure it is; turns that
-fit about as well are averaged by their likelihood.
+orientation. It is fitted to the disparity of each column and to the columns where the object truly
+begins and ends, by damped least squares (Levenberg 1944, Marquardt 1963) from several orientations
+at once. So the centre does not depend on which walls are in view, and the fit has a covariance;
+orientations that fit about equally well are averaged by their likelihood.
 """
 
 from __future__ import annotations
@@ -14,29 +14,32 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from cogmap.geometry.arrays import Booleans, Floats
 from schemas.sensing import Calibration
 
-Floats = npt.NDArray[np.float64]
-TURNS = 10
-POINTS = 20
-ROUNDS = 9
+ORIENTATIONS = 10
+COLUMNS = 20
+ITERATIONS = 9
+# Errors of neighbouring columns are correlated: this many columns count as one.
+CORRELATED_COLUMNS = 5
 DISPARITY_SD_PX = 0.14
-ALIKE_COLUMNS = 5
 DISPARITY_BIAS_SD_PX = 0.03
 NARROW_BIAS_PX = 0.4
 EDGE_SD_PX = 1.2
 HUBER = 1.5
-NEAREST_M = 0.5
-LEAST_BEARING_SD_RAD = 0.003
-LEAST_RANGE_SD_M = 0.1
+MIN_RANGE_M = 0.5
+MIN_BEARING_SD_RAD = 0.003
+MIN_RANGE_SD_M = 0.1
 HIDDEN_SD_M = 0.2
+# Largest step of one iteration: x and z in metres, orientation in radians.
+MAX_STEP = (5, 5, 0.4)
 
 
 @dataclass(frozen=True)
-class Outline:
-    """What was seen of an object: columns (n,) with their disparities, the first and last of them,
-    and whether it truly begins and ends there, or something else hides the rest; `sides_m` of its
-    ground plan.
+class Silhouette:
+    """What is seen of an object: columns (n,) and their disparities in pixels (n,), the first and
+    the last column, and whether the object truly begins and ends there or something else hides the
+    rest; `sides_m` are those of its footprint.
     """
 
     columns: Floats
@@ -49,9 +52,9 @@ class Outline:
 
 
 @dataclass(frozen=True)
-class Place:
-    """The centre in the robot's frame, its standard deviations, and the root mean square misfit in
-    deviations.
+class ObjectPose:
+    """An object's centre in the robot's frame, with standard deviations; `misfit` is the root mean
+    square of the disparity residuals, in standard deviations.
     """
 
     bearing_rad: float
@@ -63,217 +66,275 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    """Stacked outlines, a row each: slopes and disparities (s, POINTS), edge columns, which are
-    hidden, half sides.
+    """s stacked silhouettes: ray slopes and disparities (s, COLUMNS), edge columns and whether each
+    is hidden (s, 2), half sides (s, 2), standard deviations of disparity and of its bias (s,).
     """
 
     slope: Floats
-    disparity: Floats
-    edge: Floats
-    hidden: npt.NDArray[np.bool_]
-    half: Floats
+    disparity_px: Floats
+    edge_px: Floats
+    hidden: Booleans
+    half_m: Floats
     sd_px: Floats
     bias_sd_px: Floats
     camera: Calibration
 
     def take(self, rows: npt.NDArray[np.intp]) -> _Problem:
+        """The problem of these rows, each of which may be taken several times."""
         return _Problem(
             self.slope[rows],
-            self.disparity[rows],
-            self.edge[rows],
+            self.disparity_px[rows],
+            self.edge_px[rows],
             self.hidden[rows],
-            self.half[rows],
+            self.half_m[rows],
             self.sd_px[rows],
             self.bias_sd_px[rows],
             self.camera,
         )
 
 
-def locate(outlines: list[Outline], camera: Calibration) -> list[Place]:
-    """The place of each outlined object, in the same order."""
-    if not outlines:
+@dataclass(frozen=True, eq=False)
+class _Solution:
+    """Fitted x_m, z_m, orientation_rad (s, 3), weighted residuals (s, r), normal matrices
+    (s, 3, 3), and the gradient of a common disparity bias (s, 3).
+    """
+
+    parameters: Floats
+    residuals: Floats
+    normal: Floats
+    bias_gradient: Floats
+
+
+def locate(silhouettes: list[Silhouette], camera: Calibration) -> list[ObjectPose]:
+    """Return the pose of each silhouetted object, in the same order."""
+    if not silhouettes:
         return []
-    problem = _stack(outlines, camera)
-    starts = _starts(problem)
-    problem = problem.take(np.repeat(np.arange(len(outlines)), TURNS))
-    found, residual, normal, pull = _solve(starts, problem)
-    cost = (residual**2).sum(1)
-    covariance = _covariance(normal, pull)
-    hidden_variance = np.asarray(np.where(problem.hidden.any(1), HIDDEN_SD_M**2, 0.0))
-    covariance[:, :2, :2] += hidden_variance[:, None, None] * np.eye(2)
-    shape = (len(outlines), TURNS)
-    error_px = residual[:, :POINTS] * problem.sd_px[:, None]
-    misfit = np.sqrt((error_px**2).mean(1)).reshape(shape).min(1) / DISPARITY_SD_PX
+
+    objects = _stack(silhouettes, camera)
+    rows = np.repeat(np.arange(len(silhouettes)), ORIENTATIONS)
+    problem = objects.take(rows)
+    solution = _solve(_starts(objects), problem)
+
+    shape = (len(silhouettes), ORIENTATIONS)
+    parameters = solution.parameters.reshape(*shape, 3)
+    costs = (solution.residuals**2).sum(1).reshape(shape)
+    covariances = _covariances(solution, problem).reshape(*shape, 3, 3)
+    misfits = _misfits(solution, problem).reshape(shape).min(1)
+
     return [
-        _place(*parts, camera)
-        for parts in zip(
-            found.reshape(*shape, 3),
-            cost.reshape(shape),
-            covariance.reshape(*shape, 3, 3),
-            misfit,
-            strict=True,
-        )
+        _pose(parameters[row], costs[row], covariances[row], misfits[row], camera)
+        for row in range(len(silhouettes))
     ]
 
 
-def _stack(outlines: list[Outline], camera: Calibration) -> _Problem:
-    picks = [
-        np.linspace(0, len(outline.columns) - 1, POINTS).round().astype(np.intp)
-        for outline in outlines
-    ]
-    columns = np.array(
-        [outline.columns[pick] for outline, pick in zip(outlines, picks, strict=True)]
-    )
-    wide = np.array([len(outline.columns) for outline in outlines], float)
+def _stack(silhouettes: list[Silhouette], camera: Calibration) -> _Problem:
+    columns = np.empty((len(silhouettes), COLUMNS))
+    disparity_px = np.empty((len(silhouettes), COLUMNS))
+    for row, silhouette in enumerate(silhouettes):
+        picked = np.linspace(0, len(silhouette.columns) - 1, COLUMNS).round().astype(np.intp)
+        columns[row] = silhouette.columns[picked]
+        disparity_px[row] = silhouette.disparity_px[picked]
+
+    width_px = np.array([len(silhouette.columns) for silhouette in silhouettes], float)
+    edges = [(silhouette.left, silhouette.right) for silhouette in silhouettes]
+    hidden = [(not silhouette.left_true, not silhouette.right_true) for silhouette in silhouettes]
+    sides_m = [silhouette.sides_m for silhouette in silhouettes]
+    redundancy = np.maximum(1.0, COLUMNS * CORRELATED_COLUMNS / width_px)
+
     return _Problem(
-        (columns - camera.cx_px) / camera.fx_px,
-        np.array(
-            [outline.disparity_px[pick] for outline, pick in zip(outlines, picks, strict=True)]
-        ),
-        np.array([(outline.left, outline.right) for outline in outlines]),
-        np.array([(not outline.left_true, not outline.right_true) for outline in outlines]),
-        np.array([outline.sides_m for outline in outlines]) / 2,
-        # Neighbouring columns err alike, so that many of them tell no more than few.
-        DISPARITY_SD_PX * np.sqrt(np.maximum(1.0, POINTS * ALIKE_COLUMNS / wide)),
-        DISPARITY_BIAS_SD_PX + NARROW_BIAS_PX / wide,
-        camera,
+        slope=(columns - camera.cx_px) / camera.fx_px,
+        disparity_px=disparity_px,
+        edge_px=np.array(edges),
+        hidden=np.array(hidden),
+        half_m=np.array(sides_m) / 2,
+        sd_px=DISPARITY_SD_PX * np.sqrt(redundancy),
+        bias_sd_px=DISPARITY_BIAS_SD_PX + NARROW_BIAS_PX / width_px,
+        camera=camera,
     )
 
 
-def _starts(problem: _Problem) -> Floats:
-    """TURNS starts an object (s * TURNS, 3): behind the middle of what is seen."""
-    camera = problem.camera
-    depth = camera.fx_px * camera.baseline_m / np.median(problem.disparity, axis=1)
-    slope = (problem.edge.mean(1) - camera.cx_px) / camera.fx_px
-    behind = 1 + 0.8 * problem.half.mean(1) / (depth * np.hypot(slope, 1))
-    turns = np.linspace(0, np.pi, TURNS, endpoint=False)
-    centre = np.stack([slope * depth * behind, depth * behind, np.zeros_like(depth)], axis=1)
-    starts = np.repeat(centre, TURNS, axis=0)
-    starts[:, 2] = np.tile(turns, len(depth)) - np.repeat(np.arctan(slope), TURNS)
+def _starts(objects: _Problem) -> Floats:
+    """ORIENTATIONS starts an object (s * ORIENTATIONS, 3), behind the middle of what is seen."""
+    camera = objects.camera
+    depth_m = camera.fx_px * camera.baseline_m / np.median(objects.disparity_px, axis=1)
+    slope = (objects.edge_px.mean(1) - camera.cx_px) / camera.fx_px
+    behind = 1 + 0.8 * objects.half_m.mean(1) / (depth_m * np.hypot(slope, 1))
+    centre = np.stack([slope * depth_m * behind, depth_m * behind, np.zeros_like(depth_m)], axis=1)
+
+    orientations = np.linspace(0, np.pi, ORIENTATIONS, endpoint=False)
+    facing = np.repeat(np.arctan(slope), ORIENTATIONS)
+    starts = np.repeat(centre, ORIENTATIONS, axis=0)
+    starts[:, 2] = np.tile(orientations, len(depth_m)) - facing
     return starts
 
 
 def _residuals(parameters: Floats, problem: _Problem) -> Floats:
-    """(s, POINTS + 2) in standard deviations, for (s, 3) parameters x_m, z_m, turn_rad."""
+    """(s, COLUMNS + 2) residuals in standard deviations, of (s, 3) parameters."""
     camera = problem.camera
-    x, z, turn = parameters.T
-    cos = np.cos(turn)
-    sin = np.sin(turn)
+    disparity_px = camera.fx_px * camera.baseline_m * _inverse_depths(parameters, problem)
+    depth_residuals = (disparity_px - problem.disparity_px) / problem.sd_px[:, None]
+    return np.concatenate([depth_residuals, _edge_residuals(parameters, problem)], axis=1)
+
+
+def _inverse_depths(parameters: Floats, problem: _Problem) -> Floats:
+    """1 / depth in metres, (s, COLUMNS), at which the rays meet the sides that face the camera."""
+    x, z, orientation = parameters.T
+    cos = np.cos(orientation)
+    sin = np.sin(orientation)
     inverse = np.full(problem.slope.shape, np.inf)
-    for axis_x, axis_z, half in ((cos, sin, problem.half[:, 0]), (-sin, cos, problem.half[:, 1])):
+
+    sides = ((cos, sin, problem.half_m[:, 0]), (-sin, cos, problem.half_m[:, 1]))
+    for axis_x, axis_z, half in sides:
         along = x * axis_x + z * axis_z
         gap = np.abs(along) - half
         facing = gap > 1e-3
+
         towards = (problem.slope * axis_x[:, None] + axis_z[:, None]) * np.sign(along)[:, None]
         plane = towards / np.where(facing, gap, 1.0)[:, None]
         inverse = np.where(facing[:, None], np.minimum(inverse, plane), inverse)
-    inverse = np.where(np.isfinite(inverse), inverse, 1 / NEAREST_M)
-    disparity = camera.fx_px * camera.baseline_m * inverse
-    depth_error = (disparity - problem.disparity) / problem.sd_px[:, None]
-    return np.concatenate([depth_error, _edge_error(x, z, cos, sin, problem)], axis=1)
+
+    return np.where(np.isfinite(inverse), inverse, 1 / MIN_RANGE_M)
 
 
-def _edge_error(x: Floats, z: Floats, cos: Floats, sin: Floats, problem: _Problem) -> Floats:
-    """How far the rectangle's outermost corners are from the edges; a hidden edge may lie anywhere
-    farther out.
+def _edge_residuals(parameters: Floats, problem: _Problem) -> Floats:
+    """(s, 2): from each edge to the outermost corner of the rectangle, in standard deviations. The
+    true end at a hidden edge may lie anywhere farther out.
     """
+    corners_px = _corner_columns(parameters, problem)
+    left = corners_px.min(1) - problem.edge_px[:, 0]
+    right = corners_px.max(1) - problem.edge_px[:, 1]
+    residuals = np.stack([left, right], axis=1)
+
+    outward = residuals * np.array([-1.0, 1.0])
+    return np.where(problem.hidden & (outward > 0), 0.0, residuals) / EDGE_SD_PX
+
+
+def _corner_columns(parameters: Floats, problem: _Problem) -> Floats:
+    """The columns (s, 4) of the rectangle's corners."""
     camera = problem.camera
-    signs_a = np.array([1, 1, -1, -1])
-    signs_b = np.array([1, -1, 1, -1])
-    a = problem.half[:, :1] * signs_a
-    b = problem.half[:, 1:] * signs_b
-    corner_x = x[:, None] + a * cos[:, None] - b * sin[:, None]
-    corner_z = z[:, None] + a * sin[:, None] + b * cos[:, None]
-    corner = camera.cx_px + camera.fx_px * corner_x / np.maximum(corner_z, NEAREST_M)
-    error = np.stack(
-        [corner.min(1) - problem.edge[:, 0], corner.max(1) - problem.edge[:, 1]], axis=1
-    )
-    farther = error * np.array([-1.0, 1.0])
-    return np.where(problem.hidden & (farther > 0), 0.0, error) / EDGE_SD_PX
+    x, z, orientation = parameters.T[:, :, None]
+    cos = np.cos(orientation)
+    sin = np.sin(orientation)
+    a = problem.half_m[:, :1] * np.array([1, 1, -1, -1])
+    b = problem.half_m[:, 1:] * np.array([1, -1, 1, -1])
+
+    corner_x = x + a * cos - b * sin
+    corner_z = z + a * sin + b * cos
+    columns = camera.cx_px + camera.fx_px * corner_x / np.maximum(corner_z, MIN_RANGE_M)
+    return np.asarray(columns)
 
 
-def _linearised(parameters: Floats, problem: _Problem) -> tuple[Floats, Floats]:
-    """Residuals (s, r) and their derivatives (s, r, 3), by differences."""
+def _linearized(parameters: Floats, problem: _Problem) -> tuple[Floats, Floats]:
+    """Residuals (s, r) and their derivatives (s, r, 3), by forward differences."""
     steps = np.array([1e-3, 1e-3, 1e-4])
-    moved = np.concatenate([parameters, *(parameters + step for step in np.diag(steps))])
-    values = _residuals(moved, problem.take(np.tile(np.arange(len(parameters)), 4)))
-    residual, *shifted = np.split(values, 4)
-    return residual, np.stack(
-        [(other - residual) / step for other, step in zip(shifted, steps, strict=True)], axis=2
+    shifted = [parameters + step for step in np.diag(steps)]
+    evaluated = np.concatenate([parameters, *shifted])
+    rows = np.tile(np.arange(len(parameters)), 4)
+
+    residuals, *others = np.split(_residuals(evaluated, problem.take(rows)), 4)
+    derivatives = [(other - residuals) / step for other, step in zip(others, steps, strict=True)]
+    return residuals, np.stack(derivatives, axis=2)
+
+
+def _solve(parameters: Floats, problem: _Problem) -> _Solution:
+    """Levenberg-Marquardt with Huber's weights (1964), every start with a damping of its own."""
+    damping = np.full(len(parameters), 0.1)
+    best_cost = np.full(len(parameters), np.inf)
+    best = parameters
+    candidate = parameters
+    residuals, jacobian = _linearized(parameters, problem)
+
+    for _ in range(ITERATIONS):
+        new_residuals, new_jacobian = _linearized(candidate, problem)
+        cost = _huber_cost(new_residuals)
+        better = cost < best_cost
+
+        best_cost = np.where(better, cost, best_cost)
+        best = np.where(better[:, None], candidate, best)
+        residuals = np.where(better[:, None], new_residuals, residuals)
+        jacobian = np.where(better[:, None, None], new_jacobian, jacobian)
+        damping = np.where(better, damping * 0.2, damping * 8)
+        candidate = best - _damped_step(residuals, jacobian, damping)
+
+    weight = _huber_weight(residuals)
+    weighted = jacobian * weight[..., None]
+    bias_gradient = weighted[:, :COLUMNS].sum(1) * (problem.bias_sd_px / problem.sd_px)[:, None]
+    return _Solution(
+        parameters=best,
+        residuals=residuals * np.sqrt(weight),
+        normal=np.asarray(np.einsum("sri,srj->sij", weighted, jacobian)),
+        bias_gradient=np.asarray(bias_gradient),
     )
 
 
-def _solve(parameters: Floats, problem: _Problem) -> tuple[Floats, Floats, Floats, Floats]:
-    """The fits, their damped-down (Huber 1964) residuals, normal matrices, and the pull of a common
-    disparity error.
+def _damped_step(residuals: Floats, jacobian: Floats, damping: Floats) -> Floats:
+    """The step (s, 3) to subtract, at most MAX_STEP."""
+    weighted = jacobian * _huber_weight(residuals)[..., None]
+    normal = np.einsum("sri,srj->sij", weighted, jacobian)
+    gradient = np.einsum("sri,sr->si", weighted, residuals)
+
+    diagonal = np.einsum("sii->si", normal) * damping[:, None] + 1e-9
+    damped = normal + diagonal[:, :, None] * np.eye(3)
+    step = np.linalg.solve(damped, gradient[..., None])[..., 0]
+    return np.asarray(step.clip(np.negative(MAX_STEP), MAX_STEP))
+
+
+def _huber_weight(residuals: Floats) -> Floats:
+    size = np.maximum(np.abs(residuals), 1e-12)
+    return np.asarray(np.minimum(1.0, HUBER / size))
+
+
+def _huber_cost(residuals: Floats) -> Floats:
+    size = np.abs(residuals)
+    cost = np.where(size < HUBER, size**2, HUBER * (2 * size - HUBER))
+    return np.asarray(cost.sum(1))
+
+
+def _covariances(solution: _Solution, problem: _Problem) -> Floats:
+    """(s, 3, 3): of independent errors, of a bias that all disparities share, and of what a hidden
+    edge leaves open.
     """
-    damping = np.full(len(parameters), 0.1)
-    best = np.full(len(parameters), np.inf)
-    kept = parameters
-    ahead = parameters
-    residual, slope = _linearised(parameters, problem)
-    for _ in range(ROUNDS):
-        new_residual, new_slope = _linearised(ahead, problem)
-        new_cost = _huber_cost(new_residual)
-        better = new_cost < best
-        best = np.where(better, new_cost, best)
-        kept = np.where(better[:, None], ahead, kept)
-        residual = np.where(better[:, None], new_residual, residual)
-        slope = np.where(better[:, None, None], new_slope, slope)
-        damping = np.where(better, damping * 0.2, damping * 8)
-        weighted = slope * _weight(residual)[..., None]
-        normal = np.einsum("sri,srj->sij", weighted, slope)
-        gradient = np.einsum("sri,sr->si", weighted, residual)
-        scale = np.einsum("sii->si", normal) * damping[:, None] + 1e-9
-        step = np.linalg.solve(normal + scale[:, :, None] * np.eye(3), gradient[..., None])[..., 0]
-        ahead = kept - step.clip([-5, -5, -0.4], [5, 5, 0.4])
-    weight = _weight(residual)
-    weighted = slope * weight[..., None]
-    normal = np.einsum("sri,srj->sij", weighted, slope)
-    pull = weighted[:, :POINTS].sum(1) * (problem.bias_sd_px / problem.sd_px)[:, None]
-    return kept, residual * np.sqrt(weight), np.asarray(normal), np.asarray(pull)
+    prior = np.diag([1e-4, 1e-4, 1e-2])
+    independent = np.linalg.inv(solution.normal + prior)
+    common = np.einsum("sij,sj->si", independent, solution.bias_gradient)
+    covariances = np.asarray(independent + common[:, :, None] * common[:, None, :])
+
+    hidden_variance = np.where(problem.hidden.any(1), HIDDEN_SD_M**2, 0.0)
+    covariances[:, :2, :2] += np.asarray(hidden_variance)[:, None, None] * np.eye(2)
+    return covariances
 
 
-def _weight(residual: Floats) -> Floats:
-    return np.asarray(np.minimum(1.0, HUBER / np.maximum(np.abs(residual), 1e-12)))
+def _misfits(solution: _Solution, problem: _Problem) -> Floats:
+    """(s,): root mean square disparity residual, in standard deviations of one column."""
+    error_px = solution.residuals[:, :COLUMNS] * problem.sd_px[:, None]
+    return np.asarray(np.sqrt((error_px**2).mean(1)) / DISPARITY_SD_PX)
 
 
-def _huber_cost(residual: Floats) -> Floats:
-    size = np.abs(residual)
-    return np.asarray(np.where(size < HUBER, size**2, HUBER * (2 * size - HUBER)).sum(1))
-
-
-def _covariance(normal: Floats, pull: Floats) -> Floats:
-    """(s, 3, 3): of independent errors, and of one that all disparities have in common."""
-    spread = np.linalg.inv(normal + np.diag([1e-4, 1e-4, 1e-2]))
-    common = np.einsum("sij,sj->si", spread, pull)
-    return np.asarray(spread + common[:, :, None] * common[:, None, :])
-
-
-def _place(
-    found: Floats, cost: Floats, covariance: Floats, misfit: float, camera: Calibration
-) -> Place:
-    """The mean and spread over all turns, weighted by their likelihood, as bearing and range from
+def _pose(
+    parameters: Floats, costs: Floats, covariances: Floats, misfit: float, camera: Calibration
+) -> ObjectPose:
+    """Mean and covariance over all orientations, weighted by likelihood, as bearing and range from
     the robot.
     """
-    weight = np.exp(-0.5 * (cost - cost.min()))
+    weight = np.exp(-0.5 * (costs - costs.min()))
     weight /= weight.sum()
-    centre = weight @ found[:, :2]
-    away = found[:, :2] - centre
-    spread = np.einsum(
-        "s,sij->ij", weight, covariance[:, :2, :2] + away[:, :, None] * away[:, None, :]
-    )
-    forward = centre[1] + camera.mount_forward_m
-    left = -centre[0]
-    range_m = max(float(np.hypot(forward, left)), NEAREST_M)
-    outward = np.array([-left, forward]) / range_m
-    across = np.array([outward[1], -outward[0]])
-    return Place(
-        bearing_rad=float(np.arctan2(left, forward)),
+    centre = weight @ parameters[:, :2]
+    away = parameters[:, :2] - centre
+    scatter = away[:, :, None] * away[:, None, :]
+    covariance = np.einsum("s,sij->ij", weight, covariances[:, :2, :2] + scatter)
+
+    forward_m = centre[1] + camera.mount_forward_m
+    left_m = -centre[0]
+    range_m = max(float(np.hypot(forward_m, left_m)), MIN_RANGE_M)
+    radial = np.array([-left_m, forward_m]) / range_m
+    tangential = np.array([radial[1], -radial[0]])
+    bearing_sd_rad = np.sqrt(tangential @ covariance @ tangential) / range_m
+    range_sd_m = np.sqrt(radial @ covariance @ radial)
+
+    return ObjectPose(
+        bearing_rad=float(np.arctan2(left_m, forward_m)),
         range_m=range_m,
-        bearing_sd_rad=float(
-            np.hypot(np.sqrt(across @ spread @ across) / range_m, LEAST_BEARING_SD_RAD)
-        ),
-        range_sd_m=float(np.hypot(np.sqrt(outward @ spread @ outward), LEAST_RANGE_SD_M)),
+        bearing_sd_rad=float(np.hypot(bearing_sd_rad, MIN_BEARING_SD_RAD)),
+        range_sd_m=float(np.hypot(range_sd_m, MIN_RANGE_SD_M)),
         misfit=float(misfit),
     )

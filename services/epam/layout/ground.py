@@ -1,176 +1,134 @@
-"""What of the ground is road, in metres: a mask of the image laid on the ground plane that the
-depth image tells.
-
-The disparity of a plane is linear in column and row. The plane is the likeliest one given the
-disparities on the road, reweighted so that what does not fit counts for nothing (Beaton & Tukey
-1974), and given that the camera stands about level at its mount's height, which decides where
-little depth is known.
-"""
+"""The road in metres: an image mask projected onto the ground plane."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
+from cogmap.geometry.arrays import Booleans, Floats, Singles
 from schemas.sensing import Calibration
+from services.epam.layout.ground_plane import GroundPlane, fit, focal_baseline, ray_slopes
 
-Floats = npt.NDArray[np.float64]
-Depth = npt.NDArray[np.float32]
-Likelihood = npt.NDArray[np.float32]
-Points = npt.NDArray[np.float32]
-FARTHEST_M = 15.0
+MAX_RANGE_M = 15.0
 CELL_M = 0.5
-SAMPLE_EVERY_PX = 4
-DISPARITY_SD_PX = 0.3
-# Disparities of neighbours err alike: so many samples tell as much as one.
-ALIKE_SAMPLES = 6.0
-ROLL_SD_RAD = 0.02
-HEIGHT_SD_SHARE = 0.05
-PITCH_SD_RAD = 0.02
-CUTOFFS_PX = (4.0, 2.0, 1.5, 1.5)
-# So much nearer than the ground is not the ground, if more than specks of the image are.
+# What is nearer than the ground by more than this is upright, if it is larger than a speck.
 UPRIGHT_PX = 3.0
 UPRIGHT_SHARE = 0.02
 _SPECK = np.ones((5, 3), np.uint8)
-# How far from the end of the mask an upright thing that hides the rest is looked for: columns, rows
-# above, rows below.
+# Neighbourhood of a boundary pixel in which an upright thing may hide the rest of the road.
 BESIDE_PX = 4
 ABOVE_PX = 12
 BELOW_PX = 2
-STANDS_SHARE = 0.93
-STANDS_PX = 0.3
+HIDING_SHARE = 0.93
+HIDING_PX = 0.3
 BORDER_PX = 3
 
 
-@dataclass(frozen=True)
-class Plane:
-    """The disparity of the ground, in pixels: `across` a column's slope and `down` a row's slope,
-    plus `level`.
-
-    Slopes are those of the rays: (column - cx) / fx and (row - cy) / fy.
-    """
-
-    across: float
-    down: float
-    level: float
-
-    def disparity_px(
-        self, rows: npt.ArrayLike, columns: npt.ArrayLike, camera: Calibration
-    ) -> Floats:
-        """At each of these pixels; 0 or less at and over the horizon."""
-        right, below = _slopes(rows, columns, camera)
-        return self.across * right + self.down * below + self.level
-
-
-def project(likelihood: Likelihood, depth_m: Depth, camera: Calibration) -> tuple[Points, Points]:
-    """The road, and where it ends, as ground points in the robot's frame, x forward, y left,
+def project(likelihood: Singles, depth_m: Singles, camera: Calibration) -> tuple[Singles, Singles]:
+    """Return the road and its boundary as ground points in the robot's frame, x forward, y left,
     float32 (n, 2) each.
 
-    `likelihood` and `depth_m` are (h, w); a pixel is road where its likelihood is 0.5 or more, and
-    the road ends between pixels, where it would be 0.5. Both are within FARTHEST_M and thinned to
-    the mean point in each cell of CELL_M. Where the image ends, or something upright hides what is
-    behind it, no road ends.
+    `likelihood` and `depth_m` are (h, w). A pixel is road if its likelihood is at least 0.5; the
+    boundary lies between pixels, where it would be 0.5. Both are limited to MAX_RANGE_M and thinned
+    to the mean point of each cell of CELL_M. No boundary is claimed where the image ends or where
+    something upright hides what is behind it.
     """
-    disparity = np.divide(
-        _focal_baseline(camera), depth_m, out=np.zeros(depth_m.shape), where=depth_m > 0
-    )
+    unknown = np.zeros(depth_m.shape)
+    disparity_px = np.divide(focal_baseline(camera), depth_m, out=unknown, where=depth_m > 0)
     likelihood = likelihood.astype(np.float32, copy=False)
     mask = likelihood >= 0.5
-    plane = fit(mask, disparity, camera)
+    plane = fit(mask, disparity_px, camera)
+
     height, width = mask.shape
-    ground = plane.disparity_px(np.arange(height)[:, None], np.arange(width), camera)
-    above = disparity - np.maximum(ground, 0.0) > UPRIGHT_PX + UPRIGHT_SHARE * disparity
-    upright = cv2.morphologyEx(above.astype(np.uint8), cv2.MORPH_OPEN, _SPECK) > 0
-    road = np.nonzero(mask & ~upright & (ground > _focal_baseline(camera) / FARTHEST_M))
-    ends = _ends(likelihood, mask, np.where(upright, disparity, 0.0).astype(np.float32), ground)
-    return tuple(
-        thinned(_on_ground(rows, columns, plane, camera)) for rows, columns in (road, ends)
-    )  # type: ignore[return-value]
+    image_rows = np.arange(height)[:, None]
+    ground_px = plane.disparity_px(image_rows, np.arange(width), camera)
+    upright = _upright(disparity_px, ground_px)
+    near = ground_px > focal_baseline(camera) / MAX_RANGE_M
+    road_rows, road_columns = np.nonzero(mask & ~upright & near)
+
+    upright_px = np.where(upright, disparity_px, 0.0).astype(np.float32)
+    visible_ground = _visible_ground(upright_px, ground_px)
+    end_rows, end_columns = _boundary_pixels(likelihood, mask, visible_ground)
+
+    road_m = _on_ground(road_rows, road_columns, plane, camera)
+    boundary_m = _on_ground(end_rows, end_columns, plane, camera)
+    return thin(road_m), thin(boundary_m)
 
 
-def fit(mask: npt.NDArray[np.bool_], disparity_px: Floats, camera: Calibration) -> Plane:
-    """The plane of what `mask` (h, w) shows, from `disparity_px` (h, w), 0 unknown."""
-    every = (slice(SAMPLE_EVERY_PX // 2, None, SAMPLE_EVERY_PX),) * 2
-    rows, columns = np.nonzero(mask[every] & (disparity_px[every] > 0))
-    rows, columns = (SAMPLE_EVERY_PX * at + SAMPLE_EVERY_PX // 2 for at in (rows, columns))
-    right, below = _slopes(rows, columns, camera)
-    slopes = np.stack([right, below, np.ones_like(right)], axis=1)
-    down = _focal_baseline(camera) / camera.mount_height_m
-    level = np.array([0.0, down, 0.0])
-    stiffness = np.diag(1 / (down * np.array([ROLL_SD_RAD, HEIGHT_SD_SHARE, PITCH_SD_RAD])) ** 2)
-    seen = disparity_px[rows, columns] - slopes @ level
-    correction = np.zeros(3)
-    for cutoff_px in CUTOFFS_PX:
-        misfit = (seen - slopes @ correction) / cutoff_px
-        weight = np.clip(1 - misfit**2, 0.0, None) ** 2 / (ALIKE_SAMPLES * DISPARITY_SD_PX**2)
-        weighted = slopes.T * weight
-        correction = np.linalg.solve(weighted @ slopes + stiffness, weighted @ seen)
-    across, down, ahead = (level + correction).tolist()
-    return Plane(across, down, ahead)
+def _upright(disparity_px: Floats, ground_px: Floats) -> Booleans:
+    """Which pixels show something that stands on the ground, (h, w)."""
+    nearer_px = disparity_px - np.maximum(ground_px, 0.0)
+    nearer = nearer_px > UPRIGHT_PX + UPRIGHT_SHARE * disparity_px
+    opened = cv2.morphologyEx(nearer.astype(np.uint8), cv2.MORPH_OPEN, _SPECK)
+    return np.asarray(opened > 0)
 
 
-def _focal_baseline(camera: Calibration) -> float:
-    return camera.fx_px * camera.baseline_m
-
-
-def _slopes(
-    rows: npt.ArrayLike, columns: npt.ArrayLike, camera: Calibration
-) -> tuple[Floats, Floats]:
-    right = (np.asarray(columns, np.float64) - camera.cx_px) / camera.fx_px
-    return right, (np.asarray(rows, np.float64) - camera.cy_px) / camera.fy_px
-
-
-def _ends(
-    likelihood: Likelihood, mask: npt.NDArray[np.bool_], upright_px: Depth, ground_px: Floats
-) -> tuple[Floats, Floats]:
-    """Rows and columns, fractional, where the road in the image ends on the ground."""
+def _visible_ground(upright_px: Singles, ground_px: Floats) -> Booleans:
+    """Which pixels show ground with nothing upright before it nearby, (h, w)."""
     kernel = np.ones((ABOVE_PX + 1 + BELOW_PX, 2 * BESIDE_PX + 1), np.uint8)
-    nearest = cv2.dilate(upright_px, kernel, anchor=(BESIDE_PX, ABOVE_PX))
-    open_ground = (ground_px > 0) & (nearest < STANDS_SHARE * ground_px - STANDS_PX)
-    rows, columns = np.nonzero(
-        open_ground[:, :-1] & open_ground[:, 1:] & (mask[:, :-1] != mask[:, 1:])
-    )
-    beside = rows, columns + _crossing(likelihood[rows, columns], likelihood[rows, columns + 1])
-    rows, columns = np.nonzero(open_ground[:-1] & open_ground[1:] & (mask[:-1] != mask[1:]))
-    above = rows + _crossing(likelihood[rows, columns], likelihood[rows + 1, columns]), columns
-    all_rows, all_columns = (
-        np.concatenate(parts).astype(np.float64) for parts in zip(beside, above, strict=True)
-    )
+    nearest_px = cv2.dilate(upright_px, kernel, anchor=(BESIDE_PX, ABOVE_PX))
+    return np.asarray((ground_px > 0) & (nearest_px < HIDING_SHARE * ground_px - HIDING_PX))
+
+
+def _boundary_pixels(
+    likelihood: Singles, mask: Booleans, visible_ground: Booleans
+) -> tuple[Floats, Floats]:
+    """Rows and columns, fractional, where the road ends on visible ground inside the image."""
+    visible = visible_ground[:, :-1] & visible_ground[:, 1:]
+    rows, columns = np.nonzero(visible & (mask[:, :-1] != mask[:, 1:]))
+    crossing = _crossing(likelihood[rows, columns], likelihood[rows, columns + 1])
+    beside_rows = rows
+    beside_columns = columns + crossing
+
+    visible = visible_ground[:-1] & visible_ground[1:]
+    rows, columns = np.nonzero(visible & (mask[:-1] != mask[1:]))
+    crossing = _crossing(likelihood[rows, columns], likelihood[rows + 1, columns])
+    above_rows = rows + crossing
+    above_columns = columns
+
+    all_rows = np.concatenate([beside_rows, above_rows]).astype(np.float64)
+    all_columns = np.concatenate([beside_columns, above_columns]).astype(np.float64)
     height, width = mask.shape
-    inside = (np.abs(all_rows - (height - 1) / 2) < (height - 1) / 2 - BORDER_PX) & (
-        np.abs(all_columns - (width - 1) / 2) < (width - 1) / 2 - BORDER_PX
-    )
+    inside = _inside(all_rows, height) & _inside(all_columns, width)
     return all_rows[inside], all_columns[inside]
 
 
-def _crossing(first: Likelihood, second: Likelihood) -> Likelihood:
-    """How far from the first of two neighbours to the second, 0 to 1, the likelihood is 0.5."""
+def _inside(at: Floats, size: int) -> Booleans:
+    """Which of these rows or columns are farther than BORDER_PX from the image's border."""
+    middle = (size - 1) / 2
+    return np.asarray(np.abs(at - middle) < middle - BORDER_PX)
+
+
+def _crossing(first: Singles, second: Singles) -> Singles:
+    """Where the likelihood is 0.5 between two neighbours: 0 at the first, 1 at the second."""
     return np.asarray((0.5 - first) / (second - first), np.float32)
 
 
 def _on_ground(
-    rows: npt.ArrayLike, columns: npt.ArrayLike, plane: Plane, camera: Calibration
+    rows: npt.ArrayLike, columns: npt.ArrayLike, plane: GroundPlane, camera: Calibration
 ) -> Floats:
-    """The points (n, 2) of the ground that these pixels show; those at the horizon are left out."""
-    disparity = plane.disparity_px(rows, columns, camera)
-    below = disparity > _focal_baseline(camera) / FARTHEST_M
-    ahead_m = _focal_baseline(camera) / disparity[below]
-    right, _ = _slopes(rows, columns, camera)
-    return np.stack([ahead_m + camera.mount_forward_m, -right[below] * ahead_m], axis=1)
+    """The ground points (n, 2) that these pixels show; those beyond MAX_RANGE_M are left out."""
+    disparity_px = plane.disparity_px(rows, columns, camera)
+    near = disparity_px > focal_baseline(camera) / MAX_RANGE_M
+    depth_m = focal_baseline(camera) / disparity_px[near]
+    right, _ = ray_slopes(rows, columns, camera)
+
+    forward_m = depth_m + camera.mount_forward_m
+    left_m = -right[near] * depth_m
+    return np.stack([forward_m, left_m], axis=1)
 
 
-def thinned(points: Floats) -> Points:
-    """The mean of the points in each cell, in order of the cells."""
-    near = points[np.hypot(points[:, 0], points[:, 1]) <= FARTHEST_M]
-    reach = round(FARTHEST_M / CELL_M) + 1
-    cells = np.floor(near / CELL_M).astype(np.intp) + reach
+def thin(points_m: Floats) -> Singles:
+    """Return the mean of the points (n, 2) in each cell, in the order of the cells."""
+    ranges_m = np.hypot(points_m[:, 0], points_m[:, 1])
+    near_m = points_m[ranges_m <= MAX_RANGE_M]
+    reach = round(MAX_RANGE_M / CELL_M) + 1
+    cells = np.floor(near_m / CELL_M).astype(np.intp) + reach
     cell = cells[:, 0] * 2 * reach + cells[:, 1]
+
     count = np.bincount(cell, minlength=1)
-    kept = np.flatnonzero(count)
-    sums = np.stack(
-        [np.bincount(cell, near[:, axis], minlength=1)[kept] for axis in (0, 1)], axis=1
-    )
-    return np.asarray(sums / count[kept, None], np.float32)
+    occupied = np.flatnonzero(count)
+    sums = [np.bincount(cell, near_m[:, axis], minlength=1)[occupied] for axis in (0, 1)]
+    means = np.stack(sums, axis=1) / count[occupied, None]
+    return np.asarray(means, np.float32)

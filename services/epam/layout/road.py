@@ -1,5 +1,5 @@
-"""Where the road is: a fully-convolutional network that also sees where in the image a pixel is
-(paper §5.1).
+"""Which pixels show road: a fully-convolutional network that also receives where in the image each
+pixel is, the spatial prior of the paper (section 5.1).
 """
 
 from __future__ import annotations
@@ -8,102 +8,103 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-from schemas.sensing import Calibration
-from services.epam.layout.ground import Depth, Likelihood, Points, project
-from services.epam.network import WEIGHTS, Network, Tensor
+from cogmap.geometry.arrays import Booleans, Bytes, Singles
+from services.epam.network import WEIGHTS, Network
 
-Image = npt.NDArray[np.uint8]
 DEFAULT_PATH = WEIGHTS / "road.onnx"
 WIDTH_PX = 160
 HEIGHT_PX = 120
 # Rows above and below, so that the network can halve the image often enough.
 PADDING_PX = 4
 CHANNELS = 5
-TAKES = (1, CHANNELS, HEIGHT_PX + 2 * PADDING_PX, WIDTH_PX)
-GIVES: dict[str, tuple[int, ...]] = {"road": (1, 1, HEIGHT_PX + 2 * PADDING_PX, WIDTH_PX)}
+INPUT_SHAPE = (1, CHANNELS, HEIGHT_PX + 2 * PADDING_PX, WIDTH_PX)
+OUTPUT_SHAPES: dict[str, tuple[int, ...]] = {
+    "road": (1, 1, HEIGHT_PX + 2 * PADDING_PX, WIDTH_PX),
+}
 MEAN_GREY = 112.0
-DARKEST_GREY = 20.0
-LEAST_CONTRAST = 3.0
-LEAST_SHARE = 0.002
-LARGEST_HOLE_SHARE = 0.0005
-_OPEN = np.ones((3, 3), np.uint8)
+MIN_GREY = 20.0
+MIN_CONTRAST = 3.0
+MIN_ROAD_SHARE = 0.002
+MAX_HOLE_SHARE = 0.0005
+_OPENING = np.ones((3, 3), np.uint8)
 
 
-class Roads:
-    """Finds the road in images, with a network that gives the log odds of road for each pixel of
-    `pixels`.
+class RoadSegmenter:
+    """Finds the road in images, with a network whose output is the log odds of road of each pixel
+    of `network_input`.
     """
 
     def __init__(self, network: Network) -> None:
         self._network = network
 
-    def likelihood(self, image: Image) -> Likelihood:
-        """How likely each pixel of an RGB image (h, w, 3) shows road, float32 (h, w), denoised.
+    def likelihood(self, image: Bytes) -> Singles:
+        """Return the probability of road of each pixel of an RGB image (h, w, 3), float32 (h, w),
+        denoised.
 
-        0.5 and more is road. An image without any contrast, such as a black one, shows none.
+        A pixel is road if it is at least 0.5. An image without any contrast has none.
         """
         height, width = image.shape[:2]
-        small = cv2.resize(image, (WIDTH_PX, HEIGHT_PX), interpolation=cv2.INTER_AREA).astype(
-            np.uint8, copy=False
-        )
-        if small.std() < LEAST_CONTRAST:
+        resized = cv2.resize(image, (WIDTH_PX, HEIGHT_PX), interpolation=cv2.INTER_AREA)
+        small = resized.astype(np.uint8, copy=False)
+        if small.std() < MIN_CONTRAST:
             return np.zeros((height, width), np.float32)
-        (log_odds,) = self._network(pixels(small[None]))
-        whole = cv2.resize(
-            log_odds[0, 0, PADDING_PX:-PADDING_PX], (width, height), interpolation=cv2.INTER_LINEAR
-        )
-        return _denoised(np.asarray(1 / (1 + np.exp(-whole)), np.float32))
 
-    def mask(self, image: Image) -> npt.NDArray[np.bool_]:
-        """Which pixels of an RGB image (h, w, 3) show road, (h, w)."""
+        (output,) = self._network(network_input(small[None]))
+        log_odds = cv2.resize(
+            output[0, 0, PADDING_PX:-PADDING_PX], (width, height), interpolation=cv2.INTER_LINEAR
+        )
+        probability = np.asarray(1 / (1 + np.exp(-log_odds)), np.float32)
+        return _denoised(probability)
+
+    def mask(self, image: Bytes) -> Booleans:
+        """Return which pixels of an RGB image (h, w, 3) show road, (h, w)."""
         return np.asarray(self.likelihood(image) >= 0.5)
 
-    def project(
-        self, likelihood: Likelihood, depth_m: Depth, camera: Calibration
-    ) -> tuple[Points, Points]:
-        """The road and where it ends, in metres; see `services.epam.layout.ground.project`."""
-        return project(likelihood, depth_m, camera)
 
-
-def load(path: Path = DEFAULT_PATH) -> Roads:
-    """Roads by the network in the file at `path`. Raises ConfigError where it holds no such
+def load(path: Path = DEFAULT_PATH) -> RoadSegmenter:
+    """Load the road network in the file at `path`. Raises ConfigError if it holds no such
     network.
     """
-    return Roads(Network(path, TAKES, GIVES))
+    return RoadSegmenter(Network(path, INPUT_SHAPE, OUTPUT_SHAPES))
 
 
-def pixels(small: Image) -> Tensor:
-    """What the network takes: of RGB images (n, HEIGHT_PX, WIDTH_PX, 3) the colours, all images
-    about as bright, and where each pixel is, from -1 to 1 rightwards and downwards; padded, float32
-    (n, CHANNELS, h, w).
+def network_input(small: Bytes) -> Singles:
+    """Return the network's input, float32 (n, CHANNELS, h, w), of RGB images (n, HEIGHT_PX,
+    WIDTH_PX, 3), padded.
+
+    Channels are three colours, normalized to one mean brightness, and the pixel's column and row,
+    from -1 to 1.
     """
-    gain = MEAN_GREY / np.maximum(small.mean((1, 2, 3), dtype=np.float32), DARKEST_GREY)
-    tensor = np.empty((len(small), *TAKES[1:]), np.float32)
-    padded = np.pad(small, ((0, 0), (PADDING_PX, PADDING_PX), (0, 0), (0, 0)), mode="edge")
-    tensor[:, :3] = padded.transpose(0, 3, 1, 2)
-    tensor[:, :3] = tensor[:, :3] * (gain[:, None, None, None] / 64) - 2
-    tensor[:, 3] = np.linspace(-1, 1, TAKES[3], dtype=np.float32)
-    tensor[:, 4] = np.linspace(-1, 1, TAKES[2], dtype=np.float32)[:, None]
-    return tensor
+    brightness = small.mean((1, 2, 3), dtype=np.float32)
+    gain = MEAN_GREY / np.maximum(brightness, MIN_GREY)
+    rows = (PADDING_PX, PADDING_PX)
+    padded = np.pad(small, ((0, 0), rows, (0, 0), (0, 0)), mode="edge")
+
+    _, _, height, width = INPUT_SHAPE
+    values = np.empty((len(small), CHANNELS, height, width), np.float32)
+    values[:, :3] = padded.transpose(0, 3, 1, 2)
+    values[:, :3] = values[:, :3] * (gain[:, None, None, None] / 64) - 2
+    values[:, 3] = np.linspace(-1, 1, width, dtype=np.float32)
+    values[:, 4] = np.linspace(-1, 1, height, dtype=np.float32)[:, None]
+    return values
 
 
-def _denoised(likelihood: Likelihood) -> Likelihood:
-    """Specks and hairs are no road, and pinholes in it are."""
-    seen = (likelihood >= 0.5).astype(np.uint8)
-    road = _pieces(
-        cv2.morphologyEx(seen, cv2.MORPH_OPEN, _OPEN).astype(np.uint8, copy=False), LEAST_SHARE
-    )
-    whole = ~_pieces((~road).astype(np.uint8), LARGEST_HOLE_SHARE)
-    likelihood[(seen > 0) & ~whole] = 0.0
-    likelihood[(seen == 0) & whole] = 1.0
+def _denoised(likelihood: Singles) -> Singles:
+    """`likelihood` with specks and thin lines removed from the road, and small holes filled."""
+    road = (likelihood >= 0.5).astype(np.uint8)
+    opened = cv2.morphologyEx(road, cv2.MORPH_OPEN, _OPENING).astype(np.uint8, copy=False)
+    without_specks = _large_components(opened, MIN_ROAD_SHARE)
+    background = _large_components((~without_specks).astype(np.uint8), MAX_HOLE_SHARE)
+
+    likelihood[(road > 0) & background] = 0.0
+    likelihood[(road == 0) & ~background] = 1.0
     return likelihood
 
 
-def _pieces(mask: npt.NDArray[np.uint8], least_share: float) -> npt.NDArray[np.bool_]:
-    """The connected pieces of `mask` that cover at least so large a share of it."""
-    _, piece, facts, _ = cv2.connectedComponentsWithStats(mask, connectivity=4)
-    kept = facts[:, cv2.CC_STAT_AREA] >= least_share * mask.size
+def _large_components(mask: Bytes, min_share: float) -> Booleans:
+    """The connected components of `mask` that cover at least `min_share` of the image, (h, w)."""
+    _, component, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=4)
+    kept = stats[:, cv2.CC_STAT_AREA] >= min_share * mask.size
     kept[0] = False
-    return np.asarray(kept[piece])
+    return np.asarray(kept[component])

@@ -1,5 +1,5 @@
-"""The walls of a segment: how far each of its columns is, and whether the object truly ends where
-it seems to.
+"""The walls of a segment: the disparity of each of its columns, and whether the object truly ends
+where the segment does.
 """
 
 from __future__ import annotations
@@ -7,17 +7,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from cogmap.geometry.arrays import Floats, Singles
 from schemas.sensing import Calibration
-from services.epam.layout.footprint_fit import Outline, Place
+from services.epam.layout.footprint_fit import ObjectPose, Silhouette
 from services.epam.recognition.segments import Segment
 
-Floats = npt.NDArray[np.float64]
-Disparity = npt.NDArray[np.float32]
-
-FEWEST_PIXELS = 4
-FEWEST_COLUMNS = 3
+MIN_PIXELS = 4
+MIN_COLUMNS = 3
 BESIDE_PX = 4
 WITHIN_PX = 3
 NEARER_PX = 0.3
@@ -25,14 +22,14 @@ MIXED_PX = 2
 MIXED_WHERE_HIDDEN_PX = 5
 USUAL_HALF_M = 4.5
 USUAL_SD_M = 1.5
-LEAST_DISPARITY_PX = 0.5
-MOST_RANGE_M = 400.0
+MIN_DISPARITY_PX = 0.5
+MAX_RANGE_M = 400.0
 
 
 @dataclass(frozen=True, eq=False)
 class Walls:
-    """Columns (n,) of the view with their disparity in pixels (n,), and where the segment begins
-    and ends.
+    """Columns (n,) of the view with their disparity in pixels (n,), the first and last column of
+    the segment, and whether the object truly begins and ends there.
     """
 
     columns: Floats
@@ -44,109 +41,123 @@ class Walls:
 
     @property
     def whole(self) -> bool:
-        """Whether neither the image's border nor another object cuts it."""
+        """Whether neither the image's border nor another object cuts the object."""
         return self.left_true and self.right_true
 
-    def outline(self, sides_m: tuple[float, float]) -> Outline:
-        """What geometry needs of them, less the columns at each end where the depths of two things
-        mix.
+    def silhouette(self, sides_m: tuple[float, float]) -> Silhouette:
+        """Return the input of a footprint's fit, without the columns at each end whose depth mixes
+        two objects.
 
-        Depth spreads from what is nearer over what it hides, so more is left out where the object
-        is hidden.
+        Depth spreads from what is nearer over what it hides, so more columns are left out where the
+        object is hidden.
         """
-        spare = (len(self.columns) - FEWEST_COLUMNS) // 2
-        mixed = (
-            MIXED_PX if true else MIXED_WHERE_HIDDEN_PX
-            for true in (self.left_true, self.right_true)
-        )
-        first, last = (max(0, min(number, spare)) for number in mixed)
-        inner = slice(first, len(self.columns) - last)
-        columns = self.columns[inner]
-        disparity = self.disparity_px[inner]
-        matched = columns >= disparity
-        if matched.sum() >= FEWEST_COLUMNS:
+        first = self._mixed_columns(self.left_true)
+        last = len(self.columns) - self._mixed_columns(self.right_true)
+        columns = self.columns[first:last]
+        disparity_px = self.disparity_px[first:last]
+
+        # Left of its disparity, a column is outside the right camera's image.
+        matched = columns >= disparity_px
+        if matched.sum() >= MIN_COLUMNS:
             columns = columns[matched]
-            disparity = disparity[matched]
-        return Outline(
-            columns, disparity, self.left, self.right, self.left_true, self.right_true, sides_m
+            disparity_px = disparity_px[matched]
+
+        return Silhouette(
+            columns=columns,
+            disparity_px=disparity_px,
+            left=self.left,
+            right=self.right,
+            left_true=self.left_true,
+            right_true=self.right_true,
+            sides_m=sides_m,
         )
 
-    def roughly(self, camera: Calibration) -> Place:
-        """Where the middle of a building of the usual size is, behind the middle of what is seen of
-        it.
-        """
-        depth_m = (
-            camera.fx_px
-            * camera.baseline_m
-            / max(float(np.median(self.disparity_px)), LEAST_DISPARITY_PX)
-        )
+    def _mixed_columns(self, end_is_true: bool) -> int:
+        mixed = MIXED_PX if end_is_true else MIXED_WHERE_HIDDEN_PX
+        spare = (len(self.columns) - MIN_COLUMNS) // 2
+        return max(0, min(mixed, spare))
+
+    def usual_pose(self, camera: Calibration) -> ObjectPose:
+        """Return the pose of a building of the usual size, behind the middle of what is seen."""
+        disparity_px = max(float(np.median(self.disparity_px)), MIN_DISPARITY_PX)
+        depth_m = camera.fx_px * camera.baseline_m / disparity_px
         slope = (camera.cx_px - (self.left + self.right) / 2) / camera.fx_px
         forward_m = depth_m + camera.mount_forward_m
         left_m = slope * depth_m
-        seen_m = float(np.hypot(forward_m, left_m))
-        range_m = min(seen_m + USUAL_HALF_M, MOST_RANGE_M)
-        wide_m = self.width_m(camera)
+
+        wall_m = float(np.hypot(forward_m, left_m))
+        range_m = min(wall_m + USUAL_HALF_M, MAX_RANGE_M)
         hidden_m = 0.0 if self.whole else USUAL_HALF_M / 2
-        return Place(
+        lateral_sd_m = 0.1 * self.width_m(camera) + hidden_m + 0.3
+
+        return ObjectPose(
             bearing_rad=float(np.arctan2(left_m, forward_m)),
             range_m=range_m,
-            bearing_sd_rad=float((0.1 * wide_m + hidden_m + 0.3) / range_m),
+            bearing_sd_rad=float(lateral_sd_m / range_m),
             range_sd_m=float(np.hypot(USUAL_SD_M, 0.05 * range_m)),
             misfit=0.0,
         )
 
     def width_m(self, camera: Calibration) -> float:
-        """How far apart its ends are, across the view."""
-        ends = self.disparity_px[[0, -1]].clip(LEAST_DISPARITY_PX)
-        depth_m = camera.fx_px * camera.baseline_m / ends
-        across_m = (np.array([self.left, self.right]) - camera.cx_px) / camera.fx_px * depth_m
-        return float(min(np.hypot(np.ptp(across_m), np.ptp(depth_m)), MOST_RANGE_M))
+        """Return the distance between the first and the last column."""
+        ends_px = self.disparity_px[[0, -1]].clip(MIN_DISPARITY_PX)
+        depth_m = camera.fx_px * camera.baseline_m / ends_px
+        slopes = (np.array([self.left, self.right]) - camera.cx_px) / camera.fx_px
+        width_m = np.hypot(np.ptp(slopes * depth_m), np.ptp(depth_m))
+        return float(min(width_m, MAX_RANGE_M))
 
 
-def walls(segment: Segment, disparity_px: Disparity) -> Walls | None:
-    """The walls of `segment`, where `disparity_px` (h, w) is that of the view, 0 unknown; None
-    where it is unknown.
+def walls(segment: Segment, disparity_px: Singles) -> Walls | None:
+    """Return the walls of `segment`, where `disparity_px` (h, w) is that of the view, 0 unknown, or
+    None if too few columns have a known disparity.
     """
-    left, _, wide, _ = segment.box_px
-    span = slice(left, left + wide)
-    shown = segment.mask[:, span]
-    middle = _middles(np.where(shown, disparity_px[:, span], 0.0))
-    known = np.flatnonzero(middle)
-    if len(known) < FEWEST_COLUMNS:
+    left, _, width, _ = segment.box_px
+    span = slice(left, left + width)
+    own_px = np.where(segment.mask[:, span], disparity_px[:, span], 0.0)
+    medians_px = _column_medians(own_px)
+    known = np.flatnonzero(medians_px)
+    if len(known) < MIN_COLUMNS:
         return None
-    ends = [_ends(segment, disparity_px, middle, outward) for outward in (-1, 1)]
-    columns = (known + left).astype(np.float64)
+
     return Walls(
-        columns, middle[known].astype(np.float64), left - 0.5, left + wide - 0.5, ends[0], ends[1]
+        columns=(known + left).astype(np.float64),
+        disparity_px=medians_px[known].astype(np.float64),
+        left=left - 0.5,
+        right=left + width - 0.5,
+        left_true=_truly_ends(segment, disparity_px, medians_px, outward=-1),
+        right_true=_truly_ends(segment, disparity_px, medians_px, outward=1),
     )
 
 
-def _middles(values: Disparity) -> Disparity:
-    """The median of the values over 0 in each column of (h, w); 0 where there are fewer than
-    FEWEST_PIXELS.
+def _column_medians(values: Singles) -> Singles:
+    """The upper median of the positive values in each column of (h, w), 0 where there are fewer
+    than MIN_PIXELS.
     """
     count = (values > 0).sum(0)
-    ordered = np.sort(values, axis=0)
+    ascending = np.sort(values, axis=0)
     row = len(values) - 1 - np.maximum(count - 1, 0) // 2
-    return np.where(count >= FEWEST_PIXELS, ordered[row, np.arange(values.shape[1])], 0.0).astype(
-        np.float32
-    )
+    medians = ascending[row, np.arange(values.shape[1])]
+    return np.where(count >= MIN_PIXELS, medians, 0.0).astype(np.float32)
 
 
-def _ends(segment: Segment, disparity_px: Disparity, middle: Disparity, outward: int) -> bool:
-    """Whether the object itself ends on that side, and is not hidden or cut off by the view.
+def _truly_ends(segment: Segment, disparity_px: Singles, medians_px: Singles, outward: int) -> bool:
+    """Whether the object itself ends on that side (-1 left, 1 right), and is neither hidden by
+    something nearer nor cut by the view.
 
-    On the left the view ends, for what is nearer, where the right camera's does: as far in as the
-    disparity.
+    On the left, the view ends where the right camera's does: as many columns in as the disparity.
     """
-    left, _, wide, _ = segment.box_px
-    within = min(WITHIN_PX, wide - 1)
-    inside = wide - 1 - within if outward > 0 else within
-    edge = left + wide - 1 if outward > 0 else left
+    left, _, width, _ = segment.box_px
+    within = min(WITHIN_PX, width - 1)
+    inside = width - 1 - within if outward > 0 else within
+    edge = left + width - 1 if outward > 0 else left
     beyond = edge + BESIDE_PX * outward
-    if not 0 <= beyond < disparity_px.shape[1] or beyond < middle[inside]:
+    own_px = medians_px[inside]
+    if not 0 <= beyond < disparity_px.shape[1] or beyond < own_px:
         return False
+
     rows = segment.mask[:, left + inside]
-    beside = disparity_px[rows, beyond]
-    beside = beside[beside > 0]
-    return len(beside) < FEWEST_PIXELS or bool(np.median(beside) <= middle[inside] + NEARER_PX)
+    beside_px = disparity_px[rows, beyond]
+    known_px = beside_px[beside_px > 0]
+    if len(known_px) < MIN_PIXELS:
+        return True
+    return bool(np.median(known_px) <= own_px + NEARER_PX)

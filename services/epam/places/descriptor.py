@@ -1,80 +1,90 @@
-"""A view as a short code that light hardly changes: brightness and colour of a thumbnail,
-normalised by patch.
+"""A view's descriptor for place recognition, which light hardly changes: brightness and colour of a
+thumbnail, normalized by patch.
 
-After SeqSLAM (Milford and Wyeth 2012), whose grey thumbnail this widens by two opponent colours.
-Both are differences of logarithms: a lamp's or a camera's tint adds a constant to each, and a
-shadow the same one to all colours, so that the opponents do not see it. Only what stands above the
-horizon of a level camera is looked at: the ground is much the same everywhere, and shadows wander
-over it.
+After SeqSLAM (Milford and Wyeth 2012), whose grey thumbnail this extends by two opponent colours.
+Both are differences of logarithms: the tint of a lamp or a camera adds a constant to each, and a
+shadow the same one to all colours, so that the opponents are invariant to it. Only what is above
+the horizon of a level camera is used: the ground is much the same everywhere, and shadows move over
+it.
 """
 
 from __future__ import annotations
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-Image = npt.NDArray[np.uint8]
-Depth = npt.NDArray[np.float32]
-Code = npt.NDArray[np.uint8]
-Vectors = npt.NDArray[np.float32]
+from cogmap.geometry.arrays import Bytes, Singles
 
 COLUMNS = 80
 ROWS = 60
-ABOVE_ROWS = 32
+ROWS_ABOVE_HORIZON = 32
 CELL = 4
 PATCH = 4
 SHIFTS = (-6, -4, -2, 0, 2, 4, 6)
-MIDDLE = SHIFTS.index(0)
+UNSHIFTED = SHIFTS.index(0)
 DARK_LEVEL = 8.0
-FLAT = 0.1
-LEAST_CONTRAST = 0.04
-FEWEST_PATCHES = 3
+FLAT_CONTRAST = 0.1
+MIN_CONTRAST = 0.04
+MIN_PATCHES = 3
 LEVELS = 32.0
 NEAR_M = 30.0
-LEAST_NEAR = 0.06
+MIN_NEAR_SHARE = 0.06
 _ORIGINS = np.arange(SHIFTS[-1], COLUMNS - SHIFTS[-1] - CELL + 1, CELL)[: 4 * PATCH]
 _COLUMNS = np.asarray(SHIFTS)[:, None] + _ORIGINS
-CODE_BYTES = (ABOVE_ROWS // CELL) * len(_ORIGINS) * 3
+DESCRIPTOR_BYTES = (ROWS_ABOVE_HORIZON // CELL) * len(_ORIGINS) * 3
 
 
-def view_codes(image: Image) -> Code | None:
-    """The codes of `image` (h, w, 3) as it is, at MIDDLE, and as a robot turned a little to each
-    side would see it.
+def descriptors(image: Bytes) -> Bytes | None:
+    """Return the descriptors of `image` (h, w, 3) as it is, at row UNSHIFTED, and as seen by a
+    robot that is turned a little to each side.
 
-    uint8 (len(SHIFTS), CODE_BYTES); the farthest is turned by 24 columns of 320. None where there
-    is nothing to see.
+    uint8 (len(SHIFTS), DESCRIPTOR_BYTES); the largest turn is 24 columns of 320. None if there is
+    too little contrast.
     """
-    small = cv2.resize(image, (COLUMNS, ROWS), interpolation=cv2.INTER_AREA)[:ABOVE_ROWS]
-    light = np.log(small.astype(np.float32) + np.float32(DARK_LEVEL))
+    cells = _cells(image)
+    windows = cells[:, _COLUMNS].transpose(1, 3, 0, 2)
+    patches = windows.reshape(len(SHIFTS), 3, -1, PATCH, len(_ORIGINS) // PATCH, PATCH)
+
+    contrast = patches.std(axis=(3, 5), keepdims=True)
+    if (contrast[UNSHIFTED, 0] > MIN_CONTRAST).sum() < MIN_PATCHES:
+        return None
+
+    centred = patches - patches.mean(axis=(3, 5), keepdims=True)
+    normalized = centred / (contrast + np.float32(FLAT_CONTRAST))
+    levels = np.clip(np.rint(128 + LEVELS * normalized), 0, 255).astype(np.uint8)
+    return np.asarray(levels.reshape(len(SHIFTS), DESCRIPTOR_BYTES))
+
+
+def _cells(image: Bytes) -> Singles:
+    """Mean log brightness, red-green and blue-green of the cells above the horizon, a row for each
+    cell and a column for each of the thumbnail's.
+    """
+    thumbnail = cv2.resize(image, (COLUMNS, ROWS), interpolation=cv2.INTER_AREA)
+    above = thumbnail[:ROWS_ABOVE_HORIZON].astype(np.float32)
+    light = np.log(above + np.float32(DARK_LEVEL))
     red = light[..., 0]
     green = light[..., 1]
     blue = light[..., 2]
+
     channels = cv2.merge([(red + green + blue) / 3, red - green, blue - green])
-    cells = cv2.boxFilter(
+    means = cv2.boxFilter(
         channels, -1, (CELL, CELL), anchor=(0, 0), borderType=cv2.BORDER_REPLICATE
     )
-    windows = cells[::CELL][:, _COLUMNS].transpose(1, 3, 0, 2)
-    patches = windows.reshape(len(SHIFTS), 3, -1, PATCH, len(_ORIGINS) // PATCH, PATCH)
-    contrast = patches.std(axis=(3, 5), keepdims=True)
-    if (contrast[MIDDLE, 0] > LEAST_CONTRAST).sum() < FEWEST_PATCHES:
-        return None
-    normal = (patches - patches.mean(axis=(3, 5), keepdims=True)) / (contrast + np.float32(FLAT))
-    codes = np.clip(np.rint(128 + LEVELS * normal), 0, 255).astype(np.uint8)
-    return np.asarray(codes.reshape(len(SHIFTS), CODE_BYTES))
+    return np.asarray(means[::CELL], np.float32)
 
 
-def something_near(depth_m: Depth) -> bool:
-    """Whether anything above the horizon of the view with this depth (h, w) is near: far hills tell
-    no place.
+def has_near_structure(depth_m: Singles) -> bool:
+    """Return whether enough above the horizon of a view with this depth (h, w) is near: distant
+    hills identify no place.
     """
-    above = depth_m[: len(depth_m) // 2]
-    return float(((above > 0) & (above < NEAR_M)).mean()) >= LEAST_NEAR
+    above_m = depth_m[: len(depth_m) // 2]
+    near = (above_m > 0) & (above_m < NEAR_M)
+    return float(near.mean()) >= MIN_NEAR_SHARE
 
 
-def vectors(codes: Code) -> Vectors:
-    """`codes` (n, CODE_BYTES) as float32 vectors of length 1, whose inner product is how alike two
-    views are.
+def unit_vectors(codes: Bytes) -> Singles:
+    """Return `codes` (n, DESCRIPTOR_BYTES) as float32 vectors of length 1, whose inner product is
+    the similarity of two views.
     """
     values = codes.astype(np.float32) - np.float32(128)
     length = np.linalg.norm(values, axis=1, keepdims=True)

@@ -1,11 +1,11 @@
-"""Places recognised by the views that lead to them: the paper's future work, for where no landmark
-is in sight.
+"""Places recognized by the sequence of views that leads to them: the paper's future work, for where
+no landmark is in sight.
 
-One look may deceive, so looks are gathered as the robot goes on: a Bayes filter (a hidden Markov
-model) holds how probable it is that the robot is again where a remembered view was taken, or
-somewhere new. From one view to the next the place moves on by none to three remembered ones,
-whatever the speed. A place that is recognised is not remembered anew (Churchill and Newman 2012):
-memory grows with what is new.
+A single view may be ambiguous, so views are accumulated while the robot moves: a Bayes filter (a
+hidden Markov model) holds the probability that the robot is where a remembered view was taken, or
+somewhere new. From one view to the next the place advances by none to three remembered ones,
+whatever the speed. A place that is recognized is not remembered again (Churchill and Newman 2012),
+so memory grows with what is new.
 """
 
 from __future__ import annotations
@@ -17,61 +17,73 @@ import msgspec
 import numpy as np
 
 from cogmap.errors import MessageError
+from cogmap.geometry.arrays import Bytes, Floats, Singles
 from schemas.array import Array
+from schemas.base import PositiveShare
 from schemas.sensing import PlaceMatch, RememberedView
 from services.epam.places.descriptor import (
-    CODE_BYTES,
-    MIDDLE,
-    Code,
-    Depth,
-    Image,
-    Vectors,
-    something_near,
-    vectors,
-    view_codes,
+    DESCRIPTOR_BYTES,
+    UNSHIFTED,
+    descriptors,
+    has_near_structure,
+    unit_vectors,
 )
 
-# Chosen on laps in the towns of seeds 2007 to 2010, where every threshold from 0.6 on was right in
-# all it said.
-MOVES = (0.1, 0.4, 0.35, 0.15)
-FOUND = 0.02
-LOST = 0.03
-SLOPE = 15.0
-EVEN = 0.7
-MOST_EVIDENCE = 3.0
-BESIDE = 4
-FEWEST = 256
-FORGOTTEN_AT_ONCE = 0.05
+# Chosen on laps in the towns of seeds 2007 to 2010, where every threshold of at least 0.6 gave no
+# false match.
+P_ADVANCE = (0.1, 0.4, 0.35, 0.15)
+P_FOUND = 0.02
+P_LOST = 0.03
+LOG_ODDS_SLOPE = 15.0
+EVEN_SIMILARITY = 0.7
+MAX_LOG_ODDS = 3.0
+NEIGHBOURS = 4
+INITIAL_CAPACITY = 256
+FORGOTTEN_SHARE = 0.05
 
 
-class PlaceSettings(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """A match is said from `threshold` on. Views as alike as `still` show the robot at rest, or
-    nearly.
+class PlaceConfig(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """Limits of place recognition."""
 
-    The `recent` last views are no places to come back to; of more than `capacity` the oldest are
-    forgotten.
-    """
+    threshold: Annotated[
+        PositiveShare,
+        msgspec.Meta(description="smallest probability of a match, over 0, at most 1"),
+    ] = 0.9
+    still: Annotated[
+        PositiveShare,
+        msgspec.Meta(
+            description="consecutive views that are more similar, over 0, at most 1, show a robot "
+            "at rest"
+        ),
+    ] = 0.97
+    recent: Annotated[
+        int,
+        msgspec.Meta(
+            ge=1, le=10_000, description="number of last views that do not match, 1 to 10,000"
+        ),
+    ] = 30
+    capacity: Annotated[
+        int,
+        msgspec.Meta(
+            ge=100,
+            le=100_000,
+            description="number of views remembered, 100 to 100,000; the oldest are forgotten",
+        ),
+    ] = 20_000
 
-    threshold: Annotated[float, msgspec.Meta(gt=0, le=1)] = 0.9
-    still: Annotated[float, msgspec.Meta(gt=0, le=1)] = 0.97
-    recent: Annotated[int, msgspec.Meta(ge=1, le=10_000)] = 30
-    capacity: Annotated[int, msgspec.Meta(ge=100, le=100_000)] = 20_000
 
+class PlaceRecognizer:
+    """The views remembered, and the probability that the robot is at each of them again."""
 
-class PlaceMemory:
-    """The views of places where the robot has been, and how probable it is that it is at each of
-    them again.
-    """
-
-    def __init__(self, settings: PlaceSettings | None = None) -> None:
-        self._settings = settings or PlaceSettings()
+    def __init__(self, config: PlaceConfig | None = None) -> None:
+        self._config = config or PlaceConfig()
         self._views: list[RememberedView] = []
-        self._vectors: Vectors = np.empty((FEWEST, CODE_BYTES), np.float32)
-        self._taken_at = np.empty(0, np.int64)
+        self._vectors: Singles = np.empty((INITIAL_CAPACITY, DESCRIPTOR_BYTES), np.float32)
+        self._step_of_view = np.empty(0, np.int64)
         self._belief = np.empty(0)
-        self._somewhere_new = 1.0
+        self._p_new = 1.0
         self._step = 0
-        self._last: Vectors | None = None
+        self._last_vector: Singles | None = None
         self._matches: list[PlaceMatch] = []
 
     @property
@@ -79,106 +91,136 @@ class PlaceMemory:
         """Every view remembered, the oldest first."""
         return iter(self._views)
 
-    def see(
-        self, frame: int, view_ns: int, image: Image, depth_m: Depth
+    def observe(
+        self, frame: int, view_ns: int, image: Bytes, depth_m: Singles, learning: bool = True
     ) -> tuple[list[PlaceMatch], list[RememberedView]]:
-        """Which remembered view this one matches, one at most, and it itself if it is remembered.
+        """Return at most one remembered view that this one matches, and the view itself if it is
+        remembered, which needs `learning`.
 
-        The image is uint8 (h, w, 3) with its depth (h, w), 0 unknown. At rest the last match
-        stands. Where nothing stands near or there is nothing to see, it is a view of no place.
+        The image is uint8 (h, w, 3) with its depth (h, w), 0 unknown. At rest the last match is
+        returned again. A view without near structure or contrast shows no place.
         """
-        codes = view_codes(image) if something_near(depth_m) else None
+        codes = descriptors(image) if has_near_structure(depth_m) else None
         if codes is None:
             return [], []
-        seen = vectors(codes)
-        if self._last is not None and float(seen[MIDDLE] @ self._last) > self._settings.still:
+
+        vectors = unit_vectors(codes)
+        if self._is_at_rest(vectors[UNSHIFTED]):
             return list(self._matches), []
-        self._last = seen[MIDDLE]
+
+        self._last_vector = vectors[UNSHIFTED]
         self._step += 1
-        self._go_on(seen)
-        self._matches = self._probable()
-        if self._matches:
+        self._update_belief(vectors)
+        self._matches = self._best_match()
+        if self._matches or not learning:
             return list(self._matches), []
-        view = RememberedView(frame=frame, view_ns=view_ns, code=Array.of(codes[MIDDLE]))
-        self._remember([view], seen[MIDDLE : MIDDLE + 1])
+
+        view = RememberedView(frame=frame, view_ns=view_ns, code=Array.of(codes[UNSHIFTED]))
+        self._remember([view], vectors[UNSHIFTED : UNSHIFTED + 1])
         return [], [view]
 
-    def recall(self, views: Iterable[RememberedView]) -> None:
-        """Remember `views` again, the oldest first. Raises MessageError where a code is none of
-        ours.
+    def restore(self, views: Iterable[RememberedView]) -> None:
+        """Remember `views` again, the oldest first; the robot is where the last one was taken.
+        Raises MessageError if a code has another type or size.
         """
-        again = list(views)
-        if again:
-            seen = vectors(np.stack([_code(view) for view in again]))
-            self._step += len(again)
-            self._remember(again, seen)
-
-    def _go_on(self, seen: Vectors) -> None:
-        """One step of the filter: the place moves on, and what is `seen`, turned a little or not,
-        speaks for it.
-        """
-        count = len(self._views)
-        if not count:
+        restored = list(views)
+        if not restored:
             return
-        alike = (self._vectors[:count] @ seen.T).max(axis=1).astype(np.float64)
-        evidence = np.exp(np.clip(SLOPE * (alike - EVEN), -MOST_EVIDENCE, MOST_EVIDENCE))
-        evidence[self._taken_at > self._step - self._settings.recent] = 0.0
-        moved = np.zeros(count)
-        for by, share in enumerate(MOVES[:count]):
-            moved[by:] += share * self._belief[: count - by]
-        kept = (1 - LOST) * moved.sum()
-        found = FOUND * self._somewhere_new
-        belief = ((1 - LOST) * moved + found / count) * evidence
-        somewhere_new = 1.0 - kept - found
-        total = belief.sum() + somewhere_new
-        self._belief = belief / total
-        self._somewhere_new = somewhere_new / total
 
-    def _probable(self) -> list[PlaceMatch]:
-        """The likeliest remembered view, if the probability of it and those beside it comes to the
+        vectors = unit_vectors(np.stack([_code(view) for view in restored]))
+        self._step += len(restored)
+        self._remember(restored, vectors)
+        self._last_vector = vectors[-1]
+
+    def _is_at_rest(self, vector: Singles) -> bool:
+        if self._last_vector is None:
+            return False
+        return float(vector @ self._last_vector) > self._config.still
+
+    def _update_belief(self, vectors: Singles) -> None:
+        """One step of the filter: prediction, then the evidence of `vectors`, by the most similar
+        turn of the view.
+        """
+        if not self._views:
+            return
+
+        predicted = self._predicted()
+        found = P_FOUND * self._p_new
+        p_new = 1.0 - (1 - P_LOST) * predicted.sum() - found
+
+        prior = (1 - P_LOST) * predicted + found / len(predicted)
+        belief = prior * self._likelihood_ratios(vectors)
+        total = belief.sum() + p_new
+        self._belief = belief / total
+        self._p_new = p_new / total
+
+    def _predicted(self) -> Floats:
+        """The belief after the robot has advanced by none to three remembered views."""
+        count = len(self._views)
+        predicted = np.zeros(count)
+        for steps, p_advance in enumerate(P_ADVANCE[:count]):
+            predicted[steps:] += p_advance * self._belief[: count - steps]
+        return predicted
+
+    def _likelihood_ratios(self, vectors: Singles) -> Floats:
+        """How much likelier each remembered view's place makes the observed one than another place;
+        0 for recent views.
+        """
+        similarity = (self._vectors[: len(self._views)] @ vectors.T).max(axis=1).astype(np.float64)
+        log_odds = LOG_ODDS_SLOPE * (similarity - EVEN_SIMILARITY)
+        ratios = np.exp(np.clip(log_odds, -MAX_LOG_ODDS, MAX_LOG_ODDS))
+        ratios[self._step_of_view > self._step - self._config.recent] = 0.0
+        return np.asarray(ratios)
+
+    def _best_match(self) -> list[PlaceMatch]:
+        """The likeliest remembered view, if its probability with its neighbours' reaches the
         threshold.
         """
         if not self._views:
             return []
+
         best = int(self._belief.argmax())
-        score = min(1.0, float(self._belief[max(0, best - BESIDE) : best + BESIDE + 1].sum()))
-        if score < self._settings.threshold:
+        nearby = self._belief[max(0, best - NEIGHBOURS) : best + NEIGHBOURS + 1]
+        score = min(1.0, float(nearby.sum()))
+        if score < self._config.threshold:
             return []
+
         view = self._views[best]
         return [PlaceMatch(frame=view.frame, view_ns=view.view_ns, score=score)]
 
-    def _remember(self, views: list[RememberedView], seen: Vectors) -> None:
-        """Keep the last views; where they become too many, the oldest go, several at once since all
-        others move up.
-        """
+    def _remember(self, views: list[RememberedView], vectors: Singles) -> None:
         before = len(self._views)
-        count = len(self._views) + len(views)
+        count = before + len(views)
         if count > len(self._vectors):
-            larger = np.empty((2 * count, CODE_BYTES), np.float32)
-            larger[:before] = self._vectors[:before]
-            self._vectors = larger
+            enlarged = np.empty((2 * count, DESCRIPTOR_BYTES), np.float32)
+            enlarged[:before] = self._vectors[:before]
+            self._vectors = enlarged
+
         self._views += views
-        self._vectors[before:count] = seen
+        self._vectors[before:count] = vectors
         steps = np.arange(self._step - len(views), self._step) + 1
-        self._taken_at = np.concatenate([self._taken_at, steps])
+        self._step_of_view = np.concatenate([self._step_of_view, steps])
         self._belief = np.concatenate([self._belief, np.zeros(len(views))])
-        if count > self._settings.capacity:
-            self._forget(count - round(self._settings.capacity * (1 - FORGOTTEN_AT_ONCE)))
+
+        # Several at once, since all other vectors move up.
+        if count > self._config.capacity:
+            self._forget(count - round(self._config.capacity * (1 - FORGOTTEN_SHARE)))
 
     def _forget(self, oldest: int) -> None:
-        """Forget so many of the oldest views."""
+        """Forget this number of the oldest views."""
         count = len(self._views)
-        self._somewhere_new += float(self._belief[:oldest].sum())
+        self._p_new += float(self._belief[:oldest].sum())
         self._vectors[: count - oldest] = self._vectors[oldest:count]
         self._views = self._views[oldest:]
-        self._taken_at = self._taken_at[oldest:]
+        self._step_of_view = self._step_of_view[oldest:]
         self._belief = self._belief[oldest:]
 
 
-def _code(view: RememberedView) -> Code:
-    if (view.code.dtype, view.code.shape) != ("|u1", (CODE_BYTES,)):
+def _code(view: RememberedView) -> Bytes:
+    code = view.code
+    if (code.dtype, code.shape) != ("|u1", (DESCRIPTOR_BYTES,)):
         raise MessageError(
-            f"remembered view {view.frame}: expected a uint8 code of {CODE_BYTES}, "
-            f"got {view.code.dtype} {view.code.shape}; delete EPAM's journal"
+            f"remembered view {view.frame}: expected a uint8 code of {DESCRIPTOR_BYTES}, "
+            f"got {code.dtype} {code.shape}; delete EPAM's journal"
         )
-    return view.code.numpy().astype(np.uint8, copy=False)
+    return code.numpy().astype(np.uint8, copy=False)

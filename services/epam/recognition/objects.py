@@ -1,17 +1,17 @@
-"""What a segment shows: a convolutional network names it, or tells that it was never taught, and
-describes it.
+"""What a segment shows: a convolutional network embeds it, and the embedding is compared with
+prototypes.
 
-The description, an embedding, is a direction: what looks alike points the same way, from whatever
-side and in whatever light it is seen, also where no name was taught. Names are directions too (Wang
-et al. 2018, cosine softmax), and the activation of one is the calibrated posterior (Guo et al.
-2017) of it among all names and "none of them". The network tells besides how likely the segment is
-to show a building at all.
+An embedding is a direction: what looks alike points the same way, from any side and in any light,
+also where no label was taught. Prototypes are directions too (Wang et al. 2018, cosine softmax),
+and the activation of a label is its calibrated posterior (Guo et al. 2017) among all labels, an
+unknown building and the background. The network also estimates the probability that the segment
+shows a building at all.
 """
 
 from __future__ import annotations
 
 from collections.abc import Container
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import msgspec
@@ -19,29 +19,35 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.errors import ConfigError
+from cogmap.geometry.arrays import Bytes, Floats, Singles
 from schemas.sensing import Calibration
 from services.epam.network import WEIGHTS, Network
 from services.epam.recognition.crop import CHANNELS, SIDE_PX, crop, surroundings
-from services.epam.recognition.segments import Depth, Image, Segment
+from services.epam.recognition.segments import Segment
 
 DEFAULT_PATH = WEIGHTS / "objects.onnx"
 DIMENSIONS = 64
 BATCH = 4
-TAKES = (BATCH, CHANNELS, SIDE_PX, SIDE_PX)
-GIVES = {"embedding": (BATCH, DIMENSIONS), "odds": (BATCH, 2)}
-MOST_LOOKS = 8
-ALIKE = 0.9
-Vector = npt.NDArray[np.float32]
+INPUT_SHAPE = (BATCH, CHANNELS, SIDE_PX, SIDE_PX)
+OUTPUT_SHAPES = {"embedding": (BATCH, DIMENSIONS), "odds": (BATCH, 2)}
+MAX_APPEARANCES = 8
+# Appearances with a higher cosine are the same one.
+SAME_COSINE = 0.9
+_FIELDS_IN_FILE = {"novel_sharpness": "met_sharpness", "novel_unknown": "met_unknown"}
 
 
-class Names(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """What belongs to the network's weights: the names taught, and how sure a likeness makes.
+class Prototypes(
+    msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True, rename=_FIELDS_IN_FILE
+):
+    """What belongs to the network's weights: a direction for each label that was taught, and the
+    constants that make a cosine a probability.
 
     `directions` (n, DIMENSIONS) are those of `names`. At a cosine of `unknown` with one of them, a
-    building is as likely that as none known, and log odds rise by `sharpness` with the cosine;
-    `met_unknown` and `met_sharpness` are those of what was met, and not taught. The network's log
-    odds that a segment shows a building, or all of one, are multiplied by `evidence`. `size_m` (n,
-    3) is what towns showed: the longer and the shorter side of its ground plan, and its height.
+    building is as likely that as an unknown one, and log odds rise by `sharpness` with the cosine;
+    `novel_unknown` and `novel_sharpness` are those of objects learned from one encounter. The
+    network's log odds that a segment shows a building, or most of one, are multiplied by
+    `evidence`. `size_m` (n, 3) are the longer and the shorter side of the footprint, and the
+    height.
     """
 
     names: list[str]
@@ -49,161 +55,184 @@ class Names(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
     size_m: list[tuple[float, float, float]]
     sharpness: float
     unknown: float
-    met_sharpness: float
-    met_unknown: float
+    novel_sharpness: float
+    novel_unknown: float
     evidence: float
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
-    """What the network makes of a segment: its embedding (DIMENSIONS,), the probability that it
-    shows a building, and that it is most of what can be seen of that.
+class Appearance:
+    """The network's output for a segment: its embedding (DIMENSIONS,), the probability that it
+    shows a building, and that it shows most of what is visible of that building.
     """
 
-    embedding: Vector
+    embedding: Singles
     building: float
     whole: float
 
 
 @dataclass(frozen=True, eq=False)
 class Recognition:
-    """The likeliest `label`, and its posterior `activation`; the probabilities of a `new` building,
-    none of those known, and of no building. `size_m` is None where it was not taught, or is not
-    likely.
+    """The likeliest `label` with its posterior `activation`, and the probabilities of an `unknown`
+    building and of `background`. `size_m` is None unless the label was taught and is likelier than
+    those two.
     """
 
     label: str
     activation: float
-    new: float
-    nothing: float
-    look: Look
+    unknown: float
+    background: float
+    appearance: Appearance
     size_m: tuple[float, float, float] | None = None
 
     @property
     def known(self) -> bool:
-        """Whether that label is likelier than that it has none."""
-        return self.activation > self.new + self.nothing
+        """Whether the label is likelier than an unknown building and background together."""
+        return self.activation > self.unknown + self.background
 
 
-class Recogniser:
-    """Recognises segments one by one, each on its own, among what was taught and what was learned
-    since.
-    """
+class ObjectRecognizer:
+    """Recognizes segments one by one, among what was taught and what was learned since."""
 
-    def __init__(self, network: Network, names: Names) -> None:
+    def __init__(self, network: Network, prototypes: Prototypes) -> None:
         self._network = network
-        self._names = names
-        self._directions = np.asarray(names.directions, np.float32)
+        self._prototypes = prototypes
+        self._directions = np.asarray(prototypes.directions, np.float32)
         self._labels: list[str] = []
-        self._met = np.empty((0, DIMENSIONS), np.float32)
+        self._embeddings = np.empty((0, DIMENSIONS), np.float32)
 
-    def looks(
-        self, image: Image, depth_m: Depth, found: list[Segment], camera: Calibration
-    ) -> list[Look]:
-        """What each of `found` looks like."""
+    def appearances(
+        self, image: Bytes, depth_m: Singles, segments: list[Segment], camera: Calibration
+    ) -> list[Appearance]:
+        """Return the appearance of each of `segments` in a view."""
         around = surroundings(image, depth_m, camera)
-        crops = [crop(image, depth_m, segment, around, camera.fx_px) for segment in found]
-        looks: list[Look] = []
+        crops = [crop(image, depth_m, segment, around, camera.fx_px) for segment in segments]
+
+        appearances: list[Appearance] = []
         for first in range(0, len(crops), BATCH):
-            batch = np.zeros(TAKES, np.float32)
-            some = crops[first : first + BATCH]
-            batch[: len(some)] = some
-            embeddings, odds = self._network(batch)
-            likely = probability(odds, self._names)
-            looks += [Look(embeddings[row], *likely[row].tolist()) for row in range(len(some))]
-        return looks
+            appearances += self._embed(crops[first : first + BATCH])
+        return appearances
 
-    def recognise(self, look: Look, apart_from: Container[str] = ()) -> Recognition:
-        """What looks so, perhaps nothing that is known, and in no case one of `apart_from`."""
-        labels = list(dict.fromkeys(self._labels))
-        alike = self._directions @ look.embedding, self._likeness(look, labels)
-        names = [*self._names.names, *labels]
-        excluded = np.array([name in apart_from for name in names])
-        *posterior, new, nothing = posteriors(*alike, look.building, self._names, excluded).tolist()
+    def _embed(self, crops: list[Singles]) -> list[Appearance]:
+        """Of at most BATCH crops."""
+        batch = np.zeros(INPUT_SHAPE, np.float32)
+        batch[: len(crops)] = crops
+        embeddings, log_odds = self._network(batch)
+        probabilities = probability(log_odds, self._prototypes)
+
+        appearances = []
+        for row in range(len(crops)):
+            building, whole = probabilities[row].tolist()
+            appearances.append(Appearance(embeddings[row], building, whole))
+        return appearances
+
+    def recognize(self, appearance: Appearance, excluded: Container[str] = ()) -> Recognition:
+        """Return what appears so, which is none of the labels `excluded`, perhaps nothing known."""
+        novel = list(dict.fromkeys(self._labels))
+        taught = self._prototypes.names
+        labels = [*taught, *novel]
+
+        *posterior, unknown, background = posteriors(
+            self._directions @ appearance.embedding,
+            self._novel_cosines(appearance, novel),
+            appearance.building,
+            self._prototypes,
+            np.array([label in excluded for label in labels]),
+        ).tolist()
         best = int(np.argmax(posterior))
-        found = Recognition(names[best], min(posterior[best], 1.0), new, nothing, look)
-        taught = found.known and best < len(self._names.names)
-        return replace(found, size_m=self._names.size_m[best]) if taught else found
+        activation = min(posterior[best], 1.0)
 
-    def _likeness(self, look: Look, labels: list[str]) -> Vector:
-        """The cosine with each of `labels` that were met, with that of its looks which is most
-        alike.
-        """
-        cosines = self._met @ look.embedding
-        alike = np.full(len(labels), -1.0, np.float32)
-        np.maximum.at(alike, [labels.index(label) for label in self._labels], cosines)
-        return alike
+        size_m = None
+        if activation > unknown + background and best < len(taught):
+            size_m = self._prototypes.size_m[best]
+        return Recognition(labels[best], activation, unknown, background, appearance, size_m)
 
-    def learn(self, label: str, embedding: Vector) -> None:
-        """From now on, what is like `embedding` is called `label`."""
+    def _novel_cosines(self, appearance: Appearance, novel: list[str]) -> Singles:
+        """The cosine with each of the labels `novel`: that of its most similar embedding."""
+        cosines = self._embeddings @ appearance.embedding
+        rows = [novel.index(label) for label in self._labels]
+        highest = np.full(len(novel), -1.0, np.float32)
+        np.maximum.at(highest, rows, cosines)
+        return highest
+
+    def learn(self, label: str, embedding: Singles) -> None:
+        """Recognize from now on what is similar to `embedding` as `label`."""
         self._labels.append(label)
-        self._met = np.concatenate([self._met, embedding[None]])
+        self._embeddings = np.concatenate([self._embeddings, embedding[None]])
 
-    def is_another(self, recognition: Recognition) -> bool:
-        """Whether a building that was met, not taught, is unlike every look of it that was learned,
-        and there is room for one more.
+    def is_new_appearance(self, recognition: Recognition) -> bool:
+        """Return whether a learned building differs from every appearance of it that was learned,
+        and has fewer than MAX_APPEARANCES.
         """
-        known = [vector for label, vector in self.learned if label == recognition.label]
-        if not 0 < len(known) < MOST_LOOKS:
+        embeddings = [vector for label, vector in self.learned if label == recognition.label]
+        if not 0 < len(embeddings) < MAX_APPEARANCES:
             return False
-        return bool(max(vector @ recognition.look.embedding for vector in known) < ALIKE)
+
+        embedding = recognition.appearance.embedding
+        return bool(max(vector @ embedding for vector in embeddings) < SAME_COSINE)
 
     @property
     def sizes_m(self) -> dict[str, tuple[float, float, float]]:
-        """Of each name taught, the sides of its ground plan, the longer first, and its height."""
-        return dict(zip(self._names.names, self._names.size_m, strict=True))
+        """The sides of the footprint, the longer first, and the height, of each label taught."""
+        return dict(zip(self._prototypes.names, self._prototypes.size_m, strict=True))
 
     @property
-    def learned(self) -> list[tuple[str, Vector]]:
-        """All that was learned, in order."""
-        return list(zip(self._labels, self._met, strict=True))
+    def learned(self) -> list[tuple[str, Singles]]:
+        """Every label and embedding learned since the teaching, in order."""
+        return list(zip(self._labels, self._embeddings, strict=True))
 
 
-def load(path: Path = DEFAULT_PATH) -> Recogniser:
-    """A recogniser by the network in the file at `path` and the names in the .json beside it.
-    Raises ConfigError.
+def load(path: Path = DEFAULT_PATH) -> ObjectRecognizer:
+    """Load the embedding network in the file at `path` and the prototypes in the .json file beside
+    it. Raises ConfigError if they cannot be read or do not belong together.
     """
-    network = Network(path, TAKES, GIVES)
+    network = Network(path, INPUT_SHAPE, OUTPUT_SHAPES)
     beside = path.with_suffix(".json")
     try:
-        names = msgspec.json.decode(beside.read_bytes(), type=Names)
+        prototypes = msgspec.json.decode(beside.read_bytes(), type=Prototypes)
     except (OSError, msgspec.DecodeError) as error:
         raise ConfigError(
-            f"{beside} does not hold the names of {path.name} ({error}): "
-            "train both again with python -m training objects"
+            f"{beside} does not hold the prototypes of {path.name} ({error}): "
+            "train both again with cogmap train objects"
         ) from None
-    shapes = {len(direction) for direction in names.directions}
-    if shapes != {DIMENSIONS} or not len(names.names) == len(names.directions) == len(names.size_m):
+
+    dimensions = {len(direction) for direction in prototypes.directions}
+    counts = {len(prototypes.names), len(prototypes.directions), len(prototypes.size_m)}
+    if dimensions != {DIMENSIONS} or len(counts) != 1:
         raise ConfigError(
-            f"{beside} belongs to other weights: train both again with python -m training objects"
+            f"{beside} belongs to other weights: train both again with cogmap train objects"
         )
-    return Recogniser(network, names)
+    return ObjectRecognizer(network, prototypes)
 
 
 def posteriors(
-    taught: Vector,
-    met: Vector,
+    taught: Singles,
+    novel: Singles,
     building: npt.ArrayLike,
-    names: Names,
+    prototypes: Prototypes,
     excluded: npt.ArrayLike = False,
-) -> npt.NDArray[np.float64]:
-    """The posterior (…, n + m + 2) of each name taught, each object met, another building, and no
-    building, from the cosines (…, n) and (…, m) with their directions, the probability (…) of a
-    building, and which (n + m,) it is not.
+) -> Floats:
+    """Return the posterior (..., n + m + 2) of each label taught, each label learned, an unknown
+    building, and background.
+
+    `taught` (..., n) and `novel` (..., m) are cosines with their directions, `building` (...) the
+    probability of a building; labels `excluded` (n + m,) have a posterior of 0.
     """
-    log_odds = [
-        names.sharpness * (taught - names.unknown),
-        names.met_sharpness * (met - names.met_unknown),
-    ]
-    possible = np.where(excluded, -np.inf, np.concatenate(log_odds, axis=-1, dtype=np.float64))
-    likelihood = np.concatenate([possible, np.zeros((*taught.shape[:-1], 1))], axis=-1)
-    weights = np.exp(likelihood - likelihood.max(axis=-1, keepdims=True))
-    likely = np.asarray(building, np.float64)[..., None]
-    return np.concatenate(
-        [likely * weights / weights.sum(axis=-1, keepdims=True), 1 - likely], axis=-1
-    )
+    taught_odds = prototypes.sharpness * (taught - prototypes.unknown)
+    novel_odds = prototypes.novel_sharpness * (novel - prototypes.novel_unknown)
+    log_odds = np.concatenate([taught_odds, novel_odds], axis=-1, dtype=np.float64)
+    possible = np.where(excluded, -np.inf, log_odds)
+
+    unknown = np.zeros((*taught.shape[:-1], 1))
+    log_weights = np.concatenate([possible, unknown], axis=-1)
+    weights = np.exp(log_weights - log_weights.max(axis=-1, keepdims=True))
+
+    of_building = np.asarray(building, np.float64)[..., None]
+    labels = of_building * weights / weights.sum(axis=-1, keepdims=True)
+    return np.concatenate([labels, 1 - of_building], axis=-1)
 
 
-def probability(odds: Vector, names: Names) -> npt.NDArray[np.float64]:
-    """That of the network's log odds."""
-    return np.asarray(1 / (1 + np.exp(-names.evidence * odds.astype(np.float64).clip(-50, 50))))
+def probability(log_odds: Singles, prototypes: Prototypes) -> Floats:
+    """Return the calibrated probability of the network's log odds."""
+    clipped = log_odds.astype(np.float64).clip(-50, 50)
+    return np.asarray(1 / (1 + np.exp(-prototypes.evidence * clipped)))

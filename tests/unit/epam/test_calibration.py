@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from services.epam.recognition.objects import DIMENSIONS, Names
+from services.epam.recognition.objects import DIMENSIONS, Prototypes
 from training.calibration import Calibrated, calibrate, calibration_error
 from training.crops import Crops
 
@@ -29,14 +29,14 @@ def _made(noise: float, seed: int = 0, count: int = 1500) -> Calibrated:
     crops = Crops(
         np.empty((count, 0)), names, ~nothing, np.arange(count), rng.integers(100, 9000, count)
     )
-    plain = Names(
+    plain = Prototypes(
         names=TAUGHT,
         directions=middles[: len(TAUGHT)].tolist(),
         size_m=[(9.0, 8.0, 6.0)] * len(TAUGHT),
         sharpness=1.0,
         unknown=0.0,
-        met_sharpness=1.0,
-        met_unknown=0.0,
+        novel_sharpness=1.0,
+        novel_unknown=0.0,
         evidence=1.0,
     )
     return calibrate(seen.astype(np.float32), odds.astype(np.float32), crops, plain)
@@ -61,7 +61,7 @@ def test_boastful_evidence_is_taken_for_less() -> None:
 def test_the_less_likeness_tells_the_less_sharp_it_is_taken() -> None:
     clear = _made(noise=0.1).names
     blurred = _made(noise=0.4).names
-    assert clear.met_sharpness > blurred.met_sharpness
+    assert clear.novel_sharpness > blurred.novel_sharpness
     assert clear.sharpness > blurred.sharpness
 
 

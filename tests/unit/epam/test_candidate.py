@@ -7,7 +7,7 @@ import numpy as np
 
 from services.epam.layout.walls import walls
 from services.epam.recognition.candidate import Candidate, joined, outline_px
-from services.epam.recognition.objects import Look, Recognition
+from services.epam.recognition.objects import Appearance, Recognition
 from services.epam.recognition.segments import Segment
 
 
@@ -70,7 +70,7 @@ def _candidates(*blocks: tuple[int, int, float]) -> tuple[list[Candidate], np.nd
             Candidate(
                 segment,
                 stands,
-                Recognition("bakery", 0.9, 0.0, 0.1, Look(np.zeros(64, np.float32), 1, 1)),
+                Recognition("bakery", 0.9, 0.0, 0.1, Appearance(np.zeros(64, np.float32), 1, 1)),
             )
         )
     return found, disparity_px

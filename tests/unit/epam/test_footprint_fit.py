@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from services.epam.layout.footprint_fit import Outline, Place, locate
+from services.epam.layout.footprint_fit import ObjectPose, Silhouette, locate
 from tests.support.blocks import CAMERA, Block
 
 SIDES_M = (12.0, 8.0)
@@ -19,7 +19,7 @@ def _seen(
     turn_rad: float,
     window: tuple[int, int] = (0, 320),
     noise_px: float = 0.0,
-) -> Outline:
+) -> Silhouette:
     """The outline of a block, as far as it is in the columns of `window`."""
     columns = np.arange(CAMERA.width_px, dtype=float)
     depth = Block(x_m, y_m, turn_rad, SIDES_M, 8.0, (0, 0, 0)).depth_m(
@@ -28,7 +28,7 @@ def _seen(
     whole = np.flatnonzero(np.isfinite(depth))
     shown = whole[(whole >= window[0]) & (whole < window[1])]
     disparity = CAMERA.fx_px * CAMERA.baseline_m / depth[shown]
-    return Outline(
+    return Silhouette(
         columns=columns[shown],
         disparity_px=disparity + np.random.default_rng(1).normal(0, noise_px, len(shown)),
         left=shown[0] - 0.5,
@@ -39,7 +39,7 @@ def _seen(
     )
 
 
-def _error_m(place: Place, x_m: float, y_m: float) -> float:
+def _error_m(place: ObjectPose, x_m: float, y_m: float) -> float:
     return math.hypot(
         place.range_m * math.cos(place.bearing_rad) - x_m,
         place.range_m * math.sin(place.bearing_rad) - y_m,

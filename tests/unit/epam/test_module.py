@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -15,6 +16,7 @@ from cogmap.runtime.journal import Journal
 from cogmap.runtime.module import Module
 from schemas import topics
 from schemas.array import Array
+from schemas.base import Message
 from schemas.sensing import Learned, Percepts, View
 from services.epam.module import Config, build
 from tests.support.blocks import CAMERA
@@ -33,6 +35,11 @@ def views() -> list[View]:
 def _percepts(module: Module, view: View) -> Percepts:
     (said,) = (message for message in module.feed(view) if isinstance(message, Percepts))
     return said
+
+
+def _content(message: Message) -> bytes:
+    """Its bytes, apart from how many were published before."""
+    return codec.encode(msgspec.structs.replace(message, seq=0, source=""))
 
 
 def _view(image: np.ndarray, depth_m: np.ndarray) -> View:
@@ -127,6 +134,65 @@ def test_what_was_learned_is_known_again_after_a_restart(views: list[View], tmp_
     assert {percept.label for percept in _percepts(again, views[1]).objects} == labels
 
 
+def test_a_view_published_again_gets_its_percepts_again_and_teaches_nothing(
+    views: list[View],
+) -> None:
+    module = build(Config(), "epam")
+    for view in views:
+        *learned, percepts = module.feed(view)
+        again = module.feed(view)
+
+        assert len(learned) <= 1
+        assert [_content(message) for message in again] == [_content(percepts)]
+
+
+def test_a_restart_amid_a_view_learns_nothing_from_it_twice(
+    views: list[View], tmp_path: Path
+) -> None:
+    first = build(Config(), "epam")
+    journal = Journal(tmp_path / "epam")
+    assert list(journal.messages()) == []
+    for view in views[:2]:
+        learned, percepts = first.feed(view)
+        journal.append(learned, codec.encode(learned))
+    journal.close()
+    assert isinstance(learned, Learned)
+    assert learned.objects
+    assert learned.views
+
+    second = build(Config(), "epam")
+    assert second.restore is not None
+    second.restore(Journal(tmp_path / "epam").messages())
+    (again,) = second.feed(views[1])
+
+    assert isinstance(percepts, Percepts)
+    assert isinstance(again, Percepts)
+    assert [each.label for each in again.objects] == [each.label for each in percepts.objects]
+    assert second.condense is not None
+    assert first.condense is not None
+    assert codec.encode(second.condense()) == codec.encode(first.condense())
+
+
+def test_after_a_restart_the_next_view_is_learned_from(views: list[View]) -> None:
+    first = build(Config(), "epam")
+    second = build(Config(), "epam")
+    assert second.restore is not None
+    second.restore(first.feed(views[0]))
+
+    for view in views[1:]:
+        expected = [message for message in first.feed(view) if isinstance(message, Learned)]
+        found = [message for message in second.feed(view) if isinstance(message, Learned)]
+        assert [_content(message) for message in found] == [
+            _content(message) for message in expected
+        ]
+
+
+def test_a_first_view_at_time_0_is_learned_from(views: list[View]) -> None:
+    at_start = msgspec.structs.replace(views[0], stamp_ns=0, frame=0)
+    learned, _ = build(Config(), "epam").feed(at_start)
+    assert isinstance(learned, Learned)
+
+
 def test_one_message_stands_for_all_that_was_learned(views: list[View]) -> None:
     module = build(Config(), "epam")
     objects = [
@@ -165,11 +231,12 @@ def test_noise_for_a_view_is_taken_in_and_gives_sound_messages() -> None:
         rng = np.random.default_rng(seed)
         image = rng.integers(0, 256, (240, 320, 3), np.uint8)
         depth_m = (10.0 ** rng.uniform(-30, 30, (240, 320))).astype(np.float32)
-        for said in module.feed(_view(image, depth_m)):
+        view = msgspec.structs.replace(_view(image, depth_m), frame=seed)
+        for said in module.feed(view):
             codec.decode(topics.of(said), codec.encode(said))
 
 
 @pytest.mark.parametrize("weights", ["segments_weights", "object_weights", "road_weights"])
 def test_missing_weights_are_named_with_the_remedy(weights: str, tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"nowhere\.onnx.*python -m training"):
+    with pytest.raises(ConfigError, match=r"nowhere\.onnx.*cogmap train"):
         build(Config(**{weights: str(tmp_path / "nowhere.onnx")}), "epam")

@@ -12,8 +12,8 @@ import pytest
 from cogmap.errors import MessageError
 from schemas.array import Array
 from schemas.sensing import PlaceMatch, RememberedView
-from services.epam.places.descriptor import CODE_BYTES
-from services.epam.places.recognizer import PlaceMemory, PlaceSettings
+from services.epam.places.descriptor import DESCRIPTOR_BYTES
+from services.epam.places.recognizer import PlaceConfig, PlaceRecognizer
 
 Image = npt.NDArray[np.uint8]
 HEIGHT = 240
@@ -42,12 +42,12 @@ class Way:
 
 
 def _drive(
-    memory: PlaceMemory, views: list[Image], first: int = 0
+    memory: PlaceRecognizer, views: list[Image], first: int = 0
 ) -> tuple[list[PlaceMatch | None], list[RememberedView]]:
     matches: list[PlaceMatch | None] = []
     remembered = []
     for number, image in enumerate(views, first):
-        found, new = memory.see(number, 200_000_000 * number, image, NEAR)
+        found, new = memory.observe(number, 200_000_000 * number, image, NEAR)
         assert len(found) <= 1
         matches.append(found[0] if found else None)
         remembered += new
@@ -58,8 +58,8 @@ def _lap(way: Way) -> list[Image]:
     return [way.view(place) for place in range(WAY)]
 
 
-def _memory_of(way: Way) -> PlaceMemory:
-    memory = PlaceMemory()
+def _memory_of(way: Way) -> PlaceRecognizer:
+    memory = PlaceRecognizer()
     _drive(memory, _lap(way))
     return memory
 
@@ -100,7 +100,7 @@ def test_one_look_alone_is_no_match() -> None:
 def test_the_views_just_seen_are_no_match() -> None:
     way = Way(1)
     there = [way.view(place) for place in range(12)]
-    matches, _ = _drive(PlaceMemory(), [*there, *there])
+    matches, _ = _drive(PlaceRecognizer(), [*there, *there])
     assert not any(matches)
 
 
@@ -114,7 +114,7 @@ def test_a_place_that_is_recognised_is_not_remembered_anew() -> None:
 
 
 def test_a_robot_at_rest_remembers_one_view() -> None:
-    memory = PlaceMemory()
+    memory = PlaceRecognizer()
     rng = np.random.default_rng(0)
     image = Way(1).view(3).astype(np.int16)
     noisy = [
@@ -149,15 +149,15 @@ def test_a_view_that_shows_no_place_is_neither_remembered_nor_matched(
     memory = _memory_of(way)
     matches, _ = _drive(memory, [way.view(place) for place in range(10)], WAY)
     assert matches[-1] is not None
-    assert memory.see(99, 99, image, depth_m) == ([], [])
+    assert memory.observe(99, 99, image, depth_m) == ([], [])
 
 
 def test_what_was_remembered_before_a_restart_is_recognised_after_it() -> None:
     way = Way(1)
     memory = _memory_of(way)
-    restarted = PlaceMemory()
+    restarted = PlaceRecognizer()
     for view in memory.all:
-        restarted.recall([view])
+        restarted.restore([view])
     assert list(restarted.all) == list(memory.all)
     again = [way.view(place, evening=True) for place in range(30)]
     matches, _ = _drive(restarted, again, WAY)
@@ -168,7 +168,7 @@ def test_of_too_many_views_the_oldest_are_forgotten_and_the_others_known_still()
     first = Way(1)
     second = Way(2)
     third = Way(3)
-    memory = PlaceMemory(PlaceSettings(capacity=150))
+    memory = PlaceRecognizer(PlaceConfig(capacity=150))
     _drive(memory, [*_lap(first), *_lap(second), *_lap(third)])
     kept = [view.frame for view in memory.all]
     assert len(kept) <= 150
@@ -180,12 +180,12 @@ def test_of_too_many_views_the_oldest_are_forgotten_and_the_others_known_still()
 def test_the_same_views_give_the_same_answers() -> None:
     way = Way(1)
     views = [*_lap(way), *(way.view(place, 6, evening=True) for place in range(20))]
-    assert _drive(PlaceMemory(), views) == _drive(PlaceMemory(), views)
+    assert _drive(PlaceRecognizer(), views) == _drive(PlaceRecognizer(), views)
 
 
 @pytest.mark.parametrize(
-    "code", [np.zeros(CODE_BYTES - 1, np.uint8), np.zeros(CODE_BYTES, np.float32)]
+    "code", [np.zeros(DESCRIPTOR_BYTES - 1, np.uint8), np.zeros(DESCRIPTOR_BYTES, np.float32)]
 )
 def test_a_code_of_another_kind_is_refused(code: npt.NDArray[np.generic]) -> None:
     with pytest.raises(MessageError, match="remembered view 5: expected a uint8 code of 384"):
-        PlaceMemory().recall([RememberedView(frame=5, view_ns=5, code=Array.of(code))])
+        PlaceRecognizer().restore([RememberedView(frame=5, view_ns=5, code=Array.of(code))])

@@ -18,8 +18,9 @@ from benchmarks.perception.road import (
 )
 from cogmap.errors import ConfigError, UsageError
 from schemas.sensing import Calibration
-from services.epam.layout.ground import CELL_M, FARTHEST_M, fit, project
-from services.epam.layout.road import DEFAULT_PATH, GIVES, TAKES, Roads, load
+from services.epam.layout.ground import CELL_M, MAX_RANGE_M, project
+from services.epam.layout.ground_plane import fit
+from services.epam.layout.road import DEFAULT_PATH, INPUT_SHAPE, OUTPUT_SHAPES, RoadSegmenter, load
 from services.epam.network import Network
 from services.sensory.disparity import DepthFromStereo
 from services.sensory.rectify import rectification
@@ -58,7 +59,7 @@ def _projected(street: Street, depth_m: np.ndarray | None = None) -> tuple[np.nd
 
 
 @pytest.fixture(scope="module")
-def roads() -> Roads:
+def roads() -> RoadSegmenter:
     return load()
 
 
@@ -74,7 +75,7 @@ def test_a_straight_street_ends_at_its_two_sides_and_nowhere_else() -> None:
 def test_both_are_one_point_a_cell_within_reach_and_float32() -> None:
     for points in _projected(_street()):
         assert points.dtype == np.float32
-        assert np.hypot(*points.T).max() <= FARTHEST_M
+        assert np.hypot(*points.T).max() <= MAX_RANGE_M
         cells = np.floor(points / CELL_M)
         assert len(np.unique(cells, axis=0)) == len(cells)
 
@@ -164,18 +165,18 @@ def test_no_road_in_the_image_is_no_road_on_the_ground() -> None:
 
 
 @pytest.mark.parametrize("level", [0, 3, 90, 255])
-def test_an_image_without_contrast_shows_no_road(roads: Roads, level: int) -> None:
+def test_an_image_without_contrast_shows_no_road(roads: RoadSegmenter, level: int) -> None:
     assert not roads.mask(np.full((240, 320, 3), level, np.uint8)).any()
 
 
-def test_a_black_image_with_the_noise_of_a_camera_shows_no_road(roads: Roads) -> None:
+def test_a_black_image_with_the_noise_of_a_camera_shows_no_road(roads: RoadSegmenter) -> None:
     noise = np.random.default_rng(0).normal(0, 3, (240, 320, 3))
     assert not roads.mask(np.clip(noise, 0, 255).astype(np.uint8)).any()
 
 
 @pytest.mark.parametrize("size", [(240, 320), (360, 480), (121, 97)])
 def test_an_image_of_any_size_gets_a_mask_of_its_size_and_the_same_one_twice(
-    roads: Roads, size: tuple[int, int]
+    roads: RoadSegmenter, size: tuple[int, int]
 ) -> None:
     image = cv2.resize(painted([])[0], size[::-1]).astype(np.uint8)
     masks = [roads.mask(image) for _ in range(2)]
@@ -184,7 +185,7 @@ def test_an_image_of_any_size_gets_a_mask_of_its_size_and_the_same_one_twice(
     np.testing.assert_array_equal(*masks)
 
 
-def test_road_in_a_town_never_seen_is_found_and_its_ends_are_placed(roads: Roads) -> None:
+def test_road_in_a_town_never_seen_is_found_and_its_ends_are_placed(roads: RoadSegmenter) -> None:
     views = render(SEED, VIEWS)
     rectified = rectification(msgspec.json.decode(views["calibration"].tobytes(), type=Calibration))
     matcher = DepthFromStereo(rectified.calibration, 2.5)
@@ -197,7 +198,7 @@ def test_road_in_a_town_never_seen_is_found_and_its_ends_are_placed(roads: Roads
     ):
         image, other = rectified.apply(left, right)
         likelihood = roads.likelihood(image)
-        _, boundary_m = roads.project(likelihood, matcher.depth_m(image, other), camera)
+        _, boundary_m = project(likelihood, matcher.depth_m(image, other), camera)
         masks.append(likelihood >= 0.5)
         errors_m.append(road_edge_errors_m(boundary_m, surface, true_m, camera))
         missed_m.append(road_edges_missed_m(boundary_m, surface, true_m, camera))
@@ -209,18 +210,18 @@ def test_road_in_a_town_never_seen_is_found_and_its_ends_are_placed(roads: Roads
 def test_weights_that_are_missing_broken_or_of_another_shape_are_named_with_the_remedy(
     tmp_path: Path,
 ) -> None:
-    with pytest.raises(ConfigError, match=r"nowhere\.onnx.*python -m training"):
+    with pytest.raises(ConfigError, match=r"nowhere\.onnx.*cogmap train"):
         load(tmp_path / "nowhere.onnx")
     (tmp_path / "broken.onnx").write_bytes(b"no network")
-    with pytest.raises(ConfigError, match=r"broken\.onnx.*python -m training"):
+    with pytest.raises(ConfigError, match=r"broken\.onnx.*cogmap train"):
         load(tmp_path / "broken.onnx")
-    with pytest.raises(ConfigError, match=r"road\.onnx.*python -m training"):
-        Network(DEFAULT_PATH, TAKES, {"road": (1, 2, *GIVES["road"][2:])})
-    with pytest.raises(ConfigError, match=r"road\.onnx.*python -m training"):
-        Network(DEFAULT_PATH, (1, 3, *TAKES[2:]), GIVES)
+    with pytest.raises(ConfigError, match=r"road\.onnx.*cogmap train"):
+        Network(DEFAULT_PATH, INPUT_SHAPE, {"road": (1, 2, *OUTPUT_SHAPES["road"][2:])})
+    with pytest.raises(ConfigError, match=r"road\.onnx.*cogmap train"):
+        Network(DEFAULT_PATH, (1, 3, *INPUT_SHAPE[2:]), OUTPUT_SHAPES)
 
 
-def _photographs(folder: Path, roads: Roads) -> tuple[Path, Path]:
+def _photographs(folder: Path, roads: RoadSegmenter) -> tuple[Path, Path]:
     """Two images with labels that say what the network finds in one, and in the other that nothing
     is known.
     """
@@ -237,7 +238,7 @@ def _photographs(folder: Path, roads: Roads) -> tuple[Path, Path]:
 
 
 def test_iou_on_photographs_counts_what_is_labelled_and_nothing_else(
-    roads: Roads, tmp_path: Path
+    roads: RoadSegmenter, tmp_path: Path
 ) -> None:
     images, labels = _photographs(tmp_path, roads)
     assert camvid_iou(DEFAULT_PATH, images, labels) == 1.0
@@ -302,7 +303,7 @@ def _no_road(images: Path, labels: Path) -> None:
     ],
 )
 def test_photographs_that_cannot_be_used_are_named_with_the_remedy(
-    roads: Roads, tmp_path: Path, spoil: object, said: str
+    roads: RoadSegmenter, tmp_path: Path, spoil: object, said: str
 ) -> None:
     images, labels = _photographs(tmp_path, roads)
     spoil(images, labels)  # type: ignore[operator]

@@ -13,9 +13,9 @@ from services.epam.recognition.segments import (
     OFFSET_PX,
     WIDTH_PX,
     Segment,
-    channels,
     divided,
     load,
+    network_input,
 )
 from tests.support.blocks import CAMERA
 
@@ -74,7 +74,7 @@ def test_the_network_sees_height_over_the_ground_and_where_depth_is_unknown() ->
     small = np.zeros((HEIGHT_PX, WIDTH_PX, 3), np.uint8)
     depth_m = np.full((HEIGHT_PX, WIDTH_PX), 20.0, np.float32)
     depth_m[:10] = 0.0
-    values = channels(small, depth_m, CAMERA)
+    values = network_input(small, depth_m, CAMERA)
 
     assert values[4, :10].max() == 0.0
     assert values[4, 10:].min() == 1.0
@@ -137,7 +137,7 @@ def test_a_building_of_unknown_size_is_placed_behind_the_middle_of_what_is_seen(
     wall = walls(_segment(130, 190), _scene((130, 190, 8.0)))
 
     assert wall is not None
-    place = wall.roughly(CAMERA)
+    place = wall.usual_pose(CAMERA)
     assert place.range_m == pytest.approx(208 * 0.5 / 8.0 + CAMERA.mount_forward_m + 4.5, abs=0.1)
     assert abs(place.bearing_rad) < 0.01
     assert place.range_sd_m > 1.0

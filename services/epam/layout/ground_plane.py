@@ -1,0 +1,96 @@
+"""The ground plane that a view's disparities show.
+
+The disparity of a plane is linear in column and row. The plane is the likeliest one given the
+disparities on the road, reweighted so that outliers count for nothing (Beaton & Tukey 1974), and
+given that the camera is about level at its mount's height, which decides where little depth is
+known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from cogmap.geometry.arrays import Booleans, Floats
+from schemas.sensing import Calibration
+
+STRIDE_PX = 4
+DISPARITY_SD_PX = 0.3
+# Disparity errors of neighbouring pixels are correlated: this many pixels count as one.
+CORRELATED_PIXELS = 6.0
+ROLL_SD_RAD = 0.02
+HEIGHT_SD_SHARE = 0.05
+PITCH_SD_RAD = 0.02
+CUTOFFS_PX = (4.0, 2.0, 1.5, 1.5)
+
+
+@dataclass(frozen=True)
+class GroundPlane:
+    """The disparity of the ground, in pixels: `across` times a column's slope plus `down` times a
+    row's slope plus `level`.
+
+    Slopes are those of the rays: (column - cx) / fx and (row - cy) / fy.
+    """
+
+    across: float
+    down: float
+    level: float
+
+    def disparity_px(
+        self, rows: npt.ArrayLike, columns: npt.ArrayLike, camera: Calibration
+    ) -> Floats:
+        """The disparity at each of these pixels; at most 0 at and over the horizon."""
+        right, below = ray_slopes(rows, columns, camera)
+        return self.across * right + self.down * below + self.level
+
+
+def fit(mask: Booleans, disparity_px: Floats, camera: Calibration) -> GroundPlane:
+    """Return the plane of the pixels in `mask` (h, w), by `disparity_px` (h, w), 0 unknown."""
+    rows, columns = _sampled_pixels(mask, disparity_px)
+    right, below = ray_slopes(rows, columns, camera)
+    slopes = np.stack([right, below, np.ones_like(right)], axis=1)
+
+    down = focal_baseline(camera) / camera.mount_height_m
+    prior = np.array([0.0, down, 0.0])
+    prior_sd = down * np.array([ROLL_SD_RAD, HEIGHT_SD_SHARE, PITCH_SD_RAD])
+    information = np.diag(1 / prior_sd**2)
+    observed = disparity_px[rows, columns] - slopes @ prior
+
+    correction = np.zeros(3)
+    for cutoff_px in CUTOFFS_PX:
+        misfit = (observed - slopes @ correction) / cutoff_px
+        biweight = np.clip(1 - misfit**2, 0.0, None) ** 2
+        weight = biweight / (CORRELATED_PIXELS * DISPARITY_SD_PX**2)
+        weighted = slopes.T * weight
+        correction = np.linalg.solve(weighted @ slopes + information, weighted @ observed)
+
+    across, down, level = (prior + correction).tolist()
+    return GroundPlane(across, down, level)
+
+
+def focal_baseline(camera: Calibration) -> float:
+    """Disparity in pixels times depth in metres."""
+    return camera.fx_px * camera.baseline_m
+
+
+def ray_slopes(
+    rows: npt.ArrayLike, columns: npt.ArrayLike, camera: Calibration
+) -> tuple[Floats, Floats]:
+    """The slopes of the pixels' rays to the right and downwards."""
+    right = (np.asarray(columns, np.float64) - camera.cx_px) / camera.fx_px
+    below = (np.asarray(rows, np.float64) - camera.cy_px) / camera.fy_px
+    return right, below
+
+
+def _sampled_pixels(
+    mask: Booleans, disparity_px: Floats
+) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Rows and columns of the pixels in `mask` with a known disparity, one in STRIDE_PX each
+    direction.
+    """
+    first = STRIDE_PX // 2
+    grid = (slice(first, None, STRIDE_PX), slice(first, None, STRIDE_PX))
+    rows, columns = np.nonzero(mask[grid] & (disparity_px[grid] > 0))
+    return STRIDE_PX * rows + first, STRIDE_PX * columns + first
