@@ -168,9 +168,9 @@ def test_a_restart_amid_a_view_learns_nothing_from_it_twice(
     assert isinstance(percepts, Percepts)
     assert isinstance(again, Percepts)
     assert [each.label for each in again.objects] == [each.label for each in percepts.objects]
-    assert second.condense is not None
-    assert first.condense is not None
-    assert codec.encode(second.condense()) == codec.encode(first.condense())
+    assert second.compact is not None
+    assert first.compact is not None
+    assert codec.encode(second.compact()) == codec.encode(first.compact())
 
 
 def test_after_a_restart_the_next_view_is_learned_from(views: list[View]) -> None:
