@@ -23,10 +23,6 @@ class PortInUseError(UsageError):
     """Another process listens where the router should."""
 
 
-class ProcessFailedError(UsageError):
-    """A process of a run failed for a reason that a restart does not remove."""
-
-
 class MessageError(CogmapError):
     """A message that came is not what its topic carries; it is counted and passed over."""
 

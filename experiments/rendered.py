@@ -36,11 +36,7 @@ def with_cameras(sections: Sections) -> Sections:
     changed: dict[str, Any] = copy.deepcopy(dict(sections))
     sim = changed["sim"]
     sim.pop("percepts", None)
-    sim["trajectory"] = {
-        **sim["trajectory"],
-        "sensing": "cameras",
-        "landmarks": named(sim["trajectory"]["landmarks"]),
-    }
+    sim["way"] = {**sim["way"], "sensing": "cameras", "landmarks": named(sim["way"]["landmarks"])}
     sim["awaits"] = {**sim["awaits"], **dict.fromkeys(SENSES, 1)}
     noise = sim["noise"]
     changed["sensory"] = {

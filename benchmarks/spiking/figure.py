@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
 from benchmarks.spiking.measure import SIDE_M, Scene, recording
-from cli.plots.paint import STYLE
+from cli.plots.draw import STYLE
 from cli.plots.palette import ESTIMATE, FAINT, INK, KERB, OBJECT, PAPER, TRUE
 from experiments.spiking.cells import (
     GAMMA_S,

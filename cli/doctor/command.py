@@ -1,4 +1,4 @@
-"""`cogmap doctor`: what is wrong with this installation and with the running system."""
+"""`cogmap doctor`: what is wrong with this installation and with the system that runs."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ from cogmap.errors import NoRouterError
 from cogmap.runtime.inbox import Inbox
 from cogmap.runtime.intake import Intake
 from schemas import topics
+from schemas.process import Clock, Health
 from services import registry
 
-OBSERVE_S = 3.3
+LOOK_S = 3.3
 RUNS = Path("runs")
 
 
@@ -33,46 +34,54 @@ RUNS = Path("runs")
 @connect_option
 @agent_option
 def doctor(as_json: bool, connect: str, agent: str) -> None:
-    """Report what is wrong, and what to do about it; exit code 1 where anything is."""
-    findings = installation.examine(RUNS) + _examine_system(connect, agent)
+    """Say what is wrong, and what to do about it; exit code 1 where anything is."""
+    found = [*installation.examine(RUNS), *_running(connect, agent)]
     if as_json:
-        click.echo(json.dumps([msgspec.to_builtins(finding) for finding in findings]))
-    elif findings:
-        click.echo("\n".join(map(str, findings)))
+        click.echo(json.dumps([msgspec.to_builtins(finding) for finding in found]))
     else:
-        click.echo("nothing is wrong with the installation or the running system")
-    sys.exit(1 if findings else 0)
+        click.echo(
+            "\n".join(map(str, found))
+            or "all is well, with the installation and with the system that runs"
+        )
+    sys.exit(1 if found else 0)
 
 
-def _examine_system(connect: str, agent: str) -> list[Finding]:
+def _running(connect: str, agent: str) -> list[Finding]:
     try:
         with observing(connect, agent, "doctor") as bus:
-            observed = observe(bus, OBSERVE_S)
+            observed = observe(bus, LOOK_S)
             return system.examine(registry.MODULES, observed, discover(bus.session, agent))
     except NoRouterError:
-        remedy = "start one with `cogmap run`, or name it with --connect"
-        return [Finding("router", f"none answers at {connect}", remedy)]
+        return [
+            Finding(
+                "router",
+                f"none answers at {connect}",
+                "start one with `cogmap run`, or name it with --connect",
+            )
+        ]
 
 
 def observe(bus: ZenohBus, duration_s: float) -> Observed:
-    """What the processes report about themselves within `duration_s`."""
+    """Listen for so long to who is there and how they fare."""
     observed = Observed()
     inbox = Inbox()
     intake = Intake()
 
     def on_change(member: Member, alive: bool) -> None:
-        change = observed.ready.add if alive else observed.ready.discard
-        inbox.call(lambda: change(member))
+        inbox.call(lambda: (observed.ready.add if alive else observed.ready.discard)(member))
 
     bus.watch(on_change)
     for topic in (topics.HEALTH, topics.CLOCK):
         bus.subscribe(topic, inbox.put, intake.count_lost)
-
     end_s = time.monotonic() + duration_s
     while (left_s := end_s - time.monotonic()) > 0:
         item = inbox.take(left_s)
         if isinstance(item, Arrival):
-            observed.add(intake.accept(item))
+            match intake.accept(item):
+                case Health() as health:
+                    observed.health.setdefault(health.instance, []).append(health)
+                case Clock() as clock:
+                    observed.clock_rate = clock.rate
         elif item is not None:
             item()
     return observed

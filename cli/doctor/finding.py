@@ -1,4 +1,4 @@
-"""A finding of the doctor."""
+"""What the doctor finds."""
 
 from __future__ import annotations
 

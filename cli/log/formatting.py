@@ -11,17 +11,20 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from cogmap.recording.diff import Diff
-from cogmap.recording.info import Info
+from cogmap.recording.diff import Diff, TopicDiff
+from cogmap.recording.info import Info, TopicInfo
 from cogmap.recording.recorder import Summary
 from cogmap.recording.replaying.player import Played
-from cogmap.recording.replaying.replay import Report
+from cogmap.recording.replaying.replay import Outcome, Report
 from cogmap.recording.storage.recover import Recovery
 
 _PIPED_WIDTH = 160
+_INFO_COLUMNS = ["topic:", "type:", "delivery:", "count", "Hz", "mean size", "lost", "sources:"]
+_DIFF_COLUMNS = ["topic:", "left", "right", "same", "different", "left only", "right only"]
+_REPLAY_COLUMNS = ["instance:", "life", "inputs", "same", "different", "unsaid", "s"]
 
 
-def say_json(value: Any) -> None:
+def print_json(value: Any) -> None:
     """One JSON document."""
     click.echo(msgspec.json.format(msgspec.json.encode(value)).decode())
 
@@ -31,44 +34,46 @@ def megabytes(number: float) -> str:
     return f"{number / 1e6:.1f} MB" if number >= 1e5 else f"{number / 1e3:.1f} kB"
 
 
-def table(columns: list[str], rows: list[list[str]]) -> None:
-    """A plain table; columns after the first are numbers unless they are called in lower case with
-    a colon.
-    """
+def print_table(columns: list[str], rows: list[list[str]]) -> None:
+    """A plain table. A column whose name ends with a colon holds words, any other numbers."""
     shown = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for name in columns:
+        holds_words = name.endswith(":")
         shown.add_column(
-            name.rstrip(":"), justify="left" if name.endswith(":") else "right", overflow="fold"
+            name.rstrip(":"), justify="left" if holds_words else "right", overflow="fold"
         )
     for row in rows:
         shown.add_row(*row)
+
     console = Console(soft_wrap=False, highlight=False)
     if not console.is_terminal:
         console.width = _PIPED_WIDTH
     console.print(shown)
 
 
-def say_summary(summary: Summary) -> None:
+def print_summary(summary: Summary) -> None:
     """How a recording went."""
     number = sum(summary.messages.values())
     click.echo(
-        f"{summary.path}: {number} messages on {len(summary.messages)} topics in {summary.duration_s:.1f} s, "
-        f"{megabytes(summary.size_bytes)}"
+        f"{summary.path}: {number} messages on {len(summary.messages)} topics in "
+        f"{summary.duration_s:.1f} s, {megabytes(summary.size_bytes)}"
     )
     if summary.never_drop_whole:
         click.echo("No gap in any NEVER_DROP topic.")
     for sentence in summary.gaps:
         click.echo(f"gap: {sentence}")
-    for what, counts in (
-        ("given up by the bus", summary.unrecovered),
-        ("dropped, as the disk was too slow", summary.dropped),
-        ("rejected, as no messages of their topic", summary.rejected),
-    ):
+
+    losses = {
+        "given up by the bus": summary.unrecovered,
+        "dropped, as the disk was too slow": summary.dropped,
+        "rejected, as no messages of their topic": summary.rejected,
+    }
+    for reason, counts in losses.items():
         for topic, count in sorted(counts.items()):
-            click.echo(f"{topic}: {count} {what}")
+            click.echo(f"{topic}: {count} {reason}")
 
 
-def say_info(info: Info) -> None:
+def print_info(info: Info) -> None:
     """What is in a log."""
     began = datetime.fromtimestamp(info.began_ns / 1e9).astimezone()
     click.echo(f"{info.path}: {info.software or 'unknown writer'}, agent {info.agent or 'unknown'}")
@@ -76,25 +81,14 @@ def say_info(info: Info) -> None:
         f"{info.messages} messages in {info.duration_s:.1f} s from {began:%Y-%m-%d %H:%M:%S}, "
         f"{megabytes(info.size_bytes)}"
     )
-    rows = [
-        [
-            topic.topic,
-            topic.type,
-            topic.delivery,
-            str(topic.count),
-            f"{topic.rate_hz:.2f}",
-            megabytes(topic.mean_bytes) if topic.count else "",
-            str(topic.lost),
-            " ".join(f"{source}:{count}" for source, count in topic.sources.items()),
-        ]
-        for topic in info.topics
-    ]
-    table(["topic:", "type:", "delivery:", "count", "Hz", "mean size", "lost", "sources:"], rows)
+    print_table(_INFO_COLUMNS, [_info_row(topic) for topic in info.topics])
     for sentence in info.gaps:
         click.echo(f"gap: {sentence}")
+
     if info.cut_bytes:
         click.echo(
-            f"{info.cut_bytes} bytes at its end cannot be read: `cogmap log recover` leaves them out"
+            f"{info.cut_bytes} bytes at its end cannot be read: `cogmap log recover` leaves them "
+            "out"
         )
     elif not info.finished:
         click.echo("Its recorder did not end it: it was killed, or is still recording.")
@@ -102,58 +96,35 @@ def say_info(info: Info) -> None:
         click.echo(f"topics that this version does not know: {', '.join(info.unknown)}")
 
 
-def say_diff(diff: Diff) -> None:
+def print_diff(diff: Diff) -> None:
     """How two logs compare."""
-    rows = [
-        [
-            t.topic,
-            str(t.left),
-            str(t.right),
-            str(t.same),
-            str(t.different),
-            str(t.left_only),
-            str(t.right_only),
-        ]
-        for t in diff.topics
-    ]
-    table(["topic:", "left", "right", "same", "different", "left only", "right only"], rows)
+    print_table(_DIFF_COLUMNS, [_diff_row(topic) for topic in diff.topics])
     for topic in diff.topics:
         if topic.first and topic.first != diff.first:
             click.echo(topic.first)
-    click.echo(f"First difference: {diff.first}" if diff.first else "The logs say the same.")
+    verdict = f"First difference: {diff.first}" if diff.first else "The logs hold the same."
+    click.echo(verdict)
 
 
-def say_report(report: Report) -> None:
+def print_report(report: Report) -> None:
     """What a replay into modules found."""
-    rows = [
-        [
-            outcome.instance,
-            str(outcome.incarnation),
-            str(outcome.fed),
-            str(outcome.same),
-            str(outcome.different),
-            str(outcome.unsaid),
-            f"{outcome.busy_s:.2f}",
-        ]
-        for outcome in report.outcomes
-    ]
-    table(["instance:", "life", "inputs", "same", "different", "unsaid", "s"], rows)
+    print_table(_REPLAY_COLUMNS, [_replay_row(outcome) for outcome in report.outcomes])
     for outcome in report.outcomes:
         for note in outcome.notes:
             click.echo(f"{outcome.instance}: {note}")
         if outcome.first and outcome.first != report.first:
             click.echo(outcome.first)
+
     click.echo(
         f"{report.log_s:.1f} s of log in {report.wall_s:.1f} s: {report.speed:.1f} x real time"
     )
-    click.echo(
-        f"First difference: {report.first}"
-        if report.first
-        else "Every output is the same to the byte."
-    )
+    if report.first:
+        click.echo(f"First difference: {report.first}")
+    else:
+        click.echo("Every output is the same to the byte.")
 
 
-def say_played(played: Played) -> None:
+def print_played(played: Played) -> None:
     """What was played onto a bus."""
     number = sum(played.messages.values())
     click.echo(
@@ -162,7 +133,7 @@ def say_played(played: Played) -> None:
     )
 
 
-def say_recovery(recovery: Recovery) -> None:
+def print_recovery(recovery: Recovery) -> None:
     """What was saved of a log."""
     click.echo(f"{recovery.messages} messages saved from {recovery.chunks} chunks")
     for sentence in recovery.damaged:
@@ -171,6 +142,44 @@ def say_recovery(recovery: Recovery) -> None:
         click.echo("Nothing was wrong with it.")
     else:
         click.echo(
-            f"Lost: {recovery.lost_bytes} bytes, with {recovery.lost_messages} messages that an index tells of"
-            " and whatever an unfinished chunk held."
+            f"Lost: {recovery.lost_bytes} bytes, with {recovery.lost_messages} messages that an "
+            "index names and whatever an unfinished chunk held."
         )
+
+
+def _info_row(topic: TopicInfo) -> list[str]:
+    sources = [f"{source}:{count}" for source, count in topic.sources.items()]
+    return [
+        topic.topic,
+        topic.type,
+        topic.delivery,
+        str(topic.count),
+        f"{topic.rate_hz:.2f}",
+        megabytes(topic.mean_bytes) if topic.count else "",
+        str(topic.lost),
+        " ".join(sources),
+    ]
+
+
+def _diff_row(topic: TopicDiff) -> list[str]:
+    return [
+        topic.topic,
+        str(topic.left),
+        str(topic.right),
+        str(topic.same),
+        str(topic.different),
+        str(topic.left_only),
+        str(topic.right_only),
+    ]
+
+
+def _replay_row(outcome: Outcome) -> list[str]:
+    return [
+        outcome.instance,
+        str(outcome.incarnation),
+        str(outcome.fed),
+        str(outcome.same),
+        str(outcome.different),
+        str(outcome.unsaid),
+        f"{outcome.busy_s:.2f}",
+    ]

@@ -6,6 +6,7 @@ import os
 import sys
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import click
 import msgspec
@@ -32,26 +33,26 @@ Examples:
   cogmap log diff monday.mcap tuesday.mcap
   cogmap log diff a.mcap b.mcap workspace/delta
 """
-_log_argument = click.argument("log", type=click.Path(path_type=Path))
+log_argument = click.argument("log", type=click.Path(path_type=Path))
 
 
 @click.command()
-@_log_argument
+@log_argument
 @json_option
 def info(log: Path, as_json: bool) -> None:
-    """Say what is in LOG: how long, how big, how much of what from whom, and what lacks."""
+    """Show what is in LOG: how long, how big, how much of what from whom, and what is missing."""
     with bar(f"reading {log.name}") as progress:
         found = informer.info(log, progress)
     if as_json:
-        formatting.say_json(found)
+        formatting.print_json(found)
     else:
-        formatting.say_info(found)
+        formatting.print_info(found)
 
 
 @click.command(epilog=_CAT_EPILOG)
-@_log_argument
+@log_argument
 @click.argument("topics", nargs=-1)
-@click.option("-n", "number", type=click.IntRange(min=1), help="So many messages and no more.")
+@click.option("-n", "number", type=click.IntRange(min=1), help="At most so many messages.")
 @click.option(
     "--start-offset",
     type=click.FloatRange(min=0),
@@ -72,11 +73,13 @@ def cat(
     reader = LogReader(log)
     start_ns = reader.span_ns[0] + int(start_offset * 1e9)
     chosen = reader.records(selection.named(topics) or None)
-    records = islice((record for record in chosen if record.log_time_ns >= start_ns), number)
+    later = (record for record in chosen if record.log_time_ns >= start_ns)
     try:
-        for record in records:
-            click.echo(_one_line(reader, record, full) if as_json else _lines(reader, record, full))
-    except BrokenPipeError:  # whoever read it has seen enough
+        for record in islice(later, number):
+            click.echo(
+                _as_json(reader, record, full) if as_json else _as_text(reader, record, full)
+            )
+    except BrokenPipeError:  # its reader has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
@@ -86,8 +89,7 @@ def cat(
 @click.argument("topics", nargs=-1)
 @json_option
 def diff(left: Path, right: Path, topics: tuple[str, ...], as_json: bool) -> None:
-    """Compare what two logs say, message by message, on all topics about the model or on those
-    named.
+    """Compare two logs message by message, on all topics of the model or on those named.
 
     Exit code 1, and the first difference in words, where a byte differs. How messages travelled is
     not compared.
@@ -95,9 +97,9 @@ def diff(left: Path, right: Path, topics: tuple[str, ...], as_json: bool) -> Non
     with bar("comparing") as progress:
         found = differ.diff(left, right, selection.named(topics) or None, progress)
     if as_json:
-        formatting.say_json(found)
+        formatting.print_json(found)
     else:
-        formatting.say_diff(found)
+        formatting.print_diff(found)
     if not found.same:
         sys.exit(1)
 
@@ -111,13 +113,13 @@ def recover(source: Path, target: Path, as_json: bool) -> None:
     with bar(f"recovering {source.name}") as progress:
         recovery = rescuer.recover(source, target, progress)
     if as_json:
-        formatting.say_json(recovery)
+        formatting.print_json(recovery)
     else:
-        formatting.say_recovery(recovery)
+        formatting.print_recovery(recovery)
 
 
-def _one_line(reader: LogReader, record: Record, full: bool) -> str:
-    facts = {"topic": record.topic_name, "log_time_ns": record.log_time_ns}
+def _as_json(reader: LogReader, record: Record, full: bool) -> str:
+    facts: dict[str, Any] = {"topic": record.topic_name, "log_time_ns": record.log_time_ns}
     if record.envelope is not None:
         facts["envelope"] = to_jsonable(record.envelope)
     try:
@@ -127,8 +129,9 @@ def _one_line(reader: LogReader, record: Record, full: bool) -> str:
     return msgspec.json.encode(facts).decode()
 
 
-def _lines(reader: LogReader, record: Record, full: bool) -> str:
-    head = f"--- {record.topic_name} at {(record.log_time_ns - reader.span_ns[0]) / 1e9:.3f} s"
+def _as_text(reader: LogReader, record: Record, full: bool) -> str:
+    at_s = (record.log_time_ns - reader.span_ns[0]) / 1e9
+    head = f"--- {record.topic_name} at {at_s:.3f} s"
     try:
         return f"{head}\n{to_text(reader.message(record), full)}"
     except MessageError as error:

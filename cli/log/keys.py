@@ -32,18 +32,25 @@ class Keys:
 
     @contextlib.contextmanager
     def listening(self) -> Iterator[Keys]:
-        """Take single keys from the terminal until left; nothing where standard input is none."""
+        """Read single keys from the terminal until left; nothing where standard input is none.
+
+        Raises UsageError where it is to begin paused and there is no terminal.
+        """
         if not sys.stdin.isatty():
             if self.paused:
-                raise click.UsageError("--start-paused needs a terminal: the space bar goes on")
+                raise click.UsageError(
+                    "--start-paused needs a terminal: the space bar continues there"
+                )
             yield self
             return
+
         terminal = sys.stdin.fileno()
         before = termios.tcgetattr(terminal)
         self._wakes = list(socket.socketpair())
         self._wakes[1].setblocking(False)
         signal.set_wakeup_fd(self._wakes[1].fileno())
         tty.setcbreak(terminal)
+
         try:
             yield self
         finally:
@@ -53,12 +60,13 @@ class Keys:
                 end.close()
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait so long, or until asked to end, to pause or to go on; whether it is to end."""
+        """Wait so long, or until asked to end, to pause or to continue; whether it is to end."""
         if not self._wakes:
             return self._stop.wait(timeout_s)
+
         terminal = sys.stdin.fileno()
         ready, _, _ = select.select([terminal, self._wakes[0]], [], [], timeout_s)
         if terminal in ready and b" " in os.read(terminal, 64):
             self.paused = not self.paused
-            click.echo("paused: space goes on" if self.paused else "going on", err=True)
+            click.echo("paused: space continues" if self.paused else "continuing", err=True)
         return self._stop.asked

@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import click
 import msgspec
 
 from cli.log import formatting
+from cli.log.files import save
 from cli.log.progress import bar
 from cli.options import json_option
 from cogmap.errors import LogError, UsageError
 from cogmap.recording import views
 from cogmap.recording.storage.reader import LogReader
-from cogmap.recording.views import Sight
+from cogmap.recording.views import CameraFrame, Depth
 from schemas import topics
 from schemas.sensing import Percepts, StereoFrame, View
 from schemas.topics import Topic
 
 IMAGES = (".png", ".jpg", ".jpeg")
-FIGURES = (".png", ".pdf")
+PLOTS = (".png", ".pdf")
+MIN_FOCAL_LENGTH_PX = 1.0
 _IMAGE_EPILOG = """\b
 Examples:
   cogmap log image drive.mcap                          the view in the middle of the log
@@ -51,9 +51,9 @@ class Picture(msgspec.Struct, frozen=True):
     objects: list[str] | None = None
 
 
-def _which(command: _Command) -> _Command:
-    """The options that say which frame, and where to."""
-    for option in (
+def _frame_options(command: _Command) -> _Command:
+    """The options for which frame to show, and which file to write."""
+    options = (
         json_option,
         click.option(
             "-o",
@@ -72,7 +72,8 @@ def _which(command: _Command) -> _Command:
             "--frame", type=click.IntRange(min=0), metavar="N", help="The frame with this number."
         ),
         click.argument("log", type=click.Path(path_type=Path)),
-    ):
+    )
+    for option in options:
         command = option(command)
     return command
 
@@ -83,7 +84,7 @@ def _which(command: _Command) -> _Command:
 )
 @click.option("--depth", is_flag=True, help="Its depth, in colours, with a scale.")
 @click.option("--percepts", is_flag=True, help="Outline and name what was recognised in it.")
-@_which
+@_frame_options
 def image(
     log: Path,
     frame: int | None,
@@ -96,82 +97,88 @@ def image(
 ) -> None:
     """Save a view in LOG as an image file: a recorded pixel a pixel, as PNG or JPEG.
 
-    That is the rectified left image, of which depth and percepts are; --camera has it as a camera
-    gave it. Unless --frame or --at says which, it is the one in the middle. With --depth or
+    That is the rectified left image, of which depth and percepts are; --camera gives the image of a
+    camera as it was. Without --frame or --at it is the view in the middle. With --depth or
     --percepts each pixel is several wide.
     """
     if camera and (depth or percepts):
         raise click.UsageError(
-            "depth and percepts are of the rectified view: leave --camera out, or --depth and --percepts"
+            "depth and percepts are of the rectified view: leave --camera out, or --depth and "
+            "--percepts"
         )
     reader = LogReader(log)
     topic = topics.STEREO if camera else topics.VIEW
-    found = _sights(reader, topic, percepts)
-    sight = _chosen(reader, found, frame, at_s) or found[len(found) // 2]
-    kinds = [camera or "", "depth" if depth else "", "percepts" if percepts else ""]
-    path = _output(output, log, sight, "-".join(filter(None, kinds)) or "view", IMAGES)
-    said = views.percepts(reader, sight) if percepts else None
-    path.write_bytes(_image(reader, sight, camera, depth, said, path.suffix.lower()))
-    _say(path, log, topic, sight, said, as_json)
+    frames = _frames(reader, topic, percepts)
+    chosen = _chosen(reader, frames, frame, at_s) or frames[len(frames) // 2]
+
+    kind = _kind(camera, depth, percepts)
+    path = _output(output, log, chosen, kind, IMAGES)
+    suffix = path.suffix.lower()
+    recognised = views.percepts(reader, chosen) if percepts else None
+    if camera:
+        content = _camera_image(reader, chosen, camera, suffix)
+    else:
+        content = _view_image(reader, chosen, depth, recognised, suffix)
+    save(path, content)
+    _report(_picture(path, topic, chosen, recognised), log, as_json)
 
 
 @click.command(epilog=_PERCEPTION_EPILOG)
-@_which
+@_frame_options
 def perception(
     log: Path, frame: int | None, at_s: float | None, output: Path | None, as_json: bool
 ) -> None:
     """Draw what perception made of a view in LOG: figure 3 of the paper, as PNG or PDF.
 
     Camera image, depth, segments with their names, the road in the image, and from above the
-    projected road with the objects where they stand. Unless --frame or --at says which, it is the
-    view in which most is recognised.
+    projected road with the objects where they stand. Without --frame or --at it is the view in
+    which most is recognised.
     """
     reader = LogReader(log)
-    found = _sights(reader, topics.VIEW, True)
-    sight = _chosen(reader, found, frame, at_s) or max(found, key=lambda sight: sight.objects)
-    path = _output(output, log, sight, "perception", FIGURES)
-    said = views.percepts(reader, sight)
-    view = views.message(reader, sight.record)
-    named = f"{log}, frame {sight.frame}"
-    assert isinstance(view, View)
-    assert said is not None
-    if min(view.calibration.fx_px, view.calibration.fy_px) < 1:
-        raise LogError(
-            f"{named}: its calibration's focal lengths must be at least 1 pixel: choose another frame"
-        )
-    pixels = views.image(view.image, named)
-    depth_m = views.depth(view.depth_m, named)
-    title = f"What was perceived in frame {sight.frame}, {sight.at_s:.1f} s into {log.name}"
-    draw: Any = importlib.import_module(
-        "cli.plots.perception"
-    )  # other commands have no use for matplotlib
-    path.write_bytes(draw.figure(view, pixels, depth_m, said, title, path.suffix.lower()))
-    _say(path, log, topics.VIEW, sight, said, as_json)
+    frames = _frames(reader, topics.VIEW, True)
+    chosen = _chosen(reader, frames, frame, at_s) or max(frames, key=lambda each: each.objects)
+    path = _output(output, log, chosen, "perception", PLOTS)
+
+    recognised = views.percepts(reader, chosen)
+    assert recognised is not None
+    content = _perception_plot(reader, chosen, recognised, path.suffix.lower())
+    save(path, content)
+    _report(_picture(path, topics.VIEW, chosen, recognised), log, as_json)
 
 
-def _sights(reader: LogReader, topic: Topic, told: bool) -> list[Sight]:
+def _frames(reader: LogReader, topic: Topic, recognised: bool) -> list[CameraFrame]:
+    """The frames on a topic, only those with percepts where these are needed."""
     with bar(f"reading {reader.path.name}") as progress:
-        found = views.sights(reader, topic, progress)
-    return views.recognised(reader, found) if told else found
+        found = views.camera_frames(reader, topic, progress)
+    return views.with_percepts(reader, found) if recognised else found
 
 
 def _chosen(
-    reader: LogReader, found: list[Sight], frame: int | None, at_s: float | None
-) -> Sight | None:
-    if frame is not None and at_s is not None:
-        raise click.UsageError("--frame and --at both say which view: leave one out")
-    if frame is not None:
-        return views.of_frame(found, frame, reader.path)
-    return None if at_s is None else views.at_time(found, at_s, reader)
+    reader: LogReader, frames: list[CameraFrame], number: int | None, at_s: float | None
+) -> CameraFrame | None:
+    """The frame that the options name, None where they name none. Raises UsageError."""
+    if number is not None and at_s is not None:
+        raise click.UsageError("--frame and --at both name a view: leave one out")
+    if number is not None:
+        return views.by_number(frames, number, reader.path)
+    if at_s is not None:
+        return views.at_time(frames, at_s, reader)
+    return None
+
+
+def _kind(camera: str | None, depth: bool, percepts: bool) -> str:
+    """What an image shows, as the name of its file has it."""
+    parts = [camera or "", "depth" if depth else "", "percepts" if percepts else ""]
+    return "-".join(filter(None, parts)) or "view"
 
 
 def _output(
-    output: Path | None, log: Path, sight: Sight, kind: str, suffixes: tuple[str, ...]
+    output: Path | None, log: Path, frame: CameraFrame, kind: str, suffixes: tuple[str, ...]
 ) -> Path:
     """Where to write. Raises UsageError where that cannot be a file of one of the kinds in
     `suffixes`.
     """
-    path = output or Path(f"{log.stem}-frame-{sight.frame}-{kind}{suffixes[0]}")
+    path = output or Path(f"{log.stem}-frame-{frame.number}-{kind}{suffixes[0]}")
     if path.suffix.lower() not in suffixes:
         raise UsageError(f"-o {path}: name a file that ends in {' or '.join(suffixes)}")
     if not path.parent.is_dir():
@@ -179,38 +186,77 @@ def _output(
     return path
 
 
-def _image(
-    reader: LogReader,
-    sight: Sight,
-    camera: str | None,
-    depth: bool,
-    percepts: Percepts | None,
-    suffix: str,
+def _camera_image(reader: LogReader, frame: CameraFrame, camera: str, suffix: str) -> bytes:
+    """A camera's image as a file. Raises LogError."""
+    from cli.plots import draw
+
+    message = views.message(reader, frame.record)
+    assert isinstance(message, StereoFrame)
+    array = message.left if camera == "left" else message.right
+    return draw.encode_image(views.image(array, _name(reader, frame)), suffix)
+
+
+def _view_image(
+    reader: LogReader, frame: CameraFrame, depth: bool, recognised: Percepts | None, suffix: str
 ) -> bytes:
-    message = views.message(reader, sight.record)
-    named = f"{reader.path}, frame {sight.frame}"
-    paint: Any = importlib.import_module("cli.plots.paint")
-    if isinstance(message, StereoFrame):
-        side = message.left if camera == "left" else message.right
-        return bytes(paint.encoded(views.image(side, named), suffix))
+    """A view as a file, drawn over where depth or percepts are to be shown. Raises LogError."""
+    from cli.plots import draw
+
+    view = _view(reader, frame)
+    name = _name(reader, frame)
+    pixels = views.image(view.image, name)
+    depth_m: Depth | None = views.depth(view.depth_m, name) if depth else None
+    if depth_m is not None or recognised is not None:
+        objects = recognised.objects if recognised is not None else []
+        pixels = draw.draw_view(pixels, depth_m, view.calibration, objects)
+    return draw.encode_image(pixels, suffix)
+
+
+def _perception_plot(
+    reader: LogReader, frame: CameraFrame, recognised: Percepts, suffix: str
+) -> bytes:
+    """The plot of a view and its percepts as a file. Raises LogError."""
+    from cli.plots import perception as plot  # other commands have no use for matplotlib
+
+    view = _view(reader, frame)
+    name = _name(reader, frame)
+    focal_px = min(view.calibration.fx_px, view.calibration.fy_px)
+    if focal_px < MIN_FOCAL_LENGTH_PX:
+        raise LogError(
+            f"{name}: its calibration's focal lengths must be at least 1 pixel: choose another "
+            "frame"
+        )
+    pixels = views.image(view.image, name)
+    depth_m = views.depth(view.depth_m, name)
+    place = f"frame {frame.number}, {frame.at_s:.1f} s into {reader.path.name}"
+    title = f"What was perceived in {place}"
+    return plot.figure(view, pixels, depth_m, recognised, title, suffix)
+
+
+def _view(reader: LogReader, frame: CameraFrame) -> View:
+    message = views.message(reader, frame.record)
     assert isinstance(message, View)
-    pixels = views.image(message.image, named)
-    if depth or percepts is not None:
-        depth_m = views.depth(message.depth_m, named) if depth else None
-        pixels = paint.drawn(
-            pixels, depth_m, message.calibration, percepts.objects if percepts else []
-        )
-    return bytes(paint.encoded(pixels, suffix))
+    return message
 
 
-def _say(
-    path: Path, log: Path, topic: Topic, sight: Sight, percepts: Percepts | None, as_json: bool
-) -> None:
-    objects = None if percepts is None else [percept.label for percept in percepts.objects]
+def _name(reader: LogReader, frame: CameraFrame) -> str:
+    return f"{reader.path}, frame {frame.number}"
+
+
+def _picture(path: Path, topic: Topic, frame: CameraFrame, recognised: Percepts | None) -> Picture:
+    objects = None
+    if recognised is not None:
+        objects = [percept.label for percept in recognised.objects]
+    return Picture(str(path), topic.name, frame.number, frame.stamp_ns, frame.at_s, objects)
+
+
+def _report(picture: Picture, log: Path, as_json: bool) -> None:
+    """Print which file was written and what it shows."""
     if as_json:
-        formatting.say_json(
-            Picture(str(path), topic.name, sight.frame, sight.stamp_ns, sight.at_s, objects)
-        )
+        formatting.print_json(picture)
         return
-    shown = "" if objects is None else f", with {', '.join(objects) or 'nothing recognised'}"
-    click.echo(f"{path}: {topic.name}, frame {sight.frame} at {sight.at_s:.3f} s of {log}{shown}")
+    shown = ""
+    if picture.objects is not None:
+        shown = f", with {', '.join(picture.objects) or 'nothing recognised'}"
+    place = f"frame {picture.frame} at {picture.at_s:.3f} s of {log}"
+    click.echo(f"{picture.path}: {picture.topic}, {place}{shown}")

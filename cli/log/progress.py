@@ -17,7 +17,7 @@ SHOWN_AFTER_S = 2.0
 
 @contextmanager
 def bar(label: str) -> Iterator[reader.Progress]:
-    """Takes the share done, and shows it on a terminal once it has taken SHOWN_AFTER_S."""
+    """A function of the share done, which a terminal shows after SHOWN_AFTER_S."""
     began_s = time.monotonic()
     progress = Progress(
         console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()
@@ -25,7 +25,7 @@ def bar(label: str) -> Iterator[reader.Progress]:
     task = progress.add_task(label, total=1.0)
     started = False
 
-    def tell(share: float) -> None:
+    def show(share: float) -> None:
         nonlocal started
         if not started and time.monotonic() - began_s > SHOWN_AFTER_S:
             progress.start()
@@ -33,6 +33,6 @@ def bar(label: str) -> Iterator[reader.Progress]:
         progress.update(task, completed=share)
 
     try:
-        yield tell
+        yield show
     finally:
         progress.stop()

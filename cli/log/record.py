@@ -21,7 +21,7 @@ Examples:
   cogmap log record                          everything, until Ctrl-C
   cogmap log record -o drive.mcap -x camera  everything but the camera
   cogmap log record odometry motor/command   two topics
-  cogmap log record -e '^workspace/'         what the workspace says
+  cogmap log record -e '^workspace/'         what the workspace publishes
 """
 
 
@@ -33,9 +33,7 @@ Examples:
     type=click.Path(path_type=Path),
     help="The file; named by the time unless given.",
 )
-@click.option(
-    "-a", "--all", "everything", is_flag=True, help="Every topic: so it is unless some are chosen."
-)
+@click.option("-a", "--all", "everything", is_flag=True, help="Every topic, as without any choice.")
 @click.option("-e", "--regex", default="", help="Topics that match this, besides those named.")
 @click.option("-x", "--exclude", default="", help="Leave out topics that match this.")
 @click.option(
@@ -73,15 +71,17 @@ def record(
 ) -> None:
     """Record what travels on the bus into an MCAP file, until Ctrl-C.
 
-    The file is flushed four times a second, so a kill loses no more than that. At the end, and in
-    the file, every gap in the numbers of any source is told. The configuration goes into the file
+    The file is flushed four times a second, so a kill loses no more than that. At the end every gap
+    in the numbers of any source is printed, and kept in the file. The configuration is kept there
     too: replay uses it.
     """
     if everything and (topics or regex):
         raise click.UsageError("--all records every topic: leave it out, or the choice of topics")
+
     chosen = selection.to_record(topics, regex, exclude)
     about = {"agent": agent, "config": json.dumps(config.load(config_path, settings))}
     path = output or Path(f"cogmap_{time.strftime('%Y_%m_%d-%H_%M_%S')}.mcap")
+
     bus = ZenohBus(connect, agent)
     stop = Stop(tied)
     try:
@@ -89,8 +89,9 @@ def record(
     except LogError:
         bus.close()
         raise
+
     summary = recorder.run(recording, lambda: stop.asked, max_duration)
     if as_json:
-        formatting.say_json(summary)
+        formatting.print_json(summary)
     else:
-        formatting.say_summary(summary)
+        formatting.print_summary(summary)

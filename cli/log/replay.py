@@ -26,7 +26,7 @@ Examples:
   cogmap log replay drive.mcap                      onto the bus, as it was
   cogmap log replay drive.mcap -r 2 -l              twice as fast, again and again
   cogmap log replay drive.mcap --topics odometry --topics camera/stereo --clock
-  cogmap log replay drive.mcap --into sensory       does it still say the same?
+  cogmap log replay drive.mcap --into sensory       does it still publish the same?
   cogmap log replay drive.mcap --into epam --set epam.percept_threshold=0.6
 """
 
@@ -42,7 +42,7 @@ Examples:
 )
 @click.option("-l", "--loop", is_flag=True, help="Begin again at the end.")
 @click.option(
-    "--start-paused", is_flag=True, help="Begin at rest; the space bar goes on and pauses."
+    "--start-paused", is_flag=True, help="Begin paused; the space bar continues and pauses."
 )
 @click.option(
     "--clock",
@@ -51,7 +51,7 @@ Examples:
     is_flag=False,
     flag_value=CLOCK_HZ,
     metavar="[HZ]",
-    help=f"Say on the clock how far it is, so often a second ({CLOCK_HZ:g} unless given).",
+    help=f"Publish on the clock how far it is, so often a second ({CLOCK_HZ:g} unless given).",
 )
 @click.option(
     "--into", multiple=True, metavar="MODULE", help="Feed this module and compare; repeat at will."
@@ -61,9 +61,7 @@ Examples:
 @config_option
 @set_option
 @json_option
-@click.pass_context
 def replay(
-    context: click.Context,
     log: Path,
     rate: float | None,
     topics: tuple[str, ...],
@@ -80,18 +78,19 @@ def replay(
 ) -> None:
     """Play LOG back onto the bus, or feed it to modules with --into.
 
-    With --into, each recorded instance of the module takes in what it took in then, in the same
-    order and with the recorded configuration, and what it says is held against what it said: exit
+    With --into, each recorded instance of the module receives what it received then, in the same
+    order and with the recorded configuration, and what it publishes is compared with the log: exit
     code 1, and the first difference in words, where a byte differs.
     """
     overrides = config.load(config_path, settings)
     if into:
         if rate or topics or start_offset or loop or start_paused or clock_hz:
             raise click.UsageError(
-                "--into replays everything as fast as it goes: leave the options of playing out"
+                "--into replays everything as fast as it can: leave the options of playing out"
             )
         _into(log, into, overrides, as_json)
         return
+
     if overrides:
         raise click.UsageError("--config and --set are for --into: messages are played as they are")
     choices = Choices(
@@ -107,12 +106,13 @@ def replay(
 def _into(log: Path, modules: tuple[str, ...], overrides: config.Sections, as_json: bool) -> None:
     for name in modules:
         registry.config_type(name)
+
     with bar(f"replaying {', '.join(modules)}") as progress:
         report = replay_into(log, modules, registry.build, overrides=overrides, progress=progress)
     if as_json:
-        formatting.say_json(report)
+        formatting.print_json(report)
     else:
-        formatting.say_report(report)
+        formatting.print_report(report)
     if not report.same:
         sys.exit(1)
 
@@ -125,7 +125,8 @@ def _onto_bus(
             played = Player(reader, bus, choices, keys).play()
     finally:
         bus.close()
+
     if as_json:
-        formatting.say_json(played)
+        formatting.print_json(played)
     else:
-        formatting.say_played(played)
+        formatting.print_played(played)

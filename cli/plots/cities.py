@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from cli.plots.paint import STYLE
+from cli.plots.draw import STYLE
 from cli.plots.palette import (
     ESTIMATE,
     FAINT,

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
-from cli.plots.paint import STYLE
+from cli.plots.draw import STYLE
 from cli.plots.palette import ESTIMATE, FAINT, INK, KERB, OBJECT, PAPER, SEVERAL, TRUE
 from experiments.cue_integration import published
 from experiments.cue_integration.analysis import rmse_m

@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Circle, Ellipse, Polygon
 
+from cli.plots.draw import colours_of, spoken
 from cli.plots.labels import Label, place
-from cli.plots.paint import colours_of, spoken
 from cli.plots.palette import ESTIMATE, INK, KERB, ROAD, ROAD_OPACITY, STREET
 from schemas.array import Array
 from schemas.sensing import Calibration, Percept, Percepts

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from cli.plots.paint import STYLE
+from cli.plots.draw import STYLE
 from cli.plots.palette import ESTIMATE, FAINT, INK, OBJECT, PAPER, ROAD, SEVERAL, TRUE, WHEELS
 from experiments.loop_closing.run import SENSING, Loop, Map, Replayed
 

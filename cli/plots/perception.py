@@ -15,7 +15,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from cli.plots import ground, paint
+from cli.plots import draw, ground
 from cli.plots.palette import ESTIMATE, FAINT, INK, KERB, OBJECT, PAPER, ROAD, ROAD_OPACITY
 from cogmap.recording.views import Depth, Image
 from schemas.sensing import Percepts, View
@@ -30,24 +30,24 @@ def figure(
     view: View, image: Image, depth_m: Depth, percepts: Percepts, title: str, suffix: str
 ) -> bytes:
     """The file, of the kind that `suffix` names."""
-    with mpl.rc_context(paint.STYLE):
+    with mpl.rc_context(draw.STYLE):
         layout = ConstrainedLayoutEngine(h_pad=0.08, w_pad=0.05)
         sheet = Figure(figsize=(13, 7.3), dpi=130, facecolor=PAPER, layout=layout)
         panels = sheet.subplot_mosaic(MOSAIC, width_ratios=[1, 1, 0.92])
-        paint.show(panels["camera"], image)
-        shown = paint.show_depth(panels["depth"], depth_m, view.calibration)
-        paint.add_scale(panels["depth"].inset_axes((1.02, 0.0, 0.035, 0.9)), shown)
+        draw.show(panels["camera"], image)
+        shown = draw.show_depth(panels["depth"], depth_m, view.calibration)
+        draw.add_scale(panels["depth"].inset_axes((1.02, 0.0, 0.035, 0.9)), shown)
         pale = _paler(image)
-        paint.show(panels["segments"], pale)
-        paint.draw_objects(panels["segments"], percepts.objects, 0.5)
-        paint.show(panels["road"], pale)
+        draw.show(panels["segments"], pale)
+        draw.draw_objects(panels["segments"], percepts.objects, 0.5)
+        draw.show(panels["road"], pale)
         ground.draw_road_in_image(panels["road"], percepts, view.calibration)
         ground.draw_plan(panels["plan"], percepts, view.calibration)
         _dress(sheet, panels, percepts, title)
         sheet.draw_without_rendering()
         sheet.set_layout_engine("none")
         ground.fit_plan(panels["plan"], percepts)
-        paint.name_objects(panels["segments"], percepts.objects, 7.5)
+        draw.name_objects(panels["segments"], percepts.objects, 7.5)
         ground.name_in_plan(panels["plan"], percepts.objects, 8.5)
         file = BytesIO()
         sheet.savefig(file, format=suffix[1:], facecolor=PAPER, metadata=_UNDATED.get(suffix))

@@ -1,4 +1,4 @@
-"""Compares two logs message by message: what was said, never how it travelled."""
+"""Compares two logs message by message: what messages hold, not how they travelled."""
 
 from __future__ import annotations
 
@@ -59,13 +59,13 @@ def diff(
 
     Raises LogError where one is no log, or damaged.
     """
-    return _Comparison(
-        LogReader(left), LogReader(right), model_topics() if chosen is None else chosen
-    ).run(progress)
+    if chosen is None:
+        chosen = model_topics()
+    return _Comparison(LogReader(left), LogReader(right), chosen).run(progress)
 
 
 class _Comparison:
-    """Both logs and what has been found so far."""
+    """Two logs and what has been found of them so far."""
 
     def __init__(self, left: LogReader, right: LogReader, chosen: Collection[Topic]) -> None:
         self._left = left
@@ -78,43 +78,55 @@ class _Comparison:
             self._sides = (left.path.name, right.path.name)
 
     def run(self, progress: Progress | None) -> Diff:
-        others = dict(_keyed(self._right, self._chosen, None))
-        for record in others.values():
+        """Compare every message of either log."""
+        unmatched = dict(_keyed(self._right, self._chosen, None))
+        for record in unmatched.values():
             self._of(record).right += 1
+
         for key, record in _keyed(self._left, self._chosen, progress):
             self._of(record).left += 1
-            self._hold(record, others.pop(key, None))
-        for record in others.values():
+            self._compare(record, unmatched.pop(key, None))
+
+        for record in unmatched.values():
             self._of(record).right_only += 1
-            self._differ(record, self._only(self._right, record, 1))
+            self._note(record, self._in_one_only(self._right, record, 1))
+        return self._result()
+
+    def _result(self) -> Diff:
+        names = [topic.name for topic in topics.ALL if topic.name in self._found]
         return Diff(
             left=str(self._left.path),
             right=str(self._right.path),
             same=not self._first,
             first=self._first,
-            topics=[self._found[topic.name] for topic in topics.ALL if topic.name in self._found],
+            topics=[self._found[name] for name in names],
         )
 
-    def _hold(self, record: Record, other: Record | None) -> None:
+    def _compare(self, record: Record, other: Record | None) -> None:
+        """Compare a message of the left log with its counterpart in the right one."""
         found = self._of(record)
         if other is None:
             found.left_only += 1
-            self._differ(record, self._only(self._left, record, 0))
+            self._note(record, self._in_one_only(self._left, record, 0))
             return
+
         payload = self._left.payload(record)
-        others = self._right.payload(other)
-        if payload == others:
+        counterpart = self._right.payload(other)
+        if payload == counterpart:
             found.same += 1
             return
+
         found.different += 1
         if not found.first:
-            self._differ(record, compare.in_words(record.topic, payload, others, self._sides))
+            sentence = compare.in_words(record.topic, payload, counterpart, self._sides)
+            self._note(record, sentence)
 
-    def _only(self, reader: LogReader, record: Record, side: int) -> str:
+    def _in_one_only(self, reader: LogReader, record: Record, side: int) -> str:
         name = compare.which(record.topic, reader.stub(record))
         return f"{name} is in {self._sides[side]} and not in {self._sides[1 - side]}"
 
-    def _differ(self, record: Record, sentence: str) -> None:
+    def _note(self, record: Record, sentence: str) -> None:
+        """Keep the sentence on a difference, if it is the first."""
         found = self._of(record)
         found.first = found.first or sentence
         self._first = self._first or sentence
@@ -126,16 +138,17 @@ class _Comparison:
 def _keyed(
     reader: LogReader, chosen: Collection[Topic], progress: Progress | None
 ) -> Iterator[tuple[Key, Record]]:
-    """Each message by what it is called in either log: incarnations are counted, as their times
-    differ.
+    """Each message with what names it in either log.
+
+    A source's incarnations are counted, as the times that they are known by differ.
     """
-    lives: dict[str, dict[int, int]] = defaultdict(dict)
+    incarnations: dict[str, dict[int, int]] = defaultdict(dict)
     for record in reader.records(chosen, progress):
         envelope = record.envelope
         if envelope is None:
             stub = reader.stub(record)
             yield (record.topic_name, stub.source, 0, stub.seq), record
         else:
-            known = lives[envelope.source]
-            life = known.setdefault(envelope.incarnation, len(known))
-            yield (record.topic_name, envelope.source, life, envelope.seq), record
+            known = incarnations[envelope.source]
+            number = known.setdefault(envelope.incarnation, len(known))
+            yield (record.topic_name, envelope.source, number, envelope.seq), record

@@ -1,23 +1,23 @@
-"""What is in a log: how long, how big, how much of what, and whether it is whole."""
+"""What is in a log: how long, how big, how much of what, and whether it is complete."""
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
+from cogmap.recording.log import recorded_config
 from cogmap.recording.storage import format as layout
-from cogmap.recording.storage.reader import LogReader, Progress
+from cogmap.recording.storage.reader import LogReader, Progress, Record
 from cogmap.recording.storage.sequences import SequenceTracker
 from schemas.topics import BY_NAME
 
 
 class TopicInfo(msgspec.Struct, kw_only=True):
     """One topic: its messages by source, their rate over the log's duration, and how many numbers
-    lack.
+    are missing.
     """
 
     topic: str
@@ -31,7 +31,7 @@ class TopicInfo(msgspec.Struct, kw_only=True):
 
 
 class Info(msgspec.Struct, kw_only=True):
-    """A log. `cut_bytes` at its end cannot be read; `finished` says that its recorder ended it.
+    """A log. `cut_bytes` at its end cannot be read; `finished` is whether its recorder ended it.
 
     `gaps` are sentences. `unknown` are topics in it that are not in the table.
     """
@@ -53,32 +53,35 @@ class Info(msgspec.Struct, kw_only=True):
 
 @dataclass
 class _Tally:
+    """The messages of one topic."""
+
     count: int = 0
     size: int = 0
     sources: dict[str, int] = field(default_factory=dict)
+
+    def add(self, record: Record) -> None:
+        source = "?" if record.envelope is None else record.envelope.source
+        self.count += 1
+        self.size += record.size
+        self.sources[source] = self.sources.get(source, 0) + 1
 
 
 def info(path: Path, progress: Progress | None = None) -> Info:
     """What is in the log at `path`. Raises LogError."""
     reader = LogReader(path)
-    about = reader.about(layout.RECORDING)
-    began_ns = int(about.get("began_ns", "0"))
+    recording = reader.about(layout.RECORDING)
+    began_ns = int(recording.get("began_ns", "0"))
     sequences = SequenceTracker(since_ns=began_ns or None)
-    names = [channel.topic for channel in reader.channels.values()]
-    tallies = {name: _Tally() for name in names if name in BY_NAME}
-    for record in reader.records(progress=progress):
-        tally = tallies.setdefault(record.topic_name, _Tally())
-        tally.count += 1
-        tally.size += record.size
-        source = "?" if record.envelope is None else record.envelope.source
-        tally.sources[source] = tally.sources.get(source, 0) + 1
-        if record.envelope is not None:
-            sequences.follow(record.topic, record.envelope)
+    tallies = _tallies(reader, sequences, progress)
     lost = sequences.lost()
+
+    rows = []
+    for name, tally in tallies.items():
+        rows.append(_topic(name, tally, reader.span_s, lost.get(name, 0)))
     return Info(
         path=str(path),
-        software=about.get("software", ""),
-        agent=about.get("agent", ""),
+        software=recording.get("software", ""),
+        agent=recording.get("agent", ""),
         began_ns=began_ns or reader.span_ns[0],
         duration_s=reader.span_s,
         size_bytes=reader.size_bytes,
@@ -86,12 +89,28 @@ def info(path: Path, progress: Progress | None = None) -> Info:
         finished=bool(reader.about(layout.SUMMARY)),
         cut_bytes=reader.cut_bytes,
         gaps=sequences.gaps(),
-        unknown=sorted(name for name in names if name not in BY_NAME and name != layout.ENVELOPES),
-        config=json.loads(about.get("config", "{}")),
-        topics=[
-            _topic(name, tally, reader.span_s, lost.get(name, 0)) for name, tally in tallies.items()
-        ],
+        unknown=_unknown(reader),
+        config=recorded_config(reader),
+        topics=rows,
     )
+
+
+def _tallies(
+    reader: LogReader, sequences: SequenceTracker, progress: Progress | None
+) -> dict[str, _Tally]:
+    """The messages of each topic that the log has a channel for; follows their numbers too."""
+    names = [channel.topic for channel in reader.channels.values()]
+    tallies = {name: _Tally() for name in names if name in BY_NAME}
+    for record in reader.records(progress=progress):
+        tallies.setdefault(record.topic_name, _Tally()).add(record)
+        if record.envelope is not None:
+            sequences.follow(record.topic, record.envelope)
+    return tallies
+
+
+def _unknown(reader: LogReader) -> list[str]:
+    known = {*BY_NAME, layout.ENVELOPES}
+    return sorted({channel.topic for channel in reader.channels.values()} - known)
 
 
 def _topic(name: str, tally: _Tally, duration_s: float, lost: int) -> TopicInfo:

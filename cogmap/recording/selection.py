@@ -13,17 +13,11 @@ from schemas.topics import Topic
 
 
 def named(names: Iterable[str]) -> list[Topic]:
-    """The topics called so. Raises UsageError naming the one that is not in the table."""
+    """The topics of those names. Raises UsageError naming the one that is not in the table."""
     found = []
     for name in names:
         if name not in topics.BY_NAME:
-            close = difflib.get_close_matches(name, topics.BY_NAME, 1)
-            hint = (
-                f"did you mean {close[0]}?"
-                if close
-                else f"there are {', '.join(sorted(topics.BY_NAME))}"
-            )
-            raise UsageError(f"no topic {name!r}: {hint}")
+            raise UsageError(f"no topic {name!r}: {_hint(name)}")
         found.append(topics.BY_NAME[name])
     return found
 
@@ -37,8 +31,8 @@ def pattern(text: str, option: str) -> re.Pattern[str]:
 
 
 def to_record(names: Iterable[str] = (), regex: str = "", exclude: str = "") -> list[Topic]:
-    """The topics that are named or match `regex`, all of them where neither is given, less what
-    matches `exclude`.
+    """The topics that are named or match `regex`, all of them where neither is given, less those
+    that match `exclude`.
 
     Raises UsageError where nothing is left.
     """
@@ -52,9 +46,17 @@ def to_record(names: Iterable[str] = (), regex: str = "", exclude: str = "") -> 
     if exclude:
         unwanted = pattern(exclude, "--exclude")
         wanted = {topic for topic in wanted if not unwanted.search(topic.name)}
+
     chosen = [topic for topic in recordable if topic in wanted]
     if not chosen:
         raise UsageError(
             "no topic is left to record: name some, or leave --regex and --exclude out"
         )
     return chosen
+
+
+def _hint(name: str) -> str:
+    close = difflib.get_close_matches(name, topics.BY_NAME, 1)
+    if close:
+        return f"did you mean {close[0]}?"
+    return f"there are {', '.join(sorted(topics.BY_NAME))}"

@@ -1,4 +1,4 @@
-"""The frames in a log: which there are, which one is meant, and what was recognised in it."""
+"""The camera frames in a log: which there are, which one is meant, what was recognised in it."""
 
 from __future__ import annotations
 
@@ -20,25 +20,24 @@ Image = npt.NDArray[np.uint8]
 Depth = npt.NDArray[np.float32]
 
 
-class _Framed(Message, kw_only=True):
-    """As much of a view, a stereo frame or percepts as tells which frame it is, and how many
-    objects it has.
-    """
+class _Numbered(Message, kw_only=True):
+    """The part of a view, a stereo frame or percepts that names the frame, with its objects."""
 
     frame: Count
     objects: list[msgspec.Raw] = []
 
 
-_decoder = msgspec.msgpack.Decoder(_Framed)
+_decoder = msgspec.msgpack.Decoder(_Numbered)
 
 
 @dataclass(frozen=True, slots=True)
-class Sight:
-    """A frame, recorded `at_s` into the log; `percepts` where what was recognised in it is in the
-    log too.
+class CameraFrame:
+    """A camera frame in a log, received `at_s` seconds after the log's first message.
+
+    `percepts` is what was recognised in it, `objects` how many; None and 0 where the log has none.
     """
 
-    frame: int
+    number: int
     stamp_ns: int
     at_s: float
     record: Record
@@ -46,86 +45,85 @@ class Sight:
     objects: int
 
 
-def sights(reader: LogReader, topic: Topic, progress: Progress | None = None) -> list[Sight]:
+def camera_frames(
+    reader: LogReader, topic: Topic, progress: Progress | None = None
+) -> list[CameraFrame]:
     """Every frame on `topic`, which carries images, in order. Raises LogError where there is none."""
-    pictures: list[tuple[Record, _Framed]] = []
-    answers: dict[tuple[int, int], tuple[Record, int]] = {}
+    images: list[tuple[Record, _Numbered]] = []
+    recognised: dict[tuple[int, int], tuple[Record, int]] = {}
     for record in reader.records({topic, topics.PERCEPTS}, progress):
-        framed = _framed(reader, record)
+        numbered = _numbered(reader, record)
         if record.topic is topic:
-            pictures.append((record, framed))
+            images.append((record, numbered))
         else:
-            answers[framed.frame, framed.stamp_ns] = record, len(framed.objects)
-    if not pictures:
-        raise LogError(
-            f"{reader.path} holds no {topic.name}: `cogmap log info {reader.path}` says what it holds"
-        )
+            key = numbered.frame, numbered.stamp_ns
+            recognised[key] = record, len(numbered.objects)
+
+    if not images:
+        raise LogError(_holds_none(reader, topic.name))
     start_ns = reader.span_ns[0]
-    return [
-        Sight(
-            framed.frame,
-            framed.stamp_ns,
-            (record.log_time_ns - start_ns) / 1e9,
-            record,
-            *answers.get((framed.frame, framed.stamp_ns), (None, 0)),
-        )
-        for record, framed in pictures
-    ]
+    frames = []
+    for record, numbered in images:
+        percepts, objects = recognised.get((numbered.frame, numbered.stamp_ns), (None, 0))
+        at_s = (record.log_time_ns - start_ns) / 1e9
+        frame = CameraFrame(numbered.frame, numbered.stamp_ns, at_s, record, percepts, objects)
+        frames.append(frame)
+    return frames
 
 
-def recognised(reader: LogReader, found: list[Sight]) -> list[Sight]:
-    """Those of `found` that percepts tell of. Raises LogError where there is none."""
-    told = [sight for sight in found if sight.percepts is not None]
-    if not told:
-        raise LogError(
-            f"{reader.path} holds no {topics.PERCEPTS.name} of any of its {len(found)} frames: "
-            f"`cogmap log info {reader.path}` says what it holds"
-        )
-    return told
+def with_percepts(reader: LogReader, frames: list[CameraFrame]) -> list[CameraFrame]:
+    """The frames whose percepts are in the log. Raises LogError where there is none."""
+    found = [frame for frame in frames if frame.percepts is not None]
+    if not found:
+        kind = f"{topics.PERCEPTS.name} of any of its {len(frames)} frames"
+        raise LogError(_holds_none(reader, kind))
+    return found
 
 
-def of_frame(found: list[Sight], frame: int, path: object) -> Sight:
-    """The first with that number. Raises UsageError that says which there are."""
-    for sight in found:
-        if sight.frame == frame:
-            return sight
-    near = min(found, key=lambda sight: abs(sight.frame - frame)).frame
-    first = min(sight.frame for sight in found)
-    last = max(sight.frame for sight in found)
+def by_number(frames: list[CameraFrame], number: int, path: object) -> CameraFrame:
+    """The first frame with that number. Raises UsageError naming those that there are."""
+    for frame in frames:
+        if frame.number == number:
+            return frame
+
+    numbers = [frame.number for frame in frames]
+    nearest = min(numbers, key=lambda other: abs(other - number))
     raise UsageError(
-        f"no frame {frame} in {path}: there are {len(found)}, from {first} to {last}, and {near} is the nearest"
+        f"no frame {number} in {path}: there are {len(frames)}, from {min(numbers)} to "
+        f"{max(numbers)}, and {nearest} is the nearest"
     )
 
 
-def at_time(found: list[Sight], at_s: float, reader: LogReader) -> Sight:
-    """The one nearest to `at_s` into the log. Raises UsageError where the log is shorter."""
+def at_time(frames: list[CameraFrame], at_s: float, reader: LogReader) -> CameraFrame:
+    """The frame nearest to `at_s` into the log. Raises UsageError where the log is shorter."""
     if at_s > reader.span_s:
         raise UsageError(
             f"{reader.path} lasts {reader.span_s:.3f} s: choose a time before that, not {at_s:g} s"
         )
-    return min(found, key=lambda sight: abs(sight.at_s - at_s))
+    return min(frames, key=lambda frame: abs(frame.at_s - at_s))
 
 
 def message(reader: LogReader, record: Record) -> Message:
-    """The message of a sight. Raises LogError where it is not what its topic carries."""
+    """The message of a record. Raises LogError where it does not fit its topic."""
     try:
         return reader.message(record)
     except MessageError as error:
         raise LogError(f"{reader.path}: a message cannot be read: {error}") from None
 
 
-def percepts(reader: LogReader, sight: Sight) -> Percepts | None:
-    """What was recognised in it, None where the log does not tell."""
-    if sight.percepts is None:
+def percepts(reader: LogReader, frame: CameraFrame) -> Percepts | None:
+    """What was recognised in a frame, None where it is not in the log. Raises LogError."""
+    if frame.percepts is None:
         return None
-    found = message(reader, sight.percepts)
+    found = message(reader, frame.percepts)
     assert isinstance(found, Percepts)
     return found
 
 
 def image(array: Array, name: str) -> Image:
     """RGB, (h, w, 3). Raises LogError, naming the image by `name`, where it is something else."""
-    if array.dtype != "|u1" or len(array.shape) != 3 or array.shape[2] != 3 or 0 in array.shape:
+    is_rgb = array.dtype == "|u1" and len(array.shape) == 3 and array.shape[2] == 3
+    if not is_rgb or 0 in array.shape:
         raise LogError(
             f"{name}: expected a uint8 image (height, width, 3), got {array.dtype} {array.shape}"
         )
@@ -136,15 +134,20 @@ def depth(array: Array, name: str) -> Depth:
     """Metres, (h, w), 0 unknown. Raises LogError, naming it by `name`, where it is something else."""
     if array.dtype != "<f4" or len(array.shape) != 2 or 0 in array.shape:
         raise LogError(
-            f"{name}: expected a float32 depth image (height, width), got {array.dtype} {array.shape}"
+            f"{name}: expected a float32 depth image (height, width), "
+            f"got {array.dtype} {array.shape}"
         )
     return array.numpy().astype(np.float32, copy=False)
 
 
-def _framed(reader: LogReader, record: Record) -> _Framed:
+def _numbered(reader: LogReader, record: Record) -> _Numbered:
     try:
         return _decoder.decode(reader.payload(record))
     except msgspec.DecodeError as error:
         raise LogError(
             f"{reader.path}: a message of {record.topic_name} cannot be read: {error}"
         ) from None
+
+
+def _holds_none(reader: LogReader, what: str) -> str:
+    return f"{reader.path} holds no {what}: `cogmap log info {reader.path}` shows what it holds"

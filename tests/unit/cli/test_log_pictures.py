@@ -21,7 +21,7 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
 from cli.main import cogmap
-from cli.plots import ground, paint
+from cli.plots import draw, ground
 from cli.plots.labels import Label, place
 from cli.plots.palette import KERB, SEVERAL
 from cogmap.bus.codec import Envelope, encode
@@ -171,7 +171,7 @@ def test_depth_is_coloured_by_distance_grey_where_unknown_and_has_a_scale(
 ) -> None:
     run("image", drive, "--frame", "6", "--depth", "-o", "depth.png")
     shown = read("depth.png")
-    assert shown.shape == (3 * 240, 3 * 320 + paint.SCALE_PX, 3)
+    assert shown.shape == (3 * 240, 3 * 320 + draw.SCALE_PX, 3)
     pixels = shown[1 : 3 * 240 : 3, 1 : 3 * 320 : 3].astype(int)
     grey = np.round(np.array(to_rgb(KERB)) * 255)
     assert np.array_equal(np.abs(pixels - grey).max(-1) <= 1, DEPTH_M == 0)
@@ -290,7 +290,7 @@ def placed(labels: list[Label]) -> tuple[Axes, list[Bbox]]:
         (["image", "-o", "nowhere/view.png"], r"there is no folder nowhere: make it first"),
         (
             ["image", "--frame", "4", "--at", "1"],
-            r"--frame and --at both say which view: leave one out",
+            r"--frame and --at both name a view: leave one out",
         ),
         (
             ["image", "--camera", "left", "--depth"],
@@ -311,7 +311,7 @@ def test_a_log_without_views_or_percepts_says_how_to_see_what_it_holds(
     run: Callable[..., Result], tmp_path: Path
 ) -> None:
     with pytest.raises(
-        LogError, match=r"holds no sensory/view: `cogmap log info .*` says what it holds"
+        LogError, match=r"holds no sensory/view: `cogmap log info .*` shows what it holds"
     ):
         run("image", write(tmp_path / "none.mcap", [answer(4)]))
     with pytest.raises(LogError, match=r"holds no epam/percepts of any of its 1 frames"):

@@ -32,13 +32,13 @@ LEAST_DISPARITY_PX = 2.0
 TICKS = (1.0, 2.0, 5.0)
 
 
-def encoded(image: Image, suffix: str) -> bytes:
+def encode_image(image: Image, suffix: str) -> bytes:
     """The bytes of an image file of the kind that `suffix` names."""
     _, data = cv2.imencode(suffix, cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
     return data.tobytes()
 
 
-def drawn(
+def draw_view(
     image: Image, depth_m: Depth | None, camera: Calibration, objects: list[Percept]
 ) -> Image:
     """The image, or `depth_m` with a scale beside it, each pixel several wide, and `objects` over
