@@ -1,4 +1,6 @@
-"""What landmarks in view tell of where the agent is: the likelihood of eq. 1 (paper §5.4)."""
+"""The measurement model: how likely what is seen of landmarks is at each sample of the self
+(paper §5.4, eq. 1).
+"""
 
 from __future__ import annotations
 
@@ -6,168 +8,209 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from cogmap.geometry.arrays import Booleans
+from cogmap.geometry.arrays import Booleans, Floats, Singles
 from schemas.graph import Node
 from schemas.sensing import Percept
 from services.codelets.localization.motion_model import RANGE
-from services.codelets.localization.sampling import Samples
 
-Singles = npt.NDArray[np.float32]
-LARGEST_SHARE = 0.5
-ENOUGH = 2
+MAX_SD_SHARE = 0.5
+MIN_SIGHTINGS = 2
 MOVING = -1
-TURN = np.float32(2 * np.pi)
-# Squared deviations beyond which densities would be denormal numbers, by which everything is slow.
-IMPOSSIBLE = np.float32(150.0)
+FULL_TURN_RAD = np.float32(2 * np.pi)
+# Beyond this squared distance densities would be denormal numbers, with which everything is slow.
+MAX_MAHALANOBIS2 = np.float32(150.0)
 
 
 class Sighting(NamedTuple):
-    """Landmarks in view, as arrays over those seen: where each is believed and where it is seen.
+    """k known landmarks in view: where each is believed to be and where it is seen.
 
-    A deviation of a half turn says that the bearing is not known, one as large as the range that
-    the range is not.
+    `mean_m` (k, 2) and `covariance_m2` (k, 2, 2) are of the landmark on the map; the rest, (k,)
+    each, of the percept. A bearing is unknown where its standard deviation is at least a half turn,
+    a range where it is at least the range.
     """
 
     labels: tuple[str, ...]
-    mean_m: Samples
-    covariance_m2: Samples
-    bearing_rad: Samples
-    range_m: Samples
-    bearing_sd_rad: Samples
-    range_sd_m: Samples
+    mean_m: Floats
+    covariance_m2: Floats
+    bearing_rad: Floats
+    range_m: Floats
+    bearing_sd_rad: Floats
+    range_sd_m: Floats
 
     @property
     def has_bearing(self) -> Booleans:
-        """Of which the bearing is known."""
+        """(k,): of which the bearing is known."""
         return self.bearing_sd_rad < np.pi
 
     @property
     def has_range(self) -> Booleans:
-        """Of which the range is known."""
+        """(k,): of which the range is known."""
         return self.range_sd_m < self.range_m
 
 
 def has_bearing(percept: Percept) -> bool:
-    """Whether its bearing is known."""
+    """Whether the bearing of a percept is known."""
     return percept.bearing_sd_rad < np.pi
 
 
 def has_range(percept: Percept) -> bool:
-    """Whether its range is known."""
+    """Whether the range of a percept is known."""
     return percept.range_sd_m < percept.range_m
 
 
-def seen_from_here(landmark: Node, stands_ns: int) -> bool:
-    """Whether an agent that stands since `stands_ns` has seen the landmark from where it stands: it
-    sees the same.
-    """
-    return stands_ns != MOVING and int(landmark.attributes.get("stamp_ns", MOVING)) >= stands_ns
-
-
-def sightings(
-    percepts: Iterable[Percept], nodes: Iterable[Node], largest_sd_m: float, stands_ns: int
-) -> Sighting | None:
-    """The percepts whose object among `nodes` is known well enough to tell something; None if there
-    are none.
-
-    Well enough is within `largest_sd_m`, and within half of its distance, since samples on a ring
-    around the agent have a mean where nothing is; and seen there more than once, since a first
-    sighting may have had another's name. Who stands still sees the same again, and that makes
-    nobody surer.
-    """
-    known = {node.attributes.get("label"): node for node in nodes if node.kind == "object"}
-    rows = []
-    for percept in percepts:
-        node = known.get(percept.label)
-        if node is None or node.samples is None or _says_nothing(node, stands_ns):
-            continue
-        samples = np.asarray(node.samples.numpy(), np.float64)[:, :2]
-        mean = np.full(len(samples), 1 / len(samples)) @ samples
-        off = samples - mean
-        covariance = off.T @ off / max(1, len(off) - 1)
-        largest_m = (
-            min(largest_sd_m, LARGEST_SHARE * percept.range_m)
-            if has_range(percept)
-            else largest_sd_m
-        )
-        if covariance[0, 0] + covariance[1, 1] <= 2 * largest_m**2:
-            rows.append((mean, covariance, percept))
-    if not rows:
-        return None
-    means, covariances, known_ones = zip(*rows, strict=True)
-    numbers = [(p.bearing_rad, p.range_m, p.bearing_sd_rad, p.range_sd_m) for p in known_ones]
-    labels = tuple(percept.label for percept in known_ones)
-    return Sighting(labels, np.array(means), np.array(covariances), *np.array(numbers).T)
-
-
-def _says_nothing(landmark: Node, stands_ns: int) -> bool:
-    return int(landmark.attributes.get("sightings", ENOUGH)) < ENOUGH or seen_from_here(
-        landmark, stands_ns
-    )
-
-
 class Comparison(NamedTuple):
-    """How far n samples of the self are off each of k sightings, (k, n) each, of single precision.
+    """How well n samples of the self explain k landmarks in view, (k, n) each, single precision.
 
-    `squared` is in squared deviations; `density` is relative to that of an exact match by a
-    landmark whose place is certain.
+    `squared` is the squared Mahalanobis distance; `density` is relative to that of an exact match
+    with a landmark whose position is certain.
     """
 
     squared: Singles
     density: Singles
 
 
-def compare(samples: Samples, seen: Sighting) -> Comparison:
-    """Each of (n, 7) samples of the self against what is seen.
+def compare(samples: Floats, seen: Sighting) -> Comparison:
+    """Compare (n, 7) samples of the self with what is seen.
 
-    How unsure a landmark's own place makes its range and its bearing is worked out for the middle
-    of the samples.
+    The uncertainty of a landmark's own position is carried to its range and bearing once, at the
+    mean position of the samples.
     """
-    middle = np.full(len(samples), 1 / len(samples)) @ samples[:, :2]
-    bearing_var, range_var = _variances(seen, seen.mean_m - middle)
-    sharp = np.where(seen.has_bearing, seen.bearing_sd_rad**2 / bearing_var, 1.0)
-    sharp *= np.where(seen.has_range, seen.range_sd_m**2 / range_var, 1.0)
-    per_turned = _single(seen.has_bearing / bearing_var)
-    per_away = _single(seen.has_range / range_var)
-    east, north = (_single(seen.mean_m[:, axis, None] - samples[:, axis]) for axis in (0, 1))
-    turned = np.arctan2(north, east)
-    turned -= _single(samples[:, 2])
-    turned -= _single(seen.bearing_rad)[:, None]
-    turned -= TURN * np.rint(turned / TURN)
-    turned *= turned
-    turned *= per_turned[:, None]
-    east *= east
-    north *= north
-    away = np.sqrt(np.add(east, north, out=east), out=east)
-    away *= _single(1 + samples[:, RANGE])
-    away -= _single(seen.range_m)[:, None]
-    away *= away
-    away *= per_away[:, None]
-    squared = np.add(turned, away, out=away)
-    density = np.exp(np.minimum(squared, IMPOSSIBLE, out=turned) / -2)
-    density *= _single(np.sqrt(sharp))[:, None]
+    weights = np.full(len(samples), 1 / len(samples))
+    bearing_var, range_var = _variances(seen, seen.mean_m - weights @ samples[:, :2])
+
+    squared = _squared(samples, seen, bearing_var, range_var)
+    density = np.exp(np.minimum(squared, MAX_MAHALANOBIS2) / -2)
+
+    # A landmark of uncertain position is seen with a flatter density.
+    peak = np.where(seen.has_bearing, seen.bearing_sd_rad**2 / bearing_var, 1.0)
+    peak *= np.where(seen.has_range, seen.range_sd_m**2 / range_var, 1.0)
+    density *= _single(np.sqrt(peak))[:, None]
     return Comparison(squared, density)
 
 
-def _variances(seen: Sighting, off_m: Samples) -> tuple[Samples, Samples]:
-    """(k,) of bearing and of range, of landmarks that are (k, 2) off."""
-    square = np.maximum((off_m**2).sum(axis=1), 1e-6)
-    radial = np.einsum("ka,kab,kb->k", off_m, seen.covariance_m2, off_m) / square
-    across = np.maximum(np.trace(seen.covariance_m2, axis1=1, axis2=2) - radial, 0.0)
-    return seen.bearing_sd_rad**2 + across / square, seen.range_sd_m**2 + radial
+def _squared(samples: Floats, seen: Sighting, bearing_var: Floats, range_var: Floats) -> Singles:
+    """(k, n): squared Mahalanobis distances, computed in place, for they take most of an update."""
+    east_m = _single(seen.mean_m[:, 0, None] - samples[:, 0])
+    north_m = _single(seen.mean_m[:, 1, None] - samples[:, 1])
+
+    bearing = np.arctan2(north_m, east_m)
+    bearing -= _single(samples[:, 2])
+    bearing -= _single(seen.bearing_rad)[:, None]
+    bearing -= FULL_TURN_RAD * np.rint(bearing / FULL_TURN_RAD)
+    bearing *= bearing
+    bearing *= _single(seen.has_bearing / bearing_var)[:, None]
+
+    east_m *= east_m
+    north_m *= north_m
+    distance = np.sqrt(np.add(east_m, north_m, out=east_m), out=east_m)
+    distance *= _single(1 + samples[:, RANGE])
+    distance -= _single(seen.range_m)[:, None]
+    distance *= distance
+    distance *= _single(seen.has_range / range_var)[:, None]
+
+    return np.add(bearing, distance, out=distance)
 
 
-def _single(numbers: Samples) -> Singles:
+def _variances(seen: Sighting, offset_m: Floats) -> tuple[Floats, Floats]:
+    """(k,) variances of bearing and of range, landmarks being at (k, 2) offsets from the agent."""
+    squared_m2 = np.maximum((offset_m**2).sum(axis=1), 1e-6)
+
+    total = np.trace(seen.covariance_m2, axis1=1, axis2=2)
+    radial = np.einsum("ka,kab,kb->k", offset_m, seen.covariance_m2, offset_m) / squared_m2
+    tangential = np.maximum(total - radial, 0.0)
+
+    bearing_var = seen.bearing_sd_rad**2 + tangential / squared_m2
+    range_var = seen.range_sd_m**2 + radial
+    return bearing_var, range_var
+
+
+def _single(numbers: Floats) -> Singles:
     return numbers.astype(np.float32)
 
 
-def log_likelihood(density: Singles, outlier: float) -> Samples:
-    """log of the product over landmarks of p(o_j | l_j, x), (n,), of densities (k, n) (eq. 1).
+def log_likelihood(density: Singles, outlier: float) -> Floats:
+    """(n,): the logarithm of the product over landmarks of p(o_j | l_j, x), from (k, n) densities
+    (eq. 1).
 
-    `outlier` is the share of sightings that may mean anything: a landmark taken for another
+    `outlier` is the share of percepts that may mean anything, so that a landmark taken for another
     outvotes nobody.
     """
-    result = np.log((1 - outlier) * density + outlier).sum(axis=0)
-    return np.asarray(result, np.float64)
+    mixed = (1 - outlier) * density + outlier
+    return np.asarray(np.log(mixed).sum(axis=0), np.float64)
+
+
+class Landmark(NamedTuple):
+    """A landmark on the map: the mean (2,) and covariance (2, 2) of its position."""
+
+    mean_m: Floats
+    covariance_m2: Floats
+
+
+def sightings(
+    percepts: Iterable[Percept], nodes: Iterable[Node], largest_sd_m: float, stands_ns: int
+) -> Sighting | None:
+    """The percepts whose object among `nodes` is known well enough to inform; None without any.
+
+    Well enough is to `largest_sd_m`, and to half of its distance: samples on a ring around the
+    agent have their mean where nothing is. It must also have been seen at least MIN_SIGHTINGS
+    times, since a first sighting may have had another's name, and not from where the agent stands
+    since `stands_ns`: the same view again is no new evidence.
+    """
+    nodes_by_label = {node.attributes.get("label"): node for node in nodes if node.kind == "object"}
+    chosen: list[tuple[Percept, Landmark]] = []
+    for percept in percepts:
+        node = nodes_by_label.get(percept.label)
+        if node is None or not _informs(node, stands_ns):
+            continue
+        landmark = _landmark(node)
+        if landmark is not None and _is_sharp(landmark, percept, largest_sd_m):
+            chosen.append((percept, landmark))
+    return _sighting(chosen) if chosen else None
+
+
+def _is_sharp(landmark: Landmark, percept: Percept, largest_sd_m: float) -> bool:
+    limit_m = largest_sd_m
+    if has_range(percept):
+        limit_m = min(limit_m, MAX_SD_SHARE * percept.range_m)
+    covariance = landmark.covariance_m2
+    return bool(covariance[0, 0] + covariance[1, 1] <= 2 * limit_m**2)
+
+
+def _sighting(chosen: list[tuple[Percept, Landmark]]) -> Sighting:
+    percepts = [percept for percept, _ in chosen]
+    landmarks = [landmark for _, landmark in chosen]
+    return Sighting(
+        labels=tuple(percept.label for percept in percepts),
+        mean_m=np.array([landmark.mean_m for landmark in landmarks]),
+        covariance_m2=np.array([landmark.covariance_m2 for landmark in landmarks]),
+        bearing_rad=np.array([percept.bearing_rad for percept in percepts]),
+        range_m=np.array([percept.range_m for percept in percepts]),
+        bearing_sd_rad=np.array([percept.bearing_sd_rad for percept in percepts]),
+        range_sd_m=np.array([percept.range_sd_m for percept in percepts]),
+    )
+
+
+# What is read from nodes of the graph stands here.
+
+
+def _landmark(node: Node) -> Landmark | None:
+    """The landmark of an object node; None where it has no samples."""
+    if node.samples is None:
+        return None
+    samples = np.asarray(node.samples.numpy(), np.float64)[:, :2]
+    mean_m = np.full(len(samples), 1 / len(samples)) @ samples
+    offset_m = samples - mean_m
+    return Landmark(mean_m, offset_m.T @ offset_m / max(1, len(samples) - 1))
+
+
+def _informs(node: Node, stands_ns: int) -> bool:
+    """Whether another view of the landmark is evidence of where the agent is."""
+    count = int(node.attributes.get("sightings", MIN_SIGHTINGS))
+    return count >= MIN_SIGHTINGS and not seen_from_here(node, stands_ns)
+
+
+def seen_from_here(node: Node, stands_ns: int) -> bool:
+    """Whether an agent that stands since `stands_ns` has seen the landmark from where it stands."""
+    stamp_ns = int(node.attributes.get("stamp_ns", MOVING))
+    return stands_ns != MOVING and stamp_ns >= stands_ns
