@@ -1,9 +1,9 @@
 """Depth from stereo: semi-global matching (Hirschmüller 2008, OpenCV's StereoSGBM), then refined on
-the images.
+the images. Pure.
 
-The matcher's cost does not care about half a pixel (Birchfield and Tomasi 1998), so its disparities
-lean towards whole pixels by up to 0.3: 8 % of the depth at 30 m. Gauss-Newton steps (Lucas and
-Kanade 1981) take that away.
+The matcher's cost ignores half a pixel (Birchfield and Tomasi 1998), so its disparities lean
+towards whole pixels by up to 0.3: 8 % of the depth at 30 m. Gauss-Newton steps (Lucas and Kanade
+1981) correct that.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from cogmap.geometry.arrays import Bytes, Singles
 from schemas.sensing import Calibration
-from services.sensory.image import Bytes, Floats
 
 STEPS_PER_PIXEL = 16
 BLOCK_PX = 5
-MOST_DISPARITIES = 256
+MAX_DISPARITIES = 256
 WINDOW_PX = (9, 9)
 REFINEMENTS = 2
-FARTHEST_STEP_PX = 0.5
-LEAST_PX = 0.25
+MAX_STEP_PX = 0.5
+MIN_DISPARITY_PX = 0.25
 NOISE_GRADIENT = 1.0
 
 
@@ -49,69 +49,85 @@ class StereoMatcher:
             mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY,
         )
 
-    def disparity_px(self, left: Bytes, right: Bytes, refine: bool = True) -> Floats:
+    def disparity_px(self, left: Bytes, right: Bytes, refine: bool = True) -> Singles:
         """How far left each pixel of `left`, RGB (h, w, 3), is in `right`: float32 (h, w), 0 where
         no match is sure.
-
-        The matcher leaves out a strip as wide as its search at the left border, so both images are
-        padded there.
         """
-        grey_left, grey_right = (cv2.cvtColor(image, cv2.COLOR_RGB2GRAY) for image in (left, right))
-        steps = self._matcher.compute(self._padded(grey_left), self._padded(grey_right))[
-            :, self._disparities :
-        ]
-        disparity = steps.astype(np.float32) / np.float32(STEPS_PER_PIXEL)
+        grey_left = cv2.cvtColor(left, cv2.COLOR_RGB2GRAY)
+        grey_right = cv2.cvtColor(right, cv2.COLOR_RGB2GRAY)
+        steps = self._match(grey_left, grey_right)
+        disparity_px = steps.astype(np.float32) / np.float32(STEPS_PER_PIXEL)
         if refine:
-            disparity = refined(disparity, _floats(grey_left), _floats(grey_right))
-        disparity[(steps <= 0) | (disparity <= LEAST_PX)] = 0.0
-        return disparity
+            disparity_px = refined(disparity_px, _singles(grey_left), _singles(grey_right))
+
+        is_unsure = (steps <= 0) | (disparity_px <= MIN_DISPARITY_PX)
+        disparity_px[is_unsure] = 0.0
+        return disparity_px
+
+    def _match(self, left: npt.NDArray[Any], right: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """The matcher's fixed-point disparities. It leaves out a strip as wide as its search at the
+        left border, so both images are padded there.
+        """
+        padded = self._matcher.compute(self._padded(left), self._padded(right))
+        return padded[:, self._disparities :]
 
     def _padded(self, grey: npt.NDArray[Any]) -> npt.NDArray[Any]:
         return cv2.copyMakeBorder(grey, 0, 0, self._disparities, 0, cv2.BORDER_REPLICATE)
 
 
 class DepthFromStereo:
-    """Matches rectified pairs of one calibration, from infinity to `nearest_m` or a little nearer."""
+    """Matches rectified pairs of one calibration, from infinity to about `nearest_m`."""
 
     def __init__(self, calibration: Calibration, nearest_m: float) -> None:
         self._focal_baseline = calibration.fx_px * calibration.baseline_m
-        most = min(MOST_DISPARITIES, calibration.width_px)
-        self._matcher = StereoMatcher(min(self._focal_baseline / nearest_m, most))
+        most_px = min(MAX_DISPARITIES, calibration.width_px)
+        self._matcher = StereoMatcher(min(self._focal_baseline / nearest_m, most_px))
 
-    def depth_m(self, left: Bytes, right: Bytes) -> Floats:
+    def depth_m(self, left: Bytes, right: Bytes) -> Singles:
         """Depth along the optical axis for each pixel of `left`, float32 (h, w), 0 where no match
         is sure.
         """
-        disparity = self._matcher.disparity_px(left, right)
-        depth = np.zeros(disparity.shape, np.float32)
-        np.divide(np.float32(self._focal_baseline), disparity, out=depth, where=disparity > 0)
-        return depth
+        disparity_px = self._matcher.disparity_px(left, right)
+        depth_m = np.zeros(disparity_px.shape, np.float32)
+        focal_baseline = np.float32(self._focal_baseline)
+        np.divide(focal_baseline, disparity_px, out=depth_m, where=disparity_px > 0)
+        return depth_m
 
 
-def refined(disparity: Floats, left: Floats, right: Floats) -> Floats:
+def refined(disparity_px: Singles, left: Singles, right: Singles) -> Singles:
     """Disparity moved to where `left` and the shifted `right`, both grey, differ least around each
     pixel.
 
     Brightness is compared without its local mean, since two cameras seldom agree on it.
     """
-    columns, rows = np.meshgrid(*(np.arange(n, dtype=np.float32) for n in disparity.shape[::-1]))
-    left_slope, right_slope = (
-        cv2.Sobel(grey, cv2.CV_32F, 1, 0, ksize=3, scale=1 / 8) for grey in (left, right)
+    height_px, width_px = disparity_px.shape
+    columns, rows = np.meshgrid(
+        np.arange(width_px, dtype=np.float32), np.arange(height_px, dtype=np.float32)
     )
-    result = disparity
+    left_slope = _slope(left)
+    right_slope = _slope(right)
+
+    result_px = disparity_px
     for _ in range(REFINEMENTS):
-        there = columns - result
-        slope = 0.5 * (left_slope + cv2.remap(right_slope, there, rows, cv2.INTER_LINEAR))
-        error = cv2.remap(right, there, rows, cv2.INTER_LINEAR) - left
+        matched = columns - result_px
+        slope = 0.5 * (left_slope + cv2.remap(right_slope, matched, rows, cv2.INTER_LINEAR))
+        error = cv2.remap(right, matched, rows, cv2.INTER_LINEAR) - left
         error -= _local_mean(error)
-        result = result + _local_mean(slope * error) / (_local_mean(slope * slope) + NOISE_GRADIENT)
-        result = np.clip(result, disparity - FARTHEST_STEP_PX, disparity + FARTHEST_STEP_PX)
-    return result
+
+        step_px = _local_mean(slope * error) / (_local_mean(slope * slope) + NOISE_GRADIENT)
+        least_px = disparity_px - MAX_STEP_PX
+        result_px = np.clip(result_px + step_px, least_px, disparity_px + MAX_STEP_PX)
+    return result_px
 
 
-def _local_mean(values: Floats) -> Floats:
-    return _floats(cv2.boxFilter(values, -1, WINDOW_PX))
+def _slope(grey: Singles) -> Singles:
+    """The change of brightness by column."""
+    return _singles(cv2.Sobel(grey, cv2.CV_32F, 1, 0, ksize=3, scale=1 / 8))
 
 
-def _floats(values: npt.NDArray[Any]) -> Floats:
+def _local_mean(values: Singles) -> Singles:
+    return _singles(cv2.boxFilter(values, -1, WINDOW_PX))
+
+
+def _singles(values: npt.NDArray[Any]) -> Singles:
     return values.astype(np.float32, copy=False)

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from cogmap.errors import MessageError
+from cogmap.geometry.arrays import Bytes
 from schemas.array import Array
 from schemas.sensing import Calibration
-
-Bytes = npt.NDArray[np.uint8]
-Floats = npt.NDArray[np.float32]
 
 
 def colour_image(array: Array, calibration: Calibration, name: str) -> Bytes:
@@ -20,6 +17,7 @@ def colour_image(array: Array, calibration: Calibration, name: str) -> Bytes:
     expected = (calibration.height_px, calibration.width_px, 3)
     if array.dtype != "|u1" or array.shape != expected:
         raise MessageError(
-            f"{name} image: expected uint8 {expected} as calibrated, got {array.dtype} {array.shape}"
+            f"{name} image: expected uint8 {expected} as calibrated, "
+            f"got {array.dtype} {array.shape}"
         )
     return array.numpy().astype(np.uint8, copy=False)

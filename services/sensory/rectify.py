@@ -1,6 +1,4 @@
-"""Rectification: both images as two ideal pinhole cameras, side by side and parallel, would have
-given them.
-"""
+"""Rectification: the images of two ideal pinhole cameras, side by side and parallel. Pure."""
 
 from __future__ import annotations
 
@@ -12,9 +10,13 @@ import msgspec
 import numpy as np
 
 from cogmap.errors import MessageError
+from cogmap.geometry.arrays import Bytes, Singles
 from schemas.sensing import Calibration
-from services.sensory.image import Bytes, Floats
 
+Maps = tuple[Singles, Singles]
+
+MIN_FOCAL_PX = 1.0
+MAX_FOCAL_PX = 1e5
 _STRAIGHT = (0.0, 0.0, 0.0)
 _UNDISTORTED = (0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -30,20 +32,19 @@ class Rectification:
     """
 
     calibration: Calibration
-    left_maps: tuple[Floats, Floats] | None
-    right_maps: tuple[Floats, Floats] | None
+    left_maps: Maps | None
+    right_maps: Maps | None
 
     def apply(self, left: Bytes, right: Bytes) -> tuple[Bytes, Bytes]:
-        """The rectified images, uint8 of the same shapes; what no camera saw is black."""
+        """The rectified images, uint8 of the same shapes, black where no camera saw anything."""
         return _remap(left, self.left_maps), _remap(right, self.right_maps)
 
 
 def rectification(calibration: Calibration) -> Rectification:
     """The rectification for `calibration`. Raises MessageError where it describes no camera."""
-    if (
-        min(calibration.fx_px, calibration.fy_px) < 1.0
-        or max(calibration.fx_px, calibration.fy_px) > 1e5
-    ):
+    least_px = min(calibration.fx_px, calibration.fy_px)
+    most_px = max(calibration.fx_px, calibration.fy_px)
+    if least_px < MIN_FOCAL_PX or most_px > MAX_FOCAL_PX:
         raise MessageError("calibration: the focal lengths must be between 1 and 100000 pixels")
     if calibration.cx_px > calibration.width_px or calibration.cy_px > calibration.height_px:
         raise MessageError("calibration: the principal point must lie in the image")
@@ -52,25 +53,26 @@ def rectification(calibration: Calibration) -> Rectification:
 
 @lru_cache(maxsize=4)
 def _cached(encoded: bytes) -> Rectification:
-    given = msgspec.msgpack.decode(encoded, type=Calibration)
-    plain = msgspec.structs.replace(
-        given,
+    calibration = msgspec.msgpack.decode(encoded, type=Calibration)
+    rectified = msgspec.structs.replace(
+        calibration,
         right_rotation_rad=_STRAIGHT,
         left_distortion=_UNDISTORTED,
         right_distortion=_UNDISTORTED,
     )
-    left = _maps(given, given.left_distortion, _STRAIGHT)
-    right = _maps(given, given.right_distortion, given.right_rotation_rad)
-    return Rectification(plain, left, right)
+    left = _maps(calibration, calibration.left_distortion, _STRAIGHT)
+    right = _maps(calibration, calibration.right_distortion, calibration.right_rotation_rad)
+    return Rectification(rectified, left, right)
 
 
 def _maps(
     calibration: Calibration,
     distortion: tuple[float, ...],
     rotation_rad: tuple[float, float, float],
-) -> tuple[Floats, Floats] | None:
+) -> Maps | None:
     if distortion == _UNDISTORTED and rotation_rad == _STRAIGHT:
         return None
+
     camera = np.array(
         [
             [calibration.fx_px, 0.0, calibration.cx_px],
@@ -80,17 +82,17 @@ def _maps(
     )
     to_left, _ = cv2.Rodrigues(np.array(rotation_rad))
     size = (calibration.width_px, calibration.height_px)
-    maps = cv2.initUndistortRectifyMap(
+    columns, rows = cv2.initUndistortRectifyMap(
         camera, np.array(distortion), to_left, camera, size, cv2.CV_32FC1
     )
-    if not all(np.isfinite(part).all() for part in maps):
+    if not (np.isfinite(columns).all() and np.isfinite(rows).all()):
         raise MessageError("calibration: its distortion maps pixels to infinity")
-    return maps[0].astype(np.float32, copy=False), maps[1].astype(np.float32, copy=False)
+    return columns.astype(np.float32, copy=False), rows.astype(np.float32, copy=False)
 
 
-def _remap(image: Bytes, maps: tuple[Floats, Floats] | None) -> Bytes:
-    return (
-        image
-        if maps is None
-        else cv2.remap(image, maps[0], maps[1], cv2.INTER_LINEAR).astype(np.uint8, copy=False)
-    )
+def _remap(image: Bytes, maps: Maps | None) -> Bytes:
+    if maps is None:
+        return image
+    columns, rows = maps
+    rectified = cv2.remap(image, columns, rows, cv2.INTER_LINEAR)
+    return rectified.astype(np.uint8, copy=False)

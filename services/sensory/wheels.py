@@ -1,6 +1,4 @@
-"""What the wheels say of the motion between two views, how sure that is, and what becomes of it
-with what was seen.
-"""
+"""The wheels' motion between two views, its uncertainty, its fusion with what was seen. Pure."""
 
 from __future__ import annotations
 
@@ -8,41 +6,53 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from services.sensory.visual_odometry import Matrix, Motion
+from cogmap.geometry.arrays import Floats
+from services.sensory.visual_odometry import Motion
 
 STILL_M = 1e-3
 
 
 @dataclass(frozen=True)
 class WheelNoise:
-    """Multiplicative noise on both speeds, and drift in heading with the square root of the way."""
+    """Standard deviations: factors on both speeds, and drift of heading with the root of the
+    distance.
+    """
 
     speed: float
     turn: float
     drift_rad_per_sqrt_m: float
 
-    def total(self, rows: Matrix) -> Motion:
-        """The motion that (n, 3) rows of speed, turn rate and duration add up to."""
-        way = rows[:, 0] * rows[:, 2]
-        turn = rows[:, 1] * rows[:, 2]
-        turn_var = (self.turn * turn) ** 2 + self.drift_rad_per_sqrt_m**2 * np.abs(way)
-        way_sd = np.sqrt(((self.speed * way) ** 2).sum())
-        turn_sd = np.sqrt(turn_var.sum())
-        return Motion(float(way.sum()), float(turn.sum()), float(way_sd), float(turn_sd))
+    def total(self, rows: Floats) -> Motion:
+        """The sum of (n, 3) rows of speed, turn rate and duration."""
+        distance_m = rows[:, 0] * rows[:, 2]
+        turn_rad = rows[:, 1] * rows[:, 2]
+
+        distance_var_m2 = (self.speed * distance_m) ** 2
+        drift_var_rad2 = self.drift_rad_per_sqrt_m**2 * np.abs(distance_m)
+        turn_var_rad2 = (self.turn * turn_rad) ** 2 + drift_var_rad2
+        return Motion(
+            distance_m=float(distance_m.sum()),
+            turn_rad=float(turn_rad.sum()),
+            distance_sd_m=float(np.sqrt(distance_var_m2.sum())),
+            turn_sd_rad=float(np.sqrt(turn_var_rad2.sum())),
+        )
 
 
-def fuse(rows: Matrix, motion: Motion, wheels: Motion) -> Matrix:
-    """The rows, (n, 5) with standard deviations of both speeds, made to add up to `motion`.
+def fuse(rows: Floats, motion: Motion, wheels: Motion) -> Floats:
+    """The rows, (n, 5) with standard deviations of both speeds, adjusted to add up to `motion`.
 
-    The wheels tell how it went on between the two views, `motion` how far it came to.
+    How the motion was spread over the time between the views is known from the wheels alone.
     """
     if not len(rows):
         return np.zeros((0, 5))
-    speed, turn_rate, dt = rows.T
-    if abs(wheels.way_m) > STILL_M:
-        speed = speed * motion.way_m / wheels.way_m
-    turn_rate = turn_rate + (motion.turn_rad - wheels.turn_rad) / dt.sum()
-    share = 1 / (dt * np.sqrt(len(rows)))
-    return np.column_stack(
-        [speed, turn_rate, dt, motion.way_sd_m * share, motion.turn_sd_rad * share]
-    )
+
+    speed_m_s, turn_rate_rad_s, dt_s = rows.T
+    if abs(wheels.distance_m) > STILL_M:
+        speed_m_s = speed_m_s * motion.distance_m / wheels.distance_m
+    turn_error_rad = motion.turn_rad - wheels.turn_rad
+    turn_rate_rad_s = turn_rate_rad_s + turn_error_rad / dt_s.sum()
+
+    share = 1 / (dt_s * np.sqrt(len(rows)))
+    speed_sd_m_s = motion.distance_sd_m * share
+    turn_rate_sd_rad_s = motion.turn_sd_rad * share
+    return np.column_stack([speed_m_s, turn_rate_rad_s, dt_s, speed_sd_m_s, turn_rate_sd_rad_s])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import pairwise
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -108,9 +109,33 @@ def test_the_first_frame_without_earlier_odometry_has_no_motion() -> None:
     assert (motion.since_ns, motion.motions.shape) == (4 * STEP_NS, (0, 5))
 
 
-def test_frames_and_odometry_that_came_before_are_passed_over() -> None:
+def test_older_frames_and_odometry_are_ignored() -> None:
     messages = [_odometry(1), _odometry(2), _frame(0, 2)]
-    assert len(_said([*messages, _frame(0, 2), _frame(7, 1), _odometry(2), _odometry(1)])) == 3
+    assert len(_said([*messages, _frame(7, 1), _odometry(2), _odometry(1)])) == 3
+
+
+def _plain(messages: Iterable[Message]) -> list[bytes]:
+    """The messages as bytes, without their number."""
+    return [codec.encode(msgspec.structs.replace(message, seq=0)) for message in messages]
+
+
+def test_the_last_frame_published_again_gets_the_same_answer_again() -> None:
+    rows = [_odometry(step) for step in range(1, 9)]
+    module = build(Config(), "sensory")
+    for message in (*rows[:4], _frame(0, 4), *rows[4:]):
+        module.feed(message)
+    answer = module.feed(_frame(1, 8))
+    for row in rows[4:]:
+        assert module.feed(row) == []
+    assert _plain(module.feed(_frame(1, 8))) == _plain(answer)
+
+
+def test_a_frame_published_again_is_integrated_only_once() -> None:
+    rows = [_odometry(step) for step in range(1, 13)]
+    frames = [_frame(0, 4), _frame(1, 8), _frame(2, 12)]
+    once = [*rows[:4], frames[0], *rows[4:8], frames[1], *rows[8:], frames[2]]
+    twice = [*rows[:4], frames[0], *rows[4:8], frames[1], frames[1], *rows[8:], frames[2]]
+    assert _plain(_said(twice)[-3:]) == _plain(_said(once)[-3:])
 
 
 def test_the_view_keeps_the_frames_image_and_its_calibration_where_nothing_is_to_rectify() -> None:

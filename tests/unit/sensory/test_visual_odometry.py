@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from schemas.sensing import Calibration
-from services.sensory.visual_odometry import Motion, VisualMotion
+from services.sensory.visual_odometry import Motion, VisualOdometry
 from services.sensory.wheels import WheelNoise, fuse
 
 CAMERA = Calibration(
@@ -23,8 +23,8 @@ CAMERA = Calibration(
 WALL_M = 12.0
 
 
-def _view(way_m: float, turn_rad: float) -> tuple[np.ndarray, np.ndarray]:
-    """A wall at WALL_M seen after so much way ahead and a turn to the left, and its depth."""
+def _view(distance_m: float, turn_rad: float) -> tuple[np.ndarray, np.ndarray]:
+    """A wall at WALL_M seen after a distance ahead and a turn to the left, and its depth."""
     texture = cv2.GaussianBlur(
         np.random.default_rng(7).integers(0, 255, (2000, 2000), np.uint8), (0, 0), 6
     )
@@ -33,30 +33,32 @@ def _view(way_m: float, turn_rad: float) -> tuple[np.ndarray, np.ndarray]:
     right = (column - CAMERA.cx_px) / CAMERA.fx_px
     down = (row - CAMERA.cy_px) / CAMERA.fy_px
     ahead = np.cos(turn_rad) + right * np.sin(turn_rad)
-    depth = (WALL_M - way_m) / ahead
+    depth = (WALL_M - distance_m) / ahead
     across = (right * np.cos(turn_rad) - np.sin(turn_rad)) * depth
     at = [(1000 + 50 * across).astype(np.float32), (1000 + 50 * down * depth).astype(np.float32)]
     grey = cv2.remap(texture, at[0], at[1], cv2.INTER_LINEAR)
     return cv2.cvtColor(grey, cv2.COLOR_GRAY2RGB), depth.astype(np.float32)
 
 
-@pytest.mark.parametrize(("way_m", "turn_rad"), [(0.6, 0.0), (0.5, 0.1), (0.0, -0.15), (0.8, 0.02)])
-def test_views_tell_way_and_turn_far_better_than_noisy_wheels(way_m, turn_rad):
-    seen = VisualMotion()
-    said = Motion(way_m * 1.1, turn_rad + 0.03, 0.1 * way_m + 1e-3, 0.03)
-    seen.fuse(*_view(0.0, 0.0), CAMERA, Motion(0.0, 0.0, 1e-3, 1e-3))
-    motion = seen.fuse(*_view(way_m, turn_rad), CAMERA, said)
+@pytest.mark.parametrize(
+    ("distance_m", "turn_rad"), [(0.6, 0.0), (0.5, 0.1), (0.0, -0.15), (0.8, 0.02)]
+)
+def test_views_measure_distance_and_turn_far_better_than_noisy_wheels(distance_m, turn_rad):
+    odometry = VisualOdometry()
+    said = Motion(distance_m * 1.1, turn_rad + 0.03, 0.1 * distance_m + 1e-3, 0.03)
+    odometry.update(*_view(0.0, 0.0), CAMERA, Motion(0.0, 0.0, 1e-3, 1e-3))
+    motion = odometry.update(*_view(distance_m, turn_rad), CAMERA, said)
     assert motion.turn_rad == pytest.approx(turn_rad, abs=0.004)
-    assert motion.way_m == pytest.approx(way_m, abs=0.04)
+    assert motion.distance_m == pytest.approx(distance_m, abs=0.04)
     assert motion.turn_sd_rad < said.turn_sd_rad / 5
 
 
-def test_a_view_without_texture_leaves_the_word_to_the_wheels():
-    seen = VisualMotion()
+def test_without_texture_the_motion_is_that_of_the_wheels():
+    odometry = VisualOdometry()
     wheels = Motion(0.5, 0.1, 0.05, 0.02)
     blank = np.full((240, 320, 3), 90, np.uint8), np.full((240, 320), 9.0, np.float32)
-    seen.fuse(*blank, CAMERA, wheels)
-    assert seen.fuse(*blank, CAMERA, wheels) == wheels
+    odometry.update(*blank, CAMERA, wheels)
+    assert odometry.update(*blank, CAMERA, wheels) == wheels
 
 
 def test_fused_rows_add_up_to_the_fused_motion_and_its_spread():
@@ -70,4 +72,4 @@ def test_fused_rows_add_up_to_the_fused_motion_and_its_spread():
 
 def test_wheels_that_stand_still_have_no_noise():
     still = WheelNoise(0.1, 0.1, 0.02).total(np.array([[0.0, 0.0, 0.05]] * 4))
-    assert (still.way_sd_m, still.turn_sd_rad) == (0.0, 0.0)
+    assert (still.distance_sd_m, still.turn_sd_rad) == (0.0, 0.0)

@@ -1,0 +1,67 @@
+"""Odometry between two views. Pure."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cogmap.errors import MessageError
+from cogmap.geometry.arrays import Floats
+from schemas.sensing import Odometry
+
+NS_PER_S = 1_000_000_000
+MAX_SPEED_M_S = 100.0
+MAX_TURN_RATE_RAD_S = 100.0
+
+
+class OdometryBuffer:
+    """Odometry that no view has accounted for yet, in order of time."""
+
+    def __init__(self, longest_gap_s: float) -> None:
+        self._longest_gap_ns = int(longest_gap_s * NS_PER_S)
+        self._rows: list[Odometry] = []
+        self.newest_ns: int | None = None
+
+    def add(self, row: Odometry) -> None:
+        """Add `row`; one that is no newer than the last is ignored. Raises MessageError where it is
+        too fast or too far ahead.
+        """
+        speed_m_s = row.speed_m_s
+        turn_rate_rad_s = row.turn_rate_rad_s
+        if abs(speed_m_s) > MAX_SPEED_M_S or abs(turn_rate_rad_s) > MAX_TURN_RATE_RAD_S:
+            raise MessageError(
+                f"odometry: no wheels do {speed_m_s:g} m/s and {turn_rate_rad_s:g} rad/s"
+            )
+
+        self.check_near(row.stamp_ns, "odometry")
+        if self.newest_ns is None or row.stamp_ns > self.newest_ns:
+            self._rows.append(row)
+            self.newest_ns = row.stamp_ns
+
+    def check_near(self, stamp_ns: int, name: str) -> None:
+        """Raise MessageError where `stamp_ns` is so far ahead that everything up to it would be
+        ignored from then on.
+        """
+        if self.newest_ns is None or stamp_ns <= self.newest_ns + self._longest_gap_ns:
+            return
+        ahead_s = (stamp_ns - self.newest_ns) / NS_PER_S
+        raise MessageError(
+            f"{name}: {ahead_s:.0f} s ahead of the odometry; restart sensory if that is right"
+        )
+
+    def covers(self, stamp_ns: int) -> bool:
+        """Whether everything up to `stamp_ns` has come."""
+        return self.newest_ns is not None and self.newest_ns >= stamp_ns
+
+    def take(self, until_ns: int) -> tuple[int | None, Floats]:
+        """Remove the odometry up to `until_ns`: when it began (None where there is none), and
+        (n, 3) rows of speed, turn rate and duration.
+        """
+        taken = [row for row in self._rows if row.stamp_ns <= until_ns]
+        self._rows = self._rows[len(taken) :]
+        rows = [(row.speed_m_s, row.turn_rate_rad_s, row.dt_s) for row in taken]
+        began_ns = _began_ns(taken[0]) if taken else None
+        return began_ns, np.array(rows, np.float64).reshape(-1, 3)
+
+
+def _began_ns(row: Odometry) -> int:
+    return max(0, row.stamp_ns - round(row.dt_s * NS_PER_S))
