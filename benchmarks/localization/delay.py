@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from cogmap.data.mrclam import Numbers
+from cogmap.geometry.arrays import Floats
 
 LAGS_S = np.arange(0.0, 0.525, 0.025)
 TOGETHER_S = 0.6
@@ -30,7 +30,7 @@ class Delay:
         """None, until there is enough to tell by."""
         return float(LAGS_S[self._off.argmin()]) if self._pairs >= ENOUGH else 0.0
 
-    def see(self, sightings: Numbers, heading_rad: Callable[[Numbers], Numbers]) -> None:
+    def see(self, sightings: Floats, heading_rad: Callable[[Floats], Floats]) -> None:
         """Take in (n, 4) rows of stamp, subject, range and bearing, of now."""
         for stamp, subject, _, bearing in sightings.tolist():
             before = self._last.get(subject)

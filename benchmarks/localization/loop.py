@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.localization.senses import Moment
-from cogmap.data.mrclam import Numbers
+from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import object_id
 from schemas.array import Array
 from schemas.cognition import Task
@@ -139,12 +139,12 @@ class Mind:
         )
 
     @property
-    def path(self) -> Numbers:
+    def path(self) -> Floats:
         """(n, 7) rows of the path as it is on the map now: stamp_s, pose, and path integration's."""
         return rows_of(self._ledger.graph.nodes.values())
 
     @property
-    def odometry(self) -> Numbers:
+    def odometry(self) -> Floats:
         """(3,): where path integration alone would have the agent."""
         return odometry_of(self._ledger.graph.nodes[SELF])
 

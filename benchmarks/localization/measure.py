@@ -17,7 +17,8 @@ from benchmarks.localization.loop import Mind
 from benchmarks.localization.senses import Moment, label_of, moments
 from benchmarks.map_correction.measure import trajectory_error_m
 from benchmarks.threshold import at_most
-from cogmap.data.mrclam import Numbers, Recording, Robot, read
+from cogmap.data.mrclam import Recording, Robot, read
+from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import compose, relative
 from services.codelets.mapping.path import ODOMETRY, POSE, STAMP
 
@@ -59,7 +60,7 @@ def measure(folder: Path, processes: int) -> dict[str, float]:
 def _told(recording: Recording) -> dict[str, float]:
     return {
         "landmark_sightings": float(
-            sum(len(robot.landmark_sightings) for robot in recording.robots)
+            sum(len(robot.landmark_observations) for robot in recording.robots)
         ),
         "unread_barcodes": float(sum(robot.unread for robot in recording.robots)),
     }
@@ -82,7 +83,7 @@ def judge(robot: Robot, landmarks: Landmarks) -> dict[str, float]:
     ]
     slam = [follow(heard, {}, (0.0, 0.0, 0.0), seed) for seed in SEEDS]
 
-    def aligned_m(path: Numbers) -> float:
+    def aligned_m(path: Floats) -> float:
         return trajectory_error_m(path[judged, :2], truth[judged, :2])
 
     return {
@@ -104,11 +105,11 @@ class Drive(NamedTuple):
     `path` in the end.
     """
 
-    online: Numbers
-    odometry: Numbers
-    path: Numbers
+    online: Floats
+    odometry: Floats
+    path: Floats
 
-    def corrected(self, stamps_s: Numbers) -> Numbers:
+    def corrected(self, stamps_s: Floats) -> Floats:
         """(n, 3) poses at the moments as the map has them in the end: each by the path's last place
         before it.
         """
@@ -163,11 +164,11 @@ def _recovery_s(robot: Robot, landmarks: Landmarks) -> float:
     return float(stamps[found] - stamps[after[0]])
 
 
-def _rmse(path: Numbers, truth: Numbers) -> float:
+def _rmse(path: Floats, truth: Floats) -> float:
     return float(np.sqrt(np.square(path[:, :2] - truth[:, :2]).sum(axis=1).mean()))
 
 
-def _truth(robot: Robot, stamps_s: Numbers) -> tuple[Numbers, np.ndarray]:
+def _truth(robot: Robot, stamps_s: Floats) -> tuple[Floats, np.ndarray]:
     """(n, 3) true poses at `stamps_s`, and where motion capture saw the robot just before and just
     after.
     """

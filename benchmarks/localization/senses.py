@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.localization.delay import Delay
-from cogmap.data.mrclam import Numbers, Robot
+from cogmap.data.mrclam import Robot
+from cogmap.geometry.arrays import Floats
 from schemas.sensing import Percept
 from services.sensory.module import Config as SensoryConfig
 
@@ -27,7 +28,7 @@ class Moment:
     """
 
     stamp_s: float
-    motions: Numbers
+    motions: Floats
     percepts: list[Percept]
     tick: bool
 
@@ -37,7 +38,7 @@ def label_of(subject: int) -> str:
     return f"landmark-{subject}"
 
 
-def percept_of(row: Numbers) -> Percept:
+def percept_of(row: Floats) -> Percept:
     """A sighting (stamp, subject, range, bearing) as a percept: noise 3 % of the distance, as the
     paper's, and 1°.
 
@@ -69,18 +70,18 @@ class Wheels:
     the log does not matter.
     """
 
-    def __init__(self, odometry: Numbers) -> None:
+    def __init__(self, odometry: Floats) -> None:
         self._stamps = odometry[:, 0]
         self._speeds = odometry[:, 1:3]
         turned = np.concatenate([[0.0], np.cumsum(odometry[:-1, 2] * np.diff(self._stamps))])
         self._turned = turned
 
-    def heading_rad(self, stamps_s: Numbers) -> Numbers:
+    def heading_rad(self, stamps_s: Floats) -> Floats:
         """What the turns add up to at each of `stamps_s`."""
-        heading: Numbers = np.interp(stamps_s, self._stamps, self._turned)
+        heading: Floats = np.interp(stamps_s, self._stamps, self._turned)
         return heading
 
-    def rows(self, since_s: float, until_s: float) -> Numbers:
+    def rows(self, since_s: float, until_s: float) -> Floats:
         """(n, 5) rows of self-motion, one for each time that the command changed in between."""
         first = max(0, int(np.searchsorted(self._stamps, since_s, "right")) - 1)
         last = int(np.searchsorted(self._stamps, until_s, "left"))
@@ -108,7 +109,7 @@ def moments(robot: Robot, skipped_s: tuple[float, float] | None = None) -> Itera
     """
     begin_s = float(robot.odometry[0, 0])
     end_s = float(robot.odometry[-1, 0])
-    seen = robot.landmark_sightings
+    seen = robot.landmark_observations
     seen = seen[(seen[:, 0] > begin_s) & (seen[:, 0] <= end_s)]
     ticks = np.arange(begin_s + TICK_S, end_s, TICK_S)
     stamps = np.union1d(ticks, seen[:, 0])
@@ -129,7 +130,7 @@ def moments(robot: Robot, skipped_s: tuple[float, float] | None = None) -> Itera
         moved_until_s = sensed_s
 
 
-def _percepts(rows: Numbers) -> list[Percept]:
+def _percepts(rows: Floats) -> list[Percept]:
     """One percept for each landmark: of two barcodes read at once under one name, the first."""
     found: dict[int, Percept] = {}
     for row in rows:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.localization.senses import Moment
-from cogmap.data.mrclam import Numbers
 from cogmap.errors import UsageError
+from cogmap.geometry.arrays import Floats
 
 gtsam: Any
 try:
@@ -31,7 +31,7 @@ def check_installed() -> None:
         )
 
 
-def smooth(moments: list[Moment]) -> Numbers:
+def smooth(moments: list[Moment]) -> Floats:
     """(n, 3) poses at the moments that fit all percepts and motions best, landmarks unknown, the
     start at 0.
 
@@ -83,7 +83,7 @@ def _add_percepts(graph: Any, start: Any, index: int, pose: Any, moment: Moment)
             start.insert(landmark, pose.transformFrom(ahead))
 
 
-def _step(rows: Numbers) -> tuple[Numbers, Numbers]:
+def _step(rows: Floats) -> tuple[Floats, Floats]:
     """The pose that (n, 5) rows of motion lead to from 0, and its standard deviations."""
     speed, turn_rate, dt, speed_sd, turn_rate_sd = rows.T
     turn = turn_rate * dt

@@ -6,11 +6,12 @@ from pathlib import Path
 
 from cogmap.errors import UsageError
 
+_MAX_SHOWN = 60
+
 
 def wrong_line(path: Path, number: int, line: str, expected: str) -> UsageError:
-    """The error for line `number`, counted from 1, of the file at `path`, where `expected` should
-    stand.
-    """
+    """The error for line `number`, counted from 1, of the file at `path`, which lacks `expected`."""
     shown = line.strip()
-    shown = shown if len(shown) <= 60 else f"{shown[:60]}…"
+    if len(shown) > _MAX_SHOWN:
+        shown = f"{shown[:_MAX_SHOWN]}…"
     return UsageError(f"{path}, line {number}: expected {expected}, got '{shown}'")

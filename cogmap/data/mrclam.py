@@ -1,4 +1,4 @@
-"""UTIAS MRCLAM folders: robots that drive among landmarks, each with odometry and sightings of
+"""UTIAS MRCLAM folders: robots that drive among landmarks, each with odometry and observations of
 barcodes.
 
 Leung, Halpern, Barfoot and Liu (2011), doi 10.1177/0278364911398404. Files are whitespace-separated
@@ -14,35 +14,36 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from cogmap.data.lines import wrong_line
 from cogmap.errors import UsageError
+from cogmap.geometry.arrays import Floats
 
-Numbers = npt.NDArray[np.float64]
 ROBOTS = range(1, 6)
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
 @dataclass(frozen=True)
 class Robot:
-    """One robot's log, each in order of time, stamps in seconds of one clock.
+    """One robot's log, each part in order of time, stamps in seconds of one clock.
 
-    `odometry`: (n, 3) stamp, forward speed in m/s, turn rate in rad/s. `sightings`: (n, 4) stamp,
+    `odometry`: (n, 3) stamp, forward speed in m/s, turn rate in rad/s. `observations`: (n, 4) stamp,
     subject, range_m, bearing_rad, left positive. `truth`: (n, 4) stamp, x_m, y_m, heading_rad, from
-    motion capture: for judges only. `unread`: how many sightings had a barcode that is nobody's,
-    and were left out.
+    motion capture: for evaluation only. `unread`: how many observations were of a barcode that
+    belongs to no subject, and were left out.
     """
 
     number: int
-    odometry: Numbers
-    sightings: Numbers
-    truth: Numbers
+    odometry: Floats
+    observations: Floats
+    truth: Floats
     unread: int
 
     @property
-    def landmark_sightings(self) -> Numbers:
-        """Those sightings that are not of robots."""
-        return self.sightings[self.sightings[:, 1] > ROBOTS[-1]]
+    def landmark_observations(self) -> Floats:
+        """The observations that are not of robots."""
+        is_landmark = self.observations[:, 1] > ROBOTS[-1]
+        return self.observations[is_landmark]
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,35 @@ class Recording:
     landmarks: dict[int, tuple[float, float]]
 
 
+@dataclass(frozen=True)
+class _Columns:
+    """What a line of a file holds: how many numbers, and which of them must be above 0, if any."""
+
+    number: int
+    expected: str
+    positive: int | None = None
+
+    def fit(self, rows: Floats) -> bool:
+        """Whether an array (n, columns) holds such numbers."""
+        if rows.shape[1:] != (self.number,) or not np.isfinite(rows).all():
+            return False
+        return self.positive is None or bool((rows[:, self.positive] > 0).all())
+
+    def fit_words(self, words: list[str]) -> bool:
+        """Whether the words of a line are such numbers."""
+        if not all(_NUMBER.fullmatch(word) for word in words):
+            return False
+        values = [float(word) for word in words]
+        return self.fit(np.array([values]))
+
+
+_BARCODES = _Columns(2, "a subject and its barcode")
+_LANDMARKS = _Columns(5, "a subject, x, y and their standard deviations")
+_ODOMETRY = _Columns(3, "a time, a speed and a turn rate")
+_OBSERVATIONS = _Columns(4, "a time, a barcode, a range above 0 and a bearing", positive=2)
+_TRUTH = _Columns(4, "a time, x, y and a heading")
+
+
 def read(folder: Path) -> Recording:
     """The set in `folder`. Raises UsageError naming a file that is missing, or the line that is
     wrong.
@@ -62,87 +92,83 @@ def read(folder: Path) -> Recording:
         raise UsageError(
             f"there is no folder {folder}: give one with an MRCLAM set, such as MRCLAM_Dataset6"
         )
-    barcodes = _table(folder, "Barcodes", 2, "a subject and its barcode")
+    barcodes = _table(folder, "Barcodes", _BARCODES)
     subject_of = {int(barcode): int(subject) for subject, barcode in barcodes}
-    rows = _table(
-        folder, "Landmark_Groundtruth", 5, "a subject, x, y and their standard deviations"
-    )
-    landmarks = {int(row[0]): (float(row[1]), float(row[2])) for row in rows}
-    found = [n for n in ROBOTS if _path(folder, f"Robot{n}_Odometry") is not None]
-    if not found:
+    surveyed = _table(folder, "Landmark_Groundtruth", _LANDMARKS)
+    landmarks = {int(row[0]): (float(row[1]), float(row[2])) for row in surveyed}
+
+    numbers = [n for n in ROBOTS if _path(folder, f"Robot{n}_Odometry") is not None]
+    if not numbers:
         raise UsageError(f"{folder} has no Robot1_Odometry.dat: give the folder of an MRCLAM set")
-    return Recording(
-        folder.name, [_robot(folder, number, subject_of) for number in found], landmarks
-    )
+    robots = [_robot(folder, number, subject_of) for number in numbers]
+    return Recording(folder.name, robots, landmarks)
 
 
 def _robot(folder: Path, number: int, subject_of: dict[int, int]) -> Robot:
     name = f"Robot{number}"
-    odometry = _table(folder, f"{name}_Odometry", 3, "a time, a speed and a turn rate")
-    seen = _table(
-        folder,
-        f"{name}_Measurement",
-        4,
-        "a time, a barcode, a range above 0 and a bearing",
-        positive=2,
-    )
-    truth = _table(folder, f"{name}_Groundtruth", 4, "a time, x, y and a heading")
-    subjects = np.array([subject_of.get(int(barcode), 0) for barcode in seen[:, 1]])
-    sightings = np.column_stack([seen[:, 0], subjects, seen[:, 2:]])[subjects > 0]
+    odometry = _table(folder, f"{name}_Odometry", _ODOMETRY)
+    measured = _table(folder, f"{name}_Measurement", _OBSERVATIONS)
+    truth = _table(folder, f"{name}_Groundtruth", _TRUTH)
+
+    subjects = np.array([subject_of.get(int(barcode), 0) for barcode in measured[:, 1]])
+    observations = np.column_stack([measured[:, 0], subjects, measured[:, 2:]])
+    is_known = subjects > 0
     return Robot(
-        number, _by_time(odometry), _by_time(sightings), _by_time(truth), int((subjects == 0).sum())
+        number,
+        odometry=_by_time(odometry),
+        observations=_by_time(observations[is_known]),
+        truth=_by_time(truth),
+        unread=int((~is_known).sum()),
     )
 
 
-def _by_time(rows: Numbers) -> Numbers:
+def _by_time(rows: Floats) -> Floats:
     return rows[np.argsort(rows[:, 0], kind="stable")]
 
 
 def _path(folder: Path, name: str) -> Path | None:
-    paths = (folder / f"{name}.dat", folder / f"{name}.dat.xz")
-    return next((path for path in paths if path.is_file()), None)
+    for path in (folder / f"{name}.dat", folder / f"{name}.dat.xz"):
+        if path.is_file():
+            return path
+    return None
 
 
-def _table(
-    folder: Path, name: str, columns: int, expected: str, positive: int | None = None
-) -> Numbers:
-    """The numbers in a file, (n, columns), the column `positive` above 0."""
+def _table(folder: Path, name: str, columns: _Columns) -> Floats:
+    """The numbers in a file, (n, columns). Raises UsageError."""
     path = _path(folder, name)
     if path is None:
         raise UsageError(
             f"{folder} has no {name}.dat: give the folder of an MRCLAM set, with every file in it"
         )
+
     text = _text(path)
-    if not any(line.partition("#")[0].strip() for line in text.splitlines()):
-        raise UsageError(f"{path} has no line with {expected}")
+    contents = [line.partition("#")[0].split() for line in text.splitlines()]
+    if not any(contents):
+        raise UsageError(f"{path} has no line with {columns.expected}")
     try:
-        rows = np.loadtxt(io.StringIO(text), comments="#", ndmin=2)
+        rows: Floats = np.loadtxt(io.StringIO(text), comments="#", ndmin=2)
     except ValueError:
         rows = np.empty((0, 0))
-    if (
-        rows.shape[1:] == (columns,)
-        and np.isfinite(rows).all()
-        and (positive is None or (rows[:, positive] > 0).all())
-    ):
+    if columns.fit(rows):
         return rows
-    for number, line in enumerate(text.splitlines(), 1):
-        content = line.partition("#")[0].split()
-        if content and not _fits(content, columns, positive):
-            raise wrong_line(path, number, line, expected)
-    raise UsageError(f"{path} has lines that are not {expected}")
+    raise _first_wrong(path, text.splitlines(), contents, columns)
+
+
+def _first_wrong(
+    path: Path, lines: list[str], contents: list[list[str]], columns: _Columns
+) -> UsageError:
+    """The error that names the first line whose content does not fit."""
+    for number, (line, words) in enumerate(zip(lines, contents, strict=True), 1):
+        if words and not columns.fit_words(words):
+            return wrong_line(path, number, line, columns.expected)
+    return UsageError(f"{path} has lines that are not {columns.expected}")
 
 
 def _text(path: Path) -> str:
     try:
         raw = path.read_bytes()
-        return (lzma.decompress(raw) if path.suffix == ".xz" else raw).decode()
+        if path.suffix == ".xz":
+            raw = lzma.decompress(raw)
+        return raw.decode()
     except (OSError, lzma.LZMAError, UnicodeDecodeError) as error:
         raise UsageError(f"{path} cannot be read: {error}") from None
-
-
-def _fits(content: list[str], columns: int, positive: int | None) -> bool:
-    number = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
-    if len(content) != columns or not all(number.fullmatch(word) for word in content):
-        return False
-    values = [float(word) for word in content]
-    return bool(np.isfinite(values).all()) and (positive is None or values[positive] > 0)

@@ -1,4 +1,4 @@
-"""Files as they are, or packed by gzip, bzip2 or xz: told by the ends of their names."""
+"""Files as they are, or packed by gzip, bzip2 or xz, as the ends of their names tell."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from cogmap.errors import UsageError
 
 
 def lines(path: Path, give: str) -> Iterator[bytes]:
-    """The lines of a file, unpacked. Raises UsageError that says to `give` what, where it cannot be
-    read.
+    """The lines of a file, unpacked.
+
+    Raises UsageError where it cannot be read; its remedy is to give `give`.
     """
     try:
         with _opened(path) as file:

@@ -18,6 +18,7 @@ from cogmap.data.packed import lines
 SUFFIXES = (".jsonl", ".jsonl.gz", ".jsonl.xz", ".jsonl.bz2")
 Lon = Annotated[float, msgspec.Meta(ge=-180, le=180)]
 Lat = Annotated[float, msgspec.Meta(ge=-90, le=90)]
+_POLYLINE = 5
 
 
 class StreetGraph(msgspec.Struct):
@@ -34,26 +35,26 @@ class StreetGraph(msgspec.Struct):
         self.edges = self.edges or self.edges_u_v_len_highway_name_geom
 
     def line(self, edge: list[Any]) -> list[tuple[float, float]]:
-        """An edge's points in degrees, its ends exactly as the nodes are, whichever way its
-        polyline goes.
+        """An edge's points in degrees, from its first node to its second, whichever direction its
+        polyline has; the ends are exactly the nodes.
         """
         start = self.nodes_lonlat[edge[0]]
         end = self.nodes_lonlat[edge[1]]
-        polyline = edge[5] if len(edge) > 5 and edge[5] else []
-        points = [(float(lon), float(lat)) for lon, lat in polyline]
+        polyline = edge[_POLYLINE] if len(edge) > _POLYLINE else None
+
+        points = [(float(lon), float(lat)) for lon, lat in polyline or []]
         if points and math.dist(points[0], start) > math.dist(points[-1], start):
             points.reverse()
         return [start, *points[1:-1], end]
 
 
 def read(path: Path) -> list[StreetGraph]:
-    """Every city in a file. Raises UsageError that names file, line and what was expected there."""
-    numbered = enumerate(lines(path, "street graphs as JSON Lines"), start=1)
-    return [
-        _graph(path, number, line.decode("utf-8", "replace"))
-        for number, line in numbered
-        if line.strip()
-    ]
+    """Every city in a file. Raises UsageError naming file, line and what was expected there."""
+    graphs = []
+    for number, line in enumerate(lines(path, "street graphs as JSON Lines"), start=1):
+        if line.strip():
+            graphs.append(_graph(path, number, line.decode("utf-8", "replace")))
+    return graphs
 
 
 def _graph(path: Path, number: int, line: str) -> StreetGraph:
@@ -61,12 +62,18 @@ def _graph(path: Path, number: int, line: str) -> StreetGraph:
         graph = msgspec.json.decode(line, type=StreetGraph)
     except (msgspec.DecodeError, msgspec.ValidationError) as error:
         raise wrong_line(path, number, line, f"a street graph ({error})") from None
-    count = len(graph.nodes_lonlat)
+
     if not graph.edges:
         raise wrong_line(path, number, line, "a street graph with edges")
+    count = len(graph.nodes_lonlat)
     for edge in graph.edges:
-        if len(edge) < 2 or not all(isinstance(end, int) and 0 <= end < count for end in edge[:2]):
-            raise wrong_line(
-                path, number, str(edge), f"an edge between two of {count} nodes, by their numbers"
-            )
+        if not _is_edge(edge, count):
+            expected = f"an edge between two of {count} nodes, by their numbers"
+            raise wrong_line(path, number, str(edge), expected)
     return graph
+
+
+def _is_edge(edge: list[Any], nodes: int) -> bool:
+    """Whether an edge begins with the numbers of two of the `nodes`."""
+    ends = edge[:2]
+    return len(ends) == 2 and all(isinstance(end, int) and 0 <= end < nodes for end in ends)

@@ -11,7 +11,8 @@ from benchmarks.localization.delay import Delay
 from benchmarks.localization.measure import follow
 from benchmarks.localization.senses import moments
 from benchmarks.map_correction.measure import trajectory_error_m
-from cogmap.data.mrclam import Numbers, Robot
+from cogmap.data.mrclam import Robot
+from cogmap.geometry.arrays import Floats
 
 LANDMARKS = {6: (0.0, 4.0), 7: (5.0, 5.0), 8: (6.0, -1.0), 9: (-2.0, -2.0), 10: (2.0, 1.5)}
 RATE_HZ = 10
@@ -34,7 +35,7 @@ def robot() -> Robot:
     return Robot(1, felt, np.array(rows), truth, 0)
 
 
-def _seen(pose: Numbers, rng: np.random.Generator) -> list[tuple[float, int, float, float]]:
+def _seen(pose: Floats, rng: np.random.Generator) -> list[tuple[float, int, float, float]]:
     rows = []
     for subject, (x, y) in LANDMARKS.items():
         off = x - pose[1], y - pose[2]
@@ -45,7 +46,7 @@ def _seen(pose: Numbers, rng: np.random.Generator) -> list[tuple[float, int, flo
     return rows
 
 
-def _truth(robot: Robot, stamps_s: Numbers) -> Numbers:
+def _truth(robot: Robot, stamps_s: Floats) -> Floats:
     return np.column_stack(
         [np.interp(stamps_s, robot.truth[:, 0], robot.truth[:, k]) for k in (1, 2, 3)]
     )
@@ -76,7 +77,7 @@ def test_on_a_map_of_its_own_the_corrected_path_is_better_than_what_was_believed
 
 
 def test_the_truth_does_not_reach_the_codelets(robot: Robot) -> None:
-    blind = Robot(1, robot.odometry, robot.sightings, robot.truth * np.nan, 0)
+    blind = Robot(1, robot.odometry, robot.observations, robot.truth * np.nan, 0)
     one, other = (follow(moments(each), {}, (0.0, 0.0, 0.0), 0).online for each in (robot, blind))
     assert (one == other).all()
 

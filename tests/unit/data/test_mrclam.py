@@ -32,8 +32,8 @@ def test_a_set_is_read_with_barcodes_as_subjects_and_sightings_in_order_of_time(
     recording = read(_folder(tmp_path))
     assert recording.landmarks == {6: (1.0, -2.0), 7: (0.5, 4.0)}
     (robot,) = recording.robots
-    assert robot.sightings[:, 1].tolist() == [7, 6, 1]
-    assert robot.landmark_sightings[:, 1].tolist() == [7, 6]
+    assert robot.observations[:, 1].tolist() == [7, 6, 1]
+    assert robot.landmark_observations[:, 1].tolist() == [7, 6]
     assert robot.unread == 1
 
 
