@@ -1,8 +1,13 @@
-"""The examples in docs/modules.md do what the page says."""
+"""The examples do what docs/modules.md states, and the pages show them as they are."""
 
 from __future__ import annotations
 
+import base64
+import json
+import os
 import re
+import shutil
+import subprocess
 import sys
 import threading
 import types
@@ -10,26 +15,185 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import msgpack
 import msgspec
 import numpy as np
 import pytest
 
 from cogmap.bus.codec import decode, encode
-from cogmap.bus.interface import Arrival, Member
-from cogmap.bus.memory import MemoryBus
+from cogmap.bus.interface import Bus, Member
 from cogmap.errors import MessageError
-from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
+from examples import in_process, wanderer, wanderer_msgpack
 from schemas import topics
 from schemas.array import Array
 from schemas.cognition import Task
+from schemas.export import GOLDEN
 from schemas.graph import Node, Proposal
-from schemas.sensing import MotorCommand, RangeScan, TruePose
+from schemas.sensing import MotorCommand, RangeScan
 from services.codelets import module as codelets
 from services.workspace.commit import Ledger
+from tests.support.includes import LANGUAGES, PAGES, ROOT, included, included_paths
 from tests.support.networks import TIMEOUT_S, OverZenoh, Peer, publish
 
-PAGE = Path(__file__).parents[2] / "docs" / "modules.md"
+PAGE = ROOT / "docs" / "modules.md"
+RUST = ROOT / "examples" / "rust"
+JAVASCRIPT = ROOT / "examples" / "javascript"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_a_page_shows_the_files_that_it_includes(page: Path) -> None:
+    text = page.read_text()
+
+    assert included(text) == text, "`python -m tests.support.includes` writes it anew"
+
+
+def test_every_example_is_shown_on_the_page() -> None:
+    shown = set(included_paths(PAGE.read_text()))
+    written = {
+        str(path.relative_to(ROOT))
+        for path in (ROOT / "examples").glob("*.*")
+        if path.suffix in LANGUAGES
+    }
+
+    assert written <= shown
+
+
+def _scan(range_m: float, seq: int = 0) -> RangeScan:
+    bearings = np.linspace(-0.5, 0.5, 5, dtype=np.float32)
+    ranges = np.full(5, range_m, np.float32)
+    return RangeScan(
+        stamp_ns=7,
+        seq=seq,
+        source="sensory",
+        frame=seq,
+        bearing_rad=Array.of(bearings),
+        range_m=Array.of(ranges),
+    )
+
+
+def _module() -> Module:
+    return wanderer.build(wanderer.Config())
+
+
+@pytest.mark.parametrize(("range_m", "left_rad_s"), [(20.0, 10.0), (0.0, 10.0), (2.0, 0.0)])
+def test_the_module_turns_left_where_something_is_in_its_way(
+    range_m: float, left_rad_s: float
+) -> None:
+    (command,) = _module().feed(_scan(range_m))
+
+    assert isinstance(command, MotorCommand)
+    assert command.stamp_ns == 7
+    assert (command.left_wheel_rad_s, command.right_wheel_rad_s) == (left_rad_s, 10.0)
+
+
+def test_the_module_rejects_a_scan_that_makes_no_sense() -> None:
+    bad = msgspec.structs.replace(_scan(1.0), range_m=Array.of(np.ones(2, np.float32)))
+
+    with pytest.raises(MessageError, match=r"5,\) bearings, \(2"):
+        _module().feed(bad)
+
+
+def test_the_module_drives_the_robot_in_one_process() -> None:
+    poses = in_process.drive(frames=4)
+
+    assert poses[-1].travelled_m > poses[1].travelled_m > 0
+
+
+def test_msgpack_alone_computes_the_same_commands() -> None:
+    module = _module()
+    for seq, range_m in enumerate((20.0, 2.0)):
+        scan = _scan(range_m, seq)
+        command = wanderer_msgpack.command(msgpack.unpackb(encode(scan)), seq)
+        (expected,) = module.feed(scan)
+
+        assert decode(topics.MOTOR_COMMAND, msgpack.packb(command)) == expected
+
+
+class Stage:
+    """A peer that publishes scans and receives what answers them."""
+
+    def __init__(self, network: OverZenoh) -> None:
+        self._bus: Bus = network.join()
+        self._commands = Peer(self._bus, topics.MOTOR_COMMAND)
+        self._ready = threading.Event()
+        self._bus.watch(self._on_change)
+        self._bus.declare(topics.SCAN)
+
+    def _on_change(self, member: Member, alive: bool) -> None:
+        if alive and member == Member("action", "action"):
+            self._ready.set()
+
+    def check_answers(self) -> None:
+        """The foreign module becomes ready, and answers each scan as ours does."""
+        assert self._ready.wait(TIMEOUT_S)
+        for seq, range_m in enumerate((20.0, 2.0)):
+            publish(self._bus, _scan(range_m, seq))
+            (arrival,) = self._commands.take(1)
+
+            command = decode(topics.MOTOR_COMMAND, arrival.payload)
+            assert isinstance(command, MotorCommand)
+            assert command.left_wheel_rad_s == (0.0 if seq else 10.0)
+            assert (command.source, command.seq) == ("action", seq)
+
+            assert arrival.envelope is not None
+            assert (arrival.envelope.source, arrival.envelope.seq) == ("action", seq)
+
+
+def test_a_module_of_msgpack_and_zenoh_alone_answers_scans(over_zenoh: OverZenoh) -> None:
+    stage = Stage(over_zenoh)
+    stop = threading.Event()
+    arguments = (over_zenoh.endpoint, over_zenoh.agent, stop)
+    thread = threading.Thread(target=wanderer_msgpack.run, args=arguments)
+    thread.start()
+    try:
+        stage.check_answers()
+    finally:
+        stop.set()
+        thread.join()
+
+
+def test_the_module_in_rust_answers_scans(over_zenoh: OverZenoh) -> None:
+    built = Path(os.environ.get("CARGO_TARGET_DIR", RUST / "target")) / "debug" / "wanderer"
+    if not built.exists():
+        pytest.skip("`cargo build --manifest-path examples/rust/Cargo.toml` builds it")
+
+    stage = Stage(over_zenoh)
+    process = subprocess.Popen([built, over_zenoh.endpoint, over_zenoh.agent])
+    try:
+        stage.check_answers()
+    finally:
+        process.terminate()
+        process.wait(TIMEOUT_S)
+
+
+def _base64(value: Any) -> Any:
+    """`value` as JSON has it: bytes as base64 text."""
+    if isinstance(value, bytes):
+        return base64.b64encode(value).decode()
+    if isinstance(value, dict):
+        return {name: _base64(part) for name, part in value.items()}
+    if isinstance(value, list):
+        return [_base64(part) for part in value]
+    return value
+
+
+def test_javascript_decodes_every_golden_message() -> None:
+    node = shutil.which("node")
+    if node is None or not (JAVASCRIPT / "node_modules").exists():
+        pytest.skip("needs node, and `npm ci` in examples/javascript")
+
+    paths = sorted(GOLDEN.glob("*.msgpack"))
+    command = [node, JAVASCRIPT / "golden.mjs", *paths]
+    run = subprocess.run(command, capture_output=True, check=True, timeout=TIMEOUT_S)
+
+    decoded = json.loads(run.stdout)
+    assert len(decoded) == len(topics.ALL)
+    for path in paths:
+        assert decoded[path.name] == _base64(msgpack.unpackb(path.read_bytes()))
+
+
+# The codelet of the page.
 
 
 def example(name: str) -> str:
@@ -56,98 +220,6 @@ def loaded() -> Iterator[Any]:
     yield load
     for name in names:
         del sys.modules[name]
-
-
-def _scan(range_m: float, seq: int = 0) -> RangeScan:
-    bearing = Array.of(np.linspace(-0.5, 0.5, 5, dtype=np.float32))
-    ranges = Array.of(np.full(5, range_m, np.float32))
-    return RangeScan(
-        stamp_ns=7, seq=seq, source="sensory", frame=seq, bearing_rad=bearing, range_m=ranges
-    )
-
-
-def test_the_module_goes_straight_where_the_way_is_clear_and_turns_left_where_it_is_not(
-    loaded: Any,
-) -> None:
-    page = loaded("module")
-    module: Module = page.build(page.Config(), "action")
-    for range_m, left_rad_s in ((20.0, 10.0), (0.0, 10.0), (2.0, 0.0)):
-        (command,) = module.feed(_scan(range_m))
-        assert isinstance(command, MotorCommand)
-        assert (command.left_wheel_rad_s, command.right_wheel_rad_s, command.stamp_ns) == (
-            left_rad_s,
-            10.0,
-            7,
-        )
-
-
-def test_the_module_refuses_a_scan_that_makes_no_sense(loaded: Any) -> None:
-    page = loaded("module")
-    bad = _scan(1.0)
-    bad.range_m = Array.of(np.ones(2, np.float32))
-    with pytest.raises(MessageError, match="5,\\) bearings and \\(2"):
-        page.build(page.Config(), "action").feed(bad)
-
-
-def test_the_module_drives_the_robot_in_one_process(loaded: Any) -> None:
-    page = loaded("module")
-    exec(example("runner"), page.__dict__)
-    runner: InProcessRunner = page.runner
-    poses: list[TruePose] = []
-
-    def keep(arrival: Arrival) -> None:
-        pose = decode(arrival.topic, arrival.payload)
-        assert isinstance(pose, TruePose)
-        poses.append(pose)
-
-    MemoryBus(runner.network).subscribe(topics.TRUE_POSE, keep, lambda name, number: None)
-    runner.run(lambda: len(poses) >= 4)
-    runner.close()
-    assert poses[-1].travelled_m > poses[1].travelled_m > 0
-
-
-def test_the_foreign_module_answers_scans_over_zenoh(loaded: Any, over_zenoh: OverZenoh) -> None:
-    page = loaded("foreign module")
-    stop = threading.Event()
-    here = over_zenoh.join()
-    peer = Peer(here, topics.MOTOR_COMMAND)
-    ready = threading.Event()
-    here.watch(
-        lambda member, alive: (
-            ready.set() if alive and member == Member("action", "action") else None
-        )
-    )
-    here.declare(topics.SCAN)
-    thread = threading.Thread(target=page.run, args=(over_zenoh.endpoint, over_zenoh.agent, stop))
-    thread.start()
-    try:
-        assert ready.wait(TIMEOUT_S)
-        for seq, range_m in enumerate((20.0, 2.0)):
-            publish(here, _scan(range_m, seq))
-            (arrival,) = peer.take(1)
-            command = decode(topics.MOTOR_COMMAND, arrival.payload)
-            assert isinstance(command, MotorCommand)
-            assert (command.left_wheel_rad_s, command.seq, command.source) == (
-                0.0 if seq else 10.0,
-                seq,
-                "action",
-            )
-            assert arrival.envelope is not None
-            assert (arrival.envelope.source, arrival.envelope.seq) == ("action", seq)
-    finally:
-        stop.set()
-        thread.join()
-
-
-def test_the_foreign_module_says_what_ours_does(loaded: Any) -> None:
-    ours = loaded("module")
-    foreign = loaded("foreign module")
-    page = ours.build(ours.Config(), "action")
-    for seq, range_m in enumerate((20.0, 2.0)):
-        scan = _scan(range_m, seq)
-        said = foreign.command(msgspec.msgpack.decode(encode(scan)), seq)
-        (expected,) = page.feed(scan)
-        assert decode(topics.MOTOR_COMMAND, msgspec.msgpack.encode(said)) == expected
 
 
 def test_the_codelet_counts_the_way_over_two_cycles(

@@ -1,0 +1,99 @@
+"""The wanderer by a msgpack library and Zenoh alone: what a module needs in any language.
+
+Run it beside the others: `cogmap run --without action`, and `python examples/wanderer_msgpack.py`.
+"""
+
+from __future__ import annotations
+
+import array
+import json
+import queue
+import threading
+import time
+from typing import Any
+
+import msgpack
+import zenoh
+
+ENDPOINT = "tcp/127.0.0.1:7447"
+AGENT = "agent"
+INSTANCE = "action"
+STARTED_NS = time.time_ns()
+
+AHEAD_RAD = 0.3
+CLEARANCE_M = 4.0
+CRUISE_RAD_S = 10.0
+
+
+def floats(packed: dict[str, Any]) -> array.array[float]:
+    """The values of an array of dtype <f4."""
+    return array.array("f", packed["data"])
+
+
+def command(scan: dict[str, Any], number: int) -> dict[str, Any]:
+    """The message that answers a scan."""
+    blocked = False
+    for bearing_rad, range_m in zip(
+        floats(scan["bearing_rad"]), floats(scan["range_m"]), strict=True
+    ):
+        if abs(bearing_rad) < AHEAD_RAD and 0 < range_m < CLEARANCE_M:
+            blocked = True
+
+    return {
+        "stamp_ns": scan["stamp_ns"],
+        "seq": number,
+        "source": INSTANCE,
+        "left_wheel_rad_s": 0.0 if blocked else CRUISE_RAD_S,
+        "right_wheel_rad_s": CRUISE_RAD_S,
+    }
+
+
+def envelope(number: int, cause: list[Any]) -> list[Any]:
+    """The envelope of an answer: source, number, incarnation, sent, born, stages, causes."""
+    born_ns = cause[4]
+    return [INSTANCE, number, STARTED_NS, time.time_ns(), born_ns, [], []]
+
+
+def configuration(endpoint: str) -> zenoh.Config:
+    """A client of the router at `endpoint`."""
+    config = zenoh.Config()
+    settings = {
+        "mode": "client",
+        "connect/endpoints": [endpoint],
+        "scouting/multicast/enabled": False,
+        "transport/shared_memory/enabled": False,
+    }
+    for key, value in settings.items():
+        config.insert_json5(key, json.dumps(value))
+    return config
+
+
+def run(endpoint: str, agent: str, stop: threading.Event) -> None:
+    """Answer scans until `stop` is set."""
+    scans: queue.Queue[zenoh.Sample] = queue.Queue()
+    with zenoh.open(configuration(endpoint)) as session:
+        commands = session.declare_publisher(f"cogmap/{agent}/motor/command")
+        session.declare_subscriber(f"cogmap/{agent}/sensory/scan", scans.put)
+        ready = session.liveliness().declare_token(f"cogmap/{agent}/@ready/action/{INSTANCE}")
+
+        number = 0
+        while not stop.is_set():
+            try:
+                sample = scans.get(timeout=0.1)
+            except queue.Empty:
+                continue
+
+            if sample.attachment is None:
+                continue
+            scan = msgpack.unpackb(bytes(sample.payload))
+            cause = msgpack.unpackb(bytes(sample.attachment))
+            commands.put(
+                msgpack.packb(command(scan, number)),
+                attachment=msgpack.packb(envelope(number, cause)),
+            )
+            number += 1
+        ready.undeclare()  # type: ignore[no-untyped-call]
+
+
+if __name__ == "__main__":
+    run(ENDPOINT, AGENT, threading.Event())
