@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from cogmap.bus.session import DEFAULT_ENDPOINT
+from cogmap.bus.session import DEFAULT_ENDPOINT, check_name
 
 connect_option = click.option(
     "--connect",
@@ -15,8 +15,17 @@ connect_option = click.option(
     envvar="COGMAP_CONNECT",
     help="The router's endpoint.",
 )
+
+
+def _agent(context: click.Context, option: click.Parameter, value: str) -> str:
+    """Refuse a name that cannot be part of a key. Raises UsageError."""
+    check_name("--agent", value)
+    return value
+
+
 agent_option = click.option(
     "--agent",
+    callback=_agent,
     default="agent",
     show_default=True,
     envvar="COGMAP_AGENT",

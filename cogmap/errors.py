@@ -1,14 +1,14 @@
-"""The one tree of exceptions. Each says in one sentence what is wrong and what to do about it."""
+"""The tree of exceptions. Each message is one sentence: what is wrong, and the remedy."""
 
 from __future__ import annotations
 
 
 class CogmapError(Exception):
-    """Whatever this project raises on purpose."""
+    """The base of every exception that this project raises on purpose."""
 
 
 class UsageError(CogmapError):
-    """The user can mend it: a wrong configuration, a missing file, a port in use. Exit code 2."""
+    """What the user can mend: a wrong configuration, a missing file, a port in use. Exit code 2."""
 
 
 class ConfigError(UsageError):
@@ -23,13 +23,17 @@ class PortInUseError(UsageError):
     """Another process listens where the router should."""
 
 
+class LogError(UsageError):
+    """A log file is missing, damaged, or not one of ours."""
+
+
+class StorageError(UsageError):
+    """What a module must keep cannot be written: the disk is full, or the folder read-only."""
+
+
 class MessageError(CogmapError):
-    """A message that came is not what its topic carries; it is counted and passed over."""
+    """A received message is not what its topic carries; it is counted and ignored."""
 
 
 class NoAnswerError(CogmapError):
-    """A query got no answer, or an error for an answer."""
-
-
-class LogError(UsageError):
-    """A log file is missing, damaged, or not one of ours."""
+    """A query had no answer, or an error for an answer."""

@@ -14,15 +14,21 @@ from schemas.topics import Topic
 
 Cause = tuple[str, str, int]
 Stage = tuple[str, int, int]
+UNKNOWN = -1
 
 
 class Envelope(msgspec.Struct, array_like=True):
-    """Facts of transport, beside the message so that its bytes depend on nothing but what it says.
+    """Facts of transport, beside the message so that its bytes depend on its content alone.
 
-    `born_ns` is the wall time of the sensing, `sent_ns` of the sending; `stages` are the modules
+    A message is identified by `source`, `incarnation` (when that source was started, ns of wall
+    time) and `seq`, its number on its topic. `earlier` counts the messages of that topic that the
+    source published in earlier incarnations, UNKNOWN where it keeps no count: with it a receiver
+    notices what was lost before a restart.
+
+    `born_ns` is the wall time of the sensing, `sent_ns` of the publishing. `stages` are the modules
     passed since, each with nanoseconds of computing and of everything else (encoding, transport,
-    queues). `causes` are the inputs (topic, source, seq) that the sender took in since its previous
-    output: replay feeds them in that order.
+    queues). `causes` are the inputs (topic, source, seq) that the source received since its
+    previous output: replay feeds them in that order.
     """
 
     source: Annotated[str, msgspec.Meta(max_length=200)]
@@ -32,14 +38,13 @@ class Envelope(msgspec.Struct, array_like=True):
     born_ns: int
     stages: list[Stage] = []
     causes: list[Cause] = []
+    earlier: int = UNKNOWN
 
-    def follow(self, cause: Envelope, module: str, compute_ns: int) -> None:
-        """Count on from `cause`, the envelope of the message that `module` answers after computing
-        so long.
-        """
-        self.born_ns = cause.born_ns
+    def continue_trace(self, cause: Envelope, module: str, compute_ns: int) -> None:
+        """Make this the envelope of an answer to `cause`, which took `module` so long to compute."""
         passed_ns = sum(compute + rest for _, compute, rest in cause.stages)
         rest_ns = self.sent_ns - cause.born_ns - passed_ns - compute_ns
+        self.born_ns = cause.born_ns
         self.stages = [*cause.stages, (module, compute_ns, max(0, rest_ns))]
 
 
@@ -64,12 +69,13 @@ def encode(message: msgspec.Struct) -> bytes:
 
 
 def decode(topic: Topic, payload: bytes | memoryview) -> Message:
-    """The message in `payload`, validated. Raises MessageError naming the topic, what was expected
-    and where.
+    """The message in `payload`, validated.
+
+    Raises MessageError that names the topic, what was expected and where.
     """
     if len(payload) > topic.max_bytes:
         raise MessageError(
-            f"{topic.name}: {len(payload)} bytes, at most {topic.max_bytes} are taken"
+            f"{topic.name}: {len(payload)} bytes, at most {topic.max_bytes} are accepted"
         )
     try:
         return _decoder(topic.type).decode(payload)
@@ -78,7 +84,7 @@ def decode(topic: Topic, payload: bytes | memoryview) -> Message:
 
 
 def decode_envelope(data: bytes | memoryview | None) -> Envelope:
-    """The envelope in a Zenoh attachment. Raises MessageError where it is missing or not one."""
+    """The envelope in a Zenoh attachment. Raises MessageError where there is none."""
     if data is None:
         raise MessageError("no envelope")
     try:

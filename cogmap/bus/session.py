@@ -1,10 +1,11 @@
-"""The one place that opens a Zenoh session: clients with an explicit endpoint, and the router they
-meet at.
+"""The one place that opens a Zenoh session: clients with an explicit endpoint, and the router that
+they connect to.
 """
 
 from __future__ import annotations
 
 import json
+import re
 import socket
 
 import zenoh
@@ -14,20 +15,83 @@ from cogmap.errors import NoRouterError, PortInUseError, UsageError
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 CONNECT_TIMEOUT_S = 5.0
-LAST_PORT = 65535
-# How long a link that is full holds up the others before it loses a message, which the publisher's
-# cache then mends. Once it has, it loses the next at once until it has room: a subscriber that has
-# stopped costs this long once.
+MAX_PORT = 65535
+# How long a full link delays the others before it drops a message, which the publisher's cache
+# restores later. Having dropped one, it drops the next at once until it has room: a subscriber that
+# has stopped costs this long once.
 WAIT_BEFORE_DROP_US = 100_000
-# A stereo frame is seven batches: where only two find room, a busy machine drops it before it is
-# under way.
+# A stereo frame takes seven batches: with room for two only, a busy machine would drop it before it
+# is sent.
 QUEUE_BATCHES = 16
 _QUEUES = ("data_high", "data", "data_low")
+_NAME = re.compile(r"[\w.-]+")
+
+
+def check_name(option: str, name: str) -> None:
+    """Raise UsageError where `name`, given by `option`, cannot be part of a key expression."""
+    if not _NAME.fullmatch(name):
+        raise UsageError(
+            f"{option} {name!r}: use letters, digits, '.', '-' and '_' only, such as robot-1"
+        )
 
 
 def ready_key(agent: str, member: Member) -> str:
-    """The key of the liveliness token that says that `member` is ready."""
+    """The key of the liveliness token by which `member` announces that it is ready."""
     return f"cogmap/{agent}/@ready/{member.module}/{member.instance}"
+
+
+def free_endpoint() -> str:
+    """An endpoint on this machine where nothing listens."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+def open_client(endpoint: str, timeout_s: float = CONNECT_TIMEOUT_S) -> zenoh.Session:
+    """A session with the router at `endpoint`. Raises NoRouterError if none answers in time."""
+    _address(endpoint)
+    settings = {
+        "connect/endpoints": [endpoint],
+        "connect/timeout_ms": int(timeout_s * 1000),
+        "connect/exit_on_failure": True,
+        "connect/retry": {
+            "period_init_ms": 50,
+            "period_max_ms": 500,
+            "period_increase_factor": 1.5,
+        },
+    }
+    try:
+        return zenoh.open(_config("client", **settings))
+    except zenoh.ZError:
+        raise NoRouterError(
+            f"no router at {endpoint} within {timeout_s:g} s: start one with `cogmap run` or "
+            f"`cogmap router`, or name its endpoint with --connect"
+        ) from None
+
+
+def open_router(endpoint: str) -> zenoh.Session:
+    """A router that listens at `endpoint`. Raises PortInUseError where something else does."""
+    check_free(endpoint)
+    settings = {
+        "listen/endpoints": [endpoint],
+        "adminspace/enabled": True,
+        "adminspace/permissions": {"read": True, "write": False},
+    }
+    return zenoh.open(_config("router", **settings))
+
+
+def check_free(endpoint: str) -> None:
+    """Raise PortInUseError where something listens at `endpoint` already, or nothing can."""
+    host, port = _address(endpoint)
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except OSError as error:
+            raise PortInUseError(
+                f"cannot listen at {endpoint} ({error.strerror}): stop what listens there, "
+                f"or choose another port with --connect tcp/{host}:PORT"
+            ) from None
 
 
 def _config(mode: str, **settings: object) -> zenoh.Config:
@@ -48,67 +112,13 @@ def _config(mode: str, **settings: object) -> zenoh.Config:
     return config
 
 
-def free_endpoint() -> str:
-    """An endpoint on this machine where nothing listens."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
-
-
-def open_client(endpoint: str, timeout_s: float = CONNECT_TIMEOUT_S) -> zenoh.Session:
-    """A session with the router at `endpoint`. Raises NoRouterError if none answers within
-    `timeout_s`.
-    """
-    _address(endpoint)
-    settings = {
-        "connect/endpoints": [endpoint],
-        "connect/timeout_ms": int(timeout_s * 1000),
-        "connect/exit_on_failure": True,
-        "connect/retry": {
-            "period_init_ms": 50,
-            "period_max_ms": 500,
-            "period_increase_factor": 1.5,
-        },
-    }
-    try:
-        return zenoh.open(_config("client", **settings))
-    except zenoh.ZError:
-        raise NoRouterError(
-            f"no router at {endpoint} within {timeout_s:g} s: start one with `cogmap run` or `cogmap router`, "
-            f"or name its endpoint with --connect"
-        ) from None
-
-
-def check_free(endpoint: str) -> None:
-    """Raise PortInUseError where something listens at `endpoint` already, or nothing can."""
-    host, port = _address(endpoint)
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((host, port))
-        except OSError as error:
-            raise PortInUseError(
-                f"cannot listen at {endpoint} ({error.strerror}): stop what listens there, "
-                f"or choose another port with --connect tcp/{host}:PORT"
-            ) from None
-
-
-def open_router(endpoint: str) -> zenoh.Session:
-    """A router that listens at `endpoint`. Raises PortInUseError where something else does."""
-    check_free(endpoint)
-    settings = {
-        "listen/endpoints": [endpoint],
-        "adminspace/enabled": True,
-        "adminspace/permissions": {"read": True, "write": False},
-    }
-    return zenoh.open(_config("router", **settings))
-
-
 def _address(endpoint: str) -> tuple[str, int]:
+    """Host and port. Raises UsageError where `endpoint` is not one of TCP."""
     protocol, _, address = endpoint.partition("/")
     host, _, port = address.rpartition(":")
-    if protocol != "tcp" or not host or not port.isdecimal() or int(port) > LAST_PORT:
+    is_port = port.isdecimal() and int(port) <= MAX_PORT
+    if protocol != "tcp" or not host or not is_port:
         raise UsageError(
-            f"endpoint {endpoint!r}: write it as tcp/HOST:PORT, with a port of at most {LAST_PORT}"
+            f"endpoint {endpoint!r}: write it as tcp/HOST:PORT, with a port of at most {MAX_PORT}"
         )
     return host.strip("[]"), int(port)

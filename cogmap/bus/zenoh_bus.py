@@ -14,7 +14,7 @@ from zenoh import ext
 from cogmap.bus.codec import Envelope, decode_envelope, encode
 from cogmap.bus.discovery import identify
 from cogmap.bus.interface import CACHED_MESSAGES, Answer, Arrival, Job, Member
-from cogmap.bus.session import open_client, ready_key
+from cogmap.bus.session import check_name, open_client, ready_key
 from cogmap.errors import MessageError, NoAnswerError
 from schemas.topics import About, Delivery, Topic
 
@@ -29,32 +29,15 @@ class _Closable(Protocol):
     def undeclare(self) -> None: ...
 
 
-def _priority(topic: Topic) -> zenoh.Priority:
-    """Images and facts about processes give way to what the cycle waits for."""
-    behind = topic.max_bytes > _LARGE_BYTES and topic.delivery is Delivery.LATEST_WINS
-    return (
-        zenoh.Priority.DATA_LOW
-        if behind or topic.about is not About.MODEL
-        else zenoh.Priority.DATA_HIGH
-    )
-
-
-def _envelope(sample: zenoh.Sample) -> Envelope | None:
-    """The envelope in a sample's attachment, None where there is none that can be decoded."""
-    if sample.attachment is None:
-        return None
-    try:
-        return decode_envelope(bytes(sample.attachment))
-    except MessageError:
-        return None
-
-
 class ZenohBus:
-    """Connects to the router at `endpoint` as `agent`. Raises NoRouterError where none answers in
-    time.
+    """Connects to the router at `endpoint` as `agent`.
+
+    Raises NoRouterError where none answers in time, and UsageError for a name that cannot be part
+    of a key.
     """
 
     def __init__(self, endpoint: str, agent: str) -> None:
+        check_name("--agent", agent)
         sys.setswitchinterval(SWITCH_S)
         self._agent = agent
         self._session = open_client(endpoint)
@@ -72,27 +55,32 @@ class ZenohBus:
             return
         key = topic.key(self._agent)
         if topic.delivery is Delivery.NEVER_DROP:
-            # Dropped on a congested link, a message is mended from the cache; blocking would stall
-            # every subscriber.
-            self._publishers[topic] = ext.declare_advanced_publisher(
-                self._session,
-                key,
-                congestion_control=zenoh.CongestionControl.DROP,
-                cache=ext.CacheConfig(max_samples=CACHED_MESSAGES),
-                sample_miss_detection=ext.MissDetectionConfig(
-                    heartbeat=None, sporadic_heartbeat=None
-                ),
-                publisher_detection=True,
-                priority=_priority(topic),
-                express=True,
-            )
+            self._publishers[topic] = self._caching_publisher(key, topic)
         else:
             self._publishers[topic] = self._session.declare_publisher(
                 key,
+                encoding=encoding(topic),
                 congestion_control=zenoh.CongestionControl.DROP,
                 priority=_priority(topic),
                 express=True,
             )
+
+    def _caching_publisher(self, key: str, topic: Topic) -> ext.AdvancedPublisher:
+        """A publisher from whose cache subscribers recover what a congested link dropped.
+
+        Blocking on such a link would stall every subscriber.
+        """
+        return ext.declare_advanced_publisher(
+            self._session,
+            key,
+            encoding=encoding(topic),
+            congestion_control=zenoh.CongestionControl.DROP,
+            cache=ext.CacheConfig(max_samples=CACHED_MESSAGES),
+            sample_miss_detection=ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=None),
+            publisher_detection=True,
+            priority=_priority(topic),
+            express=True,
+        )
 
     def publish(self, topic: Topic, payload: bytes, envelope: Envelope) -> None:
         self._publishers[topic].put(payload, attachment=encode(envelope))
@@ -112,17 +100,16 @@ class ZenohBus:
         if topic.delivery is not Delivery.NEVER_DROP:
             self._declared.append(self._session.declare_subscriber(key, receive))
             return
-        # Heartbeats will not do: they hand a late subscriber the whole cache, and tell nothing
-        # after a lost link.
+
+        # No heartbeats: they hand a late subscriber the whole cache, and tell nothing after a lost
+        # link.
         recovery = ext.RecoveryConfig(periodic_queries=RECOVERY_PERIOD, heartbeat=None)  # type: ignore[arg-type]
         past = ext.HistoryConfig(max_samples=history) if history else None
         subscriber = ext.declare_advanced_subscriber(
             self._session, key, receive, history=past, recovery=recovery
         )
-        self._declared.append(
-            subscriber.sample_miss_listener(lambda miss: on_gap(topic.name, miss.nb))
-        )
-        self._declared.append(subscriber)
+        misses = subscriber.sample_miss_listener(lambda miss: on_gap(topic.name, miss.nb))
+        self._declared += [misses, subscriber]
 
     def serve(
         self,
@@ -138,8 +125,12 @@ class ZenohBus:
                 except Exception as error:  # whoever asked gets it: an empty reply would hide it
                     query.reply_err(str(error).encode())
                     return
-                attachment = None if answer.envelope is None else encode(answer.envelope)
-                query.reply(query.key_expr, answer.payload, attachment=attachment)
+                query.reply(
+                    query.key_expr,
+                    answer.payload,
+                    encoding=encoding(reply),
+                    attachment=None if answer.envelope is None else encode(answer.envelope),
+                )
 
         key = request.key(self._agent)
         self._declared.append(
@@ -147,8 +138,13 @@ class ZenohBus:
         )
 
     def query(self, request: Topic, payload: bytes, timeout_s: float) -> Answer:
-        key = request.key(self._agent)
-        for reply in self._session.get(key, payload=payload, timeout=timeout_s):
+        replies = self._session.get(
+            request.key(self._agent),
+            payload=payload,
+            encoding=encoding(request),
+            timeout=timeout_s,
+        )
+        for reply in replies:
             if reply.ok is not None:
                 return Answer(bytes(reply.ok.payload), _envelope(reply.ok))
             reason = "" if reply.err is None else bytes(reply.err.payload).decode(errors="replace")
@@ -160,16 +156,17 @@ class ZenohBus:
 
     def announce(self, member: Member) -> None:
         self.identify(member)
-        self._declared.append(
-            self._session.liveliness().declare_token(ready_key(self._agent, member))
-        )
+        token = self._session.liveliness().declare_token(ready_key(self._agent, member))
+        self._declared.append(token)
 
     def identify(self, member: Member) -> None:
-        """Tell observers who this is, without being one of those that others wait for; the first
-        name holds.
+        """Name this session to observers; nobody waits for it to be ready. The first name holds.
+
+        Raises UsageError for a name that cannot be part of a key.
         """
         if self._is_named:
             return
+        check_name("--instance", member.instance)
         self._is_named = True
         self._declared.append(identify(self._session, self._agent, member))
 
@@ -187,5 +184,29 @@ class ZenohBus:
         while self._declared:
             self._declared.pop().undeclare()
         while self._publishers:
-            self._publishers.popitem()[1].undeclare()
+            _, publisher = self._publishers.popitem()
+            publisher.undeclare()
         self._session.close()  # type: ignore[no-untyped-call]
+
+
+def encoding(topic: Topic) -> zenoh.Encoding:
+    """What a sample of `topic` holds, for storages and viewers: `application/msgpack;Odometry`."""
+    return zenoh.Encoding(f"application/msgpack;{topic.type.__name__}")
+
+
+def _priority(topic: Topic) -> zenoh.Priority:
+    """Images and facts about processes give way to what the cycle waits for."""
+    is_image = topic.max_bytes > _LARGE_BYTES and topic.delivery is Delivery.LATEST_WINS
+    if is_image or topic.about is not About.MODEL:
+        return zenoh.Priority.DATA_LOW
+    return zenoh.Priority.DATA_HIGH
+
+
+def _envelope(sample: zenoh.Sample) -> Envelope | None:
+    """The envelope in a sample's attachment, None where there is none that can be decoded."""
+    if sample.attachment is None:
+        return None
+    try:
+        return decode_envelope(bytes(sample.attachment))
+    except MessageError:
+        return None

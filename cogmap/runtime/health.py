@@ -1,70 +1,80 @@
-"""What a shell tells of itself once a second."""
+"""What a shell reports of its process once a second."""
 
 from __future__ import annotations
 
-import resource
-import sys
 import time
-from collections import Counter, deque
-from pathlib import Path
+from collections import deque
+
+import psutil
 
 from cogmap.runtime.inbox import Inbox
 from cogmap.runtime.intake import Intake
 from cogmap.runtime.module import Module
+from cogmap.runtime.publisher import Publisher
 from schemas.process import Health
 
-_STATM = Path("/proc/self/statm")
 _RECENT = 512
+_process = psutil.Process()
 
 
 def memory_mb() -> float:
-    """This process's resident memory; its highest where the system tells nothing else."""
-    if _STATM.exists():
-        return int(_STATM.read_text().split()[1]) * resource.getpagesize() / 1e6
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (
-        1e6 if sys.platform == "darwin" else 1e3
-    )
+    """This process's resident memory, in 10^6 bytes."""
+    return _process.memory_info().rss / 1e6
 
 
 class Meter:
-    """Counts what a module emits and the time that it takes."""
+    """Measures how long a module computes; `faults` counts the handlers that failed."""
 
     def __init__(self, module: Module) -> None:
-        self.emitted: Counter[str] = Counter()
         self.faults = 0
         self.reports = 0
         self._module = module
-        self._began_s = self._reported_s = time.monotonic()
+        self._began_s = time.monotonic()
+        self._reported_s = self._began_s
         self._busy_ns = 0
         self._compute_ns: deque[int] = deque(maxlen=_RECENT)
 
-    def count(self, compute_ns: int, busy_ns: int) -> None:
-        """Take note of one message taken in: time in the module alone, and with all around it."""
+    def add(self, compute_ns: int, busy_ns: int) -> None:
+        """Count one message: the time of its handler alone, and with all around it."""
         self._compute_ns.append(compute_ns)
         self._busy_ns += busy_ns
 
-    def report(self, intake: Intake, inbox: Inbox, ready: bool, notes: list[str]) -> Health:
-        """The counts so far; the busy share since the last report."""
+    def report(
+        self, intake: Intake, inbox: Inbox, publisher: Publisher, ready: bool, notes: list[str]
+    ) -> Health:
+        """The counts so far and the busy share since the last report, numbered."""
         now_s = time.monotonic()
-        busy = self._busy_ns / 1e9 / max(1e-9, now_s - self._reported_s)
-        compute_ms = sorted(ns / 1e6 for ns in self._compute_ns) or [0.0]
+        since_s = max(1e-9, now_s - self._reported_s)
+        busy = self._busy_ns / 1e9 / since_s
         self._reported_s = now_s
         self._busy_ns = 0
+
+        seq = self.reports
         self.reports += 1
         return Health(
+            seq=seq,
+            source=self._module.instance,
+            stamp_ns=time.time_ns(),
             module=self._module.name,
             instance=self._module.instance,
             ready=ready,
             uptime_s=now_s - self._began_s,
             received=dict(intake.received),
-            emitted=dict(self.emitted),
+            emitted=dict(publisher.emitted),
             rejected=dict(intake.rejected),
             superseded=dict(inbox.superseded),
             gaps=dict(intake.gaps),
             queued=len(inbox),
             busy=busy,
-            compute_p50_ms=compute_ms[len(compute_ms) // 2],
-            compute_p99_ms=compute_ms[int(len(compute_ms) * 0.99)],
+            compute_p50_ms=self._compute_ms(0.5),
+            compute_p99_ms=self._compute_ms(0.99),
             memory_mb=memory_mb(),
             notes=notes,
         )
+
+    def _compute_ms(self, quantile: float) -> float:
+        """A quantile of the time that recent messages took."""
+        if not self._compute_ns:
+            return 0.0
+        ordered = sorted(self._compute_ns)
+        return ordered[int(len(ordered) * quantile)] / 1e6

@@ -1,12 +1,13 @@
-"""Judges what arrives: believed, or counted and named."""
+"""Checks what arrives: received, or counted and named."""
 
 from __future__ import annotations
 
 import logging
 import time
 from collections import Counter
+from dataclasses import dataclass, field
 
-from cogmap.bus.codec import decode
+from cogmap.bus.codec import UNKNOWN, Envelope, decode
 from cogmap.bus.interface import Arrival
 from cogmap.errors import MessageError
 from schemas.base import Message
@@ -14,10 +15,48 @@ from schemas.topics import Delivery, Topic
 
 log = logging.getLogger("cogmap")
 LOG_INTERVAL_S = 1.0
+_MAX_SENTENCE = 500
+
+
+@dataclass
+class _Stream:
+    """The last message of one source on one topic, and the incarnations before its own."""
+
+    last: Envelope
+    ended: set[int] = field(default_factory=set)
+
+    def advance(self, envelope: Envelope) -> int:
+        """Make `envelope` the last one. Returns how many messages are missing before it.
+
+        Raises MessageError where it is not newer.
+        """
+        last = self.last
+        if envelope.incarnation in self.ended:
+            raise MessageError(f"number {envelope.seq} of {envelope.source} is of an earlier run")
+
+        if envelope.incarnation == last.incarnation:
+            if envelope.seq <= last.seq:
+                raise MessageError(f"number {envelope.seq} of {envelope.source} came twice")
+            missing = envelope.seq - last.seq - 1
+        else:
+            self.ended.add(last.incarnation)
+            missing = _missing_between(last, envelope)
+
+        self.last = envelope
+        return missing
+
+
+def _missing_between(last: Envelope, first: Envelope) -> int:
+    """How many messages of a source were lost between two incarnations, 0 where it is not known."""
+    if UNKNOWN in (last.earlier, first.earlier):
+        return 0
+    received = last.earlier + last.seq + 1
+    published = first.earlier + first.seq
+    return max(0, published - received)
 
 
 class Intake:
-    """Decodes arrivals and keeps count of the received, the rejected and the lost of each topic."""
+    """Decodes arrivals and counts, by topic, the received, the rejected and the lost (`gaps`)."""
 
     def __init__(self) -> None:
         self.received: Counter[str] = Counter()
@@ -25,67 +64,75 @@ class Intake:
         self.gaps: Counter[str] = Counter()
         self._missing: Counter[str] = Counter()
         self._given_up: Counter[str] = Counter()
-        self._last: dict[tuple[Topic, str], tuple[int, int]] = {}
-        self._quiet_until: dict[str, float] = {}
+        self._streams: dict[tuple[Topic, str], _Stream] = {}
+        self._log_after_s: dict[str, float] = {}
         self._suppressed: Counter[str] = Counter()
 
     def accept(self, arrival: Arrival) -> Message | None:
-        """The message in `arrival`, or None where it is not one or came before."""
+        """The message in `arrival`, or None where it is not one or was received before."""
         topic = arrival.topic
         try:
             message = decode(topic, arrival.payload)
-            self._follow(arrival, message)
+            envelope = _matching(arrival, message)
+            if topic.delivery is Delivery.NEVER_DROP:
+                self._follow(topic, envelope)
         except MessageError as error:
             self.reject(topic.name, str(error))
             return None
+
         self.received[topic.name] += 1
         return message
 
-    def _follow(self, arrival: Arrival, message: Message) -> None:
-        """Keep track of the numbers of each NEVER_DROP source, which starts anew with each
-        incarnation.
-        """
-        envelope = arrival.envelope
-        if envelope is None:
-            raise MessageError(f"{arrival.topic.name}: no envelope")
-        if (envelope.source, envelope.seq) != (message.source, message.seq):
-            raise MessageError(f"{arrival.topic.name}: envelope and message name different sources")
-        if arrival.topic.delivery is not Delivery.NEVER_DROP:
-            return
-        key = (arrival.topic, message.source)
-        incarnation, last = self._last.get(key, (0, -1))
-        if incarnation == envelope.incarnation:
-            if message.seq <= last:
-                raise MessageError(
-                    f"{arrival.topic.name}: number {message.seq} of {message.source} came twice"
-                )
-            if message.seq > last + 1:
-                self._missing[arrival.topic.name] += message.seq - last - 1
-                self._count_gaps(arrival.topic.name)
-        self._last[key] = (envelope.incarnation, message.seq)
-
     def count_lost(self, topic: str, number: int) -> None:
-        """Take note that the bus gave up `number` messages of `topic`; called from its threads."""
+        """Count messages of `topic` that the bus gave up; called from its threads."""
         self._given_up[topic] += number
         self._count_gaps(topic)
 
-    def _count_gaps(self, topic: str) -> None:
-        """Numbers that are missing and messages that the bus gave up are the same ones, seen twice."""
-        lost = max(self._missing[topic], self._given_up[topic])
-        if lost > self.gaps[topic]:
-            self._say(topic, f"{topic}: {lost - self.gaps[topic]} lost")
-            self.gaps[topic] = lost
-
     def reject(self, topic: str, reason: str) -> None:
-        """Count a message that is not believed, and name it, once a second at most for each topic."""
+        """Count a message that is ignored, and log the reason at most once a second a topic."""
         self.rejected[topic] += 1
-        self._say(topic, f"rejected {reason}")
+        self._log(topic, f"rejected {reason}")
 
-    def _say(self, topic: str, sentence: str) -> None:
-        now = time.monotonic()
-        if now < self._quiet_until.get(topic, 0.0):
+    def _follow(self, topic: Topic, envelope: Envelope) -> None:
+        """Notice what is missing before a message. Raises MessageError where it is not newer."""
+        stream = self._streams.get((topic, envelope.source))
+        if stream is None:
+            self._streams[topic, envelope.source] = _Stream(envelope)
+            return
+
+        try:
+            missing = stream.advance(envelope)
+        except MessageError as error:
+            raise MessageError(f"{topic.name}: {error}") from None
+        if missing:
+            self._missing[topic.name] += missing
+            self._count_gaps(topic.name)
+
+    def _count_gaps(self, topic: str) -> None:
+        """Count the lost once: numbers that are missing are also what the bus gave up."""
+        lost = max(self._missing[topic], self._given_up[topic])
+        new = lost - self.gaps[topic]
+        if new > 0:
+            self.gaps[topic] = lost
+            self._log(topic, f"{topic}: {new} lost")
+
+    def _log(self, topic: str, sentence: str) -> None:
+        now_s = time.monotonic()
+        if now_s < self._log_after_s.get(topic, 0.0):
             self._suppressed[topic] += 1
             return
-        more = self._suppressed.pop(topic, 0)
-        log.warning("%s%s", sentence[:500], f" (and {more} more since)" if more else "")
-        self._quiet_until[topic] = now + LOG_INTERVAL_S
+
+        suppressed = self._suppressed.pop(topic, 0)
+        more = f" (and {suppressed} more since)" if suppressed else ""
+        log.warning("%s%s", sentence[:_MAX_SENTENCE], more)
+        self._log_after_s[topic] = now_s + LOG_INTERVAL_S
+
+
+def _matching(arrival: Arrival, message: Message) -> Envelope:
+    """The envelope of `arrival`. Raises MessageError where it is missing or another message's."""
+    envelope = arrival.envelope
+    if envelope is None:
+        raise MessageError(f"{arrival.topic.name}: no envelope")
+    if (envelope.source, envelope.seq) != (message.source, message.seq):
+        raise MessageError(f"{arrival.topic.name}: envelope and message name different sources")
+    return envelope

@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
+from msgspec.structs import replace
+
 from cogmap.errors import CogmapError
 from cogmap.graph.graph import Graph
 from schemas import topics
@@ -130,22 +132,22 @@ class Module:
         return [] if self.on_load is None else self.stamp(self.on_load())
 
     def stamp(self, reply: Reply) -> list[Message]:
-        """Put this instance's name and the next numbers on what a handler returned.
+        """Copies of what a handler returned, with this instance's name and the next numbers.
 
         Raises CogmapError for a message of a topic that the module does not declare.
         """
-        messages = _as_list(reply)
-        for message in messages:
+        numbered = []
+        for message in _as_list(reply):
             topic = topics.of(message)
             if topic not in self.emits:
                 raise CogmapError(
                     f"{self.name} publishes {topic.name}, which it does not declare: "
                     f"name it in `emits`"
                 )
-            message.source = self.instance
-            message.seq = self._next_seq[topic]
+            seq = self._next_seq[topic]
             self._next_seq[topic] += 1
-        return messages
+            numbered.append(replace(message, source=self.instance, seq=seq))
+        return numbered
 
 
 def _as_list(reply: Reply) -> list[Message]:

@@ -13,9 +13,10 @@ from types import FrameType
 
 from cogmap.bus.session import open_router
 from cogmap.bus.zenoh_bus import ZenohBus
-from cogmap.runtime.journal import Journal
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
+from cogmap.runtime.state.journal import Journal
+from cogmap.runtime.state.published import PublishedCounts
 
 log = logging.getLogger("cogmap")
 IDLE_S = 0.25
@@ -57,20 +58,25 @@ class Stop:
 
 
 def run_module(module: Module, endpoint: str, agent: str, state: Path | None, stop: Stop) -> None:
-    """Run `module` until `stop` is asked. Raises NoRouterError; `state` is the folder of its
-    journal.
+    """Run `module` until `stop` is asked; what it must keep is in the folder `state`.
+
+    Raises NoRouterError, and StorageError where that folder cannot be written.
     """
-    journal = (
-        Journal(state / f"{module.instance}.journal")
-        if state is not None and module.journal
-        else None
-    )
-    shell = Shell(module, ZenohBus(endpoint, agent), journal)
-    shell.open()
-    log.info("%s is ready", module.instance)
-    while not stop.asked:
-        shell.spin_once(IDLE_S)
-    shell.close()
+    journal = None
+    counts = None
+    if state is not None:
+        counts = PublishedCounts(state / f"{module.instance}.published")
+        if module.journal is not None:
+            journal = Journal(state / f"{module.instance}.journal")
+
+    shell = Shell(module, ZenohBus(endpoint, agent), journal, counts=counts)
+    try:
+        shell.open()
+        log.info("%s is ready", module.instance)
+        while not stop.asked:
+            shell.spin_once(IDLE_S)
+    finally:
+        shell.close()
 
 
 def run_router(endpoint: str, stop: Stop) -> None:

@@ -1,4 +1,4 @@
-"""The shell around a module: takes messages off a bus, lets the module think, sends what it says."""
+"""The shell around a module: receives messages from a bus, calls the module, publishes its replies."""
 
 from __future__ import annotations
 
@@ -15,8 +15,10 @@ from cogmap.runtime.follower import Follower
 from cogmap.runtime.health import Meter
 from cogmap.runtime.inbox import Inbox
 from cogmap.runtime.intake import Intake
-from cogmap.runtime.journal import Journal
 from cogmap.runtime.module import Module, Reply
+from cogmap.runtime.publisher import Computation, Publisher
+from cogmap.runtime.state.journal import Journal
+from cogmap.runtime.state.published import PublishedCounts
 from cogmap.runtime.timers import Due, Timers
 from schemas import topics
 from schemas.base import Message
@@ -26,25 +28,34 @@ from schemas.process import Presence
 log = logging.getLogger("cogmap")
 HEALTH_PERIOD_NS = 1_000_000_000
 RETRY_PERIOD_NS = 500_000_000
-MAX_CAUSES = 1000
-MAX_TRACES = 32
 START = "@start"
 TIMER = "@timer"
 
 
 class Shell:
-    """Runs `module` on `bus`. `open()` it, then `spin_once()` it from one thread; `close()` ends it."""
+    """Runs `module` on `bus`: `open()` it, then `spin_once()` from one thread; `close()` ends it.
+
+    Where the bus is durable, `journal` and `counts` keep what a restart must not lose. `health` is
+    whether it publishes its health once a second.
+    """
 
     def __init__(
-        self, module: Module, bus: Bus, journal: Journal | None = None, health: bool = True
+        self,
+        module: Module,
+        bus: Bus,
+        journal: Journal | None = None,
+        health: bool = True,
+        counts: PublishedCounts | None = None,
     ) -> None:
-        self.module, self.bus, self.inbox, self.intake = module, bus, Inbox(), Intake()
+        self.module = module
+        self.bus = bus
+        self.inbox = Inbox()
+        self.intake = Intake()
         self.meter = Meter(module)
+        self.publisher = Publisher(module, bus, journal, counts)
         self._journal = journal
+        self._counts = counts
         self._health = health
-        self._incarnation = time.time_ns()
-        self._causes: list[Cause] = []
-        self._traces: dict[int, Envelope] = {}
         self._present: set[Member] = set()
         self._started = module.start is None
         self._follower: Follower | None = None
@@ -52,136 +63,147 @@ class Shell:
             self._follower = Follower(module.graph, bus, self._on_load)
         self._timers = Timers(self._jobs())
 
-    def _jobs(self) -> list[tuple[int, Due]]:
-        jobs = [(timer.period_ns, self._on_timer(timer.handler)) for timer in self.module.timers]
-        if self._health:
-            jobs.append((HEALTH_PERIOD_NS, self._say_health))
-        if self._follower is not None:
-            jobs.append((RETRY_PERIOD_NS, self._retry))
-        return jobs
-
     def open(self) -> None:
-        """Take up the journal, join the bus, and tell everybody: all that is sent from now on
-        arrives here.
+        """Restore the journal, join the bus, and announce the module.
+
+        What others publish once they see it announced arrives here. Raises UsageError where the
+        journal cannot be read.
         """
-        missed: frozenset[topics.Topic] = frozenset()
-        if self._journal is not None and self.module.restore is not None:
-            self.module.restore(self._journal.messages())
-            missed = frozenset() if self._journal.is_empty else self.module.backfill
-        for topic in sorted(self.module.emits, key=lambda topic: topic.name):
-            self.bus.declare(topic)
-        if self._health:
-            self.bus.declare(topics.HEALTH)
+        backfill = self._restore()
+        self.publisher.declare(self._health)
         for topic in self.module.handlers:
-            if topic is not topics.PRESENCE:
-                history = CACHED_MESSAGES if topic in missed else 0
-                self.bus.subscribe(topic, self.inbox.put, self.intake.count_lost, history)
+            if topic is topics.PRESENCE:
+                continue
+            history = CACHED_MESSAGES if topic in backfill else 0
+            self.bus.subscribe(topic, self.inbox.put, self.intake.count_lost, history)
         for request, (reply, handler) in self.module.served.items():
             self.bus.serve(request, reply, self._server(request, handler), self.inbox.call)
+
         if self._follower is not None:
             self._follower.join()
         self.bus.announce(Member(self.module.name, self.module.instance))
         if self.module.requires or topics.PRESENCE in self.module.handlers:
-            self.bus.watch(
-                lambda member, alive: self.inbox.call(lambda: self._on_presence(member, alive))
-            )
+            self.bus.watch(self._watch)
 
     def spin_once(self, timeout_s: float | None = 0.0) -> bool:
-        """Do what is due: a timer, or the oldest arrival within `timeout_s`. False if there was
-        nothing.
+        """Run the timers that are due, and handle the oldest arrival, if one comes in `timeout_s`.
+
+        `timeout_s` None waits until there is one or a timer is due. Returns whether there was an
+        arrival or a job. Raises StorageError where the journal cannot be written.
         """
         due_s = self._timers.run_due()
-        wait_s = (
-            due_s if timeout_s is None else timeout_s if due_s is None else min(timeout_s, due_s)
-        )
-        item = self.inbox.take(wait_s)
+        waits = [wait_s for wait_s in (timeout_s, due_s) if wait_s is not None]
+        item = self.inbox.take(min(waits, default=None))
+        if item is None:
+            return False
+
         if isinstance(item, Arrival):
             self._receive(item)
-        elif item is not None:
+        else:
             item()
-        return item is not None
+        return True
 
     def publish(self, messages: Iterable[Message]) -> None:
-        """Send what the module says of its own accord, numbered."""
-        self._send(messages, None, 0, time.time_ns())
+        """Publish numbered messages of the module's own accord."""
+        self.publisher.send(messages, Computation(time.time_ns()))
 
     def close(self) -> None:
-        """Leave the bus."""
+        """Leave the bus, and close the files."""
         self.bus.close()
         if self._journal is not None:
             self._journal.close()
+        if self._counts is not None:
+            self._counts.close()
+
+    @property
+    def missing(self) -> dict[str, int]:
+        """The modules that it requires, and how many instances of each are not ready yet."""
+        ready = [member.module for member in self._present]
+        lacking = {}
+        for name, number in self.module.requires.items():
+            if ready.count(name) < number:
+                lacking[name] = number - ready.count(name)
+        return lacking
+
+    @property
+    def notes(self) -> list[str]:
+        """What its health reports in words."""
+        notes = [] if self._follower is None else self._follower.notes()
+        if self.meter.faults:
+            notes.append(f"{self.meter.faults} faults: run with --verbose to see them")
+        return notes
+
+    def _jobs(self) -> list[tuple[int, Due]]:
+        jobs = [(timer.period_ns, self._timer(timer.handler)) for timer in self.module.timers]
+        if self._health:
+            jobs.append((HEALTH_PERIOD_NS, self._publish_health))
+        if self._follower is not None:
+            jobs.append((RETRY_PERIOD_NS, self._retry))
+        return jobs
+
+    def _restore(self) -> frozenset[topics.Topic]:
+        """Hand the journal to the module. Returns the topics of which it wants the past."""
+        if self._journal is None or self.module.restore is None:
+            return frozenset()
+        self.module.restore(self._journal.messages())
+        return frozenset() if self._journal.is_empty else self.module.backfill
 
     def _receive(self, arrival: Arrival) -> None:
-        started_ns = time.time_ns()
+        received_ns = time.time_ns()
         message = self.intake.accept(arrival)
-        if message is None or arrival.envelope is None:
+        envelope = arrival.envelope
+        if message is None or envelope is None:
             return
-        if self._follower is not None and isinstance(message, Delta):
-            is_held = self._follower.follow(message, arrival.envelope.incarnation)
-            if not is_held:
-                return
-        self._remember(message.stamp_ns, arrival.envelope)
-        cause = (arrival.topic.name, arrival.envelope.source, arrival.envelope.seq)
-        self._invoke(lambda: self.module.feed(message), cause, arrival.envelope, started_ns)
+        if not self._follow(message, envelope):
+            return
 
-    def _remember(self, stamp_ns: int, envelope: Envelope) -> None:
-        """What is said with that stamp follows `envelope`, also where it is said while another
-        message is taken in.
-        """
-        self._traces.pop(stamp_ns, None)
-        self._traces[stamp_ns] = envelope
-        if len(self._traces) > MAX_TRACES:
-            del self._traces[next(iter(self._traces))]
+        self.publisher.trace(message.stamp_ns, envelope)
+        cause = (arrival.topic.name, envelope.source, envelope.seq)
+        self._invoke(lambda: self.module.feed(message), cause, True, received_ns)
+
+    def _follow(self, message: Message, envelope: Envelope) -> bool:
+        """Apply a delta to the module's graph. Returns whether the module may receive `message`."""
+        if self._follower is None or not isinstance(message, Delta):
+            return True
+        return self._follower.follow(message, envelope.incarnation)
 
     def _invoke(
-        self, think: Callable[[], list[Message]], cause: Cause, of: Envelope | None, started_ns: int
+        self,
+        handler: Callable[[], list[Message]],
+        cause: Cause,
+        answers: bool = False,
+        received_ns: int | None = None,
     ) -> None:
-        """Let the module think; a message that it cannot make sense of changes nothing but a count."""
-        thinking_ns = time.time_ns()
+        """Call the module and publish what it returns.
+
+        Where it raises, nothing but a count changes. `answers` is whether `cause` is a received
+        message.
+        """
+        start_ns = time.time_ns()
         try:
-            messages = think()
+            messages = handler()
         except MessageError as error:
             self.intake.reject(cause[0], str(error))
             return
         except Exception as error:
-            self.meter.faults += 1
-            self.intake.reject(cause[0], f"{cause[0]}: {type(error).__name__}: {error}")
-            log.debug("fault in %s", self.module.instance, exc_info=True)
+            self._count_fault(cause[0], error)
             return
-        done_ns = time.time_ns()
-        if self.module.emits:
-            self._causes.append(cause)
+
+        compute_ns = time.time_ns() - start_ns
+        self.publisher.add_cause(cause)
         if messages:
-            self._send(messages, of, done_ns - thinking_ns, thinking_ns)
-        self.meter.count(done_ns - thinking_ns, time.time_ns() - started_ns)
+            self.publisher.send(messages, Computation(start_ns, compute_ns, answers))
+        self.meter.add(compute_ns, time.time_ns() - (received_ns or start_ns))
 
-    def _send(
-        self, messages: Iterable[Message], of: Envelope | None, compute_ns: int, thinking_ns: int
-    ) -> None:
-        """Send `messages`, with what led to them; the journal has them first."""
-        for message in messages:
-            topic = topics.of(message)
-            payload = encode(message)
-            if topic is self.module.journal and self._journal is not None:
-                self._journal.append(message, payload)
-            now_ns = time.time_ns()
-            envelope = Envelope(
-                message.source, message.seq, self._incarnation, now_ns, thinking_ns + compute_ns
-            )
-            cause = None if of is None or topic.sensed else self._traces.get(message.stamp_ns)
-            if cause is not None:
-                envelope.follow(cause, self.module.name, compute_ns)
-            envelope.causes = self._causes
-            self._causes = []
-            self.bus.publish(topic, payload, envelope)
-            self.meter.emitted[topic.name] += 1
-        if self._journal is not None and self._journal.is_long and self.module.compact is not None:
-            self._journal.compact(self.module.compact())
+    def _count_fault(self, topic: str, error: Exception) -> None:
+        self.meter.faults += 1
+        self.intake.reject(topic, f"{topic}: {type(error).__name__}: {error}")
+        log.debug("fault in %s", self.module.instance, exc_info=True)
 
-    def _on_timer(self, handler: Callable[[int], Reply]) -> Callable[[int], None]:
+    def _timer(self, handler: Callable[[int], Reply]) -> Due:
         def due(now_ns: int) -> None:
             cause = (TIMER, self.module.instance, now_ns)
-            self._invoke(lambda: self.module.stamp(handler(now_ns)), cause, None, time.time_ns())
+            self._invoke(lambda: self.module.stamp(handler(now_ns)), cause)
 
         return due
 
@@ -194,9 +216,7 @@ class Shell:
             except MessageError as error:
                 self.intake.reject(request.name, str(error))
                 raise
-            now_ns = time.time_ns()
-            source = self.module.instance
-            return Answer(encode(reply), Envelope(source, 0, self._incarnation, now_ns, now_ns))
+            return Answer(encode(reply), self.publisher.answer_envelope())
 
         return answer
 
@@ -205,56 +225,46 @@ class Shell:
             self._follower.retry()
 
     def _on_load(self, fetched: Fetched) -> None:
-        """Record that a snapshot replaced the graph, as what led to all that is published next."""
+        """Name the snapshot that replaced the graph as a cause of what is published next."""
         cause = (topics.SNAPSHOT.name, fetched.source, fetched.snapshot.version)
-        self._invoke(self.module.loaded, cause, None, time.time_ns())
+        self._invoke(self.module.loaded, cause)
+
+    def _watch(self, member: Member, alive: bool) -> None:
+        """Hand a change of who is there to the module's own thread."""
+        self.inbox.call(lambda: self._on_presence(member, alive))
 
     def _on_presence(self, member: Member, alive: bool) -> None:
-        (self._present.add if alive else self._present.discard)(member)
+        if alive:
+            self._present.add(member)
+        else:
+            self._present.discard(member)
+
         if topics.PRESENCE in self.module.handlers:
-            presence = Presence(
-                module=member.module,
-                instance=member.instance,
-                alive=alive,
-                observer=self.module.instance,
-            )
-            self.publish(self.module.stamp(presence))
-            cause = (topics.PRESENCE.name, presence.source, presence.seq)
-            self._invoke(lambda: self.module.feed(presence), cause, None, time.time_ns())
+            self._feed_presence(member, alive)
         if not self._started and not self.missing:
             self._started = True
-            start = self.module.start
-            if start is not None:
-                cause = (START, self.module.instance, 0)
-                self._invoke(lambda: self.module.stamp(start()), cause, None, time.time_ns())
+            self._start()
 
-    @property
-    def missing(self) -> dict[str, int]:
-        """The modules that it waits for, and how many instances of each are not ready yet."""
-        ready = [member.module for member in self._present]
-        lacking = {
-            name: number - ready.count(name) for name, number in self.module.requires.items()
-        }
-        return {name: number for name, number in lacking.items() if number > 0}
+    def _feed_presence(self, member: Member, alive: bool) -> None:
+        """Publish what this module observed, for the log, and hand it to the module."""
+        observed = Presence(
+            module=member.module,
+            instance=member.instance,
+            alive=alive,
+            observer=self.module.instance,
+        )
+        (presence,) = self.module.stamp(observed)
+        self.publish([presence])
+        cause = (topics.PRESENCE.name, presence.source, presence.seq)
+        self._invoke(lambda: self.module.feed(presence), cause)
 
-    @property
-    def notes(self) -> list[str]:
-        """What its health reports in words."""
-        notes = [] if self._follower is None else self._follower.notes()
-        if self.meter.faults:
-            notes.append(f"{self.meter.faults} faults: run with --verbose to see them")
-        return notes
+    def _start(self) -> None:
+        start = self.module.start
+        if start is not None:
+            cause = (START, self.module.instance, 0)
+            self._invoke(lambda: self.module.stamp(start()), cause)
 
-    def _say_health(self, now_ns: int) -> None:
-        health = self.meter.report(self.intake, self.inbox, not self.missing, self.notes)
-        health.source = self.module.instance
-        health.seq = self.meter.reports - 1
-        sent_ns = time.time_ns()
-        health.stamp_ns = sent_ns
-        envelope = Envelope(health.source, health.seq, self._incarnation, sent_ns, sent_ns)
-        if (
-            len(self._causes) > MAX_CAUSES
-        ):  # whoever says little else would remember all that it ever took in
-            envelope.causes = self._causes
-            self._causes = []
-        self.bus.publish(topics.HEALTH, encode(health), envelope)
+    def _publish_health(self, now_ns: int) -> None:
+        ready = not self.missing
+        health = self.meter.report(self.intake, self.inbox, self.publisher, ready, self.notes)
+        self.publisher.send_health(health)

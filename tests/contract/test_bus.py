@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import threading
 from queue import SimpleQueue
 
@@ -9,13 +10,14 @@ import pytest
 
 from cogmap.bus.codec import Envelope, decode
 from cogmap.bus.interface import Answer, Job, Member
-from cogmap.errors import NoAnswerError
+from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.errors import NoAnswerError, UsageError
 from schemas import topics
 from schemas.examples import samples
 from schemas.process import Clock
 from schemas.sensing import Odometry
 from schemas.topics import Delivery
-from tests.support.networks import TIMEOUT_S, Network, Peer, meet, publish
+from tests.support.networks import TIMEOUT_S, Network, OverZenoh, Peer, meet, publish
 
 MESSAGES = {topics.of(message): message for message in samples()}
 TRAVELLING = [topic for topic in topics.ALL if topic.delivery is not Delivery.ON_REQUEST]
@@ -231,3 +233,45 @@ def test_members_are_told_of_who_is_there_comes_and_goes(network: Network) -> No
     early.close()
     assert changes.get(timeout=TIMEOUT_S) == (first, False)
     assert changes.empty()
+
+
+@pytest.mark.parametrize("topic", TRAVELLING, ids=lambda topic: topic.name)
+def test_a_plain_subscriber_reads_what_a_sample_holds(
+    over_zenoh: OverZenoh, topic: topics.Topic
+) -> None:
+    publisher = over_zenoh.join()
+    publisher.declare(topic)
+    reader = over_zenoh.join()
+    encodings: SimpleQueue[str] = SimpleQueue()
+    reader.session.declare_subscriber(
+        topic.key(over_zenoh.agent), lambda sample: encodings.put(str(sample.encoding))
+    )
+    meet(publisher, reader)
+
+    publish(publisher, MESSAGES[topic])
+
+    assert encodings.get(timeout=TIMEOUT_S) == f"application/msgpack;{topic.type.__name__}"
+
+
+def test_a_plain_client_reads_what_queries_and_answers_hold(over_zenoh: OverZenoh) -> None:
+    asker = over_zenoh.join()
+    answerer = over_zenoh.join()
+    answerer.serve(*SNAPSHOTS, Answer, work)
+    meet(asker, answerer)
+    key = topics.SNAPSHOT_REQUEST.key(over_zenoh.agent)
+
+    (reply,) = asker.session.get(key, timeout=TIMEOUT_S)
+
+    assert reply.ok is not None
+    assert str(reply.ok.encoding) == "application/msgpack;Snapshot"
+
+
+@pytest.mark.parametrize("name", ["a/b", "", "*", "a b", "robot?", "$x"])
+def test_an_agent_that_cannot_be_in_a_key_names_itself(endpoint: str, name: str) -> None:
+    with pytest.raises(UsageError, match=f"--agent {re.escape(repr(name))}: use letters, digits"):
+        ZenohBus(endpoint, name)
+
+
+def test_an_instance_that_cannot_be_in_a_key_names_itself(over_zenoh: OverZenoh) -> None:
+    with pytest.raises(UsageError, match=r"--instance 'a/b': use letters, digits"):
+        over_zenoh.join().announce(Member("codelets", "a/b"))

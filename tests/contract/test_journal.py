@@ -7,10 +7,16 @@ from pathlib import Path
 import pytest
 
 from cogmap.bus.codec import encode
-from cogmap.errors import UsageError
-from cogmap.runtime.journal import Journal
+from cogmap.bus.interface import Arrival
+from cogmap.bus.memory import MemoryBus, MemoryNetwork
+from cogmap.errors import StorageError, UsageError
+from cogmap.runtime.module import Module
+from cogmap.runtime.shell import Shell
+from cogmap.runtime.state.journal import Journal
+from schemas import topics
 from schemas.base import Message
 from schemas.graph import Delta, Link, Snapshot
+from tests.support.disks import full_after
 
 
 def delta(version: int) -> Delta:
@@ -121,3 +127,42 @@ def test_a_whole_record_that_cannot_be_read_is_refused_and_kept(tmp_path: Path) 
     with pytest.raises(UsageError, match=r"j: a record .* move the file away"):
         restored(tmp_path / "j")
     assert (tmp_path / "j").stat().st_size == size
+
+
+def test_a_full_disk_is_one_sentence_and_costs_only_what_was_not_written(tmp_path: Path) -> None:
+    sizes = written(tmp_path / "whole", *(delta(version) for version in range(1, 4)))
+    journal = Journal(tmp_path / "j")
+    assert list(journal.messages()) == []
+
+    with (
+        full_after(sizes[1] + 20),
+        pytest.raises(StorageError, match=r"cannot write .*/j \(.*\): make room on its disk"),
+    ):
+        for version in range(1, 4):
+            journal.append(delta(version), encode(delta(version)))
+    journal.close()
+
+    assert restored(tmp_path / "j") == [delta(1), delta(2)]
+
+
+def test_a_folder_that_cannot_be_made_is_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "state").write_text("a file")
+
+    with pytest.raises(StorageError, match=r"cannot write .*/j \(.*\): name another folder"):
+        Journal(tmp_path / "state" / "j")
+
+
+def test_a_module_whose_journal_cannot_be_written_publishes_nothing_of_it(tmp_path: Path) -> None:
+    network = MemoryNetwork()
+    published: list[Arrival] = []
+    MemoryBus(network).subscribe(topics.DELTA, published.append, lambda topic, number: None)
+    module = Module("workspace", emits={topics.DELTA}).journaling(topics.DELTA, list, Snapshot)
+    journal = Journal(tmp_path / "j")
+    shell = Shell(module, MemoryBus(network), journal, health=False)
+    shell.open()
+
+    with full_after(10), pytest.raises(StorageError, match="cannot write"):
+        shell.publish(module.stamp(delta(1)))
+
+    assert published == []
+    shell.close()

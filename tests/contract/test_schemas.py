@@ -8,11 +8,12 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import msgpack
 import msgspec
 import pytest
 from msgspec.inspect import FloatType
 
-from cogmap.bus.codec import decode, encode
+from cogmap.bus.codec import Envelope, decode, encode
 from schemas import topics
 from schemas.base import Message
 from schemas.examples import samples
@@ -41,6 +42,23 @@ def test_golden_bytes_are_plain_msgpack_without_extensions(topic: Topic) -> None
 
     assert plain["source"] == "sample"
     assert msgspec.msgpack.encode(plain) == golden(topic)
+
+
+@each_topic
+def test_the_reference_library_of_msgpack_decodes_the_golden_bytes(topic: Topic) -> None:
+    decoded = msgpack.unpackb(golden(topic))
+
+    assert decoded == msgspec.msgpack.decode(golden(topic))
+    assert decode(topic, msgpack.packb(decoded)) == BY_TOPIC[topic]
+
+
+@each_topic
+def test_the_reference_library_of_msgpack_decodes_an_envelope(topic: Topic) -> None:
+    envelope = Envelope("sim", 7, 1, 2, 3, [("sensory", 4, 5)], [(topic.name, "sim", 6)], 8)
+
+    decoded = msgpack.unpackb(encode(envelope))
+
+    assert decoded == ["sim", 7, 1, 2, 3, [["sensory", 4, 5]], [[topic.name, "sim", 6]], 8]
 
 
 @each_topic

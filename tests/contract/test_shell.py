@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from pathlib import Path
 
 import pytest
 
@@ -11,7 +12,9 @@ from cogmap.bus.codec import Cause, Envelope, decode, encode
 from cogmap.bus.interface import Member
 from cogmap.errors import MessageError, NoAnswerError
 from cogmap.runtime.module import Module
-from cogmap.runtime.shell import MAX_CAUSES, Shell
+from cogmap.runtime.publisher import MAX_CAUSES
+from cogmap.runtime.shell import Shell
+from cogmap.runtime.state.published import PublishedCounts
 from schemas import topics
 from schemas.base import Message
 from schemas.graph import Snapshot, SnapshotRequest
@@ -129,6 +132,55 @@ def test_a_source_that_starts_anew_counts_from_the_beginning(network: Network) -
 
     assert not shell.intake.rejected
     assert not shell.intake.gaps
+    shell.close()
+
+
+@pytest.mark.parametrize("restarts", [1, 3])
+def test_what_was_published_unheard_before_a_restart_is_counted(
+    network: Network, tmp_path: Path, restarts: int
+) -> None:
+    heard: list[Message] = []
+    shell = listener(network, topics.ODOMETRY, heard)
+    lost = 0
+
+    def run(count: int, unheard: int) -> None:
+        sim = Module("sim", emits={topics.ODOMETRY})
+        counts = PublishedCounts(tmp_path / "sim.published")
+        publisher = Shell(sim, network.join(), health=False, counts=counts)
+        publisher.open()
+        meet(publisher.bus, shell.bus)
+        before = len(heard)
+        publisher.publish(sim.stamp([odometry(0)] * count))
+        spin_until(lambda: len(heard) == before + count, shell)
+        for _ in range(unheard):
+            counts.add(topics.ODOMETRY)
+        publisher.close()
+
+    run(5, 4)
+    for _ in range(restarts):
+        lost += 4
+        run(5, 4)
+
+    assert dict(shell.intake.gaps) == {"odometry": lost}
+    assert not shell.intake.rejected
+    shell.close()
+
+
+def test_a_message_of_an_incarnation_that_has_ended_is_ignored(network: Network) -> None:
+    heard: list[Message] = []
+    shell = listener(network, topics.ODOMETRY, heard)
+    publisher = network.join()
+    publisher.declare(topics.ODOMETRY)
+    meet(publisher, shell.bus)
+
+    publish(publisher, odometry(0), incarnation=1)
+    publish(publisher, odometry(0), incarnation=2)
+    publish(publisher, odometry(1), incarnation=1)
+    publish(publisher, odometry(1), incarnation=2)
+    spin_until(lambda: len(heard) == 3, shell)
+
+    assert [message.seq for message in heard] == [0, 0, 1]
+    assert shell.intake.rejected["odometry"] == 1
     shell.close()
 
 

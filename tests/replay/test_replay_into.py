@@ -20,9 +20,9 @@ from cogmap.recording.replaying.replay import Build, Report, replay_into
 from cogmap.recording.selection import to_record
 from cogmap.recording.storage.reader import LogReader
 from cogmap.recording.storage.writer import LogWriter
-from cogmap.runtime.journal import Journal
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
+from cogmap.runtime.state.journal import Journal
 from schemas import topics
 from schemas.array import Array
 from schemas.base import Message
@@ -192,7 +192,7 @@ def test_what_a_timer_made_a_module_say_is_replayed_with_the_timers_time(path: P
     session.settle()
     timer = shell.module.timers[0]
     for seq in range(1, 8):
-        shell._on_timer(timer.handler)(seq * 1_234_567)
+        shell._timer(timer.handler)(seq * 1_234_567)
         session.say(odometry(seq), seq)
         session.settle()
     session.end()

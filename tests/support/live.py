@@ -87,6 +87,11 @@ class Process:
     def is_alive(self) -> bool:
         return self._process.poll() is None
 
+    @property
+    def exit_code(self) -> int | None:
+        """What it ended with; None while it is alive."""
+        return self._process.poll()
+
 
 class System:
     """Processes that meet at one endpoint."""

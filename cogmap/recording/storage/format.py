@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import msgspec
 
-from cogmap.bus.codec import Cause, Envelope, Stage
+from cogmap.bus.codec import UNKNOWN, Cause, Envelope, Stage
 from cogmap.version import VERSION
 from schemas import topics
 from schemas.export import json_schema
@@ -44,6 +44,7 @@ class EnvelopeRecord(msgspec.Struct, kw_only=True):
     born_ns: int
     stages: list[Stage]
     causes: list[Cause]
+    earlier: int = UNKNOWN
 
     @classmethod
     def of(cls, topic: Topic, envelope: Envelope) -> EnvelopeRecord:

@@ -12,8 +12,8 @@ import pytest
 
 from cogmap.bus import codec
 from cogmap.errors import ConfigError, MessageError
-from cogmap.runtime.journal import Journal
 from cogmap.runtime.module import Module
+from cogmap.runtime.state.journal import Journal
 from schemas import topics
 from schemas.array import Array
 from schemas.base import Message

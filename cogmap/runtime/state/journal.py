@@ -1,4 +1,4 @@
-"""What a module has committed, on disk before it is sent, so that a kill loses none of it."""
+"""What a module has committed, on disk before it is published, so that a kill loses none of it."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 
 from cogmap.bus.codec import decode, encode
 from cogmap.errors import MessageError, UsageError
+from cogmap.runtime.state.files import open_file, write_at
 from schemas import topics
 from schemas.base import Message
 
@@ -18,57 +19,59 @@ COMPACT_BYTES = 64 * 2**20
 
 
 class Journal:
-    """An append-only file of messages. A torn tail, left by a kill amid a write, is cut off when it
-    is opened.
+    """An append-only file of messages.
 
-    Raises UsageError where it cannot be opened.
+    A torn tail, left by a kill during a write, is cut off when the file is read. Raises
+    StorageError where the file cannot be opened or written.
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
-        except OSError as error:
-            raise UsageError(
-                f"cannot write {path} ({error.strerror}): name another folder with --state"
-            ) from None
+        self._file = open_file(path)
         self._size = 0
         self._limit = COMPACT_BYTES
 
     def messages(self) -> Iterator[Message]:
-        """Everything written so far, oldest first. Raises UsageError at a whole record that cannot
-        be read.
+        """Everything written so far, oldest first.
+
+        Raises UsageError at a whole record that cannot be decoded.
         """
-        while (record := self._record_at(self._size)) is not None:
-            message, length = record
-            self._size += length
+        while (body := self._body_at(self._size)) is not None:
+            name_length, record = body
+            message = self._decoded(record[:name_length], record[name_length:])
+            self._size += _HEAD.size + len(record)
             yield message
         os.ftruncate(self._file, self._size)
 
-    def _record_at(self, offset: int) -> tuple[Message, int] | None:
+    def _body_at(self, offset: int) -> tuple[int, bytes] | None:
+        """The length of the topic's name, then name and payload; None where no whole record is."""
         head = os.pread(self._file, _HEAD.size, offset)
         if len(head) < _HEAD.size:
             return None
+
         length, checksum, name_length = _HEAD.unpack(head)
         body = os.pread(self._file, length, offset + _HEAD.size)
         if len(body) < length or zlib.crc32(body) != checksum:
             return None
+        return name_length, body
+
+    def _decoded(self, name: bytes, payload: bytes) -> Message:
         try:
-            topic = topics.BY_NAME[body[:name_length].decode()]
-            return decode(topic, body[name_length:]), _HEAD.size + length
+            return decode(topics.BY_NAME[name.decode()], payload)
         except (KeyError, UnicodeDecodeError, MessageError) as error:
             raise UsageError(
-                f"{self._path}: a record of another version cannot be read ({error}): move the file away to start anew"
+                f"{self._path}: a record of another version cannot be read ({error}): "
+                f"move the file away to start anew"
             ) from None
 
     def append(self, message: Message, payload: bytes) -> None:
         """Write `message`, whose bytes are `payload`; it survives this process from here on."""
         name = topics.of(message).name.encode()
         body = name + payload
-        record = _HEAD.pack(len(body), zlib.crc32(body), len(name)) + body
-        os.pwrite(self._file, record, self._size)
-        self._size += len(record)
+        head = _HEAD.pack(len(body), zlib.crc32(body), len(name))
+
+        write_at(self._path, self._file, head + body, self._size)
+        self._size += _HEAD.size + len(body)
 
     @property
     def is_empty(self) -> bool:
@@ -77,18 +80,20 @@ class Journal:
 
     @property
     def is_long(self) -> bool:
-        """Whether it is time to put one message in place of all."""
+        """Whether it is time to compact it."""
         return self._size > self._limit
 
     def compact(self, message: Message) -> None:
-        """Put `message` in place of everything, at once or not at all."""
-        fresh = Journal(self._path.with_suffix(".new"))
-        os.ftruncate(fresh._file, 0)
-        fresh.append(message, encode(message))
-        fresh._path.replace(self._path)
+        """Replace everything by `message`, atomically."""
+        new_path = self._path.with_suffix(".new")
+        new = Journal(new_path)
+        os.ftruncate(new._file, 0)
+        new.append(message, encode(message))
+        new_path.replace(self._path)
+
         os.close(self._file)
-        self._file = fresh._file
-        self._size = fresh._size
+        self._file = new._file
+        self._size = new._size
         self._limit = max(COMPACT_BYTES, 4 * self._size)
 
     def close(self) -> None:

@@ -1,0 +1,137 @@
+"""Publishes what a module returns, with what led to it."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from cogmap.bus.codec import UNKNOWN, Cause, Envelope, encode
+from cogmap.bus.interface import Bus
+from cogmap.runtime.module import Module
+from cogmap.runtime.state.journal import Journal
+from cogmap.runtime.state.published import PublishedCounts
+from schemas import topics
+from schemas.base import Message
+from schemas.process import Health
+from schemas.topics import Delivery, Topic
+
+MAX_CAUSES = 1000
+MAX_TRACES = 32
+
+
+@dataclass(frozen=True, slots=True)
+class Computation:
+    """How long a handler took. Its outputs belong to the trace of their stamp if it `answers` a
+    message.
+    """
+
+    start_ns: int
+    compute_ns: int = 0
+    answers: bool = False
+
+    @property
+    def end_ns(self) -> int:
+        """When it ended."""
+        return self.start_ns + self.compute_ns
+
+
+class Publisher:
+    """Sends messages of `module` on `bus`, to the journal first; `emitted` counts them by topic."""
+
+    def __init__(
+        self,
+        module: Module,
+        bus: Bus,
+        journal: Journal | None = None,
+        counts: PublishedCounts | None = None,
+    ) -> None:
+        self.incarnation = time.time_ns()
+        self.emitted: Counter[str] = Counter()
+        self._module = module
+        self._bus = bus
+        self._journal = journal
+        self._counts = counts
+        self._causes: list[Cause] = []
+        self._traces: dict[int, Envelope] = {}
+
+    def declare(self, health: bool) -> None:
+        """Prepare to publish all that the module may, and its health."""
+        for topic in sorted(self._module.emits, key=lambda topic: topic.name):
+            self._bus.declare(topic)
+        if health:
+            self._bus.declare(topics.HEALTH)
+
+    def trace(self, stamp_ns: int, envelope: Envelope) -> None:
+        """Let outputs of that stamp continue the trace of `envelope`, until another one comes."""
+        self._traces.pop(stamp_ns, None)
+        self._traces[stamp_ns] = envelope
+        if len(self._traces) > MAX_TRACES:
+            oldest = next(iter(self._traces))
+            del self._traces[oldest]
+
+    def add_cause(self, cause: Cause) -> None:
+        """Name `cause` in the next output."""
+        if self._module.emits:
+            self._causes.append(cause)
+
+    def send(self, messages: Iterable[Message], computation: Computation) -> None:
+        """Publish numbered messages. Raises StorageError where journal or counts cannot be written."""
+        for message in messages:
+            self._send(message, computation)
+        self._compact_journal()
+
+    def send_health(self, health: Health) -> None:
+        """Publish `health`, with the causes that wait for an output where they have become many."""
+        payload = encode(health)
+        envelope = self._envelope(topics.HEALTH, health, health.stamp_ns)
+        if len(self._causes) > MAX_CAUSES:
+            envelope.causes = self._take_causes()
+        self._bus.publish(topics.HEALTH, payload, envelope)
+
+    def answer_envelope(self) -> Envelope:
+        """The envelope of an answer to a query, which has no number."""
+        now_ns = time.time_ns()
+        return Envelope(self._module.instance, 0, self.incarnation, now_ns, now_ns)
+
+    def _send(self, message: Message, computation: Computation) -> None:
+        topic = topics.of(message)
+        payload = encode(message)
+        if self._journal is not None and topic is self._module.journal:
+            self._journal.append(message, payload)
+
+        envelope = self._envelope(topic, message, computation.end_ns)
+        trace = self._traces.get(message.stamp_ns)
+        if trace is not None and computation.answers and not topic.sensed:
+            envelope.continue_trace(trace, self._module.name, computation.compute_ns)
+        envelope.causes = self._take_causes()
+
+        self._bus.publish(topic, payload, envelope)
+        self.emitted[topic.name] += 1
+
+    def _envelope(self, topic: Topic, message: Message, born_ns: int) -> Envelope:
+        earlier = UNKNOWN
+        if self._counts is not None and topic.delivery is Delivery.NEVER_DROP:
+            earlier = self._counts.earlier(topic)
+            self._counts.add(topic)
+
+        return Envelope(
+            source=message.source,
+            seq=message.seq,
+            incarnation=self.incarnation,
+            sent_ns=time.time_ns(),
+            born_ns=born_ns,
+            earlier=earlier,
+        )
+
+    def _take_causes(self) -> list[Cause]:
+        causes = self._causes
+        self._causes = []
+        return causes
+
+    def _compact_journal(self) -> None:
+        compact = self._module.compact
+        if self._journal is None or compact is None or not self._journal.is_long:
+            return
+        self._journal.compact(compact())

@@ -1,0 +1,47 @@
+"""A module dies while the router is away: what it published meanwhile is lost, and counted."""
+
+from __future__ import annotations
+
+import signal
+
+from cogmap.runtime.module import Module
+from cogmap.runtime.shell import Shell
+from cogmap.runtime.state.published import PublishedCounts
+from schemas import topics
+from schemas.sensing import Odometry
+from tests.support.live import System, wait_until
+from tests.support.networks import working
+
+WITHOUT_IMAGES = ("sim.egl=false", "sim.frame_hz=1")
+
+
+def published(system: System) -> int:
+    """How many odometry messages the simulator has published, as its file counts them."""
+    counts = PublishedCounts(system.folder / "state" / "sim.published")
+    number = counts.earlier(topics.ODOMETRY)
+    counts.close()
+    return number
+
+
+def test_what_a_publisher_lost_before_its_restart_is_counted_as_a_gap(system: System) -> None:
+    received: list[Odometry] = []
+    system.router()
+    listener = Shell(Module("listener").on(topics.ODOMETRY, received.append), system.bus())
+
+    with working(listener):
+        system.modules("sim", settings=WITHOUT_IMAGES)
+        wait_until(lambda: len(received) > 20, "odometry arrives")
+        system.processes["router"].end(signal.SIGKILL)
+        before = published(system)
+        wait_until(lambda: published(system) > before + 20, "odometry is published unheard")
+        system.processes["sim"].end(signal.SIGKILL)
+        lost = published(system) - len(received)
+
+        system.router()
+        system.modules("sim", settings=WITHOUT_IMAGES)
+        heard = len(received)
+        wait_until(lambda: len(received) > heard + 20, "odometry arrives again")
+
+    assert lost > 20
+    assert dict(listener.intake.gaps) == {"odometry": lost}
+    assert not listener.intake.rejected
