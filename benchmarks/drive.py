@@ -9,13 +9,14 @@ from pathlib import Path
 import msgspec
 from rich.console import Console
 
-from cli.launch.drive import INTERRUPTED, Drive
-from cli.launch.metrics import Figures
+from cli.launch.drive import Drive
+from cli.launch.metrics import RunMetrics
 from cli.launch.observer import Errors, Observer
-from cli.launch.plan import LOG_NAME, Choices, effective, everybody
+from cli.launch.outcome import Outcome
+from cli.launch.plan import LOG_NAME, Choices, awaited, effective
 from cli.launch.watch import Watch
-from cli.run import display, summary
-from cli.run.display import Display
+from cli.run import summary
+from cli.run.display import Display, display_on
 from cogmap.bus.session import free_endpoint
 from cogmap.errors import CogmapError
 from cogmap.recording.recorder import Summary
@@ -48,9 +49,9 @@ class TimedStop(Stop):
         """Whether a signal asked for the end."""
         return super().asked
 
-    def say(self, sentence: str) -> None:
+    def show(self, sentence: str) -> None:
         """Show a sentence that stays."""
-        self._display.say(sentence)
+        self._display.show(sentence)
 
     def waiting(self, names: list[str]) -> None:
         """Show which modules the drive waits for."""
@@ -66,26 +67,26 @@ class TimedStop(Stop):
         self._display.close()
 
 
-def drive(folder: Path, laps: float = 1.0, seconds: float = TIMEOUT_S) -> tuple[Figures, Watch]:
+def drive(folder: Path, laps: float = 1.0, seconds: float = TIMEOUT_S) -> tuple[RunMetrics, Watch]:
     """Drive `laps`, at most `seconds`, leaving the files of `cogmap run` in `folder`.
 
     Ctrl-C ends the process. Raises CogmapError where the robot never moved.
     """
     began_s = time.monotonic()
     choices = Choices(laps=laps)
-    sections = effective({}, choices, everybody(choices, observer=True))
-    stop = TimedStop(display.on(Console(stderr=True)), seconds)
+    sections = effective({}, choices, awaited(choices, observer=True))
+    stop = TimedStop(display_on(Console(stderr=True)), seconds)
     run = Drive(folder, free_endpoint(), "agent", choices, sections, began_s)
 
     try:
-        watch = run.run(began_s + TIMEOUT_S, stop, stop)
+        watch, ending = run.run(began_s + TIMEOUT_S, stop, stop)
     finally:
         stop.close()
 
-    if run.ended_by == INTERRUPTED and stop.interrupted:
+    if ending.outcome is Outcome.INTERRUPTED and stop.interrupted:
         sys.exit(130)
 
-    driven = summary.finish(run, watch)
+    driven = summary.finish(run, watch, ending)
     if not driven.commands:
         raise CogmapError("the drive gave no motor command: `cogmap doctor` finds the reason")
 

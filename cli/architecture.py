@@ -1,11 +1,9 @@
-"""`cogmap architecture`: the parts of docs/architecture.md that follow from the topic table and the
-modules.
-"""
+"""`cogmap architecture`: the generated parts of docs/architecture.md."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import product
 from pathlib import Path
 
@@ -24,99 +22,112 @@ _WITHOUT_SCREEN = {"sim": {"egl": False}}
 
 
 @click.command()
-@click.option(
-    "--check", is_flag=True, help="Write nothing; fail where the page is not what the code says."
-)
+@click.option("--check", is_flag=True, help="Write nothing; fail where the page is out of date.")
 @click.argument("page", type=click.Path(path_type=Path), default=PAGE)
 def architecture(check: bool, page: Path) -> None:
-    """Write the diagram and the tables of docs/architecture.md, from the topic table and the
-    modules.
+    """Write the generated parts of docs/architecture.md.
+
+    They are the diagram and the table of topics, from the topic table and the modules.
     """
     try:
         before = page.read_text()
     except OSError as error:
         raise UsageError(
-            f"cannot read {page}: {error.strerror}; call this in the sources, or name the page"
+            f"cannot read {page}: {error.strerror}; run this in the sources, or name the page"
         ) from None
+
     after = renewed(before)
     if not check:
         page.write_text(after)
     elif before != after:
-        raise CogmapError(f"{page} is not what the code says: `cogmap architecture` writes it anew")
+        raise CogmapError(f"{page} is out of date: `cogmap architecture` writes it anew")
 
 
 def renewed(text: str) -> str:
-    """`text` with each generated part, which lies between two comments, as it is now. Raises
-    UsageError.
+    """`text` with each generated part, between its two comments, as it is now.
+
+    Raises UsageError where a part has no place.
     """
     modules = [registry.build(name, _WITHOUT_SCREEN) for name in registry.MODULES]
-    for name, part in _PARTS.items():
-        place = re.search(
-            f"<!-- {name}: generated.*?-->\n(.*?)<!-- end of {name} -->", text, re.DOTALL
-        )
+    for name, generate in _PARTS.items():
+        begin = f"<!-- {name}: generated"
+        end = f"<!-- end of {name} -->"
+        place = re.search(f"{begin}.*?-->\n(.*?){end}", text, re.DOTALL)
         if place is None:
-            raise UsageError(
-                f"the page has no place for its {name}: <!-- {name}: generated --> <!-- end of {name} -->"
-            )
-        text = text[: place.start(1)] + part(modules) + text[place.end(1) :]
+            raise UsageError(f"the page has no place for its {name}: {begin} --> {end}")
+        text = text[: place.start(1)] + generate(modules) + text[place.end(1) :]
     return text
 
 
 def diagram(modules: list[Module]) -> str:
-    """Modules as boxes, topics as arrows, in Mermaid's language. What no module takes in goes to
-    the observers.
+    """Modules as boxes and topics as arrows, in Mermaid.
+
+    A topic that no module subscribes leads to the observers.
     """
+    lines = ["```mermaid", "flowchart TD"]
+    lines += [f'    {module.name}["{module.name}"]' for module in modules]
+    lines.append(f'    {OBSERVERS}(["{OBSERVERS}"])')
+
+    lines += _arrows(modules)
+    lines += ["```", ""]
+    return "\n".join(lines)
+
+
+def _arrows(modules: list[Module]) -> Iterator[str]:
+    """An arrow for all topics of one delivery between the same two ends."""
     arrows: dict[tuple[str, str, Delivery], list[str]] = {}
     for topic in topics.ALL:
         senders, receivers = _ends(topic, modules)
         for sender, receiver in product(senders, receivers):
             if receiver != sender:
-                arrows.setdefault((sender, receiver, topic.delivery), []).append(topic.name)
-    lines = [
-        "```mermaid",
-        "flowchart TD",
-        *(f'    {module.name}["{module.name}"]' for module in modules),
-    ]
-    lines.append(f'    {OBSERVERS}(["{OBSERVERS}"])')
+                arrow = (sender, receiver, topic.delivery)
+                arrows.setdefault(arrow, []).append(topic.name)
+
     for (sender, receiver, delivery), names in arrows.items():
-        lines.append(f'    {sender} {_ARROWS[delivery]}|"{"<br/>".join(names)}"| {receiver}')
-    return "\n".join([*lines, "```", ""])
+        label = "<br/>".join(names)
+        yield f'    {sender} {_ARROWS[delivery]}|"{label}"| {receiver}'
 
 
 def topic_table(modules: list[Module]) -> str:
-    """The table of topics, with who says each and who takes it in."""
+    """The table of topics, with their publishers and subscribers."""
     lines = [
         "| topic | message | rate | delivery | about | from | to |",
         "|---|---|---|---|---|---|---|",
     ]
     for topic in topics.ALL:
-        rate = f"{topic.rate_hz:g} Hz" if topic.rate_hz else "as it happens"
         senders, receivers = _ends(topic, modules)
-        ends = (", ".join(senders) or "every process", ", ".join(receivers))
-        facts = (
+        facts = [
             f"`{topic.name}`",
             topic.type.__name__,
-            rate,
+            f"{topic.rate_hz:g} Hz" if topic.rate_hz else "as it happens",
             topic.delivery.value,
             topic.about.value,
-            *ends,
-        )
+            ", ".join(senders) or "every process",
+            ", ".join(receivers),
+        ]
         lines.append(f"| {' | '.join(facts)} |")
     return "\n".join([*lines, ""])
 
 
 def _ends(topic: Topic, modules: list[Module]) -> tuple[list[str], list[str]]:
-    """Who says `topic`, and who takes it in: modules by name, else the observers."""
+    """Who sends `topic` and who receives it: modules by name, else the observers."""
     if topic.delivery is Delivery.ON_REQUEST:
-        asked = [module.name for module in modules if topic in module.served]
-        replying = [
-            module.name
-            for module in modules
-            if topic in [reply for reply, _ in module.served.values()]
-        ]
-        return replying or [OBSERVERS], asked or [OBSERVERS]
-    takers = [module.name for module in modules if topic in module.handlers]
-    return [module.name for module in modules if topic in module.emits], takers or [OBSERVERS]
+        return _ends_on_request(topic, modules)
+
+    senders = [module.name for module in modules if topic in module.emits]
+    receivers = [module.name for module in modules if topic in module.handlers]
+    return senders, receivers or [OBSERVERS]
+
+
+def _ends_on_request(topic: Topic, modules: list[Module]) -> tuple[list[str], list[str]]:
+    asked = []
+    replying = []
+    for module in modules:
+        if topic in module.served:
+            asked.append(module.name)
+        if topic in [reply for reply, _ in module.served.values()]:
+            replying.append(module.name)
+    return replying or [OBSERVERS], asked or [OBSERVERS]
 
 
 _PARTS: dict[str, Callable[[list[Module]], str]] = {"diagram": diagram, "topics": topic_table}

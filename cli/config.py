@@ -7,7 +7,7 @@ from typing import IO
 
 import click
 
-from cli.launch.plan import Choices, effective, everybody, to_toml
+from cli.launch.plan import Choices, awaited, effective, to_toml
 from cli.options import config_option, set_option
 from cli.run.command import codelets_option, laps_option, lockstep_option, seed_option
 from cogmap.runtime import config
@@ -20,7 +20,11 @@ from cogmap.runtime import config
 @codelets_option
 @click.option("--record/--no-record", default=True, help="Whether the drive waits for a recorder.")
 @click.option(
-    "-o", "--output", type=click.File("w", atomic=True), default="-", help="Where to write it."
+    "-o",
+    "--output",
+    type=click.File("w", encoding="utf-8", atomic=True),
+    default="-",
+    help="Where to write it.",
 )
 @config_option
 @set_option
@@ -37,6 +41,6 @@ def print_config(
     """Write the whole configuration of a drive as TOML: for modules that are started one by one."""
     choices = Choices(seed=seed, laps=laps, lockstep=lockstep, codelets=codelets, record=record)
     sections = effective(
-        config.load(config_path, settings), choices, everybody(choices, observer=False)
+        config.load(config_path, settings), choices, awaited(choices, observer=False)
     )
     output.write(to_toml(sections))

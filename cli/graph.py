@@ -1,8 +1,10 @@
-"""`cogmap graph`: which process publishes, takes in and answers what on a running system."""
+"""`cogmap graph`: which process of a running system publishes, subscribes and answers what."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from typing import Any
 
 import click
 
@@ -24,15 +26,22 @@ def graph(dot: bool, as_json: bool, connect: str, agent: str) -> None:
     """Show which process publishes and subscribes what."""
     if dot and as_json:
         raise UsageError("--dot and --json exclude each other: choose one")
+
     system = inspect_system(connect, agent)
-    click.echo(to_dot(system) if dot else to_json(system) if as_json else to_tree(system))
+    if dot:
+        click.echo(to_dot(system))
+    elif as_json:
+        click.echo(to_json(system))
+    else:
+        click.echo(to_tree(system))
 
 
 def uses_of(system: System) -> dict[Process, dict[Role, list[Topic]]]:
-    """For each process, in the order of names, the topics it is on, in the order of the table."""
-    uses: dict[Process, dict[Role, list[Topic]]] = {
-        process: {role: [] for role in Role} for process in system.processes
-    }
+    """The topics that each process uses: processes by name, topics in the order of the table."""
+    uses: dict[Process, dict[Role, list[Topic]]] = {}
+    for process in system.processes:
+        uses[process] = {role: [] for role in Role}
+
     for topic in system.topics():
         for role in Role:
             for process in system.doing(role, topic):
@@ -44,37 +53,50 @@ def to_tree(system: System) -> str:
     """The system as a tree that people read."""
     if not system.processes:
         return f"no process of {system.agent!r} is on the bus"
-    lines = [line for process, roles in uses_of(system).items() for line in _branch(process, roles)]
-    return "\n".join(lines + [f"a key that is no topic's: {key}" for key in system.foreign_keys()])
+
+    lines: list[str] = []
+    for process, roles in uses_of(system).items():
+        lines += _branch(process, roles)
+    for key in system.foreign_keys():
+        lines.append(f"a key that is no topic's: {key}")
+    return "\n".join(lines)
 
 
 def _branch(process: Process, roles: dict[Role, list[Topic]]) -> list[str]:
     title = process.name
     if process.member is not None and process.member.module != process.name:
         title += f" ({process.member.module})"
-    used = [(role, found) for role, found in roles.items() if found]
+
     lines = [title]
-    for number, (role, found) in enumerate(used, 1):
-        last = number == len(used)
-        lines.append(f"{'└' if last else '├'}─ {_VERBS[role]}")
-        twigs = [f"{'└' if topic is found[-1] else '├'}─ {topic.name}" for topic in found]
-        lines += [f"{' ' if last else '│'}  {twig}" for twig in twigs]
+    used = [role for role, found in roles.items() if found]
+    for role in used:
+        is_last = role is used[-1]
+        lines.append(f"{_fork(is_last)} {_VERBS[role]}")
+        lines += _twigs(roles[role], " " if is_last else "│")
     return lines
+
+
+def _twigs(found: list[Topic], margin: str) -> list[str]:
+    return [f"{margin}  {_fork(topic is found[-1])} {topic.name}" for topic in found]
+
+
+def _fork(is_last: bool) -> str:
+    return "└─" if is_last else "├─"
 
 
 def to_json(system: System) -> str:
     """The system as a list of processes that programs read."""
-    return json.dumps(
-        [
-            {
-                "process": process.name,
-                "module": process.member.module if process.member else None,
-                "zid": process.zid,
-                **{_VERBS[role]: [topic.name for topic in found] for role, found in roles.items()},
-            }
-            for process, roles in uses_of(system).items()
-        ]
-    )
+    processes = []
+    for process, roles in uses_of(system).items():
+        facts: dict[str, Any] = {
+            "process": process.name,
+            "module": process.member.module if process.member else None,
+            "zid": process.zid,
+        }
+        for role, found in roles.items():
+            facts[_VERBS[role]] = [topic.name for topic in found]
+        processes.append(facts)
+    return json.dumps(processes)
 
 
 def to_dot(system: System) -> str:
@@ -82,10 +104,14 @@ def to_dot(system: System) -> str:
     lines = ["digraph cogmap {", "  rankdir=LR;"]
     lines += [f'  "{topic.name}" [shape=box];' for topic in system.topics()]
     for process, roles in uses_of(system).items():
-        lines += [f'  "{process.name}" -> "{topic.name}";' for topic in roles[Role.PUBLISHES]]
-        lines += [f'  "{topic.name}" -> "{process.name}";' for topic in roles[Role.SUBSCRIBES]]
-        lines += [
-            f'  "{topic.name}" -> "{process.name}" [dir=both, style=dashed];'
-            for topic in roles[Role.ANSWERS]
-        ]
+        lines += _dot_arrows(process.name, roles)
     return "\n".join([*lines, "}"])
+
+
+def _dot_arrows(name: str, roles: dict[Role, list[Topic]]) -> Iterator[str]:
+    for topic in roles[Role.PUBLISHES]:
+        yield f'  "{name}" -> "{topic.name}";'
+    for topic in roles[Role.SUBSCRIBES]:
+        yield f'  "{topic.name}" -> "{name}";'
+    for topic in roles[Role.ANSWERS]:
+        yield f'  "{name}" -> "{topic.name}" [dir=both, style=dashed];'

@@ -31,6 +31,10 @@ class StorageError(UsageError):
     """What a module must keep cannot be written: the disk is full, or the folder read-only."""
 
 
+class ProcessFailedError(UsageError):
+    """A process of a run failed for a reason that a restart does not remove."""
+
+
 class MessageError(CogmapError):
     """A received message is not what its topic carries; it is counted and ignored."""
 

@@ -36,7 +36,11 @@ def with_cameras(sections: Sections) -> Sections:
     changed: dict[str, Any] = copy.deepcopy(dict(sections))
     sim = changed["sim"]
     sim.pop("percepts", None)
-    sim["way"] = {**sim["way"], "sensing": "cameras", "landmarks": named(sim["way"]["landmarks"])}
+    sim["trajectory"] = {
+        **sim["trajectory"],
+        "sensing": "cameras",
+        "landmarks": named(sim["trajectory"]["landmarks"]),
+    }
     sim["awaits"] = {**sim["awaits"], **dict.fromkeys(SENSES, 1)}
     noise = sim["noise"]
     changed["sensory"] = {

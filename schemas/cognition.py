@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 from typing import Annotated
 
 import msgspec
@@ -68,14 +69,44 @@ class Coalitions(Message, kw_only=True):
     coalitions: list[Coalition]
 
 
-class Competition(Message, kw_only=True):
-    """How one cycle's competition for consciousness went. `trigger` is empty where nothing was
-    broadcast.
+class Trigger(enum.StrEnum):
+    """The condition that led to a broadcast (LIDA's four triggers); NONE where none was met."""
+
+    NONE = ""
+    ONE_COALITION = "one coalition over threshold"
+    AGGREGATE = "aggregate activation over threshold"
+    NO_BROADCAST = "no broadcast for long"
+    NO_NEW_COALITION = "no new coalition for long"
+
+
+class Fate(enum.StrEnum):
+    """What one cycle's competition made of a coalition."""
+
+    WON = "won"
+    WAITING = "waiting"
+    DISPLACED = "displaced"
+    DECAYED = "decayed"
+
+
+class Contender(Part, kw_only=True):
+    """A coalition in one cycle's competition: `id` names it from its first cycle to its last.
+
+    `activation` is what is left after decay. A WAITING coalition competes again in the next cycle;
+    a DISPLACED one gave its place to a newer one of its codelet; a DECAYED one has none left.
     """
 
+    id: Name
+    codelet: Name
+    activation: Unit
+    fate: Fate
+
+
+class Competition(Message, kw_only=True):
+    """One cycle's competition for consciousness: every coalition that took part, and its fate."""
+
     cycle: Count
-    contenders: dict[str, Finite]
-    trigger: str = ""
+    contenders: list[Contender]
+    trigger: Trigger = Trigger.NONE
 
 
 class Broadcast(Message, kw_only=True):
@@ -86,10 +117,31 @@ class Broadcast(Message, kw_only=True):
     coalition: Coalition
 
 
+class Rejection(enum.StrEnum):
+    """Why action selection did not choose a behaviour; NONE for the one that it chose."""
+
+    NONE = ""
+    CONTEXT_MISSING = "part of its context is missing"
+    NOT_INSTANTIATED = "activation below the instantiation threshold"
+    LESS_ACTIVE = "less active than the one chosen"
+
+
+class Behaviour(Part, kw_only=True):
+    """A scheme that action selection considered."""
+
+    scheme: Name
+    activation: Unit
+    rejection: Rejection = Rejection.NONE
+
+
 class Action(Message, kw_only=True):
-    """The scheme that action selection chose, and its parameters for the sensory-motor memory."""
+    """The scheme that action selection chose, and its parameters for the sensory-motor memory.
+
+    `behaviours` are all schemes that were considered, the chosen one included.
+    """
 
     cycle: Count
     scheme: Name
     activation: Unit
     parameters: dict[str, Scalar]
+    behaviours: list[Behaviour] = []

@@ -107,7 +107,13 @@ def _sensing() -> list[Message]:
             road_boundary_m=_ramp(2, 2, dtype="<f4"),
             matches=[sensing.PlaceMatch(frame=2, view_ns=400_000_000, score=0.75)],
         ),
-        sensing.MotorCommand(left_wheel_rad_s=10.5, right_wheel_rad_s=-9.5, halted_by="obstacle"),
+        sensing.MotorCommand(
+            left_wheel_rad_s=10.5,
+            right_wheel_rad_s=-9.5,
+            halted_by=sensing.SpeedLimit.OBSTACLE,
+            slowed_by=sensing.SpeedLimit.POSE_AGE,
+            pose_age_ns=400_000_000,
+        ),
         sensing.TruePose(pose=pose, travelled_m=12.5, progress=0.25),
         sensing.TrueTown(seed=7, streets=[street], buildings=[house]),
     ]
@@ -158,7 +164,19 @@ def _mind() -> list[Message]:
         ),
         cognition.Coalitions(cycle=6, coalitions=[coalition]),
         cognition.Competition(
-            cycle=6, contenders={"attention": 0.375, "road": 0.25}, trigger="aggregate"
+            cycle=6,
+            contenders=[
+                cognition.Contender(
+                    id="attention/6",
+                    codelet="attention",
+                    activation=0.375,
+                    fate=cognition.Fate.WON,
+                ),
+                cognition.Contender(
+                    id="road/5", codelet="road", activation=0.25, fate=cognition.Fate.WAITING
+                ),
+            ],
+            trigger=cognition.Trigger.AGGREGATE,
         ),
         cognition.Broadcast(cycle=6, trigger="aggregate", coalition=coalition),
         cognition.Action(
@@ -166,6 +184,14 @@ def _mind() -> list[Message]:
             scheme="follow-route",
             activation=0.5,
             parameters={"speed_m_s": 3.0, "turn": "left"},
+            behaviours=[
+                cognition.Behaviour(scheme="follow-route", activation=0.5),
+                cognition.Behaviour(
+                    scheme="halt",
+                    activation=0.0,
+                    rejection=cognition.Rejection.CONTEXT_MISSING,
+                ),
+            ],
         ),
     ]
 

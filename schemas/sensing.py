@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 from typing import Annotated
 
 import msgspec
@@ -162,12 +163,36 @@ class Learned(Message, kw_only=True):
     views: list[RememberedView] = []
 
 
+class SpeedLimit(enum.StrEnum):
+    """What keeps the robot below its cruising speed; NONE where nothing does.
+
+    POSE_AGE: the pose that the command is computed from is old, as the machine is too slow. STUCK:
+    the robot was commanded to move and did not. OTHER is for modules of other people.
+    """
+
+    NONE = ""
+    BEND = "bend"
+    ROUTE_END = "end of route"
+    OBSTACLE = "obstacle"
+    POSE_AGE = "pose age"
+    STUCK = "stuck"
+    NO_ACTION = "no action"
+    NO_ROUTE = "no route"
+    OTHER = "other"
+
+
 class MotorCommand(Message, kw_only=True):
-    """Wheel speeds, answering the frame whose stamp it carries."""
+    """Wheel speeds, answering the frame whose stamp it carries.
+
+    `halted_by` is the reason of zero speed, `slowed_by` that of a lower speed than cruising.
+    `pose_age_ns`: how much older than the newest message the pose is.
+    """
 
     left_wheel_rad_s: Annotated[float, msgspec.Meta(ge=-1000, le=1000)]
     right_wheel_rad_s: Annotated[float, msgspec.Meta(ge=-1000, le=1000)]
-    halted_by: str = ""
+    halted_by: SpeedLimit = SpeedLimit.NONE
+    slowed_by: SpeedLimit = SpeedLimit.NONE
+    pose_age_ns: Count = 0
 
 
 class Pose(Part, kw_only=True):

@@ -9,7 +9,6 @@ from benchmarks.cycle.position_error import TOWNS, over_fused
 from benchmarks.drive import drive
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most
-from cli.launch.drive import ROUTE_COMPLETE
 from cli.launch.plan import LOG_NAME
 from cogmap.recording.replaying.replay import replay_into
 from services import registry
@@ -50,7 +49,7 @@ def measure(folder: Path, processes: int, announce: Callable[[str], None]) -> Me
         "replay_speed": replay.speed,
         "error_ratio": driven.error_ratio,
         "replay_same": float(replay.same),
-        "route_complete": float(driven.ended_by == ROUTE_COMPLETE),
+        "route_complete": float(driven.completed),
         "drive_s": driven.drive_s,
         "cycles": float(driven.commands),
     }

@@ -11,16 +11,22 @@ from functools import partial
 import numpy as np
 
 from benchmarks.report import Metrics
-from cli.launch.observer import Observer, Track
-from cli.launch.plan import OBSERVER, Choices, effective, everybody
+from cli.launch.observer import Observer
+from cli.launch.plan import OBSERVER, Choices, awaited, effective
 from cogmap.errors import CogmapError
 from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
 from experiments.parallel import parallel_map
 from schemas import topics
-from schemas.sensing import SelfMotion, TruePose
 from services import registry
 
+FOLLOWED = (
+    topics.TRUE_TOWN,
+    topics.TRUE_POSE,
+    topics.ODOMETRY,
+    topics.SELF_MOTION,
+    topics.DELTA,
+)
 TOWNS = (1, 2, 3)
 LAPS = 3.0
 
@@ -54,73 +60,30 @@ def over_fused(processes: int) -> Metrics:
 def mean_errors(town: int, laps: float) -> MeanErrors:
     """Drive `laps` of the town of that seed. Raises CogmapError where the route is not completed."""
     choices = Choices(seed=town, laps=laps, lockstep=True, record=False)
-    sections = effective({}, choices, everybody(choices, observer=True))
-    follower = Follower()
+    sections = effective({}, choices, awaited(choices, observer=True))
+    observer = Observer()
     modules = [registry.build(name, sections) for name in registry.MODULES]
-    runner = InProcessRunner([*modules, follower.module()])
+    runner = InProcessRunner([*modules, _observing(observer)])
 
     try:
-        runner.run(lambda: follower.progress >= 1.0)
+        runner.run(lambda: observer.progress >= 1.0)
     finally:
         runner.close()
 
-    if follower.progress < 1.0:
-        raise CogmapError(f"the drive of town {town} ended at {follower.progress:.0%} of its route")
+    if observer.progress < 1.0:
+        raise CogmapError(f"the drive of town {town} ended at {observer.progress:.0%} of its route")
 
-    return follower.mean_errors()
+    errors = observer.errors()
+    return MeanErrors(
+        estimate_m=float(errors.estimate_m.mean()),
+        fused_m=float(errors.fused_m.mean()),
+        wheels_m=float(errors.wheels_m.mean()),
+    )
 
 
-class Follower:
-    """Follows one drive: the truth, the estimates, and self-motion integrated on its own."""
-
-    def __init__(self) -> None:
-        self._observer = Observer()
-        self._true = Track()
-        self._fused = Track()
-        self._pose = np.zeros(3)
-
-    @property
-    def progress(self) -> float:
-        """The share of the route that is driven."""
-        return self._observer.progress
-
-    def module(self) -> Module:
-        """The module `observer`, whom the simulator waits for."""
-        module = Module(OBSERVER)
-
-        for topic in (topics.TRUE_TOWN, topics.ODOMETRY, topics.DELTA):
-            module.on(topic, self._observer.take)
-
-        return module.on(topics.TRUE_POSE, self._on_true_pose).on(
-            topics.SELF_MOTION, self._on_self_motion
-        )
-
-    def mean_errors(self) -> MeanErrors:
-        """Of all estimates so far."""
-        errors = self._observer.errors()
-        fused_m = self._observer.to_world(self._fused.at(errors.stamps_ns))
-        off_m = np.linalg.norm(fused_m - self._true.at(errors.stamps_ns), axis=1)
-
-        return MeanErrors(
-            estimate_m=float(errors.estimate_m.mean()),
-            fused_m=float(off_m.mean()),
-            wheels_m=float(errors.integration_m.mean()),
-        )
-
-    def _on_true_pose(self, true: TruePose) -> None:
-        self._observer.take(true)
-        self._true.add(true.stamp_ns, true.pose.x_m, true.pose.y_m)
-
-    def _on_self_motion(self, motion: SelfMotion) -> None:
-        """Midpoint integration, as of the wheels."""
-        if not len(self._fused):
-            self._fused.add(motion.since_ns, 0.0, 0.0)
-
-        for speed_m_s, turn_rate_rad_s, dt_s, *_ in motion.motions.numpy().tolist():
-            middle_rad = self._pose[2] + turn_rate_rad_s * dt_s / 2
-            step_m = speed_m_s * dt_s
-            self._pose[0] += step_m * np.cos(middle_rad)
-            self._pose[1] += step_m * np.sin(middle_rad)
-            self._pose[2] += turn_rate_rad_s * dt_s
-
-        self._fused.add(motion.stamp_ns, float(self._pose[0]), float(self._pose[1]))
+def _observing(observer: Observer) -> Module:
+    """The module `observer`, whom the simulator waits for."""
+    module = Module(OBSERVER)
+    for topic in FOLLOWED:
+        module.on(topic, observer.update)
+    return module

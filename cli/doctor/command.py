@@ -1,4 +1,4 @@
-"""`cogmap doctor`: what is wrong with this installation and with the system that runs."""
+"""`cogmap doctor`: what is wrong with this installation and with the running system."""
 
 from __future__ import annotations
 
@@ -22,10 +22,9 @@ from cogmap.errors import NoRouterError
 from cogmap.runtime.inbox import Inbox
 from cogmap.runtime.intake import Intake
 from schemas import topics
-from schemas.process import Clock, Health
 from services import registry
 
-LOOK_S = 3.3
+OBSERVE_S = 3.3
 RUNS = Path("runs")
 
 
@@ -34,54 +33,46 @@ RUNS = Path("runs")
 @connect_option
 @agent_option
 def doctor(as_json: bool, connect: str, agent: str) -> None:
-    """Say what is wrong, and what to do about it; exit code 1 where anything is."""
-    found = [*installation.examine(RUNS), *_running(connect, agent)]
+    """Report what is wrong, and what to do about it; exit code 1 where anything is."""
+    findings = installation.examine(RUNS) + _examine_system(connect, agent)
     if as_json:
-        click.echo(json.dumps([msgspec.to_builtins(finding) for finding in found]))
+        click.echo(json.dumps([msgspec.to_builtins(finding) for finding in findings]))
+    elif findings:
+        click.echo("\n".join(map(str, findings)))
     else:
-        click.echo(
-            "\n".join(map(str, found))
-            or "all is well, with the installation and with the system that runs"
-        )
-    sys.exit(1 if found else 0)
+        click.echo("nothing is wrong with the installation or the running system")
+    sys.exit(1 if findings else 0)
 
 
-def _running(connect: str, agent: str) -> list[Finding]:
+def _examine_system(connect: str, agent: str) -> list[Finding]:
     try:
         with observing(connect, agent, "doctor") as bus:
-            observed = observe(bus, LOOK_S)
+            observed = observe(bus, OBSERVE_S)
             return system.examine(registry.MODULES, observed, discover(bus.session, agent))
     except NoRouterError:
-        return [
-            Finding(
-                "router",
-                f"none answers at {connect}",
-                "start one with `cogmap run`, or name it with --connect",
-            )
-        ]
+        remedy = "start one with `cogmap run`, or name it with --connect"
+        return [Finding("router", f"none answers at {connect}", remedy)]
 
 
 def observe(bus: ZenohBus, duration_s: float) -> Observed:
-    """Listen for so long to who is there and how they fare."""
+    """What the processes report about themselves within `duration_s`."""
     observed = Observed()
     inbox = Inbox()
     intake = Intake()
 
     def on_change(member: Member, alive: bool) -> None:
-        inbox.call(lambda: (observed.ready.add if alive else observed.ready.discard)(member))
+        change = observed.ready.add if alive else observed.ready.discard
+        inbox.call(lambda: change(member))
 
     bus.watch(on_change)
     for topic in (topics.HEALTH, topics.CLOCK):
         bus.subscribe(topic, inbox.put, intake.count_lost)
+
     end_s = time.monotonic() + duration_s
     while (left_s := end_s - time.monotonic()) > 0:
         item = inbox.take(left_s)
         if isinstance(item, Arrival):
-            match intake.accept(item):
-                case Health() as health:
-                    observed.health.setdefault(health.instance, []).append(health)
-                case Clock() as clock:
-                    observed.clock_rate = clock.rate
+            observed.add(intake.accept(item))
         elif item is not None:
             item()
     return observed

@@ -1,6 +1,4 @@
-"""What is wrong with a running system, judged by what its processes say of themselves for a few
-seconds.
-"""
+"""What is wrong with a running system, from what its processes report in a few seconds."""
 
 from __future__ import annotations
 
@@ -12,32 +10,43 @@ from cli.doctor.finding import Finding
 from cogmap.bus.discovery import Role, System
 from cogmap.bus.interface import Member
 from schemas import topics
-from schemas.process import Health
-from schemas.topics import About
+from schemas.base import Message
+from schemas.process import Clock, Health
+from schemas.topics import About, Topic
 
-TOLERANCE = 0.3
-SLOWEST_HZ = 1.0
+RATE_TOLERANCE = 0.3
+MIN_MEASURED_HZ = 1.0
 LONG_QUEUE = 10
-FEWEST_REPORTS = 2
+MIN_REPORTS = 2
 
 
 @dataclass
 class Observed:
-    """What was seen. `health` has each instance's reports in order; `clock_rate` is None where no
-    clock was heard.
+    """What was observed: `health` has each instance's reports in order.
+
+    `clock_rate` is simulated seconds a second, None where no clock was received.
     """
 
     ready: set[Member] = field(default_factory=set)
     health: dict[str, list[Health]] = field(default_factory=dict)
     clock_rate: float | None = None
 
+    def add(self, message: Message | None) -> None:
+        """Count a report or a clock; other messages are ignored."""
+        match message:
+            case Health() as health:
+                self.health.setdefault(health.instance, []).append(health)
+            case Clock() as clock:
+                self.clock_rate = clock.rate
+
 
 def examine(expected: Iterable[str], observed: Observed, system: System) -> list[Finding]:
-    """All that is wrong with a system that should have the modules `expected`."""
+    """All findings about a system that should have the modules `expected`."""
     return [
         *absent(expected, observed),
         *silent(expected, observed),
-        *_told(observed),
+        *not_ready(observed),
+        *complaints(observed),
         *off_rate(observed, system),
         *truth_leaks(expected, system),
     ]
@@ -45,110 +54,125 @@ def examine(expected: Iterable[str], observed: Observed, system: System) -> list
 
 def absent(expected: Iterable[str], observed: Observed) -> Iterator[Finding]:
     """Modules of which no instance is on the bus."""
-    there = {member.module for member in observed.ready}
+    present = {member.module for member in observed.ready}
     for name in expected:
-        if name not in there:
+        if name not in present:
             yield Finding(
                 name,
-                "no instance of it is on the bus: it is dead or was never started",
-                _start(name, "see its log"),
+                "no instance of it is on the bus: it has died or was never started",
+                f"start it with `cogmap module {name}`, or see its log",
             )
 
 
 def silent(expected: Iterable[str], observed: Observed) -> Iterator[Finding]:
-    """Instances that are on the bus and say nothing of themselves, others that are not ready."""
+    """Instances of the modules that are on the bus and report nothing."""
     modules = set(expected)
     for member in sorted(observed.ready):
         if member.module in modules and member.instance not in observed.health:
             yield Finding(
                 member.instance,
-                "it is on the bus but tells nothing",
-                "see its log, it hangs or is stopped",
+                "it is on the bus but reports nothing",
+                "see its log: it hangs or is stopped",
             )
+
+
+def not_ready(observed: Observed) -> Iterator[Finding]:
+    """Instances that report that they are not ready."""
     for instance, reports in sorted(observed.health.items()):
         if not reports[-1].ready:
             yield Finding(instance, "it is not ready", "start the modules that it waits for")
 
 
-def _told(observed: Observed) -> Iterator[Finding]:
-    """What the instances themselves complain of."""
+def complaints(observed: Observed) -> Iterator[Finding]:
+    """Losses, rejected messages, growing queues and notes that the instances report."""
     for instance, reports in sorted(observed.health.items()):
         last = reports[-1]
-        for name, number in sorted(last.gaps.items()):
-            if number:
-                yield Finding(
-                    instance,
-                    f"{number} messages of {name} never reached it",
-                    "see whether its queue is full, or the link",
-                )
-        for name, number in sorted(last.rejected.items()):
-            if number:
-                yield Finding(
-                    instance,
-                    f"it rejected {number} messages of {name}",
-                    "its log names them: mend who publishes them",
-                )
-        queued = [report.queued for report in reports]
-        if queued[-1] >= LONG_QUEUE and all(later > earlier for earlier, later in pairwise(queued)):
+        yield from _losses(instance, last)
+        yield from _rejections(instance, last)
+        yield from _growing_queue(instance, reports)
+        for note in last.notes:
+            yield Finding(instance, note, "see its log")
+
+
+def _losses(instance: str, health: Health) -> Iterator[Finding]:
+    for name, number in sorted(health.gaps.items()):
+        if number:
             yield Finding(
                 instance,
-                f"its queue grows, to {queued[-1]} messages",
-                "give it a core of its own, or lower the rates of its inputs",
+                f"{number} messages of {name} never reached it",
+                "see whether its queue is full, or the link",
             )
-        for note in last.notes:
-            yield Finding(instance, note, "its log says more")
+
+
+def _rejections(instance: str, health: Health) -> Iterator[Finding]:
+    for name, number in sorted(health.rejected.items()):
+        if number:
+            yield Finding(
+                instance,
+                f"it rejected {number} messages of {name}",
+                "its log names them: mend their publisher",
+            )
+
+
+def _growing_queue(instance: str, reports: list[Health]) -> Iterator[Finding]:
+    queued = [report.queued for report in reports]
+    is_growing = all(later > earlier for earlier, later in pairwise(queued))
+    if is_growing and queued[-1] >= LONG_QUEUE:
+        yield Finding(
+            instance,
+            f"its queue grows, to {queued[-1]} messages",
+            "give it a core of its own, or lower the rates of its inputs",
+        )
 
 
 def off_rate(observed: Observed, system: System) -> Iterator[Finding]:
-    """Topics whose rate is not the table's, as far as a few seconds of real time can tell."""
-    if observed.clock_rate == 0:
+    """Topics whose rate is not the table's, as far as a few seconds of real time can show."""
+    clock_rate = 1.0 if observed.clock_rate is None else observed.clock_rate
+    if clock_rate == 0:
         return
+
     measured = rates_hz(observed.health.values())
     for topic in topics.ALL:
-        if (
-            topic.rate_hz < SLOWEST_HZ
-            or not system.doing(Role.PUBLISHES, topic)
-            or topic.name not in measured
-        ):
-            continue
-        expected_hz = topic.rate_hz * (observed.clock_rate or 1.0)
-        if abs(measured[topic.name] - expected_hz) > TOLERANCE * expected_hz:
-            yield Finding(
-                topic.name,
-                f"{measured[topic.name]:.1f} Hz, the table has {expected_hz:g} Hz",
-                f"see with `cogmap topic delay {topic.name}` where the time goes",
-            )
+        if topic.name in measured and system.doing(Role.PUBLISHES, topic):
+            yield from _off_rate(topic, measured[topic.name], topic.rate_hz * clock_rate)
+
+
+def _off_rate(topic: Topic, measured_hz: float, expected_hz: float) -> Iterator[Finding]:
+    is_measurable = topic.rate_hz >= MIN_MEASURED_HZ
+    if is_measurable and abs(measured_hz - expected_hz) > RATE_TOLERANCE * expected_hz:
+        yield Finding(
+            topic.name,
+            f"{measured_hz:.1f} Hz, the table has {expected_hz:g} Hz",
+            f"see with `cogmap topic delay {topic.name}` where the time goes",
+        )
 
 
 def rates_hz(reports_of: Iterable[list[Health]]) -> dict[str, float]:
-    """The rate of each topic that somebody publishes, between the first and the last report of each
-    instance.
-    """
+    """The rate of each published topic, between each instance's first and last report."""
     rates: dict[str, float] = {}
     for reports in reports_of:
         first = reports[0]
         last = reports[-1]
         span_s = last.uptime_s - first.uptime_s
-        if len(reports) < FEWEST_REPORTS or span_s <= 0:
+        if len(reports) < MIN_REPORTS or span_s <= 0:
             continue
+
         for name, number in last.emitted.items():
-            rates[name] = rates.get(name, 0.0) + (number - first.emitted.get(name, 0)) / span_s
+            published = number - first.emitted.get(name, 0)
+            rates[name] = rates.get(name, 0.0) + published / span_s
     return rates
 
 
 def truth_leaks(expected: Iterable[str], system: System) -> Iterator[Finding]:
-    """Modules that subscribe to the simulator's truth."""
+    """Modules that subscribe to the simulator's ground truth."""
     modules = set(expected)
     for topic in topics.ALL:
-        if topic.about is About.TRUTH:
-            for process in system.doing(Role.SUBSCRIBES, topic):
-                if process.member is not None and process.member.module in modules:
-                    yield Finding(
-                        process.name,
-                        f"it subscribes to {topic.name}",
-                        "no module may see the truth",
-                    )
-
-
-def _start(name: str, else_: str) -> str:
-    return f"start it with `cogmap module {name}`, or {else_}"
+        if topic.about is not About.TRUTH:
+            continue
+        for process in system.doing(Role.SUBSCRIBES, topic):
+            if process.member is not None and process.member.module in modules:
+                yield Finding(
+                    process.name,
+                    f"it subscribes to {topic.name}",
+                    "no module may see the ground truth",
+                )

@@ -1,17 +1,31 @@
-"""One drive from start to end: processes up, the robot around its route, everything down again."""
+"""One drive from start to end: processes started, the robot on its route, every process ended."""
 
 from __future__ import annotations
 
 import shutil
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from cli.launch.plan import CONFIG_NAME, RECORDER, ROUTER, STATE_NAME, Choices, programs, to_toml
+from cli.launch.observer import Observer
+from cli.launch.outcome import Ending, Outcome
+from cli.launch.plan import (
+    CONFIG_NAME,
+    RECORDER,
+    ROUTER,
+    STATE_NAME,
+    Choices,
+    infrastructure,
+    modules,
+    to_toml,
+)
 from cli.launch.supervisor import Supervisor
 from cli.launch.watch import Watch
+from cli.launch.watchdog import Situation, Watchdog
 from cli.run.display import Display
 from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.errors import ProcessFailedError
 from cogmap.runtime.config import Sections
 from cogmap.runtime.process import Stop
 
@@ -19,99 +33,124 @@ PUMP_S = 0.05
 SHOW_PERIOD_S = 0.25
 GRACE_S = 3.0
 QUIET_S = 0.3
-ROUTE_COMPLETE = "route complete"
-TIME_LIMIT = "time limit"
-INTERRUPTED = "interrupted"
 
 
 @dataclass
 class Drive:
-    """A run in `folder`, which holds its files, of the modules as configured in `sections`."""
+    """A run in `folder`, which holds its files, of the modules as configured in `sections`, at the
+    router `endpoint`.
+    """
 
     folder: Path
-    connect: str
+    endpoint: str
     agent: str
     choices: Choices
     sections: Sections
     began_s: float
-    ended_by: str = ""
     start_s: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.supervisor = Supervisor(self.folder)
+        self._watchdog = Watchdog()
 
-    def run(self, until_s: float, stop: Stop, display: Display) -> Watch:
-        """Drive until the route is complete, `until_s` on the monotonic clock, or `stop`; all
-        processes end.
+    @property
+    def awaited(self) -> Mapping[str, int]:
+        """How many instances of each module the drive waits for."""
+        awaits: dict[str, int] = self.sections["sim"]["awaits"]
+        return awaits | {"sim": 1}
 
-        Raises UsageError in the words of a process that ended for a reason that the user can mend.
+    def run(self, until_s: float, stop: Stop, display: Display) -> tuple[Watch, Ending]:
+        """Drive until the route is complete, the drive cannot succeed, `until_s` on the monotonic
+        clock, or `stop`; every process is ended.
+
+        Raises ProcessFailedError, with its last words, where a process failed before the drive had
+        begun.
         """
-        (self.folder / CONFIG_NAME).write_text(to_toml(self.sections))
+        config = to_toml(self.sections)
+        (self.folder / CONFIG_NAME).write_text(config, encoding="utf-8")
         watch: Watch | None = None
         try:
-            first, rest = programs(self.folder, self.connect, self.agent, self.choices)
-            for program in first:
+            for program in infrastructure(self.folder, self.endpoint, self.agent, self.choices):
                 self.supervisor.start(program)
-            watch = Watch(ZenohBus(self.connect, self.agent))
-            self._await_recorder(watch, until_s, stop)
-            for program in rest:
-                self.supervisor.start(program)
-            self._note("processes started")
-            self._follow(watch, until_s, stop, display)
-            if self.sections["sim"]["mode"] == "lockstep" and self.ended_by == ROUTE_COMPLETE:
-                watch.pump_until_quiet(QUIET_S)
+            watch = Watch(ZenohBus(self.endpoint, self.agent))
+            ending = self._drive(watch, until_s, stop, display)
         finally:
-            self._end(watch)
-        return watch
+            self._close(watch)
+        return watch, ending
 
-    def _await_recorder(self, watch: Watch, until_s: float, stop: Stop) -> None:
-        """Wait for it, so that the log has what each module says from its first message on."""
+    def _drive(self, watch: Watch, until_s: float, stop: Stop, display: Display) -> Ending:
+        try:
+            ending = self._await_recorder(watch, until_s, stop)
+            if ending is None:
+                for program in modules(self.folder, self.endpoint, self.agent, self.choices):
+                    self.supervisor.start(program)
+                self._note("processes started")
+                ending = self._follow(watch, until_s, stop, display)
+        except ProcessFailedError as error:
+            if watch.tally.observer.start is None:
+                raise
+            return Ending(Outcome.MODULE_FAILED, str(error))
+
+        in_lockstep = self.sections["sim"]["mode"] == "lockstep"
+        if in_lockstep and ending.outcome is Outcome.ROUTE_COMPLETE:
+            watch.pump_until_quiet(QUIET_S)
+        return ending
+
+    def _await_recorder(self, watch: Watch, until_s: float, stop: Stop) -> Ending | None:
+        """Wait for it, so that the log holds every message of each module from its first on.
+
+        Returns how the drive ended meanwhile, if it did.
+        """
         recorders = {RECORDER: 1} if self.choices.record else {}
-        while watch.missing(recorders) and not self._has_ended(watch, until_s, stop):
+        while missing := watch.missing(recorders):
+            ending = self._ending(watch, missing, until_s, stop)
+            if ending is not None:
+                return ending
             watch.pump(PUMP_S)
             self.supervisor.check()
+        return None
 
-    def _follow(self, watch: Watch, until_s: float, stop: Stop, display: Display) -> None:
-        show_s = 0.0
-        while not self._has_ended(watch, until_s, stop):
+    def _follow(self, watch: Watch, until_s: float, stop: Stop, display: Display) -> Ending:
+        next_s = 0.0
+        missing = watch.missing(self.awaited)
+        while (ending := self._ending(watch, missing, until_s, stop)) is None:
             watch.pump(PUMP_S)
             self.supervisor.check()
-            missing = watch.missing(self.sections["sim"]["awaits"] | {"sim": 1})
+            missing = watch.missing(self.awaited)
             self._note_progress(watch, missing)
-            if time.monotonic() < show_s:
-                continue
-            show_s = time.monotonic() + SHOW_PERIOD_S
-            if watch.observer.start is None:
-                display.waiting(missing)
-            else:
-                display.driving(watch.observer, watch.observer.errors())
+            if time.monotonic() >= next_s:
+                next_s = time.monotonic() + SHOW_PERIOD_S
+                _show(watch, missing, display)
+        return ending
 
     def _note_progress(self, watch: Watch, missing: list[str]) -> None:
-        reached = {
-            "all ready": not missing,
-            "first pose": watch.observer.start,
-            "first command": watch.cycle_ms,
-        }
-        for milestone, there in reached.items():
-            if there:
-                self._note(milestone)
+        if not missing:
+            self._note("all ready")
+        if watch.tally.observer.start is not None:
+            self._note("first pose")
+        if watch.tally.cycle_ms:
+            self._note("first command")
 
-    def _has_ended(self, watch: Watch, until_s: float, stop: Stop) -> bool:
+    def _ending(
+        self, watch: Watch, missing: list[str], until_s: float, stop: Stop
+    ) -> Ending | None:
+        """How the drive must end now; None while it continues."""
+        observer = watch.tally.observer
         if stop.asked:
-            self.ended_by = INTERRUPTED
-        elif watch.observer.progress >= 1.0:
-            self.ended_by = ROUTE_COMPLETE
-        elif time.monotonic() >= until_s:
-            self.ended_by = TIME_LIMIT
-        return bool(self.ended_by)
+            return Ending(Outcome.INTERRUPTED, "it was interrupted")
+        if observer.progress >= 1.0:
+            return Ending(Outcome.ROUTE_COMPLETE, "the robot has completed its route")
+        if time.monotonic() >= until_s:
+            return Ending(Outcome.TIME_LIMIT, _out_of_time(observer, missing))
+        if observer.start is None:
+            return None
+        return self._watchdog.check(_situation(watch, missing))
 
-    def _end(self, watch: Watch | None) -> None:
-        """First what moves, then what thinks, then what records, the router last."""
+    def _close(self, watch: Watch | None) -> None:
+        """End first what moves, then what thinks, then what records, the router last."""
         supervisor = self.supervisor
         supervisor.end(["sim"], GRACE_S)
-        supervisor.end(
-            [name for name in supervisor.children if name not in (RECORDER, ROUTER)], GRACE_S
-        )
+        supervisor.end(set(supervisor.children) - {RECORDER, ROUTER}, GRACE_S)
         if watch is not None:
             watch.pump(0.0)
             watch.close()
@@ -121,3 +160,29 @@ class Drive:
 
     def _note(self, milestone: str) -> None:
         self.start_s.setdefault(milestone, round(time.monotonic() - self.began_s, 3))
+
+
+def _situation(watch: Watch, missing: list[str]) -> Situation:
+    tally = watch.tally
+    return Situation(
+        now_s=time.monotonic(),
+        drive_s=tally.observer.elapsed_s,
+        travelled_m=tally.observer.travelled_m,
+        commands=len(tally.cycle_ms),
+        halted_by=tally.halted_by,
+        missing=missing,
+    )
+
+
+def _show(watch: Watch, missing: list[str], display: Display) -> None:
+    observer = watch.tally.observer
+    if observer.start is None:
+        display.waiting(missing)
+    else:
+        display.driving(observer, observer.errors())
+
+
+def _out_of_time(observer: Observer, missing: list[str]) -> str:
+    if missing:
+        return f"the time limit came while it waited for {', '.join(missing)}: see its log"
+    return f"the time limit came at {observer.progress:.0%} of the route: --time-limit allows more"

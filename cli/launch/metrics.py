@@ -1,45 +1,48 @@
-"""The figures of a run: what `summary.json` holds."""
+"""The metrics of a drive: what `summary.json` holds."""
 
 from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import numpy as np
-import numpy.typing as npt
 
-from cli.launch.observer import Errors, Observer
-from cli.launch.watch import Watch
+from cli.launch.observer import Observer
+from cli.launch.tally import Tally
 from cogmap.errors import LogError
+from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
 from cogmap.recording.recorder import Summary
 from cogmap.recording.storage.format import SUMMARY
 from cogmap.recording.storage.reader import LogReader
 from schemas.graph import Node
 
+ROAD_THRESHOLD = 0.5
 
-class ErrorFigures(msgspec.Struct, kw_only=True):
-    """Of the distances from the truth at the same stamps, in metres."""
+
+class ErrorMetrics(msgspec.Struct, kw_only=True):
+    """Of distances from the true positions of the same stamps, in metres."""
 
     mean_m: float
     max_m: float
     final_m: float
 
     @classmethod
-    def of(cls, errors_m: npt.NDArray[np.float64]) -> ErrorFigures:
-        """Figures of (n,) distances; all 0 where there is none."""
+    def of(cls, errors_m: Floats) -> ErrorMetrics:
+        """The metrics of (n,) distances; all 0 where there is none."""
         if not errors_m.size:
             return cls(mean_m=0.0, max_m=0.0, final_m=0.0)
         return cls(
-            mean_m=float(errors_m.mean()), max_m=float(errors_m.max()), final_m=float(errors_m[-1])
+            mean_m=float(errors_m.mean()),
+            max_m=float(errors_m.max()),
+            final_m=float(errors_m[-1]),
         )
 
 
 class Recording(msgspec.Struct, kw_only=True):
-    """How the recording went. `gaps` are sentences; `never_drop_whole` says that no NEVER_DROP
-    topic lacks any.
+    """How the recording went. `gaps` are sentences; `never_drop_whole` is whether no message of any
+    NEVER_DROP topic is missing.
     """
 
     messages: int
@@ -56,6 +59,7 @@ class Recording(msgspec.Struct, kw_only=True):
             return None
         if not about:
             return None
+
         summary = msgspec.json.decode(about["json"], type=Summary)
         return cls(
             messages=sum(summary.messages.values()),
@@ -65,30 +69,26 @@ class Recording(msgspec.Struct, kw_only=True):
         )
 
 
-class Figures(msgspec.Struct, kw_only=True):
-    """What one run showed. Times in seconds of the wall clock, `drive_s` of the drive's own;
-    `start_s` says when, after the command began, what was there.
+class DriveMetrics(msgspec.Struct, kw_only=True):
+    """What the messages of a drive show. `drive_s` is the drive's own time.
 
-    `cycle_*_ms`: camera frame stamped to motor command received; `bus_share`: the part of the mean
-    spent in anything but computing. `dropped` answers of codelets are in no delta, and `refused`
-    says why of the last few. `gaps`: messages lost for good, by NEVER_DROP topic. `restarts` and
-    `killed` name processes.
+    `estimate` has the errors of the estimated position, `wheels_alone` and `fused_alone` those of
+    path integration alone: of the wheels' odometry, and of the self-motion that sensory memory
+    fuses of wheels and views. `error_ratio` is the estimate's mean error over that of the wheels,
+    `error_over_fused` over that of fused self-motion. `cycle_*_ms`: camera frame stamped to motor
+    command received; `bus_share`: the part of the mean spent in anything but computing. `dropped`
+    answers of codelets are in no delta; `refused` gives the reasons of the last few. `gaps`:
+    messages lost for good, by NEVER_DROP topic.
     """
 
-    completed: bool
-    ended_by: str
-    seed: int
-    laps: float
-    mode: str
-    codelets: int
-    wall_s: float
-    start_s: dict[str, float]
     drive_s: float
     distance_m: float
     progress: float
+    estimate: ErrorMetrics
+    wheels_alone: ErrorMetrics
+    fused_alone: ErrorMetrics
     error_ratio: float
-    estimate: ErrorFigures
-    path_integration: ErrorFigures
+    error_over_fused: float
     estimates: int
     commands: int
     broadcasts: int
@@ -107,10 +107,29 @@ class Figures(msgspec.Struct, kw_only=True):
     gaps_total: int
     rejected: dict[str, int]
     superseded: dict[str, int]
-    restarts: dict[str, int]
-    killed: list[str]
     busy: dict[str, float]
     memory_mb: dict[str, float]
+
+
+class RunMetrics(DriveMetrics, kw_only=True):
+    """What one run showed: its drive, and its processes.
+
+    `ended_by` is how it ended in two words, `reason` in a sentence. `wall_s` is how long the
+    command took and `start_s` when, after it began, each milestone was reached. `restarts` and
+    `killed` name processes.
+    """
+
+    completed: bool
+    ended_by: str
+    reason: str
+    seed: int
+    laps: float
+    mode: str
+    codelets: int
+    wall_s: float
+    start_s: dict[str, float]
+    restarts: dict[str, int]
+    killed: list[str]
     log: Recording | None
 
 
@@ -123,64 +142,74 @@ def objects(graph: Graph) -> list[Node]:
 
 
 def position_m(node: Node) -> tuple[float, float]:
-    """Where a node stands, in the agent's frame."""
+    """The position of a node in the agent's frame."""
     return float(node.attributes["x_m"]), float(node.attributes["y_m"])
 
 
-def object_errors_m(observer: Observer, graph: Graph) -> npt.NDArray[np.float64]:
-    """How far each learned object is from the building of its name, (n,); a name no building has
-    counts for none.
+def object_errors_m(observer: Observer, graph: Graph) -> Floats:
+    """How far each learned object is from the building of its name, (n,); one whose name no
+    building has does not count.
     """
-    buildings = (
-        {building.name: building.pose for building in observer.town.buildings}
-        if observer.town
-        else {}
-    )
-    errors = []
+    built = observer.town.buildings if observer.town else []
+    buildings = {building.name: building.pose for building in built}
+
+    errors_m = []
     for node in objects(graph):
-        building = buildings.get(str(node.attributes.get("label", "")))
-        if building is not None:
-            (x_m, y_m), *_ = observer.to_world(np.array([position_m(node)])).tolist()
-            errors.append(math.hypot(x_m - building.x_m, y_m - building.y_m))
-    return np.array(errors)
+        true = buildings.get(str(node.attributes.get("label", "")))
+        if true is None:
+            continue
+        learned_m = observer.to_world(np.array([position_m(node)]))[0]
+        errors_m.append(math.dist(learned_m, (true.x_m, true.y_m)))
+    return np.array(errors_m)
 
 
-def measured(watch: Watch, errors: Errors) -> dict[str, Any]:
-    """The figures that come from the bus. Of nothing, a mean and a percentile are 0."""
-    observer = watch.observer
-    graph = watch.replica.graph
-    health = watch.health
-    gaps = watch.gaps()
-    cycle_ms = watch.cycle_ms or [0.0]
-    off_m = object_errors_m(observer, graph)
-    return {
-        "drive_s": observer.elapsed_s,
-        "distance_m": observer.travelled_m,
-        "progress": observer.progress,
-        "error_ratio": errors.ratio,
-        "estimate": ErrorFigures.of(errors.estimate_m),
-        "path_integration": ErrorFigures.of(errors.integration_m),
-        "estimates": int(errors.stamps_ns.size),
-        "commands": len(watch.cycle_ms),
-        "broadcasts": watch.broadcasts,
-        "halted": dict(watch.halted),
-        "cycle_p50_ms": float(np.percentile(cycle_ms, 50)),
-        "cycle_p99_ms": float(np.percentile(cycle_ms, 99)),
-        "bus_share": sum(watch.bus_ms) / max(1e-9, sum(cycle_ms)),
-        "objects": len(objects(graph)),
-        "object_error_mean_m": float(off_m.mean()) if off_m.size else 0.0,
-        "object_error_median_m": float(np.median(off_m)) if off_m.size else 0.0,
-        "road_m2": sum(int((tile.columns["road"] > 0.5).sum()) for tile in graph.tiles.values())
-        * graph.cell_m**2,
-        "deltas": graph.version,
-        "dropped": watch.dropped,
-        "refused": list(watch.refused),
-        "gaps": gaps,
-        "gaps_total": sum(gaps.values()),
-        "rejected": watch.rejected(),
-        "superseded": {
-            name: sum(each.superseded.values()) for name, each in sorted(health.items())
-        },
-        "busy": watch.busy,
-        "memory_mb": {name: each.memory_mb for name, each in sorted(health.items())},
-    }
+def road_m2(graph: Graph) -> float:
+    """The area of the place nodes that are taken for road."""
+    cells = 0
+    for tile in graph.tiles.values():
+        is_road = tile.columns["road"] > ROAD_THRESHOLD
+        cells += int(is_road.sum())
+    return cells * graph.cell_m**2
+
+
+def drive_metrics(tally: Tally, gaps: dict[str, int], rejected: dict[str, int]) -> DriveMetrics:
+    """The metrics of a drive, with the messages that were lost and rejected, by topic. A mean and a
+    percentile of nothing are 0.
+    """
+    observer = tally.observer
+    graph = tally.replica.graph
+    errors = observer.errors()
+    object_m = object_errors_m(observer, graph)
+    cycle_ms = tally.cycle_ms or [0.0]
+    health = sorted(tally.health.items())
+
+    return DriveMetrics(
+        drive_s=observer.elapsed_s,
+        distance_m=observer.travelled_m,
+        progress=observer.progress,
+        estimate=ErrorMetrics.of(errors.estimate_m),
+        wheels_alone=ErrorMetrics.of(errors.wheels_m),
+        fused_alone=ErrorMetrics.of(errors.fused_m),
+        error_ratio=errors.over_wheels,
+        error_over_fused=errors.over_fused,
+        estimates=int(errors.stamps_ns.size),
+        commands=len(tally.cycle_ms),
+        broadcasts=tally.broadcasts,
+        halted=dict(tally.halted),
+        cycle_p50_ms=float(np.percentile(cycle_ms, 50)),
+        cycle_p99_ms=float(np.percentile(cycle_ms, 99)),
+        bus_share=sum(tally.bus_ms) / max(1e-9, sum(cycle_ms)),
+        objects=len(objects(graph)),
+        object_error_mean_m=float(object_m.mean()) if object_m.size else 0.0,
+        object_error_median_m=float(np.median(object_m)) if object_m.size else 0.0,
+        road_m2=road_m2(graph),
+        deltas=graph.version,
+        dropped=tally.dropped,
+        refused=list(tally.refused),
+        gaps=gaps,
+        gaps_total=sum(gaps.values()),
+        rejected=rejected,
+        superseded={name: sum(each.superseded.values()) for name, each in health},
+        busy=tally.busy,
+        memory_mb={name: each.memory_mb for name, each in health},
+    )

@@ -11,11 +11,12 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from cogmap.errors import UsageError
+from cogmap.errors import ProcessFailedError
 
-FIRST_BACKOFF_S = 0.2
-LONGEST_BACKOFF_S = 5.0
+MIN_BACKOFF_S = 0.2
+MAX_BACKOFF_S = 5.0
 STEADY_S = 10.0
+MAX_QUICK_DEATHS = 4
 USAGE_EXIT = 2
 _SOURCES = Path(__file__).parents[2]
 
@@ -25,7 +26,7 @@ class Program:
     """A process to run: the name of its instance, which names its log file too, and its command
     line.
 
-    `command` is told how often it has been started before.
+    `command` receives how often it has been started before.
     """
 
     instance: str
@@ -41,21 +42,24 @@ def _environment() -> dict[str, str]:
     """This process's, with one thread a process for linear algebra: there are more processes than
     cores.
     """
-    path = os.pathsep.join(filter(None, [str(_SOURCES), os.environ.get("PYTHONPATH", "")]))
-    return os.environ | {"PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    paths = [str(_SOURCES), os.environ.get("PYTHONPATH", "")]
+    search_path = os.pathsep.join(path for path in paths if path)
+    one_thread = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    return os.environ | {"PYTHONPATH": search_path} | one_thread
 
 
 class Child:
     """One program as it runs. Its standard input is a pipe that ends when this process does,
-    however it does.
+    whatever the cause.
     """
 
     def __init__(self, program: Program, folder: Path) -> None:
         self.program = program
-        self._log = folder / f"{program.instance}.log"
-        self._backoff_s = FIRST_BACKOFF_S
-        self._due_s: float | None = None
         self.starts = 0
+        self._log = folder / f"{program.instance}.log"
+        self._backoff_s = MIN_BACKOFF_S
+        self._quick_deaths = 0
+        self._due_s: float | None = None
         self.start()
 
     def start(self) -> None:
@@ -81,32 +85,48 @@ class Child:
     def restart_if_dead(self) -> bool:
         """Start it again some time after it died, later each time. True when that was now.
 
-        Raises UsageError with its last words where it ended for a reason that a restart does not
-        mend.
+        Raises ProcessFailedError with its last words where a restart would not help: it ended with
+        USAGE_EXIT, or has died MAX_QUICK_DEATHS times within STEADY_S of its start.
         """
-        now_s = time.monotonic()
         code = self._process.poll()
         if code is None:
             return False
-        if code == USAGE_EXIT:
-            raise UsageError(f"{self.program.instance} has ended: {self._last_words()}")
         if self._due_s is None:
-            if now_s - self._started_s > STEADY_S:
-                self._backoff_s = FIRST_BACKOFF_S
-            self._due_s = now_s + self._backoff_s
-            self._backoff_s = min(LONGEST_BACKOFF_S, 2 * self._backoff_s)
-        if now_s < self._due_s:
+            self._on_death(code)
+        if self._due_s is None or time.monotonic() < self._due_s:
             return False
+
         self._close_pipe()
         self.start()
         return True
 
+    def _on_death(self, code: int) -> None:
+        instance = self.program.instance
+        if code == USAGE_EXIT:
+            raise ProcessFailedError(f"{instance} has ended: {self._last_words()}")
+
+        now_s = time.monotonic()
+        if now_s - self._started_s > STEADY_S:
+            self._backoff_s = MIN_BACKOFF_S
+            self._quick_deaths = 0
+
+        self._quick_deaths += 1
+        if self._quick_deaths >= MAX_QUICK_DEATHS:
+            raise ProcessFailedError(
+                f"{instance} died {self._quick_deaths} times soon after its start, "
+                f"the last words in {self._log} are: {self._last_words()}"
+            )
+
+        self._due_s = now_s + self._backoff_s
+        self._backoff_s = min(MAX_BACKOFF_S, 2 * self._backoff_s)
+
     def _last_words(self) -> str:
-        lines = self._log.read_text(errors="replace").split("\n")
-        return next(
-            (line.removeprefix("cogmap: ") for line in reversed(lines) if line.strip()),
-            "it said nothing",
-        )
+        """The last line of its log."""
+        lines = self._log.read_text(errors="replace").splitlines()
+        for line in reversed(lines):
+            if line.strip():
+                return line.removeprefix("cogmap: ")
+        return "none"
 
     def ask_to_end(self) -> None:
         """Send SIGTERM."""
@@ -122,6 +142,7 @@ class Child:
             self._process.kill()
             self._process.wait()
             by_itself = False
+
         self._close_pipe()
         return by_itself
 
@@ -131,7 +152,7 @@ class Child:
 
 
 class Supervisor:
-    """The children of one run; `check` it often, `close` it in the end."""
+    """The children of one run, whose logs are in `folder`; `check` it often, `end` them all."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -144,7 +165,7 @@ class Supervisor:
         self.children[program.instance] = Child(program, self._folder)
 
     def check(self) -> None:
-        """Restart what has died. Raises UsageError where that would not help."""
+        """Restart what has died. Raises ProcessFailedError where that would not help."""
         for instance, child in self.children.items():
             if child.restart_if_dead():
                 self.restarts[instance] += 1
@@ -154,5 +175,8 @@ class Supervisor:
         ending = [(name, self.children.pop(name)) for name in instances if name in self.children]
         for _, child in ending:
             child.ask_to_end()
+
         deadline_s = time.monotonic() + grace_s
-        self.killed += [name for name, child in ending if not child.end(deadline_s)]
+        for name, child in ending:
+            if not child.end(deadline_s):
+                self.killed.append(name)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from cli.launch.metrics import Figures
+from cli.launch.metrics import RunMetrics
 from cli.launch.observer import Observer
 from cli.plots import map_layers as layers
 from cli.plots import palette
@@ -21,7 +21,7 @@ from cogmap.graph.graph import Graph
 MARGIN_M = 5.0
 
 
-def draw(path: Path, observer: Observer, graph: Graph, figures: Figures) -> None:
+def draw(path: Path, observer: Observer, graph: Graph, figures: RunMetrics) -> None:
     """Write the map to `path` as a PNG."""
     with mpl.rc_context(
         {"font.family": "sans-serif", "font.size": 9, "axes.edgecolor": palette.KERB}
@@ -38,7 +38,7 @@ def draw(path: Path, observer: Observer, graph: Graph, figures: Figures) -> None
 
 
 def _draw_paths(axes: Axes, observer: Observer) -> None:
-    axes.plot(*observer.integrated_path_m.T, color=WHEELS, lw=1.6, ls=(0, (4, 2)), zorder=8)
+    axes.plot(*observer.wheels_path_m.T, color=WHEELS, lw=1.6, ls=(0, (4, 2)), zorder=8)
     axes.plot(
         *observer.true_path_m.T, color=TRUE, lw=3.2, alpha=0.9, solid_capstyle="round", zorder=9
     )
@@ -56,7 +56,7 @@ def _draw_paths(axes: Axes, observer: Observer) -> None:
         )
 
 
-def _dress(axes: Axes, observer: Observer, figures: Figures) -> None:
+def _dress(axes: Axes, observer: Observer, figures: RunMetrics) -> None:
     """Limits, scale, title and legend."""
     town = observer.town
     corners = [point for street in (town.streets if town else []) for point in street.line_m]
@@ -67,7 +67,7 @@ def _dress(axes: Axes, observer: Observer, figures: Figures) -> None:
             for side in (-1, 1)
         ]
     every = np.vstack(
-        [np.array(corners).reshape(-1, 2), observer.true_path_m, observer.integrated_path_m]
+        [np.array(corners).reshape(-1, 2), observer.true_path_m, observer.wheels_path_m]
     )
     if len(every):
         (west, south), (east, north) = every.min(axis=0) - MARGIN_M, every.max(axis=0) + MARGIN_M
@@ -103,12 +103,12 @@ def _draw_scale(axes: Axes, west_m: float, south_m: float, length_m: float = 10.
     )
 
 
-def _title(axes: Axes, figures: Figures) -> None:
+def _title(axes: Axes, figures: RunMetrics) -> None:
     driven = f"Town {figures.seed}, driven through for {figures.distance_m:.0f} m in {figures.drive_s:.0f} s"
     learned = f"{figures.objects} buildings and {figures.road_m2:.0f} m² of street learned"
     errors = (
         f"position off by {figures.estimate.mean_m:.2f} m on average, "
-        f"{figures.path_integration.mean_m:.2f} m by path integration alone"
+        f"{figures.wheels_alone.mean_m:.2f} m by path integration alone"
     )
     axes.set_title(f"{driven}\n\n", loc="left", color=INK, fontsize=14, fontweight="bold")
     axes.text(

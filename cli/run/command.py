@@ -10,15 +10,18 @@ import click
 import msgspec
 from rich.console import Console
 
-from cli.launch.drive import INTERRUPTED, Drive
-from cli.launch.plan import Choices, effective, everybody
+from cli.launch.drive import Drive
+from cli.launch.plan import CONFIG_NAME, Choices, awaited, effective
 from cli.options import agent_option, config_option, connect_option, set_option
-from cli.run import display, summary
+from cli.run import summary
+from cli.run.display import Display, display_on
 from cogmap.bus.session import check_free
 from cogmap.errors import ConfigError
 from cogmap.runtime import config
 from cogmap.runtime.process import Stop
+from services import registry
 
+LAP_LIMIT_S = 85.0
 FINISH_S = 4.0
 
 seed_option = click.option(
@@ -32,7 +35,8 @@ codelets_option = click.option(
 )
 lockstep_option = click.option(
     "--lockstep/--real-time",
-    help="Wait for every answer, the same bytes each time; or drive as time passes.  [default: real time]",
+    help="Wait for every answer, the same bytes each time; or drive as time passes.  "
+    "[default: real time]",
 )
 
 
@@ -51,13 +55,23 @@ lockstep_option = click.option(
 )
 @click.option(
     "--time-limit",
-    type=click.FloatRange(5, None),
-    default=85.0,
-    show_default=True,
+    type=click.FloatRange(5, 1e6),
     metavar="SECONDS",
-    help="End after so long, all told.",
+    help=f"End after so long, start and end included.  [default: {LAP_LIMIT_S:g} for each lap]",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
+@click.option(
+    "--router",
+    metavar="ENDPOINT",
+    help="Use the router that listens there, such as zenohd, and start none.",
+)
+@click.option(
+    "--without",
+    multiple=True,
+    type=click.Choice([*registry.MODULES, "all"]),
+    metavar="MODULE",
+    help="Start all modules but this, and wait for yours; repeat at will, or `all`.",
+)
 @connect_option
 @agent_option
 @config_option
@@ -69,8 +83,10 @@ def run(
     codelets: int,
     out: Path | None,
     record: bool,
-    time_limit: float,
+    time_limit: float | None,
     as_json: bool,
+    router: str | None,
+    without: tuple[str, ...],
     connect: str,
     agent: str,
     config_path: Path | None,
@@ -78,31 +94,59 @@ def run(
 ) -> None:
     """Drive the robot around a loop of streets in a simulated town.
 
-    Starts a router and every module as a process of its own, shows how the drive goes, and leaves a
-    folder with the log, a map and a summary. Ends with 0 where the route was completed, 130 after
-    Ctrl-C, else with 1.
+    Starts a router and every module as a process of its own, shows how the drive proceeds, and
+    leaves a folder with the log, a map and a summary. Ends with 0 where the route was completed,
+    130 after Ctrl-C, else with 1; the summary gives the reason.
     """
     began_s = time.monotonic()
     stop = Stop()
     console = Console(stderr=as_json)
-    choices = Choices(seed=seed, laps=laps, lockstep=lockstep, codelets=codelets, record=record)
-    sections = effective(
-        config.load(config_path, settings), choices, everybody(choices, observer=True)
+    choices = Choices(
+        seed=seed,
+        laps=laps,
+        lockstep=lockstep,
+        codelets=codelets,
+        record=record,
+        without=registry.MODULES if "all" in without else without,
+        own_router=router is None,
     )
-    check_free(connect)
-    drive = Drive(_new_folder(out), connect, agent, choices, sections, began_s)
-    screen = display.on(console)
-    screen.say(f"town {sections['sim']['seed']}, files in {drive.folder}")
+    sections = effective(
+        config.load(config_path, settings), choices, awaited(choices, observer=True)
+    )
+    if router is None:
+        check_free(connect)
+
+    endpoint = router or connect
+    drive = Drive(_new_folder(out), endpoint, agent, choices, sections, began_s)
+    limit_s = time_limit or default_limit_s(sections["sim"]["laps"])
+    screen = display_on(console)
+    _introduce(screen, drive)
     try:
-        watch = drive.run(began_s + time_limit - FINISH_S, stop, screen)
+        watch, ending = drive.run(began_s + limit_s - FINISH_S, stop, screen)
     finally:
         screen.close()
-    figures = summary.finish(drive, watch)
+
+    metrics = summary.finish(drive, watch, ending)
     if as_json:
-        click.echo(msgspec.json.encode(figures))
+        click.echo(msgspec.json.encode(metrics))
     else:
-        console.print(summary.table(figures, drive.folder))
-    sys.exit(0 if figures.completed else 130 if figures.ended_by == INTERRUPTED else 1)
+        console.print(summary.table(metrics, drive.folder))
+    sys.exit(ending.outcome.exit_code)
+
+
+def default_limit_s(laps: float) -> float:
+    """The time limit of a drive of so many laps: it grows with each, and is one lap's at least."""
+    return LAP_LIMIT_S * max(1.0, laps)
+
+
+def _introduce(screen: Display, drive: Drive) -> None:
+    screen.show(f"town {drive.sections['sim']['seed']}, files in {drive.folder}")
+    if drive.choices.without:
+        names = ", ".join(drive.choices.without)
+        screen.show(
+            f"start {names} yourself with --connect {drive.endpoint} "
+            f"--config {drive.folder / CONFIG_NAME}"
+        )
 
 
 def _new_folder(out: Path | None) -> Path:

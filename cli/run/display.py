@@ -1,4 +1,4 @@
-"""Shows how a run goes: a live line on a terminal, a plain one now and then elsewhere."""
+"""Shows how a run proceeds: one line that changes on a terminal, a line every few seconds elsewhere."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
 from cli.launch.observer import Errors, Observer
+from cogmap.geometry.arrays import Floats
 
 PLAIN_PERIOD_S = 5.0
 
@@ -16,31 +17,40 @@ PLAIN_PERIOD_S = 5.0
 class Display(Protocol):
     """Where a run is shown."""
 
-    def say(self, sentence: str) -> None:
+    def show(self, sentence: str) -> None:
         """Show a sentence that stays."""
 
     def waiting(self, names: list[str]) -> None:
-        """Show whom the drive waits for."""
+        """Show which modules the drive waits for."""
 
     def driving(self, observer: Observer, errors: Errors) -> None:
-        """Show how far it has come, and the errors now."""
+        """Show how far the robot has come, and the errors now."""
 
     def close(self) -> None:
         """Leave the screen as it should stay."""
 
 
 def _drive_line(observer: Observer, errors: Errors) -> str:
-    estimate_m, integration_m = (
-        (each[-1] if each.size else 0.0) for each in (errors.estimate_m, errors.integration_m)
-    )
+    driven = f"{observer.elapsed_s:5.1f} s  {observer.travelled_m:6.1f} m"
+    estimate_m = _last(errors.estimate_m)
+    fused_m = _last(errors.fused_m)
+    wheels_m = _last(errors.wheels_m)
     return (
-        f"{observer.elapsed_s:5.1f} s  {observer.travelled_m:6.1f} m  "
-        f"{estimate_m:.2f} m off, path integration alone {integration_m:.2f} m"
+        f"{driven}  position error {estimate_m:.2f} m; "
+        f"path integration alone: fused {fused_m:.2f} m, wheels {wheels_m:.2f} m"
     )
+
+
+def _last(errors_m: Floats) -> float:
+    return float(errors_m[-1]) if errors_m.size else 0.0
+
+
+def _waiting_line(names: list[str]) -> str:
+    return f"waiting for {', '.join(names)}" if names else "starting"
 
 
 class LiveDisplay:
-    """A bar and a line that change in place."""
+    """A progress bar and a line that change in place."""
 
     def __init__(self, console: Console) -> None:
         self._progress = Progress(
@@ -53,13 +63,11 @@ class LiveDisplay:
         self._task = self._progress.add_task("starting", total=1.0)
         self._progress.start()
 
-    def say(self, sentence: str) -> None:
+    def show(self, sentence: str) -> None:
         self._progress.console.print(sentence, highlight=False)
 
     def waiting(self, names: list[str]) -> None:
-        self._progress.update(
-            self._task, description=f"waiting for {', '.join(names)}" if names else "starting"
-        )
+        self._progress.update(self._task, description=_waiting_line(names))
 
     def driving(self, observer: Observer, errors: Errors) -> None:
         line = _drive_line(observer, errors)
@@ -76,25 +84,26 @@ class PlainDisplay:
         self._console = console
         self._next_s = 0.0
 
-    def say(self, sentence: str) -> None:
+    def show(self, sentence: str) -> None:
         self._console.print(sentence, highlight=False, soft_wrap=True)
 
     def waiting(self, names: list[str]) -> None:
         if names:
-            self._now_and_then(f"waiting for {', '.join(names)}")
+            self._show_periodically(_waiting_line(names))
 
     def driving(self, observer: Observer, errors: Errors) -> None:
-        self._now_and_then(f"{observer.progress:4.0%}  {_drive_line(observer, errors)}")
+        self._show_periodically(f"{observer.progress:4.0%}  {_drive_line(observer, errors)}")
 
-    def _now_and_then(self, line: str) -> None:
-        if time.monotonic() >= self._next_s:
-            self._next_s = time.monotonic() + PLAIN_PERIOD_S
-            self.say(line)
+    def _show_periodically(self, line: str) -> None:
+        now_s = time.monotonic()
+        if now_s >= self._next_s:
+            self._next_s = now_s + PLAIN_PERIOD_S
+            self.show(line)
 
     def close(self) -> None:
         """Nothing to leave."""
 
 
-def on(console: Console) -> Display:
+def display_on(console: Console) -> Display:
     """The display that suits `console`."""
     return LiveDisplay(console) if console.is_terminal else PlainDisplay(console)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import logging
 import time
 from pathlib import Path
@@ -10,19 +9,34 @@ from pathlib import Path
 import msgspec
 from rich.table import Table
 
-from cli.launch.drive import ROUTE_COMPLETE, Drive
-from cli.launch.metrics import Figures, Recording, measured
+from cli.launch.drive import Drive
+from cli.launch.metrics import DriveMetrics, ErrorMetrics, Recording, RunMetrics, drive_metrics
+from cli.launch.outcome import Ending, Outcome
 from cli.launch.plan import LOG_NAME
 from cli.launch.watch import Watch
 
+SUMMARY_NAME = "summary.json"
+MAP_NAME = "map.png"
 
-def finish(drive: Drive, watch: Watch) -> Figures:
-    """Write the summary and the map."""
+
+def finish(drive: Drive, watch: Watch, ending: Ending) -> RunMetrics:
+    """Write the summary and the map of a drive that has ended so."""
+    metrics = _run_metrics(drive, watch, ending)
+    encoded = msgspec.json.format(msgspec.json.encode(metrics))
+    (drive.folder / SUMMARY_NAME).write_bytes(encoded + b"\n")
+    _draw_map(drive.folder / MAP_NAME, watch, metrics)
+    return metrics
+
+
+def _run_metrics(drive: Drive, watch: Watch, ending: Ending) -> RunMetrics:
     sim = drive.sections["sim"]
-    errors = watch.observer.errors()
-    figures = Figures(
-        completed=drive.ended_by == ROUTE_COMPLETE,
-        ended_by=drive.ended_by,
+    of_drive = drive_metrics(watch.tally, watch.gaps(), watch.rejected())
+    log = Recording.read(drive.folder / LOG_NAME) if drive.choices.record else None
+    return RunMetrics(
+        **msgspec.structs.asdict(of_drive),
+        completed=ending.outcome is Outcome.ROUTE_COMPLETE,
+        ended_by=ending.outcome.value,
+        reason=ending.reason,
         seed=sim["seed"],
         laps=sim["laps"],
         mode=sim["mode"],
@@ -31,52 +45,72 @@ def finish(drive: Drive, watch: Watch) -> Figures:
         start_s=drive.start_s,
         restarts=dict(drive.supervisor.restarts),
         killed=drive.supervisor.killed,
-        log=Recording.read(drive.folder / LOG_NAME) if drive.choices.record else None,
-        **measured(watch, errors),
+        log=log,
     )
-    (drive.folder / "summary.json").write_bytes(
-        msgspec.json.format(msgspec.json.encode(figures)) + b"\n"
-    )
+
+
+def _draw_map(path: Path, watch: Watch, metrics: RunMetrics) -> None:
+    from cli.plots import map as plot  # half a second, which the start of a run has no use for
+
     logging.getLogger("matplotlib").setLevel(logging.WARNING)
-    picture = importlib.import_module(
-        "cli.plots.map"
-    )  # half a second, which the start of a run has no use for
-    picture.draw(drive.folder / "map.png", watch.observer, watch.replica.graph, figures)
-    return figures
+    plot.draw(path, watch.tally.observer, watch.tally.replica.graph, metrics)
 
 
-def table(figures: Figures, folder: Path) -> Table:
-    """The figures that matter most."""
-    shown = Table(show_header=False, title=f"{figures.ended_by} · {folder}", title_justify="left")
-    estimate = figures.estimate
-    alone = figures.path_integration
-    rows = {
-        "driven": f"{figures.distance_m:.1f} m in {figures.drive_s:.1f} s, {figures.progress:.0%} of the route",
-        "position error": f"{estimate.mean_m:.2f} m on average, at most {estimate.max_m:.2f} m",
-        "path integration alone": f"{alone.mean_m:.2f} m on average, at most {alone.max_m:.2f} m",
-        "error ratio": f"{figures.error_ratio:.3f}",
-        "learned": f"{figures.objects} buildings, half of them within {figures.object_error_median_m:.2f} m; "
-        f"{figures.road_m2:.0f} m² of street",
-        "cycle": f"{figures.cycle_p50_ms:.0f} ms, 99 % within {figures.cycle_p99_ms:.0f} ms",
-        "lost messages": _losses(figures),
-        "dropped answers": f"{figures.dropped}, the last: {figures.refused[-1]}"
-        if figures.refused
-        else "none",
-        "restarts": ", ".join(f"{name} {number}" for name, number in figures.restarts.items())
-        or "none",
-    }
-    for name, value in rows.items():
+def table(metrics: RunMetrics, folder: Path) -> Table:
+    """The metrics that matter most."""
+    title = f"{metrics.ended_by}: {metrics.reason}\n{folder}"
+    shown = Table(show_header=False, title=title, title_justify="left")
+    for name, value in [*drive_rows(metrics), *_process_rows(metrics)]:
         shown.add_row(name, value)
     return shown
 
 
-def _losses(figures: Figures) -> str:
-    """What was lost, as the modules and the recorder counted it."""
-    if figures.log is None:
-        return f"{figures.gaps_total}; not recorded"
-    recorded = (
-        "no gap in any NEVER_DROP topic"
-        if figures.log.never_drop_whole
-        else "; ".join(figures.log.gaps)
+def drive_rows(metrics: DriveMetrics) -> list[tuple[str, str]]:
+    """The rows of the table that tell of the drive."""
+    driven = f"{metrics.distance_m:.1f} m in {metrics.drive_s:.1f} s"
+    ratios = (
+        f"{metrics.error_over_fused:.3f} over fused self-motion, "
+        f"{metrics.error_ratio:.3f} over wheels"
     )
-    return f"{figures.gaps_total}; in the log, {figures.log.messages} messages, {figures.log.size_mb:.0f} MB: {recorded}"
+    learned = (
+        f"{metrics.objects} buildings, half of them within {metrics.object_error_median_m:.2f} m; "
+        f"{metrics.road_m2:.0f} m² of street"
+    )
+    cycle = f"{metrics.cycle_p50_ms:.0f} ms, 99 % within {metrics.cycle_p99_ms:.0f} ms"
+    return [
+        ("driven", f"{driven}, {metrics.progress:.0%} of the route"),
+        ("position error", _errors(metrics.estimate)),
+        ("path integration alone, fused self-motion", _errors(metrics.fused_alone)),
+        ("path integration alone, wheels", _errors(metrics.wheels_alone)),
+        ("error ratio", ratios),
+        ("learned", learned),
+        ("cycle", cycle),
+    ]
+
+
+def _errors(errors: ErrorMetrics) -> str:
+    return f"{errors.mean_m:.2f} m on average, at most {errors.max_m:.2f} m"
+
+
+def _process_rows(metrics: RunMetrics) -> list[tuple[str, str]]:
+    dropped = "none"
+    if metrics.refused:
+        dropped = f"{metrics.dropped}, the last: {metrics.refused[-1]}"
+    restarts = [f"{name} {number}" for name, number in metrics.restarts.items()]
+    return [
+        ("lost messages", _losses(metrics)),
+        ("dropped answers", dropped),
+        ("restarts", ", ".join(restarts) or "none"),
+    ]
+
+
+def _losses(metrics: RunMetrics) -> str:
+    """What was lost, by the counts of the modules and of the recorder."""
+    log = metrics.log
+    if log is None:
+        return f"{metrics.gaps_total}; not recorded"
+
+    gaps = "no gap in any NEVER_DROP topic" if log.never_drop_whole else "; ".join(log.gaps)
+    return (
+        f"{metrics.gaps_total}; in the log, {log.messages} messages, {log.size_mb:.0f} MB: {gaps}"
+    )

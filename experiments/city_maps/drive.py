@@ -107,7 +107,7 @@ def sections(environment: Environment, tour: Tour, noise: Noise, method: str) ->
     rates = {"frame_hz": FRAME_HZ, "odometry_hz": FRAME_HZ, "awaits": dict.fromkeys(MIND, 1)}
     correction = settings(method, SPEED_M_S / FRAME_HZ)
     return {
-        "sim": {"mode": "lockstep", "seed": tour.seed, "way": way, **senses, **rates},
+        "sim": {"mode": "lockstep", "seed": tour.seed, "trajectory": way, **senses, **rates},
         "workspace": {
             "mode": "lockstep",
             "cell_m": CELL_M,
@@ -128,8 +128,8 @@ def driven(configured: Sections, modules: Sequence[Module]) -> Traversal:
     """As `traverse`, with these modules."""
     watcher = _Watcher()
     in_memory.run([*modules, watcher.module()])
-    (x, y), (ahead_x, ahead_y) = configured["sim"]["way"]["line_m"][:2]
-    names = tuple(each["name"] for each in configured["sim"]["way"]["landmarks"])
+    (x, y), (ahead_x, ahead_y) = configured["sim"]["trajectory"]["line_m"][:2]
+    names = tuple(each["name"] for each in configured["sim"]["trajectory"]["landmarks"])
     origin = np.array([x, y, np.arctan2(ahead_y - y, ahead_x - x)])
     return Traversal(
         believed=_placed(np.array(watcher.believed), origin),

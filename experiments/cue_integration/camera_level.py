@@ -26,7 +26,7 @@ from schemas.sensing import Odometry, Percept, Percepts, View
 from services import registry
 from services.sim.layout import roadside
 from services.sim.rendering.camera import StereoCamera, calibration
-from services.sim.scripted.trajectory import Way
+from services.sim.scripted.trajectory import Trajectory
 from services.sim.world import World
 
 SCALE = 10.0
@@ -72,7 +72,7 @@ class PicturedRoom(Room):
         """What EPAM says of a view, the participant's head turned so far to the left."""
         here = self._pose
         self._looks = self._looks + 1
-        self._world.lead(
+        self._world.place_robot(
             sensing.Pose(
                 x_m=SCALE * here.x_m, y_m=SCALE * here.y_m, heading_rad=here.heading_rad + turn_rad
             )
@@ -89,7 +89,7 @@ class PicturedRoom(Room):
         line_m = [_scaled(START), _scaled(POSTS[-1])]
         places = [dict(zip(("x_m", "y_m"), _scaled(each), strict=True)) for each in self._drawn]
         way = msgspec.convert(
-            {"line_m": line_m, "landmarks": named(places), "sensing": "cameras"}, Way
+            {"line_m": line_m, "landmarks": named(places), "sensing": "cameras"}, Trajectory
         )
         world = World(roadside.along(way, self._trial.seed))
         return world, StereoCamera(world, calibration())

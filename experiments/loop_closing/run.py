@@ -209,7 +209,7 @@ def sections(seed: int, method: str) -> Sections:
             "mode": "lockstep",
             "seed": seed,
             "noise": msgspec.structs.asdict(NOISE),
-            "way": way(),
+            "trajectory": way(),
             **rates,
         },
         "workspace": {
@@ -247,7 +247,8 @@ def drive_by_cameras(seed: int, progress: Progress) -> dict[str, Loop]:
 def driven(configured: Sections, modules: Sequence[Module]) -> Loop:
     """As `drive`, with these modules."""
     places = {
-        item["name"]: (item["x_m"], item["y_m"]) for item in configured["sim"]["way"]["landmarks"]
+        item["name"]: (item["x_m"], item["y_m"])
+        for item in configured["sim"]["trajectory"]["landmarks"]
     }
     observer = _Observer(places)
     watching = (

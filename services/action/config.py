@@ -1,4 +1,4 @@
-"""How action is configured."""
+"""The settings of action."""
 
 from __future__ import annotations
 
@@ -6,30 +6,129 @@ from typing import Annotated, Literal
 
 import msgspec
 
-Positive = Annotated[float, msgspec.Meta(gt=0)]
-Share = Annotated[float, msgspec.Meta(ge=0, le=1)]
+from schemas.base import (
+    PositiveAcceleration,
+    PositiveMetres,
+    PositiveSeconds,
+    PositiveSpeed,
+    Share,
+)
+
 Leg = tuple[
-    Annotated[float, msgspec.Meta(gt=0, le=1e5)], Annotated[float, msgspec.Meta(ge=-3.2, le=3.2)]
+    Annotated[
+        float, msgspec.Meta(gt=0, le=1e5, description="Length in metres, above 0, at most 100000.")
+    ],
+    Annotated[
+        float,
+        msgspec.Meta(
+            ge=-3.2, le=3.2, description="Turn at its end in radians, left positive, -3.2 to 3.2."
+        ),
+    ],
 ]
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """`route` is the way as one is told it: go so many metres, turn by so much (left positive), and
-    so on.
+    """Procedural memory, action selection and sensory-motor memory.
+
+    The route is given as a passer-by would describe it: lengths and turns.
     """
 
-    mode: Literal["lockstep", "real_time"] = "real_time"
-    route: list[Leg] = []
-    overrun_m: Annotated[float, msgspec.Meta(ge=0)] = 5.0
-    corner_radius_m: Positive = 3.5
-    cruise_m_s: Positive = 4.0
-    lookahead_m: Positive = 2.5
-    lateral_m_s2: Positive = 1.5
-    braking_m_s2: Positive = 2.5
-    clearance_m: Positive = 1.5
-    half_width_m: Positive = 0.7
-    wheel_radius_m: Positive = 0.2
-    track_m: Positive = 0.8
-    selection_threshold: Share = 0.9
-    threshold_fall: Share = 0.1
-    instantiation: Share = 0.1
+    mode: Annotated[
+        Literal["lockstep", "real_time"],
+        msgspec.Meta(
+            description="lockstep: a command waits for all that it depends on. "
+            "real_time: it does not."
+        ),
+    ] = "real_time"
+    route: Annotated[
+        list[Leg],
+        msgspec.Meta(description="Legs (length in m, turn in rad), in order from the start."),
+    ] = []
+    overrun_m: Annotated[
+        float,
+        msgspec.Meta(
+            ge=0,
+            le=1e4,
+            description="Distance by which the route continues behind its end, in m, 0 to 10000.",
+        ),
+    ] = 5.0
+    corner_radius_m: Annotated[
+        PositiveMetres,
+        msgspec.Meta(description="Radius of the route's rounded corners, in m, above 0 to 10000."),
+    ] = 3.5
+    cruise_m_s: Annotated[
+        PositiveSpeed, msgspec.Meta(description="Speed on a free straight, in m/s, above 0 to 100.")
+    ] = 4.0
+    lookahead_m: Annotated[
+        PositiveMetres,
+        msgspec.Meta(
+            description="Distance of the point ahead that pure pursuit steers to, "
+            "in m, above 0 to 10000."
+        ),
+    ] = 2.5
+    lateral_m_s2: Annotated[
+        PositiveAcceleration,
+        msgspec.Meta(
+            description="Lateral acceleration in a bend at most, in m/s2, above 0 to 100."
+        ),
+    ] = 1.5
+    braking_m_s2: Annotated[
+        PositiveAcceleration,
+        msgspec.Meta(description="Deceleration when braking, in m/s2, above 0 to 100."),
+    ] = 2.5
+    clearance_m: Annotated[
+        PositiveMetres,
+        msgspec.Meta(
+            description="Distance to an obstacle at which the robot stops, in m, above 0 to 10000."
+        ),
+    ] = 1.5
+    half_width_m: Annotated[
+        PositiveMetres,
+        msgspec.Meta(description="Half the width that must be free ahead, in m, above 0 to 10000."),
+    ] = 0.7
+    wheel_radius_m: Annotated[
+        PositiveMetres, msgspec.Meta(description="Radius of driven wheels, in m, above 0 to 10000.")
+    ] = 0.2
+    track_m: Annotated[
+        PositiveMetres,
+        msgspec.Meta(description="Distance between the driven wheels, in m, above 0 to 10000."),
+    ] = 0.8
+    blind_m: Annotated[
+        PositiveMetres,
+        msgspec.Meta(
+            description="Distance that the robot may travel within the age of its pose, in m, "
+            "above 0 to 10000: the older the pose, the lower the speed."
+        ),
+    ] = 1.25
+    max_pose_age_s: Annotated[
+        PositiveSeconds,
+        msgspec.Meta(
+            description="Age of the pose at which the robot stops, in s, above 0 to 3600."
+        ),
+    ] = 1.5
+    stuck_after_s: Annotated[
+        PositiveSeconds,
+        msgspec.Meta(
+            description="Time that a robot may stand although it is commanded to move before it "
+            "counts as stuck, in s, above 0 to 3600."
+        ),
+    ] = 5.0
+    stuck_m_s: Annotated[
+        PositiveSpeed,
+        msgspec.Meta(description="Speed below which the robot stands, in m/s, above 0 to 100."),
+    ] = 0.1
+    selection_threshold: Annotated[
+        Share, msgspec.Meta(description="Activation that a behaviour needs to be chosen, 0 to 1.")
+    ] = 0.9
+    threshold_fall: Annotated[
+        Share,
+        msgspec.Meta(
+            description="Fall of that threshold with each attempt that chooses none, 0 to 1."
+        ),
+    ] = 0.1
+    instantiation: Annotated[
+        Share,
+        msgspec.Meta(
+            description="Activation at which a scheme becomes a behaviour that competes, 0 to 1."
+        ),
+    ] = 0.1

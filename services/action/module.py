@@ -4,115 +4,155 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import NamedTuple
+
+import msgspec
 
 from cogmap.errors import MessageError
 from cogmap.runtime.module import Module
 from schemas import topics
-from schemas.base import Message
+from schemas.base import Message, Scalar
 from schemas.cognition import Action, Broadcast, Competition
 from schemas.graph import Delta, Node
-from schemas.sensing import MotorCommand, Pose, RangeScan
+from schemas.process import Clock
+from schemas.sensing import MotorCommand, Pose, RangeScan, SelfMotion, SpeedLimit
 from services.action.config import Config
-from services.action.motor import SensoryMotorMemory, obstacle_ahead_m
+from services.action.gate import LockstepGate
+from services.action.motor import SensoryMotorMemory, halted, obstacle_ahead_m
 from services.action.route import Route
 from services.action.selection import HALT, ActionSelection
+from services.action.stuck import StuckDetector
 
 __all__ = ["ActionModule", "Config", "build"]
 
 SELF = "self"
+POSE_PHASES = {"localization", "late"}
+
+
+class Estimate(NamedTuple):
+    """A committed pose of the self node, the stamp of its view and its cycle."""
+
+    stamp_ns: int
+    cycle: int
+    pose: Pose
 
 
 class ActionModule:
-    """Broadcasts choose the action; each new estimate of the self node's pose brings a motor
-    command.
+    """Broadcasts choose the action; each new pose of the self node leads to a motor command.
 
-    In lockstep the command waits for the view's scan and for the competition of the cycle before,
-    so that it depends on nothing but what was sensed.
+    In lockstep a command waits for what `LockstepGate` names. A pose that is published again, as
+    the simulator publishes a frame again that nobody answered, is answered at once.
     """
 
     def __init__(self, config: Config) -> None:
         self._config = config
-        self._route = (
-            Route(config.route, config.corner_radius_m, config.overrun_m) if config.route else None
-        )
+        self._is_lockstep = config.mode == "lockstep"
+        self._gate = LockstepGate()
         self._selection = ActionSelection(config)
-        self._motor = None if self._route is None else SensoryMotorMemory(config, self._route)
-        self._scheme = ""
-        self._competed = 0
-        self._heard = 0
-        self._won = False
-        self._clear_m = math.inf
-        self._scanned_ns = -1
-        self._waiting: tuple[Delta, Pose] | None = None
+        self._stuck = StuckDetector(config.stuck_m_s, config.stuck_after_s)
+        self._route: Route | None = None
+        self._motor: SensoryMotorMemory | None = None
+        if config.route:
+            self._route = Route(config.route, config.corner_radius_m, config.overrun_m)
+            self._motor = SensoryMotorMemory(config, self._route)
+
         self._chosen: Action | None = None
+        self._is_resumed = False
+        self._clear_m = math.inf
+        self._newest_ns = 0
+        self._waiting: Estimate | None = None
+        self._answered: MotorCommand | None = None
 
     def restore(self, past: Iterable[Message]) -> None:
-        """Take up the action that was selected last, and the route from where it was then."""
+        """Resume the action that was chosen last, and the route at the agent's place then."""
         for message in past:
             if isinstance(message, Action):
                 self._chosen = message
-                self._scheme = message.scheme
+                self._is_resumed = True
         if self._chosen is not None and self._route is not None:
-            self._route.resume(float(self._chosen.parameters.get("travelled_m", 0.0)))
+            travelled_m = float(self._chosen.parameters.get("travelled_m", 0.0))
+            self._route.resume(travelled_m)
 
     def chosen(self) -> Action:
-        """The action that was selected last. Raises MessageError where none was."""
+        """The action that was chosen last. Raises MessageError where none was."""
         if self._chosen is None:
             raise MessageError("no action was selected yet")
         return self._chosen
 
-    def on_scan(self, scan: RangeScan) -> MotorCommand | None:
-        """See how far the way is clear."""
-        self._clear_m = obstacle_ahead_m(scan, self._config.half_width_m)
-        self._scanned_ns = scan.stamp_ns
+    def on_clock(self, clock: Clock) -> MotorCommand | None:
+        """Stop the robot, once, when its newest pose has become too old."""
+        self._newest_ns = max(self._newest_ns, clock.stamp_ns)
+        last = self._answered
+        if last is None or last.halted_by or self._waiting is not None:
+            return None
+
+        age_ns = self._age_ns(last.stamp_ns)
+        if age_ns <= self._config.max_pose_age_s * 1e9:
+            return None
+        return self._remember(halted(last.stamp_ns, SpeedLimit.POSE_AGE, age_ns))
+
+    def on_motion(self, motion: SelfMotion) -> MotorCommand | None:
+        """Compare the motion with the commands before it."""
+        self._stuck.on_motion(motion)
+        self._gate.motion_ns = motion.stamp_ns
+        self._newest_ns = max(self._newest_ns, motion.stamp_ns)
         return self._command()
+
+    def on_scan(self, scan: RangeScan) -> MotorCommand | None:
+        """Measure how far it is free ahead. A repeated scan means that nobody waits any longer."""
+        self._clear_m = obstacle_ahead_m(scan, self._config.half_width_m)
+        is_repeated = scan.stamp_ns == self._gate.scan_ns
+        self._gate.scan_ns = scan.stamp_ns
+        self._newest_ns = max(self._newest_ns, scan.stamp_ns)
+        return self._command(at_once=is_repeated)
 
     def on_delta(self, delta: Delta) -> MotorCommand | None:
-        """The self node has moved: act on it."""
-        nodes = [item for item in delta.operations if isinstance(item, Node) and item.id == SELF]
-        if delta.phase not in {"localization", "late"} or not nodes:
+        """Command the wheels for a new pose of the self node; repeat the command for a repeated
+        pose.
+        """
+        pose = _self_pose(delta)
+        if pose is None:
             return None
-        place = nodes[-1].attributes
-        pose = Pose(
-            x_m=float(place["x_m"]),
-            y_m=float(place["y_m"]),
-            heading_rad=float(place["heading_rad"]),
-        )
-        self._waiting = (delta, pose)
-        return self._command()
+        if self._is_lockstep and self._is_answered(delta):
+            return self._repeated()
+
+        is_repeated = self._waiting is not None and self._waiting.stamp_ns == delta.stamp_ns
+        self._waiting = Estimate(delta.stamp_ns, delta.cycle, pose)
+        if self._is_resumed:
+            self._gate.resume(delta.cycle)
+            self._is_resumed = False
+        return self._command(at_once=is_repeated and delta.phase == "localization")
 
     def on_competition(self, competition: Competition) -> MotorCommand | None:
-        """How far the global workspace has come."""
-        self._competed, self._won = competition.cycle, bool(competition.trigger)
+        """A cycle's competition has ended."""
+        self._gate.on_competition(competition)
         return self._command()
 
     def on_broadcast(self, broadcast: Broadcast) -> list[Message]:
-        """Select an action by what has become conscious."""
-        self._heard = broadcast.cycle
-        return [
-            message for message in (self._select(broadcast), self._command()) if message is not None
-        ]
+        """Choose an action by the content of consciousness."""
+        self._gate.on_broadcast(broadcast.cycle)
+        answers = (self._select(broadcast), self._command())
+        return [message for message in answers if message is not None]
 
     def _select(self, broadcast: Broadcast) -> Action | None:
-        ended = self._route is None or self._route.left_m <= 0.0
-        chosen = self._selection.select(
-            broadcast.coalition.content,
-            {"route_end": float(ended), "route_ahead": float(not ended)},
-        )
-        if chosen is None:
+        has_ended = self._route is None or self._route.left_m <= 0.0
+        route = {"route_end": float(has_ended), "route_ahead": float(not has_ended)}
+
+        selection = self._selection.select(broadcast.coalition.content, route)
+        if selection is None:
             return None
-        scheme, activation = chosen
-        self._scheme = scheme.name
+
         self._chosen = Action(
             stamp_ns=broadcast.stamp_ns,
             cycle=broadcast.cycle,
-            scheme=scheme.name,
-            activation=activation,
+            scheme=selection.chosen.scheme,
+            activation=selection.chosen.activation,
             parameters=self._parameters(),
+            behaviours=selection.considered,
         )
         return self._chosen
 
-    def _parameters(self) -> dict[str, float | int | str | bool]:
+    def _parameters(self) -> dict[str, Scalar]:
         if self._route is None:
             return {}
         leg = self._route.leg
@@ -124,36 +164,77 @@ class ActionModule:
             "travelled_m": self._route.travelled_m,
         }
 
-    def _command(self) -> MotorCommand | None:
-        """The command for the newest pose, once everything that it depends on has come."""
-        if self._waiting is None:
+    def _command(self, at_once: bool = False) -> MotorCommand | None:
+        """The command for the newest pose, if there is one that waits for nothing any longer."""
+        estimate = self._waiting
+        if estimate is None:
             return None
-        delta, pose = self._waiting
-        heard = not self._won or self._heard >= self._competed
-        ready = self._scanned_ns >= delta.stamp_ns and self._competed >= delta.cycle - 1 and heard
-        if self._config.mode == "lockstep" and not ready:
+        is_open = at_once or self._gate.is_open(estimate.stamp_ns, estimate.cycle)
+        if self._is_lockstep and not is_open:
             return None
+
         self._waiting = None
-        if self._motor is None:
-            return MotorCommand(
-                stamp_ns=delta.stamp_ns,
-                left_wheel_rad_s=0.0,
-                right_wheel_rad_s=0.0,
-                halted_by="no route",
-            )
-        moving = self._scheme not in {"", HALT}
-        return self._motor.command(delta.stamp_ns, pose, self._clear_m, moving)
+        return self._remember(self._answer(estimate))
+
+    def _answer(self, estimate: Estimate) -> MotorCommand:
+        stamp_ns = estimate.stamp_ns
+        age_ns = self._age_ns(stamp_ns)
+        if self._motor is None or self._route is None:
+            return halted(stamp_ns, SpeedLimit.NO_ROUTE, age_ns)
+
+        self._route.advance(estimate.pose.x_m, estimate.pose.y_m)
+        if self._chosen is None or self._chosen.scheme == HALT:
+            return halted(stamp_ns, SpeedLimit.NO_ACTION, age_ns)
+        if self._stuck.is_stuck:
+            return halted(stamp_ns, SpeedLimit.STUCK, age_ns)
+        return self._motor.command(stamp_ns, estimate.pose, self._clear_m, age_ns)
+
+    def _remember(self, command: MotorCommand) -> MotorCommand:
+        wheels_rad_s = (command.left_wheel_rad_s + command.right_wheel_rad_s) / 2
+        self._stuck.on_command(wheels_rad_s * self._config.wheel_radius_m)
+        self._answered = command
+        return command
+
+    def _age_ns(self, stamp_ns: int) -> int:
+        """How much older than the newest message a stamp is; 0 in lockstep, where time waits."""
+        return 0 if self._is_lockstep else max(0, self._newest_ns - stamp_ns)
+
+    def _is_answered(self, delta: Delta) -> bool:
+        last = self._answered
+        is_pose_of_view = delta.phase == "localization"
+        return is_pose_of_view and last is not None and last.stamp_ns == delta.stamp_ns
+
+    def _repeated(self) -> MotorCommand | None:
+        return None if self._answered is None else msgspec.structs.replace(self._answered)
+
+
+def _self_pose(delta: Delta) -> Pose | None:
+    """The pose of the self node in a delta that moves it, otherwise None."""
+    nodes = [item for item in delta.operations if isinstance(item, Node) and item.id == SELF]
+    if delta.phase not in POSE_PHASES or not nodes:
+        return None
+
+    place = nodes[-1].attributes
+    return Pose(
+        x_m=float(place["x_m"]),
+        y_m=float(place["y_m"]),
+        heading_rad=float(place["heading_rad"]),
+    )
 
 
 def build(config: Config, instance: str) -> Module:
     """The module `action`."""
     action = ActionModule(config)
     commands = (topics.MOTOR_COMMAND,)
-    return (
+    module = (
         Module("action", instance)
+        .on(topics.SELF_MOTION, action.on_motion, emits=commands)
         .on(topics.SCAN, action.on_scan, emits=commands)
         .on(topics.DELTA, action.on_delta, emits=commands)
         .on(topics.COMPETITION, action.on_competition, emits=commands)
         .on(topics.BROADCAST, action.on_broadcast, emits=[topics.ACTION, *commands])
         .journaling(topics.ACTION, action.restore, action.chosen)
     )
+    if config.mode == "real_time":
+        module.on(topics.CLOCK, action.on_clock, emits=commands)
+    return module

@@ -1,79 +1,131 @@
-"""Sensory-motor memory: turns the selected action into wheel speeds, view by view (the dorsal
+"""Sensory-motor memory: turns the chosen action into wheel speeds, view by view (the dorsal
 stream).
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from cogmap.errors import MessageError
-from schemas.sensing import MotorCommand, Pose, RangeScan
+from schemas.sensing import MotorCommand, Pose, RangeScan, SpeedLimit
 from services.action.config import Config
 from services.action.route import Route
 
+MAX_BEARING_RAD = math.pi / 3
+TURNING_SPEED_M_S = 0.5
+
+
+class Speed(NamedTuple):
+    """A speed, and what keeps it below cruising speed."""
+
+    m_s: float
+    limit: SpeedLimit
+
 
 def obstacle_ahead_m(scan: RangeScan, half_width_m: float) -> float:
-    """How far it is to the nearest thing in the way, by the second nearest sector: one alone may be
-    noise.
+    """Distance of the nearest obstacle in a lane of twice `half_width_m`, infinite without one.
+
+    It is that of the second nearest sector, as one sector alone may be noise. Raises MessageError
+    where bearings and ranges do not pair.
     """
-    bearing = np.asarray(scan.bearing_rad.numpy(), float)
-    distance = np.asarray(scan.range_m.numpy(), float)
-    if bearing.shape != distance.shape or bearing.ndim != 1:
-        raise MessageError(f"scan with {bearing.shape} bearings and {distance.shape} ranges")
-    in_way = (
-        (distance > 0)
-        & (np.abs(distance * np.sin(bearing)) < half_width_m)
-        & (np.abs(bearing) < math.pi / 3)
+    bearing_rad = np.asarray(scan.bearing_rad.numpy(), float)
+    range_m = np.asarray(scan.range_m.numpy(), float)
+    if bearing_rad.shape != range_m.shape or bearing_rad.ndim != 1:
+        raise MessageError(f"scan with {bearing_rad.shape} bearings and {range_m.shape} ranges")
+
+    is_seen = range_m > 0
+    is_in_lane = np.abs(range_m * np.sin(bearing_rad)) < half_width_m
+    is_in_front = np.abs(bearing_rad) < MAX_BEARING_RAD
+    ahead_m = range_m * np.cos(bearing_rad)
+
+    nearest_m = np.sort(ahead_m[is_seen & is_in_lane & is_in_front])
+    return float(nearest_m[1]) if len(nearest_m) > 1 else math.inf
+
+
+def halted(stamp_ns: int, reason: SpeedLimit, pose_age_ns: int = 0) -> MotorCommand:
+    """A command that stops the wheels."""
+    return MotorCommand(
+        stamp_ns=stamp_ns,
+        left_wheel_rad_s=0.0,
+        right_wheel_rad_s=0.0,
+        halted_by=reason,
+        pose_age_ns=pose_age_ns,
     )
-    ahead = np.sort((distance * np.cos(bearing))[in_way])
-    return float(ahead[1]) if len(ahead) > 1 else math.inf
 
 
 class SensoryMotorMemory:
-    """Follows the route's line by pure pursuit, slower in bends, and stops before what is in the
-    way.
+    """Follows the route's line by pure pursuit, slower in bends and with an old pose, and stops
+    before obstacles.
     """
 
     def __init__(self, config: Config, route: Route) -> None:
         self._config = config
         self._route = route
 
-    def command(self, stamp_ns: int, pose: Pose, clear_m: float, moving: bool) -> MotorCommand:
-        """Wheel speeds at `pose` with `clear_m` free ahead; zero unless `moving`."""
-        self._route.advance(pose.x_m, pose.y_m)
-        if not moving:
-            return MotorCommand(
-                stamp_ns=stamp_ns,
-                left_wheel_rad_s=0.0,
-                right_wheel_rad_s=0.0,
-                halted_by="no action",
-            )
-        config = self._config
-        speed = self._speed(clear_m)
-        if speed <= 0.0:
-            return MotorCommand(
-                stamp_ns=stamp_ns, left_wheel_rad_s=0.0, right_wheel_rad_s=0.0, halted_by="obstacle"
-            )
-        target = self._route.ahead(config.lookahead_m)
-        bearing = math.atan2(target[1] - pose.y_m, target[0] - pose.x_m) - pose.heading_rad
-        bearing = math.remainder(bearing, 2 * math.pi)
-        reach = max(config.lookahead_m / 2, math.hypot(target[0] - pose.x_m, target[1] - pose.y_m))
-        curvature = 2 * math.sin(max(-math.pi / 2, min(math.pi / 2, bearing))) / reach
-        if abs(bearing) > math.pi / 2:
-            speed = min(speed, 0.5)
-        half_turn = speed * curvature * config.track_m / 2
-        left = (speed - half_turn) / config.wheel_radius_m
-        right = (speed + half_turn) / config.wheel_radius_m
-        return MotorCommand(stamp_ns=stamp_ns, left_wheel_rad_s=left, right_wheel_rad_s=right)
+    def command(
+        self, stamp_ns: int, pose: Pose, clear_m: float, pose_age_ns: int = 0
+    ) -> MotorCommand:
+        """Wheel speeds at `pose`, which is `pose_age_ns` old, with `clear_m` free ahead."""
+        speed = self._speed(clear_m, pose_age_ns / 1e9)
+        if speed.m_s <= 0.0:
+            return halted(stamp_ns, speed.limit, pose_age_ns)
 
-    def _speed(self, clear_m: float) -> float:
-        """As fast as the bend ahead, the end of the route and what is in the way allow."""
         config = self._config
-        look_m = config.cruise_m_s**2 / (2 * config.braking_m_s2)
-        bend = self._route.sharpest(look_m)
-        in_bend = math.sqrt(config.lateral_m_s2 / max(bend, 1e-6))
-        to_end = math.sqrt(2 * config.braking_m_s2 * self._route.left_m)
-        to_obstacle = math.sqrt(2 * config.braking_m_s2 * max(0.0, clear_m - config.clearance_m))
-        return min(config.cruise_m_s, in_bend, to_end, to_obstacle)
+        speed_m_s, curvature_per_m = self._steer(speed.m_s, pose)
+        half_turn_m_s = speed_m_s * curvature_per_m * config.track_m / 2
+        return MotorCommand(
+            stamp_ns=stamp_ns,
+            left_wheel_rad_s=(speed_m_s - half_turn_m_s) / config.wheel_radius_m,
+            right_wheel_rad_s=(speed_m_s + half_turn_m_s) / config.wheel_radius_m,
+            slowed_by=speed.limit,
+            pose_age_ns=pose_age_ns,
+        )
+
+    def _steer(self, speed_m_s: float, pose: Pose) -> tuple[float, float]:
+        """Speed and curvature (left positive) of the arc to the point ahead; slow where that is
+        behind the robot.
+        """
+        lookahead_m = self._config.lookahead_m
+        target_x_m, target_y_m = self._route.ahead(lookahead_m)
+        dx_m = target_x_m - pose.x_m
+        dy_m = target_y_m - pose.y_m
+
+        bearing_rad = math.remainder(math.atan2(dy_m, dx_m) - pose.heading_rad, math.tau)
+        reach_m = max(lookahead_m / 2, math.hypot(dx_m, dy_m))
+        steered_rad = max(-math.pi / 2, min(math.pi / 2, bearing_rad))
+        curvature_per_m = 2 * math.sin(steered_rad) / reach_m
+
+        if abs(bearing_rad) > math.pi / 2:
+            speed_m_s = min(speed_m_s, TURNING_SPEED_M_S)
+        return speed_m_s, curvature_per_m
+
+    def _speed(self, clear_m: float, pose_age_s: float) -> Speed:
+        """The highest speed that the bend ahead, the end of the route, an obstacle and the pose's
+        age allow.
+        """
+        config = self._config
+        braking_distance_m = config.cruise_m_s**2 / (2 * config.braking_m_s2)
+        bend_per_m = self._route.sharpest(braking_distance_m)
+        free_m = max(0.0, clear_m - config.clearance_m)
+
+        limits = {
+            SpeedLimit.NONE: config.cruise_m_s,
+            SpeedLimit.BEND: math.sqrt(config.lateral_m_s2 / max(bend_per_m, 1e-6)),
+            SpeedLimit.ROUTE_END: math.sqrt(2 * config.braking_m_s2 * self._route.left_m),
+            SpeedLimit.OBSTACLE: math.sqrt(2 * config.braking_m_s2 * free_m),
+            SpeedLimit.POSE_AGE: self._speed_by_age(pose_age_s),
+        }
+        limit = min(limits, key=lambda each: limits[each])
+        return Speed(limits[limit], limit)
+
+    def _speed_by_age(self, age_s: float) -> float:
+        """The speed that covers `blind_m` within the pose's age, 0 beyond `max_pose_age_s`."""
+        config = self._config
+        if age_s <= 0.0:
+            return math.inf
+        if age_s > config.max_pose_age_s:
+            return 0.0
+        return config.blind_m / age_s

@@ -1,108 +1,122 @@
-"""A route as a line in the plane: legs and turns, corners rounded."""
+"""A route as a line in the plane: legs and turns, corners rounded. Pure."""
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
+from itertools import pairwise
 
+import numpy as np
+
+from cogmap.geometry.arrays import Floats
+from cogmap.geometry.polylines import distances_along, resample
 from services.action.config import Leg
 
 STEP_M = 0.25
 SEARCH_M = 6.0
-ARC = 12
+ARC_POINTS = 12
 
 
 class Route:
     """Points every STEP_M along the legs, from the agent's origin, heading along x."""
 
     def __init__(self, legs: list[Leg], corner_radius_m: float, overrun_m: float) -> None:
-        corners = [np.zeros(2)]
-        heading = 0.0
-        for length_m, turn_rad in legs:
-            corners.append(corners[-1] + length_m * np.array([np.cos(heading), np.sin(heading)]))
-            heading += turn_rad
+        corners = _corners(legs, max(overrun_m, STEP_M))
+        line_m = _rounded(corners, corner_radius_m)
+        along_m = distances_along(line_m)
+
         self.length_m = sum(length_m for length_m, _ in legs)
-        corners.append(
-            corners[-1] + max(overrun_m, STEP_M) * np.array([np.cos(heading), np.sin(heading)])
-        )
-        line = _rounded(corners, corner_radius_m)
-        along_m = _along(line)
-        self.leg_ends_m = along_m[ARC // 2 + 1 : -1 : ARC]
-        self.points_m = _resampled(line, along_m)
-        ahead = np.gradient(self.points_m, axis=0)
-        turning = np.abs(np.diff(np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0])), append=0.0))
-        turning[-1] = 0.0
-        self.curvature_per_m = turning / STEP_M
-        self._at = 0
+        self.leg_ends_m = along_m[ARC_POINTS // 2 + 1 : -1 : ARC_POINTS]
+        self.points_m = resample(line_m, STEP_M)
+        self.curvature_per_m = _curvature(self.points_m)
+        self._index = 0
 
     @property
     def travelled_m(self) -> float:
-        """How far along the line the agent has come."""
-        return self._at * STEP_M
+        """Distance along the line from its start to the agent."""
+        return self._index * STEP_M
 
     @property
     def left_m(self) -> float:
-        """What is left of the line, overrun included."""
-        return (len(self.points_m) - 1 - self._at) * STEP_M
+        """Distance along the line from the agent to its end, overrun included."""
+        return (len(self.points_m) - 1 - self._index) * STEP_M
 
     @property
     def leg(self) -> int:
-        """The leg that the agent is on."""
-        return min(
-            int(np.searchsorted(self.leg_ends_m, self.travelled_m, "right")),
-            len(self.leg_ends_m) - 1,
-        )
+        """The index of the leg that the agent is on."""
+        passed = int(np.searchsorted(self.leg_ends_m, self.travelled_m, "right"))
+        return min(passed, len(self.leg_ends_m) - 1)
 
     def advance(self, x_m: float, y_m: float) -> None:
-        """Find the point nearest to the agent, never going back."""
-        window = self.points_m[self._at : self._at + int(SEARCH_M / STEP_M) + 1]
-        self._at += int(np.argmin(np.hypot(*(window - (x_m, y_m)).T)))
+        """Find the point nearest to the agent within SEARCH_M ahead, never backwards."""
+        last = self._index + int(SEARCH_M / STEP_M)
+        ahead_m = self.points_m[self._index : last + 1] - (x_m, y_m)
+        self._index += int(np.argmin(np.hypot(*ahead_m.T)))
 
     def resume(self, travelled_m: float) -> None:
-        """Go on from so far along the line."""
-        self._at = max(0, min(round(travelled_m / STEP_M), len(self.points_m) - 1))
+        """Continue from a distance along the line."""
+        index = round(travelled_m / STEP_M)
+        self._index = max(0, min(index, len(self.points_m) - 1))
 
-    def ahead(self, distance_m: float) -> npt.NDArray[np.float64]:
-        """The point so far ahead on the line."""
-        point: npt.NDArray[np.float64] = self.points_m[
-            min(self._at + round(distance_m / STEP_M), len(self.points_m) - 1)
-        ]
-        return point
+    def ahead(self, distance_m: float) -> tuple[float, float]:
+        """The point of the line `distance_m` ahead of the agent, at most its end."""
+        index = self._index + round(distance_m / STEP_M)
+        x_m, y_m = self.points_m[min(index, len(self.points_m) - 1)].tolist()
+        return x_m, y_m
 
     def sharpest(self, distance_m: float) -> float:
-        """The sharpest curvature within so far ahead."""
-        return float(
-            self.curvature_per_m[self._at : self._at + round(distance_m / STEP_M) + 1].max()
-        )
+        """The sharpest curvature within `distance_m` ahead, per metre."""
+        last = self._index + round(distance_m / STEP_M)
+        return float(self.curvature_per_m[self._index : last + 1].max())
 
 
-def _rounded(corners: list[npt.NDArray[np.float64]], radius_m: float) -> npt.NDArray[np.float64]:
-    """The polyline with an arc of ARC points in place of each corner, as wide as its legs allow."""
+def _corners(legs: list[Leg], overrun_m: float) -> list[Floats]:
+    """The ends of the legs, from the origin, and the end of the overrun."""
+    corner_m = np.zeros(2)
+    corners = [corner_m]
+    heading_rad = 0.0
+    for length_m, turn_rad in legs:
+        corner_m = corner_m + length_m * _direction(heading_rad)
+        corners.append(corner_m)
+        heading_rad += turn_rad
+
+    corners.append(corner_m + overrun_m * _direction(heading_rad))
+    return corners
+
+
+def _direction(heading_rad: float) -> Floats:
+    return np.array([np.cos(heading_rad), np.sin(heading_rad)])
+
+
+def _rounded(corners: list[Floats], radius_m: float) -> Floats:
+    """The polyline with an arc of ARC_POINTS in place of each corner, as wide as its legs allow."""
     points = [corners[0]]
-    for before, corner, after in zip(corners, corners[1:], corners[2:], strict=False):
-        into = corner - before
-        out = after - corner
-        turn = np.arctan2(into[0] * out[1] - into[1] * out[0], into @ out)
-        reach = min(
-            radius_m * abs(np.tan(turn / 2)), np.linalg.norm(into) / 2, np.linalg.norm(out) / 2
-        )
-        start = corner - into / np.linalg.norm(into) * reach
-        end = corner + out / np.linalg.norm(out) * reach
-        share = np.linspace(0, 1, ARC)[:, None]
-        points.extend((1 - share) ** 2 * start + 2 * share * (1 - share) * corner + share**2 * end)
+    for (before, corner), (_, after) in pairwise(pairwise(corners)):
+        points.extend(_arc(before, corner, after, radius_m))
     return np.vstack([*points, corners[-1]])
 
 
-def _along(points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """How far along the line each of its points is."""
-    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+def _arc(before: Floats, corner: Floats, after: Floats, radius_m: float) -> Floats:
+    """(ARC_POINTS, 2): a quadratic Bezier curve that cuts `corner`."""
+    into_m = corner - before
+    out_m = after - corner
+    into_length_m = np.linalg.norm(into_m)
+    out_length_m = np.linalg.norm(out_m)
+
+    cross = into_m[0] * out_m[1] - into_m[1] * out_m[0]
+    turn_rad = np.arctan2(cross, into_m @ out_m)
+    cut_m = min(radius_m * abs(np.tan(turn_rad / 2)), into_length_m / 2, out_length_m / 2)
+    start = corner - into_m / into_length_m * cut_m
+    end = corner + out_m / out_length_m * cut_m
+
+    share = np.linspace(0, 1, ARC_POINTS)[:, None]
+    curve: Floats = (1 - share) ** 2 * start + 2 * share * (1 - share) * corner + share**2 * end
+    return curve
 
 
-def _resampled(
-    points: npt.NDArray[np.float64], along_m: npt.NDArray[np.float64]
-) -> npt.NDArray[np.float64]:
-    """The same line with a point every STEP_M."""
-    at = np.arange(0.0, along_m[-1], STEP_M)
-    return np.column_stack(
-        [np.interp(at, along_m, points[:, 0]), np.interp(at, along_m, points[:, 1])]
-    )
+def _curvature(points_m: Floats) -> Floats:
+    """(n,): the curvature of a line of points every STEP_M, per metre, without sign."""
+    ahead = np.gradient(points_m, axis=0)
+    heading_rad = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
+    turn_rad = np.abs(np.diff(heading_rad, append=0.0))
+    turn_rad[-1] = 0.0
+    curvature_per_m: Floats = turn_rad / STEP_M
+    return curvature_per_m

@@ -1,55 +1,63 @@
-"""Procedural memory and action selection: schemes become behaviours, one behaviour wins (LIDA; Maes
-1989).
+"""Procedural memory and action selection: schemes become behaviours, one behaviour is chosen (LIDA;
+Maes 1989).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from schemas.cognition import Behaviour, Rejection
 from schemas.graph import Node
 from services.action.config import Config
 
-
-@dataclass
-class Scheme:
-    """Percepts that call for an action, and what the action is expected to bring about, by
-    salience.
-    """
-
-    name: str
-    context: tuple[str, ...]
-    adding: dict[str, float] = field(default_factory=dict)
-
-    def activation(self, context: dict[str, float]) -> float:
-        """min(1, mean context + mean |adding-list salience|); 0 where a part of the context is
-        missing.
-        """
-        if any(context.get(part, 0.0) <= 0.0 for part in self.context):
-            return 0.0
-        mean_context = sum(context[part] for part in self.context) / len(self.context)
-        mean_adding = sum(abs(salience) for salience in self.adding.values()) / max(
-            1, len(self.adding)
-        )
-        return min(1.0, mean_context + mean_adding)
-
+Context = dict[str, float]
 
 FOLLOW_ROUTE = "follow_route"
 HALT = "halt"
 
 
+@dataclass
+class Scheme:
+    """Percepts that call for an action, and the expected results of the action, by salience."""
+
+    name: str
+    context: tuple[str, ...]
+    adding: dict[str, float] = field(default_factory=dict)
+
+    def is_applicable(self, context: Context) -> bool:
+        """Whether every part of the scheme's context is active."""
+        return all(context.get(part, 0.0) > 0.0 for part in self.context)
+
+    def activation(self, context: Context) -> float:
+        """min(1, mean context + mean |adding-list salience|), 0 where it is not applicable."""
+        if not self.is_applicable(context):
+            return 0.0
+
+        mean_context = sum(context[part] for part in self.context) / len(self.context)
+        saliences = [abs(salience) for salience in self.adding.values()]
+        mean_adding = sum(saliences) / max(1, len(saliences))
+        return min(1.0, mean_context + mean_adding)
+
+
 def procedural_memory() -> list[Scheme]:
-    """The schemes there are. Following the route needs to know where the agent is; its end calls
-    for a halt.
-    """
+    """The schemes. Following the route needs a self node; the end of the route calls for a halt."""
     return [
         Scheme(FOLLOW_ROUTE, context=("self", "route_ahead"), adding={"further": 0.2}),
         Scheme(HALT, context=("route_end",), adding={"rest": 0.3}),
     ]
 
 
+@dataclass(frozen=True)
+class Selection:
+    """The behaviour that was chosen, and all that were considered, the chosen one included."""
+
+    chosen: Behaviour
+    considered: list[Behaviour]
+
+
 class ActionSelection:
-    """Picks the most active behaviour over a threshold that falls with each attempt that selects
-    none.
+    """Chooses the most active behaviour over a threshold, which falls with each attempt that
+    chooses none.
     """
 
     def __init__(self, config: Config) -> None:
@@ -57,20 +65,40 @@ class ActionSelection:
         self._schemes = procedural_memory()
         self._threshold = config.selection_threshold
 
-    def select(self, content: list[Node], route: dict[str, float]) -> tuple[Scheme, float] | None:
-        """The scheme to execute, given a broadcast's content and how far the route goes on; None
-        where none is ripe.
+    def select(self, content: list[Node], route: Context) -> Selection | None:
+        """The behaviour for a broadcast's content and the route's state; None where none is active
+        enough.
         """
-        context = dict(route)
-        for node in content:
-            context[node.kind] = max(
-                context.get(node.kind, 0.0), min(1.0, node.base_level + node.activation)
-            )
-        behaviours = [(scheme, scheme.activation(context)) for scheme in self._schemes]
-        ripe = [behaviour for behaviour in behaviours if behaviour[1] >= self._config.instantiation]
-        best = max(ripe, key=lambda behaviour: behaviour[1], default=None)
-        if best is None or best[1] < self._threshold:
+        context = _context(content, route)
+        considered = [self._behaviour(scheme, context) for scheme in self._schemes]
+
+        instantiated = [each for each in considered if not each.rejection]
+        best = max(instantiated, key=lambda each: each.activation, default=None)
+        if best is None or best.activation < self._threshold:
             self._threshold = max(0.0, self._threshold - self._config.threshold_fall)
             return None
+
         self._threshold = self._config.selection_threshold
-        return best
+        for each in instantiated:
+            if each is not best:
+                each.rejection = Rejection.LESS_ACTIVE
+        return Selection(best, considered)
+
+    def _behaviour(self, scheme: Scheme, context: Context) -> Behaviour:
+        activation = scheme.activation(context)
+        behaviour = Behaviour(scheme=scheme.name, activation=activation)
+
+        if not scheme.is_applicable(context):
+            behaviour.rejection = Rejection.CONTEXT_MISSING
+        elif activation < self._config.instantiation:
+            behaviour.rejection = Rejection.NOT_INSTANTIATED
+        return behaviour
+
+
+def _context(content: list[Node], route: Context) -> Context:
+    """The activation of each kind of node, that of its most active node, and the route's state."""
+    context = dict(route)
+    for node in content:
+        activation = min(1.0, node.base_level + node.activation)
+        context[node.kind] = max(context.get(node.kind, 0.0), activation)
+    return context

@@ -1,4 +1,4 @@
-"""How the global workspace is configured: LIDA's published defaults."""
+"""The settings of the global workspace: LIDA's published defaults."""
 
 from __future__ import annotations
 
@@ -6,21 +6,58 @@ from typing import Annotated
 
 import msgspec
 
-Positive = Annotated[float, msgspec.Meta(gt=0)]
-Ticks = Annotated[int, msgspec.Meta(ge=0)]
-Share = Annotated[float, msgspec.Meta(ge=0)]
+from schemas.base import Share
+
+TickCount = Annotated[int, msgspec.Meta(ge=0, le=10**9)]
+ActivationSum = Annotated[float, msgspec.Meta(ge=0, le=1000)]
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Times in ticks of `tick_ms`: at 5 ms, the refractory period of 40 ticks is LIDA's cycle of
+    """Times are in ticks of `tick_ms`. The refractory period, 40 ticks of 5 ms, is LIDA's cycle of
     about 200 ms.
     """
 
-    tick_ms: Positive = 5.0
-    no_broadcast_ticks: Ticks = 100
-    no_new_coalition_ticks: Ticks = 50
-    aggregate_above: Share = 0.8
-    coalition_above: Share = 0.5
-    refractory_ticks: Ticks = 40
-    decay: Share = 0.1
-    ticks_per_decay: Annotated[int, msgspec.Meta(ge=1)] = 40
+    tick_ms: Annotated[
+        float,
+        msgspec.Meta(gt=0, le=10_000, description="Length of a tick, in ms, above 0 to 10000."),
+    ] = 5.0
+    no_broadcast_ticks: Annotated[
+        TickCount,
+        msgspec.Meta(description="Time without a broadcast that triggers one, in ticks, 0 to 1e9."),
+    ] = 100
+    no_new_coalition_ticks: Annotated[
+        TickCount,
+        msgspec.Meta(
+            description="Time without a new coalition that triggers one, in ticks, 0 to 1e9."
+        ),
+    ] = 50
+    aggregate_above: Annotated[
+        ActivationSum,
+        msgspec.Meta(
+            description="Sum of activations above which a broadcast is triggered, 0 to 1000."
+        ),
+    ] = 0.8
+    coalition_above: Annotated[
+        ActivationSum,
+        msgspec.Meta(
+            description="Activation of one coalition above which one is triggered, 0 to 1000."
+        ),
+    ] = 0.5
+    refractory_ticks: Annotated[
+        TickCount,
+        msgspec.Meta(
+            description="Time after a broadcast in which none is triggered, in ticks, 0 to 1e9."
+        ),
+    ] = 40
+    decay: Annotated[
+        Share,
+        msgspec.Meta(description="Activation that a coalition loses in `ticks_per_decay`, 0 to 1."),
+    ] = 0.1
+    ticks_per_decay: Annotated[
+        int,
+        msgspec.Meta(
+            ge=1,
+            le=10**9,
+            description="Time in which a coalition loses `decay`, in ticks, 1 to 1e9.",
+        ),
+    ] = 40

@@ -12,7 +12,15 @@ from cogmap.errors import MessageError
 from cogmap.runtime.module import Module
 from schemas import topics
 from schemas.base import Message
-from schemas.cognition import Broadcast, Coalition, Coalitions, Competition
+from schemas.cognition import (
+    Broadcast,
+    Coalition,
+    Coalitions,
+    Competition,
+    Contender,
+    Fate,
+    Trigger,
+)
 from services.global_workspace.config import Config
 
 __all__ = ["Config", "GlobalWorkspace", "build"]
@@ -21,101 +29,143 @@ REMEMBERED_CYCLES = 64
 
 
 @dataclass
-class Contender:
-    """A coalition and what is left of its activation."""
+class Candidate:
+    """A coalition that competes, its id, and what is left of its activation."""
 
+    id: str
     coalition: Coalition
     activation: float
 
+    def with_fate(self, fate: Fate) -> Contender:
+        """The candidate as the competition reports it."""
+        return Contender(
+            id=self.id,
+            codelet=self.coalition.codelet,
+            activation=max(0.0, self.activation),
+            fate=fate,
+        )
+
 
 class GlobalWorkspace:
-    """Holds the contenders, one from each attention codelet, and decides when one is broadcast."""
+    """Holds one candidate of each attention codelet, and decides when one is broadcast."""
 
     def __init__(self, config: Config) -> None:
         self._config = config
-        self._contenders: dict[str, Contender] = {}
-        self._stamp_ns = 0
+        self._candidates: dict[str, Candidate] = {}
+        self._now_ns = 0
         self._broadcast_ns: int | None = None
         self._new_ns = 0
-        self._had: deque[tuple[int, int]] = deque(maxlen=REMEMBERED_CYCLES)
+        self._received: deque[tuple[int, int]] = deque(maxlen=REMEMBERED_CYCLES)
 
-    def compete(self, coalitions: Coalitions) -> list[Message]:
-        """Take in a cycle's coalitions; a competition is always reported, a broadcast where a
-        trigger fires.
+    def on_coalitions(self, coalitions: Coalitions) -> list[Message]:
+        """Let a cycle's coalitions compete: a competition, after a broadcast if one was triggered.
 
-        Raises MessageError where they came before: a task that one worker lost is answered by two.
+        Raises MessageError where they were received before: a task that one worker lost is answered
+        by two.
         """
-        which = (coalitions.cycle, coalitions.stamp_ns)
-        if which in self._had:
-            raise MessageError(f"the coalitions of cycle {coalitions.cycle} came twice")
-        self._had.append(which)
-        self._decay(max(0, coalitions.stamp_ns - self._stamp_ns))
-        self._stamp_ns = max(self._stamp_ns, coalitions.stamp_ns)
-        for coalition in coalitions.coalitions:
-            if coalition.codelet not in self._contenders:
-                self._new_ns = self._stamp_ns
-            self._contenders[coalition.codelet] = Contender(coalition, coalition.activation)
-        contenders = {
-            name: contender.activation for name, contender in sorted(self._contenders.items())
-        }
+        self._check_new(coalitions)
+        losers = self._decay(max(0, coalitions.stamp_ns - self._now_ns))
+        self._now_ns = max(self._now_ns, coalitions.stamp_ns)
+        losers += self._enter(coalitions)
+
         trigger = self._trigger()
+        winner = self._pop_winner() if trigger else None
         competition = Competition(
             stamp_ns=coalitions.stamp_ns,
             cycle=coalitions.cycle,
-            contenders=contenders,
+            contenders=self._report(winner, losers),
             trigger=trigger,
         )
-        if not trigger:
+        if winner is None:
             return [competition]
-        winner = max(sorted(self._contenders), key=lambda name: self._contenders[name].activation)
-        self._broadcast_ns = self._stamp_ns
-        coalition = self._contenders.pop(winner).coalition
+
         broadcast = Broadcast(
             stamp_ns=coalitions.stamp_ns,
             cycle=coalitions.cycle,
             trigger=trigger,
-            coalition=coalition,
+            coalition=winner.coalition,
         )
         return [broadcast, competition]
 
-    def _decay(self, passed_ns: int) -> None:
+    def _check_new(self, coalitions: Coalitions) -> None:
+        key = (coalitions.cycle, coalitions.stamp_ns)
+        if key in self._received:
+            raise MessageError(f"the coalitions of cycle {coalitions.cycle} came twice")
+        self._received.append(key)
+
+    def _decay(self, passed_ns: int) -> list[Contender]:
+        """Take off activation for the time that passed; those that have none left."""
         lost = self._config.decay * self._ticks(passed_ns) / self._config.ticks_per_decay
-        for contender in self._contenders.values():
-            contender.activation -= lost
-        self._contenders = {
-            name: left for name, left in self._contenders.items() if left.activation > 0
+        decayed = []
+        for codelet, candidate in list(self._candidates.items()):
+            candidate.activation -= lost
+            if candidate.activation <= 0.0:
+                decayed.append(candidate.with_fate(Fate.DECAYED))
+                del self._candidates[codelet]
+        return decayed
+
+    def _enter(self, coalitions: Coalitions) -> list[Contender]:
+        """Add the cycle's coalitions; those of the same codelets that they replace."""
+        displaced = []
+        for coalition in coalitions.coalitions:
+            codelet = coalition.codelet
+            before = self._candidates.get(codelet)
+            if before is None:
+                self._new_ns = self._now_ns
+            else:
+                displaced.append(before.with_fate(Fate.DISPLACED))
+            name = f"{codelet}/{coalitions.cycle}"
+            self._candidates[codelet] = Candidate(name, coalition, coalition.activation)
+        return displaced
+
+    def _trigger(self) -> Trigger:
+        """The first trigger whose condition is met."""
+        config = self._config
+        activations = [candidate.activation for candidate in self._candidates.values()]
+        silent_ticks = self._silent_ticks()
+        if not activations or silent_ticks < config.refractory_ticks:
+            return Trigger.NONE
+
+        old_ticks = self._ticks(self._now_ns - self._new_ns)
+        conditions = {
+            Trigger.ONE_COALITION: max(activations) > config.coalition_above,
+            Trigger.AGGREGATE: sum(activations) > config.aggregate_above,
+            Trigger.NO_BROADCAST: silent_ticks >= config.no_broadcast_ticks,
+            Trigger.NO_NEW_COALITION: old_ticks >= config.no_new_coalition_ticks,
         }
+        met = [trigger for trigger, is_met in conditions.items() if is_met]
+        return met[0] if met else Trigger.NONE
+
+    def _pop_winner(self) -> Candidate:
+        """Take out the most active candidate, of equals the first by its codelet's name."""
+        codelets = sorted(self._candidates)
+        best = max(codelets, key=lambda codelet: self._candidates[codelet].activation)
+        self._broadcast_ns = self._now_ns
+        return self._candidates.pop(best)
+
+    def _report(self, winner: Candidate | None, losers: list[Contender]) -> list[Contender]:
+        """Every coalition that took part, by codelet, then id."""
+        contenders = list(losers)
+        if winner is not None:
+            contenders.append(winner.with_fate(Fate.WON))
+        waiting = self._candidates.values()
+        contenders += [candidate.with_fate(Fate.WAITING) for candidate in waiting]
+        return sorted(contenders, key=lambda each: (each.codelet, each.id))
+
+    def _silent_ticks(self) -> float:
+        if self._broadcast_ns is None:
+            return math.inf
+        return self._ticks(self._now_ns - self._broadcast_ns)
 
     def _ticks(self, duration_ns: int) -> float:
         return duration_ns / 1e6 / self._config.tick_ms
 
-    def _trigger(self) -> str:
-        """The name of the first trigger that fires, empty where none does."""
-        config = self._config
-        activations = [contender.activation for contender in self._contenders.values()]
-        if not activations:
-            return ""
-        silent = (
-            math.inf
-            if self._broadcast_ns is None
-            else self._ticks(self._stamp_ns - self._broadcast_ns)
-        )
-        if silent < config.refractory_ticks:
-            return ""
-        triggers = {
-            "one coalition over threshold": max(activations) > config.coalition_above,
-            "aggregate activation over threshold": sum(activations) > config.aggregate_above,
-            "no broadcast for long": silent >= config.no_broadcast_ticks,
-            "no new coalition for long": self._ticks(self._stamp_ns - self._new_ns)
-            >= config.no_new_coalition_ticks,
-        }
-        return next((name for name, fires in triggers.items() if fires), "")
-
 
 def build(config: Config, instance: str) -> Module:
     """The module `global_workspace`."""
+    workspace = GlobalWorkspace(config)
     return Module("global_workspace", instance).on(
         topics.COALITIONS,
-        GlobalWorkspace(config).compete,
+        workspace.on_coalitions,
         emits=[topics.COMPETITION, topics.BROADCAST],
     )

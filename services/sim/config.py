@@ -1,4 +1,4 @@
-"""How the simulation is configured."""
+"""The settings of the simulation."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from typing import Annotated, Literal
 import msgspec
 
 from cogmap.errors import ConfigError
+from schemas.base import PositiveSeconds
 from services.sim.layout.catalogue import CATALOGUE
 from services.sim.odometry import Noise
 from services.sim.scripted.percepts import PerceptErrors
-from services.sim.scripted.trajectory import Way
+from services.sim.scripted.trajectory import Trajectory
 from services.sim.world import STEP_S
 
 Rate = Annotated[int, msgspec.Meta(ge=1, le=240)]
@@ -19,52 +20,106 @@ Instances = Annotated[int, msgspec.Meta(ge=1, le=1000)]
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """`awaits` are the modules, and how many instances of each, that must be ready before time
-    begins.
+    """A town with a robot in it, or a trajectory that a robot follows."""
 
-    Without `egl` TinyRenderer draws the pictures even where EGL would. With a `way` the robot is
-    led along that, in lockstep, and senses it as that says: where it has no cameras, its percepts
-    err as `percepts` tells.
-    """
-
-    seed: Annotated[int, msgspec.Meta(ge=0, le=2**32)] = 1
-    mode: Literal["lockstep", "real_time"] = "real_time"
-    frame_hz: Rate = 5
-    odometry_hz: Rate = 20
-    width_px: Side = 320
-    height_px: Side = 240
-    egl: bool = True
-    laps: Annotated[float, msgspec.Meta(gt=0, le=1000)] = 1.0
-    noise: Noise = Noise()
-    percepts: PerceptErrors = PerceptErrors()
-    way: Way | None = None
-    awaits: dict[str, Instances] = {}
+    seed: Annotated[
+        int,
+        msgspec.Meta(ge=0, le=2**32, description="Seed of the town and of all noise, 0 to 2^32."),
+    ] = 1
+    mode: Annotated[
+        Literal["lockstep", "real_time"],
+        msgspec.Meta(
+            description="lockstep: time advances by a frame for each motor command. "
+            "real_time: it follows the wall's."
+        ),
+    ] = "real_time"
+    frame_hz: Annotated[
+        Rate,
+        msgspec.Meta(description="Stereo frames a second, in Hz, 1 to 240; divides odometry_hz."),
+    ] = 5
+    odometry_hz: Annotated[
+        Rate, msgspec.Meta(description="Odometry messages a second, in Hz, 1 to 240; divides 240.")
+    ] = 20
+    width_px: Annotated[
+        Side, msgspec.Meta(description="Width of a camera image, in pixels, 64 to 1024.")
+    ] = 320
+    height_px: Annotated[
+        Side, msgspec.Meta(description="Height of a camera image, in pixels, 64 to 1024.")
+    ] = 240
+    egl: Annotated[
+        bool,
+        msgspec.Meta(description="Render by EGL where it works; otherwise by TinyRenderer."),
+    ] = True
+    laps: Annotated[
+        float,
+        msgspec.Meta(gt=0, le=1000, description="Length of the route, in laps, above 0 to 1000."),
+    ] = 1.0
+    noise: Annotated[Noise, msgspec.Meta(description="Noise of the wheels' odometry.")] = Noise()
+    percepts: Annotated[
+        PerceptErrors,
+        msgspec.Meta(description="Errors of percepts along a trajectory without cameras."),
+    ] = PerceptErrors()
+    trajectory: Annotated[
+        Trajectory | None,
+        msgspec.Meta(description="Line that the robot follows in lockstep, instead of a town."),
+    ] = None
+    command_timeout_s: Annotated[
+        PositiveSeconds,
+        msgspec.Meta(
+            description="Time without a motor command after which the wheels stop, "
+            "in s of simulated time, above 0 to 3600."
+        ),
+    ] = 1.0
+    max_command_age_s: Annotated[
+        PositiveSeconds,
+        msgspec.Meta(
+            description="Age of a motor command's stamp beyond which it moves no wheel, "
+            "in s of simulated time, above 0 to 3600."
+        ),
+    ] = 2.0
+    repeat_after_s: Annotated[
+        PositiveSeconds,
+        msgspec.Meta(
+            description="Time without a motor command after which a frame is published again "
+            "in lockstep, in s of wall time, above 0 to 3600."
+        ),
+    ] = 10.0
+    awaits: Annotated[
+        dict[str, Instances],
+        msgspec.Meta(description="Modules, and instances of each, required before time begins."),
+    ] = {}
 
 
 def check(config: Config) -> None:
-    """Raise ConfigError where the rates do not divide one another, or a way cannot be led along as
-    it is set up.
+    """Raise ConfigError where the rates do not divide one another, or a trajectory cannot be
+    followed as it is set up.
     """
     if config.odometry_hz % config.frame_hz:
         raise ConfigError(
-            f"[sim] frame_hz is {config.frame_hz}: choose one that divides odometry_hz, {config.odometry_hz}"
+            f"[sim] frame_hz is {config.frame_hz}: "
+            f"choose one that divides odometry_hz, {config.odometry_hz}"
         )
-    if config.way is not None and config.mode != "lockstep":
+    steps_hz = round(1 / STEP_S)
+    if steps_hz % config.odometry_hz:
         raise ConfigError(
-            '[sim] a robot that is led along a way waits for its mind: set mode to "lockstep"'
+            f"[sim] odometry_hz is {config.odometry_hz}: choose one that divides {steps_hz}"
         )
-    if config.way is not None and config.way.sensing == "cameras":
-        _check_names(config.way)
-    if round(1 / STEP_S) % config.odometry_hz:
-        raise ConfigError(
-            f"[sim] odometry_hz is {config.odometry_hz}: choose one that divides {round(1 / STEP_S)}"
-        )
+    if config.trajectory is not None:
+        _check_trajectory(config.trajectory, config.mode)
 
 
-def _check_names(way: Way) -> None:
+def _check_trajectory(trajectory: Trajectory, mode: str) -> None:
+    if mode != "lockstep":
+        raise ConfigError(
+            '[sim] a robot follows a trajectory in lockstep only: set mode to "lockstep"'
+        )
+    if trajectory.sensing != "cameras":
+        return
+
     known = [kind.name for kind in CATALOGUE]
-    for each in way.landmarks:
-        if each.name not in known:
+    for landmark in trajectory.landmarks:
+        if landmark.name not in known:
             raise ConfigError(
-                f"[sim] cameras see no {each.name!r}: name each landmark after its kind of building, {', '.join(known)}"
+                f"[sim] cameras see no {landmark.name!r}: name each landmark after its kind of "
+                f"building, {', '.join(known)}"
             )

@@ -61,7 +61,7 @@ class World:
         """Where the robot is."""
         return self.robot.pose()
 
-    def lead(self, pose: Pose) -> None:
+    def place_robot(self, pose: Pose) -> None:
         """Put the robot there, at rest, with the ground under it and the sky around it, however far
         that is.
         """

@@ -104,7 +104,9 @@ def wait_until(watch: Watch, condition: Callable[[], bool]) -> None:
 
 
 def test_frames_lead_to_commands_that_move_the_robot(watch: Watch) -> None:
-    wait_until(watch, lambda: watch.observer.travelled_m > 3.0 and len(watch.cycle_ms) > 5)
+    wait_until(
+        watch, lambda: watch.tally.observer.travelled_m > 3.0 and len(watch.tally.cycle_ms) > 5
+    )
 
 
 def test_each_worker_has_a_name_of_its_own(watch: Watch, compose: Compose) -> None:
@@ -158,6 +160,6 @@ def test_a_container_that_is_killed_comes_back_and_the_drive_goes_on(
     )
     wait_until(watch, lambda: member not in watch.present)
     wait_until(watch, lambda: member in watch.present)
-    commands = len(watch.cycle_ms)
-    wait_until(watch, lambda: len(watch.cycle_ms) > commands + 5)
+    commands = len(watch.tally.cycle_ms)
+    wait_until(watch, lambda: len(watch.tally.cycle_ms) > commands + 5)
     assert docker("inspect", "--format", "{{.RestartCount}}", container) == "1"

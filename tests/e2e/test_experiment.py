@@ -56,7 +56,7 @@ def test_a_json_file_in_no_folder_is_one_sentence_and_code_2(tmp_path: Path) -> 
 
 def test_a_loop_is_closed_with_the_same_bytes_through_real_processes() -> None:
     configured = sections(1, "heading")
-    configured["sim"]["way"]["line_m"] = [
+    configured["sim"]["trajectory"]["line_m"] = [
         (0.0, 0.0),
         (60.0, 0.0),
         (60.0, 40.0),

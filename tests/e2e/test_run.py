@@ -24,6 +24,7 @@ from schemas import topics
 from schemas.sensing import MotorCommand
 
 COGMAP = [sys.executable, "-m", "cli.main"]
+POOLS = ("sem.mp-", "sem.loky-", "joblib_")
 TIMEOUT_S = 60.0
 
 
@@ -42,10 +43,8 @@ def processes_at(endpoint: str, words: str = "") -> list[int]:
 
 
 def shared_memory() -> set[Path]:
-    """Files in shared memory, but for those of Python's own pools of processes, which are none of
-    ours.
-    """
-    return {path for path in Path("/dev/shm").iterdir() if not path.name.startswith("sem.mp-")}
+    """Files in shared memory, but for those of pools of processes, which no module uses."""
+    return {path for path in Path("/dev/shm").iterdir() if not path.name.startswith(POOLS)}
 
 
 def wait_until(condition: Callable[[], bool]) -> None:

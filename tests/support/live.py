@@ -29,6 +29,7 @@ from schemas.process import Clock, Health
 from schemas.sensing import MotorCommand, Percept, Percepts, SelfMotion
 
 TIMEOUT_S = 40.0
+POOLS = ("sem.mp-", "sem.loky-", "joblib_")
 AGENT = "fault"
 PERIOD_NS = 100_000_000
 SPEED_M_S = 1.0
@@ -44,10 +45,8 @@ def wait_until(condition: Callable[[], bool], what: str) -> None:
 
 
 def shared_memory() -> set[Path]:
-    """Files in shared memory, but for those of Python's own pools of processes, which are none of
-    ours.
-    """
-    return {path for path in Path("/dev/shm").iterdir() if not path.name.startswith("sem.mp-")}
+    """Files in shared memory, but for those of pools of processes, which no module uses."""
+    return {path for path in Path("/dev/shm").iterdir() if not path.name.startswith(POOLS)}
 
 
 class Process:

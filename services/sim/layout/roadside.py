@@ -1,48 +1,66 @@
-"""The place that a way leads through: a street along it, and its landmarks as buildings that look
-to it. Pure.
+"""The place that a trajectory leads through: a street along it, and its landmarks as buildings that
+face it. Pure.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
+from itertools import pairwise
 
 import numpy as np
 
 from cogmap.errors import ConfigError
 from services.sim.layout.catalogue import CATALOGUE
-from services.sim.layout.plan import Plot, Road
+from services.sim.layout.plan import Plot, Point, Road
 from services.sim.layout.town import Place
-from services.sim.scripted.trajectory import Line, Way
+from services.sim.scripted.percepts import Landmark
+from services.sim.scripted.trajectory import Line, Trajectory
 
 CLEAR_M = 1.0
 _KINDS = {kind.name: kind for kind in CATALOGUE}
 
 
-def along(way: Way, seed: int) -> Place:
-    """What is drawn of `way`, whose landmarks are named after the catalogue. Raises ConfigError
-    where one of them would stand in the robot's way.
+def along(trajectory: Trajectory, seed: int) -> Place:
+    """The place around `trajectory`, whose landmarks are named after the catalogue. Raises
+    ConfigError where one of them would stand on the line.
     """
-    line = Line(np.array(way.line_m, float))
-    points: list[tuple[float, float]] = [(x, y) for x, y in line.points.tolist()]
-    roads = tuple(Road("way", a, b) for a, b in dict.fromkeys(itertools.pairwise(points)))
-    return Place(seed, roads, _plots(way, line), (), line.at(0.0))
+    line = Line(np.array(trajectory.line_m, float))
+    return Place(
+        seed=seed,
+        roads=_roads(line),
+        plots=_plots(trajectory.landmarks, line),
+        props=(),
+        start=line.at(0.0),
+    )
 
 
-def _plots(way: Way, line: Line) -> tuple[Plot, ...]:
-    where = np.array([(each.x_m, each.y_m) for each in way.landmarks], float).reshape(-1, 2)
-    feet = line.nearest(where)
-    plots = []
-    for landmark, (x_m, y_m) in zip(way.landmarks, (feet - where).tolist(), strict=True):
-        kind = _KINDS[landmark.name]
-        away_m = math.hypot(x_m, y_m)
-        if away_m < kind.depth_m / 2 + CLEAR_M:
-            raise ConfigError(
-                f"[sim] the {landmark.name} at ({landmark.x_m:g}, {landmark.y_m:g}) would stand in the way: put it "
-                f"{kind.depth_m / 2 + CLEAR_M:g} m from the line at least, not {away_m:.1f}"
-            )
-        # A front looks to the right of its heading.
-        plots.append(
-            Plot(kind, landmark.x_m, landmark.y_m, math.remainder(math.atan2(x_m, -y_m), math.tau))
+def _roads(line: Line) -> tuple[Road, ...]:
+    """A road for each piece of the line, once where the line repeats it."""
+    points: list[Point] = [(x, y) for x, y in line.points.tolist()]
+    pieces = dict.fromkeys(pairwise(points))
+    return tuple(Road("way", start, end) for start, end in pieces)
+
+
+def _plots(landmarks: list[Landmark], line: Line) -> tuple[Plot, ...]:
+    places_m = np.array([(each.x_m, each.y_m) for each in landmarks], float).reshape(-1, 2)
+    to_line_m = line.nearest(places_m) - places_m
+    return tuple(
+        _plot(landmark, x_m, y_m)
+        for landmark, (x_m, y_m) in zip(landmarks, to_line_m.tolist(), strict=True)
+    )
+
+
+def _plot(landmark: Landmark, to_line_x_m: float, to_line_y_m: float) -> Plot:
+    """The landmark's building, its front towards the line."""
+    kind = _KINDS[landmark.name]
+    away_m = math.hypot(to_line_x_m, to_line_y_m)
+    required_m = kind.depth_m / 2 + CLEAR_M
+    if away_m < required_m:
+        raise ConfigError(
+            f"[sim] the {landmark.name} at ({landmark.x_m:g}, {landmark.y_m:g}) would stand in the "
+            f"way: put it {required_m:g} m from the line at least, not {away_m:.1f}"
         )
-    return tuple(plots)
+
+    # A front looks to the right of its heading.
+    heading_rad = math.remainder(math.atan2(to_line_x_m, -to_line_y_m), math.tau)
+    return Plot(kind, landmark.x_m, landmark.y_m, heading_rad)

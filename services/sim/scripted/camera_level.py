@@ -1,6 +1,6 @@
-"""A robot that is led along a line, with cameras and wheels: pictures and odometry, as in a town.
+"""A robot that follows a line, with cameras and wheels: images and odometry, as in a town.
 
-It stands still until its first pictures are taken, so that all its way is seen.
+It stands still until its first images are rendered, so that all of the line is seen.
 """
 
 from __future__ import annotations
@@ -11,51 +11,34 @@ from services.sim.config import Config
 from services.sim.layout import roadside
 from services.sim.odometry import WheelOdometry
 from services.sim.rendering.camera import StereoCamera, calibration
-from services.sim.scripted.percept_level import TURN_AS_M, Led
-from services.sim.scripted.trajectory import Way
+from services.sim.scripted.follower import TURN_AS_M, LineFollower
+from services.sim.scripted.trajectory import Leg, Trajectory
 from services.sim.world import World
 
-_HERE = Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)
+_ORIGIN = Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)
 
 
-class CameraLevelSim(Led):
-    """Says what its cameras see and what its wheels report, which no engine turns: it is put where
-    it is led.
+class CameraLevelSim(LineFollower):
+    """Renders what its cameras see and measures what its wheels would report. Physics is not
+    simulated: the robot is placed on its line.
     """
 
-    def __init__(self, config: Config, way: Way) -> None:
-        super().__init__(
-            way, 1_000_000_000 // config.odometry_hz, config.odometry_hz // config.frame_hz
-        )
-        self.world = World(roadside.along(way, config.seed), config.egl)
+    def __init__(self, config: Config, trajectory: Trajectory) -> None:
+        tick_ns = 1_000_000_000 // config.odometry_hz
+        super().__init__(trajectory, tick_ns, config.odometry_hz // config.frame_hz)
+        self.world = World(roadside.along(trajectory, config.seed), config.egl)
         self.camera = StereoCamera(self.world, calibration(config.width_px, config.height_px))
         self._odometry = WheelOdometry(config.noise, config.seed)
 
     def step(self) -> list[Message]:
-        """Let one tick pass, and say what the wheels report of it: of each straight and each turn
-        on the spot.
-        """
+        """Advance by one tick: a message of odometry for each straight and each turn on the spot."""
         since_ns = self.now_ns
-        legs = self._go(self._way.speed_m_s if self._frames else 0.0)
+        is_first_frame_taken = self._frames > 0
+        legs = self._advance(self._trajectory.speed_m_s if is_first_frame_taken else 0.0)
         if not legs:
-            return [
-                Odometry(
-                    stamp_ns=self.now_ns,
-                    speed_m_s=0.0,
-                    turn_rate_rad_s=0.0,
-                    dt_s=self.tick_ns / 1e9,
-                )
-            ]
-        pace_s = self._pace_s(legs)
-        rows = []
-        for length_m, turn_rad in legs:
-            if length_m:
-                rows.append(
-                    self._rolled(Pose(x_m=length_m, y_m=0.0, heading_rad=0.0), pace_s * length_m)
-                )
-            if turn_rad:
-                turned = Pose(x_m=0.0, y_m=0.0, heading_rad=turn_rad)
-                rows.append(self._rolled(turned, pace_s * TURN_AS_M * abs(turn_rad)))
+            return [self._at_rest()]
+
+        rows = self._measure(legs)
         passed_s = 0.0
         for row in rows:
             passed_s += row.dt_s
@@ -64,15 +47,34 @@ class CameraLevelSim(Led):
         return [*rows]
 
     def view(self) -> list[Message]:
-        """The next stereo frame, as of now."""
-        self.world.lead(self._pose())
-        return [self.camera.frame(self.now_ns, self._number())]
+        """The next stereo frame."""
+        self.world.place_robot(self._pose())
+        return [self.camera.frame(self.now_ns, self._next_frame())]
 
     def town(self) -> TrueTown:
-        """The way and the buildings along it, as of now."""
+        """The line and the buildings along it."""
         message = self.world.town.message()
         message.stamp_ns = self.now_ns
         return message
 
-    def _rolled(self, there: Pose, dt_s: float) -> Odometry:
-        return self._odometry.measure(_HERE, there, dt_s)
+    def _at_rest(self) -> Odometry:
+        return Odometry(
+            stamp_ns=self.now_ns,
+            speed_m_s=0.0,
+            turn_rate_rad_s=0.0,
+            dt_s=self.tick_ns / 1e9,
+        )
+
+    def _measure(self, legs: list[Leg]) -> list[Odometry]:
+        """Odometry of each straight and each turn, which together take a tick."""
+        pace_s = self._pace_s(legs)
+        rows = []
+        for length_m, turn_rad in legs:
+            if length_m:
+                ahead = Pose(x_m=length_m, y_m=0.0, heading_rad=0.0)
+                rows.append(self._odometry.measure(_ORIGIN, ahead, pace_s * length_m))
+            if turn_rad:
+                turned = Pose(x_m=0.0, y_m=0.0, heading_rad=turn_rad)
+                duration_s = pace_s * TURN_AS_M * abs(turn_rad)
+                rows.append(self._odometry.measure(_ORIGIN, turned, duration_s))
+        return rows

@@ -1,76 +1,87 @@
-"""The way that a robot is led along, as the paper's agent is given its turns (§6). Pure."""
+"""The line that a robot follows, as the paper's agent is given its turns (§6). Pure."""
 
 from __future__ import annotations
 
-import itertools
 import math
+from itertools import pairwise
 from typing import Annotated, Literal
 
 import msgspec
 import numpy as np
-import numpy.typing as npt
 
+from cogmap.geometry.arrays import Floats
+from cogmap.geometry.polylines import distances_along, nearest_on_line
+from schemas.base import PositiveSpeed
 from schemas.sensing import Pose
 from services.sim.scripted.percepts import Landmark, Metres
 
-Points = npt.NDArray[np.float64]
 Leg = tuple[float, float]
+SAME_POINT_M = 1e-6
 
 
-class Way(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Where the robot is led: a line, the landmarks along it, and how far it comes in a second.
+class Trajectory(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """A line, the landmarks along it, and how fast a robot follows it.
 
-    `sensing` is how: the simulation says percepts with the errors that perception was measured to
-    make, or it draws what the cameras see and says how the wheels turn. For cameras the landmarks
-    are buildings of the catalogue, each by its name, as wide and high as it is there.
+    With cameras the landmarks are buildings of the catalogue, each by its name, as wide and high as
+    it is there.
     """
 
-    line_m: list[tuple[Metres, Metres]]
-    landmarks: list[Landmark]
-    speed_m_s: Annotated[float, msgspec.Meta(gt=0, le=100)] = 5.0
-    sensing: Literal["percepts", "cameras"] = "percepts"
+    line_m: Annotated[
+        list[tuple[Metres, Metres]],
+        msgspec.Meta(min_length=2, description="Points of the line, x and y in m, -1e6 to 1e6."),
+    ]
+    landmarks: Annotated[list[Landmark], msgspec.Meta(description="Buildings along the line.")]
+    speed_m_s: Annotated[
+        PositiveSpeed, msgspec.Meta(description="Speed of the robot, in m/s, above 0 to 100.")
+    ] = 5.0
+    sensing: Annotated[
+        Literal["percepts", "cameras"],
+        msgspec.Meta(
+            description="percepts: published with the errors that perception was measured to make. "
+            "cameras: rendered images and odometry are published, and perception runs."
+        ),
+    ] = "percepts"
 
 
 class Line:
-    """A polyline by the way along it."""
+    """A polyline by the distance along it; points that coincide with the one before are left out."""
 
-    def __init__(self, points: Points) -> None:
-        apart = np.hypot(*np.diff(points, axis=0).T)
-        self.points = np.vstack([points[:1], points[1:][apart > 1e-6]])
-        pieces = np.diff(self.points, axis=0)
-        self.along_m = np.concatenate([[0.0], np.cumsum(np.hypot(pieces[:, 0], pieces[:, 1]))])
-        self.heading_rad = np.arctan2(pieces[:, 1], pieces[:, 0])
+    def __init__(self, points_m: Floats) -> None:
+        lengths_m = np.hypot(*np.diff(points_m, axis=0).T)
+        is_new = lengths_m > SAME_POINT_M
+        self.points = np.vstack([points_m[:1], points_m[1:][is_new]])
+        self.along_m = distances_along(self.points)
+
+        pieces_m = np.diff(self.points, axis=0)
+        self.heading_rad = np.arctan2(pieces_m[:, 1], pieces_m[:, 0])
 
     @property
     def length_m(self) -> float:
-        """From its start to its end."""
+        """Distance from its start to its end, along it."""
         return float(self.along_m[-1])
 
     def at(self, along_m: float) -> Pose:
-        """The pose there, heading as the line does; at a corner as it does after it."""
-        piece = min(
-            int(np.searchsorted(self.along_m, along_m, "right")) - 1, len(self.heading_rad) - 1
-        )
-        x, y = (float(np.interp(along_m, self.along_m, self.points[:, axis])) for axis in (0, 1))
-        return Pose(x_m=x, y_m=y, heading_rad=float(self.heading_rad[piece]))
+        """The pose there, heading as the line does; at a corner as it does after the corner."""
+        corners_passed = int(np.searchsorted(self.along_m, along_m, "right"))
+        piece = min(corners_passed - 1, len(self.heading_rad) - 1)
+        x_m, y_m = (np.interp(along_m, self.along_m, column) for column in self.points.T)
+        return Pose(x_m=float(x_m), y_m=float(y_m), heading_rad=float(self.heading_rad[piece]))
 
     def legs(self, from_m: float, to_m: float) -> list[Leg]:
-        """The way between two places as (length_m, turn_rad): go straight, then turn on the spot."""
-        corners = self.along_m[(self.along_m > from_m) & (self.along_m <= to_m)].tolist()
-        stops = [from_m, *corners] if corners and corners[-1] == to_m else [from_m, *corners, to_m]
-        headings = [self.at(stop).heading_rad for stop in stops]
-        return [
-            (b - a, math.remainder(after - before, math.tau))
-            for (a, b), (before, after) in zip(
-                itertools.pairwise(stops), itertools.pairwise(headings), strict=True
-            )
-        ]
+        """The line between two distances as (length_m, turn_rad): straight, then a turn on the
+        spot.
+        """
+        is_between = (self.along_m > from_m) & (self.along_m <= to_m)
+        stops_m = [from_m, *self.along_m[is_between].tolist()]
+        if stops_m[-1] != to_m or len(stops_m) == 1:
+            stops_m.append(to_m)
 
-    def nearest(self, points: Points) -> Points:
-        """The points (n, 2) of the line nearest to each of (n, 2) points."""
-        start = self.points[:-1]
-        piece = np.diff(self.points, axis=0)
-        share = ((points[:, None] - start) * piece).sum(2) / (piece**2).sum(1)
-        feet = start + share.clip(0, 1)[..., None] * piece
-        best = ((points[:, None] - feet) ** 2).sum(2).argmin(1)
-        return np.asarray(feet[np.arange(len(points)), best])
+        legs = []
+        for start_m, end_m in pairwise(stops_m):
+            turn_rad = self.at(end_m).heading_rad - self.at(start_m).heading_rad
+            legs.append((end_m - start_m, math.remainder(turn_rad, math.tau)))
+        return legs
+
+    def nearest(self, points_m: Floats) -> Floats:
+        """(n, 2): the points of the line nearest to each of (n, 2) points."""
+        return nearest_on_line(self.points, points_m).foot_m

@@ -9,9 +9,17 @@ from cogmap.errors import MessageError
 from cogmap.runtime.module import Module
 from schemas.array import Array
 from schemas.base import Message
-from schemas.cognition import Action, Broadcast, Coalition, Competition
+from schemas.cognition import (
+    Action,
+    Broadcast,
+    Coalition,
+    Competition,
+    Rejection,
+    Trigger,
+)
 from schemas.graph import Delta, Node
-from schemas.sensing import MotorCommand, Pose, RangeScan
+from schemas.process import Clock
+from schemas.sensing import MotorCommand, Pose, RangeScan, SelfMotion, SpeedLimit
 from services.action.module import Config, build
 from services.action.motor import SensoryMotorMemory, obstacle_ahead_m
 from services.action.route import Route
@@ -77,21 +85,43 @@ def test_the_end_of_the_route_calls_for_a_halt() -> None:
         _nodes(self=1.0), {"route_ahead": 0.0, "route_end": 1.0}
     )
     assert chosen is not None
-    assert chosen[0].name == HALT
+    assert chosen.chosen.scheme == HALT
+
+
+def test_every_behaviour_is_reported_and_why_it_was_not_chosen() -> None:
+    selection = ActionSelection(Config(selection_threshold=0.0, instantiation=0.5))
+    nodes = _nodes(self=1.0)
+    both = selection.select(nodes, {"route_ahead": 1.0, "route_end": 0.3})
+    assert both is not None
+    assert [(each.scheme, each.rejection) for each in both.considered] == [
+        (FOLLOW_ROUTE, Rejection.NONE),
+        (HALT, Rejection.LESS_ACTIVE),
+    ]
+    weak = selection.select(nodes, {"route_ahead": 1.0, "route_end": 0.1})
+    missing = selection.select(nodes, {"route_ahead": 1.0})
+    assert weak is not None
+    assert missing is not None
+    assert weak.considered[1].rejection is Rejection.NOT_INSTANTIATED
+    assert missing.considered[1].rejection is Rejection.CONTEXT_MISSING
+    assert missing.considered[1].activation == 0.0
 
 
 # Sensory-motor memory
 
 
 def _command(
-    pose: Pose, clear_m: float = math.inf, legs: tuple[tuple[float, float], ...] = ((50.0, 0.0),)
+    pose: Pose,
+    clear_m: float = math.inf,
+    legs: tuple[tuple[float, float], ...] = ((50.0, 0.0),),
+    age_s: float = 0.0,
 ) -> MotorCommand:
     config = Config()
     route = Route([*legs], config.corner_radius_m, config.overrun_m)
     for x_m in np.arange(0.0, pose.x_m, 1.0):
         route.advance(x_m, 0.0)
+    route.advance(pose.x_m, pose.y_m)
     motor = SensoryMotorMemory(config, route)
-    return motor.command(7, pose, clear_m, moving=True)
+    return motor.command(7, pose, clear_m, round(age_s * 1e9))
 
 
 def _at(x_m: float = 0.0, y_m: float = 0.0, heading_rad: float = 0.0) -> Pose:
@@ -170,7 +200,23 @@ def test_the_robot_slows_down_before_an_obstacle_and_stops_at_its_clearance() ->
     )
 
 
-def test_what_stands_beside_the_way_behind_it_or_alone_is_no_obstacle() -> None:
+def test_the_older_its_pose_the_slower_the_robot_until_it_stops() -> None:
+    config = Config()
+    commands = [_command(_at(5.0), age_s=age_s) for age_s in (0.0, 0.3, 0.5, 1.0, 1.6)]
+    speeds = [_driven(command) for command in commands]
+    assert speeds[:2] == [config.cruise_m_s] * 2
+    assert speeds[2:] == pytest.approx([config.blind_m / 0.5, config.blind_m, 0.0])
+    assert [command.slowed_by for command in commands[:4]] == [
+        SpeedLimit.NONE,
+        SpeedLimit.NONE,
+        SpeedLimit.POSE_AGE,
+        SpeedLimit.POSE_AGE,
+    ]
+    assert commands[4].halted_by is SpeedLimit.POSE_AGE
+    assert commands[3].pose_age_ns == 10**9
+
+
+def test_what_stands_aside_behind_or_alone_is_no_obstacle() -> None:
     assert obstacle_ahead_m(_scan((0.0, 8.0), (0.05, 8.2)), 0.7) == pytest.approx(8.2, abs=0.05)
     assert obstacle_ahead_m(_scan((0.0, 8.0)), 0.7) == math.inf
     assert obstacle_ahead_m(_scan((0.5, 8.0), (0.55, 8.0)), 0.7) == math.inf
@@ -212,8 +258,18 @@ def _broadcast(cycle: int = 1) -> Broadcast:
     return Broadcast(stamp_ns=cycle * PERIOD_NS, cycle=cycle, trigger="t", coalition=coalition)
 
 
-def _competition(cycle: int = 1, trigger: str = "") -> Competition:
-    return Competition(stamp_ns=cycle * PERIOD_NS, cycle=cycle, contenders={}, trigger=trigger)
+def _competition(cycle: int = 1, trigger: Trigger = Trigger.NONE) -> Competition:
+    return Competition(stamp_ns=cycle * PERIOD_NS, cycle=cycle, contenders=[], trigger=trigger)
+
+
+def _motion(cycle: int = 1, speed_m_s: float = 2.0) -> SelfMotion:
+    rows = np.array([[speed_m_s, 0.0, PERIOD_NS / 1e9, 0.0, 0.0]])
+    return SelfMotion(
+        stamp_ns=cycle * PERIOD_NS,
+        frame=cycle,
+        since_ns=(cycle - 1) * PERIOD_NS,
+        motions=Array.of(rows),
+    )
 
 
 def _commands(said: list[Message]) -> list[MotorCommand]:
@@ -276,10 +332,13 @@ def test_a_pose_that_was_committed_late_brings_a_command_too() -> None:
     assert len(_commands(_module().feed(_delta(phase="late")))) == 1
 
 
-def test_in_lockstep_the_command_waits_for_the_views_scan_and_for_the_competition_of_the_cycle_before() -> (
-    None
-):
-    inputs = {"delta": _delta(2), "scan": _scan(cycle=2), "competition": _competition(1)}
+def test_in_lockstep_the_command_waits_for_the_senses_and_the_cycle_before() -> None:
+    inputs = {
+        "delta": _delta(2),
+        "scan": _scan(cycle=2),
+        "motion": _motion(2),
+        "competition": _competition(1),
+    }
     for last, last_message in inputs.items():
         module = _module("lockstep")
         for name, message in inputs.items():
@@ -288,10 +347,11 @@ def test_in_lockstep_the_command_waits_for_the_views_scan_and_for_the_competitio
         assert len(_commands(module.feed(last_message))) == 1
 
 
-def test_in_lockstep_the_command_waits_for_the_broadcast_that_the_competition_tells_of() -> None:
+def test_in_lockstep_the_command_waits_for_the_broadcast_that_was_triggered() -> None:
     module = _module("lockstep")
+    module.feed(_motion(2))
     module.feed(_scan(cycle=2))
-    module.feed(_competition(1, "no broadcast for long"))
+    module.feed(_competition(1, Trigger.NO_BROADCAST))
     assert module.feed(_delta(2)) == []
     action, command = module.feed(_broadcast(1))
     assert isinstance(action, Action)
@@ -301,6 +361,7 @@ def test_in_lockstep_the_command_waits_for_the_broadcast_that_the_competition_te
 
 def test_in_lockstep_the_first_cycle_waits_for_no_competition() -> None:
     module = _module("lockstep")
+    module.feed(_motion())
     module.feed(_scan())
     assert len(_commands(module.feed(_delta(1)))) == 1
 
@@ -309,9 +370,110 @@ def test_each_pose_brings_one_command() -> None:
     module = _module("lockstep")
     said = [
         module.feed(message)
-        for message in (_scan(), _delta(1), _scan(), _competition(1), _competition(1))
+        for message in (
+            _motion(),
+            _scan(),
+            _delta(1),
+            _motion(),
+            _scan(),
+            _competition(1),
+            _competition(1),
+        )
     ]
-    assert [len(_commands(messages)) for messages in said] == [0, 1, 0, 0, 0]
+    assert [len(_commands(messages)) for messages in said] == [0, 0, 1, 0, 0, 0, 0]
+
+
+def _answered_lockstep() -> tuple[Module, MotorCommand]:
+    """A module in lockstep that has answered the pose of cycle 1, and its command."""
+    module = _module("lockstep")
+    for message in (_broadcast(0), _motion(), _scan()):
+        module.feed(message)
+    (command,) = _commands(module.feed(_delta(1)))
+    return module, command
+
+
+def test_in_lockstep_a_repeated_pose_is_answered_by_the_same_command() -> None:
+    module, command = _answered_lockstep()
+    assert command.left_wheel_rad_s > 0
+    (again,) = _commands(module.feed(_delta(1)))
+    assert (again.stamp_ns, again.left_wheel_rad_s) == (command.stamp_ns, command.left_wheel_rad_s)
+    assert again.seq == command.seq + 1
+
+
+def test_in_lockstep_a_repeated_scan_ends_the_wait_for_a_lost_competition() -> None:
+    module, _ = _answered_lockstep()
+    for message in (_motion(2), _scan(cycle=2), _delta(2)):
+        assert module.feed(message) == []
+    module.feed(_motion(2))
+    (command,) = _commands(module.feed(_scan(cycle=2)))
+    assert command.stamp_ns == 2 * PERIOD_NS
+
+
+def test_in_lockstep_a_restarted_action_waits_for_no_past_competition() -> None:
+    module = _module("lockstep")
+    assert module.restore is not None
+    (action,) = _module().feed(_broadcast(4))
+    module.restore([action])
+    for message in (_motion(6), _scan(cycle=6)):
+        assert module.feed(message) == []
+    assert len(_commands(module.feed(_delta(6)))) == 1
+
+
+def _clock(at_s: float) -> Clock:
+    return Clock(stamp_ns=round(at_s * 1e9), rate=1.0)
+
+
+def test_a_pose_that_is_old_by_the_clock_moves_the_robot_more_slowly() -> None:
+    fresh = _module()
+    slow = _module()
+    for module in (fresh, slow):
+        module.feed(_broadcast())
+    slow.feed(_clock(0.2 + 1.0))
+    (fast_command,) = _commands(fresh.feed(_delta(1)))
+    (slow_command,) = _commands(slow.feed(_delta(1)))
+    assert 0 < slow_command.left_wheel_rad_s < fast_command.left_wheel_rad_s
+    assert (slow_command.slowed_by, slow_command.pose_age_ns) == (SpeedLimit.POSE_AGE, 10**9)
+
+
+def test_a_moving_robot_that_gets_no_new_pose_is_halted_once() -> None:
+    module = _module()
+    module.feed(_broadcast())
+    module.feed(_delta(1))
+    halts = [_commands(module.feed(_clock(0.2 + age_s))) for age_s in (1.0, 1.6, 1.7)]
+    assert [len(commands) for commands in halts] == [0, 1, 0]
+    assert halts[1][0].halted_by is SpeedLimit.POSE_AGE
+
+
+def test_a_robot_that_is_commanded_to_move_and_stands_is_stuck() -> None:
+    module = _module()
+    module.feed(_broadcast())
+    reasons = []
+    for cycle in range(1, 40):
+        module.feed(_motion(cycle, speed_m_s=0.02))
+        reasons += [command.halted_by for command in _commands(module.feed(_delta(cycle)))]
+    halts = [cycle for cycle, reason in enumerate(reasons, start=1) if reason]
+    assert {reasons[cycle - 1] for cycle in halts} == {SpeedLimit.STUCK}
+    assert halts[0] == pytest.approx(Config().stuck_after_s * 1e9 / PERIOD_NS + 1, abs=1)
+
+
+def test_a_robot_that_moves_or_is_not_commanded_to_is_not_stuck() -> None:
+    moving = _module()
+    moving.feed(_broadcast())
+    idle = _module()
+    for cycle in range(1, 40):
+        moving.feed(_motion(cycle))
+        idle.feed(_motion(cycle, speed_m_s=0.0))
+        (moved,) = _commands(moving.feed(_delta(cycle)))
+        (stood,) = _commands(idle.feed(_delta(cycle)))
+        assert moved.halted_by is SpeedLimit.NONE
+        assert stood.halted_by is SpeedLimit.NO_ACTION
+
+
+def test_a_self_motion_of_another_shape_is_refused_by_name() -> None:
+    motion = _motion()
+    motion.motions = Array.of(np.zeros((2, 3)))
+    with pytest.raises(MessageError, match="rows of 5 columns"):
+        _module().feed(motion)
 
 
 def test_an_action_module_that_was_killed_goes_on_along_the_route_from_its_last_action() -> None:

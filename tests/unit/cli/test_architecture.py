@@ -1,4 +1,4 @@
-"""docs/architecture.md says what the topic table and the modules say."""
+"""docs/architecture.md agrees with the topic table and the modules."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def _modules() -> list[Module]:
     return [camera, memory.serve(topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, print)]  # type: ignore[arg-type]
 
 
-def test_the_page_is_what_the_code_says() -> None:
+def test_the_page_is_what_the_code_generates() -> None:
     assert renewed(PAGE.read_text()) == PAGE.read_text(), "write it anew with `cogmap architecture`"
 
 
@@ -56,7 +56,7 @@ def test_the_page_shows_no_arrow_of_the_truth_into_a_module() -> None:
     assert all(line.rstrip(" |").endswith("observers") for line in arrows)
 
 
-def test_a_page_that_is_out_of_date_fails_the_check_and_is_mended_without_it(
+def test_a_page_that_is_out_of_date_fails_the_check(
     tmp_path: Path,
 ) -> None:
     page = tmp_path / "page.md"
@@ -77,4 +77,4 @@ def test_a_page_without_a_place_for_a_part_is_named(text: str) -> None:
 def test_a_page_that_is_not_there_is_named_with_the_remedy(tmp_path: Path) -> None:
     run = CliRunner().invoke(architecture, [str(tmp_path / "none.md")])
     assert isinstance(run.exception, UsageError)
-    assert "call this in the sources" in str(run.exception)
+    assert "run this in the sources" in str(run.exception)

@@ -1,7 +1,8 @@
-"""What the doctor makes of what it sees."""
+"""The findings of `cogmap doctor`."""
 
 from __future__ import annotations
 
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -60,10 +61,10 @@ def test_a_module_that_is_not_there_is_named() -> None:
     assert finding.startswith("sensory: no instance of it is on the bus")
 
 
-def test_a_module_that_says_nothing_is_named() -> None:
+def test_a_module_that_reports_nothing_is_named() -> None:
     (finding,) = findings(observed())
 
-    assert finding.startswith("sensory: it is on the bus but tells nothing")
+    assert finding.startswith("sensory: it is on the bus but reports nothing")
 
 
 def test_a_module_that_is_not_ready_is_named() -> None:
@@ -80,13 +81,13 @@ def test_a_module_that_is_not_ready_is_named() -> None:
         ({"notes": ["1 faults"]}, "sensory: 1 faults"),
     ],
 )
-def test_what_a_module_complains_of_is_said(changes: dict[str, object], sentence: str) -> None:
+def test_what_a_module_complains_of_is_a_finding(changes: dict[str, object], sentence: str) -> None:
     (finding,) = findings(observed(health(10), health(12, **changes)))
 
     assert finding.startswith(sentence)
 
 
-def test_a_queue_that_grows_is_named_and_one_that_is_worked_off_is_not() -> None:
+def test_a_queue_that_grows_is_named_and_one_that_shrinks_is_not() -> None:
     growing = [health(10 + i, queued=queued) for i, queued in enumerate((5, 20, 40))]
     falling = [health(10 + i, queued=queued) for i, queued in enumerate((5, 40, 20))]
 
@@ -98,9 +99,7 @@ def test_a_queue_that_grows_is_named_and_one_that_is_worked_off_is_not() -> None
 @pytest.mark.parametrize(
     ("number", "is_off"), [(8, False), (10, False), (12, False), (6, True), (14, True), (0, True)]
 )
-def test_a_topic_is_named_that_is_off_its_rate_by_more_than_a_third(
-    number: int, is_off: bool
-) -> None:
+def test_a_topic_with_a_rate_far_from_the_tables_is_named(number: int, is_off: bool) -> None:
     first = health(10, emitted={"sensory/scan": 50})
     last = health(12, emitted={"sensory/scan": 50 + number})
 
@@ -120,10 +119,10 @@ def test_rates_mean_nothing_in_lockstep_and_follow_the_clock_otherwise() -> None
     assert len(findings(observed(*slow, clock_rate=1.0))) == 1
 
 
-def test_a_module_that_sees_the_truth_is_named() -> None:
+def test_a_module_that_subscribes_to_the_truth_is_named() -> None:
     found = findings(observed(health(10), health(12)), system(Role.SUBSCRIBES, topics.TRUE_POSE))
 
-    assert found == ["sensory: it subscribes to truth/pose: no module may see the truth"]
+    assert found == ["sensory: it subscribes to truth/pose: no module may see the ground truth"]
 
 
 def test_an_old_python_is_named() -> None:
@@ -139,8 +138,21 @@ def test_a_dependency_that_is_missing_or_of_another_version_is_named() -> None:
     assert [finding.about for finding in found] == ["numpy", "no-such-package-here"]
 
 
-def test_every_pinned_dependency_of_this_project_is_known() -> None:
-    assert {"eclipse-zenoh", "numpy", "msgspec", "pybullet"} <= set(installation.pins())
+def test_what_an_extra_needs_is_optional() -> None:
+    needs = [
+        "numpy==2.4.6",
+        'torch==2.15.0; extra == "train"',
+        'lz4==4.4.5; python_version > "3"',
+    ]
+
+    assert installation.pins(needs) == {"numpy": "2.4.6", "lz4": "4.4.5"}
+
+
+def test_the_installed_package_names_what_it_needs() -> None:
+    pins = installation.pins(metadata.requires("cogmap") or [])
+
+    assert {"eclipse-zenoh", "numpy", "msgspec", "pybullet"} <= set(pins)
+    assert "torch" not in pins
 
 
 def test_a_place_for_runs_that_cannot_be_written_to_is_named(tmp_path: Path) -> None:

@@ -7,10 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from cli.launch.observer import Observer, Track
+from cli.launch.observer import Observer
+from cli.launch.track import Track
+from cogmap.errors import MessageError
+from schemas.array import Array
 from schemas.cognition import Competition
 from schemas.graph import Delta, DropNode, Node
-from schemas.sensing import Odometry, Pose, TruePose
+from schemas.sensing import Odometry, Pose, SelfMotion, TruePose
 
 TICK_NS = 50_000_000
 
@@ -39,56 +42,83 @@ def estimate(tick: int, x_m: float, y_m: float, version: int = 1) -> Delta:
     )
 
 
-def straight_drive(observer: Observer, ticks: int, wheel_speed_m_s: float) -> None:
+def self_motion(tick: int, speed_m_s: float, turn_rate_rad_s: float = 0.0) -> SelfMotion:
+    """Of the two halves of one tick."""
+    half = [speed_m_s, turn_rate_rad_s, 0.025, 0.1, 0.1]
+    return SelfMotion(
+        stamp_ns=tick * TICK_NS,
+        frame=tick,
+        since_ns=(tick - 1) * TICK_NS,
+        motions=Array.of([half, half], "<f8"),
+    )
+
+
+def straight_drive(
+    observer: Observer, ticks: int, wheel_speed_m_s: float, fused_speed_m_s: float = 1.0
+) -> None:
     """1 m/s along x in truth."""
-    observer.take(true_pose(0, 0.0, 0.0))
+    observer.update(true_pose(0, 0.0, 0.0))
     for tick in range(1, ticks + 1):
-        observer.take(odometry(tick, wheel_speed_m_s))
-        observer.take(true_pose(tick, 0.05 * tick, 0.0))
+        observer.update(odometry(tick, wheel_speed_m_s))
+        observer.update(self_motion(tick, fused_speed_m_s))
+        observer.update(true_pose(tick, 0.05 * tick, 0.0))
 
 
 def test_errors_are_distances_from_the_truth_of_the_same_stamp() -> None:
     observer = Observer()
-    straight_drive(observer, 20, wheel_speed_m_s=1.2)
-    observer.take(estimate(10, 0.5, 0.03))
-    observer.take(estimate(20, 1.0, -0.05))
+    straight_drive(observer, 20, wheel_speed_m_s=1.2, fused_speed_m_s=0.9)
+    observer.update(estimate(10, 0.5, 0.03))
+    observer.update(estimate(20, 1.0, -0.05))
+
     errors = observer.errors()
     assert errors.stamps_ns.tolist() == [10 * TICK_NS, 20 * TICK_NS]
     assert errors.estimate_m == pytest.approx([0.03, 0.05])
-    assert errors.integration_m == pytest.approx([0.1, 0.2])
-    assert errors.ratio == pytest.approx(0.04 / 0.15)
+    assert errors.wheels_m == pytest.approx([0.1, 0.2])
+    assert errors.fused_m == pytest.approx([0.05, 0.1])
+
+
+def test_the_estimate_is_compared_with_wheels_and_with_fused_self_motion() -> None:
+    observer = Observer()
+    straight_drive(observer, 20, wheel_speed_m_s=1.2, fused_speed_m_s=0.9)
+    observer.update(estimate(10, 0.5, 0.03))
+    observer.update(estimate(20, 1.0, -0.05))
+
+    errors = observer.errors()
+    assert errors.over_wheels == pytest.approx(0.04 / 0.15)
+    assert errors.over_fused == pytest.approx(0.04 / 0.075)
 
 
 def test_truth_between_two_poses_is_interpolated() -> None:
     observer = Observer()
     for tick in (0, 4):
-        observer.take(true_pose(tick, float(tick), 2.0 * tick))
-    observer.take(odometry(1, 0.0))
-    observer.take(odometry(4, 0.0))
-    observer.take(estimate(3, 3.0, 6.0))
+        observer.update(true_pose(tick, float(tick), 2.0 * tick))
+    for tick in (1, 4):
+        observer.update(odometry(tick, 0.0))
+        observer.update(self_motion(tick, 0.0))
+    observer.update(estimate(3, 3.0, 6.0))
     assert observer.errors().estimate_m == pytest.approx([0.0])
 
 
 def test_an_estimate_that_no_truth_surrounds_does_not_count() -> None:
     observer = Observer()
     straight_drive(observer, 4, wheel_speed_m_s=1.0)
-    observer.take(estimate(5, 0.25, 0.0))
+    observer.update(estimate(5, 0.25, 0.0))
     assert observer.errors().stamps_ns.size == 0
-    assert observer.errors().ratio == 1.0
+    assert (observer.errors().over_wheels, observer.errors().over_fused) == (1.0, 1.0)
 
 
 def test_the_last_of_several_estimates_of_one_stamp_counts() -> None:
     observer = Observer()
     straight_drive(observer, 4, wheel_speed_m_s=1.0)
-    observer.take(estimate(4, 9.0, 9.0, version=1))
-    observer.take(estimate(4, 0.2, 0.0, version=2))
+    observer.update(estimate(4, 9.0, 9.0, version=1))
+    observer.update(estimate(4, 0.2, 0.0, version=2))
     assert observer.errors().estimate_m == pytest.approx([0.0], abs=1e-12)
 
 
 def test_the_agents_frame_starts_in_the_first_true_pose() -> None:
     observer = Observer()
-    observer.take(true_pose(0, 5.0, -2.0, math.pi / 2))
-    observer.take(true_pose(1, 5.0, -1.0, math.pi / 2))
+    observer.update(true_pose(0, 5.0, -2.0, math.pi / 2))
+    observer.update(true_pose(1, 5.0, -1.0, math.pi / 2))
     assert observer.to_world(np.array([[1.0, 0.0], [0.0, 2.0]])) == pytest.approx(
         np.array([[5.0, -1.0], [3.0, -2.0]])
     )
@@ -96,14 +126,23 @@ def test_the_agents_frame_starts_in_the_first_true_pose() -> None:
 
 def test_path_integration_of_a_circle_by_midpoints_closes_it() -> None:
     observer = Observer()
-    observer.take(true_pose(0, 0.0, 0.0))
+    observer.update(true_pose(0, 0.0, 0.0))
     steps = 200
+    turn_rate_rad_s = math.tau / (steps * 0.05)
     for tick in range(1, steps + 1):
-        observer.take(odometry(tick, 1.0, math.tau / (steps * 0.05)))
-    path_m = observer.integrated_path_m
-    assert path_m[-1] == pytest.approx([0.0, 0.0], abs=1e-9)
+        observer.update(odometry(tick, 1.0, turn_rate_rad_s))
+        observer.update(self_motion(tick, 1.0, turn_rate_rad_s))
+
     radius_m = steps * 0.05 / math.tau
-    assert path_m[:, 1].max() == pytest.approx(2 * radius_m, rel=1e-3)
+    for path_m in (observer.wheels_path_m, observer.fused_path_m):
+        assert path_m[-1] == pytest.approx([0.0, 0.0], abs=1e-9)
+        assert path_m[:, 1].max() == pytest.approx(2 * radius_m, rel=1e-3)
+
+
+def test_self_motion_without_its_five_columns_is_refused() -> None:
+    motion = SelfMotion(frame=1, since_ns=0, motions=Array.of([[1.0, 0.0, 0.05]], "<f8"))
+    with pytest.raises(MessageError, match=r"it needs \(n, 5\)"):
+        Observer().update(motion)
 
 
 def test_distance_progress_and_time_are_those_of_the_newest_pose() -> None:
@@ -115,8 +154,8 @@ def test_distance_progress_and_time_are_those_of_the_newest_pose() -> None:
 def test_other_messages_and_senseless_nodes_change_nothing() -> None:
     observer = Observer()
     straight_drive(observer, 4, wheel_speed_m_s=1.0)
-    observer.take(Competition(stamp_ns=4, cycle=1, contenders={}))
-    observer.take(
+    observer.update(Competition(stamp_ns=4, cycle=1, contenders={}))
+    observer.update(
         Delta(version=1, cycle=1, phase="x", tasks=[], operations=[Node(id="self", kind="self")])
     )
     assert len(observer.estimated_path_m) == 0

@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from pathlib import Path
 
 import pytest
 
-from cli.launch.plan import OBSERVER, RECORDER, Choices, effective, everybody, programs, to_toml
+from cli.launch.plan import (
+    OBSERVER,
+    RECORDER,
+    ROUTER,
+    Choices,
+    awaited,
+    effective,
+    infrastructure,
+    modules,
+    to_toml,
+)
+from cli.launch.supervisor import Program
 from cogmap.errors import ConfigError
 from services import registry
 from services.sim.layout.town import generate
 
 
 def configured(choices: Choices, **sections: dict[str, object]) -> dict[str, dict[str, object]]:
-    return effective(sections, choices, everybody(choices, observer=True))
+    return effective(sections, choices, awaited(choices, observer=True))
 
 
 def test_the_configuration_reads_back_from_toml_to_the_same() -> None:
@@ -61,7 +73,7 @@ def test_the_drive_waits_for_every_module_every_worker_and_whoever_watches() -> 
         RECORDER: 1,
         OBSERVER: 1,
     }
-    assert everybody(Choices(record=False), observer=False).keys().isdisjoint({RECORDER, OBSERVER})
+    assert awaited(Choices(record=False), observer=False).keys().isdisjoint({RECORDER, OBSERVER})
 
 
 def test_a_section_of_no_module_is_named() -> None:
@@ -69,17 +81,42 @@ def test_a_section_of_no_module_is_named() -> None:
         configured(Choices(), acton={})
 
 
+def started(folder: Path, choices: Choices) -> list[Program]:
+    where = (folder, "tcp/127.0.0.1:1", "agent", choices)
+    return [*infrastructure(*where), *modules(*where)]
+
+
+def instances(folder: Path, choices: Choices) -> set[str]:
+    return {program.instance for program in started(folder, choices)}
+
+
 def test_each_module_is_a_process_and_each_worker_one_more(tmp_path: Path) -> None:
-    first, rest = programs(tmp_path, "tcp/127.0.0.1:1", "agent", Choices(codelets=2))
-    instances = [program.instance for program in [*first, *rest]]
-    assert instances[0] == "router"
-    assert sorted(instances[1:]) == sorted(
+    names = [program.instance for program in started(tmp_path, Choices(codelets=2))]
+    assert names[0] == ROUTER
+    assert sorted(names[1:]) == sorted(
         {*registry.MODULES, "codelets-1", "codelets-2", RECORDER} - {"codelets"}
     )
 
 
+def test_modules_of_ones_own_are_not_started_and_waited_for(tmp_path: Path) -> None:
+    choices = Choices(without=["epam", "codelets"], codelets=2)
+    every = {*registry.MODULES, RECORDER, ROUTER}
+    assert instances(tmp_path, choices) == every - {"epam", "codelets"}
+    assert awaited(choices, observer=True)["epam"] == 1
+    assert awaited(choices, observer=True)["codelets"] == 2
+
+
+def test_an_existing_router_is_used_and_none_started(tmp_path: Path) -> None:
+    assert ROUTER not in instances(tmp_path, Choices(own_router=False))
+
+
 def test_a_recorder_that_is_started_again_writes_another_log(tmp_path: Path) -> None:
-    first, _ = programs(tmp_path, "tcp/127.0.0.1:1", "agent", Choices())
-    (recorder,) = [program for program in first if program.instance == RECORDER]
+    every = started(tmp_path, Choices())
+    (recorder,) = [program for program in every if program.instance == RECORDER]
     assert str(tmp_path / "log.mcap") in recorder.command(0)
     assert str(tmp_path / "log-2.mcap") in recorder.command(1)
+
+
+def test_toml_keeps_every_character_and_infinity() -> None:
+    sections = {"sim": {"town": '\U0001f3e0 "\\ \x7f é', "limit": math.inf, "list": [-math.inf]}}
+    assert tomllib.loads(to_toml(sections)) == sections

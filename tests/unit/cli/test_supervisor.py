@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from cli.launch.supervisor import Program, Supervisor
-from cogmap.errors import UsageError
+from cogmap.errors import ProcessFailedError
 
 TIMEOUT_S = 20.0
 
@@ -73,11 +73,8 @@ def test_each_restart_waits_longer_than_the_one_before(
         python("mind", "import time; print(time.monotonic(), flush=True); raise SystemExit(1)")
     )
 
-    def died_four_times() -> bool:
-        supervisor.check()
-        return len(said(tmp_path, "mind")) >= 4
-
-    wait_until(died_four_times)
+    with pytest.raises(ProcessFailedError):
+        wait_until(lambda: bool(supervisor.check()))
     times_s = [float(line) for line in said(tmp_path, "mind")]
     pauses_s = [later - earlier for earlier, later in itertools.pairwise(times_s)]
     assert pauses_s[2] > pauses_s[0] + 0.3
@@ -86,8 +83,18 @@ def test_each_restart_waits_longer_than_the_one_before(
 def test_a_child_that_ends_with_code_2_is_the_users_to_mend(supervisor: Supervisor) -> None:
     code = "import sys; print('cogmap: no such file: name one', file=sys.stderr); sys.exit(2)"
     supervisor.start(python("sim", code))
-    with pytest.raises(UsageError, match=r"^sim has ended: no such file: name one$"):
+    with pytest.raises(ProcessFailedError, match=r"^sim has ended: no such file: name one$"):
         wait_until(lambda: bool(supervisor.check()))
+
+
+def test_a_child_that_dies_again_and_again_fails_with_its_last_words(
+    supervisor: Supervisor, tmp_path: Path
+) -> None:
+    supervisor.start(python("mind", "raise OSError(28, 'No space left on device')"))
+    words = r"mind died 4 times .*mind.log are: OSError: \[Errno 28\] No space left on device$"
+    with pytest.raises(ProcessFailedError, match=words):
+        wait_until(lambda: bool(supervisor.check()))
+    assert supervisor.restarts == {"mind": 3}
 
 
 def test_a_child_that_does_not_listen_is_killed(supervisor: Supervisor, tmp_path: Path) -> None:

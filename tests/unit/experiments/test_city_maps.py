@@ -150,7 +150,7 @@ def test_without_noise_and_confusions_the_map_is_right_and_the_same_each_time() 
     (environment,) = environments(grown(7), 1, 7)
     quiet = Noise(speed=0.0, turn=0.0, drift_rad_per_sqrt_m=0.0)
     configured = sections(environment, Tour(start=0, backward=True, seed=1), quiet, "none")
-    configured["sim"]["way"]["line_m"] = configured["sim"]["way"]["line_m"][:12]
+    configured["sim"]["trajectory"]["line_m"] = configured["sim"]["trajectory"]["line_m"][:12]
     configured["sim"]["percepts"] |= {"right_name": 1.0, "precision": 1.0, "place_precision": 1.0}
     made, again = (traverse(configured) for _ in range(2))
     assert made.believed[:, :2] == pytest.approx(made.true[:, :2], abs=1.0)

@@ -27,7 +27,7 @@ FRAMES = 5
 def _short() -> Sections:
     """The way of figure 6, as far as its first building."""
     configured = sections(1, "heading")
-    way = configured["sim"]["way"]
+    way = configured["sim"]["trajectory"]
     way["line_m"] = [(0.0, 0.0), (10.0, 0.0)]
     return configured
 
@@ -58,10 +58,13 @@ def test_with_cameras_landmarks_become_buildings_of_the_catalogue_and_nobody_is_
 ):
     told = sections(1, "heading")
     seeing = with_cameras(told)
-    assert [each["name"] for each in seeing["sim"]["way"]["landmarks"][:2]] == ["bakery", "library"]
-    assert "percepts" not in seeing["sim"] and seeing["sim"]["way"]["sensing"] == "cameras"
+    assert [each["name"] for each in seeing["sim"]["trajectory"]["landmarks"][:2]] == [
+        "bakery",
+        "library",
+    ]
+    assert "percepts" not in seeing["sim"] and seeing["sim"]["trajectory"]["sensing"] == "cameras"
     assert seeing["sim"]["awaits"] == {**told["sim"]["awaits"], "sensory": 1, "epam": 1}
-    assert "sensing" not in told["sim"]["way"]
+    assert "sensing" not in told["sim"]["trajectory"]
 
 
 def test_more_landmarks_than_there_are_kinds_of_building_are_refused() -> None:

@@ -4,11 +4,16 @@ import pytest
 
 from cogmap.errors import MessageError
 from cogmap.runtime.module import Module
-from schemas.cognition import Broadcast, Coalition, Coalitions, Competition
+from schemas.cognition import Broadcast, Coalition, Coalitions, Competition, Fate, Trigger
 from services.global_workspace.module import Config, build
 
 TICK_NS = 5_000_000
 LIDA = {"ticks_per_decay": 1}
+
+
+def _with_fate(competition: Competition, fate: Fate) -> dict[str, float]:
+    """The activations of the contenders of one fate, by codelet."""
+    return {each.codelet: each.activation for each in competition.contenders if each.fate is fate}
 
 
 class Arena:
@@ -25,9 +30,8 @@ class Arena:
         }
         self.module: Module = build(Config(**(never | settings)), "global_workspace")  # type: ignore[arg-type]
         self._cycle = 0
-        self.compete(
-            0, first=0.01
-        )  # nothing was ever broadcast, so this is: silence is counted from here
+        # Nothing was ever broadcast, so this is: silence is counted from here.
+        self.compete(0, first=0.01)
 
     def compete(self, at_tick: float, **activations: float) -> tuple[Competition, Broadcast | None]:
         """Coalitions of attention codelets, by name, at a time in ticks."""
@@ -44,6 +48,10 @@ class Arena:
         assert (broadcast is not None) == bool(competition.trigger)
         assert broadcast is None or broadcast.trigger == competition.trigger
         return competition, broadcast
+
+    def waiting(self, at_tick: float, **activations: float) -> dict[str, float]:
+        """What is left of the activations of those that compete again in the next cycle."""
+        return _with_fate(self.compete(at_tick, **activations)[0], Fate.WAITING)
 
     def trigger(self, at_tick: float, **activations: float) -> str:
         """The trigger that fires, empty where none does."""
@@ -117,10 +125,11 @@ def test_in_the_forty_ticks_after_a_broadcast_nothing_triggers_another() -> None
 def test_the_most_active_coalition_wins_and_leaves_the_others_to_go_on_competing() -> None:
     arena = Arena(aggregate_above=0.8)
     competition, broadcast = arena.compete(10, a=0.3, b=0.4, c=0.2)
-    assert competition.contenders == {"a": 0.3, "b": 0.4, "c": 0.2}
+    assert _with_fate(competition, Fate.WON) == {"b": 0.4}
+    assert _with_fate(competition, Fate.WAITING) == {"a": 0.3, "c": 0.2}
     assert broadcast is not None
     assert broadcast.coalition.codelet == "b"
-    assert arena.compete(20)[0].contenders == {"a": 0.3, "c": 0.2}
+    assert arena.waiting(20) == {"a": 0.3, "c": 0.2}
 
 
 def test_of_equals_the_first_by_name_wins_whatever_the_order_they_came_in() -> None:
@@ -135,23 +144,34 @@ def test_of_equals_the_first_by_name_wins_whatever_the_order_they_came_in() -> N
 def test_coalitions_decay_by_a_tenth_a_tick_and_are_removed_at_zero() -> None:
     arena = Arena(decay=0.1, **LIDA)
     arena.compete(10, a=0.45, b=0.2)
-    assert arena.compete(11)[0].contenders == pytest.approx({"a": 0.35, "b": 0.1})
-    assert arena.compete(13)[0].contenders == pytest.approx({"a": 0.15})
-    assert arena.compete(15)[0].contenders == {}
+    assert arena.waiting(11) == pytest.approx({"a": 0.35, "b": 0.1})
+    competition, _ = arena.compete(13)
+    assert _with_fate(competition, Fate.WAITING) == pytest.approx({"a": 0.15})
+    assert _with_fate(competition, Fate.DECAYED) == {"b": 0.0}
+    assert arena.waiting(15) == {}
 
 
 def test_a_codelet_that_brings_its_coalition_again_renews_it() -> None:
     arena = Arena(decay=0.1, **LIDA)
     arena.compete(10, a=0.4)
-    assert arena.compete(13, a=0.4)[0].contenders == {"a": 0.4}
+    assert arena.waiting(13, a=0.4) == {"a": 0.4}
+
+
+def test_a_coalition_keeps_its_id_until_its_codelet_brings_a_newer_one() -> None:
+    arena = Arena()
+    (first,) = arena.compete(10, a=0.4)[0].contenders
+    (again,) = arena.compete(11)[0].contenders
+    displaced, newer = arena.compete(12, a=0.3)[0].contenders
+    assert first.id == again.id == displaced.id != newer.id
+    assert (displaced.fate, newer.fate) == (Fate.DISPLACED, Fate.WAITING)
 
 
 def test_every_cycle_has_its_competition_even_where_nothing_competes() -> None:
     competition, broadcast = Arena().compete(5)
     assert (competition.cycle, competition.contenders, competition.trigger, broadcast) == (
         2,
-        {},
-        "",
+        [],
+        Trigger.NONE,
         None,
     )
 

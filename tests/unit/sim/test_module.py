@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cogmap.bus.codec import encode
-from cogmap.errors import ConfigError
+from cogmap.errors import ConfigError, MessageError
 from cogmap.runtime.module import Module
 from schemas.base import Message
 from schemas.process import Clock
@@ -143,6 +143,53 @@ def test_an_older_command_that_comes_late_does_not_replace_a_newer_one() -> None
         _of(Odometry, _real_time(module, 10, 10**12 + 20 * TICK_NS, answer=False))[-1].speed_m_s
         > 1.0
     )
+
+
+def test_a_command_older_than_the_limit_is_refused_and_moves_no_wheel() -> None:
+    module = build(Config(command_timeout_s=100.0, **SMALL))
+    _start(module)
+    said = _real_time(module, 45, answer=False)
+    with pytest.raises(MessageError, match=r"it is 2\.1 s old, .* none older than 2 s"):
+        module.feed(_command(said[-1].stamp_ns - 42 * TICK_NS))
+    still = _real_time(module, 10, 10**12 + 45 * TICK_NS, answer=False)
+    assert abs(_of(Odometry, still)[-1].speed_m_s) < 0.05
+
+
+def test_the_wheels_stop_when_their_command_becomes_too_old() -> None:
+    module = build(Config(command_timeout_s=100.0, **SMALL))
+    _start(module)
+    moving = _real_time(module, 60)
+    last = _real_time(module, 80, 10**12 + 60 * TICK_NS, answer=False)
+    speeds = [abs(odometry.speed_m_s) for odometry in _of(Odometry, moving + last)]
+    assert np.mean(speeds[90:96]) > 2.0
+    assert np.mean(speeds[-10:]) < 0.05
+
+
+def _wait_for_command(module: Module, seconds: int) -> list[list[Message]]:
+    """What the timer of a simulation in lockstep publishes, second by second."""
+    timer = module.timers[0]
+    return [module.stamp(timer.handler(second * 10**9)) for second in range(seconds)]
+
+
+def test_in_lockstep_a_frame_that_nobody_answers_is_published_again() -> None:
+    module = build(Config(mode="lockstep", repeat_after_s=5.0, **SMALL))
+    first = _start(module)
+    said = _wait_for_command(module, 13)
+    assert [second for second, messages in enumerate(said) if messages] == [5, 10]
+    for kind in (Odometry, StereoFrame):
+        again = _of(kind, said[5])
+        assert [each.stamp_ns for each in again] == [each.stamp_ns for each in _of(kind, first)]
+    assert _of(StereoFrame, said[5])[0].left == _of(StereoFrame, first)[0].left
+
+
+def test_in_lockstep_a_frame_published_again_is_answered_only_once() -> None:
+    module = build(Config(mode="lockstep", repeat_after_s=5.0, **SMALL))
+    stamp_ns = _start(module)[-1].stamp_ns
+    _wait_for_command(module, 6)
+    said = module.feed(_command(stamp_ns))
+    assert _of(StereoFrame, said)[0].frame == 1
+    assert module.feed(_command(stamp_ns)) == []
+    assert module.stamp(module.timers[0].handler(7 * 10**9)) == []
 
 
 @pytest.mark.parametrize("wrong", [{"frame_hz": 6}, {"odometry_hz": 35, "frame_hz": 5}])

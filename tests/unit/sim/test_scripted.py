@@ -11,8 +11,9 @@ from schemas.sensing import MotorCommand, Percepts, Pose, SelfMotion, TruePose
 from services.sim.module import Config, build
 from services.sim.odometry import Noise
 from services.sim.scripted.percept_level import PerceptLevelSim
-from services.sim.scripted.percepts import Landmark, PerceptErrors, PerceptSense, PlaceSense
-from services.sim.scripted.trajectory import Line, Way
+from services.sim.scripted.percepts import Landmark, PerceptErrors, PerceptSim
+from services.sim.scripted.places import PlaceSim
+from services.sim.scripted.trajectory import Line, Trajectory
 
 SILENT = Noise(speed=0.0, turn=0.0, drift_rad_per_sqrt_m=0.0)
 EXACT = PerceptErrors(
@@ -26,27 +27,27 @@ def _landmarks(number: int) -> list[Landmark]:
     return [Landmark(name=f"house {k}", x_m=20.0 + k, y_m=0.0) for k in range(number)]
 
 
-def _led(
+def _simulation(
     line=SQUARE, noise: Noise = SILENT, errors: PerceptErrors = EXACT, seed: int = 1
 ) -> PerceptLevelSim:
     return PerceptLevelSim(
-        Way(line_m=line, landmarks=[HOUSE], speed_m_s=3.0), noise, errors, 1, seed
+        Trajectory(line_m=line, landmarks=[HOUSE], speed_m_s=3.0), noise, errors, 1, seed
     )
 
 
-def _ride(led: PerceptLevelSim) -> list[tuple[TruePose, SelfMotion, Percepts]]:
+def _ride(simulation: PerceptLevelSim) -> list[tuple[TruePose, SelfMotion, Percepts]]:
     ride = []
-    while led.progress < 1.0:
-        led.step()
-        truth = led.truth()
-        motion, _, percepts = led.view()
+    while simulation.progress < 1.0:
+        simulation.step()
+        truth = simulation.truth()
+        motion, _, percepts = simulation.view()
         ride.append((truth, motion, percepts))
     return ride
 
 
 def test_self_motion_without_noise_adds_up_to_the_true_way() -> None:
     x = y = heading = 0.0
-    for truth, motion, _ in _ride(_led()):
+    for truth, motion, _ in _ride(_simulation()):
         for speed, turn_rate, dt, *_ in motion.motions.numpy():
             x += speed * dt * math.cos(heading + turn_rate * dt / 2)
             y += speed * dt * math.sin(heading + turn_rate * dt / 2)
@@ -59,12 +60,17 @@ def test_self_motion_without_noise_adds_up_to_the_true_way() -> None:
 
 def test_the_rows_of_a_view_take_as_long_as_the_view() -> None:
     assert all(
-        motion.motions.numpy()[:, 2].sum() == pytest.approx(1.0) for _, motion, _ in _ride(_led())
+        motion.motions.numpy()[:, 2].sum() == pytest.approx(1.0)
+        for _, motion, _ in _ride(_simulation())
     )
 
 
 def test_a_landmark_is_seen_where_it_stands() -> None:
-    seen = [(truth.pose, each) for truth, _, percepts in _ride(_led()) for each in percepts.objects]
+    seen = [
+        (truth.pose, each)
+        for truth, _, percepts in _ride(_simulation())
+        for each in percepts.objects
+    ]
     assert seen
     for pose, percept in seen:
         bearing = pose.heading_rad + percept.bearing_rad
@@ -77,13 +83,17 @@ def test_a_landmark_is_seen_where_it_stands() -> None:
 
 def test_houses_hide_what_is_not_along_the_street() -> None:
     around = [(0.0, 0.0), (40.0, 0.0), (40.0, 40.0), (0.0, 40.0)]
-    seen_from = [truth.pose for truth, _, percepts in _ride(_led(around)) if percepts.objects]
+    seen_from = [
+        truth.pose for truth, _, percepts in _ride(_simulation(around)) if percepts.objects
+    ]
     assert seen_from
     assert all(pose.y_m < 1.0 for pose in seen_from)
 
 
 def test_the_same_seed_says_the_same() -> None:
-    rides = [_ride(_led(noise=Noise(), errors=PerceptErrors(), seed=seed)) for seed in (4, 4, 5)]
+    rides = [
+        _ride(_simulation(noise=Noise(), errors=PerceptErrors(), seed=seed)) for seed in (4, 4, 5)
+    ]
     said = [
         [(motion.motions.data, percepts.objects) for _, motion, percepts in ride] for ride in rides
     ]
@@ -93,8 +103,8 @@ def test_the_same_seed_says_the_same() -> None:
 def test_misses_confusions_and_noise_come_as_often_as_they_were_measured() -> None:
     landmarks = _landmarks(8)
     errors = PerceptErrors(named_phantoms=0.0)
-    sense = PerceptSense(errors, landmarks, seed=2)
-    views = [sense.see(Pose(x_m=0.0, y_m=0.0, heading_rad=0.0), [3]) for _ in range(4000)]
+    sense = PerceptSim(errors, landmarks, seed=2)
+    views = [sense.perceive(Pose(x_m=0.0, y_m=0.0, heading_rad=0.0), [3]) for _ in range(4000)]
     said = [view[0] for view in views if view]
     assert len(said) / len(views) == pytest.approx(errors.detected, abs=0.02)
     assert sum(each.label == "house 3" for each in said) / len(said) == pytest.approx(
@@ -105,10 +115,11 @@ def test_misses_confusions_and_noise_come_as_often_as_they_were_measured() -> No
 
 
 def test_a_name_is_said_once_a_view() -> None:
-    sense = PerceptSense(PerceptErrors(right_name=0.2, detected=1.0), _landmarks(3), seed=3)
+    sense = PerceptSim(PerceptErrors(right_name=0.2, detected=1.0), _landmarks(3), seed=3)
     for _ in range(50):
         labels = [
-            each.label for each in sense.see(Pose(x_m=0.0, y_m=0.0, heading_rad=0.0), [0, 1, 2])
+            each.label
+            for each in sense.perceive(Pose(x_m=0.0, y_m=0.0, heading_rad=0.0), [0, 1, 2])
         ]
         assert len(labels) == len(set(labels))
 
@@ -118,16 +129,16 @@ def test_a_place_is_known_again_coming_the_same_way_but_not_the_other() -> None:
     line = Line(np.array([(0.0, 0.0), (200.0, 0.0)]))
     there = [line.at(5.0 * k) for k in range(40)]
     back = [Pose(x_m=pose.x_m, y_m=0.0, heading_rad=math.pi) for pose in reversed(there)]
-    sense = PlaceSense(sure, seed=1)
-    said = [sense.see(k, 1000 * k, pose) for k, pose in enumerate([*there, *back, *there])]
+    sense = PlaceSim(sure, seed=1)
+    said = [sense.recognize(k, 1000 * k, pose) for k, pose in enumerate([*there, *back, *there])]
     assert not any(said[:80])
     matched = [(k - 80, match[0].frame, match[0].view_ns) for k, match in enumerate(said) if match]
     assert matched == [(k, k, 1000 * k) for k in range(3, 40)]
 
 
 def test_the_module_goes_on_with_each_command_until_its_way_ends() -> None:
-    way = Way(line_m=[(0.0, 0.0), (9.0, 0.0)], landmarks=[HOUSE], speed_m_s=3.0)
-    module = build(Config(mode="lockstep", frame_hz=1, odometry_hz=1, way=way))
+    trajectory = Trajectory(line_m=[(0.0, 0.0), (9.0, 0.0)], landmarks=[HOUSE], speed_m_s=3.0)
+    module = build(Config(mode="lockstep", frame_hz=1, odometry_hz=1, trajectory=trajectory))
     assert module.start is not None
     said = module.stamp(module.start())
     frames = 0
@@ -142,6 +153,6 @@ def test_the_module_goes_on_with_each_command_until_its_way_ends() -> None:
 
 
 def test_a_led_robot_in_real_time_is_refused() -> None:
-    way = Way(line_m=[(0.0, 0.0), (9.0, 0.0)], landmarks=[])
+    trajectory = Trajectory(line_m=[(0.0, 0.0), (9.0, 0.0)], landmarks=[])
     with pytest.raises(ConfigError, match="lockstep"):
-        build(Config(mode="real_time", way=way))
+        build(Config(mode="real_time", trajectory=trajectory))

@@ -25,7 +25,7 @@ from services.sim.module import Config, build
 from services.sim.odometry import Noise
 from services.sim.rendering.camera import StereoCamera, calibration
 from services.sim.scripted.percepts import Landmark
-from services.sim.scripted.trajectory import Way
+from services.sim.scripted.trajectory import Trajectory
 from services.sim.world import World
 from training.rendering import towns
 
@@ -35,13 +35,13 @@ CINEMA = Landmark(name="cinema", x_m=50.0, y_m=-14.0)
 BENT = [(0.0, 0.0), (9.0, 0.0), (9.0, 6.0), (3.0, 12.0)]
 
 
-def _way(line=BENT, landmarks=(BAKERY, CINEMA)) -> Way:
-    return Way(line_m=line, landmarks=list(landmarks), speed_m_s=3.0, sensing="cameras")
+def _way(line=BENT, landmarks=(BAKERY, CINEMA)) -> Trajectory:
+    return Trajectory(line_m=line, landmarks=list(landmarks), speed_m_s=3.0, sensing="cameras")
 
 
-def _led(way: Way, **settings) -> Module:
+def _led(way: Trajectory, **settings) -> Module:
     return build(
-        Config(mode="lockstep", way=way, frame_hz=1, odometry_hz=2, noise=SILENT, **settings)
+        Config(mode="lockstep", trajectory=way, frame_hz=1, odometry_hz=2, noise=SILENT, **settings)
     )
 
 
@@ -147,7 +147,7 @@ def test_kilometres_away_there_is_ground_underfoot_sky_above_and_the_building(
     far_world: World,
 ) -> None:
     heading_rad = math.atan2(1000.0, 3000.0)
-    far_world.lead(Pose(x_m=2970.0, y_m=990.0, heading_rad=heading_rad))
+    far_world.place_robot(Pose(x_m=2970.0, y_m=990.0, heading_rad=heading_rad))
     exposure, _ = StereoCamera(far_world, calibration()).survey()
     surface = towns.surfaces(far_world, exposure)
     names = {towns.SURFACES[number] for number in np.unique(surface)}

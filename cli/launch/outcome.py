@@ -1,0 +1,42 @@
+"""How a drive ends."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+
+class Outcome(enum.Enum):
+    """How a drive ended. The value is what `summary.json` holds as `ended_by`.
+
+    MODULE_FAILED: a process cannot run, as it dies again and again, or the disk takes no more.
+    STALLED: nothing happens any more. STUCK: time passes, and the robot stays where it is.
+    TOO_SLOW: the same, as the machine is too slow for the robot to move safely.
+    """
+
+    ROUTE_COMPLETE = "route complete"
+    INTERRUPTED = "interrupted"
+    TIME_LIMIT = "time limit"
+    MODULE_FAILED = "module failed"
+    STALLED = "stalled"
+    STUCK = "stuck"
+    TOO_SLOW = "too slow"
+
+    @property
+    def exit_code(self) -> int:
+        """What `cogmap run` exits with."""
+        match self:
+            case Outcome.ROUTE_COMPLETE:
+                return 0
+            case Outcome.INTERRUPTED:
+                return 130
+            case _:
+                return 1
+
+
+@dataclass(frozen=True)
+class Ending:
+    """An outcome, and a sentence that names the cause and the remedy where there is one."""
+
+    outcome: Outcome
+    reason: str

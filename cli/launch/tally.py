@@ -1,0 +1,109 @@
+"""Counts what a run's messages amount to: its path, the graph, cycle times, the health of its
+processes. Pure.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+
+from cli.launch.observer import Observer
+from cogmap.bus.codec import Envelope
+from cogmap.graph.replica import Replica
+from schemas import topics
+from schemas.base import Message
+from schemas.cognition import Broadcast
+from schemas.graph import Delta
+from schemas.process import Health
+from schemas.sensing import MotorCommand
+from schemas.topics import Delivery
+
+MAX_REASONS = 8
+FOLLOWED = (
+    topics.TRUE_TOWN,
+    topics.TRUE_POSE,
+    topics.ODOMETRY,
+    topics.SELF_MOTION,
+    topics.DELTA,
+    topics.MOTOR_COMMAND,
+    topics.BROADCAST,
+    topics.HEALTH,
+)
+
+
+class Tally:
+    """What the messages on FOLLOWED show of a run, live or from its log; `replica` follows its
+    graph.
+
+    `cycle_ms`: of each command, the time from the stamping of its camera frame until it was
+    received; `bus_ms`: the part of it spent in anything but computing. `refused`: why the last few
+    answers of codelets were dropped. `halted`: how many commands stopped the robot, by reason;
+    `halted_by` is that of the newest command.
+    """
+
+    def __init__(self, replica: Replica) -> None:
+        self.observer = Observer()
+        self.replica = replica
+        self.cycle_ms: list[float] = []
+        self.bus_ms: list[float] = []
+        self.broadcasts = 0
+        self.dropped = 0
+        self.refused: deque[str] = deque(maxlen=MAX_REASONS)
+        self.halted: Counter[str] = Counter()
+        self.halted_by = ""
+        self.health: dict[str, Health] = {}
+        self._busy: dict[str, list[float]] = {}
+
+    def update(self, message: Message, envelope: Envelope, received_ns: int) -> None:
+        """Take account of one message. Raises MessageError where it is not what its topic
+        carries.
+        """
+        self.observer.update(message)
+        match message:
+            case Delta():
+                self._on_delta(message)
+            case Health():
+                self._on_health(message)
+            case Broadcast():
+                self.broadcasts += 1
+            case MotorCommand():
+                self._on_command(message, envelope, received_ns)
+
+    def _on_delta(self, delta: Delta) -> None:
+        self.dropped += delta.dropped
+        self.refused.extend(delta.refused)
+        self.replica.follow(delta)
+
+    def _on_health(self, health: Health) -> None:
+        self.health[health.instance] = health
+        self._busy.setdefault(health.instance, []).append(health.busy)
+
+    def _on_command(self, command: MotorCommand, envelope: Envelope, received_ns: int) -> None:
+        cycle_ns = received_ns - envelope.born_ns
+        compute_ns = sum(compute for _, compute, _ in envelope.stages)
+        self.cycle_ms.append(cycle_ns / 1e6)
+        self.bus_ms.append((cycle_ns - compute_ns) / 1e6)
+
+        self.halted_by = command.halted_by
+        if command.halted_by:
+            self.halted[command.halted_by] += 1
+
+    @property
+    def busy(self) -> dict[str, float]:
+        """The mean share of its time that each instance was computing."""
+        shares = sorted(self._busy.items())
+        return {instance: sum(each) / len(each) for instance, each in shares}
+
+    def gaps(self, own: Counter[str]) -> dict[str, int]:
+        """Messages lost for good on each NEVER_DROP topic, by the count of whoever lost most: the
+        modules, or this process with its `own` count.
+        """
+        counts = [own, *(health.gaps for health in self.health.values())]
+        names = [topic.name for topic in topics.ALL if topic.delivery is Delivery.NEVER_DROP]
+        return {name: max(count.get(name, 0) for count in counts) for name in names}
+
+    def rejected(self, own: Counter[str]) -> dict[str, int]:
+        """Messages that were rejected, by topic, summed over the modules and `own`."""
+        total = own.copy()
+        for health in self.health.values():
+            total.update(health.rejected)
+        return dict(sorted(total.items()))

@@ -1,0 +1,87 @@
+"""A path in the plane: positions by the time they were sensed at."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cogmap.geometry.arrays import Booleans, Floats, Indices
+from cogmap.geometry.polylines import interpolate
+
+
+class Track:
+    """Positions in the order of their stamps."""
+
+    def __init__(self) -> None:
+        self._stamps_ns: list[int] = []
+        self._points_m: list[tuple[float, float]] = []
+
+    def add(self, stamp_ns: int, x_m: float, y_m: float) -> None:
+        """Append a position. It replaces one of the same stamp; one that is out of order is
+        ignored.
+        """
+        if self._stamps_ns and stamp_ns < self._stamps_ns[-1]:
+            return
+        if self._stamps_ns and stamp_ns == self._stamps_ns[-1]:
+            self._points_m[-1] = (x_m, y_m)
+            return
+        self._stamps_ns.append(stamp_ns)
+        self._points_m.append((x_m, y_m))
+
+    def __len__(self) -> int:
+        return len(self._stamps_ns)
+
+    @property
+    def stamps_ns(self) -> Indices:
+        """(n,), increasing."""
+        return np.array(self._stamps_ns, np.int64)
+
+    @property
+    def points_m(self) -> Floats:
+        """(n, 2)."""
+        return np.array(self._points_m, np.float64).reshape(-1, 2)
+
+    def covers(self, stamps_ns: Indices) -> Booleans:
+        """Which of the stamps lie between the first and the last position, any shape."""
+        if not self._stamps_ns:
+            return np.zeros(stamps_ns.shape, bool)
+        after_first: Booleans = stamps_ns >= self._stamps_ns[0]
+        before_last: Booleans = stamps_ns <= self._stamps_ns[-1]
+        return after_first & before_last
+
+    def at(self, stamps_ns: Indices) -> Floats:
+        """Positions (k, 2) at (k,) stamps that it covers, interpolated."""
+        first_ns = self._stamps_ns[0]
+        known_s = (self.stamps_ns - first_ns) / 1e9
+        wanted_s = (stamps_ns - first_ns) / 1e9
+        return interpolate(known_s, self.points_m, wanted_s)
+
+
+class PathIntegrator:
+    """Path integration alone: measured speeds add up to a path from the origin, heading along x."""
+
+    def __init__(self) -> None:
+        self.track = Track()
+        self._x_m = 0.0
+        self._y_m = 0.0
+        self._heading_rad = 0.0
+
+    def start(self, stamp_ns: int) -> None:
+        """Begin the path at the origin, unless it has begun."""
+        if not len(self.track):
+            self.track.add(stamp_ns, self._x_m, self._y_m)
+
+    def move(self, speed_m_s: float, turn_rate_rad_s: float, dt_s: float) -> None:
+        """Integrate one step by its midpoint: it heads where the robot did half-way through it."""
+        turn_rad = turn_rate_rad_s * dt_s
+        midpoint_rad = self._heading_rad + turn_rad / 2
+        distance_m = speed_m_s * dt_s
+
+        self._x_m += distance_m * math.cos(midpoint_rad)
+        self._y_m += distance_m * math.sin(midpoint_rad)
+        self._heading_rad += turn_rad
+
+    def mark(self, stamp_ns: int) -> None:
+        """Append the position that the steps so far have led to."""
+        self.track.add(stamp_ns, self._x_m, self._y_m)

@@ -1,0 +1,90 @@
+"""Detects that a drive cannot succeed: nothing happens, or the robot stays where it is. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from cli.launch.outcome import Ending, Outcome
+
+STALLED_S = 30.0
+STUCK_S = 20.0
+MIN_MOVE_M = 0.5
+POSE_AGE = "pose age"
+
+
+@dataclass(frozen=True)
+class Situation:
+    """A drive at `now_s` of the monotonic clock: `drive_s` of its own time have passed.
+
+    `missing` are the modules that are not ready, `halted_by` is the reason of the newest of so many
+    `commands`, empty where it moves the wheels.
+    """
+
+    now_s: float
+    drive_s: float
+    travelled_m: float
+    commands: int
+    halted_by: str = ""
+    missing: Sequence[str] = ()
+
+
+class Watchdog:
+    """Compares each situation of a drive with the last in which something had happened."""
+
+    def __init__(self) -> None:
+        self._ticked: Situation | None = None
+        self._moved: Situation | None = None
+
+    def check(self, situation: Situation) -> Ending | None:
+        """How the drive must end, if it must.
+
+        It is stalled after STALLED_S in which its time stood still, and stuck after STUCK_S of its
+        own time in which the robot moved less than MIN_MOVE_M.
+        """
+        ticked = self._ticked
+        moved = self._moved
+        if ticked is None or moved is None:
+            self._ticked = situation
+            self._moved = situation
+            return None
+
+        if situation.drive_s > ticked.drive_s:
+            self._ticked = situation
+        elif situation.now_s - ticked.now_s >= STALLED_S:
+            return Ending(Outcome.STALLED, _stalled(situation))
+
+        if situation.travelled_m - moved.travelled_m >= MIN_MOVE_M:
+            self._moved = situation
+        elif situation.drive_s - moved.drive_s >= STUCK_S:
+            return _stuck(situation, situation.commands - moved.commands)
+
+        return None
+
+
+def _stalled(situation: Situation) -> str:
+    if situation.missing:
+        names = ", ".join(situation.missing)
+        return f"nothing happened for {STALLED_S:.0f} s: {names} is not ready, see its log"
+    return (
+        f"nothing happened for {STALLED_S:.0f} s, though every module is ready: "
+        "`cogmap doctor` names the one that does not answer"
+    )
+
+
+def _stuck(situation: Situation, commands: int) -> Ending:
+    still = f"the robot has not moved for {STUCK_S:.0f} s"
+    if situation.missing:
+        names = ", ".join(situation.missing)
+        return Ending(Outcome.STALLED, f"{still}: {names} is not ready, see its log")
+    if not commands:
+        return Ending(Outcome.STALLED, f"{still}: no motor command arrived, see action's log")
+    if situation.halted_by == POSE_AGE:
+        return Ending(
+            Outcome.TOO_SLOW,
+            f"{still}: its pose is too old to move safely, as this machine is too slow; "
+            "end other programs, or use --lockstep, which waits for every answer",
+        )
+    if situation.halted_by:
+        return Ending(Outcome.STUCK, f"{still}, halted by {situation.halted_by}: see map.png")
+    return Ending(Outcome.STUCK, f"{still}, though its wheels turn: see map.png")

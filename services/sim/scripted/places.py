@@ -1,0 +1,66 @@
+"""Place recognition without images, with the errors that it was measured to make. Pure."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from schemas.sensing import PlaceMatch, Pose
+from services.sim.scripted.percepts import PerceptErrors
+
+MAX_APART_M = 3.0
+MAX_TURN_RAD = 0.35
+SEQUENCE_FRAMES = 4
+RECENT_FRAMES = 20
+
+
+class PlaceSim:
+    """Recognizes places that the robot passes in the same direction a second time, by the views
+    that lead up to them.
+    """
+
+    def __init__(self, errors: PerceptErrors, seed: int) -> None:
+        self._errors = errors
+        self._rng = np.random.default_rng([seed, 0x9F])
+        self._views: list[tuple[int, int]] = []
+        self._poses: list[tuple[float, float, float]] = []
+        self._similar_frames = 0
+
+    def recognize(self, frame: int, stamp_ns: int, pose: Pose) -> list[PlaceMatch]:
+        """The remembered view that this one matches, if any; one near none is remembered."""
+        similar = self._similar(frame, pose)
+        if similar is None:
+            self._similar_frames = 0
+            self._views.append((frame, stamp_ns))
+            self._poses.append((pose.x_m, pose.y_m, pose.heading_rad))
+            return []
+
+        self._similar_frames += 1
+        if self._similar_frames < SEQUENCE_FRAMES:
+            return []
+        if self._rng.random() >= self._errors.place_recall:
+            return []
+        return [self._match(similar)]
+
+    def _match(self, similar: int) -> PlaceMatch:
+        """The right view or, by mistake, any other."""
+        precision = self._errors.place_precision
+        is_right = self._rng.random() < precision
+        number = similar if is_right else int(self._rng.integers(len(self._views)))
+        frame, view_ns = self._views[number]
+        return PlaceMatch(frame=frame, view_ns=view_ns, score=precision)
+
+    def _similar(self, frame: int, pose: Pose) -> int | None:
+        """The nearest remembered view of about the same place and heading that is not recent."""
+        if not self._views:
+            return None
+
+        poses = np.array(self._poses)
+        apart_m = np.hypot(poses[:, 0] - pose.x_m, poses[:, 1] - pose.y_m)
+        difference_rad = poses[:, 2] - pose.heading_rad
+        turn_rad = np.abs(np.remainder(difference_rad + np.pi, 2 * np.pi) - np.pi)
+        frames = np.array([number for number, _ in self._views])
+
+        is_excluded = (turn_rad > MAX_TURN_RAD) | (frames > frame - RECENT_FRAMES)
+        apart_m[is_excluded] = np.inf
+        nearest = int(apart_m.argmin())
+        return nearest if apart_m[nearest] <= MAX_APART_M else None

@@ -1,0 +1,75 @@
+"""A drive that cannot succeed is ended, and the reason is named."""
+
+from __future__ import annotations
+
+import pytest
+
+from cli.launch.outcome import Ending, Outcome
+from cli.launch.watchdog import MIN_MOVE_M, STALLED_S, STUCK_S, Situation, Watchdog
+
+
+def after(wall_s: float, drive_s: float, moved_m: float = 0.0, **more: object) -> Ending | None:
+    """What the watchdog finds when so much has changed since the first look at a drive."""
+    watchdog = Watchdog()
+    first = Situation(now_s=100.0, drive_s=10.0, travelled_m=5.0, commands=50)
+    facts = {"commands": 60, **more}
+    later = Situation(
+        now_s=100.0 + wall_s, drive_s=10.0 + drive_s, travelled_m=5.0 + moved_m, **facts
+    )
+    assert watchdog.check(first) is None
+    return watchdog.check(later)
+
+
+def test_a_robot_that_moves_is_left_alone() -> None:
+    assert after(STUCK_S, STUCK_S, moved_m=MIN_MOVE_M) is None
+
+
+def test_a_robot_that_stands_for_a_while_is_left_alone() -> None:
+    assert after(STUCK_S - 0.1, STUCK_S - 0.1, halted_by="obstacle") is None
+
+
+@pytest.mark.parametrize(
+    ("facts", "outcome", "words"),
+    [
+        ({"halted_by": "obstacle"}, Outcome.STUCK, "halted by obstacle"),
+        ({}, Outcome.STUCK, "though its wheels turn"),
+        ({"halted_by": "pose age"}, Outcome.TOO_SLOW, "this machine is too slow"),
+        ({"missing": ["epam"]}, Outcome.STALLED, "epam is not ready"),
+        ({"commands": 50}, Outcome.STALLED, "no motor command arrived"),
+    ],
+)
+def test_a_robot_that_stays_where_it_is_ends_the_drive_with_the_reason(
+    facts: dict[str, object], outcome: Outcome, words: str
+) -> None:
+    ending = after(STUCK_S, STUCK_S, **facts)
+    assert ending is not None
+    assert ending.outcome is outcome
+    assert words in ending.reason
+
+
+def test_time_that_stands_still_ends_the_drive_with_who_is_missing() -> None:
+    ending = after(STALLED_S, 0.0, missing=["epam", "workspace"])
+    assert ending is not None
+    assert ending.outcome is Outcome.STALLED
+    assert "epam, workspace is not ready" in ending.reason
+
+
+def test_lockstep_that_is_slow_is_not_stalled() -> None:
+    assert after(10 * STALLED_S, 0.2) is None
+
+
+def test_each_move_begins_the_wait_anew() -> None:
+    watchdog = Watchdog()
+    for step in range(10):
+        seconds = step * (STUCK_S - 1.0)
+        situation = Situation(
+            now_s=seconds, drive_s=seconds, travelled_m=step * MIN_MOVE_M, commands=step
+        )
+        assert watchdog.check(situation) is None
+
+
+def test_only_a_completed_route_exits_with_0() -> None:
+    codes = {outcome: outcome.exit_code for outcome in Outcome}
+    assert codes.pop(Outcome.ROUTE_COMPLETE) == 0
+    assert codes.pop(Outcome.INTERRUPTED) == 130
+    assert set(codes.values()) == {1}
