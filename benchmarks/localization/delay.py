@@ -1,4 +1,4 @@
-"""How long after a command the wheels turn: found by the robot's own senses, while it drives."""
+"""How long after a command the wheels turn, estimated from the robot's own senses as it drives."""
 
 from __future__ import annotations
 
@@ -9,35 +9,36 @@ import numpy as np
 from cogmap.geometry.arrays import Floats
 
 LAGS_S = np.arange(0.0, 0.525, 0.025)
-TOGETHER_S = 0.6
-ENOUGH = 30
+MAX_GAP_S = 0.6
+MIN_PAIRS = 30
 
 
 class Delay:
-    """Compares how a landmark's bearing changes with how the wheels were told to turn, at each of
-    `LAGS_S`.
+    """Compares how a landmark's bearing changes with how the wheels were told to turn.
 
-    The lag at which the two agree best, so far.
+    Of LAGS_S, `lag_s` is the one at which the two agree best so far.
     """
 
     def __init__(self) -> None:
         self._last: dict[int, tuple[float, float]] = {}
-        self._off = np.zeros(len(LAGS_S))
+        self._errors_rad = np.zeros(len(LAGS_S))
         self._pairs = 0
 
     @property
     def lag_s(self) -> float:
-        """None, until there is enough to tell by."""
-        return float(LAGS_S[self._off.argmin()]) if self._pairs >= ENOUGH else 0.0
+        """0 until there are MIN_PAIRS of observations."""
+        return float(LAGS_S[self._errors_rad.argmin()]) if self._pairs >= MIN_PAIRS else 0.0
 
-    def see(self, sightings: Floats, heading_rad: Callable[[Floats], Floats]) -> None:
-        """Take in (n, 4) rows of stamp, subject, range and bearing, of now."""
-        for stamp, subject, _, bearing in sightings.tolist():
+    def observe(self, rows: Floats, heading_rad: Callable[[Floats], Floats]) -> None:
+        """Take in (n, 4) rows of stamp, subject, range and bearing; `heading_rad` is the wheels'."""
+        for stamp_s, subject, _, bearing_rad in rows.tolist():
             before = self._last.get(subject)
-            if before is not None and 0 < stamp - before[0] < TOGETHER_S:
-                turned = heading_rad(stamp - LAGS_S) - heading_rad(before[0] - LAGS_S)
-                self._off += np.abs(
-                    np.remainder(bearing - before[1] + turned + np.pi, 2 * np.pi) - np.pi
-                )
-                self._pairs += 1
-            self._last[subject] = (stamp, bearing)
+            self._last[subject] = (stamp_s, bearing_rad)
+
+            if before is None or not 0 < stamp_s - before[0] < MAX_GAP_S:
+                continue
+
+            turned_rad = heading_rad(stamp_s - LAGS_S) - heading_rad(before[0] - LAGS_S)
+            error_rad = bearing_rad - before[1] + turned_rad
+            self._errors_rad += np.abs(np.remainder(error_rad + np.pi, 2 * np.pi) - np.pi)
+            self._pairs += 1

@@ -1,6 +1,4 @@
-"""An MRCLAM robot's log as percepts and self-motion: what EPAM and sensory memory are to the town's
-agent.
-"""
+"""An MRCLAM robot's log as percepts and self-motion, as sensory memory and EPAM publish the town's."""
 
 from __future__ import annotations
 
@@ -16,15 +14,18 @@ from schemas.sensing import Percept
 from services.sensory.module import Config as SensoryConfig
 
 TICK_S = 0.2
+STAMP_DECIMALS = 6
 RANGE_NOISE = 0.03
-BEARING_SD_RAD = np.deg2rad(1.0)
-WHEELS = SensoryConfig()
+BEARING_SD_RAD = float(np.deg2rad(1.0))
+MIN_COSINE = 0.1
+NOISE = SensoryConfig()
 
 
 @dataclass(frozen=True)
 class Moment:
-    """What came in up to `stamp_s`: rows of self-motion as in SelfMotion, and percepts; `tick`
-    comes at even times.
+    """What was sensed up to `stamp_s`: (n, 5) rows of self-motion as in SelfMotion, and percepts.
+
+    `tick` is True at even times, False where it is one only because something was seen.
     """
 
     stamp_s: float
@@ -38,22 +39,14 @@ def label_of(subject: int) -> str:
     return f"landmark-{subject}"
 
 
-def percept_of(row: Floats) -> Percept:
-    """A sighting (stamp, subject, range, bearing) as a percept: noise 3 % of the distance, as the
-    paper's, and 1°.
-
-    What a set calls range is how high an upright barcode looks, which is its depth along the
-    camera's axis.
-    """
-    depth_m = float(row[2])
-    bearing_rad = float(row[3])
-    range_m = depth_m / max(np.cos(bearing_rad), 0.1)
+def seen(label: str, bearing_rad: float, range_m: float) -> Percept:
+    """A percept with the benchmark's noise: 3 % of the distance, as the paper's, and 1°."""
     return Percept(
-        label=label_of(int(row[1])),
+        label=label,
         activation=1.0,
         bearing_rad=bearing_rad,
         range_m=range_m,
-        bearing_sd_rad=float(BEARING_SD_RAD),
+        bearing_sd_rad=BEARING_SD_RAD,
         range_sd_m=RANGE_NOISE * range_m,
         width_m=0.0,
         height_m=0.0,
@@ -62,9 +55,20 @@ def percept_of(row: Floats) -> Percept:
     )
 
 
+def percept_of(row: Floats) -> Percept:
+    """An observation (stamp, subject, range, bearing) as a percept.
+
+    What a set calls range is how high an upright barcode looks, which is its depth along the
+    camera's axis.
+    """
+    depth_m = float(row[2])
+    bearing_rad = float(row[3])
+    range_m = depth_m / max(float(np.cos(bearing_rad)), MIN_COSINE)
+    return seen(label_of(int(row[1])), bearing_rad, range_m)
+
+
 class Wheels:
-    """The odometry's commands as self-motion, with the noise that the town's sensory memory gives
-    its own wheels.
+    """The odometry's commands as self-motion, with the noise that sensory memory gives the town's.
 
     The paper's noise multiplies the speeds of a movement: here of a second's, so that the rate of
     the log does not matter.
@@ -73,8 +77,8 @@ class Wheels:
     def __init__(self, odometry: Floats) -> None:
         self._stamps = odometry[:, 0]
         self._speeds = odometry[:, 1:3]
-        turned = np.concatenate([[0.0], np.cumsum(odometry[:-1, 2] * np.diff(self._stamps))])
-        self._turned = turned
+        turns = odometry[:-1, 2] * np.diff(self._stamps)
+        self._turned = np.concatenate([[0.0], np.cumsum(turns)])
 
     def heading_rad(self, stamps_s: Floats) -> Floats:
         """What the turns add up to at each of `stamps_s`."""
@@ -83,56 +87,78 @@ class Wheels:
 
     def rows(self, since_s: float, until_s: float) -> Floats:
         """(n, 5) rows of self-motion, one for each time that the command changed in between."""
+        begin_s = max(since_s, float(self._stamps[0]))
+        if until_s <= begin_s:
+            return np.empty((0, 5))
+
+        speeds, lasts_s = self._commands(since_s, begin_s, until_s)
+        speed, turn_rate = speeds.T
+        speed_sd = NOISE.speed_noise * np.abs(speed) / np.sqrt(lasts_s)
+        drift_variance = NOISE.drift_rad_per_sqrt_m**2 * np.abs(speed)
+        turn_variance = (NOISE.turn_noise * turn_rate) ** 2 + drift_variance
+        turn_sd = np.sqrt(turn_variance / lasts_s)
+        return np.column_stack([speed, turn_rate, lasts_s, speed_sd, turn_sd])
+
+    def _commands(self, since_s: float, begin_s: float, until_s: float) -> tuple[Floats, Floats]:
+        """The speeds (n, 2) commanded in between, equal ones in a row as one, and how long each
+        lasts.
+        """
         first = max(0, int(np.searchsorted(self._stamps, since_s, "right")) - 1)
         last = int(np.searchsorted(self._stamps, until_s, "left"))
-        if until_s <= max(since_s, self._stamps[0]):
-            return np.empty((0, 5))
         speeds = self._speeds[first:last]
-        edges = np.concatenate(
-            [[max(since_s, self._stamps[0])], self._stamps[first + 1 : last], [until_s]]
-        )
-        begins = np.flatnonzero(np.append(True, (speeds[1:] != speeds[:-1]).any(axis=1)))
-        lasts_s = np.diff(np.append(edges[begins], until_s))
-        begins = begins[lasts_s > 0]
-        lasts_s = lasts_s[lasts_s > 0]
-        speed, turn_rate = speeds[begins].T
-        speed_sd = WHEELS.speed_noise * np.abs(speed) / np.sqrt(lasts_s)
-        drift_var = WHEELS.drift_rad_per_sqrt_m**2 * np.abs(speed)
-        turn_sd = np.sqrt(((WHEELS.turn_noise * turn_rate) ** 2 + drift_var) / lasts_s)
-        return np.column_stack([speed, turn_rate, lasts_s, speed_sd, turn_sd])
+        edges_s = np.concatenate([[begin_s], self._stamps[first + 1 : last], [until_s]])
+
+        changes = (speeds[1:] != speeds[:-1]).any(axis=1)
+        begins = np.flatnonzero(np.append(True, changes))
+        lasts_s = np.diff(np.append(edges_s[begins], until_s))
+        some = lasts_s > 0
+        return speeds[begins[some]], lasts_s[some]
 
 
 def moments(robot: Robot, skipped_s: tuple[float, float] | None = None) -> Iterator[Moment]:
-    """A robot's log in order of time, sightings of other robots left out.
+    """A robot's log in order of time, observations of other robots left out.
 
-    Between `skipped_s`, seconds after its start, nothing reaches it: it is carried away.
+    Between `skipped_s`, seconds after its start, nothing reaches it: it is kidnapped.
     """
     begin_s = float(robot.odometry[0, 0])
     end_s = float(robot.odometry[-1, 0])
-    seen = robot.landmark_observations
-    seen = seen[(seen[:, 0] > begin_s) & (seen[:, 0] <= end_s)]
-    ticks = np.arange(begin_s + TICK_S, end_s, TICK_S)
-    stamps = np.union1d(ticks, seen[:, 0])
+    observed = robot.landmark_observations
+    observed = observed[(observed[:, 0] > begin_s) & (observed[:, 0] <= end_s)]
+    observed[:, 0] = observed[:, 0].round(STAMP_DECIMALS)
+    ticks = np.arange(begin_s + TICK_S, end_s, TICK_S).round(STAMP_DECIMALS)
+    stamps = np.union1d(ticks, observed[:, 0])
     is_tick = np.isin(stamps, ticks)
     wheels = Wheels(robot.odometry)
     delay = Delay()
     moved_until_s = begin_s
-    for stamp, tick in zip(stamps.tolist(), is_tick.tolist(), strict=True):
-        here = seen[
-            np.searchsorted(seen[:, 0], stamp, "left") : np.searchsorted(seen[:, 0], stamp, "right")
-        ]
-        delay.see(here, wheels.heading_rad)
-        sensed_s = max(moved_until_s, stamp - delay.lag_s)
-        if skipped_s is not None and skipped_s[0] <= stamp - begin_s < skipped_s[1]:
-            moved_until_s = sensed_s
-            continue
-        yield Moment(stamp, wheels.rows(moved_until_s, sensed_s), _percepts(here), tick)
+
+    for stamp_s, tick in zip(stamps.tolist(), is_tick.tolist(), strict=True):
+        here = _at(observed, stamp_s)
+        delay.observe(here, wheels.heading_rad)
+        sensed_s = max(moved_until_s, stamp_s - delay.lag_s)
+
+        if not _is_within(stamp_s - begin_s, skipped_s):
+            yield Moment(stamp_s, wheels.rows(moved_until_s, sensed_s), _percepts(here), tick)
+
         moved_until_s = sensed_s
+
+
+def _at(observed: Floats, stamp_s: float) -> Floats:
+    """The rows of that stamp; they are in order of time."""
+    first = np.searchsorted(observed[:, 0], stamp_s, "left")
+    last = np.searchsorted(observed[:, 0], stamp_s, "right")
+    return observed[first:last]
+
+
+def _is_within(time_s: float, limits_s: tuple[float, float] | None) -> bool:
+    return limits_s is not None and limits_s[0] <= time_s < limits_s[1]
 
 
 def _percepts(rows: Floats) -> list[Percept]:
     """One percept for each landmark: of two barcodes read at once under one name, the first."""
     found: dict[int, Percept] = {}
+
     for row in rows:
         found.setdefault(int(row[1]), percept_of(row))
+
     return list(found.values())

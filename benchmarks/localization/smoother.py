@@ -1,96 +1,108 @@
-"""What mapping is held against: a batch smoother of gtsam's, which sees the whole log at once."""
+"""What mapping is compared with: a batch smoother of gtsam's, which gets the whole log at once."""
 
 from __future__ import annotations
 
-import importlib
-from typing import Any
-
 import numpy as np
 
+from benchmarks import optional
 from benchmarks.localization.senses import Moment
-from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Floats
-
-gtsam: Any
-try:
-    gtsam = importlib.import_module("gtsam")
-except ImportError:
-    gtsam = None
+from schemas.sensing import Percept
 
 STEPS = 100
-LEAST_SD = 1e-4
+MIN_SD = 1e-4
 SIDEWAYS_SHARE = 0.2
 CAUCHY = 2.0
 
 
-def check_installed() -> None:
-    """Raise UsageError where gtsam is not installed."""
-    if gtsam is None:
-        raise UsageError(
-            "gtsam is not installed, and this benchmark measures against it: run make bench-setup"
-        )
-
-
 def smooth(moments: list[Moment]) -> Floats:
-    """(n, 3) poses at the moments that fit all percepts and motions best, landmarks unknown, the
-    start at 0.
+    """(n, 3) poses at the moments that fit all percepts and motions best; the start is at 0.
 
-    Levenberg-Marquardt on the same percepts, motions and noise that the codelets get; Cauchy's
-    weights, so that a landmark taken for another does not count for much.
+    Levenberg-Marquardt on the same percepts, motions and noise that the codelets get; landmarks are
+    unknown. Raises UsageError where gtsam is not installed.
     """
-    graph = gtsam.NonlinearFactorGraph()
-    start = gtsam.Values()
-    pose = gtsam.Pose2(0.0, 0.0, 0.0)
-    start.insert(_pose(0), pose)
-    graph.add(gtsam.PriorFactorPose2(_pose(0), pose, gtsam.noiseModel.Constrained.All(3)))
-    for index, moment in enumerate(moments, 1):
-        way, sd = _step(moment.motions)
-        noise = gtsam.noiseModel.Diagonal.Sigmas(sd)
-        graph.add(
-            gtsam.BetweenFactorPose2(_pose(index - 1), _pose(index), gtsam.Pose2(*way), noise)
-        )
-        pose = pose.compose(gtsam.Pose2(*way))
-        start.insert(_pose(index), pose)
-        _add_percepts(graph, start, index, pose, moment)
-    parameters = gtsam.LevenbergMarquardtParams()
-    parameters.setMaxIterations(STEPS)
-    found = gtsam.LevenbergMarquardtOptimizer(graph, start, parameters).optimize()
-    poses = [found.atPose2(_pose(index)) for index in range(1, len(moments) + 1)]
-    return np.array([(each.x(), each.y(), each.theta()) for each in poses])
+    problem = Problem()
+
+    for moment in moments:
+        problem.add(moment)
+
+    return problem.solve()
 
 
-def _pose(index: int) -> int:
-    key: int = gtsam.symbol("x", index)
-    return key
+class Problem:
+    """A factor graph of the poses at the moments and of the landmarks seen.
 
+    Observations weigh by Cauchy's function, so that a landmark taken for another does not count for
+    much.
+    """
 
-def _add_percepts(graph: Any, start: Any, index: int, pose: Any, moment: Moment) -> None:
-    robust = gtsam.noiseModel.mEstimator.Cauchy.Create(CAUCHY)
-    for percept in moment.percepts:
+    def __init__(self) -> None:
+        self._gtsam = optional.gtsam()
+        self._graph = self._gtsam.NonlinearFactorGraph()
+        self._start = self._gtsam.Values()
+        self._count = 0
+        self._pose = self._gtsam.Pose2(0.0, 0.0, 0.0)
+
+        fixed = self._gtsam.noiseModel.Constrained.All(3)
+        self._start.insert(self._key(0), self._pose)
+        self._graph.add(self._gtsam.PriorFactorPose2(self._key(0), self._pose, fixed))
+
+    def add(self, moment: Moment) -> None:
+        """Add the next pose, by path integration from the last, and what is seen from it."""
+        step, sd = _step(moment.motions)
+        motion = self._gtsam.Pose2(*step)
+        noise = self._gtsam.noiseModel.Diagonal.Sigmas(sd)
+        before = self._key(self._count)
+        self._count += 1
+        here = self._key(self._count)
+
+        self._graph.add(self._gtsam.BetweenFactorPose2(before, here, motion, noise))
+        self._pose = self._pose.compose(motion)
+        self._start.insert(here, self._pose)
+
+        for percept in moment.percepts:
+            self._observe(here, percept)
+
+    def solve(self) -> Floats:
+        """(n, 3) poses, without the start."""
+        parameters = self._gtsam.LevenbergMarquardtParams()
+        parameters.setMaxIterations(STEPS)
+        optimizer = self._gtsam.LevenbergMarquardtOptimizer(self._graph, self._start, parameters)
+        found = optimizer.optimize()
+        poses = [found.atPose2(self._key(number)) for number in range(1, self._count + 1)]
+        return np.array([(pose.x(), pose.y(), pose.theta()) for pose in poses])
+
+    def _observe(self, here: int, percept: Percept) -> None:
+        gtsam = self._gtsam
         landmark = gtsam.symbol("l", int(percept.label.rpartition("-")[2]))
-        sd = gtsam.noiseModel.Diagonal.Sigmas(
-            np.array([percept.bearing_sd_rad, percept.range_sd_m])
-        )
+        sds = np.array([percept.bearing_sd_rad, percept.range_sd_m])
+        robust = gtsam.noiseModel.mEstimator.Cauchy.Create(CAUCHY)
+        noise = gtsam.noiseModel.Robust.Create(robust, gtsam.noiseModel.Diagonal.Sigmas(sds))
         bearing = gtsam.Rot2(percept.bearing_rad)
-        noise = gtsam.noiseModel.Robust.Create(robust, sd)
-        graph.add(
-            gtsam.BearingRangeFactor2D(_pose(index), landmark, bearing, percept.range_m, noise)
-        )
-        if not start.exists(landmark):
-            ahead = percept.range_m * np.array(
-                [np.cos(percept.bearing_rad), np.sin(percept.bearing_rad)]
-            )
-            start.insert(landmark, pose.transformFrom(ahead))
+        self._graph.add(gtsam.BearingRangeFactor2D(here, landmark, bearing, percept.range_m, noise))
+
+        if not self._start.exists(landmark):
+            direction = np.array([np.cos(percept.bearing_rad), np.sin(percept.bearing_rad)])
+            where = self._pose.transformFrom(percept.range_m * direction)
+            self._start.insert(landmark, where)
+
+    def _key(self, number: int) -> int:
+        key: int = self._gtsam.symbol("x", number)
+        return key
 
 
 def _step(rows: Floats) -> tuple[Floats, Floats]:
     """The pose that (n, 5) rows of motion lead to from 0, and its standard deviations."""
     speed, turn_rate, dt, speed_sd, turn_rate_sd = rows.T
     turn = turn_rate * dt
-    heading = np.cumsum(turn) - turn / 2
-    way_sd = float(np.sqrt(np.square(speed_sd * dt).sum()))
-    turn_sd = float(np.sqrt(np.square(turn_rate_sd * dt).sum()))
-    way = np.array(
-        [(speed * dt * np.cos(heading)).sum(), (speed * dt * np.sin(heading)).sum(), turn.sum()]
-    )
-    return way, np.array([way_sd, SIDEWAYS_SHARE * way_sd, turn_sd]) + LEAST_SD
+    middle_rad = np.cumsum(turn) - turn / 2
+    distance_m = speed * dt
+
+    forwards_m = (distance_m * np.cos(middle_rad)).sum()
+    left_m = (distance_m * np.sin(middle_rad)).sum()
+    distance_sd_m = float(np.sqrt(np.square(speed_sd * dt).sum()))
+    turn_sd_rad = float(np.sqrt(np.square(turn_rate_sd * dt).sum()))
+
+    step = np.array([forwards_m, left_m, turn.sum()])
+    sds = np.array([distance_sd_m, SIDEWAYS_SHARE * distance_sd_m, turn_sd_rad])
+    return step, sds + MIN_SD

@@ -1,4 +1,4 @@
-"""The figures of map correction on one pose graph."""
+"""The metrics of map correction on one pose graph."""
 
 from __future__ import annotations
 
@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
-from rich.progress import track
 
 from benchmarks.map_correction.reference import Gtsam, best_positions
+from benchmarks.report import Metrics
 from benchmarks.threshold import at_most
+from benchmarks.trajectory import trajectory_error_m
+from cli.log.progress import bar
 from cogmap.data.g2o import read_g2o
 from cogmap.data.pose_graph import PoseGraphFile, read_true_positions
 from cogmap.data.toro import read_toro
@@ -31,20 +33,46 @@ THRESHOLDS = {
 }
 READERS = {".g2o": read_g2o, ".graph": read_toro, ".toro": read_toro}
 PAIRS = 7
-NEW_CLOSURES = 200
-HELD_OUT_AT_MOST = 0.5
-SETTLE_EVERY = 20
+MAX_NEW_CLOSURES = 200
+MAX_HELD_OUT_SHARE = 0.5
+RELINEARIZE_EVERY = 20
 SEED = 4
 T = TypeVar("T")
 
 
+def measure(graph_path: Path, truth_path: Path | None) -> Metrics:
+    """The metrics of THRESHOLDS, and others that explain them; errors only where there is a truth.
+
+    Raises UsageError where a file cannot be read, or gtsam or evo is not installed.
+    """
+    graph = read_graph(graph_path)
+    truth_m = _truth(truth_path, graph_path, len(graph.poses))
+    peer = Gtsam(graph.poses, graph.constraints)
+
+    positions_m, of_positions = _positions(graph)
+    poses, peers_poses, of_headings = _headings(graph, peer)
+    metrics = {"poses": float(len(graph.poses)), "closures": float(len(graph.closures))}
+    metrics |= of_positions | of_headings
+
+    if truth_m is not None:
+        metrics["ate_uncorrected_m"] = trajectory_error_m(graph.poses[:, :2], truth_m)
+        metrics["ate_positions_m"] = trajectory_error_m(positions_m, truth_m)
+        metrics["ate_m"] = trajectory_error_m(poses[:, :2], truth_m)
+        metrics["ate_gtsam_m"] = trajectory_error_m(peers_poses[:, :2], truth_m)
+        metrics["ate_vs_gtsam"] = metrics["ate_m"] / metrics["ate_gtsam_m"]
+
+    return metrics | _incremental(graph, cost(poses, graph.constraints))
+
+
 def read_graph(path: Path) -> PoseGraph:
-    """The path of a pose graph file, its kind told by its name. Raises UsageError where it cannot
-    be read.
+    """The pose graph in a file, whose suffix names its format.
+
+    Raises UsageError where it cannot be read.
     """
     suffix = Path(path.stem).suffix if path.suffix == ".xz" else path.suffix
     if suffix not in READERS:
         raise UsageError(f"{path} is none of {', '.join(READERS)}, or one of them packed as .xz")
+
     file: PoseGraphFile = READERS[suffix](path)
     constraints = Constraints(file.i, file.j, file.measurement, file.information)
     try:
@@ -53,107 +81,95 @@ def read_graph(path: Path) -> PoseGraph:
         raise UsageError(f"{path}: {error}") from None
 
 
-def trajectory_error_m(positions_m: Floats, truth_m: Floats) -> float:
-    """Root mean square distance of (n, 2) positions from the true ones, once turned and moved to
-    fit them best.
-    """
-    found = positions_m - positions_m.mean(axis=0)
-    true = truth_m - truth_m.mean(axis=0)
-    left, _, right = np.linalg.svd(found.T @ true)
-    turn = left @ np.diag([1.0, np.linalg.det(left @ right)]) @ right
-    return float(np.sqrt(np.square(found @ turn - true).sum(axis=1).mean()))
+def _truth(path: Path | None, graph_path: Path, count: int) -> Floats | None:
+    if path is None:
+        return None
+
+    truth_m = read_true_positions(path)
+    if len(truth_m) != count:
+        raise UsageError(f"{path} has {len(truth_m)} poses, {graph_path} has {count}")
+
+    return truth_m
 
 
-def measure(graph_path: Path, truth_path: Path | None) -> dict[str, float]:
-    """Every figure of THRESHOLDS, and others that tell how it came about; errors only where there is a
-    truth.
-    """
-    graph = read_graph(graph_path)
-    truth_m = None if truth_path is None else read_true_positions(truth_path)
-    if truth_m is not None and len(truth_m) != len(graph.poses):
-        raise UsageError(
-            f"{truth_path} has {len(truth_m)} poses, {graph_path} has {len(graph.poses)}"
-        )
-    peer = Gtsam(graph.poses, graph.constraints)
-    figures = {"poses": float(len(graph.poses)), "closures": float(len(graph.closures))}
-    positions_m, told = _positions(graph)
-    poses, peers_poses, times = _headings(graph, peer)
-    figures |= told | times
-    if truth_m is not None:
-        errors = [
-            trajectory_error_m(found[:, :2], truth_m)
-            for found in (graph.poses, positions_m, poses, peers_poses)
-        ]
-        names = ("ate_uncorrected_m", "ate_positions_m", "ate_m", "ate_gtsam_m")
-        figures |= dict(zip(names, errors, strict=True)) | {"ate_vs_gtsam": errors[2] / errors[3]}
-    return figures | _incremental(graph, cost(poses, graph.constraints))
-
-
-def _positions(graph: PoseGraph) -> tuple[Floats, dict[str, float]]:
+def _positions(graph: PoseGraph) -> tuple[Floats, Metrics]:
+    """By the paper's rule, positions only, against exact least squares."""
     took_s, found = _timed(lambda: close_loops(graph))
     constraints = graph.constraints
     known = displacements(graph.poses, constraints)
-    least = position_cost(best_positions(graph), constraints, known)
-    ratio = position_cost(found.positions_m, constraints, known) / least
-    return found.positions_m, {
-        "positions_cost_ratio": ratio,
+    min_cost = position_cost(best_positions(graph), constraints, known)
+
+    metrics = {
+        "positions_cost_ratio": position_cost(found.positions_m, constraints, known) / min_cost,
         "positions_replays": float(found.replays),
-        "positions_ms": took_s * 1e3,
+        "positions_ms": 1e3 * took_s,
     }
+    return found.positions_m, metrics
 
 
-def _headings(graph: PoseGraph, peer: Gtsam) -> tuple[Floats, Floats, dict[str, float]]:
+def _headings(graph: PoseGraph, peer: Gtsam) -> tuple[Floats, Floats, Metrics]:
     """Both from the same poses, each once to warm up, then in turn; each one's median time."""
     by_qr = peer.gives_up()
     poses = optimize(graph)
     peers_poses = peer.poses(peer.solve())
-    rounds = [
-        (_timed(lambda: optimize(graph))[0], _timed(peer.solve)[0])
-        for _ in track(range(PAIRS), "correcting headings, and gtsam the same", transient=True)
-    ]
-    ours_s, peers_s = np.median(rounds, axis=0).tolist()
-    ours, peers = (cost(found, graph.constraints) for found in (poses, peers_poses))
-    told = {
-        "heading_ms": ours_s * 1e3,
-        "gtsam_ms": peers_s * 1e3,
+    ours_s = []
+    peers_s = []
+
+    with bar("correcting headings, and gtsam the same") as progress:
+        for pair in range(1, PAIRS + 1):
+            ours_s.append(_timed(lambda: optimize(graph))[0])
+            peers_s.append(_timed(peer.solve)[0])
+            progress(pair / PAIRS)
+
+    heading_cost = cost(poses, graph.constraints)
+    metrics = {
+        "heading_ms": 1e3 * float(np.median(ours_s)),
+        "gtsam_ms": 1e3 * float(np.median(peers_s)),
         "gtsam_by_qr": float(by_qr),
-        "time_vs_gtsam": ours_s / peers_s,
-        "heading_cost": ours,
-        "cost_vs_gtsam": ours / peers,
+        "time_vs_gtsam": float(np.median(ours_s) / np.median(peers_s)),
+        "heading_cost": heading_cost,
+        "cost_vs_gtsam": heading_cost / cost(peers_poses, graph.constraints),
     }
-    return poses, peers_poses, told
+    return poses, peers_poses, metrics
 
 
-def _incremental(graph: PoseGraph, batch_cost: float) -> dict[str, float]:
-    """Closures left out at random come one at a time; factoring anew, as between two closures, is
-    timed apart.
+def _incremental(graph: PoseGraph, batch_cost: float) -> Metrics:
+    """Closures left out at random are added one at a time.
+
+    Relinearizing, which happens between two closures, is timed apart.
     """
-    count = min(NEW_CLOSURES, int(HELD_OUT_AT_MOST * len(graph.closures)))
-    held_out = np.random.default_rng(SEED).permutation(len(graph.closures))[:count]
-    rest = np.setdiff1d(np.arange(len(graph.closures)), held_out)
-    solved = IncrementalSolver(PoseGraph(graph.poses, graph.steps, graph.closures.select(rest)))
-    took_s = []
-    settling_s = []
-    for number, index in enumerate(
-        track(held_out.tolist(), "closing one more loop", transient=True), 1
-    ):
-        closure = graph.closures.select(np.array([index]))
-        took_s.append(_timed(partial(solved.add, closure))[0])
-        if number % SETTLE_EVERY == 0:
-            settling_s.append(_timed(solved.relinearize)[0])
-    if not took_s:
+    closures = len(graph.closures)
+    count = min(MAX_NEW_CLOSURES, int(MAX_HELD_OUT_SHARE * closures))
+    if not count:
         return {}
+
+    held_out = np.random.default_rng(SEED).permutation(closures)[:count]
+    rest = np.setdiff1d(np.arange(closures), held_out)
+    solver = IncrementalSolver(PoseGraph(graph.poses, graph.steps, graph.closures.select(rest)))
+    took_ms = []
+    relinearized_ms = [0.0]
+
+    with bar("closing one more loop") as progress:
+        for number, index in enumerate(held_out.tolist(), start=1):
+            closure = graph.closures.select(np.array([index]))
+            took_ms.append(1e3 * _timed(partial(solver.add, closure))[0])
+            if number % RELINEARIZE_EVERY == 0:
+                relinearized_ms.append(1e3 * _timed(solver.relinearize)[0])
+            progress(number / count)
+
+    final_cost = cost(solver.graph.poses, solver.graph.constraints)
     return {
-        "incremental_ms_p50": float(np.percentile(took_s, 50)) * 1e3,
-        "incremental_ms_p99": float(np.percentile(took_s, 99)) * 1e3,
-        "incremental_ms_max": max(took_s) * 1e3,
-        "incremental_cost_ratio": cost(solved.graph.poses, solved.graph.constraints) / batch_cost,
+        "incremental_ms_p50": float(np.percentile(took_ms, 50)),
+        "incremental_ms_p99": float(np.percentile(took_ms, 99)),
+        "incremental_ms_max": max(took_ms),
+        "incremental_cost_ratio": final_cost / batch_cost,
         "incremental_closures": float(count),
-        "settle_ms_p50": float(np.median(settling_s)) * 1e3 if settling_s else 0.0,
+        "settle_ms_p50": float(np.median(relinearized_ms[1:] or relinearized_ms)),
     }
 
 
-def _timed(what: Callable[[], T]) -> tuple[float, T]:
-    begun = time.perf_counter()
-    result = what()
-    return time.perf_counter() - begun, result
+def _timed(work: Callable[[], T]) -> tuple[float, T]:
+    """The seconds that `work` took, and what it returned."""
+    began_s = time.perf_counter()
+    result = work()
+    return time.perf_counter() - began_s, result

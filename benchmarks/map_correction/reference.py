@@ -1,86 +1,94 @@
-"""What map correction is held against: exact least squares for positions, gtsam for poses."""
+"""What map correction is compared with: exact least squares for positions, gtsam for poses."""
 
 from __future__ import annotations
 
-import importlib
 from typing import Any
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from cogmap.errors import UsageError
+from benchmarks import optional
 from cogmap.geometry.arrays import Floats
 from services.codelets.correction.pose_graph import Constraints, PoseGraph
 from services.codelets.correction.reverse_replay import displacements
 
-gtsam: Any
-try:
-    gtsam = importlib.import_module("gtsam")
-except ImportError:
-    gtsam = None
-
 
 def best_positions(graph: PoseGraph) -> Floats:
-    """(n, 2) positions that minimise eq. 7 exactly, the headings and the first position as they
-    are.
-    """
-    constraints = graph.constraints
-    count = len(graph.poses)
-    known = displacements(graph.poses, constraints)
+    """(n, 2) positions that minimise eq. 7 exactly; headings and the first position stay."""
+    known = displacements(graph.poses, graph.constraints)
+    differences = _differences(graph.constraints, len(graph.poses))
+    covariance = sparse.block_diag(known.covariance_m2, format="csc")
+
+    # Forces and positions together: the normal equations lose what a certain constraint leaves to
+    # uncertain ones.
+    blocks = [[covariance, differences], [differences.T, None]]
+    unknowns = differences.shape[1]
+    right_side = np.concatenate([known.off_m.reshape(-1), np.zeros(unknowns)])
+    found = spsolve(sparse.bmat(blocks, format="csc"), right_side)
+
+    positions_m = found[-unknowns:].reshape(-1, 2)
+    result: Floats = graph.poses[0, :2] + np.vstack([np.zeros(2), positions_m])
+    return result
+
+
+def _differences(constraints: Constraints, count: int) -> sparse.csc_matrix:
+    """(2m, 2(n - 1)): takes all positions but the first to the m differences between two each."""
     edges = np.arange(len(constraints))
     signs = np.repeat([1.0, -1.0], len(constraints))
     ends = np.concatenate([constraints.j, constraints.i])
-    across = sparse.csr_matrix((signs, (np.tile(edges, 2), ends)), shape=(len(constraints), count))
-    differences = sparse.kron(across[:, 1:], sparse.identity(2), format="csc")
-    covariance = sparse.block_diag(known.covariance_m2, format="csc")
-    # Forces and positions together: the normal equations lose what a certain constraint leaves to
-    # uncertain ones.
-    both = sparse.bmat([[covariance, differences], [differences.T, None]], format="csc")
-    found = spsolve(both, np.concatenate([known.off_m.reshape(-1), np.zeros(differences.shape[1])]))
-    positions = found[differences.shape[0] :].reshape(-1, 2)
-    result: Floats = graph.poses[0, :2] + np.vstack([np.zeros(2), positions])
-    return result
+    shape = (len(constraints), count)
+    of_one_axis = sparse.csr_matrix((signs, (np.tile(edges, 2), ends)), shape=shape)
+    return sparse.kron(of_one_axis[:, 1:], sparse.identity(2), format="csc")
 
 
 class Gtsam:
     """The same graph for gtsam. Raises UsageError where gtsam is not installed."""
 
     def __init__(self, poses: Floats, constraints: Constraints) -> None:
-        if gtsam is None:
-            raise UsageError(
-                "gtsam is not installed, and this benchmark measures against it: run make bench-setup"
-            )
+        self._gtsam = optional.gtsam()
         self._count = len(poses)
-        self._start, self._graph = gtsam.Values(), gtsam.NonlinearFactorGraph()
-        self._parameters = gtsam.LevenbergMarquardtParams()
-        for index, pose in enumerate(poses):
-            self._start.insert(index, gtsam.Pose2(*pose))
-        fixed = gtsam.noiseModel.Constrained.All(3)
-        self._graph.add(gtsam.PriorFactorPose2(0, gtsam.Pose2(*poses[0]), fixed))
-        columns = (constraints.i.tolist(), constraints.j.tolist(), constraints.measurement)
-        for first, second, measured, information in zip(
-            *columns, constraints.information, strict=True
-        ):
-            noise = gtsam.noiseModel.Gaussian.Information(information)
-            self._graph.add(gtsam.BetweenFactorPose2(first, second, gtsam.Pose2(*measured), noise))
+        self._start = self._gtsam.Values()
+        self._graph = self._gtsam.NonlinearFactorGraph()
+        self._parameters = self._gtsam.LevenbergMarquardtParams()
+
+        for number, pose in enumerate(poses):
+            self._start.insert(number, self._gtsam.Pose2(*pose))
+
+        fixed = self._gtsam.noiseModel.Constrained.All(3)
+        first = self._gtsam.Pose2(*poses[0])
+        self._graph.add(self._gtsam.PriorFactorPose2(0, first, fixed))
+
+        for number in range(len(constraints)):
+            self._constrain(constraints, number)
 
     def solve(self) -> Any:
         """Levenberg and Marquardt's method, as gtsam has it by default; `poses` reads the result."""
-        return gtsam.LevenbergMarquardtOptimizer(
+        optimizer = self._gtsam.LevenbergMarquardtOptimizer(
             self._graph, self._start, self._parameters
-        ).optimize()
+        )
+        return optimizer.optimize()
 
     def gives_up(self) -> bool:
-        """Whether gtsam's default, factoring by Cholesky, leaves all as it was; `solve` factors by
-        QR from then on.
+        """Whether gtsam's default, factoring by Cholesky, leaves all as it was.
+
+        `solve` factors by QR from then on.
         """
         gives_up = bool(self._graph.error(self.solve()) >= self._graph.error(self._start))
+
         if gives_up:
             self._parameters.setLinearSolverType("MULTIFRONTAL_QR")
+
         return gives_up
 
     def poses(self, values: Any) -> Floats:
-        """(n, 3)."""
-        found = [values.atPose2(index) for index in range(self._count)]
+        """(n, 3) poses of a result of `solve`."""
+        found = [values.atPose2(number) for number in range(self._count)]
         return np.array([(pose.x(), pose.y(), pose.theta()) for pose in found])
+
+    def _constrain(self, constraints: Constraints, number: int) -> None:
+        i = int(constraints.i[number])
+        j = int(constraints.j[number])
+        measurement = self._gtsam.Pose2(*constraints.measurement[number])
+        noise = self._gtsam.noiseModel.Gaussian.Information(constraints.information[number])
+        self._graph.add(self._gtsam.BetweenFactorPose2(i, j, measurement, noise))
