@@ -11,19 +11,25 @@ help:
 
 setup: $(INSTALLED) ## install into .venv, nothing else
 
+# pybullet, which the simulator needs, has wheels for one Python and one platform.
+SIMULATES = import platform, sys; sys.exit((sys.version_info[:2], sys.platform, platform.machine()) != ((3, 11), "linux", "x86_64"))
+
 $(INSTALLED): requirements/run.txt requirements/build.txt requirements/dev.txt pyproject.toml
+	@$(PYTHON) -c '$(SIMULATES)' || { \
+	    echo "The simulator needs Python 3.11 on Linux x86-64, and $(PYTHON) is not that:" \
+	        "name one with PYTHON=/path/to/python3.11, or use docker compose up" >&2; exit 1; }
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements/dev.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	touch $@
 
-train-setup: $(TRAINS) ## torch besides, to train the networks of perception
+train-setup: $(TRAINS) ## torch besides (5 GB), to train the networks of perception and to test that
 
 $(TRAINS): $(INSTALLED) requirements/train.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements/train.txt
 	touch $@
 
-bench-setup: $(MEASURES) ## gtsam besides, which benchmarks measure against
+bench-setup: $(MEASURES) ## gtsam besides, which benchmarks compare with
 
 $(MEASURES): $(INSTALLED) requirements/bench.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements/bench.txt
@@ -32,23 +38,20 @@ $(MEASURES): $(INSTALLED) requirements/bench.txt
 demo: setup ## drive around a simulated town; more options: make demo ARGS="--seed 2"
 	$(BIN)/cogmap run $(ARGS)
 
-test: setup ## every test but the one of the containers
+test: setup ## every test but those of the containers; those of training are skipped without torch
 	$(BIN)/python -m pytest
 
 test-compose: setup ## build the containers and test them as they run
 	$(BIN)/python -m pytest tests/compose -m compose --timeout 1200
 
-lint: setup ## style, types, and who imports whom
+lint: setup ## style, types, and which package imports which; needs no torch
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-bench: setup ## every benchmark there is
-	$(BIN)/python -m benchmarks cycle
-	$(BIN)/python -m benchmarks bus
-	$(BIN)/python -m benchmarks perception
-	$(BIN)/python -m benchmarks spiking
+bench: bench-setup ## every benchmark and experiment that has a threshold; make bench ARGS="--data DIR"
+	$(BIN)/python -m benchmarks all $(ARGS)
 
 clean: ## remove what was installed and built; runs stay
 	rm -rf .venv build *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import os
-import re
+import platform
 import sys
 from collections.abc import Iterable, Iterator
 from importlib import metadata
 from pathlib import Path
 
+from packaging.requirements import Requirement
+
 from cli.doctor.finding import Finding
+from cogmap.errors import UsageError
 
 OLDEST_PYTHON = (3, 11)
 PACKAGE = "cogmap"
-_PIN = re.compile(r"([A-Za-z0-9_.-]+)==([A-Za-z0-9_.+!-]+)")
 
 
 def examine(runs: Path) -> list[Finding]:
     """All findings about this installation, where runs are kept in `runs`."""
     return [
         *python_version(sys.version_info[:2]),
+        *simulator(sys.version_info[:2], sys.platform, platform.machine()),
         *dependencies(pins(_requirements())),
         *renderer(),
         *write_access(runs),
@@ -36,6 +39,16 @@ def python_version(version: tuple[int, int]) -> Iterator[Finding]:
         )
 
 
+def simulator(version: tuple[int, int], system: str, machine: str) -> Iterator[Finding]:
+    """Whether the simulator runs here: pybullet has wheels for one Python and one platform."""
+    if (version, system, machine) != ((3, 11), "linux", "x86_64"):
+        yield Finding(
+            "simulator",
+            "it needs Python 3.11 on Linux x86-64, as pybullet has no wheel for others",
+            "run it there or in the container; everything else runs here",
+        )
+
+
 def _requirements() -> list[str]:
     """What the installed package declares that it needs."""
     try:
@@ -45,13 +58,15 @@ def _requirements() -> list[str]:
 
 
 def pins(requirements: Iterable[str]) -> dict[str, str]:
-    """The version that each required package is pinned to; those of an extra are optional."""
+    """The version that each package required here is pinned to; those of an extra, or for another
+    Python or platform, are not required here.
+    """
     versions = {}
-    for requirement in requirements:
-        name_and_version, _, marker = requirement.partition(";")
-        pin = _PIN.match(name_and_version.strip())
-        if pin is not None and "extra" not in marker:
-            versions[pin[1]] = pin[2]
+    for line in requirements:
+        requirement = Requirement(line)
+        marker = requirement.marker
+        if marker is None or marker.evaluate({"extra": ""}):
+            versions[requirement.name] = str(requirement.specifier).removeprefix("==")
     return versions
 
 
@@ -84,7 +99,7 @@ def renderer() -> Iterator[Finding]:
     """Whether the simulator can render with EGL."""
     try:
         from services.sim.rendering import egl
-    except ImportError:  # the missing dependency is a finding of its own
+    except (ImportError, UsageError):  # the missing dependency is a finding of its own
         return
 
     if not egl.works():

@@ -7,6 +7,8 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from cogmap.errors import UsageError
+
 
 @contextmanager
 def quiet() -> Iterator[None]:
@@ -26,8 +28,13 @@ def quiet() -> Iterator[None]:
         os.close(nowhere)
 
 
-# It greets on standard error while it is imported.
-with quiet():
-    import pybullet
+try:
+    with quiet():  # pybullet greets on standard error while it is imported
+        import pybullet
+except ModuleNotFoundError:
+    raise UsageError(
+        "the simulator needs pybullet, which has wheels for Python 3.11 on Linux x86-64 only: "
+        "run it there or in the container; everything else runs here"
+    ) from None
 
 __all__ = ["pybullet", "quiet"]

@@ -132,6 +132,13 @@ def test_an_old_python_is_named() -> None:
     assert list(installation.python_version((3, 12))) == []
 
 
+def test_a_python_or_platform_without_the_simulator_is_named() -> None:
+    assert list(installation.simulator((3, 11), "linux", "x86_64")) == []
+    for elsewhere in (((3, 12), "linux", "x86_64"), ((3, 11), "darwin", "arm64")):
+        (finding,) = installation.simulator(*elsewhere)
+        assert "needs Python 3.11 on Linux x86-64" in finding.wrong
+
+
 def test_a_dependency_that_is_missing_or_of_another_version_is_named() -> None:
     found = installation.dependencies({"numpy": "0.0.1", "no-such-package-here": "1.0"})
 
@@ -143,6 +150,7 @@ def test_what_an_extra_needs_is_optional() -> None:
         "numpy==2.4.6",
         'torch==2.15.0; extra == "train"',
         'lz4==4.4.5; python_version > "3"',
+        'pybullet==3.2.7; python_version < "3"',
     ]
 
     assert installation.pins(needs) == {"numpy": "2.4.6", "lz4": "4.4.5"}

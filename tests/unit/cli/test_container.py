@@ -1,0 +1,39 @@
+"""What the image and compose.yaml hold: every package, and every module of the table."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import yaml
+
+from services import registry
+
+ROOT = Path(__file__).parents[3]
+
+
+def services() -> dict[str, dict[str, str]]:
+    compose: dict[str, dict[str, dict[str, str]]] = yaml.safe_load(
+        (ROOT / "compose.yaml").read_text()
+    )
+    return compose["services"]
+
+
+def test_the_image_gets_every_package() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    found = project["tool"]["setuptools"]["packages"]["find"]["include"]
+    packages = {pattern.rstrip("*") for pattern in found}
+    copied = (ROOT / ".dockerignore").read_text().splitlines()
+    assert packages <= {line.removeprefix("!") for line in copied}
+
+
+def test_every_module_is_a_service() -> None:
+    assert set(registry.MODULES) <= set(services())
+
+
+def test_a_module_that_keeps_a_journal_keeps_its_state() -> None:
+    sections = {"action": {"route": [[10.0, 0.0]]}}
+    journaling = {name for name in registry.MODULES if registry.build(name, sections).journal}
+    stateful = {name for name, service in services().items() if "--state" in str(service)}
+    assert {"epam", "workspace"} <= journaling
+    assert journaling <= stateful
