@@ -1,16 +1,26 @@
-"""`cogmap config`: every setting of every module."""
+"""`cogmap config`: every setting of every module, with what it means."""
 
 from __future__ import annotations
 
+import json
+import textwrap
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import click
+import msgspec
+import tomli_w
 
-from cli.launch.plan import Choices, awaited, effective, to_toml
-from cli.options import config_option, set_option
+from cli.launch.plan import Choices, awaited, effective
+from cli.options import config_option, json_option, set_option
 from cli.run.command import codelets_option, laps_option, lockstep_option, seed_option
+from cogmap.errors import UsageError
 from cogmap.runtime import config
+from cogmap.runtime.config import Sections
+from services import registry
+
+COLUMNS = 100
+Schema = dict[str, Any]
 
 
 @click.command(name="config")
@@ -26,6 +36,8 @@ from cogmap.runtime import config
     default="-",
     help="Where to write it.",
 )
+@json_option
+@click.option("--schema", is_flag=True, help="Print the JSON Schema of the configuration file.")
 @config_option
 @set_option
 def print_config(
@@ -35,12 +47,115 @@ def print_config(
     codelets: int,
     record: bool,
     output: IO[str],
+    as_json: bool,
+    schema: bool,
     config_path: Path | None,
     settings: tuple[str, ...],
 ) -> None:
-    """Write the whole configuration of a drive as TOML: for modules that are started one by one."""
+    """Print the whole configuration of a drive, with the meaning, unit and range of each key.
+
+    As TOML it is a file for --config, for modules that are started one by one.
+    """
+    if as_json and schema:
+        raise UsageError("--json and --schema exclude each other: choose one")
+
     choices = Choices(seed=seed, laps=laps, lockstep=lockstep, codelets=codelets, record=record)
-    sections = effective(
-        config.load(config_path, settings), choices, awaited(choices, observer=False)
+    given = config.load(config_path, settings)
+    sections = effective(given, choices, awaited(choices, observer=False))
+    if schema:
+        output.write(json.dumps(file_schema(), indent=2) + "\n")
+    elif as_json:
+        output.write(json.dumps(described(sections), indent=2) + "\n")
+    else:
+        output.write(commented_toml(sections))
+
+
+def file_schema() -> Schema:
+    """The JSON Schema (2020-12) of the configuration file: an object with one for each module."""
+    kinds = [registry.config_type(name) for name in registry.MODULES]
+    references, definitions = msgspec.json.schema_components(kinds, ref_template="#/$defs/{name}")
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": "cogmap/config",
+        "type": "object",
+        "properties": dict(zip(registry.MODULES, references, strict=True)),
+        "additionalProperties": False,
+        "$defs": definitions,
+    }
+
+
+def described(sections: Sections) -> dict[str, Any]:
+    """For each key of each module, its value and its schema: description, type and bounds."""
+    whole = file_schema()
+    modules = {}
+    for name, values in sections.items():
+        keys = _keys(whole["properties"][name], whole)
+        modules[name] = {
+            key: {"value": values.get(key), **_without_default(schema)}
+            for key, schema in keys.items()
+        }
+    return modules
+
+
+def _without_default(schema: Schema) -> Schema:
+    return {name: value for name, value in schema.items() if name != "default"}
+
+
+def _keys(schema: Schema, whole: Schema) -> dict[str, Schema]:
+    """The schema of each key of the object that `schema` describes; none for any other type."""
+    for option in (schema, *schema.get("anyOf", ())):
+        if "$ref" in option:
+            name = option["$ref"].rpartition("/")[2]
+            keys: dict[str, Schema] = whole["$defs"][name]["properties"]
+            return keys
+    return {}
+
+
+def commented_toml(sections: Sections) -> str:
+    """`sections` as a TOML file with a comment before each key that has a description."""
+    whole = file_schema()
+    lines: list[str] = []
+    for name, values in sections.items():
+        lines += _table([name], values, _keys(whole["properties"][name], whole), whole)
+    return "\n".join(lines) + "\n"
+
+
+def _table(
+    path: list[str], values: dict[str, Any], keys: dict[str, Schema], whole: Schema
+) -> list[str]:
+    """The table at `path`: its own keys, then the tables inside it."""
+    lines = [f"[{'.'.join(path)}]"]
+    tables: list[str] = []
+    unnamed = [key for key in values if key not in keys]
+    for key in [*keys, *unnamed]:
+        schema = keys.get(key, {})
+        comment = _comment(schema)
+        value = values.get(key)
+        if value is None:
+            lines += [*comment, f"# {key} is not set", ""]
+        elif isinstance(value, dict):
+            tables += comment + _table([*path, key], value, _keys(schema, whole), whole)
+        elif _holds_tables(value):
+            tables += comment + _array_of_tables([*path, key], value)
+        else:
+            lines += [*comment, tomli_w.dumps({key: value})]
+
+    return lines + tables
+
+
+def _holds_tables(value: Any) -> bool:
+    return isinstance(value, list | tuple) and bool(value) and isinstance(value[0], dict)
+
+
+def _array_of_tables(path: list[str], tables: list[dict[str, Any]]) -> list[str]:
+    lines = []
+    for table in tables:
+        lines += [f"[[{'.'.join(path)}]]", tomli_w.dumps(table)]
+    return lines
+
+
+def _comment(schema: Schema) -> list[str]:
+    description = schema.get("description", "")
+    return textwrap.wrap(
+        description, COLUMNS, initial_indent="# ", subsequent_indent="# ", break_long_words=False
     )
-    output.write(to_toml(sections))
