@@ -6,8 +6,6 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
-import msgspec
-
 from cogmap.errors import MessageError
 from cogmap.runtime.module import Module
 from schemas import topics
@@ -114,7 +112,7 @@ class ActionModule:
         if pose is None:
             return None
         if self._is_lockstep and self._is_answered(delta):
-            return self._repeated()
+            return self._answered
 
         is_repeated = self._waiting is not None and self._waiting.stamp_ns == delta.stamp_ns
         self._waiting = Estimate(delta.stamp_ns, delta.cycle, pose)
@@ -203,9 +201,6 @@ class ActionModule:
         last = self._answered
         is_pose_of_view = delta.phase == "localization"
         return is_pose_of_view and last is not None and last.stamp_ns == delta.stamp_ns
-
-    def _repeated(self) -> MotorCommand | None:
-        return None if self._answered is None else msgspec.structs.replace(self._answered)
 
 
 def _self_pose(delta: Delta) -> Pose | None:

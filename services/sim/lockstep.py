@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Protocol
 
-import msgspec
-
 from schemas.base import Message
 from schemas.process import Clock
 from schemas.sensing import MotorCommand, TruePose, TrueTown
@@ -78,7 +76,7 @@ class Lockstep:
             return []
 
         self._waiting_since_ns = wall_ns
-        return [msgspec.structs.replace(message) for message in self._senses]
+        return self._senses
 
     def _advance(self) -> list[Message]:
         simulation = self._simulation
