@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -16,35 +17,40 @@ C = TypeVar("C", bound=msgspec.Struct)
 Sections = dict[str, dict[str, Any]]
 
 
-def _parse(text: str) -> Any:
-    try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        return text
-
-
 def load(path: Path | None, settings: Iterable[str] = ()) -> Sections:
     """The sections of the file at `path`, overridden by `settings` such as `action.speed_m_s=3`.
 
-    Raises ConfigError naming the file or the setting that cannot be read.
+    Raises ConfigError that names the file or the setting that cannot be read.
     """
-    sections: Sections = {}
-    if path is not None:
-        try:
-            sections = tomllib.loads(path.read_text())
-        except FileNotFoundError:
-            raise ConfigError(
-                f"no configuration file {path}: name one that exists, or leave --config out"
-            ) from None
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
-            raise ConfigError(f"cannot read {path} as TOML: {error}") from None
+    sections = {} if path is None else _read(path)
     for setting in settings:
         key, equals, value = setting.partition("=")
         section, dot, name = key.partition(".")
         if not (equals and dot and name):
             raise ConfigError(f"--set {setting}: write it as module.key=value")
-        _keys_of(section, sections.setdefault(section, {}))[name] = _parse(value)
+
+        keys = _keys_of(section, sections.setdefault(section, {}))
+        keys[name] = _parsed(value)
     return sections
+
+
+def _read(path: Path) -> Sections:
+    try:
+        return tomllib.loads(path.read_text())
+    except FileNotFoundError:
+        raise ConfigError(
+            f"no configuration file {path}: name one that exists, or leave --config out"
+        ) from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+        raise ConfigError(f"cannot read {path} as TOML: {error}") from None
+
+
+def _parsed(text: str) -> Any:
+    """`text` as a value of TOML; itself where it is none, so that a word needs no quotes."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
 
 
 def check_sections(sections: Mapping[str, Any], known: Iterable[str]) -> None:
@@ -63,20 +69,38 @@ def _keys_of(name: str, section: Any) -> dict[str, Any]:
 
 
 def typed(sections: Sections, name: str, kind: type[C]) -> C:
-    """Section `name` as a `kind`, its defaults filled in. Raises ConfigError naming the key or the
-    value.
+    """Section `name` as a `kind`, its defaults filled in.
+
+    Raises ConfigError that names the key or the value, also where a number is not finite.
     """
     section = sections.get(name, {})
     fields = [field.encode_name for field in msgspec.structs.fields(kind)]
-    for key in section:
+    for key, value in section.items():
         if key not in fields:
             raise ConfigError(f"unknown key {key!r} in [{name}]{_nearest(key, fields)}")
+        _check_finite(f"{name}.{key}", value)
+
     try:
         return msgspec.convert(section, kind)
     except msgspec.ValidationError as error:
         raise ConfigError(f"[{name}] {error}".replace("`$.", f"`{name}.")) from None
 
 
+def _check_finite(path: str, value: Any) -> None:
+    """Raise ConfigError where `value`, or a value in it, is NaN or infinite."""
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ConfigError(f"{path} is {value}: write a finite number")
+    if isinstance(value, list):
+        for index, item in enumerate(value):
+            _check_finite(f"{path}[{index}]", item)
+    if isinstance(value, dict):
+        for key, item in value.items():
+            _check_finite(f"{path}.{key}", item)
+
+
 def _nearest(word: str, words: list[str]) -> str:
+    """The end of a sentence about an unknown `word`: what was meant, or what there is."""
     close = difflib.get_close_matches(word, words, 1)
-    return f": did you mean {close[0]!r}?" if close else f": it has {', '.join(words) or 'none'}"
+    if close:
+        return f": did you mean {close[0]!r}?"
+    return f": it has {', '.join(words) or 'none'}"
