@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from cogmap.bus.session import DEFAULT_ENDPOINT, check_name
+from cogmap.bus.session import DEFAULT_AGENT, DEFAULT_ENDPOINT, check_name
 
 connect_option = click.option(
     "--connect",
@@ -26,7 +26,7 @@ def _agent(context: click.Context, option: click.Parameter, value: str) -> str:
 agent_option = click.option(
     "--agent",
     callback=_agent,
-    default="agent",
+    default=DEFAULT_AGENT,
     show_default=True,
     envvar="COGMAP_AGENT",
     help="Whose topics, where several agents share a bus.",

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from cogmap.bus.codec import decode
-from cogmap.bus.interface import Arrival
-from cogmap.bus.memory import MemoryBus
-from cogmap.runtime.in_process import InProcessRunner
+from cogmap import InProcessRunner, topics
 from examples import wanderer
-from schemas import topics
 from schemas.sensing import TruePose
 from services import registry
 
@@ -17,19 +13,11 @@ def drive(frames: int) -> list[TruePose]:
     sections = {"sim": {"mode": "lockstep", "egl": False}}
     modules = [registry.build(name, sections) for name in ("sim", "sensory")]
     modules.append(wanderer.build(wanderer.Config()))
-    runner = InProcessRunner(modules)
 
     poses: list[TruePose] = []
-
-    def on_pose(arrival: Arrival) -> None:
-        pose = decode(arrival.topic, arrival.payload)
-        assert isinstance(pose, TruePose)
-        poses.append(pose)
-
-    observer = MemoryBus(runner.network)
-    observer.subscribe(topics.TRUE_POSE, on_pose, lambda name, number: None)
-    runner.run(lambda: len(poses) >= frames)
-    runner.close()
+    with InProcessRunner(modules) as runner:
+        runner.observe(topics.TRUE_POSE, poses.append)
+        runner.run(until=lambda: len(poses) >= frames)
     return poses
 
 

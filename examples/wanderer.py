@@ -10,11 +10,7 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
-from cogmap.bus.session import DEFAULT_ENDPOINT
-from cogmap.errors import MessageError
-from cogmap.runtime.module import Module
-from cogmap.runtime.process import Stop, run_module
-from schemas import topics
+from cogmap import MessageError, Module, run_module, topics
 from schemas.sensing import MotorCommand, RangeScan
 
 AHEAD_RAD = 0.3
@@ -69,4 +65,4 @@ def build(config: Config, instance: str = "action") -> Module:
 
 
 if __name__ == "__main__":
-    run_module(build(Config()), DEFAULT_ENDPOINT, "agent", state=None, stop=Stop())
+    run_module(build(Config()))

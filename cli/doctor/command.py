@@ -19,8 +19,8 @@ from cogmap.bus.discovery import discover
 from cogmap.bus.interface import Arrival, Member
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.errors import NoRouterError
-from cogmap.runtime.inbox import Inbox
-from cogmap.runtime.intake import Intake
+from cogmap.runtime.delivery.inbox import Inbox
+from cogmap.runtime.delivery.intake import Intake
 from schemas import topics
 from services import registry
 

@@ -11,8 +11,8 @@ from cli.launch.tally import FOLLOWED, Tally
 from cogmap.bus.interface import Arrival, Bus, Member
 from cogmap.errors import MessageError
 from cogmap.graph.replica import Replica, snapshot_over
-from cogmap.runtime.inbox import Inbox
-from cogmap.runtime.intake import Intake
+from cogmap.runtime.delivery.inbox import Inbox
+from cogmap.runtime.delivery.intake import Intake
 from schemas import topics
 
 

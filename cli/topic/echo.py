@@ -16,8 +16,8 @@ from cli.topic.argument import streamed_argument
 from cli.topic.observing import TICK_S, RouterWatch, observing
 from cogmap.bus.interface import Arrival
 from cogmap.errors import UsageError
-from cogmap.runtime.inbox import Inbox
-from cogmap.runtime.intake import Intake
+from cogmap.runtime.delivery.inbox import Inbox
+from cogmap.runtime.delivery.intake import Intake
 from cogmap.runtime.process import Stop
 from schemas.array import Array
 from schemas.base import Message

@@ -14,6 +14,7 @@ from cogmap.bus.interface import Member
 from cogmap.errors import NoRouterError, PortInUseError, UsageError
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+DEFAULT_AGENT = "agent"
 CONNECT_TIMEOUT_S = 5.0
 MAX_PORT = 65535
 # How long a full link delays the others before it drops a message, which the publisher's cache

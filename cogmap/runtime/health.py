@@ -7,10 +7,10 @@ from collections import deque
 
 import psutil
 
-from cogmap.runtime.inbox import Inbox
-from cogmap.runtime.intake import Intake
+from cogmap.runtime.delivery.inbox import Inbox
+from cogmap.runtime.delivery.intake import Intake
+from cogmap.runtime.delivery.publisher import Publisher
 from cogmap.runtime.module import Module
-from cogmap.runtime.publisher import Publisher
 from schemas.process import Health
 
 _RECENT = 512

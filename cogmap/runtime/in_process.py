@@ -1,17 +1,27 @@
-"""Many modules in one Python process, on the in-memory bus: experiments, replay, tests."""
+"""Many modules in one Python process, on the in-memory bus: experiments, notebooks, tests."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from types import TracebackType
+from typing import Any
 
+from cogmap.bus.codec import decode
+from cogmap.bus.interface import Arrival
 from cogmap.bus.memory import MemoryBus, MemoryNetwork
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
+from schemas.topics import Topic
 
 
 class InProcessRunner:
-    """Runs modules in turn on one thread, each message to its end, so that a run depends on its
-    seeds alone.
+    """Runs modules in turn on one thread, each message to its end.
+
+    A run depends on the modules' seeds alone. Use it in a `with` statement, or `close()` it.
+
+        with InProcessRunner([mapper, planner]) as runner:
+            runner.observe(topics.MOTOR_COMMAND, commands.append)
+            runner.run(until=lambda: len(commands) >= 20)
     """
 
     def __init__(self, modules: Iterable[Module]) -> None:
@@ -20,17 +30,40 @@ class InProcessRunner:
         for shell in self.shells:
             shell.open()
 
+    def __enter__(self) -> InProcessRunner:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def observe(self, topic: Topic, handler: Callable[[Any], object]) -> None:
+        """Call `handler` with every message of `topic` from now on, when it is published."""
+
+        def deliver(arrival: Arrival) -> None:
+            handler(decode(arrival.topic, arrival.payload))
+
+        MemoryBus(self.network).subscribe(topic, deliver, lambda name, number: None)
+
     def run(self, until: Callable[[], bool] = lambda: False) -> None:
-        """Go on until `until` says so, or nobody has anything left to do."""
+        """Run until `until()` is true, or no message is left to process."""
         while not until():
-            idle = True
-            for shell in self.shells:
-                while shell.spin_once(0.0):
-                    idle = False
-            if idle:
+            if not self._spin_all():
                 return
 
     def close(self) -> None:
         """End every module."""
         for shell in self.shells:
             shell.close()
+
+    def _spin_all(self) -> bool:
+        """Let every module process what it has received. Returns whether there was anything."""
+        moved = False
+        for shell in self.shells:
+            while shell.spin_once():
+                moved = True
+        return moved

@@ -1,4 +1,4 @@
-"""The one runner of modules: a process with one module in it."""
+"""A process with one module in it, or with the router."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 from types import FrameType
 
-from cogmap.bus.session import open_router
+from cogmap.bus.session import DEFAULT_AGENT, DEFAULT_ENDPOINT, open_router
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
@@ -35,18 +35,6 @@ class Stop:
         if tied:
             threading.Thread(target=self._watch_parent, daemon=True).start()
 
-    def _on_signal(self, number: int, frame: FrameType | None) -> None:
-        self._asked.set()
-
-    def _watch_parent(self) -> None:
-        while os.read(
-            sys.stdin.fileno(), 4096
-        ):  # not sys.stdin.read(): its lock would outlive the main thread
-            pass
-        self._asked.set()
-        time.sleep(ORPHAN_GRACE_S)
-        os._exit(1)  # it hangs, and nobody is left to end it
-
     @property
     def asked(self) -> bool:
         """Whether to end."""
@@ -56,12 +44,31 @@ class Stop:
         """Wait until asked; False after `timeout_s`."""
         return self._asked.wait(timeout_s)
 
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        self._asked.set()
 
-def run_module(module: Module, endpoint: str, agent: str, state: Path | None, stop: Stop) -> None:
-    """Run `module` until `stop` is asked; what it must keep is in the folder `state`.
+    def _watch_parent(self) -> None:
+        # Not sys.stdin.read(): its lock would outlive the main thread.
+        while os.read(sys.stdin.fileno(), 4096):
+            pass
+        self._asked.set()
+        time.sleep(ORPHAN_GRACE_S)
+        os._exit(1)  # it hangs, and nobody is left to end it
 
-    Raises NoRouterError, and StorageError where that folder cannot be written.
+
+def run_module(
+    module: Module,
+    endpoint: str = DEFAULT_ENDPOINT,
+    agent: str = DEFAULT_AGENT,
+    state: Path | None = None,
+    stop: Stop | None = None,
+) -> None:
+    """Run `module` as this process, until `stop` is asked: by default, until a signal to end.
+
+    It connects to the router at `endpoint` as one of `agent`'s; what it must keep is in the folder
+    `state`. Raises NoRouterError, and StorageError where that folder cannot be written.
     """
+    stop = stop or Stop()
     journal = None
     counts = None
     if state is not None:

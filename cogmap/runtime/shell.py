@@ -11,12 +11,12 @@ from cogmap.bus.codec import Cause, Envelope, decode, encode
 from cogmap.bus.interface import CACHED_MESSAGES, Answer, Arrival, Bus, Member
 from cogmap.errors import MessageError
 from cogmap.graph.replica import Fetched
+from cogmap.runtime.delivery.inbox import Inbox
+from cogmap.runtime.delivery.intake import Intake
+from cogmap.runtime.delivery.publisher import Computation, Publisher
 from cogmap.runtime.follower import Follower
 from cogmap.runtime.health import Meter
-from cogmap.runtime.inbox import Inbox
-from cogmap.runtime.intake import Intake
 from cogmap.runtime.module import Module, Reply
-from cogmap.runtime.publisher import Computation, Publisher
 from cogmap.runtime.state.journal import Journal
 from cogmap.runtime.state.published import PublishedCounts
 from cogmap.runtime.timers import Due, Timers

@@ -11,8 +11,8 @@ import pytest
 from cogmap.bus.codec import Cause, Envelope, decode, encode
 from cogmap.bus.interface import Member
 from cogmap.errors import MessageError, NoAnswerError
+from cogmap.runtime.delivery.publisher import MAX_CAUSES
 from cogmap.runtime.module import Module
-from cogmap.runtime.publisher import MAX_CAUSES
 from cogmap.runtime.shell import Shell
 from cogmap.runtime.state.published import PublishedCounts
 from schemas import topics

@@ -7,7 +7,7 @@ from __future__ import annotations
 import itertools
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Protocol
 
@@ -19,7 +19,7 @@ from cogmap.bus.memory import MemoryBus, MemoryNetwork
 from cogmap.bus.session import free_endpoint, open_client, open_router
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.errors import MessageError
-from cogmap.runtime.inbox import Inbox
+from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.base import Message
@@ -131,19 +131,29 @@ def meet(here: Bus, *others: Bus) -> None:
     """Wait until `here` knows that the others are ready: what it publishes from now on reaches
     them.
     """
-    expected = {Member("peer", f"peer{next(_numbers)}") for _ in others}
-    seen = set()
-    done = threading.Event()
+    members = [Member("peer", f"peer{next(_numbers)}") for _ in others]
+    await_members(here, *members, then=lambda: _announce(members, others))
 
-    def changed(member: Member, alive: bool) -> None:
-        seen.add(member)
-        if expected <= seen:
-            done.set()
 
-    here.watch(changed)
-    for member, other in zip(sorted(expected), others, strict=True):
-        other.announce(member)
-    assert done.wait(TIMEOUT_S)
+def _announce(members: list[Member], buses: Iterable[Bus]) -> None:
+    for member, bus in zip(members, buses, strict=True):
+        bus.announce(member)
+
+
+def await_members(here: Bus, *members: Member, then: Callable[[], None] = lambda: None) -> None:
+    """Call `then`, and wait until `here` knows that the members are ready."""
+    seen: set[Member] = set()
+    changed = threading.Condition()
+
+    def on_change(member: Member, alive: bool) -> None:
+        with changed:
+            seen.add(member)
+            changed.notify_all()
+
+    here.watch(on_change)
+    then()
+    with changed:
+        assert changed.wait_for(lambda: set(members) <= seen, TIMEOUT_S), f"only {seen} are ready"
 
 
 def spin_until(condition: Callable[[], bool], *shells: Shell) -> None:

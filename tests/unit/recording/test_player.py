@@ -15,7 +15,7 @@ from cogmap.recording.replaying.player import Choices, Played, Player
 from cogmap.recording.storage.format import topics_to_record
 from cogmap.recording.storage.reader import LogReader
 from cogmap.recording.storage.writer import LogWriter
-from cogmap.runtime.intake import Intake
+from cogmap.runtime.delivery.intake import Intake
 from schemas import topics
 from schemas.base import Message
 from schemas.process import Clock, Presence

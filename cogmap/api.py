@@ -1,0 +1,53 @@
+"""What a module of one's own and a notebook need; `import cogmap` gives these names.
+
+A module:       Module, topics, run_module; its messages are in `schemas`
+The map:        Graph, Replica, snapshot_over (Module.following is the short form)
+Running:        InProcessRunner in one process; Client beside a running system
+Recorded logs:  open_log, Log, Entry
+Errors:         CogmapError and its kinds
+"""
+
+from __future__ import annotations
+
+from cogmap.errors import (
+    CogmapError,
+    ConfigError,
+    LogError,
+    MessageError,
+    NoAnswerError,
+    NoRouterError,
+    PortInUseError,
+    StorageError,
+    UsageError,
+)
+from cogmap.graph.graph import Graph
+from cogmap.graph.replica import Replica, snapshot_over
+from cogmap.recording import Entry, Log, open_log
+from cogmap.runtime.client import Client
+from cogmap.runtime.in_process import InProcessRunner
+from cogmap.runtime.module import Module
+from cogmap.runtime.process import run_module
+from schemas import topics
+
+__all__ = [
+    "Client",
+    "CogmapError",
+    "ConfigError",
+    "Entry",
+    "Graph",
+    "InProcessRunner",
+    "Log",
+    "LogError",
+    "MessageError",
+    "Module",
+    "NoAnswerError",
+    "NoRouterError",
+    "PortInUseError",
+    "Replica",
+    "StorageError",
+    "UsageError",
+    "open_log",
+    "run_module",
+    "snapshot_over",
+    "topics",
+]

@@ -1,0 +1,58 @@
+"""A module beside a running system, on a thread of this process: for notebooks and tests."""
+
+from __future__ import annotations
+
+import threading
+from types import TracebackType
+
+from cogmap.bus.session import DEFAULT_AGENT, DEFAULT_ENDPOINT
+from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.runtime.module import Module
+from cogmap.runtime.shell import Shell
+
+IDLE_S = 0.05
+
+
+class Client:
+    """Runs `module` on a thread of its own while in a `with` statement.
+
+    It is connected to the router at `endpoint`, as one of `agent`'s. Raises NoRouterError where
+    none answers. Handlers are called on that thread.
+
+        graph = Graph()
+        with Client(Module("notebook").following(graph)):
+            input("Enter ends it")
+        print(len(graph.nodes))
+    """
+
+    def __init__(
+        self, module: Module, endpoint: str = DEFAULT_ENDPOINT, agent: str = DEFAULT_AGENT
+    ) -> None:
+        self.module = module
+        self._endpoint = endpoint
+        self._agent = agent
+        self._ended = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def __enter__(self) -> Client:
+        shell = Shell(self.module, ZenohBus(self._endpoint, self._agent))
+        shell.open()
+        self._ended.clear()
+        self._thread = threading.Thread(target=self._work, args=(shell,), daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._ended.set()
+        if self._thread is not None:
+            self._thread.join()
+
+    def _work(self, shell: Shell) -> None:
+        while not self._ended.is_set():
+            shell.spin_once(IDLE_S)
+        shell.close()

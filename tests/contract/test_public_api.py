@@ -1,0 +1,124 @@
+"""`import cogmap` is all of the library that a module of one's own or a notebook needs."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import cogmap
+from cogmap import api
+from cogmap.bus.interface import Member
+from schemas.graph import Delta, Node
+from schemas.sensing import MotorCommand, Odometry
+from tests.support.includes import ROOT
+from tests.support.networks import OverZenoh, Peer, await_members, publish
+from tests.support.reference import REFERENCE
+
+OURS = {"benchmarks", "cli", "cogmap", "experiments", "services", "tests", "training"}
+PUBLIC = {"cogmap", "services.registry"}
+
+
+def imported(path: Path) -> set[str]:
+    """The modules of ours, besides schemas, that a file imports."""
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module == "services":
+            names.update(f"services.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module is not None:
+            names.add(node.module)
+    return {name for name in names if name.partition(".")[0] in OURS}
+
+
+def test_the_public_names_are_those_of_the_api() -> None:
+    assert set(api.__all__) <= set(dir(cogmap))
+    for name in api.__all__:
+        assert getattr(cogmap, name) is getattr(api, name)
+
+
+@pytest.mark.parametrize("name", api.__all__)
+def test_a_public_name_is_documented(name: str) -> None:
+    assert inspect.getdoc(getattr(cogmap, name))
+
+
+def test_a_name_that_is_not_public_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="module 'cogmap' has no attribute 'Shell'"):
+        _ = cogmap.Shell
+
+
+def test_importing_the_package_imports_nothing_heavy() -> None:
+    program = "import cogmap, sys; print(*sys.modules)"
+    run = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+
+    assert not {"numpy", "zenoh", "mcap", "cogmap.api"} & set(run.stdout.split())
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "examples").glob("*.py")), ids=lambda p: p.name)
+def test_an_example_imports_only_what_is_public(path: Path) -> None:
+    assert imported(path) <= PUBLIC
+
+
+def odometry(seq: int, speed_m_s: float) -> Odometry:
+    return Odometry(
+        speed_m_s=speed_m_s, turn_rate_rad_s=0.0, dt_s=0.05, seq=seq, source="sim", stamp_ns=seq
+    )
+
+
+def test_modules_run_in_one_process() -> None:
+    def brake(message: Odometry) -> MotorCommand:
+        return MotorCommand(left_wheel_rad_s=0.0, right_wheel_rad_s=0.0, stamp_ns=message.stamp_ns)
+
+    def begin() -> list[Odometry]:
+        return [odometry(0, 1.0), odometry(0, 2.0)]
+
+    sim = cogmap.Module("sim").on_start(begin, {"action": 1}, [cogmap.topics.ODOMETRY])
+    action = cogmap.Module("action").on(
+        cogmap.topics.ODOMETRY, brake, [cogmap.topics.MOTOR_COMMAND]
+    )
+    commands: list[MotorCommand] = []
+
+    with cogmap.InProcessRunner([sim, action]) as runner:
+        runner.observe(cogmap.topics.MOTOR_COMMAND, commands.append)
+        runner.run()
+
+    assert [command.seq for command in commands] == [0, 1]
+
+
+def test_a_notebook_follows_the_graph_of_a_running_system(over_zenoh: OverZenoh) -> None:
+    workspace = over_zenoh.join()
+    workspace.declare(cogmap.topics.DELTA)
+    peer = Peer(over_zenoh.join(), cogmap.topics.MOTOR_COMMAND)
+    graph = cogmap.Graph()
+
+    def on_delta(delta: Delta) -> MotorCommand:
+        return MotorCommand(left_wheel_rad_s=0.0, right_wheel_rad_s=0.0, stamp_ns=delta.version)
+
+    module = cogmap.Module("notebook").following(graph, on_delta, [cogmap.topics.MOTOR_COMMAND])
+    with cogmap.Client(module, over_zenoh.endpoint, over_zenoh.agent):
+        await_members(workspace, Member("notebook", "notebook"))
+        node = Node(id="object:house", kind="object")
+        delta = Delta(version=1, cycle=1, phase="objects", tasks=[], operations=[node])
+        delta.source = "workspace"
+        publish(workspace, delta)
+        peer.wait_for(1)
+
+    assert graph.version == 1
+    assert list(graph.nodes) == ["object:house"]
+
+
+def test_a_log_is_read_with_its_graph() -> None:
+    log = cogmap.open_log(REFERENCE)
+
+    commands = list(log.messages("motor/command"))
+    graph = log.graph_at(log.duration_s)
+
+    assert isinstance(commands[0].message, MotorCommand)
+    assert graph.version > 0
