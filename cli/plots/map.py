@@ -15,10 +15,12 @@ from cli.launch.metrics import RunMetrics
 from cli.launch.observer import Observer
 from cli.plots import map_layers as layers
 from cli.plots import palette
-from cli.plots.palette import ESTIMATE, FAINT, INK, PAPER, TRUE, WHEELS
+from cli.plots.palette import ESTIMATE, FAINT, FUSED, INK, PAPER, TRUE, WHEELS
 from cogmap.graph.graph import Graph
 
 MARGIN_M = 5.0
+DASHED = (0, (4, 2))
+DOTTED = (0, (1, 1.2))
 
 
 def draw(path: Path, observer: Observer, graph: Graph, figures: RunMetrics) -> None:
@@ -38,11 +40,13 @@ def draw(path: Path, observer: Observer, graph: Graph, figures: RunMetrics) -> N
 
 
 def _draw_paths(axes: Axes, observer: Observer) -> None:
-    axes.plot(*observer.wheels_path_m.T, color=WHEELS, lw=1.6, ls=(0, (4, 2)), zorder=8)
+    axes.plot(*observer.wheels_path_m.T, color=WHEELS, lw=1.6, ls=DASHED, zorder=8)
     axes.plot(
         *observer.true_path_m.T, color=TRUE, lw=3.2, alpha=0.9, solid_capstyle="round", zorder=9
     )
+    axes.plot(*observer.fused_path_m.T, color=FUSED, lw=1.4, ls=DOTTED, zorder=9.5)
     axes.plot(*observer.estimated_path_m.T, color=ESTIMATE, lw=1.5, zorder=10)
+
     if observer.start is not None:
         axes.plot(
             observer.start.x_m,
@@ -67,7 +71,12 @@ def _dress(axes: Axes, observer: Observer, figures: RunMetrics) -> None:
             for side in (-1, 1)
         ]
     every = np.vstack(
-        [np.array(corners).reshape(-1, 2), observer.true_path_m, observer.wheels_path_m]
+        [
+            np.array(corners).reshape(-1, 2),
+            observer.true_path_m,
+            observer.wheels_path_m,
+            observer.fused_path_m,
+        ]
     )
     if len(every):
         (west, south), (east, north) = every.min(axis=0) - MARGIN_M, every.max(axis=0) + MARGIN_M
@@ -107,8 +116,9 @@ def _title(axes: Axes, figures: RunMetrics) -> None:
     driven = f"Town {figures.seed}, driven through for {figures.distance_m:.0f} m in {figures.drive_s:.0f} s"
     learned = f"{figures.objects} buildings and {figures.road_m2:.0f} m² of street learned"
     errors = (
-        f"position off by {figures.estimate.mean_m:.2f} m on average, "
-        f"{figures.wheels_alone.mean_m:.2f} m by path integration alone"
+        f"position error {figures.estimate.mean_m:.2f} m on average; "
+        f"{figures.fused_alone.mean_m:.2f} m by fused self-motion alone, "
+        f"{figures.wheels_alone.mean_m:.2f} m by wheels alone"
     )
     axes.set_title(f"{driven}\n\n", loc="left", color=INK, fontsize=14, fontweight="bold")
     axes.text(
@@ -128,7 +138,8 @@ def _legend() -> list[Patch | Line2D]:
         Patch(fc=palette.HOUSE, ec=palette.WALL, label="building"),
         Line2D([], [], color=TRUE, lw=3.2, label="true path"),
         Line2D([], [], color=ESTIMATE, lw=1.5, label="estimated path"),
-        Line2D([], [], color=WHEELS, lw=1.6, ls=(0, (4, 2)), label="path integration alone"),
+        Line2D([], [], color=FUSED, lw=1.4, ls=DOTTED, label="fused self-motion alone"),
+        Line2D([], [], color=WHEELS, lw=1.6, ls=DASHED, label="wheels alone"),
         Patch(fc=palette.ROAD, alpha=palette.ROAD_OPACITY, label="learned street"),
         Line2D(
             [],

@@ -1,4 +1,4 @@
-"""The colours of the pictures, so that the same thing looks the same in each."""
+"""The colours of the plots, so that the same thing looks the same in each."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ FAINT = "#8a857a"
 TRUE = "#1f2430"
 ESTIMATE = "#e4572e"
 WHEELS = "#8d7cc4"
+FUSED = "#3f74b5"
 STREET = "#e7e3da"
 KERB = "#cfc9bc"
 HOUSE = "#d3d0cb"
