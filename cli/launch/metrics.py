@@ -111,7 +111,19 @@ class DriveMetrics(msgspec.Struct, kw_only=True):
     memory_mb: dict[str, float]
 
 
-class RunMetrics(DriveMetrics, kw_only=True):
+class RecordedMetrics(DriveMetrics, kw_only=True):
+    """What the log of a drive shows: its drive, its settings, and the recording; None where there
+    is none, or it was not finished.
+    """
+
+    completed: bool
+    seed: int
+    laps: float
+    mode: str
+    log: Recording | None
+
+
+class RunMetrics(RecordedMetrics, kw_only=True):
     """What one run showed: its drive, and its processes.
 
     `ended_by` is how it ended in two words, `reason` in a sentence. `wall_s` is how long the
@@ -119,18 +131,13 @@ class RunMetrics(DriveMetrics, kw_only=True):
     `killed` name processes.
     """
 
-    completed: bool
     ended_by: str
     reason: str
-    seed: int
-    laps: float
-    mode: str
     codelets: int
     wall_s: float
     start_s: dict[str, float]
     restarts: dict[str, int]
     killed: list[str]
-    log: Recording | None
 
 
 def objects(graph: Graph) -> list[Node]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from cli.log.drive import draw_map, summary
 from cli.log.inspect import cat, diff, info, recover
 from cli.log.pictures import image, perception
 from cli.log.record import record
@@ -13,6 +14,8 @@ _EPILOG = """\b
 A first session, with `cogmap run` going on in another terminal:
   cogmap log record -o drive.mcap     Ctrl-C ends it
   cogmap log info drive.mcap          what is in it
+  cogmap log summary drive.mcap       how the drive went
+  cogmap log map drive.mcap           the town and what was learned of it
   cogmap log cat drive.mcap action/selected
   cogmap log image drive.mcap         a view, as a file
   cogmap log replay drive.mcap --into sensory
@@ -26,5 +29,16 @@ def log() -> None:
     """
 
 
-for _command in (record, info, cat, image, perception, replay, diff, recover):
+for _command in (
+    record,
+    info,
+    summary,
+    cat,
+    draw_map,
+    image,
+    perception,
+    replay,
+    diff,
+    recover,
+):
     log.add_command(_command)

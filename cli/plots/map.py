@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from cli.launch.metrics import RunMetrics
+from cli.launch.metrics import RecordedMetrics
 from cli.launch.observer import Observer
 from cli.plots import map_layers as layers
 from cli.plots import palette
@@ -23,7 +23,7 @@ DASHED = (0, (4, 2))
 DOTTED = (0, (1, 1.2))
 
 
-def draw(path: Path, observer: Observer, graph: Graph, figures: RunMetrics) -> None:
+def draw(path: Path, observer: Observer, graph: Graph, figures: RecordedMetrics) -> None:
     """Write the map to `path` as a PNG."""
     with mpl.rc_context(
         {"font.family": "sans-serif", "font.size": 9, "axes.edgecolor": palette.KERB}
@@ -60,7 +60,7 @@ def _draw_paths(axes: Axes, observer: Observer) -> None:
         )
 
 
-def _dress(axes: Axes, observer: Observer, figures: RunMetrics) -> None:
+def _dress(axes: Axes, observer: Observer, figures: RecordedMetrics) -> None:
     """Limits, scale, title and legend."""
     town = observer.town
     corners = [point for street in (town.streets if town else []) for point in street.line_m]
@@ -112,7 +112,7 @@ def _draw_scale(axes: Axes, west_m: float, south_m: float, length_m: float = 10.
     )
 
 
-def _title(axes: Axes, figures: RunMetrics) -> None:
+def _title(axes: Axes, figures: RecordedMetrics) -> None:
     driven = f"Town {figures.seed}, driven through for {figures.distance_m:.0f} m in {figures.drive_s:.0f} s"
     learned = f"{figures.objects} buildings and {figures.road_m2:.0f} m² of street learned"
     errors = (

@@ -10,7 +10,14 @@ import msgspec
 from rich.table import Table
 
 from cli.launch.drive import Drive
-from cli.launch.metrics import DriveMetrics, ErrorMetrics, Recording, RunMetrics, drive_metrics
+from cli.launch.metrics import (
+    DriveMetrics,
+    ErrorMetrics,
+    RecordedMetrics,
+    Recording,
+    RunMetrics,
+    drive_metrics,
+)
 from cli.launch.outcome import Ending, Outcome
 from cli.launch.plan import LOG_NAME
 from cli.launch.watch import Watch
@@ -59,8 +66,20 @@ def _draw_map(path: Path, watch: Watch, metrics: RunMetrics) -> None:
 def table(metrics: RunMetrics, folder: Path) -> Table:
     """The metrics that matter most."""
     title = f"{metrics.ended_by}: {metrics.reason}\n{folder}"
+    return _table(
+        title, [*drive_rows(metrics), *_loss_rows(metrics, "not recorded"), *_process_rows(metrics)]
+    )
+
+
+def recorded_table(metrics: RecordedMetrics, log: Path) -> Table:
+    """The metrics that matter most, of a log."""
+    losses = _loss_rows(metrics, "the recording was not finished")
+    return _table(str(log), [*drive_rows(metrics), *losses])
+
+
+def _table(title: str, rows: list[tuple[str, str]]) -> Table:
     shown = Table(show_header=False, title=title, title_justify="left")
-    for name, value in [*drive_rows(metrics), *_process_rows(metrics)]:
+    for name, value in rows:
         shown.add_row(name, value)
     return shown
 
@@ -92,23 +111,23 @@ def _errors(errors: ErrorMetrics) -> str:
     return f"{errors.mean_m:.2f} m on average, at most {errors.max_m:.2f} m"
 
 
-def _process_rows(metrics: RunMetrics) -> list[tuple[str, str]]:
+def _loss_rows(metrics: RecordedMetrics, without_log: str) -> list[tuple[str, str]]:
     dropped = "none"
     if metrics.refused:
         dropped = f"{metrics.dropped}, the last: {metrics.refused[-1]}"
+    return [("lost messages", _losses(metrics, without_log)), ("dropped answers", dropped)]
+
+
+def _process_rows(metrics: RunMetrics) -> list[tuple[str, str]]:
     restarts = [f"{name} {number}" for name, number in metrics.restarts.items()]
-    return [
-        ("lost messages", _losses(metrics)),
-        ("dropped answers", dropped),
-        ("restarts", ", ".join(restarts) or "none"),
-    ]
+    return [("restarts", ", ".join(restarts) or "none")]
 
 
-def _losses(metrics: RunMetrics) -> str:
-    """What was lost, by the counts of the modules and of the recorder."""
+def _losses(metrics: RecordedMetrics, without_log: str) -> str:
+    """What was lost, by the counts of the modules and of the recorder, which there may not be."""
     log = metrics.log
     if log is None:
-        return f"{metrics.gaps_total}; not recorded"
+        return f"{metrics.gaps_total}; {without_log}"
 
     gaps = "no gap in any NEVER_DROP topic" if log.never_drop_whole else "; ".join(log.gaps)
     return (

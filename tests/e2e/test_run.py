@@ -121,6 +121,25 @@ def test_a_short_drive_ends_by_itself_and_leaves_a_log_a_map_and_a_summary(
     assert processes_at(run.endpoint) == []
 
 
+def test_the_log_alone_gives_the_summary_and_the_map_of_its_run(start: Callable[..., Run]) -> None:
+    run = start("--lockstep", "--laps", "0.05")
+    assert run.end() == 0, run.output()
+    log = str(run.folder / "log.mcap")
+    result = subprocess.run(
+        [*COGMAP, "log", "summary", log, "--json"], capture_output=True, check=True
+    )
+    of_run = json.loads((run.folder / "summary.json").read_text())
+    of_log = json.loads(result.stdout)
+    of_process = {"superseded", "busy", "memory_mb", "rejected"}
+    timed = {name for name in of_log if name.startswith("cycle_")} | {"bus_share"}
+    same = set(of_log) - of_process - timed
+    assert {name: of_log[name] for name in same} == {name: of_run[name] for name in same}
+
+    drawn = run.folder / "again.png"
+    subprocess.run([*COGMAP, "log", "map", log, "-o", str(drawn)], check=True)
+    assert drawn.read_bytes() == (run.folder / "map.png").read_bytes()
+
+
 def test_the_summary_comes_as_json_too(start: Callable[..., Run]) -> None:
     run = start("--lockstep", "--laps", "0.02", "--no-record", "--json")
     assert run.end() == 0, run.output()

@@ -1,0 +1,132 @@
+"""The summary and the map of a drive, from its log alone."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from cli.main import cogmap
+from cogmap.bus.codec import Envelope, encode
+from cogmap.errors import LogError, UsageError
+from cogmap.recording.storage.writer import LogWriter
+from schemas import topics
+from schemas.base import Message
+from schemas.sensing import Odometry, Pose, TruePose
+
+SECOND_NS = 10**9
+STEPS = 5
+
+
+def true_pose(seq: int) -> TruePose:
+    return TruePose(
+        stamp_ns=seq * SECOND_NS,
+        seq=seq,
+        source="sim",
+        pose=Pose(x_m=float(seq), y_m=0.0, heading_rad=0.0),
+        travelled_m=float(seq),
+        progress=seq / STEPS,
+    )
+
+
+def odometry(seq: int) -> Odometry:
+    return Odometry(
+        stamp_ns=seq * SECOND_NS,
+        seq=seq,
+        source="sim",
+        speed_m_s=1.0,
+        turn_rate_rad_s=0.0,
+        dt_s=1.0,
+    )
+
+
+def write(path: Path, messages: list[Message], config: str = "{}") -> Path:
+    writer = LogWriter(path, topics.ALL, {"agent": "a", "config": config})
+    for message in messages:
+        envelope = Envelope(message.source, message.seq, 1, message.stamp_ns, message.stamp_ns)
+        writer.write(topics.of(message), encode(message), envelope, message.stamp_ns)
+    writer.close()
+    return path
+
+
+@pytest.fixture
+def drive(tmp_path: Path) -> Path:
+    """A robot that drives straight for five seconds, with wheels that measure it so."""
+    messages: list[Message] = []
+    for seq in range(STEPS + 1):
+        messages += [true_pose(seq), odometry(seq)]
+    config = json.dumps({"sim": {"seed": 7, "laps": 0.5, "mode": "lockstep"}})
+    return write(tmp_path / "drive.mcap", messages, config)
+
+
+@pytest.fixture
+def run() -> Callable[..., Result]:
+    def invoke(*arguments: str | Path) -> Result:
+        result = CliRunner().invoke(cogmap, ["log", *map(str, arguments)], standalone_mode=False)
+        if result.exception is not None:
+            raise result.exception
+        return result
+
+    return invoke
+
+
+def test_a_summary_has_the_drive_and_its_settings(run: Callable[..., Result], drive: Path) -> None:
+    found = json.loads(run("summary", drive, "--json").stdout)
+    assert (found["seed"], found["laps"], found["mode"]) == (7, 0.5, "lockstep")
+    assert (found["drive_s"], found["distance_m"]) == (5.0, 5.0)
+    assert found["completed"]
+    assert found["gaps_total"] == 0
+    assert found["log"] is None
+
+
+def test_a_summary_is_a_table_for_people(run: Callable[..., Result], drive: Path) -> None:
+    shown = run("summary", drive).stdout
+    assert "5.0 m in 5.0 s" in shown
+    assert "path integration alone, wheels" in shown
+    assert "the recording was not finished" in shown
+
+
+def test_settings_that_a_log_lacks_are_the_defaults(
+    run: Callable[..., Result], tmp_path: Path
+) -> None:
+    log = write(tmp_path / "bare.mcap", [true_pose(0)])
+    found = json.loads(run("summary", log, "--json").stdout)
+    assert (found["seed"], found["laps"]) == (1, 1.0)
+
+
+def test_a_log_without_true_poses_is_said_to_have_none(
+    run: Callable[..., Result], tmp_path: Path
+) -> None:
+    result = run("summary", write(tmp_path / "blind.mcap", [odometry(0)]), "--json")
+    assert "holds no truth/pose: distances and errors are 0" in result.stderr
+    assert json.loads(result.stdout)["distance_m"] == 0.0
+
+
+@pytest.mark.parametrize("suffix", [".png", ".pdf"])
+def test_a_map_is_drawn_as_an_image(
+    run: Callable[..., Result], drive: Path, tmp_path: Path, suffix: str
+) -> None:
+    path = tmp_path / f"town{suffix}"
+    shown = run("map", drive, "-o", path).stdout
+    assert f"{path}: 5 m of driving" in shown
+    assert path.read_bytes().startswith({".png": b"\x89PNG", ".pdf": b"%PDF"}[suffix])
+
+
+def test_a_map_is_named_by_its_log(
+    run: Callable[..., Result], drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    run("map", drive)
+    assert (tmp_path / "drive-map.png").is_file()
+
+
+def test_a_map_that_cannot_be_written_is_one_sentence(
+    run: Callable[..., Result], drive: Path, tmp_path: Path
+) -> None:
+    with pytest.raises(UsageError, match=r"name a file that ends in \.png or \.pdf"):
+        run("map", drive, "-o", "town.txt")
+    with pytest.raises(LogError, match="name a file in a folder that can be written to"):
+        run("map", drive, "-o", tmp_path / "absent" / "town.png")
