@@ -195,7 +195,7 @@ def bus_command(pairs: int, number: int, json_path: Path | None) -> None:
     "--road-weights",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Of --camvid-test: the road network, as python -m training road --camvid wrote it; "
+    help="Of --camvid-test: the road network, as cogmap train road --camvid wrote it; "
     "that of the running system if not given.",
 )
 @json_option

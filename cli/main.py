@@ -83,6 +83,13 @@ def _topic() -> click.Command:
     return topic
 
 
+def _train() -> click.Command:
+    """Train the networks of perception."""
+    from training.command import train
+
+    return train
+
+
 COMMANDS: dict[str, Loader] = {
     "architecture": _architecture,
     "config": _config,
@@ -94,6 +101,7 @@ COMMANDS: dict[str, Loader] = {
     "router": _router,
     "run": _run,
     "topic": _topic,
+    "train": _train,
 }
 
 

@@ -10,9 +10,9 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from cogmap.errors import CogmapError
+from cogmap.parallel import Progress
 from cogmap.runtime.config import Sections
 from cogmap.runtime.module import Module
-from experiments.parallel import Progress
 from schemas import topics
 from schemas.base import Message
 from schemas.sensing import MotorCommand, TruePose

@@ -1,6 +1,4 @@
-"""Other views, light and cameras from the images there are, so that a network learns what holds in
-all of them.
-"""
+"""Augmentation: other viewpoints, light and cameras, from images with labels."""
 
 from __future__ import annotations
 
@@ -8,22 +6,19 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
+from cogmap.geometry.arrays import Bytes, Floats, Singles
 from services.epam.layout.road import HEIGHT_PX, WIDTH_PX
-
-Bytes = npt.NDArray[np.uint8]
-Floats = npt.NDArray[np.float32]
 
 
 @dataclass(frozen=True)
 class Augmentation:
-    """How much is varied. `zoom` is the least and the greatest enlargement, `shift` the most that
-    the image moves, as a share of its size, and `turn_deg` the most that it turns; `contrast`,
+    """How much is varied. `zoom` is the smallest and the largest magnification, `shift` the largest
+    translation, as a share of the image's size, and `turn_deg` the largest rotation; `contrast`,
     `cast` and `gamma` are factors about 1, given as natural logarithms; `noise` and `brightness`
-    are in grey levels of 255.
+    are in grey levels of 255; a shadow and a blur are given to shares of the images.
 
-    By default little, for renderings, which vary much of this themselves.
+    The defaults vary little, for renderings, which have much of this variation themselves.
     """
 
     zoom: tuple[float, float] = (0.9, 1.15)
@@ -39,7 +34,7 @@ class Augmentation:
 
 
 @dataclass(frozen=True, eq=False)
-class Sample:
+class LabelledImage:
     """An image, uint8 (h, w, 3), and, uint8 (h, w) each, how much of a pixel is road and how much
     of it is known.
     """
@@ -49,74 +44,96 @@ class Sample:
     known: Bytes
 
 
-def varied(sample: Sample, how: Augmentation, rng: np.random.Generator) -> Sample:
-    """`sample` as it might have been, HEIGHT_PX by WIDTH_PX."""
-    matrix = _warp(sample.image.shape[:2], how, rng)
+def augmented(
+    labelled: LabelledImage, how: Augmentation, rng: np.random.Generator
+) -> LabelledImage:
+    """Return a variation of `labelled`, HEIGHT_PX by WIDTH_PX."""
+    matrix = _affine(labelled.image.shape[:2], how, rng)
     size = (WIDTH_PX, HEIGHT_PX)
     image = cv2.warpAffine(
-        sample.image, matrix, size, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+        labelled.image, matrix, size, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
     )
-    road = cv2.warpAffine(sample.road, matrix, size, flags=cv2.INTER_LINEAR)
-    known = cv2.warpAffine(sample.known, matrix, size, flags=cv2.INTER_LINEAR)
-    return Sample(
-        _relit(image.astype(np.float32), how, rng), road.astype(np.uint8), known.astype(np.uint8)
+    road = cv2.warpAffine(labelled.road, matrix, size, flags=cv2.INTER_LINEAR)
+    known = cv2.warpAffine(labelled.known, matrix, size, flags=cv2.INTER_LINEAR)
+    return LabelledImage(
+        image=_relit(image.astype(np.float32), how, rng),
+        road=road.astype(np.uint8),
+        known=known.astype(np.uint8),
     )
 
 
-def plain(sample: Sample) -> Sample:
-    """`sample` as it is, HEIGHT_PX by WIDTH_PX."""
-    parts = (sample.image, sample.road, sample.known)
-    scaled = (
-        cv2.resize(part, (WIDTH_PX, HEIGHT_PX), interpolation=cv2.INTER_AREA) for part in parts
+def resized(labelled: LabelledImage) -> LabelledImage:
+    """Return `labelled` unchanged but for its size, HEIGHT_PX by WIDTH_PX."""
+    return LabelledImage(
+        image=_resized(labelled.image),
+        road=_resized(labelled.road),
+        known=_resized(labelled.known),
     )
-    image, road, known = (part.astype(np.uint8, copy=False) for part in scaled)
-    return Sample(image, road, known)
 
 
-def _warp(
-    size: tuple[int, ...], how: Augmentation, rng: np.random.Generator
-) -> npt.NDArray[np.float64]:
-    """The affine map, (2, 3), from pixels of an image of `size` to those of its variation."""
+def _resized(image: Bytes) -> Bytes:
+    small = cv2.resize(image, (WIDTH_PX, HEIGHT_PX), interpolation=cv2.INTER_AREA)
+    return small.astype(np.uint8, copy=False)
+
+
+def _affine(size: tuple[int, ...], how: Augmentation, rng: np.random.Generator) -> Floats:
+    """The affine map, (2, 3), from pixels of an image of `size` (h, w) to those of its variation,
+    perhaps mirrored.
+    """
     height, width = size
     zoom = np.exp(rng.uniform(*np.log(how.zoom)))
-    turn = np.radians(rng.uniform(-how.turn_deg, how.turn_deg))
+    turn_rad = np.radians(rng.uniform(-how.turn_deg, how.turn_deg))
     mirror = rng.choice((-1.0, 1.0))
+
     across = zoom * WIDTH_PX / width
     down = zoom * HEIGHT_PX / height
-    cos = np.cos(turn)
-    sin = np.sin(turn)
+    cos = np.cos(turn_rad)
+    sin = np.sin(turn_rad)
     linear = np.array([[mirror * across * cos, -down * sin], [mirror * across * sin, down * cos]])
-    moved = rng.uniform(-how.shift, how.shift, 2) * (WIDTH_PX, HEIGHT_PX)
-    centre = np.array([width - 1, height - 1]) / 2
-    to = np.array([WIDTH_PX - 1, HEIGHT_PX - 1]) / 2 + moved - linear @ centre
-    return np.column_stack([linear, to])
+
+    shift_px = rng.uniform(-how.shift, how.shift, 2) * (WIDTH_PX, HEIGHT_PX)
+    centre_px = np.array([width - 1, height - 1]) / 2
+    new_centre_px = np.array([WIDTH_PX - 1, HEIGHT_PX - 1]) / 2
+    translation_px = new_centre_px + shift_px - linear @ centre_px
+    return np.column_stack([linear, translation_px])
 
 
-def _relit(image: Floats, how: Augmentation, rng: np.random.Generator) -> Bytes:
-    """Another light, another camera."""
+def _relit(image: Singles, how: Augmentation, rng: np.random.Generator) -> Bytes:
+    """`image` (HEIGHT_PX, WIDTH_PX, 3) in another light, by another camera."""
     if rng.random() < how.blur_share:
-        image = cv2.GaussianBlur(image, (3, 3), rng.uniform(0.4, 1.0)).astype(
-            np.float32, copy=False
-        )
+        blurred = cv2.GaussianBlur(image, (3, 3), rng.uniform(0.4, 1.0))
+        image = blurred.astype(np.float32, copy=False)
     if rng.random() < how.shadow_share:
         image *= _shadow(rng)
-    gain = np.exp(rng.uniform(-how.contrast, how.contrast) + rng.uniform(-how.cast, how.cast, 3))
-    gamma = np.exp(rng.uniform(-how.gamma, how.gamma))
-    offset = rng.uniform(-how.brightness, how.brightness)
-    levels = (255 * (np.arange(256) / 255) ** gamma)[:, None] * gain + offset
-    image = levels.astype(np.float32)[np.clip(image, 0, 255).astype(np.uint8), np.arange(3)]
-    image += rng.standard_normal(image.shape, np.float32) * np.float32(rng.uniform(0, how.noise))
+
+    levels = _response(how, rng)
+    image = levels[np.clip(image, 0, 255).astype(np.uint8), np.arange(3)]
+    noise = rng.standard_normal(image.shape, np.float32)
+    image += noise * np.float32(rng.uniform(0, how.noise))
     return np.clip(image, 0, 255).astype(np.uint8)
 
 
-def _shadow(rng: np.random.Generator) -> Floats:
-    """The light that is left, (HEIGHT_PX, WIDTH_PX, 1), beside one edge or between two."""
+def _response(how: Augmentation, rng: np.random.Generator) -> Singles:
+    """A camera's response: the new level of each of 256 levels in each colour, (256, 3)."""
+    contrast = rng.uniform(-how.contrast, how.contrast)
+    gain = np.exp(contrast + rng.uniform(-how.cast, how.cast, 3))
+    gamma = np.exp(rng.uniform(-how.gamma, how.gamma))
+    offset = rng.uniform(-how.brightness, how.brightness)
+
+    curve = 255 * (np.arange(256) / 255) ** gamma
+    return np.asarray(curve[:, None] * gain + offset, np.float32)
+
+
+def _shadow(rng: np.random.Generator) -> Singles:
+    """The share of light that is left, (HEIGHT_PX, WIDTH_PX, 1), by a shadow in a straight band."""
     rows, columns = np.indices((HEIGHT_PX, WIDTH_PX), dtype=np.float32, sparse=True)
-    direction = rng.uniform(0, np.pi)
-    along = np.cos(direction) * (columns - WIDTH_PX / 2) + np.sin(direction) * (
-        rows - HEIGHT_PX / 2
-    )
-    middle = rng.uniform(-80, 80)
-    half = rng.uniform(5, 60)
-    shade = np.clip((half - np.abs(along - middle)) / rng.uniform(0.5, 4.0) + 0.5, 0, 1)
+    direction_rad = rng.uniform(0, np.pi)
+    right_px = np.cos(direction_rad) * (columns - WIDTH_PX / 2)
+    down_px = np.sin(direction_rad) * (rows - HEIGHT_PX / 2)
+    from_middle_px = right_px + down_px
+
+    middle_px = rng.uniform(-80, 80)
+    half_px = rng.uniform(5, 60)
+    inside_px = half_px - np.abs(from_middle_px - middle_px)
+    shade = np.clip(inside_px / rng.uniform(0.5, 4.0) + 0.5, 0, 1)
     return np.asarray(1 - rng.uniform(0.2, 0.65) * shade, np.float32)[..., None]

@@ -1,154 +1,209 @@
-"""How sure a likeness makes: fitted on towns that the network was not trained on."""
+"""Calibrates object recognition: which probability a cosine means, fitted on towns that the network
+was not trained on.
+"""
 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from cogmap.geometry.arrays import Booleans, Floats, Singles
 from services.epam.recognition.objects import Prototypes, posteriors, probability
-from training.crops import Crops
+from training.crops import VIEWS_A_TOWN, Crops
+from training.rendering.reader import INVENTED
 
-Floats = npt.NDArray[np.float32]
 Rows = npt.NDArray[np.intp]
 SHARPNESS = np.geomspace(4, 60, 40).tolist()
 UNKNOWN = np.linspace(0.0, 0.95, 39).tolist()
 EVIDENCE = np.geomspace(0.2, 2.0, 40).tolist()
 BINS = 15
-VIEWS_A_TOWN = 1000
-NEVER = -10.0
+IMPOSSIBLE_COSINE = -10.0
 
 
 @dataclass(frozen=True, eq=False)
 class Calibrated:
-    """The names with their constants, and the figures on the same towns."""
+    """The prototypes with their constants, and the metrics on the same towns."""
 
-    names: Prototypes
-    figures: dict[str, float]
+    prototypes: Prototypes
+    metrics: dict[str, float]
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """Segments to recognise: cosines with what was taught (n, k) and met (n, m), and which column
-    is right (n,).
+    """Segments of buildings to recognize: cosines with what was taught (n, k) and learned (n, m),
+    and the column of the right answer (n,).
     """
 
-    taught: Floats
-    met: Floats
+    taught: Singles
+    novel: Singles
     wanted: Rows
 
-    def posteriors(self, names: Prototypes) -> npt.NDArray[np.float64]:
-        """Of buildings, as these segments are."""
-        return posteriors(self.taught, self.met, np.ones(len(self.wanted)), names)
+    def posteriors(self, prototypes: Prototypes) -> Floats:
+        """The posteriors (n, k + m + 2)."""
+        building = np.ones(len(self.wanted))
+        return posteriors(self.taught, self.novel, building, prototypes)
 
-    def cost(self, names: Prototypes) -> float:
-        """Negative log likelihood."""
-        return _surprise(self.posteriors(names)[np.arange(len(self.wanted)), self.wanted])
+    def cost(self, prototypes: Prototypes) -> float:
+        """The negative log likelihood of the right answers."""
+        rows = np.arange(len(self.wanted))
+        return _surprise(self.posteriors(prototypes)[rows, self.wanted])
 
-    def right(self, names: Prototypes) -> npt.NDArray[np.bool_]:
-        """Which of the segments are recognised."""
-        return np.asarray(self.posteriors(names).argmax(1) == self.wanted)
+    def correct(self, prototypes: Prototypes) -> Booleans:
+        """Which of the segments are recognized, (n,)."""
+        return np.asarray(self.posteriors(prototypes).argmax(1) == self.wanted)
 
 
-def calibrate(seen: Floats, odds: Floats, of: Crops, names: Prototypes) -> Calibrated:
-    """`names` with the likeliest constants, for embeddings `seen` (n, d) and log `odds` (n, 2) of
-    the segments `of` held-out towns.
+@dataclass(frozen=True, eq=False)
+class _Encounters:
+    """Trials in which unlabelled buildings were encountered once before, and never."""
+
+    known: list[Trial]
+    unknown: list[Trial]
+
+
+def calibrate(
+    embeddings: Singles, log_odds: Singles, of: Crops, prototypes: Prototypes
+) -> Calibrated:
+    """Return `prototypes` with the likeliest constants, for embeddings (n, d) and log odds (n, 2)
+    of the segments `of` held-out towns.
     """
-    shows = np.stack([of.name != "", of.whole], 1)
-    names = min(
-        (msgspec.structs.replace(names, evidence=evidence) for evidence in EVIDENCE),
-        key=lambda tried: _surprise(np.abs(probability(odds, tried) - ~shows)),
-    )
-    building = np.flatnonzero(shows[:, 0])
-    taught = names.names
-    cosines = seen @ np.asarray(names.directions, np.float32).T
-    column = np.array([taught.index(name) if name in taught else len(taught) for name in of.name])
-    first = Trial(cosines[building], np.empty((len(building), 0), np.float32), column[building])
-    names = _likeliest(names, [first], "sharpness", "unknown")
-    known, strangers = _meetings(seen, cosines, of)
-    names = _likeliest(names, [*known, *strangers], "novel_sharpness", "novel_unknown")
+    building = of.name != ""
+    prototypes = _with_evidence(prototypes, log_odds, np.stack([building, of.whole], 1))
+
+    cosines = embeddings @ np.asarray(prototypes.directions, np.float32).T
+    column = _columns(of, prototypes)
+    rows = np.flatnonzero(building)
+    taught = Trial(cosines[rows], np.empty((len(rows), 0), np.float32), column[rows])
+    prototypes = _likeliest(prototypes, [taught], "sharpness", "unknown")
+
+    encounters = _encounters(embeddings, cosines, of)
+    trials = [*encounters.known, *encounters.unknown]
+    prototypes = _likeliest(prototypes, trials, "novel_sharpness", "novel_unknown")
+
     posterior = posteriors(
-        cosines, np.empty((len(seen), 0), np.float32), probability(odds, names)[:, 0], names
+        cosines,
+        np.empty((len(embeddings), 0), np.float32),
+        probability(log_odds, prototypes)[:, 0],
+        prototypes,
     )
-    return Calibrated(
-        names, _figures(posterior, of, column, len(taught)) | _met_figures(names, known, strangers)
-    )
+    metrics = _metrics(posterior, of, column) | _novel_metrics(prototypes, encounters)
+    return Calibrated(prototypes, metrics)
 
 
-def _likeliest(names: Prototypes, trials: list[Trial], sharpness: str, unknown: str) -> Prototypes:
+def _with_evidence(prototypes: Prototypes, log_odds: Singles, shown: Booleans) -> Prototypes:
+    """`prototypes` with the factor that makes log odds (n, 2) of what is `shown` likeliest."""
+
+    def cost(tried: Prototypes) -> float:
+        return _surprise(np.abs(probability(log_odds, tried) - ~shown))
+
+    tried = (msgspec.structs.replace(prototypes, evidence=evidence) for evidence in EVIDENCE)
+    return min(tried, key=cost)
+
+
+def _likeliest(
+    prototypes: Prototypes, trials: list[Trial], sharpness: str, unknown: str
+) -> Prototypes:
+    """`prototypes` with the values of these two fields that make `trials` likeliest."""
+
+    def cost(tried: Prototypes) -> float:
+        return sum(trial.cost(tried) for trial in trials)
+
     tried = (
-        msgspec.structs.replace(names, **{sharpness: sharp, unknown: at})
-        for sharp, at in itertools.product(SHARPNESS, UNKNOWN)
+        msgspec.structs.replace(prototypes, **{sharpness: sharpness_tried, unknown: unknown_tried})
+        for sharpness_tried, unknown_tried in itertools.product(SHARPNESS, UNKNOWN)
     )
-    return min(tried, key=lambda one: sum(trial.cost(one) for trial in trials))
+    return min(tried, key=cost)
 
 
-def _figures(
-    posterior: npt.NDArray[np.float64], of: Crops, column: Rows, taught: int
-) -> dict[str, float]:
-    """Of segments whose posterior (n, taught + 2) is given."""
-    said = np.concatenate(
-        [posterior[:, :taught], posterior[:, taught:].sum(1, keepdims=True)], axis=1
-    )
-    named = said.argmax(1)
-    shows = of.name != ""
+def _columns(of: Crops, prototypes: Prototypes) -> Rows:
+    """The column of the right posterior (n,): that of its name, or the one after all names."""
+    column_of = {name: column for column, name in enumerate(prototypes.names)}
+    return np.array([column_of.get(name, len(column_of)) for name in of.name.tolist()])
+
+
+def _metrics(posterior: Floats, of: Crops, column: Rows) -> dict[str, float]:
+    """Of segments with these posteriors (n, k + 2) and the columns that are right (n,)."""
+    taught = posterior.shape[1] - 2
+    unlabelled = posterior[:, taught:].sum(1, keepdims=True)
+    claims = np.concatenate([posterior[:, :taught], unlabelled], axis=1)
+    claimed = claims.argmax(1)
+    building = of.name != ""
     known = column < taught
+    background = posterior[:, -1]
+
     return {
-        "segments": float(len(said)),
-        "top1": float((named[known] == column[known]).mean()),
-        "unknown_told": float((named[shows & ~known] == taught).mean()),
-        "no_building_told": float((posterior[~shows, -1] > 0.5).mean()),
-        "building_told": float((posterior[shows, -1] < 0.5).mean()),
-        "ece": calibration_error(said.max(1), named == column),
+        "segments": float(len(claims)),
+        "top1": float((claimed[known] == column[known]).mean()),
+        "unknown_recall": float((claimed[building & ~known] == taught).mean()),
+        "background_recall": float((background[~building] > 0.5).mean()),
+        "building_recall": float((background[building] < 0.5).mean()),
+        "ece": calibration_error(claims.max(1), claimed == column),
     }
 
 
-def _met_figures(names: Prototypes, known: list[Trial], strangers: list[Trial]) -> dict[str, float]:
+def _novel_metrics(prototypes: Prototypes, encounters: _Encounters) -> dict[str, float]:
     return {
-        key: float(np.concatenate([trial.right(names) for trial in trials]).mean())
-        if trials
-        else 0.0
-        for key, trials in (("met_once_top1", known), ("never_met_told", strangers))
+        "novel_top1": _accuracy(prototypes, encounters.known),
+        "novel_unknown_recall": _accuracy(prototypes, encounters.unknown),
     }
 
 
-def _meetings(seen: Floats, cosines: Floats, of: Crops) -> tuple[list[Trial], list[Trial]]:
-    """In each town every building that was not taught is met once, in one view; all its other views
-    are then to be recognised, once with and once without that meeting.
+def _accuracy(prototypes: Prototypes, trials: Iterable[Trial]) -> float:
+    correct = [trial.correct(prototypes) for trial in trials]
+    return float(np.concatenate(correct).mean()) if correct else 0.0
+
+
+def _encounters(embeddings: Singles, cosines: Singles, of: Crops) -> _Encounters:
+    """In each town every unlabelled building is encountered once, in its largest segment; all its
+    other segments are then to be recognized, once with and once without that encounter.
     """
-    known = []
-    strangers = []
-    for town in np.unique(of.view // VIEWS_A_TOWN):
-        here = np.flatnonzero(
-            (of.view // VIEWS_A_TOWN == town) & np.char.startswith(of.name, "invented-")
-        )
-        if not len(here):
-            continue
-        names = sorted(set(of.name[here].tolist()))
-        first = np.array(
-            [max(here[of.name[here] == name], key=lambda row: of.area_px[row]) for name in names]
-        )
-        rows = np.setdiff1d(here, first)
-        column = np.searchsorted(names, of.name[rows])
-        met = seen[rows] @ seen[first].T
-        forgotten = met.copy()
-        forgotten[np.arange(len(rows)), column] = NEVER
-        taught = cosines.shape[1]
-        known.append(Trial(cosines[rows], met, taught + column))
-        strangers.append(Trial(cosines[rows], forgotten, np.full(len(rows), taught + len(names))))
-    return known, strangers
+    encounters = _Encounters([], [])
+    town_of = of.view // VIEWS_A_TOWN
+    invented = np.char.startswith(of.name, INVENTED)
+
+    for town in np.unique(town_of):
+        here = np.flatnonzero((town_of == town) & invented)
+        if len(here):
+            _encounter(here, embeddings, cosines, of, encounters)
+    return encounters
 
 
-def _surprise(likelihood: npt.NDArray[np.float64]) -> float:
+def _encounter(
+    here: Rows, embeddings: Singles, cosines: Singles, of: Crops, encounters: _Encounters
+) -> None:
+    """Add the trials of the segments `here`, all of unlabelled buildings of one town."""
+    names = sorted(set(of.name[here].tolist()))
+    first = []
+    for name in names:
+        segments = here[of.name[here] == name]
+        first.append(segments[of.area_px[segments].argmax()])
+
+    rows = np.setdiff1d(here, first)
+    column = np.searchsorted(names, of.name[rows])
+    novel = embeddings[rows] @ embeddings[first].T
+    never = novel.copy()
+    never[np.arange(len(rows)), column] = IMPOSSIBLE_COSINE
+
+    taught = cosines.shape[1]
+    unknown = np.full(len(rows), taught + len(names))
+    encounters.known.append(Trial(cosines[rows], novel, taught + column))
+    encounters.unknown.append(Trial(cosines[rows], never, unknown))
+
+
+def _surprise(likelihood: Floats) -> float:
     return float(-np.log(likelihood.clip(1e-6)).sum())
 
 
-def calibration_error(activation: npt.NDArray[np.float64], right: npt.NDArray[np.bool_]) -> float:
-    """The expected calibration error, by BINS of equal width (Naeini, Cooper & Hauskrecht 2015)."""
+def calibration_error(activation: Floats, correct: Booleans) -> float:
+    """Return the expected calibration error, by BINS of equal width (Naeini, Cooper & Hauskrecht
+    2015).
+    """
     number = np.minimum((activation * BINS).astype(np.intp), BINS - 1)
-    weight = np.bincount(number, minlength=BINS)
-    off = np.bincount(number, activation - right, minlength=BINS)
-    return float(np.abs(off).sum() / max(weight.sum(), 1))
+    count = np.bincount(number, minlength=BINS)
+    gap = np.bincount(number, activation - correct, minlength=BINS)
+    return float(np.abs(gap).sum() / max(count.sum(), 1))

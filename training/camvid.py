@@ -1,4 +1,4 @@
-"""Trains the road network on street photographs with label images, few of them."""
+"""Trains the road network on a few street photographs with label images."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from training.augment import Augmentation, Sample
+from cogmap.geometry.arrays import Booleans, Bytes
+from training.augment import Augmentation, LabelledImage
 from training.photographs import Photograph, photographs
-from training.road import Plan, export, train
+from training.road import Schedule, train, write
 
 SIZE_PX = (240, 180)
 STRONG = Augmentation(
@@ -24,32 +25,38 @@ STRONG = Augmentation(
     shadow_share=0.5,
     blur_share=0.3,
 )
-# Few photographs: an epoch is many variations of each.
+# Few photographs: an epoch has many augmented images of each.
 EPOCHS = 12
-SAMPLES = 960
+IMAGES = 960
 
 
 def train_on_photographs(
-    folder: Path, out: Path, seed: int, epochs: int = EPOCHS, samples: int = SAMPLES
+    folder: Path, out: Path, *, seed: int, epochs: int | None = None, images: int = IMAGES
 ) -> None:
-    """Train on `folder`/train with the labels in `folder`/trainannot, and write the weights to
-    `out`. An epoch is so many `samples`, variations of the photographs.
+    """Train on `folder`/train with the labels in `folder`/trainannot, and write the network to
+    `out`. An epoch has this number of augmented `images`.
 
-    Raises UsageError where the photographs cannot be read.
+    Raises UsageError if the photographs cannot be read.
     """
-    known = [
-        _sample(photograph) for photograph in photographs(folder / "train", folder / "trainannot")
-    ]
-    export(train(known, Plan(epochs, samples, seed, STRONG)), out)
+    read = photographs(folder / "train", folder / "trainannot")
+    known = [_labelled(photograph) for photograph in read]
+
+    schedule = Schedule(epochs or EPOCHS, images, seed, STRONG)
+    write(train(known, schedule), out)
 
 
-def _sample(photograph: Photograph) -> Sample:
-    image, road, known = (
-        cv2.resize(part, SIZE_PX, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
-        for part in (
-            photograph.image,
-            photograph.road.astype(np.uint8) * 255,
-            photograph.known.astype(np.uint8) * 255,
-        )
+def _labelled(photograph: Photograph) -> LabelledImage:
+    return LabelledImage(
+        image=_resized(photograph.image),
+        road=_resized(_levels(photograph.road)),
+        known=_resized(_levels(photograph.known)),
     )
-    return Sample(image, road, known)
+
+
+def _levels(mask: Booleans) -> Bytes:
+    return mask.astype(np.uint8) * 255
+
+
+def _resized(image: Bytes) -> Bytes:
+    resized = cv2.resize(image, SIZE_PX, interpolation=cv2.INTER_AREA)
+    return resized.astype(np.uint8, copy=False)

@@ -1,83 +1,103 @@
-"""The segments of renderings, each with the building that it shows, as the recogniser is trained on
-them.
+"""The segments of renderings, each with the building that it shows, to train and calibrate object
+recognition on.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from cogmap.geometry.arrays import Booleans, Bytes
 from services.epam.recognition.crop import CHANNELS, SIDE_PX, crop, surroundings
 from services.epam.recognition.segments import Segment, Segmenter
-from training.renderings import Town
+from training.rendering.reader import Town
 
-LEAST_OVERLAP = 0.5
-LEAST_PURE = 0.5
+MIN_OVERLAP = 0.5
+MIN_PURITY = 0.5
+VIEWS_A_TOWN = 1000
 
 
 @dataclass(frozen=True, eq=False)
 class Crops:
-    """`seen` float16 (n, CHANNELS, SIDE_PX, SIDE_PX); of each the `name` of the building that it
-    shows, empty for none, whether it is most of what can be seen of that, the town and view that it
-    is from, and how many pixels it has.
+    """Network inputs `values`, float16 (n, CHANNELS, SIDE_PX, SIDE_PX), and (n,) of each: the
+    `name` of the building that it shows, empty for none; whether it is most of what is visible of
+    that building; the number of its view, which is VIEWS_A_TOWN times that of its town and more;
+    and its area.
     """
 
-    seen: npt.NDArray[np.float16]
+    values: npt.NDArray[np.float16]
     name: npt.NDArray[np.str_]
-    whole: npt.NDArray[np.bool_]
+    whole: Booleans
     view: npt.NDArray[np.int64]
     area_px: npt.NDArray[np.int64]
 
 
-def overlap(segment: Segment, label: npt.NDArray[np.uint8]) -> tuple[int, float]:
-    """The building that a segment shows most of, and the share of both that is common (intersection
-    over union).
+class _Row(NamedTuple):
+    values: npt.NDArray[np.float16]
+    name: str
+    whole: bool
+    view: int
+    area_px: int
+
+
+def overlap(segment: Segment, label: Bytes) -> tuple[int, float]:
+    """Return the number of the building in `label` (h, w) that most of `segment` shows, and the
+    intersection over union of the two.
     """
-    count = np.bincount(label[segment.mask], minlength=2)
-    count[0] = 0
-    number = int(count.argmax())
-    union = segment.area_px + int((label == number).sum()) - int(count[number])
-    return number, float(count[number] / max(union, 1))
+    number, common_px = _main_building(segment, label)
+    union_px = segment.area_px + int((label == number).sum()) - common_px
+    return number, common_px / max(union_px, 1)
 
 
 def crops(towns: Iterable[Town], segmenter: Segmenter) -> Crops:
-    """Every segment of every view."""
-    rows = [row for index, town in enumerate(towns) for row in _of_town(index, town, segmenter)]
-    seen, name, whole, view, area = zip(*rows, strict=True)
+    """Return every segment of every view."""
+    rows: list[_Row] = []
+    for index, town in enumerate(towns):
+        rows += _of_town(index, town, segmenter)
+
+    values = np.asarray([row.values for row in rows])
     return Crops(
-        np.asarray(seen).reshape(-1, CHANNELS, SIDE_PX, SIDE_PX),
-        np.asarray(name),
-        np.asarray(whole),
-        np.asarray(view),
-        np.asarray(area),
+        values=values.reshape(-1, CHANNELS, SIDE_PX, SIDE_PX),
+        name=np.asarray([row.name for row in rows]),
+        whole=np.asarray([row.whole for row in rows]),
+        view=np.asarray([row.view for row in rows]),
+        area_px=np.asarray([row.area_px for row in rows]),
     )
 
 
-def _of_town(index: int, town: Town, segmenter: Segmenter) -> Iterator[tuple[object, ...]]:
+def _of_town(index: int, town: Town, segmenter: Segmenter) -> Iterator[_Row]:
     camera = town.calibration
     for number in range(len(town.left)):
         image = town.left[number]
         depth_m = town.stereo_m[number]
         label = town.label[number]
         around = surroundings(image, depth_m, camera)
+
         for segment in segmenter.segments(image, depth_m, camera):
-            values = crop(image, depth_m, segment, around, camera.fx_px).astype(np.float16)
-            whole = overlap(segment, label)[1] >= LEAST_OVERLAP
-            yield (
-                values,
-                _shown(segment, label, town.names),
-                whole,
-                1000 * index + number,
-                segment.area_px,
+            values = crop(image, depth_m, segment, around, camera.fx_px)
+            _, share = overlap(segment, label)
+            yield _Row(
+                values=values.astype(np.float16),
+                name=_shown(segment, label, town.names),
+                whole=share >= MIN_OVERLAP,
+                view=VIEWS_A_TOWN * index + number,
+                area_px=segment.area_px,
             )
 
 
-def _shown(segment: Segment, label: npt.NDArray[np.uint8], names: tuple[str, ...]) -> str:
-    """The building that LEAST_PURE of the segment shows; a segment of less shows none."""
+def _shown(segment: Segment, label: Bytes, names: tuple[str, ...]) -> str:
+    """The name of the building that at least MIN_PURITY of the segment shows, empty for none."""
+    number, common_px = _main_building(segment, label)
+    return names[number - 1] if common_px >= MIN_PURITY * segment.area_px else ""
+
+
+def _main_building(segment: Segment, label: Bytes) -> tuple[int, int]:
+    """The building that most pixels of `segment` show, and how many do; 0 pixels if none does."""
     count = np.bincount(label[segment.mask], minlength=2)
     count[0] = 0
-    most = int(count.argmax())
-    return names[most - 1] if count[most] >= LEAST_PURE * segment.area_px else ""
+    number = int(count.argmax())
+    return number, int(count[number])

@@ -1,5 +1,5 @@
-"""Street photographs with label images, as in CamVid (Brostow, Fauqueur & Cipolla 2009), and how
-well road is found.
+"""Street photographs with label images, as in CamVid (Brostow, Fauqueur & Cipolla 2009), and the
+road network's IoU on them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.errors import UsageError
-from cogmap.geometry.arrays import Bytes
+from cogmap.geometry.arrays import Booleans, Bytes
 from services.epam.layout.road import load
 
 ROAD = 3
@@ -29,55 +29,66 @@ class Photograph:
 
     name: str
     image: Bytes
-    road: npt.NDArray[np.bool_]
-    known: npt.NDArray[np.bool_]
+    road: Booleans
+    known: Booleans
 
 
 def photographs(images: Path, labels: Path) -> Iterator[Photograph]:
-    """Each PNG in the folder `images` with the label image of the same name in `labels`, by name.
+    """Return each PNG in the folder `images` with the label image of the same name in `labels`, by
+    name.
 
-    Raises UsageError where a folder or file is missing, no image, or of another size than its
+    Raises UsageError if a folder or file is missing, is no image, or has another size than its
     label.
     """
     for folder in (images, labels):
         if not folder.is_dir():
             raise UsageError(f"there is no folder {folder}: name the one that holds the PNG files")
+
     paths = sorted(images.glob("*.png"))
     if not paths:
         raise UsageError(
             f"no *.png in {images}: put street photographs there, and their labels in {labels}"
         )
     for path in paths:
-        label_path = labels / path.name
-        if not label_path.is_file():
-            raise UsageError(f"{path} has no label {label_path}: add it or take the image out")
-        image = _read(path, cv2.IMREAD_COLOR)
-        label = _read(label_path, cv2.IMREAD_UNCHANGED)
-        if label.shape != image.shape[:2] or label.dtype != np.uint8:
-            raise UsageError(
-                f"the label {label_path} is {label.dtype} {label.shape}, where uint8 {image.shape[:2]} fits its image: "
-                "make it anew from the labels of that image"
-            )
-        rgb = cv2.cvtColor(image, cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)
-        yield Photograph(path.stem, rgb, label == ROAD, label != UNLABELLED)
+        yield _photograph(path, labels / path.name)
+
+
+def _photograph(path: Path, label_path: Path) -> Photograph:
+    if not label_path.is_file():
+        raise UsageError(f"{path} has no label {label_path}: add it or take the image out")
+
+    image = _read(path, cv2.IMREAD_COLOR)
+    label = _read(label_path, cv2.IMREAD_UNCHANGED)
+    size = image.shape[:2]
+    if label.shape != size or label.dtype != np.uint8:
+        raise UsageError(
+            f"the label {label_path} is {label.dtype} {label.shape}, where uint8 {size} fits its "
+            "image: make it anew from the labels of that image"
+        )
+
+    rgb = cv2.cvtColor(image, cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)
+    return Photograph(path.stem, rgb, road=label == ROAD, known=label != UNLABELLED)
 
 
 def camvid_iou(weights: Path, images: Path, labels: Path) -> float:
-    """Of all pixels in the photographs that are labelled or taken for road, the share that are
-    both.
+    """Return the intersection over union of road, as found and as labelled, over all labelled
+    pixels.
 
-    Raises UsageError where the photographs cannot be read, or none of them shows road, ConfigError
-    where `weights` hold no road network.
+    Raises UsageError if the photographs cannot be read or none of them shows road, ConfigError if
+    `weights` hold no road network.
     """
-    roads = load(weights)
-    both = either = 0
+    segmenter = load(weights)
+    both = 0
+    either = 0
     for photograph in photographs(images, labels):
-        found = roads.mask(photograph.image)
+        found = segmenter.mask(photograph.image)
         both += int(np.count_nonzero(found & photograph.road & photograph.known))
         either += int(np.count_nonzero((found | photograph.road) & photograph.known))
+
     if not either:
         raise UsageError(
-            f"no pixel in {labels} is labelled {ROAD}, road: are these CamVid's labels in 12 classes?"
+            f"no pixel in {labels} is labelled {ROAD}, road: are these CamVid's labels in 12 "
+            "classes?"
         )
     return both / either
 

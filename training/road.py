@@ -1,17 +1,20 @@
-"""Trains the road network: on renderings of towns, or on street photographs."""
+"""Trains the road network (services/epam/layout/road.py) on renderings of towns."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import torch
-from rich.progress import track
-from torch import Tensor, nn
+from rich.progress import Progress, track
+from torch import Tensor
+from torch.nn import functional
 
+from cogmap.geometry.arrays import Bytes, Singles
 from services.epam.layout.road import (
     CHANNELS,
     INPUT_SHAPE,
@@ -20,122 +23,120 @@ from services.epam.layout.road import (
     load,
     network_input,
 )
-from training.augment import Augmentation, Bytes, Sample, plain, varied
-from training.renderings import files, read
-from training.unet import UNet, unet
+from training.augment import Augmentation, LabelledImage, augmented, resized
+from training.networks.export import export
+from training.networks.loader import prefetch
+from training.networks.optimizer import Optimizer, seed_torch
+from training.networks.unet import UNet
+from training.rendering.reader import SURFACES, files, read, towns
 
 WIDTHS = (8, 16, 32, 48, 64, 64)
 BATCH = 8
-STEEPEST_RATE = 4e-3
+MAX_RATE = 4e-3
 WEIGHT_DECAY = 0.02
+WARM_UP = 0.15
 EPOCHS = 4
-ROAD = 2
+ROAD = SURFACES.index("road")
 
 
 @dataclass(frozen=True)
-class Plan:
-    """How long to train: `epochs` of `samples` variations each; one seed gives the same weights
-    each time.
-    """
+class Schedule:
+    """`epochs` of `images` augmented images each, in an order that follows from `seed`."""
 
     epochs: int
-    samples: int
+    images: int
     seed: int
-    how: Augmentation
+    augmentation: Augmentation
 
 
-def train_on_renderings(folder: Path, out: Path, seed: int, epochs: int = EPOCHS) -> float:
-    """Train on the towns in `folder`/train and write the weights to `out`; the IoU of road in
-    `folder`/val.
+def train_on_renderings(
+    folder: Path, out: Path, *, seed: int, epochs: int | None = None
+) -> dict[str, float]:
+    """Train on the towns in `folder`/train, write the network to `out`, and return the IoU of road
+    in `folder`/val.
 
-    Raises UsageError where there are no renderings.
+    Raises UsageError if there are no renderings.
     """
     held_out = files(folder, "val")
-    samples = [
-        _sample(image, surface)
-        for path in track(files(folder, "train"), "reading")
-        for image, surface in zip(*_views(path), strict=True)
-    ]
-    export(train(samples, Plan(epochs, len(samples), seed, Augmentation())), out)
-    roads = load(out)
+    images: list[LabelledImage] = []
+    for path in track(files(folder, "train"), "reading"):
+        town = read(path)
+        for image, surface in zip(town.left, town.surface, strict=True):
+            images.append(_labelled(image, surface))
+
+    schedule = Schedule(epochs or EPOCHS, len(images), seed, Augmentation())
+    write(train(images, schedule), out)
+    return {"road_iou": _iou(folder, out, len(held_out))}
+
+
+def train(images: Sequence[LabelledImage], schedule: Schedule) -> UNet:
+    """Return a road network trained on augmented `images`."""
+    seed_torch(schedule.seed)
+    net = UNet(CHANNELS, 1, WIDTHS).to(memory_format=torch.channels_last)
+    steps = max(1, schedule.epochs * schedule.images // BATCH)
+    optimizer = Optimizer(net.parameters(), steps, MAX_RATE, WEIGHT_DECAY, WARM_UP)
+    net.train()
+
+    with Progress() as progress:
+        task = progress.add_task("training", total=steps)
+        for values, road, known in prefetch(partial(_batches, images, schedule, steps)):
+            value = optimizer.step(loss(net, values, road, known))
+            progress.update(task, advance=1, description=f"training, loss {value:.3f}")
+    return net.eval()
+
+
+def loss(net: UNet, values: Tensor, road: Tensor, known: Tensor) -> Tensor:
+    """Return the mean cross entropy of the network's output for `values`, over the pixels that are
+    `known` (n, h, w), where `road` (n, h, w) is right; both are shares of a pixel.
+    """
+    output = net(values.to(memory_format=torch.channels_last))[:, 0, PADDING_PX:-PADDING_PX]
+    of_pixels = functional.binary_cross_entropy_with_logits(output, road, reduction="none")
+    return (of_pixels * known).sum() / known.sum().clamp(min=1)
+
+
+def write(net: UNet, path: Path) -> None:
+    """Write `net` to `path`, as `services.epam.layout.road` reads it."""
+    export(net, path, "image", INPUT_SHAPE, OUTPUT_SHAPES)
+
+
+def _batches(
+    images: Sequence[LabelledImage], schedule: Schedule, steps: int
+) -> Iterator[tuple[Singles, Singles, Singles]]:
+    rng = np.random.default_rng([schedule.seed, 0x60AD])
+    order = _order(len(images), steps * BATCH, rng)
+    for chosen in order.reshape(steps, BATCH):
+        batch = [augmented(images[number], schedule.augmentation, rng) for number in chosen]
+        values = network_input(np.stack([each.image for each in batch]))
+        road = _shares([each.road for each in batch])
+        known = _shares([each.known for each in batch])
+        yield values, road, known
+
+
+def _order(count: int, wanted: int, rng: np.random.Generator) -> npt.NDArray[np.intp]:
+    """Which image comes when, (wanted,): each once, in any order, then each once more."""
+    rounds = -(-wanted // count)
+    return np.concatenate([rng.permutation(count) for _ in range(rounds)])[:wanted]
+
+
+def _shares(levels: Sequence[Bytes]) -> Singles:
+    """Levels of 0 to 255 as 0 to 1."""
+    return np.stack(levels).astype(np.float32) / np.float32(255)
+
+
+def _labelled(image: Bytes, surface: Bytes) -> LabelledImage:
+    road = (surface == ROAD).astype(np.uint8) * 255
+    return resized(LabelledImage(image, road, np.full_like(road, 255)))
+
+
+def _iou(folder: Path, weights: Path, count: int) -> float:
+    """The IoU of road in the `count` towns of `folder`/val."""
+    segmenter = load(weights)
     both = 0
     either = 0
-    for path in track(held_out, "testing"):
-        for image, surface in zip(*_views(path), strict=True):
-            found = roads.mask(image)
+    for town in track(towns(folder, "val"), "testing", total=count):
+        for image, surface in zip(town.left, town.surface, strict=True):
+            found = segmenter.mask(image)
             road = surface == ROAD
             both += int(np.count_nonzero(found & road))
             either += int(np.count_nonzero(found | road))
     return both / max(either, 1)
-
-
-def train(samples: Sequence[Sample], plan: Plan) -> UNet:
-    """A road network that was trained on variations of `samples`, on one thread."""
-    torch.set_num_threads(1)
-    torch.use_deterministic_algorithms(True)
-    torch.manual_seed(plan.seed)
-    rng = np.random.default_rng([plan.seed, 0x60AD])
-    network = unet(CHANNELS, 1, WIDTHS).to(memory_format=torch.channels_last)
-    steps = max(1, plan.epochs * plan.samples // BATCH)
-    optimizer = torch.optim.AdamW(network.parameters(), STEEPEST_RATE, weight_decay=WEIGHT_DECAY)
-    rate = torch.optim.lr_scheduler.OneCycleLR(
-        optimizer, STEEPEST_RATE, total_steps=steps, pct_start=0.15
-    )
-    network.train()
-    order = _order(len(samples), steps * BATCH, rng)
-    for step in track(range(steps), "training"):
-        batch = [
-            varied(samples[number], plan.how, rng)
-            for number in order[step * BATCH : (step + 1) * BATCH]
-        ]
-        optimizer.zero_grad()
-        loss(network, batch).backward()
-        optimizer.step()
-        rate.step()
-    return network.eval()
-
-
-def loss(network: UNet, batch: Sequence[Sample]) -> Tensor:
-    """The mean cross entropy between what `network` says of the known pixels of `batch` and what
-    they show.
-    """
-    values = torch.from_numpy(network_input(np.stack([sample.image for sample in batch])))
-    said = network(values.to(memory_format=torch.channels_last))[:, 0, PADDING_PX:-PADDING_PX]
-    road, known = (
-        torch.from_numpy(np.stack(parts).astype(np.float32) / 255)
-        for parts in zip(*((sample.road, sample.known) for sample in batch), strict=True)
-    )
-    each = nn.functional.binary_cross_entropy_with_logits(said, road, reduction="none")
-    return (each * known).sum() / known.sum().clamp(min=1)
-
-
-def export(network: UNet, path: Path) -> None:
-    """Write `network` to `path`, as `services.epam.layout.road` takes it."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    example = (torch.zeros(INPUT_SHAPE),)
-    torch.onnx.export(
-        network.eval(),
-        example,
-        str(path),
-        dynamo=False,
-        opset_version=13,
-        input_names=["image"],
-        output_names=[*OUTPUT_SHAPES],
-    )
-
-
-def _views(path: Path) -> tuple[Bytes, Bytes]:
-    """The images (n, h, w, 3) and the surfaces (n, h, w) in one file of renderings."""
-    town = read(path)
-    return town.left, town.surface
-
-
-def _sample(image: Bytes, surface: Bytes) -> Sample:
-    road = (surface == ROAD).astype(np.uint8) * 255
-    return plain(Sample(image, road, np.full_like(road, 255)))
-
-
-def _order(number: int, wanted: int, rng: np.random.Generator) -> npt.NDArray[np.intp]:
-    """Which sample comes when: each once, in any order, then each once more."""
-    rounds = -(-wanted // number)
-    return np.concatenate([rng.permutation(number) for _ in range(rounds)])[:wanted]

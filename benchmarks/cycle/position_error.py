@@ -14,9 +14,9 @@ from benchmarks.report import Metrics
 from cli.launch.observer import Observer
 from cli.launch.plan import OBSERVER, Choices, awaited, effective
 from cogmap.errors import CogmapError
+from cogmap.parallel import parallel_map
 from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
-from experiments.parallel import parallel_map
 from schemas import topics
 from services import registry
 

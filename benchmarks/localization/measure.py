@@ -14,7 +14,7 @@ from benchmarks.report import Metrics
 from benchmarks.threshold import at_most
 from cli.log.progress import bar
 from cogmap.data.mrclam import Recording, read
-from experiments.parallel import parallel_map
+from cogmap.parallel import parallel_map
 
 THRESHOLDS = {
     "known_map_rmse_m": at_most(0.15),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.threshold import at_most, within
-from experiments.parallel import Progress, parallel_map
+from cogmap.parallel import Progress, parallel_map
 from experiments.spiking.cells import Values
 from experiments.spiking.network import Border, Cues, Posterior, Recording, exact, record
 from services.codelets.localization.sampling import rejection_mask

@@ -19,6 +19,7 @@ from cli.experiment.options import (
     seed_option,
 )
 from cli.log.progress import bar
+from cogmap.parallel import parallel_map
 from experiments.loop_closing.run import (
     METHODS,
     MIND,
@@ -28,7 +29,6 @@ from experiments.loop_closing.run import (
     figures_of_rule,
     sections,
 )
-from experiments.parallel import parallel_map
 
 NAME = "loop-closing"
 _EPILOG = """\b

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cogmap.parallel import Progress, parallel_map
 from cogmap.runtime.config import Sections
 from experiments import rendered
 from experiments.city_maps.correction import METHODS
 from experiments.city_maps.drive import MIND, Tour, Traversal, driven, sections, traverse
 from experiments.city_maps.environment import BUILDINGS, Environment
 from experiments.city_maps.streets import Points
-from experiments.parallel import Progress, parallel_map
 from services.sim.odometry import Noise
 
 TRAVERSALS = 12

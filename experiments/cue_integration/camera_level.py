@@ -14,12 +14,12 @@ from collections.abc import Mapping
 
 import msgspec
 
+from cogmap.parallel import Progress
 from experiments.cue_integration import senses
 from experiments.cue_integration.geometry import POSTS, START, Point
 from experiments.cue_integration.room import Room
 from experiments.cue_integration.run import Session, respond
 from experiments.cue_integration.trial import Condition, Noise, Response, Trial
-from experiments.parallel import Progress
 from experiments.rendered import SENSES, named
 from schemas import sensing
 from schemas.sensing import Odometry, Percept, Percepts, View

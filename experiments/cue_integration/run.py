@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 
 from cogmap.errors import CogmapError
+from cogmap.parallel import Progress, parallel_map
 from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
 from experiments.cue_integration import agent, analysis, participant, published, room
@@ -16,7 +17,6 @@ from experiments.cue_integration.analysis import Gaussian
 from experiments.cue_integration.fit import coordinate_descent
 from experiments.cue_integration.geometry import Points
 from experiments.cue_integration.trial import Condition, Noise, Response, Trial
-from experiments.parallel import Progress, parallel_map
 from experiments.transcript import Transcript
 from schemas import topics
 

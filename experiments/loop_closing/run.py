@@ -15,11 +15,11 @@ import numpy.typing as npt
 
 from cogmap.errors import CogmapError
 from cogmap.graph.graph import TILE_SIDE, Graph
+from cogmap.parallel import Progress
 from cogmap.runtime.config import Sections
 from cogmap.runtime.module import Module
 from experiments import in_memory, rendered
 from experiments.loop_closing.rule import close_laps
-from experiments.parallel import Progress
 from schemas import topics
 from schemas.cognition import Replay
 from schemas.graph import Delta

@@ -1,44 +1,45 @@
-"""Renders what perception is trained on: `python -m training.rendering.dataset --out DIR`.
+"""Renders what perception is trained on.
 
 The simulator draws towns from seeds, each view in a light of its own and from another place, and
-labels what it knows; sensory memory adds the depth that its stereo gives. Towns for training are in
-DIR/train, and in DIR/strangers more of them, for learning what tells buildings apart; those to
-choose and calibrate by are in DIR/val, and those for tests in DIR/test: no town is in two of them,
-and none of the invented kinds of building. A file that is there already is kept, so an interrupted
-command goes on where it was; the same command gives the same files.
+labels what it knows; sensory memory adds the depth from stereo. Towns for training are in the
+folder train, and in unlabelled more of them, whose buildings have no taught label; towns to choose
+and calibrate by are in val, and towns for tests in test. No town and no invented kind of building
+is in two of them. Files that exist are kept, so that an interrupted command continues; the same
+command gives the same files.
 """
 
 from __future__ import annotations
 
-import argparse
 import os
-import subprocess
-import sys
 import tempfile
-from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from rich.progress import Progress
+import numpy as np
 
-from cogmap.errors import CogmapError, UsageError
+from cogmap.errors import CogmapError
+from cogmap.parallel import Progress, parallel_map
+from training.rendering.stereo import with_stereo_depth
+from training.rendering.towns import render_town
 
 
 @dataclass(frozen=True)
 class Split:
-    """Towns `first` and on, in turn with as many invented kinds of building as `unknown` says."""
+    """`towns` towns with seeds from `first_seed` on, of which one after the other has each number
+    of invented kinds of building.
+    """
 
     name: str
-    first: int
+    first_seed: int
     towns: int
     views: int
-    unknown: tuple[int, ...] = (0, 14, 28)
+    invented: tuple[int, ...] = (0, 14, 28)
 
 
 SPLITS = (
     Split("train", 1001, 84, 110),
-    Split("strangers", 5001, 140, 45, (30,)),
+    Split("unlabelled", 5001, 140, 45, (30,)),
     Split("val", 2001, 6, 90),
     Split("test", 3001, 6, 90),
 )
@@ -50,87 +51,47 @@ class Job:
 
     seed: int
     views: int
-    unknown: int
+    invented: int
     target: Path
 
 
 def jobs(out: Path, scale: float) -> Iterator[Job]:
-    """What there is to render, the towns of each split times `scale`."""
+    """Return what there is to render: the towns of each split times `scale`, at least one."""
     for split in SPLITS:
         for number in range(max(1, round(scale * split.towns))):
-            seed = split.first + number
+            seed = split.first_seed + number
             yield Job(
-                seed,
-                split.views,
-                split.unknown[number % len(split.unknown)],
-                out / split.name / f"town-{seed}.npz",
+                seed=seed,
+                views=split.views,
+                invented=split.invented[number % len(split.invented)],
+                target=out / split.name / f"town-{seed}.npz",
             )
 
 
 def render(job: Job) -> None:
-    """Render the town of `job`, unless it is there. Raises CogmapError where the simulator or
-    sensory memory fails.
-    """
+    """Render the town of `job`, unless its file exists. Raises CogmapError if that fails."""
     if job.target.exists():
         return
+
     job.target.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".part-", dir=job.target.parent) as folder:
-        drawn = Path(folder) / job.target.name
-        seen = Path(folder) / "seen.npz"
-        counts = ["--views", str(job.views), "--invented", str(job.unknown)]
-        _run("training.rendering.towns", "--out", folder, "--seeds", str(job.seed), *counts)
-        _run("training.rendering.views", str(drawn), str(seen))
-        seen.replace(job.target)
-
-
-def _run(module: str, *arguments: str) -> None:
-    environment = os.environ | {"OMP_NUM_THREADS": "1", "LP_NUM_THREADS": "1"}
-    done = subprocess.run(
-        [sys.executable, "-m", module, *arguments],
-        capture_output=True,
-        text=True,
-        env=environment,
-        check=False,
-    )
-    if done.returncode:
-        reason = (done.stderr.strip() or done.stdout.strip() or "no word").splitlines()[-1]
-        raise CogmapError(f"{module} failed: {reason}")
-
-
-def main() -> None:
-    """The command."""
-    parser = argparse.ArgumentParser(
-        prog="python -m training.rendering.dataset", description=__doc__
-    )
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="DIR", help="folder for the renderings"
-    )
-    parser.add_argument(
-        "--scale", type=float, default=1.0, metavar="X", help="times as many towns (default 1)"
-    )
-    parser.add_argument(
-        "--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="towns at a time"
-    )
-    arguments = parser.parse_args()
     try:
-        if arguments.scale <= 0 or arguments.jobs < 1:
-            raise UsageError("--scale must be over 0 and --jobs at least 1")
-        _render_all(list(jobs(arguments.out, arguments.scale)), arguments.jobs)
-    except (CogmapError, OSError) as error:
-        sys.exit(f"dataset: {error}")
+        views = with_stereo_depth(render_town(job.seed, job.views, job.invented))
+    except Exception as error:
+        raise CogmapError(f"cannot render the town of seed {job.seed}: {error}") from error
+
+    # Renamed when it is complete, so that an interrupted command leaves no half file.
+    with tempfile.TemporaryDirectory(prefix=".part-", dir=job.target.parent) as folder:
+        part = Path(folder) / job.target.name
+        np.savez(part, allow_pickle=False, **views)
+        part.replace(job.target)
 
 
-def _render_all(wanted: list[Job], at_a_time: int) -> None:
-    with Progress() as progress, ThreadPoolExecutor(at_a_time) as pool:
-        task = progress.add_task("towns", total=len(wanted))
-        running = [pool.submit(render, job) for job in wanted]
-        try:
-            for done in as_completed(running):
-                done.result()
-                progress.advance(task)
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)
-
-
-if __name__ == "__main__":
-    main()
+def render_all(
+    wanted: Sequence[Job], processes: int, progress: Progress = lambda share: None
+) -> None:
+    """Render the towns of all jobs, in this number of processes; `progress` is called with the
+    share done. Raises CogmapError if one fails.
+    """
+    # Every process has a core: neither numerics nor Mesa should start threads in it.
+    os.environ.update(OMP_NUM_THREADS="1", LP_NUM_THREADS="1")
+    parallel_map(render, wanted, processes, progress)

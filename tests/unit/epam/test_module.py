@@ -21,7 +21,7 @@ from schemas.sensing import Learned, Percepts, View
 from services.epam.module import Config, build
 from tests.support.blocks import CAMERA
 from tests.support.rendered import seen
-from training.rendering.towns import render
+from training.rendering.towns import render_town
 
 STRANGERS = 4005
 
@@ -29,7 +29,7 @@ STRANGERS = 4005
 @pytest.fixture(scope="module")
 def views() -> list[View]:
     """Views of a town that has buildings nobody was taught."""
-    return seen(render(STRANGERS, 8, 28))
+    return seen(render_town(STRANGERS, 8, 28))
 
 
 def _percepts(module: Module, view: View) -> Percepts:

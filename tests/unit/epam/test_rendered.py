@@ -12,7 +12,7 @@ from schemas.sensing import Building, Learned, Percept, Percepts
 from services.epam.module import Config, build
 from services.sim.layout import town
 from tests.support.rendered import seen
-from training.rendering.towns import Views, render
+from training.rendering.towns import Views, render_town
 
 SEED = 4003
 COUNT = 24
@@ -22,7 +22,7 @@ RECOGNISED = 0.7
 
 @pytest.fixture(scope="module")
 def views() -> Views:
-    return render(SEED, COUNT)
+    return render_town(SEED, COUNT)
 
 
 @pytest.fixture(scope="module")
@@ -110,7 +110,7 @@ def _offset(percept: Percept, building: Building, pose: np.ndarray) -> tuple[flo
 
 
 def test_buildings_nobody_was_taught_get_nodes_at_first_sight_and_are_known_again() -> None:
-    views = render(4004, 20, 28)
+    views = render_town(4004, 20, 28)
     module = build(Config(), "epam")
     truths = views["label"]
     labels: dict[str, list[str]] = {}

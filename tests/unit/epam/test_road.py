@@ -26,7 +26,7 @@ from services.sensory.disparity import DepthFromStereo
 from services.sensory.rectify import rectification
 from tests.support.blocks import CAMERA, Block, painted
 from training.photographs import camvid_iou
-from training.rendering.towns import render
+from training.rendering.towns import render_town
 
 HALF_M = 4.0
 # Of towns, from 1001 on for training and from 2001 for validation, nobody trains on this one.
@@ -186,7 +186,7 @@ def test_an_image_of_any_size_gets_a_mask_of_its_size_and_the_same_one_twice(
 
 
 def test_road_in_a_town_never_seen_is_found_and_its_ends_are_placed(roads: RoadSegmenter) -> None:
-    views = render(SEED, VIEWS)
+    views = render_town(SEED, VIEWS)
     rectified = rectification(msgspec.json.decode(views["calibration"].tobytes(), type=Calibration))
     matcher = DepthFromStereo(rectified.calibration, 2.5)
     camera = rectified.calibration

@@ -13,13 +13,14 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from cli.main import cogmap
 from cogmap.errors import UsageError
 from services.epam.layout.road import load
 from services.epam.recognition import objects, segments
 from services.sim.layout.catalogue import CATALOGUE
 from tests.support.blocks import CAMERA, painted
-from training.__main__ import train
-from training.rendering.dataset import Job, render
+from training.command import train
+from training.rendering.dataset import Job, render_all
 
 needs_torch = pytest.mark.skipif(
     find_spec("torch") is None and "CI" not in os.environ,
@@ -32,13 +33,30 @@ from training.camvid import train_on_photographs
 
 folder, out = map(Path, sys.argv[1:])
 for name, seed in (("a", 3), ("b", 3), ("c", 4)):
-    train_on_photographs(folder, out / f"{name}.onnx", seed, epochs=1, samples=16)
+    train_on_photographs(folder, out / f"{name}.onnx", seed=seed, epochs=1, images=16)
+"""
+BATCHES = """
+import sys
+import numpy as np
+import torch
+from training.networks.loader import prefetch
+
+def batches():
+    for number in range(7):
+        yield np.full((2, 3), number, np.float32), np.arange(number)
+
+torch.manual_seed(5)
+before = torch.random.get_rng_state()
+found = list(prefetch(batches))
+assert (torch.random.get_rng_state() == before).all()
+assert [len(whole) for _, whole in found] == list(range(7))
+assert all((values == number).all() for number, (values, _) in enumerate(found))
 """
 
 
 def _python(*arguments: str) -> subprocess.CompletedProcess[str]:
     """Python in a process of its own: torch's compiler and the simulator's renderer each bring an
-    LLVM, and no process bears both.
+    LLVM, and both in one process crash.
     """
     return subprocess.run([sys.executable, *arguments], capture_output=True, text=True, check=False)
 
@@ -48,37 +66,53 @@ def folder(tmp_path: Path) -> Path:
     """Four small street photographs, in CamVid's folders."""
     for name in ("train", "trainannot"):
         (tmp_path / name).mkdir()
+
     for number in range(4):
         image, depth_m, _ = painted([], road_half_m=3.0 + number, seed=number)
         grey = (np.ptp(image.astype(int), axis=2) < 40) & (depth_m > 0)
+        label = np.where(grey, 3, 11 * (number == 0)).astype(np.uint8)
         cv2.imwrite(str(tmp_path / "train" / f"{number}.png"), image[..., ::-1])
-        cv2.imwrite(
-            str(tmp_path / "trainannot" / f"{number}.png"),
-            np.where(grey, 3, 11 * (number == 0)).astype(np.uint8),
-        )
+        cv2.imwrite(str(tmp_path / "trainannot" / f"{number}.png"), label)
     return tmp_path
 
 
 @needs_torch
-def test_training_twice_from_one_seed_gives_the_same_weights_and_from_another_others(
+def test_one_seed_gives_the_same_weights_and_another_seed_others(
     folder: Path, tmp_path: Path
 ) -> None:
     done = _python("-c", TRAINING, str(folder), str(tmp_path))
     assert done.returncode == 0, done.stderr
     first, again, other = ((tmp_path / f"{name}.onnx").read_bytes() for name in "abc")
+
     assert again == first
     assert other != first
     image = painted([])[0]
     assert load(tmp_path / "a.onnx").mask(image).shape == image.shape[:2]
 
 
-def test_without_torch_the_remedy_is_named(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("torch", "training.camvid", "training.road", "training.unet"):
-        monkeypatch.delitem(sys.modules, name, raising=False)
+@needs_torch
+def test_prefetched_batches_come_in_order_without_using_torchs_random_state() -> None:
+    done = _python("-c", BATCHES)
+    assert done.returncode == 0, done.stderr
+
+
+def test_train_is_a_command_of_cogmap() -> None:
+    shown = CliRunner().invoke(cogmap, ["train", "--help"])
+    assert shown.exit_code == 0
+    for name in ("render", "segments", "objects", "road"):
+        assert f"\n  {name}" in shown.output
+
+
+@pytest.mark.parametrize("name", ["segments", "objects", "road"])
+def test_without_torch_the_remedy_is_named(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for module in [*sys.modules]:
+        if module.startswith(("training.networks", "training.camvid", f"training.{name}")):
+            monkeypatch.delitem(sys.modules, module)
     monkeypatch.setitem(sys.modules, "torch", None)
-    run = CliRunner().invoke(
-        train, ["road", "--camvid", str(folder), "--out", str(folder / "a.onnx")]
-    )
+    run = CliRunner().invoke(train, [name, str(tmp_path), "--out", str(tmp_path / "a.onnx")])
+
     assert isinstance(run.exception, UsageError)
     assert "pip install 'cogmap[train]'" in str(run.exception)
 
@@ -94,48 +128,44 @@ def test_roads_are_learned_from_one_kind_of_folder(arguments: list[str]) -> None
 def test_segments_and_objects_are_learned_from_renderings_the_same_each_time(
     tmp_path: Path,
 ) -> None:
-    for split, seed, unknown in (("train", 4007, 0), ("strangers", 4008, 30), ("val", 4009, 20)):
-        render(Job(seed, 8, unknown, tmp_path / split / f"town-{seed}.npz"))
-    said = {}
+    towns = (("train", 4007, 0), ("unlabelled", 4008, 30), ("val", 4009, 20))
+    wanted = [
+        Job(seed, 8, invented, tmp_path / split / f"town-{seed}.npz")
+        for split, seed, invented in towns
+    ]
+    render_all(wanted, processes=2)
+
     for name in ("segments", "objects"):
-        for out in ("a", "b"):
-            weights = tmp_path / out / f"{name}.onnx"
-            done = _python(
-                "-m",
-                "training",
-                name,
-                str(tmp_path),
-                "--out",
-                str(weights),
-                "--epochs",
-                "1",
-                "--seed",
-                "3",
-            )
-            assert done.returncode == 0, done.stderr
-            said[out] = done.stdout.replace(str(weights), "")
-        assert said["a"] == said["b"]
+        printed = [_trained(name, tmp_path, out) for out in ("a", "b")]
+        assert printed[0] == printed[1]
     for name in ("segments.onnx", "objects.onnx", "objects.json"):
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
-    assert objects.load(tmp_path / "a" / "objects.onnx").sizes_m.keys() <= {
-        kind.name for kind in CATALOGUE
-    }
+
+    recognizer = objects.load(tmp_path / "a" / "objects.onnx")
+    assert recognizer.sizes_m.keys() <= {kind.name for kind in CATALOGUE}
     image, depth_m, _ = painted([])
     found = segments.load(tmp_path / "a" / "segments.onnx").segments(image, depth_m, CAMERA)
-    assert all(each.mask.shape == depth_m.shape for each in found)
+    assert all(segment.mask.shape == depth_m.shape for segment in found)
+
+
+def _trained(name: str, folder: Path, out: str) -> str:
+    """Train for one epoch, and return what is printed, without the file's name."""
+    weights = str(folder / out / f"{name}.onnx")
+    options = ["--out", weights, "--epochs", "1", "--seed", "3"]
+    done = _python("-m", "training", name, str(folder), *options)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.replace(weights, "")
 
 
 @needs_torch
-def test_a_folder_without_renderings_is_named_before_anything_is_trained(tmp_path: Path) -> None:
+def test_a_folder_without_renderings_is_named_before_training(tmp_path: Path) -> None:
     done = _python("-m", "training", "road", str(tmp_path), "--out", str(tmp_path / "a.onnx"))
     assert done.returncode == 2
-    assert "training.rendering.dataset" in done.stderr
+    assert "cogmap train render" in done.stderr
     assert "Traceback" not in done.stderr
 
 
-def test_photographs_are_tested_alone_by_weights_that_must_be_there(
-    folder: Path, tmp_path: Path
-) -> None:
+def test_photographs_are_tested_by_weights_that_must_exist(folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "none.onnx"
     pair = (str(folder / "train"), str(folder / "trainannot"))
     run = CliRunner().invoke(train, ["road", "--camvid-test", *pair, "--out", str(out)])

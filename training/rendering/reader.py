@@ -1,4 +1,4 @@
-"""The renderings that `python -m training.rendering.dataset` wrote, as training reads them."""
+"""Reads the renderings that `cogmap train render` wrote."""
 
 from __future__ import annotations
 
@@ -8,11 +8,15 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-import numpy.typing as npt
 
 from cogmap.errors import UsageError
+from cogmap.geometry.arrays import Bytes, Floats, Singles
 from schemas.sensing import Calibration
 
+# What a pixel of `surface` shows: a row of this.
+SURFACES = ("sky", "ground", "road", "building", "prop")
+# Names of buildings that are in no catalogue begin with it.
+INVENTED = "invented-"
 ARRAYS = ("left", "stereo_m", "depth_m", "label", "surface", "pose", "place_m", "size_m")
 
 
@@ -20,23 +24,23 @@ ARRAYS = ("left", "stereo_m", "depth_m", "label", "surface", "pose", "place_m", 
 class Town:
     """All views of one town: `left` uint8 (n, h, w, 3), `stereo_m` and `depth_m` float32 (n, h, w),
     `label` and `surface` uint8 (n, h, w), `pose` float64 (n, 3); `names` of its buildings,
-    `place_m` (k, 2), `size_m` (k, 3).
+    `place_m` (k, 2), `size_m` (k, 3). See training/rendering/towns.py.
     """
 
-    left: npt.NDArray[np.uint8]
-    stereo_m: npt.NDArray[np.float32]
-    depth_m: npt.NDArray[np.float32]
-    label: npt.NDArray[np.uint8]
-    surface: npt.NDArray[np.uint8]
-    pose: npt.NDArray[np.float64]
+    left: Bytes
+    stereo_m: Singles
+    depth_m: Singles
+    label: Bytes
+    surface: Bytes
+    pose: Floats
     names: tuple[str, ...]
-    place_m: npt.NDArray[np.float64]
-    size_m: npt.NDArray[np.float64]
+    place_m: Floats
+    size_m: Floats
     calibration: Calibration
 
 
 def read(path: Path) -> Town:
-    """The town in one file. Raises UsageError where it does not hold any."""
+    """Return the town in the file at `path`. Raises UsageError if it does not hold one."""
     try:
         with np.load(path, allow_pickle=False) as stored:
             calibration = msgspec.json.decode(stored["calibration"].tobytes(), type=Calibration)
@@ -45,20 +49,18 @@ def read(path: Path) -> Town:
             return Town(**arrays, names=names, calibration=calibration)
     except (OSError, ValueError, KeyError, msgspec.DecodeError) as error:
         raise UsageError(
-            f"{path} holds no renderings ({error}): write them with python -m training.rendering.dataset"
+            f"{path} holds no renderings ({error}): write them with cogmap train render"
         ) from None
 
 
 def files(folder: Path, split: str) -> list[Path]:
-    """The files of one split. Raises UsageError where there are none."""
+    """Return the files of one split, by seed. Raises UsageError if there are none."""
     found = sorted((folder / split).glob("town-*.npz"))
     if not found:
-        raise UsageError(
-            f"no town-*.npz in {folder / split}: write them with python -m training.rendering.dataset"
-        )
+        raise UsageError(f"no town-*.npz in {folder / split}: write them with cogmap train render")
     return found
 
 
 def towns(folder: Path, split: str) -> Iterator[Town]:
-    """The towns of one split, in order of their seeds."""
+    """Return the towns of one split, by seed. Raises UsageError if there are none."""
     return (read(path) for path in files(folder, split))

@@ -7,11 +7,11 @@ import sys
 import time
 from pathlib import Path
 
-from experiments.parallel import parallel_map
+from cogmap.parallel import parallel_map
 
 SLOW = """
 import sys, time
-from experiments.parallel import parallel_map
+from cogmap.parallel import parallel_map
 if __name__ == "__main__":
     parallel_map(print, ["there"] * 2, 2)
     print("waiting", flush=True)

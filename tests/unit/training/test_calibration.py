@@ -1,0 +1,76 @@
+"""Calibration: an activation of 0.9 is right nine times in ten."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from services.epam.recognition.objects import DIMENSIONS, Prototypes
+from training.calibration import Calibrated, calibrate, calibration_error
+from training.crops import Crops
+
+TAUGHT = ["bakery", "bank", "cafe"]
+NOVEL = [f"invented-9-{number}" for number in range(6)]
+
+
+def _calibrated(noise: float, seed: int = 0, count: int = 1500) -> Calibrated:
+    """Calibration on segments whose embeddings have this much `noise`; a fifth show no building."""
+    rng = np.random.default_rng(seed)
+    directions = _unit(rng.normal(size=(len(TAUGHT) + len(NOVEL), DIMENSIONS)))
+    which = rng.integers(len(directions), size=count)
+    embeddings = _unit(directions[which] + noise * rng.normal(size=(count, DIMENSIONS)))
+
+    background = rng.random(count) < 0.2
+    log_odds = np.where(background, -1.0, 1.0)[:, None] * 8.0 + rng.normal(size=(count, 2)) * 8.0
+    crops = Crops(
+        values=np.empty((count, 0), np.float16),
+        name=np.where(background, "", np.array([*TAUGHT, *NOVEL])[which]),
+        whole=~background,
+        view=np.arange(count),
+        area_px=rng.integers(100, 9000, count),
+    )
+    prototypes = Prototypes(
+        names=TAUGHT,
+        directions=directions[: len(TAUGHT)].tolist(),
+        size_m=[(9.0, 8.0, 6.0)] * len(TAUGHT),
+        sharpness=1.0,
+        unknown=0.0,
+        novel_sharpness=1.0,
+        novel_unknown=0.0,
+        evidence=1.0,
+    )
+    return calibrate(embeddings.astype(np.float32), log_odds.astype(np.float32), crops, prototypes)
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+
+
+def test_clear_embeddings_are_recognized_taught_novel_and_unknown() -> None:
+    metrics = _calibrated(noise=0.05).metrics
+    assert metrics["top1"] > 0.8
+    assert metrics["novel_top1"] > 0.95
+    assert metrics["novel_unknown_recall"] > 0.95
+
+
+@pytest.mark.parametrize("noise", [0.05, 0.25, 0.4])
+def test_the_activation_is_a_probability_with_any_noise(noise: float) -> None:
+    assert _calibrated(noise).metrics["ece"] < 0.06
+
+
+def test_overconfident_log_odds_are_scaled_down() -> None:
+    assert _calibrated(noise=0.05).prototypes.evidence < 0.6
+
+
+def test_noisier_embeddings_get_a_lower_sharpness() -> None:
+    clear = _calibrated(noise=0.1).prototypes
+    noisy = _calibrated(noise=0.4).prototypes
+    assert clear.novel_sharpness > noisy.novel_sharpness
+    assert clear.sharpness > noisy.sharpness
+
+
+def test_calibration_error_is_the_gap_between_activation_and_accuracy() -> None:
+    correct = np.arange(1000) % 2 == 0
+    assert calibration_error(np.full(1000, 0.5), correct) == pytest.approx(0.0)
+    assert calibration_error(np.full(1000, 0.9), correct) == pytest.approx(0.4)
+    assert calibration_error(np.where(correct, 0.99, 0.01), correct) == pytest.approx(0.01)

@@ -1,0 +1,214 @@
+"""`cogmap train`: renders towns and trains the networks of perception on them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import click
+
+from cogmap.errors import UsageError
+
+CAMVID_ROAD = Path("road-camvid.onnx")
+MAX_SCALE = 100.0
+MAX_SEED = 2**31 - 1
+
+_folder = click.Path(file_okay=False, path_type=Path)
+_file = click.Path(dir_okay=False, path_type=Path)
+_data_dir = click.argument("data_dir", type=_folder)
+_out = click.option(
+    "--out", type=_file, metavar="FILE", help="The weights.  [default: EPAM's own file]"
+)
+_seed = click.option(
+    "--seed",
+    type=click.IntRange(0, MAX_SEED),
+    default=0,
+    show_default=True,
+    metavar="N",
+    help="The same seed gives the same weights.",
+)
+_epochs = click.option(
+    "--epochs",
+    type=click.IntRange(1, 1000),
+    metavar="N",
+    help="How often every example is used.  [default: as the built-in weights]",
+)
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+def train() -> None:
+    """Train the networks of perception.
+
+    Rendering needs nothing more; training needs torch: pip install 'cogmap[train]'. In this order:
+
+    \b
+    cogmap train render DATA_DIR
+    cogmap train segments DATA_DIR
+    cogmap train objects DATA_DIR
+    cogmap train road DATA_DIR
+    """
+
+
+@train.command()
+@_data_dir
+@click.option(
+    "--scale",
+    type=float,
+    default=1.0,
+    show_default=True,
+    metavar="X",
+    help="Times the number of towns: 0.1 is a trial.",
+)
+@click.option(
+    "--jobs",
+    type=click.IntRange(1, 1024),
+    default=os.cpu_count() or 1,
+    metavar="N",
+    help="Processes.  [default: one a core]",
+)
+def render(*, data_dir: Path, scale: float, jobs: int) -> None:
+    """Render the towns that the networks are trained on, with labels, into DATA_DIR.
+
+    Files that exist are kept, so an interrupted command continues; the same command gives the same
+    files.
+    """
+    from rich.progress import Progress
+
+    from training.rendering import dataset
+
+    if not 0 < scale <= MAX_SCALE:
+        raise UsageError(f"--scale must be over 0 and at most {MAX_SCALE:.0f}")
+
+    with Progress() as progress:
+        task = progress.add_task("towns", total=1.0)
+        dataset.render_all(
+            list(dataset.jobs(data_dir, scale)),
+            jobs,
+            lambda share: progress.update(task, completed=share),
+        )
+
+
+@train.command()
+@_data_dir
+@_out
+@_seed
+@_epochs
+def segments(*, data_dir: Path, out: Path | None, seed: int, epochs: int | None) -> None:
+    """Train the network that separates the objects of a view.
+
+    Prints its recall and precision in held-out towns. Takes about a quarter of an hour on one
+    thread.
+    """
+    from services.epam.recognition.segments import DEFAULT_PATH
+
+    with _needs_torch():
+        from training.segments import train_on_renderings
+
+    weights = out or DEFAULT_PATH
+    _report(train_on_renderings(data_dir, weights, seed=seed, epochs=epochs), weights)
+
+
+@train.command()
+@_data_dir
+@_out
+@_seed
+@_epochs
+def objects(*, data_dir: Path, out: Path | None, seed: int, epochs: int | None) -> None:
+    """Train the network that recognizes what a segment shows, and calibrate it.
+
+    Its segments are those of the segmentation network: train that first. The prototypes are written
+    to a .json file beside the weights. Prints metrics in held-out towns. Takes about a quarter of
+    an hour on one thread.
+    """
+    from services.epam.recognition.objects import DEFAULT_PATH
+
+    with _needs_torch():
+        from training.objects import train_on_renderings
+
+    weights = out or DEFAULT_PATH
+    _report(train_on_renderings(data_dir, weights, seed=seed, epochs=epochs), weights)
+
+
+@train.command()
+@click.argument("data_dir", required=False, type=_folder)
+@click.option(
+    "--camvid", type=_folder, metavar="DIR", help="Train on the street photographs there instead."
+)
+@click.option(
+    "--camvid-test",
+    type=(_folder, _folder),
+    metavar="IMAGES LABELS",
+    help="Print the IoU of road on these photographs, after training or without any.",
+)
+@click.option(
+    "--out",
+    type=_file,
+    metavar="FILE",
+    help=f"The weights.  [default: {CAMVID_ROAD} with --camvid or --camvid-test, else EPAM's own "
+    "file]",
+)
+@_seed
+@_epochs
+def road(
+    *,
+    data_dir: Path | None,
+    camvid: Path | None,
+    camvid_test: tuple[Path, Path] | None,
+    out: Path | None,
+    seed: int,
+    epochs: int | None,
+) -> None:
+    """Train the network that finds the road; prints its IoU in held-out towns.
+
+    Takes about ten minutes on one thread. With --camvid it is trained on photographs instead:
+    DIR/train/*.png, with label images of the same names in DIR/trainannot, where 3 is road and 11
+    unlabelled, as in CamVid.
+
+    \b
+    cogmap train road --camvid DIR
+    cogmap train road --camvid-test DIR/val DIR/valannot
+    """
+    from services.epam.layout.road import DEFAULT_PATH
+
+    sources = (data_dir is not None) + (camvid is not None)
+    if sources > 1 or (not sources and camvid_test is None):
+        raise UsageError(
+            "name what to train on, either DATA_DIR, with renderings of towns, or --camvid DIR"
+        )
+
+    weights = out or (DEFAULT_PATH if data_dir is not None else CAMVID_ROAD)
+    if data_dir is not None:
+        with _needs_torch():
+            from training.road import train_on_renderings
+        _report(train_on_renderings(data_dir, weights, seed=seed, epochs=epochs), weights)
+
+    if camvid is not None:
+        with _needs_torch():
+            from training.camvid import train_on_photographs
+        train_on_photographs(camvid, weights, seed=seed, epochs=epochs)
+        _report({}, weights)
+
+    if camvid_test is not None:
+        from training.photographs import camvid_iou
+
+        images, labels = camvid_test
+        click.echo(f"road IoU on {images}: {camvid_iou(weights, images, labels):.4f}")
+
+
+@contextmanager
+def _needs_torch() -> Iterator[None]:
+    """Raises UsageError if an import fails because torch is not installed."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        if error.name != "torch":
+            raise
+        raise UsageError("training needs torch: pip install 'cogmap[train]'") from None
+
+
+def _report(metrics: dict[str, float], weights: Path) -> None:
+    for key, value in metrics.items():
+        click.echo(f"{key}: {value:.4f}")
+    click.echo(f"weights: {weights}")

@@ -1,0 +1,45 @@
+"""Optimization that gives the same weights from one seed: AdamW with one cycle of the learning
+rate, on one thread.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import torch
+from torch import Tensor, nn
+
+
+def seed_torch(seed: int) -> None:
+    """Make what torch computes from here on a function of `seed` alone."""
+    torch.manual_seed(seed)
+    torch.use_deterministic_algorithms(True)
+    torch.utils.deterministic.fill_uninitialized_memory = False
+    torch.set_num_threads(1)
+
+
+class Optimizer:
+    """AdamW (Loshchilov & Hutter 2019), whose learning rate rises to `max_rate` in the share
+    `warm_up` of all steps and then falls (Smith & Topin 2019).
+    """
+
+    def __init__(
+        self,
+        parameters: Iterable[nn.Parameter],
+        steps: int,
+        max_rate: float,
+        weight_decay: float,
+        warm_up: float = 0.1,
+    ) -> None:
+        self._adam = torch.optim.AdamW(parameters, weight_decay=weight_decay)
+        self._rate = torch.optim.lr_scheduler.OneCycleLR(
+            self._adam, max_rate, total_steps=steps, pct_start=warm_up
+        )
+
+    def step(self, loss: Tensor) -> float:
+        """Change the parameters against the gradient of `loss`, and return its value."""
+        self._adam.zero_grad()
+        loss.backward()
+        self._adam.step()
+        self._rate.step()
+        return float(loss.item())

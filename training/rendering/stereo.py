@@ -1,0 +1,37 @@
+"""The depth that sensory memory computes from rendered stereo pairs."""
+
+from __future__ import annotations
+
+import cv2
+import msgspec
+import numpy as np
+
+from schemas.sensing import Calibration
+from services.sensory.disparity import DepthFromStereo
+from services.sensory.module import Config
+from services.sensory.rectify import rectification
+from training.rendering.towns import Views
+
+
+def with_stereo_depth(views: Views) -> Views:
+    """Return `views` with the rectified `left` image and its calibration, and, instead of the
+    `right` image, the depth `stereo_m` float32 (n, h, w), 0 where it is unknown.
+    """
+    cv2.setNumThreads(1)
+    calibration = msgspec.json.decode(views["calibration"].tobytes(), type=Calibration)
+    rectified = rectification(calibration)
+    matcher = DepthFromStereo(rectified.calibration, Config().nearest_m)
+
+    lefts = []
+    depths_m = []
+    for raw_left, raw_right in zip(views["left"], views["right"], strict=True):
+        left, right = rectified.apply(raw_left, raw_right)
+        lefts.append(left)
+        depths_m.append(matcher.depth_m(left, right))
+
+    unchanged = {key: value for key, value in views.items() if key not in ("left", "right")}
+    return unchanged | {
+        "left": np.asarray(lefts),
+        "stereo_m": np.asarray(depths_m),
+        "calibration": np.frombuffer(msgspec.json.encode(rectified.calibration), np.uint8),
+    }
