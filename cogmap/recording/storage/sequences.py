@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from cogmap.bus.codec import Envelope
+from cogmap.bus.codec import UNKNOWN, Envelope
 from schemas.topics import Delivery, Topic
 
 _MAX_SPANS = 4
@@ -16,15 +16,15 @@ Key = tuple[str, str, int]
 class Stream:
     """The numbers of one source on one topic in one incarnation.
 
-    `missing` are spans [start, end) of numbers between `first` and `last` that have not come.
+    `missing` are spans [start, end) of numbers up to `last` that have not come. `earlier` is how many
+    messages the source published in earlier incarnations, UNKNOWN where it keeps no count.
     """
 
     topic: Topic
     source: str
     incarnation: int
-    first: int
+    earlier: int
     last: int
-    count: int = 1
     missing: list[Span] = field(default_factory=list)
 
     @property
@@ -34,12 +34,17 @@ class Stream:
 
     def follow(self, seq: int) -> None:
         """Take note of the next number; one that was thought lost may come late."""
-        self.count += 1
         if seq > self.last + 1:
             self.missing.append((self.last + 1, seq))
         elif seq <= self.last:
             self._found(seq)
         self.last = max(self.last, seq)
+
+    def end(self, published: int) -> None:
+        """Take note that the source published that many messages in all before it was restarted."""
+        if published > self.last + 1:
+            self.missing.append((self.last + 1, published))
+            self.last = published - 1
 
     def _found(self, seq: int) -> None:
         """Take one number out of the missing ones."""
@@ -54,7 +59,7 @@ class Stream:
 
 
 class SequenceTracker:
-    """Follows the numbers of every source on every topic.
+    """Follows the numbers of every source on every topic, from one incarnation to the next.
 
     A source whose incarnation began after `since_ns` should be there from number 0.
     """
@@ -62,6 +67,7 @@ class SequenceTracker:
     def __init__(self, since_ns: int | None = None) -> None:
         self._since_ns = since_ns
         self._streams: dict[Key, Stream] = {}
+        self._newest: dict[tuple[str, str], Stream] = {}
 
     def follow(self, topic: Topic, envelope: Envelope) -> None:
         """Take note of one message."""
@@ -73,12 +79,21 @@ class SequenceTracker:
             stream.follow(envelope.seq)
 
     def _begun(self, topic: Topic, envelope: Envelope) -> Stream:
-        """The stream that begins with a message, what came before it missing if it should be there."""
-        seq = envelope.seq
-        stream = Stream(topic, envelope.source, envelope.incarnation, first=seq, last=seq)
+        """The stream that begins with a message; the source's stream before it has ended.
+
+        What came before the message is missing if it should be there.
+        """
+        stream = Stream(
+            topic, envelope.source, envelope.incarnation, envelope.earlier, last=envelope.seq
+        )
         is_new = self._since_ns is not None and envelope.incarnation > self._since_ns
-        if is_new and seq > 0:
-            stream.missing.append((0, seq))
+        if is_new and envelope.seq > 0:
+            stream.missing.append((0, envelope.seq))
+
+        before = self._newest.get((topic.name, envelope.source))
+        self._newest[topic.name, envelope.source] = stream
+        if before is not None and UNKNOWN not in (before.earlier, stream.earlier):
+            before.end(stream.earlier - before.earlier)
         return stream
 
     @property

@@ -153,6 +153,25 @@ def test_a_restarted_source_begins_anew_and_that_is_no_gap(path: Path) -> None:
     assert town.end().gaps == []
 
 
+def test_what_a_source_published_before_its_restart_and_is_missing_is_a_gap(path: Path) -> None:
+    town = Town(path)
+    for seq, incarnation, earlier in ((0, 1, 10), (1, 1, 10), (0, 2, 15)):
+        message = odometry(seq)
+        envelope = Envelope("sim", seq, incarnation, seq, seq, earlier=earlier)
+        town.say_bytes(topics.ODOMETRY, encode(message), envelope)
+    summary = town.end()
+    assert summary.gaps == ["odometry (never drop): 3 of sim missing, number 2 to 4"]
+    assert summary.lost == {"odometry": 3}
+
+
+def test_a_restart_after_which_nothing_is_missing_is_no_gap(path: Path) -> None:
+    town = Town(path)
+    for seq, incarnation, earlier in ((0, 1, 10), (1, 1, 10), (0, 2, 12)):
+        envelope = Envelope("sim", seq, incarnation, seq, seq, earlier=earlier)
+        town.say_bytes(topics.ODOMETRY, encode(odometry(seq)), envelope)
+    assert town.end().gaps == []
+
+
 def test_what_is_no_message_is_counted_and_not_written(path: Path) -> None:
     town = Town(path)
     town.say(odometry(0), 1)
