@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cogmap import InProcessRunner, topics
+from cogmap import InProcessRunner, Module, topics
 from examples import wanderer
 from schemas.sensing import TruePose
 from services import registry
@@ -10,14 +10,18 @@ from services import registry
 
 def drive(frames: int) -> list[TruePose]:
     """The robot's true poses while the wanderer answers that many frames, in lockstep."""
-    sections = {"sim": {"mode": "lockstep", "egl": False}}
-    modules = [registry.build(name, sections) for name in ("sim", "sensory")]
-    modules.append(wanderer.build(wanderer.Config()))
-
     poses: list[TruePose] = []
-    with InProcessRunner(modules) as runner:
-        runner.observe(topics.TRUE_POSE, poses.append)
-        runner.run(until=lambda: len(poses) >= frames)
+    sections = {"sim": {"mode": "lockstep", "egl": False}}
+    runner = InProcessRunner(
+        [
+            registry.build("sim", sections),
+            registry.build("sensory", sections),
+            wanderer.build(wanderer.Config()),
+            Module("observer").on(topics.TRUE_POSE, poses.append),
+        ]
+    )
+    runner.run(until=lambda: len(poses) >= frames)
+    runner.close()
     return poses
 
 
