@@ -42,10 +42,14 @@ class Envelope(msgspec.Struct, array_like=True):
 
     def continue_trace(self, cause: Envelope, module: str, compute_ns: int) -> None:
         """Make this the envelope of an answer to `cause`, which took `module` so long to compute."""
-        passed_ns = sum(compute + rest for _, compute, rest in cause.stages)
-        rest_ns = self.sent_ns - cause.born_ns - passed_ns - compute_ns
+        passed_ns = 0
+        for _, stage_compute_ns, stage_rest_ns in cause.stages:
+            passed_ns += stage_compute_ns + stage_rest_ns
+        age_ns = self.sent_ns - cause.born_ns
+        rest_ns = max(0, age_ns - passed_ns - compute_ns)
+
         self.born_ns = cause.born_ns
-        self.stages = [*cause.stages, (module, compute_ns, max(0, rest_ns))]
+        self.stages = [*cause.stages, (module, compute_ns, rest_ns)]
 
 
 def _plain(value: object) -> object:

@@ -1,6 +1,4 @@
-"""What a bus is: the Zenoh bus and the in-memory bus both are one, and pass the same contract
-tests.
-"""
+"""What a bus is: the Zenoh bus and the in-memory bus pass the same contract tests."""
 
 from __future__ import annotations
 
@@ -11,10 +9,14 @@ from typing import Protocol
 from cogmap.bus.codec import Envelope
 from schemas.topics import Topic
 
+# How many messages of a NEVER_DROP topic a publisher keeps for subscribers that missed them.
+CACHED_MESSAGES = 1024
+Job = Callable[[], None]
+
 
 @dataclass(slots=True)
 class Arrival:
-    """One message as it came: still bytes, the envelope decoded where it could be."""
+    """One received message: still bytes, the envelope None where it could not be decoded."""
 
     topic: Topic
     payload: bytes | memoryview
@@ -30,10 +32,6 @@ class Answer:
     envelope: Envelope | None = None
 
 
-Job = Callable[[], None]
-CACHED_MESSAGES = 1024
-
-
 @dataclass(frozen=True, order=True)
 class Member:
     """An instance of a module."""
@@ -43,15 +41,16 @@ class Member:
 
 
 class Bus(Protocol):
-    """Carries bytes on topics between members. Callbacks only enqueue; nothing is published from
-    one.
-    """
+    """Carries bytes on topics between members.
 
-    def publish(self, topic: Topic, payload: bytes, envelope: Envelope) -> None:
-        """Send `payload` to every subscriber of `topic`. Declare the topic first."""
+    Callbacks are called on the bus's threads: they only enqueue, and nothing is published from one.
+    """
 
     def declare(self, topic: Topic) -> None:
         """Prepare to publish on `topic`."""
+
+    def publish(self, topic: Topic, payload: bytes, envelope: Envelope) -> None:
+        """Send `payload` to every subscriber of `topic`, which has been declared."""
 
     def subscribe(
         self,
@@ -60,10 +59,10 @@ class Bus(Protocol):
         on_gap: Callable[[str, int], None],
         history: int = 0,
     ) -> None:
-        """Hand every message of `topic` to `deliver`; `on_gap` is told (topic name, how many) where
-        some are lost.
+        """Hand every message of `topic` to `deliver`.
 
-        Of a NEVER_DROP topic, up to `history` messages that each publisher still there said before
+        `on_gap` is called with the topic's name and a number where messages are lost. Of a
+        NEVER_DROP topic, up to `history` earlier messages of each publisher that is still there
         come first.
         """
 
@@ -84,10 +83,10 @@ class Bus(Protocol):
         """Send a query and wait for its answer. Raises NoAnswerError."""
 
     def announce(self, member: Member) -> None:
-        """Tell everybody that `member` is ready; it holds until this bus closes or dies."""
+        """Let everybody know that `member` is ready, until this bus closes or its process dies."""
 
     def watch(self, on_change: Callable[[Member, bool], None]) -> None:
-        """Tell of every member that is there, comes or goes."""
+        """Call `on_change` with every member that is ready (True), becomes ready or leaves (False)."""
 
     def close(self) -> None:
-        """Leave. What was published is sent first."""
+        """Leave the bus. What was published is sent first."""

@@ -4,57 +4,81 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from cogmap.bus.codec import Envelope
 from cogmap.bus.interface import CACHED_MESSAGES, Answer, Arrival, Job, Member
 from cogmap.errors import NoAnswerError
 from schemas.topics import Delivery, Topic
 
-_Subscriber = tuple[Callable[[Arrival], None], Callable[[str, int], None]]
+Handler = Callable[[bytes], Answer]
+Watcher = Callable[[Member, bool], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Subscription:
+    """That a bus hands the messages of `topic` to `deliver`. None are ever lost here."""
+
+    topic: Topic
+    deliver: Callable[[Arrival], None]
 
 
 class MemoryNetwork:
-    """What the in-memory buses of one experiment share. Each message is delivered before `publish`
-    returns.
+    """What the in-memory buses of one process share.
+
+    A message is delivered to every subscriber before `publish` returns.
     """
 
     def __init__(self) -> None:
-        self.subscribers: dict[Topic, list[_Subscriber]] = {}
-        self.servers: dict[Topic, Callable[[bytes], Answer]] = {}
+        self.subscribers: dict[Topic, list[Subscription]] = {}
+        self.servers: dict[Topic, Handler] = {}
         self.members: dict[Member, MemoryBus] = {}
         self.buses: list[MemoryBus] = []
-        self.watchers: list[Callable[[Member, bool], None]] = []
+        self.watchers: list[Watcher] = []
 
-    def change(self, member: Member, bus: MemoryBus | None) -> None:
-        """Enter `member`, or take it out where `bus` is None, and tell the watchers."""
-        if bus is not None:
-            self.members[member] = bus
-        elif self.members.pop(member, None) is None:
-            return
+    def deliver(self, arrival: Arrival) -> None:
+        """Hand `arrival` to all who subscribe to its topic now."""
+        for subscription in tuple(self.subscribers.get(arrival.topic, ())):
+            subscription.deliver(arrival)
+
+    def enter(self, member: Member, bus: MemoryBus) -> None:
+        """Let the watchers know that `member` is ready."""
+        self.members[member] = bus
+        self._notify(member, True)
+
+    def leave(self, bus: MemoryBus) -> None:
+        """Let the watchers know that the members of `bus` are gone."""
+        if bus in self.buses:
+            self.buses.remove(bus)
+        gone = [member for member, other in self.members.items() if other is bus]
+        for member in gone:
+            del self.members[member]
+            self._notify(member, False)
+
+    def _notify(self, member: Member, alive: bool) -> None:
         for watcher in self.watchers:
-            watcher(member, bus is not None)
+            watcher(member, alive)
 
 
 class MemoryBus:
-    """One member's connection to a MemoryNetwork."""
+    """One member's connection to `network`."""
 
     def __init__(self, network: MemoryNetwork) -> None:
+        self.cache: dict[Topic, deque[Arrival]] = {}
         self._network = network
-        self.said: dict[Topic, deque[Arrival]] = {}
-        network.buses.append(self)
-        self._subscriptions: list[tuple[Topic, _Subscriber]] = []
+        self._subscriptions: list[Subscription] = []
         self._served: list[Topic] = []
+        network.buses.append(self)
 
     def declare(self, topic: Topic) -> None:
         if topic.delivery is Delivery.NEVER_DROP:
-            self.said.setdefault(topic, deque(maxlen=CACHED_MESSAGES))
+            self.cache.setdefault(topic, deque(maxlen=CACHED_MESSAGES))
 
     def publish(self, topic: Topic, payload: bytes, envelope: Envelope) -> None:
         arrival = Arrival(topic, payload, envelope, envelope.sent_ns)
-        if topic in self.said:
-            self.said[topic].append(arrival)
-        for deliver, _ in tuple(self._network.subscribers.get(topic, ())):
-            deliver(arrival)
+        if topic in self.cache:
+            self.cache[topic].append(arrival)
+        self._network.deliver(arrival)
 
     def subscribe(
         self,
@@ -63,19 +87,21 @@ class MemoryBus:
         on_gap: Callable[[str, int], None],
         history: int = 0,
     ) -> None:
-        subscriber = (deliver, on_gap)
-        for bus in self._network.buses if history else ():
-            for arrival in list(bus.said.get(topic, ()))[-history:]:
+        if history:
+            self._deliver_past(topic, deliver, history)
+
+        subscription = Subscription(topic, deliver)
+        self._network.subscribers.setdefault(topic, []).append(subscription)
+        self._subscriptions.append(subscription)
+
+    def _deliver_past(self, topic: Topic, deliver: Callable[[Arrival], None], history: int) -> None:
+        for bus in self._network.buses:
+            past = list(bus.cache.get(topic, ()))
+            for arrival in past[-history:]:
                 deliver(arrival)
-        self._network.subscribers.setdefault(topic, []).append(subscriber)
-        self._subscriptions.append((topic, subscriber))
 
     def serve(
-        self,
-        request: Topic,
-        reply: Topic,
-        handler: Callable[[bytes], Answer],
-        enqueue: Callable[[Job], None],
+        self, request: Topic, reply: Topic, handler: Handler, enqueue: Callable[[Job], None]
     ) -> None:
         self._network.servers[request] = handler
         self._served.append(request)
@@ -90,20 +116,17 @@ class MemoryBus:
             raise NoAnswerError(f"{request.name}: {error}") from error
 
     def announce(self, member: Member) -> None:
-        self._network.change(member, self)
+        self._network.enter(member, self)
 
-    def watch(self, on_change: Callable[[Member, bool], None]) -> None:
+    def watch(self, on_change: Watcher) -> None:
         self._network.watchers.append(on_change)
         for member in sorted(self._network.members):
             on_change(member, True)
 
     def close(self) -> None:
         while self._subscriptions:
-            topic, subscriber = self._subscriptions.pop()
-            self._network.subscribers[topic].remove(subscriber)
+            subscription = self._subscriptions.pop()
+            self._network.subscribers[subscription.topic].remove(subscription)
         while self._served:
             self._network.servers.pop(self._served.pop(), None)
-        if self in self._network.buses:
-            self._network.buses.remove(self)
-        for member in [m for m, bus in self._network.members.items() if bus is self]:
-            self._network.change(member, None)
+        self._network.leave(self)

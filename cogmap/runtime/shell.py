@@ -17,6 +17,7 @@ from cogmap.runtime.delivery.publisher import Computation, Publisher
 from cogmap.runtime.follower import Follower
 from cogmap.runtime.health import Meter
 from cogmap.runtime.module import Module, Reply
+from cogmap.runtime.roster import Roster
 from cogmap.runtime.state.journal import Journal
 from cogmap.runtime.state.published import PublishedCounts
 from cogmap.runtime.timers import Due, Timers
@@ -35,8 +36,8 @@ TIMER = "@timer"
 class Shell:
     """Runs `module` on `bus`: `open()` it, then `spin_once()` from one thread; `close()` ends it.
 
-    Where the bus is durable, `journal` and `counts` keep what a restart must not lose. `health` is
-    whether it publishes its health once a second.
+    `journal` and `counts` keep on disk what a restart must not lose. `health` is whether it
+    publishes its health once a second.
     """
 
     def __init__(
@@ -56,7 +57,7 @@ class Shell:
         self._journal = journal
         self._counts = counts
         self._health = health
-        self._present: set[Member] = set()
+        self._roster = Roster(module.requires)
         self._started = module.start is None
         self._follower: Follower | None = None
         if module.graph is not None:
@@ -71,18 +72,15 @@ class Shell:
         """
         backfill = self._restore()
         self.publisher.declare(self._health)
-        for topic in self.module.handlers:
-            if topic is topics.PRESENCE:
-                continue
-            history = CACHED_MESSAGES if topic in backfill else 0
-            self.bus.subscribe(topic, self.inbox.put, self.intake.count_lost, history)
+        self._subscribe(backfill)
         for request, (reply, handler) in self.module.served.items():
-            self.bus.serve(request, reply, self._server(request, handler), self.inbox.call)
+            answer = self._server(request, handler)
+            self.bus.serve(request, reply, answer, self.inbox.call)
 
         if self._follower is not None:
             self._follower.join()
         self.bus.announce(Member(self.module.name, self.module.instance))
-        if self.module.requires or topics.PRESENCE in self.module.handlers:
+        if self.module.requires or self._observes_presence:
             self.bus.watch(self._watch)
 
     def spin_once(self, timeout_s: float | None = 0.0) -> bool:
@@ -105,7 +103,8 @@ class Shell:
 
     def publish(self, messages: Iterable[Message]) -> None:
         """Publish numbered messages of the module's own accord."""
-        self.publisher.send(messages, Computation(time.time_ns()))
+        now_ns = time.time_ns()
+        self.publisher.send(messages, Computation(now_ns))
 
     def close(self) -> None:
         """Leave the bus, and close the files."""
@@ -118,12 +117,7 @@ class Shell:
     @property
     def missing(self) -> dict[str, int]:
         """The modules that it requires, and how many instances of each are not ready yet."""
-        ready = [member.module for member in self._present]
-        lacking = {}
-        for name, number in self.module.requires.items():
-            if ready.count(name) < number:
-                lacking[name] = number - ready.count(name)
-        return lacking
+        return self._roster.missing
 
     @property
     def notes(self) -> list[str]:
@@ -143,10 +137,27 @@ class Shell:
 
     def _restore(self) -> frozenset[topics.Topic]:
         """Hand the journal to the module. Returns the topics of which it wants the past."""
-        if self._journal is None or self.module.restore is None:
+        journal = self._journal
+        restore = self.module.restore
+        if journal is None or restore is None:
             return frozenset()
-        self.module.restore(self._journal.messages())
-        return frozenset() if self._journal.is_empty else self.module.backfill
+
+        restore(journal.messages())
+        if journal.is_empty:
+            return frozenset()
+        return self.module.backfill
+
+    def _subscribe(self, backfill: frozenset[topics.Topic]) -> None:
+        """Subscribe to what the module handles, with the past of those topics."""
+        for topic in self.module.handlers:
+            if topic is topics.PRESENCE:
+                continue
+            history = CACHED_MESSAGES if topic in backfill else 0
+            self.bus.subscribe(topic, self.inbox.put, self.intake.count_lost, history)
+
+    @property
+    def _observes_presence(self) -> bool:
+        return topics.PRESENCE in self.module.handlers
 
     def _receive(self, arrival: Arrival) -> None:
         received_ns = time.time_ns()
@@ -196,14 +207,18 @@ class Shell:
         self.meter.add(compute_ns, time.time_ns() - (received_ns or start_ns))
 
     def _count_fault(self, topic: str, error: Exception) -> None:
+        kind = type(error).__name__
         self.meter.faults += 1
-        self.intake.reject(topic, f"{topic}: {type(error).__name__}: {error}")
+        self.intake.reject(topic, f"{topic}: {kind}: {error}")
         log.debug("fault in %s", self.module.instance, exc_info=True)
 
     def _timer(self, handler: Callable[[int], Reply]) -> Due:
         def due(now_ns: int) -> None:
+            def call() -> list[Message]:
+                return self.module.stamp(handler(now_ns))
+
             cause = (TIMER, self.module.instance, now_ns)
-            self._invoke(lambda: self.module.stamp(handler(now_ns)), cause)
+            self._invoke(call, cause)
 
         return due
 
@@ -226,7 +241,8 @@ class Shell:
 
     def _on_load(self, fetched: Fetched) -> None:
         """Name the snapshot that replaced the graph as a cause of what is published next."""
-        cause = (topics.SNAPSHOT.name, fetched.source, fetched.snapshot.version)
+        version = fetched.snapshot.version
+        cause = (topics.SNAPSHOT.name, fetched.source, version)
         self._invoke(self.module.loaded, cause)
 
     def _watch(self, member: Member, alive: bool) -> None:
@@ -234,12 +250,8 @@ class Shell:
         self.inbox.call(lambda: self._on_presence(member, alive))
 
     def _on_presence(self, member: Member, alive: bool) -> None:
-        if alive:
-            self._present.add(member)
-        else:
-            self._present.discard(member)
-
-        if topics.PRESENCE in self.module.handlers:
+        self._roster.update(member, alive)
+        if self._observes_presence:
             self._feed_presence(member, alive)
         if not self._started and not self.missing:
             self._started = True
@@ -260,9 +272,14 @@ class Shell:
 
     def _start(self) -> None:
         start = self.module.start
-        if start is not None:
-            cause = (START, self.module.instance, 0)
-            self._invoke(lambda: self.module.stamp(start()), cause)
+        if start is None:
+            return
+
+        def call() -> list[Message]:
+            return self.module.stamp(start())
+
+        cause = (START, self.module.instance, 0)
+        self._invoke(call, cause)
 
     def _publish_health(self, now_ns: int) -> None:
         ready = not self.missing

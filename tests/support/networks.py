@@ -67,8 +67,7 @@ class InMemory:
             envelope = decode_envelope(attachment)
         except MessageError:
             envelope = None
-        for deliver, _ in self.network.subscribers.get(topic, ()):
-            deliver(Arrival(topic, payload, envelope, time.time_ns()))
+        self.network.deliver(Arrival(topic, payload, envelope, time.time_ns()))
 
     def close(self) -> None:
         for bus in self.buses:

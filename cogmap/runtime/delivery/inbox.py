@@ -1,4 +1,4 @@
-"""What came and has not been taken in yet."""
+"""What has arrived and is not processed yet."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ _Slot = tuple[str, str]
 
 
 class Inbox:
-    """Arrivals in order. Of a LATEST_WINS topic only each source's newest stays, in the place of
-    the one it replaced.
+    """Arrivals in order.
 
-    What was replaced is counted.
+    Of a LATEST_WINS topic only the newest of each source stays, in the place of the one that it
+    replaced; `superseded` counts those by topic.
     """
 
     def __init__(self) -> None:
@@ -27,15 +27,19 @@ class Inbox:
 
     def put(self, arrival: Arrival) -> None:
         """Enqueue; called from the bus's threads."""
-        if arrival.topic.delivery is not Delivery.LATEST_WINS:
+        topic = arrival.topic
+        if topic.delivery is not Delivery.LATEST_WINS:
             self._waiting.put(arrival)
             return
-        slot = (arrival.topic.name, arrival.envelope.source if arrival.envelope else "")
+
+        source = arrival.envelope.source if arrival.envelope else ""
+        slot = (topic.name, source)
         with self._replacing:
             replaced = slot in self._newest
             self._newest[slot] = arrival
+
         if replaced:
-            self.superseded[arrival.topic.name] += 1
+            self.superseded[topic.name] += 1
         else:
             self._waiting.put(slot)
 
@@ -44,9 +48,7 @@ class Inbox:
         self._waiting.put(job)
 
     def take(self, timeout_s: float | None) -> Arrival | Job | None:
-        """The oldest arrival or job; None if there is none within `timeout_s` (None waits for
-        ever).
-        """
+        """The oldest arrival or job; None if none comes in `timeout_s` (None waits for ever)."""
         try:
             item = self._waiting.get(timeout_s != 0, timeout_s)
         except Empty:

@@ -110,7 +110,10 @@ class Intake:
 
     def _count_gaps(self, topic: str) -> None:
         """Count the lost once: numbers that are missing are also what the bus gave up."""
-        lost = max(self._missing[topic], self._given_up[topic])
+        missing = self._missing[topic]
+        given_up = self._given_up[topic]
+        lost = max(missing, given_up)
+
         new = lost - self.gaps[topic]
         if new > 0:
             self.gaps[topic] = lost
@@ -130,9 +133,12 @@ class Intake:
 
 def _matching(arrival: Arrival, message: Message) -> Envelope:
     """The envelope of `arrival`. Raises MessageError where it is missing or another message's."""
+    name = arrival.topic.name
     envelope = arrival.envelope
     if envelope is None:
-        raise MessageError(f"{arrival.topic.name}: no envelope")
-    if (envelope.source, envelope.seq) != (message.source, message.seq):
-        raise MessageError(f"{arrival.topic.name}: envelope and message name different sources")
+        raise MessageError(f"{name}: no envelope")
+
+    is_same = envelope.source == message.source and envelope.seq == message.seq
+    if not is_same:
+        raise MessageError(f"{name}: envelope and message name different sources")
     return envelope

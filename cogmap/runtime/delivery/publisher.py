@@ -58,18 +58,20 @@ class Publisher:
 
     def declare(self, health: bool) -> None:
         """Prepare to publish all that the module may, and its health."""
-        for topic in sorted(self._module.emits, key=lambda topic: topic.name):
-            self._bus.declare(topic)
+        for topic in topics.ALL:
+            if topic in self._module.emits:
+                self._bus.declare(topic)
         if health:
             self._bus.declare(topics.HEALTH)
 
     def trace(self, stamp_ns: int, envelope: Envelope) -> None:
         """Let outputs of that stamp continue the trace of `envelope`, until another one comes."""
-        self._traces.pop(stamp_ns, None)
-        self._traces[stamp_ns] = envelope
-        if len(self._traces) > MAX_TRACES:
-            oldest = next(iter(self._traces))
-            del self._traces[oldest]
+        traces = self._traces
+        traces.pop(stamp_ns, None)
+        traces[stamp_ns] = envelope
+        if len(traces) > MAX_TRACES:
+            oldest = next(iter(traces))
+            del traces[oldest]
 
     def add_cause(self, cause: Cause) -> None:
         """Name `cause` in the next output."""
@@ -84,11 +86,14 @@ class Publisher:
 
     def send_health(self, health: Health) -> None:
         """Publish `health`, with the causes that wait for an output where they have become many."""
+        topic = topics.HEALTH
         payload = encode(health)
-        envelope = self._envelope(topics.HEALTH, health, health.stamp_ns)
-        if len(self._causes) > MAX_CAUSES:
+        envelope = self._envelope(topic, health, health.stamp_ns)
+
+        has_many = len(self._causes) > MAX_CAUSES
+        if has_many:
             envelope.causes = self._take_causes()
-        self._bus.publish(topics.HEALTH, payload, envelope)
+        self._bus.publish(topic, payload, envelope)
 
     def answer_envelope(self) -> Envelope:
         """The envelope of an answer to a query, which has no number."""
@@ -102,13 +107,19 @@ class Publisher:
             self._journal.append(message, payload)
 
         envelope = self._envelope(topic, message, computation.end_ns)
-        trace = self._traces.get(message.stamp_ns)
-        if trace is not None and computation.answers and not topic.sensed:
-            envelope.continue_trace(trace, self._module.name, computation.compute_ns)
         envelope.causes = self._take_causes()
+        if computation.answers and not topic.sensed:
+            self._continue_trace(envelope, message, computation)
 
         self._bus.publish(topic, payload, envelope)
         self.emitted[topic.name] += 1
+
+    def _continue_trace(
+        self, envelope: Envelope, message: Message, computation: Computation
+    ) -> None:
+        trace = self._traces.get(message.stamp_ns)
+        if trace is not None:
+            envelope.continue_trace(trace, self._module.name, computation.compute_ns)
 
     def _envelope(self, topic: Topic, message: Message, born_ns: int) -> Envelope:
         earlier = UNKNOWN
@@ -131,7 +142,9 @@ class Publisher:
         return causes
 
     def _compact_journal(self) -> None:
+        journal = self._journal
         compact = self._module.compact
-        if self._journal is None or compact is None or not self._journal.is_long:
+        if journal is None or compact is None:
             return
-        self._journal.compact(compact())
+        if journal.is_long:
+            journal.compact(compact())

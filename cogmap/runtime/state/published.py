@@ -46,10 +46,13 @@ class PublishedCounts:
         """Count one message of `topic` that is about to be published."""
         slot = self._slots.get(topic.name)
         if slot is None:
-            slot = self._slots[topic.name] = self._append(topic.name)
+            slot = self._append(topic.name)
+            self._slots[topic.name] = slot
 
         slot.count += 1
-        write_at(self._path, self._file, _COUNT.pack(slot.count), slot.offset + _COUNT_OFFSET)
+        data = _COUNT.pack(slot.count)
+        offset = slot.offset + _COUNT_OFFSET
+        write_at(self._path, self._file, data, offset)
 
     def close(self) -> None:
         """Close the file; the counts stay in it."""
@@ -58,15 +61,19 @@ class PublishedCounts:
     def _read(self) -> dict[str, _Slot]:
         slots: dict[str, _Slot] = {}
         offset = 0
-        while len(data := os.pread(self._file, _RECORD.size, offset)) == _RECORD.size:
-            name, count = _RECORD.unpack(data)
-            slots[self._decoded(name)] = _Slot(offset, count)
-            offset += _RECORD.size
-        return slots
+        while True:
+            data = os.pread(self._file, _RECORD.size, offset)
+            if len(data) < _RECORD.size:
+                return slots
 
-    def _decoded(self, name: bytes) -> str:
+            padded, count = _RECORD.unpack(data)
+            name = self._decoded(padded)
+            slots[name] = _Slot(offset, count)
+            offset += _RECORD.size
+
+    def _decoded(self, padded: bytes) -> str:
         try:
-            return name.rstrip(b"\0").decode()
+            return padded.rstrip(b"\0").decode()
         except UnicodeDecodeError:
             raise StorageError(
                 f"{self._path} is damaged: move it away to count from the beginning"
