@@ -17,45 +17,32 @@ import pytest
 from click.testing import CliRunner, Result
 
 from cli.main import cogmap
-from cogmap.bus.codec import Envelope, encode
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.errors import UsageError
 from cogmap.recording.diff import diff
 from cogmap.recording.recorder import Recorder
 from cogmap.recording.storage.format import topics_to_record
-from cogmap.recording.storage.writer import LogWriter
-from schemas import topics
 from schemas.array import Array
-from schemas.sensing import Odometry, RangeScan
+from schemas.base import Message
+from tests.support.logs import SECOND_NS, odometry, scan, write_log
 from tests.support.networks import routed
 
 COUNT = 5
 TIMEOUT_S = 30.0
+REPLAY = [sys.executable, "-m", "cli.main", "log", "replay"]
+PLAYED = {"odometry": COUNT, "sensory/scan": COUNT}
 
 
 def write(path: Path, speed_m_s: float = 1.0, without: int | None = None) -> Path:
-    writer = LogWriter(path, topics_to_record(), {"agent": "a", "config": "{}", "began_ns": "1"})
+    """Odometry and scans, a second apart, without those of one number."""
     values = Array.of(np.arange(4, dtype=np.float32))
+    rows: list[tuple[int, Message]] = []
     for seq in range(COUNT):
-        if seq == without:
-            continue
-        at_ns = 10**9 * (seq + 1)
-        row = Odometry(
-            stamp_ns=at_ns,
-            seq=seq,
-            source="sim",
-            speed_m_s=speed_m_s,
-            turn_rate_rad_s=0.0,
-            dt_s=0.05,
-        )
-        scan = RangeScan(
-            stamp_ns=at_ns, seq=seq, source="sensory", frame=seq, bearing_rad=values, range_m=values
-        )
-        for message in (row, scan):
-            envelope = Envelope(message.source, seq, 5, at_ns, at_ns)
-            writer.write(topics.of(message), encode(message), envelope, at_ns)
-    writer.close()
-    return path
+        at_ns = SECOND_NS * (seq + 1)
+        if seq != without:
+            rows.append((at_ns, odometry(seq, stamp_ns=at_ns, speed_m_s=speed_m_s)))
+            rows.append((at_ns, scan(seq, stamp_ns=at_ns, values=values)))
+    return write_log(path, rows, incarnation=5)
 
 
 @pytest.fixture
@@ -74,22 +61,16 @@ def run() -> Callable[..., Result]:
     return invoke
 
 
-def test_info_says_how_much_of_each_topic_came_from_whom(
+def test_info_counts_the_messages_of_each_topic_by_source(
     run: Callable[..., Result], path: Path
 ) -> None:
     found = json.loads(run("info", path, "--json").stdout)
-    odometry = next(topic for topic in found["topics"] if topic["topic"] == "odometry")
-    assert (found["agent"], found["messages"], found["duration_s"], found["gaps"]) == (
-        "a",
-        2 * COUNT,
-        4.0,
-        [],
-    )
-    assert (odometry["count"], odometry["rate_hz"], odometry["sources"]) == (
-        COUNT,
-        1.25,
-        {"sim": COUNT},
-    )
+    assert (found["agent"], found["messages"], found["duration_s"]) == ("a", 2 * COUNT, 4.0)
+    assert found["gaps"] == []
+    rows = {topic["topic"]: topic for topic in found["topics"]}
+    wheels = rows["odometry"]
+    assert (wheels["count"], wheels["rate_hz"]) == (COUNT, 1.25)
+    assert wheels["sources"] == {"sim": COUNT}
     text = run("info", path).stdout
     assert "sim:5" in text
     assert "its recorder did not end it" in text.lower()
@@ -103,10 +84,8 @@ def test_info_names_a_gap(run: Callable[..., Result], tmp_path: Path) -> None:
 def test_cat_prints_the_messages_of_the_topics_named_and_no_more_than_asked(
     run: Callable[..., Result], path: Path
 ) -> None:
-    lines = [
-        json.loads(line)
-        for line in run("cat", path, "odometry", "-n", "3", "--json").stdout.splitlines()
-    ]
+    printed = run("cat", path, "odometry", "-n", "3", "--json").stdout
+    lines = [json.loads(line) for line in printed.splitlines()]
     assert [line["message"]["seq"] for line in lines] == [0, 1, 2]
     assert {line["topic"] for line in lines} == {"odometry"}
     assert lines[0]["envelope"]["source"] == "sim"
@@ -129,24 +108,21 @@ def test_diff_ends_with_0_for_the_same_and_1_with_words_for_a_difference(
     assert run("diff", path, same).exit_code == 0
     result = run("diff", path, other)
     assert result.exit_code == 1
-    assert (
-        "First difference: odometry number 0 of sim (stamp 1.000 s): speed_m_s is 1.0 in log.mcap"
-        in result.stdout
-    )
+    first = "odometry number 0 of sim (stamp 1.000 s): speed_m_s is 1.0 in log.mcap"
+    assert f"First difference: {first}" in result.stdout
     assert run("diff", path, other, "sensory/scan").exit_code == 0
     assert json.loads(run("diff", path, other, "--json").stdout)["same"] is False
 
 
-def test_recover_says_what_it_saved_and_what_is_lost(
+def test_recover_prints_what_it_saved_and_what_is_lost(
     run: Callable[..., Result], path: Path, tmp_path: Path
 ) -> None:
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(path.read_bytes()[:-1500])
     result = run("recover", cut, tmp_path / "saved.mcap", "--json")
     assert json.loads(result.stdout)["messages"] == 2 * COUNT
-    assert (
-        json.loads(run("info", tmp_path / "saved.mcap", "--json").stdout)["messages"] == 2 * COUNT
-    )
+    found = json.loads(run("info", tmp_path / "saved.mcap", "--json").stdout)
+    assert found["messages"] == 2 * COUNT
     assert "messages saved from" in run("recover", cut, tmp_path / "again.mcap").stdout
 
 
@@ -180,7 +156,7 @@ def endpoint() -> Iterator[str]:
         yield address
 
 
-def test_what_is_played_onto_zenoh_and_recorded_again_says_the_same(
+def test_what_is_played_onto_zenoh_and_recorded_again_is_the_same(
     endpoint: str, path: Path, tmp_path: Path
 ) -> None:
     again = tmp_path / "again.mcap"
@@ -191,7 +167,7 @@ def test_what_is_played_onto_zenoh_and_recorded_again_says_the_same(
     observer.watch(lambda member, alive: here.set())
     assert here.wait(TIMEOUT_S)
     observer.close()
-    command = [sys.executable, "-m", "cli.main", "log", "replay", str(path), "-r", "1000", "--json"]
+    command = [*REPLAY, str(path), "-r", "1000", "--json"]
     with subprocess.Popen(
         [*command, "--connect", endpoint, "--agent", "played"], stdout=subprocess.PIPE, text=True
     ) as player:
@@ -199,31 +175,17 @@ def test_what_is_played_onto_zenoh_and_recorded_again_says_the_same(
         while sum(recorder.received.values()) < 2 * COUNT and time.monotonic() < deadline_s:
             recorder.pump(0.1)
         assert player.stdout is not None
-        assert json.loads(player.stdout.read())["messages"] == {
-            "odometry": COUNT,
-            "sensory/scan": COUNT,
-        }
+        assert json.loads(player.stdout.read())["messages"] == PLAYED
     assert recorder.close().never_drop_whole
     assert diff(path, again).same
 
 
-def test_the_space_bar_lets_a_replay_go_on_that_began_paused(endpoint: str, path: Path) -> None:
+def test_the_space_bar_continues_a_replay_that_began_paused(endpoint: str, path: Path) -> None:
     observer = ZenohBus(endpoint, "paused")
     here = threading.Event()
     observer.watch(lambda member, alive: here.set())
     terminal, other = pty.openpty()
-    command = [
-        sys.executable,
-        "-m",
-        "cli.main",
-        "log",
-        "replay",
-        str(path),
-        "-r",
-        "1000",
-        "--start-paused",
-        "--json",
-    ]
+    command = [*REPLAY, str(path), "-r", "1000", "--start-paused", "--json"]
     with subprocess.Popen(
         [*command, "--connect", endpoint, "--agent", "paused"],
         stdin=other,
@@ -234,10 +196,7 @@ def test_the_space_bar_lets_a_replay_go_on_that_began_paused(endpoint: str, path
         assert player.poll() is None
         os.write(terminal, b" ")
         assert player.stdout is not None
-        assert json.loads(player.stdout.read())["messages"] == {
-            "odometry": COUNT,
-            "sensory/scan": COUNT,
-        }
+        assert json.loads(player.stdout.read())["messages"] == PLAYED
     observer.close()
     os.close(terminal)
     os.close(other)

@@ -105,7 +105,7 @@ def numbers(path: Path) -> list[int]:
     return [record.sequence for record in LogReader(path).records({topics.ODOMETRY})]
 
 
-def test_a_recorder_killed_with_9_loses_no_more_than_what_came_since_its_last_flush(
+def test_a_killed_recorder_loses_only_what_came_since_its_last_flush(
     endpoint: str, speaker: Speaker, tmp_path: Path
 ) -> None:
     path = tmp_path / "log.mcap"

@@ -10,14 +10,11 @@ import pytest
 from click.testing import CliRunner, Result
 
 from cli.main import cogmap
-from cogmap.bus.codec import Envelope, encode
 from cogmap.errors import LogError, UsageError
-from cogmap.recording.storage.writer import LogWriter
-from schemas import topics
 from schemas.base import Message
 from schemas.sensing import Odometry, Pose, TruePose
+from tests.support.logs import SECOND_NS, odometry, write_log
 
-SECOND_NS = 10**9
 STEPS = 5
 
 
@@ -32,24 +29,13 @@ def true_pose(seq: int) -> TruePose:
     )
 
 
-def odometry(seq: int) -> Odometry:
-    return Odometry(
-        stamp_ns=seq * SECOND_NS,
-        seq=seq,
-        source="sim",
-        speed_m_s=1.0,
-        turn_rate_rad_s=0.0,
-        dt_s=1.0,
-    )
+def turn_of_wheels(seq: int) -> Odometry:
+    return odometry(seq, stamp_ns=seq * SECOND_NS, dt_s=1.0)
 
 
 def write(path: Path, messages: list[Message], config: str = "{}") -> Path:
-    writer = LogWriter(path, topics.ALL, {"agent": "a", "config": config})
-    for message in messages:
-        envelope = Envelope(message.source, message.seq, 1, message.stamp_ns, message.stamp_ns)
-        writer.write(topics.of(message), encode(message), envelope, message.stamp_ns)
-    writer.close()
-    return path
+    rows = [(message.stamp_ns, message) for message in messages]
+    return write_log(path, rows, config=config)
 
 
 @pytest.fixture
@@ -57,7 +43,7 @@ def drive(tmp_path: Path) -> Path:
     """A robot that drives straight for five seconds, with wheels that measure it so."""
     messages: list[Message] = []
     for seq in range(STEPS + 1):
-        messages += [true_pose(seq), odometry(seq)]
+        messages += [true_pose(seq), turn_of_wheels(seq)]
     config = json.dumps({"sim": {"seed": 7, "laps": 0.5, "mode": "lockstep"}})
     return write(tmp_path / "drive.mcap", messages, config)
 
@@ -100,7 +86,7 @@ def test_settings_that_a_log_lacks_are_the_defaults(
 def test_a_log_without_true_poses_is_said_to_have_none(
     run: Callable[..., Result], tmp_path: Path
 ) -> None:
-    result = run("summary", write(tmp_path / "blind.mcap", [odometry(0)]), "--json")
+    result = run("summary", write(tmp_path / "blind.mcap", [turn_of_wheels(0)]), "--json")
     assert "holds no truth/pose: distances and errors are 0" in result.stderr
     assert json.loads(result.stdout)["distance_m"] == 0.0
 

@@ -24,17 +24,13 @@ from cli.main import cogmap
 from cli.plots import draw, ground
 from cli.plots.labels import Label, place
 from cli.plots.palette import KERB, SEVERAL
-from cogmap.bus.codec import Envelope, encode
 from cogmap.errors import LogError, UsageError
-from cogmap.recording.storage.format import topics_to_record
-from cogmap.recording.storage.writer import LogWriter
-from schemas import topics
 from schemas.array import Array
 from schemas.base import Message
 from schemas.sensing import Percept, Percepts, StereoFrame, View
 from tests.support.blocks import ASPHALT, CAMERA, GRASS, Block, painted
+from tests.support.logs import SECOND_NS, write_log
 
-SECOND_NS = 10**9
 FRAMES = 5
 FIRST = 3
 RECOGNISED = {4: 1, 5: 2, 7: 1}
@@ -92,17 +88,8 @@ def answer(frame: int) -> Percepts:
 
 def write(path: Path, messages: list[Message]) -> Path:
     """A log with a message every second."""
-    writer = LogWriter(path, topics_to_record(), {"agent": "a", "config": "{}", "began_ns": "1"})
-    for number, message in enumerate(messages):
-        at_ns = (1 + number) * SECOND_NS
-        writer.write(
-            topics.of(message),
-            encode(message),
-            Envelope(message.source, number, 1, at_ns, at_ns),
-            at_ns,
-        )
-    writer.close()
-    return path
+    rows = [(number * SECOND_NS, message) for number, message in enumerate(messages, 1)]
+    return write_log(path, rows)
 
 
 @pytest.fixture(scope="module")
@@ -110,15 +97,16 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Views 3 to 7, a second each, of which 4, 5 and 7 have percepts half a second later."""
     messages: list[Message] = []
     for frame in range(FIRST, FIRST + FRAMES):
-        right = Array.of(255 - shade(frame))
         pair = StereoFrame(
             frame=frame,
             stamp_ns=frame,
             left=Array.of(shade(frame)),
-            right=right,
+            right=Array.of(255 - shade(frame)),
             calibration=CAMERA,
         )
-        messages += [view(frame), pair, *([answer(frame)] if frame in RECOGNISED else [])]
+        messages += [view(frame), pair]
+        if frame in RECOGNISED:
+            messages.append(answer(frame))
     return write(tmp_path_factory.mktemp("pictures") / "drive.mcap", messages)
 
 
@@ -144,12 +132,12 @@ def read(path: str | Path) -> Pixels:
 def test_an_image_has_the_pixels_of_the_view_one_for_one(
     run: Callable[..., Result], drive: Path
 ) -> None:
-    said = run("image", drive, "--frame", "4").stdout
-    assert said == f"drive-frame-4-view.png: sensory/view, frame 4 at 2.000 s of {drive}\n"
+    printed = run("image", drive, "--frame", "4").stdout
+    assert printed == f"drive-frame-4-view.png: sensory/view, frame 4 at 2.000 s of {drive}\n"
     assert np.array_equal(read("drive-frame-4-view.png"), shade(4))
 
 
-def test_without_a_choice_it_is_the_view_in_the_middle_and_with_a_time_the_nearest(
+def test_it_is_the_view_in_the_middle_or_the_nearest_to_a_time(
     run: Callable[..., Result], drive: Path
 ) -> None:
     middle = json.loads(run("image", drive, "--json").stdout)
@@ -199,16 +187,15 @@ def test_percepts_are_outlined_where_they_are_and_leave_the_rest_of_the_view(
 def test_with_percepts_only_views_that_were_answered_are_chosen(
     run: Callable[..., Result], drive: Path
 ) -> None:
-    assert (
-        json.loads(run("image", drive, "--percepts", "--json", "--at", "7.4").stdout)["frame"] == 5
-    )
+    facts = json.loads(run("image", drive, "--percepts", "--json", "--at", "7.4").stdout)
+    assert facts["frame"] == 5
     with pytest.raises(
         UsageError, match=r"no frame 6 in .*: there are 3, from 4 to 7, and 5 is the nearest"
     ):
         run("image", drive, "--percepts", "--frame", "6")
 
 
-def test_the_figure_is_of_the_view_with_the_most_percepts_and_the_same_bytes_each_time(
+def test_the_plot_has_the_most_percepts_and_the_same_bytes_each_time(
     run: Callable[..., Result], drive: Path
 ) -> None:
     facts = json.loads(run("perception", drive, "--json").stdout)
@@ -221,7 +208,7 @@ def test_the_figure_is_of_the_view_with_the_most_percepts_and_the_same_bytes_eac
     assert Path("first.pdf").read_bytes() == Path("second.pdf").read_bytes()
 
 
-def test_a_view_in_which_nothing_was_recognised_has_a_figure_too(
+def test_a_view_in_which_nothing_was_recognised_has_a_plot_too(
     run: Callable[..., Result], tmp_path: Path
 ) -> None:
     empty = Array.of(np.empty((0, 2), np.float32))
@@ -233,7 +220,7 @@ def test_a_view_in_which_nothing_was_recognised_has_a_figure_too(
     assert "with nothing recognised" in run("image", log, "--percepts", "--depth").stdout
 
 
-def test_the_reference_drive_has_its_figure(run: Callable[..., Result]) -> None:
+def test_the_reference_drive_has_its_plot(run: Callable[..., Result]) -> None:
     facts = json.loads(run("perception", REFERENCE, "-o", "reference.png", "--json").stdout)
     assert facts["objects"]
 
@@ -307,7 +294,7 @@ def test_what_is_wrong_is_named_with_the_remedy(
     assert not list(Path().iterdir())
 
 
-def test_a_log_without_views_or_percepts_says_how_to_see_what_it_holds(
+def test_a_log_without_views_or_percepts_names_the_command_that_helps(
     run: Callable[..., Result], tmp_path: Path
 ) -> None:
     with pytest.raises(

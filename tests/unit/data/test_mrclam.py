@@ -26,7 +26,7 @@ def _folder(path: Path, **changed: str | None) -> Path:
     return path
 
 
-def test_a_set_is_read_with_barcodes_as_subjects_and_sightings_in_order_of_time(
+def test_a_set_is_read_with_barcodes_as_subjects_and_by_time(
     tmp_path: Path,
 ) -> None:
     recording = read(_folder(tmp_path))

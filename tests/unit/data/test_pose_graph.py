@@ -41,7 +41,7 @@ def test_a_g2o_file_is_read_with_the_upper_triangle_row_by_row(tmp_path: Path) -
     assert graph.information[0].tolist() == SYMMETRIC
 
 
-def test_a_toro_file_is_read_in_its_own_order_of_information_and_ids_become_indices(
+def test_a_toro_file_is_read_in_its_own_order_of_information(
     tmp_path: Path,
 ) -> None:
     graph = read_toro(_file(tmp_path, TORO))

@@ -8,80 +8,58 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cogmap.bus.codec import Envelope, encode
+from cogmap.bus.codec import encode
 from cogmap.recording.diff import Diff, diff
 from cogmap.recording.replaying.compare import difference, in_words
-from cogmap.recording.storage.format import topics_to_record
-from cogmap.recording.storage.writer import LogWriter
 from schemas import topics
 from schemas.array import Array
 from schemas.base import Message
 from schemas.graph import Delta, DropNode, Link, Node
 from schemas.sensing import Odometry, RangeScan
+from tests.support.logs import odometry, scan, write_log
 
 Change = Callable[[list[Message]], object]
 
 
-def said() -> list[Message]:
+def messages() -> list[Message]:
     """Ten rows of odometry and scans of two sources."""
-    messages: list[Message] = []
+    found: list[Message] = []
     for seq in range(10):
-        row = Odometry(
-            seq=seq,
-            stamp_ns=seq * 10**8,
-            source="sim",
-            speed_m_s=2.0,
-            turn_rate_rad_s=0.0,
-            dt_s=0.05,
-        )
+        stamp_ns = seq * 10**8
         values = Array.of(np.arange(6, dtype=np.float32).reshape(2, 3) + seq)
-        scan = RangeScan(
-            seq=seq,
-            stamp_ns=seq * 10**8,
-            source="sensory",
-            frame=seq,
-            bearing_rad=values,
-            range_m=values,
-        )
-        messages += [row, scan]
-    return messages
+        found.append(odometry(seq, stamp_ns=stamp_ns, speed_m_s=2.0))
+        found.append(scan(seq, stamp_ns=stamp_ns, values=values))
+    return found
 
 
-def written(
-    path: Path, messages: Iterable[Message], delay_ns: int = 0, incarnation: int = 1
+def record(
+    path: Path, recorded: Iterable[Message], delay_ns: int = 0, incarnation: int = 1
 ) -> Path:
-    writer = LogWriter(path, topics_to_record(), {})
-    for n, message in enumerate(messages):
-        at_ns = 1000 * n + delay_ns
-        writer.write(
-            topics.of(message),
-            encode(message),
-            Envelope(message.source, message.seq, incarnation, at_ns, at_ns),
-            at_ns,
-        )
-    writer.close()
-    return path
+    rows = [(1000 * n + delay_ns, message) for n, message in enumerate(recorded)]
+    return write_log(path, rows, incarnation=incarnation)
 
 
 def compared(folder: Path, change: Change, delay_ns: int = 0, incarnation: int = 1) -> Diff:
-    other = said()
+    other = messages()
     change(other)
-    left = written(folder / "a.mcap", said())
-    return diff(left, written(folder / "b.mcap", other, delay_ns, incarnation))
+    left = record(folder / "a.mcap", messages())
+    right = record(folder / "b.mcap", other, delay_ns, incarnation)
+    return diff(left, right)
 
 
 def test_logs_of_the_same_messages_are_the_same_however_they_travelled(tmp_path: Path) -> None:
-    found = compared(
-        tmp_path, lambda messages: messages.sort(key=lambda m: m.source), delay_ns=77, incarnation=9
-    )
+    def reorder(other: list[Message]) -> None:
+        other.sort(key=lambda message: message.source)
+
+    found = compared(tmp_path, reorder, delay_ns=77, incarnation=9)
     assert (found.same, found.first) == (True, "")
     assert [(t.topic, t.same) for t in found.topics] == [("odometry", 10), ("sensory/scan", 10)]
 
 
 def test_a_changed_value_is_found_and_named(tmp_path: Path) -> None:
-    def change(messages: list[Message]) -> None:
-        messages[8].speed_m_s = 2.5
-        messages[12].speed_m_s = 9.0
+    def change(other: list[Message]) -> None:
+        other[8].speed_m_s = 2.5
+        other[12].speed_m_s = 9.0
 
     found = compared(tmp_path, change)
     assert found.first == (
@@ -91,10 +69,10 @@ def test_a_changed_value_is_found_and_named(tmp_path: Path) -> None:
 
 
 def test_a_changed_value_in_an_array_is_named_with_its_index(tmp_path: Path) -> None:
-    def change(messages: list[Message]) -> None:
+    def change(other: list[Message]) -> None:
         values = np.arange(6, dtype=np.float32).reshape(2, 3) + 1
         values[1, 0] = 0.5
-        messages[3].range_m = Array.of(values)
+        other[3].range_m = Array.of(values)
 
     assert compared(tmp_path, change).first == (
         "sensory/scan number 1 of sensory (stamp 0.100 s): range_m.1.0 is 4.0 in a.mcap, 0.5 in b.mcap "
@@ -103,14 +81,16 @@ def test_a_changed_value_in_an_array_is_named_with_its_index(tmp_path: Path) -> 
 
 
 def test_a_message_in_one_log_only_is_named(tmp_path: Path) -> None:
-    found = compared(tmp_path, lambda messages: messages.pop(18))
+    found = compared(tmp_path, lambda other: other.pop(18))
     assert found.first == "odometry number 9 of sim (stamp 0.900 s) is in a.mcap and not in b.mcap"
-    assert (found.topics[0].left, found.topics[0].right, found.topics[0].left_only) == (10, 9, 1)
+    first = found.topics[0]
+    assert (first.left, first.right, first.left_only) == (10, 9, 1)
 
 
 def test_only_the_chosen_topics_are_compared(tmp_path: Path) -> None:
-    left = written(tmp_path / "a.mcap", said())
-    right = written(tmp_path / "b.mcap", [m for m in said() if isinstance(m, RangeScan)])
+    left = record(tmp_path / "a.mcap", messages())
+    scans = [message for message in messages() if isinstance(message, RangeScan)]
+    right = record(tmp_path / "b.mcap", scans)
     assert not diff(left, right).same
     assert diff(left, right, [topics.SCAN]).same
 
@@ -163,6 +143,5 @@ def test_the_same_values_in_other_bytes_are_told_by_the_first_byte() -> None:
     left = encode(row)
     right = left.replace(b"\xcb\x40\x00\x00\x00\x00\x00\x00\x00", b"\x02")
     assert left != right
-    assert "the same values in other bytes, from byte" in in_words(
-        topics.ODOMETRY, left, right, ("A", "B")
-    )
+    words = in_words(topics.ODOMETRY, left, right, ("A", "B"))
+    assert "the same values in other bytes, from byte" in words

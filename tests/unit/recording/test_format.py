@@ -21,7 +21,7 @@ from cogmap.recording.storage.recover import recover
 from cogmap.recording.storage.writer import LogWriter
 from cogmap.version import VERSION
 from schemas import topics
-from schemas.sensing import Odometry
+from tests.support.logs import odometry
 from tests.support.mcap_doctor import Doctor
 
 
@@ -29,9 +29,8 @@ def write(path: Path, times_ns: list[int], flush_every: int = 2) -> None:
     """A log of odometry received at `times_ns`, in several chunks."""
     writer = LogWriter(path, topics_to_record(), {"agent": "a"})
     for seq, time_ns in enumerate(times_ns):
-        message = Odometry(seq=seq, source="sim", speed_m_s=1.0, turn_rate_rad_s=0.0, dt_s=0.05)
         envelope = Envelope("sim", seq, 1, time_ns, time_ns)
-        writer.write(topics.ODOMETRY, encode(message), envelope, time_ns)
+        writer.write(topics.ODOMETRY, encode(odometry(seq)), envelope, time_ns)
         if seq % flush_every == flush_every - 1:
             writer.flush()
     writer.close()

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 from msgspec import structs
 
-from cogmap.bus.codec import Envelope, encode
 from cogmap.errors import LogError, UsageError
 from cogmap.recording import open_log
 from cogmap.recording.storage.writer import LogWriter
@@ -16,14 +15,9 @@ from schemas import topics
 from schemas.base import Message
 from schemas.examples import samples
 from schemas.graph import Delta
-from schemas.sensing import Odometry
+from tests.support.logs import SECOND_NS, odometry, write_log
 
-SECOND_NS = 10**9
 START_NS = 100 * SECOND_NS
-
-
-def odometry(seq: int) -> Odometry:
-    return Odometry(seq=seq, source="sim", speed_m_s=float(seq), turn_rate_rad_s=0.0, dt_s=1.0)
 
 
 def delta(version: int) -> Delta:
@@ -33,13 +27,8 @@ def delta(version: int) -> Delta:
 
 def write(path: Path, *rows: tuple[float, Message]) -> Path:
     """A log of messages, each with the seconds into the log when it was received."""
-    writer = LogWriter(path, topics.ALL, {"agent": "a", "config": '{"workspace": {"cell_m": 0.5}}'})
-    for time_s, message in rows:
-        at_ns = START_NS + round(time_s * SECOND_NS)
-        envelope = Envelope(message.source, message.seq, 1, at_ns, at_ns)
-        writer.write(topics.of(message), encode(message), envelope, at_ns)
-    writer.close()
-    return path
+    timed = [(START_NS + round(time_s * SECOND_NS), message) for time_s, message in rows]
+    return write_log(path, timed, config='{"workspace": {"cell_m": 0.5}}')
 
 
 @pytest.fixture

@@ -1,10 +1,9 @@
-"""Recording on the in-memory bus: what the file says afterwards."""
+"""Recording on the in-memory bus: what the file holds afterwards."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from cogmap.bus.codec import Envelope, encode
@@ -15,61 +14,29 @@ from cogmap.recording.recorder import Recorder, Summary
 from cogmap.recording.selection import to_record
 from cogmap.recording.storage.reader import LogReader
 from schemas import topics
-from schemas.array import Array
 from schemas.base import Message
-from schemas.sensing import Odometry, RangeScan
-
-SECOND_NS = 10**9
+from tests.support.logs import odometry, scan
 
 
-def odometry(seq: int, source: str = "sim", speed_m_s: float = 1.0) -> Odometry:
-    return Odometry(
-        stamp_ns=seq * SECOND_NS,
-        seq=seq,
-        source=source,
-        speed_m_s=speed_m_s,
-        turn_rate_rad_s=0.0,
-        dt_s=0.05,
-    )
-
-
-def scan(seq: int) -> RangeScan:
-    values = Array.of(np.full(8, seq, np.float32))
-    return RangeScan(
-        stamp_ns=seq * SECOND_NS,
-        seq=seq,
-        source="sensory",
-        frame=seq,
-        bearing_rad=values,
-        range_m=values,
-    )
-
-
-class Town:
-    """A network with a recorder on it, and a bus to say things on."""
+class Recorded:
+    """A network with a recorder on it, and a bus to publish on."""
 
     def __init__(self, path: Path, limit_bytes: int = 2**20) -> None:
         self.network = MemoryNetwork()
         self.bus = MemoryBus(self.network)
+        about = {"agent": "a", "config": "{}"}
         self.recorder = Recorder(
-            MemoryBus(self.network),
-            path,
-            to_record(),
-            {"agent": "a", "config": "{}"},
-            limit_bytes=limit_bytes,
+            MemoryBus(self.network), path, to_record(), about, limit_bytes=limit_bytes
         )
         self.recorder.open()
 
-    def say(self, message: Message, at_ns: int, incarnation: int = 1) -> bytes:
+    def publish(self, message: Message, at_ns: int, incarnation: int = 1) -> bytes:
         payload = encode(message)
-        self.say_bytes(
-            topics.of(message),
-            payload,
-            Envelope(message.source, message.seq, incarnation, at_ns, at_ns),
-        )
+        envelope = Envelope(message.source, message.seq, incarnation, at_ns, at_ns)
+        self.publish_bytes(topics.of(message), payload, envelope)
         return payload
 
-    def say_bytes(self, topic: topics.Topic, payload: bytes, envelope: Envelope) -> None:
+    def publish_bytes(self, topic: topics.Topic, payload: bytes, envelope: Envelope) -> None:
         self.bus.publish(topic, payload, envelope)
 
     def end(self) -> Summary:
@@ -81,148 +48,145 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "log.mcap"
 
 
-def test_the_log_gives_back_the_same_bytes_times_and_envelopes_in_order_of_arrival(
-    path: Path,
-) -> None:
-    town = Town(path)
-    said = [
-        town.say(message, 100 + n)
-        for n, message in enumerate([odometry(0), scan(0), odometry(1), scan(1)])
-    ]
+def test_a_log_gives_back_bytes_times_and_envelopes_in_order_of_arrival(path: Path) -> None:
+    recorded = Recorded(path)
+    messages = [odometry(0), scan(0), odometry(1), scan(1)]
+    published = [recorded.publish(message, 100 + n) for n, message in enumerate(messages)]
     envelope = Envelope("sim", 2, 1, 105, 90, [("sim", 3, 4)], [("motor/command", "action", 7)])
-    said.append(encode(odometry(2)))
-    town.say_bytes(topics.ODOMETRY, said[-1], envelope)
-    town.end()
+    published.append(encode(odometry(2)))
+    recorded.publish_bytes(topics.ODOMETRY, published[-1], envelope)
+    recorded.end()
+
     reader = LogReader(path)
     records = list(reader.records())
-    assert [reader.payload(record) for record in records] == said
+    assert [reader.payload(record) for record in records] == published
     assert [record.log_time_ns for record in records] == [100, 101, 102, 103, 105]
     assert [record.sequence for record in records] == [0, 0, 1, 1, 2]
     assert records[-1].envelope == envelope
     assert reader.about("recording")["agent"] == "a"
 
 
-def test_a_summary_says_how_many_messages_of_each_topic_came_and_that_none_lacks(
+def test_a_summary_counts_messages_by_topic_and_that_none_is_missing(
     path: Path,
 ) -> None:
-    town = Town(path)
-    town.say(odometry(0), 1)
-    town.say(scan(0), 2)
-    summary = town.end()
+    recorded = Recorded(path)
+    recorded.publish(odometry(0), 1)
+    recorded.publish(scan(0), 2)
+    summary = recorded.end()
     assert summary.messages == {"odometry": 1, "sensory/scan": 1}
     assert summary.never_drop_whole
     assert (summary.gaps, summary.rejected, summary.size_bytes) == ([], {}, path.stat().st_size)
 
 
 def test_a_gap_is_named_with_its_source_and_its_numbers(path: Path) -> None:
-    town = Town(path)
+    recorded = Recorded(path)
     for seq in (0, 1, 4, 5, 7):
-        town.say(odometry(seq), seq)
-    summary = town.end()
+        recorded.publish(odometry(seq), seq)
+    summary = recorded.end()
     assert summary.lost == {"odometry": 3}
     assert summary.gaps == ["odometry (never drop): 3 of sim missing, number 2 to 3, 6"]
     assert not summary.never_drop_whole
 
 
-def test_a_gap_in_a_latest_wins_topic_is_named_and_leaves_the_never_drop_topics_whole(
+def test_a_gap_in_a_latest_wins_topic_leaves_never_drop_topics_whole(
     path: Path,
 ) -> None:
-    town = Town(path)
-    town.say(scan(0), 0)
-    town.say(scan(3), 1)
-    summary = town.end()
+    recorded = Recorded(path)
+    recorded.publish(scan(0), 0)
+    recorded.publish(scan(3), 1)
+    summary = recorded.end()
     assert summary.gaps == ["sensory/scan (latest wins): 2 of sensory missing, number 1 to 2"]
     assert summary.never_drop_whole
 
 
-def test_a_source_that_began_after_the_recorder_should_be_there_from_its_first_message(
+def test_a_source_begun_after_the_recorder_is_awaited_from_number_0(
     path: Path,
 ) -> None:
-    town = Town(path)
-    town.say(odometry(5), 1, incarnation=1)
-    town.say(odometry(2, source="later"), 2, incarnation=2**62)
-    summary = town.end()
+    recorded = Recorded(path)
+    recorded.publish(odometry(5), 1, incarnation=1)
+    recorded.publish(odometry(2, source="later"), 2, incarnation=2**62)
+    summary = recorded.end()
     assert summary.gaps == ["odometry (never drop): 2 of later missing, number 0 to 1"]
 
 
 def test_a_restarted_source_begins_anew_and_that_is_no_gap(path: Path) -> None:
-    town = Town(path)
+    recorded = Recorded(path)
     for incarnation in (1, 2):
         for seq in (0, 1):
-            town.say(odometry(seq), seq, incarnation)
-    assert town.end().gaps == []
+            recorded.publish(odometry(seq), seq, incarnation)
+    assert recorded.end().gaps == []
 
 
 def test_what_a_source_published_before_its_restart_and_is_missing_is_a_gap(path: Path) -> None:
-    town = Town(path)
+    recorded = Recorded(path)
     for seq, incarnation, earlier in ((0, 1, 10), (1, 1, 10), (0, 2, 15)):
         message = odometry(seq)
         envelope = Envelope("sim", seq, incarnation, seq, seq, earlier=earlier)
-        town.say_bytes(topics.ODOMETRY, encode(message), envelope)
-    summary = town.end()
+        recorded.publish_bytes(topics.ODOMETRY, encode(message), envelope)
+    summary = recorded.end()
     assert summary.gaps == ["odometry (never drop): 3 of sim missing, number 2 to 4"]
     assert summary.lost == {"odometry": 3}
 
 
 def test_a_restart_after_which_nothing_is_missing_is_no_gap(path: Path) -> None:
-    town = Town(path)
+    recorded = Recorded(path)
     for seq, incarnation, earlier in ((0, 1, 10), (1, 1, 10), (0, 2, 12)):
         envelope = Envelope("sim", seq, incarnation, seq, seq, earlier=earlier)
-        town.say_bytes(topics.ODOMETRY, encode(odometry(seq)), envelope)
-    assert town.end().gaps == []
+        recorded.publish_bytes(topics.ODOMETRY, encode(odometry(seq)), envelope)
+    assert recorded.end().gaps == []
 
 
 def test_what_is_no_message_is_counted_and_not_written(path: Path) -> None:
-    town = Town(path)
-    town.say(odometry(0), 1)
-    town.say_bytes(topics.ODOMETRY, b"\xc1", Envelope("sim", 1, 1, 2, 2))
-    town.say_bytes(topics.ODOMETRY, encode(odometry(1)), Envelope("mallory", 1, 1, 3, 3))
-    summary = town.end()
+    recorded = Recorded(path)
+    recorded.publish(odometry(0), 1)
+    recorded.publish_bytes(topics.ODOMETRY, b"\xc1", Envelope("sim", 1, 1, 2, 2))
+    recorded.publish_bytes(topics.ODOMETRY, encode(odometry(1)), Envelope("mallory", 1, 1, 3, 3))
+    summary = recorded.end()
     assert summary.rejected == {"odometry": 2}
     assert len(list(LogReader(path).records())) == 1
 
 
 def test_numbers_that_mcap_has_no_room_for_are_kept_in_the_envelope(path: Path) -> None:
-    town = Town(path)
+    recorded = Recorded(path)
     far = scan(0)
     far.seq = 2**40 + 3
-    town.say_bytes(topics.SCAN, encode(far), Envelope("sensory", far.seq, 1, -5, -5))
-    town.end()
+    recorded.publish_bytes(topics.SCAN, encode(far), Envelope("sensory", far.seq, 1, -5, -5))
+    recorded.end()
     (record,) = LogReader(path).records()
     assert (record.sequence, record.publish_ns, record.log_time_ns) == (3, 0, 0)
     assert record.envelope is not None
     assert (record.envelope.seq, record.envelope.sent_ns) == (2**40 + 3, -5)
 
 
-def test_what_finds_no_room_is_counted_by_topic_and_never_drop_topics_have_more_of_it(
+def test_what_finds_no_room_is_counted_and_never_drop_topics_have_more(
     path: Path,
 ) -> None:
-    town = Town(path, limit_bytes=40_000)
+    recorded = Recorded(path, limit_bytes=40_000)
     for seq in range(50):
-        town.say(scan(seq), seq)
+        recorded.publish(scan(seq), seq)
     for seq in range(5):
-        town.say(odometry(seq), seq)
-    summary = town.end()
+        recorded.publish(odometry(seq), seq)
+    summary = recorded.end()
     assert summary.messages["odometry"] == 5
     assert 0 < summary.messages["sensory/scan"] < 50
     assert summary.dropped == {"sensory/scan": 50 - summary.messages["sensory/scan"]}
     assert summary.never_drop_whole
 
 
-def test_latest_wins_messages_are_all_recorded_however_late_the_recorder_gets_to_them(
+def test_latest_wins_messages_are_all_recorded_by_a_late_recorder(
     path: Path,
 ) -> None:
-    town = Town(path)
+    recorded = Recorded(path)
     for seq in range(20):
-        town.say(scan(seq), seq)
-    assert town.end().messages == {"sensory/scan": 20}
+        recorded.publish(scan(seq), seq)
+    assert recorded.end().messages == {"sensory/scan": 20}
 
 
 def test_others_can_wait_for_the_recorder_and_it_notes_who_is_there(path: Path) -> None:
-    town = Town(path)
-    assert Member("recorder", "recorder") in town.network.members
-    town.bus.announce(Member("codelets", "codelets-1"))
-    town.end()
+    recorded = Recorded(path)
+    assert Member("recorder", "recorder") in recorded.network.members
+    recorded.bus.announce(Member("codelets", "codelets-1"))
+    recorded.end()
     members = [facts["instance"] for name, facts in LogReader(path).metadata if name == "member"]
     assert members[:2] == ["recorder", "codelets-1"]
 
@@ -230,5 +194,5 @@ def test_others_can_wait_for_the_recorder_and_it_notes_who_is_there(path: Path) 
 def test_an_existing_file_is_never_overwritten(path: Path) -> None:
     path.write_text("precious")
     with pytest.raises(LogError, match="exists already"):
-        Town(path)
+        Recorded(path)
     assert path.read_text() == "precious"

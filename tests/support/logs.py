@@ -1,0 +1,58 @@
+"""Logs written for a test, message by message."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from cogmap.bus.codec import Envelope, encode
+from cogmap.recording.storage.format import topics_to_record
+from cogmap.recording.storage.writer import LogWriter
+from schemas import topics
+from schemas.array import Array
+from schemas.base import Message
+from schemas.sensing import Odometry, RangeScan
+
+SECOND_NS = 10**9
+ABOUT = {"agent": "a", "config": "{}", "began_ns": "1"}
+Row = tuple[int, Message]
+
+
+def write_log(path: Path, rows: Iterable[Row], *, incarnation: int = 1, **about: str) -> Path:
+    """A finished log of messages, each with the time in ns at which it was published and received."""
+    writer = LogWriter(path, topics_to_record(), {**ABOUT, **about})
+    for at_ns, message in rows:
+        envelope = Envelope(message.source, message.seq, incarnation, at_ns, at_ns)
+        writer.write(topics.of(message), encode(message), envelope, at_ns)
+    writer.close()
+    return path
+
+
+def odometry(
+    seq: int, *, stamp_ns: int = 0, source: str = "sim", speed_m_s: float = 1.0, dt_s: float = 0.05
+) -> Odometry:
+    """Wheels that roll straight ahead."""
+    return Odometry(
+        seq=seq,
+        stamp_ns=stamp_ns,
+        source=source,
+        speed_m_s=speed_m_s,
+        turn_rate_rad_s=0.0,
+        dt_s=dt_s,
+    )
+
+
+def scan(seq: int, *, stamp_ns: int = 0, values: Array | None = None) -> RangeScan:
+    """A scan whose ranges are its number, or `values`."""
+    if values is None:
+        values = Array.of(np.full(8, seq, np.float32))
+    return RangeScan(
+        seq=seq,
+        stamp_ns=stamp_ns,
+        source="sensory",
+        frame=seq,
+        bearing_rad=values,
+        range_m=values,
+    )
