@@ -5,7 +5,7 @@ RUN apt-get update \
     && rm -rf /var/lib/apt/lists/*
 
 RUN useradd --system --uid 10001 --home-dir /var/lib/cogmap cogmap \
-    && install -d -o cogmap -g cogmap /var/lib/cogmap /var/lib/cogmap/town /var/lib/cogmap/logs /var/lib/cogmap/state
+    && install -d -o cogmap -g cogmap /var/lib/cogmap /var/lib/cogmap/runs
 
 COPY requirements/run.txt requirements/build.txt /opt/cogmap/requirements/
 RUN python3 -m venv /opt/cogmap/venv \

@@ -156,7 +156,8 @@ class Drive:
             watch.close()
         supervisor.end([RECORDER], GRACE_S)
         supervisor.end([ROUTER], GRACE_S)
-        shutil.rmtree(self.folder / STATE_NAME, ignore_errors=True)
+        if not self.choices.without:  # modules of others may still write there
+            shutil.rmtree(self.folder / STATE_NAME, ignore_errors=True)
 
     def _note(self, milestone: str) -> None:
         self.start_s.setdefault(milestone, round(time.monotonic() - self.began_s, 3))

@@ -92,6 +92,9 @@ class Observer:
         self.progress = true.progress
 
     def _on_odometry(self, odometry: Odometry) -> None:
+        if self._wheels.reached(odometry.stamp_ns):
+            return
+
         self._wheels.start(odometry.stamp_ns - round(odometry.dt_s * 1e9))
         self._wheels.move(odometry.speed_m_s, odometry.turn_rate_rad_s, odometry.dt_s)
         self._wheels.mark(odometry.stamp_ns)
@@ -100,6 +103,9 @@ class Observer:
         motions = motion.motions.numpy()
         if motions.ndim != 2 or motions.shape[1] != MOTION_COLUMNS:
             raise MessageError(f"self-motion of shape {motions.shape}: it needs (n, 5)")
+
+        if self._fused.reached(motion.stamp_ns):
+            return
 
         self._fused.start(motion.since_ns)
         for speed_m_s, turn_rate_rad_s, dt_s, *_ in motions.tolist():

@@ -29,6 +29,11 @@ class Track:
         self._stamps_ns.append(stamp_ns)
         self._points_m.append((x_m, y_m))
 
+    @property
+    def last_ns(self) -> int | None:
+        """The stamp of the last position; None where there is none."""
+        return self._stamps_ns[-1] if self._stamps_ns else None
+
     def __len__(self) -> int:
         return len(self._stamps_ns)
 
@@ -71,6 +76,12 @@ class PathIntegrator:
         """Begin the path at the origin, unless it has begun."""
         if not len(self.track):
             self.track.add(stamp_ns, self._x_m, self._y_m)
+
+    def reached(self, stamp_ns: int) -> bool:
+        """Whether the path is there already: in lockstep a message is repeated to a module that was
+        restarted.
+        """
+        return self.track.last_ns is not None and stamp_ns <= self.track.last_ns
 
     def move(self, speed_m_s: float, turn_rate_rad_s: float, dt_s: float) -> None:
         """Integrate one step by its midpoint: it heads where the robot did half-way through it."""

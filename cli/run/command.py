@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import click
@@ -16,11 +18,12 @@ from cli.options import agent_option, config_option, connect_option, set_option
 from cli.run import summary
 from cli.run.display import Display, display_on
 from cogmap.bus.session import check_free
-from cogmap.errors import ConfigError
+from cogmap.errors import ConfigError, StorageError
 from cogmap.runtime import config
 from cogmap.runtime.process import Stop
 from services import registry
 
+RUNS = Path("runs")
 LAP_LIMIT_S = 85.0
 FINISH_S = 4.0
 
@@ -95,8 +98,8 @@ def run(
     """Drive the robot around a loop of streets in a simulated town.
 
     Starts a router and every module as a process of its own, shows how the drive proceeds, and
-    leaves a folder with the log, a map and a summary. Ends with 0 where the route was completed,
-    130 after Ctrl-C, else with 1; the summary gives the reason.
+    leaves a folder with the log, a map and a summary, which runs/latest links to. Ends with 0
+    where the route was completed, 130 after Ctrl-C, else with 1; the summary gives the reason.
     """
     began_s = time.monotonic()
     stop = Stop()
@@ -121,12 +124,13 @@ def run(
     limit_s = time_limit or default_limit_s(sections["sim"]["laps"])
     screen = display_on(console)
     _introduce(screen, drive)
-    try:
-        watch, ending = drive.run(began_s + limit_s - FINISH_S, stop, screen)
-    finally:
-        screen.close()
+    with _writing(drive.folder):
+        try:
+            watch, ending = drive.run(began_s + limit_s - FINISH_S, stop, screen)
+        finally:
+            screen.close()
+        metrics = summary.finish(drive, watch, ending)
 
-    metrics = summary.finish(drive, watch, ending)
     if as_json:
         click.echo(msgspec.json.encode(metrics))
     else:
@@ -150,13 +154,14 @@ def _introduce(screen: Display, drive: Drive) -> None:
 
 
 def _new_folder(out: Path | None) -> Path:
-    """`out`, or a folder named after the time. Raises ConfigError where it exists or cannot be
-    made.
+    """`out`, or a folder of RUNS named after the time, which RUNS/latest then links to. Raises
+    ConfigError where it exists or cannot be made.
     """
-    name = time.strftime("%Y-%m-%d-%H%M%S")
-    folder = out if out is not None else Path("runs") / name
+    folder = out or RUNS / time.strftime("%Y-%m-%d-%H%M%S")
     try:
         folder.mkdir(parents=True)
+        if out is None:
+            _link_latest(folder)
     except FileExistsError:
         raise ConfigError(f"{folder} exists already: name another with --out") from None
     except OSError as error:
@@ -164,3 +169,23 @@ def _new_folder(out: Path | None) -> Path:
             f"cannot make the folder {folder} ({error.strerror}): name another with --out"
         ) from None
     return folder
+
+
+def _link_latest(folder: Path) -> None:
+    """Let the link `latest` beside `folder` lead to it, at no moment nowhere."""
+    new = folder.with_name(f".latest-{folder.name}")
+    new.symlink_to(folder.name)
+    new.replace(folder.with_name("latest"))
+
+
+@contextmanager
+def _writing(folder: Path) -> Iterator[None]:
+    """Raise StorageError where a file of `folder` cannot be written."""
+    try:
+        yield
+    except OSError as error:
+        path = error.filename or folder
+        raise StorageError(
+            f"cannot write {path} ({error.strerror}): make room on its disk, "
+            "or name another folder with --out"
+        ) from error

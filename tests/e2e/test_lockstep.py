@@ -1,50 +1,39 @@
-"""Two drives of one seed in lockstep, through real processes, Zenoh and two workers: the same bytes
-on every topic.
-"""
+"""Lockstep through real processes, Zenoh and two workers: the same bytes, and no end for a kill."""
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
-from pathlib import Path
+from collections.abc import Callable
 
-from cogmap.bus.session import free_endpoint
+import pytest
+
 from cogmap.recording.diff import diff
+from tests.support.runs import DRIVING, Run
 
-TIMEOUT_S = 90.0
-
-
-def _drive(folder: Path, workers: int) -> Path:
-    command = [
-        sys.executable,
-        "-m",
-        "cli.main",
-        "run",
-        "--lockstep",
-        "--laps",
-        "0.04",
-        "--seed",
-        "6",
-    ]
-    whole = [
-        *command,
-        "--codelets",
-        str(workers),
-        "--out",
-        str(folder),
-        "--connect",
-        free_endpoint(),
-    ]
-    done = subprocess.run(whole, capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert json.loads((folder / "summary.json").read_text())["gaps_total"] == 0
-    return folder / "log.mcap"
+SHORT = ("--lockstep", "--laps", "0.04", "--seed", "6", "--codelets", "2")
 
 
-def test_two_lockstep_drives_of_one_seed_say_the_same_bytes_on_every_topic(tmp_path: Path) -> None:
-    logs = [_drive(tmp_path / name, workers=2) for name in ("first", "second")]
+def test_two_lockstep_drives_of_one_seed_publish_the_same_bytes_on_every_topic(
+    start: Callable[..., Run],
+) -> None:
+    logs = []
+    for _ in range(2):
+        run = start(*SHORT)
+        assert run.end() == 0, run.output()
+        assert run.summary()["gaps_total"] == 0
+        logs.append(run.folder / "log.mcap")
+
     compared = diff(*logs)
     assert compared.same, compared.first
     counts = {topic.topic: topic.same for topic in compared.topics}
     assert counts["motor/command"] == counts["epam/percepts"] > 10
+
+
+@pytest.mark.parametrize("instance", ["epam", "sensory", "codelets-1"])
+def test_a_lockstep_drive_survives_the_kill_of_a_module(
+    start: Callable[..., Run], instance: str
+) -> None:
+    run = start("--lockstep", "--laps", "0.2", "--set", "sim.repeat_after_s=3")
+    run.wait_for(DRIVING)
+    run.kill(instance)
+    assert run.end() == 0, run.output()
+    assert run.summary()["restarts"] == {instance: 1}

@@ -1,16 +1,12 @@
-"""`cogmap run` as users run it: real processes, a real router, a short way."""
+"""`cogmap run` as users run it: real processes, a real router, a short route."""
 
 from __future__ import annotations
 
 import json
-import os
-import select
 import signal
 import socket
 import subprocess
-import sys
 import threading
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -22,95 +18,17 @@ from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.sensing import MotorCommand
+from tests.support.runs import COGMAP, DRIVING, Run, processes_at, shared_memory, wait_until
 
-COGMAP = [sys.executable, "-m", "cli.main"]
-POOLS = ("sem.mp-", "sem.loky-", "joblib_")
-TIMEOUT_S = 60.0
-
-
-def processes_at(endpoint: str, words: str = "") -> list[int]:
-    """Every process with `endpoint`, and `words`, in its command line."""
-    found = []
-    for entry in Path("/proc").iterdir():
-        try:
-            command = (entry / "cmdline").read_bytes().decode(errors="replace")
-            state = (entry / "stat").read_text().rpartition(")")[2].split()[0]
-        except (OSError, IndexError):
-            continue
-        if entry.name.isdigit() and endpoint in command and words in command and state != "Z":
-            found.append(int(entry.name))
-    return found
+LOG_LIMIT_BYTES = 4_000_000
 
 
-def shared_memory() -> set[Path]:
-    """Files in shared memory, but for those of pools of processes, which no module uses."""
-    return {path for path in Path("/dev/shm").iterdir() if not path.name.startswith(POOLS)}
-
-
-def wait_until(condition: Callable[[], bool]) -> None:
-    deadline_s = time.monotonic() + TIMEOUT_S
-    while not condition():
-        assert time.monotonic() < deadline_s, "it never happened"
-        select.select([], [], [], 0.02)
-
-
-class Run:
-    """A `cogmap run` in a new folder, without a terminal."""
-
-    def __init__(self, folder: Path, *arguments: str) -> None:
-        self.folder, self.endpoint = folder, free_endpoint()
-        command = [*COGMAP, "run", "--out", str(folder), "--connect", self.endpoint, *arguments]
-        self._output = folder.with_suffix(".txt").open("w+")
-        self.process = subprocess.Popen(command, stdout=self._output, stderr=subprocess.STDOUT)
-
-    def output(self) -> str:
-        return Path(self._output.name).read_text()
-
-    def end(self) -> int:
-        return self.process.wait(TIMEOUT_S)
-
-    def wait_for(self, sentence: str) -> None:
-        def said() -> bool:
-            assert self.process.poll() is None, self.output()
-            return sentence in self.output()
-
-        wait_until(said)
-
-    def pid_of(self, instance: str) -> int | None:
-        """The process of a module's instance, or of the router or the recorder; None where it does
-        not run.
-        """
-        words = {"router": "\0router\0", "recorder": "\0log\0record\0"}.get(
-            instance, f"\0--instance\0{instance}\0"
-        )
-        return next(iter(processes_at(self.endpoint, words)), None)
-
-    def close(self) -> None:
-        if self.process.poll() is None:
-            self.process.terminate()
-            self.end()
-        self._output.close()
-
-
-@pytest.fixture
-def start(tmp_path: Path) -> Iterator[Callable[..., Run]]:
-    runs: list[Run] = []
-
-    def start(*arguments: str) -> Run:
-        runs.append(Run(tmp_path / f"run-{len(runs)}", *arguments))
-        return runs[-1]
-
-    yield start
-    for run in runs:
-        run.close()
-
-
-def test_a_short_drive_ends_by_itself_and_leaves_a_log_a_map_and_a_summary(
+def test_a_short_drive_ends_and_leaves_a_log_a_map_and_a_summary(
     start: Callable[..., Run],
 ) -> None:
     run = start("--lockstep", "--laps", "0.05", "--codelets", "2")
     assert run.end() == 0, run.output()
-    summary = json.loads((run.folder / "summary.json").read_text())
+    summary = run.summary()
     assert summary["completed"] and summary["ended_by"] == "route complete"
     assert summary["gaps_total"] == 0 and summary["restarts"] == {} and summary["killed"] == []
     assert summary["distance_m"] > 5.0 and summary["estimates"] == summary["commands"] > 5
@@ -148,10 +66,10 @@ def test_the_summary_comes_as_json_too(start: Callable[..., Run]) -> None:
 
 def test_ctrl_c_ends_a_drive_cleanly(start: Callable[..., Run]) -> None:
     run = start()
-    run.wait_for("path integration alone")
+    run.wait_for(DRIVING)
     run.process.send_signal(signal.SIGINT)
     assert run.end() == 130, run.output()
-    assert json.loads((run.folder / "summary.json").read_text())["ended_by"] == "interrupted"
+    assert run.summary()["ended_by"] == "interrupted"
     assert (run.folder / "log.mcap").read_bytes().endswith(b"\x89MCAP0\r\n")
     assert "Traceback" not in run.output() + "".join(
         log.read_text() for log in run.folder.glob("*.log")
@@ -161,7 +79,7 @@ def test_ctrl_c_ends_a_drive_cleanly(start: Callable[..., Run]) -> None:
 
 def test_nothing_is_left_of_a_launcher_that_is_killed(start: Callable[..., Run]) -> None:
     run = start()
-    run.wait_for("path integration alone")
+    run.wait_for(DRIVING)
     assert len(processes_at(run.endpoint)) > 7
     run.process.kill()
     run.end()
@@ -207,25 +125,20 @@ def commands() -> Iterator[Callable[[str], list[MotorCommand]]]:
         shell.close()
 
 
-def test_whatever_is_killed_is_started_again_and_the_robot_is_moved_on(
+def test_whatever_is_killed_is_restarted_and_the_robot_drives_again(
     start: Callable[..., Run], commands: Callable[[str], list[MotorCommand]]
 ) -> None:
     before = shared_memory()
     run = start("--laps", "3", "--time-limit", "100")
-    run.wait_for("path integration alone")
+    run.wait_for(DRIVING)
     heard = commands(run.endpoint)
     for together in KILLED_TOGETHER:
-        pids = {instance: run.pid_of(instance) for instance in together}
-        for pid in pids.values():
-            os.kill(pid, signal.SIGKILL)
-        wait_until(
-            lambda pids=pids: all(run.pid_of(name) not in (pid, None) for name, pid in pids.items())
-        )
+        run.kill(*together)
         enough = len(heard) + 5
         wait_until(lambda enough=enough: len(heard) >= enough)
     run.process.send_signal(signal.SIGINT)
     assert run.end() == 130, run.output()
-    summary = json.loads((run.folder / "summary.json").read_text())
+    summary = run.summary()
     assert summary["restarts"] == {
         instance: 1 for together in KILLED_TOGETHER for instance in together
     }
@@ -233,6 +146,43 @@ def test_whatever_is_killed_is_started_again_and_the_robot_is_moved_on(
     assert processes_at(run.endpoint) == []
     assert shared_memory() <= before
     check_free(run.endpoint)
+
+
+def test_a_router_and_a_module_of_ones_own_take_part(
+    start: Callable[..., Run], router: str, tmp_path: Path
+) -> None:
+    theirs = ["--lockstep", "--laps", "0.02", "--router", router, "--without", "global_workspace"]
+    run = start(*theirs)
+    run.wait_for("waiting for global_workspace")
+    assert run.pid_of("router") is None
+    config = str(run.folder / "config.toml")
+    ours = [*COGMAP, "module", "global_workspace", "--connect", router, "--config", config]
+    with subprocess.Popen(ours) as module:
+        try:
+            assert run.end() == 0, run.output()
+            assert module.poll() is None
+        finally:
+            module.terminate()
+    assert len(processes_at(router)) == 1
+
+
+@pytest.fixture
+def router() -> Iterator[str]:
+    """The endpoint of a router that somebody else started."""
+    endpoint = free_endpoint()
+    with subprocess.Popen([*COGMAP, "router", "--connect", endpoint]) as process:
+        yield endpoint
+        process.terminate()
+
+
+def test_a_full_disk_ends_a_drive_at_once_with_the_reason(start: Callable[..., Run]) -> None:
+    run = start("--laps", "3", file_limit_bytes=LOG_LIMIT_BYTES)
+    assert run.end() == 1, run.output()
+    summary = run.summary()
+    assert summary["ended_by"] == "module failed"
+    assert summary["reason"].startswith("recorder has ended: cannot write ")
+    assert "Traceback" not in run.output()
+    assert processes_at(run.endpoint) == []
 
 
 def test_a_port_in_use_is_one_sentence_and_code_2(

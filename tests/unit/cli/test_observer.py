@@ -139,6 +139,18 @@ def test_path_integration_of_a_circle_by_midpoints_closes_it() -> None:
         assert path_m[:, 1].max() == pytest.approx(2 * radius_m, rel=1e-3)
 
 
+def test_a_repeated_motion_moves_nothing() -> None:
+    observer = Observer()
+    straight_drive(observer, 4, wheel_speed_m_s=1.0)
+    before_m = [observer.wheels_path_m, observer.fused_path_m]
+    observer.update(odometry(4, 1.0))
+    observer.update(self_motion(4, 1.0))
+    for path_m, after_m in zip(
+        before_m, [observer.wheels_path_m, observer.fused_path_m], strict=True
+    ):
+        assert after_m == pytest.approx(path_m)
+
+
 def test_self_motion_without_its_five_columns_is_refused() -> None:
     motion = SelfMotion(frame=1, since_ns=0, motions=Array.of([[1.0, 0.0, 0.05]], "<f8"))
     with pytest.raises(MessageError, match=r"it needs \(n, 5\)"):
