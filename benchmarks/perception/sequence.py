@@ -101,7 +101,9 @@ def drive(
         for part in course(place):
             for pose in part.poses:
                 world.robot.place(pose)
-                left, right = straight.apply(*(eye.image for eye in camera.survey(part.light, rng)))
+                left, right = straight.apply(
+                    *(eye.image for eye in camera.capture_labelled(part.light, rng))
+                )
                 matches, _ = memory.observe(
                     frame, frame * FRAME_NS, left, stereo.depth_m(left, right)
                 )

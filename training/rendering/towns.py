@@ -105,7 +105,7 @@ def labelled(
 ) -> dict[str, npt.ArrayLike]:
     """Return one view from `pose` in some light, with its labels."""
     world.robot.place(pose)
-    left, right = camera.survey(some_light(rng), rng)
+    left, right = camera.capture_labelled(some_light(rng), rng)
     return {
         "left": left.image,
         "right": right.image,

@@ -1,5 +1,5 @@
-"""The kinds of building a town is made of: each has its own size, colours and façade, the same in
-every town.
+"""The kinds of building in a town: each has its own size, colours and façade, the same in every
+town. Pure.
 """
 
 from __future__ import annotations
@@ -50,9 +50,21 @@ def _type(
     """`size_m`: width, depth, height; `colours`: of wall, accent and door; `finish`: colours of
     trim and roof.
     """
-    wall, accent, door = (_rgb(colour) for colour in colours.split())
+    width_m, depth_m, height_m = size_m
+    wall, accent, door = colours.split()
+    trim, roof = finish
     return BuildingType(
-        name, *size_m, wall, accent, _rgb(finish[0]), door, _rgb(finish[1]), pattern, shape
+        name=name,
+        width_m=width_m,
+        depth_m=depth_m,
+        height_m=height_m,
+        wall=_rgb(wall),
+        accent=_rgb(accent),
+        trim=_rgb(trim),
+        door=_rgb(door),
+        roof=_rgb(roof),
+        pattern=pattern,
+        roof_shape=shape,
     )
 
 
@@ -169,37 +181,61 @@ _PATTERNS = (
     "shutters",
 )
 _FINISHES = (_WHITE, _CREAM, _STONE, _DARK)
+MIN_CONTRAST = 80
 _ROOFS = (_TILE, _SLATE, _COPPER, _THATCH, _DARK)
 
 
 def invented(seed: int, count: int) -> tuple[BuildingType, ...]:
-    """`count` kinds that no catalogue has, named after `seed`: buildings that nobody was taught."""
+    """`count` kinds that are in no catalogue, named after `seed`: buildings that no network was
+    trained on.
+    """
     rng = np.random.default_rng([seed, 0x1D])
-    return tuple(_invent(f"invented-{seed}-{number}", rng) for number in range(count))
+    names = [f"invented-{seed}-{number}" for number in range(count)]
+    return tuple(_invent(name, rng) for name in names)
 
 
 def _invent(name: str, rng: np.random.Generator) -> BuildingType:
     pattern = str(rng.choice(_PATTERNS))
     height_m = float(rng.uniform(5, 14))
-    size_m = (
-        float(rng.uniform(9 if pattern == "gates" else 6, 14)),
-        float(rng.uniform(6, 12)),
-        height_m,
-    )
+    least_width_m = 9 if pattern == "gates" else 6
+    width_m = float(rng.uniform(least_width_m, 14))
+    depth_m = float(rng.uniform(6, 12))
+
     wall = _paint(rng)
     accent = _paint(rng)
-    while max(abs(a - b) for a, b in zip(wall, accent, strict=True)) < 80:
+    while _difference(wall, accent) < MIN_CONTRAST:
         accent = _paint(rng)
+
     trim = _rgb(str(rng.choice(_FINISHES)))
     roof = _rgb(str(rng.choice(_ROOFS)))
-    shape = "gable" if rng.random() < 0.35 else "flat"
-    return BuildingType(name, *size_m, wall, accent, trim, _paint(rng), roof, pattern, shape)
+    is_gabled = rng.random() < 0.35
+    return BuildingType(
+        name=name,
+        width_m=width_m,
+        depth_m=depth_m,
+        height_m=height_m,
+        wall=wall,
+        accent=accent,
+        trim=trim,
+        door=_paint(rng),
+        roof=roof,
+        pattern=pattern,
+        roof_shape="gable" if is_gabled else "flat",
+    )
+
+
+def _difference(a: Colour, b: Colour) -> int:
+    """The greatest difference of red, green or blue."""
+    return max(abs(x - y) for x, y in zip(a, b, strict=True))
 
 
 def _paint(rng: np.random.Generator) -> Colour:
     """A colour that a house may have: of any hue, from white over strong to dark."""
-    saturation = float(rng.choice([rng.uniform(0.0, 0.2), rng.uniform(0.3, 0.95)], p=[0.25, 0.75]))
-    red, green, blue = colorsys.hsv_to_rgb(
-        float(rng.random()), saturation, float(rng.uniform(0.35, 0.98))
-    )
+    pale = rng.uniform(0.0, 0.2)
+    strong = rng.uniform(0.3, 0.95)
+    saturation = float(rng.choice([pale, strong], p=[0.25, 0.75]))
+    hue = float(rng.random())
+    value = float(rng.uniform(0.35, 0.98))
+
+    red, green, blue = colorsys.hsv_to_rgb(hue, saturation, value)
     return round(255 * red), round(255 * green), round(255 * blue)

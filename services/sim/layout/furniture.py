@@ -17,9 +17,13 @@ from services.sim.layout.plan import (
     overlap,
 )
 
+Size = tuple[float, float, float]
+
 _SPACING_M = 5.0
 _SCATTERED = 30
 _AROUND_M = 55.0
+_KERB_M = 0.15
+_GAP_M = 0.1
 
 
 @dataclass(frozen=True)
@@ -32,22 +36,29 @@ class Prop:
     x_m: float
     y_m: float
     heading_rad: float
-    size_m: tuple[float, float, float]
+    size_m: Size
     look: int
 
     @property
     def area(self) -> Rectangle:
-        """West, south, east, north of what holds it."""
-        long = self.size_m[0] / 2
-        wide = self.size_m[1] / 2
-        along = abs(math.cos(self.heading_rad))
-        across = abs(math.sin(self.heading_rad))
-        reach_x = along * long + across * wide
-        reach_y = across * long + along * wide
-        return self.x_m - reach_x, self.y_m - reach_y, self.x_m + reach_x, self.y_m + reach_y
+        """West, south, east, north of its bounding box."""
+        length_m, width_m, _ = self.size_m
+        half_length_m = length_m / 2
+        half_width_m = width_m / 2
+        cos = abs(math.cos(self.heading_rad))
+        sin = abs(math.sin(self.heading_rad))
+
+        reach_x_m = cos * half_length_m + sin * half_width_m
+        reach_y_m = sin * half_length_m + cos * half_width_m
+        return (
+            self.x_m - reach_x_m,
+            self.y_m - reach_y_m,
+            self.x_m + reach_x_m,
+            self.y_m + reach_y_m,
+        )
 
 
-_SIZES: dict[str, tuple[tuple[float, float, float], tuple[float, float, float]]] = {
+_SIZES: dict[str, tuple[Size, Size]] = {
     "tree": ((1.4, 1.4, 3.0), (2.6, 2.6, 6.0)),
     "lamp": ((0.6, 0.6, 4.5), (0.7, 0.7, 5.5)),
     "car": ((3.8, 1.7, 1.4), (4.6, 1.9, 1.7)),
@@ -55,52 +66,67 @@ _SIZES: dict[str, tuple[tuple[float, float, float], tuple[float, float, float]]]
     "kiosk": ((1.6, 1.6, 2.2), (2.4, 2.0, 2.7)),
     "bin": ((0.6, 0.6, 1.0), (0.8, 0.8, 1.3)),
 }
-_OFTEN = (0.38, 0.14, 0.18, 0.14, 0.08, 0.08)
+_PROBABILITIES = (0.38, 0.14, 0.18, 0.14, 0.08, 0.08)
 
 
 def furnish(seed: int, roads: Sequence[Road], plots: Sequence[Plot]) -> tuple[Prop, ...]:
-    """Props along `roads` and some farther off, clear of every street and every building."""
+    """Props along `roads` and some farther away, clear of every street and every building."""
     rng = np.random.default_rng([seed, 0xF0])
-    streets = [road.area(STREET_WIDTH_M / 2) for road in roads]
+    occupied = [road.area(STREET_WIDTH_M / 2) for road in roads]
+    occupied += [plot.footprint for plot in plots]
+
     props: list[Prop] = []
-
-    def put(prop: Prop) -> None:
-        taken = [*streets, *(other.area for other in props), *(plot.footprint for plot in plots)]
-        if not any(overlap(prop.area, area, 0.1) for area in taken):
+    for prop in [*_along(rng, roads), *_scattered(rng)]:
+        area = prop.area
+        if not any(overlap(area, other, _GAP_M) for other in occupied):
             props.append(prop)
+            occupied.append(area)
+    return tuple(props)
 
+
+def _along(rng: np.random.Generator, roads: Sequence[Road]) -> list[Prop]:
+    """Candidates on both pavements of each road."""
+    props = []
     for road in roads:
         for side in (-1.0, 1.0):
             along_m = float(rng.uniform(0, _SPACING_M))
             while along_m < road.length_m:
-                put(_beside(rng, road, along_m, side))
+                props.append(_beside(rng, road, along_m, side))
                 along_m += float(rng.uniform(0.6, 2.0)) * _SPACING_M
+    return props
+
+
+def _scattered(rng: np.random.Generator) -> list[Prop]:
+    """Candidates anywhere around the town."""
+    props = []
     for _ in range(_SCATTERED):
         x_m, y_m = rng.uniform(-_AROUND_M, _AROUND_M, 2).tolist()
-        put(_prop(rng, x_m, y_m, float(rng.uniform(-math.pi, math.pi))))
-    return tuple(props)
+        heading_rad = float(rng.uniform(-math.pi, math.pi))
+        props.append(_prop(rng, x_m, y_m, heading_rad))
+    return props
 
 
 def _prop(rng: np.random.Generator, x_m: float, y_m: float, heading_rad: float) -> Prop:
-    kind = str(rng.choice(list(_SIZES), p=_OFTEN))
-    least, most = _SIZES[kind]
-    length, width, height = (
-        round(float(rng.uniform(a, b)), 2) for a, b in zip(least, most, strict=True)
-    )
+    kind = str(rng.choice(list(_SIZES), p=_PROBABILITIES))
+    least_m, most_m = _SIZES[kind]
+    length_m, width_m, height_m = rng.uniform(least_m, most_m).round(2).tolist()
     return Prop(
-        kind,
-        round(x_m, 3),
-        round(y_m, 3),
-        heading_rad,
-        (length, width, height),
-        int(rng.integers(2**31)),
+        kind=kind,
+        x_m=round(x_m, 3),
+        y_m=round(y_m, 3),
+        heading_rad=heading_rad,
+        size_m=(length_m, width_m, height_m),
+        look=int(rng.integers(2**31)),
     )
 
 
 def _beside(rng: np.random.Generator, road: Road, along_m: float, side: float) -> Prop:
-    """A prop on the pavement, or as near to it as its size lets it."""
+    """A prop on the pavement, or as near to it as its size allows."""
     prop = _prop(rng, 0.0, 0.0, road.heading_rad)
-    clear_m = STREET_WIDTH_M / 2 + 0.15 + prop.size_m[1] / 2
-    left_m = side * float(rng.uniform(clear_m, max(clear_m, STREET_WIDTH_M / 2 + PAVEMENT_WIDTH_M)))
-    x, y = road.point(along_m, left_m)
-    return replace(prop, x_m=round(x, 3), y_m=round(y, 3))
+    _, width_m, _ = prop.size_m
+    least_m = STREET_WIDTH_M / 2 + _KERB_M + width_m / 2
+    most_m = max(least_m, STREET_WIDTH_M / 2 + PAVEMENT_WIDTH_M)
+
+    left_m = side * float(rng.uniform(least_m, most_m))
+    x_m, y_m = road.point(along_m, left_m)
+    return replace(prop, x_m=round(x_m, 3), y_m=round(y_m, 3))

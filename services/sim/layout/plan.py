@@ -1,6 +1,4 @@
-"""What a ground plan is made of: roads, in a town along x or y, and buildings that front them.
-Pure.
-"""
+"""The parts of a ground plan: roads, in a town along x or y, and buildings that front them."""
 
 from __future__ import annotations
 
@@ -27,38 +25,50 @@ class Road:
 
     @property
     def length_m(self) -> float:
-        """From end to end."""
+        """Distance from end to end."""
         return math.dist(self.start, self.end)
 
     @property
+    def extent_m(self) -> Point:
+        """x and y from start to end."""
+        start_x, start_y = self.start
+        end_x, end_y = self.end
+        return end_x - start_x, end_y - start_y
+
+    @property
     def heading_rad(self) -> float:
-        """From start to end, counter-clockwise from x."""
-        return math.atan2(self.end[1] - self.start[1], self.end[0] - self.start[0])
+        """Direction from start to end, counter-clockwise from x."""
+        dx_m, dy_m = self.extent_m
+        return math.atan2(dy_m, dx_m)
 
     @property
     def is_along_an_axis(self) -> bool:
         """Whether it runs along x or y."""
-        return min(abs(self.end[0] - self.start[0]), abs(self.end[1] - self.start[1])) < LEVEL_M
+        dx_m, dy_m = self.extent_m
+        return min(abs(dx_m), abs(dy_m)) < LEVEL_M
 
     def point(self, along_m: float, left_m: float = 0.0) -> Point:
         """The point `along_m` from the start, `left_m` to the left of the centre line."""
-        ux = math.cos(self.heading_rad)
-        uy = math.sin(self.heading_rad)
-        return self.start[0] + along_m * ux - left_m * uy, self.start[
-            1
-        ] + along_m * uy + left_m * ux
+        start_x, start_y = self.start
+        heading_rad = self.heading_rad
+        cos = math.cos(heading_rad)
+        sin = math.sin(heading_rad)
+
+        x_m = start_x + along_m * cos - left_m * sin
+        y_m = start_y + along_m * sin + left_m * cos
+        return x_m, y_m
 
     def area(self, reach_m: float) -> Rectangle:
         """West, south, east, north of a road along x or y, within `reach_m` of the centre line,
         ends squared off.
         """
-        (ax, ay), (bx, by) = self.start, self.end
-        return (
-            min(ax, bx) - reach_m,
-            min(ay, by) - reach_m,
-            max(ax, bx) + reach_m,
-            max(ay, by) + reach_m,
-        )
+        start_x, start_y = self.start
+        end_x, end_y = self.end
+        west = min(start_x, end_x) - reach_m
+        south = min(start_y, end_y) - reach_m
+        east = max(start_x, end_x) + reach_m
+        north = max(start_y, end_y) + reach_m
+        return west, south, east, north
 
 
 @dataclass(frozen=True)
@@ -75,16 +85,23 @@ class Plot:
     @property
     def footprint(self) -> Rectangle:
         """West, south, east, north in metres."""
-        along = self.kind.width_m / 2
-        across = self.kind.depth_m / 2
-        half_x, half_y = (
-            (across, along) if abs(math.sin(self.heading_rad)) > 0.5 else (along, across)
-        )
-        return self.x_m - half_x, self.y_m - half_y, self.x_m + half_x, self.y_m + half_y
+        half_x_m = self.kind.width_m / 2
+        half_y_m = self.kind.depth_m / 2
+        is_along_y = abs(math.sin(self.heading_rad)) > 0.5
+        if is_along_y:
+            half_x_m, half_y_m = half_y_m, half_x_m
+
+        west = self.x_m - half_x_m
+        south = self.y_m - half_y_m
+        east = self.x_m + half_x_m
+        north = self.y_m + half_y_m
+        return west, south, east, north
 
 
 def overlap(a: Rectangle, b: Rectangle, gap_m: float = 0.0) -> bool:
     """Whether the rectangles come closer than `gap_m`."""
-    return (
-        a[0] < b[2] + gap_m and b[0] < a[2] + gap_m and a[1] < b[3] + gap_m and b[1] < a[3] + gap_m
-    )
+    a_west, a_south, a_east, a_north = a
+    b_west, b_south, b_east, b_north = b
+    in_x = a_west < b_east + gap_m and b_west < a_east + gap_m
+    in_y = a_south < b_north + gap_m and b_south < a_north + gap_m
+    return in_x and in_y

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
@@ -22,8 +22,10 @@ from services.sim.layout.plan import (
 )
 
 MIN_BUILDINGS = 21
+CANDIDATES = 6
+STREET_GAP_M = 0.2
+BUILDING_GAP_M = 1.0
 _REACH_M = STREET_WIDTH_M / 2 + PAVEMENT_WIDTH_M
-_CHOICE = 6
 
 Leg = tuple[float, float]
 
@@ -40,11 +42,10 @@ class Place:
 
     def message(self) -> TrueTown:
         """The place as it travels."""
-        streets = [
-            Street(name=r.name, line_m=[r.start, r.end], width_m=STREET_WIDTH_M) for r in self.roads
-        ]
         return TrueTown(
-            seed=self.seed, streets=streets, buildings=[_building(plot) for plot in self.plots]
+            seed=self.seed,
+            streets=[_street(road) for road in self.roads],
+            buildings=[_building(plot) for plot in self.plots],
         )
 
 
@@ -52,7 +53,7 @@ class Place:
 class Town(Place):
     """Streets on a rectangular loop with stubs, and what stands along them.
 
-    The way leads from `start` to the `corners` in order.
+    The route leads from `start` to the `corners` in order, again and again.
     """
 
     corners: tuple[Point, Point, Point, Point]
@@ -60,29 +61,35 @@ class Town(Place):
     @property
     def lap_m(self) -> float:
         """The length of one lap along the centre lines."""
-        return sum(math.dist(self.corners[i - 1], self.corners[i]) for i in range(4))
+        closed = (self.corners[-1], *self.corners)
+        return sum(math.dist(a, b) for a, b in pairwise(closed))
 
     def route(self, laps: float = 1.0) -> list[Leg]:
         """The legs (length_m, turn_rad at its end, left positive) of `laps` laps from the start;
         the last turn is 0.
         """
-        points = self.line(laps)
-        headings = [math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in itertools.pairwise(points)]
-        turns = [math.remainder(b - a, math.tau) for a, b in itertools.pairwise(headings)]
-        lengths = [math.dist(a, b) for a, b in itertools.pairwise(points)]
-        return list(zip(lengths, [*turns, 0.0], strict=True))
+        roads = [Road("", a, b) for a, b in pairwise(self.line(laps))]
+        turns_rad = [
+            math.remainder(after.heading_rad - before.heading_rad, math.tau)
+            for before, after in pairwise(roads)
+        ]
+        lengths_m = [road.length_m for road in roads]
+        return list(zip(lengths_m, [*turns_rad, 0.0], strict=True))
 
     def line(self, laps: float = 1.0) -> list[Point]:
         """The points between the route's legs: the start, the corners passed, the end."""
-        points: list[Point] = [(self.start.x_m, self.start.y_m)]
+        here = (self.start.x_m, self.start.y_m)
+        points: list[Point] = [here]
         left_m = laps * self.lap_m
         while True:
             corner = self.corners[(len(points) - 1) % 4]
-            length_m = math.dist(points[-1], corner)
+            length_m = math.dist(here, corner)
             if left_m <= length_m:
-                points.append(_between(points[-1], corner, left_m / length_m))
+                points.append(_between(here, corner, left_m / length_m))
                 return points
+
             points.append(corner)
+            here = corner
             left_m -= length_m
 
 
@@ -95,22 +102,43 @@ def generate(seed: int, kinds: tuple[BuildingType, ...] = CATALOGUE) -> Town:
     rng = np.random.default_rng([seed, 0x70])
     plots: list[Plot] = []
     while len(plots) < MIN_BUILDINGS:
-        half_x = float(rng.uniform(23, 28))
-        half_y = float(rng.uniform(18, 21))
-        roads = _roads(rng, half_x, half_y)
-        settlement = _Settlement(rng, [road.area(_REACH_M) for road in roads], kinds)
-        for road in (roads[0], roads[2], roads[1], roads[3]):
-            settlement.line(road, left=True)
-            settlement.line(road, left=False)
-        plots = settlement.plots
-    start = Pose(x_m=float(rng.uniform(-0.7, -0.3)) * half_x, y_m=-half_y, heading_rad=0.0)
-    corners = ((half_x, -half_y), (half_x, half_y), (-half_x, half_y), (-half_x, -half_y))
-    return Town(seed, tuple(roads), tuple(plots), furnish(seed, roads, plots), start, corners)
+        half_x_m = float(rng.uniform(23, 28))
+        half_y_m = float(rng.uniform(18, 21))
+        roads = _roads(rng, half_x_m, half_y_m)
+        plots = _settle(rng, roads, kinds)
+
+    start_x_m = float(rng.uniform(-0.7, -0.3)) * half_x_m
+    return Town(
+        seed=seed,
+        roads=tuple(roads),
+        plots=tuple(plots),
+        props=furnish(seed, roads, plots),
+        start=Pose(x_m=start_x_m, y_m=-half_y_m, heading_rad=0.0),
+        corners=(
+            (half_x_m, -half_y_m),
+            (half_x_m, half_y_m),
+            (-half_x_m, half_y_m),
+            (-half_x_m, -half_y_m),
+        ),
+    )
+
+
+def _settle(
+    rng: np.random.Generator, roads: list[Road], kinds: tuple[BuildingType, ...]
+) -> list[Plot]:
+    """Buildings on both sides of the loop."""
+    streets = [road.area(_REACH_M) for road in roads]
+    settlement = _Settlement(rng, streets, kinds)
+    south, east, north, west = roads[:4]
+    for road in (south, north, east, west):
+        settlement.line(road, left=True)
+        settlement.line(road, left=False)
+    return settlement.plots
 
 
 @dataclass
 class _Settlement:
-    """Buildings as they come: each kind is built once, and none on a street."""
+    """Buildings in the order of their placement: each kind is built once, and none on a street."""
 
     rng: np.random.Generator
     streets: list[Rectangle]
@@ -118,55 +146,83 @@ class _Settlement:
     plots: list[Plot] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.kinds: list[BuildingType] = [
-            self.choice[i] for i in self.rng.permutation(len(self.choice))
-        ]
+        order = self.rng.permutation(len(self.choice))
+        self.kinds: list[BuildingType] = [self.choice[i] for i in order]
 
     def line(self, road: Road, left: bool) -> None:
-        """Go along one side of `road` and build wherever something fits."""
+        """Build along one side of `road` wherever something fits."""
         along_m = -_REACH_M
         while along_m < road.length_m + _REACH_M:
             plot = self._fitting(road, along_m, left)
             if plot is None:
                 along_m += 1.0
                 continue
+
             self.plots.append(plot)
             self.kinds.remove(plot.kind)
-            along_m += plot.kind.width_m + float(self.rng.uniform(1.2, 4.0))
+            gap_m = float(self.rng.uniform(1.2, 4.0))
+            along_m += plot.kind.width_m + gap_m
 
     def _fitting(self, road: Road, along_m: float, left: bool) -> Plot | None:
-        # A front looks to the right of its heading: to the road.
-        heading_rad = math.remainder(road.heading_rad + (0.0 if left else math.pi), math.tau)
-        for kind in self.kinds[:_CHOICE]:
-            back_m = _REACH_M + float(self.rng.uniform(0.3, 2.0)) + kind.depth_m / 2
-            x, y = road.point(along_m + kind.width_m / 2, back_m if left else -back_m)
-            plot = Plot(kind, round(x, 3), round(y, 3), heading_rad)
-            if along_m + kind.width_m < road.length_m + _REACH_M and self._is_free(plot.footprint):
+        """The first of the next kinds that fits `along_m` from the road's start."""
+        for kind in self.kinds[:CANDIDATES]:
+            plot = self._plot(kind, road, along_m, left)
+            end_m = along_m + kind.width_m
+            if end_m < road.length_m + _REACH_M and self._is_free(plot.footprint):
                 return plot
         return None
 
+    def _plot(self, kind: BuildingType, road: Road, along_m: float, left: bool) -> Plot:
+        # A front looks to the right of its heading: to the road.
+        turn_rad = 0.0 if left else math.pi
+        heading_rad = math.remainder(road.heading_rad + turn_rad, math.tau)
+
+        garden_m = float(self.rng.uniform(0.3, 2.0))
+        back_m = _REACH_M + garden_m + kind.depth_m / 2
+        left_m = back_m if left else -back_m
+        x_m, y_m = road.point(along_m + kind.width_m / 2, left_m)
+        return Plot(kind, round(x_m, 3), round(y_m, 3), heading_rad)
+
     def _is_free(self, area: Rectangle) -> bool:
-        on_street = any(overlap(area, street, 0.2) for street in self.streets)
-        return not on_street and not any(overlap(area, plot.footprint, 1.0) for plot in self.plots)
+        if any(overlap(area, street, STREET_GAP_M) for street in self.streets):
+            return False
+        footprints = [plot.footprint for plot in self.plots]
+        return not any(overlap(area, other, BUILDING_GAP_M) for other in footprints)
 
 
-def _roads(rng: np.random.Generator, half_x: float, half_y: float) -> list[Road]:
+def _roads(rng: np.random.Generator, half_x_m: float, half_y_m: float) -> list[Road]:
+    """The four streets of the loop, and two stubs at opposite corners."""
+    south_west = (-half_x_m, -half_y_m)
+    south_east = (half_x_m, -half_y_m)
+    north_east = (half_x_m, half_y_m)
+    north_west = (-half_x_m, half_y_m)
+
     east, north = rng.choice([-1.0, 1.0], 2).tolist()
     stub_m = float(rng.uniform(14, 20))
-    corner = (east * half_x, north * half_y)
-    opposite = (-east * half_x, -north * half_y)
+    corner = (east * half_x_m, north * half_y_m)
+    station = (corner[0] + east * stub_m, corner[1])
+    opposite = (-east * half_x_m, -north * half_y_m)
+    mill = (opposite[0], opposite[1] - north * stub_m)
     return [
-        Road("South Street", (-half_x, -half_y), (half_x, -half_y)),
-        Road("East Street", (half_x, -half_y), (half_x, half_y)),
-        Road("North Street", (half_x, half_y), (-half_x, half_y)),
-        Road("West Street", (-half_x, half_y), (-half_x, -half_y)),
-        Road("Station Road", corner, (corner[0] + east * stub_m, corner[1])),
-        Road("Mill Lane", opposite, (opposite[0], opposite[1] - north * stub_m)),
+        Road("South Street", south_west, south_east),
+        Road("East Street", south_east, north_east),
+        Road("North Street", north_east, north_west),
+        Road("West Street", north_west, south_west),
+        Road("Station Road", corner, station),
+        Road("Mill Lane", opposite, mill),
     ]
 
 
 def _between(a: Point, b: Point, share: float) -> Point:
-    return a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])
+    a_x, a_y = a
+    b_x, b_y = b
+    x = a_x + share * (b_x - a_x)
+    y = a_y + share * (b_y - a_y)
+    return x, y
+
+
+def _street(road: Road) -> Street:
+    return Street(name=road.name, line_m=[road.start, road.end], width_m=STREET_WIDTH_M)
 
 
 def _building(plot: Plot) -> Building:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from schemas.array import Array
 from schemas.sensing import Calibration, StereoFrame
-from services.sim.rendering.light import Light, brightness, shadow_top, taken
+from services.sim.rendering.light import Light, brightness, shadow_top, expose
 from services.sim.rendering.wall import Image
 from services.sim.stdio import pybullet, quiet
 from services.sim.world import World
@@ -78,9 +78,9 @@ class StereoCamera:
         self._rays = np.stack([across, down, np.ones_like(across)], axis=2).astype(np.float32)
         # The first pictures take long, and EGL announces them.
         with quiet():
-            self.shoot()
+            self.capture()
 
-    def shoot(self) -> tuple[Image, Image]:
+    def capture(self) -> tuple[Image, Image]:
         """The left and the right picture from where the robot is."""
         (left, left_at), (right, right_at) = self._stations()
         return self._expose(left, left_at, False, None).image, self._expose(
@@ -88,8 +88,8 @@ class StereoCamera:
         ).image
 
     def frame(self, stamp_ns: int, number: int) -> StereoFrame:
-        """As `shoot`, as it travels."""
-        left, right = self.shoot()
+        """As `capture`, as it travels."""
+        left, right = self.capture()
         return StereoFrame(
             stamp_ns=stamp_ns,
             frame=number,
@@ -98,10 +98,10 @@ class StereoCamera:
             calibration=self.calibration,
         )
 
-    def survey(
+    def capture_labelled(
         self, light: Light | None = None, rng: np.random.Generator | None = None
     ) -> tuple[Exposure, Exposure]:
-        """As `shoot`, with true depth and bodies, for learning and tests; in `light`, with noise
+        """As `capture`, with true depth and bodies, for learning and tests; in `light`, with noise
         from `rng`.
         """
         left, right = (self._expose(turn, at, True, light) for turn, at in self._stations())
@@ -113,7 +113,7 @@ class StereoCamera:
         for exposure, (turn, at) in zip((left, right), self._stations(), strict=True):
             rays = self._rays @ turn.T.astype(np.float32)
             bright = brightness(exposure.depth_m, rays, at, top_m, light)
-            lit.append(replace(exposure, image=taken(exposure.image, bright, light, rng)))
+            lit.append(replace(exposure, image=expose(exposure.image, bright, light, rng)))
         return lit[0], lit[1]
 
     def _stations(self) -> list[tuple[Matrix, Matrix]]:

@@ -14,6 +14,10 @@ from services.sim.rendering.wall import PX_PER_M, Image, Wall, roughen, shaded
 
 _GLASS: Colour = (58, 74, 96)
 _PLINTH_M = 0.5
+_BAY_M = 2.6
+_SILL_M = 1.0
+_HALF_ENTRANCE_M = 1.7
+_ROOF_PICTURE = 4
 
 
 def side(kind: BuildingType, width_m: float, number: int) -> Image:
@@ -22,10 +26,12 @@ def side(kind: BuildingType, width_m: float, number: int) -> Image:
     """
     rng = _generator(kind, number)
     wall = Wall(kind, width_m, kind.height_m)
+    is_front = number == 0
+
     if kind.pattern in PAINT:
         PAINT[kind.pattern](wall)
-    _windows(wall, number == 0, rng)
-    if number == 0:
+    _windows(wall, is_front, rng)
+    if is_front:
         _entrance(wall)
     wall.box(0, 0, width_m, _PLINTH_M, shaded(kind.wall, 0.55))
     return roughen(wall.image, rng)
@@ -33,48 +39,73 @@ def side(kind: BuildingType, width_m: float, number: int) -> Image:
 
 def roof(kind: BuildingType) -> Image:
     """The roof from above, uint8 (depth, width, 3), in courses."""
-    picture = np.full(
-        (round(kind.depth_m * PX_PER_M), round(kind.width_m * PX_PER_M), 3), kind.roof, np.uint8
-    )
-    picture[:: PX_PER_M // 2] = shaded(kind.roof, 0.75)
-    return roughen(picture, _generator(kind, 4))
+    depth_px = round(kind.depth_m * PX_PER_M)
+    width_px = round(kind.width_m * PX_PER_M)
+    picture = np.full((depth_px, width_px, 3), kind.roof, np.uint8)
+
+    course_px = PX_PER_M // 2
+    picture[::course_px] = shaded(kind.roof, 0.75)
+    return roughen(picture, _generator(kind, _ROOF_PICTURE))
 
 
 def _generator(kind: BuildingType, number: int) -> np.random.Generator:
-    return np.random.default_rng([zlib.crc32(kind.name.encode()), number])
+    """A source of random numbers for one picture of a type."""
+    name = kind.name.encode()
+    return np.random.default_rng([zlib.crc32(name), number])
 
 
-def _windows(wall: Wall, front: bool, rng: np.random.Generator) -> None:
-    columns = max(2, int(wall.width_m / 2.6))
-    for storey in range(max(1, int((wall.height_m - 0.6) / STOREY_M))):
+def _windows(wall: Wall, is_front: bool, rng: np.random.Generator) -> None:
+    storeys = max(1, int((wall.height_m - 0.6) / STOREY_M))
+    columns = max(2, int(wall.width_m / _BAY_M))
+    for storey in range(storeys):
         for column in range(columns):
             middle_m = (column + 0.5) * wall.width_m / columns
-            if front and storey == 0 and abs(middle_m - wall.width_m / 2) < 1.7:
+            from_door_m = abs(middle_m - wall.width_m / 2)
+            if is_front and storey == 0 and from_door_m < _HALF_ENTRANCE_M:
                 continue
-            _window(wall, middle_m, storey * STOREY_M + 1.0, float(rng.uniform(0.7, 1.5)))
+
+            shade = float(rng.uniform(0.7, 1.5))
+            _window(wall, middle_m, storey * STOREY_M + _SILL_M, shade)
 
 
 def _window(wall: Wall, middle_m: float, sill_m: float, shade: float) -> None:
     trim = wall.kind.trim
+    left_m = middle_m - 0.48
     wall.box(middle_m - 0.6, sill_m - 0.1, 1.2, 1.6, trim)
-    wall.box(middle_m - 0.48, sill_m, 0.96, 1.4, shaded(_GLASS, shade))
+    wall.box(left_m, sill_m, 0.96, 1.4, shaded(_GLASS, shade))
     wall.box(middle_m - 0.05, sill_m, 0.1, 1.4, trim)
-    wall.box(middle_m - 0.48, sill_m + 0.85, 0.96, 0.1, trim)
+    wall.box(left_m, sill_m + 0.85, 0.96, 0.1, trim)
+
     if wall.kind.pattern == "shutters":
-        for x_m in (middle_m - 1.2, middle_m + 0.6):
-            wall.box(x_m, sill_m - 0.1, 0.6, 1.6, wall.kind.accent)
+        _shutters(wall, middle_m, sill_m)
+
+
+def _shutters(wall: Wall, middle_m: float, sill_m: float) -> None:
+    accent = wall.kind.accent
+    bottom_m = sill_m - 0.1
+    wall.box(middle_m - 1.2, bottom_m, 0.6, 1.6, accent)
+    wall.box(middle_m + 0.6, bottom_m, 0.6, 1.6, accent)
 
 
 def _entrance(wall: Wall) -> None:
     middle_m = wall.width_m / 2
-    kind = wall.kind
-    if kind.pattern == "gates":
-        for x_m in (middle_m - 3.4, middle_m + 0.2):
-            wall.box(x_m, 0, 3.2, 3.4, kind.trim)
-            wall.box(x_m + 0.2, 0, 2.8, 3.2, kind.door)
+    if wall.kind.pattern == "gates":
+        _gate(wall, middle_m - 3.4)
+        _gate(wall, middle_m + 0.2)
         return
-    wall.box(middle_m - 0.95, 0, 1.9, 2.7, kind.trim)
-    wall.box(middle_m - 0.75, 0, 1.5, 2.5, kind.door)
-    if kind.pattern == "cross":
-        wall.box(middle_m - 0.3, 3.0, 0.6, 2.0, kind.accent)
-        wall.box(middle_m - 1.0, 3.7, 2.0, 0.6, kind.accent)
+
+    wall.box(middle_m - 0.95, 0, 1.9, 2.7, wall.kind.trim)
+    wall.box(middle_m - 0.75, 0, 1.5, 2.5, wall.kind.door)
+    if wall.kind.pattern == "cross":
+        _cross(wall, middle_m)
+
+
+def _gate(wall: Wall, left_m: float) -> None:
+    wall.box(left_m, 0, 3.2, 3.4, wall.kind.trim)
+    wall.box(left_m + 0.2, 0, 2.8, 3.2, wall.kind.door)
+
+
+def _cross(wall: Wall, middle_m: float) -> None:
+    accent = wall.kind.accent
+    wall.box(middle_m - 0.3, 3.0, 0.6, 2.0, accent)
+    wall.box(middle_m - 1.0, 3.7, 2.0, 0.6, accent)

@@ -1,5 +1,5 @@
-"""The hour and the weather, and how the camera takes them: shadows, colour, exposure, blur and
-noise. Pure.
+"""Time of day and weather, and how a camera exposes them: shadows, colour, exposure, blur and noise.
+Pure.
 """
 
 from __future__ import annotations
@@ -9,18 +9,17 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
+from cogmap.geometry.arrays import Floats, Singles
 from services.sim.layout.plan import Rectangle
 from services.sim.rendering.wall import Image
 
-Matrix = npt.NDArray[np.float64]
-Floats = npt.NDArray[np.float32]
 Box = tuple[Rectangle, float]
 
 _CELL_M = 0.5
 _CELLS = 400
 _CLEAR_M = 0.6
+_PENUMBRA_PX = (5, 5)
 
 
 @dataclass(frozen=True)
@@ -43,86 +42,117 @@ class Light:
 
     @property
     def sun(self) -> tuple[float, float, float]:
-        """The direction to the sun: east, north, up."""
+        """The unit vector to the sun: east, north, up."""
         flat = math.cos(self.sun_elevation_rad)
-        x = flat * math.cos(self.sun_azimuth_rad)
-        y = flat * math.sin(self.sun_azimuth_rad)
-        return x, y, math.sin(self.sun_elevation_rad)
+        east = flat * math.cos(self.sun_azimuth_rad)
+        north = flat * math.sin(self.sun_azimuth_rad)
+        up = math.sin(self.sun_elevation_rad)
+        return east, north, up
 
 
 def some_light(rng: np.random.Generator) -> Light:
     """Any hour of a day with the sun up, any weather but night and fog."""
     elevation_rad = float(rng.uniform(0.25, 1.2))
-    warmth = float(rng.uniform(-0.06, 0.1) + 0.06 * (1.2 - elevation_rad))
+    low_sun = 1.2 - elevation_rad
+    warmth = float(rng.uniform(-0.06, 0.1) + 0.06 * low_sun)
     tint = float(rng.uniform(-0.03, 0.03))
+    azimuth_rad = float(rng.uniform(-math.pi, math.pi))
+
+    is_clouded = rng.random() < 0.3
+    shade = 1.0 if is_clouded else float(rng.uniform(0.5, 0.85))
+    gain = float(rng.uniform(0.65, 1.2))
+    gamma = float(rng.uniform(0.8, 1.25))
+    is_sharp = rng.random() < 0.5
+    blur_px = 0.0 if is_sharp else float(rng.uniform(0.3, 0.9))
     return Light(
-        sun_azimuth_rad=float(rng.uniform(-math.pi, math.pi)),
+        sun_azimuth_rad=azimuth_rad,
         sun_elevation_rad=elevation_rad,
-        shade=1.0 if rng.random() < 0.3 else float(rng.uniform(0.5, 0.85)),
+        shade=shade,
         cast=(1 + warmth, 1 + tint, 1 - warmth),
-        gain=float(rng.uniform(0.65, 1.2)),
-        gamma=float(rng.uniform(0.8, 1.25)),
-        blur_px=0.0 if rng.random() < 0.5 else float(rng.uniform(0.3, 0.9)),
+        gain=gain,
+        gamma=gamma,
+        blur_px=blur_px,
         noise=float(rng.uniform(0.5, 5.0)),
     )
 
 
-def relief(boxes: list[Box]) -> Floats:
-    """How high the town stands in each cell of _CELL_M, float32 (n, n), rows from south to north,
+def relief(boxes: list[Box]) -> Singles:
+    """The height of the town in each cell of _CELL_M, float32 (n, n), rows from south to north,
     columns from west.
     """
-    heights = np.zeros((_CELLS, _CELLS), np.float32)
+    heights_m = np.zeros((_CELLS, _CELLS), np.float32)
     for area, height_m in boxes:
-        west, south, east, north = (round(side / _CELL_M) + _CELLS // 2 for side in area)
-        cells = heights[max(south, 0) : max(north, 0), max(west, 0) : max(east, 0)]
+        west, south, east, north = (_cell(side_m) for side_m in area)
+        cells = heights_m[south:north, west:east]
         np.maximum(cells, height_m, out=cells)
-    return heights
+    return heights_m
 
 
-def shadow_top(heights: Floats, light: Light) -> Floats:
-    """Up to which height each cell of a relief lies in the shadow of others, metres, float32 like
-    `heights`.
+def _cell(side_m: float) -> int:
+    """The row or column of a coordinate, at least 0."""
+    cell = round(side_m / _CELL_M) + _CELLS // 2
+    return max(cell, 0)
+
+
+def shadow_top(heights_m: Singles, light: Light) -> Singles:
+    """The height up to which each cell of a relief lies in the shadow of others, in metres, float32
+    like `heights_m`.
     """
     east, north, up = light.sun
-    top = np.zeros_like(heights)
-    steps = math.ceil(float(heights.max()) * math.hypot(east, north) / up / _CELL_M)
+    flat = math.hypot(east, north)
+    longest_m = float(heights_m.max()) * flat / up
+    steps = math.ceil(longest_m / _CELL_M)
+
+    top_m = np.zeros_like(heights_m)
     for step in range(1, steps + 1):
-        dx, dy = (round(step * side / math.hypot(east, north)) for side in (east, north))
-        here = (slice(max(0, -dy), _CELLS - max(0, dy)), slice(max(0, -dx), _CELLS - max(0, dx)))
-        there = (slice(max(0, dy), _CELLS + min(0, dy)), slice(max(0, dx), _CELLS + min(0, dx)))
-        drop_m = step * _CELL_M * up / math.hypot(east, north)
-        np.maximum(top[here], heights[there] - np.float32(drop_m), out=top[here])
-    return top
+        dx = round(step * east / flat)
+        dy = round(step * north / flat)
+        drop_m = np.float32(step * _CELL_M * up / flat)
+
+        shaded_rows, casting_rows = _shifted(dy)
+        shaded_columns, casting_columns = _shifted(dx)
+        shaded = top_m[shaded_rows, shaded_columns]
+        casting = heights_m[casting_rows, casting_columns]
+        np.maximum(shaded, casting - drop_m, out=shaded)
+    return top_m
 
 
-def brightness(depth_m: Floats, rays: Floats, at: Matrix, top_m: Floats, light: Light) -> Floats:
-    """How bright each pixel is under `light`, float32 (h, w) from `shade` to 1.
+def _shifted(cells: int) -> tuple[slice, slice]:
+    """The cells that have one `cells` further on, and those."""
+    ahead = max(0, cells)
+    back = max(0, -cells)
+    return slice(back, _CELLS - ahead), slice(ahead, _CELLS - back)
 
-    `depth_m` (h, w), 0 in the sky; `rays` (h, w, 3) are the directions of the pixels in the world,
-    of length 1 along the optical axis, from `at`; `top_m` is what `shadow_top` gives.
+
+def brightness(
+    depth_m: Singles, rays: Singles, at: Floats, top_m: Singles, light: Light
+) -> Singles:
+    """The brightness of each pixel under `light`, float32 (h, w) from `shade` to 1.
+
+    `depth_m` (h, w) is 0 in the sky; `rays` (h, w, 3) are the directions of the pixels in the
+    world, of length 1 along the optical axis, from `at`; `top_m` is the result of `shadow_top`.
     """
-    points = at.astype(np.float32) + rays * (depth_m - _CLEAR_M)[..., None]
-    column, row = (
-        np.clip(points[..., axis] / _CELL_M + _CELLS / 2, 0, _CELLS - 1).astype(np.intp)
-        for axis in (0, 1)
-    )
-    dark = (points[..., 2] < top_m[row, column]) & (depth_m > 0)
-    return np.asarray(
-        cv2.blur(np.where(dark, light.shade, 1.0).astype(np.float32), (5, 5)), np.float32
-    )
+    # A little nearer than the surface, which would shade itself.
+    reach_m = (depth_m - _CLEAR_M)[..., None]
+    points_m = at.astype(np.float32) + rays * reach_m
+    cells = points_m[..., :2] / _CELL_M + _CELLS / 2
+    column, row = np.moveaxis(cells.clip(0, _CELLS - 1).astype(np.int64), 2, 0)
+
+    is_under_top = points_m[..., 2] < top_m[row, column]
+    is_dark = is_under_top & (depth_m > 0)
+    share = np.where(is_dark, light.shade, 1.0).astype(np.float32)
+    return np.asarray(cv2.blur(share, _PENUMBRA_PX), np.float32)
 
 
-def taken(image: Image, bright: Floats, light: Light, rng: np.random.Generator) -> Image:
-    """`image` (h, w, 3) as the camera takes it, where `bright` (h, w) is left of the light."""
-    seen = (
-        image.astype(np.float32)
-        / 255
-        * bright[..., None]
-        * np.asarray(light.cast, np.float32)
-        * light.gain
-    )
-    seen = np.clip(seen, 0.0, 1.0) ** np.float32(light.gamma)
+def expose(image: Image, bright: Singles, light: Light, rng: np.random.Generator) -> Image:
+    """`image` (h, w, 3) as the camera exposes it, where `bright` (h, w) is left of the light."""
+    cast = np.asarray(light.cast, np.float32)
+    lit = image.astype(np.float32) / 255 * bright[..., None]
+    exposed = np.clip(lit * cast * light.gain, 0.0, 1.0) ** np.float32(light.gamma)
     if light.blur_px:
-        seen = np.asarray(cv2.GaussianBlur(seen, (0, 0), light.blur_px), np.float32)
-    noise = rng.standard_normal(seen.shape, np.float32) * np.sqrt(0.3 + seen)
-    return np.clip(255 * seen + light.noise * noise + 0.5, 0, 255).astype(np.uint8)
+        blurred = cv2.GaussianBlur(exposed, (0, 0), light.blur_px)
+        exposed = np.asarray(blurred, np.float32)
+
+    noise = rng.standard_normal(exposed.shape, np.float32) * np.sqrt(0.3 + exposed)
+    levels = 255 * exposed + light.noise * noise
+    return np.clip(levels + 0.5, 0, 255).astype(np.uint8)

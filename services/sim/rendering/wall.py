@@ -8,9 +8,11 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from cogmap.geometry.arrays import Singles
 from services.sim.layout.catalogue import BuildingType, Colour
 
 PX_PER_M = 20
+GRAIN = ((1, 0.5), (4, 0.5), (12, 0.45), (40, 0.3))
 Image = npt.NDArray[np.uint8]
 
 
@@ -23,55 +25,65 @@ class Wall:
     height_m: float
 
     def __post_init__(self) -> None:
-        shape = (round(self.height_m * PX_PER_M), round(self.width_m * PX_PER_M), 3)
-        self.image: Image = np.full(shape, self.kind.wall, np.uint8)
+        height_px = _pixels(self.height_m)
+        width_px = _pixels(self.width_m)
+        self.image: Image = np.full((height_px, width_px, 3), self.kind.wall, np.uint8)
 
     def box(self, x_m: float, z_m: float, width_m: float, height_m: float, colour: Colour) -> None:
         """Paint a rectangle whose lower left corner is (`x_m`, `z_m`)."""
-        left = round(x_m * PX_PER_M)
-        top = round((self.height_m - z_m - height_m) * PX_PER_M)
-        right = left + round(width_m * PX_PER_M)
-        bottom = top + round(height_m * PX_PER_M)
-        self.image[max(top, 0) : max(bottom, 0), max(left, 0) : max(right, 0)] = colour
+        left = _pixels(x_m)
+        right = left + _pixels(width_m)
+        top = _pixels(self.height_m - z_m - height_m)
+        bottom = top + _pixels(height_m)
+
+        rows = slice(max(top, 0), max(bottom, 0))
+        columns = slice(max(left, 0), max(right, 0))
+        self.image[rows, columns] = colour
 
     def line(
         self, a_m: tuple[float, float], b_m: tuple[float, float], width_m: float, colour: Colour
     ) -> None:
         """Paint a line from `a_m` to `b_m`."""
-        ends = [(round(x * PX_PER_M), round((self.height_m - z) * PX_PER_M)) for x, z in (a_m, b_m)]
-        cv2.line(self.image, ends[0], ends[1], colour, round(width_m * PX_PER_M))
+        start = self._pixel(*a_m)
+        end = self._pixel(*b_m)
+        cv2.line(self.image, start, end, colour, _pixels(width_m))
+
+    def _pixel(self, x_m: float, z_m: float) -> tuple[int, int]:
+        """Column and row."""
+        return _pixels(x_m), _pixels(self.height_m - z_m)
+
+
+def _pixels(length_m: float) -> int:
+    return round(length_m * PX_PER_M)
 
 
 def shaded(colour: Colour, factor: float) -> Colour:
     """`colour`, darker or lighter."""
-    red, green, blue = (min(255, round(factor * c)) for c in colour)
+    levels = [round(factor * level) for level in colour]
+    red, green, blue = (min(255, level) for level in levels)
     return red, green, blue
 
 
 def plain(side_px: int, colour: Colour) -> Image:
     """A square picture of one colour."""
-    return np.full((side_px, side_px, 3), colour, np.uint8)
+    shape = (side_px, side_px, 3)
+    return np.full(shape, colour, np.uint8)
 
 
 def roughen(image: Image, rng: np.random.Generator, strength: float = 0.13) -> Image:
     """`image` with grain on it."""
-    tall, wide = image.shape[:2]
-    rough: Image = np.clip(image * _grain(rng, tall, wide, strength)[..., None], 0, 255).astype(
-        np.uint8
-    )
-    return rough
+    height_px, width_px, _ = image.shape
+    grain = _grain(rng, height_px, width_px, strength)
+    rough = np.clip(image * grain[..., None], 0, 255)
+    return rough.astype(np.uint8)
 
 
-def _grain(
-    rng: np.random.Generator, tall_px: int, wide_px: int, strength: float
-) -> npt.NDArray[np.float32]:
+def _grain(rng: np.random.Generator, height_px: int, width_px: int, strength: float) -> Singles:
     """Brightness factors around 1, in four scales: stereo finds them near and far."""
-    total = np.ones((tall_px, wide_px), np.float32)
-    for scale, share in ((1, 0.5), (4, 0.5), (12, 0.45), (40, 0.3)):
-        coarse = rng.standard_normal((tall_px // scale + 2, wide_px // scale + 2), np.float32)
-        total += (
-            strength
-            * share
-            * cv2.resize(coarse, (wide_px, tall_px), interpolation=cv2.INTER_LINEAR)
-        )
+    total = np.ones((height_px, width_px), np.float32)
+    for scale, share in GRAIN:
+        coarse_shape = (height_px // scale + 2, width_px // scale + 2)
+        coarse = rng.standard_normal(coarse_shape, np.float32)
+        fine = cv2.resize(coarse, (width_px, height_px), interpolation=cv2.INTER_LINEAR)
+        total += strength * share * fine
     return total

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from services.sim.rendering.light import Light, brightness, relief, shadow_top, some_light, taken
+from services.sim.rendering.light import Light, brightness, relief, shadow_top, some_light, expose
 
 TOWER = ((-2.0, -2.0, 2.0, 2.0), 10.0)
 EVENING = Light(sun_azimuth_rad=0.0, sun_elevation_rad=math.radians(45), shade=0.5)
@@ -45,9 +45,9 @@ def test_the_camera_takes_brightness_colour_gain_and_noise() -> None:
     grey = np.full((60, 80, 3), 100, np.uint8)
     lit = np.ones((60, 80), np.float32)
     rng = np.random.default_rng(1)
-    warm = taken(grey, lit, Light(0.0, 1.0, cast=(1.2, 1.0, 0.8)), rng)
-    dim = taken(grey, 0.5 * lit, Light(0.0, 1.0, gain=0.8), rng)
-    noisy = taken(grey, lit, Light(0.0, 1.0, noise=4.0), rng)
+    warm = expose(grey, lit, Light(0.0, 1.0, cast=(1.2, 1.0, 0.8)), rng)
+    dim = expose(grey, 0.5 * lit, Light(0.0, 1.0, gain=0.8), rng)
+    noisy = expose(grey, lit, Light(0.0, 1.0, noise=4.0), rng)
 
     assert warm[0, 0].tolist() == [120, 100, 80]
     assert dim[0, 0].tolist() == [40, 40, 40]

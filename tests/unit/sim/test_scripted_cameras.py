@@ -148,7 +148,7 @@ def test_kilometres_away_there_is_ground_underfoot_sky_above_and_the_building(
 ) -> None:
     heading_rad = math.atan2(1000.0, 3000.0)
     far_world.place_robot(Pose(x_m=2970.0, y_m=990.0, heading_rad=heading_rad))
-    exposure, _ = StereoCamera(far_world, calibration()).survey()
+    exposure, _ = StereoCamera(far_world, calibration()).capture_labelled()
     surface = towns.surfaces(far_world, exposure)
     names = {towns.SURFACES[number] for number in np.unique(surface)}
     assert names == {"sky", "ground", "road", "building"}

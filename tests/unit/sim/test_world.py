@@ -88,7 +88,7 @@ def test_a_known_building_stands_in_both_pictures_where_geometry_puts_it(world: 
         heading_rad=toward,
     )
     world.robot.place(pose)
-    exposures = camera.survey()
+    exposures = camera.capture_labelled()
     eye = camera.calibration
     distance_m = 9.0 - eye.mount_forward_m
     half_m = plot.kind.width_m / 2
@@ -114,8 +114,8 @@ def test_a_known_building_stands_in_both_pictures_where_geometry_puts_it(world: 
 def test_the_same_view_gives_the_same_pictures(world: World) -> None:
     camera = StereoCamera(world, calibration())
     world.robot.place(world.town.start)
-    first = [picture.tobytes() for picture in camera.shoot()]
-    assert [picture.tobytes() for picture in camera.shoot()] == first
+    first = [picture.tobytes() for picture in camera.capture()]
+    assert [picture.tobytes() for picture in camera.capture()] == first
     assert first[0] != first[1]
 
 
@@ -134,7 +134,7 @@ def test_pictures_asked_for_on_another_thread_are_refused(world: World) -> None:
 
     def shoot() -> None:
         with pytest.raises(CogmapError, match="thread") as refusal:
-            camera.shoot()
+            camera.capture()
         caught.append(refusal)
 
     thread = threading.Thread(target=shoot)
@@ -145,9 +145,9 @@ def test_pictures_asked_for_on_another_thread_are_refused(world: World) -> None:
 
 def test_tiny_renderer_draws_the_same_town(world: World) -> None:
     world.robot.place(world.town.start)
-    here = StereoCamera(world, calibration()).shoot()[0].astype(float)
+    here = StereoCamera(world, calibration()).capture()[0].astype(float)
     plain = World(world.town, want_egl=False)
-    there = StereoCamera(plain, calibration()).shoot()[0].astype(float)
+    there = StereoCamera(plain, calibration()).capture()[0].astype(float)
     plain.close()
     assert plain.egl is None
     assert np.corrcoef(cv2.blur(here, (9, 9)).ravel(), cv2.blur(there, (9, 9)).ravel())[0, 1] > 0.9
