@@ -55,8 +55,8 @@ class Lockstep:
         return [self._simulation.town(), *self._advance()]
 
     def on_command(self, command: MotorCommand) -> list[Message] | None:
-        """The next frame, after the odometry up to it; None where `command` does not answer the last
-        frame, or answers it once more.
+        """The next frame, after the odometry up to it; None where `command` answers another frame
+        than the last, or the last once more.
         """
         if command.stamp_ns != self._frame_ns or self._simulation.progress >= 1.0:
             return None

@@ -26,8 +26,8 @@ class Noise(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
     drift_rad_per_sqrt_m: Annotated[
         Share,
         msgspec.Meta(
-            description="Standard deviation of heading after a metre, in rad, growing with the root "
-            "of the distance, 0 to 1."
+            description="Standard deviation of heading after a metre, in rad, growing with the "
+            "root of the distance, 0 to 1."
         ),
     ] = 0.015
 

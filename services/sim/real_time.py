@@ -48,8 +48,8 @@ class RealTime:
         age_ns = now_ns - command.stamp_ns
         if age_ns > self._max_age_ns:
             raise MessageError(
-                f"motor command: it is {age_ns / 1e9:.1f} s old, and the wheels obey none older than "
-                f"{self._max_age_ns / 1e9:g} s: lower the frame rate or use a faster machine"
+                f"motor command: it is {age_ns / 1e9:.1f} s old, and the wheels obey none older "
+                f"than {self._max_age_ns / 1e9:g} s: lower the frame rate or use a faster machine"
             )
         self._command_ns = command.stamp_ns
         self._arrived_ns = now_ns

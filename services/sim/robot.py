@@ -17,6 +17,8 @@ _TORQUE_NM = 20.0
 _GRIP = 1.5
 _CASTER_RADIUS_M = 0.1
 _CASTER_FORWARD_M = 0.45
+_WHEELS = (0, 1)
+_UPRIGHT = (0, 0, 0, 1)
 
 
 class Robot:
@@ -29,85 +31,100 @@ class Robot:
         self.drive(0.0, 0.0)
 
     def drive(self, left_rad_s: float, right_rad_s: float) -> None:
-        """Turn the wheels at these speeds, as far as the motors can."""
-        speeds = [max(-MAX_WHEEL_RAD_S, min(MAX_WHEEL_RAD_S, s)) for s in (left_rad_s, right_rad_s)]
+        """Turn the wheels at these speeds, within what the motors can do."""
         pybullet.setJointMotorControlArray(
             self.body,
-            [0, 1],
+            _WHEELS,
             pybullet.VELOCITY_CONTROL,
-            targetVelocities=speeds,
+            targetVelocities=[_within_limits(left_rad_s), _within_limits(right_rad_s)],
             forces=[_TORQUE_NM] * 2,
             physicsClientId=self._client,
         )
 
     def pose(self) -> Pose:
-        """Where the middle of the axle is, and where the robot heads."""
-        (x, y, _), quaternion = self.position_and_orientation()
-        heading = pybullet.getEulerFromQuaternion(quaternion)[2]
-        return Pose(x_m=x, y_m=y, heading_rad=heading)
+        """The middle of the axle, and the robot's heading."""
+        (x_m, y_m, _), quaternion = self.position_and_orientation()
+        _, _, heading_rad = pybullet.getEulerFromQuaternion(quaternion)
+        return Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad)
 
     def position_and_orientation(
         self,
     ) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
         """The axle's middle in metres, and a quaternion (x, y, z, w)."""
-        position, orientation = pybullet.getBasePositionAndOrientation(
+        position_m, orientation = pybullet.getBasePositionAndOrientation(
             self.body, physicsClientId=self._client
         )
-        return position, orientation
+        return position_m, orientation
 
     def place(self, pose: Pose) -> None:
         """Put the robot there, at rest."""
-        turned = (0.0, 0.0, math.sin(pose.heading_rad / 2), math.cos(pose.heading_rad / 2))
-        above = (pose.x_m, pose.y_m, WHEEL_RADIUS_M)
+        client = self._client
+        half_rad = pose.heading_rad / 2
+        rotation = (0.0, 0.0, math.sin(half_rad), math.cos(half_rad))
+        position_m = (pose.x_m, pose.y_m, WHEEL_RADIUS_M)
         pybullet.resetBasePositionAndOrientation(
-            self.body, above, turned, physicsClientId=self._client
+            self.body, position_m, rotation, physicsClientId=client
         )
-        pybullet.resetBaseVelocity(self.body, (0, 0, 0), (0, 0, 0), physicsClientId=self._client)
-        for wheel in (0, 1):
-            pybullet.resetJointState(self.body, wheel, 0.0, 0.0, physicsClientId=self._client)
+
+        still = (0, 0, 0)
+        pybullet.resetBaseVelocity(self.body, still, still, physicsClientId=client)
+        for wheel in _WHEELS:
+            pybullet.resetJointState(self.body, wheel, 0.0, 0.0, physicsClientId=client)
 
     def _assemble(self) -> int:
         client = self._client
-        trunk = pybullet.createCollisionShape(
-            pybullet.GEOM_BOX,
-            halfExtents=[0.5, 0.3, 0.1],
-            collisionFramePosition=[0, 0, 0.08],
-            physicsClientId=client,
-        )
-        # Spheres touch the ground in a point, so that the track is what it says.
-        wheel = pybullet.createCollisionShape(
-            pybullet.GEOM_SPHERE, radius=WHEEL_RADIUS_M, physicsClientId=client
-        )
-        caster = pybullet.createCollisionShape(
-            pybullet.GEOM_SPHERE, radius=_CASTER_RADIUS_M, physicsClientId=client
-        )
-        low = _CASTER_RADIUS_M - WHEEL_RADIUS_M + 0.002
-        places = [
-            (0, TRACK_M / 2, 0),
-            (0, -TRACK_M / 2, 0),
-            (_CASTER_FORWARD_M, 0, low),
-            (-_CASTER_FORWARD_M, 0, low),
-        ]
-        upright = [(0, 0, 0, 1)] * 4
+        # Spheres touch the ground in a point, so that the track is exactly TRACK_M.
+        wheel = self._sphere(WHEEL_RADIUS_M)
+        caster = self._sphere(_CASTER_RADIUS_M)
+        caster_m = _CASTER_RADIUS_M - WHEEL_RADIUS_M + 0.002
         body = pybullet.createMultiBody(
             _MASS_KG,
-            trunk,
+            self._trunk(),
             -1,
             linkMasses=[_WHEEL_KG, _WHEEL_KG, _CASTER_KG, _CASTER_KG],
             linkCollisionShapeIndices=[wheel, wheel, caster, caster],
             linkVisualShapeIndices=[-1] * 4,
-            linkPositions=places,
-            linkOrientations=upright,
+            linkPositions=[
+                (0, TRACK_M / 2, 0),
+                (0, -TRACK_M / 2, 0),
+                (_CASTER_FORWARD_M, 0, caster_m),
+                (-_CASTER_FORWARD_M, 0, caster_m),
+            ],
+            linkOrientations=[_UPRIGHT] * 4,
             linkInertialFramePositions=[(0, 0, 0)] * 4,
-            linkInertialFrameOrientations=upright,
+            linkInertialFrameOrientations=[_UPRIGHT] * 4,
             linkParentIndices=[0] * 4,
             linkJointTypes=[pybullet.JOINT_REVOLUTE] * 2 + [pybullet.JOINT_FIXED] * 2,
             linkJointAxis=[(0, 1, 0)] * 4,
             physicsClientId=client,
         )
+
         pybullet.changeDynamics(
             body, -1, linearDamping=0.0, angularDamping=0.0, physicsClientId=client
         )
         for link, friction in enumerate((_GRIP, _GRIP, 0.0, 0.0)):
             pybullet.changeDynamics(body, link, lateralFriction=friction, physicsClientId=client)
         return int(body)
+
+    def _trunk(self) -> int:
+        return int(
+            pybullet.createCollisionShape(
+                pybullet.GEOM_BOX,
+                halfExtents=[0.5, 0.3, 0.1],
+                collisionFramePosition=[0, 0, 0.08],
+                physicsClientId=self._client,
+            )
+        )
+
+    def _sphere(self, radius_m: float) -> int:
+        return int(
+            pybullet.createCollisionShape(
+                pybullet.GEOM_SPHERE,
+                radius=radius_m,
+                physicsClientId=self._client,
+            )
+        )
+
+
+def _within_limits(speed_rad_s: float) -> float:
+    return max(-MAX_WHEEL_RAD_S, min(MAX_WHEEL_RAD_S, speed_rad_s))

@@ -1,7 +1,8 @@
-"""The world and all that senses it, tick by tick of the odometry."""
+"""The world and the sensors in it, tick by tick of the odometry."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 from schemas.base import Message
@@ -16,13 +17,15 @@ from services.sim.world import World
 
 
 class Simulation:
-    """Simulated time starts at 0 and goes on by `tick_ns` with every `tick`."""
+    """A town with a robot. Simulated time starts at 0 and advances by `tick_ns` with every tick."""
 
     def __init__(self, config: Config) -> None:
         self.config = config
         self.tick_ns = 1_000_000_000 // config.odometry_hz
         self.ticks_per_frame = config.odometry_hz // config.frame_hz
         self.now_ns = 0
+        self.progress = 0.0
+
         place = town.generate(config.seed)
         self.world = World(place, config.egl)
         self.camera = StereoCamera(self.world, calibration(config.width_px, config.height_px))
@@ -31,20 +34,21 @@ class Simulation:
         self._pose = self.world.pose()
         self._travelled_m = 0.0
         self._frames = 0
-        self.progress = 0.0
 
     def resume(self, past: Iterable[Message]) -> None:
-        """Go on at the time and from the place of the last truth that was told, at rest."""
+        """Continue at the time and the place of the last true pose, at rest."""
         last: Message | None = None
         for message in past:
             last = message
-        if isinstance(last, TruePose):
-            self.world.robot.place(last.pose)
-            self._pose = self.world.pose()
-            self._travelled_m = last.travelled_m
-            self.now_ns = last.stamp_ns
-            self._frames = self.now_ns // self.tick_ns // self.ticks_per_frame
-            self._progress.resume(last.progress)
+        if not isinstance(last, TruePose):
+            return
+
+        self.world.robot.place(last.pose)
+        self._pose = self.world.pose()
+        self._travelled_m = last.travelled_m
+        self._progress.resume(last.progress)
+        self.now_ns = last.stamp_ns
+        self._frames = self.now_ns // self.tick_ns // self.ticks_per_frame
 
     def drive(self, command: MotorCommand) -> None:
         """Set the wheels' speeds."""
@@ -55,49 +59,51 @@ class Simulation:
         self.world.robot.drive(0.0, 0.0)
 
     def tick(self) -> Odometry:
-        """Let one tick pass; what the wheels report of it."""
-        dt_s = self.tick_ns / 1e9
+        """Advance by one tick: the wheels' measurement of it."""
         before = self._pose
+        dt_s = self.tick_ns / 1e9
         self.world.step(dt_s)
         self.now_ns += self.tick_ns
         self._pose = self.world.pose()
-        self._travelled_m += (
-            (self._pose.x_m - before.x_m) ** 2 + (self._pose.y_m - before.y_m) ** 2
-        ) ** 0.5
+
+        dx_m = self._pose.x_m - before.x_m
+        dy_m = self._pose.y_m - before.y_m
+        self._travelled_m += math.sqrt(dx_m**2 + dy_m**2)
         odometry = self._odometry.measure(before, self._pose, dt_s)
         odometry.stamp_ns = self.now_ns
         return odometry
 
     def step(self) -> list[Message]:
-        """Let one tick pass, and say what the wheels report of it."""
+        """As `tick`, in a list."""
         return [self.tick()]
 
     def view(self) -> list[Message]:
-        """What is sensed of the world now: the next stereo frame."""
+        """As `frame`, in a list."""
         return [self.frame()]
 
     def frame(self) -> StereoFrame:
-        """The next stereo frame, as of now."""
+        """The next stereo frame."""
         number = self._frames
-        self._frames = self._frames + 1
+        self._frames += 1
         return self.camera.frame(self.now_ns, number)
 
     def clock(self, rate: float) -> Clock:
-        """Now, and how fast it goes by."""
+        """The simulated time, which passes at `rate` times the wall's."""
         return Clock(stamp_ns=self.now_ns, rate=rate)
 
     def truth(self) -> TruePose:
-        """Where the robot is now."""
-        self.progress = self._progress.advance(self._pose.x_m, self._pose.y_m)
+        """The robot's true pose."""
+        pose = self._pose
+        self.progress = self._progress.advance(pose.x_m, pose.y_m)
         return TruePose(
             stamp_ns=self.now_ns,
-            pose=self._pose,
+            pose=pose,
             travelled_m=self._travelled_m,
             progress=self.progress,
         )
 
     def town(self) -> TrueTown:
-        """The town, as of now."""
+        """The town."""
         message = self.world.town.message()
         message.stamp_ns = self.now_ns
         return message

@@ -1,4 +1,4 @@
-"""The town as pybullet knows it: shapes with pictures, and a wheeled robot with physics."""
+"""The town in pybullet: shapes with pictures, and a wheeled robot with physics."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import logging
 import math
 import tempfile
 import weakref
-from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
 import numpy as np
 
+from cogmap.geometry.arrays import Singles
 from schemas.sensing import Pose
-from services.sim.layout.plan import Plot
+from services.sim.layout.plan import Plot, Point
 from services.sim.layout.town import Place
 from services.sim.rendering import mesh, prop_shapes, scenery
 from services.sim.rendering.egl import Egl
@@ -24,14 +24,17 @@ from services.sim.robot import Robot
 from services.sim.stdio import pybullet, quiet
 
 STEP_S = 1 / 240
+_GRAVITY_M_S2 = -9.81
+_NOT_SOLID = -1
+_ORIGIN = (0.0, 0.0)
 _log = logging.getLogger(__name__)
 
 
 class World:
     """A place with a robot in it. Positions in metres, x east, y north, z up; close it when done.
 
-    With `want_egl` EGL draws it where it works, and only in one world at a time in a process (else
-    CogmapError).
+    With `want_egl` it is rendered by EGL where that works, and only in one world at a time in a
+    process (otherwise CogmapError).
     """
 
     def __init__(self, town: Place, want_egl: bool = True) -> None:
@@ -40,12 +43,10 @@ class World:
             self.client: int = pybullet.connect(pybullet.DIRECT)
         self.egl = Egl.load(self.client) if want_egl and egl_works() else None
         self._leave = weakref.finalize(self, _leave, self.client, self.egl)
-        _log.info(
-            "the camera's pictures are drawn by %s",
-            "EGL" if self.egl else "TinyRenderer, more slowly than by EGL",
-        )
-        plots = [(plot.footprint, plot.kind.height_m) for plot in town.plots]
-        self.relief = relief(plots + [(prop.area, prop.size_m[2]) for prop in town.props])
+        renderer = "EGL" if self.egl else "TinyRenderer, more slowly than by EGL"
+        _log.info("the camera's pictures are drawn by %s", renderer)
+
+        self.relief = _relief(town)
         self.building_of_body: dict[int, str] = {}
         self.props: list[int] = []
         self.streets: list[int] = []
@@ -53,103 +54,127 @@ class World:
         self.robot = Robot(self.client, town.start)
 
     def step(self, dt_s: float) -> None:
-        """Let `dt_s` pass, in steps of STEP_S."""
-        for _ in range(round(dt_s / STEP_S)):
+        """Advance by `dt_s`, in steps of STEP_S."""
+        steps = round(dt_s / STEP_S)
+        for _ in range(steps):
             pybullet.stepSimulation(physicsClientId=self.client)
 
     def pose(self) -> Pose:
-        """Where the robot is."""
+        """The robot's pose."""
         return self.robot.pose()
 
     def place_robot(self, pose: Pose) -> None:
-        """Put the robot there, at rest, with the ground under it and the sky around it, however far
-        that is.
+        """Put the robot there, at rest, with the ground under it and the sky around it, at any
+        distance.
         """
         self.robot.place(pose)
-        under = [
-            round(where / scenery.GRASS_TILE_M) * scenery.GRASS_TILE_M
-            for where in (pose.x_m, pose.y_m)
-        ]
-        for body, (x_m, y_m) in ((self._soil, under), (self.sky, (pose.x_m, pose.y_m))):
-            pybullet.resetBasePositionAndOrientation(
-                body, (x_m, y_m, 0), (0, 0, 0, 1), physicsClientId=self.client
-            )
+        self._move(self._soil, _on_tile(pose.x_m), _on_tile(pose.y_m))
+        self._move(self.sky, pose.x_m, pose.y_m)
 
     def close(self) -> None:
         """Leave pybullet; nothing of it stays."""
         self._leave()
 
+    def _move(self, body: int, x_m: float, y_m: float) -> None:
+        upright = (0, 0, 0, 1)
+        pybullet.resetBasePositionAndOrientation(
+            body, (x_m, y_m, 0), upright, physicsClientId=self.client
+        )
+
     def _build(self) -> None:
         client = self.client
-        pybullet.setGravity(0, 0, -9.81, physicsClientId=client)
+        pybullet.setGravity(0, 0, _GRAVITY_M_S2, physicsClientId=client)
         pybullet.setTimeStep(STEP_S, physicsClientId=client)
-        half = [scenery.GROUND_M, scenery.GROUND_M, 1.0]
-        floor = pybullet.createCollisionShape(
-            pybullet.GEOM_BOX,
-            halfExtents=half,
-            collisionFramePosition=[0, 0, -1.0],
-            physicsClientId=client,
-        )
-        grass, pavement, *street = scenery.ground(self.town.roads)
-        self._soil = self._add(*grass, floor)
-        pybullet.changeDynamics(self._soil, -1, lateralFriction=1.0, physicsClientId=client)
-        self._add(*pavement)
-        self.streets = [self._add(surface, picture) for surface, picture in street]
-        self.sky = self._add(*scenery.sky())
-        for plot in self.town.plots:
-            self._raise(plot)
-        for prop in self.town.props:
-            self.props.append(
-                self._add(
-                    *prop_shapes.shape(prop),
-                    place=(prop.x_m, prop.y_m, 0.0),
-                    heading_rad=prop.heading_rad,
-                )
-            )
 
-    def _raise(self, plot: Plot) -> None:
-        kind = plot.kind
-        half = [kind.width_m / 2, kind.depth_m / 2, kind.height_m / 2]
-        solid = pybullet.createCollisionShape(
-            pybullet.GEOM_BOX,
-            halfExtents=half,
-            collisionFramePosition=[0, 0, half[2]],
-            physicsClientId=self.client,
+        self._add_ground()
+        sky, picture = scenery.sky()
+        self.sky = self._add(sky, picture)
+        for plot in self.town.plots:
+            self._add_building(plot)
+        for prop in self.town.props:
+            surface, picture = prop_shapes.shape(prop)
+            at_m = (prop.x_m, prop.y_m)
+            body = self._add(surface, picture, at_m=at_m, heading_rad=prop.heading_rad)
+            self.props.append(body)
+
+    def _add_ground(self) -> None:
+        (grass, grass_picture), (pavement, pavement_picture), *streets = scenery.ground(
+            self.town.roads
         )
-        body = self._add(*mesh.building(kind), solid, (plot.x_m, plot.y_m, 0.0), plot.heading_rad)
+        floor = self._solid_box(scenery.GROUND_M, scenery.GROUND_M, 1.0, middle_m=-1.0)
+        self._soil = self._add(grass, grass_picture, floor)
+        pybullet.changeDynamics(self._soil, -1, lateralFriction=1.0, physicsClientId=self.client)
+        self._add(pavement, pavement_picture)
+        self.streets = [self._add(surface, picture) for surface, picture in streets]
+
+    def _add_building(self, plot: Plot) -> None:
+        kind = plot.kind
+        half_height_m = kind.height_m / 2
+        solid = self._solid_box(
+            kind.width_m / 2, kind.depth_m / 2, half_height_m, middle_m=half_height_m
+        )
+        surface, picture = mesh.building(kind)
+        body = self._add(surface, picture, solid, (plot.x_m, plot.y_m), plot.heading_rad)
         self.building_of_body[body] = kind.name
+
+    def _solid_box(self, half_x_m: float, half_y_m: float, half_z_m: float, middle_m: float) -> int:
+        """A box that nothing passes, its middle at height `middle_m`."""
+        return int(
+            pybullet.createCollisionShape(
+                pybullet.GEOM_BOX,
+                halfExtents=[half_x_m, half_y_m, half_z_m],
+                collisionFramePosition=[0, 0, middle_m],
+                physicsClientId=self.client,
+            )
+        )
 
     def _add(
         self,
         surface: mesh.Mesh,
         picture: Image,
-        solid: int = -1,
-        place: Sequence[float] = (0.0, 0.0, 0.0),
+        solid: int = _NOT_SOLID,
+        at_m: Point = _ORIGIN,
         heading_rad: float = 0.0,
     ) -> int:
-        """Add a body. Its shape and picture go through files, the only way that every renderer of
-        pybullet takes.
+        """Add a body. Its shape and picture go through files, as all renderers of pybullet load
+        nothing else.
         """
+        client = self.client
         with tempfile.TemporaryDirectory(prefix="cogmap-") as folder:
             form = Path(folder) / "surface.obj"
             paint = Path(folder) / "texture.bmp"
             form.write_text(surface.obj())
-            cv2.imwrite(str(paint), np.ascontiguousarray(picture[..., ::-1]))
+            bgr = np.ascontiguousarray(picture[..., ::-1])
+            cv2.imwrite(str(paint), bgr)
             shape = pybullet.createVisualShape(
                 pybullet.GEOM_MESH,
                 fileName=str(form),
                 specularColor=[0, 0, 0],
-                physicsClientId=self.client,
+                physicsClientId=client,
             )
-            turned = (0.0, 0.0, math.sin(heading_rad / 2), math.cos(heading_rad / 2))
-            body = int(
-                pybullet.createMultiBody(
-                    0, solid, shape, place, turned, physicsClientId=self.client
-                )
+            rotation = (0.0, 0.0, math.sin(heading_rad / 2), math.cos(heading_rad / 2))
+            body = pybullet.createMultiBody(
+                0, solid, shape, (*at_m, 0.0), rotation, physicsClientId=client
             )
-            texture = pybullet.loadTexture(str(paint), physicsClientId=self.client)
-        pybullet.changeVisualShape(body, -1, textureUniqueId=texture, physicsClientId=self.client)
-        return body
+            texture = pybullet.loadTexture(str(paint), physicsClientId=client)
+
+        pybullet.changeVisualShape(body, -1, textureUniqueId=texture, physicsClientId=client)
+        return int(body)
+
+
+def _relief(town: Place) -> Singles:
+    """The height of the town's buildings and props."""
+    boxes = [(plot.footprint, plot.kind.height_m) for plot in town.plots]
+    for prop in town.props:
+        _, _, height_m = prop.size_m
+        boxes.append((prop.area, height_m))
+    return relief(boxes)
+
+
+def _on_tile(where_m: float) -> float:
+    """The nearest multiple of the grass's tile, so that its picture stays in place."""
+    tiles = round(where_m / scenery.GRASS_TILE_M)
+    return tiles * scenery.GRASS_TILE_M
 
 
 def _leave(client: int, egl: Egl | None) -> None:

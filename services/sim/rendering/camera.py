@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
+from cogmap.geometry.arrays import Floats, Singles
 from schemas.array import Array
 from schemas.sensing import Calibration, StereoFrame
-from services.sim.rendering.light import Light, brightness, shadow_top, expose
+from services.sim.rendering.light import Light, brightness, expose, shadow_top
 from services.sim.rendering.wall import Image
 from services.sim.stdio import pybullet, quiet
 from services.sim.world import World
 
-Matrix = npt.NDArray[np.float64]
 NEAR_M = 0.2
 FAR_M = 400.0
 _NOON = (-0.4, -0.7, 1.0)
 # The camera's axes (x right, y down, z forward) in the robot's (x forward, y left, z up).
-_MOUNT: Matrix = np.array([[0, 0, 1], [-1, 0, 0], [0, -1, 0]], float)
+_MOUNT: Floats = np.array([[0, 0, 1], [-1, 0, 0], [0, -1, 0]], float)
 
 
 def calibration(
@@ -50,42 +51,42 @@ def calibration(
 
 @dataclass(frozen=True)
 class Exposure:
-    """One camera's picture, uint8 (h, w, 3).
+    """One camera's image, uint8 (h, w, 3).
 
-    In a survey also the true depth along the optical axis in metres, float32 (h, w), 0 in the sky,
-    and pybullet's body at each pixel, int32 (h, w); else these are empty.
+    A labelled one has also the true depth along the optical axis in metres, float32 (h, w), 0 in
+    the sky, and pybullet's body at each pixel, int32 (h, w); otherwise these are empty.
     """
 
     image: Image
-    depth_m: npt.NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 0), np.float32))
+    depth_m: Singles = field(default_factory=lambda: np.empty((0, 0), np.float32))
     body: npt.NDArray[np.int32] = field(default_factory=lambda: np.empty((0, 0), np.int32))
 
 
+class Station(NamedTuple):
+    """A camera's axes as columns (3, 3), and its place (3,), in the world."""
+
+    axes: Floats
+    at_m: Floats
+
+
 class StereoCamera:
-    """Takes pictures of `world` from its robot."""
+    """Renders images of `world` from its robot."""
 
     def __init__(self, world: World, calibration: Calibration) -> None:
         self.calibration = calibration
         self._world = world
         self._projection = _projection(calibration)
-        right, _ = cv2.Rodrigues(np.asarray(calibration.right_rotation_rad))
-        self._right_turn: Matrix = np.asarray(right, float)
-        columns, rows = np.meshgrid(
-            np.arange(calibration.width_px), np.arange(calibration.height_px)
-        )
-        across = (columns - calibration.cx_px) / calibration.fx_px
-        down = (rows - calibration.cy_px) / calibration.fy_px
-        self._rays = np.stack([across, down, np.ones_like(across)], axis=2).astype(np.float32)
-        # The first pictures take long, and EGL announces them.
+        self._rays = _rays(calibration)
+        rotation, _ = cv2.Rodrigues(np.asarray(calibration.right_rotation_rad))
+        self._right_rotation: Floats = np.asarray(rotation, float)
+        # The first images take long, and EGL announces them.
         with quiet():
             self.capture()
 
     def capture(self) -> tuple[Image, Image]:
-        """The left and the right picture from where the robot is."""
-        (left, left_at), (right, right_at) = self._stations()
-        return self._expose(left, left_at, False, None).image, self._expose(
-            right, right_at, False, None
-        ).image
+        """The left and the right image from where the robot is."""
+        left, right = (self._render(station) for station in self._stations())
+        return left.image, right.image
 
     def frame(self, stamp_ns: int, number: int) -> StereoFrame:
         """As `capture`, as it travels."""
@@ -101,49 +102,56 @@ class StereoCamera:
     def capture_labelled(
         self, light: Light | None = None, rng: np.random.Generator | None = None
     ) -> tuple[Exposure, Exposure]:
-        """As `capture`, with true depth and bodies, for learning and tests; in `light`, with noise
+        """As `capture`, with true depth and bodies, for training and tests; in `light`, with noise
         from `rng`.
         """
-        left, right = (self._expose(turn, at, True, light) for turn, at in self._stations())
+        stations = self._stations()
+        left, right = (self._render(station, True, light) for station in stations)
         if light is None:
             return left, right
+
         rng = rng or np.random.default_rng(0)
         top_m = shadow_top(self._world.relief, light)
         lit = []
-        for exposure, (turn, at) in zip((left, right), self._stations(), strict=True):
-            rays = self._rays @ turn.T.astype(np.float32)
-            bright = brightness(exposure.depth_m, rays, at, top_m, light)
-            lit.append(replace(exposure, image=expose(exposure.image, bright, light, rng)))
+        for exposure, station in zip((left, right), stations, strict=True):
+            bright = self._brightness(exposure, station, top_m, light)
+            image = expose(exposure.image, bright, light, rng)
+            lit.append(replace(exposure, image=image))
         return lit[0], lit[1]
 
-    def _stations(self) -> list[tuple[Matrix, Matrix]]:
-        """Each camera's axes as columns, and its place, in the world."""
-        position, quaternion = self._world.robot.position_and_orientation()
-        turn = np.reshape(pybullet.getMatrixFromQuaternion(quaternion), (3, 3))
-        mount = self.calibration
-        axle_height_m = position[2]
-        left_at = position + turn @ (
-            mount.mount_forward_m,
-            0.0,
-            mount.mount_height_m - axle_height_m,
-        )
-        left = turn @ _MOUNT
-        return [
-            (left, left_at),
-            (left @ self._right_turn, left_at + left @ (mount.baseline_m, 0.0, 0.0)),
-        ]
+    def _brightness(
+        self, exposure: Exposure, station: Station, top_m: Singles, light: Light
+    ) -> Singles:
+        rays = self._rays @ station.axes.T.astype(np.float32)
+        return brightness(exposure.depth_m, rays, station.at_m, top_m, light)
 
-    def _expose(self, turn: Matrix, at: Matrix, labelled: bool, light: Light | None) -> Exposure:
+    def _stations(self) -> tuple[Station, Station]:
+        """The left and the right camera."""
+        position_m, quaternion = self._world.robot.position_and_orientation()
+        matrix = pybullet.getMatrixFromQuaternion(quaternion)
+        robot_axes = np.reshape(matrix, (3, 3))
+
         mount = self.calibration
+        above_axle_m = mount.mount_height_m - position_m[2]
+        left_at_m = position_m + robot_axes @ (mount.mount_forward_m, 0.0, above_axle_m)
+        left_axes = robot_axes @ _MOUNT
+        right_at_m = left_at_m + left_axes @ (mount.baseline_m, 0.0, 0.0)
+        right_axes = left_axes @ self._right_rotation
+        return Station(left_axes, left_at_m), Station(right_axes, right_at_m)
+
+    def _render(
+        self, station: Station, labelled: bool = False, light: Light | None = None
+    ) -> Exposure:
+        """What one camera sees, with depth and bodies where it is `labelled`."""
         world = self._world
         if world.egl is not None:
             world.egl.check()
+
+        mount = self.calibration
         _, _, rgba, depth, mask = pybullet.getCameraImage(
             mount.width_px,
             mount.height_px,
-            pybullet.computeViewMatrix(
-                at.tolist(), (at + turn[:, 2]).tolist(), (-turn[:, 1]).tolist()
-            ),
+            _view(station),
             self._projection,
             lightDirection=light.sun if light else _NOON,
             lightColor=(1, 1, 1),
@@ -155,27 +163,52 @@ class StereoCamera:
             renderer=pybullet.ER_BULLET_HARDWARE_OPENGL if world.egl else pybullet.ER_TINY_RENDERER,
             physicsClientId=world.client,
         )
-        image = np.ascontiguousarray(
-            np.asarray(rgba, np.uint8).reshape(mount.height_px, mount.width_px, 4)[..., :3]
-        )
+        pixels = np.asarray(rgba, np.uint8).reshape(mount.height_px, mount.width_px, 4)
+        image = np.ascontiguousarray(pixels[..., :3])
         if not labelled:
             return Exposure(image)
+
         body = np.asarray(mask, np.int32)
-        return Exposure(
-            image, np.where(body == world.sky, np.float32(0), _metres(np.asarray(depth))), body
-        )
+        depth_m = _metres(np.asarray(depth))
+        is_sky = body == world.sky
+        return Exposure(image, np.where(is_sky, np.float32(0), depth_m), body)
 
 
-def _metres(depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+def _rays(calibration: Calibration) -> Singles:
+    """(h, w, 3): the direction of each pixel in the camera's axes, of length 1 along the optical
+    axis.
+    """
+    columns = np.arange(calibration.width_px)
+    rows = np.arange(calibration.height_px)
+    right = (columns - calibration.cx_px) / calibration.fx_px
+    down = (rows - calibration.cy_px) / calibration.fy_px
+
+    x, y = np.meshgrid(right, down)
+    rays = np.stack([x, y, np.ones_like(x)], axis=2)
+    return rays.astype(np.float32)
+
+
+def _view(station: Station) -> list[float]:
+    """OpenGL's view matrix of a camera."""
+    _, down, forward = station.axes.T
+    eye = station.at_m.tolist()
+    target = (station.at_m + forward).tolist()
+    view: list[float] = pybullet.computeViewMatrix(eye, target, (-down).tolist())
+    return view
+
+
+def _metres(depth: Singles) -> Singles:
     """Depth along the axis from OpenGL's depth buffer."""
-    metres = FAR_M * NEAR_M / (FAR_M - (FAR_M - NEAR_M) * depth.astype(np.float64))
-    return metres.astype(np.float32)
+    share = depth.astype(np.float64)
+    depth_m = FAR_M * NEAR_M / (FAR_M - (FAR_M - NEAR_M) * share)
+    return depth_m.astype(np.float32)
 
 
 def _projection(mount: Calibration) -> list[float]:
-    """OpenGL's projection matrix, column by column, of a pinhole camera centred on its picture."""
-    a = (FAR_M + NEAR_M) / (NEAR_M - FAR_M)
-    b = 2 * FAR_M * NEAR_M / (NEAR_M - FAR_M)
+    """OpenGL's projection matrix, column by column, of a pinhole camera centred on its image."""
+    range_m = NEAR_M - FAR_M
+    a = (FAR_M + NEAR_M) / range_m
+    b = 2 * FAR_M * NEAR_M / range_m
     wide = 2 * mount.fx_px / mount.width_px
     high = 2 * mount.fy_px / mount.height_px
     return [wide, 0, 0, 0, 0, high, 0, 0, 0, 0, a, -1, 0, 0, b, 0]

@@ -1,4 +1,4 @@
-"""The EGL plugin, which draws several times faster than TinyRenderer, where it works."""
+"""The EGL plugin, which renders several times faster than TinyRenderer, where it works."""
 
 from __future__ import annotations
 
@@ -19,13 +19,14 @@ plugin = importlib.util.find_spec("eglRenderer").origin
 raise SystemExit(pybullet.loadPlugin(plugin, "_eglRendererPlugin") < 0)
 """
 _PROBE_S = 20.0
+_ENTRY_POINT = "_eglRendererPlugin"
 
 
 class Egl:
     """The plugin in one pybullet client.
 
     Its OpenGL context belongs to the thread that loaded it, and loading another takes that thread
-    from it: a process has one at a time, or pictures would silently show something else.
+    from it: a process has one at a time, or images would silently show something else.
     """
 
     _loaded = False
@@ -44,27 +45,27 @@ class Egl:
             raise CogmapError(
                 "a simulated world is open in this process: close it before opening another"
             )
+
         found = importlib.util.find_spec("eglRenderer")
         if found is None or found.origin is None:
             return None
         with quiet():
-            plugin = int(
-                pybullet.loadPlugin(found.origin, "_eglRendererPlugin", physicsClientId=client)
-            )
+            plugin = pybullet.loadPlugin(found.origin, _ENTRY_POINT, physicsClientId=client)
         if plugin < 0:
             return None
+
         cls._loaded = True
-        return cls(client, plugin)
+        return cls(client, int(plugin))
 
     def check(self) -> None:
         """Raise CogmapError on another thread than the one that loaded it."""
         if threading.get_ident() != self._thread:
             raise CogmapError(
-                "pictures are taken on the thread that opened the simulated world: open it on that one"
+                "images are rendered on the thread that opened the simulated world: open it there"
             )
 
     def unload(self) -> None:
-        """Leave the client without it."""
+        """Unload it from the client."""
         pybullet.unloadPlugin(self._plugin, physicsClientId=self._client)
         type(self)._loaded = False
 
@@ -78,11 +79,10 @@ def works() -> bool:
         ctypes.CDLL("libEGL.so.1")
     except OSError:
         return False
+
     command = [sys.executable, "-c", _PROBE]
     try:
-        return (
-            subprocess.run(command, capture_output=True, timeout=_PROBE_S, check=False).returncode
-            == 0
-        )
+        probe = subprocess.run(command, capture_output=True, timeout=_PROBE_S, check=False)
     except subprocess.TimeoutExpired:
         return False
+    return probe.returncode == 0

@@ -1,6 +1,4 @@
-"""Time of day and weather, and how a camera exposes them: shadows, colour, exposure, blur and noise.
-Pure.
-"""
+"""Time of day and weather, and how a camera exposes them: shadows, colour, blur and noise. Pure."""
 
 from __future__ import annotations
 

@@ -5,22 +5,24 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
 from services.sim.layout.catalogue import BuildingType
+from services.sim.layout.plan import Point, Rectangle
 from services.sim.rendering import facade
 from services.sim.rendering.wall import PX_PER_M, Image
 
 Vertex = tuple[float, float, float]
 UV = tuple[float, float]
-Rectangle = tuple[float, float, float, float]
 _ROOF_RISE_M = 2.2
+_ROOF = 4
 
 
 @dataclass
 class Mesh:
-    """Triangles; uv (0, 0) is a picture's upper left corner, and the picture repeats beyond (1, 1)."""
+    """Triangles; uv (0, 0) is a picture's upper left corner; it repeats beyond (1, 1)."""
 
     vertices: list[Vertex] = field(default_factory=list)
     uvs: list[UV] = field(default_factory=list)
@@ -30,35 +32,44 @@ class Mesh:
     def polygon(self, corners: list[Vertex], uvs: list[UV], normal: Vertex | None = None) -> None:
         """Add a convex polygon, its corners counter-clockwise as seen from its front."""
         first = len(self.vertices)
+        if normal is None:
+            normal = _normal(corners)
+
         self.vertices += corners
         self.uvs += uvs
-        self.normals += [normal or _normal(corners)] * len(corners)
-        self.triangles += [(first, first + i, first + i + 1) for i in range(1, len(corners) - 1)]
+        self.normals += [normal] * len(corners)
+        for number in range(first + 1, first + len(corners) - 1):
+            self.triangles.append((first, number, number + 1))
 
     def level(self, area: Rectangle, z_m: float, tile_m: float, cell_m: float) -> None:
         """Add `area` (west, south, east, north) at `z_m`, cut to cells, its picture repeated every
         `tile_m`.
         """
         west, south, east, north = area
-        xs = np.linspace(west, east, math.ceil((east - west) / cell_m) + 1).tolist()
-        ys = np.linspace(south, north, math.ceil((north - south) / cell_m) + 1).tolist()
-        for x0, x1 in itertools.pairwise(xs):
-            for y0, y1 in itertools.pairwise(ys):
-                corners = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
-                self.polygon(
-                    [(x, y, z_m) for x, y in corners],
-                    [(x / tile_m, -y / tile_m) for x, y in corners],
-                )
+        xs = pairwise(_cuts(west, east, cell_m))
+        ys = pairwise(_cuts(south, north, cell_m))
+        for (x0, x1), (y0, y1) in itertools.product(xs, ys):
+            corners = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
+            self.floor(corners, z_m, tile_m)
+
+    def floor(self, corners: list[Point], z_m: float, tile_m: float) -> None:
+        """Add a level polygon at `z_m`, its picture repeated every `tile_m`."""
+        vertices = [(x, y, z_m) for x, y in corners]
+        uvs = [(x / tile_m, -y / tile_m) for x, y in corners]
+        self.polygon(vertices, uvs)
 
     def obj(self) -> str:
         """The text of a Wavefront OBJ file."""
-        lines = [f"v {x:.4f} {y:.4f} {z:.4f}" for x, y, z in self.vertices]
-        lines += [f"vt {u:.6f} {1 - v:.6f}" for u, v in self.uvs]
-        lines += [f"vn {x:.4f} {y:.4f} {z:.4f}" for x, y, z in self.normals]
-        lines += [
-            "f " + " ".join(f"{i + 1}/{i + 1}/{i + 1}" for i in corners)
-            for corners in self.triangles
-        ]
+        lines = []
+        for x, y, z in self.vertices:
+            lines.append(f"v {x:.4f} {y:.4f} {z:.4f}")
+        for u, v in self.uvs:
+            lines.append(f"vt {u:.6f} {1 - v:.6f}")
+        for x, y, z in self.normals:
+            lines.append(f"vn {x:.4f} {y:.4f} {z:.4f}")
+        for corners in self.triangles:
+            numbers = [corner + 1 for corner in corners]
+            lines.append("f " + " ".join(f"{n}/{n}/{n}" for n in numbers))
         return "\n".join(lines) + "\n"
 
 
@@ -66,51 +77,110 @@ def building(kind: BuildingType) -> tuple[Mesh, Image]:
     """A building around the origin of its ground plan, width along x, front to -y, and the picture
     on it.
     """
-    w = kind.width_m / 2
-    d = kind.depth_m / 2
-    h = kind.height_m
-    eaves = h - _ROOF_RISE_M if kind.roof_shape == "gable" else h
-    corners = [(-w, -d), (w, -d), (w, d), (-w, d)]
-    sides = list(itertools.pairwise([*corners, corners[0]]))
-    pictures = [facade.side(kind, math.dist(a, b), number) for number, (a, b) in enumerate(sides)]
-    atlas, lefts = _side_by_side([*pictures, facade.roof(kind)])
+    shell = _Shell(kind)
+    for number in range(4):
+        shell.add_side(number)
+    shell.add_roof()
+    return shell.mesh, shell.atlas
 
-    def uv(number: int, along_m: float, down_m: float) -> UV:
-        return (lefts[number] + along_m * PX_PER_M) / atlas.shape[
-            1
-        ], down_m * PX_PER_M / atlas.shape[0]
 
-    mesh = Mesh()
-    for number, (a, b) in enumerate(sides):
-        length = math.dist(a, b)
-        outline = [(0.0, 0.0), (length, 0.0), (length, eaves), (0.0, eaves)]
-        if eaves < h and number % 2 == 1:
-            outline.insert(3, (length / 2, h))
-        unit = (b[0] - a[0]) / length, (b[1] - a[1]) / length
-        wall = [(a[0] + s * unit[0], a[1] + s * unit[1], z) for s, z in outline]
-        mesh.polygon(wall, [uv(number, s, h - z) for s, z in outline])
-    ridge_y = 0.0 if eaves < h else d
-    cover = [
-        uv(4, s, t) for s, t in ((0, 2 * d), (2 * w, 2 * d), (2 * w, d - ridge_y), (0, d - ridge_y))
-    ]
-    mesh.polygon([(-w, -d, eaves), (w, -d, eaves), (w, ridge_y, h), (-w, ridge_y, h)], cover)
-    if eaves < h:
-        mesh.polygon([(w, d, eaves), (-w, d, eaves), (-w, 0, h), (w, 0, h)], cover)
-    return mesh, atlas
+class _Shell:
+    """The sides and the roof of a building as they are built, and one picture for all of them."""
+
+    def __init__(self, kind: BuildingType) -> None:
+        self.mesh = Mesh()
+        self._half_width_m = kind.width_m / 2
+        self._half_depth_m = kind.depth_m / 2
+        self._height_m = kind.height_m
+        self._is_gabled = kind.roof_shape == "gable"
+        self._eaves_m = kind.height_m - _ROOF_RISE_M if self._is_gabled else kind.height_m
+
+        w = self._half_width_m
+        d = self._half_depth_m
+        self._corners: list[Point] = [(-w, -d), (w, -d), (w, d), (-w, d), (-w, -d)]
+        pictures = [
+            facade.side(kind, math.dist(a, b), number)
+            for number, (a, b) in enumerate(pairwise(self._corners))
+        ]
+        self.atlas, self._lefts = _side_by_side([*pictures, facade.roof(kind)])
+
+    def add_side(self, number: int) -> None:
+        """Wall `number`; with a gable, those at the sides have one."""
+        (ax, ay), (bx, by) = self._corners[number : number + 2]
+        length_m = math.dist((ax, ay), (bx, by))
+        along_x = (bx - ax) / length_m
+        along_y = (by - ay) / length_m
+
+        vertices = []
+        uvs = []
+        for s, z in self._outline(number, length_m):
+            vertices.append((ax + s * along_x, ay + s * along_y, z))
+            uvs.append(self._uv(number, s, self._height_m - z))
+        self.mesh.polygon(vertices, uvs)
+
+    def add_roof(self) -> None:
+        """A flat roof, or the two halves of a gabled one."""
+        w = self._half_width_m
+        d = self._half_depth_m
+        eaves_m = self._eaves_m
+        ridge_m = self._height_m
+        ridge_y = 0.0 if self._is_gabled else d
+
+        front = [(-w, -d, eaves_m), (w, -d, eaves_m), (w, ridge_y, ridge_m), (-w, ridge_y, ridge_m)]
+        uvs = self._roof_uvs(ridge_y)
+        self.mesh.polygon(front, uvs)
+        if self._is_gabled:
+            back = [(w, d, eaves_m), (-w, d, eaves_m), (-w, 0, ridge_m), (w, 0, ridge_m)]
+            self.mesh.polygon(back, uvs)
+
+    def _outline(self, number: int, length_m: float) -> list[Point]:
+        """The corners of a wall: along it, and up."""
+        eaves_m = self._eaves_m
+        outline = [(0.0, 0.0), (length_m, 0.0), (length_m, eaves_m), (0.0, eaves_m)]
+        if self._is_gabled and number % 2 == 1:
+            outline.insert(3, (length_m / 2, self._height_m))
+        return outline
+
+    def _roof_uvs(self, ridge_y: float) -> list[UV]:
+        width_m = 2 * self._half_width_m
+        eaves_m = 2 * self._half_depth_m
+        ridge_m = self._half_depth_m - ridge_y
+        corners = ((0, eaves_m), (width_m, eaves_m), (width_m, ridge_m), (0, ridge_m))
+        return [self._uv(_ROOF, along_m, down_m) for along_m, down_m in corners]
+
+    def _uv(self, number: int, along_m: float, down_m: float) -> UV:
+        """The point of picture `number` in the atlas."""
+        height_px, width_px, _ = self.atlas.shape
+        column = self._lefts[number] + along_m * PX_PER_M
+        row = down_m * PX_PER_M
+        return column / width_px, row / height_px
+
+
+def _cuts(start: float, end: float, cell_m: float) -> list[float]:
+    """Where a stretch is cut to cells of `cell_m` at most."""
+    cells = math.ceil((end - start) / cell_m)
+    cuts: list[float] = np.linspace(start, end, cells + 1).tolist()
+    return cuts
 
 
 def _normal(corners: list[Vertex]) -> Vertex:
     a, b, c = np.asarray(corners[:3])
     across = np.cross(b - a, c - a)
-    x, y, z = (across / np.linalg.norm(across)).tolist()
+    length = np.linalg.norm(across)
+    x, y, z = (across / length).tolist()
     return x, y, z
 
 
 def _side_by_side(pictures: list[Image]) -> tuple[Image, list[int]]:
     """One picture with all of them in a row, and where each begins, in pixels."""
-    lefts = [0, *itertools.accumulate(picture.shape[1] for picture in pictures)]
-    # OpenGL wants rows of whole words: a width that 4 divides.
-    row = np.zeros((max(p.shape[0] for p in pictures), math.ceil(lefts[-1] / 4) * 4, 3), np.uint8)
+    heights_px = [picture.shape[0] for picture in pictures]
+    widths_px = [picture.shape[1] for picture in pictures]
+    lefts = [0, *itertools.accumulate(widths_px)]
+
+    # OpenGL needs rows of whole words: a width that 4 divides.
+    width_px = math.ceil(lefts[-1] / 4) * 4
+    row = np.zeros((max(heights_px), width_px, 3), np.uint8)
     for left, picture in zip(lefts, pictures, strict=False):
-        row[: picture.shape[0], left : left + picture.shape[1]] = picture
+        height_px, picture_px, _ = picture.shape
+        row[:height_px, left : left + picture_px] = picture
     return row, lefts

@@ -1,92 +1,120 @@
-"""What trees, lamps, parked cars, hedges and kiosks look like: a mesh and its picture. Pure."""
+"""The shapes of trees, lamps, parked cars, hedges and kiosks: a mesh and its picture. Pure."""
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from services.sim.layout.catalogue import Colour
-from services.sim.layout.furniture import Prop
-from services.sim.rendering.mesh import Mesh, Vertex
+from services.sim.layout.furniture import Prop, Size
+from services.sim.rendering.mesh import UV, Mesh, Vertex
 from services.sim.rendering.wall import Image, roughen
 
+Colours = tuple[Colour, Colour]
+
 _SIDES = 9
+_GRAIN = 0.25
 _DARK: Colour = (40, 42, 46)
+_BARK: Colour = (92, 66, 44)
+# The two halves of the picture, each with one of the two colours.
+_FIRST = 0.0
+_SECOND = 0.5
+_MARGIN = 0.02
+_HALF_WIDTH = 0.46
+
+
+class Ring(NamedTuple):
+    """A circle around the vertical axis, and its height in the picture."""
+
+    radius_m: float
+    z_m: float
+    v: float
 
 
 def shape(prop: Prop) -> tuple[Mesh, Image]:
-    """The prop around the origin, length along x, and the picture on it: two colours, side by side."""
+    """The prop around the origin, length along x, and its picture: two colours, side by side."""
     rng = np.random.default_rng(prop.look)
     mesh = Mesh()
     colours = _BUILD[prop.kind](mesh, prop.size_m, rng)
-    picture = np.repeat(np.repeat(np.array([colours], np.uint8), 64, axis=0), 32, axis=1)
-    return mesh, roughen(np.ascontiguousarray(picture), rng, 0.25)
+
+    pixels = np.array([colours], np.uint8)
+    picture = pixels.repeat(64, axis=0).repeat(32, axis=1)
+    return mesh, roughen(picture, rng, _GRAIN)
 
 
-def _tree(
-    mesh: Mesh, size_m: tuple[float, float, float], rng: np.random.Generator
-) -> tuple[Colour, Colour]:
-    reach = size_m[0] / 2
-    tall = size_m[2]
-    _turned(mesh, [(0.16, 0.0), (0.14, 0.5 * tall)], 0)
-    crown = [(math.sin(a), -math.cos(a)) for a in np.linspace(0, math.pi, 6).tolist()]
-    _turned(mesh, [(reach * r, 0.66 * tall + 0.34 * tall * z) for r, z in crown], 1)
-    return (92, 66, 44), _tinted((58, 112, 44), rng)
+def _tree(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
+    width_m, _, tall_m = size_m
+    reach_m = width_m / 2
+    _rotate(mesh, [(0.16, 0.0), (0.14, 0.5 * tall_m)], _FIRST)
+
+    crown = []
+    for angle_rad in np.linspace(0, math.pi, 6).tolist():
+        radius_m = reach_m * math.sin(angle_rad)
+        z_m = 0.66 * tall_m + 0.34 * tall_m * -math.cos(angle_rad)
+        crown.append((radius_m, z_m))
+    _rotate(mesh, crown, _SECOND)
+    return _BARK, _tinted((58, 112, 44), rng)
 
 
-def _lamp(
-    mesh: Mesh, size_m: tuple[float, float, float], rng: np.random.Generator
-) -> tuple[Colour, Colour]:
-    tall = size_m[2]
-    _turned(mesh, [(0.09, 0.0), (0.06, tall - 0.4)], 0)
-    _turned(mesh, [(0.1, tall - 0.4), (0.28, tall - 0.1), (0.0, tall)], 1)
+def _lamp(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
+    _, _, tall_m = size_m
+    neck_m = tall_m - 0.4
+    _rotate(mesh, [(0.09, 0.0), (0.06, neck_m)], _FIRST)
+
+    shade = [(0.1, neck_m), (0.28, tall_m - 0.1), (0.0, tall_m)]
+    _rotate(mesh, shade, _SECOND)
     return _DARK, _tinted((226, 220, 190), rng)
 
 
-def _car(
-    mesh: Mesh, size_m: tuple[float, float, float], rng: np.random.Generator
-) -> tuple[Colour, Colour]:
-    long, wide, tall = size_m
-    _box(mesh, (-long / 2, -wide / 2, 0.12), (long / 2, wide / 2, 0.58 * tall), 1)
-    _box(mesh, (-0.3 * long, -0.46 * wide, 0.58 * tall), (0.24 * long, 0.46 * wide, tall), 0)
-    red, green, blue = rng.integers(30, 235, 3).tolist()
-    return _DARK, (red, green, blue)
+def _car(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
+    long_m, wide_m, tall_m = size_m
+    bonnet_m = 0.58 * tall_m
+    body_low = (-long_m / 2, -wide_m / 2, 0.12)
+    body_high = (long_m / 2, wide_m / 2, bonnet_m)
+    _box(mesh, body_low, body_high, _SECOND)
+
+    cabin_low = (-0.3 * long_m, -0.46 * wide_m, bonnet_m)
+    cabin_high = (0.24 * long_m, 0.46 * wide_m, tall_m)
+    _box(mesh, cabin_low, cabin_high, _FIRST)
+    return _DARK, _any_colour(rng, 30, 235)
 
 
-def _hedge(
-    mesh: Mesh, size_m: tuple[float, float, float], rng: np.random.Generator
-) -> tuple[Colour, Colour]:
-    long, wide, tall = size_m
-    _box(mesh, (-long / 2, -wide / 2, 0.0), (long / 2, wide / 2, tall), 1)
+def _hedge(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
+    long_m, wide_m, tall_m = size_m
+    low = (-long_m / 2, -wide_m / 2, 0.0)
+    high = (long_m / 2, wide_m / 2, tall_m)
+    _box(mesh, low, high, _SECOND)
     return _DARK, _tinted((50, 96, 40), rng)
 
 
-def _kiosk(
-    mesh: Mesh, size_m: tuple[float, float, float], rng: np.random.Generator
-) -> tuple[Colour, Colour]:
-    long, wide, tall = size_m
-    _box(mesh, (-long / 2, -wide / 2, 0.0), (long / 2, wide / 2, tall - 0.3), 0)
-    _box(mesh, (-0.6 * long, -0.6 * wide, tall - 0.3), (0.6 * long, 0.6 * wide, tall), 1)
-    first, second = (rng.integers(40, 230, 3).tolist() for _ in range(2))
-    return (first[0], first[1], first[2]), (second[0], second[1], second[2])
+def _kiosk(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
+    long_m, wide_m, tall_m = size_m
+    eaves_m = tall_m - 0.3
+    hut_low = (-long_m / 2, -wide_m / 2, 0.0)
+    hut_high = (long_m / 2, wide_m / 2, eaves_m)
+    _box(mesh, hut_low, hut_high, _FIRST)
+
+    roof_low = (-0.6 * long_m, -0.6 * wide_m, eaves_m)
+    roof_high = (0.6 * long_m, 0.6 * wide_m, tall_m)
+    _box(mesh, roof_low, roof_high, _SECOND)
+    hut_colour = _any_colour(rng, 40, 230)
+    return hut_colour, _any_colour(rng, 40, 230)
 
 
-def _bin(
-    mesh: Mesh, size_m: tuple[float, float, float], rng: np.random.Generator
-) -> tuple[Colour, Colour]:
-    reach = size_m[0] / 2
-    tall = size_m[2]
-    _turned(mesh, [(0.85 * reach, 0.0), (reach, tall), (0.0, tall)], 1)
+def _bin(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
+    width_m, _, tall_m = size_m
+    reach_m = width_m / 2
+    profile = [(0.85 * reach_m, 0.0), (reach_m, tall_m), (0.0, tall_m)]
+    _rotate(mesh, profile, _SECOND)
     return _DARK, _tinted((70, 84, 90), rng)
 
 
-_BUILD: dict[
-    str, Callable[[Mesh, tuple[float, float, float], np.random.Generator], tuple[Colour, Colour]]
-] = {
+_BUILD: dict[str, Callable[[Mesh, Size, np.random.Generator], Colours]] = {
     "tree": _tree,
     "lamp": _lamp,
     "car": _car,
@@ -96,53 +124,67 @@ _BUILD: dict[
 }
 
 
-def _tinted(colour: Colour, rng: np.random.Generator) -> Colour:
-    pixel = np.array([[colour]], np.uint8)
-    hue, saturation, value = (int(v) for v in cv2.cvtColor(pixel, cv2.COLOR_RGB2HSV)[0, 0])
-    turned = (
-        (hue + int(rng.integers(-8, 9))) % 180,
-        saturation,
-        int(np.clip(value * rng.uniform(0.75, 1.3), 0, 255)),
-    )
-    red, green, blue = cv2.cvtColor(np.array([[turned]], np.uint8), cv2.COLOR_HSV2RGB)[
-        0, 0
-    ].tolist()
+def _any_colour(rng: np.random.Generator, least: int, most: int) -> Colour:
+    red, green, blue = rng.integers(least, most, 3).tolist()
     return red, green, blue
 
 
-def _turned(mesh: Mesh, profile: Sequence[tuple[float, float]], half: int) -> None:
-    """A body of rotation from (radius, height) points upwards, painted with one half of the
+def _tinted(colour: Colour, rng: np.random.Generator) -> Colour:
+    """`colour`, its hue and brightness varied a little."""
+    pixel = np.array([[colour]], np.uint8)
+    hue, saturation, value = cv2.cvtColor(pixel, cv2.COLOR_RGB2HSV)[0, 0].tolist()
+    new_hue = (hue + int(rng.integers(-8, 9))) % 180
+    new_value = int(np.clip(value * rng.uniform(0.75, 1.3), 0, 255))
+
+    varied = np.array([[(new_hue, saturation, new_value)]], np.uint8)
+    red, green, blue = cv2.cvtColor(varied, cv2.COLOR_HSV2RGB)[0, 0].tolist()
+    return red, green, blue
+
+
+def _rotate(mesh: Mesh, profile: Sequence[tuple[float, float]], half: float) -> None:
+    """Add a body of rotation from (radius, height) points upwards, painted with one half of the
     picture.
     """
-    angles = np.linspace(0, math.tau, _SIDES + 1).tolist()
-    rings = [
-        (r, z, v)
-        for (r, z), v in zip(profile, np.linspace(1, 0, len(profile)).tolist(), strict=True)
-    ]
-    for (r0, z0, v0), (r1, z1, v1) in itertools.pairwise(rings):
-        for number, (a, b) in enumerate(itertools.pairwise(angles)):
-            corners: list[Vertex] = [
-                (r0 * math.cos(a), r0 * math.sin(a), z0),
-                (r0 * math.cos(b), r0 * math.sin(b), z0),
-                (r1 * math.cos(b), r1 * math.sin(b), z1),
-                (r1 * math.cos(a), r1 * math.sin(a), z1),
+    heights = np.linspace(1, 0, len(profile)).tolist()
+    rings = [Ring(radius, z, v) for (radius, z), v in zip(profile, heights, strict=True)]
+    angles_rad = np.linspace(0, math.tau, _SIDES + 1).tolist()
+    for lower, upper in pairwise(rings):
+        for number, (start_rad, end_rad) in enumerate(pairwise(angles_rad)):
+            corners = [
+                _on_ring(lower, start_rad),
+                _on_ring(lower, end_rad),
+                _on_ring(upper, end_rad),
+                _on_ring(upper, start_rad),
             ]
-            u0, u1 = (half / 2 + 0.02 + 0.46 * (number + side) / _SIDES for side in (0, 1))
-            middle = (a + b) / 2
-            mesh.polygon(
-                corners,
-                [(u0, v0), (u1, v0), (u1, v1), (u0, v1)],
-                (math.cos(middle), math.sin(middle), 0.3),
-            )
+            left = half + _MARGIN + _HALF_WIDTH * number / _SIDES
+            right = half + _MARGIN + _HALF_WIDTH * (number + 1) / _SIDES
+            uvs = [(left, lower.v), (right, lower.v), (right, upper.v), (left, upper.v)]
+            mesh.polygon(corners, uvs, _outwards((start_rad + end_rad) / 2))
 
 
-def _box(mesh: Mesh, low: Vertex, high: Vertex, half: int) -> None:
-    """A box without a floor, painted with one half of the picture."""
-    (x0, y0, z0), (x1, y1, z1) = low, high
-    u0 = half / 2 + 0.02
-    u1 = half / 2 + 0.48
-    uvs = [(u0, 1.0), (u1, 1.0), (u1, 0.0), (u0, 0.0)]
+def _on_ring(ring: Ring, angle_rad: float) -> Vertex:
+    x_m = ring.radius_m * math.cos(angle_rad)
+    y_m = ring.radius_m * math.sin(angle_rad)
+    return x_m, y_m, ring.z_m
+
+
+def _outwards(angle_rad: float) -> Vertex:
+    """A normal that points outwards and a little upwards."""
+    return math.cos(angle_rad), math.sin(angle_rad), 0.3
+
+
+def _box(mesh: Mesh, low: Vertex, high: Vertex, half: float) -> None:
+    """Add a box without a floor, painted with one half of the picture."""
+    x0, y0, z0 = low
+    x1, y1, z1 = high
+    left = half + _MARGIN
+    right = half + _MARGIN + _HALF_WIDTH
+    uvs: list[UV] = [(left, 1.0), (right, 1.0), (right, 0.0), (left, 0.0)]
+
     ground = [(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)]
-    for (ax, ay), (bx, by) in itertools.pairwise(ground):
-        mesh.polygon([(ax, ay, z0), (bx, by, z0), (bx, by, z1), (ax, ay, z1)], uvs)
-    mesh.polygon([(x0, y0, z1), (x1, y0, z1), (x1, y1, z1), (x0, y1, z1)], uvs)
+    for (ax, ay), (bx, by) in pairwise(ground):
+        side = [(ax, ay, z0), (bx, by, z0), (bx, by, z1), (ax, ay, z1)]
+        mesh.polygon(side, uvs)
+
+    top = [(x, y, z1) for x, y in ground[:4]]
+    mesh.polygon(top, uvs)

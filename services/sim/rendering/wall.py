@@ -74,8 +74,8 @@ def roughen(image: Image, rng: np.random.Generator, strength: float = 0.13) -> I
     """`image` with grain on it."""
     height_px, width_px, _ = image.shape
     grain = _grain(rng, height_px, width_px, strength)
-    rough = np.clip(image * grain[..., None], 0, 255)
-    return rough.astype(np.uint8)
+    rough: Image = np.clip(image * grain[..., None], 0, 255).astype(np.uint8)
+    return rough
 
 
 def _grain(rng: np.random.Generator, height_px: int, width_px: int, strength: float) -> Singles:

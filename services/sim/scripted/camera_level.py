@@ -31,7 +31,7 @@ class CameraLevelSim(LineFollower):
         self._odometry = WheelOdometry(config.noise, config.seed)
 
     def step(self) -> list[Message]:
-        """Advance by one tick: a message of odometry for each straight and each turn on the spot."""
+        """Advance by one tick: odometry of each straight and each turn on the spot."""
         since_ns = self.now_ns
         is_first_frame_taken = self._frames > 0
         legs = self._advance(self._trajectory.speed_m_s if is_first_frame_taken else 0.0)

@@ -44,7 +44,7 @@ class Trajectory(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_field
 
 
 class Line:
-    """A polyline by the distance along it; points that coincide with the one before are left out."""
+    """A polyline by the distance along it, without points that coincide with the one before."""
 
     def __init__(self, points_m: Floats) -> None:
         lengths_m = np.hypot(*np.diff(points_m, axis=0).T)
