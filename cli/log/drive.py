@@ -122,9 +122,10 @@ def _warn(reader: LogReader, tally: Tally) -> None:
             f"{reader.path} holds no {topics.TRUE_POSE.name}: distances and errors are 0", err=True
         )
     if tally.replica.is_behind:
+        version = tally.replica.graph.version
         click.echo(
-            f"{reader.path} lacks a {topics.DELTA.name} after number {tally.replica.graph.version}: "
-            "what was learned later is not shown",
+            f"{reader.path} lacks a {topics.DELTA.name} after number {version}: what was learned "
+            "later is not shown",
             err=True,
         )
 

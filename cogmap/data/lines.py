@@ -10,7 +10,7 @@ _MAX_SHOWN = 60
 
 
 def wrong_line(path: Path, number: int, line: str, expected: str) -> UsageError:
-    """The error for line `number`, counted from 1, of the file at `path`, which lacks `expected`."""
+    """The error for line `number`, counted from 1, of the file at `path`: not as `expected`."""
     shown = line.strip()
     if len(shown) > _MAX_SHOWN:
         shown = f"{shown[:_MAX_SHOWN]}…"

@@ -27,10 +27,10 @@ _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 class Robot:
     """One robot's log, each part in order of time, stamps in seconds of one clock.
 
-    `odometry`: (n, 3) stamp, forward speed in m/s, turn rate in rad/s. `observations`: (n, 4) stamp,
-    subject, range_m, bearing_rad, left positive. `truth`: (n, 4) stamp, x_m, y_m, heading_rad, from
-    motion capture: for evaluation only. `unread`: how many observations were of a barcode that
-    belongs to no subject, and were left out.
+    `odometry`: (n, 3) stamp, forward speed in m/s, turn rate in rad/s. `observations`: (n, 4)
+    stamp, subject, range_m, bearing_rad, left positive. `truth`: (n, 4) stamp, x_m, y_m,
+    heading_rad, from motion capture: for evaluation only. `unread`: how many observations were of a
+    barcode that belongs to no subject, and were left out.
     """
 
     number: int
@@ -48,7 +48,7 @@ class Robot:
 
 @dataclass(frozen=True)
 class Recording:
-    """A set: its robots, and the surveyed positions (x_m, y_m) of its landmarks by subject number."""
+    """A set: its robots, and the surveyed positions (x_m, y_m) of its landmarks by subject."""
 
     name: str
     robots: list[Robot]
@@ -65,14 +65,20 @@ class _Columns:
 
     def fit(self, rows: Floats) -> bool:
         """Whether an array (n, columns) holds such numbers."""
-        if rows.shape[1:] != (self.number,) or not np.isfinite(rows).all():
+        if rows.shape[1:] != (self.number,):
             return False
-        return self.positive is None or bool((rows[:, self.positive] > 0).all())
+        if not np.isfinite(rows).all():
+            return False
+        if self.positive is None:
+            return True
+        positive = rows[:, self.positive]
+        return bool((positive > 0).all())
 
     def fit_words(self, words: list[str]) -> bool:
         """Whether the words of a line are such numbers."""
-        if not all(_NUMBER.fullmatch(word) for word in words):
-            return False
+        for word in words:
+            if not _NUMBER.fullmatch(word):
+                return False
         values = [float(word) for word in words]
         return self.fit(np.array([values]))
 
@@ -123,7 +129,9 @@ def _robot(folder: Path, number: int, subject_of: dict[int, int]) -> Robot:
 
 
 def _by_time(rows: Floats) -> Floats:
-    return rows[np.argsort(rows[:, 0], kind="stable")]
+    stamps = rows[:, 0]
+    order = np.argsort(stamps, kind="stable")
+    return rows[order]
 
 
 def _path(folder: Path, name: str) -> Path | None:

@@ -50,8 +50,8 @@ class Extract:
 
 
 def read(path: Path) -> Extract:
-    """The extract in a file. Raises UsageError naming the file and the element that is wrong, or the
-    line where its XML is.
+    """The extract in a file. Raises UsageError naming the file and the element that is wrong, or
+    the line where its XML is.
     """
     extract = Extract()
     kinds = osmium.osm.NODE | osmium.osm.WAY
@@ -76,7 +76,8 @@ def _source(path: Path) -> str | osmium.io.FileBuffer:
 def _add_node(extract: Extract, path: Path, node: Node) -> None:
     if not node.location.valid():
         raise UsageError(
-            f"{path}, node {node.id}: expected lon in degrees from -180 to 180 and lat from -90 to 90"
+            f"{path}, node {node.id}: expected lon in degrees from -180 to 180 and lat from -90 "
+            "to 90"
         )
     extract.nodes[node.id] = (node.lon, node.lat)
     tags = dict(node.tags)

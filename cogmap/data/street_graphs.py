@@ -41,9 +41,13 @@ class StreetGraph(msgspec.Struct):
         start = self.nodes_lonlat[edge[0]]
         end = self.nodes_lonlat[edge[1]]
         polyline = edge[_POLYLINE] if len(edge) > _POLYLINE else None
+        if not polyline:
+            return [start, end]
 
-        points = [(float(lon), float(lat)) for lon, lat in polyline or []]
-        if points and math.dist(points[0], start) > math.dist(points[-1], start):
+        points = [(float(lon), float(lat)) for lon, lat in polyline]
+        to_first = math.dist(points[0], start)
+        to_last = math.dist(points[-1], start)
+        if to_first > to_last:
             points.reverse()
         return [start, *points[1:-1], end]
 
@@ -76,4 +80,6 @@ def _graph(path: Path, number: int, line: str) -> StreetGraph:
 def _is_edge(edge: list[Any], nodes: int) -> bool:
     """Whether an edge begins with the numbers of two of the `nodes`."""
     ends = edge[:2]
-    return len(ends) == 2 and all(isinstance(end, int) and 0 <= end < nodes for end in ends)
+    if len(ends) < 2:
+        return False
+    return all(isinstance(end, int) and 0 <= end < nodes for end in ends)

@@ -73,9 +73,7 @@ class _Comparison:
         self._chosen = chosen
         self._found: dict[str, TopicDiff] = {}
         self._first = ""
-        self._sides = (str(left.path), str(right.path))
-        if left.path.name != right.path.name:
-            self._sides = (left.path.name, right.path.name)
+        self._sides = _names(left.path, right.path)
 
     def run(self, progress: Progress | None) -> Diff:
         """Compare every message of either log."""
@@ -123,7 +121,9 @@ class _Comparison:
 
     def _in_one_only(self, reader: LogReader, record: Record, side: int) -> str:
         name = compare.which(record.topic, reader.stub(record))
-        return f"{name} is in {self._sides[side]} and not in {self._sides[1 - side]}"
+        here = self._sides[side]
+        there = self._sides[1 - side]
+        return f"{name} is in {here} and not in {there}"
 
     def _note(self, record: Record, sentence: str) -> None:
         """Keep the sentence on a difference, if it is the first."""
@@ -132,7 +132,17 @@ class _Comparison:
         self._first = self._first or sentence
 
     def _of(self, record: Record) -> TopicDiff:
-        return self._found.setdefault(record.topic_name, TopicDiff(topic=record.topic_name))
+        name = record.topic_name
+        if name not in self._found:
+            self._found[name] = TopicDiff(topic=name)
+        return self._found[name]
+
+
+def _names(left: Path, right: Path) -> tuple[str, str]:
+    """How sentences call the two logs: by their files' names, or by paths where these are equal."""
+    if left.name != right.name:
+        return left.name, right.name
+    return str(left), str(right)
 
 
 def _keyed(
@@ -147,8 +157,11 @@ def _keyed(
         envelope = record.envelope
         if envelope is None:
             stub = reader.stub(record)
-            yield (record.topic_name, stub.source, 0, stub.seq), record
-        else:
-            known = incarnations[envelope.source]
-            number = known.setdefault(envelope.incarnation, len(known))
-            yield (record.topic_name, envelope.source, number, envelope.seq), record
+            key = record.topic_name, stub.source, 0, stub.seq
+            yield key, record
+            continue
+
+        known = incarnations[envelope.source]
+        number = known.setdefault(envelope.incarnation, len(known))
+        key = record.topic_name, envelope.source, number, envelope.seq
+        yield key, record

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -57,13 +58,14 @@ class _Tally:
 
     count: int = 0
     size: int = 0
-    sources: dict[str, int] = field(default_factory=dict)
+    sources: Counter[str] = field(default_factory=Counter)
 
     def add(self, record: Record) -> None:
-        source = "?" if record.envelope is None else record.envelope.source
+        envelope = record.envelope
+        source = "?" if envelope is None else envelope.source
         self.count += 1
         self.size += record.size
-        self.sources[source] = self.sources.get(source, 0) + 1
+        self.sources[source] += 1
 
 
 def info(path: Path, progress: Progress | None = None) -> Info:
@@ -99,18 +101,26 @@ def _tallies(
     reader: LogReader, sequences: SequenceTracker, progress: Progress | None
 ) -> dict[str, _Tally]:
     """The messages of each topic that the log has a channel for; follows their numbers too."""
-    names = [channel.topic for channel in reader.channels.values()]
-    tallies = {name: _Tally() for name in names if name in BY_NAME}
+    tallies: dict[str, _Tally] = {}
+    for channel in reader.channels.values():
+        if channel.topic in BY_NAME:
+            tallies[channel.topic] = _Tally()
+
     for record in reader.records(progress=progress):
-        tallies.setdefault(record.topic_name, _Tally()).add(record)
-        if record.envelope is not None:
-            sequences.follow(record.topic, record.envelope)
+        name = record.topic_name
+        tally = tallies.setdefault(name, _Tally())
+        tally.add(record)
+        envelope = record.envelope
+        if envelope is not None:
+            sequences.follow(record.topic, envelope)
     return tallies
 
 
 def _unknown(reader: LogReader) -> list[str]:
+    channels = reader.channels.values()
+    names = {channel.topic for channel in channels}
     known = {*BY_NAME, layout.ENVELOPES}
-    return sorted({channel.topic for channel in reader.channels.values()} - known)
+    return sorted(names - known)
 
 
 def _topic(name: str, tally: _Tally, duration_s: float, lost: int) -> TopicInfo:

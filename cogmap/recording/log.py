@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,11 +13,14 @@ from cogmap.errors import LogError, MessageError
 from cogmap.graph.graph import Graph
 from cogmap.recording import selection
 from cogmap.recording.storage import format as layout
+from cogmap.recording.storage.format import MAX_TIME_NS
 from cogmap.recording.storage.reader import LogReader, Record
 from schemas import topics as table
 from schemas.base import Message
 from schemas.graph import Delta
 from schemas.topics import Topic
+
+DEFAULT_CELL_M = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,8 +73,11 @@ class Log:
     @property
     def topics(self) -> list[str]:
         """The topics that it has a channel for, in the order of the table; some may be empty."""
-        recorded = {channel.topic for channel in self._reader.channels.values()}
-        return [topic.name for topic in table.ALL if topic.name in recorded]
+        channels = self._reader.channels.values()
+        recorded = {channel.topic for channel in channels}
+
+        names = [topic.name for topic in table.ALL]
+        return [name for name in names if name in recorded]
 
     def messages(
         self, *topics: str, start_s: float = 0.0, end_s: float | None = None
@@ -112,12 +118,15 @@ class Log:
         return graph
 
     def _between(
-        self, chosen: Iterable[Topic] | None, start_s: float, end_s: float | None
+        self, chosen: Collection[Topic] | None, start_s: float, end_s: float | None
     ) -> Iterator[Record]:
         first_ns = self._start_ns + round(start_s * 1e9)
-        end_ns = None if end_s is None else self._start_ns + round(end_s * 1e9)
-        for record in self._reader.records(None if chosen is None else list(chosen)):
-            if end_ns is not None and record.log_time_ns >= end_ns:
+        end_ns = MAX_TIME_NS
+        if end_s is not None:
+            end_ns = self._start_ns + round(end_s * 1e9)
+
+        for record in self._reader.records(chosen):
+            if record.log_time_ns >= end_ns:
                 return
             if record.log_time_ns >= first_ns:
                 yield record
@@ -132,7 +141,9 @@ class Log:
         return self._reader.about(layout.RECORDING)
 
     def _cell_m(self) -> float:
-        return float(self.config.get("workspace", {}).get("cell_m", 1.0))
+        settings = self.config.get("workspace", {})
+        cell_m: float = settings.get("cell_m", DEFAULT_CELL_M)
+        return cell_m
 
 
 def open_log(path: Path | str) -> Log:

@@ -29,8 +29,9 @@ class Summary(msgspec.Struct, kw_only=True):
     """How a recording went. Counts are of messages, by topic.
 
     `lost`: missing by the sources' numbers; `unrecovered`: given up by the bus; `dropped`: found no
-    room here; `rejected`: were no messages of their topic. `gaps` are sentences; `never_drop_whole`:
-    no NEVER_DROP topic misses any. `queue_peak_mb` is the most that ever waited to be written.
+    room here; `rejected`: were no messages of their topic. `gaps` are sentences;
+    `never_drop_whole`: no NEVER_DROP topic misses any. `queue_peak_mb` is the most that ever waited
+    to be written.
     """
 
     path: str
@@ -132,13 +133,20 @@ class Recorder:
         return True
 
     def _write(self, arrival: Arrival) -> None:
-        if self._intake.accept(arrival) is None or arrival.envelope is None:
+        message = self._intake.accept(arrival)
+        envelope = arrival.envelope
+        if message is None or envelope is None:
             return
-        self._sequences.follow(arrival.topic, arrival.envelope)
-        self._writer.write(arrival.topic, arrival.payload, arrival.envelope, arrival.received_ns)
+
+        topic = arrival.topic
+        self._sequences.follow(topic, envelope)
+        self._writer.write(topic, arrival.payload, envelope, arrival.received_ns)
 
     def _on_gap(self, topic: str, number: int) -> None:
-        self._queue.call(lambda: self._unrecovered.update({topic: number}))
+        def count() -> None:
+            self._unrecovered[topic] += number
+
+        self._queue.call(count)
 
     def _on_member(self, member: Member, alive: bool) -> None:
         self._queue.call(lambda: self._note_member(member, alive))

@@ -48,7 +48,7 @@ class CameraFrame:
 def camera_frames(
     reader: LogReader, topic: Topic, progress: Progress | None = None
 ) -> list[CameraFrame]:
-    """Every frame on `topic`, which carries images, in order. Raises LogError where there is none."""
+    """Every frame on `topic`, which carries images, in order. Raises LogError where none is."""
     images: list[tuple[Record, _Numbered]] = []
     recognised: dict[tuple[int, int], tuple[Record, int]] = {}
     for record in reader.records({topic, topics.PERCEPTS}, progress):
@@ -122,16 +122,17 @@ def percepts(reader: LogReader, frame: CameraFrame) -> Percepts | None:
 
 def image(array: Array, name: str) -> Image:
     """RGB, (h, w, 3). Raises LogError, naming the image by `name`, where it is something else."""
-    is_rgb = array.dtype == "|u1" and len(array.shape) == 3 and array.shape[2] == 3
-    if not is_rgb or 0 in array.shape:
+    shape = array.shape
+    is_rgb = array.dtype == "|u1" and len(shape) == 3 and shape[2] == 3
+    if not is_rgb or 0 in shape:
         raise LogError(
-            f"{name}: expected a uint8 image (height, width, 3), got {array.dtype} {array.shape}"
+            f"{name}: expected a uint8 image (height, width, 3), got {array.dtype} {shape}"
         )
     return array.numpy().astype(np.uint8, copy=False)
 
 
 def depth(array: Array, name: str) -> Depth:
-    """Metres, (h, w), 0 unknown. Raises LogError, naming it by `name`, where it is something else."""
+    """Metres, (h, w), 0 unknown. Raises LogError, naming it by `name`, for something else."""
     if array.dtype != "<f4" or len(array.shape) != 2 or 0 in array.shape:
         raise LogError(
             f"{name}: expected a float32 depth image (height, width), "

@@ -21,7 +21,7 @@ Row = tuple[int, Message]
 
 
 def write_log(path: Path, rows: Iterable[Row], *, incarnation: int = 1, **about: str) -> Path:
-    """A finished log of messages, each with the time in ns at which it was published and received."""
+    """A finished log of messages, each with the time in ns of its publishing and receipt."""
     writer = LogWriter(path, topics_to_record(), {**ABOUT, **about})
     for at_ns, message in rows:
         envelope = Envelope(message.source, message.seq, incarnation, at_ns, at_ns)

@@ -6,14 +6,15 @@ time when it was sent, its sequence the sender's number. The record before it, o
 message has its predecessor's time.
 
 A schema is called by the message's type, is encoded as `jsonschema`, and describes bytes encoded as
-`msgpack`; both names are of MCAP's registry. MCAP's registry has no profile for such logs, so it is
-left empty: a log of ours is known by its library, or by the `software` of its recording, where a tool
-has written it anew.
+`msgpack`; both names are of MCAP's registry. It has no profile for such logs, so the profile is
+left empty: a log of ours is known by its library, or by the `software` of its recording, where a
+tool has written it anew.
 """
 
 from __future__ import annotations
 
 import msgspec
+from msgspec.structs import asdict
 
 from cogmap.bus.codec import UNKNOWN, Cause, Envelope, Stage
 from cogmap.version import VERSION
@@ -49,12 +50,13 @@ class EnvelopeRecord(msgspec.Struct, kw_only=True):
     @classmethod
     def of(cls, topic: Topic, envelope: Envelope) -> EnvelopeRecord:
         """The record of `envelope`, which came with a message on `topic`."""
-        facts = {name: getattr(envelope, name) for name in Envelope.__struct_fields__}
+        facts = asdict(envelope)
         return cls(topic=topic.name, **facts)
 
     def envelope(self) -> Envelope:
         """The envelope that it was made of."""
-        facts = {name: getattr(self, name) for name in Envelope.__struct_fields__}
+        facts = asdict(self)
+        del facts["topic"]
         return Envelope(**facts)
 
 

@@ -27,7 +27,7 @@ class DamageError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class ChunkSpan:
-    """Where a chunk's record begins in the file, and the log times of its first and last message."""
+    """Where a chunk begins in the file, and the log times of its first and last message."""
 
     offset: int
     first_ns: int
@@ -38,8 +38,8 @@ class ChunkSpan:
 class LogIndex:
     """The contents of a log but for its messages; chunks in order of time.
 
-    `unreadable_bytes` at its end belong to no whole record. Channels that only a later chunk declares
-    are missing where the log has no index of its own.
+    `unreadable_bytes` at its end belong to no whole record. Channels that only a later chunk
+    declares are missing where the log has no index of its own.
     """
 
     library: str = ""
@@ -86,7 +86,7 @@ def read_chunk(path: Path, chunk: ChunkSpan) -> list[McapRecord]:
 
 
 def open_chunk(chunk: Chunk) -> list[McapRecord]:
-    """The schemas, channels and messages in a chunk, checked by its checksum. Raises DamageError."""
+    """The schemas, channels and messages in a chunk. Raises DamageError where a checksum is wrong."""
     try:
         return breakup_chunk(chunk, validate_crc=True)
     except Exception as error:  # each decompressor has errors of its own
@@ -156,7 +156,7 @@ def _enter(index: LogIndex, record: McapRecord, offset: int) -> None:
 
 
 def _declared(chunk: Chunk) -> dict[int, Channel]:
-    """The channels that a chunk declares, none where it is damaged: whoever reads it reports that."""
+    """The channels that a chunk declares; none where it is damaged, which its reader reports."""
     try:
         return channels_in(open_chunk(chunk))
     except DamageError:

@@ -133,7 +133,7 @@ class _Rescue:
         self._recovery.chunks += 1
 
     def _check_channels(self, messages: list[Message]) -> None:
-        """Raise DamageError where no readable part of the file declares the channel of a message."""
+        """Raise DamageError where nothing that can be read declares a message's channel."""
         used = {message.channel_id for message in messages}
         if not used <= self._channels.keys():
             self._read_summary()
@@ -150,7 +150,7 @@ class _Rescue:
         )
 
     def _read_summary(self) -> None:
-        """Take channels and schemas from the file's end: the chunk that declared them is damaged."""
+        """Take channels and schemas from the file's end: what declared them is damaged."""
         for span in self._source.all_records(_ignore):
             record = self._parsed(span)
             if isinstance(record, Channel):
@@ -166,15 +166,18 @@ class _Rescue:
             return None
 
     def _count_lost(self, index: MessageIndex) -> None:
-        if index.channel_id not in self._channels:
+        identifier = index.channel_id
+        if identifier not in self._channels:
             self._read_summary()
-        known = self._channels.get(index.channel_id)
-        if known is None or known.topic != layout.ENVELOPES:
+
+        channel = self._channels.get(identifier)
+        if channel is None or channel.topic != layout.ENVELOPES:
             self._recovery.lost_messages += len(index.records)
 
     def _lose(self, start: int, end: int, reason: str) -> None:
-        self._recovery.lost_bytes += end - start
-        self._recovery.damaged.append(f"bytes {start} to {end}: {reason}")
+        recovery = self._recovery
+        recovery.lost_bytes += end - start
+        recovery.damaged.append(f"bytes {start} to {end}: {reason}")
 
 
 def _ignore(_start: int, _end: int, _reason: str) -> None:

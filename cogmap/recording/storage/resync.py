@@ -1,10 +1,10 @@
 """Finds the records of a damaged file again after a place where none begins.
 
 The MCAP library reads record after record and stops at the first that it cannot read. A recorded
-drive of 0.2 laps (42 MB, 1832 messages, 53 chunks) with one wrong byte in the chunk in its middle: the
-library gives 658 messages, this module 1793, all but those of that chunk, in 0.26 s of CPU time. So
-this much of MCAP's layout is read here: a record's opcode and length, and the place of a chunk's
-compression. The contents of records are the library's to read.
+drive of 0.2 laps (42 MB, 1832 messages, 53 chunks) with one wrong byte in the chunk in its middle:
+the library gives 658 messages, this module 1793, all but those of that chunk, in 0.26 s of CPU
+time. So this much of MCAP's layout is read here: a record's opcode and length, and the place of a
+chunk's compression. The contents of records are the library's to read.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class RecordSpan:
 
 
 class LogBytes:
-    """The bytes of a log, mapped. Raises LogError where there is no such file, or it is not MCAP."""
+    """The bytes of a log, mapped. Raises LogError where there is no file, or it is not MCAP."""
 
     def __init__(self, path: Path) -> None:
         check_magic(path)

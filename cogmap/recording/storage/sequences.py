@@ -16,8 +16,8 @@ Key = tuple[str, str, int]
 class Stream:
     """The numbers of one source on one topic in one incarnation.
 
-    `missing` are spans [start, end) of numbers up to `last` that have not come. `earlier` is how many
-    messages the source published in earlier incarnations, UNKNOWN where it keeps no count.
+    `missing` are spans [start, end) of numbers up to `last` that have not come. `earlier` counts
+    the messages that the source published in earlier incarnations, UNKNOWN where it does not.
     """
 
     topic: Topic
@@ -30,7 +30,10 @@ class Stream:
     @property
     def lost(self) -> int:
         """How many numbers are missing."""
-        return sum(end - start for start, end in self.missing)
+        lost = 0
+        for start, end in self.missing:
+            lost += end - start
+        return lost
 
     def follow(self, seq: int) -> None:
         """Take note of the next number; one that was thought lost may come late."""
@@ -42,8 +45,9 @@ class Stream:
 
     def end(self, published: int) -> None:
         """Take note that the source published that many messages in all before it was restarted."""
-        if published > self.last + 1:
-            self.missing.append((self.last + 1, published))
+        awaited = self.last + 1
+        if published > awaited:
+            self.missing.append((awaited, published))
             self.last = published - 1
 
     def _found(self, seq: int) -> None:
@@ -83,15 +87,21 @@ class SequenceTracker:
 
         What came before the message is missing if it should be there.
         """
+        seq = envelope.seq
         stream = Stream(
-            topic, envelope.source, envelope.incarnation, envelope.earlier, last=envelope.seq
+            topic=topic,
+            source=envelope.source,
+            incarnation=envelope.incarnation,
+            earlier=envelope.earlier,
+            last=seq,
         )
-        is_new = self._since_ns is not None and envelope.incarnation > self._since_ns
-        if is_new and envelope.seq > 0:
-            stream.missing.append((0, envelope.seq))
+        is_new = self._since_ns is not None and stream.incarnation > self._since_ns
+        if is_new and seq > 0:
+            stream.missing.append((0, seq))
 
-        before = self._newest.get((topic.name, envelope.source))
-        self._newest[topic.name, envelope.source] = stream
+        key = topic.name, stream.source
+        before = self._newest.get(key)
+        self._newest[key] = stream
         if before is not None and UNKNOWN not in (before.earlier, stream.earlier):
             before.end(stream.earlier - before.earlier)
         return stream
@@ -130,4 +140,7 @@ def _sentence(stream: Stream) -> str:
 
 def _numbers(span: Span) -> str:
     start, end = span
-    return f"{start}" if end == start + 1 else f"{start} to {end - 1}"
+    last = end - 1
+    if start == last:
+        return f"{start}"
+    return f"{start} to {last}"

@@ -96,8 +96,12 @@ class LogWriter:
             raise cannot_write(self.path, error) from None
 
     def _topic_channel(self, topic: Topic) -> int:
-        facts = {"delivery": topic.delivery.name, "about": topic.about.name}
-        return self._channel(topic.name, layout.schema_of(topic), facts)
+        schema = layout.schema_of(topic)
+        facts = {
+            "delivery": topic.delivery.name,
+            "about": topic.about.name,
+        }
+        return self._channel(topic.name, schema, facts)
 
     def _channel(self, topic: str, schema: tuple[str, bytes], facts: dict[str, str]) -> int:
         name, text = schema

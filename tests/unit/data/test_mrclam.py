@@ -14,7 +14,9 @@ FILES = {
     "Barcodes": "# Subject # Barcode #\n1 5\n6 63\n7 25\n",
     "Landmark_Groundtruth": "# Subject x y sd sd\n6 1.0 -2.0 0.0 0.0\n7 0.5 4.0 0.0 0.0\n",
     "Robot1_Odometry": "# Time v w\n10.0 0.1 0.0\n10.5 0.2 -0.1\n",
-    "Robot1_Measurement": "# Time barcode r b\n10.2 63 2.0 0.1\n10.3 5 1.0 0.0\n10.1 25 3.0 -0.2\n10.4 99 3.0 0.0\n",
+    "Robot1_Measurement": (
+        "# Time barcode r b\n10.2 63 2.0 0.1\n10.3 5 1.0 0.0\n10.1 25 3.0 -0.2\n10.4 99 3.0 0.0\n"
+    ),
     "Robot1_Groundtruth": "# Time x y o\n10.0 0.0 0.0 0.0\n10.5 0.1 0.0 0.0\n",
 }
 

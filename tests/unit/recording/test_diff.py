@@ -75,8 +75,8 @@ def test_a_changed_value_in_an_array_is_named_with_its_index(tmp_path: Path) -> 
         other[3].range_m = Array.of(values)
 
     assert compared(tmp_path, change).first == (
-        "sensory/scan number 1 of sensory (stamp 0.100 s): range_m.1.0 is 4.0 in a.mcap, 0.5 in b.mcap "
-        "(1 of 6 values differ)"
+        "sensory/scan number 1 of sensory (stamp 0.100 s): "
+        "range_m.1.0 is 4.0 in a.mcap, 0.5 in b.mcap (1 of 6 values differ)"
     )
 
 
