@@ -24,7 +24,7 @@ def best_positions(graph: PoseGraph) -> Floats:
     # uncertain ones.
     blocks = [[covariance, differences], [differences.T, None]]
     unknowns = differences.shape[1]
-    right_side = np.concatenate([known.off_m.reshape(-1), np.zeros(unknowns)])
+    right_side = np.concatenate([known.offset_m.reshape(-1), np.zeros(unknowns)])
     found = spsolve(sparse.bmat(blocks, format="csc"), right_side)
 
     positions_m = found[-unknowns:].reshape(-1, 2)

@@ -5,50 +5,193 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 import msgspec
+from msgspec import Meta
 
-Positive = Annotated[float, msgspec.Meta(gt=0)]
-Share = Annotated[float, msgspec.Meta(ge=0, le=1)]
+Gain = Annotated[float, Meta(ge=0, le=1)]
+Metres = Annotated[float, Meta(gt=0, le=10_000)]
+Seconds = Annotated[float, Meta(gt=0, le=1e9)]
+Positive = Annotated[float, Meta(gt=0, le=100)]
+Share = Annotated[float, Meta(ge=0, le=1)]
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Numbers of samples, and what is believed of sightings. The noise of each sense comes with
-    what it says.
+    """Numbers of samples, what is assumed of percepts and self-motion, and how maps are corrected.
 
-    `correlated_views`: so many views of a landmark on end err alike and count for one, those of driving
-    by once. The paper takes each for independent (eq. 1); a landmark that is always seen a little
-    too near then drags the agent. `correct`: the map's positions only, as in the paper, or its
-    headings too. `false_closure`: closures that would be as wrong as they look with a smaller
-    probability than this do not hold. Gains: what each sense may be off by for longer than one
-    step, as a share, and how long it stays so. The town's senses have none; a robot's that nobody
-    calibrated are found while it drives. After `astray` views on end that fit nowhere, of two
-    landmarks at least, the agent looks for itself anew. What is seen by its bearing alone stands at
-    most `farthest_m` away.
+    The noise of each sense comes with its messages. The gains are what a sense errs by for longer
+    than one step; the town's senses have none, those of an uncalibrated robot are estimated as it
+    drives.
     """
 
-    samples: Annotated[int, msgspec.Meta(ge=10, le=100_000)] = 800
-    kept_samples: Annotated[int, msgspec.Meta(ge=1, le=10_000)] = 200
-    landmark_samples: Annotated[int, msgspec.Meta(ge=10, le=10_000)] = 200
-    outlier_share: Share = 1e-3
-    correlated_views: Annotated[float, msgspec.Meta(ge=1, le=1000)] = 60.0
-    largest_landmark_sd_m: Positive = 4.0
-    landmark_jitter_m: Positive = 0.03
-    gate: Positive = 4.0
-    misses: Annotated[int, msgspec.Meta(ge=1)] = 8
-    speed_gain_sd: Share = 0.0
-    turn_gain_sd: Share = 0.0
-    drift_rad_per_m: Share = 0.0
-    motion_bias_time_s: Positive = 30.0
-    range_gain_sd: Share = 0.0
-    range_bias_time_s: Positive = 300.0
-    astray: Annotated[int, msgspec.Meta(ge=2)] = 8
-    farthest_m: Positive = 50.0
-    attention_base_level: Share = 1.0
-    path_spacing_m: Positive = 1.0
-    path_variance_per_m: Positive = 1e-4
-    heading_variance_per_m: Positive = 1e-6
-    heading_variance_per_rad: Positive = 1e-5
-    correct: Literal["positions", "heading"] = "heading"
-    place_match_sd_m: Positive = 2.0
-    place_match_sd_rad: Positive = 0.2
-    false_closure: Annotated[float, msgspec.Meta(gt=0, lt=1)] = 1e-3
-    synapse_decay_per_m: Positive = 0.2
+    samples: Annotated[
+        int,
+        Meta(
+            description="Monte-Carlo samples of the agent's pose, 10 to 100000", ge=10, le=100_000
+        ),
+    ] = 800
+    kept_samples: Annotated[
+        int,
+        Meta(
+            description="samples that rejection leaves at least, some drawn repeatedly, 1 to 10000",
+            ge=1,
+            le=10_000,
+        ),
+    ] = 200
+    landmark_samples: Annotated[
+        int,
+        Meta(description="samples of each landmark's position, 10 to 10000", ge=10, le=10_000),
+    ] = 200
+    outlier_share: Annotated[
+        Share,
+        Meta(description="share of percepts that may be of another landmark, 0 to 1"),
+    ] = 1e-3
+    correlated_views: Annotated[
+        float,
+        Meta(
+            description="successive views of a landmark whose errors are alike, so that together "
+            "they count as one, 1 to 10000; 1 takes each for independent, as eq. 1 does",
+            ge=1,
+            le=10_000,
+        ),
+    ] = 60.0
+    largest_landmark_sd_m: Annotated[
+        Metres,
+        Meta(
+            description="landmarks whose position is less certain do not inform localization, "
+            "standard deviation in m, above 0, at most 10000"
+        ),
+    ] = 4.0
+    landmark_jitter_m: Annotated[
+        Metres,
+        Meta(
+            description="least noise added to a landmark's samples at each view, standard "
+            "deviation in m, above 0, at most 10000"
+        ),
+    ] = 0.03
+    gate: Annotated[
+        float,
+        Meta(
+            description="a percept further from what a sample predicts does not fit it, in "
+            "standard deviations, above 0, at most 100",
+            gt=0,
+            le=100,
+        ),
+    ] = 4.0
+    misses: Annotated[
+        int,
+        Meta(
+            description="successive misfits after which a landmark is placed anew, 1 to 10000",
+            ge=1,
+            le=10_000,
+        ),
+    ] = 8
+    speed_gain_sd: Annotated[
+        Gain,
+        Meta(description="standard deviation of the gain error of speed, a share, 0 to 1"),
+    ] = 0.0
+    turn_gain_sd: Annotated[
+        Gain,
+        Meta(description="standard deviation of the gain error of turn rate, a share, 0 to 1"),
+    ] = 0.0
+    drift_rad_per_m: Annotated[
+        Gain,
+        Meta(description="standard deviation of the drift of heading, rad per m, 0 to 1"),
+    ] = 0.0
+    motion_bias_time_s: Annotated[
+        Seconds,
+        Meta(
+            description="correlation time of the errors of speed, turn rate and drift, in s, "
+            "above 0, at most 1e9"
+        ),
+    ] = 30.0
+    range_gain_sd: Annotated[
+        Gain,
+        Meta(description="standard deviation of the gain error of range, a share, 0 to 1"),
+    ] = 0.0
+    range_bias_time_s: Annotated[
+        Seconds,
+        Meta(description="correlation time of the gain error of range, in s, above 0, at most 1e9"),
+    ] = 300.0
+    astray: Annotated[
+        int,
+        Meta(
+            description="successive views that fit no sample, of two landmarks or more, after "
+            "which the agent relocalizes, 2 to 10000",
+            ge=2,
+            le=10_000,
+        ),
+    ] = 8
+    farthest_m: Annotated[
+        Metres,
+        Meta(
+            description="distance up to which a landmark seen by its bearing alone may stand, in "
+            "m, above 0, at most 10000"
+        ),
+    ] = 50.0
+    attention_base_level: Annotated[
+        Share,
+        Meta(description="base-level activation of the attention codelet's coalitions, 0 to 1"),
+    ] = 1.0
+    path_spacing_m: Annotated[
+        Metres,
+        Meta(description="distance between places of the path, in m, above 0, at most 10000"),
+    ] = 1.0
+    path_variance_per_m: Annotated[
+        Positive,
+        Meta(
+            description="least variance of path integration's position, m^2 per m, above 0, at "
+            "most 100"
+        ),
+    ] = 1e-4
+    heading_variance_per_m: Annotated[
+        Positive,
+        Meta(
+            description="least variance of path integration's heading, rad^2 per m, above 0, at "
+            "most 100"
+        ),
+    ] = 1e-6
+    heading_variance_per_rad: Annotated[
+        Positive,
+        Meta(
+            description="least variance of path integration's heading, rad^2 per rad turned, "
+            "above 0, at most 100"
+        ),
+    ] = 1e-5
+    correct: Annotated[
+        Literal["positions", "heading"],
+        Meta(
+            description="what map correction corrects: positions alone, by reverse replay "
+            "(eq. 9), or headings too, by nonlinear least squares"
+        ),
+    ] = "heading"
+    place_match_sd_m: Annotated[
+        Metres,
+        Meta(
+            description="standard deviation of the position at which a place is recognised, in m, "
+            "above 0, at most 10000"
+        ),
+    ] = 2.0
+    place_match_sd_rad: Annotated[
+        float,
+        Meta(
+            description="standard deviation of the heading at which a place is recognised, in "
+            "rad, above 0, at most 3.2",
+            gt=0,
+            le=3.2,
+        ),
+    ] = 0.2
+    false_closure: Annotated[
+        float,
+        Meta(
+            description="a loop closure is rejected if a true one would misfit as much with a "
+            "smaller probability, between 0 and 1",
+            gt=0,
+            lt=1,
+        ),
+    ] = 1e-3
+    synapse_decay_per_m: Annotated[
+        Positive,
+        Meta(
+            description="decay of the synapse between two place cells with the distance of their "
+            "fields, per m, above 0, at most 100"
+        ),
+    ] = 0.2

@@ -1,9 +1,9 @@
-"""Which of the loops that were closed hold: a place taken for another must not bend the map (beyond
-the paper).
+"""Inliers among loop closures, by graduated non-convexity: a place taken for another must not bend
+the map (beyond the paper).
 
-Graduated non-convexity (Yang et al. 2020) on truncated least squares: at first every closure
-counts, and those that fit badly count less and less, until each holds or does not. Those left out
-are then held against all that hold.
+Yang et al. 2020 (doi 10.1109/LRA.2020.2965893) on truncated least squares: at first every closure
+has its full weight, and the weight of those that fit badly falls round by round, until each closure
+is an inlier or an outlier. Outliers are then compared with all inliers.
 """
 
 from __future__ import annotations
@@ -21,57 +21,68 @@ from services.codelets.correction.pose_graph import (
     residuals,
 )
 
-STEEPER = 1.4
-MOST_ROUNDS = 60
-LEAST_WEIGHT = 1e-6
-
-
-def limits(closures: Constraints, false_closure: float) -> Floats:
-    """(m,): the chi-square that a true closure exceeds with probability `false_closure`."""
-    known = np.linalg.eigvalsh(closures.information)
-    degrees = (known > 1e-9 * known[:, -1:]).sum(axis=1)
-    result: Floats = chdtri(degrees, false_closure)
-    return result
+CONVEXITY_FACTOR = 1.4
+MAX_ROUNDS = 60
+MIN_WEIGHT = 1e-6
 
 
 def inliers(graph: PoseGraph, false_closure: float) -> Booleans:
-    """(m,): which of the closures of `graph` hold, heading and all."""
-    closures = graph.closures
-    if not len(closures):
+    """(m,): which closures of `graph` are inliers, headings included."""
+    if not len(graph.closures):
         return np.zeros(0, bool)
-    limit = limits(closures, false_closure)
-    hold = _by_weights(graph, limit)
-    return _readmit(graph, hold, limit)
+    threshold = thresholds(graph.closures, false_closure)
+    accepted = _by_weights(graph, threshold)
+    return _readmit(graph, accepted, threshold)
 
 
-def _by_weights(graph: PoseGraph, limit: Floats) -> Booleans:
-    weights = np.ones(len(limit))
+def thresholds(closures: Constraints, false_closure: float) -> Floats:
+    """(m,): the squared Mahalanobis distance that a true closure exceeds with probability
+    `false_closure`; its degrees of freedom are the rank of its information.
+    """
+    eigenvalues = np.linalg.eigvalsh(closures.information)
+    measured = eigenvalues > 1e-9 * eigenvalues[:, -1:]
+    threshold: Floats = chdtri(measured.sum(axis=1), false_closure)
+    return threshold
+
+
+def _by_weights(graph: PoseGraph, threshold: Floats) -> Booleans:
+    closures = graph.closures
+    weights = np.ones(len(closures))
     convexity = 0.0
-    for _ in range(MOST_ROUNDS):
-        poses = optimize(PoseGraph(graph.poses, graph.steps, graph.closures.weighted(weights)))
-        excess = mahalanobis2(residuals(poses, graph.closures), graph.closures.information) / limit
+
+    for _ in range(MAX_ROUNDS):
+        poses = optimize(PoseGraph(graph.poses, graph.steps, closures.weighted(weights)))
+        squared = mahalanobis2(residuals(poses, closures), closures.information)
+        excess = squared / threshold
+
         if not convexity:
             if excess.max() <= 1:
                 break
             convexity = 1 / (2 * excess.max() - 1)
-        weights = (np.sqrt(convexity * (convexity + 1) / excess.clip(1e-12)) - convexity).clip(
-            LEAST_WEIGHT, 1.0
-        )
-        if ((weights == LEAST_WEIGHT) | (weights == 1.0)).all():
+
+        weights = _weights(excess, convexity)
+        decided = (weights == MIN_WEIGHT) | (weights == 1.0)
+        if decided.all():
             break
-        convexity *= STEEPER
+        convexity *= CONVEXITY_FACTOR
     return weights > 0.5
 
 
-def _readmit(graph: PoseGraph, hold: Booleans, limit: Floats) -> Booleans:
-    """A closure that came to be left out may yet agree with those that hold, since the path is long
-    between them.
+def _weights(excess: Floats, convexity: float) -> Floats:
+    """The weights of the surrogate of truncated least squares."""
+    surrogate = np.sqrt(convexity * (convexity + 1) / excess.clip(1e-12)) - convexity
+    return surrogate.clip(MIN_WEIGHT, 1.0)
+
+
+def _readmit(graph: PoseGraph, accepted: Booleans, threshold: Floats) -> Booleans:
+    """Accept outliers that agree with all inliers: the path between the two may be long and
+    uncertain.
     """
-    solved = IncrementalSolver(PoseGraph(graph.poses, graph.steps, graph.closures.select(hold)))
-    hold = hold.copy()
-    for index in np.flatnonzero(~hold):
+    solver = IncrementalSolver(PoseGraph(graph.poses, graph.steps, graph.closures.select(accepted)))
+    result = accepted.copy()
+    for index in np.flatnonzero(~accepted):
         closure = graph.closures.select(np.array([index]))
-        if solved.chi_square(closure) <= limit[index]:
-            solved.add(closure)
-            hold[index] = True
-    return hold
+        if solver.chi_square(closure) <= threshold[index]:
+            solver.add(closure)
+            result[index] = True
+    return result

@@ -1,12 +1,14 @@
-"""A path whose loops are closed, headings and all, ready to take in one more closure in no time."""
+"""An optimized pose graph that takes in one more closure at little cost."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from cogmap.geometry.arrays import Floats
+from cogmap.geometry.arrays import Floats, Indices
 from services.codelets.correction.least_squares import (
-    MOST_ITERATIONS,
+    MAX_ITERATIONS,
     NormalEquations,
     factor,
     optimize,
@@ -21,70 +23,92 @@ from services.codelets.correction.pose_graph import (
 )
 
 TOLERANCE = 0.01
-ITERATIONS_A_CLOSURE = 10
+ITERATIONS_PER_CLOSURE = 10
+
+
+class _Update(NamedTuple):
+    """What one closure changes: `step` (u,) of the unknowns, and the columns (u, 3) by which
+    solutions of the normal equations shrink once it is in. `chi_square` is its misfit.
+    """
+
+    step: Floats
+    chi_square: float
+    columns: Floats
 
 
 class IncrementalSolver:
-    """The factors of a path's normal equations, and the closures since, each of which changes them
-    a little.
+    """The factors of a path's normal equations, and the updates by the closures since.
 
-    A closure adds three columns (Woodbury's identity), and one step corrects the path: its turns
-    are small. Where eq. 7 then shows that they were not, the path is solved and factored anew, in
-    bounded time: what some iterations leave undone is left to the next closures, and to `relinearize`.
+    A closure adds three columns by Woodbury's identity, and one Gauss-Newton step corrects the
+    path, for its turns are small. Where the cost of eq. 7 shows that they were not, the path is
+    optimized and factored anew, in bounded time: what some iterations leave undone is left to the
+    next closures and to `relinearize`.
     """
 
     def __init__(self, graph: PoseGraph) -> None:
         self._relinearize(graph)
 
-    def _relinearize(self, graph: PoseGraph, most_iterations: int = MOST_ITERATIONS) -> None:
-        poses = optimize(graph, most_iterations)
+    def _relinearize(self, graph: PoseGraph, max_iterations: int = MAX_ITERATIONS) -> None:
+        poses = optimize(graph, max_iterations)
         self.graph = PoseGraph(poses, graph.steps, graph.closures)
         constraints = self.graph.constraints
+
         self._normal = NormalEquations(len(poses), constraints)
         self._factors = factor(self._normal.matrix(poses, constraints))
         self._cost = cost(poses, constraints)
         self._update_columns: list[Floats] = []
 
     def relinearize(self) -> None:
-        """Take the closures that have come into the factors: for when there is time."""
+        """Optimize and factor with all closures so far: for when there is time."""
         self._relinearize(self.graph)
 
     def chi_square(self, closure: Constraints) -> float:
-        """How badly one closure fits all that is known without it; its degrees of freedom are what
-        it tells of.
-        """
-        return self._fit(closure)[1]
+        """The squared Mahalanobis distance of one closure from what the others predict of it."""
+        return self._update(closure).chi_square
 
     def add(self, closure: Constraints) -> Floats:
-        """Take in one more closure: the (n, 3) poses after it."""
-        step, chi_square, columns = self._fit(closure)
+        """Take in one more closure. Returns the (n, 3) poses after it."""
         graph = self.graph
-        poses = self._normal.moved(graph.poses, -step)
+        update = self._update(closure)
+
+        poses = self._normal.moved(graph.poses, -update.step)
         self.graph = PoseGraph(poses, graph.steps, graph.closures + closure)
-        self._update_columns.append(columns)
-        self._cost += chi_square
+        self._update_columns.append(update.columns)
+
+        self._cost += update.chi_square
         if cost(poses, self.graph.constraints) > (1 + TOLERANCE) * self._cost:
-            self._relinearize(self.graph, ITERATIONS_A_CLOSURE)
+            self._relinearize(self.graph, ITERATIONS_PER_CLOSURE)
         return self.graph.poses
 
-    def _fit(self, closure: Constraints) -> tuple[Floats, float, Floats]:
-        """The step that takes `closure` in, its chi-square, and by what the path answers less once
-        it is in.
-        """
+    def _update(self, closure: Constraints) -> _Update:
         root = sqrt_information(closure.information)[0]
-        pulls = np.zeros((3 * (len(self.graph.poses) - 1), 3))
-        used = []
-        for end, by_end in zip(
-            (closure.i, closure.j), jacobians(self.graph.poses, closure), strict=True
-        ):
+        columns, used = self._columns(closure, root)
+        solved = self._solve(columns, used)
+
+        gram = columns[used].T @ solved[used]
+        left = np.linalg.cholesky(np.eye(3) + gram)
+        update_columns = np.linalg.solve(left, solved.T).T
+
+        whitened = root.T @ residuals(self.graph.poses, closure)[0]
+        misfit = np.linalg.solve(left, whitened)
+        return _Update(update_columns @ misfit, float(misfit @ misfit), update_columns)
+
+    def _columns(self, closure: Constraints, root: Floats) -> tuple[Floats, Indices]:
+        """(u, 3): the closure's whitened Jacobian, transposed, and which of its rows are used."""
+        columns = np.zeros((3 * (len(self.graph.poses) - 1), 3))
+        used = [np.zeros(0, np.int64)]
+        by_i, by_j = jacobians(self.graph.poses, closure)
+
+        for end, by_end in ((closure.i, by_i), (closure.j, by_j)):
             unknowns, free = self._normal.unknowns(end)
             if free[0]:
-                pulls[unknowns[0]] = by_end[0].T @ root
-                used += unknowns[0].tolist()
-        answers = self._factors.solve(pulls)
-        for columns in self._update_columns:
-            answers -= columns @ (columns[used].T @ pulls[used])
-        left = np.linalg.cholesky(np.eye(3) + pulls[used].T @ answers[used])
-        columns = np.linalg.solve(left, answers.T).T
-        off = np.linalg.solve(left, root.T @ residuals(self.graph.poses, closure)[0])
-        return columns @ off, float(off @ off), columns
+                columns[unknowns[0]] = by_end[0].T @ root
+                used.append(unknowns[0])
+        return columns, np.concatenate(used)
+
+    def _solve(self, columns: Floats, used: Indices) -> Floats:
+        """(u, 3): the solution of the normal equations, all closures so far included."""
+        solved = self._factors.solve(columns)
+        for update in self._update_columns:
+            solved -= update @ (update[used].T @ columns[used])
+        return np.asarray(solved, np.float64)

@@ -1,5 +1,5 @@
-"""Loops closed with headings corrected too, beyond the paper: Gauss-Newton on the whole path,
-sparse.
+"""Pose graphs optimized with their headings, beyond the paper: sparse nonlinear least squares by
+Levenberg-Marquardt.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from services.codelets.correction.pose_graph import (
 )
 
 RELATIVE_DECREASE = 1e-5
-MOST_ITERATIONS = 100
-LEAST_DAMPING = 1e-9
-MOST_DAMPING = 1e8
+MAX_ITERATIONS = 100
+MIN_DAMPING = 1e-9
+MAX_DAMPING = 1e8
 DAMPING_FACTOR = 10.0
 # Symmetric, positive definite and ordered beforehand: no pivoting. The three columns of a pose
 # belong together.
@@ -34,61 +34,73 @@ FACTORING = {
 
 
 class NormalEquations:
-    """The normal equations of constraints among `count` poses, whose sparsity is worked out once.
+    """The normal equations of constraints among `count` poses, whose sparsity is analysed once.
 
-    The first pose stays. Unknowns stand in an order that makes the factors sparse.
+    The first pose is fixed. The unknowns, three a pose, are ordered for sparse factors.
     """
 
     def __init__(self, count: int, constraints: Constraints) -> None:
         self._order = _elimination_order(count, constraints)
-        self._at = np.full(count, -1)
-        self._at[self._order] = np.arange(count - 1)
-        first = self._at[constraints.i]
-        second = self._at[constraints.j]
-        rows = np.concatenate([first, first, second, second])
-        columns = np.concatenate([first, second, first, second])
-        used = np.flatnonzero((rows >= 0) & (columns >= 0))
-        blocks, target = np.unique(columns[used] * (count - 1) + rows[used], return_inverse=True)
-        self._sum_blocks = _summing(target, used, len(blocks), len(rows))
-        self._indices = (blocks % (count - 1)).astype(np.int32)
-        self._starts = np.searchsorted(blocks, np.arange(count) * (count - 1)).astype(np.int32)
-        ends = np.concatenate([first, second])
+        self._position = np.full(count, -1)
+        self._position[self._order] = np.arange(count - 1)
+        self._side = 3 * (count - 1)
+
+        i = self._position[constraints.i]
+        j = self._position[constraints.j]
+        self._analyse_blocks(i, j, count - 1)
+
+        ends = np.concatenate([i, j])
         used = np.flatnonzero(ends >= 0)
         self._sum_ends = _summing(ends[used], used, count - 1, len(ends))
-        self._side = 3 * (count - 1)
+
+    def _analyse_blocks(self, i: Indices, j: Indices, unknown_poses: int) -> None:
+        """Where the four 3 x 3 blocks of each constraint go: by i and i, i and j, j and i, j and
+        j.
+        """
+        rows = np.concatenate([i, i, j, j])
+        columns = np.concatenate([i, j, i, j])
+        used = np.flatnonzero((rows >= 0) & (columns >= 0))
+
+        keys = columns[used] * unknown_poses + rows[used]
+        blocks, target = np.unique(keys, return_inverse=True)
+        self._sum_blocks = _summing(target, used, len(blocks), len(rows))
+
+        column_keys = np.arange(unknown_poses + 1) * unknown_poses
+        self._indices = (blocks % unknown_poses).astype(np.int32)
+        self._starts = np.searchsorted(blocks, column_keys).astype(np.int32)
 
     def matrix(self, poses: Floats, constraints: Constraints) -> sparse.csc_matrix:
         """J' S^-1 J at `poses`."""
-        by_first, by_second = jacobians(poses, constraints)
-        weighed_first = by_first.transpose(0, 2, 1) @ constraints.information
-        weighed_second = by_second.transpose(0, 2, 1) @ constraints.information
-        across = weighed_first @ by_second
+        by_i, by_j = jacobians(poses, constraints)
+        weighted_i = by_i.transpose(0, 2, 1) @ constraints.information
+        weighted_j = by_j.transpose(0, 2, 1) @ constraints.information
+        across = weighted_i @ by_j
+
         # Columns are stored, and blocks by rows: each is transposed.
-        blocks = np.concatenate(
-            [
-                weighed_first @ by_first,
-                across.transpose(0, 2, 1),
-                across,
-                weighed_second @ by_second,
-            ]
-        )
-        data = (self._sum_blocks @ blocks.reshape(-1, 9)).reshape(-1, 3, 3)
+        parts = [weighted_i @ by_i, across.transpose(0, 2, 1), across, weighted_j @ by_j]
+        blocks = np.concatenate(parts).reshape(-1, 9)
+        data = (self._sum_blocks @ blocks).reshape(-1, 3, 3)
+
         shape = (self._side, self._side)
         rows = sparse.bsr_matrix((data, self._indices, self._starts), shape=shape).tocsr()
         return sparse.csc_matrix((rows.data, rows.indices, rows.indptr), shape=shape)
 
     def gradient(self, poses: Floats, constraints: Constraints) -> Floats:
-        """J' S^-1 d at `poses`."""
-        by_first, by_second = jacobians(poses, constraints)
-        weighed = np.einsum("mab,mb->ma", constraints.information, residuals(poses, constraints))
-        ends = [np.einsum("mba,mb->ma", by_end, weighed) for by_end in (by_first, by_second)]
-        result: Floats = (self._sum_ends @ np.concatenate(ends)).reshape(-1)
-        return result
+        """J' S^-1 d at `poses`, (3 (n - 1),)."""
+        residual = residuals(poses, constraints)
+        weighted = np.einsum("mab,mb->ma", constraints.information, residual)
+
+        by_i, by_j = jacobians(poses, constraints)
+        at_i = np.einsum("mba,mb->ma", by_i, weighted)
+        at_j = np.einsum("mba,mb->ma", by_j, weighted)
+
+        gradient: Floats = (self._sum_ends @ np.concatenate([at_i, at_j])).reshape(-1)
+        return gradient
 
     def unknowns(self, pose: Indices) -> tuple[Indices, Booleans]:
-        """(k, 3) which unknowns some poses are, and which of the poses are any: the first is none."""
-        known = self._at[pose] >= 0
-        return 3 * self._at[pose][:, None] + np.arange(3), known
+        """(k, 3): the unknowns of k poses, and (k,) which poses have any: the first has none."""
+        position = self._position[pose]
+        return 3 * position[:, None] + np.arange(3), position >= 0
 
     def moved(self, poses: Floats, step: Floats) -> Floats:
         """`poses` after a step of the unknowns."""
@@ -99,17 +111,16 @@ class NormalEquations:
 
 def _elimination_order(count: int, constraints: Constraints) -> Indices:
     """The poses but the first, in an order of little fill (minimum degree)."""
-    ends = (
-        np.concatenate([constraints.i, constraints.j]),
-        np.concatenate([constraints.j, constraints.i]),
-    )
-    touching = sparse.csc_matrix((np.ones(len(ends[0])), ends), shape=(count, count))[1:, 1:]
-    touching.data[:] = 1.0
-    # Dominant diagonal, so that the order is decided by the pattern alone.
-    dominant = (touching + count * sparse.identity(count - 1)).tocsc()
-    order: Indices = (
-        np.argsort(splu(dominant, **(FACTORING | {"permc_spec": "MMD_AT_PLUS_A"})).perm_c) + 1
-    )
+    rows = np.concatenate([constraints.i, constraints.j])
+    columns = np.concatenate([constraints.j, constraints.i])
+    adjacency = sparse.csc_matrix((np.ones(len(rows)), (rows, columns)), shape=(count, count))
+    pattern = adjacency[1:, 1:]
+    pattern.data[:] = 1.0
+
+    # A dominant diagonal, so that the order is decided by the pattern alone.
+    dominant = (pattern + count * sparse.identity(count - 1)).tocsc()
+    factors = splu(dominant, **(FACTORING | {"permc_spec": "MMD_AT_PLUS_A"}))
+    order: Indices = np.argsort(factors.perm_c) + 1
     return order
 
 
@@ -119,43 +130,49 @@ def _summing(target: Indices, source: Indices, targets: int, sources: int) -> sp
 
 
 def factor(matrix: sparse.csc_matrix) -> SuperLU:
-    """Factors of a positive definite matrix, its order as it is."""
+    """The factors of a positive definite matrix, in its own order."""
     return splu(matrix, **FACTORING)
 
 
-def optimize(graph: PoseGraph, most_iterations: int = MOST_ITERATIONS) -> Floats:
-    """(n, 3) poses that minimise eq. 7, headings and all, near those of `graph`. The first pose
+def optimize(graph: PoseGraph, max_iterations: int = MAX_ITERATIONS) -> Floats:
+    """(n, 3): poses at a minimum of eq. 7, headings included, near those of `graph`. The first pose
     stays.
 
-    Where `most_iterations` do not do, they are nearer to the least than those of `graph`.
+    After `max_iterations`, the best so far.
     """
     poses = graph.poses
     constraints = graph.constraints
     normal = NormalEquations(len(poses), constraints)
     damping = 0.0
     before = cost(poses, constraints)
-    for _ in range(most_iterations):
-        matrix = normal.matrix(poses, constraints)
+
+    for _ in range(max_iterations):
         gradient = normal.gradient(poses, constraints)
-        damped = (
-            matrix + damping * sparse.diags(matrix.diagonal(), format="csc") if damping else matrix
-        )
-        step = factor(damped).solve(gradient)
+        matrix = _damped(normal.matrix(poses, constraints), damping)
+        step = factor(matrix).solve(gradient)
         moved = normal.moved(poses, -step)
         after = cost(moved, constraints)
+
         if after > before:
-            damping = max(LEAST_DAMPING, damping * DAMPING_FACTOR)
-            if damping > MOST_DAMPING:
+            damping = max(MIN_DAMPING, damping * DAMPING_FACTOR)
+            if damping > MAX_DAMPING:
                 break
             continue
-        # What the linear model did not foresee is about what another step would gain.
-        unforeseen = after - (before - float(gradient @ step))
-        gained = before - after
+
+        predicted = before - float(gradient @ step)
+        decrease = before - after
         poses = moved
         before = after
-        if gained <= RELATIVE_DECREASE * after or (
-            not damping and unforeseen <= RELATIVE_DECREASE * after
-        ):
+
+        # What the linear model did not predict is about what another step would gain.
+        is_linear = not damping and after - predicted <= RELATIVE_DECREASE * after
+        if decrease <= RELATIVE_DECREASE * after or is_linear:
             break
-        damping = damping / DAMPING_FACTOR if damping > LEAST_DAMPING else 0.0
+        damping = damping / DAMPING_FACTOR if damping > MIN_DAMPING else 0.0
     return poses
+
+
+def _damped(matrix: sparse.csc_matrix, damping: float) -> sparse.csc_matrix:
+    if not damping:
+        return matrix
+    return matrix + damping * sparse.diags(matrix.diagonal(), format="csc")

@@ -1,10 +1,10 @@
-"""Which views that may close a loop agree: one alone may be of another place or landmark than it
-seems to be.
+"""Which loop closures agree with one another: a single view may be of another place or landmark
+than it seems.
 
-Three that agree with one another count (beyond the paper, whose landmarks are never taken for
-others). Two agree where what they join lies as far apart here as it did there, by path integration
-between them alone: nothing that the agent believes of where it is comes into it (pairwise
-consistency, as in Mangelson et al. 2018).
+Beyond the paper, whose landmarks are never confused. Two closures agree where what they join is as
+far apart on this pass as it was on the earlier one, by path integration within each pass alone;
+what the agent believes of its pose is not used. At least MIN_AGREEING must agree with one another
+(pairwise consistency, as in Mangelson et al. 2018, doi 10.1109/ICRA.2018.8460217).
 """
 
 from __future__ import annotations
@@ -16,21 +16,22 @@ from scipy import sparse
 from scipy.special import chdtri
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from cogmap.geometry.se2 import rotation_matrices, wrap_angle
+from cogmap.geometry.se2 import cumulative, integrate, transform_from, wrap_angle
 from services.codelets.correction.pose_graph import Constraints
 
 MIN_AGREEING = 3
-# Views further apart than that on the way say nothing of one another: anything would agree.
-WIDEST_M = 5.0
-NEXT = 32
+# With more uncertainty between them than this, any two views would agree.
+MAX_SD_M = 5.0
+# Each view is compared with so many that follow it.
+NEIGHBOURS = 31
 
 
 class Views(NamedTuple):
-    """View k, from row `j[k]` of the path, of what stands at `there_m` (m, 2) as seen from row
-    `i[k]`.
+    """m views from places `j` (m,) of the path, of what was seen from places `i` (m,) before.
 
-    It is seen at `here_m` (m, 2), x forward, y left, to `sd_m`; how the two rows are turned is
-    known to `sd_rad`, or, where that is 0, not.
+    It stands at `there_m` (m, 2) in the frame of place i and at `here_m` (m, 2) in that of place j,
+    x forward, y left, known to `sd_m` (m,). The heading between the two places is known to
+    `sd_rad` (m,), or unknown where that is 0.
     """
 
     i: Indices
@@ -41,84 +42,105 @@ class Views(NamedTuple):
     sd_rad: Floats
 
     def select(self, chosen: Booleans | Indices) -> Views:
-        """Some of them."""
-        ends = (self.i[chosen], self.j[chosen])
-        points = (self.there_m[chosen], self.here_m[chosen])
-        return Views(*ends, *points, self.sd_m[chosen], self.sd_rad[chosen])
+        """The chosen ones, by mask or indices."""
+        return Views(
+            i=self.i[chosen],
+            j=self.j[chosen],
+            there_m=self.there_m[chosen],
+            here_m=self.here_m[chosen],
+            sd_m=self.sd_m[chosen],
+            sd_rad=self.sd_rad[chosen],
+        )
 
 
 def consistent(views: Views, steps: Constraints, false_closure: float) -> Booleans:
-    """(m,): which of the views are among MIN_AGREEING that agree with one another, on a path of
-    `steps`.
+    """(m,): which views are among MIN_AGREEING that all agree with one another.
+
+    `steps` are those of the path; views that agree are taken for disagreeing with probability
+    `false_closure`.
     """
+    one, other = _pairs(views)
+    agree = _agree(views.select(one), views.select(other), _DeadReckoning(steps), false_closure)
+    one = one[agree]
+    other = other[agree]
+
+    count = len(views.i)
+    rows = np.concatenate([one, other])
+    columns = np.concatenate([other, one])
+    adjacency = sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
+    triangles = (adjacency @ adjacency).multiply(adjacency).sum(axis=1)
+    return np.asarray(triangles).ravel() > 0
+
+
+def _pairs(views: Views) -> tuple[Indices, Indices]:
+    """Pairs of views to compare, by number: each with those that follow it along the path."""
     count = len(views.i)
     order = np.lexsort((np.arange(count), views.j))
-    way = _Way(steps)
-    pairs = [
-        np.column_stack([order[:-apart], order[apart:]]) for apart in range(1, min(NEXT, count))
-    ]
-    both = np.vstack([np.zeros((0, 2), np.int64), *pairs])
-    one, other = both[
-        _agree(views.select(both[:, 0]), views.select(both[:, 1]), way, false_closure)
-    ].T
-    touching = sparse.csr_array(
-        (np.ones(2 * len(one)), (np.r_[one, other], np.r_[other, one])), shape=(count, count)
-    )
-    triangles = (touching @ touching).multiply(touching).sum(axis=1)
-    result: Booleans = np.asarray(triangles).ravel() > 0
-    return result
+    nothing = np.zeros(0, np.int64)
+    ones = [nothing]
+    others = [nothing]
+    for apart in range(1, min(NEIGHBOURS + 1, count)):
+        ones.append(order[:-apart])
+        others.append(order[apart:])
+    return np.concatenate(ones), np.concatenate(others)
 
 
-class _Way:
-    """A path as path integration alone has it, from where it begins, and how unsure that becomes."""
+class _DeadReckoning:
+    """A path by path integration alone, from its beginning, and the variances summed along it."""
 
     def __init__(self, steps: Constraints) -> None:
-        self.heading = np.concatenate([[0.0], np.cumsum(steps.measurement[:, 2])])
-        moved = np.einsum(
-            "mab,mb->ma", rotation_matrices(self.heading[:-1]), steps.measurement[:, :2]
-        )
-        self.where = np.vstack([np.zeros(2), np.cumsum(moved, axis=0)])
-        self.length = np.concatenate([[0.0], np.cumsum(np.hypot(*steps.measurement[:, :2].T))])
-        self.variance = np.concatenate([[0.0], np.cumsum(1 / steps.information[:, 0, 0])])
-        self.turning = np.concatenate([[0.0], np.cumsum(1 / steps.information[:, 2, 2])])
+        self.poses = integrate(np.zeros(3), steps.measurement)
+        lengths_m = np.hypot(*steps.measurement[:, :2].T)
+        self._length_m = cumulative(lengths_m)
+        self._variance_m2 = cumulative(1 / steps.information[:, 0, 0])
+        self._variance_rad2 = cumulative(1 / steps.information[:, 2, 2])
 
-    def seen(self, rows: Indices, off_m: Floats) -> Floats:
-        """(m, 2): where things are that are seen from rows."""
-        result: Floats = self.where[rows] + np.einsum(
-            "mab,mb->ma", rotation_matrices(self.heading[rows]), off_m
-        )
-        return result
+    def between_m(self, one: Indices, one_m: Floats, other: Indices, other_m: Floats) -> Floats:
+        """(m,): the distance between points seen from two places each, given in their frames."""
+        first_m = transform_from(self.poses[one], one_m)
+        second_m = transform_from(self.poses[other], other_m)
+        return np.asarray(np.hypot(*(first_m - second_m).T))
 
-    def unsure_m2(self, rows: Indices, others: Indices, lever_m: Floats) -> Floats:
-        """(m,): the variance of where things that far away seem to be between two rows."""
-        length = np.abs(self.length[rows] - self.length[others])
-        turning = np.abs(self.turning[rows] - self.turning[others])
-        result: Floats = np.abs(self.variance[rows] - self.variance[others]) + turning * (
-            length**2 / 3 + lever_m**2
-        )
-        return result
+    def variance_m2(self, one: Indices, one_m: Floats, other: Indices, other_m: Floats) -> Floats:
+        """(m,): the variance of `between_m`: of the steps, and of the turns at their lever arm."""
+        length_m = np.abs(self._length_m[one] - self._length_m[other])
+        position_m2 = np.abs(self._variance_m2[one] - self._variance_m2[other])
+        lever_arm_m = np.maximum(np.hypot(*one_m.T), np.hypot(*other_m.T))
+
+        lever_m2 = length_m**2 / 3 + lever_arm_m**2
+        variance: Floats = position_m2 + self.variance_rad2(one, other) * lever_m2
+        return variance
+
+    def variance_rad2(self, one: Indices, other: Indices) -> Floats:
+        """(m,): the variance of the heading between two places each."""
+        return np.abs(self._variance_rad2[one] - self._variance_rad2[other])
 
 
-def _agree(one: Views, other: Views, way: _Way, false_closure: float) -> Booleans:
-    there = np.hypot(*(way.seen(one.i, one.there_m) - way.seen(other.i, other.there_m)).T)
-    here = np.hypot(*(way.seen(one.j, one.here_m) - way.seen(other.j, other.here_m)).T)
-    unsure = way.unsure_m2(one.i, other.i, _lever(one.there_m, other.there_m))
-    unsure += way.unsure_m2(one.j, other.j, _lever(one.here_m, other.here_m))
-    squared = (there - here) ** 2 / (one.sd_m**2 + other.sd_m**2 + unsure)
-    turns = (one.sd_rad > 0) & (other.sd_rad > 0)
-    heading = way.heading
-    turned = wrap_angle(heading[one.j] - heading[other.j] - heading[one.i] + heading[other.i])
-    turning = np.abs(way.turning[one.i] - way.turning[other.i])
-    turning += np.abs(way.turning[one.j] - way.turning[other.j])
-    squared[turns] += (turned**2 / np.maximum(one.sd_rad**2 + other.sd_rad**2 + turning, 1e-12))[
-        turns
-    ]
-    degrees = np.where(turns, 3, 2)
-    near = (unsure <= WIDEST_M**2) & (one.j != other.j)
-    agree: Booleans = near & (squared <= chdtri(degrees, false_closure))
+def _agree(one: Views, other: Views, path: _DeadReckoning, false_closure: float) -> Booleans:
+    """(m,): which pairs of views agree."""
+    there = (one.i, one.there_m, other.i, other.there_m)
+    here = (one.j, one.here_m, other.j, other.here_m)
+    difference_m = path.between_m(*there) - path.between_m(*here)
+    path_m2 = path.variance_m2(*there) + path.variance_m2(*here)
+    squared = difference_m**2 / (one.sd_m**2 + other.sd_m**2 + path_m2)
+
+    has_heading = (one.sd_rad > 0) & (other.sd_rad > 0)
+    squared += np.where(has_heading, _turn_squared(one, other, path), 0.0)
+
+    degrees = np.where(has_heading, 3, 2)
+    comparable = (path_m2 <= MAX_SD_M**2) & (one.j != other.j)
+    agree: Booleans = comparable & (squared <= chdtri(degrees, false_closure))
     return agree
 
 
-def _lever(one_m: Floats, other_m: Floats) -> Floats:
-    lever: Floats = np.maximum(np.hypot(*one_m.T), np.hypot(*other_m.T))
-    return lever
+def _turn_squared(one: Views, other: Views, path: _DeadReckoning) -> Floats:
+    """(m,): the squared Mahalanobis distance of the turn between two views on either pass."""
+    headings = path.poses[:, 2]
+    here = headings[one.j] - headings[other.j]
+    there = headings[one.i] - headings[other.i]
+    turned = wrap_angle(here - there)
+
+    path_rad2 = path.variance_rad2(one.i, other.i) + path.variance_rad2(one.j, other.j)
+    variance = one.sd_rad**2 + other.sd_rad**2 + path_rad2
+    squared: Floats = turned**2 / np.maximum(variance, 1e-12)
+    return squared

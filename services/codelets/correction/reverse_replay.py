@@ -2,12 +2,12 @@
 Positions only.
 
 Eq. 9 gives every position of a loop a share of its discrepancy, as large as the share of path
-integration's uncertainty that lies before it. Seen as forces: a closed loop pulls with one force on
+integration's variance that lies before it. Seen as forces: a closed loop pulls with one force on
 each of its steps, and a step yields by its own covariance times the force. Where loops overlap,
 their forces add up. One replay from the last position to the first finds the sum at each step: a
-loop's force comes in at its end and goes out at its beginning. Each loop then corrects its force by
-its own precision A_i times what is left of its discrepancy, and replay begins anew. The learning
-rate alpha of a replay and how much it takes over from the replay before are those of conjugate
+loop's force enters at its end and leaves at its beginning. Each loop then corrects its force by its
+own precision A_i times what is left of its discrepancy, and replay begins anew. The learning rate
+alpha of a replay and how much it takes over from the replay before are those of conjugate
 gradients; with them a handful of replays closes a few loops, and some hundred close thousands.
 """
 
@@ -17,22 +17,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cogmap.geometry.arrays import Floats
-from cogmap.geometry.se2 import cumulative, rotation_matrices
-from services.codelets.correction.pose_graph import (
-    Constraints,
-    PoseGraph,
-    residuals,
-)
+from cogmap.geometry.arrays import Floats, Indices
+from cogmap.geometry.se2 import cumulative, rotate, rotation_matrices
+from services.codelets.correction.pose_graph import Constraints, PoseGraph, residuals
 
 CHECK_EVERY = 10
 
 
 @dataclass(frozen=True)
 class Correction:
-    """(n, 2) `positions_m` and how often the path was replayed.
+    """(n, 2) `positions_m` and the number of times that the path was replayed.
 
-    `cost` is eq. 7 for them, headings as they are; `least_cost` is what no positions can be below.
+    `cost` is eq. 7 for them, headings unchanged; `least_cost` is a lower bound of it.
     """
 
     positions_m: Floats
@@ -43,53 +39,57 @@ class Correction:
 
 @dataclass(frozen=True)
 class Displacements:
-    """Constraints between positions, in the world's frame: (m, 2) `off_m` and (m, 2, 2)
-    covariances.
+    """Constraints between positions, in the world's frame: (m, 2) `offset_m` from position i to j
+    and (m, 2, 2) covariances.
     """
 
-    off_m: Floats
+    offset_m: Floats
     covariance_m2: Floats
 
 
 def displacements(poses: Floats, constraints: Constraints) -> Displacements:
-    """What `constraints` say of positions once the headings of `poses` are taken as they are."""
-    turn = rotation_matrices(poses[constraints.i, 2])
-    off_rad = residuals(poses, constraints)[:, 2]
-    covariance = np.linalg.inv(constraints.information[:, :2, :2])
-    # A measured distance that goes with the measured heading changes with how wrong that heading
-    # turned out to be.
-    along = np.einsum(
-        "mab,mb->ma", covariance, constraints.information[:, :2, 2] * off_rad[:, None]
+    """What `constraints` measure of positions where the headings are those of `poses`."""
+    covariance = _inverse(constraints.information[:, :2, :2])
+    heading_error_rad = residuals(poses, constraints)[:, 2]
+
+    # Where position and heading are measured together, the position that is expected changes with
+    # the error of the heading.
+    coupling = constraints.information[:, :2, 2] * heading_error_rad[:, None]
+    expected_m = constraints.measurement[:, :2] - _times(covariance, coupling)
+
+    heading_rad = poses[constraints.i, 2]
+    turn = rotation_matrices(heading_rad)
+    return Displacements(
+        rotate(expected_m, heading_rad),
+        turn @ covariance @ turn.transpose(0, 2, 1),
     )
-    off_m = np.einsum("mab,mb->ma", turn, constraints.measurement[:, :2] - along)
-    return Displacements(off_m, turn @ covariance @ turn.transpose(0, 2, 1))
 
 
 def position_cost(positions_m: Floats, constraints: Constraints, known: Displacements) -> float:
     """Eq. 7 for (n, 2) positions."""
-    off = positions_m[constraints.j] - positions_m[constraints.i] - known.off_m
-    return float(
-        np.einsum("ma,ma->", off, np.linalg.solve(known.covariance_m2, off[..., None])[..., 0])
-    )
+    offset_m = positions_m[constraints.j] - positions_m[constraints.i]
+    return _weighted_squares(offset_m - known.offset_m, known.covariance_m2)
 
 
 class Loops:
     """The loops of one path, and the forces by which they hold it together."""
 
     def __init__(self, graph: PoseGraph) -> None:
-        back = graph.closures.i > graph.closures.j
-        self._start = np.where(back, graph.closures.j, graph.closures.i)
-        self._end = np.where(back, graph.closures.i, graph.closures.j)
-        known = displacements(graph.poses, graph.closures)
+        closures = graph.closures
+        backwards = closures.i > closures.j
+        self._start = np.where(backwards, closures.j, closures.i)
+        self._end = np.where(backwards, closures.i, closures.j)
+
+        closing = displacements(graph.poses, closures)
+        self._closing_m = np.where(backwards[:, None], -closing.offset_m, closing.offset_m)
+        self._closing_m2 = closing.covariance_m2
+
         step = displacements(graph.poses, graph.steps)
-        self._closing_m = np.where(back[:, None], -known.off_m, known.off_m)
-        self._closing_m2 = known.covariance_m2
         self._step_m2 = step.covariance_m2
-        self._integrated_m = graph.poses[0, :2] + cumulative(step.off_m)
-        so_far_m2 = cumulative(step.covariance_m2)
-        self.gain = np.linalg.inv(
-            so_far_m2[self._end] - so_far_m2[self._start] + known.covariance_m2
-        )
+        self._integrated_m = graph.poses[0, :2] + cumulative(step.offset_m)
+
+        along_m2 = self._across(cumulative(step.covariance_m2))
+        self.gain = _inverse(along_m2 + self._closing_m2)
 
     @property
     def discrepancy_m(self) -> Floats:
@@ -100,67 +100,91 @@ class Loops:
         """One reverse replay: (n, 2) shifts of the positions under (m, 2) forces (eq. 9's alpha A d
         p, summed up).
         """
-        count = len(self._integrated_m)
-        entered = [np.bincount(self._end, forces[:, axis], count) for axis in (0, 1)]
-        left = [np.bincount(self._start, forces[:, axis], count) for axis in (0, 1)]
-        pull = np.cumsum((np.array(entered) - np.array(left)).T[::-1], axis=0)[::-1]
-        return cumulative(np.einsum("kab,kb->ka", self._step_m2, pull[1:]))
+        change = self._summed(self._end, forces) - self._summed(self._start, forces)
+        pull = np.cumsum(change[::-1], axis=0)[::-1]
+        return cumulative(_times(self._step_m2, pull[1:]))
 
     def yielded(self, forces: Floats) -> Floats:
-        """(m, 2): by how much `forces` close each loop: the path gives way, and so does the
-        closure.
-        """
-        result: Floats = self._across(self.shifts(forces)) + np.einsum(
-            "mab,mb->ma", self._closing_m2, forces
-        )
-        return result
+        """(m, 2): how far `forces` close each loop: the path yields, and so does the closure."""
+        by_path_m = self._across(self.shifts(forces))
+        return by_path_m + _times(self._closing_m2, forces)
 
     def positions_m(self, forces: Floats) -> Floats:
         """(n, 2): the path under `forces`."""
         return self._integrated_m + self.shifts(forces)
 
     def costs(self, forces: Floats) -> tuple[float, float]:
-        """Eq. 7 of the path under `forces`, and the least that it could be for any (its dual)."""
-        yielded = self.yielded(forces)
-        work = float(np.sum(forces * yielded))
-        left = self.discrepancy_m - yielded
-        given_way = np.einsum("mab,mb->ma", self._closing_m2, forces)
-        # The closure bears what the path has not given way to.
-        borne = left + given_way
-        strain = float(np.sum(borne * np.linalg.solve(self._closing_m2, borne[..., None])[..., 0]))
-        in_steps = work - float(np.sum(forces * given_way))
-        return in_steps + strain, 2 * float(np.sum(forces * self.discrepancy_m)) - work
+        """Eq. 7 of the path under `forces`, and a lower bound for any forces (its dual)."""
+        yielded_m = self.yielded(forces)
+        by_closure_m = _times(self._closing_m2, forces)
+        work = float(np.sum(forces * yielded_m))
+        in_steps = work - float(np.sum(forces * by_closure_m))
 
-    def _across(self, positions: Floats) -> Floats:
-        result: Floats = positions[self._end] - positions[self._start]
-        return result
+        # A closure is misfitted by what the path does not yield.
+        misfit_m = self.discrepancy_m - yielded_m + by_closure_m
+        in_closures = _weighted_squares(misfit_m, self._closing_m2)
+
+        bound = 2 * float(np.sum(forces * self.discrepancy_m)) - work
+        return in_steps + in_closures, bound
+
+    def _across(self, along: Floats) -> Floats:
+        """The change of (n, ...) values along the path from each loop's start to its end."""
+        change: Floats = along[self._end] - along[self._start]
+        return change
+
+    def _summed(self, places: Indices, forces: Floats) -> Floats:
+        """(n, 2): the forces that act at each place."""
+        count = len(self._integrated_m)
+        axes = [np.bincount(places, forces[:, axis], count) for axis in (0, 1)]
+        return np.column_stack(axes)
 
 
-def close_loops(graph: PoseGraph, tolerance: float = 0.01, most_replays: int = 5000) -> Correction:
-    """Positions along the path after so many reverse replays that eq. 7 is within `tolerance` of
-    its least.
+def close_loops(graph: PoseGraph, tolerance: float = 0.01, max_replays: int = 5000) -> Correction:
+    """Replay the path in reverse until the cost of eq. 7 is within `tolerance` of its least.
 
     The headings of `graph.poses` stay, and its first position.
     """
     loops = Loops(graph)
     forces = np.zeros((len(graph.closures), 2))
-    left = loops.discrepancy_m
-    correction = np.einsum("mab,mb->ma", loops.gain, left)
-    towards = correction
-    gained = float(np.sum(left * correction))
-    replays, total, least = 0, *loops.costs(forces)
-    while (
-        total > (1 + tolerance) * max(least, 0.0) + 1e-12 and replays < most_replays and gained > 0
-    ):
-        yielded = loops.yielded(towards)
-        rate = gained / float(np.sum(towards * yielded))
-        forces = forces + rate * towards
-        left = left - rate * yielded
-        correction = np.einsum("mab,mb->ma", loops.gain, left)
-        gained, before = float(np.sum(left * correction)), gained
-        towards = correction + gained / before * towards
+    left_m = loops.discrepancy_m
+    correction = _times(loops.gain, left_m)
+    direction = correction
+    gained = float(np.sum(left_m * correction))
+
+    replays = 0
+    total, bound = loops.costs(forces)
+    while total > (1 + tolerance) * max(bound, 0.0) + 1e-12:
+        if replays >= max_replays or gained <= 0:
+            break
+        yielded_m = loops.yielded(direction)
+        rate = gained / float(np.sum(direction * yielded_m))
+        forces = forces + rate * direction
+        left_m = left_m - rate * yielded_m
+
+        correction = _times(loops.gain, left_m)
+        before = gained
+        gained = float(np.sum(left_m * correction))
+        direction = correction + gained / before * direction
+
         replays += 1
         if replays % CHECK_EVERY == 0 or replays < CHECK_EVERY:
-            total, least = loops.costs(forces)
-    total, least = loops.costs(forces)
-    return Correction(loops.positions_m(forces), replays, total, least)
+            total, bound = loops.costs(forces)
+
+    total, bound = loops.costs(forces)
+    return Correction(loops.positions_m(forces), replays, total, bound)
+
+
+def _inverse(matrices: Floats) -> Floats:
+    return np.asarray(np.linalg.inv(matrices), np.float64)
+
+
+def _times(matrices: Floats, vectors: Floats) -> Floats:
+    """(m, 2): each of (m, 2, 2) matrices times its vector."""
+    product: Floats = np.einsum("mab,mb->ma", matrices, vectors)
+    return product
+
+
+def _weighted_squares(errors_m: Floats, covariance_m2: Floats) -> float:
+    """The sum of d' S^-1 d over (m, 2) errors."""
+    solved = np.linalg.solve(covariance_m2, errors_m[..., None])[..., 0]
+    return float(np.sum(errors_m * solved))

@@ -1,4 +1,4 @@
-"""Distributions as samples: moving them, keeping some, telling their mean and spread (paper §5.4)."""
+"""Distributions as Monte-Carlo samples: rejection, resampling, moments (paper §5.4)."""
 
 from __future__ import annotations
 
@@ -7,142 +7,150 @@ import hashlib
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats
-from cogmap.geometry.se2 import mean_pose, wrap_angle
+from cogmap.geometry.se2 import FULL_TURN_RAD, mean_pose, wrap_angle
 
 Samples = Floats
-STRAIGHTS = 4
-TURN = 2 * np.pi
-# How far samples that are all the same are spread where they must be: metres, metres, radians.
-HEAP = np.array([0.02, 0.02, 0.01])
+SECANT_STEPS = 4
+# Added when samples are inflated, which may all be the same: metres, metres, radians.
+INFLATION_SD = np.array([0.02, 0.02, 0.01])
+MAX_KERNEL_VARIANCE = 0.9
 
 
 def generator(identifier: str) -> np.random.Generator:
-    """Randomness that depends on what is being computed alone, so that every worker computes the
-    same.
-    """
-    return np.random.default_rng(
-        int.from_bytes(hashlib.blake2b(identifier.encode(), digest_size=8).digest())
-    )
+    """A generator seeded by `identifier` alone, so that every worker draws the same numbers."""
+    digest = hashlib.blake2b(identifier.encode(), digest_size=8).digest()
+    return np.random.default_rng(int.from_bytes(digest))
 
 
 def standard_normal(rng: np.random.Generator, *shape: int) -> Samples:
-    """Standard normal numbers, of single precision: they cost half, and noise needs no more."""
+    """Standard normal numbers of single precision: they cost half, and noise needs no more."""
     return rng.standard_normal(shape, np.float32).astype(np.float64)
 
 
 def centred(samples: Samples) -> tuple[Samples, Samples]:
-    """The mean (d,) of (n, d) samples and how far each is off it; of three columns or more the
-    third is a heading.
+    """The mean (d,) of (n, d) samples and their deviations (n, d) from it. Of three columns or more
+    the third is a heading.
     """
-    number, columns = samples.shape
-    average = np.full(number, 1 / number)
-    mean = average @ samples
-    if columns > 2:
-        heading = np.ascontiguousarray(samples[:, 2])
-        mean[2] = np.arctan2(average @ np.sin(heading), average @ np.cos(heading))
-    off = samples - mean
-    if columns > 2:
-        off[:, 2] -= TURN * np.rint(off[:, 2] / TURN)
-    return mean, off
+    count, columns = samples.shape
+    weights = np.full(count, 1 / count)
+    mean = weights @ samples
+    if columns < 3:
+        return mean, samples - mean
+
+    headings_rad = np.ascontiguousarray(samples[:, 2])
+    mean[2] = np.arctan2(weights @ np.sin(headings_rad), weights @ np.cos(headings_rad))
+    deviations = samples - mean
+    deviations[:, 2] -= FULL_TURN_RAD * np.rint(deviations[:, 2] / FULL_TURN_RAD)
+    return mean, deviations
 
 
 def spread(samples: Samples, mean: Samples) -> Samples:
-    """Standard deviation of each column about `mean`; a third column is a heading."""
-    off = samples - mean
+    """(d,): the standard deviation of each column about `mean`; of three columns the third is a
+    heading.
+    """
+    deviations = samples - mean
     if samples.shape[1] == 3:
-        off[:, 2] = wrap_angle(off[:, 2])
-    sd: Samples = np.sqrt((off**2).mean(axis=0))
-    return sd
+        deviations[:, 2] = wrap_angle(deviations[:, 2])
+    return np.asarray(np.sqrt((deviations**2).mean(axis=0)))
 
 
 def rejection_mask(log_likelihood: Samples, rng: np.random.Generator) -> Booleans:
-    """Rejection sampling: each sample stays with a probability proportional to its likelihood.
+    """(n,): which samples rejection keeps, each with a probability proportional to its likelihood.
 
-    The likeliest always stays, so that something does even where all are unlikely.
+    The likeliest is always kept, so that one is even where all are unlikely.
     """
-    relative = np.exp(log_likelihood - log_likelihood.max())
-    kept: Booleans = rng.random(len(relative)) < relative
-    kept[int(np.argmax(relative))] = True
+    probability = np.exp(log_likelihood - log_likelihood.max())
+    kept: Booleans = rng.random(len(probability)) < probability
+    kept[int(np.argmax(probability))] = True
     return kept
 
 
 def inflate(poses: Samples, factor: float, rng: np.random.Generator) -> Samples:
-    """Samples whose first three columns are `factor` times as far about their mean, and those of a
-    heap a little.
+    """Samples whose first three columns deviate `factor` times as far from their mean, and a little
+    at random.
     """
-    result = poses.copy()
     mean = mean_pose(poses)
-    off = poses[:, :3] - mean
-    off[:, 2] = wrap_angle(off[:, 2])
-    result[:, :3] = mean + factor * off + rng.normal(0.0, 1.0, off.shape) * HEAP
+    deviations = poses[:, :3] - mean
+    deviations[:, 2] = wrap_angle(deviations[:, 2])
+    noise = rng.normal(0.0, 1.0, deviations.shape) * INFLATION_SD
+
+    result = poses.copy()
+    result[:, :3] = mean + factor * deviations + noise
     return result
 
 
-def kernel_smooth(drawn: Samples, tell_apart: float, rng: np.random.Generator) -> Samples:
-    """Samples in place of `drawn`, in which few stand for many, with the same mean and covariance.
+def kernel_smooth(drawn: Samples, effective: float, rng: np.random.Generator) -> Samples:
+    """(n, d) samples in place of `drawn`, which repeats few, with the same mean and covariance.
 
-    A Gaussian kernel as wide as Silverman's rule has it for `tell_apart` samples, shrunk to the
-    mean by as much (Liu and West 2001). The third column may be a heading: it is taken on the
-    circle.
+    A Gaussian kernel of Silverman's width for `effective` samples, shrunk towards the mean by as
+    much (Liu and West 2001). Of three columns or more the third is a heading.
     """
-    number, columns = drawn.shape
-    mean, off = centred(drawn)
-    width2 = min(0.9, (4 / ((columns + 2) * max(1.0, tell_apart))) ** (2 / (columns + 4)))
-    values, vectors = np.linalg.eigh(off.T @ off / number)
-    noise = standard_normal(rng, *drawn.shape) @ (vectors * np.sqrt(values.clip(0.0) * width2)).T
-    off *= np.sqrt(1 - width2)
-    off += noise
-    off += mean - np.full(number, 1 / number) @ noise
-    return off
+    count, columns = drawn.shape
+    mean, deviations = centred(drawn)
+    width = (4 / ((columns + 2) * max(1.0, effective))) ** (1 / (columns + 4))
+    variance = min(MAX_KERNEL_VARIANCE, width**2)
+
+    values, vectors = np.linalg.eigh(deviations.T @ deviations / count)
+    root = vectors * np.sqrt(values.clip(0.0) * variance)
+    noise = standard_normal(rng, *drawn.shape) @ root.T
+
+    deviations *= np.sqrt(1 - variance)
+    deviations += noise
+    deviations += mean - np.full(count, 1 / count) @ noise
+    return deviations
 
 
 def tempering_exponent(log_likelihood: Samples, share: float) -> float:
-    """About the largest power of the likelihood, at most 1, that leaves a `share` of the samples by
-    rejection.
+    """About the largest power of the likelihood, at most 1, with which rejection keeps a `share` of
+    the samples.
 
-    What is left falls with the power, ever more slowly in its logarithm: a straight line from the
+    The logarithm of what is kept falls with the power, ever more slowly: a straight line from the
     start leads to a power that is a little too large, and from there on ever nearer.
     """
     relative = (log_likelihood - log_likelihood.max()).astype(np.float32)
+    target = float(np.log(share))
     power = 1.0
-    aimed = float(np.log(share))
-    for _ in range(STRAIGHTS):
-        left = float(np.log(np.exp(power * relative).mean()))
-        if left >= aimed:
+    for _ in range(SECANT_STEPS):
+        kept = float(np.log(np.exp(power * relative).mean()))
+        if kept >= target:
             break
-        power *= aimed / left
+        power *= target / kept
     return power
 
 
 def rejection_resample(
-    samples: Samples, log_likelihood: Samples, fewest: int, rng: np.random.Generator
+    samples: Samples, log_likelihood: Samples, min_kept: int, rng: np.random.Generator
 ) -> tuple[Samples, float]:
-    """What rejection leaves of (n, d) samples, with a little about each, and the share that it is.
+    """What rejection keeps of (n, d) samples, smoothed by a kernel, and the share that it is.
 
-    Each stays with a probability proportional to its likelihood, and of those alike in the last
-    column as many as should: independent draws would let the mean of what the likelihood says
-    nothing of walk away, view by view. Where fewer than `fewest` would stay, that many are drawn
-    with the same probabilities, some more than once.
+    Each is kept with a probability proportional to its likelihood, and of those alike in the last
+    column as many as expected: independent draws would let the mean of what the likelihood does not
+    inform drift, view by view. Where fewer than `min_kept` would be kept, that many are drawn with
+    the same probabilities, some repeatedly.
     """
     order = np.argsort(samples[:, -1], kind="stable")
-    chances = np.exp(log_likelihood - log_likelihood.max())[order]
-    share = float(chances.mean())
-    tell_apart = float(chances.sum() ** 2 / np.square(chances).sum())
-    chances *= max(1.0, fewest / chances.sum())
-    copies = np.diff(np.floor(np.cumsum(chances) + rng.random()), prepend=0.0).astype(np.int64)
-    chosen = samples[np.repeat(order, copies)]
-    return kernel_smooth(
-        chosen if len(chosen) else samples[[int(log_likelihood.argmax())]], tell_apart, rng
-    ), share
+    probability = np.exp(log_likelihood - log_likelihood.max())[order]
+    share = float(probability.mean())
+    effective = float(probability.sum() ** 2 / np.square(probability).sum())
+
+    expected = probability * max(1.0, min_kept / probability.sum())
+    drawn = np.floor(np.cumsum(expected) + rng.random())
+    copies = np.diff(drawn, prepend=0.0).astype(np.int64)
+    kept = samples[np.repeat(order, copies)]
+    if not len(kept):
+        kept = samples[[int(log_likelihood.argmax())]]
+    return kernel_smooth(kept, effective, rng), share
 
 
 def resample(
-    kept: Samples, number: int, jitter: float | Samples, rng: np.random.Generator
+    kept: Samples, count: int, jitter: float | Samples, rng: np.random.Generator
 ) -> Samples:
-    """`number` samples of those kept, of each as many as of the next, moved a little so that none
-    stands for many.
+    """`count` samples of those kept, each as often as the next, with normal noise of standard
+    deviation `jitter`, one for all columns or (d,).
     """
-    whole, rest = divmod(number, len(kept))
+    whole, rest = divmod(count, len(kept))
     evenly = np.arange(rest) * len(kept) // max(1, rest)
-    moved: Samples = np.concatenate([kept] * whole + [kept[evenly]])
-    return moved + standard_normal(rng, *moved.shape) * jitter if np.any(jitter) else moved
+    copies: Samples = np.concatenate([kept] * whole + [kept[evenly]])
+    if not np.any(jitter):
+        return copies
+    return copies + standard_normal(rng, *copies.shape) * jitter

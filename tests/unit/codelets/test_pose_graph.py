@@ -146,7 +146,7 @@ def test_a_loop_told_backwards_is_the_same_loop() -> None:
     turned = Constraints(ends.j, ends.i, np.zeros((len(ends), 3)), ends.information)
     cos = np.cos(headings[ends.j])
     sin = np.sin(headings[ends.j])
-    off = -here.off_m
+    off = -here.offset_m
     turned.measurement[:, 0] = cos * off[:, 0] + sin * off[:, 1]
     turned.measurement[:, 1] = cos * off[:, 1] - sin * off[:, 0]
     backwards = close_loops(PoseGraph(graph.poses, graph.steps, turned), 1e-6)
@@ -227,7 +227,7 @@ def test_what_a_closure_leaves_undone_is_done_when_there_is_time(
     _, graph, _ = _laps(laps=2)
     far = _between(np.array([0]), np.array([80]), np.array([[15.0, -15.0, 1.0]]), CLOSURE_SD / 10)
     least = cost(optimize(PoseGraph(graph.poses, graph.steps, far)), graph.steps + far)
-    monkeypatch.setattr(incremental, "ITERATIONS_A_CLOSURE", 1)
+    monkeypatch.setattr(incremental, "ITERATIONS_PER_CLOSURE", 1)
     hasty = IncrementalSolver(
         PoseGraph(graph.poses, graph.steps, graph.closures.select(slice(0, 0)))
     )
