@@ -31,6 +31,8 @@ MIN_RANGE_M = 0.5
 MIN_BEARING_SD_RAD = 0.003
 MIN_RANGE_SD_M = 0.1
 HIDDEN_SD_M = 0.2
+# Of differences: x and z in metres, orientation in radians.
+STEPS = (1e-3, 1e-3, 1e-4)
 # Largest step of one iteration: x and z in metres, orientation in radians.
 MAX_STEP = (5, 5, 0.4)
 
@@ -131,21 +133,22 @@ def _stack(silhouettes: list[Silhouette], camera: Calibration) -> _Problem:
     columns = np.empty((len(silhouettes), COLUMNS))
     disparity_px = np.empty((len(silhouettes), COLUMNS))
     for row, silhouette in enumerate(silhouettes):
-        picked = np.linspace(0, len(silhouette.columns) - 1, COLUMNS).round().astype(np.intp)
+        last = len(silhouette.columns) - 1
+        picked = np.linspace(0, last, COLUMNS).round().astype(np.intp)
         columns[row] = silhouette.columns[picked]
         disparity_px[row] = silhouette.disparity_px[picked]
 
-    width_px = np.array([len(silhouette.columns) for silhouette in silhouettes], float)
-    edges = [(silhouette.left, silhouette.right) for silhouette in silhouettes]
-    hidden = [(not silhouette.left_true, not silhouette.right_true) for silhouette in silhouettes]
-    sides_m = [silhouette.sides_m for silhouette in silhouettes]
+    width_px = np.array([len(each.columns) for each in silhouettes], float)
+    edges_px = [(each.left, each.right) for each in silhouettes]
+    true_ends = [(each.left_true, each.right_true) for each in silhouettes]
+    sides_m = [each.sides_m for each in silhouettes]
     redundancy = np.maximum(1.0, COLUMNS * CORRELATED_COLUMNS / width_px)
 
     return _Problem(
         slope=(columns - camera.cx_px) / camera.fx_px,
         disparity_px=disparity_px,
-        edge_px=np.array(edges),
-        hidden=np.array(hidden),
+        edge_px=np.array(edges_px),
+        hidden=~np.array(true_ends),
         half_m=np.array(sides_m) / 2,
         sd_px=DISPARITY_SD_PX * np.sqrt(redundancy),
         bias_sd_px=DISPARITY_BIAS_SD_PX + NARROW_BIAS_PX / width_px,
@@ -156,24 +159,35 @@ def _stack(silhouettes: list[Silhouette], camera: Calibration) -> _Problem:
 def _starts(objects: _Problem) -> Floats:
     """ORIENTATIONS starts an object (s * ORIENTATIONS, 3), behind the middle of what is seen."""
     camera = objects.camera
-    depth_m = camera.fx_px * camera.baseline_m / np.median(objects.disparity_px, axis=1)
-    slope = (objects.edge_px.mean(1) - camera.cx_px) / camera.fx_px
-    behind = 1 + 0.8 * objects.half_m.mean(1) / (depth_m * np.hypot(slope, 1))
-    centre = np.stack([slope * depth_m * behind, depth_m * behind, np.zeros_like(depth_m)], axis=1)
+    median_px = np.median(objects.disparity_px, axis=1)
+    depth_m = camera.fx_px * camera.baseline_m / median_px
+    middle_px = objects.edge_px.mean(1)
+    slope = (middle_px - camera.cx_px) / camera.fx_px
+
+    distance_m = depth_m * np.hypot(slope, 1)
+    behind = 1 + 0.8 * objects.half_m.mean(1) / distance_m
+    x_m = slope * depth_m * behind
+    z_m = depth_m * behind
+    centre = np.stack([x_m, z_m, np.zeros_like(depth_m)], axis=1)
 
     orientations = np.linspace(0, np.pi, ORIENTATIONS, endpoint=False)
-    facing = np.repeat(np.arctan(slope), ORIENTATIONS)
+    facing = np.arctan(slope)
     starts = np.repeat(centre, ORIENTATIONS, axis=0)
-    starts[:, 2] = np.tile(orientations, len(depth_m)) - facing
+    starts[:, 2] = np.tile(orientations, len(depth_m))
+    starts[:, 2] -= np.repeat(facing, ORIENTATIONS)
     return starts
 
 
 def _residuals(parameters: Floats, problem: _Problem) -> Floats:
     """(s, COLUMNS + 2) residuals in standard deviations, of (s, 3) parameters."""
     camera = problem.camera
-    disparity_px = camera.fx_px * camera.baseline_m * _inverse_depths(parameters, problem)
-    depth_residuals = (disparity_px - problem.disparity_px) / problem.sd_px[:, None]
-    return np.concatenate([depth_residuals, _edge_residuals(parameters, problem)], axis=1)
+    focal_baseline = camera.fx_px * camera.baseline_m
+    disparity_px = focal_baseline * _inverse_depths(parameters, problem)
+    error_px = disparity_px - problem.disparity_px
+
+    of_columns = error_px / problem.sd_px[:, None]
+    of_edges = _edge_residuals(parameters, problem)
+    return np.concatenate([of_columns, of_edges], axis=1)
 
 
 def _inverse_depths(parameters: Floats, problem: _Problem) -> Floats:
@@ -183,17 +197,21 @@ def _inverse_depths(parameters: Floats, problem: _Problem) -> Floats:
     sin = np.sin(orientation)
     inverse = np.full(problem.slope.shape, np.inf)
 
-    sides = ((cos, sin, problem.half_m[:, 0]), (-sin, cos, problem.half_m[:, 1]))
-    for axis_x, axis_z, half in sides:
+    axes = ((cos, sin), (-sin, cos))
+    for (axis_x, axis_z), half in zip(axes, problem.half_m.T, strict=True):
         along = x * axis_x + z * axis_z
         gap = np.abs(along) - half
         facing = gap > 1e-3
+        safe_gap = np.where(facing, gap, 1.0)
 
-        towards = (problem.slope * axis_x[:, None] + axis_z[:, None]) * np.sign(along)[:, None]
-        plane = towards / np.where(facing, gap, 1.0)[:, None]
-        inverse = np.where(facing[:, None], np.minimum(inverse, plane), inverse)
+        across = problem.slope * axis_x[:, None] + axis_z[:, None]
+        towards = across * np.sign(along)[:, None]
+        of_side = towards / safe_gap[:, None]
+        nearer = np.minimum(inverse, of_side)
+        inverse = np.where(facing[:, None], nearer, inverse)
 
-    return np.where(np.isfinite(inverse), inverse, 1 / MIN_RANGE_M)
+    met = np.isfinite(inverse)
+    return np.where(met, inverse, 1 / MIN_RANGE_M)
 
 
 def _edge_residuals(parameters: Floats, problem: _Problem) -> Floats:
@@ -201,12 +219,12 @@ def _edge_residuals(parameters: Floats, problem: _Problem) -> Floats:
     true end at a hidden edge may lie anywhere farther out.
     """
     corners_px = _corner_columns(parameters, problem)
-    left = corners_px.min(1) - problem.edge_px[:, 0]
-    right = corners_px.max(1) - problem.edge_px[:, 1]
-    residuals = np.stack([left, right], axis=1)
+    outermost_px = np.stack([corners_px.min(1), corners_px.max(1)], axis=1)
+    error_px = outermost_px - problem.edge_px
 
-    outward = residuals * np.array([-1.0, 1.0])
-    return np.where(problem.hidden & (outward > 0), 0.0, residuals) / EDGE_SD_PX
+    outward_px = error_px * np.array([-1.0, 1.0])
+    is_free = problem.hidden & (outward_px > 0)
+    return np.where(is_free, 0.0, error_px) / EDGE_SD_PX
 
 
 def _corner_columns(parameters: Floats, problem: _Problem) -> Floats:
@@ -220,19 +238,27 @@ def _corner_columns(parameters: Floats, problem: _Problem) -> Floats:
 
     corner_x = x + a * cos - b * sin
     corner_z = z + a * sin + b * cos
-    columns = camera.cx_px + camera.fx_px * corner_x / np.maximum(corner_z, MIN_RANGE_M)
-    return np.asarray(columns)
+    depth_m = np.maximum(corner_z, MIN_RANGE_M)
+    right_px = camera.fx_px * corner_x / depth_m
+    return np.asarray(camera.cx_px + right_px)
 
 
 def _linearized(parameters: Floats, problem: _Problem) -> tuple[Floats, Floats]:
     """Residuals (s, r) and their derivatives (s, r, 3), by forward differences."""
-    steps = np.array([1e-3, 1e-3, 1e-4])
-    shifted = [parameters + step for step in np.diag(steps)]
-    evaluated = np.concatenate([parameters, *shifted])
-    rows = np.tile(np.arange(len(parameters)), 4)
+    evaluated = [parameters]
+    for axis, step in enumerate(STEPS):
+        shifted = parameters.copy()
+        shifted[:, axis] += step
+        evaluated.append(shifted)
 
-    residuals, *others = np.split(_residuals(evaluated, problem.take(rows)), 4)
-    derivatives = [(other - residuals) / step for other, step in zip(others, steps, strict=True)]
+    # All at once: one call of numpy for four evaluations.
+    rows = np.tile(np.arange(len(parameters)), len(evaluated))
+    values = _residuals(np.concatenate(evaluated), problem.take(rows))
+    residuals, *others = np.split(values, len(evaluated))
+
+    derivatives = []
+    for other, step in zip(others, STEPS, strict=True):
+        derivatives.append((other - residuals) / step)
     return residuals, np.stack(derivatives, axis=2)
 
 
@@ -248,45 +274,59 @@ def _solve(parameters: Floats, problem: _Problem) -> _Solution:
         new_residuals, new_jacobian = _linearized(candidate, problem)
         cost = _huber_cost(new_residuals)
         better = cost < best_cost
+        better_row = better[:, None]
 
         best_cost = np.where(better, cost, best_cost)
-        best = np.where(better[:, None], candidate, best)
-        residuals = np.where(better[:, None], new_residuals, residuals)
-        jacobian = np.where(better[:, None, None], new_jacobian, jacobian)
+        best = np.where(better_row, candidate, best)
+        residuals = np.where(better_row, new_residuals, residuals)
+        jacobian = np.where(better_row[..., None], new_jacobian, jacobian)
         damping = np.where(better, damping * 0.2, damping * 8)
         candidate = best - _damped_step(residuals, jacobian, damping)
 
+    return _solution(best, residuals, jacobian, problem)
+
+
+def _solution(
+    parameters: Floats, residuals: Floats, jacobian: Floats, problem: _Problem
+) -> _Solution:
     weight = _huber_weight(residuals)
     weighted = jacobian * weight[..., None]
-    bias_gradient = weighted[:, :COLUMNS].sum(1) * (problem.bias_sd_px / problem.sd_px)[:, None]
+    normal = np.einsum("sri,srj->sij", weighted, jacobian)
+
+    bias_share = problem.bias_sd_px / problem.sd_px
+    of_columns = weighted[:, :COLUMNS].sum(1)
     return _Solution(
-        parameters=best,
+        parameters=parameters,
         residuals=residuals * np.sqrt(weight),
-        normal=np.asarray(np.einsum("sri,srj->sij", weighted, jacobian)),
-        bias_gradient=np.asarray(bias_gradient),
+        normal=np.asarray(normal),
+        bias_gradient=of_columns * bias_share[:, None],
     )
 
 
 def _damped_step(residuals: Floats, jacobian: Floats, damping: Floats) -> Floats:
     """The step (s, 3) to subtract, at most MAX_STEP."""
-    weighted = jacobian * _huber_weight(residuals)[..., None]
+    weight = _huber_weight(residuals)
+    weighted = jacobian * weight[..., None]
     normal = np.einsum("sri,srj->sij", weighted, jacobian)
     gradient = np.einsum("sri,sr->si", weighted, residuals)
 
-    diagonal = np.einsum("sii->si", normal) * damping[:, None] + 1e-9
-    damped = normal + diagonal[:, :, None] * np.eye(3)
-    step = np.linalg.solve(damped, gradient[..., None])[..., 0]
-    return np.asarray(step.clip(np.negative(MAX_STEP), MAX_STEP))
+    diagonal = np.einsum("sii->si", normal)
+    added = diagonal * damping[:, None] + 1e-9
+    damped = normal + added[:, :, None] * np.eye(3)
+    step = np.linalg.solve(damped, gradient[..., None])
+    return np.asarray(step[..., 0].clip(np.negative(MAX_STEP), MAX_STEP))
 
 
 def _huber_weight(residuals: Floats) -> Floats:
-    size = np.maximum(np.abs(residuals), 1e-12)
-    return np.asarray(np.minimum(1.0, HUBER / size))
+    size = np.abs(residuals)
+    ratio = HUBER / np.maximum(size, 1e-12)
+    return np.asarray(np.minimum(1.0, ratio))
 
 
 def _huber_cost(residuals: Floats) -> Floats:
     size = np.abs(residuals)
-    cost = np.where(size < HUBER, size**2, HUBER * (2 * size - HUBER))
+    linear = HUBER * (2 * size - HUBER)
+    cost = np.where(size < HUBER, size**2, linear)
     return np.asarray(cost.sum(1))
 
 
@@ -297,17 +337,27 @@ def _covariances(solution: _Solution, problem: _Problem) -> Floats:
     prior = np.diag([1e-4, 1e-4, 1e-2])
     independent = np.linalg.inv(solution.normal + prior)
     common = np.einsum("sij,sj->si", independent, solution.bias_gradient)
-    covariances = np.asarray(independent + common[:, :, None] * common[:, None, :])
+    covariances = np.asarray(independent + _outer(common))
 
-    hidden_variance = np.where(problem.hidden.any(1), HIDDEN_SD_M**2, 0.0)
-    covariances[:, :2, :2] += np.asarray(hidden_variance)[:, None, None] * np.eye(2)
+    is_hidden = problem.hidden.any(1)
+    hidden_variance = np.where(is_hidden, HIDDEN_SD_M**2, 0.0)
+    covariances[:, :2, :2] += hidden_variance[:, None, None] * np.eye(2)
     return covariances
+
+
+def _outer(vectors: Floats) -> Floats:
+    """(s, k, k): the outer product of each of (s, k) vectors with itself."""
+    columns = vectors[:, :, None]
+    rows = vectors[:, None, :]
+    return columns * rows
 
 
 def _misfits(solution: _Solution, problem: _Problem) -> Floats:
     """(s,): root mean square disparity residual, in standard deviations of one column."""
-    error_px = solution.residuals[:, :COLUMNS] * problem.sd_px[:, None]
-    return np.asarray(np.sqrt((error_px**2).mean(1)) / DISPARITY_SD_PX)
+    of_columns = solution.residuals[:, :COLUMNS]
+    error_px = of_columns * problem.sd_px[:, None]
+    mean_square_px2 = (error_px**2).mean(1)
+    return np.asarray(np.sqrt(mean_square_px2) / DISPARITY_SD_PX)
 
 
 def _pose(
@@ -316,20 +366,20 @@ def _pose(
     """Mean and covariance over all orientations, weighted by likelihood, as bearing and range from
     the robot.
     """
-    weight = np.exp(-0.5 * (costs - costs.min()))
-    weight /= weight.sum()
-    centre = weight @ parameters[:, :2]
-    away = parameters[:, :2] - centre
-    scatter = away[:, :, None] * away[:, None, :]
+    likelihood = np.exp(-0.5 * (costs - costs.min()))
+    weight = likelihood / likelihood.sum()
+    centres = parameters[:, :2]
+    mean = weight @ centres
+    scatter = _outer(centres - mean)
     covariance = np.einsum("s,sij->ij", weight, covariances[:, :2, :2] + scatter)
 
-    forward_m = centre[1] + camera.mount_forward_m
-    left_m = -centre[0]
+    forward_m = mean[1] + camera.mount_forward_m
+    left_m = -mean[0]
     range_m = max(float(np.hypot(forward_m, left_m)), MIN_RANGE_M)
     radial = np.array([-left_m, forward_m]) / range_m
     tangential = np.array([radial[1], -radial[0]])
-    bearing_sd_rad = np.sqrt(tangential @ covariance @ tangential) / range_m
-    range_sd_m = np.sqrt(radial @ covariance @ radial)
+    range_sd_m = _sd(covariance, radial)
+    bearing_sd_rad = _sd(covariance, tangential) / range_m
 
     return ObjectPose(
         bearing_rad=float(np.arctan2(left_m, forward_m)),
@@ -338,3 +388,9 @@ def _pose(
         range_sd_m=float(np.hypot(range_sd_m, MIN_RANGE_SD_M)),
         misfit=float(misfit),
     )
+
+
+def _sd(covariance: Floats, direction: Floats) -> Floats:
+    """The standard deviation along `direction`."""
+    variance = direction @ covariance @ direction
+    return np.asarray(np.sqrt(variance))

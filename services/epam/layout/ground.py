@@ -34,75 +34,97 @@ def project(likelihood: Singles, depth_m: Singles, camera: Calibration) -> tuple
     to the mean point of each cell of CELL_M. No boundary is claimed where the image ends or where
     something upright hides what is behind it.
     """
-    unknown = np.zeros(depth_m.shape)
-    disparity_px = np.divide(focal_baseline(camera), depth_m, out=unknown, where=depth_m > 0)
     likelihood = likelihood.astype(np.float32, copy=False)
     mask = likelihood >= 0.5
+    disparity_px = _disparity_px(depth_m, camera)
     plane = fit(mask, disparity_px, camera)
+    ground_px = plane.disparity_image_px(mask.shape, camera)
 
-    height, width = mask.shape
-    image_rows = np.arange(height)[:, None]
-    ground_px = plane.disparity_px(image_rows, np.arange(width), camera)
     upright = _upright(disparity_px, ground_px)
-    near = ground_px > focal_baseline(camera) / MAX_RANGE_M
+    near = ground_px > min_disparity_px(camera)
     road_rows, road_columns = np.nonzero(mask & ~upright & near)
-
-    upright_px = np.where(upright, disparity_px, 0.0).astype(np.float32)
-    visible_ground = _visible_ground(upright_px, ground_px)
-    end_rows, end_columns = _boundary_pixels(likelihood, mask, visible_ground)
-
     road_m = _on_ground(road_rows, road_columns, plane, camera)
+
+    upright_px = np.where(upright, disparity_px, 0.0)
+    visible_ground = _visible_ground(upright_px.astype(np.float32), ground_px)
+    end_rows, end_columns = _boundary_pixels(likelihood, mask, visible_ground)
     boundary_m = _on_ground(end_rows, end_columns, plane, camera)
+
     return thin(road_m), thin(boundary_m)
+
+
+def min_disparity_px(camera: Calibration) -> float:
+    """Return the disparity at MAX_RANGE_M."""
+    return focal_baseline(camera) / MAX_RANGE_M
+
+
+def _disparity_px(depth_m: Singles, camera: Calibration) -> Floats:
+    """Of each pixel (h, w), 0 where depth is unknown."""
+    known = depth_m > 0
+    unknown_px = np.zeros(depth_m.shape)
+    return np.divide(focal_baseline(camera), depth_m, out=unknown_px, where=known)
 
 
 def _upright(disparity_px: Floats, ground_px: Floats) -> Booleans:
     """Which pixels show something that stands on the ground, (h, w)."""
-    nearer_px = disparity_px - np.maximum(ground_px, 0.0)
-    nearer = nearer_px > UPRIGHT_PX + UPRIGHT_SHARE * disparity_px
+    horizon_px = np.maximum(ground_px, 0.0)
+    nearer_px = disparity_px - horizon_px
+    limit_px = UPRIGHT_PX + UPRIGHT_SHARE * disparity_px
+
+    nearer = nearer_px > limit_px
     opened = cv2.morphologyEx(nearer.astype(np.uint8), cv2.MORPH_OPEN, _SPECK)
     return np.asarray(opened > 0)
 
 
 def _visible_ground(upright_px: Singles, ground_px: Floats) -> Booleans:
     """Which pixels show ground with nothing upright before it nearby, (h, w)."""
-    kernel = np.ones((ABOVE_PX + 1 + BELOW_PX, 2 * BESIDE_PX + 1), np.uint8)
+    height = ABOVE_PX + 1 + BELOW_PX
+    width = 2 * BESIDE_PX + 1
+    kernel = np.ones((height, width), np.uint8)
     nearest_px = cv2.dilate(upright_px, kernel, anchor=(BESIDE_PX, ABOVE_PX))
-    return np.asarray((ground_px > 0) & (nearest_px < HIDING_SHARE * ground_px - HIDING_PX))
+
+    limit_px = HIDING_SHARE * ground_px - HIDING_PX
+    is_hidden = nearest_px >= limit_px
+    return np.asarray((ground_px > 0) & ~is_hidden)
 
 
 def _boundary_pixels(
     likelihood: Singles, mask: Booleans, visible_ground: Booleans
 ) -> tuple[Floats, Floats]:
     """Rows and columns, fractional, where the road ends on visible ground inside the image."""
-    visible = visible_ground[:, :-1] & visible_ground[:, 1:]
-    rows, columns = np.nonzero(visible & (mask[:, :-1] != mask[:, 1:]))
-    crossing = _crossing(likelihood[rows, columns], likelihood[rows, columns + 1])
-    beside_rows = rows
-    beside_columns = columns + crossing
+    across_rows, across_columns = _crossings(likelihood, mask, visible_ground)
+    down_columns, down_rows = _crossings(likelihood.T, mask.T, visible_ground.T)
 
-    visible = visible_ground[:-1] & visible_ground[1:]
-    rows, columns = np.nonzero(visible & (mask[:-1] != mask[1:]))
-    crossing = _crossing(likelihood[rows, columns], likelihood[rows + 1, columns])
-    above_rows = rows + crossing
-    above_columns = columns
-
-    all_rows = np.concatenate([beside_rows, above_rows]).astype(np.float64)
-    all_columns = np.concatenate([beside_columns, above_columns]).astype(np.float64)
+    rows = np.concatenate([across_rows, down_rows])
+    columns = np.concatenate([across_columns, down_columns])
     height, width = mask.shape
-    inside = _inside(all_rows, height) & _inside(all_columns, width)
-    return all_rows[inside], all_columns[inside]
+    inside = _inside(rows, height) & _inside(columns, width)
+    return rows[inside], columns[inside]
 
 
 def _inside(at: Floats, size: int) -> Booleans:
     """Which of these rows or columns are farther than BORDER_PX from the image's border."""
     middle = (size - 1) / 2
-    return np.asarray(np.abs(at - middle) < middle - BORDER_PX)
+    from_middle = np.abs(at - middle)
+    return np.asarray(from_middle < middle - BORDER_PX)
 
 
-def _crossing(first: Singles, second: Singles) -> Singles:
-    """Where the likelihood is 0.5 between two neighbours: 0 at the first, 1 at the second."""
-    return np.asarray((0.5 - first) / (second - first), np.float32)
+def _crossings(
+    likelihood: Singles, mask: Booleans, visible_ground: Booleans
+) -> tuple[Floats, Floats]:
+    """Rows and columns where the likelihood is 0.5 between neighbours in a row, if both show
+    visible ground.
+    """
+    visible = visible_ground[:, :-1] & visible_ground[:, 1:]
+    changes = mask[:, :-1] != mask[:, 1:]
+    rows, columns = np.nonzero(visible & changes)
+
+    first = likelihood[rows, columns]
+    second = likelihood[rows, columns + 1]
+    rise = second - first
+    share = (0.5 - first) / rise
+    crossed = np.asarray(columns + share, np.float64)
+    return rows.astype(np.float64), crossed
 
 
 def _on_ground(
@@ -110,10 +132,10 @@ def _on_ground(
 ) -> Floats:
     """The ground points (n, 2) that these pixels show; those beyond MAX_RANGE_M are left out."""
     disparity_px = plane.disparity_px(rows, columns, camera)
-    near = disparity_px > focal_baseline(camera) / MAX_RANGE_M
-    depth_m = focal_baseline(camera) / disparity_px[near]
+    near = disparity_px > min_disparity_px(camera)
     right, _ = ray_slopes(rows, columns, camera)
 
+    depth_m = focal_baseline(camera) / disparity_px[near]
     forward_m = depth_m + camera.mount_forward_m
     left_m = -right[near] * depth_m
     return np.stack([forward_m, left_m], axis=1)
@@ -123,12 +145,22 @@ def thin(points_m: Floats) -> Singles:
     """Return the mean of the points (n, 2) in each cell, in the order of the cells."""
     ranges_m = np.hypot(points_m[:, 0], points_m[:, 1])
     near_m = points_m[ranges_m <= MAX_RANGE_M]
-    reach = round(MAX_RANGE_M / CELL_M) + 1
-    cells = np.floor(near_m / CELL_M).astype(np.intp) + reach
-    cell = cells[:, 0] * 2 * reach + cells[:, 1]
+    cell = _cell_numbers(near_m)
 
     count = np.bincount(cell, minlength=1)
     occupied = np.flatnonzero(count)
-    sums = [np.bincount(cell, near_m[:, axis], minlength=1)[occupied] for axis in (0, 1)]
-    means = np.stack(sums, axis=1) / count[occupied, None]
-    return np.asarray(means, np.float32)
+    sum_x_m = np.bincount(cell, near_m[:, 0], minlength=1)
+    sum_y_m = np.bincount(cell, near_m[:, 1], minlength=1)
+
+    sums_m = np.stack([sum_x_m, sum_y_m], axis=1)
+    means_m = sums_m[occupied] / count[occupied, None]
+    return np.asarray(means_m, np.float32)
+
+
+def _cell_numbers(points_m: Floats) -> npt.NDArray[np.intp]:
+    """The number of the cell of each point (n, 2), x before y."""
+    reach = round(MAX_RANGE_M / CELL_M) + 1
+    cells = np.floor(points_m / CELL_M).astype(np.intp)
+    rows = cells[:, 0] + reach
+    columns = cells[:, 1] + reach
+    return np.asarray(rows * 2 * reach + columns)

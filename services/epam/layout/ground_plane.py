@@ -43,7 +43,16 @@ class GroundPlane:
     ) -> Floats:
         """The disparity at each of these pixels; at most 0 at and over the horizon."""
         right, below = ray_slopes(rows, columns, camera)
-        return self.across * right + self.down * below + self.level
+        across_px = self.across * right
+        down_px = self.down * below
+        return across_px + down_px + self.level
+
+    def disparity_image_px(self, size: tuple[int, ...], camera: Calibration) -> Floats:
+        """The disparity at each pixel of an image of `size` (h, w)."""
+        height, width = size
+        rows = np.arange(height)[:, None]
+        columns = np.arange(width)
+        return self.disparity_px(rows, columns, camera)
 
 
 def fit(mask: Booleans, disparity_px: Floats, camera: Calibration) -> GroundPlane:
@@ -52,22 +61,29 @@ def fit(mask: Booleans, disparity_px: Floats, camera: Calibration) -> GroundPlan
     right, below = ray_slopes(rows, columns, camera)
     slopes = np.stack([right, below, np.ones_like(right)], axis=1)
 
-    down = focal_baseline(camera) / camera.mount_height_m
-    prior = np.array([0.0, down, 0.0])
-    prior_sd = down * np.array([ROLL_SD_RAD, HEIGHT_SD_SHARE, PITCH_SD_RAD])
+    down_px = focal_baseline(camera) / camera.mount_height_m
+    prior = np.array([0.0, down_px, 0.0])
+    prior_sd = down_px * np.array([ROLL_SD_RAD, HEIGHT_SD_SHARE, PITCH_SD_RAD])
     information = np.diag(1 / prior_sd**2)
-    observed = disparity_px[rows, columns] - slopes @ prior
+    variance_px2 = CORRELATED_PIXELS * DISPARITY_SD_PX**2
+    observed_px = disparity_px[rows, columns] - slopes @ prior
 
     correction = np.zeros(3)
     for cutoff_px in CUTOFFS_PX:
-        misfit = (observed - slopes @ correction) / cutoff_px
-        biweight = np.clip(1 - misfit**2, 0.0, None) ** 2
-        weight = biweight / (CORRELATED_PIXELS * DISPARITY_SD_PX**2)
+        misfit_px = observed_px - slopes @ correction
+        weight = _biweight(misfit_px / cutoff_px) / variance_px2
         weighted = slopes.T * weight
-        correction = np.linalg.solve(weighted @ slopes + information, weighted @ observed)
+        normal = weighted @ slopes + information
+        correction = np.linalg.solve(normal, weighted @ observed_px)
 
     across, down, level = (prior + correction).tolist()
     return GroundPlane(across, down, level)
+
+
+def _biweight(misfit: Floats) -> Floats:
+    """Tukey's weight of residuals in units of the cutoff."""
+    inlying = np.clip(1 - misfit**2, 0.0, None)
+    return np.asarray(inlying**2)
 
 
 def focal_baseline(camera: Calibration) -> float:
@@ -79,9 +95,9 @@ def ray_slopes(
     rows: npt.ArrayLike, columns: npt.ArrayLike, camera: Calibration
 ) -> tuple[Floats, Floats]:
     """The slopes of the pixels' rays to the right and downwards."""
-    right = (np.asarray(columns, np.float64) - camera.cx_px) / camera.fx_px
-    below = (np.asarray(rows, np.float64) - camera.cy_px) / camera.fy_px
-    return right, below
+    right_px = np.asarray(columns, np.float64) - camera.cx_px
+    below_px = np.asarray(rows, np.float64) - camera.cy_px
+    return right_px / camera.fx_px, below_px / camera.fy_px
 
 
 def _sampled_pixels(
@@ -91,6 +107,9 @@ def _sampled_pixels(
     direction.
     """
     first = STRIDE_PX // 2
-    grid = (slice(first, None, STRIDE_PX), slice(first, None, STRIDE_PX))
-    rows, columns = np.nonzero(mask[grid] & (disparity_px[grid] > 0))
+    every = slice(first, None, STRIDE_PX)
+    wanted = mask[every, every]
+    known = disparity_px[every, every] > 0
+
+    rows, columns = np.nonzero(wanted & known)
     return STRIDE_PX * rows + first, STRIDE_PX * columns + first

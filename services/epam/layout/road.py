@@ -44,17 +44,17 @@ class RoadSegmenter:
 
         A pixel is road if it is at least 0.5. An image without any contrast has none.
         """
-        height, width = image.shape[:2]
+        height, width, _ = image.shape
         resized = cv2.resize(image, (WIDTH_PX, HEIGHT_PX), interpolation=cv2.INTER_AREA)
         small = resized.astype(np.uint8, copy=False)
         if small.std() < MIN_CONTRAST:
             return np.zeros((height, width), np.float32)
 
         (output,) = self._network(network_input(small[None]))
-        log_odds = cv2.resize(
-            output[0, 0, PADDING_PX:-PADDING_PX], (width, height), interpolation=cv2.INTER_LINEAR
-        )
-        probability = np.asarray(1 / (1 + np.exp(-log_odds)), np.float32)
+        unpadded = output[0, 0, PADDING_PX:-PADDING_PX]
+        log_odds = cv2.resize(unpadded, (width, height), interpolation=cv2.INTER_LINEAR)
+        odds_against = np.exp(-log_odds)
+        probability = np.asarray(1 / (1 + odds_against), np.float32)
         return _denoised(probability)
 
     def mask(self, image: Bytes) -> Booleans:
@@ -76,35 +76,50 @@ def network_input(small: Bytes) -> Singles:
     Channels are three colours, normalized to one mean brightness, and the pixel's column and row,
     from -1 to 1.
     """
-    brightness = small.mean((1, 2, 3), dtype=np.float32)
-    gain = MEAN_GREY / np.maximum(brightness, MIN_GREY)
+    count = len(small)
+    _, _, height, width = INPUT_SHAPE
+    values = np.empty((count, CHANNELS, height, width), np.float32)
+
     rows = (PADDING_PX, PADDING_PX)
     padded = np.pad(small, ((0, 0), rows, (0, 0), (0, 0)), mode="edge")
+    colours = values[:, :3]
+    colours[:] = padded.transpose(0, 3, 1, 2)
+    colours[:] = colours * (_gain(small) / 64) - 2
 
-    _, _, height, width = INPUT_SHAPE
-    values = np.empty((len(small), CHANNELS, height, width), np.float32)
-    values[:, :3] = padded.transpose(0, 3, 1, 2)
-    values[:, :3] = values[:, :3] * (gain[:, None, None, None] / 64) - 2
-    values[:, 3] = np.linspace(-1, 1, width, dtype=np.float32)
-    values[:, 4] = np.linspace(-1, 1, height, dtype=np.float32)[:, None]
+    across = np.linspace(-1, 1, width, dtype=np.float32)
+    down = np.linspace(-1, 1, height, dtype=np.float32)
+    values[:, 3] = across
+    values[:, 4] = down[:, None]
     return values
+
+
+def _gain(small: Bytes) -> Singles:
+    """The factor (n, 1, 1, 1) by which each image's mean becomes MEAN_GREY."""
+    brightness = small.mean((1, 2, 3), dtype=np.float32)
+    gain = MEAN_GREY / np.maximum(brightness, MIN_GREY)
+    return np.asarray(gain[:, None, None, None])
 
 
 def _denoised(likelihood: Singles) -> Singles:
     """`likelihood` with specks and thin lines removed from the road, and small holes filled."""
-    road = (likelihood >= 0.5).astype(np.uint8)
-    opened = cv2.morphologyEx(road, cv2.MORPH_OPEN, _OPENING).astype(np.uint8, copy=False)
-    without_specks = _large_components(opened, MIN_ROAD_SHARE)
-    background = _large_components((~without_specks).astype(np.uint8), MAX_HOLE_SHARE)
+    road = likelihood >= 0.5
+    opened = cv2.morphologyEx(road.astype(np.uint8), cv2.MORPH_OPEN, _OPENING)
+    without_specks = _large_components(opened.astype(bool), MIN_ROAD_SHARE)
+    background = _large_components(~without_specks, MAX_HOLE_SHARE)
 
-    likelihood[(road > 0) & background] = 0.0
-    likelihood[(road == 0) & ~background] = 1.0
+    is_speck = road & background
+    is_hole = ~road & ~background
+    likelihood[is_speck] = 0.0
+    likelihood[is_hole] = 1.0
     return likelihood
 
 
-def _large_components(mask: Bytes, min_share: float) -> Booleans:
+def _large_components(mask: Booleans, min_share: float) -> Booleans:
     """The connected components of `mask` that cover at least `min_share` of the image, (h, w)."""
-    _, component, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=4)
-    kept = stats[:, cv2.CC_STAT_AREA] >= min_share * mask.size
+    found = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
+    _, component, stats, _ = found
+    area_px = stats[:, cv2.CC_STAT_AREA]
+
+    kept = area_px >= min_share * mask.size
     kept[0] = False
     return np.asarray(kept[component])

@@ -79,9 +79,10 @@ class Walls:
 
     def usual_pose(self, camera: Calibration) -> ObjectPose:
         """Return the pose of a building of the usual size, behind the middle of what is seen."""
-        disparity_px = max(float(np.median(self.disparity_px)), MIN_DISPARITY_PX)
-        depth_m = camera.fx_px * camera.baseline_m / disparity_px
-        slope = (camera.cx_px - (self.left + self.right) / 2) / camera.fx_px
+        median_px = float(np.median(self.disparity_px))
+        depth_m = camera.fx_px * camera.baseline_m / max(median_px, MIN_DISPARITY_PX)
+        middle_px = (self.left + self.right) / 2
+        slope = (camera.cx_px - middle_px) / camera.fx_px
         forward_m = depth_m + camera.mount_forward_m
         left_m = slope * depth_m
 
@@ -101,9 +102,12 @@ class Walls:
     def width_m(self, camera: Calibration) -> float:
         """Return the distance between the first and the last column."""
         ends_px = self.disparity_px[[0, -1]].clip(MIN_DISPARITY_PX)
-        depth_m = camera.fx_px * camera.baseline_m / ends_px
-        slopes = (np.array([self.left, self.right]) - camera.cx_px) / camera.fx_px
-        width_m = np.hypot(np.ptp(slopes * depth_m), np.ptp(depth_m))
+        forward_m = camera.fx_px * camera.baseline_m / ends_px
+        columns_px = np.array([self.left, self.right])
+        slopes = (columns_px - camera.cx_px) / camera.fx_px
+        right_m = slopes * forward_m
+
+        width_m = np.hypot(np.ptp(right_m), np.ptp(forward_m))
         return float(min(width_m, MAX_RANGE_M))
 
 
@@ -133,11 +137,15 @@ def _column_medians(values: Singles) -> Singles:
     """The upper median of the positive values in each column of (h, w), 0 where there are fewer
     than MIN_PIXELS.
     """
+    height, width = values.shape
     count = (values > 0).sum(0)
     ascending = np.sort(values, axis=0)
-    row = len(values) - 1 - np.maximum(count - 1, 0) // 2
-    medians = ascending[row, np.arange(values.shape[1])]
-    return np.where(count >= MIN_PIXELS, medians, 0.0).astype(np.float32)
+
+    above_median = np.maximum(count - 1, 0) // 2
+    row = height - 1 - above_median
+    medians = ascending[row, np.arange(width)]
+    enough = count >= MIN_PIXELS
+    return np.where(enough, medians, 0.0).astype(np.float32)
 
 
 def _truly_ends(segment: Segment, disparity_px: Singles, medians_px: Singles, outward: int) -> bool:
@@ -147,12 +155,15 @@ def _truly_ends(segment: Segment, disparity_px: Singles, medians_px: Singles, ou
     On the left, the view ends where the right camera's does: as many columns in as the disparity.
     """
     left, _, width, _ = segment.box_px
-    within = min(WITHIN_PX, width - 1)
-    inside = width - 1 - within if outward > 0 else within
-    edge = left + width - 1 if outward > 0 else left
+    last = width - 1
+    within = min(WITHIN_PX, last)
+    inside = last - within if outward > 0 else within
+    edge = left + last if outward > 0 else left
     beyond = edge + BESIDE_PX * outward
+
     own_px = medians_px[inside]
-    if not 0 <= beyond < disparity_px.shape[1] or beyond < own_px:
+    is_in_view = 0 <= beyond < disparity_px.shape[1]
+    if not is_in_view or beyond < own_px:
         return False
 
     rows = segment.mask[:, left + inside]

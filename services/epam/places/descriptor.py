@@ -41,18 +41,21 @@ def descriptors(image: Bytes) -> Bytes | None:
     uint8 (len(SHIFTS), DESCRIPTOR_BYTES); the largest turn is 24 columns of 320. None if there is
     too little contrast.
     """
-    cells = _cells(image)
-    windows = cells[:, _COLUMNS].transpose(1, 3, 0, 2)
-    patches = windows.reshape(len(SHIFTS), 3, -1, PATCH, len(_ORIGINS) // PATCH, PATCH)
+    windows = _cells(image)[:, _COLUMNS].transpose(1, 3, 0, 2)
+    patches_across = len(_ORIGINS) // PATCH
+    patches = windows.reshape(len(SHIFTS), 3, -1, PATCH, patches_across, PATCH)
 
     contrast = patches.std(axis=(3, 5), keepdims=True)
-    if (contrast[UNSHIFTED, 0] > MIN_CONTRAST).sum() < MIN_PATCHES:
+    of_brightness = contrast[UNSHIFTED, 0]
+    if np.count_nonzero(of_brightness > MIN_CONTRAST) < MIN_PATCHES:
         return None
 
-    centred = patches - patches.mean(axis=(3, 5), keepdims=True)
-    normalized = centred / (contrast + np.float32(FLAT_CONTRAST))
-    levels = np.clip(np.rint(128 + LEVELS * normalized), 0, 255).astype(np.uint8)
-    return np.asarray(levels.reshape(len(SHIFTS), DESCRIPTOR_BYTES))
+    mean = patches.mean(axis=(3, 5), keepdims=True)
+    divisor = contrast + np.float32(FLAT_CONTRAST)
+    normalized = (patches - mean) / divisor
+    levels = np.rint(128 + LEVELS * normalized)
+    codes = np.clip(levels, 0, 255).astype(np.uint8)
+    return np.asarray(codes.reshape(len(SHIFTS), DESCRIPTOR_BYTES))
 
 
 def _cells(image: Bytes) -> Singles:
@@ -62,14 +65,12 @@ def _cells(image: Bytes) -> Singles:
     thumbnail = cv2.resize(image, (COLUMNS, ROWS), interpolation=cv2.INTER_AREA)
     above = thumbnail[:ROWS_ABOVE_HORIZON].astype(np.float32)
     light = np.log(above + np.float32(DARK_LEVEL))
-    red = light[..., 0]
-    green = light[..., 1]
-    blue = light[..., 2]
+    red, green, blue = np.moveaxis(light, 2, 0)
 
-    channels = cv2.merge([(red + green + blue) / 3, red - green, blue - green])
-    means = cv2.boxFilter(
-        channels, -1, (CELL, CELL), anchor=(0, 0), borderType=cv2.BORDER_REPLICATE
-    )
+    brightness = (red + green + blue) / 3
+    channels = cv2.merge([brightness, red - green, blue - green])
+    cell = (CELL, CELL)
+    means = cv2.boxFilter(channels, -1, cell, anchor=(0, 0), borderType=cv2.BORDER_REPLICATE)
     return np.asarray(means[::CELL], np.float32)
 
 
@@ -77,8 +78,10 @@ def has_near_structure(depth_m: Singles) -> bool:
     """Return whether enough above the horizon of a view with this depth (h, w) is near: distant
     hills identify no place.
     """
-    above_m = depth_m[: len(depth_m) // 2]
-    near = (above_m > 0) & (above_m < NEAR_M)
+    horizon = len(depth_m) // 2
+    above_m = depth_m[:horizon]
+    known = above_m > 0
+    near = known & (above_m < NEAR_M)
     return float(near.mean()) >= MIN_NEAR_SHARE
 
 
@@ -88,4 +91,5 @@ def unit_vectors(codes: Bytes) -> Singles:
     """
     values = codes.astype(np.float32) - np.float32(128)
     length = np.linalg.norm(values, axis=1, keepdims=True)
-    return np.asarray(values / np.maximum(length, np.float32(1)), np.float32)
+    divisor = np.maximum(length, np.float32(1))
+    return np.asarray(values / divisor, np.float32)

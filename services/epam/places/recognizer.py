@@ -159,17 +159,23 @@ class PlaceRecognizer:
         count = len(self._views)
         predicted = np.zeros(count)
         for steps, p_advance in enumerate(P_ADVANCE[:count]):
-            predicted[steps:] += p_advance * self._belief[: count - steps]
+            before = self._belief[: count - steps]
+            predicted[steps:] += p_advance * before
         return predicted
 
     def _likelihood_ratios(self, vectors: Singles) -> Floats:
         """How much likelier each remembered view's place makes the observed one than another place;
         0 for recent views.
         """
-        similarity = (self._vectors[: len(self._views)] @ vectors.T).max(axis=1).astype(np.float64)
-        log_odds = LOG_ODDS_SLOPE * (similarity - EVEN_SIMILARITY)
-        ratios = np.exp(np.clip(log_odds, -MAX_LOG_ODDS, MAX_LOG_ODDS))
-        ratios[self._step_of_view > self._step - self._config.recent] = 0.0
+        known = self._vectors[: len(self._views)]
+        similarities = known @ vectors.T
+        highest = similarities.max(axis=1).astype(np.float64)
+        log_odds = LOG_ODDS_SLOPE * (highest - EVEN_SIMILARITY)
+        ratios = np.exp(log_odds.clip(-MAX_LOG_ODDS, MAX_LOG_ODDS))
+
+        first_recent_step = self._step - self._config.recent + 1
+        is_recent = self._step_of_view >= first_recent_step
+        ratios[is_recent] = 0.0
         return np.asarray(ratios)
 
     def _best_match(self) -> list[PlaceMatch]:
@@ -180,8 +186,10 @@ class PlaceRecognizer:
             return []
 
         best = int(self._belief.argmax())
-        nearby = self._belief[max(0, best - NEIGHBOURS) : best + NEIGHBOURS + 1]
-        score = min(1.0, float(nearby.sum()))
+        first = max(0, best - NEIGHBOURS)
+        last = best + NEIGHBOURS
+        probability = float(self._belief[first : last + 1].sum())
+        score = min(1.0, probability)
         if score < self._config.threshold:
             return []
 
@@ -191,20 +199,27 @@ class PlaceRecognizer:
     def _remember(self, views: list[RememberedView], vectors: Singles) -> None:
         before = len(self._views)
         count = before + len(views)
-        if count > len(self._vectors):
-            enlarged = np.empty((2 * count, DESCRIPTOR_BYTES), np.float32)
-            enlarged[:before] = self._vectors[:before]
-            self._vectors = enlarged
+        self._reserve(count)
 
         self._views += views
         self._vectors[before:count] = vectors
         steps = np.arange(self._step - len(views), self._step) + 1
+        unlikely = np.zeros(len(views))
         self._step_of_view = np.concatenate([self._step_of_view, steps])
-        self._belief = np.concatenate([self._belief, np.zeros(len(views))])
+        self._belief = np.concatenate([self._belief, unlikely])
 
         # Several at once, since all other vectors move up.
         if count > self._config.capacity:
-            self._forget(count - round(self._config.capacity * (1 - FORGOTTEN_SHARE)))
+            kept = round(self._config.capacity * (1 - FORGOTTEN_SHARE))
+            self._forget(count - kept)
+
+    def _reserve(self, count: int) -> None:
+        """Make room for `count` vectors."""
+        if count <= len(self._vectors):
+            return
+        known = self._vectors[: len(self._views)]
+        self._vectors = np.empty((2 * count, DESCRIPTOR_BYTES), np.float32)
+        self._vectors[: len(known)] = known
 
     def _forget(self, oldest: int) -> None:
         """Forget this number of the oldest views."""

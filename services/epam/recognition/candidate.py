@@ -52,11 +52,16 @@ def is_beside(one: Candidate, other: Candidate) -> bool:
     """Return whether both may be pieces of one object: hardly a gap between them, and at the same
     distance.
     """
-    disparities_px = [float(np.median(each.walls.disparity_px)) for each in (one, other)]
-    gap_px = max(one.walls.left, other.walls.left) - min(one.walls.right, other.walls.right)
+    begin = max(one.walls.left, other.walls.left)
+    end = min(one.walls.right, other.walls.right)
+    if begin - end > BRIDGED_PX[-1]:
+        return False
 
-    adjacent = gap_px <= BRIDGED_PX[-1]
-    return adjacent and max(disparities_px) <= MAX_DISPARITY_RATIO * min(disparities_px)
+    one_px = float(np.median(one.walls.disparity_px))
+    other_px = float(np.median(other.walls.disparity_px))
+    near_px = max(one_px, other_px)
+    far_px = min(one_px, other_px)
+    return near_px <= MAX_DISPARITY_RATIO * far_px
 
 
 def outline_px(segment: Segment) -> list[tuple[int, int]]:
@@ -66,15 +71,13 @@ def outline_px(segment: Segment) -> list[tuple[int, int]]:
     If its pieces are farther apart, the polygon is around the largest.
     """
     left, top, width, height = segment.box_px
-    shown = segment.mask[top : top + height, left : left + width].astype(np.uint8)
-    piece = _main_piece(shown)
+    shown = segment.mask[top : top + height, left : left + width]
+    piece = _main_piece(shown.astype(np.uint8)).astype(np.uint8)
 
-    contours, _ = cv2.findContours(
-        piece.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE
-    )
+    contours, _ = cv2.findContours(piece, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     longest = max(contours, key=len)
-    corners = cv2.approxPolyDP(longest, OUTLINE_TOLERANCE_PX, True).reshape(-1, 2)
-    return [(left + int(column), top + int(row)) for column, row in corners]
+    polygon = cv2.approxPolyDP(longest, OUTLINE_TOLERANCE_PX, True)
+    return [(left + int(column), top + int(row)) for column, row in polygon[:, 0]]
 
 
 def _main_piece(shown: Bytes) -> Booleans:
@@ -93,19 +96,24 @@ def _largest_piece(shown: Bytes, bridged_px: int) -> Booleans:
     columns belong.
     """
     # At a border, closing would fill what lies between it and the segment.
-    bordered = cv2.copyMakeBorder(shown, 0, 0, bridged_px, bridged_px, cv2.BORDER_CONSTANT, value=0)
+    border = (0, 0, bridged_px, bridged_px)
+    bordered = cv2.copyMakeBorder(shown, *border, cv2.BORDER_CONSTANT, value=0)
     kernel = np.ones((1, bridged_px), np.uint8)
-    closed = cv2.morphologyEx(bordered, cv2.MORPH_CLOSE, kernel)[:, bridged_px:-bridged_px]
+    closed = cv2.morphologyEx(bordered, cv2.MORPH_CLOSE, kernel)
+    bridged = closed[:, bridged_px:-bridged_px]
 
-    _, component, stats, _ = cv2.connectedComponentsWithStats(closed)
-    largest = 1 + int(stats[1:, cv2.CC_STAT_AREA].argmax())
+    _, component, stats, _ = cv2.connectedComponentsWithStats(bridged)
+    area_px = stats[1:, cv2.CC_STAT_AREA]
+    largest = 1 + int(area_px.argmax())
     return np.asarray(component == largest)
 
 
 def height_m(candidate: Candidate, camera: Calibration) -> float:
     """Return the height over the ground of the top of what is seen."""
-    nearest_px = max(float(candidate.walls.disparity_px.max()), 1e-3)
-    depth_m = camera.fx_px * camera.baseline_m / nearest_px
+    nearest_px = float(candidate.walls.disparity_px.max())
+    depth_m = camera.fx_px * camera.baseline_m / max(nearest_px, 1e-3)
+
     _, top, _, _ = candidate.segment.box_px
-    top_m = camera.mount_height_m + (camera.cy_px - top) / camera.fy_px * depth_m
+    slope = (camera.cy_px - top) / camera.fy_px
+    top_m = camera.mount_height_m + slope * depth_m
     return float(np.clip(top_m, MIN_HEIGHT_M, MAX_HEIGHT_M))

@@ -32,13 +32,24 @@ def surroundings(image: Bytes, depth_m: Singles, camera: Calibration) -> Singles
     """
     image = image[::STRIDE_PX, ::STRIDE_PX]
     depth_m = depth_m[::STRIDE_PX, ::STRIDE_PX]
-    rows = STRIDE_PX * np.arange(depth_m.shape[0], dtype=np.float32)[:, None]
-    down = (rows - np.float32(camera.cy_px)) / np.float32(camera.fy_px)
-    height_m = camera.mount_height_m - down * depth_m
+    known = depth_m > 0
+    down = _downward_slopes(len(depth_m), camera)
+    below_camera_m = down * depth_m
+    height_m = camera.mount_height_m - below_camera_m
 
-    ground = (depth_m > 0) & (down > 0) & (height_m < GROUND_M)
-    sky = (depth_m == 0) & (down < 0)
-    return np.concatenate([_median_colour(image[ground]), _median_colour(image[sky])])
+    ground = known & (down > 0) & (height_m < GROUND_M)
+    sky = ~known & (down < 0)
+    of_ground = _median_colour(image[ground])
+    of_sky = _median_colour(image[sky])
+    return np.concatenate([of_ground, of_sky])
+
+
+def _downward_slopes(count: int, camera: Calibration) -> Singles:
+    """The slopes of the rays of `count` rows, every STRIDE_PX, (count, 1)."""
+    rows = STRIDE_PX * np.arange(count, dtype=np.float32)
+    below_px = rows - np.float32(camera.cy_px)
+    slopes = below_px / np.float32(camera.fy_px)
+    return np.asarray(slopes[:, None])
 
 
 def _median_colour(pixels: Bytes) -> Singles:
@@ -62,38 +73,52 @@ def crop(
     """
     left, top, width, height = segment.box_px
     side = round(max(width, height) * (1 + 2 * MARGIN))
-    source, target = _overlap(
-        left + width // 2 - side // 2, top + height // 2 - side // 2, side, depth_m.shape
-    )
+    first_column = left + width // 2 - side // 2
+    first_row = top + height // 2 - side // 2
+    source, target = _overlap(first_column, first_row, side, depth_m.shape)
     mask = segment.mask[source]
     distance_m = _distance_m(depth_m[source], mask)
 
     square = np.zeros((side, side, 4), np.float32)
-    square[*target, :3] = colours(image[source]) * mask[..., None]
-    square[*target, 3] = mask
+    inside = square[target]
+    inside[..., :3] = colours(image[source]) * mask[..., None]
+    inside[..., 3] = mask
     relief = np.zeros((side, side), np.float32)
     relief[target] = _relief(depth_m[source], distance_m)
 
-    size = (SIDE_PX, SIDE_PX)
-    interpolation = cv2.INTER_AREA if side > SIDE_PX else cv2.INTER_LINEAR
-    values = np.empty((CHANNELS, *size), np.float32)
-    values[:4] = cv2.resize(square, size, interpolation=interpolation).transpose(2, 0, 1)
-    values[4] = cv2.resize(relief, size, interpolation=interpolation)
-    values[5] = np.log(max(side * distance_m / focal_px, 1.0)) / 2.0 - 1.0
+    values = np.empty((CHANNELS, SIDE_PX, SIDE_PX), np.float32)
+    values[:4] = _resized(square).transpose(2, 0, 1)
+    values[4] = _resized(relief)
+    side_m = side * distance_m / focal_px
+    values[5] = np.log(max(side_m, 1.0)) / 2.0 - 1.0
     values[6:] = around[:, None, None]
     return values
 
 
+def _resized(square: Singles) -> Singles:
+    """To SIDE_PX."""
+    is_larger = len(square) > SIDE_PX
+    interpolation = cv2.INTER_AREA if is_larger else cv2.INTER_LINEAR
+    resized = cv2.resize(square, (SIDE_PX, SIDE_PX), interpolation=interpolation)
+    return resized.astype(np.float32, copy=False)
+
+
 def _distance_m(depth_m: Singles, mask: Booleans) -> float:
     """The median known depth within `mask`."""
-    own_m = depth_m[(depth_m > 0) & mask]
-    return float(np.median(own_m)) if len(own_m) else UNKNOWN_DISTANCE_M
+    known = depth_m > 0
+    own_m = depth_m[known & mask]
+    if not len(own_m):
+        return UNKNOWN_DISTANCE_M
+    return float(np.median(own_m))
 
 
 def _relief(depth_m: Singles, distance_m: float) -> Singles:
     """Log ratio of depth to `distance_m`, scaled and clipped to -1 to 1, 0 where unknown."""
-    filled_m = np.where(depth_m > 0, depth_m, distance_m)
-    return np.asarray((RELIEF * np.log(filled_m / distance_m)).clip(-1, 1))
+    known = depth_m > 0
+    filled_m = np.where(known, depth_m, distance_m)
+    ratio = np.log(filled_m / distance_m)
+    scaled = RELIEF * ratio
+    return np.asarray(scaled.clip(-1, 1))
 
 
 def _overlap(
@@ -102,14 +127,13 @@ def _overlap(
     """Of the square at `left`, `top`, the part inside an image of `size` (h, w): its rows and
     columns in the image, and in the square.
     """
-    first_row = max(top, 0)
-    first_column = max(left, 0)
-    last_row = min(top + side, size[0])
-    last_column = min(left + side, size[1])
+    height, width = size
+    rows, rows_in_square = _overlap_1d(top, side, height)
+    columns, columns_in_square = _overlap_1d(left, side, width)
+    return (rows, columns), (rows_in_square, columns_in_square)
 
-    source = slice(first_row, last_row), slice(first_column, last_column)
-    target = (
-        slice(first_row - top, last_row - top),
-        slice(first_column - left, last_column - left),
-    )
-    return source, target
+
+def _overlap_1d(start: int, length: int, size: int) -> tuple[slice, slice]:
+    first = max(start, 0)
+    last = min(start + length, size)
+    return slice(first, last), slice(first - start, last - start)

@@ -106,11 +106,12 @@ class ObjectRecognizer:
     ) -> list[Appearance]:
         """Return the appearance of each of `segments` in a view."""
         around = surroundings(image, depth_m, camera)
-        crops = [crop(image, depth_m, segment, around, camera.fx_px) for segment in segments]
+        crops = [crop(image, depth_m, each, around, camera.fx_px) for each in segments]
 
         appearances: list[Appearance] = []
         for first in range(0, len(crops), BATCH):
-            appearances += self._embed(crops[first : first + BATCH])
+            some = crops[first : first + BATCH]
+            appearances += self._embed(some)
         return appearances
 
     def _embed(self, crops: list[Singles]) -> list[Appearance]:
@@ -151,7 +152,9 @@ class ObjectRecognizer:
         """The cosine with each of the labels `novel`: that of its most similar embedding."""
         cosines = self._embeddings @ appearance.embedding
         rows = [novel.index(label) for label in self._labels]
-        highest = np.full(len(novel), -1.0, np.float32)
+
+        lowest = np.float32(-1.0)
+        highest = np.full(len(novel), lowest)
         np.maximum.at(highest, rows, cosines)
         return highest
 
@@ -164,12 +167,14 @@ class ObjectRecognizer:
         """Return whether a learned building differs from every appearance of it that was learned,
         and has fewer than MAX_APPEARANCES.
         """
-        embeddings = [vector for label, vector in self.learned if label == recognition.label]
+        label = recognition.label
+        embeddings = [embedding for known, embedding in self.learned if known == label]
         if not 0 < len(embeddings) < MAX_APPEARANCES:
             return False
 
         embedding = recognition.appearance.embedding
-        return bool(max(vector @ embedding for vector in embeddings) < SAME_COSINE)
+        cosines = [known @ embedding for known in embeddings]
+        return bool(max(cosines) < SAME_COSINE)
 
     @property
     def sizes_m(self) -> dict[str, tuple[float, float, float]]:
@@ -223,16 +228,20 @@ def posteriors(
     log_odds = np.concatenate([taught_odds, novel_odds], axis=-1, dtype=np.float64)
     possible = np.where(excluded, -np.inf, log_odds)
 
-    unknown = np.zeros((*taught.shape[:-1], 1))
+    *leading, _ = taught.shape
+    unknown = np.zeros((*leading, 1))
     log_weights = np.concatenate([possible, unknown], axis=-1)
-    weights = np.exp(log_weights - log_weights.max(axis=-1, keepdims=True))
+    highest = log_weights.max(axis=-1, keepdims=True)
+    weights = np.exp(log_weights - highest)
+    total = weights.sum(axis=-1, keepdims=True)
 
     of_building = np.asarray(building, np.float64)[..., None]
-    labels = of_building * weights / weights.sum(axis=-1, keepdims=True)
+    labels = of_building * weights / total
     return np.concatenate([labels, 1 - of_building], axis=-1)
 
 
 def probability(log_odds: Singles, prototypes: Prototypes) -> Floats:
     """Return the calibrated probability of the network's log odds."""
     clipped = log_odds.astype(np.float64).clip(-50, 50)
-    return np.asarray(1 / (1 + np.exp(-prototypes.evidence * clipped)))
+    odds_against = np.exp(-prototypes.evidence * clipped)
+    return np.asarray(1 / (1 + odds_against))

@@ -73,10 +73,12 @@ class Segmenter:
         if small.std() < MIN_CONTRAST:
             return []
 
-        small_depth_m = cv2.resize(depth_m, size, interpolation=cv2.INTER_NEAREST)
-        values = network_input(small, np.asarray(small_depth_m, np.float32), camera)
-        (output,) = self._network(padded(values)[None])
-        return divided(output[0, :, PADDING_PX:-PADDING_PX], depth_m.shape)
+        resized_m = cv2.resize(depth_m, size, interpolation=cv2.INTER_NEAREST)
+        small_depth_m = np.asarray(resized_m, np.float32)
+        values = padded(network_input(small, small_depth_m, camera))
+        (output,) = self._network(values[None])
+        unpadded = output[0, :, PADDING_PX:-PADDING_PX]
+        return divided(unpadded, depth_m.shape)
 
 
 def load(path: Path = DEFAULT_PATH) -> Segmenter:
@@ -94,26 +96,35 @@ def network_input(small: Bytes, depth_m: Singles, camera: Calibration) -> Single
     ground, and the pixel's row and column, from -1 to 1.
     """
     values = np.empty((CHANNELS, HEIGHT_PX, WIDTH_PX), np.float32)
-    values[:3] = small.transpose(2, 0, 1)
-    values[:3] = values[:3] / 64.0 - 2.0
+    colours = values[:3]
+    colours[:] = small.transpose(2, 0, 1)
+    colours[:] = colours / 64.0 - 2.0
 
     known = depth_m > 0
-    values[3] = np.log(np.clip(depth_m, 1.0, 100.0)) / 2.0 - 1.0
+    log_depth = np.log(np.clip(depth_m, 1.0, 100.0))
+    height_m = _height_m(depth_m, camera)
+    values[3] = log_depth / 2.0 - 1.0
     values[4] = known
-    values[5] = np.clip(_height_m(depth_m, camera) / 5.0, -1.0, 3.0)
+    values[5] = np.clip(height_m / 5.0, -1.0, 3.0)
     values[3][~known] = 0.0
     values[5][~known] = 0.0
 
-    values[6] = np.linspace(-1, 1, HEIGHT_PX, dtype=np.float32)[:, None]
-    values[7] = np.linspace(-1, 1, WIDTH_PX, dtype=np.float32)
+    down = np.linspace(-1, 1, HEIGHT_PX, dtype=np.float32)
+    across = np.linspace(-1, 1, WIDTH_PX, dtype=np.float32)
+    values[6] = down[:, None]
+    values[7] = across
     return values
 
 
 def _height_m(depth_m: Singles, camera: Calibration) -> Singles:
     """Height over the ground of what each pixel of (HEIGHT_PX, WIDTH_PX) shows."""
-    row = np.arange(HEIGHT_PX, dtype=np.float32) * camera.height_px / HEIGHT_PX
-    down = (row[:, None] - np.float32(camera.cy_px)) / np.float32(camera.fy_px)
-    return np.asarray(camera.mount_height_m - down * depth_m)
+    small_row = np.arange(HEIGHT_PX, dtype=np.float32)
+    row = small_row * camera.height_px / HEIGHT_PX
+    below_px = row[:, None] - np.float32(camera.cy_px)
+    down = below_px / np.float32(camera.fy_px)
+
+    below_camera_m = down * depth_m
+    return np.asarray(camera.mount_height_m - below_camera_m)
 
 
 def padded(values: Singles) -> Singles:
@@ -121,7 +132,9 @@ def padded(values: Singles) -> Singles:
     halve them often enough.
     """
     leading = [(0, 0)] * (values.ndim - 2)
-    return np.pad(values, [*leading, (PADDING_PX, PADDING_PX), (0, 0)], mode="edge")
+    rows = (PADDING_PX, PADDING_PX)
+    columns = (0, 0)
+    return np.pad(values, [*leading, rows, columns], mode="edge")
 
 
 def divided(output: Singles, size: tuple[int, ...]) -> list[Segment]:
@@ -134,25 +147,31 @@ def divided(output: Singles, size: tuple[int, ...]) -> list[Segment]:
 
 def _instances(output: Singles) -> npt.NDArray[np.intp]:
     """The number of the object at each pixel, -1 for none, by the network's output (4, h, w)."""
-    numbers = np.full(output.shape[1:], -1, np.intp)
-    building = output[0] > np.log(MIN_BUILDING / (1 - MIN_BUILDING))
+    log_odds, centre, right, down = output
+    numbers = np.full(log_odds.shape, -1, np.intp)
+    building = log_odds > np.log(MIN_BUILDING / (1 - MIN_BUILDING))
     rows, columns = np.nonzero(building)
-    centres = _centres(output[1])
+    centres = _centres(centre)
     if not len(centres) or not len(rows):
         return numbers
 
-    down = OFFSET_PX * output[3, rows, columns]
-    right = OFFSET_PX * output[2, rows, columns]
-    pointed_at = np.stack([rows + down, columns + right], 1)
-    squared_px2 = ((pointed_at[:, None] - centres[None]) ** 2).sum(2)
-    numbers[rows, columns] = squared_px2.argmin(1)
+    pointed_row = rows + OFFSET_PX * down[building]
+    pointed_column = columns + OFFSET_PX * right[building]
+    pointed_at = np.stack([pointed_row, pointed_column], 1)
+    away_px = pointed_at[:, None] - centres[None]
+    squared_px2 = (away_px**2).sum(2)
+
+    numbers[building] = squared_px2.argmin(1)
     return numbers
 
 
 def _centres(probability: Singles) -> npt.NDArray[np.intp]:
     """Row and column (k, 2) of the local maxima over MIN_CENTRE."""
-    highest = cv2.dilate(probability, np.ones((PEAK_PX, PEAK_PX), np.uint8))
-    return np.argwhere((probability == highest) & (probability > MIN_CENTRE))
+    window = np.ones((PEAK_PX, PEAK_PX), np.uint8)
+    highest = cv2.dilate(probability, window)
+    is_peak = probability == highest
+    is_likely = probability > MIN_CENTRE
+    return np.argwhere(is_peak & is_likely)
 
 
 def _enlarged(
@@ -179,4 +198,5 @@ def _enlarged(
 
 def _middle_column(segment: Segment) -> float:
     left, _, width, _ = segment.box_px
-    return left + width / 2
+    half = width / 2
+    return left + half
