@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_most, more_than, within
-from cli.experiment.city_maps import MAPS
 from cli.log.progress import bar
-from experiments.city_maps import figures as city_metrics
 from experiments.city_maps import measure as city_maps
-from experiments.city_maps.environment import environments
-from experiments.city_maps.sources import grown
+from experiments.city_maps.metrics import map_metrics
+from experiments.city_maps.sources import grown_environments
 from experiments.cue_integration import run as cue_integration
 
 CUE_INTEGRATION_THRESHOLDS = {
@@ -27,17 +25,16 @@ def measure_cue_integration(processes: int) -> Metrics:
         budget = cue_integration.Budget(TRIALS, SEED, processes, progress)
         outcome = cue_integration.measure(cue_integration.FITTED, budget)
 
-    return outcome.figures()
+    return outcome.metrics()
 
 
 def measure_city_maps(processes: int) -> Metrics:
     """Experiment 2, as `cogmap experiment city-maps` runs it: cities grown from seeds."""
-    seeds = [SEED * 1000 + number for number in range(MAPS)]
-    places = [environments(grown(seed), 1, SEED)[0] for seed in seeds]
+    places = grown_environments(city_maps.MAPS, SEED)
 
     with bar("traversals") as progress:
         budget = city_maps.Budget(city_maps.TRAVERSALS, SEED, processes, progress)
         maps = city_maps.measure(places, city_maps.NOISE, budget)
 
-    measured = city_metrics.figures(maps, city_maps.NOISE)
+    measured = map_metrics(maps, city_maps.NOISE)
     return {key: value for key, value in measured.items() if isinstance(value, float)}

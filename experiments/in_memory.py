@@ -10,16 +10,14 @@ from cogmap.runtime.module import Module
 
 
 def run(modules: Iterable[Module]) -> None:
-    """Run them until nobody has anything left to do. Raises CogmapError where one refused a
-    message.
-    """
+    """Run them until no message is left. Raises CogmapError where one was refused."""
     runner = InProcessRunner(modules)
+
     try:
         runner.run()
         for shell in runner.shells:
-            if shell.intake.rejected:
-                raise CogmapError(
-                    f"{shell.module.name} refused messages: {dict(shell.intake.rejected)}"
-                )
+            refused = dict(shell.intake.rejected)
+            if refused:
+                raise CogmapError(f"{shell.module.name} refused messages: {refused}")
     finally:
         runner.close()

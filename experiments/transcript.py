@@ -1,4 +1,4 @@
-"""Everything that is said about the model in a run, as bytes: what two runs are compared by."""
+"""All that a run publishes about the model, as bytes: what two runs are compared by."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from schemas.base import Message
 from schemas.topics import About, Delivery, Topic
 
 NAME = "listener"
-# What the model says, and nobody may miss.
+# What the model publishes and nobody may miss.
 MODEL = tuple(
-    each
-    for each in topics.ALL
-    if each.about is About.MODEL and each.delivery is Delivery.NEVER_DROP
+    topic
+    for topic in topics.ALL
+    if topic.about is About.MODEL and topic.delivery is Delivery.NEVER_DROP
 )
 
 
@@ -29,16 +29,18 @@ class Transcript:
     def module(self) -> Module:
         """The module `listener`."""
         module = Module(NAME)
+
         for topic in self._topics:
             module.on(topic, self._keep(topic))
+
         return module
 
     def has_as_many_as(self, other: Transcript) -> bool:
-        """Whether it has heard at least as many messages of each topic."""
+        """Whether it has at least as many messages of each topic."""
         return all(len(self.messages[name]) >= len(there) for name, there in other.messages.items())
 
     def differs_from(self, other: Transcript) -> list[str]:
-        """The topics on which other bytes were heard."""
+        """The topics on which the bytes are others."""
         return [name for name, there in other.messages.items() if self.messages[name] != there]
 
     def _keep(self, topic: Topic) -> Callable[[Message], None]:

@@ -2,41 +2,33 @@
 
 from __future__ import annotations
 
-import importlib
 from pathlib import Path
-from typing import Any
 
 import click
 
 from cli.experiment import live, outcome
-from cli.experiment.options import (
-    cameras_option,
-    json_option,
-    live_option,
-    out_option,
-    processes_option,
-    seed_option,
-)
+from cli.experiment.options import Common, common_options
 from cli.log.progress import bar
 from cogmap.errors import UsageError
-from experiments.city_maps.drive import MIND
+from experiments.city_maps.drive import MODULES
 from experiments.city_maps.environment import Environment, environments
-from experiments.city_maps.figures import camera_figures, figures
 from experiments.city_maps.fit import fitted
 from experiments.city_maps.measure import (
+    MAPS,
     NOISE,
     TRAVERSALS,
     Budget,
+    CityMap,
     by_cameras,
     configurations,
     jobs,
     measure,
 )
-from experiments.city_maps.sources import folder, from_osm, grown
+from experiments.city_maps.metrics import camera_metrics, map_metrics
+from experiments.city_maps.sources import folder, from_osm, grown_environments
 from services.sim.odometry import Noise
 
 NAME = "city-maps"
-MAPS = 8
 _EPILOG = """\b
 Examples:
   cogmap experiment city-maps --json city.json        cities grown from a seed
@@ -85,25 +77,15 @@ Examples:
     is_flag=True,
     help="Fit that noise first, so that maps err as people's do; takes many times as long.",
 )
-@cameras_option
-@live_option
-@seed_option
-@processes_option
-@out_option
-@json_option
+@common_options
 def city_maps(
+    common: Common,
     osm: Path | None,
     all_in: Path | None,
     maps: int | None,
     traversals: int,
     noise: tuple[float, float, float],
     fit: bool,
-    cameras: bool,
-    goes_live: bool,
-    seed: int,
-    processes: int,
-    out: Path | None,
-    json_path: Path | None,
 ) -> None:
     """Experiment 2, figure 8: the maps that an agent learns of cities, with their loops closed and
     not.
@@ -112,30 +94,39 @@ def city_maps(
     anew so often by an agent that knows nothing, from any of the buildings. Percepts are not drawn:
     they err as perception was measured to.
     """
-    where = outcome.folder_for(NAME, out)
-    places = _places(osm, all_in, maps, seed)
-    asked = Noise(speed=noise[0], turn=noise[1], drift_rad_per_sqrt_m=noise[2])
+    out = outcome.folder_for(NAME, common.out)
+    places = _places(osm, all_in, maps, common.seed)
+    chosen = Noise(speed=noise[0], turn=noise[1], drift_rad_per_sqrt_m=noise[2])
+
     if fit:
         with bar("fitting the noise") as progress:
-            asked = fitted(places, Budget(traversals, seed, processes, progress))
+            budget = Budget(traversals, common.seed, common.processes, progress)
+            chosen = fitted(places, budget)
+
     with bar("traversals") as progress:
-        found = measure(places, asked, Budget(traversals, seed, processes, progress))
-    said = figures(found, asked)
-    first = jobs(places, asked, 1, seed)[0]
-    if cameras:
+        budget = Budget(traversals, common.seed, common.processes, progress)
+        found = measure(places, chosen, budget)
+
+    metrics = map_metrics(found, chosen)
+    first = jobs(places, chosen, 1, common.seed)[0]
+    if common.cameras:
         with bar("with cameras") as progress:
-            said |= camera_figures(by_cameras(first, progress), found[0].learned[0])
-    differing = (
-        live.differing(configurations(first)["heading"], ("sim", *MIND)) if goes_live else []
-    )
-    if goes_live:
-        said["live_same"] = float(not differing)
-    outcome.say(NAME, said)
-    draw: Any = importlib.import_module(
-        "cli.plots.cities"
-    )  # other commands have no use for matplotlib
-    outcome.save(where, NAME, draw.figure(found, said), said, seed, json_path)
+            metrics |= camera_metrics(by_cameras(first, progress), found[0].learned[0])
+
+    differing = None
+    if common.live:
+        differing = live.differing(configurations(first)["heading"], MODULES)
+        metrics[live.SAME] = float(not differing)
+
+    outcome.show(NAME, metrics)
+    _save(out, found, metrics, common)
     live.check(differing)
+
+
+def _save(out: Path, found: list[CityMap], metrics: dict[str, float | str], common: Common) -> None:
+    from cli.plots.cities import figure  # matplotlib takes long to import
+
+    outcome.save(out, NAME, figure(found, metrics), metrics, common)
 
 
 def _places(
@@ -143,10 +134,14 @@ def _places(
 ) -> list[Environment]:
     if osm is not None and all_in is not None:
         raise UsageError("--osm and --all: give one of them")
+
     if osm is not None:
         return environments(from_osm(osm), maps or MAPS, seed)
+
     if all_in is not None:
-        return [
-            each for city in folder(all_in, seed) for each in environments(city, maps or 1, seed)
-        ]
-    return [environments(grown(seed * 1000 + number), 1, seed)[0] for number in range(maps or MAPS)]
+        found = []
+        for city in folder(all_in, seed):
+            found += environments(city, maps or 1, seed)
+        return found
+
+    return grown_environments(maps or MAPS, seed)

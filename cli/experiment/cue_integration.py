@@ -2,21 +2,10 @@
 
 from __future__ import annotations
 
-import importlib
-from pathlib import Path
-from typing import Any
-
 import click
 
 from cli.experiment import live, outcome
-from cli.experiment.options import (
-    cameras_option,
-    json_option,
-    live_option,
-    out_option,
-    processes_option,
-    seed_option,
-)
+from cli.experiment.options import Common, common_options
 from cli.log.progress import bar
 from experiments.cue_integration import agent, camera_level
 from experiments.cue_integration.run import FIT_TRIALS, FITTED, Budget, Session, fitted, measure
@@ -49,65 +38,61 @@ Examples:
 @click.option(
     "--fit", is_flag=True, help="Fit the noise of self-motion first; else take what a fit gave."
 )
-@cameras_option
-@live_option
-@seed_option
-@processes_option
-@out_option
-@json_option
-def cue_integration(
-    trials: int,
-    distance_noise: float,
-    fit: bool,
-    cameras: bool,
-    goes_live: bool,
-    seed: int,
-    processes: int,
-    out: Path | None,
-    json_path: Path | None,
-) -> None:
+@common_options
+def cue_integration(common: Common, trials: int, distance_noise: float, fit: bool) -> None:
     """Experiment 1, figure 7: a post is carried back to its place in the dark, by self-motion,
     landmarks, or both.
 
     In Nardini's room, with four conditions: self-motion alone, landmarks alone after
-    disorientation, both, and both in conflict, landmarks turned by 15°. The published figures
+    disorientation, both, and both in conflict, landmarks turned by 15°. The published results
     beside ours are a simulation's, not people's.
     """
-    folder = outcome.folder_for(NAME, out)
+    folder = outcome.folder_for(NAME, common.out)
     noise = Noise(FITTED.speed, FITTED.turn, distance_noise)
+
     if fit:
         with bar("fitting the noise") as progress:
-            noise = fitted(distance_noise, Budget(FIT_TRIALS, seed, processes, progress))
+            budget = Budget(FIT_TRIALS, common.seed, common.processes, progress)
+            noise = fitted(distance_noise, budget)
+
     with bar("trials") as progress:
-        found = measure(noise, Budget(trials, seed, processes, progress))
-    figures = found.figures()
-    if cameras:
+        found = measure(noise, Budget(trials, common.seed, common.processes, progress))
+
+    metrics = found.metrics()
+    if common.cameras:
         with bar("trials with cameras") as progress:
-            figures |= camera_level.figures(noise, seed, progress)
-    differing = _differing(Trial(Condition.CONFLICT, 0, noise, seed)) if goes_live else []
-    if goes_live:
-        figures["live_same"] = float(not differing)
-    outcome.say(NAME, figures)
-    draw: Any = importlib.import_module(
-        "cli.plots.cue_integration"
-    )  # other commands have no use for matplotlib
-    outcome.save(folder, NAME, draw.figure(found), figures, seed, json_path)
+            metrics |= camera_level.metrics(noise, common.seed, progress)
+
+    differing = None
+    if common.live:
+        differing = _differing(Trial(Condition.CONFLICT, 0, noise, common.seed))
+        metrics[live.SAME] = float(not differing)
+
+    outcome.show(NAME, metrics)
+
+    from cli.plots.cue_integration import figure  # matplotlib takes long to import
+
+    outcome.save(folder, NAME, figure(found), metrics, common)
     live.check(differing)
 
 
 def _differing(trial: Trial) -> list[str]:
-    """The topics on which `trial` says other bytes through real processes, and the response where
-    that is another.
+    """The topics on which `trial` publishes other bytes through real processes.
+
+    The response is named too where it is another.
     """
     inside = Session(trial)
     outside = Session(trial)
     response = inside.run()
-    minds = [("workspace", "workspace"), ("codelets", agent.WORKER)]
-    live.run(
-        agent.SECTIONS,
-        minds,
-        outside.bodies(),
-        lambda: outside.transcript.has_as_many_as(inside.transcript),
-    )
-    answer = [] if outside.room.response == response else ["the response"]
-    return outside.transcript.differs_from(inside.transcript) + answer
+    instances = [("workspace", "workspace"), ("codelets", agent.WORKER)]
+
+    def is_done() -> bool:
+        return outside.transcript.has_as_many_as(inside.transcript)
+
+    live.run(agent.SECTIONS, instances, outside.bodies(), is_done)
+    differing = outside.transcript.differs_from(inside.transcript)
+
+    if outside.room.response != response:
+        differing.append("the response")
+
+    return differing

@@ -1,6 +1,4 @@
-"""One run of an experiment through real processes on a real bus, as the demo's: it must say the
-same bytes.
-"""
+"""One run of an experiment through real processes on a real bus: it must publish the same bytes."""
 
 from __future__ import annotations
 
@@ -23,79 +21,93 @@ from experiments import transcript
 from experiments.transcript import Transcript
 from services import registry
 
-PUMP_S = 0.005
-PATIENCE_S = 60.0
+SPIN_S = 0.005
+TIMEOUT_S = 60.0
 GRACE_S = 3.0
 AGENT = "agent"
+SAME = "live_same"
 
 
 def differing(sections: Sections, modules: Sequence[str]) -> list[str]:
-    """The topics on which `modules` say other bytes as real processes than on the in-memory bus,
-    where the simulation is one of them and leads its robot: nothing else has to be there.
+    """The topics on which `modules` publish other bytes as processes than on the in-memory bus.
+
+    The simulation is one of them and moves its robot itself, so nothing else has to be there.
     """
     awaits = {**sections["sim"]["awaits"], transcript.NAME: 1}
     sections = {**sections, "sim": {**sections["sim"], "awaits": awaits}}
     inside = Transcript(transcript.MODEL)
     outside = Transcript(transcript.MODEL)
-    runner = InProcessRunner(
-        [*(registry.build(name, sections) for name in modules), inside.module()]
-    )
+
+    built = [registry.build(name, sections) for name in modules]
+    runner = InProcessRunner([*built, inside.module()])
     runner.run()
     runner.close()
-    run(
-        sections,
-        [(name, name) for name in modules],
-        [outside.module()],
-        lambda: outside.has_as_many_as(inside),
-    )
+
+    instances = [(name, name) for name in modules]
+    run(sections, instances, [outside.module()], lambda: outside.has_as_many_as(inside))
     return outside.differs_from(inside)
 
 
-def check(differing: Sequence[str]) -> None:
-    """Raise CogmapError where topics differ: the command then ends with code 1, its figures
-    written.
-    """
+def check(differing: Sequence[str] | None) -> None:
+    """Raise CogmapError where topics differ: the command then ends with code 1."""
     if differing:
         raise CogmapError(
-            f"through real processes the run said other bytes on {', '.join(differing)}"
+            f"through real processes the run published other bytes on {', '.join(differing)}"
         )
 
 
 def run(
     sections: Sections,
-    minds: Sequence[tuple[str, str]],
+    instances: Sequence[tuple[str, str]],
     here: Sequence[Module],
-    done: Callable[[], bool],
+    is_done: Callable[[], bool],
 ) -> None:
-    """Run `minds` (module, instance) as processes, configured by `sections`, and the modules
-    `here`, until `done`, or nothing was said for PATIENCE_S: what was not said by then is missing.
+    """Run `instances` (module, instance) as processes, and the modules `here` in this one.
+
+    Until `is_done`, or nothing was published for TIMEOUT_S: what was not published by then is
+    missing.
     """
     with tempfile.TemporaryDirectory() as name, ExitStack() as stack:
         folder = Path(name)
         endpoint = free_endpoint()
         (folder / CONFIG_NAME).write_text(to_toml(sections))
+
         supervisor = Supervisor(folder)
         stack.callback(lambda: supervisor.end(list(supervisor.children), GRACE_S))
-        for program in _programs(folder, endpoint, minds):
+        for program in _programs(folder, endpoint, instances):
             supervisor.start(program)
+
         shells = [Shell(module, ZenohBus(endpoint, AGENT), health=False) for module in here]
         for shell in shells:
             stack.callback(shell.close)
             shell.open()
-        until_s = time.monotonic() + PATIENCE_S
-        while not done() and time.monotonic() < until_s:
-            news = [shell.spin_once(PUMP_S) for shell in shells]
-            if any(news):
-                until_s = time.monotonic() + PATIENCE_S
-            supervisor.check()
+
+        _spin(shells, supervisor, is_done)
 
 
-def _programs(folder: Path, endpoint: str, minds: Sequence[tuple[str, str]]) -> list[Program]:
+def _spin(shells: Sequence[Shell], supervisor: Supervisor, is_done: Callable[[], bool]) -> None:
+    until_s = time.monotonic() + TIMEOUT_S
+
+    while not is_done() and time.monotonic() < until_s:
+        had_work = [shell.spin_once(SPIN_S) for shell in shells]
+        if any(had_work):
+            until_s = time.monotonic() + TIMEOUT_S
+        supervisor.check()
+
+
+def _programs(folder: Path, endpoint: str, instances: Sequence[tuple[str, str]]) -> list[Program]:
     where = ["--tied", "--connect", endpoint]
     config = ["--agent", AGENT, "--config", str(folder / CONFIG_NAME)]
-    router = cogmap_command("router", *where)
-    programs = [Program(ROUTER, lambda starts: router)]
-    for module, instance in minds:
-        command = cogmap_command("module", module, "--instance", instance, *where, *config)
-        programs.append(Program(instance, lambda starts, command=command: command))  # type: ignore[misc]
+    programs = [_program(ROUTER, ["router", *where])]
+
+    for module, instance in instances:
+        arguments = ["module", module, "--instance", instance, *where, *config]
+        programs.append(_program(instance, arguments))
+
     return programs
+
+
+def _program(name: str, arguments: list[str]) -> Program:
+    """A process that is started again by the same command."""
+    command = cogmap_command(*arguments)
+    return Program(name, lambda starts: command)

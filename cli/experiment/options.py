@@ -2,53 +2,96 @@
 
 from __future__ import annotations
 
+import functools
 import os
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import click
 
 from cogmap.errors import UsageError
 
 
+@dataclass(frozen=True)
+class Common:
+    """What the user chose of the options that every experiment has."""
+
+    cameras: bool
+    live: bool
+    seed: int
+    processes: int
+    out: Path | None
+    json_path: Path | None
+
+
 def _writable(context: click.Context, parameter: click.Parameter, path: Path | None) -> Path | None:
-    """Better now than after minutes."""
+    """Refuse a file that cannot be written before minutes of driving."""
     if path is not None and not path.parent.is_dir():
         raise UsageError(f"--json {path}: there is no folder {path.parent}: make it first")
+
     return path
 
 
-seed_option = click.option(
-    "--seed",
-    type=click.IntRange(0, 2**32),
-    default=1,
-    show_default=True,
-    help="Which noise; the same, the same bytes.",
+_OPTIONS = (
+    click.option(
+        "--cameras",
+        is_flag=True,
+        help="Run one more with cameras: percepts come from drawn images, by sensory and epam.",
+    ),
+    click.option(
+        "--live",
+        is_flag=True,
+        help="Run one more through real processes and compare bytes; code 1 where they differ.",
+    ),
+    click.option(
+        "--seed",
+        type=click.IntRange(0, 2**32),
+        default=1,
+        show_default=True,
+        help="Of all noise; the same seed gives the same bytes.",
+    ),
+    click.option(
+        "--processes",
+        type=click.IntRange(1, 256),
+        default=os.cpu_count() or 1,
+        help="How many run at once; the metrics do not depend on it.  [default: one a core]",
+    ),
+    click.option(
+        "--out",
+        type=click.Path(path_type=Path),
+        help="A folder for its files.  [default: runs/NAME]",
+    ),
+    click.option(
+        "--json",
+        "json_path",
+        type=click.Path(dir_okay=False, path_type=Path),
+        callback=_writable,
+        metavar="FILE",
+        help="Write the metrics there too, as one flat object.",
+    ),
 )
-processes_option = click.option(
-    "--processes",
-    type=click.IntRange(1, 256),
-    default=os.cpu_count() or 1,
-    help="How many at once; the figures do not depend on it.  [default: one a core]",
-)
-out_option = click.option(
-    "--out", type=click.Path(path_type=Path), help="A folder for its files.  [default: runs/NAME]"
-)
-json_option = click.option(
-    "--json",
-    "json_path",
-    type=click.Path(dir_okay=False, path_type=Path),
-    callback=_writable,
-    metavar="FILE",
-    help="Write the figures there too, as one flat object.",
-)
-live_option = click.option(
-    "--live",
-    "goes_live",
-    is_flag=True,
-    help="Run one more through real processes and compare bytes; code 1 where they differ.",
-)
-cameras_option = click.option(
-    "--cameras",
-    is_flag=True,
-    help="Run one more with cameras: what is told otherwise is drawn and recognised.",
-)
+
+
+def common_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Give `command` the shared options, as a `Common`, its first argument."""
+
+    @functools.wraps(command)
+    def with_common(
+        *,
+        cameras: bool,
+        live: bool,
+        seed: int,
+        processes: int,
+        out: Path | None,
+        json_path: Path | None,
+        **own: Any,
+    ) -> None:
+        command(Common(cameras, live, seed, processes, out, json_path), **own)
+
+    decorated: Callable[..., None] = with_common
+    for option in reversed(_OPTIONS):
+        decorated = option(decorated)
+
+    return decorated

@@ -28,22 +28,23 @@ from cli.plots.palette import (
 )
 from experiments.city_maps import published
 from experiments.city_maps.drive import SENSING
-from experiments.city_maps.figures import NAMES
-from experiments.city_maps.measure import FELT, CityMap
+from experiments.city_maps.measure import CityMap
+from experiments.city_maps.metrics import NAMES
+from experiments.city_maps.observer import WHEELS as WHEELS_ALONE
 
 SHOWN = {
-    FELT: "path integration alone",
-    "none": "landmarks known again, no loop closed",
+    WHEELS_ALONE: "wheels alone",
+    "none": "landmarks recognised, no loop closed",
     "positions": "positions corrected (eq. 9)",
     "heading": "headings too",
 }
-COLOURS = {FELT: FAINT, "none": WHEELS, "positions": SEVERAL[1], "heading": ESTIMATE}
+COLOURS = {WHEELS_ALONE: FAINT, "none": WHEELS, "positions": SEVERAL[1], "heading": ESTIMATE}
 MOST_SHEETS = 8
 MARGIN_M = 120.0
 SCALE_M = 200.0
 
 
-def figure(maps: Sequence[CityMap], figures: dict[str, Any]) -> Figure:
+def figure(maps: Sequence[CityMap], metrics: dict[str, Any]) -> Figure:
     """The sheet: errors on top, below true and learned maps, a column each, of at most MOST_SHEETS
     of them.
     """
@@ -59,25 +60,25 @@ def figure(maps: Sequence[CityMap], figures: dict[str, Any]) -> Figure:
         below.set_facecolor(PAPER)
         errors, sizes = top.subplots(1, 2, width_ratios=(2.2, 1))
         _draw_errors(errors, maps)
-        _draw_growth(sizes, maps, figures)
+        _draw_growth(sizes, maps, metrics)
         panels = below.subplots(3, columns, squeeze=False)
         for column, each in enumerate(chosen):
             _draw_maps(panels[:, column].tolist(), each)
         for panel in panels[:, len(chosen) :].ravel():
             panel.axis("off")
         sheet.suptitle(
-            _title(maps, figures), x=0.01, ha="left", color=INK, fontsize=12, fontweight="bold"
+            _title(maps, metrics), x=0.01, ha="left", color=INK, fontsize=12, fontweight="bold"
         )
         sheet.draw_without_rendering()
     return sheet
 
 
-def _title(maps: Sequence[CityMap], figures: dict[str, Any]) -> str:
+def _title(maps: Sequence[CityMap], metrics: dict[str, Any]) -> str:
     times = "once" if len(maps[0].learned) == 1 else f"{len(maps[0].learned)} times"
     return (
         f"Learned maps of {len(maps)} environments, traversed {times} each, {SENSING}.\n"
-        f"Corrected over uncorrected error: {figures['error_corrected_over_uncorrected']:.2f} with headings, "
-        f"{figures['error_positions_over_uncorrected']:.2f} positions only"
+        f"Corrected over uncorrected error: {metrics['error_corrected_over_uncorrected']:.2f} with headings, "
+        f"{metrics['error_positions_over_uncorrected']:.2f} positions only"
     )
 
 
@@ -129,11 +130,11 @@ def _draw_errors(axes: Axes, maps: Sequence[CityMap]) -> None:
     _label(axes, "", "km²")
 
 
-def _draw_growth(axes: Axes, maps: Sequence[CityMap], figures: dict[str, Any]) -> None:
+def _draw_growth(axes: Axes, maps: Sequence[CityMap], metrics: dict[str, Any]) -> None:
     length = np.array([each.environment.tour_m / 1e3 for each in maps])
     for method, name in NAMES.items():
         error = np.array([each.error_km2(method) for each in maps])
-        slope = figures[f"growth_{name}_km2_per_km"]
+        slope = metrics[f"growth_{name}_km2_per_km"]
         axes.plot(length, error, "o", ms=5, color=COLOURS[method], mec="white")
         ends = np.array([length.min(), length.max()])
         axes.plot(

@@ -14,10 +14,11 @@ from matplotlib.figure import Figure
 
 from cli.plots.draw import STYLE
 from cli.plots.palette import ESTIMATE, FAINT, INK, OBJECT, PAPER, ROAD, SEVERAL, TRUE, WHEELS
-from experiments.loop_closing.run import SENSING, Loop, Map, Replayed
+from experiments.loop_closing.observer import Loop, Map, Replayed
+from experiments.loop_closing.run import SENSING
 
 
-def figure(loops: dict[str, Loop], figures: dict[str, Any]) -> Figure:
+def figure(loops: dict[str, Loop], metrics: dict[str, Any]) -> Figure:
     """The sheet: the map before, right after, and in the end with headings; below, the first
     replay.
     """
@@ -44,7 +45,7 @@ def figure(loops: dict[str, Loop], figures: dict[str, Any]) -> Figure:
         )
         shifts, synapses = below.subplots(1, 2)
         _draw_replay(shifts, positions.replays[0])
-        _draw_synapses(synapses, positions.replays[0], figures)
+        _draw_synapses(synapses, positions.replays[0], metrics)
         sheet.suptitle(
             f"A loop of {len(positions.before.path_m)} places, {SENSING}, wheels as the town's",
             x=0.01,
@@ -101,14 +102,14 @@ def _draw_replay(axes: Axes, replay: Replayed) -> None:
     _label(axes, "places, from the one met again backwards", "m")
 
 
-def _draw_synapses(axes: Axes, replay: Replayed, figures: dict[str, Any]) -> None:
+def _draw_synapses(axes: Axes, replay: Replayed, metrics: dict[str, Any]) -> None:
     """Pairs of place fields near one another; those brought together from afar lie far outside,
     near 1.
     """
     nearer = replay.nearer_m[replay.close]
     changes = replay.strength_changes[replay.close]
-    slope = figures["strength_change_per_m_close_pairs"]
-    r = figures["strength_and_shift_correlation_close_pairs"]
+    slope = metrics["strength_change_per_m_close_pairs"]
+    r = metrics["strength_and_shift_correlation_close_pairs"]
     axes.axline((0.0, 0.0), slope=slope, color=FAINT, lw=1.0, ls=(0, (4, 2)))
     axes.plot(nearer, changes, ".", ms=5, color=SEVERAL[4], alpha=0.6)
     title = f"e   predicted change of synapses, fields under {1 / replay.decay_per_m:g} m apart"

@@ -13,13 +13,14 @@ from cogmap.parallel import Progress, parallel_map
 from cogmap.runtime.config import Sections
 from experiments import rendered
 from experiments.city_maps.correction import METHODS
-from experiments.city_maps.drive import MIND, Tour, Traversal, driven, sections, traverse
+from experiments.city_maps.drive import COGNITION, Tour, driven, sections, traverse
 from experiments.city_maps.environment import BUILDINGS, Environment
+from experiments.city_maps.observer import Traversal
 from experiments.city_maps.streets import Points
 from services.sim.odometry import Noise
 
 TRAVERSALS = 12
-FELT = "felt"
+MAPS = 8
 NOISE = Noise(speed=0.1, turn=0.1, drift_rad_per_sqrt_m=0.0)
 
 
@@ -48,7 +49,8 @@ class Learned:
     """What one traversal left, by METHODS: error in km^2, buildings (8, 2), path (n, 2), road (k,
     2).
 
-    The error is also that of path integration alone, by the name FELT.
+    `error_km2` is also that by path integration alone: of WHEELS and, with cameras, of FUSED
+    self-motion.
     """
 
     error_km2: dict[str, float]
@@ -94,7 +96,7 @@ def traversed(job: Job) -> Learned:
 
 def by_cameras(job: Job, progress: Progress) -> Learned:
     """As `traversed`, with buildings that are drawn and recognised."""
-    return _learned(job, rendered.by_cameras(configurations(job), MIND, driven, progress))
+    return _learned(job, rendered.by_cameras(configurations(job), COGNITION, driven, progress))
 
 
 def configurations(job: Job) -> dict[str, Sections]:
@@ -107,13 +109,21 @@ def configurations(job: Job) -> dict[str, Sections]:
 def _learned(job: Job, maps: Mapping[str, Traversal]) -> Learned:
     true_m = job.environment.buildings_m
     return Learned(
-        error_km2={FELT: map_error_km2(maps["none"].felt_m, true_m)}
-        | {method: map_error_km2(one.buildings_m, true_m) for method, one in maps.items()},
+        error_km2=_errors_km2(maps, true_m),
         missing=sum(int(np.isnan(one.buildings_m[:, 0]).sum()) for one in maps.values()),
         buildings_m={method: one.buildings_m for method, one in maps.items()},
         path_m={method: one.path_m for method, one in maps.items()},
         road_m={method: one.road_m for method, one in maps.items()},
     )
+
+
+def _errors_km2(maps: Mapping[str, Traversal], true_m: Points) -> dict[str, float]:
+    errors_km2 = {method: map_error_km2(one.buildings_m, true_m) for method, one in maps.items()}
+
+    for name, buildings_m in maps["none"].alone_m.items():
+        errors_km2[name] = map_error_km2(buildings_m, true_m)
+
+    return errors_km2
 
 
 def jobs(

@@ -13,7 +13,7 @@ from cogmap.data import osm, street_graphs
 from cogmap.data.osm import Extract, Tags, Way
 from cogmap.data.street_graphs import StreetGraph
 from cogmap.errors import UsageError
-from experiments.city_maps.environment import City
+from experiments.city_maps.environment import City, Environment, environments
 from experiments.city_maps.streets import Points, Streets
 
 EARTH_M = 6_371_008.8
@@ -82,6 +82,12 @@ def grown(seed: int) -> City:
     streets = Streets(points, pieces[rng.random(len(pieces)) < STREETS_LEFT]).connected()
     where = _along(streets, rng)
     return City(f"city {seed}", streets, tuple(f"house {k + 1}" for k in range(len(where))), where)
+
+
+def grown_environments(number: int, seed: int) -> list[Environment]:
+    """`number` environments, each of a city grown from a seed of its own."""
+    cities = [grown(1000 * seed + count) for count in range(number)]
+    return [environments(city, 1, seed)[0] for city in cities]
 
 
 def _along(streets: Streets, rng: np.random.Generator) -> Points:

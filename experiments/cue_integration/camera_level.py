@@ -95,7 +95,7 @@ class PicturedRoom(Room):
         return world, StereoCamera(world, calibration())
 
 
-def figures(noise: Noise, seed: int, progress: Progress) -> dict[str, float]:
+def metrics(noise: Noise, seed: int, progress: Progress) -> dict[str, float]:
     """How far off the response is in one trial of each condition with cameras, and in the same told
     percepts.
     """

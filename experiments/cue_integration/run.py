@@ -82,20 +82,20 @@ class Outcome:
             self.sd_m(Condition.SELF_MOTION), self.sd_m(Condition.LANDMARKS)
         )
 
-    def figures(self) -> dict[str, float]:
-        """Every figure, flat; lengths in metres."""
-        figures: dict[str, float] = {}
+    def metrics(self) -> dict[str, float]:
+        """Every metric, flat; lengths in metres."""
+        metrics: dict[str, float] = {}
         for condition, errors_m in self.errors_m.items():
             name = condition.value
-            figures[f"sd_{name}_m"] = self.sd_m(condition)
-            figures[f"rmse_{name}_m"] = analysis.rmse_m(errors_m)
-            figures[f"lost_trials_{name}"] = float(analysis.lost(errors_m))
-            figures[f"published_simulation_sd_{name}_m"] = published.SD_M[condition]
-            figures[f"published_simulation_rmse_{name}_m"] = published.RMSE_M[condition]
-        figures["sd_optimal_m"] = self.optimal_sd_m
-        figures["sd_both_over_optimal"] = figures["sd_both_m"] / self.optimal_sd_m
-        figures |= self._conflict()
-        return figures | {
+            metrics[f"sd_{name}_m"] = self.sd_m(condition)
+            metrics[f"rmse_{name}_m"] = analysis.rmse_m(errors_m)
+            metrics[f"lost_trials_{name}"] = float(analysis.lost(errors_m))
+            metrics[f"published_simulation_sd_{name}_m"] = published.SD_M[condition]
+            metrics[f"published_simulation_rmse_{name}_m"] = published.RMSE_M[condition]
+        metrics["sd_optimal_m"] = self.optimal_sd_m
+        metrics["sd_both_over_optimal"] = metrics["sd_both_m"] / self.optimal_sd_m
+        metrics |= self._conflict()
+        return metrics | {
             "sigma_v": self.noise.speed,
             "sigma_w": self.noise.turn,
             "distance_noise": self.noise.distance,

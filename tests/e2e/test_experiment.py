@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from cli.experiment import live
-from experiments.loop_closing.run import MIND, driven, sections
+from experiments.loop_closing.run import MODULES, driven, sections
 from services import registry
 
 COGMAP = [sys.executable, "-m", "cli.main", "experiment"]
@@ -64,6 +64,6 @@ def test_a_loop_is_closed_with_the_same_bytes_through_real_processes() -> None:
         (0.0, 0.0),
         (60.0, 0.0),
     ]
-    modules = ("sim", *MIND)
+    modules = MODULES
     assert driven(configured, [registry.build(name, configured) for name in modules]).replays
     assert live.differing(configured, modules) == []

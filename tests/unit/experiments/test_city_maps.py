@@ -11,8 +11,9 @@ from cogmap.errors import CogmapError, UsageError
 from experiments.city_maps.correction import settings
 from experiments.city_maps.drive import Tour, sections, traverse
 from experiments.city_maps.environment import BUILDINGS, MOST_KM2, City, environments
-from experiments.city_maps.figures import figures
-from experiments.city_maps.measure import FELT, NOISE, CityMap, Learned, map_error_km2
+from experiments.city_maps.measure import NOISE, CityMap, Learned, map_error_km2
+from experiments.city_maps.metrics import map_metrics
+from experiments.city_maps.observer import WHEELS
 from experiments.city_maps.sources import from_osm, grown, plane_m
 from experiments.city_maps.streets import Streets, backwards
 from experiments.city_maps.tour import shortest_tour
@@ -128,9 +129,9 @@ def test_the_error_is_the_sum_of_squares_in_square_kilometres() -> None:
     assert map_error_km2(learned, true) == pytest.approx(8 * 0.25)
 
 
-def test_the_ratio_is_the_mean_of_the_maps_own_ratios_and_all_figures_are_json() -> None:
+def test_the_ratio_is_the_mean_of_the_maps_own_ratios() -> None:
     (environment,) = environments(grown(1), 1, 1)
-    nothing = dict.fromkeys((FELT, "none", "positions", "heading"), np.zeros((0, 2)))
+    nothing = dict.fromkeys((WHEELS, "none", "positions", "heading"), np.zeros((0, 2)))
     errors = [(3.0, 4.0, 2.0, 1.0), (3.0, 2.0, 2.0, 1.0)]
     maps = [
         CityMap(
@@ -139,11 +140,11 @@ def test_the_ratio_is_the_mean_of_the_maps_own_ratios_and_all_figures_are_json()
         )
         for error in errors
     ]
-    said = figures(maps, NOISE)
-    assert said["error_corrected_over_uncorrected"] == pytest.approx((0.25 + 0.5) / 2)
-    assert said["error_uncorrected_km2"] == pytest.approx(3.0)
-    assert said["sensing"] == "percept-level sensing"
-    assert json.loads(json.dumps(said)) == said
+    metrics = map_metrics(maps, NOISE)
+    assert metrics["error_corrected_over_uncorrected"] == pytest.approx((0.25 + 0.5) / 2)
+    assert metrics["error_uncorrected_km2"] == pytest.approx(3.0)
+    assert metrics["sensing"] == "percept-level sensing"
+    assert json.loads(json.dumps(metrics)) == metrics
 
 
 def test_without_noise_and_confusions_the_map_is_right_and_the_same_each_time() -> None:
@@ -157,7 +158,7 @@ def test_without_noise_and_confusions_the_map_is_right_and_the_same_each_time() 
     known = ~np.isnan(made.buildings_m[:, 0])
     assert known.any()
     assert np.hypot(*(made.buildings_m - environment.buildings_m)[known].T).max() < 5.0
-    assert np.hypot(*(made.felt_m - environment.buildings_m)[known].T).max() < 5.0
+    assert np.hypot(*(made.alone_m[WHEELS] - environment.buildings_m)[known].T).max() < 5.0
     assert made.believed.tolist() == again.believed.tolist()
 
 

@@ -167,8 +167,8 @@ def test_responses_between_the_cues_speak_for_integration_and_responses_at_eithe
     either = np.where(
         follows, rng.normal((0.457, 0), 0.28, (400, 2)), rng.normal(0, 0.35, (400, 2))
     )
-    assert _outcome(between).figures()["integration_over_best_alternation"] > 0
-    assert _outcome(either).figures()["integration_over_alternation"] < 0
+    assert _outcome(between).metrics()["integration_over_best_alternation"] > 0
+    assert _outcome(either).metrics()["integration_over_alternation"] < 0
 
 
 def test_one_lost_trial_turns_the_sum_of_likelihoods_but_not_the_median_nor_the_share_and_it_is_counted() -> (
@@ -178,7 +178,7 @@ def test_one_lost_trial_turns_the_sum_of_likelihoods_but_not_the_median_nor_the_
     weight = 0.35**2 / (0.35**2 + 0.28**2)
     between = rng.normal((weight * 0.457, 0), 0.22, (400, 2))
     between[7] = (9.0, 7.0)
-    figures = _outcome(between).figures()
+    figures = _outcome(between).metrics()
     assert figures["integration_over_alternation"] < 0
     assert figures["integration_over_alternation_median_of_a_trial"] > 0
     assert figures["integration_likelier_share"] > 0.5

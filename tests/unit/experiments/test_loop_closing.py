@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from experiments.loop_closing.metrics import loop_metrics
+from experiments.loop_closing.observer import Loop, Map, Replayed
 from experiments.loop_closing.rule import close_laps
-from experiments.loop_closing.run import CORNERS_M, METHODS, Loop, Map, Replayed, figures, way
+from experiments.loop_closing.run import CORNERS_M, METHODS, trajectory
 from schemas.array import Array
 from schemas.cognition import Replay
 from services.sim.odometry import Noise
@@ -47,7 +49,9 @@ def _loop(error_m: float) -> Loop:
     off = Map(
         there + np.array([error_m, 0.0]), there, there + np.array([0.0, error_m]), there, there
     )
-    return Loop(off, Map(there, there, there, there, there), off, [_squeezed()])
+    exact = Map(there, there, there, there, there)
+    wheels_m = there + np.array([2 * error_m, 0.0])
+    return Loop(off, exact, off, there, wheels_m, [_squeezed()])
 
 
 def test_pairs_are_close_where_their_fields_are_before_and_after() -> None:
@@ -57,23 +61,25 @@ def test_pairs_are_close_where_their_fields_are_before_and_after() -> None:
 
 
 def test_synapses_of_close_places_change_by_the_decay_times_the_shift_and_others_do_not() -> None:
-    said = figures({method: _loop(3.0) for method in METHODS})
+    metrics = loop_metrics({method: _loop(3.0) for method in METHODS})
     expected = DECAY * np.exp(-DECAY * 2.375)
-    assert said["strength_change_per_m_close_pairs"] == pytest.approx(expected, rel=0.05)
-    assert said["strength_and_shift_correlation_close_pairs"] > 0.99
-    assert said["strength_change_per_m_all_pairs"] < 0.02
-    assert said["close_pairs"] == 38
+    assert metrics["strength_change_per_m_close_pairs"] == pytest.approx(expected, rel=0.05)
+    assert metrics["strength_and_shift_correlation_close_pairs"] > 0.99
+    assert metrics["strength_change_per_m_all_pairs"] < 0.02
+    assert metrics["close_pairs"] == 38
 
 
 def test_errors_are_told_before_and_after_the_first_correction_and_in_the_end() -> None:
-    said = figures({method: _loop(3.0) for method in METHODS})
+    metrics = loop_metrics({method: _loop(3.0) for method in METHODS})
     told = [
-        said[f"{name}_error_{when}_m_positions"]
+        metrics[f"{name}_error_{when}_m_positions"]
         for name in ("path", "object")
         for when in ("before", "after")
     ]
     assert told == pytest.approx([3.0, 0.0, 3.0, 0.0])
-    assert said["end_error_in_the_end_m_heading"] == pytest.approx(3.0)
+    assert metrics["end_error_in_the_end_m_heading"] == pytest.approx(3.0)
+    assert metrics["path_error_wheels_alone_m"] == pytest.approx(6.0)
+    assert metrics["path_error_fused_alone_m"] == 0.0
 
 
 def test_where_only_distances_err_the_rule_leaves_a_bridge_of_what_was_a_random_walk() -> None:
@@ -102,5 +108,5 @@ def test_without_noise_nothing_errs() -> None:
 
 
 def test_the_way_ends_on_the_street_where_it_began() -> None:
-    line = way()["line_m"]
+    line = trajectory()["line_m"]
     assert line[0] == line[-2] and line[-1][1] == line[0][1] and 0 < line[-1][0] < line[1][0]

@@ -14,7 +14,7 @@ from experiments.cue_integration.camera_level import PicturedRoom
 from experiments.cue_integration.geometry import LANDMARKS
 from experiments.cue_integration.run import FITTED
 from experiments.cue_integration.trial import Condition, Trial
-from experiments.loop_closing.run import MIND, sections
+from experiments.loop_closing.run import COGNITION, sections
 from experiments.rendered import by_cameras, named, with_cameras
 from experiments.transcript import MODEL, Transcript
 from schemas import topics
@@ -44,7 +44,7 @@ def test_another_mind_that_is_given_what_was_sensed_says_what_it_would_with_the_
     None
 ):
     shares: list[float] = []
-    both = by_cameras({"first": _short(), "again": _short()}, MIND, _heard, shares.append)
+    both = by_cameras({"first": _short(), "again": _short()}, COGNITION, _heard, shares.append)
     names = [each.name for each in (topics.PERCEPTS, topics.DELTA, topics.MOTOR_COMMAND)]
     first, again = (both[name].messages for name in ("first", "again"))
     assert [len(first[name]) for name in (names[0], names[2])] == [FRAMES, FRAMES]

@@ -1,0 +1,128 @@
+"""The metrics of the experiment as one flat object."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from experiments.city_maps import published
+from experiments.city_maps.drive import SENSING
+from experiments.city_maps.measure import CityMap, Learned
+from experiments.city_maps.observer import FUSED, WHEELS
+from services.sim.odometry import Noise
+
+# Of what was learned, how it is named: by wheels alone, without closing loops, by the paper's own
+# rule, and by ours, which corrects headings too.
+NAMES = {
+    WHEELS: "wheels_alone",
+    "none": "uncorrected",
+    "positions": "positions",
+    "heading": "corrected",
+}
+CAMERA_NAMES = NAMES | {FUSED: "fused_alone"}
+RATIOS = ("corrected", "positions")
+Errors = npt.NDArray[np.float64]
+Metrics = dict[str, float | str]
+
+
+def map_metrics(maps: Sequence[CityMap], noise: Noise) -> Metrics:
+    """Every metric that is printed or drawn.
+
+    `error_corrected_over_uncorrected` is the mean over the maps of each one's ratio of mean errors.
+    Corrected is with headings, beyond the paper; `positions` is the paper's own rule. Uncorrected
+    is the map of an agent that recognises landmarks but closes no loops; `wheels_alone` the map by
+    path integration alone, which without images is that of the wheels.
+    """
+    errors = {}
+    for method, name in NAMES.items():
+        errors[name] = np.array([city.error_km2(method) for city in maps])
+
+    metrics = _ratios(errors)
+    for name, values in errors.items():
+        metrics[f"error_{name}_km2"] = float(values.mean())
+        metrics[f"error_{name}_sd_km2"] = float(values.std())
+        metrics[f"growth_{name}_km2_per_km"] = growth(maps, values)
+
+    metrics |= _protocol(maps, noise)
+    for number, city in enumerate(maps, start=1):
+        own = {name: float(values[number - 1]) for name, values in errors.items()}
+        metrics |= _of_map(f"map_{number:02d}", city, own)
+
+    return metrics
+
+
+def _ratios(errors: dict[str, Errors]) -> Metrics:
+    metrics: Metrics = {}
+
+    for name in RATIOS:
+        ratio = errors[name] / errors["uncorrected"]
+        metrics[f"error_{name}_over_uncorrected"] = float(ratio.mean())
+
+    over_wheels = errors["corrected"] / errors["wheels_alone"]
+    metrics["error_corrected_over_wheels_alone"] = float(over_wheels.mean())
+    return metrics
+
+
+def _protocol(maps: Sequence[CityMap], noise: Noise) -> Metrics:
+    missing = sum(one.missing for city in maps for one in city.learned)
+    return {
+        "maps": float(len(maps)),
+        "traversals": float(len(maps[0].learned)),
+        "buildings_missing": float(missing),
+        "noise_speed": noise.speed,
+        "noise_turn": noise.turn,
+        "noise_drift_rad_per_sqrt_m": noise.drift_rad_per_sqrt_m,
+        "published_human_mean_km2": published.HUMAN_MEAN_KM2,
+        "published_human_sd_km2": published.HUMAN_SD_KM2,
+        "published_model_mean_km2": published.MODEL_MEAN_KM2,
+        "published_model_sd_km2": published.MODEL_SD_KM2,
+        "sensing": SENSING,
+        "self_motion": "wheels",
+    }
+
+
+def _of_map(prefix: str, city: CityMap, errors_km2: dict[str, float]) -> Metrics:
+    metrics: Metrics = {
+        f"{prefix}_name": city.environment.name,
+        f"{prefix}_area_km2": city.environment.area_km2,
+        f"{prefix}_tour_km": city.environment.tour_m / 1e3,
+    }
+
+    for name, error_km2 in errors_km2.items():
+        metrics[f"{prefix}_error_{name}_km2"] = error_km2
+
+    return metrics
+
+
+def camera_metrics(seen: Learned, told: Learned) -> Metrics:
+    """Those of one traversal with cameras, and of the same one at percept level.
+
+    With cameras self-motion is fused: `fused_alone` is path integration of that alone.
+    """
+    metrics: Metrics = {"cameras_traversals": 1.0}
+
+    for method, name in CAMERA_NAMES.items():
+        metrics[f"cameras_error_{name}_km2"] = seen.error_km2[method]
+        if method in told.error_km2:
+            metrics[f"cameras_same_traversal_by_percepts_error_{name}_km2"] = told.error_km2[method]
+
+    for method in ("heading", "positions"):
+        ratio = seen.error_km2[method] / seen.error_km2["none"]
+        metrics[f"cameras_error_{NAMES[method]}_over_uncorrected"] = ratio
+
+    metrics["cameras_buildings_missing"] = float(seen.missing)
+    return metrics
+
+
+def growth(maps: Sequence[CityMap], errors_km2: Errors) -> float:
+    """By how many km^2 the error grows for a kilometre of tour: a line's slope, 0 for one map."""
+    length_km = np.array([city.environment.tour_m / 1e3 for city in maps])
+    centred_km = length_km - length_km.mean()
+    variance = float(centred_km @ centred_km)
+
+    if variance == 0:
+        return 0.0
+
+    return float(centred_km @ errors_km2 / variance)

@@ -1,0 +1,127 @@
+"""What one traversal made of a city: the map in the end, beside the truth and path integration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cogmap.errors import CogmapError
+from cogmap.geometry.se2 import transform_from
+from cogmap.graph.graph import Graph
+from cogmap.runtime.module import Module
+from experiments import reading
+from experiments.city_maps.streets import Points
+from experiments.dead_reckoning import DeadReckoning
+from schemas import topics
+from schemas.graph import Delta
+from schemas.sensing import TruePose
+
+LOCALIZATION = "localization"
+WHEELS = "wheels"
+FUSED = "fused"
+
+
+@dataclass(frozen=True, eq=False)
+class Traversal:
+    """What one agent made of one tour, in the true frame: (n, 3) poses believed and true, by view.
+
+    `path_m` (n, 2) is the path as the map has it in the end, `buildings_m` (8, 2) has NaN for one
+    that is not on the map, and `road_m` (k, 2) are the cells that are road. `alone_m` has the
+    buildings (8, 2) where they would be by path integration alone, of the WHEELS and, where they
+    are fused with views, of FUSED self-motion.
+    """
+
+    believed: Points
+    true: Points
+    path_m: Points
+    buildings_m: Points
+    road_m: Points
+    alone_m: dict[str, Points]
+
+
+class Observer:
+    """Follows the graph, the truth and the odometry of one traversal.
+
+    `origin` (3,) is the true pose where the agent's own frame begins; `names` are the buildings'.
+    """
+
+    def __init__(self, origin: Points, names: tuple[str, ...], cell_m: float) -> None:
+        self._origin = origin
+        self._names = names
+        self._graph = Graph(cell_m)
+        self._wheels = DeadReckoning()
+        self._believed: list[tuple[float, float, float]] = []
+        self._true: list[tuple[float, float, float]] = []
+
+    def module(self) -> Module:
+        """The module `observer`."""
+        return (
+            Module("observer")
+            .on(topics.DELTA, self._on_delta)
+            .on(topics.TRUE_POSE, self._on_pose)
+            .on(topics.ODOMETRY, self._wheels.on_odometry)
+        )
+
+    def traversal(self) -> Traversal:
+        """All that was observed."""
+        path = reading.path_rows(self._graph)
+        buildings_m = reading.object_positions_m(self._graph, self._names)
+        alone_m = {name: self._placed(own_m) for name, own_m in self._alone_m(path).items()}
+
+        return Traversal(
+            believed=self._placed_poses(np.array(self._believed)),
+            true=np.array(self._true)[: len(self._believed)],
+            path_m=self._placed(path[:, reading.POSE][:, :2]),
+            buildings_m=self._placed(buildings_m),
+            road_m=self._placed(reading.road_m(self._graph)),
+            alone_m=alone_m,
+        )
+
+    def _on_delta(self, delta: Delta) -> None:
+        if not self._graph.apply(delta):
+            raise CogmapError(f"delta {delta.version} is not the next one")
+
+        if delta.phase == LOCALIZATION:
+            self._believed.append(reading.self_pose(self._graph))
+
+    def _on_pose(self, true: TruePose) -> None:
+        pose = true.pose
+        self._true.append((pose.x_m, pose.y_m, pose.heading_rad))
+
+    def _alone_m(self, path: Points) -> dict[str, Points]:
+        """The buildings (8, 2) by path integration alone.
+
+        Without images self-motion is that of the wheels.
+        """
+        fused = path[:, reading.ODOMETRY].copy()
+        fused[:, :2] -= fused[0, :2] - path[0, reading.POSE][:2]
+
+        if not self._wheels:
+            return {WHEELS: self._seen_from(fused)}
+
+        wheels = self._wheels.poses(path[:, reading.STAMP])
+        return {WHEELS: self._seen_from(wheels), FUSED: self._seen_from(fused)}
+
+    def _seen_from(self, poses: Points) -> Points:
+        """(8, 2): the median of all observations of each building, made from `poses` of the path."""
+        seen = reading.observations(self._graph)
+        where_m = transform_from(poses[seen.place], seen.where_m)
+        numbers = {label: number for number, label in enumerate(seen.labels)}
+        buildings_m = np.full((len(self._names), 2), np.nan)
+
+        for row, name in enumerate(self._names):
+            if name in numbers:
+                of_it = seen.landmark == numbers[name]
+                buildings_m[row] = np.median(where_m[of_it], axis=0)
+
+        return buildings_m
+
+    def _placed(self, own_m: Points) -> Points:
+        """(n, 2) positions of the agent's own frame, in the true one."""
+        return transform_from(self._origin, own_m)
+
+    def _placed_poses(self, own: Points) -> Points:
+        """(n, 3) poses of the agent's own frame, in the true one."""
+        heading_rad = own[:, 2] + self._origin[2]
+        return np.column_stack([self._placed(own[:, :2]), heading_rad])

@@ -1,0 +1,83 @@
+"""The metrics of loop closing: errors by method, and what the first replay predicts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from experiments.loop_closing.observer import Loop, Replayed, rms_m
+from experiments.loop_closing.rule import close_laps
+from experiments.loop_closing.run import CORNERS_M, FRAME_HZ, NOISE, SPEED_M_S
+from services.sim.odometry import Noise
+
+LAPS = 1000
+MIN_PAIRS = 3
+ERRORS = ("path_error", "object_error", "end_error")
+Metrics = dict[str, float]
+
+
+def loop_metrics(loops: Mapping[str, Loop]) -> Metrics:
+    """Errors before and after the first correction and in the end, by the method of correction.
+
+    `positions` is the paper's own rule (eq. 9), `heading` ours. `path_error_wheels_alone_m` and
+    `path_error_fused_alone_m` are of the path by path integration alone: of the wheels, and of
+    self-motion as the agent has it; they are the same where no images are taken.
+    """
+    metrics: Metrics = {}
+
+    for method, loop in loops.items():
+        maps = {"before": loop.before, "after": loop.after, "in_the_end": loop.end}
+        for error in ERRORS:
+            for when, drawn in maps.items():
+                metrics[f"{error}_{when}_m_{method}"] = getattr(drawn, f"{error}_m")
+
+        metrics[f"corrections_{method}"] = float(len(loop.replays))
+        metrics[f"replays_of_the_first_{method}"] = float(loop.replays[0].passes)
+
+    positions = loops["positions"]
+    true_path_m = positions.end.true_path_m
+    metrics["path_error_wheels_alone_m"] = rms_m(positions.wheels_path_m - true_path_m)
+    metrics["path_error_fused_alone_m"] = rms_m(positions.fused_path_m - true_path_m)
+    return metrics | _predicted(positions.replays[0])
+
+
+def _predicted(replay: Replayed) -> Metrics:
+    """How the change of synapses depends on how much nearer place fields come.
+
+    It is k a metre, where they are close.
+    """
+    every = np.ones(len(replay.close), bool)
+    metrics = {"synapse_decay_per_m": replay.decay_per_m}
+    return metrics | _fit("close_pairs", replay, replay.close) | _fit("all_pairs", replay, every)
+
+
+def _fit(name: str, replay: Replayed, pairs: npt.NDArray[np.bool_]) -> Metrics:
+    nearer_m = replay.nearer_m[pairs]
+    changes = replay.strength_changes[pairs]
+    slope = 0.0
+    correlation = 0.0
+
+    if len(nearer_m) >= MIN_PAIRS and np.ptp(nearer_m) > 0:
+        slope = float(np.polyfit(nearer_m, changes, 1)[0])
+        correlation = float(np.corrcoef(nearer_m, changes)[0, 1])
+
+    return {
+        name: float(len(nearer_m)),
+        f"strength_change_per_m_{name}": slope,
+        f"strength_and_shift_correlation_{name}": correlation,
+    }
+
+
+def rule_metrics(seed: int) -> Metrics:
+    """What eq. 9 does for many laps of the wheels alone, with the headings' noise and without."""
+    exact_headings = Noise(speed=NOISE.speed, turn=0.0, drift_rad_per_sqrt_m=0.0)
+    metrics: Metrics = {}
+
+    for name, noise in (("", NOISE), ("_exact_headings", exact_headings)):
+        laps = close_laps(CORNERS_M, SPEED_M_S / FRAME_HZ, noise, LAPS, seed)
+        metrics[f"rule_over_uncorrected{name}"] = laps.ratio
+        metrics[f"rule_helps_share{name}"] = laps.helped
+
+    return metrics

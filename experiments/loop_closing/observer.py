@@ -1,0 +1,199 @@
+"""What is observed of one loop: the map before and after its corrections, and the replays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from cogmap.errors import CogmapError
+from cogmap.geometry.arrays import Floats
+from cogmap.graph.graph import Graph
+from cogmap.runtime.module import Module
+from experiments import reading
+from experiments.dead_reckoning import DeadReckoning
+from schemas import topics
+from schemas.cognition import Replay
+from schemas.graph import Delta
+from schemas.sensing import TruePose
+
+SHIFT = "shift"
+
+
+@dataclass(frozen=True)
+class Map:
+    """What the agent believes at one time, in its own frame, which begins as the true one does.
+
+    (n, 2) `path_m` and `true_path_m` at the same stamps, (k, 2) `objects_m` and where they truly
+    stand, and `road_m`.
+    """
+
+    path_m: Floats
+    true_path_m: Floats
+    objects_m: Floats
+    true_objects_m: Floats
+    road_m: Floats
+
+    @property
+    def path_error_m(self) -> float:
+        """Root mean square over the path."""
+        return rms_m(self.path_m - self.true_path_m)
+
+    @property
+    def object_error_m(self) -> float:
+        """Root mean square over the objects."""
+        return rms_m(self.objects_m - self.true_objects_m)
+
+    @property
+    def end_error_m(self) -> float:
+        """Distance of the agent's estimate from where it is."""
+        return float(np.hypot(*(self.path_m[-1] - self.true_path_m[-1])))
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """A reverse replay: `shifts_m` (n,) of the place fields in its order, and changes of synapses.
+
+    `nearer_m` (m,) is by how much the fields of each pair of place cells come nearer. `close` marks
+    the pairs near enough, before and after, for exp(-k d) to be about linear: less than 1/k apart.
+    """
+
+    passes: int
+    decay_per_m: float
+    shifts_m: Floats
+    nearer_m: Floats
+    strength_changes: Floats
+    close: npt.NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, replay: Replay) -> Replayed:
+        """From the event on the bus."""
+        before_m = np.asarray(replay.positions_m.numpy(), float)
+        shifts_m = np.asarray(replay.shifts_m.numpy(), float)
+        pairs = np.asarray(replay.pairs.numpy(), np.int64)
+        apart_before_m = _distances_m(before_m, pairs)
+        apart_after_m = _distances_m(before_m + shifts_m, pairs)
+        farthest_m = np.maximum(apart_before_m, apart_after_m)
+
+        return cls(
+            passes=replay.replays,
+            decay_per_m=replay.decay_per_m,
+            shifts_m=np.hypot(*shifts_m.T),
+            nearer_m=apart_before_m - apart_after_m,
+            strength_changes=np.asarray(replay.strength_changes.numpy(), float),
+            close=farthest_m * replay.decay_per_m < 1,
+        )
+
+
+@dataclass(frozen=True)
+class Loop:
+    """The map before the first correction was applied, right after it, and in the end.
+
+    `fused_path_m` and `wheels_path_m` (n, 2) are the path in the end as self-motion alone and as
+    the wheels alone would have it. They are the same where self-motion is the wheels'.
+    """
+
+    before: Map
+    after: Map
+    end: Map
+    fused_path_m: Floats
+    wheels_path_m: Floats
+    replays: list[Replayed]
+
+
+class Observer:
+    """Follows the graph, the truth, the odometry and the replays of one drive."""
+
+    def __init__(self, landmarks: dict[str, tuple[float, float]], cell_m: float) -> None:
+        self._landmarks = landmarks
+        self._graph = Graph(cell_m)
+        self._true: dict[int, tuple[float, float]] = {}
+        self._wheels = DeadReckoning()
+        self._replays: list[Replayed] = []
+        self._before: Map | None = None
+        self._after: Map | None = None
+
+    def module(self) -> Module:
+        """The module `observer`."""
+        return (
+            Module("observer")
+            .on(topics.DELTA, self._on_delta)
+            .on(topics.TRUE_POSE, self._on_pose)
+            .on(topics.ODOMETRY, self._wheels.on_odometry)
+            .on(topics.REPLAY, self._on_replay)
+        )
+
+    def loop(self) -> Loop:
+        """What was observed. Raises CogmapError where no loop was closed."""
+        if self._before is None or self._after is None:
+            raise CogmapError("no loop was closed on the path")
+
+        rows = reading.path_rows(self._graph)
+        fused_path_m = rows[:, reading.ODOMETRY][:, :2]
+        wheels_path_m = fused_path_m
+        if self._wheels:
+            wheels_path_m = self._wheels.poses(rows[:, reading.STAMP])[:, :2]
+
+        return Loop(
+            before=self._before,
+            after=self._after,
+            end=self._map(),
+            fused_path_m=fused_path_m,
+            wheels_path_m=wheels_path_m,
+            replays=self._replays,
+        )
+
+    def _on_delta(self, delta: Delta) -> None:
+        corrects = delta.phase == SHIFT and self._before is None
+        if corrects:
+            self._before = self._map()
+
+        if not self._graph.apply(delta):
+            raise CogmapError(f"delta {delta.version} is not the next one")
+
+        if corrects:
+            self._after = self._map()
+
+    def _on_pose(self, true: TruePose) -> None:
+        self._true[true.stamp_ns] = (true.pose.x_m, true.pose.y_m)
+
+    def _on_replay(self, replay: Replay) -> None:
+        self._replays.append(Replayed.of(replay))
+
+    def _map(self) -> Map:
+        """The map as it is now."""
+        rows = reading.path_rows(self._graph)
+        labels = sorted(self._landmarks)
+        objects_m = reading.object_positions_m(self._graph, labels)
+        true_objects_m = np.array([self._landmarks[label] for label in labels])
+        is_known = ~np.isnan(objects_m[:, 0])
+
+        return Map(
+            path_m=rows[:, reading.POSE][:, :2],
+            true_path_m=self._true_path_m(rows[:, reading.STAMP]),
+            objects_m=objects_m[is_known],
+            true_objects_m=true_objects_m[is_known],
+            road_m=reading.road_m(self._graph),
+        )
+
+    def _true_path_m(self, stamps_s: Floats) -> Floats:
+        """(n, 2): where the agent truly was at the stamp known nearest to each."""
+        stamps_ns = np.rint(stamps_s * 1e9).astype(np.int64)
+        known_ns = np.array(list(self._true))
+        positions_m = np.array(list(self._true.values()))
+        nearest = np.abs(known_ns - stamps_ns[:, None]).argmin(axis=1)
+        return np.asarray(positions_m[nearest].reshape(-1, 2), np.float64)
+
+
+def rms_m(offsets_m: Floats) -> float:
+    """Root mean square length of (n, 2) offsets, 0 of none."""
+    if not len(offsets_m):
+        return 0.0
+
+    return float(np.sqrt(np.square(offsets_m).sum(axis=1).mean()))
+
+
+def _distances_m(positions_m: Floats, pairs: npt.NDArray[np.int64]) -> Floats:
+    offsets_m = positions_m[pairs[:, 0]] - positions_m[pairs[:, 1]]
+    return np.asarray(np.hypot(*offsets_m.T))
