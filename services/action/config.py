@@ -99,13 +99,13 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             description="Distance that the robot may travel within the age of its pose, in m, "
             "above 0 to 10000: the older the pose, the lower the speed."
         ),
-    ] = 1.25
+    ] = 1.0
     max_pose_age_s: Annotated[
         PositiveSeconds,
         msgspec.Meta(
             description="Age of the pose at which the robot stops, in s, above 0 to 3600."
         ),
-    ] = 1.5
+    ] = 2.0
     stuck_after_s: Annotated[
         PositiveSeconds,
         msgspec.Meta(

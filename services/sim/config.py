@@ -76,7 +76,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             description="Age of a motor command's stamp beyond which it moves no wheel, "
             "in s of simulated time, above 0 to 3600."
         ),
-    ] = 2.0
+    ] = 2.5
     repeat_after_s: Annotated[
         PositiveSeconds,
         msgspec.Meta(

@@ -201,7 +201,7 @@ def test_the_robot_slows_down_before_an_obstacle_and_stops_at_its_clearance() ->
 
 def test_the_older_its_pose_the_slower_the_robot_until_it_stops() -> None:
     config = Config()
-    commands = [_command(_at(5.0), age_s=age_s) for age_s in (0.0, 0.3, 0.5, 1.0, 1.6)]
+    commands = [_command(_at(5.0), age_s=age_s) for age_s in (0.0, 0.2, 0.5, 1.0, 2.1)]
     speeds = [_driven(command) for command in commands]
     assert speeds[:2] == [config.cruise_m_s] * 2
     assert speeds[2:] == pytest.approx([config.blind_m / 0.5, config.blind_m, 0.0])
@@ -438,7 +438,7 @@ def test_a_moving_robot_that_gets_no_new_pose_is_halted_once() -> None:
     module = _module()
     module.feed(_broadcast())
     module.feed(_delta(1))
-    halts = [_commands(module.feed(_clock(0.2 + age_s))) for age_s in (1.0, 1.6, 1.7)]
+    halts = [_commands(module.feed(_clock(0.2 + age_s))) for age_s in (1.0, 2.1, 2.2)]
     assert [len(commands) for commands in halts] == [0, 1, 0]
     assert halts[1][0].halted_by is SpeedLimit.POSE_AGE
 

@@ -1,0 +1,137 @@
+"""A robot on a slow machine: its poses are old, on the in-memory bus."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+import pytest
+
+from cogmap.runtime.in_process import InProcessRunner
+from cogmap.runtime.module import Module
+from schemas import topics
+from schemas.base import Message
+from schemas.cognition import Broadcast, Coalition
+from schemas.graph import Delta, Node
+from schemas.process import Clock
+from schemas.sensing import MotorCommand, SpeedLimit
+from services.action.module import Config, build
+
+TICK_S = 0.05
+CYCLE_TICKS = 8
+ROUTE = [(25.0, math.pi / 2), (25.0, 0.0)]
+STREET_HALF_WIDTH_M = 4.0
+
+
+class SlowMachine:
+    """A robot whose pose at a frame reaches action `age_s` later, every CYCLE_TICKS.
+
+    The wheels obey the newest command without delay; there is no noise.
+    """
+
+    def __init__(self, age_s: float) -> None:
+        self.module = Module("body", emits={topics.CLOCK, topics.DELTA, topics.BROADCAST})
+        self.module.on(topics.MOTOR_COMMAND, self.on_command)
+        self.commands: list[MotorCommand] = []
+        self.farthest_m = 0.0
+        self._delay_ticks = round(age_s / TICK_S)
+        self._ticks = 0
+        self._pose = (0.0, 0.0, 0.0)
+        self._wheels_m_s = (0.0, 0.0)
+        self._pending: deque[tuple[int, Delta]] = deque()
+
+    def on_command(self, command: MotorCommand) -> None:
+        """Obey the newest command."""
+        radius_m = Config().wheel_radius_m
+        self.commands.append(command)
+        self._wheels_m_s = (
+            command.left_wheel_rad_s * radius_m,
+            command.right_wheel_rad_s * radius_m,
+        )
+
+    def broadcast(self) -> Message:
+        """Content that selects following the route."""
+        node = Node(id="self", kind="self", activation=1.0)
+        coalition = Coalition(codelet="whereabouts", activation=0.9, content=[node])
+        return Broadcast(cycle=1, trigger="t", coalition=coalition)
+
+    def tick(self) -> list[Message]:
+        """Move for a tick: the clock, and the pose that has been computed by now."""
+        self._move()
+        self._ticks += 1
+        if self._ticks % CYCLE_TICKS == 0:
+            due = self._ticks + self._delay_ticks
+            self._pending.append((due, self._delta()))
+
+        messages: list[Message] = [Clock(stamp_ns=self._now_ns(), rate=1.0)]
+        while self._pending and self._pending[0][0] <= self._ticks:
+            messages.append(self._pending.popleft()[1])
+        return messages
+
+    def _move(self) -> None:
+        x_m, y_m, heading_rad = self._pose
+        left, right = self._wheels_m_s
+        step_m = (left + right) / 2 * TICK_S
+        turn_rad = (right - left) / Config().track_m * TICK_S
+        middle_rad = heading_rad + turn_rad / 2
+        x_m += step_m * math.cos(middle_rad)
+        y_m += step_m * math.sin(middle_rad)
+        self._pose = (x_m, y_m, heading_rad + turn_rad)
+        self.farthest_m = max(self.farthest_m, _off_street_m(x_m, y_m))
+
+    def _delta(self) -> Delta:
+        x_m, y_m, heading_rad = self._pose
+        place = {"x_m": x_m, "y_m": y_m, "heading_rad": heading_rad}
+        cycle = self._ticks // CYCLE_TICKS
+        return Delta(
+            stamp_ns=self._now_ns(),
+            version=cycle,
+            cycle=cycle,
+            phase="localization",
+            tasks=[],
+            operations=[Node(id="self", kind="self", attributes=place)],
+        )
+
+    def _now_ns(self) -> int:
+        return round(self._ticks * TICK_S * 1e9)
+
+
+def _off_street_m(x_m: float, y_m: float) -> float:
+    """The distance from the nearer of the two legs of ROUTE, the overrun included."""
+    along_x_m = min(max(x_m, 0.0), 25.0)
+    along_y_m = min(max(y_m, 0.0), 35.0)
+    return min(math.hypot(x_m - along_x_m, y_m), math.hypot(x_m - 25.0, y_m - along_y_m))
+
+
+def _drive(age_s: float, seconds: float, config: Config) -> SlowMachine:
+    machine = SlowMachine(age_s)
+    with InProcessRunner([machine.module, build(config, "action")]) as runner:
+        body = runner.shells[0]
+        body.publish(machine.module.stamp(machine.broadcast()))
+        for _ in range(round(seconds / TICK_S)):
+            body.publish(machine.module.stamp(machine.tick()))
+            runner.run()
+    return machine
+
+
+def test_with_poses_over_a_second_old_the_robot_keeps_to_its_street() -> None:
+    machine = _drive(1.2, 60.0, Config(route=ROUTE))
+    assert machine.farthest_m < STREET_HALF_WIDTH_M / 2
+    assert SpeedLimit.POSE_AGE in {command.slowed_by for command in machine.commands}
+    assert max(command.pose_age_ns for command in machine.commands) == pytest.approx(1.2e9)
+
+
+def test_at_full_speed_it_would_leave_the_street() -> None:
+    reckless = Config(route=ROUTE, blind_m=1000.0)
+    assert _drive(1.2, 20.0, reckless).farthest_m > STREET_HALF_WIDTH_M
+
+
+def test_with_fresh_poses_it_reaches_the_corner_at_full_speed() -> None:
+    machine = _drive(0.1, 12.0, Config(route=ROUTE))
+    assert machine.farthest_m < STREET_HALF_WIDTH_M / 2
+    assert SpeedLimit.POSE_AGE not in {command.slowed_by for command in machine.commands}
+
+
+def test_poses_older_than_the_limit_move_no_wheel() -> None:
+    machine = _drive(2.2, 10.0, Config(route=ROUTE))
+    assert {command.halted_by for command in machine.commands} == {SpeedLimit.POSE_AGE}
