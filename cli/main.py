@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from cogmap.runtime.command import run_command
+from cogmap.version import VERSION
 
 Loader = Callable[[], click.Command]
 
@@ -123,7 +124,7 @@ class LazyCommand(click.Command):
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(package_name="cogmap", message="cogmap %(version)s")
+@click.version_option(VERSION, message="cogmap %(version)s")
 @click.option("--verbose", is_flag=True, help="Log more.")
 def cogmap(verbose: bool) -> None:
     """LIDA's cognitive cycle with spatial memory, every module a process on a message bus."""

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from importlib import metadata
 
 import click
 import pytest
 from click.testing import CliRunner
 
 from cli.main import COMMANDS, cogmap
+from cogmap.recording.storage.format import SOFTWARE
 
 HEAVY = {"matplotlib", "cv2", "pybullet", "scipy"}
 
 
-def test_version_is_that_of_the_installed_package() -> None:
+def test_version_is_the_one_that_logs_name_too() -> None:
     result = CliRunner().invoke(cogmap, ["--version"])
 
-    assert result.output == f"cogmap {metadata.version('cogmap')}\n"
+    assert result.output == f"{SOFTWARE}\n"
 
 
 def test_help_lists_every_command_and_imports_none_of_them() -> None:
