@@ -14,14 +14,14 @@ from rich.table import Table
 from cogmap.recording.diff import Diff, TopicDiff
 from cogmap.recording.info import Info, TopicInfo
 from cogmap.recording.recorder import Summary
+from cogmap.recording.replaying.outcome import Outcome, Report
 from cogmap.recording.replaying.player import Played
-from cogmap.recording.replaying.replay import Outcome, Report
 from cogmap.recording.storage.recover import Recovery
 
 _PIPED_WIDTH = 160
 _INFO_COLUMNS = ["topic:", "type:", "delivery:", "count", "Hz", "mean size", "lost", "sources:"]
 _DIFF_COLUMNS = ["topic:", "left", "right", "same", "different", "left only", "right only"]
-_REPLAY_COLUMNS = ["instance:", "life", "inputs", "same", "different", "unsaid", "s"]
+_REPLAY_COLUMNS = ["instance:", "life", "inputs", "same", "different", "missing", "s"]
 
 
 def print_json(value: Any) -> None:
@@ -180,6 +180,6 @@ def _replay_row(outcome: Outcome) -> list[str]:
         str(outcome.fed),
         str(outcome.same),
         str(outcome.different),
-        str(outcome.unsaid),
+        str(outcome.missing_outputs),
         f"{outcome.busy_s:.2f}",
     ]

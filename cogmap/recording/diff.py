@@ -116,11 +116,11 @@ class _Comparison:
 
         found.different += 1
         if not found.first:
-            sentence = compare.in_words(record.topic, payload, counterpart, self._sides)
+            sentence = compare.describe(record.topic, payload, counterpart, self._sides)
             self._note(record, sentence)
 
     def _in_one_only(self, reader: LogReader, record: Record, side: int) -> str:
-        name = compare.which(record.topic, reader.stub(record))
+        name = compare.title(record.topic, reader.stub(record))
         here = self._sides[side]
         there = self._sides[1 - side]
         return f"{name} is in {here} and not in {there}"

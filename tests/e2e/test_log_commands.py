@@ -134,7 +134,7 @@ def test_recover_prints_what_it_saved_and_what_is_lost(
         (["replay", "LOG", "--into", "cerebellum"], "no module 'cerebellum'"),
         (
             ["replay", "LOG", "--into", "action"],
-            "nothing that module action said: there are sensory, sim",
+            "nothing that module action published: there are sensory, sim",
         ),
         (["record", "-x", "."], "no topic is left"),
         (["record", "-e", "("], "not a regular expression"),

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from cogmap.recording.replaying.replay import Outcome, replay_into
+from cogmap.recording.replaying.outcome import Outcome
+from cogmap.recording.replaying.replay import replay_into
 from cogmap.recording.storage.reader import LogReader
 from schemas import topics
 from schemas.sensing import MotorCommand
@@ -50,7 +51,7 @@ def test_a_module_says_the_bytes_of_the_reference(module: str) -> None:
         _needs_the_same_arithmetic()
     outcome = _replayed(REFERENCE, module)
     assert outcome.same >= FRAMES - 1
-    assert (outcome.missing, outcome.unrecorded, outcome.notes) == ({}, 0, [])
+    assert (outcome.missing_inputs, outcome.extra_outputs, outcome.notes) == ({}, 0, [])
 
 
 @pytest.mark.parametrize("module", registry.MODULES)

@@ -12,7 +12,8 @@ from cogmap.bus.memory import MemoryBus, MemoryNetwork
 from cogmap.errors import LogError
 from cogmap.graph.graph import Graph
 from cogmap.recording.recorder import Recorder
-from cogmap.recording.replaying.replay import Report, replay_into
+from cogmap.recording.replaying.outcome import Report
+from cogmap.recording.replaying.replay import replay_into
 from cogmap.recording.selection import to_record
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell

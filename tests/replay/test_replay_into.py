@@ -16,7 +16,8 @@ from cogmap.bus.interface import Member
 from cogmap.bus.memory import MemoryBus, MemoryNetwork
 from cogmap.errors import LogError
 from cogmap.recording.recorder import Recorder
-from cogmap.recording.replaying.replay import Build, Report, replay_into
+from cogmap.recording.replaying.outcome import Report
+from cogmap.recording.replaying.replay import Build, replay_into
 from cogmap.recording.selection import to_record
 from cogmap.recording.storage.reader import LogReader
 from cogmap.recording.storage.writer import LogWriter
@@ -277,7 +278,7 @@ def test_what_is_no_longer_said_is_named(path: Path) -> None:
     report = replay(path, _silent)
     assert not report.same
     assert "sensory/scan number 0 of mixer" in report.first
-    assert report.first.endswith("is in the log and not said in the replay")
+    assert report.first.endswith("is in the log and not published in the replay")
 
 
 def _refusing(name: str, sections: Sections, instance: str) -> Module:
@@ -290,7 +291,7 @@ def test_an_input_that_is_refused_now_is_named(path: Path) -> None:
     record(path)
     assert (
         replay(path, _refusing).first
-        == "clock: mixer refuses what it took in: ZeroDivisionError: division by zero"
+        == "clock: mixer refuses what it received: ZeroDivisionError: division by zero"
     )
 
 
@@ -304,7 +305,7 @@ def test_inputs_that_the_log_lacks_are_counted_by_topic(path: Path, tmp_path: Pa
             writer.write(r.topic, reader.payload(r), r.envelope, r.log_time_ns)
     writer.close()
     report = replay(thinner)
-    assert report.outcomes[0].missing == {"clock": 30}
+    assert report.outcomes[0].missing_inputs == {"clock": 30}
     assert report.outcomes[0].notes == ["inputs that the log lacks: 30 of clock"]
     assert not report.same
 
@@ -335,5 +336,5 @@ def test_without_envelopes_inputs_are_fed_in_the_order_of_log_time_channel_and_s
 
 def test_a_module_that_said_nothing_is_named_with_those_that_did(path: Path) -> None:
     record(path)
-    with pytest.raises(LogError, match="nothing that module epam said: there are mixer, sim"):
+    with pytest.raises(LogError, match="nothing that module epam published: there are mixer, sim"):
         replay_into(path, ["epam"], build)

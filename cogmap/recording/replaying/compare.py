@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import msgspec
@@ -13,14 +14,12 @@ from schemas.array import Array
 from schemas.base import Message
 from schemas.topics import Topic
 
-_SHOWN = 60
+_MAX_SHOWN = 60
 Sides = tuple[str, str]
 
 
 class Difference(msgspec.Struct, frozen=True):
-    """Where two messages first differ, and what each has there; `more` says how far the difference
-    goes.
-    """
+    """Where two messages first differ, and what each has there; `more` is the extent, if known."""
 
     path: str
     left: str
@@ -28,48 +27,44 @@ class Difference(msgspec.Struct, frozen=True):
     more: str = ""
 
     def in_words(self, sides: Sides) -> str:
-        """A clause, each side called by its name."""
-        return f"{self.path} is {self.left} in {sides[0]}, {self.right} in {sides[1]}{self.more}"
+        """A clause, with the names of the two sides."""
+        left_side, right_side = sides
+        return f"{self.path} is {self.left} in {left_side}, {self.right} in {right_side}{self.more}"
 
 
 def difference(left: Any, right: Any, path: str = "") -> Difference | None:
-    """Where two messages, or two parts at `path`, first differ; None where they say the same in the
-    same bytes.
-    """
+    """Where two messages, or two parts at `path`, first differ; None where they hold the same."""
     if type(left) is not type(right):
         return Difference(path or "its kind", _short(left), _short(right))
-    if isinstance(left, Array):
-        return _in_array(left, right, path)
-    if isinstance(left, msgspec.Struct):
-        return _in_fields(left, right, path)
-    if isinstance(left, list | tuple):
-        return _in_list(left, right, path)
-    if isinstance(left, dict):
-        return _in_dict(left, right, path)
-    return None if repr(left) == repr(right) else Difference(path, _short(left), _short(right))
+    for kind, compare in _COMPARISONS:
+        if isinstance(left, kind):
+            return compare(left, right, path)
+
+    if repr(left) == repr(right):
+        return None
+    return Difference(path, _short(left), _short(right))
 
 
-def in_words(topic: Topic, left: bytes, right: bytes, sides: Sides) -> str:
-    """A sentence on two messages of `topic` whose bytes differ: which they are, and where they
-    first differ.
-    """
+def describe(topic: Topic, left: bytes, right: bytes, sides: Sides) -> str:
+    """A sentence on two messages of `topic` whose bytes differ: which, and where first."""
     try:
         first = decode(topic, left)
         second = decode(topic, right)
     except MessageError as error:
         return f"{topic.name}: one of the two is no message: {error}"
+
     found = difference(first, second)
-    clause = (
-        found.in_words(sides)
-        if found
-        else f"the same values in other bytes, from byte {_first_byte(left, right)}"
-    )
-    return f"{which(topic, first)}: {clause}"
+    if found is not None:
+        clause = found.in_words(sides)
+    else:
+        clause = f"the same values in other bytes, from byte {_first_byte(left, right)}"
+    return f"{title(topic, first)}: {clause}"
 
 
-def which(topic: Topic, message: Message) -> str:
-    """How a message is called: its topic, number, source and stamp."""
-    return f"{topic.name} number {message.seq} of {message.source} (stamp {message.stamp_ns / 1e9:.3f} s)"
+def title(topic: Topic, message: Message) -> str:
+    """A message's topic, number, source and stamp."""
+    stamp_s = message.stamp_ns / 1e9
+    return f"{topic.name} number {message.seq} of {message.source} (stamp {stamp_s:.3f} s)"
 
 
 def _in_fields(left: msgspec.Struct, right: msgspec.Struct, path: str) -> Difference | None:
@@ -80,11 +75,12 @@ def _in_fields(left: msgspec.Struct, right: msgspec.Struct, path: str) -> Differ
     return None
 
 
-def _in_list(left: Any, right: Any, path: str) -> Difference | None:
+def _in_list(left: Sequence[Any], right: Sequence[Any], path: str) -> Difference | None:
     for index, (one, other) in enumerate(zip(left, right, strict=False)):
         found = difference(one, other, _step(path, index))
         if found is not None:
             return found
+
     if len(left) == len(right):
         return None
     return Difference(f"the length of {path}", str(len(left)), str(len(right)))
@@ -92,28 +88,42 @@ def _in_list(left: Any, right: Any, path: str) -> Difference | None:
 
 def _in_dict(left: dict[Any, Any], right: dict[Any, Any], path: str) -> Difference | None:
     for name, value in left.items():
+        step = _step(path, name)
         if name not in right:
-            return Difference(_step(path, name), _short(value), "absent")
-        found = difference(value, right[name], _step(path, name))
+            return Difference(step, _short(value), "absent")
+        found = difference(value, right[name], step)
         if found is not None:
             return found
-    added = next((name for name in right if name not in left), None)
-    return None if added is None else Difference(_step(path, added), "absent", _short(right[added]))
+
+    for name, value in right.items():
+        if name not in left:
+            return Difference(_step(path, name), "absent", _short(value))
+    return None
 
 
 def _in_array(left: Array, right: Array, path: str) -> Difference | None:
     if (left.dtype, left.shape) != (right.dtype, right.shape):
-        return Difference(
-            f"the kind of {path}", f"{left.dtype} {left.shape}", f"{right.dtype} {right.shape}"
-        )
-    raw = [np.frombuffer(array.data, f"V{int(array.dtype[2])}") for array in (left, right)]
-    differing = np.flatnonzero(raw[0] != raw[1])
-    if differing.size == 0:
+        left_kind = f"{left.dtype} {left.shape}"
+        right_kind = f"{right.dtype} {right.shape}"
+        return Difference(f"the kind of {path}", left_kind, right_kind)
+
+    differs = _raw(left) != _raw(right)
+    if not differs.any():
         return None
-    index = tuple(int(i) for i in np.unravel_index(differing[0], left.shape))
-    more = f" ({differing.size} of {raw[0].size} values differ)"
-    one, other = (_short(array.numpy()[index].item()) for array in (left, right))
-    return Difference(".".join([path, *map(str, index)]), one, other, more)
+
+    first = int(differs.argmax())
+    index = tuple(int(i) for i in np.unravel_index(first, left.shape))
+    where = ".".join([path, *map(str, index)])
+    more = f" ({differs.sum()} of {differs.size} values differ)"
+    return Difference(
+        where, _short(left.numpy()[index].item()), _short(right.numpy()[index].item()), more
+    )
+
+
+def _raw(array: Array) -> np.ndarray[Any, Any]:
+    """The values as bytes, so that NaN equals NaN and -0.0 differs from 0.0."""
+    size = int(array.dtype[2])
+    return np.frombuffer(array.data, f"V{size}")
 
 
 def _step(path: str, name: object) -> str:
@@ -121,16 +131,25 @@ def _step(path: str, name: object) -> str:
 
 
 def _short(value: Any) -> str:
-    text = (
-        type(value).__name__
-        if isinstance(value, msgspec.Struct | Array | list | tuple | dict)
-        else repr(value)
-    )
-    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
+    text = type(value).__name__ if isinstance(value, _COMPOUND) else repr(value)
+    if len(text) <= _MAX_SHOWN:
+        return text
+    return f"{text[:_MAX_SHOWN]}..."
 
 
 def _first_byte(left: bytes, right: bytes) -> int:
-    return next(
-        (n for n, (one, other) in enumerate(zip(left, right, strict=False)) if one != other),
-        len(left),
-    )
+    """The index of the first byte that differs; the shorter length where there is none."""
+    for index, (one, other) in enumerate(zip(left, right, strict=False)):
+        if one != other:
+            return index
+    return min(len(left), len(right))
+
+
+_COMPARISONS: tuple[tuple[type, Callable[[Any, Any, str], Difference | None]], ...] = (
+    (Array, _in_array),
+    (msgspec.Struct, _in_fields),
+    (list, _in_list),
+    (tuple, _in_list),
+    (dict, _in_dict),
+)
+_COMPOUND = tuple(kind for kind, _ in _COMPARISONS)

@@ -10,7 +10,7 @@ import pytest
 
 from cogmap.bus.codec import encode
 from cogmap.recording.diff import Diff, diff
-from cogmap.recording.replaying.compare import difference, in_words
+from cogmap.recording.replaying.compare import describe, difference
 from schemas import topics
 from schemas.array import Array
 from schemas.base import Message
@@ -143,5 +143,5 @@ def test_the_same_values_in_other_bytes_are_told_by_the_first_byte() -> None:
     left = encode(row)
     right = left.replace(b"\xcb\x40\x00\x00\x00\x00\x00\x00\x00", b"\x02")
     assert left != right
-    words = in_words(topics.ODOMETRY, left, right, ("A", "B"))
+    words = describe(topics.ODOMETRY, left, right, ("A", "B"))
     assert "the same values in other bytes, from byte" in words

@@ -1,0 +1,156 @@
+"""Plans a replay from the causes in envelopes: the exact order of what each instance received."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+
+from cogmap.bus.codec import Cause, Envelope
+from cogmap.errors import LogError
+from cogmap.recording.replaying.plan import (
+    Job,
+    Kind,
+    Step,
+    inexact_jobs,
+    modules_of,
+    of_model,
+    without_envelope,
+)
+from cogmap.recording.storage.reader import LogReader, Progress, Record
+from cogmap.runtime.shell import START, TIMER
+from schemas.topics import SNAPSHOT
+
+
+def jobs(reader: LogReader, modules: Sequence[str], progress: Progress | None = None) -> list[Job]:
+    """The jobs that replay `modules`, in the order of the log.
+
+    Raises LogError where one of them published nothing in it.
+    """
+    records = list(reader.records(progress=progress))
+    has_envelopes = all(record.envelope is not None for record in records)
+    if not has_envelopes:
+        return inexact_jobs(reader, records, modules)
+
+    planner = _Planner(records)
+    found = []
+    for source, module in modules_of(reader, planner.sources, modules).items():
+        found += planner.jobs(source, module)
+    return found
+
+
+class _Planner:
+    """Plans from all `records` of a log, every one with its envelope."""
+
+    def __init__(self, records: list[Record]) -> None:
+        self._by_cause: dict[Cause, list[Record]] = defaultdict(list)
+        self._published: dict[str, dict[int, list[Record]]] = defaultdict(lambda: defaultdict(list))
+        for record in records:
+            envelope = _envelope(record)
+            cause = (record.topic.name, envelope.source, envelope.seq)
+            self._by_cause[cause].append(record)
+            self._published[envelope.source][envelope.incarnation].append(record)
+
+    @property
+    def sources(self) -> list[str]:
+        """Every instance that published something."""
+        return sorted(self._published)
+
+    def jobs(self, source: str, module: str) -> list[Job]:
+        """A job for each incarnation of an instance in which something happened."""
+        found: list[Job] = []
+        earlier: list[Record] = []
+        for number, incarnation in enumerate(sorted(self._published[source])):
+            published = sorted(self._published[source][incarnation], key=_sent_ns)
+            job = Job(module, source, number, earlier=list(earlier))
+            self._fill(job, published)
+            if job.steps or job.expected:
+                found.append(job)
+            earlier += [without_envelope(record) for record in published]
+        return found
+
+    def _fill(self, job: Job, published: list[Record]) -> None:
+        """Add what led to the messages that the job's incarnation published, and these."""
+        inputs = _Inputs(self._by_cause, _envelope(published[0]).incarnation)
+        numbered = []
+        for record in published:
+            envelope = _envelope(record)
+            numbered.append((envelope.seq, without_envelope(record)))
+            for cause in envelope.causes:
+                step = _step(cause, inputs, envelope.sent_ns)
+                if step is None:
+                    job.missing[cause[0]] += 1
+                else:
+                    job.steps.append(step)
+        job.expected = of_model(numbered)
+
+
+def _step(cause: Cause, inputs: _Inputs, before_ns: int) -> Step | None:
+    """What `cause` names, before the message that names it; None where the log lacks it."""
+    name, _, number = cause
+    if name == START:
+        return Step(Kind.START)
+    if name == TIMER:
+        return Step(Kind.TIMER, at_ns=number)
+    if name == SNAPSHOT.name:
+        return Step(Kind.SNAPSHOT, at_ns=before_ns, version=number)
+
+    record = inputs.find(cause)
+    return None if record is None else Step(Kind.FEED, without_envelope(record))
+
+
+class _Inputs:
+    """Finds the messages that causes name, for one consumer that began at `since_ns`.
+
+    A source that was restarted numbers its messages anew, so a cause may name several: numbers rise
+    within an incarnation, a source's incarnations follow one another, and nothing is received that
+    was sent before the consumer began.
+    """
+
+    def __init__(self, by_cause: dict[Cause, list[Record]], since_ns: int) -> None:
+        self._by_cause = by_cause
+        self._since_ns = since_ns
+        self._incarnation: dict[str, int] = {}
+        self._last: dict[tuple[str, str], int] = {}
+
+    def find(self, cause: Cause) -> Record | None:
+        """The message that `cause` names; None where the log lacks it."""
+        topic, source, seq = cause
+        candidates = self._by_cause.get(cause)
+        if not candidates:
+            return None
+
+        record = candidates[0]
+        if len(candidates) > 1:
+            record = self._choose(candidates, cause)
+        self._enter(source, _envelope(record).incarnation)
+        self._last[topic, source] = seq
+        return record
+
+    def _enter(self, source: str, incarnation: int) -> None:
+        """Forget the numbers of a source's earlier incarnations."""
+        if self._incarnation.get(source) == incarnation:
+            return
+        self._incarnation[source] = incarnation
+        self._last = {key: last for key, last in self._last.items() if key[1] != source}
+
+    def _choose(self, candidates: list[Record], cause: Cause) -> Record:
+        """The candidate of the first incarnation that it can be of; the last one if none can."""
+        topic, source, seq = cause
+        current = self._incarnation.get(source)
+        if current is None:
+            fitting = [r for r in candidates if _sent_ns(r) >= self._since_ns]
+        else:
+            is_past = seq <= self._last.get((topic, source), -1)
+            first = current + 1 if is_past else current
+            fitting = [r for r in candidates if _envelope(r).incarnation >= first]
+        return min(fitting or candidates[-1:], key=lambda record: _envelope(record).incarnation)
+
+
+def _envelope(record: Record) -> Envelope:
+    if record.envelope is None:
+        raise LogError("a message in the log has no envelope")
+    return record.envelope
+
+
+def _sent_ns(record: Record) -> int:
+    return _envelope(record).sent_ns
