@@ -58,7 +58,7 @@ def echo(
     style = "csv" if as_csv else "json" if as_json else "text"
     show = formatter(field, full_length, no_arr, style)
     stop = Stop()
-    with observing(connect, agent, "topic echo") as bus:
+    with observing(connect, agent, "topic-echo") as bus:
         messages = _Messages(topic)
         bus.subscribe(topic, messages.inbox.put, messages.intake.count_lost)
         router = RouterWatch(bus.session, connect)

@@ -81,13 +81,13 @@ class RouterWatch:
 
 @contextmanager
 def observing(connect: str, agent: str, what: str) -> Iterator[ZenohBus]:
-    """A bus on which others see this process as `cli what`. Raises NoRouterError.
+    """A bus on which others see this process as `cli-what`. Raises NoRouterError.
 
     The bus is closed in the end, also where the reader of the output has closed it.
     """
     bus = ZenohBus(connect, agent)
     try:
-        bus.identify(Member(CLI, f"{CLI} {what}"))
+        bus.identify(Member(CLI, f"{CLI}-{what}"))
         yield bus
         sys.stdout.flush()
     except BrokenPipeError:

@@ -43,7 +43,7 @@ def pub(
 
     stop = Stop()
     limit = 1 if once else times
-    with observing(connect, agent, "topic pub") as bus:
+    with observing(connect, agent, "topic-pub") as bus:
         router = RouterWatch(bus.session, connect)
         publisher = Publisher(bus, topic, parsed)
         due_s = time.monotonic()

@@ -38,7 +38,7 @@ def watch(
     """Print the metrics of `topic` every second until asked to stop, and once more then."""
     stop = Stop()
     report = _Report(topic, metrics, as_json)
-    with observing(connect, agent, f"topic {what}") as bus:
+    with observing(connect, agent, f"topic-{what}") as bus:
         receptions = Receptions(bus, topic)
         router = RouterWatch(bus.session, connect)
         due_s = time.monotonic() + REPORT_S

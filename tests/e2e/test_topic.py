@@ -12,62 +12,53 @@ from collections.abc import Iterator
 
 import pytest
 
-from cogmap.bus.session import free_endpoint, open_router
-from cogmap.bus.zenoh_bus import ZenohBus
-from cogmap.runtime.module import Module
-from cogmap.runtime.shell import Shell
-from schemas import topics
+from cogmap import Client, Module, topics
+from schemas.base import Message
 from schemas.examples import samples
 from schemas.sensing import MotorCommand, Odometry
+from tests.support.networks import routed
 
 TIMEOUT_S = 30.0
-SAMPLES = {topics.of(message): message for message in samples()}
+PERIOD_NS = 20_000_000
+EXAMPLES = {topics.of(message): message for message in samples()}
 
 
-class System:
-    """A robot that tells its odometry 50 times a second and keeps the commands it gets."""
+class Robot:
+    """Publishes odometry and self-motion 50 times a second, and keeps the commands it receives."""
 
-    def __init__(self, endpoint: str) -> None:
+    def __init__(self) -> None:
         self.commands: list[MotorCommand] = []
-        self.got_command, self._ended = threading.Event(), threading.Event()
-        self._router = open_router(endpoint)
-        sim = Module("sim").every(20_000_000, self._odometry, emits=[topics.ODOMETRY])
-        sim.every(
-            20_000_000, lambda now_ns: SAMPLES[topics.SELF_MOTION], emits=[topics.SELF_MOTION]
-        )
-        self._shell = Shell(sim.on(topics.MOTOR_COMMAND, self._obey), ZenohBus(endpoint, "agent"))
-        self._shell.open()
-        self._thread = threading.Thread(target=self._work)
-        self._thread.start()
+        self.got_command = threading.Event()
+
+    def module(self) -> Module:
+        """The robot as the module `sim`."""
+        module = Module("sim")
+        module.every(PERIOD_NS, self._odometry, emits=[topics.ODOMETRY])
+        module.every(PERIOD_NS, self._self_motion, emits=[topics.SELF_MOTION])
+        return module.on(topics.MOTOR_COMMAND, self._on_command)
 
     def _odometry(self, now_ns: int) -> Odometry:
         return Odometry(speed_m_s=1.5, turn_rate_rad_s=0.0, dt_s=0.02, stamp_ns=now_ns)
 
-    def _obey(self, command: MotorCommand) -> None:
+    def _self_motion(self, now_ns: int) -> Message:
+        return EXAMPLES[topics.SELF_MOTION]
+
+    def _on_command(self, command: MotorCommand) -> None:
         self.commands.append(command)
         self.got_command.set()
 
-    def _work(self) -> None:
-        while not self._ended.is_set():
-            self._shell.spin_once(0.01)
 
-    def close(self) -> None:
-        self._ended.set()
-        self._thread.join()
-        self._shell.close()
-        self._router.close()
+@pytest.fixture(scope="module")
+def endpoint() -> Iterator[str]:
+    with routed() as address:
+        yield address
 
 
 @pytest.fixture(scope="module")
-def endpoint() -> str:
-    return free_endpoint()
-
-
-@pytest.fixture(scope="module")
-def system(endpoint: str) -> Iterator[System]:
-    system = System(endpoint)
-    yield system
-    system.close()
+def robot(endpoint: str) -> Iterator[Robot]:
+    robot = Robot()
+    with Client(robot.module(), endpoint):
+        yield robot
 
 
 def start(endpoint: str, *arguments: str) -> subprocess.Popen[str]:
@@ -80,7 +71,7 @@ def start(endpoint: str, *arguments: str) -> subprocess.Popen[str]:
     )
 
 
-def said(endpoint: str, *arguments: str, code: int = 0) -> tuple[str, str]:
+def printed(endpoint: str, *arguments: str, code: int = 0) -> tuple[str, str]:
     """What a command prints, to its output and its errors."""
     process = start(endpoint, *arguments)
     output, errors = process.communicate(timeout=TIMEOUT_S)
@@ -88,8 +79,8 @@ def said(endpoint: str, *arguments: str, code: int = 0) -> tuple[str, str]:
     return output, errors
 
 
-def test_list_names_the_topics_in_use(system: System, endpoint: str) -> None:
-    output, _ = said(endpoint, "topic", "list", "-t")
+def test_list_names_the_topics_in_use(robot: Robot, endpoint: str) -> None:
+    output, _ = printed(endpoint, "topic", "list", "-t")
 
     assert output.splitlines() == [
         "odometry [Odometry]",
@@ -99,8 +90,8 @@ def test_list_names_the_topics_in_use(system: System, endpoint: str) -> None:
     ]
 
 
-def test_info_names_the_processes(system: System, endpoint: str) -> None:
-    output, _ = said(endpoint, "topic", "info", "-v", "odometry")
+def test_info_names_the_processes(robot: Robot, endpoint: str) -> None:
+    output, _ = printed(endpoint, "topic", "info", "-v", "odometry")
 
     assert "Type: Odometry" in output
     assert (
@@ -109,8 +100,8 @@ def test_info_names_the_processes(system: System, endpoint: str) -> None:
     assert "Subscription count: 0" in output
 
 
-def test_echo_prints_so_many_messages_and_ends(system: System, endpoint: str) -> None:
-    output, _ = said(endpoint, "topic", "echo", "odometry", "-n", "3", "--json")
+def test_echo_prints_so_many_messages_and_ends(robot: Robot, endpoint: str) -> None:
+    output, _ = printed(endpoint, "topic", "echo", "odometry", "-n", "3", "--json")
 
     messages = [json.loads(line) for line in output.splitlines()]
     assert [message["speed_m_s"] for message in messages] == [1.5] * 3
@@ -122,7 +113,7 @@ def test_echo_prints_so_many_messages_and_ends(system: System, endpoint: str) ->
     [("hz", "average rate: "), ("bw", "/s from "), ("delay", "average delay: ")],
 )
 def test_ctrl_c_ends_with_the_figures(
-    system: System, endpoint: str, command: str, figure: str
+    robot: Robot, endpoint: str, command: str, figure: str
 ) -> None:
     process = start(endpoint, "topic", command, "sensory/motion")
     assert process.stdout is not None
@@ -134,14 +125,14 @@ def test_ctrl_c_ends_with_the_figures(
     assert figure in output
 
 
-def test_pub_is_obeyed(system: System, endpoint: str) -> None:
-    system.got_command.clear()
+def test_pub_is_obeyed(robot: Robot, endpoint: str) -> None:
+    robot.got_command.clear()
     written = '{"left_wheel_rad_s": 1.5, "right_wheel_rad_s": 2}'
 
-    said(endpoint, "topic", "pub", "-t", "2", "-r", "20", "motor/command", written)
+    printed(endpoint, "topic", "pub", "-t", "2", "-r", "20", "motor/command", written)
 
-    assert system.got_command.wait(TIMEOUT_S)
-    assert system.commands[0] == MotorCommand(
+    assert robot.got_command.wait(TIMEOUT_S)
+    assert robot.commands[0] == MotorCommand(
         left_wheel_rad_s=1.5, right_wheel_rad_s=2.0, source="cli"
     )
 
@@ -166,9 +157,9 @@ def test_pub_is_obeyed(system: System, endpoint: str) -> None:
     ],
 )
 def test_what_the_user_can_mend_is_a_sentence_and_exit_code_2(
-    system: System, endpoint: str, arguments: tuple[str, ...], sentence: str
+    robot: Robot, endpoint: str, arguments: tuple[str, ...], sentence: str
 ) -> None:
-    output, errors = said(endpoint, *arguments, code=2)
+    output, errors = printed(endpoint, *arguments, code=2)
 
     assert output == ""
     assert sentence in errors
@@ -176,23 +167,21 @@ def test_what_the_user_can_mend_is_a_sentence_and_exit_code_2(
 
 
 def test_no_router_is_a_sentence_and_exit_code_2() -> None:
-    _, errors = said("tcp/127.0.0.1:1", "topic", "list", code=2)
+    _, errors = printed("tcp/127.0.0.1:1", "topic", "list", code=2)
 
     assert errors.startswith("cogmap: no router at tcp/127.0.0.1:1 within 5 s: start one")
     assert errors.count("\n") == 1
 
 
-def test_graph_shows_the_process_and_its_topics(system: System, endpoint: str) -> None:
-    (sim,) = json.loads(said(endpoint, "graph", "--json")[0])
+def test_graph_shows_the_process_and_its_topics(robot: Robot, endpoint: str) -> None:
+    (sim,) = json.loads(printed(endpoint, "graph", "--json")[0])
 
     assert (sim["process"], sim["subscribes"]) == ("sim", ["motor/command"])
     assert sim["publishes"] == ["odometry", "sensory/motion", "health"]
 
 
-def test_doctor_names_what_is_missing_and_what_is_off_its_rate(
-    system: System, endpoint: str
-) -> None:
-    found = json.loads(said(endpoint, "doctor", "--json", code=1)[0])
+def test_doctor_names_what_is_missing_and_what_is_off_its_rate(robot: Robot, endpoint: str) -> None:
+    found = json.loads(printed(endpoint, "doctor", "--json", code=1)[0])
 
     about = {finding["about"] for finding in found}
     assert {"sensory", "epam", "workspace", "codelets", "global_workspace", "action"} <= about

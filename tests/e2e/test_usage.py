@@ -83,6 +83,8 @@ def endpoint() -> Iterator[str]:
         ),
         (["router", "--connect", "tcp/127.0.0.1:99999"], "99999", "a port of at most 65535"),
         (["run", "--out", "/dev/null/x", "--connect", FREE], "/dev/null/x", "another with --out"),
+        (["topic", "list", "--agent", "a/b"], "'a/b'", "use letters, digits"),
+        (["module", "sim", "--agent", "a/b"], "'a/b'", "use letters, digits"),
         (["topic", "echo", "clok"], "'clok'", "did you mean 'clock'?"),
         (
             ["log", "info", "nowhere.mcap"],
@@ -92,7 +94,7 @@ def endpoint() -> Iterator[str]:
         (
             ["log", "record", "-o", "/dev/null/x.mcap", "--connect", "ROUTER"],
             "/dev/null/x.mcap",
-            "-o",
+            "in a folder that can be written to",
         ),
         (["router", "--connect", "ROUTER"], "ROUTER", "choose another port with --connect"),
     ],
@@ -106,7 +108,7 @@ def test_what_is_wrong_is_named_with_the_remedy(
     assert remedy in said
 
 
-def test_a_router_that_does_not_answer_within_five_seconds_is_named_by_whoever_looks_for_it(
+def test_whoever_finds_no_router_within_five_seconds_names_it(
     tmp_path: Path,
 ) -> None:
     commands = (
@@ -139,7 +141,7 @@ def test_a_router_that_ends_is_named_by_whoever_watches_a_topic() -> None:
     commands = ("echo", "hz")
     with routed() as endpoint:
         watching = [start("topic", name, "clock", "--connect", endpoint) for name in commands]
-        wait_for_processes(endpoint, {f"cli topic {name}" for name in commands})
+        wait_for_processes(endpoint, {f"cli-topic-{name}" for name in commands})
 
     for process in watching:
         _, errors = process.communicate(timeout=TIMEOUT_S)

@@ -73,7 +73,7 @@ def test_an_array_whose_data_do_not_fit_its_shape_is_refused() -> None:
         parse(topics.SELF_MOTION, f'{{"frame": 0, "since_ns": 0, "motions": {array}}}')
 
 
-def test_a_topic_is_found_with_or_without_a_slash_and_a_wrong_one_names_the_nearest() -> None:
+def test_a_topic_may_begin_with_a_slash_and_a_wrong_one_names_the_nearest() -> None:
     assert topic_named("/odometry") is topic_named("odometry") is topics.ODOMETRY
     with pytest.raises(UsageError, match=r"no topic 'odometri': did you mean 'odometry'\?"):
         topic_named("odometri")
