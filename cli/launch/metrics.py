@@ -52,15 +52,13 @@ class Recording(msgspec.Struct, kw_only=True):
 
     @classmethod
     def read(cls, path: Path) -> Recording | None:
-        """From the log at `path`; None where it was not finished."""
+        """From the log at `path`; None where it was not finished, or cannot be read."""
         try:
             about = LogReader(path).about(SUMMARY)
-        except LogError:
-            return None
-        if not about:
+            summary = msgspec.json.decode(about.get("json", ""), type=Summary)
+        except (LogError, msgspec.DecodeError):
             return None
 
-        summary = msgspec.json.decode(about["json"], type=Summary)
         return cls(
             messages=sum(summary.messages.values()),
             size_mb=path.stat().st_size / 1e6,

@@ -72,7 +72,7 @@ def info(path: Path, progress: Progress | None = None) -> Info:
     """What is in the log at `path`. Raises LogError."""
     reader = LogReader(path)
     recording = reader.about(layout.RECORDING)
-    began_ns = int(recording.get("began_ns", "0"))
+    began_ns = _time_ns(recording.get("began_ns", ""))
     sequences = SequenceTracker(since_ns=began_ns or None)
     tallies = _tallies(reader, sequences, progress)
     lost = sequences.lost()
@@ -95,6 +95,11 @@ def info(path: Path, progress: Progress | None = None) -> Info:
         config=recorded_config(reader),
         topics=rows,
     )
+
+
+def _time_ns(text: str) -> int:
+    """A recorded time; 0 where it is none, as metadata have no checksum."""
+    return int(text) if text.isdecimal() else 0
 
 
 def _tallies(

@@ -12,12 +12,15 @@ from mcap.writer import MCAP0_MAGIC
 
 from cogmap.bus.codec import Envelope, encode
 from cogmap.errors import LogError
+from cogmap.recording import open_log
+from cogmap.recording.diff import diff
+from cogmap.recording.info import info
 from cogmap.recording.storage.reader import LogReader
 from cogmap.recording.storage.recover import recover
 from cogmap.recording.storage.resync import LogBytes
 from cogmap.recording.storage.writer import LogWriter
 from schemas import topics
-from schemas.sensing import Odometry
+from tests.support.logs import odometry
 
 CHUNKS = 6
 EACH = 5
@@ -25,15 +28,13 @@ EACH = 5
 
 def _message(seq: int) -> bytes:
     speed_m_s = float(np.random.default_rng(seq).normal())
-    return encode(
-        Odometry(seq=seq, source="sim", speed_m_s=speed_m_s, turn_rate_rad_s=0.0, dt_s=0.05)
-    )
+    return encode(odometry(seq, speed_m_s=speed_m_s))
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("log") / "whole.mcap"
-    writer = LogWriter(path, [topics.ODOMETRY, topics.SCAN], {"agent": "a"})
+    writer = LogWriter(path, [topics.ODOMETRY, topics.SCAN], {"agent": "a", "began_ns": "17"})
     for seq in range(CHUNKS * EACH):
         writer.write(topics.ODOMETRY, _message(seq), Envelope("sim", seq, 1, seq, seq), seq)
         if seq % EACH == EACH - 1:
@@ -96,7 +97,7 @@ def test_a_cut_file_says_how_many_bytes_at_its_end_are_lost(whole: Path, tmp_pat
 
 
 @pytest.mark.parametrize("number", range(CHUNKS))
-def test_a_damaged_chunk_is_passed_over_and_the_messages_in_it_are_counted(
+def test_a_damaged_chunk_is_left_out_and_its_messages_are_counted(
     whole: Path, tmp_path: Path, number: int
 ) -> None:
     start, end = _chunks(whole)[number]
@@ -149,6 +150,37 @@ def test_random_bytes_after_the_first_record_never_break_recovery(
         recovery = recover(_altered(whole, tmp_path, bytes(altered)), target)
         assert recovery.messages >= (CHUNKS - 2) * EACH
         assert len(_numbers(target)) == recovery.messages
+
+
+def _read_all(path: Path) -> None:
+    """Read a log in every manner there is."""
+    info(path)
+    list(open_log(path).messages())
+    open_log(path).graph_at(1.0)
+    diff(path, path)
+
+
+def test_a_damaged_log_is_read_or_is_one_sentence(whole: Path, tmp_path: Path) -> None:
+    content = whole.read_bytes()
+    generator = np.random.default_rng(4)
+    refused = 0
+    for trial in range(60):
+        altered = bytearray(content)
+        start, end = [(8, 400), (len(content) - 4000, len(content)), (8, len(content))][trial % 3]
+        altered[int(generator.integers(start, end))] ^= int(generator.integers(1, 256))
+        try:
+            _read_all(_altered(whole, tmp_path, bytes(altered)))
+        except LogError as error:
+            refused += 1
+            assert "altered.mcap" in str(error)
+    assert 0 < refused < 60
+
+
+def test_a_log_whose_beginning_cannot_be_read_has_none(whole: Path, tmp_path: Path) -> None:
+    content = whole.read_bytes().replace(
+        b"began_ns\x02\x00\x00\x0017", b"began_ns\x02\x00\x00\x00x7"
+    )
+    assert info(_altered(whole, tmp_path, content)).began_ns == 0
 
 
 def test_a_missing_file_and_a_foreign_one_are_named(tmp_path: Path) -> None:
