@@ -98,8 +98,9 @@ class Player:
         return topic in chosen
 
     def _play_once(self) -> None:
-        """Play the log once. Each round is a new incarnation of every source, as its numbers begin
-        anew.
+        """Play the log once; the clock ends with its newest stamp.
+
+        Each round is a new incarnation of every source, as its numbers begin anew.
         """
         self._incarnations.clear()
         offset_ns = int(self._choices.start_offset_s * 1e9)
@@ -112,6 +113,9 @@ class Player:
             if not self._pacer.wait_until(record.log_time_ns, self._clock):
                 return
             self._publish(record)
+
+        if self._clock is not None:
+            self._clock.publish()
 
     def _publish(self, record: Record) -> None:
         stub = self._reader.stub(record)
