@@ -41,7 +41,7 @@ class Envelope(msgspec.Struct, array_like=True):
     earlier: int = UNKNOWN
 
     def continue_trace(self, cause: Envelope, module: str, compute_ns: int) -> None:
-        """Make this the envelope of an answer to `cause`, which took `module` so long to compute."""
+        """Make this the envelope of an answer to `cause` that `module` computed in `compute_ns`."""
         passed_ns = 0
         for _, stage_compute_ns, stage_rest_ns in cause.stages:
             passed_ns += stage_compute_ns + stage_rest_ns

@@ -1,4 +1,4 @@
-"""Which process publishes, subscribes and answers what on a running system, as its router reports."""
+"""Which process publishes, subscribes and answers what, as the router of a system reports it."""
 
 from __future__ import annotations
 

@@ -86,7 +86,7 @@ class Bus(Protocol):
         """Let everybody know that `member` is ready, until this bus closes or its process dies."""
 
     def watch(self, on_change: Callable[[Member, bool], None]) -> None:
-        """Call `on_change` with every member that is ready (True), becomes ready or leaves (False)."""
+        """Call `on_change` with every member that is or becomes ready (True), or leaves (False)."""
 
     def close(self) -> None:
         """Leave the bus. What was published is sent first."""

@@ -34,7 +34,7 @@ class Module:
 
     It has no clock, no bus, no thread and no file: the shell around it has. `name` is what it is,
     `instance` which one of them. A handler returns what to publish: None, a message, or several. A
-    message that it cannot make sense of makes it raise MessageError, before it has changed anything.
+    message without sense makes it raise MessageError, before it has changed anything.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""The shell around a module: receives messages from a bus, calls the module, publishes its replies."""
+"""The shell around a module: it receives messages, calls the module and publishes its replies."""
 
 from __future__ import annotations
 

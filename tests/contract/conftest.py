@@ -1,4 +1,4 @@
-"""One suite over both buses: what a `network` joins is a bus, in memory or through a real router."""
+"""One suite over both buses: what joins a `network` is in memory, or at a real router."""
 
 from __future__ import annotations
 

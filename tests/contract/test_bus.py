@@ -54,7 +54,7 @@ def test_a_message_of_every_topic_arrives_whole(network: Network, topic: topics.
     )
 
 
-def test_2000_quick_messages_that_must_not_be_dropped_arrive_in_order_at_every_subscriber(
+def test_2000_never_drop_messages_arrive_in_order_at_every_subscriber(
     network: Network,
 ) -> None:
     publisher, *subscribers = (network.join() for _ in range(4))
@@ -71,7 +71,7 @@ def test_2000_quick_messages_that_must_not_be_dropped_arrive_in_order_at_every_s
         assert len(peer.inbox) == 0
 
 
-def test_a_slow_subscriber_sees_the_newest_and_counts_what_it_replaced(network: Network) -> None:
+def test_a_slow_subscriber_receives_the_newest_and_counts_the_superseded(network: Network) -> None:
     publisher = network.join()
     subscriber = network.join()
     publisher.declare(topics.CLOCK)
@@ -103,7 +103,7 @@ def test_the_newest_of_one_source_does_not_replace_that_of_another(network: Netw
     ]
 
 
-def test_a_publisher_does_not_wait_for_a_subscriber_that_takes_nothing_in(network: Network) -> None:
+def test_a_publisher_does_not_wait_for_an_idle_subscriber(network: Network) -> None:
     publisher = network.join()
     idle = network.join()
     busy = network.join()
@@ -117,7 +117,7 @@ def test_a_publisher_does_not_wait_for_a_subscriber_that_takes_nothing_in(networ
     assert len(peer.take(200)) == 200
 
 
-def test_who_comes_late_gets_nothing_of_what_was_said_before(network: Network) -> None:
+def test_a_late_subscriber_receives_nothing_of_the_past(network: Network) -> None:
     publisher = network.join()
     early = network.join()
     publisher.declare(topics.ODOMETRY)
@@ -134,7 +134,7 @@ def test_who_comes_late_gets_nothing_of_what_was_said_before(network: Network) -
     assert [arrival.envelope.seq for arrival in late.take(1) if arrival.envelope] == [50]
 
 
-def test_who_asks_for_the_past_gets_the_last_of_it_first_and_then_goes_on(network: Network) -> None:
+def test_a_subscriber_with_history_receives_the_last_messages_first(network: Network) -> None:
     publishers = [network.join(), network.join()]
     early = network.join()
     peer = Peer(early, topics.ODOMETRY)
@@ -157,7 +157,7 @@ def test_who_asks_for_the_past_gets_the_last_of_it_first_and_then_goes_on(networ
     assert len(late.inbox) == 0
 
 
-def test_the_past_of_somebody_who_left_is_gone_with_it(network: Network) -> None:
+def test_the_history_of_a_publisher_that_left_is_gone(network: Network) -> None:
     gone = network.join()
     early = network.join()
     gone.declare(topics.ODOMETRY)
@@ -185,7 +185,7 @@ def test_a_query_is_answered(network: Network) -> None:
     assert answer == Answer(b"onceonce", ENVELOPE)
 
 
-def test_an_error_of_whoever_answers_comes_back_in_words(network: Network) -> None:
+def test_an_error_of_the_answerer_comes_back_in_words(network: Network) -> None:
     def refuse(payload: bytes) -> Answer:
         raise ValueError("no such version")
 
@@ -198,12 +198,12 @@ def test_an_error_of_whoever_answers_comes_back_in_words(network: Network) -> No
         asker.query(topics.SNAPSHOT_REQUEST, b"", TIMEOUT_S)
 
 
-def test_a_query_that_nobody_answers_says_so(network: Network) -> None:
+def test_a_query_without_an_answerer_raises(network: Network) -> None:
     with pytest.raises(NoAnswerError, match=r"nobody answers workspace/snapshot_request"):
         network.join().query(topics.SNAPSHOT_REQUEST, b"", 1.0)
 
 
-def test_a_query_to_somebody_who_left_says_so(network: Network) -> None:
+def test_a_query_to_an_answerer_that_left_raises(network: Network) -> None:
     asker = network.join()
     answerer = network.join()
     answerer.serve(*SNAPSHOTS, Answer, work)
@@ -217,7 +217,7 @@ def test_a_query_to_somebody_who_left_says_so(network: Network) -> None:
         asker.query(topics.SNAPSHOT_REQUEST, b"", 1.0)
 
 
-def test_members_are_told_of_who_is_there_comes_and_goes(network: Network) -> None:
+def test_watchers_learn_who_is_there_comes_and_goes(network: Network) -> None:
     watcher = network.join()
     early = network.join()
     late = network.join()

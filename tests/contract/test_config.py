@@ -21,7 +21,7 @@ def typed(*settings: str) -> Config:
     return config.typed(config.load(None, settings), "action", Config)
 
 
-def test_defaults_hold_where_nothing_is_said() -> None:
+def test_defaults_hold_where_nothing_is_set() -> None:
     assert typed() == Config()
 
 

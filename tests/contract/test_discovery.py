@@ -52,7 +52,7 @@ def test_every_process_is_found_by_name_with_all_that_it_does(over_zenoh: OverZe
     assert system.foreign_keys() == []
 
 
-def test_no_module_subscribes_to_the_truth_on_the_live_system(over_zenoh: OverZenoh) -> None:
+def test_no_module_subscribes_to_the_truth(over_zenoh: OverZenoh) -> None:
     shells = [
         Shell(registry.build(name, {"sim": {"egl": False}}), over_zenoh.join())
         for name in registry.MODULES
@@ -101,14 +101,14 @@ def system() -> System:
     return read("agent", TOKENS, FACTS, "own")
 
 
-def test_what_several_routers_tell_is_put_together_and_the_nameless_keep_their_session(
+def test_the_facts_of_several_routers_are_merged_and_unnamed_keep_their_id(
     system: System,
 ) -> None:
     assert names(system, Role.PUBLISHES, topics.ODOMETRY) == ["?cc", "sim"]
     assert system.doing(Role.PUBLISHES, topics.ODOMETRY)[0] == Process("cc")
 
 
-def test_one_on_many_topics_at_once_counts_for_each_and_whoever_asks_for_none(
+def test_a_wildcard_counts_for_each_topic_and_the_asker_for_none(
     system: System,
 ) -> None:
     assert names(system, Role.SUBSCRIBES, topics.TRUE_POSE) == ["recorder"]
@@ -129,7 +129,7 @@ def test_the_graph_shows_every_process_and_what_it_does(
     assert all(name in shown for name in ("sim", "recorder", "?cc", "odometry", "truth/pose"))
 
 
-def test_the_graph_of_nobody_says_so() -> None:
+def test_an_empty_graph_is_a_sentence() -> None:
     assert to_tree(read("agent", [], [])) == "no process of 'agent' is on the bus"
 
 

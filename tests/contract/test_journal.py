@@ -45,7 +45,7 @@ def restored(path: Path) -> list[Message]:
     return messages
 
 
-def test_what_was_written_comes_back_in_order(tmp_path: Path) -> None:
+def test_what_was_written_is_read_in_order(tmp_path: Path) -> None:
     deltas = [delta(version) for version in range(1, 6)]
     written(tmp_path / "j", *deltas)
 
@@ -75,7 +75,7 @@ def test_a_tail_whose_bytes_never_reached_the_disk_is_cut_off(tmp_path: Path) ->
     assert restored(tmp_path / "j") == deltas[:2]
 
 
-def test_writing_goes_on_behind_the_last_whole_record(tmp_path: Path) -> None:
+def test_writing_continues_behind_the_last_whole_record(tmp_path: Path) -> None:
     sizes = written(tmp_path / "j", delta(1), delta(2))
     content = (tmp_path / "j").read_bytes()
     (tmp_path / "j").write_bytes(content[: sizes[1] - 1])
@@ -88,7 +88,7 @@ def test_writing_goes_on_behind_the_last_whole_record(tmp_path: Path) -> None:
     assert restored(tmp_path / "j") == [delta(1), delta(2)]
 
 
-def test_one_message_stands_for_all_after_condensing(tmp_path: Path) -> None:
+def test_one_message_replaces_all_when_compacted(tmp_path: Path) -> None:
     journal = Journal(tmp_path / "j")
     assert list(journal.messages()) == []
     for version in range(1, 50):
@@ -103,7 +103,7 @@ def test_one_message_stands_for_all_after_condensing(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["j"]
 
 
-def test_a_kill_while_condensing_leaves_the_old_journal(tmp_path: Path) -> None:
+def test_a_kill_during_compaction_leaves_the_old_journal(tmp_path: Path) -> None:
     written(tmp_path / "j", delta(1), delta(2))
     (tmp_path / "j.new").write_bytes(b"half of a snapsh")
 

@@ -53,7 +53,7 @@ def odometry(seq: int) -> Odometry:
 
 
 @pytest.mark.parametrize("afterwards", [0, 20], ids=["nothing said since", "more said since"])
-def test_what_is_said_while_the_router_is_dead_arrives_when_it_is_back(
+def test_what_is_published_while_the_router_is_dead_arrives_afterwards(
     router: Router, afterwards: int
 ) -> None:
     network = OverZenoh(router.endpoint)
@@ -76,7 +76,7 @@ def test_what_is_said_while_the_router_is_dead_arrives_when_it_is_back(
     network.close()
 
 
-def test_of_more_than_the_cache_holds_the_loss_is_counted_and_a_replica_is_mended_by_a_snapshot(
+def test_a_loss_beyond_the_cache_is_counted_and_a_snapshot_mends_the_graph(
     router: Router,
 ) -> None:
     graph = Graph()

@@ -69,7 +69,7 @@ def test_a_delta_that_the_snapshot_held_already_changes_nothing(network: Network
     assert replica.graph.digest() == graph.digest()
 
 
-def test_without_an_answer_the_graph_stays_as_it_is_and_says_so(network: Network) -> None:
+def test_without_an_answer_the_graph_stays_behind(network: Network) -> None:
     replica = Replica(snapshot_over(network.join(), timeout_s=0.5))
     assert replica.follow(delta(1))
     before = replica.graph.digest()

@@ -85,7 +85,7 @@ def test_bad_input_is_counted_and_changes_nothing_else(network: Network, topic: 
     shell.close()
 
 
-def test_bad_input_is_named_once_a_second_at_most(
+def test_bad_input_is_logged_at_most_once_a_second(
     network: Network, caplog: pytest.LogCaptureFixture
 ) -> None:
     shell = listener(network, topics.ODOMETRY, [])
@@ -104,7 +104,7 @@ def test_bad_input_is_named_once_a_second_at_most(
     shell.close()
 
 
-def test_a_message_that_comes_twice_is_taken_in_once(network: Network) -> None:
+def test_a_message_that_comes_twice_is_received_once(network: Network) -> None:
     heard: list[Message] = []
     shell = listener(network, topics.ODOMETRY, heard)
     publisher = network.join()
@@ -119,7 +119,7 @@ def test_a_message_that_comes_twice_is_taken_in_once(network: Network) -> None:
     shell.close()
 
 
-def test_a_source_that_starts_anew_counts_from_the_beginning(network: Network) -> None:
+def test_a_restarted_source_is_received_from_number_0(network: Network) -> None:
     heard: list[Message] = []
     shell = listener(network, topics.ODOMETRY, heard)
     publisher = network.join()
@@ -136,7 +136,7 @@ def test_a_source_that_starts_anew_counts_from_the_beginning(network: Network) -
 
 
 @pytest.mark.parametrize("restarts", [1, 3])
-def test_what_was_published_unheard_before_a_restart_is_counted(
+def test_what_a_publisher_lost_before_its_restart_is_counted(
     network: Network, tmp_path: Path, restarts: int
 ) -> None:
     heard: list[Message] = []
@@ -198,7 +198,7 @@ def test_a_gap_in_the_numbers_of_a_source_is_counted(network: Network) -> None:
     shell.close()
 
 
-def test_a_loss_that_the_bus_tells_of_and_the_numbers_show_counts_once(network: Network) -> None:
+def test_a_loss_that_the_bus_and_the_numbers_show_counts_once(network: Network) -> None:
     heard: list[Message] = []
     shell = listener(network, topics.ODOMETRY, heard)
     publisher = network.join()
@@ -219,7 +219,7 @@ def test_a_loss_that_the_bus_tells_of_and_the_numbers_show_counts_once(network: 
 @pytest.mark.parametrize(
     "error", [MessageError("image of the wrong shape"), ZeroDivisionError("division by zero")]
 )
-def test_a_module_whose_handler_raises_goes_on(network: Network, error: Exception) -> None:
+def test_a_module_whose_handler_raises_continues(network: Network, error: Exception) -> None:
     def think(message: Odometry) -> MotorCommand:
         if message.seq == 1:
             raise error
@@ -246,7 +246,7 @@ def test_a_module_whose_handler_raises_goes_on(network: Network, error: Exceptio
     shell.close()
 
 
-def test_what_led_to_a_message_and_the_time_it_took_travel_with_it(network: Network) -> None:
+def test_the_causes_and_the_latency_of_a_message_travel_with_it(network: Network) -> None:
     module = Module("action").on(
         topics.ODOMETRY, lambda m: command(m) if m.seq % 2 else None, emits=[topics.MOTOR_COMMAND]
     )
@@ -269,7 +269,7 @@ def test_what_led_to_a_message_and_the_time_it_took_travel_with_it(network: Netw
     shell.close()
 
 
-def test_what_a_silent_module_took_in_is_told_with_its_health_before_it_grows_long(
+def test_health_carries_the_causes_of_a_module_that_publishes_nothing(
     network: Network,
 ) -> None:
     module = Module("codelets", "codelets-2").on(
@@ -298,7 +298,7 @@ def test_what_a_silent_module_took_in_is_told_with_its_health_before_it_grows_lo
     shell.close()
 
 
-def test_health_is_published_and_says_what_was_taken_in_and_refused(network: Network) -> None:
+def test_health_reports_what_was_received_and_rejected(network: Network) -> None:
     module = Module("action", "action-1").on(topics.ODOMETRY, command, emits=[topics.MOTOR_COMMAND])
     shell = Shell(module, network.join())
     observer = network.join()
@@ -329,7 +329,7 @@ def test_health_is_published_and_says_what_was_taken_in_and_refused(network: Net
     shell.close()
 
 
-def test_a_module_that_waits_for_others_is_not_ready_and_says_so(network: Network) -> None:
+def test_a_module_that_waits_for_others_is_not_ready(network: Network) -> None:
     module = Module("sim").on_start(lambda: None, requires={"action": 1})
     shell = Shell(module, network.join())
     observer = network.join()
@@ -346,7 +346,7 @@ def test_a_module_that_waits_for_others_is_not_ready_and_says_so(network: Networ
     shell.close()
 
 
-def test_nothing_is_missed_by_those_that_a_start_requires(network: Network) -> None:
+def test_those_that_a_start_requires_miss_nothing(network: Network) -> None:
     heard: dict[str, list[int]] = {"one": [], "two": []}
     first = [odometry(seq) for seq in range(20)]
     sim = Module("sim").on_start(lambda: first, requires={"listener": 2}, emits=[topics.ODOMETRY])
@@ -374,7 +374,7 @@ def test_nothing_is_missed_by_those_that_a_start_requires(network: Network) -> N
         shell.close()
 
 
-def test_a_start_happens_once_though_one_that_it_awaited_goes_and_comes(network: Network) -> None:
+def test_a_start_happens_once_though_a_required_module_restarts(network: Network) -> None:
     started: list[int] = []
     shell = Shell(
         Module("sim").on_start(lambda: started.append(1), requires={"action": 1}),
@@ -393,7 +393,7 @@ def test_a_start_happens_once_though_one_that_it_awaited_goes_and_comes(network:
     shell.close()
 
 
-def test_a_module_that_asks_is_told_who_comes_and_goes(network: Network) -> None:
+def test_a_module_that_observes_presence_learns_who_comes_and_goes(network: Network) -> None:
     told: list[Presence] = []
     module = Module("workspace").on(topics.PRESENCE, told.append, emits=[topics.PRESENCE])
     shell = Shell(module, network.join(), health=False)
@@ -412,7 +412,7 @@ def test_a_module_that_asks_is_told_who_comes_and_goes(network: Network) -> None
     shell.close()
 
 
-def test_a_question_that_makes_no_sense_is_refused_and_counted(network: Network) -> None:
+def test_a_query_without_sense_is_refused_and_counted(network: Network) -> None:
     empty = Snapshot(version=0, cycle=0, nodes=[], links=[], tiles=[])
     module = Module("workspace").serve(
         topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, lambda request: empty
@@ -433,7 +433,7 @@ def test_a_question_that_makes_no_sense_is_refused_and_counted(network: Network)
     assert shell.intake.rejected == {"workspace/snapshot_request": 1}
 
 
-def test_a_clock_that_is_older_than_the_newest_is_never_thought_about(network: Network) -> None:
+def test_a_superseded_clock_is_never_handled(network: Network) -> None:
     heard: list[Message] = []
     shell = listener(network, topics.CLOCK, heard)
     publisher = network.join()

@@ -125,7 +125,7 @@ def test_a_killed_recorder_loses_only_what_came_since_its_last_flush(
 
 
 @pytest.mark.parametrize("how", ["SIGTERM", "SIGINT", "end of input"])
-def test_a_recorder_that_is_asked_to_end_has_every_message_and_says_so(
+def test_a_recorder_that_is_asked_to_end_has_every_message(
     endpoint: str, speaker: Speaker, tmp_path: Path, how: str
 ) -> None:
     path = tmp_path / "log.mcap"

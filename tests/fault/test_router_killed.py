@@ -7,7 +7,7 @@ import signal
 from tests.support.live import Feeder, System, Witness, wait_until
 
 
-def test_every_delta_arrives_in_order_though_the_router_was_killed_and_the_cycle_goes_on(
+def test_deltas_arrive_in_order_and_cycles_continue_after_a_router_is_killed(
     mind: tuple[System, Feeder, Witness],
 ) -> None:
     system, feeder, witness = mind

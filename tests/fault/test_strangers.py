@@ -77,7 +77,7 @@ def taken_in(instance: str) -> set[str]:
     return {topic.name for topic in handlers if topic is not topics.PRESENCE}
 
 
-def test_bytes_that_are_no_message_are_counted_and_named_and_the_mind_goes_on(
+def test_bytes_that_are_no_message_are_counted_and_logged_and_change_nothing(
     mind: tuple[System, Feeder, Witness],
 ) -> None:
     system, feeder, witness = mind

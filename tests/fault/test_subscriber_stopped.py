@@ -74,7 +74,7 @@ def recorded(mind: tuple[System, Feeder, Witness]) -> System:
     return system
 
 
-def test_others_see_no_gap_memory_stays_bounded_and_nothing_is_lost_for_good(
+def test_a_stopped_subscriber_delays_nobody_and_loses_nothing(
     mind: tuple[System, Feeder, Witness], recorded: System
 ) -> None:
     system, feeder, witness = mind

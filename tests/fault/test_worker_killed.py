@@ -23,7 +23,7 @@ OTHER = "codelets-2"
 @pytest.mark.parametrize(
     "mind", [PATIENT], indirect=True, ids=["only its death takes back what it holds"]
 )
-def test_the_task_of_a_worker_killed_amid_it_is_done_by_another_and_committed_once(
+def test_the_task_of_a_killed_worker_is_done_by_another_and_committed_once(
     mind: tuple[System, Feeder, Witness],
 ) -> None:
     system, feeder, witness = mind

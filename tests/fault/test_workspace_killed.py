@@ -16,7 +16,7 @@ def where(witness: Witness) -> tuple[float, int]:
     return float(attributes["x_m"]), int(attributes["stamp_ns"])
 
 
-def test_a_restarted_workspace_takes_up_its_graph_and_the_way_that_was_gone_while_it_was_away(
+def test_a_restarted_workspace_resumes_its_graph_and_the_missed_self_motion(
     mind: tuple[System, Feeder, Witness],
 ) -> None:
     system, feeder, witness = mind

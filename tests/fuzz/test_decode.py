@@ -114,7 +114,7 @@ def judge(topic: Topic, payload: bytes) -> bool:
 
 
 @pytest.mark.parametrize("topic", topics.ALL, ids=lambda topic: topic.name)
-def test_mutated_bytes_are_refused_by_name_or_are_a_finite_message(topic: Topic) -> None:
+def test_mutated_bytes_are_refused_by_name_or_finite_messages(topic: Topic) -> None:
     rng = random.Random(topic.name)
     whole = (GOLDEN / file_name(topic, ".msgpack")).read_bytes()
 
@@ -125,7 +125,7 @@ def test_mutated_bytes_are_refused_by_name_or_are_a_finite_message(topic: Topic)
 
 
 @pytest.mark.parametrize("topic", topics.ALL, ids=lambda topic: topic.name)
-def test_wellformed_bytes_of_the_wrong_content_are_refused_or_are_a_finite_message(
+def test_wellformed_bytes_of_wrong_content_are_refused_or_finite_messages(
     topic: Topic,
 ) -> None:
     rng = random.Random(topic.name)
@@ -144,7 +144,7 @@ def test_every_byte_string_up_to_two_bytes_is_refused_or_an_envelope() -> None:
             decode_envelope(number.to_bytes(2, "big"))
 
 
-def test_mutated_envelopes_are_refused_or_can_be_said_again() -> None:
+def test_mutated_envelopes_are_refused_or_encode_to_the_same() -> None:
     rng = random.Random(7)
     whole = encode(
         Envelope("sim", 7, 1, 2**60, 2**60, [("sensory", 10, 20)], [("odometry", "sim", 3)])

@@ -100,7 +100,7 @@ class Session:
         self.recorder.close()
 
 
-def test_answers_that_came_late_were_dropped_or_were_refused_are_replayed_to_the_same_deltas(
+def test_late_dropped_and_refused_answers_replay_to_the_same_deltas(
     tmp_path: Path,
 ) -> None:
     session = Session(tmp_path / "log.mcap")

@@ -150,7 +150,7 @@ def replay(path: Path, build: Build = build, **options: Any) -> Report:
     return replay_into(path, ["mixer"], build, **options)
 
 
-def test_a_replay_says_the_recorded_bytes_although_inputs_were_taken_in_another_order_than_the_logs(
+def test_a_replay_feeds_inputs_in_the_order_of_causes_not_of_the_log(
     path: Path,
 ) -> None:
     record(path)
@@ -186,7 +186,7 @@ def test_the_recorded_configuration_is_used_unless_it_is_overridden(path: Path) 
     assert not replay(path, overrides={"mixer": {"start": 6.0}}).same
 
 
-def test_what_a_timer_made_a_module_say_is_replayed_with_the_timers_time(path: Path) -> None:
+def test_outputs_of_a_timer_are_replayed_with_its_time(path: Path) -> None:
     session = Session(path, {"mixer": {"timer": True}})
     shell = session.enter()
     session.say(odometry(0), 1)
@@ -251,7 +251,7 @@ def _shifted(name: str, sections: Sections, instance: str) -> Module:
     return module
 
 
-def test_the_first_difference_is_told_in_words_with_topic_number_stamp_field_and_both_values(
+def test_the_first_difference_names_message_field_and_both_values(
     path: Path,
 ) -> None:
     record(path)
@@ -273,7 +273,7 @@ def _silent(name: str, sections: Sections, instance: str) -> Module:
     return build(name, {name: {"every": 1000}}, instance)
 
 
-def test_what_is_no_longer_said_is_named(path: Path) -> None:
+def test_an_output_that_is_no_longer_published_is_named(path: Path) -> None:
     record(path)
     report = replay(path, _silent)
     assert not report.same
@@ -310,7 +310,7 @@ def test_inputs_that_the_log_lacks_are_counted_by_topic(path: Path, tmp_path: Pa
     assert not report.same
 
 
-def test_without_envelopes_inputs_are_fed_in_the_order_of_log_time_channel_and_sequence(
+def test_without_envelopes_inputs_are_fed_in_the_order_of_the_log(
     path: Path, tmp_path: Path
 ) -> None:
     session = Session(path)
@@ -334,7 +334,7 @@ def test_without_envelopes_inputs_are_fed_in_the_order_of_log_time_channel_and_s
     ]
 
 
-def test_a_module_that_said_nothing_is_named_with_those_that_did(path: Path) -> None:
+def test_a_module_that_published_nothing_is_named_with_those_that_did(path: Path) -> None:
     record(path)
     with pytest.raises(LogError, match="nothing that module epam published: there are mixer, sim"):
         replay_into(path, ["epam"], build)

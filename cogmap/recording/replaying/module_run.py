@@ -57,7 +57,7 @@ class ModuleRun:
             restore(self._reader.message(record) for record in past)
 
     def _do(self, step: Step) -> list[Message]:
-        """What the module publishes at a step. Whatever it raises is a difference: it did not then."""
+        """What the module publishes at a step. An exception is a difference: then it had none."""
         try:
             return self._step(step)
         except LogError:

@@ -29,7 +29,7 @@ class Control(Protocol):
 
 
 class ClockPublisher:
-    """Publishes the newest stamp that was played on the clock's topic, `clock_hz` times a second."""
+    """Publishes the newest stamp that was played as the clock, `clock_hz` times a second."""
 
     def __init__(self, bus: Bus, source: str, rate: float, clock_hz: float) -> None:
         bus.declare(topics.CLOCK)

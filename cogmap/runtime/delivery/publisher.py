@@ -79,7 +79,7 @@ class Publisher:
             self._causes.append(cause)
 
     def send(self, messages: Iterable[Message], computation: Computation) -> None:
-        """Publish numbered messages. Raises StorageError where journal or counts cannot be written."""
+        """Publish numbered messages. Raises StorageError where the state cannot be written."""
         for message in messages:
             self._send(message, computation)
         self._compact_journal()

@@ -24,7 +24,7 @@ def open_file(path: Path) -> int:
 
 
 def write_at(path: Path, file: int, data: bytes, offset: int) -> None:
-    """Write all of `data` at `offset` of `file`, which was opened at `path`. Raises StorageError."""
+    """Write all of `data` at `offset` of `file`, which is open at `path`. Raises StorageError."""
     try:
         written = os.pwrite(file, data, offset)
         if written < len(data):

@@ -35,7 +35,7 @@ def test_a_job_that_comes_late_is_not_made_up_for(clock: list[int]) -> None:
     assert runs == [570, 600]
 
 
-def test_the_time_until_the_next_job_is_told(clock: list[int]) -> None:
+def test_the_time_until_the_next_job_is_returned(clock: list[int]) -> None:
     jobs = Timers([(2_000_000_000, lambda now_ns: None), (3_000_000_000, lambda now_ns: None)])
     clock[0] = 500_000_000
 
