@@ -120,7 +120,6 @@ def selected(only: Sequence[str], skip: Sequence[str]) -> list[Benchmark]:
 
 def run(benchmark: Benchmark, setting: Setting) -> Outcome:
     """Measure one benchmark. A failure of any kind is its outcome, so that others still run."""
-    setting.announce(f"{benchmark.name} …")
     metrics: Metrics = {}
     failure = ""
 

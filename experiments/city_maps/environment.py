@@ -1,6 +1,4 @@
-"""An environment of the experiment: streets, eight buildings, and the shortest tour past all of
-them.
-"""
+"""An environment of the experiment: streets, eight buildings, and the shortest tour past them."""
 
 from __future__ import annotations
 
@@ -8,19 +6,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from cogmap.errors import UsageError
-from experiments.city_maps.streets import Points, Streets, backwards
+from cogmap.geometry.arrays import Indices
+from cogmap.geometry.polylines import distances_along
+from experiments.city_maps.streets import Points, Streets, shortest_path
 from experiments.city_maps.tour import shortest_tour
 
 BUILDINGS = 8
-MOST_KM2 = 4.0
-LEAST_SIDE_M = 400.0
-MOST_SIDE_M = 1e3 * MOST_KM2**0.5
-LEAST_APART = 0.12
+MAX_KM2 = 4.0
+MIN_SIDE_M = 400.0
+MAX_SIDE_M = 1e3 * MAX_KM2**0.5
+MIN_APART = 0.12
 FROM_STREET_M = (4.0, 35.0)
-TRIES = 400
+MAX_TRIES = 400
+SAME_POINT_M = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,23 +48,28 @@ class Environment:
     @property
     def area_km2(self) -> float:
         """Of the rectangle around the buildings."""
-        return float(np.prod(np.ptp(self.buildings_m, axis=0))) / 1e6
+        sides_m = np.ptp(self.buildings_m, axis=0)
+        return float(np.prod(sides_m)) / 1e6
 
     @property
     def tour_m(self) -> float:
         """The length of the tour."""
-        return sum(float(np.hypot(*np.diff(leg, axis=0).T).sum()) for leg in self.legs_m)
+        return sum(_length_m(leg) for leg in self.legs_m)
 
     def line(self, start: int, backward: bool, lead_m: float, overrun_m: float) -> Points:
         """The tour past building `start`, all others and `start` again.
 
-        It begins `lead_m` before `start`, so that one comes up to it, and goes on `overrun_m`
+        It begins `lead_m` before `start`, so that the building is approached, and ends `overrun_m`
         beyond where it began.
         """
-        legs = [self.legs_m[(start + k) % len(self.legs_m)] for k in range(len(self.legs_m))]
-        whole = _joined([leg[::-1] for leg in reversed(legs)] if backward else legs)
+        legs = [*self.legs_m[start:], *self.legs_m[:start]]
+        if backward:
+            legs = [leg[::-1] for leg in reversed(legs)]
+
+        whole = _joined(legs)
         lead = _beginning(whole[::-1], lead_m)[::-1]
-        return _joined([lead, whole, _beginning(whole, overrun_m)])
+        overrun = _beginning(whole, overrun_m)
+        return _joined([lead, whole, overrun])
 
 
 def environments(city: City, number: int, seed: int) -> list[Environment]:
@@ -74,72 +79,113 @@ def environments(city: City, number: int, seed: int) -> list[Environment]:
     streets.
     """
     streets = city.streets.connected()
-    _, feet = streets.nearest(city.buildings_m)
-    away = np.hypot(*(city.buildings_m - feet).T)
-    usable = np.flatnonzero((away >= FROM_STREET_M[0]) & (away <= FROM_STREET_M[1]))
-    made = []
+    usable = _beside_streets(city, streets)
+    found = []
+
     for count in range(number):
         rng = np.random.default_rng([seed, 0xC1, count])
         chosen = _choose(city.buildings_m, usable, rng)
         if chosen is None:
             raise UsageError(
-                f"{city.name}: no {BUILDINGS} buildings by its streets that lie far enough apart: give a larger extract"
+                f"{city.name}: no {BUILDINGS} buildings by its streets lie far enough apart: "
+                "give a larger extract"
             )
+
         name = city.name if number == 1 else f"{city.name} {count + 1}"
-        made.append(_environment(name, city, streets, chosen))
-    return made
+        found.append(_environment(name, city, streets, chosen))
+
+    return found
 
 
-def _choose(
-    buildings_m: Points, usable: npt.NDArray[np.intp], rng: np.random.Generator
-) -> list[int] | None:
-    """Eight buildings in a square of random size at a random place, none too near to another; or
-    None.
+def _beside_streets(city: City, streets: Streets) -> Indices:
+    """The buildings that stand by a street, neither on it nor far away."""
+    _, feet_m = streets.nearest(city.buildings_m)
+    offsets_m = city.buildings_m - feet_m
+    distances_m = np.hypot(*offsets_m.T)
+    nearest_m, farthest_m = FROM_STREET_M
+    return np.flatnonzero((distances_m >= nearest_m) & (distances_m <= farthest_m))
+
+
+def _choose(buildings_m: Points, usable: Indices, rng: np.random.Generator) -> list[int] | None:
+    """Eight buildings in a square of random size at a random place, none too near to another.
+
+    None where MAX_TRIES squares have none.
     """
     if len(usable) < BUILDINGS:
         return None
-    extent = np.ptp(buildings_m[usable], axis=0)
-    largest = min(MOST_SIDE_M, max(LEAST_SIDE_M, float(extent.max())))
-    for _ in range(TRIES):
-        side = float(rng.uniform(LEAST_SIDE_M, largest))
-        corner = buildings_m[usable].min(axis=0) + rng.uniform(0, 1, 2) * np.maximum(
-            extent - side, 0
-        )
-        inside = usable[
-            ((buildings_m[usable] >= corner) & (buildings_m[usable] <= corner + side)).all(axis=1)
-        ]
-        chosen: list[int] = []
-        for candidate in rng.permutation(inside).tolist():
-            apart = np.hypot(*(buildings_m[chosen] - buildings_m[candidate]).T)
-            if not chosen or apart.min() >= LEAST_APART * side:
-                chosen.append(candidate)
-            if len(chosen) == BUILDINGS:
-                return chosen
+
+    corner_m = buildings_m[usable].min(axis=0)
+    extent_m = np.ptp(buildings_m[usable], axis=0)
+    max_side_m = min(MAX_SIDE_M, max(MIN_SIDE_M, float(extent_m.max())))
+
+    for _ in range(MAX_TRIES):
+        side_m = float(rng.uniform(MIN_SIDE_M, max_side_m))
+        room_m = np.maximum(extent_m - side_m, 0)
+        lower_m = corner_m + rng.uniform(0, 1, 2) * room_m
+        upper_m = lower_m + side_m
+
+        candidates_m = buildings_m[usable]
+        inside = ((candidates_m >= lower_m) & (candidates_m <= upper_m)).all(axis=1)
+        order = rng.permutation(usable[inside]).tolist()
+        chosen = _apart(buildings_m, order, MIN_APART * side_m)
+
+        if len(chosen) == BUILDINGS:
+            return chosen
+
     return None
+
+
+def _apart(buildings_m: Points, candidates: Sequence[int], min_m: float) -> list[int]:
+    """The first BUILDINGS of `candidates` that lie `min_m` from each other, or fewer."""
+    chosen: list[int] = []
+
+    for candidate in candidates:
+        offsets_m = buildings_m[chosen] - buildings_m[candidate]
+        distances_m = np.hypot(*offsets_m.T)
+        if distances_m.min(initial=np.inf) >= min_m:
+            chosen.append(candidate)
+        if len(chosen) == BUILDINGS:
+            break
+
+    return chosen
 
 
 def _environment(name: str, city: City, streets: Streets, chosen: Sequence[int]) -> Environment:
     joined, fronts = streets.with_points(city.buildings_m[chosen])
-    distance, before = joined.ways(fronts)
-    _, order = shortest_tour(distance[:, fronts])
-    legs = [
-        joined.points_m[backwards(before[a], int(fronts[b]))]
-        for a, b in zip(order, [*order[1:], order[0]], strict=True)
-    ]
-    where = city.buildings_m[[chosen[place] for place in order]]
+    distances_m, before = joined.shortest_paths(fronts)
+    _, order = shortest_tour(distances_m[:, fronts])
+    legs = []
+
+    for start, end in zip(order, [*order[1:], order[0]], strict=True):
+        points = shortest_path(before[start], int(fronts[end]))
+        legs.append(joined.points_m[points])
+
+    in_order = [chosen[place] for place in order]
     return Environment(
-        name, streets, tuple(city.names[chosen[place]] for place in order), where, tuple(legs)
+        name=name,
+        streets=streets,
+        names=tuple(city.names[building] for building in in_order),
+        buildings_m=city.buildings_m[in_order],
+        legs_m=tuple(legs),
     )
 
 
 def _joined(lines: Sequence[Points]) -> Points:
-    points = np.vstack(lines)
-    fresh = np.hypot(*np.diff(points, axis=0).T) > 1e-6
-    return np.asarray(points[np.concatenate([[True], fresh])])
+    """One line, without points that coincide with the one before."""
+    points_m = np.vstack(lines)
+    steps_m = np.diff(points_m, axis=0)
+    is_new = np.hypot(*steps_m.T) > SAME_POINT_M
+    return np.asarray(points_m[np.concatenate([[True], is_new])])
 
 
-def _beginning(line: Points, length_m: float) -> Points:
+def _beginning(line_m: Points, length_m: float) -> Points:
     """The first `length_m` of a line."""
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
-    end = [[float(np.interp(length_m, along, line[:, axis])) for axis in (0, 1)]]
-    return np.vstack([line[along < length_m], end])
+    along_m = distances_along(line_m)
+    x_m = np.interp(length_m, along_m, line_m[:, 0])
+    y_m = np.interp(length_m, along_m, line_m[:, 1])
+    return np.vstack([line_m[along_m < length_m], [[x_m, y_m]]])
+
+
+def _length_m(line_m: Points) -> float:
+    steps_m = np.diff(line_m, axis=0)
+    return float(np.hypot(*steps_m.T).sum())

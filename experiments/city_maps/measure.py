@@ -1,10 +1,8 @@
-"""Every environment traversed often, and how far the learned maps are off, with and without
-correction.
-"""
+"""Every environment traversed often, and how much the learned maps err, by method of correction."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,12 +34,12 @@ class Job:
 
 @dataclass(frozen=True)
 class Budget:
-    """How often each environment is traversed, and how."""
+    """How often each environment is traversed, from which seed, on how many processes."""
 
     traversals: int
     seed: int
     processes: int
-    progress: Callable[[float], None] = lambda share: None
+    progress: Progress = lambda share: None
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,48 +67,95 @@ class CityMap:
 
     def error_km2(self, method: str) -> float:
         """The mean over the traversals."""
-        return float(np.mean([one.error_km2[method] for one in self.learned]))
+        errors_km2 = [one.error_km2[method] for one in self.learned]
+        return float(np.mean(errors_km2))
 
     @property
     def typical(self) -> Learned:
         """The traversal whose corrected error is the median one."""
-        order = np.argsort([one.error_km2["heading"] for one in self.learned], kind="stable")
-        return self.learned[int(order[(len(order) - 1) // 2])]
+        errors_km2 = [one.error_km2["heading"] for one in self.learned]
+        order = np.argsort(errors_km2, kind="stable")
+        middle = (len(order) - 1) // 2
+        return self.learned[int(order[middle])]
 
 
-def map_error_km2(learned_m: Points, true_m: Points) -> float:
-    """The sum of squared errors of the positions in km^2, as the paper has it; one that is missing
-    errs as the others do on average, and nothing known is NaN.
-    """
-    squared = ((learned_m - true_m) ** 2).sum(axis=1)
-    known = squared[~np.isnan(squared)]
-    return float(known.mean() * len(squared) / 1e6) if len(known) else float("nan")
+def measure(environments: Sequence[Environment], noise: Noise, budget: Budget) -> list[CityMap]:
+    """All environments, the same from the same seed whatever the number of processes."""
+    every = jobs(environments, noise, budget.traversals, budget.seed)
+    learned = parallel_map(traversed, every, budget.processes, budget.progress)
+    maps = []
+
+    for place, environment in enumerate(environments):
+        first = place * budget.traversals
+        own = learned[first : first + budget.traversals]
+        maps.append(CityMap(environment, tuple(own)))
+
+    return maps
+
+
+def jobs(
+    environments: Sequence[Environment], noise: Noise, traversals: int, seed: int
+) -> list[Job]:
+    """All traversals of each environment, one environment after the other."""
+    found = []
+
+    for place, environment in enumerate(environments):
+        own_seed = seed * 1000 + place
+        found += [Job(environment, number, noise, own_seed) for number in range(traversals)]
+
+    return found
 
 
 def traversed(job: Job) -> Learned:
-    """Drive one tour from a building and in a direction drawn from the seed, with the same noise by
-    each method.
+    """Drive one tour from a building and in a direction drawn from the seed.
+
+    Each method gets the same noise.
     """
-    return _learned(job, {method: traverse(one) for method, one in configurations(job).items()})
+    maps = {}
+
+    for method, configured in configurations(job).items():
+        maps[method] = traverse(configured)
+
+    return _learned(job, maps)
 
 
 def by_cameras(job: Job, progress: Progress) -> Learned:
     """As `traversed`, with buildings that are drawn and recognised."""
-    return _learned(job, rendered.by_cameras(configurations(job), COGNITION, driven, progress))
+    maps = rendered.by_cameras(configurations(job), COGNITION, driven, progress)
+    return _learned(job, maps)
 
 
 def configurations(job: Job) -> dict[str, Sections]:
     """That of every module for the tour of `job`, by each method."""
     rng = np.random.default_rng([job.seed, 0xCAFE, job.number])
-    tour = Tour(int(rng.integers(BUILDINGS)), bool(rng.integers(2)), int(rng.integers(2**32)))
+    tour = Tour(
+        start=int(rng.integers(BUILDINGS)),
+        backward=bool(rng.integers(2)),
+        seed=int(rng.integers(2**32)),
+    )
     return {method: sections(job.environment, tour, job.noise, method) for method in METHODS}
 
 
+def map_error_km2(learned_m: Points, true_m: Points) -> float:
+    """The sum of squared errors of the positions in km^2, as the paper has it.
+
+    One that is missing errs as the others do on average; nothing known is NaN.
+    """
+    offsets_m = learned_m - true_m
+    squared_m2 = (offsets_m**2).sum(axis=1)
+    known_m2 = squared_m2[~np.isnan(squared_m2)]
+
+    if not len(known_m2):
+        return float("nan")
+
+    return float(known_m2.mean()) * len(squared_m2) / 1e6
+
+
 def _learned(job: Job, maps: Mapping[str, Traversal]) -> Learned:
-    true_m = job.environment.buildings_m
+    missing = [np.isnan(one.buildings_m[:, 0]).sum() for one in maps.values()]
     return Learned(
-        error_km2=_errors_km2(maps, true_m),
-        missing=sum(int(np.isnan(one.buildings_m[:, 0]).sum()) for one in maps.values()),
+        error_km2=_errors_km2(maps, job.environment.buildings_m),
+        missing=int(sum(missing)),
         buildings_m={method: one.buildings_m for method, one in maps.items()},
         path_m={method: one.path_m for method, one in maps.items()},
         road_m={method: one.road_m for method, one in maps.items()},
@@ -118,32 +163,12 @@ def _learned(job: Job, maps: Mapping[str, Traversal]) -> Learned:
 
 
 def _errors_km2(maps: Mapping[str, Traversal], true_m: Points) -> dict[str, float]:
-    errors_km2 = {method: map_error_km2(one.buildings_m, true_m) for method, one in maps.items()}
+    errors_km2 = {}
+
+    for method, one in maps.items():
+        errors_km2[method] = map_error_km2(one.buildings_m, true_m)
 
     for name, buildings_m in maps["none"].alone_m.items():
         errors_km2[name] = map_error_km2(buildings_m, true_m)
 
     return errors_km2
-
-
-def jobs(
-    environments: Sequence[Environment], noise: Noise, traversals: int, seed: int
-) -> list[Job]:
-    """All traversals of each environment, one environment after the other."""
-    return [
-        Job(environment, number, noise, seed * 1000 + place)
-        for place, environment in enumerate(environments)
-        for number in range(traversals)
-    ]
-
-
-def measure(environments: Sequence[Environment], noise: Noise, budget: Budget) -> list[CityMap]:
-    """All environments, the same from the same seed whatever the number of processes."""
-    number = budget.traversals
-    learned = parallel_map(
-        traversed, jobs(environments, noise, number, budget.seed), budget.processes, budget.progress
-    )
-    return [
-        CityMap(environment, tuple(learned[place * number : (place + 1) * number]))
-        for place, environment in enumerate(environments)
-    ]

@@ -1,6 +1,4 @@
-"""A street network: points, and straight pieces between them. Where it is nearest to something, and
-the ways on it.
-"""
+"""A street network of straight pieces between points: what is nearest to it, and the paths on it."""
 
 from __future__ import annotations
 
@@ -14,6 +12,8 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 
 Points = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
+MIN_LENGTH_M = 1e-6
+MIN_SQUARED_M2 = 1e-9
 _CHUNK = 256
 
 
@@ -30,78 +30,93 @@ class Streets:
         return float(self._lengths_m().sum())
 
     def connected(self) -> Streets:
-        """The part with the most points from where each can be reached from every other, and no
-        others.
-        """
+        """The largest part in which each point can be reached from every other."""
         _, part = connected_components(self._graph(), directed=False)
-        kept = np.flatnonzero(part == np.bincount(part).argmax())
+        largest = np.bincount(part).argmax()
+        kept = np.flatnonzero(part == largest)
+
         number = np.full(len(self.points_m), -1)
         number[kept] = np.arange(len(kept))
         pieces = number[self.pieces]
-        return Streets(self.points_m[kept], pieces[(pieces >= 0).all(axis=1)])
+        is_kept = (pieces >= 0).all(axis=1)
+        return Streets(self.points_m[kept], pieces[is_kept])
 
     def nearest(self, positions_m: Points) -> tuple[Indices, Points]:
         """The piece nearest to each of (k, 2) positions, and the nearest point on it, (k, 2)."""
-        start = self.points_m[self.pieces[:, 0]]
-        along = self.points_m[self.pieces[:, 1]] - start
-        squared = np.maximum((along**2).sum(1), 1e-9)
-        found = []
-        feet = []
-        for position in np.array_split(positions_m, range(_CHUNK, len(positions_m), _CHUNK)):
-            share = (((position[:, None] - start) * along).sum(2) / squared).clip(0, 1)
-            foot = start + share[..., None] * along
-            best = ((position[:, None] - foot) ** 2).sum(2).argmin(1)
-            found.append(best)
-            feet.append(foot[np.arange(len(position)), best])
-        return np.concatenate(found), np.concatenate(feet)
+        pieces = []
+        feet_m = []
+
+        for chunk_m in np.array_split(positions_m, range(_CHUNK, len(positions_m), _CHUNK)):
+            found, foot_m = self._nearest(chunk_m)
+            pieces.append(found)
+            feet_m.append(foot_m)
+
+        return np.concatenate(pieces), np.concatenate(feet_m)
 
     def with_points(self, positions_m: Points) -> tuple[Streets, Indices]:
-        """The network with a point of its own where each of (k, 2) positions is nearest to it;
-        those points' numbers.
+        """The network with a point of its own where each of (k, 2) positions is nearest to it.
 
-        The pieces that are cut are replaced.
+        Returns those points' numbers too. The pieces that are cut are replaced.
         """
-        found, feet = self.nearest(positions_m)
-        numbers = len(self.points_m) + np.arange(len(feet))
-        points = np.vstack([self.points_m, feet])
-        pieces = [
-            piece
-            for place, piece in enumerate(self.pieces.tolist())
-            if place not in set(found.tolist())
-        ]
-        for place in np.unique(found).tolist():
-            a, b = self.pieces[place].tolist()
-            on_it = numbers[found == place]
-            away = np.hypot(*(points[on_it] - points[a]).T)
-            chain = [a, *on_it[np.argsort(away, kind="stable")].tolist(), b]
-            pieces.extend(list(pair) for pair in itertools.pairwise(chain))
-        return Streets(points, np.array(pieces, np.intp)), numbers
+        cut, feet_m = self.nearest(positions_m)
+        numbers = len(self.points_m) + np.arange(len(feet_m))
+        points_m = np.vstack([self.points_m, feet_m])
+        is_whole = ~np.isin(np.arange(len(self.pieces)), cut)
+        pieces = self.pieces[is_whole].tolist()
 
-    def ways(self, from_points: Indices) -> tuple[Points, Indices]:
+        for piece in np.unique(cut).tolist():
+            start, end = self.pieces[piece].tolist()
+            on_it = numbers[cut == piece]
+            offsets_m = points_m[on_it] - points_m[start]
+            order = np.argsort(np.hypot(*offsets_m.T), kind="stable")
+            chain = [start, *on_it[order].tolist(), end]
+            pieces += [list(pair) for pair in itertools.pairwise(chain)]
+
+        return Streets(points_m, np.array(pieces, np.intp)), numbers
+
+    def shortest_paths(self, from_points: Indices) -> tuple[Points, Indices]:
         """Distances along the streets from each of k points to all, (k, n), infinite where there is
-        no way, and the point before each on the shortest way, (k, n).
+        no path, and the point before each on the shortest path, (k, n).
         """
-        distance, before = dijkstra(
+        distances_m, before = dijkstra(
             self._graph(), directed=False, indices=from_points, return_predecessors=True
         )
-        return distance, before
+        return distances_m, before
+
+    def _nearest(self, positions_m: Points) -> tuple[Indices, Points]:
+        start_m = self.points_m[self.pieces[:, 0]]
+        along_m = self.points_m[self.pieces[:, 1]] - start_m
+        squared_m2 = np.maximum((along_m**2).sum(axis=1), MIN_SQUARED_M2)
+
+        offsets_m = positions_m[:, None] - start_m
+        share = (offsets_m * along_m).sum(axis=2) / squared_m2
+        feet_m = start_m + share.clip(0, 1)[..., None] * along_m
+
+        missing_m = positions_m[:, None] - feet_m
+        best = (missing_m**2).sum(axis=2).argmin(axis=1)
+        return best, feet_m[np.arange(len(positions_m)), best]
 
     def _lengths_m(self) -> Points:
-        along = self.points_m[self.pieces[:, 1]] - self.points_m[self.pieces[:, 0]]
-        return np.asarray(np.hypot(along[:, 0], along[:, 1]))
+        start_m = self.points_m[self.pieces[:, 0]]
+        end_m = self.points_m[self.pieces[:, 1]]
+        along_m = end_m - start_m
+        return np.asarray(np.hypot(along_m[:, 0], along_m[:, 1]))
 
     def _graph(self) -> csr_array:
         # An explicit zero would be no edge at all; of two pieces between the same points the sum
         # would be taken.
         ends = np.sort(self.pieces, axis=1)
         ends, first = np.unique(ends, axis=0, return_index=True)
-        weights = np.maximum(self._lengths_m()[first], 1e-6)
-        return coo_array((weights, ends.T), shape=(len(self.points_m),) * 2).tocsr()
+        weights = np.maximum(self._lengths_m()[first], MIN_LENGTH_M)
+        count = len(self.points_m)
+        return coo_array((weights, ends.T), shape=(count, count)).tocsr()
 
 
-def backwards(before: Indices, end: int) -> list[int]:
-    """The points of the shortest way to `end`, by a row of `Streets.ways`."""
-    way = [end]
-    while before[way[-1]] >= 0:
-        way.append(int(before[way[-1]]))
-    return way[::-1]
+def shortest_path(before: Indices, end: int) -> list[int]:
+    """The points of the shortest path to `end`, by a row of `Streets.shortest_paths`."""
+    path = [end]
+
+    while before[path[-1]] >= 0:
+        path.append(int(before[path[-1]]))
+
+    return path[::-1]

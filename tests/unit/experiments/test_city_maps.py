@@ -10,12 +10,12 @@ import pytest
 from cogmap.errors import CogmapError, UsageError
 from experiments.city_maps.correction import settings
 from experiments.city_maps.drive import Tour, sections, traverse
-from experiments.city_maps.environment import BUILDINGS, MOST_KM2, City, environments
+from experiments.city_maps.environment import BUILDINGS, MAX_KM2, City, environments
 from experiments.city_maps.measure import NOISE, CityMap, Learned, map_error_km2
 from experiments.city_maps.metrics import map_metrics
 from experiments.city_maps.observer import WHEELS
 from experiments.city_maps.sources import from_osm, grown, plane_m
-from experiments.city_maps.streets import Streets, backwards
+from experiments.city_maps.streets import Streets, shortest_path
 from experiments.city_maps.tour import shortest_tour
 from services.sim.odometry import Noise
 
@@ -49,15 +49,15 @@ def test_a_tour_past_what_cannot_be_reached_is_refused() -> None:
 
 def test_ways_follow_the_streets_between_points_put_on_them() -> None:
     streets, (east, north) = CROSS.with_points(np.array([(60.0, 9.0), (-5.0, 80.0)]))
-    distance, before = streets.ways(np.array([east, north]))
+    distance, before = streets.shortest_paths(np.array([east, north]))
     assert distance[0, north] == pytest.approx(140.0)
-    way = streets.points_m[backwards(before[0], int(north))]
+    way = streets.points_m[shortest_path(before[0], int(north))]
     assert way.tolist() == [[60.0, 0.0], [0.0, 0.0], [0.0, 80.0]]
 
 
 def test_two_points_on_one_piece_stand_in_order() -> None:
     streets, (far, near) = CROSS.with_points(np.array([(80.0, 1.0), (20.0, 1.0)]))
-    distance, _ = streets.ways(np.array([near]))
+    distance, _ = streets.shortest_paths(np.array([near]))
     assert distance[0, far] == pytest.approx(60.0)
     assert distance[0, 0] == pytest.approx(20.0)
     assert streets.length_m == pytest.approx(CROSS.length_m)
@@ -78,7 +78,7 @@ def test_an_environment_has_eight_buildings_in_four_square_kilometres_and_a_tour
     (environment,) = environments(grown(seed), 1, seed)
     assert environment.buildings_m.shape == (BUILDINGS, 2)
     assert len(set(environment.names)) == BUILDINGS
-    assert environment.area_km2 <= MOST_KM2
+    assert environment.area_km2 <= MAX_KM2
     for leg, building in zip(environment.legs_m, environment.buildings_m, strict=True):
         assert np.hypot(*(leg[0] - building)) < 40.0
     for leg, following in zip(
