@@ -36,4 +36,5 @@ class LockstepGate:
         has_senses = min(self.scan_ns, self.motion_ns) >= stamp_ns
         has_competition = self._competition_cycle >= cycle - 1
         lacks_broadcast = self._awaits_broadcast and self._broadcast_cycle < self._competition_cycle
+
         return has_senses and has_competition and not lacks_broadcast

@@ -67,6 +67,7 @@ class ActionModule:
             if isinstance(message, Action):
                 self._chosen = message
                 self._is_resumed = True
+
         if self._chosen is not None and self._route is not None:
             travelled_m = float(self._chosen.parameters.get("travelled_m", 0.0))
             self._route.resume(travelled_m)
@@ -87,6 +88,7 @@ class ActionModule:
         age_ns = self._age_ns(last.stamp_ns)
         if age_ns <= self._config.max_pose_age_s * 1e9:
             return None
+
         return self._remember(halted(last.stamp_ns, SpeedLimit.POSE_AGE, age_ns))
 
     def on_motion(self, motion: SelfMotion) -> MotorCommand | None:
@@ -94,6 +96,7 @@ class ActionModule:
         self._stuck.on_motion(motion)
         self._gate.motion_ns = motion.stamp_ns
         self._newest_ns = max(self._newest_ns, motion.stamp_ns)
+
         return self._command()
 
     def on_scan(self, scan: RangeScan) -> MotorCommand | None:
@@ -102,6 +105,7 @@ class ActionModule:
         is_repeated = scan.stamp_ns == self._gate.scan_ns
         self._gate.scan_ns = scan.stamp_ns
         self._newest_ns = max(self._newest_ns, scan.stamp_ns)
+
         return self._command(at_once=is_repeated)
 
     def on_delta(self, delta: Delta) -> MotorCommand | None:
@@ -111,6 +115,7 @@ class ActionModule:
         pose = _self_pose(delta)
         if pose is None:
             return None
+
         if self._is_lockstep and self._is_answered(delta):
             return self._answered
 
@@ -119,6 +124,7 @@ class ActionModule:
         if self._is_resumed:
             self._gate.resume(delta.cycle)
             self._is_resumed = False
+
         return self._command(at_once=is_repeated and delta.phase == "localization")
 
     def on_competition(self, competition: Competition) -> MotorCommand | None:
@@ -148,13 +154,16 @@ class ActionModule:
             parameters=self._parameters(),
             behaviours=selection.considered,
         )
+
         return self._chosen
 
     def _parameters(self) -> dict[str, Scalar]:
         if self._route is None:
             return {}
+
         leg = self._route.leg
         length_m, turn_rad = self._config.route[leg]
+
         return {
             "leg": leg,
             "length_m": length_m,
@@ -167,11 +176,13 @@ class ActionModule:
         estimate = self._waiting
         if estimate is None:
             return None
+
         is_open = at_once or self._gate.is_open(estimate.stamp_ns, estimate.cycle)
         if self._is_lockstep and not is_open:
             return None
 
         self._waiting = None
+
         return self._remember(self._answer(estimate))
 
     def _answer(self, estimate: Estimate) -> MotorCommand:
@@ -183,14 +194,17 @@ class ActionModule:
         self._route.advance(estimate.pose.x_m, estimate.pose.y_m)
         if self._chosen is None or self._chosen.scheme == HALT:
             return halted(stamp_ns, SpeedLimit.NO_ACTION, age_ns)
+
         if self._stuck.is_stuck:
             return halted(stamp_ns, SpeedLimit.STUCK, age_ns)
+
         return self._motor.command(stamp_ns, estimate.pose, self._clear_m, age_ns)
 
     def _remember(self, command: MotorCommand) -> MotorCommand:
         wheels_rad_s = (command.left_wheel_rad_s + command.right_wheel_rad_s) / 2
         self._stuck.on_command(wheels_rad_s * self._config.wheel_radius_m)
         self._answered = command
+
         return command
 
     def _age_ns(self, stamp_ns: int) -> int:
@@ -210,6 +224,7 @@ def _self_pose(delta: Delta) -> Pose | None:
         return None
 
     place = nodes[-1].attributes
+
     return Pose(
         x_m=float(place["x_m"]),
         y_m=float(place["y_m"]),
@@ -232,4 +247,5 @@ def build(config: Config, instance: str) -> Module:
     )
     if config.mode == "real_time":
         module.on(topics.CLOCK, action.on_clock, emits=commands)
+
     return module

@@ -42,6 +42,7 @@ def obstacle_ahead_m(scan: RangeScan, half_width_m: float) -> float:
     ahead_m = range_m * np.cos(bearing_rad)
 
     nearest_m = np.sort(ahead_m[is_seen & is_in_lane & is_in_front])
+
     return float(nearest_m[1]) if len(nearest_m) > 1 else math.inf
 
 
@@ -76,6 +77,7 @@ class SensoryMotorMemory:
         config = self._config
         speed_m_s, curvature_per_m = self._steer(speed.m_s, pose)
         half_turn_m_s = speed_m_s * curvature_per_m * config.track_m / 2
+
         return MotorCommand(
             stamp_ns=stamp_ns,
             left_wheel_rad_s=(speed_m_s - half_turn_m_s) / config.wheel_radius_m,
@@ -100,6 +102,7 @@ class SensoryMotorMemory:
 
         if abs(bearing_rad) > math.pi / 2:
             speed_m_s = min(speed_m_s, TURNING_SPEED_M_S)
+
         return speed_m_s, curvature_per_m
 
     def _speed(self, clear_m: float, pose_age_s: float) -> Speed:
@@ -119,6 +122,7 @@ class SensoryMotorMemory:
             SpeedLimit.POSE_AGE: self._speed_by_age(pose_age_s),
         }
         limit = min(limits, key=lambda each: limits[each])
+
         return Speed(limits[limit], limit)
 
     def _speed_by_age(self, age_s: float) -> float:
@@ -126,6 +130,8 @@ class SensoryMotorMemory:
         config = self._config
         if age_s <= 0.0:
             return math.inf
+
         if age_s > config.max_pose_age_s:
             return 0.0
+
         return config.blind_m / age_s

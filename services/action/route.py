@@ -79,6 +79,7 @@ def _corners(legs: list[Leg], overrun_m: float) -> list[Floats]:
         heading_rad += turn_rad
 
     corners.append(corner_m + overrun_m * _direction(heading_rad))
+
     return corners
 
 
@@ -91,6 +92,7 @@ def _rounded(corners: list[Floats], radius_m: float) -> Floats:
     points = [corners[0]]
     for (before, corner), (_, after) in pairwise(pairwise(corners)):
         points.extend(_arc(before, corner, after, radius_m))
+
     return np.vstack([*points, corners[-1]])
 
 
@@ -109,6 +111,7 @@ def _arc(before: Floats, corner: Floats, after: Floats, radius_m: float) -> Floa
 
     share = np.linspace(0, 1, ARC_POINTS)[:, None]
     curve: Floats = (1 - share) ** 2 * start + 2 * share * (1 - share) * corner + share**2 * end
+
     return curve
 
 
@@ -119,4 +122,5 @@ def _curvature(points_m: Floats) -> Floats:
     turn_rad = np.abs(np.diff(heading_rad, append=0.0))
     turn_rad[-1] = 0.0
     curvature_per_m: Floats = turn_rad / STEP_M
+
     return curvature_per_m

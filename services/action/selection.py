@@ -36,6 +36,7 @@ class Scheme:
         mean_context = sum(context[part] for part in self.context) / len(self.context)
         saliences = [abs(salience) for salience in self.adding.values()]
         mean_adding = sum(saliences) / max(1, len(saliences))
+
         return min(1.0, mean_context + mean_adding)
 
 
@@ -82,6 +83,7 @@ class ActionSelection:
         for each in instantiated:
             if each is not best:
                 each.rejection = Rejection.LESS_ACTIVE
+
         return Selection(best, considered)
 
     def _behaviour(self, scheme: Scheme, context: Context) -> Behaviour:
@@ -92,6 +94,7 @@ class ActionSelection:
             behaviour.rejection = Rejection.CONTEXT_MISSING
         elif activation < self._config.instantiation:
             behaviour.rejection = Rejection.NOT_INSTANTIATED
+
         return behaviour
 
 
@@ -101,4 +104,5 @@ def _context(content: list[Node], route: Context) -> Context:
     for node in content:
         activation = min(1.0, node.base_level + node.activation)
         context[node.kind] = max(context.get(node.kind, 0.0), activation)
+
     return context

@@ -71,4 +71,5 @@ def _mean_speeds(motion: SelfMotion) -> Speeds:
 
     distance_m = float(np.abs(rows[:, 0] * rows[:, 2]).sum())
     turn_rad = float(np.abs(rows[:, 1] * rows[:, 2]).sum())
+
     return Speeds(distance_m / duration_s, turn_rad / duration_s)

@@ -85,12 +85,14 @@ class GlobalWorkspace:
             trigger=trigger,
             coalition=winner.coalition,
         )
+
         return [broadcast, competition]
 
     def _check_new(self, coalitions: Coalitions) -> None:
         key = (coalitions.cycle, coalitions.stamp_ns)
         if key in self._received:
             raise MessageError(f"the coalitions of cycle {coalitions.cycle} came twice")
+
         self._received.append(key)
 
     def _decay(self, passed_ns: int) -> list[Contender]:
@@ -102,6 +104,7 @@ class GlobalWorkspace:
             if candidate.activation <= 0.0:
                 decayed.append(candidate.with_fate(Fate.DECAYED))
                 del self._candidates[codelet]
+
         return decayed
 
     def _enter(self, coalitions: Coalitions) -> list[Contender]:
@@ -116,6 +119,7 @@ class GlobalWorkspace:
                 displaced.append(before.with_fate(Fate.DISPLACED))
             name = f"{codelet}/{coalitions.cycle}"
             self._candidates[codelet] = Candidate(name, coalition, coalition.activation)
+
         return displaced
 
     def _trigger(self) -> Trigger:
@@ -134,6 +138,7 @@ class GlobalWorkspace:
             Trigger.NO_NEW_COALITION: old_ticks >= config.no_new_coalition_ticks,
         }
         met = [trigger for trigger, is_met in conditions.items() if is_met]
+
         return met[0] if met else Trigger.NONE
 
     def _pop_winner(self) -> Candidate:
@@ -141,6 +146,7 @@ class GlobalWorkspace:
         codelets = sorted(self._candidates)
         best = max(codelets, key=lambda codelet: self._candidates[codelet].activation)
         self._broadcast_ns = self._now_ns
+
         return self._candidates.pop(best)
 
     def _report(self, winner: Candidate | None, losers: list[Contender]) -> list[Contender]:
@@ -148,8 +154,10 @@ class GlobalWorkspace:
         contenders = list(losers)
         if winner is not None:
             contenders.append(winner.with_fate(Fate.WON))
+
         waiting = self._candidates.values()
         contenders += [candidate.with_fate(Fate.WAITING) for candidate in waiting]
+
         return sorted(contenders, key=lambda each: (each.codelet, each.id))
 
     def _silent_ticks(self) -> float:

@@ -62,6 +62,7 @@ class StereoMatcher:
 
         is_unsure = (steps <= 0) | (disparity_px <= MIN_DISPARITY_PX)
         disparity_px[is_unsure] = 0.0
+
         return disparity_px
 
     def _match(self, left: npt.NDArray[Any], right: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -91,6 +92,7 @@ class DepthFromStereo:
         depth_m = np.zeros(disparity_px.shape, np.float32)
         focal_baseline = np.float32(self._focal_baseline)
         np.divide(focal_baseline, disparity_px, out=depth_m, where=disparity_px > 0)
+
         return depth_m
 
 
@@ -117,6 +119,7 @@ def refined(disparity_px: Singles, left: Singles, right: Singles) -> Singles:
         step_px = _local_mean(slope * error) / (_local_mean(slope * slope) + NOISE_GRADIENT)
         least_px = disparity_px - MAX_STEP_PX
         result_px = np.clip(result_px + step_px, least_px, disparity_px + MAX_STEP_PX)
+
     return result_px
 
 

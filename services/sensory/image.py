@@ -20,4 +20,5 @@ def colour_image(array: Array, calibration: Calibration, name: str) -> Bytes:
             f"{name} image: expected uint8 {expected} as calibrated, "
             f"got {array.dtype} {array.shape}"
         )
+
     return array.numpy().astype(np.uint8, copy=False)

@@ -51,8 +51,10 @@ class SensoryMemory:
 
         if self._last_ns is not None and frame.stamp_ns <= self._last_ns:
             return self._repeated(frame)
+
         if self._waiting is None or frame.stamp_ns > self._waiting.stamp_ns:
             self._waiting = frame
+
         return self._emit()
 
     def on_odometry(self, odometry: Odometry) -> list[Message]:
@@ -74,12 +76,14 @@ class SensoryMemory:
         self._waiting = None
         ranges, view = self._views(frame)
         self._answer = [self._self_motion(frame, view), ranges, view]
+
         return self._answer
 
     def _self_motion(self, frame: StereoFrame, view: View) -> SelfMotion:
         began_ns, rows = self._odometry.take(frame.stamp_ns)
         if self._last_ns is None:
             self._last_ns = frame.stamp_ns if began_ns is None else began_ns
+
         since_ns = self._last_ns
         self._last_ns = frame.stamp_ns
 
@@ -87,6 +91,7 @@ class SensoryMemory:
         depth_m = view.depth_m.numpy().astype(np.float32)
         wheels = self._noise.total(rows)
         motion = self._visual_odometry.update(image, depth_m, view.calibration, wheels)
+
         return SelfMotion(
             stamp_ns=frame.stamp_ns,
             frame=frame.frame,
@@ -117,12 +122,14 @@ class SensoryMemory:
             depth_m=Array.of(depth_m),
             calibration=calibration,
         )
+
         return ranges, view
 
     def _matcher(self, calibration: Calibration) -> DepthFromStereo:
         if self._depth is None or self._depth[0] != calibration:
             matcher = DepthFromStereo(calibration, self._config.nearest_m)
             self._depth = (calibration, matcher)
+
         return self._depth[1]
 
 
@@ -132,4 +139,5 @@ def build(config: Config, instance: str) -> Module:
     emits = (topics.SELF_MOTION, topics.SCAN, topics.VIEW)
     module = Module("sensory", instance)
     module.on(topics.STEREO, memory.on_frame, emits=emits)
+
     return module.on(topics.ODOMETRY, memory.on_odometry, emits=emits)

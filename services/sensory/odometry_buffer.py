@@ -43,6 +43,7 @@ class OdometryBuffer:
         """
         if self.newest_ns is None or stamp_ns <= self.newest_ns + self._longest_gap_ns:
             return
+
         ahead_s = (stamp_ns - self.newest_ns) / NS_PER_S
         raise MessageError(
             f"{name}: {ahead_s:.0f} s ahead of the odometry; restart sensory if that is right"
@@ -60,6 +61,7 @@ class OdometryBuffer:
         self._rows = self._rows[len(taken) :]
         rows = [(row.speed_m_s, row.turn_rate_rad_s, row.dt_s) for row in taken]
         began_ns = _began_ns(taken[0]) if taken else None
+
         return began_ns, np.array(rows, np.float64).reshape(-1, 3)
 
 

@@ -46,8 +46,10 @@ def rectification(calibration: Calibration) -> Rectification:
     most_px = max(calibration.fx_px, calibration.fy_px)
     if least_px < MIN_FOCAL_PX or most_px > MAX_FOCAL_PX:
         raise MessageError("calibration: the focal lengths must be between 1 and 100000 pixels")
+
     if calibration.cx_px > calibration.width_px or calibration.cy_px > calibration.height_px:
         raise MessageError("calibration: the principal point must lie in the image")
+
     return _cached(msgspec.msgpack.encode(calibration))
 
 
@@ -62,6 +64,7 @@ def _cached(encoded: bytes) -> Rectification:
     )
     left = _maps(calibration, calibration.left_distortion, _STRAIGHT)
     right = _maps(calibration, calibration.right_distortion, calibration.right_rotation_rad)
+
     return Rectification(rectified, left, right)
 
 
@@ -87,12 +90,15 @@ def _maps(
     )
     if not (np.isfinite(columns).all() and np.isfinite(rows).all()):
         raise MessageError("calibration: its distortion maps pixels to infinity")
+
     return columns.astype(np.float32, copy=False), rows.astype(np.float32, copy=False)
 
 
 def _remap(image: Bytes, maps: Maps | None) -> Bytes:
     if maps is None:
         return image
+
     columns, rows = maps
     rectified = cv2.remap(image, columns, rows, cv2.INTER_LINEAR)
+
     return rectified.astype(np.uint8, copy=False)

@@ -36,6 +36,7 @@ def scan(depth_m: Singles, calibration: Calibration, sectors: int) -> tuple[Sing
     range_m[np.isinf(range_m)] = 0.0
 
     bearing_rad = half_rad - (np.arange(sectors) + 0.5) * sector_rad
+
     return bearing_rad.astype(np.float32), range_m.astype(np.float32)
 
 
@@ -66,4 +67,5 @@ def _nearest_by_column(depth_m: Singles, calibration: Calibration) -> Floats:
     candidates_m = np.where(is_obstacle, depth_m, np.inf).astype(np.float64)
     sorted_m: Floats = np.partition(candidates_m, SURE_PIXELS - 1, axis=0)
     nearest_m: Floats = sorted_m[SURE_PIXELS - 1]
+
     return nearest_m

@@ -64,6 +64,7 @@ class Scale:
             self._update(seen.distance_m, wheels)
 
         scale_sd_m = seen.distance_m / math.sqrt(self._information)
+
         return Motion(
             distance_m=seen.distance_m * self._mean,
             turn_rad=seen.turn_rad,
@@ -110,6 +111,7 @@ class VisualOdometry:
             seen = _estimate(pair, corners_px, guess, wheels)
             if seen is not None:
                 return self._scale.correct(seen, wheels)
+
         return wheels
 
 
@@ -145,6 +147,7 @@ def _estimate(pair: _Pair, corners_px: Singles, guess: Floats, wheels: Motion) -
 
     points_m = _points(corners_px[tracks.is_found], pair.depth_m, pair.calibration)
     before_px = tracks.before_px[tracks.is_found]
+
     return _solve(points_m, before_px, guess, wheels, pair.calibration)
 
 
@@ -155,6 +158,7 @@ def _corners(grey: Bytes, depth_m: Singles) -> Singles:
     found = cv2.goodFeaturesToTrack(grey, CORNERS, 0.01, 7, mask=mask)
     if found is None:
         return np.empty((0, 2), np.float32)
+
     return np.asarray(found, np.float32).reshape(-1, 2)
 
 
@@ -164,6 +168,7 @@ def _points(pixels: Singles, depth_m: Singles, calibration: Calibration) -> Floa
     ahead_m = depth_m[row, column].astype(np.float64)
     left_m = -(pixels[:, 0] - calibration.cx_px) / calibration.fx_px * ahead_m
     up_m = -(pixels[:, 1] - calibration.cy_px) / calibration.fy_px * ahead_m
+
     return np.column_stack([ahead_m + calibration.mount_forward_m, left_m, up_m])
 
 
@@ -182,6 +187,7 @@ def _track_back(pair: _Pair, corners_px: Singles, guess: Floats) -> _Tracks:
     height_px, width_px = pair.new.shape
     in_image = (before_px >= 0) & (before_px <= (width_px - 1, height_px - 1))
     is_found = np.asarray(is_tracked[:, 0], bool) & np.all(in_image, axis=1)
+
     return _Tracks(np.asarray(before_px, np.float64), is_found)
 
 
@@ -203,6 +209,7 @@ def _redraw(pair: _Pair, guess: Floats) -> tuple[Bytes, Singles]:
         cv2.INTER_LINEAR,
         borderMode=cv2.BORDER_REPLICATE,
     )
+
     return np.asarray(redrawn, np.uint8), before
 
 
@@ -228,6 +235,7 @@ def _project(points_m: Floats, motion: Floats, calibration: Calibration) -> Floa
     y = -points_m[:, 2] / ahead_m
     tilted = np.column_stack([x - roll_rad * y, y + roll_rad * x + pitch_rad])
     focal_px = (calibration.fx_px, calibration.fy_px)
+
     return tilted * focal_px + (calibration.cx_px, calibration.cy_px)
 
 
@@ -259,8 +267,10 @@ def _solve(
     distance_px = np.hypot(*residual_px.T)
     if (distance_px < OUTLIER_PX).mean() < MIN_INLIER_SHARE:
         return None
+
     inflation = max(1.0, float(np.median(distance_px)) / TRACK_SD_PX)
     deviation = inflation * np.sqrt(np.diag(np.linalg.inv(information)))
+
     return Motion(float(motion[0]), float(motion[2]), float(deviation[0]), float(deviation[2]))
 
 
@@ -287,8 +297,10 @@ def _linearize(
     for step in np.diag(np.full(5, DIFFERENCE)):
         moved_px = _project(points_m, motion + step, calibration)
         columns.append((moved_px - predicted_px) / DIFFERENCE)
+
     jacobian = np.stack(columns, axis=2)
 
     distance_px = np.hypot(residual_px[:, 0], residual_px[:, 1])
     weight = 1 / (1 + (distance_px / OUTLIER_PX) ** 2) ** 2 / TRACK_SD_PX**2
+
     return _Fit(residual_px, jacobian, weight)

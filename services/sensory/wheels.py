@@ -30,6 +30,7 @@ class WheelNoise:
         distance_var_m2 = (self.speed * distance_m) ** 2
         drift_var_rad2 = self.drift_rad_per_sqrt_m**2 * np.abs(distance_m)
         turn_var_rad2 = (self.turn * turn_rad) ** 2 + drift_var_rad2
+
         return Motion(
             distance_m=float(distance_m.sum()),
             turn_rad=float(turn_rad.sum()),
@@ -49,10 +50,12 @@ def fuse(rows: Floats, motion: Motion, wheels: Motion) -> Floats:
     speed_m_s, turn_rate_rad_s, dt_s = rows.T
     if abs(wheels.distance_m) > STILL_M:
         speed_m_s = speed_m_s * motion.distance_m / wheels.distance_m
+
     turn_error_rad = motion.turn_rad - wheels.turn_rad
     turn_rate_rad_s = turn_rate_rad_s + turn_error_rad / dt_s.sum()
 
     share = 1 / (dt_s * np.sqrt(len(rows)))
     speed_sd_m_s = motion.distance_sd_m * share
     turn_rate_sd_rad_s = motion.turn_sd_rad * share
+
     return np.column_stack([speed_m_s, turn_rate_rad_s, dt_s, speed_sd_m_s, turn_rate_sd_rad_s])

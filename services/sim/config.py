@@ -99,11 +99,13 @@ def check(config: Config) -> None:
             f"[sim] frame_hz is {config.frame_hz}: "
             f"choose one that divides odometry_hz, {config.odometry_hz}"
         )
+
     steps_hz = round(1 / STEP_S)
     if steps_hz % config.odometry_hz:
         raise ConfigError(
             f"[sim] odometry_hz is {config.odometry_hz}: choose one that divides {steps_hz}"
         )
+
     if config.trajectory is not None:
         _check_trajectory(config.trajectory, config.mode)
 
@@ -113,6 +115,7 @@ def _check_trajectory(trajectory: Trajectory, mode: str) -> None:
         raise ConfigError(
             '[sim] a robot follows a trajectory in lockstep only: set mode to "lockstep"'
         )
+
     if trajectory.sensing != "cameras":
         return
 

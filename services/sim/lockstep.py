@@ -60,7 +60,9 @@ class Lockstep:
         """
         if command.stamp_ns != self._frame_ns or self._simulation.progress >= 1.0:
             return None
+
         self._simulation.drive(command)
+
         return self._advance()
 
     def on_timer(self, wall_ns: int) -> list[Message]:
@@ -69,13 +71,16 @@ class Lockstep:
         """
         if self._frame_ns is None or self._simulation.progress >= 1.0:
             return []
+
         if self._timed_frame_ns != self._frame_ns:
             self._timed_frame_ns = self._frame_ns
             self._waiting_since_ns = wall_ns
+
         if wall_ns - self._waiting_since_ns < self._repeat_after_ns:
             return []
 
         self._waiting_since_ns = wall_ns
+
         return self._senses
 
     def _advance(self) -> list[Message]:
@@ -83,10 +88,12 @@ class Lockstep:
         odometry: list[Message] = []
         for _ in range(simulation.ticks_per_frame):
             odometry += simulation.step()
+
         clock = simulation.clock(0.0)
         truth = simulation.truth()
         view = simulation.view()
 
         self._frame_ns = simulation.now_ns
         self._senses = [*odometry, *view]
+
         return [*odometry, clock, truth, *view]

@@ -30,6 +30,7 @@ def build(config: Config, instance: str = "sim") -> Module:
     module.journaling(topics.TRUE_POSE, simulation.resume, simulation.truth)
     if config.mode == "lockstep":
         return _in_lockstep(module, config, simulation, _CAMERA_LEVEL)
+
     return _in_real_time(module, config, simulation)
 
 
@@ -42,6 +43,7 @@ def _scripted(module: Module, config: Config, trajectory: Trajectory) -> Module:
     percepts = PerceptLevelSim(
         trajectory, config.noise, config.percepts, config.frame_hz, config.seed
     )
+
     return _in_lockstep(module, config, percepts, _PERCEPT_LEVEL)
 
 
@@ -51,6 +53,7 @@ def _in_lockstep(
     lockstep = Lockstep(simulation, config.repeat_after_s)
     module.on(topics.MOTOR_COMMAND, lockstep.on_command, emits)
     module.on_start(lockstep.on_start, _required(config), emits)
+
     return module.every(REPEAT_CHECK_NS, lockstep.on_timer, emits)
 
 
@@ -58,6 +61,7 @@ def _in_real_time(module: Module, config: Config, simulation: Simulation) -> Mod
     real_time = RealTime(simulation, config.command_timeout_s, config.max_command_age_s)
     module.on(topics.MOTOR_COMMAND, real_time.on_command)
     module.on_start(real_time.on_start, _required(config))
+
     return module.every(simulation.tick_ns, real_time.on_timer, _CAMERA_LEVEL)
 
 

@@ -53,6 +53,7 @@ class WheelOdometry:
         deviations = (noise.speed, noise.turn, noise.drift_rad_per_sqrt_m)
         speed, turn, drift = self._rng.normal((1.0, 1.0, 0.0), deviations).tolist()
         measured_rad = turn_rad * turn + drift * math.sqrt(abs(forward_m))
+
         return Odometry(
             speed_m_s=forward_m * speed / dt_s,
             turn_rate_rad_s=measured_rad / dt_s,

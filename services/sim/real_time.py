@@ -51,6 +51,7 @@ class RealTime:
                 f"motor command: it is {age_ns / 1e9:.1f} s old, and the wheels obey none older "
                 f"than {self._max_age_ns / 1e9:g} s: lower the frame rate or use a faster machine"
             )
+
         self._command_ns = command.stamp_ns
         self._arrived_ns = now_ns
         self._simulation.drive(command)
@@ -70,8 +71,10 @@ class RealTime:
         if messages:
             rate = self._rate(wall_ns)
             messages += [self._simulation.clock(rate), self._simulation.truth()]
+
         if is_frame_due:
             messages.append(self._simulation.frame())
+
         return messages
 
     def _fall_behind(self, wall_ns: int) -> None:
@@ -81,6 +84,7 @@ class RealTime:
         else:
             passed_ns = wall_ns - self._wall_ns
             self._behind_ns = min(self._behind_ns + passed_ns, CATCH_UP_NS)
+
         self._wall_ns = wall_ns
 
     def _tick(self) -> list[Message]:
@@ -92,12 +96,14 @@ class RealTime:
         is_town_due = simulation.now_ns % TOWN_PERIOD_NS == 0
         town: list[Message] = [simulation.town()] if is_town_due else []
         self._behind_ns -= simulation.tick_ns
+
         return [*town, simulation.tick()]
 
     def _is_command_over(self) -> bool:
         now_ns = self._simulation.now_ns
         is_silent = now_ns - self._arrived_ns >= self._timeout_ns
         is_old = now_ns - self._command_ns > self._max_age_ns
+
         return is_silent or is_old
 
     def _is_at_frame(self) -> bool:
@@ -113,4 +119,5 @@ class RealTime:
 
         first_wall_ns, first_ns = history[0]
         passed_ns = wall_ns - first_wall_ns
+
         return (self._simulation.now_ns - first_ns) / passed_ns if passed_ns else 1.0

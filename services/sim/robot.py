@@ -104,6 +104,7 @@ class Robot:
         )
         for link, friction in enumerate((_GRIP, _GRIP, 0.0, 0.0)):
             pybullet.changeDynamics(body, link, lateralFriction=friction, physicsClientId=client)
+
         return int(body)
 
     def _trunk(self) -> int:

@@ -40,6 +40,7 @@ class Simulation:
         last: Message | None = None
         for message in past:
             last = message
+
         if not isinstance(last, TruePose):
             return
 
@@ -71,6 +72,7 @@ class Simulation:
         self._travelled_m += math.sqrt(dx_m**2 + dy_m**2)
         odometry = self._odometry.measure(before, self._pose, dt_s)
         odometry.stamp_ns = self.now_ns
+
         return odometry
 
     def step(self) -> list[Message]:
@@ -95,6 +97,7 @@ class Simulation:
         """The robot's true pose."""
         pose = self._pose
         self.progress = self._progress.advance(pose.x_m, pose.y_m)
+
         return TruePose(
             stamp_ns=self.now_ns,
             pose=pose,

@@ -41,6 +41,7 @@ class World:
         self.town = town
         with quiet():
             self.client: int = pybullet.connect(pybullet.DIRECT)
+
         self.egl = Egl.load(self.client) if want_egl and egl_works() else None
         self._leave = weakref.finalize(self, _leave, self.client, self.egl)
         renderer = "EGL" if self.egl else "TinyRenderer, more slowly than by EGL"
@@ -91,6 +92,7 @@ class World:
         self.sky = self._add(sky, picture)
         for plot in self.town.plots:
             self._add_building(plot)
+
         for prop in self.town.props:
             surface, picture = prop_shapes.shape(prop)
             at_m = (prop.x_m, prop.y_m)
@@ -159,6 +161,7 @@ class World:
             texture = pybullet.loadTexture(str(paint), physicsClientId=client)
 
         pybullet.changeVisualShape(body, -1, textureUniqueId=texture, physicsClientId=client)
+
         return int(body)
 
 
@@ -168,6 +171,7 @@ def _relief(town: Place) -> Singles:
     for prop in town.props:
         _, _, height_m = prop.size_m
         boxes.append((prop.area, height_m))
+
     return relief(boxes)
 
 

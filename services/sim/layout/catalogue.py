@@ -53,6 +53,7 @@ def _type(
     width_m, depth_m, height_m = size_m
     wall, accent, door = colours.split()
     trim, roof = finish
+
     return BuildingType(
         name=name,
         width_m=width_m,
@@ -209,6 +210,7 @@ def _invent(name: str, rng: np.random.Generator) -> BuildingType:
     trim = _rgb(str(rng.choice(_FINISHES)))
     roof = _rgb(str(rng.choice(_ROOFS)))
     is_gabled = rng.random() < 0.35
+
     return BuildingType(
         name=name,
         width_m=width_m,
@@ -238,4 +240,5 @@ def _paint(rng: np.random.Generator) -> Colour:
     value = float(rng.uniform(0.35, 0.98))
 
     red, green, blue = colorsys.hsv_to_rgb(hue, saturation, value)
+
     return round(255 * red), round(255 * green), round(255 * blue)

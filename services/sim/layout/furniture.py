@@ -50,6 +50,7 @@ class Prop:
 
         reach_x_m = cos * half_length_m + sin * half_width_m
         reach_y_m = sin * half_length_m + cos * half_width_m
+
         return (
             self.x_m - reach_x_m,
             self.y_m - reach_y_m,
@@ -81,6 +82,7 @@ def furnish(seed: int, roads: Sequence[Road], plots: Sequence[Plot]) -> tuple[Pr
         if not any(overlap(area, other, _GAP_M) for other in occupied):
             props.append(prop)
             occupied.append(area)
+
     return tuple(props)
 
 
@@ -93,6 +95,7 @@ def _along(rng: np.random.Generator, roads: Sequence[Road]) -> list[Prop]:
             while along_m < road.length_m:
                 props.append(_beside(rng, road, along_m, side))
                 along_m += float(rng.uniform(0.6, 2.0)) * _SPACING_M
+
     return props
 
 
@@ -103,6 +106,7 @@ def _scattered(rng: np.random.Generator) -> list[Prop]:
         x_m, y_m = rng.uniform(-_AROUND_M, _AROUND_M, 2).tolist()
         heading_rad = float(rng.uniform(-math.pi, math.pi))
         props.append(_prop(rng, x_m, y_m, heading_rad))
+
     return props
 
 
@@ -110,6 +114,7 @@ def _prop(rng: np.random.Generator, x_m: float, y_m: float, heading_rad: float) 
     kind = str(rng.choice(list(_SIZES), p=_PROBABILITIES))
     least_m, most_m = _SIZES[kind]
     length_m, width_m, height_m = rng.uniform(least_m, most_m).round(2).tolist()
+
     return Prop(
         kind=kind,
         x_m=round(x_m, 3),
@@ -129,4 +134,5 @@ def _beside(rng: np.random.Generator, road: Road, along_m: float, side: float) -
 
     left_m = side * float(rng.uniform(least_m, most_m))
     x_m, y_m = road.point(along_m, left_m)
+
     return replace(prop, x_m=round(x_m, 3), y_m=round(y_m, 3))

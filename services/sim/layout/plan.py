@@ -56,6 +56,7 @@ class Road:
 
         x_m = start_x + along_m * cos - left_m * sin
         y_m = start_y + along_m * sin + left_m * cos
+
         return x_m, y_m
 
     def area(self, reach_m: float) -> Rectangle:
@@ -68,6 +69,7 @@ class Road:
         south = min(start_y, end_y) - reach_m
         east = max(start_x, end_x) + reach_m
         north = max(start_y, end_y) + reach_m
+
         return west, south, east, north
 
 
@@ -95,6 +97,7 @@ class Plot:
         south = self.y_m - half_y_m
         east = self.x_m + half_x_m
         north = self.y_m + half_y_m
+
         return west, south, east, north
 
 
@@ -104,4 +107,5 @@ def overlap(a: Rectangle, b: Rectangle, gap_m: float = 0.0) -> bool:
     b_west, b_south, b_east, b_north = b
     in_x = a_west < b_east + gap_m and b_west < a_east + gap_m
     in_y = a_south < b_north + gap_m and b_south < a_north + gap_m
+
     return in_x and in_y

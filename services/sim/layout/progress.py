@@ -33,6 +33,7 @@ class Progress:
         away_m = self._points_m[self._index : end] - (x_m, y_m)
         nearest = np.argmin(np.hypot(*away_m.T))
         self._index += int(nearest)
+
         return self._index / self._last
 
     @property

@@ -44,6 +44,7 @@ def _roads(line: Line) -> tuple[Road, ...]:
 def _plots(landmarks: list[Landmark], line: Line) -> tuple[Plot, ...]:
     places_m = np.array([(each.x_m, each.y_m) for each in landmarks], float).reshape(-1, 2)
     to_line_m = line.nearest(places_m) - places_m
+
     return tuple(
         _plot(landmark, x_m, y_m)
         for landmark, (x_m, y_m) in zip(landmarks, to_line_m.tolist(), strict=True)
@@ -63,4 +64,5 @@ def _plot(landmark: Landmark, to_line_x_m: float, to_line_y_m: float) -> Plot:
 
     # A front looks to the right of its heading.
     heading_rad = math.remainder(math.atan2(to_line_x_m, -to_line_y_m), math.tau)
+
     return Plot(kind, landmark.x_m, landmark.y_m, heading_rad)

@@ -74,6 +74,7 @@ class Town(Place):
             for before, after in pairwise(roads)
         ]
         lengths_m = [road.length_m for road in roads]
+
         return list(zip(lengths_m, [*turns_rad, 0.0], strict=True))
 
     def line(self, laps: float = 1.0) -> list[Point]:
@@ -108,6 +109,7 @@ def generate(seed: int, kinds: tuple[BuildingType, ...] = CATALOGUE) -> Town:
         plots = _settle(rng, roads, kinds)
 
     start_x_m = float(rng.uniform(-0.7, -0.3)) * half_x_m
+
     return Town(
         seed=seed,
         roads=tuple(roads),
@@ -133,6 +135,7 @@ def _settle(
     for road in (south, north, east, west):
         settlement.line(road, left=True)
         settlement.line(road, left=False)
+
     return settlement.plots
 
 
@@ -170,6 +173,7 @@ class _Settlement:
             end_m = along_m + kind.width_m
             if end_m < road.length_m + _REACH_M and self._is_free(plot.footprint):
                 return plot
+
         return None
 
     def _plot(self, kind: BuildingType, road: Road, along_m: float, left: bool) -> Plot:
@@ -181,12 +185,15 @@ class _Settlement:
         back_m = _REACH_M + garden_m + kind.depth_m / 2
         left_m = back_m if left else -back_m
         x_m, y_m = road.point(along_m + kind.width_m / 2, left_m)
+
         return Plot(kind, round(x_m, 3), round(y_m, 3), heading_rad)
 
     def _is_free(self, area: Rectangle) -> bool:
         if any(overlap(area, street, STREET_GAP_M) for street in self.streets):
             return False
+
         footprints = [plot.footprint for plot in self.plots]
+
         return not any(overlap(area, other, BUILDING_GAP_M) for other in footprints)
 
 
@@ -203,6 +210,7 @@ def _roads(rng: np.random.Generator, half_x_m: float, half_y_m: float) -> list[R
     station = (corner[0] + east * stub_m, corner[1])
     opposite = (-east * half_x_m, -north * half_y_m)
     mill = (opposite[0], opposite[1] - north * stub_m)
+
     return [
         Road("South Street", south_west, south_east),
         Road("East Street", south_east, north_east),
@@ -218,6 +226,7 @@ def _between(a: Point, b: Point, share: float) -> Point:
     b_x, b_y = b
     x = a_x + share * (b_x - a_x)
     y = a_y + share * (b_y - a_y)
+
     return x, y
 
 

@@ -117,6 +117,7 @@ class StereoCamera:
             bright = self._brightness(exposure, station, top_m, light)
             image = expose(exposure.image, bright, light, rng)
             lit.append(replace(exposure, image=image))
+
         return lit[0], lit[1]
 
     def _brightness(
@@ -137,6 +138,7 @@ class StereoCamera:
         left_axes = robot_axes @ _MOUNT
         right_at_m = left_at_m + left_axes @ (mount.baseline_m, 0.0, 0.0)
         right_axes = left_axes @ self._right_rotation
+
         return Station(left_axes, left_at_m), Station(right_axes, right_at_m)
 
     def _render(
@@ -171,6 +173,7 @@ class StereoCamera:
         body = np.asarray(mask, np.int32)
         depth_m = _metres(np.asarray(depth))
         is_sky = body == world.sky
+
         return Exposure(image, np.where(is_sky, np.float32(0), depth_m), body)
 
 
@@ -185,6 +188,7 @@ def _rays(calibration: Calibration) -> Singles:
 
     x, y = np.meshgrid(right, down)
     rays = np.stack([x, y, np.ones_like(x)], axis=2)
+
     return rays.astype(np.float32)
 
 
@@ -194,6 +198,7 @@ def _view(station: Station) -> list[float]:
     eye = station.at_m.tolist()
     target = (station.at_m + forward).tolist()
     view: list[float] = pybullet.computeViewMatrix(eye, target, (-down).tolist())
+
     return view
 
 
@@ -211,4 +216,5 @@ def _projection(mount: Calibration) -> list[float]:
     b = 2 * FAR_M * NEAR_M / range_m
     wide = 2 * mount.fx_px / mount.width_px
     high = 2 * mount.fy_px / mount.height_px
+
     return [wide, 0, 0, 0, 0, high, 0, 0, 0, 0, a, -1, 0, 0, b, 0]

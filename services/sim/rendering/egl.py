@@ -49,12 +49,15 @@ class Egl:
         found = importlib.util.find_spec("eglRenderer")
         if found is None or found.origin is None:
             return None
+
         with quiet():
             plugin = pybullet.loadPlugin(found.origin, _ENTRY_POINT, physicsClientId=client)
+
         if plugin < 0:
             return None
 
         cls._loaded = True
+
         return cls(client, int(plugin))
 
     def check(self) -> None:
@@ -85,4 +88,5 @@ def works() -> bool:
         probe = subprocess.run(command, capture_output=True, timeout=_PROBE_S, check=False)
     except subprocess.TimeoutExpired:
         return False
+
     return probe.returncode == 0

@@ -30,10 +30,13 @@ def side(kind: BuildingType, width_m: float, number: int) -> Image:
 
     if kind.pattern in PAINT:
         PAINT[kind.pattern](wall)
+
     _windows(wall, is_front, rng)
     if is_front:
         _entrance(wall)
+
     wall.box(0, 0, width_m, _PLINTH_M, shaded(kind.wall, 0.55))
+
     return roughen(wall.image, rng)
 
 
@@ -45,6 +48,7 @@ def roof(kind: BuildingType) -> Image:
 
     course_px = PX_PER_M // 2
     picture[::course_px] = shaded(kind.roof, 0.75)
+
     return roughen(picture, _generator(kind, _ROOF_PICTURE))
 
 

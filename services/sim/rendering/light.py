@@ -45,6 +45,7 @@ class Light:
         east = flat * math.cos(self.sun_azimuth_rad)
         north = flat * math.sin(self.sun_azimuth_rad)
         up = math.sin(self.sun_elevation_rad)
+
         return east, north, up
 
 
@@ -62,6 +63,7 @@ def some_light(rng: np.random.Generator) -> Light:
     gamma = float(rng.uniform(0.8, 1.25))
     is_sharp = rng.random() < 0.5
     blur_px = 0.0 if is_sharp else float(rng.uniform(0.3, 0.9))
+
     return Light(
         sun_azimuth_rad=azimuth_rad,
         sun_elevation_rad=elevation_rad,
@@ -83,6 +85,7 @@ def relief(boxes: list[Box]) -> Singles:
         west, south, east, north = (_cell(side_m) for side_m in area)
         cells = heights_m[south:north, west:east]
         np.maximum(cells, height_m, out=cells)
+
     return heights_m
 
 
@@ -112,6 +115,7 @@ def shadow_top(heights_m: Singles, light: Light) -> Singles:
         shaded = top_m[shaded_rows, shaded_columns]
         casting = heights_m[casting_rows, casting_columns]
         np.maximum(shaded, casting - drop_m, out=shaded)
+
     return top_m
 
 
@@ -139,6 +143,7 @@ def brightness(
     is_under_top = points_m[..., 2] < top_m[row, column]
     is_dark = is_under_top & (depth_m > 0)
     share = np.where(is_dark, light.shade, 1.0).astype(np.float32)
+
     return np.asarray(cv2.blur(share, _PENUMBRA_PX), np.float32)
 
 
@@ -153,4 +158,5 @@ def expose(image: Image, bright: Singles, light: Light, rng: np.random.Generator
 
     noise = rng.standard_normal(exposed.shape, np.float32) * np.sqrt(0.3 + exposed)
     levels = 255 * exposed + light.noise * noise
+
     return np.clip(levels + 0.5, 0, 255).astype(np.uint8)

@@ -63,13 +63,17 @@ class Mesh:
         lines = []
         for x, y, z in self.vertices:
             lines.append(f"v {x:.4f} {y:.4f} {z:.4f}")
+
         for u, v in self.uvs:
             lines.append(f"vt {u:.6f} {1 - v:.6f}")
+
         for x, y, z in self.normals:
             lines.append(f"vn {x:.4f} {y:.4f} {z:.4f}")
+
         for corners in self.triangles:
             numbers = [corner + 1 for corner in corners]
             lines.append("f " + " ".join(f"{n}/{n}/{n}" for n in numbers))
+
         return "\n".join(lines) + "\n"
 
 
@@ -80,7 +84,9 @@ def building(kind: BuildingType) -> tuple[Mesh, Image]:
     shell = _Shell(kind)
     for number in range(4):
         shell.add_side(number)
+
     shell.add_roof()
+
     return shell.mesh, shell.atlas
 
 
@@ -116,6 +122,7 @@ class _Shell:
         for s, z in self._outline(number, length_m):
             vertices.append((ax + s * along_x, ay + s * along_y, z))
             uvs.append(self._uv(number, s, self._height_m - z))
+
         self.mesh.polygon(vertices, uvs)
 
     def add_roof(self) -> None:
@@ -139,6 +146,7 @@ class _Shell:
         outline = [(0.0, 0.0), (length_m, 0.0), (length_m, eaves_m), (0.0, eaves_m)]
         if self._is_gabled and number % 2 == 1:
             outline.insert(3, (length_m / 2, self._height_m))
+
         return outline
 
     def _roof_uvs(self, ridge_y: float) -> list[UV]:
@@ -146,6 +154,7 @@ class _Shell:
         eaves_m = 2 * self._half_depth_m
         ridge_m = self._half_depth_m - ridge_y
         corners = ((0, eaves_m), (width_m, eaves_m), (width_m, ridge_m), (0, ridge_m))
+
         return [self._uv(_ROOF, along_m, down_m) for along_m, down_m in corners]
 
     def _uv(self, number: int, along_m: float, down_m: float) -> UV:
@@ -153,6 +162,7 @@ class _Shell:
         height_px, width_px, _ = self.atlas.shape
         column = self._lefts[number] + along_m * PX_PER_M
         row = down_m * PX_PER_M
+
         return column / width_px, row / height_px
 
 
@@ -168,6 +178,7 @@ def _normal(corners: list[Vertex]) -> Vertex:
     across = np.cross(b - a, c - a)
     length = np.linalg.norm(across)
     x, y, z = (across / length).tolist()
+
     return x, y, z
 
 
@@ -183,4 +194,5 @@ def _side_by_side(pictures: list[Image]) -> tuple[Image, list[int]]:
     for left, picture in zip(lefts, pictures, strict=False):
         height_px, picture_px, _ = picture.shape
         row[:height_px, left : left + picture_px] = picture
+
     return row, lefts

@@ -44,6 +44,7 @@ def shape(prop: Prop) -> tuple[Mesh, Image]:
 
     pixels = np.array([colours], np.uint8)
     picture = pixels.repeat(64, axis=0).repeat(32, axis=1)
+
     return mesh, roughen(picture, rng, _GRAIN)
 
 
@@ -57,7 +58,9 @@ def _tree(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
         radius_m = reach_m * math.sin(angle_rad)
         z_m = 0.66 * tall_m + 0.34 * tall_m * -math.cos(angle_rad)
         crown.append((radius_m, z_m))
+
     _rotate(mesh, crown, _SECOND)
+
     return _BARK, _tinted((58, 112, 44), rng)
 
 
@@ -68,6 +71,7 @@ def _lamp(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
 
     shade = [(0.1, neck_m), (0.28, tall_m - 0.1), (0.0, tall_m)]
     _rotate(mesh, shade, _SECOND)
+
     return _DARK, _tinted((226, 220, 190), rng)
 
 
@@ -81,6 +85,7 @@ def _car(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
     cabin_low = (-0.3 * long_m, -0.46 * wide_m, bonnet_m)
     cabin_high = (0.24 * long_m, 0.46 * wide_m, tall_m)
     _box(mesh, cabin_low, cabin_high, _FIRST)
+
     return _DARK, _any_colour(rng, 30, 235)
 
 
@@ -89,6 +94,7 @@ def _hedge(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
     low = (-long_m / 2, -wide_m / 2, 0.0)
     high = (long_m / 2, wide_m / 2, tall_m)
     _box(mesh, low, high, _SECOND)
+
     return _DARK, _tinted((50, 96, 40), rng)
 
 
@@ -103,6 +109,7 @@ def _kiosk(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
     roof_high = (0.6 * long_m, 0.6 * wide_m, tall_m)
     _box(mesh, roof_low, roof_high, _SECOND)
     hut_colour = _any_colour(rng, 40, 230)
+
     return hut_colour, _any_colour(rng, 40, 230)
 
 
@@ -111,6 +118,7 @@ def _bin(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
     reach_m = width_m / 2
     profile = [(0.85 * reach_m, 0.0), (reach_m, tall_m), (0.0, tall_m)]
     _rotate(mesh, profile, _SECOND)
+
     return _DARK, _tinted((70, 84, 90), rng)
 
 
@@ -138,6 +146,7 @@ def _tinted(colour: Colour, rng: np.random.Generator) -> Colour:
 
     varied = np.array([[(new_hue, saturation, new_value)]], np.uint8)
     red, green, blue = cv2.cvtColor(varied, cv2.COLOR_HSV2RGB)[0, 0].tolist()
+
     return red, green, blue
 
 

@@ -36,6 +36,7 @@ def ground(roads: tuple[Road, ...]) -> list[tuple[Mesh, Image]]:
         (_asphalt(roads), roughen(plain(512, (92, 92, 98)), rng, 0.15)),
         (_lines(roads), roughen(plain(64, (232, 230, 220)), rng, 0.06)),
     ]
+
     return [(mesh, picture) for mesh, picture in surfaces if mesh.triangles]
 
 
@@ -43,6 +44,7 @@ def _grass() -> Mesh:
     mesh = Mesh()
     area = (-GROUND_M, -GROUND_M, GROUND_M, GROUND_M)
     mesh.level(area, 0.0, GRASS_TILE_M, 20.0)
+
     return mesh
 
 
@@ -51,6 +53,7 @@ def _pavements(roads: tuple[Road, ...]) -> Mesh:
     reach_m = STREET_WIDTH_M / 2 + PAVEMENT_WIDTH_M
     for road in roads:
         _pave(mesh, road, reach_m, 0.015, (4.0, 8.0))
+
     return mesh
 
 
@@ -58,6 +61,7 @@ def _asphalt(roads: tuple[Road, ...]) -> Mesh:
     mesh = Mesh()
     for road in roads:
         _pave(mesh, road, STREET_WIDTH_M / 2, 0.03, (8.0, 8.0))
+
     return mesh
 
 
@@ -69,6 +73,7 @@ def _lines(roads: tuple[Road, ...]) -> Mesh:
         for along_m in np.arange(STREET_WIDTH_M, end_m, 2 * _DASH_M).tolist():
             dash = Road(road.name, road.point(along_m), road.point(along_m + _DASH_M))
             _pave(mesh, dash, 0.08, 0.045, (1.0, 4.0))
+
     return mesh
 
 
@@ -78,6 +83,7 @@ def _slabs() -> Image:
     joint = (140, 134, 126)
     picture[::32] = joint
     picture[:, ::32] = joint
+
     return picture
 
 
@@ -110,6 +116,7 @@ def sky() -> tuple[Mesh, Image]:
     rim = [(_SKY_M * math.cos(angle), _SKY_M * math.sin(angle)) for angle in angles_rad]
     for number, (start, end) in enumerate(pairwise(rim)):
         _add_segment(mesh, number, start, end)
+
     return mesh, _panorama()
 
 
@@ -143,6 +150,7 @@ def _panorama() -> Image:
     for base, colour in _HILLS:
         is_hill = height < _crest(base, rng)
         picture[is_hill] = colour
+
     return roughen(np.clip(picture, 0, 255).astype(np.uint8), rng, 0.02)
 
 
@@ -157,6 +165,7 @@ def _air(
 
     blueness = height[..., None] ** 0.5
     clear = np.asarray(_ZENITH) * blueness + np.asarray(_HORIZON) * (1 - blueness)
+
     return (clear * (1 - mist) + 250 * mist).astype(np.float32)
 
 
@@ -169,6 +178,7 @@ def _clouds(rng: np.random.Generator, height: Floats, wide: int) -> Floats:
         lean_rad = rng.uniform(-30, 30) * height
         wave = np.sin(k * angle_rad + phase_rad + lean_rad)
         clouds += wave / k**0.6
+
     return clouds
 
 
@@ -181,4 +191,5 @@ def _crest(base: float, rng: np.random.Generator) -> Floats:
 
     waves = amplitude * np.sin(k * angle_rad + phase_rad)
     crest: Floats = base + waves.sum(axis=0)
+
     return crest

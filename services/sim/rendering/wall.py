@@ -75,6 +75,7 @@ def roughen(image: Image, rng: np.random.Generator, strength: float = 0.13) -> I
     height_px, width_px, _ = image.shape
     grain = _grain(rng, height_px, width_px, strength)
     rough: Image = np.clip(image * grain[..., None], 0, 255).astype(np.uint8)
+
     return rough
 
 
@@ -86,4 +87,5 @@ def _grain(rng: np.random.Generator, height_px: int, width_px: int, strength: fl
         coarse = rng.standard_normal(coarse_shape, np.float32)
         fine = cv2.resize(coarse, (width_px, height_px), interpolation=cv2.INTER_LINEAR)
         total += strength * share * fine
+
     return total

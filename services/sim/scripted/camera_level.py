@@ -43,7 +43,9 @@ class CameraLevelSim(LineFollower):
         for row in rows:
             passed_s += row.dt_s
             row.stamp_ns = since_ns + round(1e9 * passed_s)
+
         rows[-1].stamp_ns = self.now_ns
+
         return [*rows]
 
     def view(self) -> list[Message]:
@@ -77,4 +79,5 @@ class CameraLevelSim(LineFollower):
                 turned = Pose(x_m=0.0, y_m=0.0, heading_rad=turn_rad)
                 duration_s = pace_s * TURN_AS_M * abs(turn_rad)
                 rows.append(self._odometry.measure(_ORIGIN, turned, duration_s))
+
         return rows

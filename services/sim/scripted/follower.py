@@ -48,6 +48,7 @@ class LineFollower:
         to_m = min(from_m + speed_m_s * self.tick_ns / 1e9, self.line.length_m)
         self._travelled_m = to_m
         self.now_ns += self.tick_ns
+
         return self.line.legs(from_m, to_m) if to_m > from_m else []
 
     def _pace_s(self, legs: list[Leg]) -> float:

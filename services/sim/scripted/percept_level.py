@@ -66,6 +66,7 @@ class PerceptLevelSim(LineFollower):
         frame = self._next_frame()
         pose = self._pose()
         empty = Array.of(np.zeros(0, np.float32))
+
         return [
             SelfMotion(
                 stamp_ns=self.now_ns,
@@ -110,6 +111,7 @@ class PerceptLevelSim(LineFollower):
             if turn_rad:
                 duration_s = pace_s * TURN_AS_M * abs(turn_rad)
                 rows.append(self._turn(turn_rad * turn, duration_s))
+
         return np.array(rows).reshape(-1, 5)
 
     def _straight(self, length_m: float, duration_s: float, speed: float, drift: float) -> Row:
@@ -117,6 +119,7 @@ class PerceptLevelSim(LineFollower):
         felt_m = length_m * speed
         drift_rad = drift * math.sqrt(length_m)
         drift_sd_rad = noise.drift_rad_per_sqrt_m * math.sqrt(length_m)
+
         return (
             felt_m / duration_s,
             drift_rad / duration_s,
@@ -139,6 +142,7 @@ class PerceptLevelSim(LineFollower):
             along_m = min(self._travelled_m + ahead_m, self.line.length_m)
             there = self.line.at(along_m)
             points_m.append((there.x_m, there.y_m))
+
         return transform_to(_array(pose), np.array(points_m))
 
     def _visible(self, pose: Pose) -> list[int]:
@@ -159,6 +163,7 @@ class PerceptLevelSim(LineFollower):
         sight_m = eye_m + share * (front_m - eye_m)
 
         off_m = sight_m - self.line.nearest(sight_m)
+
         return bool((np.hypot(off_m[:, 0], off_m[:, 1]) > STREET_HALF_WIDTH_M).any())
 
 

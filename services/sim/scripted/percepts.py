@@ -127,6 +127,7 @@ class PerceptSim:
         is_near = (range_m >= errors.nearest_m) & (range_m <= errors.farthest_m)
         is_ahead = np.abs(bearing_rad) <= errors.field_of_view_rad / 2
         numbers: list[int] = np.flatnonzero(is_near & is_ahead).tolist()
+
         return numbers
 
     def perceive(self, pose: Pose, visible: Sequence[int]) -> list[Percept]:
@@ -143,12 +144,14 @@ class PerceptSim:
             if self._rng.random() < phantoms_per_object:
                 phantom = self._phantom()
                 percepts.setdefault(phantom.label, phantom)
+
         return list(percepts.values())
 
     def _detection(self, pose: Pose, number: int) -> Percept:
         x_m, y_m = self._places_m[number] - (pose.x_m, pose.y_m)
         bearing_rad = math.remainder(math.atan2(y_m, x_m) - pose.heading_rad, math.tau)
         label = self._name(number)
+
         return self._percept(label, number, math.hypot(x_m, y_m), bearing_rad)
 
     def _phantom(self) -> Percept:
@@ -158,6 +161,7 @@ class PerceptSim:
         number = int(self._rng.integers(len(self._landmarks)))
         range_m = float(self._rng.uniform(errors.nearest_m, errors.farthest_m))
         bearing_rad = float(self._rng.uniform(-half_rad, half_rad))
+
         return self._percept(self._landmarks[number].name, number, range_m, bearing_rad)
 
     def _name(self, number: int) -> str:
@@ -166,6 +170,7 @@ class PerceptSim:
         if others and self._rng.random() >= self._errors.right_name:
             shift = 1 + int(self._rng.integers(others))
             number = (number + shift) % (others + 1)
+
         return self._landmarks[number].name
 
     def _percept(self, label: str, number: int, range_m: float, bearing_rad: float) -> Percept:
@@ -175,6 +180,7 @@ class PerceptSim:
         range_sd_m = max(errors.range_sd_share * range_m, MIN_RANGE_SD_M)
         noisy_bearing_rad = float(self._rng.normal(bearing_rad, errors.bearing_sd_rad))
         noisy_range_m = float(self._rng.normal(range_m, range_sd_m))
+
         return Percept(
             label=label,
             activation=errors.right_name,

@@ -37,8 +37,10 @@ class PlaceSim:
         self._similar_frames += 1
         if self._similar_frames < SEQUENCE_FRAMES:
             return []
+
         if self._rng.random() >= self._errors.place_recall:
             return []
+
         return [self._match(similar)]
 
     def _match(self, similar: int) -> PlaceMatch:
@@ -47,6 +49,7 @@ class PlaceSim:
         is_right = self._rng.random() < precision
         number = similar if is_right else int(self._rng.integers(len(self._views)))
         frame, view_ns = self._views[number]
+
         return PlaceMatch(frame=frame, view_ns=view_ns, score=precision)
 
     def _similar(self, frame: int, pose: Pose) -> int | None:
@@ -63,4 +66,5 @@ class PlaceSim:
         is_excluded = (turn_rad > MAX_TURN_RAD) | (frames > frame - RECENT_FRAMES)
         apart_m[is_excluded] = np.inf
         nearest = int(apart_m.argmin())
+
         return nearest if apart_m[nearest] <= MAX_APART_M else None

@@ -65,6 +65,7 @@ class Line:
         corners_passed = int(np.searchsorted(self.along_m, along_m, "right"))
         piece = min(corners_passed - 1, len(self.heading_rad) - 1)
         x_m, y_m = (np.interp(along_m, self.along_m, column) for column in self.points.T)
+
         return Pose(x_m=float(x_m), y_m=float(y_m), heading_rad=float(self.heading_rad[piece]))
 
     def legs(self, from_m: float, to_m: float) -> list[Leg]:
@@ -80,6 +81,7 @@ class Line:
         for start_m, end_m in pairwise(stops_m):
             turn_rad = self.at(end_m).heading_rad - self.at(start_m).heading_rad
             legs.append((end_m - start_m, math.remainder(turn_rad, math.tau)))
+
         return legs
 
     def nearest(self, points_m: Floats) -> Floats:
