@@ -51,6 +51,7 @@ def _in_lockstep(
     module: Module, config: Config, simulation: SteppedSim, emits: tuple[topics.Topic, ...]
 ) -> Module:
     lockstep = Lockstep(simulation, config.repeat_after_s)
+
     module.on(topics.MOTOR_COMMAND, lockstep.on_command, emits)
     module.on_start(lockstep.on_start, _required(config), emits)
 
@@ -58,7 +59,12 @@ def _in_lockstep(
 
 
 def _in_real_time(module: Module, config: Config, simulation: Simulation) -> Module:
-    real_time = RealTime(simulation, config.command_timeout_s, config.max_command_age_s)
+    real_time = RealTime(
+        simulation,
+        config.command_timeout_s,
+        config.max_command_age_s,
+    )
+
     module.on(topics.MOTOR_COMMAND, real_time.on_command)
     module.on_start(real_time.on_start, _required(config))
 

@@ -45,13 +45,16 @@ class WheelOdometry:
         """The wheels' measurement of a motion that took `dt_s`."""
         turn_rad = math.remainder(after.heading_rad - before.heading_rad, math.tau)
         mean_heading_rad = before.heading_rad + turn_rad / 2
+
         dx_m = after.x_m - before.x_m
         dy_m = after.y_m - before.y_m
         forward_m = dx_m * math.cos(mean_heading_rad) + dy_m * math.sin(mean_heading_rad)
 
         noise = self._noise
         deviations = (noise.speed, noise.turn, noise.drift_rad_per_sqrt_m)
-        speed, turn, drift = self._rng.normal((1.0, 1.0, 0.0), deviations).tolist()
+        means = (1.0, 1.0, 0.0)
+        speed, turn, drift = self._rng.normal(means, deviations).tolist()
+
         measured_rad = turn_rad * turn + drift * math.sqrt(abs(forward_m))
 
         return Odometry(

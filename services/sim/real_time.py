@@ -119,5 +119,6 @@ class RealTime:
 
         first_wall_ns, first_ns = history[0]
         passed_ns = wall_ns - first_wall_ns
+        simulated_ns = self._simulation.now_ns - first_ns
 
-        return (self._simulation.now_ns - first_ns) / passed_ns if passed_ns else 1.0
+        return simulated_ns / passed_ns if passed_ns else 1.0

@@ -28,7 +28,9 @@ class Simulation:
 
         place = town.generate(config.seed)
         self.world = World(place, config.egl)
-        self.camera = StereoCamera(self.world, calibration(config.width_px, config.height_px))
+        mount = calibration(config.width_px, config.height_px)
+        self.camera = StereoCamera(self.world, mount)
+
         self._odometry = WheelOdometry(config.noise, config.seed)
         self._progress = Progress(place.line(config.laps))
         self._pose = self.world.pose()
@@ -63,6 +65,7 @@ class Simulation:
         """Advance by one tick: the wheels' measurement of it."""
         before = self._pose
         dt_s = self.tick_ns / 1e9
+
         self.world.step(dt_s)
         self.now_ns += self.tick_ns
         self._pose = self.world.pose()
@@ -70,6 +73,7 @@ class Simulation:
         dx_m = self._pose.x_m - before.x_m
         dy_m = self._pose.y_m - before.y_m
         self._travelled_m += math.sqrt(dx_m**2 + dy_m**2)
+
         odometry = self._odometry.measure(before, self._pose, dt_s)
         odometry.stamp_ns = self.now_ns
 

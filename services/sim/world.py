@@ -57,6 +57,7 @@ class World:
     def step(self, dt_s: float) -> None:
         """Advance by `dt_s`, in steps of STEP_S."""
         steps = round(dt_s / STEP_S)
+
         for _ in range(steps):
             pybullet.stepSimulation(physicsClientId=self.client)
 
@@ -113,8 +114,12 @@ class World:
         kind = plot.kind
         half_height_m = kind.height_m / 2
         solid = self._solid_box(
-            kind.width_m / 2, kind.depth_m / 2, half_height_m, middle_m=half_height_m
+            kind.width_m / 2,
+            kind.depth_m / 2,
+            half_height_m,
+            middle_m=half_height_m,
         )
+
         surface, picture = mesh.building(kind)
         body = self._add(surface, picture, solid, (plot.x_m, plot.y_m), plot.heading_rad)
         self.building_of_body[body] = kind.name
@@ -178,6 +183,7 @@ def _relief(town: Place) -> Singles:
 def _on_tile(where_m: float) -> float:
     """The nearest multiple of the grass's tile, so that its picture stays in place."""
     tiles = round(where_m / scenery.GRASS_TILE_M)
+
     return tiles * scenery.GRASS_TILE_M
 
 

@@ -236,9 +236,11 @@ def _paint(rng: np.random.Generator) -> Colour:
     pale = rng.uniform(0.0, 0.2)
     strong = rng.uniform(0.3, 0.95)
     saturation = float(rng.choice([pale, strong], p=[0.25, 0.75]))
+
     hue = float(rng.random())
     value = float(rng.uniform(0.35, 0.98))
 
-    red, green, blue = colorsys.hsv_to_rgb(hue, saturation, value)
+    shares = colorsys.hsv_to_rgb(hue, saturation, value)
 
-    return round(255 * red), round(255 * green), round(255 * blue)
+    levels = [round(255 * share) for share in shares]
+    return levels[0], levels[1], levels[2]

@@ -75,11 +75,13 @@ def furnish(seed: int, roads: Sequence[Road], plots: Sequence[Plot]) -> tuple[Pr
     rng = np.random.default_rng([seed, 0xF0])
     occupied = [road.area(STREET_WIDTH_M / 2) for road in roads]
     occupied += [plot.footprint for plot in plots]
+    candidates = [*_along(rng, roads), *_scattered(rng)]
 
     props: list[Prop] = []
-    for prop in [*_along(rng, roads), *_scattered(rng)]:
+    for prop in candidates:
         area = prop.area
-        if not any(overlap(area, other, _GAP_M) for other in occupied):
+        is_free = not any(overlap(area, other, _GAP_M) for other in occupied)
+        if is_free:
             props.append(prop)
             occupied.append(area)
 
@@ -105,6 +107,7 @@ def _scattered(rng: np.random.Generator) -> list[Prop]:
     for _ in range(_SCATTERED):
         x_m, y_m = rng.uniform(-_AROUND_M, _AROUND_M, 2).tolist()
         heading_rad = float(rng.uniform(-math.pi, math.pi))
+
         props.append(_prop(rng, x_m, y_m, heading_rad))
 
     return props

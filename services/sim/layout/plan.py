@@ -33,12 +33,16 @@ class Road:
         """x and y from start to end."""
         start_x, start_y = self.start
         end_x, end_y = self.end
-        return end_x - start_x, end_y - start_y
+
+        dx_m = end_x - start_x
+        dy_m = end_y - start_y
+        return dx_m, dy_m
 
     @property
     def heading_rad(self) -> float:
         """Direction from start to end, counter-clockwise from x."""
         dx_m, dy_m = self.extent_m
+
         return math.atan2(dy_m, dx_m)
 
     @property
@@ -65,6 +69,7 @@ class Road:
         """
         start_x, start_y = self.start
         end_x, end_y = self.end
+
         west = min(start_x, end_x) - reach_m
         south = min(start_y, end_y) - reach_m
         east = max(start_x, end_x) + reach_m
@@ -105,7 +110,8 @@ def overlap(a: Rectangle, b: Rectangle, gap_m: float = 0.0) -> bool:
     """Whether the rectangles come closer than `gap_m`."""
     a_west, a_south, a_east, a_north = a
     b_west, b_south, b_east, b_north = b
-    in_x = a_west < b_east + gap_m and b_west < a_east + gap_m
-    in_y = a_south < b_north + gap_m and b_south < a_north + gap_m
 
-    return in_x and in_y
+    gap_x_m = max(a_west, b_west) - min(a_east, b_east)
+    gap_y_m = max(a_south, b_south) - min(a_north, b_north)
+
+    return max(gap_x_m, gap_y_m) < gap_m

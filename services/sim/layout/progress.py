@@ -18,9 +18,11 @@ class Progress:
         corners_m = np.array(line)
         along_m = distances_along(corners_m)
         length_m = along_m[-1]
+
         number = max(2, round(length_m / STEP_M) + 1)
         at_m = np.linspace(0.0, length_m, number)
         self._points_m = interpolate(along_m, corners_m, at_m)
+
         self._index = 0
 
     def resume(self, share: float) -> None:

@@ -42,7 +42,8 @@ def _roads(line: Line) -> tuple[Road, ...]:
 
 
 def _plots(landmarks: list[Landmark], line: Line) -> tuple[Plot, ...]:
-    places_m = np.array([(each.x_m, each.y_m) for each in landmarks], float).reshape(-1, 2)
+    places = [(each.x_m, each.y_m) for each in landmarks]
+    places_m = np.array(places, float).reshape(-1, 2)
     to_line_m = line.nearest(places_m) - places_m
 
     return tuple(

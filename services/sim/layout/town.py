@@ -62,18 +62,21 @@ class Town(Place):
     def lap_m(self) -> float:
         """The length of one lap along the centre lines."""
         closed = (self.corners[-1], *self.corners)
-        return sum(math.dist(a, b) for a, b in pairwise(closed))
+        lengths_m = [math.dist(a, b) for a, b in pairwise(closed)]
+
+        return sum(lengths_m)
 
     def route(self, laps: float = 1.0) -> list[Leg]:
         """The legs (length_m, turn_rad at its end, left positive) of `laps` laps from the start;
         the last turn is 0.
         """
         roads = [Road("", a, b) for a, b in pairwise(self.line(laps))]
+        lengths_m = [road.length_m for road in roads]
+
         turns_rad = [
             math.remainder(after.heading_rad - before.heading_rad, math.tau)
             for before, after in pairwise(roads)
         ]
-        lengths_m = [road.length_m for road in roads]
 
         return list(zip(lengths_m, [*turns_rad, 0.0], strict=True))
 
@@ -131,6 +134,7 @@ def _settle(
     """Buildings on both sides of the loop."""
     streets = [road.area(_REACH_M) for road in roads]
     settlement = _Settlement(rng, streets, kinds)
+
     south, east, north, west = roads[:4]
     for road in (south, north, east, west):
         settlement.line(road, left=True)
@@ -206,8 +210,10 @@ def _roads(rng: np.random.Generator, half_x_m: float, half_y_m: float) -> list[R
 
     east, north = rng.choice([-1.0, 1.0], 2).tolist()
     stub_m = float(rng.uniform(14, 20))
+
     corner = (east * half_x_m, north * half_y_m)
     station = (corner[0] + east * stub_m, corner[1])
+
     opposite = (-east * half_x_m, -north * half_y_m)
     mill = (opposite[0], opposite[1] - north * stub_m)
 

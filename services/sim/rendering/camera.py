@@ -112,10 +112,12 @@ class StereoCamera:
 
         rng = rng or np.random.default_rng(0)
         top_m = shadow_top(self._world.relief, light)
+
         lit = []
         for exposure, station in zip((left, right), stations, strict=True):
             bright = self._brightness(exposure, station, top_m, light)
             image = expose(exposure.image, bright, light, rng)
+
             lit.append(replace(exposure, image=image))
 
         return lit[0], lit[1]
@@ -136,10 +138,14 @@ class StereoCamera:
         above_axle_m = mount.mount_height_m - position_m[2]
         left_at_m = position_m + robot_axes @ (mount.mount_forward_m, 0.0, above_axle_m)
         left_axes = robot_axes @ _MOUNT
+
         right_at_m = left_at_m + left_axes @ (mount.baseline_m, 0.0, 0.0)
         right_axes = left_axes @ self._right_rotation
 
-        return Station(left_axes, left_at_m), Station(right_axes, right_at_m)
+        return (
+            Station(left_axes, left_at_m),
+            Station(right_axes, right_at_m),
+        )
 
     def _render(
         self, station: Station, labelled: bool = False, light: Light | None = None
@@ -183,11 +189,13 @@ def _rays(calibration: Calibration) -> Singles:
     """
     columns = np.arange(calibration.width_px)
     rows = np.arange(calibration.height_px)
+
     right = (columns - calibration.cx_px) / calibration.fx_px
     down = (rows - calibration.cy_px) / calibration.fy_px
 
     x, y = np.meshgrid(right, down)
-    rays = np.stack([x, y, np.ones_like(x)], axis=2)
+    forward = np.ones_like(x)
+    rays = np.stack([x, y, forward], axis=2)
 
     return rays.astype(np.float32)
 
@@ -195,9 +203,11 @@ def _rays(calibration: Calibration) -> Singles:
 def _view(station: Station) -> list[float]:
     """OpenGL's view matrix of a camera."""
     _, down, forward = station.axes.T
+    up = (-down).tolist()
+
     eye = station.at_m.tolist()
     target = (station.at_m + forward).tolist()
-    view: list[float] = pybullet.computeViewMatrix(eye, target, (-down).tolist())
+    view: list[float] = pybullet.computeViewMatrix(eye, target, up)
 
     return view
 

@@ -44,6 +44,7 @@ def roof(kind: BuildingType) -> Image:
     """The roof from above, uint8 (depth, width, 3), in courses."""
     depth_px = round(kind.depth_m * PX_PER_M)
     width_px = round(kind.width_m * PX_PER_M)
+
     picture = np.full((depth_px, width_px, 3), kind.roof, np.uint8)
 
     course_px = PX_PER_M // 2
@@ -61,22 +62,28 @@ def _generator(kind: BuildingType, number: int) -> np.random.Generator:
 def _windows(wall: Wall, is_front: bool, rng: np.random.Generator) -> None:
     storeys = max(1, int((wall.height_m - 0.6) / STOREY_M))
     columns = max(2, int(wall.width_m / _BAY_M))
+    door_m = wall.width_m / 2
+
     for storey in range(storeys):
         for column in range(columns):
             middle_m = (column + 0.5) * wall.width_m / columns
-            from_door_m = abs(middle_m - wall.width_m / 2)
-            if is_front and storey == 0 and from_door_m < _HALF_ENTRANCE_M:
+            is_over_door = abs(middle_m - door_m) < _HALF_ENTRANCE_M
+            if is_front and storey == 0 and is_over_door:
                 continue
 
+            sill_m = storey * STOREY_M + _SILL_M
             shade = float(rng.uniform(0.7, 1.5))
-            _window(wall, middle_m, storey * STOREY_M + _SILL_M, shade)
+            _window(wall, middle_m, sill_m, shade)
 
 
 def _window(wall: Wall, middle_m: float, sill_m: float, shade: float) -> None:
     trim = wall.kind.trim
-    left_m = middle_m - 0.48
     wall.box(middle_m - 0.6, sill_m - 0.1, 1.2, 1.6, trim)
-    wall.box(left_m, sill_m, 0.96, 1.4, shaded(_GLASS, shade))
+
+    left_m = middle_m - 0.48
+    glass = shaded(_GLASS, shade)
+    wall.box(left_m, sill_m, 0.96, 1.4, glass)
+
     wall.box(middle_m - 0.05, sill_m, 0.1, 1.4, trim)
     wall.box(left_m, sill_m + 0.85, 0.96, 0.1, trim)
 
@@ -87,6 +94,7 @@ def _window(wall: Wall, middle_m: float, sill_m: float, shade: float) -> None:
 def _shutters(wall: Wall, middle_m: float, sill_m: float) -> None:
     accent = wall.kind.accent
     bottom_m = sill_m - 0.1
+
     wall.box(middle_m - 1.2, bottom_m, 0.6, 1.6, accent)
     wall.box(middle_m + 0.6, bottom_m, 0.6, 1.6, accent)
 
@@ -100,6 +108,7 @@ def _entrance(wall: Wall) -> None:
 
     wall.box(middle_m - 0.95, 0, 1.9, 2.7, wall.kind.trim)
     wall.box(middle_m - 0.75, 0, 1.5, 2.5, wall.kind.door)
+
     if wall.kind.pattern == "cross":
         _cross(wall, middle_m)
 

@@ -42,6 +42,7 @@ class Light:
     def sun(self) -> tuple[float, float, float]:
         """The unit vector to the sun: east, north, up."""
         flat = math.cos(self.sun_elevation_rad)
+
         east = flat * math.cos(self.sun_azimuth_rad)
         north = flat * math.sin(self.sun_azimuth_rad)
         up = math.sin(self.sun_elevation_rad)
@@ -80,10 +81,13 @@ def relief(boxes: list[Box]) -> Singles:
     """The height of the town in each cell of _CELL_M, float32 (n, n), rows from south to north,
     columns from west.
     """
-    heights_m = np.zeros((_CELLS, _CELLS), np.float32)
+    shape = (_CELLS, _CELLS)
+    heights_m = np.zeros(shape, np.float32)
+
     for area, height_m in boxes:
         west, south, east, north = (_cell(side_m) for side_m in area)
         cells = heights_m[south:north, west:east]
+
         np.maximum(cells, height_m, out=cells)
 
     return heights_m
@@ -91,7 +95,8 @@ def relief(boxes: list[Box]) -> Singles:
 
 def _cell(side_m: float) -> int:
     """The row or column of a coordinate, at least 0."""
-    cell = round(side_m / _CELL_M) + _CELLS // 2
+    middle = _CELLS // 2
+    cell = middle + round(side_m / _CELL_M)
     return max(cell, 0)
 
 
@@ -101,7 +106,9 @@ def shadow_top(heights_m: Singles, light: Light) -> Singles:
     """
     east, north, up = light.sun
     flat = math.hypot(east, north)
-    longest_m = float(heights_m.max()) * flat / up
+
+    highest_m = float(heights_m.max())
+    longest_m = highest_m * flat / up
     steps = math.ceil(longest_m / _CELL_M)
 
     top_m = np.zeros_like(heights_m)
@@ -112,6 +119,7 @@ def shadow_top(heights_m: Singles, light: Light) -> Singles:
 
         shaded_rows, casting_rows = _shifted(dy)
         shaded_columns, casting_columns = _shifted(dx)
+
         shaded = top_m[shaded_rows, shaded_columns]
         casting = heights_m[casting_rows, casting_columns]
         np.maximum(shaded, casting - drop_m, out=shaded)

@@ -38,7 +38,9 @@ class Mesh:
         self.vertices += corners
         self.uvs += uvs
         self.normals += [normal] * len(corners)
-        for number in range(first + 1, first + len(corners) - 1):
+
+        last = first + len(corners) - 1
+        for number in range(first + 1, last):
             self.triangles.append((first, number, number + 1))
 
     def level(self, area: Rectangle, z_m: float, tile_m: float, cell_m: float) -> None:
@@ -72,7 +74,8 @@ class Mesh:
 
         for corners in self.triangles:
             numbers = [corner + 1 for corner in corners]
-            lines.append("f " + " ".join(f"{n}/{n}/{n}" for n in numbers))
+            references = [f"{n}/{n}/{n}" for n in numbers]
+            lines.append("f " + " ".join(references))
 
         return "\n".join(lines) + "\n"
 
@@ -143,7 +146,12 @@ class _Shell:
     def _outline(self, number: int, length_m: float) -> list[Point]:
         """The corners of a wall: along it, and up."""
         eaves_m = self._eaves_m
-        outline = [(0.0, 0.0), (length_m, 0.0), (length_m, eaves_m), (0.0, eaves_m)]
+        outline = [
+            (0.0, 0.0),
+            (length_m, 0.0),
+            (length_m, eaves_m),
+            (0.0, eaves_m),
+        ]
         if self._is_gabled and number % 2 == 1:
             outline.insert(3, (length_m / 2, self._height_m))
 
@@ -160,6 +168,7 @@ class _Shell:
     def _uv(self, number: int, along_m: float, down_m: float) -> UV:
         """The point of picture `number` in the atlas."""
         height_px, width_px, _ = self.atlas.shape
+
         column = self._lefts[number] + along_m * PX_PER_M
         row = down_m * PX_PER_M
 
@@ -189,10 +198,13 @@ def _side_by_side(pictures: list[Image]) -> tuple[Image, list[int]]:
     lefts = [0, *itertools.accumulate(widths_px)]
 
     # OpenGL needs rows of whole words: a width that 4 divides.
-    width_px = math.ceil(lefts[-1] / 4) * 4
-    row = np.zeros((max(heights_px), width_px, 3), np.uint8)
+    words = math.ceil(lefts[-1] / 4)
+    shape = (max(heights_px), 4 * words, 3)
+    row = np.zeros(shape, np.uint8)
+
     for left, picture in zip(lefts, pictures, strict=False):
         height_px, picture_px, _ = picture.shape
-        row[:height_px, left : left + picture_px] = picture
+        right = left + picture_px
+        row[:height_px, left:right] = picture
 
     return row, lefts

@@ -32,6 +32,7 @@ def columns(wall: Wall) -> None:
     accent = wall.kind.accent
     number = max(3, round(wall.width_m / 2.6))
     last_m = wall.width_m - 0.9
+
     for x_m in np.linspace(0, last_m, number).tolist():
         wall.box(x_m, 0, 0.9, wall.height_m, accent)
 
@@ -75,7 +76,8 @@ def frame(wall: Wall) -> None:
     """A frame along the top and both edges."""
     accent = wall.kind.accent
     band_m = 0.14 * wall.height_m
-    wall.box(0, wall.height_m - band_m, wall.width_m, band_m, accent)
+    bottom_m = wall.height_m - band_m
+    wall.box(0, bottom_m, wall.width_m, band_m, accent)
 
     right_m = wall.width_m - 0.7
     for x_m in (0, right_m):

@@ -39,6 +39,7 @@ class Ring(NamedTuple):
 def shape(prop: Prop) -> tuple[Mesh, Image]:
     """The prop around the origin, length along x, and its picture: two colours, side by side."""
     rng = np.random.default_rng(prop.look)
+
     mesh = Mesh()
     colours = _BUILD[prop.kind](mesh, prop.size_m, rng)
 
@@ -51,12 +52,15 @@ def shape(prop: Prop) -> tuple[Mesh, Image]:
 def _tree(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
     width_m, _, tall_m = size_m
     reach_m = width_m / 2
-    _rotate(mesh, [(0.16, 0.0), (0.14, 0.5 * tall_m)], _FIRST)
+
+    trunk = [(0.16, 0.0), (0.14, 0.5 * tall_m)]
+    _rotate(mesh, trunk, _FIRST)
 
     crown = []
     for angle_rad in np.linspace(0, math.pi, 6).tolist():
         radius_m = reach_m * math.sin(angle_rad)
         z_m = 0.66 * tall_m + 0.34 * tall_m * -math.cos(angle_rad)
+
         crown.append((radius_m, z_m))
 
     _rotate(mesh, crown, _SECOND)
@@ -67,7 +71,9 @@ def _tree(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
 def _lamp(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
     _, _, tall_m = size_m
     neck_m = tall_m - 0.4
-    _rotate(mesh, [(0.09, 0.0), (0.06, neck_m)], _FIRST)
+
+    post = [(0.09, 0.0), (0.06, neck_m)]
+    _rotate(mesh, post, _FIRST)
 
     shade = [(0.1, neck_m), (0.28, tall_m - 0.1), (0.0, tall_m)]
     _rotate(mesh, shade, _SECOND)
@@ -78,6 +84,7 @@ def _lamp(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
 def _car(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
     long_m, wide_m, tall_m = size_m
     bonnet_m = 0.58 * tall_m
+
     body_low = (-long_m / 2, -wide_m / 2, 0.12)
     body_high = (long_m / 2, wide_m / 2, bonnet_m)
     _box(mesh, body_low, body_high, _SECOND)
@@ -91,6 +98,7 @@ def _car(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
 
 def _hedge(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
     long_m, wide_m, tall_m = size_m
+
     low = (-long_m / 2, -wide_m / 2, 0.0)
     high = (long_m / 2, wide_m / 2, tall_m)
     _box(mesh, low, high, _SECOND)
@@ -101,6 +109,7 @@ def _hedge(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
 def _kiosk(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
     long_m, wide_m, tall_m = size_m
     eaves_m = tall_m - 0.3
+
     hut_low = (-long_m / 2, -wide_m / 2, 0.0)
     hut_high = (long_m / 2, wide_m / 2, eaves_m)
     _box(mesh, hut_low, hut_high, _FIRST)
@@ -108,6 +117,7 @@ def _kiosk(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
     roof_low = (-0.6 * long_m, -0.6 * wide_m, eaves_m)
     roof_high = (0.6 * long_m, 0.6 * wide_m, tall_m)
     _box(mesh, roof_low, roof_high, _SECOND)
+
     hut_colour = _any_colour(rng, 40, 230)
 
     return hut_colour, _any_colour(rng, 40, 230)
@@ -116,6 +126,7 @@ def _kiosk(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
 def _bin(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
     width_m, _, tall_m = size_m
     reach_m = width_m / 2
+
     profile = [(0.85 * reach_m, 0.0), (reach_m, tall_m), (0.0, tall_m)]
     _rotate(mesh, profile, _SECOND)
 

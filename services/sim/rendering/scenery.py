@@ -70,7 +70,8 @@ def _lines(roads: tuple[Road, ...]) -> Mesh:
     mesh = Mesh()
     for road in roads:
         end_m = road.length_m - STREET_WIDTH_M
-        for along_m in np.arange(STREET_WIDTH_M, end_m, 2 * _DASH_M).tolist():
+        starts_m = np.arange(STREET_WIDTH_M, end_m, 2 * _DASH_M)
+        for along_m in starts_m.tolist():
             dash = Road(road.name, road.point(along_m), road.point(along_m + _DASH_M))
             _pave(mesh, dash, 0.08, 0.045, (1.0, 4.0))
 
@@ -97,7 +98,8 @@ def _pave(mesh: Mesh, road: Road, reach_m: float, z_m: float, grain_m: tuple[flo
         return
 
     end_m = road.length_m + reach_m
-    cells = math.ceil((road.length_m + 2 * reach_m) / cell_m)
+    length_m = road.length_m + 2 * reach_m
+    cells = math.ceil(length_m / cell_m)
     cuts_m = np.linspace(-reach_m, end_m, cells + 1).tolist()
     for start_m, stop_m in pairwise(cuts_m):
         corners: list[Point] = [
@@ -125,6 +127,7 @@ def _add_segment(mesh: Mesh, number: int, start: Point, end: Point) -> None:
     up = (0.0, 0.0, 1.0)
     left = number / _SEGMENTS
     right = (number + 1) / _SEGMENTS
+
     foot_start: Vertex = (*start, 0.0)
     foot_end: Vertex = (*end, 0.0)
     top_start: Vertex = (*start, _SKY_TOP_M)
@@ -144,14 +147,16 @@ def _panorama() -> Image:
     rng = np.random.default_rng(5)
     height_px, width_px = _PANORAMA_PX
     air = _air(rng, height_px // 4, width_px // 4)
-    picture = cv2.resize(air, (width_px, height_px), interpolation=cv2.INTER_LINEAR)
+    size = (width_px, height_px)
+    picture = cv2.resize(air, size, interpolation=cv2.INTER_LINEAR)
 
     height = np.linspace(1, 0, height_px)[:, None]
     for base, colour in _HILLS:
         is_hill = height < _crest(base, rng)
         picture[is_hill] = colour
 
-    return roughen(np.clip(picture, 0, 255).astype(np.uint8), rng, 0.02)
+    pixels = np.clip(picture, 0, 255).astype(np.uint8)
+    return roughen(pixels, rng, 0.02)
 
 
 def _air(
@@ -173,9 +178,11 @@ def _clouds(rng: np.random.Generator, height: Floats, wide: int) -> Floats:
     """A sum of waves around the horizon, which lean with height."""
     angle_rad = np.linspace(0, math.tau, wide, endpoint=False)
     clouds = np.zeros((len(height), wide))
+
     for k in range(1, 24):
         phase_rad = rng.uniform(0, math.tau)
         lean_rad = rng.uniform(-30, 30) * height
+
         wave = np.sin(k * angle_rad + phase_rad + lean_rad)
         clouds += wave / k**0.6
 

@@ -74,7 +74,8 @@ def roughen(image: Image, rng: np.random.Generator, strength: float = 0.13) -> I
     """`image` with grain on it."""
     height_px, width_px, _ = image.shape
     grain = _grain(rng, height_px, width_px, strength)
-    rough: Image = np.clip(image * grain[..., None], 0, 255).astype(np.uint8)
+    factors = grain[..., None]
+    rough: Image = np.clip(image * factors, 0, 255).astype(np.uint8)
 
     return rough
 
@@ -85,6 +86,7 @@ def _grain(rng: np.random.Generator, height_px: int, width_px: int, strength: fl
     for scale, share in GRAIN:
         coarse_shape = (height_px // scale + 2, width_px // scale + 2)
         coarse = rng.standard_normal(coarse_shape, np.float32)
+
         fine = cv2.resize(coarse, (width_px, height_px), interpolation=cv2.INTER_LINEAR)
         total += strength * share * fine
 

@@ -45,7 +45,9 @@ class LineFollower:
     def _advance(self, speed_m_s: float) -> list[Leg]:
         """Advance by one tick: the legs that the robot travels, none at rest and at the end."""
         from_m = self._travelled_m
-        to_m = min(from_m + speed_m_s * self.tick_ns / 1e9, self.line.length_m)
+        step_m = speed_m_s * self.tick_ns / 1e9
+        to_m = min(from_m + step_m, self.line.length_m)
+
         self._travelled_m = to_m
         self.now_ns += self.tick_ns
 

@@ -103,11 +103,14 @@ class PerceptLevelSim(LineFollower):
         noise = self._noise
         deviations = (noise.speed, noise.turn, noise.drift_rad_per_sqrt_m)
         pace_s = self._pace_s(legs)
+
         rows = []
         for length_m, turn_rad in legs:
             speed, turn, drift = self._rng.normal((1.0, 1.0, 0.0), deviations).tolist()
             if length_m:
-                rows.append(self._straight(length_m, pace_s * length_m, speed, drift))
+                duration_s = pace_s * length_m
+                rows.append(self._straight(length_m, duration_s, speed, drift))
+
             if turn_rad:
                 duration_s = pace_s * TURN_AS_M * abs(turn_rad)
                 rows.append(self._turn(turn_rad * turn, duration_s))
@@ -138,9 +141,11 @@ class PerceptLevelSim(LineFollower):
     def _road(self, pose: Pose) -> Floats:
         """(4, 2): points of the street ahead, in the robot's frame."""
         points_m = []
+
         for ahead_m in ROAD_AHEAD_M:
             along_m = min(self._travelled_m + ahead_m, self.line.length_m)
             there = self.line.at(along_m)
+
             points_m.append((there.x_m, there.y_m))
 
         return transform_to(_array(pose), np.array(points_m))
