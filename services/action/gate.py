@@ -35,6 +35,7 @@ class LockstepGate:
         """Whether the command for the pose of `stamp_ns` in `cycle` may be computed."""
         has_senses = min(self.scan_ns, self.motion_ns) >= stamp_ns
         has_competition = self._competition_cycle >= cycle - 1
-        lacks_broadcast = self._awaits_broadcast and self._broadcast_cycle < self._competition_cycle
+        is_behind = self._broadcast_cycle < self._competition_cycle
+        lacks_broadcast = self._awaits_broadcast and is_behind
 
         return has_senses and has_competition and not lacks_broadcast

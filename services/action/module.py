@@ -103,6 +103,7 @@ class ActionModule:
         """Measure how far it is free ahead. A repeated scan means that nobody waits any longer."""
         self._clear_m = obstacle_ahead_m(scan, self._config.half_width_m)
         is_repeated = scan.stamp_ns == self._gate.scan_ns
+
         self._gate.scan_ns = scan.stamp_ns
         self._newest_ns = max(self._newest_ns, scan.stamp_ns)
 
@@ -188,6 +189,7 @@ class ActionModule:
     def _answer(self, estimate: Estimate) -> MotorCommand:
         stamp_ns = estimate.stamp_ns
         age_ns = self._age_ns(stamp_ns)
+
         if self._motor is None or self._route is None:
             return halted(stamp_ns, SpeedLimit.NO_ROUTE, age_ns)
 

@@ -39,9 +39,10 @@ def obstacle_ahead_m(scan: RangeScan, half_width_m: float) -> float:
     is_seen = range_m > 0
     is_in_lane = np.abs(range_m * np.sin(bearing_rad)) < half_width_m
     is_in_front = np.abs(bearing_rad) < MAX_BEARING_RAD
-    ahead_m = range_m * np.cos(bearing_rad)
+    is_obstacle = is_seen & is_in_lane & is_in_front
 
-    nearest_m = np.sort(ahead_m[is_seen & is_in_lane & is_in_front])
+    ahead_m = range_m * np.cos(bearing_rad)
+    nearest_m = np.sort(ahead_m[is_obstacle])
 
     return float(nearest_m[1]) if len(nearest_m) > 1 else math.inf
 
@@ -95,7 +96,8 @@ class SensoryMotorMemory:
         dx_m = target_x_m - pose.x_m
         dy_m = target_y_m - pose.y_m
 
-        bearing_rad = math.remainder(math.atan2(dy_m, dx_m) - pose.heading_rad, math.tau)
+        direction_rad = math.atan2(dy_m, dx_m)
+        bearing_rad = math.remainder(direction_rad - pose.heading_rad, math.tau)
         reach_m = max(lookahead_m / 2, math.hypot(dx_m, dy_m))
         steered_rad = max(-math.pi / 2, min(math.pi / 2, bearing_rad))
         curvature_per_m = 2 * math.sin(steered_rad) / reach_m
@@ -112,6 +114,7 @@ class SensoryMotorMemory:
         config = self._config
         braking_distance_m = config.cruise_m_s**2 / (2 * config.braking_m_s2)
         bend_per_m = self._route.sharpest(braking_distance_m)
+
         free_m = max(0.0, clear_m - config.clearance_m)
 
         limits = {

@@ -19,7 +19,8 @@ class Route:
     """Points every STEP_M along the legs, from the agent's origin, heading along x."""
 
     def __init__(self, legs: list[Leg], corner_radius_m: float, overrun_m: float) -> None:
-        corners = _corners(legs, max(overrun_m, STEP_M))
+        overrun_m = max(overrun_m, STEP_M)
+        corners = _corners(legs, overrun_m)
         line_m = _rounded(corners, corner_radius_m)
         along_m = distances_along(line_m)
 
@@ -37,7 +38,7 @@ class Route:
     @property
     def left_m(self) -> float:
         """Distance along the line from the agent to its end, overrun included."""
-        return (len(self.points_m) - 1 - self._index) * STEP_M
+        return (self._last - self._index) * STEP_M
 
     @property
     def leg(self) -> int:
@@ -48,24 +49,37 @@ class Route:
     def advance(self, x_m: float, y_m: float) -> None:
         """Find the point nearest to the agent within SEARCH_M ahead, never backwards."""
         last = self._index + int(SEARCH_M / STEP_M)
-        ahead_m = self.points_m[self._index : last + 1] - (x_m, y_m)
-        self._index += int(np.argmin(np.hypot(*ahead_m.T)))
+        window_m = self.points_m[self._index : last + 1]
+
+        away_x_m, away_y_m = (window_m - (x_m, y_m)).T
+        away_m = np.hypot(away_x_m, away_y_m)
+        self._index += int(np.argmin(away_m))
 
     def resume(self, travelled_m: float) -> None:
         """Continue from a distance along the line."""
         index = round(travelled_m / STEP_M)
-        self._index = max(0, min(index, len(self.points_m) - 1))
+        index = min(index, self._last)
+
+        self._index = max(0, index)
 
     def ahead(self, distance_m: float) -> tuple[float, float]:
         """The point of the line `distance_m` ahead of the agent, at most its end."""
-        index = self._index + round(distance_m / STEP_M)
-        x_m, y_m = self.points_m[min(index, len(self.points_m) - 1)].tolist()
+        steps = round(distance_m / STEP_M)
+        index = min(self._index + steps, self._last)
+
+        x_m, y_m = self.points_m[index].tolist()
         return x_m, y_m
 
     def sharpest(self, distance_m: float) -> float:
         """The sharpest curvature within `distance_m` ahead, per metre."""
         last = self._index + round(distance_m / STEP_M)
-        return float(self.curvature_per_m[self._index : last + 1].max())
+        window_per_m = self.curvature_per_m[self._index : last + 1]
+
+        return float(window_per_m.max())
+
+    @property
+    def _last(self) -> int:
+        return len(self.points_m) - 1
 
 
 def _corners(legs: list[Leg], overrun_m: float) -> list[Floats]:
@@ -84,7 +98,9 @@ def _corners(legs: list[Leg], overrun_m: float) -> list[Floats]:
 
 
 def _direction(heading_rad: float) -> Floats:
-    return np.array([np.cos(heading_rad), np.sin(heading_rad)])
+    cos = np.cos(heading_rad)
+    sin = np.sin(heading_rad)
+    return np.array([cos, sin])
 
 
 def _rounded(corners: list[Floats], radius_m: float) -> Floats:
@@ -119,6 +135,7 @@ def _curvature(points_m: Floats) -> Floats:
     """(n,): the curvature of a line of points every STEP_M, per metre, without sign."""
     ahead = np.gradient(points_m, axis=0)
     heading_rad = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
+
     turn_rad = np.abs(np.diff(heading_rad, append=0.0))
     turn_rad[-1] = 0.0
     curvature_per_m: Floats = turn_rad / STEP_M

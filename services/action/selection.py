@@ -33,7 +33,9 @@ class Scheme:
         if not self.is_applicable(context):
             return 0.0
 
-        mean_context = sum(context[part] for part in self.context) / len(self.context)
+        activations = [context[part] for part in self.context]
+        mean_context = sum(activations) / len(activations)
+
         saliences = [abs(salience) for salience in self.adding.values()]
         mean_adding = sum(saliences) / max(1, len(saliences))
 

@@ -48,7 +48,10 @@ class StuckDetector:
             self._standing_since_ns = motion.since_ns
 
         since_ns = self._standing_since_ns
-        self.is_stuck = since_ns is not None and motion.stamp_ns - since_ns >= self._after_ns
+        if since_ns is None:
+            self.is_stuck = False
+        else:
+            self.is_stuck = motion.stamp_ns - since_ns >= self._after_ns
 
     @property
     def _is_commanded(self) -> bool:
@@ -56,7 +59,10 @@ class StuckDetector:
 
     def _is_moving(self, motion: SelfMotion) -> bool:
         speeds = _mean_speeds(motion)
-        return speeds.speed_m_s >= self._stuck_m_s or speeds.turn_rad_s >= MIN_TURN_RAD_S
+        is_travelling = speeds.speed_m_s >= self._stuck_m_s
+        is_turning = speeds.turn_rad_s >= MIN_TURN_RAD_S
+
+        return is_travelling or is_turning
 
 
 def _mean_speeds(motion: SelfMotion) -> Speeds:
@@ -69,7 +75,8 @@ def _mean_speeds(motion: SelfMotion) -> Speeds:
     if duration_s <= 0.0:
         return Speeds(0.0, 0.0)
 
-    distance_m = float(np.abs(rows[:, 0] * rows[:, 2]).sum())
-    turn_rad = float(np.abs(rows[:, 1] * rows[:, 2]).sum())
+    speed_m_s, turn_rate_rad_s, dt_s = rows[:, :3].T
+    distance_m = float(np.abs(speed_m_s * dt_s).sum())
+    turn_rad = float(np.abs(turn_rate_rad_s * dt_s).sum())
 
     return Speeds(distance_m / duration_s, turn_rad / duration_s)

@@ -81,16 +81,19 @@ class DepthFromStereo:
 
     def __init__(self, calibration: Calibration, nearest_m: float) -> None:
         self._focal_baseline = calibration.fx_px * calibration.baseline_m
-        most_px = min(MAX_DISPARITIES, calibration.width_px)
-        self._matcher = StereoMatcher(min(self._focal_baseline / nearest_m, most_px))
+
+        nearest_px = self._focal_baseline / nearest_m
+        most_px = min(nearest_px, MAX_DISPARITIES, calibration.width_px)
+        self._matcher = StereoMatcher(most_px)
 
     def depth_m(self, left: Bytes, right: Bytes) -> Singles:
         """Depth along the optical axis for each pixel of `left`, float32 (h, w), 0 where no match
         is sure.
         """
         disparity_px = self._matcher.disparity_px(left, right)
-        depth_m = np.zeros(disparity_px.shape, np.float32)
         focal_baseline = np.float32(self._focal_baseline)
+
+        depth_m = np.zeros(disparity_px.shape, np.float32)
         np.divide(focal_baseline, disparity_px, out=depth_m, where=disparity_px > 0)
 
         return depth_m
@@ -112,11 +115,14 @@ def refined(disparity_px: Singles, left: Singles, right: Singles) -> Singles:
     result_px = disparity_px
     for _ in range(REFINEMENTS):
         matched = columns - result_px
-        slope = 0.5 * (left_slope + cv2.remap(right_slope, matched, rows, cv2.INTER_LINEAR))
+        matched_slope = cv2.remap(right_slope, matched, rows, cv2.INTER_LINEAR)
+        slope = 0.5 * (left_slope + matched_slope)
+
         error = cv2.remap(right, matched, rows, cv2.INTER_LINEAR) - left
         error -= _local_mean(error)
 
-        step_px = _local_mean(slope * error) / (_local_mean(slope * slope) + NOISE_GRADIENT)
+        curvature = _local_mean(slope * slope) + NOISE_GRADIENT
+        step_px = _local_mean(slope * error) / curvature
         least_px = disparity_px - MAX_STEP_PX
         result_px = np.clip(result_px + step_px, least_px, disparity_px + MAX_STEP_PX)
 

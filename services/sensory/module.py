@@ -35,7 +35,11 @@ class SensoryMemory:
         cv2.setNumThreads(1)
         self._config = config
         self._odometry = OdometryBuffer(config.longest_gap_s)
-        self._noise = WheelNoise(config.speed_noise, config.turn_noise, config.drift_rad_per_sqrt_m)
+        self._noise = WheelNoise(
+            config.speed_noise,
+            config.turn_noise,
+            config.drift_rad_per_sqrt_m,
+        )
         self._visual_odometry = VisualOdometry()
         self._depth: tuple[Calibration, DepthFromStereo] | None = None
         self._waiting: StereoFrame | None = None
@@ -127,7 +131,8 @@ class SensoryMemory:
 
     def _matcher(self, calibration: Calibration) -> DepthFromStereo:
         if self._depth is None or self._depth[0] != calibration:
-            matcher = DepthFromStereo(calibration, self._config.nearest_m)
+            nearest_m = self._config.nearest_m
+            matcher = DepthFromStereo(calibration, nearest_m)
             self._depth = (calibration, matcher)
 
         return self._depth[1]
@@ -137,6 +142,7 @@ def build(config: Config, instance: str) -> Module:
     """The module `sensory`."""
     memory = SensoryMemory(config)
     emits = (topics.SELF_MOTION, topics.SCAN, topics.VIEW)
+
     module = Module("sensory", instance)
     module.on(topics.STEREO, memory.on_frame, emits=emits)
 

@@ -59,6 +59,7 @@ class OdometryBuffer:
         """
         taken = [row for row in self._rows if row.stamp_ns <= until_ns]
         self._rows = self._rows[len(taken) :]
+
         rows = [(row.speed_m_s, row.turn_rate_rad_s, row.dt_s) for row in taken]
         began_ns = _began_ns(taken[0]) if taken else None
 
@@ -66,4 +67,6 @@ class OdometryBuffer:
 
 
 def _began_ns(row: Odometry) -> int:
-    return max(0, row.stamp_ns - round(row.dt_s * NS_PER_S))
+    duration_ns = round(row.dt_s * NS_PER_S)
+
+    return max(0, row.stamp_ns - duration_ns)

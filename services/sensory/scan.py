@@ -56,16 +56,17 @@ def _nearest_by_column(depth_m: Singles, calibration: Calibration) -> Floats:
     are fewer.
     """
     rows = np.arange(calibration.height_px)
-    slope = ((rows - calibration.cy_px) / calibration.fy_px).astype(np.float32)[:, None]
-    below_camera_m = slope * depth_m
+    slope = (rows - calibration.cy_px) / calibration.fy_px
+    below_camera_m = slope.astype(np.float32)[:, None] * depth_m
 
     camera_m = calibration.mount_height_m
     is_over_ground = below_camera_m < camera_m - LOWEST_M
     is_under_top = below_camera_m > camera_m - HIGHEST_M
-    is_obstacle = (depth_m > 0) & is_over_ground & is_under_top
+    is_known = depth_m > 0
+    is_obstacle = is_known & is_over_ground & is_under_top
 
     candidates_m = np.where(is_obstacle, depth_m, np.inf).astype(np.float64)
-    sorted_m: Floats = np.partition(candidates_m, SURE_PIXELS - 1, axis=0)
-    nearest_m: Floats = sorted_m[SURE_PIXELS - 1]
+    number = SURE_PIXELS - 1
+    nearest_m: Floats = np.partition(candidates_m, number, axis=0)[number]
 
     return nearest_m

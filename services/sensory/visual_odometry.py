@@ -153,8 +153,10 @@ def _estimate(pair: _Pair, corners_px: Singles, guess: Floats, wheels: Motion) -
 
 def _corners(grey: Bytes, depth_m: Singles) -> Singles:
     """(n, 2) pixels that can be tracked and whose depth is known well."""
-    is_near_enough = (depth_m > MIN_DEPTH_M) & (depth_m < MAX_DEPTH_M)
-    mask = is_near_enough.astype(np.uint8)
+    is_far_enough = depth_m > MIN_DEPTH_M
+    is_near_enough = depth_m < MAX_DEPTH_M
+    mask = (is_far_enough & is_near_enough).astype(np.uint8)
+
     found = cv2.goodFeaturesToTrack(grey, CORNERS, 0.01, 7, mask=mask)
     if found is None:
         return np.empty((0, 2), np.float32)
@@ -165,6 +167,7 @@ def _corners(grey: Bytes, depth_m: Singles) -> Singles:
 def _points(pixels: Singles, depth_m: Singles, calibration: Calibration) -> Floats:
     """(n, 3) points ahead, left and above the camera, from the robot's origin, at (n, 2) pixels."""
     column, row = np.rint(pixels).astype(int).T
+
     ahead_m = depth_m[row, column].astype(np.float64)
     left_m = -(pixels[:, 0] - calibration.cx_px) / calibration.fx_px * ahead_m
     up_m = -(pixels[:, 1] - calibration.cy_px) / calibration.fy_px * ahead_m
@@ -175,6 +178,7 @@ def _points(pixels: Singles, depth_m: Singles, calibration: Calibration) -> Floa
 def _track_back(pair: _Pair, corners_px: Singles, guess: Floats) -> _Tracks:
     """Where the corners of the new view were in the last one."""
     redrawn, before = _redraw(pair, guess)
+
     anywhere = np.zeros_like(corners_px)
     tracked_px, is_tracked, _ = cv2.calcOpticalFlowPyrLK(
         pair.new, redrawn, corners_px, anywhere, winSize=(11, 11), maxLevel=3
@@ -182,8 +186,13 @@ def _track_back(pair: _Pair, corners_px: Singles, guess: Floats) -> _Tracks:
 
     at = tracked_px.reshape(1, -1, 2)
     before_px = cv2.remap(
-        before, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+        before,
+        at[..., 0],
+        at[..., 1],
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
     )[0]
+
     height_px, width_px = pair.new.shape
     in_image = (before_px >= 0) & (before_px <= (width_px - 1, height_px - 1))
     is_found = np.asarray(is_tracked[:, 0], bool) & np.all(in_image, axis=1)
@@ -197,6 +206,7 @@ def _redraw(pair: _Pair, guess: Floats) -> tuple[Bytes, Singles]:
     """
     row, column = np.indices(pair.last.shape, np.float32)
     pixels = np.column_stack([column.ravel(), row.ravel()])
+
     depth_m = np.where(pair.depth_m > 0, pair.depth_m, HORIZON_M).astype(np.float32)
 
     points_m = _points(pixels, depth_m, pair.calibration)
@@ -293,8 +303,9 @@ def _linearize(
     predicted_px = _project(points_m, motion, calibration)
     residual_px = before_px - predicted_px
 
+    steps = np.diag(np.full(5, DIFFERENCE))
     columns = []
-    for step in np.diag(np.full(5, DIFFERENCE)):
+    for step in steps:
         moved_px = _project(points_m, motion + step, calibration)
         columns.append((moved_px - predicted_px) / DIFFERENCE)
 

@@ -24,12 +24,14 @@ class WheelNoise:
 
     def total(self, rows: Floats) -> Motion:
         """The sum of (n, 3) rows of speed, turn rate and duration."""
-        distance_m = rows[:, 0] * rows[:, 2]
-        turn_rad = rows[:, 1] * rows[:, 2]
+        speed_m_s, turn_rate_rad_s, dt_s = rows.T
+        distance_m = speed_m_s * dt_s
+        turn_rad = turn_rate_rad_s * dt_s
 
         distance_var_m2 = (self.speed * distance_m) ** 2
         drift_var_rad2 = self.drift_rad_per_sqrt_m**2 * np.abs(distance_m)
-        turn_var_rad2 = (self.turn * turn_rad) ** 2 + drift_var_rad2
+        factor_var_rad2 = (self.turn * turn_rad) ** 2
+        turn_var_rad2 = factor_var_rad2 + drift_var_rad2
 
         return Motion(
             distance_m=float(distance_m.sum()),
