@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from cli.launch.observer import Observer
 from cli.launch.outcome import Ending, Outcome
 from cli.launch.plan import (
     CONFIG_NAME,
@@ -22,17 +21,19 @@ from cli.launch.plan import (
 )
 from cli.launch.supervisor import Supervisor
 from cli.launch.watch import Watch
-from cli.launch.watchdog import Situation, Watchdog
+from cli.launch.watchdog import REMEDY, Situation, Watchdog
 from cli.run.display import Display
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.errors import ProcessFailedError
 from cogmap.runtime.config import Sections
 from cogmap.runtime.process import Stop
+from schemas.sensing import SpeedLimit
 
 PUMP_S = 0.05
 SHOW_PERIOD_S = 0.25
 GRACE_S = 3.0
 QUIET_S = 0.3
+MAX_SHARE_SLOWED = 0.3
 
 
 @dataclass
@@ -141,7 +142,7 @@ class Drive:
         if observer.progress >= 1.0:
             return Ending(Outcome.ROUTE_COMPLETE, "the robot has completed its route")
         if time.monotonic() >= until_s:
-            return Ending(Outcome.TIME_LIMIT, _out_of_time(observer, missing))
+            return _out_of_time(watch, missing)
         if observer.start is None:
             return None
         return self._watchdog.check(_situation(watch, missing))
@@ -170,7 +171,7 @@ def _situation(watch: Watch, missing: list[str]) -> Situation:
         drive_s=tally.observer.elapsed_s,
         travelled_m=tally.observer.travelled_m,
         commands=len(tally.cycle_ms),
-        halted_by=tally.halted_by,
+        halted_by=tally.command.halted_by if tally.command else SpeedLimit.NONE,
         missing=missing,
     )
 
@@ -183,7 +184,15 @@ def _show(watch: Watch, missing: list[str], display: Display) -> None:
         display.driving(observer, observer.errors())
 
 
-def _out_of_time(observer: Observer, missing: list[str]) -> str:
+def _out_of_time(watch: Watch, missing: list[str]) -> Ending:
     if missing:
-        return f"the time limit came while it waited for {', '.join(missing)}: see its log"
-    return f"the time limit came at {observer.progress:.0%} of the route: --time-limit allows more"
+        names = ", ".join(missing)
+        waited = f"the time limit came while it waited for {names}: see its log"
+        return Ending(Outcome.TIME_LIMIT, waited)
+
+    came = f"the time limit came at {watch.tally.observer.progress:.0%} of the route"
+    share = watch.tally.share_limited_by(SpeedLimit.POSE_AGE)
+    if share > MAX_SHARE_SLOWED:
+        slow = f"{came}: the robot drove slowly, as {share:.0%} of its poses were old: {REMEDY}"
+        return Ending(Outcome.TOO_SLOW, slow)
+    return Ending(Outcome.TIME_LIMIT, f"{came}: --time-limit allows more")

@@ -74,8 +74,9 @@ class DriveMetrics(msgspec.Struct, kw_only=True):
     path integration alone: of the wheels' odometry, and of the self-motion that sensory memory
     fuses of wheels and views. `error_ratio` is the estimate's mean error over that of the wheels,
     `error_over_fused` over that of fused self-motion. `cycle_*_ms`: camera frame stamped to motor
-    command received; `bus_share`: the part of the mean spent in anything but computing. `dropped`
-    answers of codelets are in no delta; `refused` gives the reasons of the last few. `gaps`:
+    command received; `bus_share`: the part of the mean spent in anything but computing. `halted`
+    and `slowed` count the commands that stopped the robot or kept it below cruising, by reason.
+    `dropped` answers of codelets are in no delta; `refused` gives the reasons of the last few. `gaps`:
     messages lost for good, by NEVER_DROP topic.
     """
 
@@ -91,6 +92,7 @@ class DriveMetrics(msgspec.Struct, kw_only=True):
     commands: int
     broadcasts: int
     halted: dict[str, int]
+    slowed: dict[str, int]
     cycle_p50_ms: float
     cycle_p99_ms: float
     bus_share: float
@@ -201,6 +203,7 @@ def drive_metrics(tally: Tally, gaps: dict[str, int], rejected: dict[str, int]) 
         commands=len(tally.cycle_ms),
         broadcasts=tally.broadcasts,
         halted=dict(tally.halted),
+        slowed=dict(tally.slowed),
         cycle_p50_ms=float(np.percentile(cycle_ms, 50)),
         cycle_p99_ms=float(np.percentile(cycle_ms, 99)),
         bus_share=sum(tally.bus_ms) / max(1e-9, sum(cycle_ms)),

@@ -1,4 +1,4 @@
-"""Compares where the robot is with where it believes to be, and with path integration alone. Pure."""
+"""Compares the robot's true path with its estimate and with path integration alone. Pure."""
 
 from __future__ import annotations
 

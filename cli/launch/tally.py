@@ -14,7 +14,7 @@ from schemas.base import Message
 from schemas.cognition import Broadcast
 from schemas.graph import Delta
 from schemas.process import Health
-from schemas.sensing import MotorCommand
+from schemas.sensing import MotorCommand, SpeedLimit
 from schemas.topics import Delivery
 
 MAX_REASONS = 8
@@ -36,8 +36,8 @@ class Tally:
 
     `cycle_ms`: of each command, the time from the stamping of its camera frame until it was
     received; `bus_ms`: the part of it spent in anything but computing. `refused`: why the last few
-    answers of codelets were dropped. `halted`: how many commands stopped the robot, by reason;
-    `halted_by` is that of the newest command.
+    answers of codelets were dropped. `halted` and `slowed`: how many commands stopped the robot or
+    kept it below its cruising speed, by reason; `command` is the newest.
     """
 
     def __init__(self, replica: Replica) -> None:
@@ -49,7 +49,8 @@ class Tally:
         self.dropped = 0
         self.refused: deque[str] = deque(maxlen=MAX_REASONS)
         self.halted: Counter[str] = Counter()
-        self.halted_by = ""
+        self.slowed: Counter[str] = Counter()
+        self.command: MotorCommand | None = None
         self.health: dict[str, Health] = {}
         self._busy: dict[str, list[float]] = {}
 
@@ -83,9 +84,16 @@ class Tally:
         self.cycle_ms.append(cycle_ns / 1e6)
         self.bus_ms.append((cycle_ns - compute_ns) / 1e6)
 
-        self.halted_by = command.halted_by
+        self.command = command
         if command.halted_by:
-            self.halted[command.halted_by] += 1
+            self.halted[command.halted_by.value] += 1
+        elif command.slowed_by:
+            self.slowed[command.slowed_by.value] += 1
+
+    def share_limited_by(self, limit: SpeedLimit) -> float:
+        """The share of the commands that it slowed or halted; 0 where there is none."""
+        limited = self.halted[limit.value] + self.slowed[limit.value]
+        return limited / max(1, len(self.cycle_ms))
 
     @property
     def busy(self) -> dict[str, float]:

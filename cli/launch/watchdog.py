@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from cli.launch.outcome import Ending, Outcome
+from schemas.sensing import SpeedLimit
 
 STALLED_S = 30.0
 STUCK_S = 20.0
 MIN_MOVE_M = 0.5
-POSE_AGE = "pose age"
+REMEDY = "end other programs, or use --lockstep, which waits for every answer"
 
 
 @dataclass(frozen=True)
@@ -18,14 +19,14 @@ class Situation:
     """A drive at `now_s` of the monotonic clock: `drive_s` of its own time have passed.
 
     `missing` are the modules that are not ready, `halted_by` is the reason of the newest of so many
-    `commands`, empty where it moves the wheels.
+    `commands`, NONE where it moves the wheels.
     """
 
     now_s: float
     drive_s: float
     travelled_m: float
     commands: int
-    halted_by: str = ""
+    halted_by: SpeedLimit = SpeedLimit.NONE
     missing: Sequence[str] = ()
 
 
@@ -79,12 +80,11 @@ def _stuck(situation: Situation, commands: int) -> Ending:
         return Ending(Outcome.STALLED, f"{still}: {names} is not ready, see its log")
     if not commands:
         return Ending(Outcome.STALLED, f"{still}: no motor command arrived, see action's log")
-    if situation.halted_by == POSE_AGE:
+    if situation.halted_by is SpeedLimit.POSE_AGE:
         return Ending(
             Outcome.TOO_SLOW,
-            f"{still}: its pose is too old to move safely, as this machine is too slow; "
-            "end other programs, or use --lockstep, which waits for every answer",
+            f"{still}: its pose is too old to move safely, as this machine is too slow: {REMEDY}",
         )
     if situation.halted_by:
-        return Ending(Outcome.STUCK, f"{still}, halted by {situation.halted_by}: see map.png")
+        return Ending(Outcome.STUCK, f"{still}, halted by {situation.halted_by.value}: see map.png")
     return Ending(Outcome.STUCK, f"{still}, though its wheels turn: see map.png")

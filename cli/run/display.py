@@ -1,4 +1,4 @@
-"""Shows how a run proceeds: one line that changes on a terminal, a line every few seconds elsewhere."""
+"""Shows how a run proceeds: a line that changes on a terminal, elsewhere one every few seconds."""
 
 from __future__ import annotations
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from collections import Counter
 from pathlib import Path
 
 import msgspec
@@ -104,7 +105,15 @@ def drive_rows(metrics: DriveMetrics) -> list[tuple[str, str]]:
         ("error ratio", ratios),
         ("learned", learned),
         ("cycle", cycle),
+        ("slowed or halted", _limits(metrics)),
     ]
+
+
+def _limits(metrics: DriveMetrics) -> str:
+    """What kept the robot below its cruising speed, by how many of the commands."""
+    limits = Counter(metrics.halted) + Counter(metrics.slowed)
+    shares = [f"{name} {number / metrics.commands:.0%}" for name, number in limits.most_common()]
+    return ", ".join(shares) or "never"
 
 
 def _errors(errors: ErrorMetrics) -> str:

@@ -13,48 +13,57 @@ from pathlib import Path
 
 import pytest
 
+from cli.launch.metrics import Recording
 from cli.launch.watch import Watch
 from cogmap.bus.interface import Member
 from cogmap.bus.zenoh_bus import ZenohBus
+from services import registry
 
 pytestmark = pytest.mark.compose
 
 ROOT = Path(__file__).parents[2]
-MODULES = (
-    "sim",
-    "sensory",
-    "epam",
-    "workspace",
-    "codelets",
-    "global_workspace",
-    "action",
-    "recorder",
-)
-TIMEOUT_S = 60.0
+SERVICES = (*registry.MODULES, "drive", "router")
+RUN = "/var/lib/cogmap/runs/latest"
+TIMEOUT_S = 90.0
 
 
 class Compose:
-    """One project of `docker compose`, its router published at a port of its own."""
+    """One project of `docker compose` with a drive of so many laps, its router published at a port
+    of its own.
+    """
 
-    def __init__(self) -> None:
+    def __init__(self, name: str, laps: str) -> None:
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             self.port = probe.getsockname()[1]
         self._environment = os.environ | {
+            "COGMAP_LAPS": laps,
             "COGMAP_PORT": str(self.port),
-            "COMPOSE_PROJECT_NAME": f"cogmap-test-{os.getpid()}",
+            "COMPOSE_PROJECT_NAME": f"cogmap-{name}-{os.getpid()}",
         }
 
     def __call__(self, *arguments: str) -> str:
-        command = ["docker", "compose", *arguments]
-        done = subprocess.run(
-            command, cwd=ROOT, env=self._environment, capture_output=True, text=True, check=False
-        )
-        assert done.returncode == 0, f"{' '.join(command)}:\n{(done.stdout + done.stderr)[-3000:]}"
+        done = self.attempt(*arguments)
+        words = " ".join(done.args)
+        assert done.returncode == 0, f"{words}:\n{(done.stdout + done.stderr)[-3000:]}"
         return done.stdout
+
+    def attempt(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        """Run it, whatever its exit code."""
+        return subprocess.run(
+            ["docker", "compose", *arguments],
+            cwd=ROOT,
+            env=self._environment,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
 
     def containers(self, service: str) -> list[str]:
         return self("ps", "--quiet", service).split()
+
+    def cogmap(self, service: str, command: str) -> subprocess.CompletedProcess[str]:
+        return self.attempt("exec", "-T", service, "sh", "-c", f"cogmap {command}")
 
 
 def docker(*arguments: str) -> str:
@@ -74,14 +83,22 @@ def there_is_docker() -> bool:
 
 
 @pytest.fixture(scope="module")
-def compose() -> Iterator[Compose]:
-    """The running system with two workers."""
-    if not there_is_docker():
-        missing = "no Docker engine with compose v2"
-        pytest.fail(missing) if os.environ.get("CI") == "true" else pytest.skip(missing)
-    project = Compose()
+def image() -> None:
+    """The image, built."""
+    if there_is_docker():
+        Compose("build", laps="1")("build")
+        return
+    missing = "no Docker engine with compose v2"
+    if os.environ.get("CI") == "true":
+        pytest.fail(missing)
+    pytest.skip(missing)
+
+
+@pytest.fixture(scope="module")
+def compose(image: None) -> Iterator[Compose]:
+    """The running system with two workers, on a long drive."""
+    project = Compose("long", laps="30")
     try:
-        project("build")
         project("up", "--detach", "--scale", "codelets=2")
         yield project
     finally:
@@ -118,48 +135,73 @@ def test_each_worker_has_a_name_of_its_own(watch: Watch, compose: Compose) -> No
     wait_until(watch, lambda: named <= watch.present)
 
 
-@pytest.mark.parametrize("service", [*MODULES, "router"])
+@pytest.mark.parametrize("service", SERVICES)
 def test_no_process_in_a_container_is_roots(compose: Compose, service: str) -> None:
     for container in compose.containers(service):
         users = docker("top", container, "-o", "pid,uid").split()[3::2]
-        assert users and "0" not in users
+        assert users
+        assert "0" not in users
 
 
-def test_the_logs_say_which_module_says_what(compose: Compose) -> None:
+def test_the_output_names_the_module_of_each_line(compose: Compose) -> None:
     lines = compose("logs", "--no-color").splitlines()
     for service in ("sensory", "workspace", "action"):
-        assert any(
-            line.startswith(f"{service}-1 ") and f"{service} is ready" in line for line in lines
-        )
+        said = [line for line in lines if line.startswith(f"{service}-1 ")]
+        assert any(f"{service} is ready" in line for line in said)
 
 
-def test_the_recorder_writes_a_log(compose: Compose) -> None:
-    sizes = compose("exec", "-T", "recorder", "sh", "-c", "stat --format %s *.mcap").split()
-    assert len(sizes) == 1
-    assert int(sizes[0]) > 0
-
-
-def test_the_log_has_what_the_workspace_says_from_its_first_message_on(compose: Compose) -> None:
-    said = compose(
-        "exec", "-T", "recorder", "sh", "-c", "cogmap log cat *.mcap presence -n 1 --json"
-    )
-    assert json.loads(said.splitlines()[0])["message"]["seq"] == 0
+def test_the_log_has_what_the_workspace_publishes_from_its_first_message_on(
+    compose: Compose,
+) -> None:
+    first = compose.cogmap("drive", f"log cat {RUN}/log.mcap presence -n 1 --json").stdout
+    assert json.loads(first.splitlines()[0])["message"]["seq"] == 0
 
 
 @pytest.mark.parametrize("service", ["epam", "workspace", "sim", "action"])
-def test_a_container_that_is_killed_comes_back_and_the_drive_goes_on(
+def test_a_container_that_is_killed_restarts_and_the_robot_drives_again(
     watch: Watch, compose: Compose, service: str
 ) -> None:
     member = Member(service, service)
     wait_until(watch, lambda: member in watch.present)
     (container,) = compose.containers(service)
-    pid = docker("inspect", "--format", "{{.State.Pid}}", container)
-    kill = f"kill -9 {pid}"
-    docker(
-        "run", "--rm", "--pid", "host", "--user", "0", "--entrypoint", "sh", "cogmap", "-c", kill
-    )
+    kill(container)
     wait_until(watch, lambda: member not in watch.present)
     wait_until(watch, lambda: member in watch.present)
+
     commands = len(watch.tally.cycle_ms)
     wait_until(watch, lambda: len(watch.tally.cycle_ms) > commands + 5)
     assert docker("inspect", "--format", "{{.RestartCount}}", container) == "1"
+
+
+def kill(container: str) -> None:
+    """Kill its process as the kernel would: `docker kill` would keep it from being restarted."""
+    pid = docker("inspect", "--format", "{{.State.Pid}}", container)
+    host = ["run", "--rm", "--pid", "host", "--user", "0", "--entrypoint", "sh"]
+    docker(*host, "cogmap", "-c", f"kill -9 {pid}")
+
+
+def test_when_recording_has_ended_the_doctor_misses_nobody(compose: Compose) -> None:
+    compose("stop", "drive")
+    findings = json.loads(compose.cogmap("sim", "doctor --json").stdout)
+    missed = {finding["about"] for finding in findings} & {"recorder", "observer", *SERVICES}
+    assert not missed, findings
+
+
+def test_a_drive_ends_every_container_and_leaves_its_files(image: None, tmp_path: Path) -> None:
+    project = Compose("short", laps="0.1")
+    try:
+        output = project("up", "--no-color", "--exit-code-from", "drive")
+        project("cp", f"drive:{RUN}/.", str(tmp_path))
+        assert project("ps", "--quiet", "--status", "running") == ""
+    finally:
+        project("down", "--volumes", "--timeout", "5")
+
+    assert "route complete" in output
+    assert json.loads((tmp_path / "summary.json").read_text())["completed"]
+    assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
+    assert Recording.read(tmp_path / "log.mcap") is not None
+
+
+def test_the_image_has_the_experiments(image: None) -> None:
+    command = ["experiment", "cue-integration", "--trials", "8", "--processes", "1"]
+    assert "runs/cue-integration" in docker("run", "--rm", "cogmap", *command)

@@ -97,21 +97,21 @@ KILLED_TOGETHER = (
 
 @pytest.fixture
 def commands() -> Iterator[Callable[[str], list[MotorCommand]]]:
-    """Gives the list of the commands that move the wheels of the robot at an endpoint, which grows."""
+    """Gives the list, which grows, of the commands at an endpoint that move the robot's wheels."""
     ended = threading.Event()
     shells = []
     threads = []
 
     def listen(endpoint: str) -> list[MotorCommand]:
-        heard: list[MotorCommand] = []
+        moving: list[MotorCommand] = []
         keep = Module("listener").on(
-            topics.MOTOR_COMMAND, lambda command: command.halted_by or heard.append(command)
+            topics.MOTOR_COMMAND, lambda command: command.halted_by or moving.append(command)
         )
         shells.append(Shell(keep, ZenohBus(endpoint, "agent")))
         shells[-1].open()
         threads.append(threading.Thread(target=work, args=shells[-1:]))
         threads[-1].start()
-        return heard
+        return moving
 
     def work(shell: Shell) -> None:
         while not ended.is_set():
@@ -131,11 +131,11 @@ def test_whatever_is_killed_is_restarted_and_the_robot_drives_again(
     before = shared_memory()
     run = start("--laps", "3", "--time-limit", "100")
     run.wait_for(DRIVING)
-    heard = commands(run.endpoint)
+    moving = commands(run.endpoint)
     for together in KILLED_TOGETHER:
         run.kill(*together)
-        enough = len(heard) + 5
-        wait_until(lambda enough=enough: len(heard) >= enough)
+        enough = len(moving) + 5
+        wait_until(lambda enough=enough: len(moving) >= enough)
     run.process.send_signal(signal.SIGINT)
     assert run.end() == 130, run.output()
     summary = run.summary()

@@ -18,7 +18,7 @@ from schemas.array import Array
 from schemas.base import Message
 from schemas.graph import Cells, Delta, Node
 from schemas.process import Health
-from schemas.sensing import MotorCommand, Odometry, Pose, SelfMotion, TruePose
+from schemas.sensing import MotorCommand, Odometry, Pose, SelfMotion, SpeedLimit, TruePose
 from services.sim.layout.town import generate
 
 MS = 1_000_000
@@ -168,13 +168,27 @@ def test_errors_of_the_estimate_the_wheels_and_fused_self_motion_are_apart(
 
 
 def test_a_cycle_is_timed_from_the_frame_to_the_command(watch: Watch, publisher: Publisher) -> None:
-    command = MotorCommand(left_wheel_rad_s=0.0, right_wheel_rad_s=0.0, halted_by="obstacle")
+    command = MotorCommand(
+        left_wheel_rad_s=0.0, right_wheel_rad_s=0.0, halted_by=SpeedLimit.OBSTACLE
+    )
     stages = [("sensory", 20 * MS, 5 * MS), ("action", 10 * MS, 5 * MS)]
     publisher.publish(command, sent_ns=40 * MS, stages=stages)
     metrics = metrics_of(watch)
     assert (metrics.commands, metrics.halted) == (1, {"obstacle": 1})
     assert metrics.cycle_p50_ms == pytest.approx(40.0)
     assert metrics.bus_share == pytest.approx(0.25)
+
+
+def test_what_slowed_or_halted_the_robot_is_counted_by_reason(
+    watch: Watch, publisher: Publisher
+) -> None:
+    for seq, slowed_by in enumerate((SpeedLimit.POSE_AGE, SpeedLimit.NONE, SpeedLimit.BEND)):
+        command = MotorCommand(
+            seq=seq, left_wheel_rad_s=1.0, right_wheel_rad_s=1.0, slowed_by=slowed_by
+        )
+        publisher.publish(command)
+    assert metrics_of(watch).slowed == {"pose age": 1, "bend": 1}
+    assert watch.tally.share_limited_by(SpeedLimit.POSE_AGE) == pytest.approx(1 / 3)
 
 
 def test_gaps_are_those_of_whoever_missed_most(watch: Watch, publisher: Publisher) -> None:

@@ -6,6 +6,7 @@ import pytest
 
 from cli.launch.outcome import Ending, Outcome
 from cli.launch.watchdog import MIN_MOVE_M, STALLED_S, STUCK_S, Situation, Watchdog
+from schemas.sensing import SpeedLimit
 
 
 def after(wall_s: float, drive_s: float, moved_m: float = 0.0, **more: object) -> Ending | None:
@@ -25,15 +26,15 @@ def test_a_robot_that_moves_is_left_alone() -> None:
 
 
 def test_a_robot_that_stands_for_a_while_is_left_alone() -> None:
-    assert after(STUCK_S - 0.1, STUCK_S - 0.1, halted_by="obstacle") is None
+    assert after(STUCK_S - 0.1, STUCK_S - 0.1, halted_by=SpeedLimit.OBSTACLE) is None
 
 
 @pytest.mark.parametrize(
     ("facts", "outcome", "words"),
     [
-        ({"halted_by": "obstacle"}, Outcome.STUCK, "halted by obstacle"),
+        ({"halted_by": SpeedLimit.OBSTACLE}, Outcome.STUCK, "halted by obstacle"),
         ({}, Outcome.STUCK, "though its wheels turn"),
-        ({"halted_by": "pose age"}, Outcome.TOO_SLOW, "this machine is too slow"),
+        ({"halted_by": SpeedLimit.POSE_AGE}, Outcome.TOO_SLOW, "this machine is too slow"),
         ({"missing": ["epam"]}, Outcome.STALLED, "epam is not ready"),
         ({"commands": 50}, Outcome.STALLED, "no motor command arrived"),
     ],
