@@ -6,27 +6,38 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cogmap.errors import CogmapError
 from cogmap.geometry.arrays import Floats
-from cogmap.graph.graph import TILE_SIDE, Graph, object_id
+from cogmap.graph.graph import Graph
+from schemas.nodes import (
+    ROOT_MAP,
+    Object,
+    Observations,
+    PathSegment,
+    PlaceColumn,
+    object_id,
+)
 from services.codelets.mapping.observations import Sightings
 from services.codelets.mapping.path import rows_of
 
 STAMP = 0
 POSE = slice(1, 4)
 ODOMETRY = slice(4, 7)
-POSE_KEYS = ("x_m", "y_m", "heading_rad")
 
 
 def self_pose(graph: Graph) -> tuple[float, float, float]:
-    """Where the agent believes that it is: x_m, y_m, heading_rad."""
-    facts = graph.nodes["self"].attributes
-    x_m, y_m, heading_rad = (float(facts[key]) for key in POSE_KEYS)
-    return x_m, y_m, heading_rad
+    """Where the agent believes that it is: x_m, y_m, heading_rad. Raises CogmapError before the
+    first cycle.
+    """
+    agent = graph.agent
+    if agent is None:
+        raise CogmapError("the graph has no self node")
+    return agent.x_m, agent.y_m, agent.heading_rad
 
 
 def path_rows(graph: Graph) -> Floats:
     """(n, 9) rows of the path, the oldest first: see STAMP, POSE and ODOMETRY."""
-    return rows_of(graph.nodes.values())
+    return rows_of(graph.of_kind(PathSegment))
 
 
 def object_positions_m(graph: Graph, labels: Sequence[str]) -> Floats:
@@ -34,24 +45,19 @@ def object_positions_m(graph: Graph, labels: Sequence[str]) -> Floats:
     positions_m = np.full((len(labels), 2), np.nan)
 
     for row, label in enumerate(labels):
-        node = graph.nodes.get(object_id(label))
+        node = graph.get(Object, object_id(label))
         if node is not None:
-            positions_m[row] = (node.attributes["x_m"], node.attributes["y_m"])
+            positions_m[row] = (node.x_m, node.y_m)
 
     return positions_m
 
 
 def observations(graph: Graph) -> Sightings:
     """All observations of landmarks, by the place of the path that they were made from."""
-    return Sightings.of(graph.nodes.values(), path_rows(graph)[:, STAMP])
+    return Sightings.of(graph.of_kind(Observations), path_rows(graph)[:, STAMP])
 
 
 def road_m(graph: Graph) -> Floats:
     """(n, 2): the middles of the cells that are road."""
-    cells = [np.zeros((0, 2))]
-
-    for place, tile in sorted(graph.tiles.items()):
-        here = np.argwhere(tile.columns["road"] > 0)
-        cells.append(here + TILE_SIDE * np.array(place))
-
-    return np.vstack(cells) * graph.cell_m
+    cells, _ = graph.places.written_cells(ROOT_MAP, PlaceColumn.ROAD)
+    return cells.astype(np.float64) * graph.cell_m()

@@ -2,13 +2,32 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import msgspec
 import numpy as np
 import numpy.typing as npt
 
-_ITEM_BYTES = {"|u1": 1, "<u2": 2, "<i4": 4, "<i8": 8, "<f4": 4, "<f8": 8}
+_ITEM_BYTES = {"|u1": 1, "<u2": 2, "<f2": 2, "<i4": 4, "<i8": 8, "<f4": 4, "<f8": 8}
 DTYPES = frozenset(_ITEM_BYTES)
+MatrixType = Literal["<f2", "<f4", "<f8"]
 MAX_DIMENSIONS = 4
+
+
+def _check(dtype: str, shape: tuple[int, ...], data: memoryview | bytes) -> None:
+    """Raise ValueError where the parts of an array do not fit together, or it is not finite."""
+    expected = _ITEM_BYTES.get(dtype, 0)
+    if not expected:
+        raise ValueError(f"array dtype {dtype!r} is none of {', '.join(sorted(_ITEM_BYTES))}")
+
+    for side in shape:
+        expected *= side if side >= 0 else 0
+    if len(shape) > MAX_DIMENSIONS or min(shape, default=0) < 0:
+        raise ValueError(f"array shape {shape} is not one of up to {MAX_DIMENSIONS} sizes")
+    if len(data) != expected:
+        raise ValueError(f"array of shape {shape} needs {expected} bytes, got {len(data)}")
+    if dtype[1] == "f" and not np.isfinite(np.frombuffer(data, dtype)).all():
+        raise ValueError("array holds NaN or infinity")
 
 
 class Array(msgspec.Struct, frozen=True, eq=False, gc=False):
@@ -23,21 +42,7 @@ class Array(msgspec.Struct, frozen=True, eq=False, gc=False):
     data: memoryview
 
     def __post_init__(self) -> None:
-        expected = _ITEM_BYTES.get(self.dtype, 0)
-        if not expected:
-            raise ValueError(
-                f"array dtype {self.dtype!r} is none of {', '.join(sorted(_ITEM_BYTES))}"
-            )
-        for side in self.shape:
-            expected *= side if side >= 0 else 0
-        if len(self.shape) > MAX_DIMENSIONS or min(self.shape, default=0) < 0:
-            raise ValueError(f"array shape {self.shape} is not one of up to {MAX_DIMENSIONS} sizes")
-        if len(self.data) != expected:
-            raise ValueError(
-                f"array of shape {self.shape} needs {expected} bytes, got {len(self.data)}"
-            )
-        if self.dtype[1] == "f" and not np.isfinite(np.frombuffer(self.data, self.dtype)).all():
-            raise ValueError("array holds NaN or infinity")
+        _check(self.dtype, self.shape, self.data)
 
     @classmethod
     def of(cls, values: npt.ArrayLike, dtype: str | None = None) -> Array:
@@ -54,7 +59,34 @@ class Array(msgspec.Struct, frozen=True, eq=False, gc=False):
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Array):
             return NotImplemented
-        return (self.dtype, self.shape) == (other.dtype, other.shape) and self.data == other.data
+        same_type = (self.dtype, self.shape) == (other.dtype, other.shape)
+        return same_type and self.data == other.data
 
     def __hash__(self) -> int:
         return hash((self.dtype, self.shape, bytes(self.data)))
+
+
+class Matrix(msgspec.Struct, frozen=True, gc=False):
+    """A matrix of floats that a node of the graph keeps; all are finite.
+
+    It travels as an Array does, but owns its bytes: a node that is kept does not keep the message
+    that it came in.
+    """
+
+    dtype: MatrixType
+    shape: tuple[int, int]
+    data: bytes
+
+    def __post_init__(self) -> None:
+        _check(self.dtype, self.shape, self.data)
+
+    @classmethod
+    def of(cls, values: npt.ArrayLike, dtype: MatrixType = "<f8") -> Matrix:
+        """Copy `values`, (n, columns)."""
+        array = np.ascontiguousarray(values, dtype)
+        rows, columns = array.shape
+        return cls(dtype, (rows, columns), array.tobytes())
+
+    def numpy(self) -> npt.NDArray[np.float64]:
+        """The values, read-only, sharing memory with the matrix, of its dtype."""
+        return np.frombuffer(self.data, self.dtype).reshape(self.shape)

@@ -1,4 +1,4 @@
-"""Messages inside the mind: tasks for codelets, coalitions, broadcasts, actions."""
+"""Messages of the cognitive cycle: replays, coalitions, competitions, broadcasts, actions."""
 
 from __future__ import annotations
 
@@ -8,30 +8,12 @@ from typing import Annotated
 import msgspec
 
 from schemas.array import Array
-from schemas.base import Count, Finite, Message, Name, Part, Scalar
-from schemas.graph import Node, PlaceTile
-from schemas.sensing import Percept, PlaceMatch, Unit
+from schemas.base import Count, Message, Name, Part, Scalar, Unit
+from schemas.graph import Link
+from schemas.nodes import AnyNode
 
 
-class Task(Message, kw_only=True):
-    """Work for one codelet, with all it needs: workers hold no state. `motions` as in SelfMotion."""
-
-    task_id: Name
-    codelet: Name
-    worker: Name
-    attempt: Count
-    cycle: Count
-    base_version: Count
-    cell_m: Finite
-    nodes: list[Node]
-    percepts: list[Percept]
-    motions: Array
-    road_m: Array
-    matches: list[PlaceMatch] = []
-    tiles: list[PlaceTile] = []
-
-
-class Replay(Message, kw_only=True):
+class Replay(Message, kw_only=True, frozen=True):
     """A loop closed by reverse replay, and what it predicts of place cells (paper §5.6).
 
     Positions of the path in the order in which they are replayed, the newest first: `stamps_ns`
@@ -54,15 +36,22 @@ class Replay(Message, kw_only=True):
     decay_per_m: Annotated[float, msgspec.Meta(gt=0, le=100)]
 
 
-class Coalition(Part, kw_only=True):
-    """Content that an attention codelet brings to the global workspace."""
+class Coalition(Part, kw_only=True, frozen=True):
+    """Content that an attention codelet brings to the global workspace.
 
+    `id` is unique in a run; the workspace gives it when it commits the codelet's answer. `maps` are
+    ids of cognitive maps.
+    """
+
+    id: str = ""
     codelet: Name
     activation: Unit
-    content: list[Node]
+    nodes: list[AnyNode]
+    links: list[Link] = []
+    maps: list[Name] = []
 
 
-class Coalitions(Message, kw_only=True):
+class Coalitions(Message, kw_only=True, frozen=True):
     """What the attention codelets found in one cycle, perhaps nothing."""
 
     cycle: Count
@@ -88,7 +77,7 @@ class Fate(enum.StrEnum):
     DECAYED = "decayed"
 
 
-class Contender(Part, kw_only=True):
+class Contender(Part, kw_only=True, frozen=True):
     """A coalition in one cycle's competition: `id` names it from its first cycle to its last.
 
     `activation` is what is left after decay. A WAITING coalition competes again in the next cycle;
@@ -101,7 +90,7 @@ class Contender(Part, kw_only=True):
     fate: Fate
 
 
-class Competition(Message, kw_only=True):
+class Competition(Message, kw_only=True, frozen=True):
     """One cycle's competition for consciousness: every coalition that took part, and its fate."""
 
     cycle: Count
@@ -109,7 +98,7 @@ class Competition(Message, kw_only=True):
     trigger: Trigger = Trigger.NONE
 
 
-class Broadcast(Message, kw_only=True):
+class Broadcast(Message, kw_only=True, frozen=True):
     """The winning coalition, to every module."""
 
     cycle: Count
@@ -126,7 +115,7 @@ class Rejection(enum.StrEnum):
     LESS_ACTIVE = "less active than the one chosen"
 
 
-class Behaviour(Part, kw_only=True):
+class Behaviour(Part, kw_only=True, frozen=True):
     """A scheme that action selection considered."""
 
     scheme: Name
@@ -134,7 +123,7 @@ class Behaviour(Part, kw_only=True):
     rejection: Rejection = Rejection.NONE
 
 
-class Action(Message, kw_only=True):
+class Action(Message, kw_only=True, frozen=True):
     """The scheme that action selection chose, and its parameters for the sensory-motor memory.
 
     `behaviours` are all schemes that were considered, the chosen one included.

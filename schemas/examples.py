@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import msgspec
 import numpy as np
 
-from schemas import cognition, graph, process, sensing
-from schemas.array import Array
+from schemas import codelets, cognition, graph, nodes, process, sensing
+from schemas.array import Array, Matrix, MatrixType
 from schemas.base import Message
+from schemas.nodes import LinkKind, PlaceColumn
 
 _STAMP_NS = 1_200_000_000
 
@@ -51,39 +55,165 @@ def _percept() -> sensing.Percept:
     )
 
 
-def _node() -> graph.Node:
-    return graph.Node(
-        id="self",
-        kind="self",
+def _matrix(rows: int, columns: int, dtype: MatrixType = "<f8") -> Matrix:
+    return Matrix.of(np.arange(rows * columns, dtype=dtype).reshape(rows, columns) / 8, dtype)
+
+
+def _node() -> nodes.Node:
+    return nodes.Node(
+        id="post:3",
+        kind="post",
         activation=0.5,
         base_level=0.125,
+        cycle=5,
         attributes={"x_m": 1.5, "count": 3, "name": "Häuserzeile", "moving": True},
-        samples=_ramp(4, 3, dtype="<f8"),
+        samples=_matrix(4, 3),
     )
+
+
+def _self() -> nodes.Self:
+    return nodes.Self(
+        id=nodes.SELF_ID,
+        activation=1.0,
+        base_level=1.0,
+        cycle=6,
+        map="map:1",
+        stamp_ns=1_100_000_000,
+        x_m=3.5,
+        y_m=-1.25,
+        heading_rad=0.5,
+        x_sd_m=0.25,
+        y_sd_m=0.125,
+        heading_sd_rad=0.0625,
+        kept_share=0.375,
+        misfit_count=2,
+        first_misfit="building-03",
+        is_lost=True,
+        last_misfit_ns=1_000_000_000,
+        last_fit_ns=900_000_000,
+        stationary_since_ns=800_000_000,
+        speed_gain=0.03125,
+        turn_gain=-0.03125,
+        range_gain=0.015625,
+        odometry_x_m=3.25,
+        odometry_y_m=-1.5,
+        odometry_heading_rad=0.625,
+        odometry_variance_m2=0.5,
+        odometry_variance_rad2=0.25,
+        samples=_matrix(2, 7),
+    )
+
+
+def _object() -> nodes.Object:
+    return nodes.Object(
+        id=nodes.object_id("building-07"),
+        activation=0.75,
+        base_level=0.25,
+        cycle=6,
+        label="building-07",
+        map="map:1",
+        x_m=12.5,
+        y_m=4.25,
+        x_sd_m=0.5,
+        y_sd_m=0.25,
+        width_m=9.0,
+        height_m=6.5,
+        sightings=4,
+        misses=1,
+        last_seen_ns=1_100_000_000,
+        created_ns=700_000_000,
+        surveyed=True,
+        salience=0.5,
+        offsets_m=_matrix(3, 2, "<f2"),
+    )
+
+
+def _closure() -> nodes.LoopClosure:
+    return nodes.LoopClosure(
+        id="closure:6:building-07",
+        activation=0.5,
+        base_level=1.0,
+        cycle=6,
+        from_ns=200_000_000,
+        to_ns=1_100_000_000,
+        cue="building-07",
+        ahead_m=8.5,
+        left_m=-2.25,
+        range_m=9.5,
+        bearing_rad=0.25,
+        sd_m=0.5,
+        sd_rad=0.125,
+        before_ns=400_000_000,
+        view=2,
+        consistent=True,
+        accepted=False,
+    )
+
+
+def _nodes() -> list[graph.Operation]:
+    """A node of every kind, every field of it other than its default."""
+    usual: dict[str, Any] = {"activation": 0.5, "base_level": 0.25, "cycle": 6}
+    observations = nodes.observations_id(1, "building-07")
+    return [
+        _node(),
+        _self(),
+        nodes.Percept(
+            id=nodes.percept_id("building-07"),
+            label="building-07",
+            bearing_rad=0.25,
+            range_m=9.5,
+            **usual,
+        ),
+        _object(),
+        nodes.PathSegment(id=nodes.segment_id(1), number=1, rows=_matrix(2, 9), **usual),
+        nodes.Observations(
+            id=observations, number=1, landmark="building-07", rows=_matrix(2, 6), **usual
+        ),
+        _closure(),
+        nodes.Correction(id=nodes.CORRECTION_ID, rows=_matrix(2, 7), **usual),
+        nodes.Map(
+            id="map:1",
+            cell_m=0.5,
+            parent=nodes.ROOT_MAP,
+            x_m=3.0,
+            y_m=-2.0,
+            heading_rad=0.25,
+            **usual,
+        ),
+    ]
 
 
 def _operations() -> list[graph.Operation]:
     return [
-        _node(),
-        graph.Link(source="self", target="place:3:-4", kind="at", weight=0.75),
+        *_nodes(),
+        graph.Link(source="self", target="place:map:1:3:-4", kind=LinkKind.INSTANCE, weight=0.75),
         _tile(),
         graph.Links(
-            kind="instance", weights={"percept:07": {"building-07": 1.0, "building-08": 0.25}}
+            kind=LinkKind.INSTANCE,
+            weights={"percept:07": {"building-07": 1.0, "building-08": 0.25}},
         ),
         graph.DropNode(id="building-03"),
-        graph.DropLink(source="self", target="place:2:-4", kind="at"),
-        graph.Activations(
-            ids=["self", "building-07"],
-            values=_ramp(2, dtype="<f4"),
-            base_levels=_ramp(2, dtype="<f4"),
+        graph.DropLink(source="self", target="place:map:1:2:-4", kind=LinkKind.INSTANCE),
+        graph.Cells(
+            map="map:1",
+            column=PlaceColumn.ROAD,
+            cells=_ramp(3, 2, dtype="<i4"),
+            values=_ramp(3, dtype="<f4"),
+            cycle=6,
         ),
-        graph.Cells(column="road", cells=_ramp(3, 2, dtype="<i4"), values=_ramp(3, dtype="<f4")),
+        _decay(),
     ]
 
 
+def _decay() -> graph.Decay:
+    return graph.Decay(activation=0.5, base_level=0.0625, place_activation=0.125, forget_below=0.25)
+
+
 def _tile() -> graph.PlaceTile:
-    columns = {name: _ramp(2, 2, dtype="<f4") for name in ("activation", "road", "traversable")}
-    return graph.PlaceTile(x=-1, y=2, side=2, cell_m=1.5, **columns)
+    side = graph.TILE_SIDE
+    columns = {name: _ramp(side, side, dtype="<f4") for name in (PlaceColumn.ROAD,)}
+    cycles = _ramp(side, side, dtype="<i4")
+    return graph.PlaceTile(map="map:1", x=-1, y=2, columns=columns, activation_cycle=cycles)
 
 
 def _sensing() -> list[Message]:
@@ -120,48 +250,62 @@ def _sensing() -> list[Message]:
 
 
 def _mind() -> list[Message]:
-    coalition = cognition.Coalition(codelet="attention", activation=0.375, content=[_node()])
+    coalition = cognition.Coalition(
+        id="6/whereabouts/0",
+        codelet="whereabouts",
+        activation=0.375,
+        nodes=[_self(), _object()],
+        links=[graph.Link(source="self", target="place:map:1:3:-4", kind=LinkKind.INSTANCE)],
+        maps=["map:1"],
+    )
     return [
-        graph.Proposal(
-            task_id="6:localization",
-            worker="codelets-2",
+        codelets.Proposal(
+            task_id="6/localization",
             codelet="localization",
             base_version=41,
             operations=_operations(),
+            coalitions=[coalition],
+            events=[_replay()],
             failure="too few samples",
         ),
         graph.Delta(
             version=42,
             cycle=6,
-            phase="collect",
-            tasks=["6:localization"],
+            phase=graph.Phase.OBJECTS,
+            tasks=["6/localization"],
             operations=_operations(),
-            dropped=1,
-            refused=["proposal 6:landmark failed: too few samples"],
+            rejected=1,
+            reasons=["proposal 6/landmark failed: too few samples"],
         ),
         graph.Snapshot(
             version=42,
             cycle=6,
-            nodes=[_node()],
-            links=[graph.Link(source="self", target="a")],
+            phase=graph.Phase.ATTENTION,
+            decay=_decay(),
+            nodes=[_self(), _object()],
+            links=[graph.Links(weights={"self": {"place:map:1:3:-4": 1.0}})],
             tiles=[_tile()],
         ),
         graph.SnapshotRequest(at_least=41),
-        cognition.Task(
-            task_id="6:localization",
+        codelets.Task(
+            task_id="6/localization",
             codelet="localization",
-            worker="codelets-2",
-            attempt=1,
             cycle=6,
-            base_version=41,
-            nodes=[_node()],
+            version=41,
+            about=["self"],
             percepts=[_percept()],
-            motions=_ramp(4, 3, dtype="<f8"),
-            cell_m=1.5,
-            road_m=_ramp(3, 2, dtype="<f4"),
             matches=[sensing.PlaceMatch(frame=2, view_ns=400_000_000, score=0.75)],
-            tiles=[_tile()],
+            motions=_ramp(4, 3, dtype="<f8"),
+            road_m=_ramp(3, 2, dtype="<f4"),
         ),
+        codelets.Leases(
+            assignments=[
+                codelets.Assignment(
+                    task_id="6/localization", worker="codelets-2", attempt=1, version=41
+                )
+            ]
+        ),
+        codelets.Offer(cycle=5, operations=[_node()]),
         cognition.Coalitions(cycle=6, coalitions=[coalition]),
         cognition.Competition(
             cycle=6,
@@ -248,8 +392,9 @@ def _replay() -> cognition.Replay:
 def samples() -> list[Message]:
     """A message of every type in the table of topics, every field of it other than its default."""
     messages = [*_sensing(), *_mind(), *_process(), _learned(), _replay()]
+    stamped: list[Message] = []
     for seq, message in enumerate(messages):
-        message.stamp_ns = _STAMP_NS
-        message.seq = seq
-        message.source = "sample"
-    return messages
+        stamped.append(
+            msgspec.structs.replace(message, stamp_ns=_STAMP_NS, seq=seq, source="sample")
+        )
+    return stamped

@@ -1,146 +1,145 @@
-"""The Current Situational Model as it travels: nodes, links, place tiles, operations, deltas,
-snapshots.
+"""The Current Situational Model as it travels: links, place tiles, operations, deltas, snapshots.
 
 Every operation states a result, never a change to one, so applying it twice is applying it once.
 """
 
 from __future__ import annotations
 
+import enum
 from typing import Annotated
 
 import msgspec
 
 from schemas.array import Array
-from schemas.base import Count, Finite, Message, Name, Part, Scalar
-from schemas.sensing import Unit
+from schemas.base import Count, Finite, Message, Name, Part, Unit
+from schemas.nodes import ROOT_MAP, AnyNode, LinkKind, PlaceColumn
+
+TILE_SIDE = 32
 
 
-class Node(Part, kw_only=True, tag="node"):
-    """A node of the graph. `samples`: float64 (n, d), positions (x_m, y_m) or poses (x_m, y_m,
-    heading_rad).
+class Phase(enum.StrEnum):
+    """The phases of a cognitive cycle in the workspace, in order; each ends with a commit.
 
-    Nodes of the kinds `path` and `correction` have rows of their own there: see
-    services.codelets.mapping.path.
+    PERCEPTS: percepts and offers enter. CORRECTION: a correction of the map is applied.
+    LOCALIZATION, OBJECTS, ATTENTION: codelets run. END: what has decayed is forgotten. BACKGROUND
+    codelets run beside the cycle, in lanes of their own. LATE: answers that came after their cycle
+    had ended.
     """
 
-    id: Name
-    kind: Name
-    activation: Unit = 0.0
-    base_level: Unit = 0.0
-    attributes: dict[str, Scalar] = {}
-    samples: Array | None = None
+    PERCEPTS = "percepts"
+    CORRECTION = "correction"
+    LOCALIZATION = "localization"
+    OBJECTS = "objects"
+    ATTENTION = "attention"
+    END = "end"
+    BACKGROUND = "background"
+    LATE = "late"
 
 
-class Link(Part, kw_only=True, tag="link"):
+class Link(Part, kw_only=True, frozen=True, tag="link"):
     """A weighted link. A node has one link of a kind to one target."""
 
     source: Name
     target: Name
-    kind: Name = "at"
+    kind: Name = LinkKind.AT
     weight: Finite = 1.0
 
 
-class Links(Part, kw_only=True, tag="links"):
-    """Many links of one kind: weights by source, then target. They join the links that there are."""
+class Links(Part, kw_only=True, frozen=True, tag="links"):
+    """Many links of one kind: weights by source, then target. They join the links that exist."""
 
-    kind: Name = "at"
+    kind: Name = LinkKind.AT
     weights: dict[Name, dict[Name, Finite]]
 
 
-class PlaceTile(Part, kw_only=True, tag="tile"):
-    """A square of place nodes in bulk: `side` x `side` cells of `cell_m`, row-major from (`x`, `y`)
-    in tiles.
+class PlaceTile(Part, kw_only=True, frozen=True, tag="tile"):
+    """A square of place nodes in bulk: TILE_SIDE x TILE_SIDE cells of map `map`, row-major from
+    tile (`x`, `y`).
 
-    Cell (i, j) of the whole plane is the node `place:i:j`. `activation`, `road` and `traversable`
-    are float32 (side, side); each cell links to its eight neighbours with the mean of the two
-    cells' `traversable`.
+    Cell (i, j) of the map is the node `place:MAP:i:j`. `columns` are float32 (TILE_SIDE, TILE_SIDE)
+    each; one that is missing has its default everywhere. `activation_cycle`, int32 of the same
+    shape, is the cycle as of which each activation is.
     """
 
-    x: int
-    y: int
-    side: Annotated[int, msgspec.Meta(ge=1, le=256)]
-    cell_m: Annotated[float, msgspec.Meta(gt=0, le=1e4)]
-    activation: Array
-    road: Array
-    traversable: Array
+    map: Name = ROOT_MAP
+    x: Annotated[int, msgspec.Meta(ge=-(2**31), le=2**31)]
+    y: Annotated[int, msgspec.Meta(ge=-(2**31), le=2**31)]
+    columns: dict[PlaceColumn, Array]
+    activation_cycle: Array | None = None
 
 
-class DropNode(Part, kw_only=True, tag="drop_node"):
+class Cells(Part, kw_only=True, frozen=True, tag="cells"):
+    """New values of one column of some place nodes: int32 (n, 2) cells and float32 (n,) values.
+
+    A tile that does not exist is created. Activations are as of `cycle`.
+    """
+
+    map: Name = ROOT_MAP
+    column: PlaceColumn
+    cells: Array
+    values: Array
+    cycle: Count = 0
+
+
+class DropNode(Part, kw_only=True, frozen=True, tag="drop_node"):
     """Forget a node and all its links."""
 
     id: Name
 
 
-class DropLink(Part, kw_only=True, tag="drop_link"):
+class DropLink(Part, kw_only=True, frozen=True, tag="drop_link"):
     """Forget one link."""
 
     source: Name
     target: Name
-    kind: Name = "at"
+    kind: Name = LinkKind.AT
 
 
-class Activations(Part, kw_only=True, tag="activations"):
-    """New activations and base-levels of many nodes, float32 (n,): decay in bulk. An unknown node
-    is passed over.
+class Decay(Part, kw_only=True, frozen=True, tag="decay"):
+    """By how much activation decays in a cycle (linear, as in LIDA's framework).
+
+    A node is forgotten once its total activation is below `forget_below`.
     """
 
-    ids: list[Name]
-    values: Array
-    base_levels: Array
+    activation: Unit = 0.0
+    base_level: Unit = 0.0
+    place_activation: Unit = 0.0
+    forget_below: Unit = 0.0
 
 
-class Cells(Part, kw_only=True, tag="cells"):
-    """New values of some place nodes: int32 (n, 2) cells and a column float32 (n,). Unknown tiles
-    come into being.
-    """
-
-    column: Name
-    cells: Array
-    values: Array
+Operation = AnyNode | Link | Links | PlaceTile | DropNode | DropLink | Cells | Decay
 
 
-Operation = Node | Link | Links | PlaceTile | DropNode | DropLink | Activations | Cells
-
-
-class Proposal(Message, kw_only=True):
-    """A codelet's answer to a task: operations on the graph as of `base_version`."""
-
-    task_id: Name
-    worker: Name
-    codelet: Name
-    base_version: Count
-    operations: list[Operation]
-    failure: str = ""
-
-
-class Delta(Message, kw_only=True):
+class Delta(Message, kw_only=True, frozen=True):
     """A numbered commit. `version` follows the one before by 1; `tasks` are those whose proposals
     are in it.
 
-    `dropped` counts the answers since the delta before that are in none, and `refused` says why, of
+    `rejected` counts the answers since the delta before that are in none; `reasons` are those of
     the first few.
     """
 
     version: Count
     cycle: Count
-    phase: Name
-    tasks: list[str]
+    phase: Phase
+    tasks: list[str] = []
     operations: list[Operation]
-    dropped: Count = 0
-    refused: list[str] = []
+    rejected: Count = 0
+    reasons: list[str] = []
 
 
-class Snapshot(Message, kw_only=True):
-    """The whole graph at `version`."""
+class Snapshot(Message, kw_only=True, frozen=True):
+    """The whole graph at `version`, in the course of `cycle` after its phase `phase`."""
 
     version: Count
     cycle: Count
-    nodes: list[Node]
-    links: list[Link]
+    phase: Phase = Phase.END
+    decay: Decay
+    nodes: list[AnyNode]
+    links: list[Links]
     tiles: list[PlaceTile]
 
 
-class SnapshotRequest(Message, kw_only=True):
+class SnapshotRequest(Message, kw_only=True, frozen=True):
     """Asks the workspace for its graph, at `at_least` this version or newer."""
 
     at_least: Count = 0

@@ -5,13 +5,13 @@ from __future__ import annotations
 from schemas.base import Count, Finite, Message, Name
 
 
-class Clock(Message, kw_only=True):
+class Clock(Message, kw_only=True, frozen=True):
     """The time that messages are stamped in. `rate` is its speed against wall time, 0 in lockstep."""
 
     rate: Finite = 1.0
 
 
-class Presence(Message, kw_only=True):
+class Presence(Message, kw_only=True, frozen=True):
     """That an instance of a module came or went, as `observer` saw it."""
 
     module: Name
@@ -20,7 +20,7 @@ class Presence(Message, kw_only=True):
     observer: Name
 
 
-class Health(Message, kw_only=True):
+class Health(Message, kw_only=True, frozen=True):
     """How one process fares: counts since it started and, over the last second, what time and
     memory it took.
     """

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import enum
 from typing import Any
 
 import msgspec
 import yaml
 
-from schemas.array import Array
+from schemas.array import Array, Matrix
 
 _NAMED = (msgspec.Struct, dict)
 _ONE_LINE = 2**31 - 1
@@ -19,8 +20,10 @@ def to_jsonable(message: Any, full: bool = False) -> Any:
     An array becomes its dtype, shape, least and greatest value (None where it is empty); with
     `full`, its dtype, shape and nested lists of all values.
     """
-    if isinstance(message, Array):
+    if isinstance(message, Array | Matrix):
         return _array(message, full)
+    if isinstance(message, enum.Enum):
+        return message.value
     if isinstance(message, msgspec.Struct):
         return {name: to_jsonable(value, full) for name, value in _fields(message).items()}
     if isinstance(message, dict):
@@ -62,7 +65,7 @@ def _fields(struct: msgspec.Struct) -> dict[str, Any]:
     return fields if tag is None else {str(struct.__struct_config__.tag_field): tag, **fields}
 
 
-def _array(array: Array, full: bool) -> dict[str, Any]:
+def _array(array: Array | Matrix, full: bool) -> dict[str, Any]:
     values = array.numpy()
     facts: dict[str, Any] = {"dtype": array.dtype, "shape": list(array.shape)}
     if full:
@@ -72,14 +75,14 @@ def _array(array: Array, full: bool) -> dict[str, Any]:
 
 
 def _step(value: Any, step: str, path: str) -> Any:
-    if isinstance(value, _NAMED) and not isinstance(value, Array):
+    if isinstance(value, _NAMED) and not isinstance(value, Array | Matrix):
         fields = _fields(value) if isinstance(value, msgspec.Struct) else value
         if step in fields:
             return fields[step]
         raise LookupError(
             f"no {step!r} on the way to {path!r}: there are {', '.join(map(str, fields)) or 'no fields'}"
         )
-    if not isinstance(value, list | tuple | Array):
+    if not isinstance(value, list | tuple | Array | Matrix):
         raise LookupError(f"nothing is inside {value!r}, so no {step!r} on the way to {path!r}")
     try:
         return _element(value, int(step))
@@ -92,14 +95,16 @@ def _step(value: Any, step: str, path: str) -> Any:
 
 
 def _element(value: Any, index: int) -> Any:
-    if not isinstance(value, Array):
+    if not isinstance(value, Array | Matrix):
         return value[index]
     part = value.numpy()[index]
     return Array.of(part) if part.ndim else part.item()
 
 
 def _arrays_as_text(value: Any, full: bool) -> Any:
-    if isinstance(value, Array):
+    if isinstance(value, enum.Enum):
+        return value.value
+    if isinstance(value, Array | Matrix):
         return _array_line(value, full)
     if isinstance(value, msgspec.Struct):
         value = _fields(value)
@@ -111,7 +116,7 @@ def _arrays_as_text(value: Any, full: bool) -> Any:
     return value
 
 
-def _array_line(array: Array, full: bool) -> str:
+def _array_line(array: Array | Matrix, full: bool) -> str:
     facts = _array(array, full)
     shape = " x ".join(map(str, array.shape)) or "scalar"
     described = f"{array.dtype} {shape}"

@@ -9,13 +9,12 @@ import msgspec
 import numpy as np
 
 from schemas.array import Array
-from schemas.base import Count, Finite, Message, Name, Part
+from schemas.base import Count, Finite, Message, Name, Part, Unit
 
-Unit = Annotated[float, msgspec.Meta(ge=0, le=1)]
 Metres = Annotated[float, msgspec.Meta(ge=0, le=1e6)]
 
 
-class Calibration(Part, kw_only=True):
+class Calibration(Part, kw_only=True, frozen=True):
     """A stereo camera: pinhole intrinsics in pixels, right camera relative to the left, mount on
     the robot.
 
@@ -37,7 +36,7 @@ class Calibration(Part, kw_only=True):
     right_distortion: tuple[Finite, Finite, Finite, Finite, Finite] = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-class StereoFrame(Message, kw_only=True):
+class StereoFrame(Message, kw_only=True, frozen=True):
     """A pair of RGB images, uint8 (height, width, 3), as the cameras gave them. `frame` counts from
     0.
     """
@@ -48,7 +47,7 @@ class StereoFrame(Message, kw_only=True):
     calibration: Calibration
 
 
-class Odometry(Message, kw_only=True):
+class Odometry(Message, kw_only=True, frozen=True):
     """Wheel odometry over the `dt_s` that end at `stamp_ns`: noisy mean speeds of the robot."""
 
     speed_m_s: Finite
@@ -56,7 +55,7 @@ class Odometry(Message, kw_only=True):
     dt_s: Annotated[float, msgspec.Meta(gt=0, le=10)]
 
 
-class SelfMotion(Message, kw_only=True):
+class SelfMotion(Message, kw_only=True, frozen=True):
     """What moved between two views: float64 (n, 5) rows, in order of time.
 
     Each is speed_m_s, turn_rate_rad_s and dt_s, then the standard deviations of the two speeds.
@@ -67,7 +66,7 @@ class SelfMotion(Message, kw_only=True):
     motions: Array
 
 
-class View(Message, kw_only=True):
+class View(Message, kw_only=True, frozen=True):
     """The rectified left image, uint8 (h, w, 3), and depth along the optical axis, float32 (h, w);
     0 is unknown.
     """
@@ -78,7 +77,7 @@ class View(Message, kw_only=True):
     calibration: Calibration
 
 
-class RangeScan(Message, kw_only=True):
+class RangeScan(Message, kw_only=True, frozen=True):
     """Nearest obstacle by bearing (left positive), float32 (n,) each; range 0 is nothing seen."""
 
     frame: Count
@@ -86,7 +85,7 @@ class RangeScan(Message, kw_only=True):
     range_m: Array
 
 
-class Percept(Part, kw_only=True):
+class Percept(Part, kw_only=True, frozen=True):
     """One recognised object: a PAM node over threshold, and where it stands as seen from the robot.
 
     Bearing (left positive) and range point to the object's estimated centre; `whole` says that
@@ -107,7 +106,7 @@ class Percept(Part, kw_only=True):
     outline_px: list[tuple[int, int]] = []
 
 
-class PlaceMatch(Part, kw_only=True):
+class PlaceMatch(Part, kw_only=True, frozen=True):
     """A view from a place that was seen before, recognised by the views that led to it.
 
     `frame` and `view_ns` are those of the remembered view; `score` is how sure it is.
@@ -122,7 +121,7 @@ def _no_points() -> Array:
     return Array.of(np.empty((0, 2), np.float32))
 
 
-class Percepts(Message, kw_only=True):
+class Percepts(Message, kw_only=True, frozen=True):
     """All that was recognised in one view.
 
     `road_m` and `road_boundary_m`: float32 (n, 2), ground points seen as road, and where it ends,
@@ -136,7 +135,7 @@ class Percepts(Message, kw_only=True):
     matches: list[PlaceMatch] = []
 
 
-class LearnedObject(Part, kw_only=True):
+class LearnedObject(Part, kw_only=True, frozen=True):
     """A PAM node that one encounter gave: its label, and what the object looks like, float32 (n,)
     of length 1.
     """
@@ -145,7 +144,7 @@ class LearnedObject(Part, kw_only=True):
     embedding: Array
 
 
-class RememberedView(Part, kw_only=True):
+class RememberedView(Part, kw_only=True, frozen=True):
     """A view to recognise a place by: its `frame` and stamp, and `code`, uint8 (n,), for EPAM to
     compare.
     """
@@ -155,7 +154,7 @@ class RememberedView(Part, kw_only=True):
     code: Array
 
 
-class Learned(Message, kw_only=True):
+class Learned(Message, kw_only=True, frozen=True):
     """What perception learned from one view, or, after a restart, from all before."""
 
     frame: Count
@@ -181,7 +180,7 @@ class SpeedLimit(enum.StrEnum):
     OTHER = "other"
 
 
-class MotorCommand(Message, kw_only=True):
+class MotorCommand(Message, kw_only=True, frozen=True):
     """Wheel speeds, answering the frame whose stamp it carries.
 
     `halted_by` is the reason of zero speed, `slowed_by` that of a lower speed than cruising.
@@ -195,7 +194,7 @@ class MotorCommand(Message, kw_only=True):
     pose_age_ns: Count = 0
 
 
-class Pose(Part, kw_only=True):
+class Pose(Part, kw_only=True, frozen=True):
     """A pose in the plane, heading counter-clockwise from x."""
 
     x_m: Finite
@@ -203,7 +202,7 @@ class Pose(Part, kw_only=True):
     heading_rad: Finite
 
 
-class TruePose(Message, kw_only=True):
+class TruePose(Message, kw_only=True, frozen=True):
     """Where the robot really is. Observers only."""
 
     pose: Pose
@@ -211,7 +210,7 @@ class TruePose(Message, kw_only=True):
     progress: Unit
 
 
-class Street(Part, kw_only=True):
+class Street(Part, kw_only=True, frozen=True):
     """A street's centre line, (x, y) in metres, and its width."""
 
     name: Name
@@ -219,7 +218,7 @@ class Street(Part, kw_only=True):
     width_m: Metres
 
 
-class Building(Part, kw_only=True):
+class Building(Part, kw_only=True, frozen=True):
     """A building's footprint: centre, width along its heading, depth across it, height."""
 
     name: Name
@@ -229,7 +228,7 @@ class Building(Part, kw_only=True):
     height_m: Metres
 
 
-class TrueTown(Message, kw_only=True):
+class TrueTown(Message, kw_only=True, frozen=True):
     """The town as it was built. Observers only."""
 
     seed: Count

@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
-from schemas import cognition, graph, process, sensing
+from schemas import codelets, cognition, graph, process, sensing
 from schemas.base import Message
 
 KIB = 1024
@@ -69,13 +69,15 @@ VIEW = Topic("sensory/view", sensing.View, 5, _LATEST, max_bytes=64 * MIB)
 SCAN = Topic("sensory/scan", sensing.RangeScan, 5, _LATEST)
 PERCEPTS = Topic("epam/percepts", sensing.Percepts, 5, _NEVER)
 LEARNED = Topic("epam/learned", sensing.Learned, 0, _NEVER, max_bytes=64 * MIB)
-TASK = Topic("workspace/task", cognition.Task, 0, _NEVER, max_bytes=16 * MIB)
-PROPOSAL = Topic("codelets/proposal", graph.Proposal, 0, _NEVER, max_bytes=16 * MIB)
+TASK = Topic("workspace/task", codelets.Task, 0, _NEVER)
+LEASES = Topic("workspace/leases", codelets.Leases, 0, _NEVER, About.PROCESS)
+PROPOSAL = Topic("codelets/proposal", codelets.Proposal, 0, _NEVER, max_bytes=64 * MIB)
+OFFER = Topic("workspace/offer", codelets.Offer, 0, _NEVER, max_bytes=16 * MIB)
 DELTA = Topic("workspace/delta", graph.Delta, 0, _NEVER, max_bytes=64 * MIB)
 SNAPSHOT = Topic("workspace/snapshot", graph.Snapshot, 0, _REQUEST, max_bytes=512 * MIB)
 SNAPSHOT_REQUEST = Topic("workspace/snapshot_request", graph.SnapshotRequest, 0, _REQUEST)
-REPLAY = Topic("codelets/replay", cognition.Replay, 0, _NEVER, max_bytes=16 * MIB)
-COALITIONS = Topic("codelets/coalitions", cognition.Coalitions, 5, _NEVER)
+REPLAY = Topic("workspace/replay", cognition.Replay, 0, _NEVER, max_bytes=16 * MIB)
+COALITIONS = Topic("workspace/coalitions", cognition.Coalitions, 5, _NEVER)
 COMPETITION = Topic("global_workspace/competition", cognition.Competition, 5, _NEVER)
 BROADCAST = Topic("global_workspace/broadcast", cognition.Broadcast, 0, _NEVER)
 ACTION = Topic("action/selected", cognition.Action, 0, _NEVER)

@@ -21,8 +21,9 @@ from cogmap.graph.replica import Replica, snapshot_over
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
 from schemas import topics
-from schemas.array import Array
-from schemas.graph import Delta, Links, Node, Operation
+from schemas.array import Matrix
+from schemas.graph import Delta, Links, Operation, Phase
+from schemas.nodes import SELF_ID, Object, Self, object_id
 from schemas.process import Clock
 from services.workspace.commit import Ledger
 
@@ -32,33 +33,30 @@ COST_REPEATS = 5
 RAW_KEY = "benchmark/raw"
 NODES = 50
 LINKS = 200
-SAMPLES = 730
+SAMPLES = 444
 SEED = 31
+LINK_KIND = "near"
 
 
 def typical_operations() -> list[Operation]:
     """50 nodes, 200 links and one cloud of samples: 31 KB, in operations of the workspace."""
     rng = np.random.default_rng(SEED)
-    cloud = Array.of(rng.normal(size=(SAMPLES, 3)))
-    nodes = [_node(number, cloud if number == 0 else None) for number in range(NODES)]
-    weights = {nodes[number].id: _links(number) for number in range(NODES)}
-    return [*nodes, Links(weights=weights)]
+    agent = Self(id=SELF_ID, samples=Matrix.of(rng.normal(size=(SAMPLES, 3))))
+    objects = [_object(number) for number in range(1, NODES)]
+    weights = {node.id: _links(number) for number, node in enumerate([agent, *objects])}
+    return [agent, *objects, Links(kind=LINK_KIND, weights=weights)]
 
 
-def _node(number: int, samples: Array | None) -> Node:
+def _object(number: int) -> Object:
     label = f"building_{number}"
-    return Node(
-        id=f"object:{label}",
-        kind="object",
+    return Object(
+        id=object_id(label),
         activation=0.75,
         base_level=0.25,
-        attributes={
-            "label": label,
-            "x_m": number * 1.5,
-            "y_m": number * 0.5,
-            "sightings": number,
-        },
-        samples=samples,
+        label=label,
+        x_m=number * 1.5,
+        y_m=number * 0.5,
+        sightings=number,
     )
 
 
@@ -91,15 +89,15 @@ def measure(endpoint: str, number: int, pairs: int, announce: Callable[[str], No
 
 def costs() -> Metrics:
     """The CPU time of each step that a delta takes, where nothing else runs, and its size."""
-    ledger = Ledger(1.0)
+    ledger = Ledger({})
     replica = Graph()
     operations = typical_operations()
-    payload = encode(ledger.commit(0, 1, "objects", operations))
+    payload = encode(ledger.commit(0, 1, Phase.OBJECTS, operations))
     delta = decode(topics.DELTA, payload)
     assert isinstance(delta, Delta)
 
     return {
-        "delta_commit_us": _cost_us(lambda: ledger.commit(0, 1, "objects", operations)),
+        "delta_commit_us": _cost_us(lambda: ledger.commit(0, 1, Phase.OBJECTS, operations)),
         "delta_encode_us": _cost_us(lambda: encode(delta)),
         "delta_decode_us": _cost_us(lambda: decode(topics.DELTA, payload)),
         "delta_apply_us": _cost_us(lambda: replica.change(delta.operations)),
@@ -114,11 +112,11 @@ def _cost_us(work: Callable[[], object]) -> float:
 
 def _commit(race: Race) -> None:
     """The workspace's part: commit, encode, publish."""
-    ledger = Ledger(1.0)
+    ledger = Ledger({})
     operations = typical_operations()
     publisher = Module("workspace").on(
         topics.CLOCK,
-        lambda clock: ledger.commit(clock.stamp_ns, 1, "objects", operations),
+        lambda clock: ledger.commit(clock.stamp_ns, 1, Phase.OBJECTS, operations),
         emits=[topics.DELTA],
     )
     publisher.requires = {"replica": REPLICAS}
@@ -159,7 +157,7 @@ def _replicate(race: Race) -> None:
 
 def _put(race: Race) -> None:
     """The peer: the same bytes put on a plain publisher."""
-    payload = encode(Ledger(1.0).commit(0, 1, "objects", typical_operations()))
+    payload = encode(Ledger({}).commit(0, 1, Phase.OBJECTS, typical_operations()))
     session = open_client(race.endpoint)
     publisher = session.declare_publisher(RAW_KEY, congestion_control=zenoh.CongestionControl.BLOCK)
     receivers = session.liveliness().declare_subscriber(f"{RAW_KEY}/*", history=True)

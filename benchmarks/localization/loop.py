@@ -17,7 +17,7 @@ from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module, Reply
 from schemas import topics
 from schemas.array import Array
-from schemas.cognition import Task
+from schemas.codelets import Leases
 from schemas.graph import Delta
 from schemas.sensing import Percepts, SelfMotion
 from services import registry
@@ -38,7 +38,7 @@ Landmarks = dict[str, tuple[float, float]]
 
 def sections(surveyed: bool) -> dict[str, dict[str, Any]]:
     """The configuration of both modules; no loop is closed on a map that was surveyed."""
-    workspace = {"mode": "lockstep", "path_spacing_m": SPACING_M, "base_level_decay": 0.0}
+    workspace = {"mode": "lockstep", "base_level_decay": 0.0}
 
     codelets = {
         "samples": SAMPLES,
@@ -58,7 +58,7 @@ def sections(surveyed: bool) -> dict[str, dict[str, Any]]:
     }
 
     if surveyed:
-        workspace["revisit_s"] = NEVER_S
+        codelets["revisit_s"] = NEVER_S
 
     return {"workspace": workspace, "codelets": codelets}
 
@@ -66,7 +66,8 @@ def sections(surveyed: bool) -> dict[str, dict[str, Any]]:
 class LocalizationLoop:
     """Runs both modules on the in-memory bus, one cognitive cycle for each moment of a log.
 
-    `task_s` has the CPU time that the worker took for each task of the last cycle, by codelet.
+    `task_s` has the CPU time that the worker took for each phase's tasks of the last cycle, by the
+    codelet of the first.
     """
 
     def __init__(
@@ -85,7 +86,7 @@ class LocalizationLoop:
             workspace.restore([initial])
 
         worker = registry.build("codelets", configured)
-        worker.handlers[topics.TASK] = self._timed(worker.handlers[topics.TASK])
+        worker.handlers[topics.LEASES] = self._timed(worker.handlers[topics.LEASES])
 
         self.task_s: list[tuple[str, float]] = []
         self._graph = Graph()
@@ -145,13 +146,15 @@ class LocalizationLoop:
         return nodes.path(self._graph)
 
     def _on_delta(self, delta: Delta) -> None:
-        self._dropped += delta.refused
+        self._dropped += delta.reasons
 
-    def _timed(self, handler: Callable[[Task], Reply]) -> Callable[[Task], Reply]:
-        def on_task(task: Task) -> Reply:
+    def _timed(self, handler: Callable[[Leases], Reply]) -> Callable[[Leases], Reply]:
+        def on_leases(leases: Leases) -> Reply:
             began_s = time.process_time()
-            reply = handler(task)
-            self.task_s.append((task.codelet, time.process_time() - began_s))
+            reply = handler(leases)
+            took_s = time.process_time() - began_s
+            _, codelet, *_ = leases.assignments[0].task_id.split("/")
+            self.task_s.append((codelet, took_s))
             return reply
 
-        return on_task
+        return on_leases

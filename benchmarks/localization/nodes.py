@@ -6,15 +6,22 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from cogmap.errors import CogmapError
 from cogmap.geometry.arrays import Floats
-from cogmap.graph.graph import Graph, object_id
-from schemas.array import Array
-from schemas.graph import Node, Snapshot
+from cogmap.graph.graph import Graph
+from schemas.array import Matrix
+from schemas.graph import Decay, Snapshot
+from schemas.nodes import (
+    ROOT_MAP,
+    SELF_ID,
+    AnyNode,
+    Map,
+    Object,
+    PathSegment,
+    Self,
+    object_id,
+)
 
-SELF = "self"
-PATH = "path"
-POSE = ("x_m", "y_m", "heading_rad")
-ODOMETRY = ("odometry_x_m", "odometry_y_m", "odometry_heading_rad")
 CERTAIN_M = 1e-3
 LANDMARK_SAMPLES = 50
 KNOWN_WELL = 100
@@ -30,58 +37,60 @@ def initial_map(
     `surveyed` landmarks stay where they are for good. Codelets draw their samples by the number of
     the cycle, so runs that begin at another `cycle` have other noise.
     """
-    nodes = [_self_node(start, samples)]
+    nodes: list[AnyNode] = [Map(id=ROOT_MAP, cell_m=1.0), _self_node(start, samples)]
+    offsets_m = np.random.default_rng(0).normal(0.0, CERTAIN_M, (LANDMARK_SAMPLES, 2))
+    for label, (x_m, y_m) in landmarks.items():
+        landmark = Object(
+            id=object_id(label),
+            activation=1.0,
+            base_level=1.0,
+            cycle=cycle,
+            label=label,
+            x_m=x_m,
+            y_m=y_m,
+            surveyed=surveyed,
+            sightings=KNOWN_WELL,
+            offsets_m=Matrix.of(offsets_m, "<f2"),
+        )
+        nodes.append(landmark)
+    return Snapshot(version=1, cycle=cycle, decay=Decay(), nodes=nodes, links=[], tiles=[])
 
-    spread_m = np.random.default_rng(0).normal(0.0, CERTAIN_M, (LANDMARK_SAMPLES, 2))
-    for label, where_m in landmarks.items():
-        nodes.append(_landmark(label, spread_m + where_m, surveyed))
 
-    return Snapshot(version=1, cycle=cycle, nodes=nodes, links=[], tiles=[])
-
-
-def _self_node(start: Pose, samples: int) -> Node:
-    return Node(
-        id=SELF,
-        kind=SELF,
+def _self_node(start: Pose, samples: int) -> Self:
+    x_m, y_m, heading_rad = start
+    return Self(
+        id=SELF_ID,
         activation=1.0,
         base_level=1.0,
-        attributes={**dict(zip(POSE, start, strict=True)), "stamp_ns": -1},
-        samples=Array.of(np.tile(np.array(start), (samples, 1))),
-    )
-
-
-def _landmark(label: str, samples_m: Floats, surveyed: bool) -> Node:
-    x_m, y_m = samples_m.mean(axis=0).tolist()
-    return Node(
-        id=object_id(label),
-        kind="object",
-        activation=1.0,
-        base_level=1.0,
-        attributes={
-            "label": label,
-            "x_m": x_m,
-            "y_m": y_m,
-            "surveyed": surveyed,
-            "sightings": KNOWN_WELL,
-        },
-        samples=Array.of(samples_m),
+        x_m=x_m,
+        y_m=y_m,
+        heading_rad=heading_rad,
+        odometry_x_m=x_m,
+        odometry_y_m=y_m,
+        odometry_heading_rad=heading_rad,
+        samples=Matrix.of(np.tile(np.array(start), (samples, 1))),
     )
 
 
 def pose(graph: Graph) -> Floats:
     """(3,): where the agent believes that it is, the mean of the self's samples."""
-    facts = graph.nodes[SELF].attributes
-    return np.array([float(facts[key]) for key in POSE])
+    agent = _agent(graph)
+    return np.array([agent.x_m, agent.y_m, agent.heading_rad])
 
 
 def odometry(graph: Graph) -> Floats:
     """(3,): where path integration alone would have the agent."""
-    facts = graph.nodes[SELF].attributes
-    return np.array([float(facts[key]) for key in ODOMETRY])
+    agent = _agent(graph)
+    return np.array([agent.odometry_x_m, agent.odometry_y_m, agent.odometry_heading_rad])
 
 
 def path(graph: Graph) -> Floats:
-    """(n, 7) rows of the path as it is on the map now: stamp_s, pose, and path integration's."""
-    segments = sorted(graph.of_kind(PATH), key=lambda node: int(node.attributes["number"]))
-    rows = [node.samples.numpy()[:, :7] for node in segments if node.samples is not None]
-    return np.vstack(rows).astype(np.float64)
+    """(n, 9) rows of the path as it is on the map now, see PathColumn."""
+    segments = sorted(graph.of_kind(PathSegment), key=lambda segment: segment.number)
+    return np.vstack([segment.rows.numpy() for segment in segments])
+
+
+def _agent(graph: Graph) -> Self:
+    if graph.agent is None:
+        raise CogmapError("the graph has no self node")
+    return graph.agent

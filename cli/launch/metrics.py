@@ -16,7 +16,7 @@ from cogmap.graph.graph import Graph
 from cogmap.recording.recorder import Summary
 from cogmap.recording.storage.format import SUMMARY
 from cogmap.recording.storage.reader import LogReader
-from schemas.graph import Node
+from schemas.nodes import ROOT_MAP, Object, PlaceColumn
 
 ROAD_THRESHOLD = 0.5
 
@@ -140,17 +140,14 @@ class RunMetrics(RecordedMetrics, kw_only=True):
     killed: list[str]
 
 
-def objects(graph: Graph) -> list[Node]:
-    """The object nodes that have a position, by name."""
-    nodes = [graph.nodes[name] for name in sorted(graph.nodes)]
-    return [
-        node for node in nodes if node.kind == "object" and {"x_m", "y_m"} <= node.attributes.keys()
-    ]
+def objects(graph: Graph) -> list[Object]:
+    """The objects of the map, by id."""
+    return list(graph.of_kind(Object))
 
 
-def position_m(node: Node) -> tuple[float, float]:
-    """The position of a node in the agent's frame."""
-    return float(node.attributes["x_m"]), float(node.attributes["y_m"])
+def position_m(node: Object) -> tuple[float, float]:
+    """The position of an object in the agent's frame."""
+    return node.x_m, node.y_m
 
 
 def object_errors_m(observer: Observer, graph: Graph) -> Floats:
@@ -162,7 +159,7 @@ def object_errors_m(observer: Observer, graph: Graph) -> Floats:
 
     errors_m = []
     for node in objects(graph):
-        true = buildings.get(str(node.attributes.get("label", "")))
+        true = buildings.get(node.label)
         if true is None:
             continue
         learned_m = observer.to_world(np.array([position_m(node)]))[0]
@@ -172,11 +169,8 @@ def object_errors_m(observer: Observer, graph: Graph) -> Floats:
 
 def road_m2(graph: Graph) -> float:
     """The area of the place nodes that are taken for road."""
-    cells = 0
-    for tile in graph.tiles.values():
-        is_road = tile.columns["road"] > ROAD_THRESHOLD
-        cells += int(is_road.sum())
-    return cells * graph.cell_m**2
+    _, road = graph.places.written_cells(ROOT_MAP, PlaceColumn.ROAD)
+    return int((road > ROAD_THRESHOLD).sum()) * graph.cell_m() ** 2
 
 
 def drive_metrics(tally: Tally, gaps: dict[str, int], rejected: dict[str, int]) -> DriveMetrics:

@@ -11,7 +11,8 @@ from cogmap.errors import MessageError
 from cogmap.geometry import se2
 from cogmap.geometry.arrays import Floats, Indices
 from schemas.base import Message
-from schemas.graph import Delta, Node
+from schemas.graph import Delta
+from schemas.nodes import Self
 from schemas.sensing import Odometry, Pose, SelfMotion, TruePose, TrueTown
 
 SELF_NODE = "self"
@@ -114,12 +115,8 @@ class Observer:
 
     def _on_delta(self, delta: Delta) -> None:
         for node in delta.operations:
-            if not isinstance(node, Node) or node.id != SELF_NODE:
-                continue
-            x_m = node.attributes.get("x_m")
-            y_m = node.attributes.get("y_m")
-            if isinstance(x_m, int | float) and isinstance(y_m, int | float):
-                self._estimate.add(delta.stamp_ns, float(x_m), float(y_m))
+            if isinstance(node, Self):
+                self._estimate.add(delta.stamp_ns, node.x_m, node.y_m)
 
     @property
     def elapsed_s(self) -> float:

@@ -70,8 +70,8 @@ class Tally:
                 self._on_command(message, envelope, received_ns)
 
     def _on_delta(self, delta: Delta) -> None:
-        self.dropped += delta.dropped
-        self.refused.extend(delta.refused)
+        self.dropped += delta.rejected
+        self.refused.extend(delta.reasons)
         self.replica.follow(delta)
 
     def _on_health(self, health: Health) -> None:

@@ -83,8 +83,7 @@ def draw_map(log: Path, output: Path | None) -> None:
 def _followed(reader: LogReader) -> tuple[RecordedMetrics, Tally]:
     """The metrics of the drive in a log, and what its messages amount to. Raises LogError."""
     config = recorded_config(reader)
-    cell_m = float(_setting(config, "workspace", "cell_m"))
-    tally = Tally(Replica(_no_snapshot, Graph(cell_m)))
+    tally = Tally(Replica(_no_snapshot, Graph()))
     intake = Intake()
     with bar(f"reading {reader.path.name}") as progress:
         for record in reader.records(FOLLOWED, progress):

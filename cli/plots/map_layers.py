@@ -17,8 +17,9 @@ from matplotlib.transforms import Affine2D, Transform
 from cli.launch.metrics import objects, position_m
 from cli.launch.observer import Observer
 from cli.plots.palette import HOUSE, KERB, NAME, OBJECT, ROAD, ROAD_OPACITY, STREET, WALL
-from cogmap.graph.graph import TILE_SIDE, Graph
-from schemas.graph import Node
+from cogmap.graph.graph import Graph
+from schemas.graph import TILE_SIDE
+from schemas.nodes import ROOT_MAP, Object, PlaceColumn
 from schemas.sensing import Building, Pose
 
 
@@ -98,12 +99,16 @@ def draw_road(axes: Axes, observer: Observer, graph: Graph) -> None:
     """The place nodes' road column, cell by cell."""
     red, green, blue = to_rgb(ROAD)
     frame = _agent_frame(axes, observer.start)
-    for (x, y), tile in sorted(graph.tiles.items()):
-        road = np.clip(tile.columns["road"].T, 0, 1)
+    cell_m = graph.cell_m()
+    side_m = TILE_SIDE * cell_m
+    for (_, x, y), tile in graph.places.of_map(ROOT_MAP):
+        if PlaceColumn.ROAD not in tile.columns:
+            continue
+        road = np.clip(tile.columns[PlaceColumn.ROAD].T, 0, 1)
         image = np.empty((*road.shape, 4))
         image[..., :3], image[..., 3] = (red, green, blue), ROAD_OPACITY * road
-        west, south = ((n * TILE_SIDE - 0.5) * graph.cell_m for n in (x, y))
-        side_m = TILE_SIDE * graph.cell_m
+        west = (x * TILE_SIDE - 0.5) * cell_m
+        south = (y * TILE_SIDE - 0.5) * cell_m
         extent = (west, west + side_m, south, south + side_m)
         axes.imshow(
             image, extent=extent, origin="lower", interpolation="nearest", transform=frame, zorder=3
@@ -121,7 +126,7 @@ def draw_objects(axes: Axes, observer: Observer, graph: Graph) -> None:
     )
     for node in objects(graph):
         middle = observer.to_world(np.array([position_m(node)]))[0]
-        true = buildings.get(str(node.attributes.get("label", "")))
+        true = buildings.get(node.label)
         if true is not None:
             axes.plot(
                 [middle[0], true.x_m],
@@ -135,10 +140,10 @@ def draw_objects(axes: Axes, observer: Observer, graph: Graph) -> None:
         axes.plot(*middle, "o", ms=5, mfc=OBJECT, mec="white", mew=0.8, zorder=7)
 
 
-def _draw_samples(axes: Axes, observer: Observer, node: Node) -> None:
-    if node.samples is None or node.samples.shape[0] < 3:
+def _draw_samples(axes: Axes, observer: Observer, node: Object) -> None:
+    if node.offsets_m is None or node.offsets_m.shape[0] < 3:
         return
-    points = observer.to_world(np.asarray(node.samples.numpy(), np.float64)[:, :2])
+    points = observer.to_world(node.positions_m())
     axes.plot(*points.T, ".", ms=1.6, color=OBJECT, alpha=0.35, zorder=4)
     spread, directions = np.linalg.eigh(np.cov(points.T))
     width, height = 4 * np.sqrt(np.maximum(spread, 0))

@@ -19,7 +19,7 @@ from cogmap.errors import UsageError
 from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.delivery.intake import Intake
 from cogmap.runtime.process import Stop
-from schemas.array import Array
+from schemas.array import Array, Matrix
 from schemas.base import Message
 from schemas.render import field as field_at
 from schemas.render import to_jsonable, to_text
@@ -136,7 +136,7 @@ def _part_of(message: Message, path: str | None) -> Any:
 
 def without_arrays(part: Any) -> Any:
     """`part` as dicts, lists and scalars, each array in it as its type and shape."""
-    if isinstance(part, Array):
+    if isinstance(part, Array | Matrix):
         return f"<array type: {part.dtype}{list(part.shape)}>"
     if isinstance(part, msgspec.Struct):
         fields = {name: getattr(part, name) for name in part.__struct_fields__}

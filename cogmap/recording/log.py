@@ -20,8 +20,6 @@ from schemas.base import Message
 from schemas.graph import Delta
 from schemas.topics import Topic
 
-DEFAULT_CELL_M = 1.0
-
 
 @dataclass(frozen=True, slots=True)
 class Entry:
@@ -104,7 +102,7 @@ class Log:
         Raises LogError where the log lacks a delta before that, as one does that was begun in the
         middle of a drive.
         """
-        graph = Graph(self._cell_m())
+        graph = Graph()
         for record in self._between([table.DELTA], 0.0, None):
             if record.log_time_ns - self._start_ns > time_s * 1e9:
                 break
@@ -139,11 +137,6 @@ class Log:
 
     def _about(self) -> dict[str, str]:
         return self._reader.about(layout.RECORDING)
-
-    def _cell_m(self) -> float:
-        settings = self.config.get("workspace", {})
-        cell_m: float = settings.get("cell_m", DEFAULT_CELL_M)
-        return cell_m
 
 
 def open_log(path: Path | str) -> Log:

@@ -20,7 +20,7 @@ Image = npt.NDArray[np.uint8]
 Depth = npt.NDArray[np.float32]
 
 
-class _Numbered(Message, kw_only=True):
+class _Numbered(Message, kw_only=True, frozen=True):
     """The part of a view, a stereo frame or percepts that names the frame, with its objects."""
 
     frame: Count

@@ -12,9 +12,8 @@ PLACE_SD_RAD = 0.05
 
 
 def settings(method: str, step_m: float) -> Sections:
-    """The keys of the workspace and its codelets for one of METHODS; views are `step_m` apart."""
+    """The keys of the codelets for one of METHODS; views are `step_m` apart."""
     # The measured length of a step varies: with half of it, each view has its place on the path.
-    workspace = {"path_spacing_m": step_m / 2}
     codelets: dict[str, float | str] = {
         "path_spacing_m": step_m / 2,
         "place_match_sd_m": PLACE_SD_M,
@@ -22,8 +21,8 @@ def settings(method: str, step_m: float) -> Sections:
     }
 
     if method == "none":
-        workspace["revisit_s"] = NEVER_S
+        codelets["revisit_s"] = NEVER_S
     else:
         codelets["correct"] = method
 
-    return {"workspace": workspace, "codelets": codelets}
+    return {"codelets": codelets}

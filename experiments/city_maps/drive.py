@@ -56,7 +56,7 @@ def sections(environment: Environment, tour: Tour, noise: Noise, method: str) ->
 
     return {
         "sim": sim,
-        "workspace": workspace | correction["workspace"],
+        "workspace": workspace,
         "codelets": correction["codelets"],
         "action": {"mode": "lockstep"},
     }
@@ -85,6 +85,6 @@ def driven(configured: Sections, modules: Sequence[Module]) -> Traversal:
     origin = np.array([x_m, y_m, math.atan2(ahead_y_m - y_m, ahead_x_m - x_m)])
     names = tuple(landmark["name"] for landmark in trajectory["landmarks"])
 
-    observer = Observer(origin, names, CELL_M)
+    observer = Observer(origin, names)
     in_memory.run([*modules, observer.module()])
     return observer.traversal()

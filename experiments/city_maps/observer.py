@@ -14,10 +14,9 @@ from experiments import reading
 from experiments.city_maps.streets import Points
 from experiments.dead_reckoning import DeadReckoning
 from schemas import topics
-from schemas.graph import Delta
+from schemas.graph import Delta, Phase
 from schemas.sensing import TruePose
 
-LOCALIZATION = "localization"
 WHEELS = "wheels"
 FUSED = "fused"
 
@@ -46,10 +45,10 @@ class Observer:
     `origin` (3,) is the true pose where the agent's own frame begins; `names` are the buildings'.
     """
 
-    def __init__(self, origin: Points, names: tuple[str, ...], cell_m: float) -> None:
+    def __init__(self, origin: Points, names: tuple[str, ...]) -> None:
         self._origin = origin
         self._names = names
-        self._graph = Graph(cell_m)
+        self._graph = Graph()
         self._wheels = DeadReckoning()
         self._believed: list[tuple[float, float, float]] = []
         self._true: list[tuple[float, float, float]] = []
@@ -82,7 +81,7 @@ class Observer:
         if not self._graph.apply(delta):
             raise CogmapError(f"delta {delta.version} is not the next one")
 
-        if delta.phase == LOCALIZATION:
+        if delta.phase is Phase.LOCALIZATION:
             self._believed.append(reading.self_pose(self._graph))
 
     def _on_pose(self, true: TruePose) -> None:

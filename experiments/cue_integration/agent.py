@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from cogmap.runtime.module import Module
-from schemas.graph import Snapshot
+from schemas.graph import Decay, Snapshot
 from services import registry
 
 # Distances err anew with each look here, so each counts (eq. 1); the room is small, and so are its
@@ -27,6 +27,15 @@ def modules(number: int) -> list[Module]:
     workspace = registry.build("workspace", SECTIONS, "workspace")
     if number and workspace.restore is not None:
         workspace.restore(
-            [Snapshot(version=0, cycle=number * CYCLES_A_TRIAL, nodes=[], links=[], tiles=[])]
+            [
+                Snapshot(
+                    version=0,
+                    cycle=number * CYCLES_A_TRIAL,
+                    decay=Decay(),
+                    nodes=[],
+                    links=[],
+                    tiles=[],
+                )
+            ]
         )
     return [workspace, registry.build("codelets", SECTIONS, WORKER)]

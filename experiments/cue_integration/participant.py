@@ -5,14 +5,15 @@ post stood.
 from __future__ import annotations
 
 from cogmap.errors import MessageError
-from cogmap.graph.graph import Graph, object_id
+from cogmap.graph.graph import Graph
 from cogmap.runtime.module import Module
 from experiments.cue_integration.geometry import REACH_M, Point, Pose, step
 from experiments.cue_integration.room import FOLLOW, STOP, WAIT, WALK
 from schemas import topics
 from schemas.base import Scalar
 from schemas.cognition import Action
-from schemas.graph import Delta, Node
+from schemas.graph import Delta, Phase
+from schemas.nodes import Object, Percept, Self, object_id
 
 POSTS_CARRIED = 3
 NEAR_M = 0.1
@@ -43,12 +44,12 @@ class Participant:
             raise MessageError(
                 f"delta {delta.version} after version {self._graph.version}: a commit is missing"
             )
-        if delta.phase != "decay" or self._has_stopped:
+        if delta.phase is not Phase.END or self._has_stopped:
             return None
         pose = self._pose()
-        for name, node in sorted(self._graph.nodes.items()):
-            if name.startswith("percept:post-"):
-                self._pick_up(str(node.attributes["label"]), node, pose)
+        for node in self._graph.of_kind(Percept):
+            if node.label.startswith("post-"):
+                self._pick_up(node, pose)
         scheme, parameters = self._choose(pose)
         return Action(
             stamp_ns=delta.stamp_ns,
@@ -59,13 +60,19 @@ class Participant:
         )
 
     def _pose(self) -> Pose:
-        own = self._graph.nodes["self"].attributes
-        return Pose(float(own["x_m"]), float(own["y_m"]), float(own["heading_rad"]))
+        agent = self._agent()
+        return Pose(agent.x_m, agent.y_m, agent.heading_rad)
 
-    def _pick_up(self, label: str, post: Node, pose: Pose) -> None:
+    def _agent(self) -> Self:
+        agent = self._graph.agent
+        if agent is None:
+            raise MessageError("the graph has no self node")
+        return agent
+
+    def _pick_up(self, post: Percept, pose: Pose) -> None:
         """Carry a post from now on, and keep in mind where it was, for the map may not have it."""
-        there = pose.after(float(post.attributes["bearing_rad"]), float(post.attributes["range_m"]))
-        self._carried.setdefault(label, (there.x_m, there.y_m))
+        there = pose.after(post.bearing_rad, post.range_m)
+        self._carried.setdefault(post.label, (there.x_m, there.y_m))
 
     def _choose(self, pose: Pose) -> tuple[str, dict[str, Scalar]]:
         if len(self._carried) < POSTS_CARRIED:
@@ -74,17 +81,13 @@ class Participant:
             self._has_waited = True
             return WAIT, {}
         label, in_mind = next(iter(self._carried.items()))
-        node = self._graph.nodes.get(object_id(label))
-        on_map = (
-            in_mind
-            if node is None
-            else (float(node.attributes["x_m"]), float(node.attributes["y_m"]))
-        )
+        node = self._graph.get(Object, object_id(label))
+        on_map = in_mind if node is None else (node.x_m, node.y_m)
         return self._go_back(pose, on_map)
 
     def _go_back(self, pose: Pose, goal: Point) -> tuple[str, dict[str, Scalar]]:
         bearing_rad, distance_m = pose.towards(goal)
-        heading_sd_rad = float(self._graph.nodes["self"].attributes["heading_sd_rad"])
+        heading_sd_rad = self._agent().heading_sd_rad
         is_lost = heading_sd_rad > LOST_RAD and self._looks < MOST_LOOKS
         if self._movements == MOST_MOVEMENTS or (distance_m < REACH_M + NEAR_M and not is_lost):
             self._has_stopped = True

@@ -15,10 +15,8 @@ from experiments import reading
 from experiments.dead_reckoning import DeadReckoning
 from schemas import topics
 from schemas.cognition import Replay
-from schemas.graph import Delta
+from schemas.graph import Delta, Phase
 from schemas.sensing import TruePose
-
-SHIFT = "shift"
 
 
 @dataclass(frozen=True)
@@ -105,9 +103,9 @@ class Loop:
 class Observer:
     """Follows the graph, the truth, the odometry and the replays of one drive."""
 
-    def __init__(self, landmarks: dict[str, tuple[float, float]], cell_m: float) -> None:
+    def __init__(self, landmarks: dict[str, tuple[float, float]]) -> None:
         self._landmarks = landmarks
-        self._graph = Graph(cell_m)
+        self._graph = Graph()
         self._true: dict[int, tuple[float, float]] = {}
         self._wheels = DeadReckoning()
         self._replays: list[Replayed] = []
@@ -145,7 +143,7 @@ class Observer:
         )
 
     def _on_delta(self, delta: Delta) -> None:
-        corrects = delta.phase == SHIFT and self._before is None
+        corrects = delta.phase is Phase.CORRECTION and self._before is None
         if corrects:
             self._before = self._map()
 

@@ -79,7 +79,6 @@ def sections(seed: int, method: str) -> Sections:
         "mode": "lockstep",
         "cell_m": CELL_M,
         "base_level_decay": 0.0,
-        "path_spacing_m": step_m,
     }
 
     codelets = {
@@ -110,6 +109,6 @@ def driven(configured: Sections, modules: Sequence[Module]) -> Loop:
     """As `drive`, with these modules."""
     landmarks = configured["sim"]["trajectory"]["landmarks"]
     places_m = {landmark["name"]: (landmark["x_m"], landmark["y_m"]) for landmark in landmarks}
-    observer = Observer(places_m, CELL_M)
+    observer = Observer(places_m)
     in_memory.run([*modules, observer.module()])
     return observer.loop()

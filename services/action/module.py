@@ -11,7 +11,8 @@ from cogmap.runtime.module import Module
 from schemas import topics
 from schemas.base import Message, Scalar
 from schemas.cognition import Action, Broadcast, Competition
-from schemas.graph import Delta, Node
+from schemas.graph import Delta, Phase
+from schemas.nodes import Self
 from schemas.process import Clock
 from schemas.sensing import MotorCommand, Pose, RangeScan, SelfMotion, SpeedLimit
 from services.action.config import Config
@@ -23,8 +24,7 @@ from services.action.stuck import StuckDetector
 
 __all__ = ["ActionModule", "Config", "build"]
 
-SELF = "self"
-POSE_PHASES = {"localization", "late"}
+POSE_PHASES = frozenset({Phase.LOCALIZATION, Phase.LATE})
 
 
 class Estimate(NamedTuple):
@@ -126,7 +126,7 @@ class ActionModule:
             self._gate.resume(delta.cycle)
             self._is_resumed = False
 
-        return self._command(at_once=is_repeated and delta.phase == "localization")
+        return self._command(at_once=is_repeated and delta.phase is Phase.LOCALIZATION)
 
     def on_competition(self, competition: Competition) -> MotorCommand | None:
         """A cycle's competition has ended."""
@@ -143,7 +143,7 @@ class ActionModule:
         has_ended = self._route is None or self._route.left_m <= 0.0
         route = {"route_end": float(has_ended), "route_ahead": float(not has_ended)}
 
-        selection = self._selection.select(broadcast.coalition.content, route)
+        selection = self._selection.select(broadcast.coalition.nodes, route)
         if selection is None:
             return None
 
@@ -215,23 +215,18 @@ class ActionModule:
 
     def _is_answered(self, delta: Delta) -> bool:
         last = self._answered
-        is_pose_of_view = delta.phase == "localization"
+        is_pose_of_view = delta.phase is Phase.LOCALIZATION
         return is_pose_of_view and last is not None and last.stamp_ns == delta.stamp_ns
 
 
 def _self_pose(delta: Delta) -> Pose | None:
     """The pose of the self node in a delta that moves it, otherwise None."""
-    nodes = [item for item in delta.operations if isinstance(item, Node) and item.id == SELF]
-    if delta.phase not in POSE_PHASES or not nodes:
+    agents = [item for item in delta.operations if isinstance(item, Self)]
+    if delta.phase not in POSE_PHASES or not agents:
         return None
 
-    place = nodes[-1].attributes
-
-    return Pose(
-        x_m=float(place["x_m"]),
-        y_m=float(place["y_m"]),
-        heading_rad=float(place["heading_rad"]),
-    )
+    agent = agents[-1]
+    return Pose(x_m=agent.x_m, y_m=agent.y_m, heading_rad=agent.heading_rad)
 
 
 def build(config: Config, instance: str) -> Module:

@@ -4,10 +4,13 @@ Maes 1989).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import msgspec
+
 from schemas.cognition import Behaviour, Rejection
-from schemas.graph import Node
+from schemas.nodes import GraphNode, kind_of
 from services.action.config import Config
 
 Context = dict[str, float]
@@ -68,7 +71,7 @@ class ActionSelection:
         self._schemes = procedural_memory()
         self._threshold = config.selection_threshold
 
-    def select(self, content: list[Node], route: Context) -> Selection | None:
+    def select(self, content: Sequence[GraphNode], route: Context) -> Selection | None:
         """The behaviour for a broadcast's content and the route's state; None where none is active
         enough.
         """
@@ -82,29 +85,33 @@ class ActionSelection:
             return None
 
         self._threshold = self._config.selection_threshold
-        for each in instantiated:
-            if each is not best:
-                each.rejection = Rejection.LESS_ACTIVE
-
-        return Selection(best, considered)
+        return Selection(best, [_compared(each, best) for each in considered])
 
     def _behaviour(self, scheme: Scheme, context: Context) -> Behaviour:
         activation = scheme.activation(context)
-        behaviour = Behaviour(scheme=scheme.name, activation=activation)
+        rejection = Rejection.NONE
 
         if not scheme.is_applicable(context):
-            behaviour.rejection = Rejection.CONTEXT_MISSING
+            rejection = Rejection.CONTEXT_MISSING
         elif activation < self._config.instantiation:
-            behaviour.rejection = Rejection.NOT_INSTANTIATED
+            rejection = Rejection.NOT_INSTANTIATED
 
+        return Behaviour(scheme=scheme.name, activation=activation, rejection=rejection)
+
+
+def _compared(behaviour: Behaviour, chosen: Behaviour) -> Behaviour:
+    """A behaviour, rejected where it was instantiated and another was chosen."""
+    if behaviour is chosen or behaviour.rejection:
         return behaviour
+    return msgspec.structs.replace(behaviour, rejection=Rejection.LESS_ACTIVE)
 
 
-def _context(content: list[Node], route: Context) -> Context:
+def _context(content: Sequence[GraphNode], route: Context) -> Context:
     """The activation of each kind of node, that of its most active node, and the route's state."""
     context = dict(route)
     for node in content:
         activation = min(1.0, node.base_level + node.activation)
-        context[node.kind] = max(context.get(node.kind, 0.0), activation)
+        kind = kind_of(node)
+        context[kind] = max(context.get(kind, 0.0), activation)
 
     return context

@@ -7,6 +7,8 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+SECTION = "codelets"
+
 Gain = Annotated[float, Meta(ge=0, le=1)]
 Metres = Annotated[float, Meta(gt=0, le=10_000)]
 Seconds = Annotated[float, Meta(gt=0, le=1e9)]
@@ -135,6 +137,17 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         Metres,
         Meta(description="distance between places of the path, in m, above 0, at most 10000"),
     ] = 1.0
+    revisit_s: Annotated[
+        Seconds,
+        Meta(
+            description="time after which a landmark or place seen again may close a loop, in s, "
+            "above 0"
+        ),
+    ] = 20.0
+    closure_spacing_s: Annotated[
+        Seconds,
+        Meta(description="least time between two loop closures by the same cue, in s, above 0"),
+    ] = 2.0
     path_variance_per_m: Annotated[
         Positive,
         Meta(

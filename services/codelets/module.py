@@ -1,84 +1,114 @@
-"""A worker: it answers the tasks that the workspace gives it, and keeps nothing between them."""
+"""A worker: it does the tasks that the workspace leases to it, on the graph that it follows."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterable
 
 from cogmap.errors import MessageError
+from cogmap.graph.graph import Graph
+from cogmap.runtime.codelet import Answer, ConfiguredCodelet
 from cogmap.runtime.module import Module
 from schemas import topics
-from schemas.base import Message
-from schemas.cognition import Coalitions, Task
-from schemas.graph import Operation, Proposal
-from services.codelets.attention import attend
+from schemas.codelets import Assignment, Leases, Proposal, Task
+from schemas.graph import Delta
 from services.codelets.config import Config
-from services.codelets.correction.apply_correction import shift_map
-from services.codelets.correction.map_correction import correct_map
-from services.codelets.localization.landmarks import locate_landmark
-from services.codelets.localization.localization import localize
-from services.codelets.mapping.loop_detection import revisit
-from services.codelets.mapping.object_place import place_object, place_road
-from services.codelets.mapping.path import extend_path
 
 __all__ = ["Config", "Worker", "build"]
 
-BUILDERS: dict[str, Callable[[Task, Config], list[Operation]]] = {
-    "localization": localize,
-    "landmark": locate_landmark,
-    "object_place": place_object,
-    "road_place": place_road,
-    "path": extend_path,
-    "revisit": revisit,
-    "map_shift": shift_map,
-}
-ATTENTION = "attention"
-MAP_CORRECTION = "map_correction"
+MAX_WAITING = 1024
 
 
 class Worker:
-    """Runs the codelet that a task names, if the task is for this worker."""
+    """Runs the codelets of the tasks that are leased to it.
 
-    def __init__(self, config: Config, instance: str) -> None:
-        self._config = config
+    A task begins once it has come, its lease has come, and the graph has reached its version. The
+    proposal names the version that was read.
+    """
+
+    def __init__(self, instance: str, graph: Graph, codelets: Iterable[ConfiguredCodelet]) -> None:
         self._instance = instance
+        self._graph = graph
+        self._codelets = {codelet.name: codelet for codelet in codelets}
+        self._tasks: dict[str, Task] = {}
+        self._leases: dict[str, Assignment] = {}
 
-    def work(self, task: Task) -> list[Message] | None:
-        """A proposal for a task, before it what attention found or replay tells; a failure is said,
-        not kept back.
-        """
-        if task.worker != self._instance:
-            return None
-        said: list[Message] = []
-        operations: list[Operation] = []
+    def on_task(self, task: Task) -> list[Proposal]:
+        """Keep a task until it is leased, or the graph has reached its version."""
+        self._tasks.pop(task.task_id, None)
+        self._tasks[task.task_id] = task
+        if len(self._tasks) > MAX_WAITING:
+            del self._tasks[next(iter(self._tasks))]
+        return self._run_ready()
+
+    def on_leases(self, leases: Leases) -> list[Proposal]:
+        """Take up the leases of this worker; a task that another holds now is not done here."""
+        for assignment in leases.assignments:
+            if assignment.worker == self._instance:
+                self._leases[assignment.task_id] = assignment
+            else:
+                self._leases.pop(assignment.task_id, None)
+        return self._run_ready()
+
+    def on_delta(self, delta: Delta) -> list[Proposal]:
+        """Begin what waited for that version of the graph."""
+        for name in delta.tasks:
+            self._tasks.pop(name, None)
+            self._leases.pop(name, None)
+        return self._run_ready()
+
+    def on_load(self) -> list[Proposal]:
+        """Begin what waited for the graph."""
+        return self._run_ready()
+
+    def _run_ready(self) -> list[Proposal]:
+        proposals = []
+        for name, lease in list(self._leases.items()):
+            task = self._tasks.get(name)
+            if task is None or task.version != lease.version:
+                continue
+            if self._graph.version >= task.version:
+                del self._leases[name]
+                del self._tasks[name]
+                proposals.append(self._run(task))
+        return proposals
+
+    def _run(self, task: Task) -> Proposal:
+        """The proposal for a task; a failure is part of it."""
+        answer = Answer()
         failure = ""
         try:
-            if task.codelet == ATTENTION:
-                said.append(attend(task, self._config))
-            elif task.codelet == MAP_CORRECTION:
-                operations, replay = correct_map(task, self._config)
-                said += [] if replay is None else [replay]
-            elif task.codelet in BUILDERS:
-                operations = BUILDERS[task.codelet](task, self._config)
-            else:
-                failure = f"no codelet {task.codelet}: there are {', '.join(BUILDERS)}, {MAP_CORRECTION}, {ATTENTION}"
-        except (MessageError, ValueError, IndexError, KeyError, StopIteration) as error:
-            failure = f"{task.codelet}: {error or type(error).__name__}"
-        if failure and task.codelet == ATTENTION:
-            said.append(Coalitions(stamp_ns=task.stamp_ns, cycle=task.cycle, coalitions=[]))
-        proposal = Proposal(
+            answer = self._codelet(task).run(task, self._graph)
+        except MessageError as error:
+            failure = f"{task.codelet}: {error}"
+        except Exception as error:  # another package's codelet may raise anything: it is named here
+            failure = f"{task.codelet}: {type(error).__name__}: {error}"
+        return Proposal(
             stamp_ns=task.stamp_ns,
             task_id=task.task_id,
-            worker=self._instance,
             codelet=task.codelet,
-            base_version=task.base_version,
-            operations=operations,
+            base_version=self._graph.version,
+            operations=answer.operations,
+            coalitions=answer.coalitions,
+            events=answer.events,
             failure=failure,
         )
-        return [*said, proposal]
+
+    def _codelet(self, task: Task) -> ConfiguredCodelet:
+        codelet = self._codelets.get(task.codelet)
+        if codelet is None:
+            there_are = ", ".join(self._codelets)
+            raise MessageError(f"no codelet {task.codelet}: there are {there_are}")
+        return codelet
 
 
-def build(config: Config, instance: str) -> Module:
+def build(instance: str, codelets: Iterable[ConfiguredCodelet]) -> Module:
     """The module `codelets`, one worker of it."""
-    worker = Worker(config, instance)
-    says = (topics.PROPOSAL, topics.COALITIONS, topics.REPLAY)
-    return Module("codelets", instance).on(topics.TASK, worker.work, emits=says)
+    graph = Graph()
+    worker = Worker(instance, graph, codelets)
+    published = (topics.PROPOSAL,)
+    return (
+        Module("codelets", instance)
+        .following(graph, worker.on_delta, emits=published, on_load=worker.on_load)
+        .on(topics.TASK, worker.on_task, emits=published)
+        .on(topics.LEASES, worker.on_leases, emits=published)
+    )

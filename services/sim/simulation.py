@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+import msgspec
+
 from schemas.base import Message
 from schemas.process import Clock
 from schemas.sensing import MotorCommand, Odometry, StereoFrame, TruePose, TrueTown
@@ -75,9 +77,7 @@ class Simulation:
         self._travelled_m += math.sqrt(dx_m**2 + dy_m**2)
 
         odometry = self._odometry.measure(before, self._pose, dt_s)
-        odometry.stamp_ns = self.now_ns
-
-        return odometry
+        return msgspec.structs.replace(odometry, stamp_ns=self.now_ns)
 
     def step(self) -> list[Message]:
         """As `tick`, in a list."""
@@ -111,6 +111,4 @@ class Simulation:
 
     def town(self) -> TrueTown:
         """The town."""
-        message = self.world.town.message()
-        message.stamp_ns = self.now_ns
-        return message
+        return msgspec.structs.replace(self.world.town.message(), stamp_ns=self.now_ns)

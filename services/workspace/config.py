@@ -6,33 +6,88 @@ from typing import Annotated, Literal
 
 import msgspec
 
-Positive = Annotated[float, msgspec.Meta(gt=0)]
-Share = Annotated[float, msgspec.Meta(ge=0, le=1)]
+from schemas.base import Unit
+
+Milliseconds = Annotated[float, msgspec.Meta(gt=0, le=3.6e6)]
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Lockstep waits for every answer; real time commits what there is at the deadline, counted
-    from the frame.
+    """The cycle's timing, the resolution of the map, and how activation decays."""
 
-    A percept is an object of the map where its total activation is over `recognition_threshold`. A
-    view of what was away for `revisit_s` may close a loop, as may those that follow, one in
-    `closure_spacing_s`. Map correction goes on meanwhile: lockstep waits for it at the end of the
-    `correction_cycles`th cycle.
-    """
-
-    mode: Literal["lockstep", "real_time"] = "real_time"
-    cell_m: Positive = 1.0
-    deadline_ms: Positive = 180.0
-    lease_ms: Positive = 120.0
-    attempts: Annotated[int, msgspec.Meta(ge=1, le=100)] = 5
-    first_samples: Annotated[int, msgspec.Meta(ge=10, le=100_000)] = 200
-    recognition_threshold: Share = 0.7
-    decay: Share = 0.1
-    base_level_decay: Share = 0.0005
-    place_decay: Share = 0.02
-    forget_below: Share = 0.05
-    path_spacing_m: Positive = 1.0
-    revisit_s: Positive = 20.0
-    closure_spacing_s: Positive = 2.0
-    correction_cycles: Annotated[int, msgspec.Meta(ge=1, le=1000)] = 3
-    correction_lease_ms: Positive = 5000.0
+    mode: Annotated[
+        Literal["lockstep", "real_time"],
+        msgspec.Meta(
+            description="lockstep waits for every answer; real_time commits at the deadline what"
+            " has come, and the rest in the next cycle"
+        ),
+    ] = "real_time"
+    cell_m: Annotated[
+        float,
+        msgspec.Meta(
+            gt=0, le=1e4, description="Distance between neighbouring place nodes of the root map, m"
+        ),
+    ] = 1.0
+    deadline_ms: Annotated[
+        Milliseconds,
+        msgspec.Meta(description="In real time, the age of the view at which a cycle ends, ms"),
+    ] = 180.0
+    lease_ms: Annotated[
+        Milliseconds,
+        msgspec.Meta(
+            description="In real time, how long a worker may take for a task before another gets"
+            " it, ms"
+        ),
+    ] = 120.0
+    attempts: Annotated[
+        int,
+        msgspec.Meta(ge=1, le=100, description="Workers that a task is given to before it fails"),
+    ] = 5
+    first_samples: Annotated[
+        int,
+        msgspec.Meta(
+            ge=10, le=100_000, description="Samples of the self before anything is known, number"
+        ),
+    ] = 200
+    recognition_threshold: Annotated[
+        Unit,
+        msgspec.Meta(
+            description="A percept enters the workspace where its activation is above this, 0 to 1"
+        ),
+    ] = 0.7
+    decay: Annotated[
+        Unit, msgspec.Meta(description="What a node's activation loses in a cycle, 0 to 1")
+    ] = 0.1
+    base_level_decay: Annotated[
+        Unit, msgspec.Meta(description="What a node's base level loses in a cycle, 0 to 1")
+    ] = 0.0005
+    place_decay: Annotated[
+        Unit, msgspec.Meta(description="What a place node's activation loses in a cycle, 0 to 1")
+    ] = 0.02
+    forget_below: Annotated[
+        Unit,
+        msgspec.Meta(
+            description="A node is forgotten where its total activation falls below this, 0 to 1"
+        ),
+    ] = 0.05
+    background_cycles: Annotated[
+        int,
+        msgspec.Meta(
+            ge=1,
+            le=1000,
+            description="In lockstep, cycles after which a background codelet's answer is"
+            " committed, whenever it comes",
+        ),
+    ] = 3
+    background_lease_ms: Annotated[
+        Milliseconds,
+        msgspec.Meta(
+            description="In real time, how long a worker may take for a background task, ms"
+        ),
+    ] = 5000.0
+    offering: Annotated[
+        list[str],
+        msgspec.Meta(
+            description="In lockstep, instances of modules that send an offer each cycle, which"
+            " the next cycle waits for"
+        ),
+    ] = []

@@ -2,246 +2,321 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
+import msgspec
 import numpy as np
 
 from cogmap.errors import MessageError
+from cogmap.runtime.codelet import ConfiguredCodelet, CycleContext
 from schemas.array import Array
 from schemas.base import Message
-from schemas.cognition import Task
-from schemas.graph import Delta, Operation, Proposal, Snapshot, SnapshotRequest
+from schemas.codelets import Offer, Proposal
+from schemas.cognition import Coalitions
+from schemas.graph import Delta, Operation, Phase, Snapshot, SnapshotRequest
 from schemas.process import Clock, Presence
 from schemas.sensing import Percepts, SelfMotion
 from services.workspace.commit import Ledger
 from services.workspace.config import Config
-from services.workspace.context import SELF, Scene
-from services.workspace.correction import Correction
-from services.workspace.decay import fade
 from services.workspace.dispatch import Dispatch
-from services.workspace.loop_closure import correction_tasks, revisit_tasks
-from services.workspace.triggers import (
-    PHASES,
-    first_self,
-    percept_operations,
-    recognised,
-    tasks_for,
-)
+from services.workspace.entrance import first_operations, percept_operations, recognised
+from services.workspace.forgetting import Forgetting
+from services.workspace.lane import Lane
+from services.workspace.offers import Offers
 
 WORKERS = "codelets"
+MAX_LATE_TASKS = 256
+PHASES = (Phase.CORRECTION, Phase.LOCALIZATION, Phase.OBJECTS, Phase.ATTENTION)
+LANES_BEGIN = Phase.OBJECTS
+SELF_MOTION_COLUMNS = 5
 
 
 class Workspace:
-    """One cycle for each view: a state machine that messages drive. It is the only writer of its
-    graph.
+    """One cycle for each view: a state machine that messages drive, the only writer of its graph.
+
+    Each phase gives its codelets' tasks to workers and ends with a commit of their answers.
     """
 
-    def __init__(self, config: Config) -> None:
+    def __init__(self, config: Config, codelets: Sequence[ConfiguredCodelet]) -> None:
         self._config = config
-        self._ledger = Ledger(config.cell_m)
-        self._correction = Correction(config)
+        self._codelets = codelets
+        self._ledger = Ledger({codelet.name: codelet.codelet.may_write for codelet in codelets})
+        self._lanes = [
+            Lane(codelet, config)
+            for codelet in codelets
+            if codelet.codelet.phase is Phase.BACKGROUND
+        ]
         self._dispatch = Dispatch(
-            int(config.lease_ms * 1e6), config.attempts, self._correction.dispatch
+            int(config.lease_ms * 1e6), config.attempts, lambda: [x.dispatch for x in self._lanes]
         )
+        self._forgetting = Forgetting()
+        self._offers = Offers(config.offering if self._is_lockstep else ())
         self._motions: list[SelfMotion] = []
         self._waiting: Percepts | None = None
-        self._scene: Scene | None = None
+        self._context: CycleContext | None = None
         self._phase = 0
         self._late: dict[str, None] = {}
         self._now_ns = 0
         self._begun_ns = -1
 
     def restore(self, past: Iterable[Message]) -> None:
-        """Take up the graph where it was left."""
+        """Restore the graph as it was left.
+
+        A cycle that was interrupted goes on from its last commit when its percepts come again.
+        """
         for message in past:
             if isinstance(message, Snapshot | Delta):
                 self._ledger.restore(message)
                 self._begun_ns = max(self._begun_ns, message.stamp_ns)
+        self._forgetting.restore(self._ledger.graph)
 
     def snapshot(self, request: SnapshotRequest | None = None) -> Snapshot:
-        """The whole graph. Raises MessageError where `request` wants a version that is not
-        committed yet.
+        """The whole graph.
+
+        Raises MessageError where `request` asks for a version that is not committed yet.
         """
         graph = self._ledger.graph
         if request is not None and request.at_least > graph.version:
             raise MessageError(
                 f"version {request.at_least} is not committed yet: the graph is at {graph.version}"
             )
-        return graph.snapshot()
+        return msgspec.structs.replace(graph.snapshot(), stamp_ns=max(0, self._begun_ns))
 
     def on_motion(self, motion: SelfMotion) -> list[Message]:
         """Keep what moved until a cycle moves the self node by it."""
-        if (
-            motion.motions.dtype != "<f8"
-            or len(motion.motions.shape) != 2
-            or motion.motions.shape[1] != 5
-        ):
-            raise MessageError(
-                f"self-motion of shape {motion.motions.shape} and dtype {motion.motions.dtype}"
-            )
-        if motion.stamp_ns > self._moved_until_ns:
+        shape = motion.motions.shape
+        is_valid = len(shape) == 2 and shape[1] == SELF_MOTION_COLUMNS
+        if motion.motions.dtype != "<f8" or not is_valid:
+            raise MessageError(f"self-motion of shape {shape} and dtype {motion.motions.dtype}")
+        if motion.stamp_ns > self._moved_until_ns and not self._is_known(motion):
             self._motions.append(motion)
         return self._begin()
 
     def on_percepts(self, percepts: Percepts) -> list[Message]:
-        """Start a cycle with the view's percepts, as soon as the one before has ended."""
+        """Begin a cycle with the view's percepts, as soon as the one before has ended."""
         if len(percepts.road_m.shape) != 2 or percepts.road_m.shape[1] != 2:
             raise MessageError(f"road points of shape {percepts.road_m.shape}")
-        if percepts.stamp_ns <= self._begun_ns:
+        if percepts.stamp_ns <= self._begun_ns and not self._is_interrupted(percepts):
             return []
         self._waiting = recognised(percepts, self._config.recognition_threshold)
         return self._begin()
 
-    def on_proposal(self, proposal: Proposal) -> list[Message]:
-        """Collect an answer. One that comes after its cycle has ended is committed now if it still
-        applies.
+    def on_offer(self, offer: Offer) -> list[Message]:
+        """Keep an offer until the next cycle begins."""
+        self._offers.put(offer)
+        return self._begin()
 
-        Where it does not, it is dropped, and the next delta counts it.
+    def on_proposal(self, proposal: Proposal) -> list[Message]:
+        """Collect an answer.
+
+        One that comes after its cycle has ended is committed now if it still applies. Where it does
+        not, it is rejected, and the next delta counts it.
         """
         if self._dispatch.answer(proposal):
-            return self._go_on_if_complete([])
-        if self._correction.dispatch.answer(proposal):
-            return self._end() if self._scene is not None and self._phase == len(PHASES) else []
+            return self._continue_if_complete([])
+        if any(lane.dispatch.answer(proposal) for lane in self._lanes):
+            return self._end() if self._phase == len(PHASES) else []
         if proposal.task_id not in self._late:
             return []
         del self._late[proposal.task_id]
-        operations, tasks = self._ledger.judge([proposal])
-        if not tasks:
-            return []
-        cycle = self._ledger.graph.cycle
-        return [self._ledger.commit(proposal.stamp_ns, cycle, "late", operations, tasks)]
+        return self._commit_late(proposal)
 
     def on_presence(self, presence: Presence) -> list[Message]:
-        """A worker came or went; the cycle goes on without a task that too many have been lost
-        with.
-        """
+        """A worker came or went; the cycle goes on without a task that has failed."""
         if presence.module != WORKERS:
             return []
-        worker = presence.instance
-        alive = presence.alive
-        tasks = self._correction.dispatch.presence(worker, alive, self._now_ns)
-        tasks += self._dispatch.presence(worker, alive, self._now_ns)
-        return self._go_on_if_complete(tasks)
+        published: list[Message] = []
+        for lane in self._lanes:
+            lane.dispatch.refresh(self._ledger.graph.version)
+            published += lane.dispatch.presence(presence.instance, presence.alive, self._now_ns)
+        published += self._dispatch.presence(presence.instance, presence.alive, self._now_ns)
+        return self._continue_if_complete(published)
 
     def on_clock(self, clock: Clock) -> list[Message]:
-        """In real time, take back what a lease has ended for, and end a cycle at its deadline.
+        """In real time, revoke leases that have ended, and end a cycle at its deadline.
 
-        The newest word holds: after a clock that ran far ahead, once, no later deadline would be
-        kept.
+        The newest clock is taken as it is: after one that ran far ahead, once, no later deadline
+        would be kept.
         """
         self._now_ns = clock.stamp_ns
-        if self._config.mode == "lockstep":
+        if self._is_lockstep:
             return []
-        tasks = self._correction.dispatch.expire(self._now_ns)
-        if self._scene is None:
-            return [*tasks]
-        if self._now_ns > self._scene.percepts.stamp_ns + self._config.deadline_ms * 1e6:
-            return [*tasks, *self._end_at_deadline()]
-        return self._go_on_if_complete(tasks + self._dispatch.expire(self._now_ns))
+        published: list[Message] = []
+        for lane in self._lanes:
+            lane.dispatch.refresh(self._ledger.graph.version)
+            published += lane.dispatch.expire(self._now_ns)
+        if self._context is None:
+            return published
+        if self._now_ns > self._context.stamp_ns + self._config.deadline_ms * 1e6:
+            return [*published, *self._commit_answers(), *self._end()]
+        return self._continue_if_complete(published + self._dispatch.expire(self._now_ns))
+
+    @property
+    def _is_lockstep(self) -> bool:
+        return self._config.mode == "lockstep"
 
     @property
     def _moved_until_ns(self) -> int:
-        node = self._ledger.graph.nodes.get(SELF)
-        return -1 if node is None else int(node.attributes["stamp_ns"])
+        agent = self._ledger.graph.agent
+        return -1 if agent is None else agent.stamp_ns
+
+    def _is_known(self, motion: SelfMotion) -> bool:
+        return any(motion.stamp_ns == known.stamp_ns for known in self._motions)
+
+    def _is_interrupted(self, percepts: Percepts) -> bool:
+        """Whether those are the percepts of a cycle that ended before its last phase."""
+        has_ended = self._ledger.graph.phase is Phase.END
+        return percepts.stamp_ns == self._begun_ns and self._context is None and not has_ended
 
     def _begin(self) -> list[Message]:
         """Begin a cycle if none runs, a view waits, and the self-motion up to it has come."""
         percepts = self._waiting
-        if self._scene is not None or percepts is None:
+        if self._context is not None or percepts is None:
             return []
-        if not self._motions or self._motions[-1].stamp_ns < percepts.stamp_ns:
+        newest_ns = self._motions[-1].stamp_ns if self._motions else -1
+        if max(newest_ns, self._moved_until_ns) < percepts.stamp_ns:
             return []
+
+        graph = self._ledger.graph
+        motions = self._motions_until(percepts.stamp_ns)
+        if self._is_interrupted(percepts):
+            self._waiting = None
+            self._context = CycleContext(graph.cycle, percepts, motions, graph.version)
+            self._phase = PHASES.index(graph.phase) if graph.phase in PHASES else -1
+            return self._next_phase()
+        if not self._offers.complete(graph.cycle):
+            return []
+
         self._waiting = None
         self._begun_ns = percepts.stamp_ns
-        graph = self._ledger.graph
-        self._scene = Scene(graph.cycle + 1, percepts, self._motions_until(percepts.stamp_ns))
+        self._context = CycleContext(graph.cycle + 1, percepts, motions, graph.version)
         self._phase = -1
-        operations: list[Operation] = (
-            [] if SELF in graph.nodes else [first_self(self._config.first_samples)]
-        )
-        operations += percept_operations(graph, percepts)
-        return [self._commit("percepts", operations), *self._next_phase()]
+        entering = first_operations(graph, self._config)
+        entering += percept_operations(graph, self._context)
+        entering += self._offers.take(self._ledger)
+        return [self._commit(Phase.PERCEPTS, entering), *self._next_phase()]
 
     def _motions_until(self, stamp_ns: int) -> Array:
         """Rows of self-motion since the self node was moved last, up to `stamp_ns`."""
         moved_ns = self._moved_until_ns
-        rows = [
-            motion.motions.numpy()
-            for motion in self._motions
-            if motion.since_ns >= moved_ns and motion.stamp_ns <= stamp_ns
-        ]
-        return Array.of(np.vstack(rows) if rows else np.zeros((0, 5)), "<f8")
+        rows = [np.zeros((0, SELF_MOTION_COLUMNS))]
+        for motion in self._motions:
+            if motion.since_ns >= moved_ns and motion.stamp_ns <= stamp_ns:
+                rows.append(np.asarray(motion.motions.numpy(), np.float64))
+        return Array.of(np.vstack(rows), "<f8")
 
     def _commit(
-        self, phase: str, operations: list[Operation], tasks: list[str] | None = None
+        self, phase: Phase, operations: list[Operation], tasks: list[str] | None = None
     ) -> Delta:
-        if self._scene is None:
+        if self._context is None:
             raise MessageError("nothing is committed between cycles")
-        return self._ledger.commit(
-            self._scene.percepts.stamp_ns, self._scene.cycle, phase, operations, tasks
+        delta = self._ledger.commit(
+            self._context.stamp_ns, self._context.cycle, phase, operations, tasks
         )
+        self._forgetting.note(delta, self._ledger.graph)
+        return delta
 
     def _next_phase(self) -> list[Message]:
-        """Dispatch the next phase's tasks; after the last, let activation fade and end the cycle."""
+        """Give out the next phase's tasks; after the last, end the cycle."""
         self._phase += 1
-        if self._scene is None or self._phase == len(PHASES):
+        if self._context is None or self._phase == len(PHASES):
             return self._end()
-        graph = self._ledger.graph
-        now_ns = self._now_ns
-        tasks = tasks_for(PHASES[self._phase], self._scene, graph, self._config.path_spacing_m)
-        sent: list[Message] = []
-        if PHASES[self._phase] == "objects":
-            tasks += revisit_tasks(self._scene, graph, self._config)
-            loops = (
-                [] if self._correction.runs else correction_tasks(self._scene, graph, self._config)
-            )
-            sent += self._correction.begin(loops, self._scene.cycle, now_ns)
-        sent += self._dispatch.begin(tasks, now_ns)
-        return sent if tasks else [*sent, *self._next_phase()]
 
-    def _go_on_if_complete(self, tasks: list[Task]) -> list[Message]:
-        """`tasks` to be sent, or the next phase where nothing is left to wait for in this one."""
-        if self._scene is None or not self._dispatch.complete:
-            return [*tasks]
+        phase = PHASES[self._phase]
+        graph = self._ledger.graph
+        self._context = replace(self._context, version=graph.version)
+        published: list[Message] = []
+        if phase is LANES_BEGIN:
+            for lane in self._lanes:
+                published += lane.begin(self._context, self._ledger, self._now_ns)
+
+        tasks = []
+        for codelet in self._codelets:
+            if codelet.codelet.phase is phase:
+                tasks += codelet.due(self._context, graph)
+        published += self._dispatch.begin(tasks, self._now_ns)
+        if tasks:
+            return published
+        return [*published, *self._commit_answers(), *self._next_phase()]
+
+    def _continue_if_complete(self, published: list[Message]) -> list[Message]:
+        """`published`, and the next phase where no answer is waited for in this one."""
+        if self._context is None or not self._dispatch.complete:
+            return published
         if self._phase == len(PHASES):
-            return [*tasks, *self._end()]
-        return [*tasks, *self._commit_answers(), *self._next_phase()]
+            return [*published, *self._end()]
+        return [*published, *self._commit_answers(), *self._next_phase()]
 
     def _commit_answers(self) -> list[Message]:
-        for name in self._dispatch.failed:
-            self._ledger.drop(
-                f"task {name} was given to {self._config.attempts} workers and lost each time"
-            )
+        """Commit the answers of the current phase; unanswered tasks may be answered later."""
+        if self._phase == len(PHASES):
+            return []
+        self._reject_failed(self._dispatch.failed)
         answers, unanswered = self._dispatch.collect()
         self._late |= {task.task_id: None for task in unanswered}
-        while len(self._late) > 256:
+        while len(self._late) > MAX_LATE_TASKS:
             del self._late[next(iter(self._late))]
-        operations, tasks = self._ledger.judge(answers)
-        return [self._commit(PHASES[self._phase], operations, tasks)] if operations else []
+        return self._commit_proposals(PHASES[self._phase], answers)
 
-    def _end_at_deadline(self) -> list[Message]:
-        """Commit what has come; the rest may still come in the next cycle."""
-        return [*self._commit_answers(), *self._end()]
+    def _commit_proposals(self, phase: Phase, proposals: list[Proposal]) -> list[Message]:
+        """Commit valid proposals, then publish their events; of ATTENTION, their coalitions."""
+        if self._context is None:
+            return []
+        valid = self._ledger.validate(proposals)
+        operations = [operation for proposal in valid for operation in proposal.operations]
+        published: list[Message] = []
+        if operations:
+            tasks = [proposal.task_id for proposal in valid]
+            published.append(self._commit(phase, operations, tasks))
+        for proposal in valid:
+            published += proposal.events
+        if phase is Phase.ATTENTION:
+            published.append(_coalitions(self._context, valid))
+        return published
+
+    def _commit_late(self, proposal: Proposal) -> list[Message]:
+        if not self._ledger.validate([proposal]):
+            return []
+        if proposal.coalitions:
+            self._ledger.reject(f"the coalitions of {proposal.task_id} came after its cycle")
+        graph = self._ledger.graph
+        delta = self._ledger.commit(
+            proposal.stamp_ns, graph.cycle, Phase.LATE, proposal.operations, [proposal.task_id]
+        )
+        self._forgetting.note(delta, graph)
+        return [delta, *proposal.events]
 
     def _end(self) -> list[Message]:
-        """Let activation fade and begin the next cycle, unless a correction of the map is to be
-        waited for.
-        """
-        if self._scene is None or self._correction.holds_up(self._scene.cycle):
+        """Forget what has decayed and begin the next cycle, unless a lane holds this one up."""
+        self._phase = len(PHASES)
+        context = self._context
+        if context is None or any(lane.holds_up(context.cycle) for lane in self._lanes):
             return []
-        said: list[Message] = [*self._commit_correction(self._scene.cycle)]
-        said.append(self._commit("decay", fade(self._ledger.graph, self._config)))
-        self._motions = [
-            motion for motion in self._motions if motion.stamp_ns > self._moved_until_ns
-        ]
-        self._scene = None
-        return [*said, *self._begin()]
+        published: list[Message] = []
+        for lane in self._lanes:
+            answers, failed = lane.collect(context.cycle)
+            self._reject_failed(failed)
+            published += self._commit_proposals(Phase.BACKGROUND, answers)
+        published.append(self._commit(Phase.END, [*self._forgetting.due(self._ledger.graph)]))
 
-    def _commit_correction(self, cycle: int) -> list[Delta]:
-        answers, failed = self._correction.collect(cycle)
-        for name in failed:
-            self._ledger.drop(
+        moved_ns = self._moved_until_ns
+        self._motions = [motion for motion in self._motions if motion.stamp_ns > moved_ns]
+        self._context = None
+        return [*published, *self._begin()]
+
+    def _reject_failed(self, tasks: list[str]) -> None:
+        for name in tasks:
+            self._ledger.reject(
                 f"task {name} was given to {self._config.attempts} workers and lost each time"
             )
-        operations, tasks = self._ledger.judge(answers)
-        return [self._commit("correction", operations, tasks)] if operations else []
+
+
+def _coalitions(context: CycleContext, proposals: list[Proposal]) -> Coalitions:
+    """What all attention codelets have found in a cycle, perhaps nothing."""
+    found = []
+    for proposal in proposals:
+        for number, coalition in enumerate(proposal.coalitions):
+            name = f"{proposal.task_id}/{number}"
+            found.append(msgspec.structs.replace(coalition, id=name))
+    return Coalitions(stamp_ns=context.stamp_ns, cycle=context.cycle, coalitions=found)

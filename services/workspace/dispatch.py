@@ -1,4 +1,4 @@
-"""Which worker does which task: leases, taken back when the worker goes or the lease ends."""
+"""Which worker does which task: leases, revoked when the worker goes or the lease ends."""
 
 from __future__ import annotations
 
@@ -8,131 +8,156 @@ from dataclasses import dataclass
 
 import msgspec
 
-from schemas.cognition import Task
-from schemas.graph import Proposal
+from schemas.base import Message
+from schemas.codelets import Assignment, Leases, Proposal, Task
+
+BUSY = 1000
 
 
 @dataclass
 class Lease:
-    """A task that a worker holds until `until_ns`; it waits for a worker while `task.worker` is its
-    placeholder.
+    """A task, and the worker that holds it until `until_ns`; `worker` is empty while none does.
 
-    `lost_by` had it before.
+    `lost_by` is the worker that held it before, `attempt` the number of workers that lost it.
     """
 
     task: Task
     until_ns: int
+    worker: str = ""
     lost_by: str = ""
+    attempt: int = 0
     proposal: Proposal | None = None
 
-
-NOBODY = "nobody"
-BUSY = 1000
+    @property
+    def is_open(self) -> bool:
+        """Whether no answer has come yet."""
+        return self.proposal is None
 
 
 class Dispatch:
-    """Gives tasks to the least loaded worker, but not again to the one that lost it where there is
-    another.
+    """Gives tasks to the least loaded worker, and again to the one that lost it only where there is
+    no other.
 
-    The same workers and tasks give the same choice. Whoever is at a task of the dispatch `beside`
-    counts as busy.
+    The same workers and tasks give the same choice. Workers that hold a task of one of the
+    dispatches in `background` count as busy.
     """
 
-    def __init__(self, lease_ns: int, attempts: int, beside: Dispatch | None = None) -> None:
+    def __init__(
+        self, lease_ns: int, attempts: int, background: Callable[[], list[Dispatch]] = list
+    ) -> None:
         self._lease_ns = lease_ns
         self._attempts = attempts
-        self._beside = beside
+        self._background = background
         self._workers: set[str] = set()
         self._leases: dict[str, Lease] = {}
 
-    def begin(self, tasks: list[Task], now_ns: int) -> list[Task]:
-        """Take on `tasks` and return those to be sent now; where there is no worker they wait for
-        one.
-        """
+    def begin(self, tasks: list[Task], now_ns: int) -> list[Message]:
+        """Add `tasks`; what is to be published now. Where there is no worker they wait for one."""
         for task in tasks:
             self._leases[task.task_id] = Lease(task, now_ns)
         return self._assign(now_ns)
 
-    def presence(self, worker: str, alive: bool, now_ns: int) -> list[Task]:
-        """A worker came or went: tasks to send because of it."""
+    def presence(self, worker: str, alive: bool, now_ns: int) -> list[Message]:
+        """A worker came or went; what is to be published because of it."""
         if alive:
             self._workers.add(worker)
         else:
             self._workers.discard(worker)
-            self._take_back(lambda lease: lease.task.worker == worker)
+            self._revoke(lambda lease: lease.worker == worker)
         return self._assign(now_ns)
 
-    def expire(self, now_ns: int) -> list[Task]:
-        """Tasks to send to somebody else, since their lease has ended; where there is nobody else,
-        they stay.
-        """
-        self._take_back(
-            lambda lease: now_ns > lease.until_ns and not self._workers <= {lease.task.worker}
-        )
+    def expire(self, now_ns: int) -> list[Message]:
+        """Give tasks whose lease has ended to another worker; where there is no other, they stay."""
+        self._revoke(lambda lease: now_ns > lease.until_ns and not self._workers <= {lease.worker})
         return self._assign(now_ns)
+
+    def refresh(self, version: int) -> None:
+        """Have open tasks without a worker read the graph at `version`."""
+        for lease in self._leases.values():
+            if lease.is_open and not lease.worker:
+                lease.task = msgspec.structs.replace(lease.task, version=version)
 
     def answer(self, proposal: Proposal) -> bool:
-        """Take in a proposal. False where nobody waits for it: it was answered before, or is of
-        another time.
+        """Take a proposal.
+
+        False where none is expected: the task was answered before, or is of another time.
         """
         lease = self._leases.get(proposal.task_id)
-        if lease is None or lease.proposal is not None:
+        if lease is None or not lease.is_open:
             return False
         lease.proposal = proposal
         return True
 
     @property
+    def is_idle(self) -> bool:
+        """Whether it has no tasks at all."""
+        return not self._leases
+
+    @property
     def complete(self) -> bool:
-        """Whether every task is answered, or given up."""
-        return all(
-            lease.proposal is not None or self._has_failed(lease) for lease in self._leases.values()
-        )
+        """Whether every task is answered, or has failed."""
+        return all(not lease.is_open or self._has_failed(lease) for lease in self._leases.values())
 
     @property
     def failed(self) -> list[str]:
-        """The tasks that are given up: handed out as often as is allowed, and lost each time."""
+        """The tasks that were given out as often as is allowed, and lost each time."""
         return [name for name, lease in self._leases.items() if self._has_failed(lease)]
 
     def collect(self) -> tuple[list[Proposal], list[Task]]:
-        """The answers, in the order of the tasks, and the tasks without one; all are done with now."""
+        """The answers, in the order of the tasks, and the tasks without one; both are removed."""
         leases = self._leases
         self._leases = {}
         answers = [lease.proposal for lease in leases.values() if lease.proposal is not None]
-        return answers, [lease.task for lease in leases.values() if lease.proposal is None]
+        unanswered = [lease.task for lease in leases.values() if lease.proposal is None]
+        return answers, unanswered
+
+    def load(self) -> Counter[str]:
+        """How many open tasks each worker holds."""
+        held = (lease.worker for lease in self._leases.values() if lease.is_open and lease.worker)
+        return Counter(held)
 
     def _has_failed(self, lease: Lease) -> bool:
-        return (
-            lease.proposal is None
-            and lease.task.worker == NOBODY
-            and lease.task.attempt >= self._attempts
-        )
+        return lease.is_open and not lease.worker and lease.attempt >= self._attempts
 
-    def _take_back(self, lost: Callable[[Lease], bool]) -> None:
+    def _revoke(self, is_lost: Callable[[Lease], bool]) -> None:
         for lease in self._leases.values():
-            if lease.proposal is None and lease.task.worker != NOBODY and lost(lease):
-                lease.lost_by = lease.task.worker
-                lease.task = msgspec.structs.replace(
-                    lease.task, worker=NOBODY, attempt=lease.task.attempt + 1
-                )
+            if lease.is_open and lease.worker and is_lost(lease):
+                lease.lost_by = lease.worker
+                lease.worker = ""
+                lease.attempt += 1
 
-    def _load(self) -> Counter[str]:
-        return Counter(
-            lease.task.worker for lease in self._leases.values() if lease.proposal is None
-        )
+    def _assign(self, now_ns: int) -> list[Message]:
+        """Assign open tasks: each task, then one message of all leases."""
+        load = self.load()
+        for other in self._background():
+            for worker, tasks in other.load().items():
+                load[worker] += BUSY * tasks
 
-    def _assign(self, now_ns: int) -> list[Task]:
-        load = self._load()
-        if self._beside is not None:
-            # Who is at something long will be long.
-            load.update({worker: BUSY * tasks for worker, tasks in self._beside._load().items()})
-        sent = []
+        published: list[Message] = []
+        assignments: list[Assignment] = []
         for lease in self._leases.values():
-            waits = lease.proposal is None and lease.task.worker == NOBODY
-            if not waits or not self._workers or self._has_failed(lease):
+            is_waiting = lease.is_open and not lease.worker
+            if not is_waiting or not self._workers or self._has_failed(lease):
                 continue
-            worker = min(self._workers, key=lambda name: (name == lease.lost_by, load[name], name))
+            worker = self._least_loaded(load, lease.lost_by)
             load[worker] += 1
-            lease.task = msgspec.structs.replace(lease.task, worker=worker)
+            lease.worker = worker
             lease.until_ns = now_ns + self._lease_ns
-            sent.append(lease.task)
-        return sent
+            published.append(lease.task)
+            assignments.append(_assignment(lease))
+        if assignments:
+            stamp_ns = max(task.stamp_ns for task in published)
+            published.append(Leases(stamp_ns=stamp_ns, assignments=assignments))
+        return published
+
+    def _least_loaded(self, load: Counter[str], lost_by: str) -> str:
+        return min(self._workers, key=lambda name: (name == lost_by, load[name], name))
+
+
+def _assignment(lease: Lease) -> Assignment:
+    return Assignment(
+        task_id=lease.task.task_id,
+        worker=lease.worker,
+        attempt=lease.attempt,
+        version=lease.task.version,
+    )

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from cogmap.runtime.codelet import ConfiguredCodelet
 from cogmap.runtime.module import Module
 from schemas import topics
 from services.workspace.config import Config
@@ -10,17 +13,18 @@ from services.workspace.cycle import Workspace
 __all__ = ["Config", "Workspace", "build"]
 
 
-def build(config: Config, instance: str) -> Module:
-    """The module `workspace`, the single writer of the graph."""
-    workspace = Workspace(config)
-    says = (topics.DELTA, topics.TASK)
+def build(config: Config, instance: str, codelets: Sequence[ConfiguredCodelet]) -> Module:
+    """The module `workspace`, the single writer of the graph, which calls `codelets`."""
+    workspace = Workspace(config, codelets)
+    published = (topics.DELTA, topics.TASK, topics.LEASES, topics.COALITIONS, topics.REPLAY)
     return (
         Module("workspace", instance, emits={topics.PRESENCE})
-        .on(topics.SELF_MOTION, workspace.on_motion, emits=says)
-        .on(topics.PERCEPTS, workspace.on_percepts, emits=says)
-        .on(topics.PROPOSAL, workspace.on_proposal, emits=says)
-        .on(topics.PRESENCE, workspace.on_presence, emits=says)
-        .on(topics.CLOCK, workspace.on_clock, emits=says)
+        .on(topics.SELF_MOTION, workspace.on_motion, emits=published)
+        .on(topics.PERCEPTS, workspace.on_percepts, emits=published)
+        .on(topics.PROPOSAL, workspace.on_proposal, emits=published)
+        .on(topics.OFFER, workspace.on_offer, emits=published)
+        .on(topics.PRESENCE, workspace.on_presence, emits=published)
+        .on(topics.CLOCK, workspace.on_clock, emits=published)
         .serve(topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, workspace.snapshot)
         .journaling(
             topics.DELTA, workspace.restore, workspace.snapshot, backfill=[topics.SELF_MOTION]

@@ -5,13 +5,9 @@ from __future__ import annotations
 import base64
 import json
 import os
-import re
 import shutil
 import subprocess
-import sys
 import threading
-import types
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -27,12 +23,8 @@ from cogmap.runtime.module import Module
 from examples import in_process, wanderer, wanderer_msgpack
 from schemas import topics
 from schemas.array import Array
-from schemas.cognition import Task
 from schemas.export import GOLDEN
-from schemas.graph import Node, Proposal
 from schemas.sensing import MotorCommand, RangeScan
-from services.codelets import module as codelets
-from services.workspace.commit import Ledger
 from tests.support.includes import LANGUAGES, PAGES, ROOT, included, included_paths
 from tests.support.networks import TIMEOUT_S, OverZenoh, Peer, publish
 
@@ -191,64 +183,3 @@ def test_javascript_decodes_every_golden_message() -> None:
     assert len(decoded) == len(topics.ALL)
     for path in paths:
         assert decoded[path.name] == _base64(msgpack.unpackb(path.read_bytes()))
-
-
-# The codelet of the page.
-
-
-def example(name: str) -> str:
-    """The code of an example on the page."""
-    found = re.findall(
-        rf"<!-- example: {name} -->\n```python\n(.*?)```", PAGE.read_text(), re.DOTALL
-    )
-    assert len(found) == 1, f"{name}: {len(found)} examples of that name"
-    return found[0]
-
-
-@pytest.fixture
-def loaded() -> Iterator[Any]:
-    """Makes a module of Python from the code of an example."""
-    names = []
-
-    def load(name: str) -> types.ModuleType:
-        made = types.ModuleType(f"example_{name.replace(' ', '_')}")
-        sys.modules[made.__name__] = made
-        names.append(made.__name__)
-        exec(compile(example(name), f"{PAGE.name}: {name}", "exec"), made.__dict__)
-        return made
-
-    yield load
-    for name in names:
-        del sys.modules[name]
-
-
-def test_the_codelet_counts_the_way_over_two_cycles(
-    loaded: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    page = loaded("codelet")
-    ledger = Ledger(1.0)
-    monkeypatch.setitem(codelets.BUILDERS, "count_way", page.count_way)
-    worker = codelets.build(codelets.Config(), "w")
-    for cycle in (1, 2):
-        motions = Array.of(np.array([[2.0, 0.0, 0.5, 0.1, 0.1], [1.0, 0.0, 0.5, 0.1, 0.1]]))
-        asked = Task(
-            task_id=f"{cycle}/count_way",
-            codelet="count_way",
-            worker="w",
-            attempt=0,
-            cycle=cycle,
-            base_version=ledger.graph.version,
-            cell_m=1.0,
-            nodes=[node for node in ledger.graph.nodes.values() if node.id == page.TRIP],
-            percepts=[],
-            motions=motions,
-            road_m=Array.of(np.zeros((0, 2), np.float32)),
-        )
-        (proposal,) = worker.feed(asked)
-        assert isinstance(proposal, Proposal)
-        operations, tasks = ledger.judge([proposal])
-        assert tasks == [asked.task_id]
-        ledger.commit(0, cycle, "objects", operations, tasks)
-    trip = ledger.graph.nodes[page.TRIP]
-    assert isinstance(trip, Node)
-    assert trip.attributes["way_m"] == pytest.approx(3.0)

@@ -13,7 +13,8 @@ from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.base import Message
-from schemas.graph import Delta, DropNode, Link, Node, Operation, SnapshotRequest
+from schemas.graph import Delta, DropNode, Link, Operation, Phase, SnapshotRequest
+from schemas.nodes import Node
 from schemas.process import Health
 from schemas.sensing import MotorCommand, Odometry
 from tests.support.networks import Network, Peer, meet, publish, spin_until, working
@@ -37,7 +38,7 @@ class Workspace:
     def _commit(self, lost: bool) -> None:
         version = self.graph.version + 1
         delta = Delta(
-            version=version, cycle=version, phase="collect", tasks=[], operations=changes(version)
+            version=version, cycle=version, phase=Phase.OBJECTS, operations=changes(version)
         )
         self.graph.apply(delta)
         numbered = self.shell.module.stamp(delta)
@@ -57,7 +58,7 @@ class Workspace:
 
 def changes(version: int) -> list[Operation]:
     """Another node at every version, and every third forgotten again."""
-    node = Node(id=f"building-{version}", kind="object", activation=0.5)
+    node = Node(id=f"building-{version}", kind="thing", activation=0.5)
     operations: list[Operation] = [node, Link(source=node.id, target="self", kind="near")]
     if version % 3 == 0:
         operations.append(DropNode(id=f"building-{version - 2}"))
@@ -202,7 +203,7 @@ def test_a_workspace_that_restarts_is_followed(
         follower.catch_up(before, 5)
     graph = Graph()
     for version in range(1, kept + 1):
-        graph.apply(Delta(version=version, cycle=version, phase="", tasks=[], operations=[]))
+        graph.apply(Delta(version=version, cycle=version, phase=Phase.END, operations=[]))
 
     after = Workspace(network, graph)
     with after.running(follower.shell):

@@ -15,15 +15,13 @@ from cogmap.runtime.shell import Shell
 from cogmap.runtime.state.journal import Journal
 from schemas import topics
 from schemas.base import Message
-from schemas.graph import Delta, Link, Snapshot
+from schemas.graph import Decay, Delta, Link, Phase, Snapshot
 from tests.support.disks import full_after
 
 
 def delta(version: int) -> Delta:
     operations = [Link(source="self", target=f"place:{version}:0", weight=0.5)]
-    return Delta(
-        version=version, cycle=version, phase="collect", tasks=[], operations=list(operations)
-    )
+    return Delta(version=version, cycle=version, phase=Phase.OBJECTS, operations=list(operations))
 
 
 def written(path: Path, *messages: Message) -> list[int]:
@@ -93,7 +91,7 @@ def test_one_message_replaces_all_when_compacted(tmp_path: Path) -> None:
     assert list(journal.messages()) == []
     for version in range(1, 50):
         journal.append(delta(version), encode(delta(version)))
-    snapshot = Snapshot(version=49, cycle=49, nodes=[], links=[], tiles=[])
+    snapshot = Snapshot(version=49, cycle=49, decay=Decay(), nodes=[], links=[], tiles=[])
 
     journal.compact(snapshot)
     journal.append(delta(50), encode(delta(50)))
@@ -110,14 +108,14 @@ def test_a_kill_during_compaction_leaves_the_old_journal(tmp_path: Path) -> None
     assert restored(tmp_path / "j") == [delta(1), delta(2)]
 
     journal = Journal(tmp_path / "j")
-    snapshot = Snapshot(version=2, cycle=2, nodes=[], links=[], tiles=[])
+    snapshot = Snapshot(version=2, cycle=2, decay=Decay(), nodes=[], links=[], tiles=[])
     journal.compact(snapshot)
     journal.close()
     assert restored(tmp_path / "j") == [snapshot]
 
 
 def test_a_whole_record_that_cannot_be_read_is_refused_and_kept(tmp_path: Path) -> None:
-    stranger = Delta(version=2, cycle=2, phase="collect", tasks=[], operations=[])
+    stranger = Delta(version=2, cycle=2, phase=Phase.OBJECTS, operations=[])
     journal = Journal(tmp_path / "j")
     journal.append(delta(1), encode(delta(1)))
     journal.append(stranger, b"\x80")

@@ -8,12 +8,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import msgspec
 import pytest
 
 import cogmap
 from cogmap import api
 from cogmap.bus.interface import Member
-from schemas.graph import Delta, Node
+from schemas.graph import Delta, Phase
+from schemas.nodes import Node
 from schemas.sensing import MotorCommand, Odometry
 from tests.support.includes import ROOT
 from tests.support.networks import OverZenoh, Peer, await_members, publish
@@ -104,9 +106,9 @@ def test_a_notebook_follows_the_graph_of_a_running_system(over_zenoh: OverZenoh)
     module = cogmap.Module("notebook").following(graph, on_delta, [cogmap.topics.MOTOR_COMMAND])
     with cogmap.Client(module, over_zenoh.endpoint, over_zenoh.agent):
         await_members(workspace, Member("notebook", "notebook"))
-        node = Node(id="object:house", kind="object")
-        delta = Delta(version=1, cycle=1, phase="objects", tasks=[], operations=[node])
-        delta.source = "workspace"
+        node = Node(id="object:house", kind="thing")
+        delta = Delta(version=1, cycle=1, phase=Phase.OBJECTS, operations=[node])
+        delta = msgspec.structs.replace(delta, source="workspace")
         publish(workspace, delta)
         peer.wait_for(1)
 

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 
+import msgspec
 import pytest
 
 from cogmap.bus.interface import CACHED_MESSAGES
@@ -14,7 +15,8 @@ from cogmap.graph.graph import Graph
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
 from schemas import topics
-from schemas.graph import Delta, Node
+from schemas.graph import Delta, Phase
+from schemas.nodes import Node
 from schemas.sensing import Odometry
 from tests.support.networks import OverZenoh, Peer, meet, publish, spin_until, working
 
@@ -93,14 +95,11 @@ def test_a_loss_beyond_the_cache_is_counted_and_a_snapshot_mends_the_graph(
     follower.open()
 
     def commit() -> None:
-        node = Node(id=f"building-{graph.version}", kind="object", activation=0.5)
-        delta = Delta(
-            version=graph.version + 1, cycle=1, phase="objects", tasks=[], operations=[node]
-        )
+        node = Node(id=f"building-{graph.version}", kind="thing", activation=0.5)
+        delta = Delta(version=graph.version + 1, cycle=1, phase=Phase.OBJECTS, operations=[node])
         graph.apply(delta)
-        delta.source = "workspace"
-        delta.seq = delta.version
-        publish(publisher, delta)
+        numbered = msgspec.structs.replace(delta, source="workspace", seq=delta.version)
+        publish(publisher, numbered)
 
     with working(Shell(keeper, network.join(), health=False)):
         meet(publisher, reader)

@@ -7,14 +7,15 @@ from cogmap.graph.replica import Replica, snapshot_over
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
 from schemas import topics
-from schemas.graph import Delta, Link, Node
+from schemas.graph import Delta, Link, Phase
+from schemas.nodes import Node
 from tests.support.networks import Network, meet, working
 
 
 def delta(version: int) -> Delta:
-    node = Node(id=f"building-{version}", kind="object", activation=0.5)
+    node = Node(id=f"building-{version}", kind="thing", activation=0.5)
     link = Link(source=node.id, target=f"place:{version}:0")
-    return Delta(version=version, cycle=version, phase="collect", tasks=[], operations=[node, link])
+    return Delta(version=version, cycle=version, phase=Phase.OBJECTS, operations=[node, link])
 
 
 def keeper(network: Network, graph: Graph) -> Shell:

@@ -17,7 +17,7 @@ from cogmap.runtime.shell import Shell
 from cogmap.runtime.state.published import PublishedCounts
 from schemas import topics
 from schemas.base import Message
-from schemas.graph import Snapshot, SnapshotRequest
+from schemas.graph import Decay, Snapshot, SnapshotRequest
 from schemas.process import Clock, Health, Presence
 from schemas.sensing import MotorCommand, Odometry
 from schemas.topics import Delivery, Topic
@@ -413,7 +413,7 @@ def test_a_module_that_observes_presence_learns_who_comes_and_goes(network: Netw
 
 
 def test_a_query_without_sense_is_refused_and_counted(network: Network) -> None:
-    empty = Snapshot(version=0, cycle=0, nodes=[], links=[], tiles=[])
+    empty = Snapshot(version=0, cycle=0, decay=Decay(), nodes=[], links=[], tiles=[])
     module = Module("workspace").serve(
         topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, lambda request: empty
     )

@@ -16,7 +16,7 @@ from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.array import Array
 from schemas.base import Message
-from schemas.graph import Delta
+from schemas.graph import Delta, Phase
 from schemas.sensing import Percept, Percepts, SelfMotion
 from schemas.topics import Delivery
 from tests.support.damage import damaged
@@ -45,7 +45,7 @@ class Turns:
         )
 
     def _on_delta(self, delta: Delta) -> list[Message]:
-        return self._view() if delta.phase == "decay" and self._views < VIEWS else []
+        return self._view() if delta.phase is Phase.END and self._views < VIEWS else []
 
     def _view(self) -> list[Message]:
         self._before(self._views)
@@ -89,7 +89,7 @@ def drive(system: System, before: Callable[[int], None] = lambda view: None) -> 
     turns = Turns(before)
     with working(witness.shell), working(Shell(turns.module, system.bus())):
         wait_until(
-            lambda: witness.graph.cycle == VIEWS and witness.deltas[-1].phase == "decay",
+            lambda: witness.graph.cycle == VIEWS and witness.deltas[-1].phase is Phase.END,
             "all views",
         )
     return witness

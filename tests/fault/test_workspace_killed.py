@@ -6,14 +6,14 @@ import signal
 
 import pytest
 
-from services.workspace.triggers import SELF
 from tests.support.live import Feeder, System, Witness, wait_until
 
 
 def where(witness: Witness) -> tuple[float, int]:
     """The self node's x and the view that it is of."""
-    attributes = witness.graph.nodes[SELF].attributes
-    return float(attributes["x_m"]), int(attributes["stamp_ns"])
+    agent = witness.graph.agent
+    assert agent is not None
+    return agent.x_m, agent.stamp_ns
 
 
 def test_a_restarted_workspace_resumes_its_graph_and_the_missed_self_motion(

@@ -8,6 +8,7 @@ import json
 from collections import Counter
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from cogmap.bus.codec import Envelope, decode, encode
@@ -18,10 +19,11 @@ from cogmap.recording.replaying.replay import replay_into
 from cogmap.recording.selection import to_record
 from cogmap.runtime.shell import Shell
 from schemas import topics
-from schemas.array import Array
+from schemas.array import Array, Matrix
 from schemas.base import Message
-from schemas.cognition import Task
-from schemas.graph import Delta, Node, Proposal
+from schemas.codelets import Proposal, Task
+from schemas.graph import Decay, Delta, Operation, Phase
+from schemas.nodes import SELF_ID, Self
 from schemas.process import Clock
 from schemas.sensing import Percepts, SelfMotion
 from services import registry
@@ -58,8 +60,8 @@ class Session:
 
     def say(self, message: Message) -> None:
         topic = topics.of(message)
-        message.source = "everyone"
-        message.seq = self._numbers[topic.name]
+        seq = self._numbers[topic.name]
+        message = msgspec.structs.replace(message, source="everyone", seq=seq)
         self._numbers[topic.name] += 1
         now_ns = 10**9 + sum(self._numbers.values())
         self.bus.publish(
@@ -78,22 +80,21 @@ class Session:
         self.say(Percepts(stamp_ns=stamp_ns, frame=frame, objects=[], road_m=road_m))
         return self.tasks[-1]
 
-    def answer(self, task: Task, samples: Array) -> None:
-        where = {"x_m": 1.0, "y_m": 0.0, "heading_rad": 0.0, "stamp_ns": task.stamp_ns}
-        me = Node(
-            id="self",
-            kind="self",
-            activation=1.0,
-            base_level=1.0,
-            attributes=where,
-            samples=samples,
+    def answer(self, task: Task) -> None:
+        samples = Matrix.of(np.zeros((10, 3)))
+        me = Self(id=SELF_ID, x_m=1.0, stamp_ns=task.stamp_ns, samples=samples)
+        self.propose(task, me)
+
+    def propose(self, task: Task, operation: Operation) -> None:
+        self.say(
+            Proposal(
+                stamp_ns=task.stamp_ns,
+                task_id=task.task_id,
+                codelet=task.codelet,
+                base_version=task.version,
+                operations=[operation],
+            )
         )
-        facts = {
-            "task_id": task.task_id,
-            "codelet": task.codelet,
-            "base_version": task.base_version,
-        }
-        self.say(Proposal(stamp_ns=task.stamp_ns, worker="w", operations=[me], **facts))  # type: ignore[arg-type]
 
     def end(self) -> None:
         self.shell.close()
@@ -104,24 +105,23 @@ def test_late_dropped_and_refused_answers_replay_to_the_same_deltas(
     tmp_path: Path,
 ) -> None:
     session = Session(tmp_path / "log.mcap")
-    samples = Array.of(np.zeros((10, 3)))
     late = session.see(0)
     session.say(Clock(stamp_ns=200 * MS + 181 * MS))
     second = session.see(1)
-    session.answer(late, samples)
+    session.answer(late)
     session.say(Clock(stamp_ns=400 * MS + 181 * MS))
     third = session.see(2)
-    session.answer(third, samples)
-    session.answer(second, samples)
+    session.answer(third)
+    session.answer(second)
     session.say(Clock(stamp_ns=600 * MS + 181 * MS))
-    session.answer(session.see(3), Array.of(np.zeros(10)))
+    session.propose(session.see(3), Decay())
     session.say(Clock(stamp_ns=800 * MS + 181 * MS))
     session.end()
     assert [(delta.cycle, delta.phase) for delta in session.deltas if delta.tasks] == [
-        (2, "late"),
-        (3, "localization"),
+        (2, Phase.LATE),
+        (3, Phase.LOCALIZATION),
     ]
-    assert sum(delta.dropped for delta in session.deltas) == 2
+    assert sum(delta.rejected for delta in session.deltas) == 2
     report = replay_into(tmp_path / "log.mcap", ["workspace"], registry.build, processes=1)
     assert report.same, report.first
     assert report.outcomes[0].same >= len(session.deltas) + len(session.tasks)

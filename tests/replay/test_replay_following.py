@@ -18,7 +18,8 @@ from cogmap.recording.selection import to_record
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
 from schemas import topics
-from schemas.graph import Delta, Node, Snapshot
+from schemas.graph import Delta, Phase, Snapshot
+from schemas.nodes import Node
 from schemas.sensing import MotorCommand
 
 
@@ -68,8 +69,8 @@ class Session:
     def commit(self, number: int, activation: float = 0.5) -> None:
         for _ in range(number):
             version = self.graph.version + 1
-            node = Node(id=f"building-{version}", kind="object", activation=activation)
-            delta = Delta(version=version, cycle=1, phase="objects", tasks=[], operations=[node])
+            node = Node(id=f"building-{version}", kind="thing", activation=activation)
+            delta = Delta(version=version, cycle=1, phase=Phase.OBJECTS, operations=[node])
             self.graph.apply(delta)
             self._workspace.publish(self._workspace.module.stamp(delta))
             self._settle()

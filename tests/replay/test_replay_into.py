@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -105,7 +106,7 @@ class Session:
         return shell
 
     def say(self, message: Message, sent_ns: int, incarnation: int = 1) -> None:
-        message.source = "sim"
+        message = msgspec.structs.replace(message, source="sim")
         envelope = Envelope("sim", message.seq, incarnation, self.now_ns + sent_ns, 0)
         self.bus.publish(topics.of(message), encode(message), envelope)
 
@@ -239,12 +240,13 @@ def _shifted(name: str, sections: Sections, instance: str) -> Module:
     count = iter(range(1000))
 
     def handler(message: Message) -> Iterable[Message]:
-        messages = list(said(message))
-        for scan in messages:
+        messages = []
+        for scan in said(message):
             if isinstance(scan, RangeScan) and next(count) >= 2:
                 values = scan.range_m.numpy().copy()
                 values[1, 1] += 1
-                scan.range_m = Array.of(values)
+                scan = msgspec.structs.replace(scan, range_m=Array.of(values))  # noqa: PLW2901
+            messages.append(scan)
         return messages
 
     module.handlers[topics.ODOMETRY] = handler

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import numpy as np
 
 from schemas.sensing import Percept, PlaceMatch
@@ -13,7 +14,6 @@ from tests.support.scenes import Desk, motion, percept, percepts, stamp_ns
 STEP_M = 2.0
 SIDE_STEPS = 20
 LAP = 4 * SIDE_STEPS
-SETTINGS = {"revisit_s": 5.0, "closure_spacing_s": 0.2}
 QUIET = WorkerConfig(
     samples=60,
     kept_samples=30,
@@ -23,6 +23,8 @@ QUIET = WorkerConfig(
     path_variance_per_m=0.01,
     heading_variance_per_m=1e-4,
     heading_variance_per_rad=2e-3,
+    revisit_s=5.0,
+    closure_spacing_s=0.2,
 )
 SLIP = 0.1
 
@@ -57,8 +59,8 @@ class LoopDrive:
         bias_rad: float = 0.0,
         **settings: object,
     ):
-        self.desk = Desk(*[f"w{n}" for n in range(workers)], mode=mode, **{**SETTINGS, **settings})
-        self.worker = worker
+        names = [f"w{number}" for number in range(workers)]
+        self.desk = Desk(*names, mode=mode, codelets=worker, **settings)
         self.bias_rad = bias_rad
         self.poses = true_poses(3 * LAP)
         self.frame = 0
@@ -84,9 +86,10 @@ class LoopDrive:
             ]
             view = percepts(self.frame, *objects, road_m=((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
             if match is not None and left == 1:
-                view.matches = [PlaceMatch(frame=match, view_ns=stamp_ns(match), score=0.99)]
+                seen_again = PlaceMatch(frame=match, view_ns=stamp_ns(match), score=0.99)
+                view = msgspec.structs.replace(view, matches=[seen_again])
             self.desk.feed(view)
-            self.desk.work(self.worker)
+            self.desk.work()
             self.frame += 1
 
     def meet(
@@ -102,6 +105,6 @@ class LoopDrive:
 
     def error_m(self) -> float:
         """How far the agent takes itself to be from where it is."""
-        facts = self.desk.graph.nodes["self"].attributes
+        agent = self.desk.agent
         where = self.poses[self.frame - 1]
-        return math.hypot(float(facts["x_m"]) - where[0], float(facts["y_m"]) - where[1])
+        return math.hypot(agent.x_m - where[0], agent.y_m - where[1])

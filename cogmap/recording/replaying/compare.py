@@ -10,7 +10,7 @@ import numpy as np
 
 from cogmap.bus.codec import decode
 from cogmap.errors import MessageError
-from schemas.array import Array
+from schemas.array import Array, Matrix
 from schemas.base import Message
 from schemas.topics import Topic
 
@@ -101,7 +101,7 @@ def _in_dict(left: dict[Any, Any], right: dict[Any, Any], path: str) -> Differen
     return None
 
 
-def _in_array(left: Array, right: Array, path: str) -> Difference | None:
+def _in_array(left: Array | Matrix, right: Array | Matrix, path: str) -> Difference | None:
     if (left.dtype, left.shape) != (right.dtype, right.shape):
         left_kind = f"{left.dtype} {left.shape}"
         right_kind = f"{right.dtype} {right.shape}"
@@ -120,7 +120,7 @@ def _in_array(left: Array, right: Array, path: str) -> Difference | None:
     )
 
 
-def _raw(array: Array) -> np.ndarray[Any, Any]:
+def _raw(array: Array | Matrix) -> np.ndarray[Any, Any]:
     """The values as bytes, so that NaN equals NaN and -0.0 differs from 0.0."""
     size = int(array.dtype[2])
     return np.frombuffer(array.data, f"V{size}")
@@ -147,6 +147,7 @@ def _first_byte(left: bytes, right: bytes) -> int:
 
 _COMPARISONS: tuple[tuple[type, Callable[[Any, Any, str], Difference | None]], ...] = (
     (Array, _in_array),
+    (Matrix, _in_array),
     (msgspec.Struct, _in_fields),
     (list, _in_list),
     (tuple, _in_list),

@@ -1,5 +1,5 @@
-"""The map shift codelet: it carries out a correction of the path on the map as it is now (paper
-§5.6).
+"""The apply-correction codelet: it carries out a correction of the path on the map as it is now
+(paper §5.6).
 
 Each object and each road node moves with the place of the path that is nearest to it. What was
 written since the correction was computed is kept: places that the path has gained move with its
@@ -10,186 +10,225 @@ from __future__ import annotations
 
 import msgspec
 import numpy as np
+from scipy.spatial import cKDTree
 
 from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import mean_pose, move_with, wrap_angle
-from cogmap.graph.graph import TILE_SIDE, nearest_place
-from schemas.array import Array
-from schemas.base import Scalar
-from schemas.cognition import Task
-from schemas.graph import Cells, DropNode, Node, Operation
-from services.codelets.config import Config
-from services.codelets.correction.map_correction import CORRECTION
+from cogmap.graph.graph import Graph
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from schemas.array import Array, Matrix
+from schemas.codelets import Task
+from schemas.graph import Cells, DropNode, Link, Operation, Phase
+from schemas.nodes import (
+    CORRECTION_ID,
+    POSE_COLUMNS,
+    ROOT_MAP,
+    Correction,
+    CorrectionColumn,
+    LinkKind,
+    Object,
+    Observations,
+    PathSegment,
+    PlaceColumn,
+    Self,
+    nearest_place,
+)
+from services.codelets.config import SECTION, Config
 from services.codelets.mapping.observations import Sightings
-from services.codelets.mapping.path import KIND as PATH
 from services.codelets.mapping.path import POSE, STAMP, rows_of, segments
-from services.codelets.mapping.places import place_link
 
-COLUMNS = 7
-OLD = slice(1, 4)
-NEW = slice(4, 7)
+OLD = slice(CorrectionColumn.OLD_X_M, CorrectionColumn.OLD_HEADING_RAD + 1)
+NEW = slice(CorrectionColumn.NEW_X_M, CorrectionColumn.NEW_HEADING_RAD + 1)
+OLD_POSITION = slice(CorrectionColumn.OLD_X_M, CorrectionColumn.OLD_Y_M + 1)
 AROUND = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)])
-AT_ONCE = 4096
+MAX_CELLS = 2**16
 BESIDE_M = 10.0
 
 
-def shift_map(task: Task, config: Config) -> list[Operation]:
+def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
+    """One task where a correction waits to be applied."""
+    if CORRECTION_ID not in graph.nodes:
+        return []
+    return [context.task(CODELET.name, about=[CORRECTION_ID])]
+
+
+def run(task: Task, graph: Graph, config: Config) -> Answer:
     """Everything on the map where the correction puts it, and the correction forgotten."""
-    correction = next(node for node in task.nodes if node.kind == CORRECTION)
-    if correction.samples is None or correction.samples.shape[1:] != (COLUMNS,):
-        raise MessageError(f"a correction whose rows are not {COLUMNS} numbers")
-    rows = np.asarray(correction.samples.numpy(), np.float64)
-    path = _path(task, rows)
-    operations: list[Operation] = [DropNode(id=CORRECTION), *segments(path, _first_number(task))]
-    seen = Sightings.of(task.nodes, path[:, STAMP])
+    correction = graph.get(Correction, CORRECTION_ID)
+    if correction is None:
+        raise MessageError(f"task {task.task_id}: the correction was applied before")
+    rows = correction.rows.numpy()
+    path = _corrected_path(graph, rows)
+    operations: list[Operation] = [DropNode(id=CORRECTION_ID), *segments(path)]
+    if graph.agent is not None:
+        operations += _move_self(graph, graph.agent, rows[-1:])
+
+    seen = Sightings.of(graph.of_kind(Observations), path[:, STAMP])
     landmarks_m = dict(zip(seen.labels, seen.landmarks_m(path[:, POSE]), strict=True))
-    for node in task.nodes:
-        if node.kind == "self":
-            operations += _self(task, node, rows[-1:])
-        elif node.kind == "object":
-            operations += _object(
-                task, node, rows, landmarks_m.get(str(node.attributes.get("label")))
-            )
-    return [*operations, *_road(task, rows)]
+    for node in graph.of_kind(Object):
+        if not node.surveyed:
+            operations += _move_object(graph, node, rows, landmarks_m.get(node.label))
+    return Answer([*operations, *_move_road(graph, rows)])
 
 
-def _path(task: Task, rows: Floats) -> Floats:
-    """The path with its places corrected."""
-    path = rows_of(task.nodes)
+CODELET = Codelet(
+    name="apply_correction",
+    phase=Phase.CORRECTION,
+    due=due,
+    run=run,
+    reads=frozenset({Correction, PathSegment, Observations, Self, Object, PlaceColumn.ROAD}),
+    writes=frozenset({Correction, PathSegment, Self, Object, LinkKind.AT, PlaceColumn.ROAD}),
+    config=Config,
+    section=SECTION,
+)
+
+
+def _corrected_path(graph: Graph, rows: Floats) -> Floats:
+    """The rows of the whole path, with its places corrected."""
+    path = rows_of(graph.of_kind(PathSegment))
     at = np.searchsorted(rows[:, STAMP], path[:, STAMP]).clip(0, len(rows) - 1)
-    path[:, POSE] = _poses(path[:, POSE], rows[at])
+    path[:, POSE] = _moved_poses(path[:, POSE], rows[at])
     return path
 
 
-def _first_number(task: Task) -> int:
-    return min(
-        (int(node.attributes["number"]) for node in task.nodes if node.kind == PATH), default=0
-    )
+def _moved_poses(poses: Floats, rows: Floats) -> Floats:
+    """(n, 3) poses, each moved as a row of the correction is."""
+    positions_m = move_with(poses[:, :2], rows[:, OLD], rows[:, NEW])
+    turned_rad = rows[:, NEW][:, 2] - rows[:, OLD][:, 2]
+    return np.column_stack([positions_m, wrap_angle(poses[:, 2] + turned_rad)])
 
 
-def _poses(poses: Floats, rows: Floats) -> Floats:
-    heading = wrap_angle(poses[:, 2] + rows[:, NEW][:, 2] - rows[:, OLD][:, 2])
-    return np.column_stack([move_with(poses[:, :2], rows[:, OLD], rows[:, NEW]), heading])
-
-
-def _self(task: Task, node: Node, last: Floats) -> list[Operation]:
+def _move_self(graph: Graph, agent: Self, last: Floats) -> list[Operation]:
     """The agent moves with the last place of its path."""
-    if node.samples is None:
-        raise MessageError(f"task {task.task_id} has a self node without samples")
-    samples = np.asarray(node.samples.numpy(), np.float64)
-    moved = np.column_stack([_poses(samples[:, :3], last), samples[:, 3:]])
-    mean = mean_pose(moved)
-    facts: dict[str, Scalar] = {"heading_rad": float(mean[2])}
-    return _placed(task, node, moved, facts)
+    samples = agent.samples.numpy()
+    moved = np.column_stack(
+        [_moved_poses(samples[:, :POSE_COLUMNS], last), samples[:, POSE_COLUMNS:]]
+    )
+    x_m, y_m = moved[:, :2].mean(axis=0).tolist()
+    after = msgspec.structs.replace(
+        agent,
+        x_m=x_m,
+        y_m=y_m,
+        heading_rad=float(mean_pose(moved)[2]),
+        samples=Matrix.of(moved),
+    )
+    return [after, _place_link(after, graph)]
 
 
-def _object(task: Task, node: Node, rows: Floats, seen_m: Floats | None) -> list[Operation]:
+def _move_object(
+    graph: Graph, node: Object, rows: Floats, seen_m: Floats | None
+) -> list[Operation]:
     """An object moves to where it is seen from the corrected path: `seen_m` (2,).
 
-    One that was not recorded on the way moves with the place nearest to it of those from where it
-    came to be known.
+    One that was not observed along the path moves with the place nearest to it, of those from which
+    it came to be known. One that does not move is not written.
     """
-    if node.samples is None:
-        return []
-    samples = np.asarray(node.samples.numpy(), np.float64)
+    positions_m = node.positions_m()
+    mean_m = positions_m.mean(axis=0)
     if seen_m is not None:
-        return _placed(task, node, samples + seen_m - samples.mean(axis=0), {})
-    since_s, until_s = (int(node.attributes.get(key, 0)) * 1e-9 for key in ("since_ns", "stamp_ns"))
-    known = np.flatnonzero((rows[:, STAMP] >= since_s) & (rows[:, STAMP] <= until_s))
-    # One seen since the correction was computed goes with the path's last place.
-    near = rows[known] if len(known) else rows[[int(np.abs(rows[:, STAMP] - since_s).argmin())]]
-    away = np.hypot(*(near[:, OLD][:, :2] - samples[:, :2].mean(axis=0)).T)
-    row = near[[_first_pass(away)]]
-    return _placed(task, node, move_with(samples, row[:, OLD], row[:, NEW]), {})
+        moved_m = positions_m + seen_m - mean_m
+    else:
+        row = _row_of(node, mean_m, rows)
+        moved_m = move_with(positions_m, row[:, OLD], row[:, NEW])
+    if np.array_equal(moved_m, positions_m):
+        return []
+
+    mean_m = moved_m.mean(axis=0)
+    after = msgspec.structs.replace(
+        node,
+        x_m=float(mean_m[0]),
+        y_m=float(mean_m[1]),
+        offsets_m=None if node.offsets_m is None else Matrix.of(moved_m - mean_m, "<f2"),
+    )
+    return [after, _place_link(after, graph)]
 
 
-def _first_pass(away: Floats) -> int:
+def _row_of(node: Object, mean_m: Floats, rows: Floats) -> Floats:
+    """(1, 7): the row of the correction that an object moves with."""
+    since_s = node.created_ns * 1e-9
+    until_s = node.last_seen_ns * 1e-9
+    stamps_s = rows[:, STAMP]
+    known = np.flatnonzero((stamps_s >= since_s) & (stamps_s <= until_s))
+    if not len(known):
+        # One seen since the correction was computed goes with the path's last place.
+        known = np.array([int(np.abs(stamps_s - since_s).argmin())])
+    near = rows[known]
+    away_m = np.hypot(*(near[:, OLD_POSITION] - mean_m).T)
+    return near[[_first_pass(away_m)]]
+
+
+def _first_pass(away_m: Floats) -> int:
     """The nearest of the places, by (n,) distances along the path, where it first passes by.
 
     Not the nearest of all: where a loop has drifted, its end may lie nearer than the beginning that
-    an object is of.
+    an object was seen from.
     """
-    passing = np.flatnonzero(away <= max(2 * away.min(), away.min() + BESIDE_M))
+    passing = np.flatnonzero(away_m <= max(2 * away_m.min(), away_m.min() + BESIDE_M))
     gone = np.flatnonzero(np.diff(passing) > 1)
     first = passing[: gone[0] + 1] if len(gone) else passing
-    return int(first[away[first].argmin()])
+    return int(first[away_m[first].argmin()])
 
 
-def _placed(task: Task, node: Node, samples: Floats, facts: dict[str, Scalar]) -> list[Operation]:
-    """The node with its samples moved, and its link to the place of their mean."""
-    x_m, y_m = samples[:, :2].mean(axis=0).tolist()
-    cell = nearest_place(x_m, y_m, task.cell_m)
-    attributes = node.attributes | {"x_m": x_m, "y_m": y_m, "place": cell} | facts
-    return [
-        msgspec.structs.replace(node, attributes=attributes, samples=Array.of(samples)),
-        *place_link(node, cell),
-    ]
+def _place_link(node: Self | Object, graph: Graph) -> Link:
+    place = nearest_place(node.x_m, node.y_m, graph.cell_m(node.map), node.map)
+    return Link(source=node.id, target=place, kind=LinkKind.AT)
 
 
-def _road(task: Task, rows: Floats) -> list[Operation]:
+def _move_road(graph: Graph, rows: Floats) -> list[Operation]:
     """Each road node moves with the place nearest to it; what a turn would leave open between them
     is filled.
     """
-    cells, values = _road_cells(task)
+    cells, values = graph.places.written_cells(ROOT_MAP, PlaceColumn.ROAD)
     if not len(cells):
         return []
-    where = _moved(cells.astype(np.float64) * task.cell_m, rows[:, OLD], rows[:, NEW])
-    arrived = np.rint(where / task.cell_m).astype(np.int64)
+    cell_m = graph.cell_m()
+    arrived_m = _moved_with_nearest(cells.astype(np.float64) * cell_m, rows[:, OLD], rows[:, NEW])
+    arrived = np.rint(arrived_m / cell_m).astype(np.int64)
     around = np.unique((arrived[:, None, :] + AROUND).reshape(-1, 2), axis=0)
-    came_from = np.rint(
-        _moved(around * task.cell_m, rows[:, NEW], rows[:, OLD]) / task.cell_m
-    ).astype(np.int64)
-    road = dict(zip(_pairs(cells), values.tolist(), strict=True))
-    result = dict.fromkeys(road, 0.0)
-    sources = zip(_pairs(around), _pairs(came_from), strict=True)
-    for cell, source in sources:
-        if (value := road.get(source, 0.0)) > 0:
-            result[cell] = max(result.get(cell, 0.0), value)
-    for cell, value in zip(_pairs(arrived), values.tolist(), strict=True):
-        result[cell] = max(result.get(cell, 0.0), value)
-    changed = {cell: value for cell, value in result.items() if road.get(cell, 0.0) != value}
+    origin_m = _moved_with_nearest(around.astype(np.float64) * cell_m, rows[:, NEW], rows[:, OLD])
+    origin = np.rint(origin_m / cell_m).astype(np.int64)
+
+    before = dict(zip(_keys(cells), values.tolist(), strict=True))
+    after = dict.fromkeys(before, 0.0)
+    for cell, source in zip(_keys(around), _keys(origin), strict=True):
+        value = before.get(source, 0.0)
+        if value > 0:
+            after[cell] = max(after.get(cell, 0.0), value)
+    for cell, value in zip(_keys(arrived), values.tolist(), strict=True):
+        after[cell] = max(after.get(cell, 0.0), value)
+
+    changed = {}
+    for cell, value in after.items():
+        if before.get(cell, 0.0) != value:
+            changed[cell] = value
     return _cells(changed)
 
 
-def _pairs(cells: Indices) -> list[tuple[int, int]]:
+def _keys(cells: Indices) -> list[tuple[int, int]]:
     return [(i, j) for i, j in cells.tolist()]
 
 
 def _cells(values: dict[tuple[int, int], float]) -> list[Operation]:
-    """New values of road nodes, so many at once as the workspace takes."""
+    """New values of road nodes, at most as many at once as the workspace takes."""
     cells = np.array(list(values), np.int32).reshape(-1, 2)
     roads = np.array(list(values.values()), np.float32)
-    starts = range(0, len(cells), 2**16)
-    return [
-        Cells(
-            column="road",
-            cells=Array.of(cells[k : k + 2**16]),
-            values=Array.of(roads[k : k + 2**16]),
+    parts: list[Operation] = []
+    for start in range(0, len(cells), MAX_CELLS):
+        some = slice(start, start + MAX_CELLS)
+        parts.append(
+            Cells(
+                map=ROOT_MAP,
+                column=PlaceColumn.ROAD,
+                cells=Array.of(cells[some]),
+                values=Array.of(roads[some]),
+            )
         )
-        for k in starts
-    ]
+    return parts
 
 
-def _road_cells(task: Task) -> tuple[Indices, Floats]:
-    """(k, 2) cells that are road, and how surely."""
-    cells = [np.zeros((0, 2), np.int64)]
-    values = [np.zeros(0)]
-    for tile in task.tiles:
-        road = np.asarray(tile.road.numpy(), np.float64)
-        if road.shape != (TILE_SIDE, TILE_SIDE):
-            raise MessageError(f"a tile of road of shape {road.shape}")
-        i, j = np.nonzero(road)
-        cells.append(np.column_stack([i + tile.x * TILE_SIDE, j + tile.y * TILE_SIDE]))
-        values.append(road[i, j])
-    return np.vstack(cells), np.concatenate(values)
-
-
-def _moved(points: Floats, old: Floats, new: Floats) -> Floats:
+def _moved_with_nearest(points_m: Floats, old: Floats, new: Floats) -> Floats:
     """(k, 2) points moved as the pose nearest to each is."""
-    result = np.empty_like(points, dtype=np.float64)
-    for start in range(0, len(points), AT_ONCE):
-        some = points[start : start + AT_ONCE]
-        nearest = ((some[:, None, :] - old[None, :, :2]) ** 2).sum(axis=2).argmin(axis=1)
-        result[start : start + AT_ONCE] = move_with(some, old[nearest], new[nearest])
-    return result
+    _, nearest = cKDTree(old[:, :2]).query(points_m)
+    moved_m: Floats = move_with(points_m, old[nearest], new[nearest])
+    return moved_m

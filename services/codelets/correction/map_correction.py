@@ -2,8 +2,7 @@
 §5.6, eq. 5-9).
 
 It may take longer than a cycle. So it writes nothing that others write meanwhile: it leaves a
-`correction` node, whose samples are (n, 7) rows of the path, stamp_s and the poses before and
-after, for the map shift codelet to carry out.
+Correction node for the apply-correction codelet.
 """
 
 from __future__ import annotations
@@ -13,13 +12,17 @@ import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.geometry.se2 import rotation_matrices, wrap_angle
-from schemas.array import Array
-from schemas.cognition import Replay, Task
-from schemas.graph import Node, Operation
-from services.codelets.config import Config
+from cogmap.graph.graph import Graph
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from schemas.array import Array, Matrix
+from schemas.codelets import Task
+from schemas.cognition import Replay
+from schemas.graph import Operation, Phase
+from schemas.nodes import CORRECTION_ID, Correction, LoopClosure, Observations, PathSegment
+from services.codelets.config import SECTION, Config
 from services.codelets.correction.gnc import inliers
 from services.codelets.correction.least_squares import optimize
-from services.codelets.correction.pairwise_consistency import Views, consistent
+from services.codelets.correction.pairwise_consistency import MIN_AGREEING, Views, consistent
 from services.codelets.correction.pose_graph import (
     Constraints,
     PoseGraph,
@@ -27,50 +30,86 @@ from services.codelets.correction.pose_graph import (
     residuals,
 )
 from services.codelets.correction.reverse_replay import close_loops
-from services.codelets.mapping.loop_detection import KIND, constraints_of, views_of
+from services.codelets.mapping.loop_detection import constraints_of, views_of
 from services.codelets.mapping.observations import Sightings
 from services.codelets.mapping.path import POSE, STAMP, rows_of, steps_of
 
-CORRECTION = "correction"
-LEAST_ROWS = 10
+MIN_ROWS = 10
 IMPOSSIBLE_SD = 5.0
-MOST_ROUNDS = 3
+MAX_ROUNDS = 3
 SAME_RAD = 0.05
 ROUNDS = 5
 
 
-def correct_map(task: Task, config: Config) -> tuple[list[Operation], Replay | None]:
-    """What becomes of the closures of `task`, those before and the new, the correction of the path,
-    and its replay.
+def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
+    """One task where there are closures not judged yet, and enough of late to agree; unless some
+    were judged just now, or a correction waits to be applied.
     """
-    rows = rows_of(task.nodes)
-    closures = sorted(
-        (node for node in task.nodes if node.kind == KIND),
-        key=lambda node: int(node.attributes["to_ns"]),
-    )
+    if CORRECTION_ID in graph.nodes:
+        return []
+    closures = list(graph.of_kind(LoopClosure))
+    fresh = [closure for closure in closures if closure.accepted is None]
+    late_ns = context.stamp_ns - config.revisit_s * 1e9
+    late = [closure for closure in closures if closure.to_ns > late_ns]
+    if not fresh or len(late) < MIN_AGREEING:
+        return []
+
+    judged_ns = [closure.to_ns for closure in closures if closure.accepted is not None]
+    if judged_ns and context.stamp_ns < max(judged_ns) + config.closure_spacing_s * 1e9:
+        return []
+    return [context.task(CODELET.name, about=[closure.id for closure in fresh])]
+
+
+def run(task: Task, graph: Graph, config: Config) -> Answer:
+    """What becomes of all closures, the correction of the path, and its replay."""
+    rows = rows_of(graph.of_kind(PathSegment))
+    closures = sorted(graph.of_kind(LoopClosure), key=lambda closure: closure.to_ns)
     if not closures or len(rows) < 2:
-        return [], None
+        return Answer()
+
     views = views_of(closures, rows)
     steps = steps_of(rows, config)
-    agrees = consistent(views, steps, config.false_closure) & (views.j - views.i >= LEAST_ROWS)
-    graph, among = _holding(_start(rows[:, POSE], steps), steps, views.select(agrees), config)
-    holds = np.zeros(len(closures), bool)
-    holds[agrees] = among
-    written = _judged(closures, agrees, holds)
-    held_before = {node.id for node in closures if node.attributes.get("holds")}
-    held = {node.id for node, hold in zip(closures, holds, strict=True) if hold}
-    if held == held_before:
-        return written, None
-    seen = Sightings.of(task.nodes, rows[:, STAMP])
-    new, replays = corrected(graph, seen, config)
-    samples = Array.of(np.column_stack([rows[:, STAMP], rows[:, POSE], new]))
-    written.append(Node(id=CORRECTION, kind=CORRECTION, base_level=1.0, samples=samples))
-    replay = _replay(rows, new, graph.closures, config)
-    replay.stamp_ns = task.stamp_ns
-    replay.cycle = task.cycle
-    replay.replays = replays
-    replay.closed, replay.undone = sorted(held), sorted(held_before - held)
-    return written, replay
+    is_consistent = consistent(views, steps, config.false_closure)
+    is_consistent &= views.j - views.i >= MIN_ROWS
+    start = _start(rows[:, POSE], steps)
+    path, accepted = _accepted(start, steps, views.select(is_consistent), config)
+    is_accepted = np.zeros(len(closures), bool)
+    is_accepted[is_consistent] = accepted
+
+    operations = _judged(closures, is_consistent, is_accepted)
+    accepted_before = {closure.id for closure in closures if closure.accepted}
+    accepted_now = set()
+    for closure, holds in zip(closures, is_accepted.tolist(), strict=True):
+        if holds:
+            accepted_now.add(closure.id)
+    if accepted_now == accepted_before:
+        return Answer(operations)
+
+    seen = Sightings.of(graph.of_kind(Observations), rows[:, STAMP])
+    poses, replays = corrected(path, seen, config)
+    correction = np.column_stack([rows[:, STAMP], rows[:, POSE], poses])
+    operations.append(Correction(id=CORRECTION_ID, base_level=1.0, rows=Matrix.of(correction)))
+    replay = msgspec.structs.replace(
+        _replay(rows, poses, path.closures, config),
+        stamp_ns=task.stamp_ns,
+        cycle=task.cycle,
+        replays=replays,
+        closed=sorted(accepted_now),
+        undone=sorted(accepted_before - accepted_now),
+    )
+    return Answer(operations, events=[replay])
+
+
+CODELET = Codelet(
+    name="map_correction",
+    phase=Phase.BACKGROUND,
+    due=due,
+    run=run,
+    reads=frozenset({PathSegment, Observations, LoopClosure}),
+    writes=frozenset({LoopClosure, Correction}),
+    config=Config,
+    section=SECTION,
+)
 
 
 def _start(poses: Floats, steps: Constraints) -> Floats:
@@ -89,7 +128,7 @@ def _start(poses: Floats, steps: Constraints) -> Floats:
     return np.column_stack([where, wrap_angle(heading)])
 
 
-def _holding(
+def _accepted(
     poses: Floats, steps: Constraints, views: Views, config: Config
 ) -> tuple[PoseGraph, Booleans]:
     """The path with the loops that hold, and which of `views` those are.
@@ -98,7 +137,7 @@ def _holding(
     to be another.
     """
     loops = constraints_of(views, poses)
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         holds = inliers(PoseGraph(poses, steps, loops), config.false_closure)
         graph = PoseGraph(poses, steps, loops.select(holds))
         again = constraints_of(views, optimize(graph))
@@ -111,21 +150,23 @@ def _holding(
 
 def corrected(graph: PoseGraph, seen: Sightings, config: Config) -> tuple[Floats, int]:
     """(n, 3) poses with all loops closed, by the paper's rule or with the headings, and how often
-    the path replayed.
+    the whole path was replayed for that: reverse replays of eq. 9, or solutions with the headings.
 
     Where no loop is left, the path is as path integration has it. With the headings, the path is
     also bound to what was seen along it.
     """
-    positions = close_loops(_positions_only(graph))
-    poses = np.column_stack([positions.positions_m, graph.poses[:, 2]])
     if config.correct == "positions":
-        return poses, positions.replays
+        positions = close_loops(_positions_only(graph))
+        return np.column_stack([positions.positions_m, graph.poses[:, 2]]), positions.replays
+
     poses = optimize(graph)
     landmarks_m = seen.landmarks_m(poses)
-    for _ in range(ROUNDS if len(landmarks_m) else 0):
+    rounds = ROUNDS if len(landmarks_m) else 0
+    for _ in range(rounds):
         joint = optimize(seen.joined(PoseGraph(poses, graph.steps, graph.closures), landmarks_m))
-        poses, landmarks_m = joint[: len(poses)], joint[len(poses) :, :2]
-    return poses, positions.replays
+        landmarks_m = joint[len(poses) :, :2]
+        poses = joint[: len(poses)]
+    return poses, 1 + rounds
 
 
 def _positions_only(graph: PoseGraph) -> PoseGraph:
@@ -158,39 +199,47 @@ def _positions_only(graph: PoseGraph) -> PoseGraph:
     return PoseGraph(graph.poses, steps, loops.weighted(1 / (1 + unsure)))
 
 
-def _judged(closures: list[Node], agrees: Booleans, holds: Booleans) -> list[Operation]:
-    """The closures of which something else is to be said than before."""
-    said = [
-        msgspec.structs.replace(node, attributes=node.attributes | {"agrees": agree, "holds": hold})
-        for node, agree, hold in zip(closures, agrees.tolist(), holds.tolist(), strict=True)
-    ]
-    return [node for node, was in zip(said, closures, strict=True) if node != was]
+def _judged(
+    closures: list[LoopClosure], is_consistent: Booleans, is_accepted: Booleans
+) -> list[Operation]:
+    """The closures whose judgement differs from before."""
+    changed: list[Operation] = []
+    judgements = zip(closures, is_consistent.tolist(), is_accepted.tolist(), strict=True)
+    for closure, consistent_now, accepted_now in judgements:
+        judged = msgspec.structs.replace(closure, consistent=consistent_now, accepted=accepted_now)
+        if judged != closure:
+            changed.append(judged)
+    return changed
 
 
 def _replay(rows: Floats, new: Floats, loops: Constraints, config: Config) -> Replay:
-    """What is told of it, the newest place first, from where the loops begin."""
+    """The replay of a correction, the newest place first, from where the loops begin."""
     first = int(min(loops.i.min(), loops.j.min())) if len(loops) else 0
     backwards = slice(None, first - 1 if first else None, -1)
-    before = rows[backwards, POSE][:, :2]
-    after = new[backwards, :2]
-    pairs = _pairs(after, loops, len(rows), config)
-    decay = config.synapse_decay_per_m
-    strengths = [
-        np.exp(-decay * np.hypot(*(where[pairs[:, 0]] - where[pairs[:, 1]]).T))
-        for where in (before, after)
-    ]
+    before_m = rows[backwards, POSE][:, :2]
+    after_m = new[backwards, :2]
+    pairs = _pairs(after_m, loops, len(rows), config)
+    decay_per_m = config.synapse_decay_per_m
+    change = _strengths(after_m, pairs, decay_per_m) - _strengths(before_m, pairs, decay_per_m)
     return Replay(
         cycle=0,
         replays=0,
         closed=[],
         undone=[],
         stamps_ns=Array.of(np.rint(rows[backwards, STAMP] * 1e9).astype(np.int64)),
-        positions_m=Array.of(before),
-        shifts_m=Array.of(after - before),
+        positions_m=Array.of(before_m),
+        shifts_m=Array.of(after_m - before_m),
         pairs=Array.of(pairs.astype(np.int32)),
-        strength_changes=Array.of(strengths[1] - strengths[0]),
-        decay_per_m=decay,
+        strength_changes=Array.of(change),
+        decay_per_m=decay_per_m,
     )
+
+
+def _strengths(positions_m: Floats, pairs: Indices, decay_per_m: float) -> Floats:
+    """(m,): the synaptic strengths of pairs of place cells (paper §5.6)."""
+    apart_m = positions_m[pairs[:, 0]] - positions_m[pairs[:, 1]]
+    strengths: Floats = np.exp(-decay_per_m * np.hypot(apart_m[:, 0], apart_m[:, 1]))
+    return strengths
 
 
 def _pairs(after: Floats, loops: Constraints, count: int, config: Config) -> Indices:

@@ -1,4 +1,4 @@
-"""Where each landmark in view is: the landmark codelet (paper §5.4, eq. 4)."""
+"""The landmark codelet: where each landmark in view is (paper §5.4, eq. 4)."""
 
 from __future__ import annotations
 
@@ -9,19 +9,29 @@ import numpy as np
 
 from cogmap.errors import MessageError
 from cogmap.geometry.se2 import mean_pose, wrap_angle
-from cogmap.graph.graph import nearest_place
-from schemas.array import Array
-from schemas.cognition import Task
-from schemas.graph import Node, Operation
+from cogmap.graph.graph import Graph
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from schemas.array import Matrix
+from schemas.codelets import Task
+from schemas.graph import Link, Phase
+from schemas.nodes import (
+    POSE_COLUMNS,
+    SELF_ID,
+    LinkKind,
+    Object,
+    Self,
+    SelfColumn,
+    nearest_place,
+    object_id,
+)
 from schemas.sensing import Percept
-from services.codelets.config import Config
+from services.codelets.config import SECTION, Config
 from services.codelets.localization.measurement_model import (
-    MOVING,
     has_bearing,
     has_range,
-    seen_from_here,
+    is_seen_from_here,
 )
-from services.codelets.localization.motion_model import POSE_COLUMNS, RANGE, with_gains
+from services.codelets.localization.motion_model import with_gains
 from services.codelets.localization.sampling import (
     Samples,
     generator,
@@ -29,80 +39,103 @@ from services.codelets.localization.sampling import (
     resample,
     spread,
 )
-from services.codelets.mapping.places import place_link
 
 GAP = 3.0
 LOCAL_SHARE = 0.5
+BASE_LEVEL_GAIN = 0.05
+MIN_RANGE_M = 0.1
 
 
 class Record(NamedTuple):
-    """How often a landmark was seen where it is believed to be, and how often on end it was seen
-    elsewhere since.
+    """In how many views a landmark was seen where it is believed to be, and in how many in a row it
+    was seen elsewhere since.
     """
 
-    agreed: int
-    missed: int
+    sightings: int
+    misses: int
 
 
 FIRST = Record(1, 0)
 
 
-def locate_landmark(task: Task, config: Config) -> list[Operation]:
+def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
+    """One task for each object in view that the map has."""
+    tasks = []
+    for percept in sorted(context.percepts.objects, key=lambda percept: percept.label):
+        name = object_id(percept.label)
+        if name in graph.nodes:
+            about = [SELF_ID, name]
+            task = context.task(CODELET.name, about, subject=percept.label, percepts=[percept])
+            tasks.append(task)
+    return tasks
+
+
+def run(task: Task, graph: Graph, config: Config) -> Answer:
     """Eq. 4 for the one landmark and percept of `task`: keep the samples that agree with what is
     seen now.
 
-    A landmark that disagrees `config.misses` times on end, or more often than it ever agreed,
-    stands elsewhere: it starts anew from what is seen. But while it is the agent who may be
-    elsewhere, or stands and sees the same again, landmarks stay where they are, and those that were
-    surveyed always do.
+    A landmark that disagrees in `config.misses` views in a row, or in more than it ever agreed
+    with, stands elsewhere: it starts anew from what is seen. But while it is the agent that may be
+    elsewhere, or stands still and sees the same again, landmarks stay where they are; those that
+    were surveyed always do.
     """
-    self_node = next(node for node in task.nodes if node.kind == "self")
-    landmark = next(node for node in task.nodes if node.kind == "object")
-    if self_node.samples is None or landmark.samples is None:
-        raise MessageError(f"task {task.task_id} has nodes without samples")
+    (percept,) = task.percepts
+    agent = graph.agent
+    landmark = graph.get(Object, object_id(percept.label))
+    if agent is None or landmark is None:
+        raise MessageError(f"task {task.task_id}: the graph lacks the self or the landmark")
+    before = landmark.positions_m()
+    record = Record(landmark.sightings, landmark.misses)
+    if _stays(agent, landmark):
+        return _kept_answer(task, graph, landmark, record)
+
     rng = generator(task.task_id)
-    percept = task.percepts[0]
-    before = np.array(landmark.samples.numpy(), np.float64)
-    agreed, missed = (int(landmark.attributes.get(key, 0)) for key in ("sightings", "misses"))
-    if _stays(self_node, landmark):
-        return object_operations(task, landmark, before, percept, Record(agreed, missed))
-    selves = near_by(
-        with_gains(np.array(self_node.samples.numpy(), np.float64), config, rng), config
-    )
+    selves = nearby_selves(with_gains(agent.samples.numpy(), config, rng), config)
     selves = rng.permutation(resample(selves, len(before), 0.0, rng))
-    squared = _squared(before, selves, percept)
-    if squared.min() < config.gate**2:
-        kept = before[rejection_mask(-squared / 2 / config.correlated_views, rng)]
-        # Few that are left stand for all between them: of a ring or a ray, the next view must find
+    mahalanobis2 = _mahalanobis2(before, selves, percept)
+    if mahalanobis2.min() < config.gate**2:
+        kept = before[rejection_mask(-mahalanobis2 / 2 / config.correlated_views, rng)]
+        # Few that are kept stand for all between them: of a ring or a ray, the next view must find
         # some again.
-        jitter_m = np.maximum(
-            config.landmark_jitter_m, GAP * spread(kept, kept.mean(axis=0)) / len(kept)
-        )
-        kept = resample(kept, len(before), jitter_m, rng)
-        return object_operations(task, landmark, kept, percept, Record(agreed + 1, 0))
-    if missed + 1 < min(config.misses, agreed + 1):
-        return object_operations(task, landmark, before, percept, Record(agreed, missed + 1))
-    anew = msgspec.structs.replace(
-        landmark, attributes=landmark.attributes | {"since_ns": task.stamp_ns}
-    )
-    return object_operations(
-        task, anew, first_sighting(selves, percept, config, rng), percept, FIRST
-    )
+        gaps_m = GAP * spread(kept, kept.mean(axis=0)) / len(kept)
+        jitter_m = np.maximum(config.landmark_jitter_m, gaps_m)
+        after = resample(kept, len(before), jitter_m, rng)
+        record = Record(record.sightings + 1, 0)
+        return object_answer(task, graph, landmark, after, record)
+
+    misses = record.misses + 1
+    if misses < min(config.misses, record.sightings + 1):
+        record = Record(record.sightings, misses)
+        return _kept_answer(task, graph, landmark, record)
+    anew = msgspec.structs.replace(landmark, created_ns=task.stamp_ns)
+    positions_m = first_positions(selves, percept, config, rng)
+    return object_answer(task, graph, anew, positions_m, FIRST)
 
 
-def near_by(selves: Samples, config: Config) -> Samples:
+CODELET = Codelet(
+    name="landmark",
+    phase=Phase.OBJECTS,
+    due=due,
+    run=run,
+    reads=frozenset({Self, Object}),
+    writes=frozenset({Object, LinkKind.AT}),
+    config=Config,
+    section=SECTION,
+)
+
+
+def nearby_selves(selves: Samples, config: Config) -> Samples:
     """(n, 7) samples of the self for where a landmark stands as seen from it, which is known
-    however lost it is.
+    however lost the agent is.
 
-    The paper's samples start from their mean at each step (§5.4), so that landmarks are as sure as
-    the last step was. Here the self's samples keep all that is unsure since the start; drawn
-    together about their mean, they say the same.
+    The paper's samples start from their mean at each step (§5.4), so that landmarks are as certain
+    as the last step was. Here the self's samples keep all that is uncertain since the start; drawn
+    together about their mean, they state the same.
     """
     mean = mean_pose(selves)
     sd = spread(selves[:, :POSE_COLUMNS], mean)
-    share = min(
-        1.0, LOCAL_SHARE * config.largest_landmark_sd_m / max(float(np.hypot(sd[0], sd[1])), 1e-9)
-    )
+    position_sd_m = max(float(np.hypot(sd[0], sd[1])), 1e-9)
+    share = min(1.0, LOCAL_SHARE * config.largest_landmark_sd_m / position_sd_m)
     if share == 1.0:
         return selves
     off = selves[:, :POSE_COLUMNS] - mean
@@ -110,82 +143,86 @@ def near_by(selves: Samples, config: Config) -> Samples:
     return np.hstack([mean + share * off, selves[:, POSE_COLUMNS:]])
 
 
-def _stays(self_node: Node, landmark: Node) -> bool:
-    own = self_node.attributes
-    facts = landmark.attributes
-    here = seen_from_here(landmark, int(own.get("stands_ns", MOVING)))
-    return bool(facts.get("surveyed", False)) or bool(own.get("others", False)) or here
-
-
-def _squared(where_m: Samples, selves: Samples, percept: Percept) -> Samples:
-    """Squared deviations (n,) of the percept from what each pair of landmark and self would have it
-    be.
-    """
-    offset = where_m - selves[:, :2]
-    squared = np.zeros(len(offset))
-    if has_bearing(percept):
-        off = wrap_angle(
-            np.arctan2(offset[:, 1], offset[:, 0]) - selves[:, 2] - percept.bearing_rad
-        )
-        squared += (off / percept.bearing_sd_rad) ** 2
-    if has_range(percept):
-        distance = np.hypot(offset[:, 0], offset[:, 1]) * (1 + selves[:, RANGE])
-        squared += ((distance - percept.range_m) / percept.range_sd_m) ** 2
-    return squared
-
-
-def first_sighting(
+def first_positions(
     selves: Samples, percept: Percept, config: Config, rng: np.random.Generator
 ) -> Samples:
-    """Where something may be that is seen from (n, 7) samples of the self for the first time: (n,
-    2) samples.
+    """(n, 2) samples of where an object may be that is seen for the first time from (n, 7) samples
+    of the self.
 
     Seen by range alone it is on a ring, by bearing alone on a ray as long as `config.farthest_m`.
     """
     number = len(selves)
     if has_bearing(percept):
-        bearing = selves[:, 2] + rng.normal(percept.bearing_rad, percept.bearing_sd_rad, number)
+        seen_rad = rng.normal(percept.bearing_rad, percept.bearing_sd_rad, number)
+        direction_rad = selves[:, SelfColumn.HEADING_RAD] + seen_rad
     else:
-        bearing = rng.uniform(-np.pi, np.pi, number)
+        direction_rad = rng.uniform(-np.pi, np.pi, number)
     if has_range(percept):
-        distance = rng.normal(percept.range_m, percept.range_sd_m, number).clip(0.1) / (
-            1 + selves[:, RANGE]
-        )
+        seen_m = rng.normal(percept.range_m, percept.range_sd_m, number).clip(MIN_RANGE_M)
+        distance_m = seen_m / (1 + selves[:, SelfColumn.RANGE_GAIN])
     else:
-        distance = rng.uniform(0.0, config.farthest_m, number)
-    where: Samples = selves[:, :2] + distance[:, None] * np.column_stack(
-        [np.cos(bearing), np.sin(bearing)]
-    )
-    return where
+        distance_m = rng.uniform(0.0, config.farthest_m, number)
+    direction = np.column_stack([np.cos(direction_rad), np.sin(direction_rad)])
+    positions_m: Samples = selves[:, :2] + distance_m[:, None] * direction
+    return positions_m
 
 
-def object_operations(
-    task: Task, node: Node, samples: Samples, percept: Percept, record: Record
-) -> list[Operation]:
-    """An object node with new samples, refreshed by a percept, and its link to the place of their
-    mean.
+def object_answer(
+    task: Task, graph: Graph, node: Object, positions_m: Samples, record: Record
+) -> Answer:
+    """An object with new samples, refreshed by the percept of `task`, and its link to the place of
+    their mean.
     """
-    mean = samples.mean(axis=0)
-    sd = spread(samples, mean)
-    cell = nearest_place(mean[0], mean[1], task.cell_m)
-    attributes = node.attributes | {
-        "x_m": float(mean[0]),
-        "y_m": float(mean[1]),
-        "x_sd_m": float(sd[0]),
-        "y_sd_m": float(sd[1]),
-        "width_m": percept.width_m,
-        "height_m": percept.height_m,
-        "sightings": record.agreed,
-        "misses": record.missed,
-        "stamp_ns": task.stamp_ns,
-        "place": cell,
-    }
-    seen = Node(
-        id=node.id,
-        kind="object",
-        activation=percept.activation,
-        base_level=min(1.0, node.base_level + 0.05),
-        attributes=attributes,
-        samples=Array.of(samples),
+    mean = positions_m.mean(axis=0)
+    sd = spread(positions_m, mean)
+    located = msgspec.structs.replace(
+        node,
+        x_m=float(mean[0]),
+        y_m=float(mean[1]),
+        x_sd_m=float(sd[0]),
+        y_sd_m=float(sd[1]),
+        offsets_m=Matrix.of(positions_m - mean, "<f2"),
     )
-    return [seen, *place_link(node, cell)]
+    return _kept_answer(task, graph, located, record)
+
+
+def _kept_answer(task: Task, graph: Graph, node: Object, record: Record) -> Answer:
+    """An object refreshed by the percept of `task`, its position as it is, and its link to the
+    place there.
+    """
+    (percept,) = task.percepts
+    seen = msgspec.structs.replace(
+        node,
+        activation=percept.activation,
+        base_level=min(1.0, graph.base_level(node) + BASE_LEVEL_GAIN),
+        cycle=task.cycle,
+        width_m=percept.width_m,
+        height_m=percept.height_m,
+        sightings=record.sightings,
+        misses=record.misses,
+        last_seen_ns=task.stamp_ns,
+    )
+    place = nearest_place(seen.x_m, seen.y_m, graph.cell_m(node.map), node.map)
+    return Answer([seen, Link(source=seen.id, target=place, kind=LinkKind.AT)])
+
+
+def _stays(agent: Self, landmark: Object) -> bool:
+    if landmark.surveyed or agent.is_lost:
+        return True
+    return is_seen_from_here(landmark, agent.stationary_since_ns)
+
+
+def _mahalanobis2(positions_m: Samples, selves: Samples, percept: Percept) -> Samples:
+    """(n,): squared deviations of the percept from what each pair of landmark and self predicts."""
+    offset_m = positions_m - selves[:, :2]
+    mahalanobis2 = np.zeros(len(offset_m))
+    if has_bearing(percept):
+        direction_rad = np.arctan2(offset_m[:, 1], offset_m[:, 0])
+        bearing_rad = direction_rad - selves[:, SelfColumn.HEADING_RAD]
+        residual_rad = wrap_angle(bearing_rad - percept.bearing_rad)
+        mahalanobis2 += (residual_rad / percept.bearing_sd_rad) ** 2
+    if has_range(percept):
+        distance_m = np.hypot(offset_m[:, 0], offset_m[:, 1])
+        seen_m = distance_m * (1 + selves[:, SelfColumn.RANGE_GAIN])
+        mahalanobis2 += ((seen_m - percept.range_m) / percept.range_sd_m) ** 2
+    return mahalanobis2

@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Singles
-from schemas.graph import Node
+from cogmap.graph.graph import Graph
+from schemas.nodes import NEVER_NS, Object, object_id
 from schemas.sensing import Percept
 from services.codelets.localization.motion_model import RANGE
 
 MAX_SD_SHARE = 0.5
 MIN_SIGHTINGS = 2
-MOVING = -1
 FULL_TURN_RAD = np.float32(2 * np.pi)
 # Beyond this squared distance densities would be denormal numbers, with which everything is slow.
 MAX_MAHALANOBIS2 = np.float32(150.0)
@@ -148,23 +148,22 @@ class Landmark(NamedTuple):
 
 
 def sightings(
-    percepts: Iterable[Percept], nodes: Iterable[Node], largest_sd_m: float, stands_ns: int
+    percepts: Iterable[Percept], graph: Graph, largest_sd_m: float, stationary_since_ns: int
 ) -> Sighting | None:
-    """The percepts whose object among `nodes` is known well enough to inform; None without any.
+    """The percepts whose object on the map is known well enough to inform; None without any.
 
     Well enough is to `largest_sd_m`, and to half of its distance: samples on a ring around the
     agent have their mean where nothing is. It must also have been seen at least MIN_SIGHTINGS
     times, since a first sighting may have had another's name, and not from where the agent stands
-    since `stands_ns`: the same view again is no new evidence.
+    since `stationary_since_ns`: the same view again is no new evidence.
     """
-    nodes_by_label = {node.attributes.get("label"): node for node in nodes if node.kind == "object"}
     chosen: list[tuple[Percept, Landmark]] = []
     for percept in percepts:
-        node = nodes_by_label.get(percept.label)
-        if node is None or not _informs(node, stands_ns):
+        node = graph.get(Object, object_id(percept.label))
+        if node is None or not _informs(node, stationary_since_ns):
             continue
         landmark = _landmark(node)
-        if landmark is not None and _is_sharp(landmark, percept, largest_sd_m):
+        if _is_sharp(landmark, percept, largest_sd_m):
             chosen.append((percept, landmark))
     return _sighting(chosen) if chosen else None
 
@@ -191,26 +190,22 @@ def _sighting(chosen: list[tuple[Percept, Landmark]]) -> Sighting:
     )
 
 
-# What is read from nodes of the graph stands here.
-
-
-def _landmark(node: Node) -> Landmark | None:
-    """The landmark of an object node; None where it has no samples."""
-    if node.samples is None:
-        return None
-    samples = np.asarray(node.samples.numpy(), np.float64)[:, :2]
+def _landmark(node: Object) -> Landmark:
+    samples = node.positions_m()
     mean_m = np.full(len(samples), 1 / len(samples)) @ samples
     offset_m = samples - mean_m
     return Landmark(mean_m, offset_m.T @ offset_m / max(1, len(samples) - 1))
 
 
-def _informs(node: Node, stands_ns: int) -> bool:
+def _informs(node: Object, stationary_since_ns: int) -> bool:
     """Whether another view of the landmark is evidence of where the agent is."""
-    count = int(node.attributes.get("sightings", MIN_SIGHTINGS))
-    return count >= MIN_SIGHTINGS and not seen_from_here(node, stands_ns)
+    is_confirmed = node.surveyed or node.sightings >= MIN_SIGHTINGS
+    return is_confirmed and not is_seen_from_here(node, stationary_since_ns)
 
 
-def seen_from_here(node: Node, stands_ns: int) -> bool:
-    """Whether an agent that stands since `stands_ns` has seen the landmark from where it stands."""
-    stamp_ns = int(node.attributes.get("stamp_ns", MOVING))
-    return stands_ns != MOVING and stamp_ns >= stands_ns
+def is_seen_from_here(node: Object, stationary_since_ns: int) -> bool:
+    """Whether an agent that stands since `stationary_since_ns` has seen the landmark from where it
+    stands.
+    """
+    is_stationary = stationary_since_ns != NEVER_NS
+    return is_stationary and node.last_seen_ns >= stationary_since_ns

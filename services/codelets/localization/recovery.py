@@ -9,40 +9,50 @@ import math
 import numpy as np
 
 from cogmap.geometry.se2 import compose, relative
-from schemas.cognition import Task
+from cogmap.graph.graph import Graph
 from schemas.sensing import Percept
 from services.codelets.config import Config
 from services.codelets.localization.measurement_model import Sighting, compare, log_likelihood
 from services.codelets.localization.motion_model import COLUMNS, RANGE
 from services.codelets.localization.sampling import Samples
 from services.codelets.mapping.observations import Sightings
-from services.codelets.mapping.path import ODOMETRY, STAMP, rows_of
+from services.codelets.mapping.path import ODOMETRY, STAMP, objects_along
 
 CANDIDATES = 16
 # What path integration may be off by since a landmark was seen, as a share of the way.
 DRIFT_SHARE = 0.05
 
 
-def seen_before(task: Task, odometry: Samples) -> list[Percept]:
+def seen_before(graph: Graph, odometry: Samples) -> list[Percept]:
     """Landmarks that were seen since anything last fitted, as they would be in view now, each as it
     was seen last.
 
-    `task` has what was seen along the path since then; path integration alone has the agent at
-    `odometry` (3,).
+    Path integration alone has the agent at `odometry` (3,).
     """
-    self_node = next(node for node in task.nodes if node.kind == "self")
-    rows = rows_of(task.nodes)
-    rows = rows[rows[:, STAMP] > int(self_node.attributes.get("fits_ns", 0)) * 1e-9]
-    seen = Sightings.of(task.nodes, rows[:, STAMP])
-    latest = {seen.labels[landmark]: index for index, landmark in enumerate(seen.landmark.tolist())}
+    agent = graph.agent
+    last = graph.last_segment
+    if agent is None or last is None:
+        return []
+    rows = last.rows.numpy()
+    rows = rows[rows[:, STAMP] > agent.last_fit_ns * 1e-9]
+    observations = [each for each, _ in objects_along(graph, last)]
+    seen = Sightings.of(observations, rows[:, STAMP])
+
+    latest = {}
+    for index, landmark in enumerate(seen.landmark.tolist()):
+        latest[seen.labels[landmark]] = index
+
     percepts = []
     for label, index in latest.items():
         then = rows[seen.place[index], ODOMETRY]
-        place = compose(then, np.append(seen.where_m[index], 0.0))
-        forwards_m, left_m, _ = relative(odometry, place).tolist()
-        variance = float(np.linalg.eigvalsh(np.linalg.inv(seen.information[index])).max())
+        landmark_pose = compose(then, np.append(seen.where_m[index], 0.0))
+        forwards_m, left_m, _ = relative(odometry, landmark_pose).tolist()
+
+        covariance_m2 = np.linalg.inv(seen.information[index])
+        variance_m2 = float(np.linalg.eigvalsh(covariance_m2).max())
         drift_m = DRIFT_SHARE * float(np.hypot(*(then - odometry)[:2]))
-        percepts.append(_percept(label, forwards_m, left_m, math.sqrt(variance + drift_m**2)))
+        sd_m = math.sqrt(variance_m2 + drift_m**2)
+        percepts.append(_percept(label, forwards_m, left_m, sd_m))
     return percepts
 
 

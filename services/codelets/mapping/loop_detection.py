@@ -1,131 +1,251 @@
-"""Views that may close a loop: a landmark recognised again after long, or a place by the views that
-led to it (§5.6).
+"""The loop detection codelet: views that may close a loop, of a landmark recognised again after
+long, or of a place by the views that led to it (paper §5.6).
 
-A node of kind `closure` says that what stands `ahead_m` and `left_m` of where the agent was at
-`from_ns` was seen at `range_m` and `bearing_rad` at `to_ns`, to `sd_m`. Of a place met again, that
-is the place itself, and the heading there is known to `sd_rad`; a landmark tells none, and `sd_rad`
-is 0. Map correction says whether it `agrees` and `holds`.
+Map correction determines whether they are consistent with one another, and accepted.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 import numpy as np
 
 from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import relative, rotation_matrices
-from schemas.base import Scalar
-from schemas.cognition import Task
-from schemas.graph import Node, Operation
-from schemas.sensing import Percept, PlaceMatch
-from services.codelets.config import Config
-from services.codelets.correction.pairwise_consistency import MIN_AGREEING, Views
-from services.codelets.correction.pose_graph import (
-    Constraints,
+from cogmap.graph.graph import Graph
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from schemas.codelets import Task
+from schemas.graph import Operation, Phase
+from schemas.nodes import (
+    LinkKind,
+    LoopClosure,
+    Object,
+    Observations,
+    PathSegment,
+    Self,
+    object_id,
+    segment_id,
 )
+from schemas.sensing import Percept, PlaceMatch
+from services.codelets.config import SECTION, Config
+from services.codelets.correction.pairwise_consistency import MIN_AGREEING, Views
+from services.codelets.correction.pose_graph import Constraints
 from services.codelets.localization.measurement_model import has_bearing, has_range
 from services.codelets.mapping.observations import Sightings
-from services.codelets.mapping.path import ODOMETRY, STAMP, rows_of
+from services.codelets.mapping.path import ODOMETRY, STAMP, path_grows, rows_of
 
-KIND = "closure"
 SAME_M = 6.0
+MIN_SD_M = 1e-3
+PLACE_CUE = ""
 
-_Facts = dict[str, Scalar]
+
+def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
+    """One task where a landmark comes again that was away for long, or the path grows along it
+    since, or along a known path.
+    """
+    percepts = context.percepts
+    again = _seen_again(percepts.objects, graph, context.stamp_ns, config)
+    matches = _places_again(percepts.matches, graph, context.stamp_ns, config)
+    if not again and not matches:
+        return []
+    about = [object_id(percept.label) for percept in again]
+    return [context.task(CODELET.name, about, percepts=again, matches=matches)]
 
 
-def revisit(task: Task, config: Config) -> list[Operation]:
+def run(task: Task, graph: Graph, config: Config) -> Answer:
     """A closure for each percept and match of `task`.
 
-    It has the landmarks, or the newest closures that they have made on this pass, all sightings of
-    them, and the path along which these were made. Each view of a landmark is joined to a sighting
-    of its own, so that one mistake, now or then, makes one closure. What the map has the landmark
-    at does not come into it: this pass may have moved it.
+    Each view of a landmark is joined to an observation of its own, so that one mistake, now or
+    then, makes one closure. Where the map has the landmark is not used: this pass may have moved
+    it.
     """
     if not task.percepts and not task.matches:
-        raise MessageError(f"task {task.task_id} has nothing that was met again")
-    rows = rows_of(task.nodes)
-    seen = Sightings.of(task.nodes, rows[:, STAMP])
-    found: list[Operation] = []
-    for percept in task.percepts:
-        begun = next(
-            node
-            for node in task.nodes
-            if percept.label in (node.attributes.get(key) for key in ("label", "by"))
-        )
-        before_ns, number = (int(begun.attributes.get(key, 0)) for key in ("before_ns", "view"))
-        before_ns = before_ns or int(begun.attributes["stamp_ns"])
-        there = _clearest(seen, percept.label, rows, before_ns)
-        if len(there) < MIN_AGREEING or not (has_bearing(percept) and has_range(percept)):
-            continue
-        facts = _joined(seen, int(there[number % len(there)]), rows, percept)
-        found.append(
-            _closure(task, percept.label, facts | {"before_ns": before_ns, "view": number + 1})
-        )
-    return found + [
-        _closure(task, f"view-{match.frame}", _place(match, config)) for match in task.matches
-    ]
+        raise MessageError(f"task {task.task_id} has nothing that was seen again")
+    newest = newest_closures(graph)
+    operations: list[Operation] = []
+    for percept in _seen_again(task.percepts, graph, task.stamp_ns, config):
+        closure = _closure_by_landmark(percept, task, graph, newest.get(percept.label), config)
+        if closure is not None:
+            operations.append(closure)
+    for match in task.matches:
+        operations.append(_closure_by_place(match, task, config))
+    return Answer(operations)
 
 
-def _clearest(seen: Sightings, label: str, rows: Floats, before_ns: int) -> Indices:
+CODELET = Codelet(
+    name="loop_detection",
+    phase=Phase.OBJECTS,
+    due=due,
+    run=run,
+    reads=frozenset({Self, Object, PathSegment, Observations, LoopClosure, LinkKind.OBSERVES}),
+    writes=frozenset({LoopClosure}),
+    config=Config,
+    section=SECTION,
+)
+
+
+def newest_closures(graph: Graph) -> dict[str, LoopClosure]:
+    """The newest closure by each landmark, and by places, under PLACE_CUE."""
+    newest: dict[str, LoopClosure] = {}
+    for closure in sorted(graph.of_kind(LoopClosure), key=lambda closure: closure.to_ns):
+        cue = PLACE_CUE if closure.sd_rad else closure.cue
+        newest[cue] = closure
+    return newest
+
+
+def _seen_again(
+    percepts: Iterable[Percept], graph: Graph, now_ns: int, config: Config
+) -> list[Percept]:
+    """The percepts of landmarks that come again: last seen, or closing a loop, long ago; or closing
+    one on this pass, where the path has grown since.
+    """
+    long_ago_ns = now_ns - config.revisit_s * 1e9
+    soon_ns = now_ns - config.closure_spacing_s * 1e9
+    known = [percept for percept in percepts if percept.whole]
+    known = [percept for percept in known if object_id(percept.label) in graph.nodes]
+    if not known:
+        return []
+
+    grows = path_grows(graph, config)
+    newest = newest_closures(graph)
+    again = []
+    for percept in known:
+        landmark = graph.get(Object, object_id(percept.label))
+        closure = newest.get(percept.label)
+        if closure is not None and closure.to_ns > long_ago_ns:
+            is_again = grows and closure.to_ns <= soon_ns
+        else:
+            is_again = landmark is not None and 0 <= landmark.last_seen_ns <= long_ago_ns
+        if is_again:
+            again.append(percept)
+    return again
+
+
+def _places_again(
+    matches: Iterable[PlaceMatch], graph: Graph, now_ns: int, config: Config
+) -> list[PlaceMatch]:
+    """The matches of places that were seen long ago, where the path has grown since the last."""
+    found = [match for match in matches if match.view_ns <= now_ns - config.revisit_s * 1e9]
+    if not found or not path_grows(graph, config):
+        return []
+    newest = newest_closures(graph).get(PLACE_CUE)
+    if newest is not None and newest.to_ns > now_ns - config.closure_spacing_s * 1e9:
+        return []
+    return found
+
+
+def _closure_by_landmark(
+    percept: Percept, task: Task, graph: Graph, newest: LoopClosure | None, config: Config
+) -> LoopClosure | None:
+    """A closure to one of the landmark's observations before; None where these are too few.
+
+    The pass before ended where `newest` began this one, or the landmark was last seen.
+    """
+    landmark = graph.get(Object, object_id(percept.label))
+    if landmark is None or not (has_bearing(percept) and has_range(percept)):
+        return None
+    is_this_pass = newest is not None and newest.to_ns > task.stamp_ns - config.revisit_s * 1e9
+    if newest is not None and is_this_pass:
+        before_ns = newest.before_ns
+        view = newest.view
+    else:
+        before_ns = landmark.last_seen_ns
+        view = 0
+
+    observations, rows = _observed(landmark, graph)
+    seen = Sightings.of(observations, rows[:, STAMP])
+    there = _clearest(seen, rows, before_ns)
+    if len(there) < MIN_AGREEING:
+        return None
+
+    chosen = int(there[view % len(there)])
+    ahead_m, left_m = seen.where_m[chosen].tolist()
+    variance_there_m2 = 1 / float(np.linalg.eigvalsh(seen.information[chosen])[0])
+    across_sd_m = percept.range_m * percept.bearing_sd_rad
+    variance_here_m2 = percept.range_sd_m**2 + across_sd_m**2
+    return LoopClosure(
+        id=_closure_id(task, percept.label),
+        base_level=1.0,
+        from_ns=round(float(rows[seen.place[chosen], STAMP]) * 1e9),
+        to_ns=task.stamp_ns,
+        cue=percept.label,
+        ahead_m=ahead_m,
+        left_m=left_m,
+        range_m=percept.range_m,
+        bearing_rad=percept.bearing_rad,
+        sd_m=float(np.sqrt(variance_there_m2 + variance_here_m2)),
+        sd_rad=0.0,
+        before_ns=before_ns,
+        view=view + 1,
+    )
+
+
+def _closure_by_place(match: PlaceMatch, task: Task, config: Config) -> LoopClosure:
+    cue = f"view-{match.frame}"
+    return LoopClosure(
+        id=_closure_id(task, cue),
+        base_level=1.0,
+        from_ns=match.view_ns,
+        to_ns=task.stamp_ns,
+        cue=cue,
+        ahead_m=0.0,
+        left_m=0.0,
+        range_m=0.0,
+        bearing_rad=0.0,
+        sd_m=config.place_match_sd_m,
+        sd_rad=config.place_match_sd_rad,
+    )
+
+
+def _closure_id(task: Task, cue: str) -> str:
+    return f"closure:{task.cycle}:{cue}"
+
+
+def _observed(landmark: Object, graph: Graph) -> tuple[list[Observations], Floats]:
+    """All observations of a landmark, and the rows of the path segments they were made along."""
+    observations = []
+    for name in graph.links.sources(landmark.id, LinkKind.OBSERVES):
+        node = graph.get(Observations, name)
+        if node is not None:
+            observations.append(node)
+
+    path = []
+    for number in sorted({node.number for node in observations}):
+        segment = graph.get(PathSegment, segment_id(number))
+        if segment is not None:
+            path.append(segment)
+    return observations, rows_of(path)
+
+
+def _clearest(seen: Sightings, rows: Floats, before_ns: int) -> Indices:
     """The sightings of a landmark that most others agree with, up to `before_ns`, those from
     nearest first.
 
     On one pass by, they lead to the same place by path integration alone.
     """
     known = np.flatnonzero(rows[seen.place, STAMP] <= before_ns * 1e-9 + 1e-6)
-    known = known[[seen.labels[index] == label for index in seen.landmark[known].tolist()]]
     stood = rows[seen.place[known], ODOMETRY]
-    where = stood[:, :2] + np.einsum(
-        "mab,mb->ma", rotation_matrices(stood[:, 2]), seen.where_m[known]
-    )
+    turn = rotation_matrices(stood[:, 2])
+    where = stood[:, :2] + np.einsum("mab,mb->ma", turn, seen.where_m[known])
     same = np.hypot(*(where[:, None] - where).transpose(2, 0, 1)) <= SAME_M
     chosen = known[same[same.sum(axis=1).argmax()]] if len(known) else known
     order: Indices = chosen[np.argsort(np.hypot(*seen.where_m[chosen].T), kind="stable")]
     return order
 
 
-def _joined(seen: Sightings, there: int, rows: Floats, percept: Percept) -> _Facts:
-    ahead_m, left_m = seen.where_m[there].tolist()
-    there_m2 = 1 / float(np.linalg.eigvalsh(seen.information[there])[0])
-    here_m2 = percept.range_sd_m**2 + (percept.range_m * percept.bearing_sd_rad) ** 2
-    return {
-        "from_ns": round(float(rows[seen.place[there], STAMP]) * 1e9),
-        "ahead_m": ahead_m,
-        "left_m": left_m,
-        "range_m": percept.range_m,
-        "bearing_rad": percept.bearing_rad,
-        "sd_m": float(np.sqrt(there_m2 + here_m2)),
-        "sd_rad": 0.0,
-    }
-
-
-def _place(match: PlaceMatch, config: Config) -> _Facts:
-    here = dict.fromkeys(("ahead_m", "left_m", "range_m", "bearing_rad"), 0.0)
-    return {
-        "from_ns": match.view_ns,
-        **here,
-        "sd_m": config.place_match_sd_m,
-        "sd_rad": config.place_match_sd_rad,
-    }
-
-
-def _closure(task: Task, by: str, facts: _Facts) -> Node:
-    attributes = {**facts, "to_ns": task.stamp_ns, "by": by}
-    return Node(id=f"{KIND}:{task.cycle}:{by}", kind=KIND, base_level=1.0, attributes=attributes)
-
-
-def views_of(closures: list[Node], rows: Floats) -> Views:
+def views_of(closures: list[LoopClosure], rows: Floats) -> Views:
     """The closures as views from rows of the path."""
-    keys = ("ahead_m", "left_m", "range_m", "bearing_rad", "sd_m", "sd_rad")
-    facts = np.array([[float(node.attributes[key]) for key in keys] for node in closures]).reshape(
-        -1, len(keys)
-    )
-    seen = facts[:, 2:3] * np.column_stack([np.cos(facts[:, 3]), np.sin(facts[:, 3])])
-    stamps = np.array(
-        [[int(node.attributes[key]) for key in ("from_ns", "to_ns")] for node in closures]
-    ).reshape(-1, 2)
-    ends = np.abs(rows[:, STAMP] - stamps[..., None] * 1e-9).argmin(axis=2)
-    return Views(ends[:, 0], ends[:, 1], facts[:, :2], seen, facts[:, 4].clip(1e-3), facts[:, 5])
+    range_m = np.array([closure.range_m for closure in closures])
+    bearing_rad = np.array([closure.bearing_rad for closure in closures])
+    here_m = range_m[:, None] * np.column_stack([np.cos(bearing_rad), np.sin(bearing_rad)])
+
+    there_m = np.array([[closure.ahead_m, closure.left_m] for closure in closures])
+    stamps_ns = np.array([[closure.from_ns, closure.to_ns] for closure in closures]).reshape(-1, 2)
+    ends = np.abs(rows[:, STAMP] - stamps_ns[..., None] * 1e-9).argmin(axis=2)
+    sd_m = np.array([closure.sd_m for closure in closures]).clip(MIN_SD_M)
+    sd_rad = np.array([closure.sd_rad for closure in closures])
+    return Views(ends[:, 0], ends[:, 1], there_m.reshape(-1, 2), here_m, sd_m, sd_rad)
 
 
 def constraints_of(views: Views, poses: Floats) -> Constraints:

@@ -1,10 +1,7 @@
-"""From where on the path each landmark was seen: what binds the map to the path (beyond the paper).
+"""Observations of landmarks from places of the path: what binds the map to the path (beyond the
+paper).
 
-A node of kind `sighted` holds one landmark's sightings along one node of the path, one a place.
-Each row of its samples is stamp_s of the place, where the landmark stood as seen from there,
-forwards_m and left_m, the standard deviations of that along and across the line of sight, and the
-direction of that line. Corrections do not change them: they tell what the agent sensed, from the
-place of the path on.
+Corrections do not change them: they state what the agent sensed, relative to the place of the path.
 """
 
 from __future__ import annotations
@@ -15,41 +12,32 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import rotation_matrices
-from schemas.array import Array
-from schemas.base import Scalar
-from schemas.graph import Node
+from schemas.array import Matrix
+from schemas.nodes import ObservationColumn, Observations, observations_id
 from schemas.sensing import Percept
-from services.codelets.correction.pose_graph import (
-    Constraints,
-    PoseGraph,
-)
+from services.codelets.correction.pose_graph import Constraints, PoseGraph
 
-KIND = "sighted"
-COLUMNS = 6
-STAMP = 0
-WHERE = slice(1, 3)
-SPREAD = slice(3, 5)
-DIRECTION = 5
-# So many standard deviations off, a sighting counts half as much as one that fits: it may be of
-# another landmark.
+COLUMNS = len(ObservationColumn)
+STAMP = ObservationColumn.STAMP_S
+WHERE = slice(ObservationColumn.FORWARDS_M, ObservationColumn.LEFT_M + 1)
+SPREAD = slice(ObservationColumn.ALONG_SD_M, ObservationColumn.ACROSS_SD_M + 1)
+DIRECTION = ObservationColumn.DIRECTION_RAD
+# An observation that deviates by this many standard deviations counts half as much as one that
+# fits: it may be of another landmark.
 DOUBTED = 2.0
 ROUNDS = 6
 NO_HEADING = 1e-6
+MIN_SD_M = 1e-3
+SAME_PLACE_S = 1e-6
 
 
-def sighted_id(number: int, label: str) -> str:
-    """The name of the sightings of landmark `label` along the path's node `number`."""
-    return f"{KIND}:{number}:{label}"
+class Viewpoint(NamedTuple):
+    """The pose that a landmark is observed from: the place of path segment `number` at `stamp_s`,
+    and the step of path integration since then, (3,).
 
-
-class Outlook(NamedTuple):
-    """What the agent looks out from: a place of the path's node `number`, and how it has moved
-    since then, (3,).
-
-    `range_gain` is by how much it sees too far.
+    `range_gain` is the share by which ranges are seen too large.
     """
 
     number: int
@@ -58,38 +46,35 @@ class Outlook(NamedTuple):
     range_gain: float
 
 
-def recorded(before: Node | None, outlook: Outlook, percept: Percept) -> Node:
-    """A landmark's sightings along a node of the path, with one more."""
-    step = outlook.step
-    direction = step[2] + percept.bearing_rad
-    range_m = percept.range_m / (1 + outlook.range_gain)
-    where = step[:2] + range_m * np.array([math.cos(direction), math.sin(direction)])
-    row = np.array(
-        [outlook.stamp_s, *where, percept.range_sd_m, range_m * percept.bearing_sd_rad, direction]
+def extended(before: Observations | None, viewpoint: Viewpoint, percept: Percept) -> Observations:
+    """The observations of a landmark along a path segment, with one more."""
+    direction_rad = viewpoint.step[2] + percept.bearing_rad
+    range_m = percept.range_m / (1 + viewpoint.range_gain)
+    forwards_m = viewpoint.step[0] + range_m * math.cos(direction_rad)
+    left_m = viewpoint.step[1] + range_m * math.sin(direction_rad)
+    across_sd_m = range_m * percept.bearing_sd_rad
+
+    row = [viewpoint.stamp_s, forwards_m, left_m, percept.range_sd_m, across_sd_m, direction_rad]
+    rows = np.array([row])
+    if before is not None:
+        rows = np.vstack([before.rows.numpy(), rows])
+    return Observations(
+        id=observations_id(viewpoint.number, percept.label),
+        base_level=1.0,
+        number=viewpoint.number,
+        landmark=percept.label,
+        rows=Matrix.of(rows),
     )
-    rows = row[None] if before is None else np.vstack([_rows(before), row])
-    facts: dict[str, Scalar] = {"number": outlook.number, "landmark": percept.label}
-    name = sighted_id(outlook.number, percept.label)
-    return Node(id=name, kind=KIND, base_level=1.0, attributes=facts, samples=Array.of(rows))
 
 
-def seen_from(node: Node | None, stamp_s: float) -> bool:
-    """Whether the sightings have one of the place at `stamp_s`, which would be the last."""
-    return node is not None and float(_rows(node)[-1, STAMP]) >= stamp_s
-
-
-def _rows(node: Node) -> Floats:
-    rows = (
-        np.empty((0, 0)) if node.samples is None else np.asarray(node.samples.numpy(), np.float64)
-    )
-    if rows.ndim != 2 or rows.shape[1] != COLUMNS:
-        raise MessageError(f"{node.id}: sightings whose rows are not {COLUMNS} numbers")
-    return rows
+def is_observed_from(observations: Observations | None, stamp_s: float) -> bool:
+    """Whether the newest of the observations is from the place at `stamp_s`, or from a later one."""
+    return observations is not None and float(observations.rows.numpy()[-1, STAMP]) >= stamp_s
 
 
 class Sightings(NamedTuple):
-    """m sightings: `place` (m,) on the path, `landmark` (m,) in `labels`, `where_m` (m, 2),
-    `information` (m, 2, 2).
+    """m observations as arrays: `place` (m,) on the path, `landmark` (m,) in `labels`, `where_m`
+    (m, 2), `information` (m, 2, 2).
     """
 
     labels: tuple[str, ...]
@@ -99,25 +84,28 @@ class Sightings(NamedTuple):
     information: Floats
 
     @classmethod
-    def of(cls, nodes: Iterable[Node], stamps_s: Floats) -> Sightings:
-        """Those in the nodes of kind `sighted` among `nodes`, seen from the places of the path at
-        `stamps_s` (n,).
-        """
-        records = [node for node in nodes if node.kind == KIND]
-        labels = tuple(sorted({str(node.attributes["landmark"]) for node in records}))
-        rows = np.vstack([np.zeros((0, COLUMNS)), *map(_rows, records)])
-        numbers = [labels.index(str(node.attributes["landmark"])) for node in records]
-        landmark = np.repeat(np.array(numbers, np.int64), [len(_rows(node)) for node in records])
-        after = np.searchsorted(stamps_s, rows[:, STAMP]).clip(0, max(0, len(stamps_s) - 1))
-        known = (
-            np.abs(stamps_s[after] - rows[:, STAMP]) < 1e-6
-            if len(stamps_s)
-            else np.zeros(len(rows), bool)
-        )
-        rows = rows[known]
+    def of(cls, observations: Iterable[Observations], stamps_s: Floats) -> Sightings:
+        """The observations that were made from the places of the path at `stamps_s`, (n,)."""
+        records = list(observations)
+        labels = tuple(sorted({record.landmark for record in records}))
+        number_of = {label: number for number, label in enumerate(labels)}
+
+        parts = [record.rows.numpy() for record in records]
+        rows = np.vstack([np.zeros((0, COLUMNS)), *parts])
+        numbers = np.array([number_of[record.landmark] for record in records], np.int64)
+        landmark = np.repeat(numbers, [len(part) for part in parts])
+
+        place = np.searchsorted(stamps_s, rows[:, STAMP]).clip(0, max(0, len(stamps_s) - 1))
+        if len(stamps_s):
+            is_known = np.abs(stamps_s[place] - rows[:, STAMP]) < SAME_PLACE_S
+        else:
+            is_known = np.zeros(len(rows), bool)
+
+        rows = rows[is_known]
         turn = rotation_matrices(rows[:, DIRECTION])
-        information = turn * (rows[:, None, SPREAD].clip(1e-3) ** -2) @ turn.transpose(0, 2, 1)
-        return cls(labels, after[known], landmark[known], rows[:, WHERE], information)
+        weights = rows[:, None, SPREAD].clip(MIN_SD_M) ** -2
+        information = turn * weights @ turn.transpose(0, 2, 1)
+        return cls(labels, place[is_known], landmark[is_known], rows[:, WHERE], information)
 
     def weights(self, poses: Floats, landmarks_m: Floats) -> Floats:
         """(m,) how much each counts, the path being at (n, 3) `poses` and landmarks at (k, 2):

@@ -1,10 +1,7 @@
 """The path that the agent took, as nodes of the graph: what map correction corrects (paper §5.6).
 
-A node of kind `path` holds up to ROWS places on end. Each row of its samples is stamp_s, then x_m,
-y_m, heading_rad where the agent takes itself to have been, then the same where path integration
-alone would have had it, and by which variance, of the way in m^2 and of the heading in rad^2,
-summed up from the start. Landmarks and corrections change the agent's own belief; the steps between
-the latter are what self-motion says, and nothing else.
+The pose believed at each place is the agent's own, which landmarks and corrections change. The
+steps between the poses by path integration alone are what self-motion measured, and nothing else.
 """
 
 from __future__ import annotations
@@ -16,145 +13,220 @@ import numpy as np
 from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import mean_pose, relative
-from schemas.array import Array
-from schemas.cognition import Task
-from schemas.graph import Node, Operation
-from services.codelets.config import Config
+from cogmap.graph.graph import Graph
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from schemas.array import Matrix
+from schemas.codelets import Task
+from schemas.graph import Link, Operation, Phase
+from schemas.nodes import (
+    SELF_ID,
+    LinkKind,
+    Object,
+    Observations,
+    PathColumn,
+    PathSegment,
+    Self,
+    object_id,
+    observations_id,
+    segment_id,
+)
+from schemas.sensing import Percept
+from services.codelets.config import SECTION, Config
 from services.codelets.correction.pose_graph import Constraints
 from services.codelets.localization.measurement_model import has_bearing, has_range
-from services.codelets.mapping.observations import Outlook, recorded, seen_from, sighted_id
+from services.codelets.mapping.observations import Viewpoint, extended, is_observed_from
 
-KIND = "path"
-COLUMNS = 9
 ROWS = 64
-STAMP = 0
-POSE = slice(1, 4)
-ODOMETRY = slice(4, 7)
-VARIANCES = slice(7, 9)
-ODOMETRY_FACTS = ("odometry_x_m", "odometry_y_m", "odometry_heading_rad")
-VARIANCE_FACTS = ("odometry_variance_m2", "odometry_variance_rad2")
+COLUMNS = len(PathColumn)
+STAMP = PathColumn.STAMP_S
+POSE = slice(PathColumn.X_M, PathColumn.HEADING_RAD + 1)
+ODOMETRY = slice(PathColumn.ODOMETRY_X_M, PathColumn.ODOMETRY_HEADING_RAD + 1)
+VARIANCES = slice(PathColumn.VARIANCE_M2, PathColumn.VARIANCE_RAD2 + 1)
 
 
-def segment_id(number: int) -> str:
-    """The name of a node of the path; they are numbered from 0."""
-    return f"{KIND}:{number}"
-
-
-def rows_of(nodes: Iterable[Node]) -> Floats:
-    """(n, COLUMNS): the rows of all path nodes among `nodes`, the oldest first.
-
-    Raises MessageError where one has samples of another shape.
+def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
+    """One task where the path grows, or a landmark is in view that was not observed from the path's
+    last place.
     """
-    segments = sorted(
-        (node for node in nodes if node.kind == KIND),
-        key=lambda node: int(node.attributes["number"]),
-    )
-    rows = [node.samples.numpy() for node in segments if node.samples is not None]
-    if any(array.ndim != 2 or array.shape[1] != COLUMNS for array in rows):
-        raise MessageError(f"a path whose rows are not {COLUMNS} numbers")
-    return np.vstack([np.zeros((0, COLUMNS)), *rows]).astype(np.float64)
-
-
-def segments(rows: Floats, first: int = 0) -> list[Operation]:
-    """The path nodes of `rows`, which begin with that of number `first`."""
-    starts = range(0, len(rows), ROWS)
-    return [_segment(first + start // ROWS, rows[start : start + ROWS]) for start in starts]
-
-
-def _segment(number: int, rows: Floats) -> Node:
-    samples = Array.of(rows)
-    return Node(
-        id=segment_id(number),
-        kind=KIND,
-        base_level=1.0,
-        attributes={"number": number},
-        samples=samples,
-    )
-
-
-def extend_path(task: Task, config: Config) -> list[Operation]:
-    """The place where the agent is now, added to the path's last node, and what landmarks are seen
-    from there.
-
-    `task` has the last node, if there is any, and what was seen along it of the landmarks in its
-    percepts. Where the agent has hardly moved from the last place, they are seen from that.
-    """
-    self_node = next(node for node in task.nodes if node.kind == "self")
-    if self_node.samples is None:
-        raise MessageError(f"task {task.task_id} has a self node without samples")
-    last = next((node for node in task.nodes if node.kind == KIND), None)
-    rows = np.zeros((0, COLUMNS)) if last is None else rows_of([last])
-    number = 0 if last is None else int(last.attributes["number"])
-    pose = mean_pose(np.asarray(self_node.samples.numpy(), np.float64))
-    odometry = odometry_of(self_node)
-    written: list[Operation] = []
-    if is_apart(rows, odometry, config.path_spacing_m) or is_lost_since(rows, self_node):
-        row = np.concatenate([[task.stamp_ns * 1e-9], pose, odometry, variances_of(self_node)])[
-            None
+    percepts = context.percepts.objects
+    last = graph.last_segment
+    if last is not None and not path_grows(graph, config):
+        stamp_s = float(last.rows.numpy()[-1, STAMP])
+        percepts = [
+            percept
+            for percept in percepts
+            if not is_observed_from(_observations(graph, last.number, percept.label), stamp_s)
         ]
-        number, rows = (number + 1, row) if len(rows) >= ROWS else (number, np.vstack([rows, row]))
-        written += segments(rows, number)
-    stamp_s = float(rows[-1, STAMP])
-    step = relative(rows[-1, ODOMETRY], odometry)
-    outlook = Outlook(number, stamp_s, step, float(self_node.attributes.get("range_gain", 0.0)))
-    before = {node.id: node for node in task.nodes}
+        if not percepts:
+            return []
+    return [context.task(CODELET.name, about=[SELF_ID], percepts=percepts)]
+
+
+def run(task: Task, graph: Graph, config: Config) -> Answer:
+    """Add the place where the agent is now to the path's last segment, and what landmarks are
+    observed from there.
+
+    Where the agent has hardly moved from the last place, they are observed from that.
+    """
+    agent = graph.agent
+    if agent is None:
+        raise MessageError(f"task {task.task_id}: the graph has no self node")
+    last = graph.last_segment
+    number = 0 if last is None else last.number
+    rows = np.zeros((0, COLUMNS)) if last is None else last.rows.numpy()
+
+    operations: list[Operation] = []
+    if _is_apart(rows, agent, config.path_spacing_m) or _is_lost_since(rows, agent):
+        row = _row(task.stamp_ns, agent)
+        if len(rows) >= ROWS:
+            number += 1
+            rows = row
+        else:
+            rows = np.vstack([rows, row])
+        operations += segments(rows, number)
+
+    viewpoint = Viewpoint(
+        number=number,
+        stamp_s=float(rows[-1, STAMP]),
+        step=relative(rows[-1, ODOMETRY], odometry_of(agent)),
+        range_gain=agent.range_gain,
+    )
     for percept in task.percepts:
-        sightings = before.get(sighted_id(number, percept.label))
-        if has_range(percept) and has_bearing(percept) and not seen_from(sightings, stamp_s):
-            written.append(recorded(sightings, outlook, percept))
-    return written
+        operations += _observe(percept, viewpoint, graph)
+    return Answer(operations)
 
 
-def is_apart(rows: Floats, odometry: Floats, spacing_m: float) -> bool:
-    """Whether path integration leads `spacing_m` or more from the last of the (n, COLUMNS) rows, or
-    there is none.
+CODELET = Codelet(
+    name="path",
+    phase=Phase.OBJECTS,
+    due=due,
+    run=run,
+    reads=frozenset({Self, PathSegment, Observations}),
+    writes=frozenset({PathSegment, Observations, LinkKind.OBSERVES, LinkKind.ALONG}),
+    config=Config,
+    section=SECTION,
+)
+
+
+def path_grows(graph: Graph, config: Config) -> bool:
+    """Whether the agent has gone `path_spacing_m` from the path's last place, or has got lost
+    there, or there is no path.
+
+    That is by path integration alone: the pose believed may jump, or hardly move while the agent is
+    lost.
     """
-    return not len(rows) or bool(np.hypot(*(rows[-1, ODOMETRY][:2] - odometry[:2])) >= spacing_m)
+    agent = graph.agent
+    last = graph.last_segment
+    if agent is None or last is None:
+        return True
+    rows = last.rows.numpy()
+    return _is_lost_since(rows, agent) or _is_apart(rows, agent, config.path_spacing_m)
 
 
-def is_lost_since(rows: Floats, self_node: Node) -> bool:
-    """Whether the agent has got lost since the last of the rows: what it sees now, it may see from
-    elsewhere.
+def rows_of(path: Iterable[PathSegment]) -> Floats:
+    """(n, COLUMNS): the rows of path segments, the oldest first."""
+    ordered = sorted(path, key=lambda segment: segment.number)
+    rows = [segment.rows.numpy() for segment in ordered]
+    return np.vstack([np.zeros((0, COLUMNS)), *rows])
+
+
+def segments(rows: Floats, first: int = 0) -> list[PathSegment]:
+    """The path segments of (n, COLUMNS) `rows`, numbered from `first`."""
+    parts = []
+    for start in range(0, len(rows), ROWS):
+        number = first + start // ROWS
+        part = Matrix.of(rows[start : start + ROWS])
+        parts.append(PathSegment(id=segment_id(number), base_level=1.0, number=number, rows=part))
+    return parts
+
+
+def odometry_of(agent: Self) -> Floats:
+    """(3,): the agent's pose by path integration alone."""
+    return np.array([agent.odometry_x_m, agent.odometry_y_m, agent.odometry_heading_rad])
+
+
+def variances_of(agent: Self) -> Floats:
+    """(2,): the variance of path integration since the start, of the distance, in m^2, and of the
+    heading, in rad^2.
     """
-    facts = self_node.attributes
-    return (
-        bool(facts.get("others", False))
-        and float(rows[-1, STAMP]) <= int(facts.get("fits_ns", 0)) * 1e-9
-    )
-
-
-def odometry_of(self_node: Node) -> Floats:
-    """(3,): where path integration alone would have the agent; where that is not known, where it
-    takes itself to be.
-    """
-    facts = self_node.attributes
-    own = [float(facts[key]) for key in ("x_m", "y_m", "heading_rad")]
-    return np.array(
-        [float(facts.get(key, other)) for key, other in zip(ODOMETRY_FACTS, own, strict=True)]
-    )
-
-
-def variances_of(self_node: Node) -> Floats:
-    """(2,): the variance of the way, in m^2, and of the heading, in rad^2, by path integration
-    since the start.
-    """
-    return np.array([float(self_node.attributes.get(key, 0.0)) for key in VARIANCE_FACTS])
+    return np.array([agent.odometry_variance_m2, agent.odometry_variance_rad2])
 
 
 def steps_of(rows: Floats, config: Config) -> Constraints:
-    """What path integration says from each row to the next, as surely as self-motion says, or less,
-    by the way.
+    """The steps of path integration from each row to the next, as certain as self-motion states, or
+    less, by the distance.
     """
     at = np.arange(max(0, len(rows) - 1))
     odometry = rows[:, ODOMETRY]
     steps = relative(odometry[:-1], odometry[1:])
-    length = np.hypot(steps[:, 0], steps[:, 1]).clip(config.path_spacing_m / 2)
-    turned = np.abs(steps[:, 2])
-    said_m2, said_rad2 = np.diff(rows[:, VARIANCES], axis=0).T
-    least_rad2 = config.heading_variance_per_m * length + config.heading_variance_per_rad * turned
-    information = np.zeros((len(length), 3, 3))
-    information[:, 0, 0] = information[:, 1, 1] = 1 / np.maximum(
-        config.path_variance_per_m * length, said_m2
-    )
-    information[:, 2, 2] = 1 / np.maximum(least_rad2, said_rad2)
+    length_m = np.hypot(steps[:, 0], steps[:, 1]).clip(config.path_spacing_m / 2)
+    turned_rad = np.abs(steps[:, 2])
+
+    stated_m2, stated_rad2 = np.diff(rows[:, VARIANCES], axis=0).T
+    least_m2 = config.path_variance_per_m * length_m
+    least_rad2 = config.heading_variance_per_m * length_m
+    least_rad2 = least_rad2 + config.heading_variance_per_rad * turned_rad
+
+    information = np.zeros((len(length_m), 3, 3))
+    information[:, 0, 0] = 1 / np.maximum(least_m2, stated_m2)
+    information[:, 1, 1] = information[:, 0, 0]
+    information[:, 2, 2] = 1 / np.maximum(least_rad2, stated_rad2)
     return Constraints(at, at + 1, steps, information)
+
+
+def _row(stamp_ns: int, agent: Self) -> Floats:
+    pose = mean_pose(agent.samples.numpy())
+    row = np.concatenate([[stamp_ns * 1e-9], pose, odometry_of(agent), variances_of(agent)])
+    return row[None]
+
+
+def _is_apart(rows: Floats, agent: Self, spacing_m: float) -> bool:
+    """Whether path integration leads `spacing_m` or more from the last row, or there is none."""
+    if not len(rows):
+        return True
+    moved_m = odometry_of(agent)[:2] - rows[-1, ODOMETRY][:2]
+    return bool(np.hypot(*moved_m) >= spacing_m)
+
+
+def _is_lost_since(rows: Floats, agent: Self) -> bool:
+    """Whether the agent has got lost since the last row: what it sees now, it may see from
+    elsewhere.
+    """
+    return agent.is_lost and float(rows[-1, STAMP]) <= agent.last_fit_ns * 1e-9
+
+
+def _observations(graph: Graph, number: int, label: str) -> Observations | None:
+    return graph.get(Observations, observations_id(number, label))
+
+
+def _observe(percept: Percept, viewpoint: Viewpoint, graph: Graph) -> list[Operation]:
+    """The observations of a landmark with one more, where range and bearing are known."""
+    before = _observations(graph, viewpoint.number, percept.label)
+    if not (has_range(percept) and has_bearing(percept)):
+        return []
+    if is_observed_from(before, viewpoint.stamp_s):
+        return []
+    after = extended(before, viewpoint, percept)
+    if before is not None:
+        return [after]
+
+    landmark = object_id(percept.label)
+    segment = segment_id(viewpoint.number)
+    return [
+        after,
+        Link(source=after.id, target=landmark, kind=LinkKind.OBSERVES),
+        Link(source=after.id, target=segment, kind=LinkKind.ALONG),
+    ]
+
+
+def objects_along(graph: Graph, segment: PathSegment) -> list[tuple[Observations, Object]]:
+    """The observations along a path segment, by landmark, of objects that the map has."""
+    found = []
+    for name in sorted(graph.links.sources(segment.id, LinkKind.ALONG)):
+        observations = graph.get(Observations, name)
+        if observations is None:
+            continue
+        landmark = graph.get(Object, object_id(observations.landmark))
+        if landmark is not None:
+            found.append((observations, landmark))
+    return found

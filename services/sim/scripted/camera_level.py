@@ -5,6 +5,8 @@ It stands still until its first images are rendered, so that all of the line is 
 
 from __future__ import annotations
 
+import msgspec
+
 from schemas.base import Message
 from schemas.sensing import Odometry, Pose, TrueTown
 from services.sim.config import Config
@@ -40,13 +42,15 @@ class CameraLevelSim(LineFollower):
 
         rows = self._measure(legs)
         passed_s = 0.0
+        stamped: list[Message] = []
         for row in rows:
             passed_s += row.dt_s
-            row.stamp_ns = since_ns + round(1e9 * passed_s)
+            stamp_ns = since_ns + round(1e9 * passed_s)
+            if row is rows[-1]:
+                stamp_ns = self.now_ns
+            stamped.append(msgspec.structs.replace(row, stamp_ns=stamp_ns))
 
-        rows[-1].stamp_ns = self.now_ns
-
-        return [*rows]
+        return stamped
 
     def view(self) -> list[Message]:
         """The next stereo frame."""
@@ -55,9 +59,7 @@ class CameraLevelSim(LineFollower):
 
     def town(self) -> TrueTown:
         """The line and the buildings along it."""
-        message = self.world.town.message()
-        message.stamp_ns = self.now_ns
-        return message
+        return msgspec.structs.replace(self.world.town.message(), stamp_ns=self.now_ns)
 
     def _at_rest(self) -> Odometry:
         return Odometry(

@@ -18,19 +18,22 @@ from schemas.cognition import (
     Rejection,
     Trigger,
 )
-from schemas.graph import Delta, Node
+from schemas.graph import Delta, Phase
+from schemas.nodes import Node
 from schemas.process import Clock
 from schemas.sensing import MotorCommand, Pose, RangeScan, SelfMotion, SpeedLimit
 from services.action.module import Config, build
 from services.action.motor import SensoryMotorMemory, obstacle_ahead_m
 from services.action.route import Route
 from services.action.selection import FOLLOW_ROUTE, HALT, ActionSelection, Scheme
+from tests.support.scenes import agent
 
 PERIOD_NS = 200_000_000
 QUARTER = math.pi / 2
 
 
 def _nodes(**activations: float) -> list[Node]:
+    """Nodes of these kinds, as activated; of the generic node, for its kind is what counts here."""
     return [
         Node(id=kind, kind=kind, activation=activation) for kind, activation in activations.items()
     ]
@@ -225,7 +228,7 @@ def test_what_stands_aside_behind_or_alone_is_no_obstacle() -> None:
 
 def test_a_scan_whose_bearings_and_ranges_do_not_pair_is_refused() -> None:
     scan = _scan((0.0, 8.0), (0.1, 8.0))
-    scan.range_m = Array.of(np.ones(3, np.float32))
+    scan = msgspec.structs.replace(scan, range_m=Array.of(np.ones(3, np.float32)))
     with pytest.raises(MessageError, match="2,\\) bearings and \\(3"):
         obstacle_ahead_m(scan, 0.7)
 
@@ -239,9 +242,8 @@ def _module(
     return build(Config(mode=mode, route=[*route]), "action")  # type: ignore[arg-type]
 
 
-def _delta(cycle: int = 1, x_m: float = 0.0, phase: str = "localization") -> Delta:
-    attributes = {"x_m": x_m, "y_m": 0.0, "heading_rad": 0.0, "stamp_ns": cycle * PERIOD_NS}
-    me = Node(id="self", kind="self", activation=1.0, attributes=attributes)
+def _delta(cycle: int = 1, x_m: float = 0.0, phase: Phase = Phase.LOCALIZATION) -> Delta:
+    me = agent(x_m=x_m, stamp_ns=cycle * PERIOD_NS)
     return Delta(
         stamp_ns=cycle * PERIOD_NS,
         version=cycle,
@@ -253,7 +255,7 @@ def _delta(cycle: int = 1, x_m: float = 0.0, phase: str = "localization") -> Del
 
 
 def _broadcast(cycle: int = 1) -> Broadcast:
-    coalition = Coalition(codelet="whereabouts", activation=0.5, content=_nodes(self=1.0))
+    coalition = Coalition(codelet="whereabouts", activation=0.5, nodes=[*_nodes(self=1.0)])
     return Broadcast(stamp_ns=cycle * PERIOD_NS, cycle=cycle, trigger="t", coalition=coalition)
 
 
@@ -322,13 +324,13 @@ def test_an_obstacle_in_the_scan_halts_the_robot_until_it_has_gone() -> None:
     assert [command.halted_by for command in _commands(module.feed(_delta(2)))] == [""]
 
 
-@pytest.mark.parametrize("phase", ["percepts", "objects", "decay"])
+@pytest.mark.parametrize("phase", [Phase.PERCEPTS, Phase.OBJECTS, Phase.END])
 def test_deltas_without_a_new_pose_lead_to_no_command(phase: str) -> None:
     assert _module().feed(_delta(phase=phase)) == []
 
 
 def test_a_pose_that_is_committed_late_leads_to_a_command_too() -> None:
-    assert len(_commands(_module().feed(_delta(phase="late")))) == 1
+    assert len(_commands(_module().feed(_delta(phase=Phase.LATE)))) == 1
 
 
 def test_in_lockstep_the_command_waits_for_the_senses_and_the_cycle_before() -> None:
@@ -469,8 +471,7 @@ def test_a_robot_that_moves_or_is_not_commanded_to_is_not_stuck() -> None:
 
 
 def test_a_self_motion_of_another_shape_is_refused_by_name() -> None:
-    motion = _motion()
-    motion.motions = Array.of(np.zeros((2, 3)))
+    motion = msgspec.structs.replace(_motion(), motions=Array.of(np.zeros((2, 3))))
     with pytest.raises(MessageError, match="rows of 5 columns"):
         _module().feed(motion)
 

@@ -12,10 +12,12 @@ from cogmap.runtime.module import Module
 from schemas import topics
 from schemas.base import Message
 from schemas.cognition import Broadcast, Coalition
-from schemas.graph import Delta, Node
+from schemas.graph import Delta, Phase
+from schemas.nodes import Node
 from schemas.process import Clock
 from schemas.sensing import MotorCommand, SpeedLimit
 from services.action.module import Config, build
+from tests.support.scenes import agent
 
 TICK_S = 0.05
 CYCLE_TICKS = 8
@@ -52,7 +54,7 @@ class SlowMachine:
     def broadcast(self) -> Message:
         """Content that selects following the route."""
         node = Node(id="self", kind="self", activation=1.0)
-        coalition = Coalition(codelet="whereabouts", activation=0.9, content=[node])
+        coalition = Coalition(codelet="whereabouts", activation=0.9, nodes=[node])
         return Broadcast(cycle=1, trigger="t", coalition=coalition)
 
     def tick(self) -> list[Message]:
@@ -81,15 +83,13 @@ class SlowMachine:
 
     def _delta(self) -> Delta:
         x_m, y_m, heading_rad = self._pose
-        place = {"x_m": x_m, "y_m": y_m, "heading_rad": heading_rad}
         cycle = self._ticks // CYCLE_TICKS
         return Delta(
             stamp_ns=self._now_ns(),
             version=cycle,
             cycle=cycle,
-            phase="localization",
-            tasks=[],
-            operations=[Node(id="self", kind="self", attributes=place)],
+            phase=Phase.LOCALIZATION,
+            operations=[agent(x_m=x_m, y_m=y_m, heading_rad=heading_rad)],
         )
 
     def _now_ns(self) -> int:

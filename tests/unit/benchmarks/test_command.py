@@ -19,7 +19,8 @@ from benchmarks.suite import Benchmark, Setting
 from benchmarks.threshold import at_least, at_most, more_than, within
 from cogmap.bus.codec import encode
 from cogmap.errors import UsageError
-from schemas.graph import Links, Node
+from schemas.graph import Links
+from schemas.nodes import GraphNode
 from services.workspace.commit import Ledger
 
 
@@ -163,7 +164,7 @@ def test_a_typical_delta_has_50_nodes_200_links_and_31_kb() -> None:
         for weights in part.weights.values()
     ]
 
-    assert sum(isinstance(part, Node) for part in operations) == 50
+    assert sum(isinstance(part, GraphNode) for part in operations) == 50
     assert sum(map(len, links)) == 200
     assert len(encode(Ledger(1.0).commit(0, 1, "objects", operations))) == pytest.approx(
         31_000, rel=0.02

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import cv2
+import msgspec
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -212,8 +213,8 @@ def test_a_view_in_which_nothing_was_recognised_has_a_plot_too(
     run: Callable[..., Result], tmp_path: Path
 ) -> None:
     empty = Array.of(np.empty((0, 2), np.float32))
-    unknown = view(0)
-    unknown.depth_m = Array.of(np.zeros((240, 320), np.float32))
+    nothing = Array.of(np.zeros((240, 320), np.float32))
+    unknown = msgspec.structs.replace(view(0), depth_m=nothing)
     log = write(tmp_path / "empty.mcap", [unknown, Percepts(frame=0, objects=[], road_m=empty)])
     run("perception", log, "-o", "figure.png")
     assert read("figure.png").shape == (949, 1690, 3)

@@ -12,8 +12,9 @@ from cli.launch.track import Track
 from cogmap.errors import MessageError
 from schemas.array import Array
 from schemas.cognition import Competition
-from schemas.graph import Delta, DropNode, Node
+from schemas.graph import Delta, DropNode, Phase
 from schemas.sensing import Odometry, Pose, SelfMotion, TruePose
+from tests.support.scenes import agent, thing
 
 TICK_NS = 50_000_000
 
@@ -30,13 +31,12 @@ def odometry(tick: int, speed_m_s: float, turn_rate_rad_s: float = 0.0) -> Odome
 
 
 def estimate(tick: int, x_m: float, y_m: float, version: int = 1) -> Delta:
-    node = Node(id="self", kind="self", attributes={"x_m": x_m, "y_m": y_m, "heading_rad": 0.0})
-    operations = [DropNode(id="object:inn"), node]
+    operations = [DropNode(id="object:inn"), agent(x_m=x_m, y_m=y_m)]
     return Delta(
         stamp_ns=tick * TICK_NS,
         version=version,
         cycle=1,
-        phase="localization",
+        phase=Phase.LOCALIZATION,
         tasks=[],
         operations=operations,
     )
@@ -163,13 +163,11 @@ def test_distance_progress_and_time_are_those_of_the_newest_pose() -> None:
     assert (observer.travelled_m, observer.progress, observer.elapsed_s) == (1.0, 0.5, 1.0)
 
 
-def test_other_messages_and_senseless_nodes_change_nothing() -> None:
+def test_other_messages_and_nodes_change_nothing() -> None:
     observer = Observer()
     straight_drive(observer, 4, wheel_speed_m_s=1.0)
-    observer.update(Competition(stamp_ns=4, cycle=1, contenders={}))
-    observer.update(
-        Delta(version=1, cycle=1, phase="x", tasks=[], operations=[Node(id="self", kind="self")])
-    )
+    observer.update(Competition(stamp_ns=4, cycle=1, contenders=[]))
+    observer.update(Delta(version=1, cycle=1, phase=Phase.OBJECTS, operations=[thing("x")]))
     assert len(observer.estimated_path_m) == 0
 
 

@@ -16,10 +16,12 @@ from cogmap.bus.memory import MemoryBus, MemoryNetwork
 from schemas import topics
 from schemas.array import Array
 from schemas.base import Message
-from schemas.graph import Cells, Delta, Node
+from schemas.graph import Cells, Delta, Phase
+from schemas.nodes import PlaceColumn
 from schemas.process import Health
 from schemas.sensing import MotorCommand, Odometry, Pose, SelfMotion, SpeedLimit, TruePose
 from services.sim.layout.town import generate
+from tests.support.scenes import agent, landmark
 
 MS = 1_000_000
 
@@ -34,7 +36,7 @@ class Publisher:
     def publish(
         self, message: Message, sent_ns: int = 0, stages: list[tuple[str, int, int]] | None = None
     ) -> bool:
-        message.source = "somebody"
+        message = msgspec.structs.replace(message, source="somebody")
         envelope = Envelope(message.source, message.seq, 1, sent_ns, 0, stages or [])
         self._bus.publish(topics.of(message), encode(message), envelope)
         return self._watch.pump(0.0)
@@ -118,15 +120,10 @@ def learned() -> Delta:
     y_m = building.pose.y_m - town.start.y_m
     samples = np.random.default_rng(0).normal([x_m, y_m], 0.5, (50, 2))
     operations = [
-        Node(id="self", kind="self", attributes={"x_m": 2.1, "y_m": 0.0, "heading_rad": 0.0}),
-        Node(
-            id="object:x",
-            kind="object",
-            attributes={"label": building.name, "x_m": x_m, "y_m": y_m},
-            samples=Array.of(samples),
-        ),
+        agent(x_m=2.1),
+        landmark(building.name, samples, x_m=x_m, y_m=y_m),
         Cells(
-            column="road",
+            column=PlaceColumn.ROAD,
             cells=Array.of([[0, 0], [1, 0]], "<i4"),
             values=Array.of(np.ones(2, np.float32)),
         ),
@@ -135,7 +132,7 @@ def learned() -> Delta:
         stamp_ns=2 * STEP_NS,
         version=1,
         cycle=1,
-        phase="localization",
+        phase=Phase.LOCALIZATION,
         tasks=[],
         operations=operations,
     )
@@ -211,11 +208,11 @@ def test_dropped_answers_are_counted_and_the_last_reasons_kept(
                 seq=version,
                 version=version,
                 cycle=1,
-                phase="decay",
+                phase=Phase.END,
                 tasks=[],
                 operations=[],
-                dropped=2,
-                refused=refused,
+                rejected=2,
+                reasons=refused,
             )
         )
     metrics = metrics_of(watch)

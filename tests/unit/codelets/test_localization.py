@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -8,27 +9,21 @@ import pytest
 
 from cogmap.errors import MessageError
 from cogmap.geometry.se2 import mean_pose, wrap_angle
+from cogmap.graph.graph import Graph
 from schemas.array import Array
-from schemas.cognition import Task
-from schemas.graph import DropLink, Link, Node, Operation
-from services.codelets.localization.landmarks import locate_landmark
-from services.codelets.localization.localization import localize
+from schemas.graph import Link, Operation
+from schemas.nodes import LinkKind, Object, Self
+from services.codelets.config import Config
 from services.codelets.localization.sampling import (
     generator,
     rejection_mask,
     resample,
     spread,
 )
-from services.codelets.module import Config
-from tests.support.scenes import node, percept, task
+from tests.support.scenes import agent, graph_of, landmark, percept, run, task
 
 Samples = npt.NDArray[np.float64]
 EXACT = Config(samples=4000, kept_samples=2000, outlier_share=1e-9, correlated_views=1.0)
-
-
-def _self(samples: Samples | None = None, **facts: float | str) -> Node:
-    samples = np.zeros((200, 3)) if samples is None else samples
-    return node("self", samples, "self", x_m=0.0, y_m=0.0, heading_rad=0.0, stamp_ns=0, **facts)
 
 
 def _landmark(
@@ -37,44 +32,37 @@ def _landmark(
     sd_m: float = 0.01,
     label: str = "house",
     sightings: int = 20,
-    **facts: float | str,
-) -> Node:
+    **facts: Any,
+) -> Object:
     samples = np.random.default_rng(5).normal((x_m, y_m), sd_m, (200, 2))
-    return node(f"object:{label}", samples, label=label, sightings=sightings, **facts)
+    return landmark(label, samples, sightings=sightings, **facts)
 
 
 def _rows(*rows: tuple[float, float, float, float, float]) -> Array:
     return Array.of(np.array(rows, np.float64))
 
 
-def _moved(operations: list[Operation]) -> Node:
-    (found,) = [operation for operation in operations if isinstance(operation, Node)]
+def _samples(found: Self) -> Samples:
+    return found.samples.numpy()
+
+
+def _pose(found: Self) -> tuple[float, float, float]:
+    return found.x_m, found.y_m, found.heading_rad
+
+
+def _localized(*nodes: Operation, config: Config = EXACT, **facts: Any) -> Self:
+    (found, _) = run(task("localization", **facts), graph_of(*nodes), config).operations
+    assert isinstance(found, Self)
     return found
-
-
-def _samples(found: Node) -> Samples:
-    assert found.samples is not None
-    return np.asarray(found.samples.numpy(), np.float64)
-
-
-def _pose(found: Node) -> tuple[float, float, float]:
-    x_m, y_m, heading_rad = (
-        float(found.attributes[name]) for name in ("x_m", "y_m", "heading_rad")
-    )
-    return x_m, y_m, heading_rad
-
-
-def _localized(*nodes: Node, config: Config = EXACT, **facts: object) -> Node:
-    return _moved(localize(task("localization", *nodes, **facts), config))
 
 
 def test_without_landmarks_the_samples_move_by_the_motion() -> None:
     found = _localized(
-        _self(), motions=_rows((2.0, 0.0, 1.0, 0.0, 0.0), (0.0, math.pi / 2, 1.0, 0.0, 0.0))
+        agent(), motions=_rows((2.0, 0.0, 1.0, 0.0, 0.0), (0.0, math.pi / 2, 1.0, 0.0, 0.0))
     )
     assert _pose(found) == pytest.approx((2.0, 0.0, math.pi / 2))
     again = _localized(
-        _self(_samples(found)),
+        agent(_samples(found)),
         motions=_rows((3.0, 0.0, 1.0, 0.0, 0.0)),
         identifier="2/localization",
     )
@@ -83,17 +71,17 @@ def test_without_landmarks_the_samples_move_by_the_motion() -> None:
 
 def test_a_quarter_circle_ends_where_its_chord_does() -> None:
     rows = [(math.pi / 2, math.pi / 2, 0.05, 0.0, 0.0)] * 20
-    assert _pose(_localized(_self(), motions=_rows(*rows))) == pytest.approx(
+    assert _pose(_localized(agent(), motions=_rows(*rows))) == pytest.approx(
         (1.0, 1.0, math.pi / 2), abs=1e-3
     )
 
 
 def test_the_samples_spread_as_the_motions_noise_says() -> None:
-    found = _localized(_self(), motions=_rows((4.0, 0.0, 1.0, 0.5, 0.0)))
-    assert found.attributes["x_sd_m"] == pytest.approx(0.5, rel=0.1)
-    assert found.attributes["y_sd_m"] == 0.0
-    turned = _localized(_self(), motions=_rows((0.0, 1.0, 1.0, 0.0, 0.2)))
-    assert turned.attributes["heading_sd_rad"] == pytest.approx(0.2, rel=0.1)
+    found = _localized(agent(), motions=_rows((4.0, 0.0, 1.0, 0.5, 0.0)))
+    assert found.x_sd_m == pytest.approx(0.5, rel=0.1)
+    assert found.y_sd_m == 0.0
+    turned = _localized(agent(), motions=_rows((0.0, 1.0, 1.0, 0.0, 0.2)))
+    assert turned.heading_sd_rad == pytest.approx(0.2, rel=0.1)
 
 
 def test_a_landmark_ahead_corrects_the_way_to_the_exact_gaussian_posterior() -> None:
@@ -105,13 +93,13 @@ def test_a_landmark_ahead_corrects_the_way_to_the_exact_gaussian_posterior() -> 
     sensed = 1 / seen_sd_m**2
     exact_m = (prior * way_m + sensed * (20.0 - seen_m)) / (prior + sensed)
     found = _localized(
-        _self(),
+        agent(),
         _landmark(20.0, 0.0),
         motions=_rows((way_m, 0.0, 1.0, way_sd_m, 0.0)),
         percepts=[percept("house", 0.0, seen_m, range_sd_m=seen_sd_m)],
     )
-    assert found.attributes["x_m"] == pytest.approx(exact_m, abs=0.03)
-    assert found.attributes["x_sd_m"] == pytest.approx((prior + sensed) ** -0.5, rel=0.1)
+    assert found.x_m == pytest.approx(exact_m, abs=0.03)
+    assert found.x_sd_m == pytest.approx((prior + sensed) ** -0.5, rel=0.1)
 
 
 def test_a_bearing_corrects_the_heading_to_the_exact_gaussian_posterior() -> None:
@@ -121,17 +109,15 @@ def test_a_bearing_corrects_the_heading_to_the_exact_gaussian_posterior() -> Non
     prior = 1 / turn_sd_rad**2
     sensed = 1 / bearing_sd_rad**2
     found = _localized(
-        _self(),
+        agent(),
         _landmark(50.0, 0.0, 1e-3),
         motions=_rows((1e-3, 0.0, 1.0, 0.0, turn_sd_rad)),
         percepts=[
             percept("house", bearing_rad, 50.0, bearing_sd_rad=bearing_sd_rad, range_sd_m=5.0)
         ],
     )
-    assert found.attributes["heading_rad"] == pytest.approx(
-        -sensed * bearing_rad / (prior + sensed), abs=0.006
-    )
-    assert found.attributes["heading_sd_rad"] == pytest.approx((prior + sensed) ** -0.5, rel=0.1)
+    assert found.heading_rad == pytest.approx(-sensed * bearing_rad / (prior + sensed), abs=0.006)
+    assert found.heading_sd_rad == pytest.approx((prior + sensed) ** -0.5, rel=0.1)
 
 
 def test_two_landmarks_weigh_as_much_as_their_noise_allows() -> None:
@@ -141,7 +127,7 @@ def test_two_landmarks_weigh_as_much_as_their_noise_allows() -> None:
     weights = np.array([way_sd_m, near_sd_m, far_sd_m]) ** -2.0
     exact_m = weights @ [5.0, 5.4, 4.4] / weights.sum()
     found = _localized(
-        _self(),
+        agent(),
         _landmark(20.0, 0.0, 1e-3, "near"),
         _landmark(40.0, 0.0, 1e-3, "far"),
         motions=_rows((5.0, 0.0, 1.0, way_sd_m, 0.0)),
@@ -150,30 +136,30 @@ def test_two_landmarks_weigh_as_much_as_their_noise_allows() -> None:
             percept("far", 0.0, 35.6, range_sd_m=far_sd_m),
         ],
     )
-    assert found.attributes["x_m"] == pytest.approx(exact_m, abs=0.03)
+    assert found.x_m == pytest.approx(exact_m, abs=0.03)
 
 
 def test_an_uncertain_landmark_corrects_less_than_a_certain_one() -> None:
     def corrected_m(sd_m: float) -> float:
         found = _localized(
-            _self(),
+            agent(),
             _landmark(20.0, 0.0, sd_m),
             motions=_rows((5.0, 0.0, 1.0, 0.5, 0.0)),
             percepts=[percept("house", 0.0, 14.0, range_sd_m=0.2)],
         )
-        return float(found.attributes["x_m"]) - 5.0
+        return found.x_m - 5.0
 
     assert 0.0 < corrected_m(2.0) < corrected_m(0.5) < corrected_m(0.01) < 1.0
 
 
 def test_a_landmark_whose_place_is_hardly_known_corrects_nothing() -> None:
     found = _localized(
-        _self(),
+        agent(),
         _landmark(20.0, 0.0, 6.0),
         motions=_rows((5.0, 0.0, 1.0, 0.5, 0.0)),
         percepts=[percept("house", 0.0, 12.0)],
     )
-    assert found.attributes["kept_share"] == 1.0
+    assert found.kept_share == 1.0
 
 
 def test_where_every_sample_is_unlikely_the_answer_is_still_a_pose_from_among_them() -> None:
@@ -181,7 +167,7 @@ def test_where_every_sample_is_unlikely_the_answer_is_still_a_pose_from_among_th
         config = Config(samples=100, kept_samples=50, outlier_share=outlier_share)
         with np.errstate(divide="ignore", invalid="ignore"):
             found = _localized(
-                _self(),
+                agent(),
                 _landmark(20.0, 0.0, 1e-6),
                 config=config,
                 motions=_rows((5.0, 0.0, 1.0, 0.01, 0.01)),
@@ -202,7 +188,7 @@ def test_one_landmark_taken_for_another_does_not_outvote_the_rest() -> None:
         for name, y_m in (("a", -5.0), ("b", 0.0))
     ]
     found = _localized(
-        _self(),
+        agent(),
         *landmarks,
         config=Config(),
         motions=_rows((5.0, 0.0, 1.0, 0.5, 0.05)),
@@ -213,16 +199,14 @@ def test_one_landmark_taken_for_another_does_not_outvote_the_rest() -> None:
 
 def test_an_agent_that_stands_still_does_not_grow_surer_of_itself_by_looking() -> None:
     def looking(seen_ns: int) -> float:
-        agent = _self(
-            np.random.default_rng(1).normal(0.0, (1.0, 0.01, 0.01), (4000, 3)), stands_ns=5
+        looker = agent(
+            np.random.default_rng(1).normal(0.0, (1.0, 0.01, 0.01), (4000, 3)),
+            stationary_since_ns=5,
         )
-        house = _landmark(20.0, 0.0, stamp_ns=seen_ns)
+        house = _landmark(20.0, 0.0, last_seen_ns=seen_ns)
         motions = _rows((0.0, 0.0, 0.2, 0.0, 0.0))
-        return float(
-            _localized(
-                agent, house, motions=motions, percepts=[percept("house", 0.0, 19.0)]
-            ).attributes["x_m"]
-        )
+        seen = [percept("house", 0.0, 19.0)]
+        return _localized(looker, house, motions=motions, percepts=seen).x_m
 
     assert looking(seen_ns=4) == pytest.approx(0.92, abs=0.05)
     assert looking(seen_ns=5) == pytest.approx(0.0, abs=0.05)
@@ -249,7 +233,7 @@ def test_an_agent_that_was_turned_about_knows_its_heading_again_by_three_landmar
         for name, (x, y) in places.items()
     ]
     found = _localized(
-        _self(samples),
+        agent(samples),
         *[_landmark(x, y, label=name) for name, (x, y) in places.items()],
         config=Config(samples=800, correlated_views=1.0),
         percepts=seen,
@@ -260,19 +244,15 @@ def test_an_agent_that_was_turned_about_knows_its_heading_again_by_three_landmar
 
 
 def test_the_self_node_is_linked_to_the_place_of_its_mean_and_no_longer_to_the_one_before() -> None:
-    asked = task(
-        "localization",
-        _self(place="place:0:0"),
-        motions=_rows((6.2, 0.0, 1.0, 0.0, 0.0)),
-        cell_m=2.0,
-    )
-    _, dropped, link = localize(asked, Config())
-    assert dropped == DropLink(source="self", target="place:0:0")
-    assert link == Link(source="self", target="place:3:0")
+    before = Link(source="self", target="place:map:0:0:0")
+    graph = graph_of(agent(), before, cell_m=2.0)
+    asked = task("localization", motions=_rows((6.2, 0.0, 1.0, 0.0, 0.0)))
+    graph.change(run(asked, graph, Config()).operations)
+    assert graph.links.targets("self", LinkKind.AT) == {"place:map:0:3:0": 1.0}
 
 
 def test_the_number_of_samples_does_not_fall_from_one_task_to_the_next() -> None:
-    current = _self()
+    current = agent()
     for frame in range(10):
         current = _localized(
             current,
@@ -283,91 +263,83 @@ def test_the_number_of_samples_does_not_fall_from_one_task_to_the_next() -> None
             percepts=[percept("house", 0.0, 20.0 - 0.2 * (frame + 1))],
         )
         assert len(_samples(current)) >= 50
-    assert current.attributes["x_m"] == pytest.approx(2.0, abs=0.15)
+    assert current.x_m == pytest.approx(2.0, abs=0.15)
 
 
-def test_a_task_without_a_self_node_or_without_its_samples_is_refused() -> None:
-    for nodes in ([], [node("self", kind="self")]):
-        with pytest.raises(MessageError, match="no self node with samples"):
-            localize(task("localization", *nodes), Config())
+def test_a_task_on_a_graph_without_a_self_node_is_refused() -> None:
+    with pytest.raises(MessageError, match="no self node"):
+        run(task("localization"), Graph(), Config())
 
 
 LANDMARK = Config(misses=3, correlated_views=1.0)
 
 
-def _landmark_task(landmark: Node, bearing_rad: float, range_m: float, number: int = 0) -> Task:
+def _located(
+    house: Object, bearing_rad: float, range_m: float, number: int = 0, config: Config = LANDMARK
+) -> Object:
     seen = percept("house", bearing_rad, range_m, bearing_sd_rad=0.02, range_sd_m=0.4)
-    return task(
-        "landmark", _self(), landmark, percepts=[seen], identifier=f"{number}/landmark/house"
-    )
+    asked = task("landmark", identifier=f"{number}/landmark/house", percepts=[seen])
+    (found, _) = run(asked, graph_of(agent(), house), config).operations
+    assert isinstance(found, Object)
+    return found
 
 
 def test_seeing_a_landmark_again_shrinks_its_spread_around_where_it_is() -> None:
-    landmark = _landmark(10.0, 0.0, 1.0, sightings=1)
+    house = _landmark(10.0, 0.0, 1.0, sightings=1)
     spreads = []
     for number in range(12):
-        landmark = _moved(locate_landmark(_landmark_task(landmark, 0.0, 10.5, number), LANDMARK))
-        spreads.append(
-            math.hypot(float(landmark.attributes["x_sd_m"]), float(landmark.attributes["y_sd_m"]))
-        )
+        house = _located(house, 0.0, 10.5, number)
+        spreads.append(math.hypot(house.x_sd_m, house.y_sd_m))
     assert spreads[0] < 0.6
     assert spreads[-1] < 0.5 * spreads[0]
-    assert (landmark.attributes["x_m"], landmark.attributes["y_m"]) == pytest.approx(
-        (10.5, 0.0), abs=0.25
-    )
-    assert landmark.attributes["sightings"] == 13
+    assert (house.x_m, house.y_m) == pytest.approx((10.5, 0.0), abs=0.25)
+    assert house.sightings == 13
 
 
 def test_a_landmarks_samples_become_the_exact_gaussian_posterior_of_eq_4() -> None:
     prior = 1 / 1.0**2
     sensed = 1 / 0.4**2
     samples = np.random.default_rng(6).normal((10.0, 0.0), (1.0, 0.01), (8000, 2))
-    landmark = node("object:house", samples, label="house")
+    house = landmark("house", samples)
     config = Config(landmark_jitter_m=1e-6, correlated_views=1.0)
-    found = _moved(locate_landmark(_landmark_task(landmark, 0.0, 11.0), config))
-    assert found.attributes["x_m"] == pytest.approx(
-        (prior * 10 + sensed * 11) / (prior + sensed), abs=0.03
-    )
-    assert found.attributes["x_sd_m"] == pytest.approx((prior + sensed) ** -0.5, rel=0.1)
+    found = _located(house, 0.0, 11.0, config=config)
+    assert found.x_m == pytest.approx((prior * 10 + sensed * 11) / (prior + sensed), abs=0.03)
+    assert found.x_sd_m == pytest.approx((prior + sensed) ** -0.5, rel=0.1)
 
 
 def test_the_number_of_a_landmarks_samples_stays() -> None:
-    found = _moved(locate_landmark(_landmark_task(_landmark(10.0, 0.0, 0.5), 0.0, 10.0), LANDMARK))
-    assert len(_samples(found)) == 200
+    found = _located(_landmark(10.0, 0.0, 0.5), 0.0, 10.0)
+    assert len(found.positions_m()) == 200
 
 
 def test_a_landmark_seen_elsewhere_stays_until_it_has_been_missed_as_often_as_configured_then_starts_anew() -> (
     None
 ):
-    landmark = _landmark(10.0, 0.0, 0.1)
+    house = _landmark(10.0, 0.0, 0.1)
     places = []
     for number in range(3):
-        landmark = _moved(
-            locate_landmark(_landmark_task(landmark, math.pi / 2, 6.0, number), LANDMARK)
-        )
-        places.append((float(landmark.attributes["x_m"]), float(landmark.attributes["y_m"])))
+        house = _located(house, math.pi / 2, 6.0, number)
+        places.append((house.x_m, house.y_m))
     assert places[0] == pytest.approx((10.0, 0.0), abs=0.1)
     assert places[1] == places[0]
     assert places[2] == pytest.approx((0.0, 6.0), abs=0.2)
-    assert landmark.attributes["misses"] == 0
+    assert house.misses == 0
 
 
 def test_a_landmark_that_is_seen_in_its_place_again_is_forgiven_its_misses() -> None:
-    landmark = _landmark(10.0, 0.0, 0.1)
+    house = _landmark(10.0, 0.0, 0.1)
     for number, (bearing_rad, range_m) in enumerate(
         [(1.5, 6.0), (1.5, 6.0), (0.0, 10.0), (1.5, 6.0), (1.5, 6.0)]
     ):
-        landmark = _moved(
-            locate_landmark(_landmark_task(landmark, bearing_rad, range_m, number), LANDMARK)
-        )
-    assert landmark.attributes["misses"] == 2
-    assert landmark.attributes["x_m"] == pytest.approx(10.0, abs=0.2)
+        house = _located(house, bearing_rad, range_m, number)
+    assert house.misses == 2
+    assert house.x_m == pytest.approx(10.0, abs=0.2)
 
 
 def test_the_same_task_gives_the_same_samples_and_another_task_gives_others() -> None:
     motions = _rows((2.0, 0.1, 1.0, 0.3, 0.1))
-    first, second = (_samples(_localized(_self(), motions=motions)) for _ in range(2))
-    other = _samples(_localized(_self(), motions=motions, identifier="2/localization"))
+    first, second = (_samples(_localized(agent(), motions=motions)) for _ in range(2))
+    other = _samples(_localized(agent(), motions=motions, identifier="2/localization"))
     assert first.tobytes() == second.tobytes()
     assert first.tobytes() != other.tobytes()
 
@@ -399,42 +371,42 @@ def test_refilling_draws_from_those_kept_and_jitters_each() -> None:
 
 
 def test_a_landmark_that_was_seen_but_once_and_then_twice_elsewhere_starts_anew_there() -> None:
-    landmark = _landmark(300.0, 0.0, 0.5, sightings=1)
+    house = _landmark(300.0, 0.0, 0.5, sightings=1)
     for number in range(2):
-        landmark = _moved(locate_landmark(_landmark_task(landmark, 0.0, 10.0, number), LANDMARK))
-    assert landmark.attributes["x_m"] == pytest.approx(10.0, abs=0.5)
-    assert (landmark.attributes["sightings"], landmark.attributes["misses"]) == (1, 0)
+        house = _located(house, 0.0, 10.0, number)
+    assert house.x_m == pytest.approx(10.0, abs=0.5)
+    assert (house.sightings, house.misses) == (1, 0)
 
 
 def test_a_landmark_that_was_seen_but_once_moves_nobody() -> None:
-    def found(sightings: int) -> Node:
+    def found(sightings: int) -> Self:
         house = _landmark(20.0, 0.0, sightings=sightings)
         motions = _rows((5.0, 0.0, 1.0, 0.5, 0.0))
         return _localized(
-            _self(), house, motions=motions, percepts=[percept("house", 0.0, 14.0, range_sd_m=0.2)]
+            agent(), house, motions=motions, percepts=[percept("house", 0.0, 14.0, range_sd_m=0.2)]
         )
 
-    assert found(sightings=1).attributes["x_m"] == pytest.approx(5.0, abs=0.05)
-    assert float(found(sightings=2).attributes["x_m"]) > 5.5
+    assert found(sightings=1).x_m == pytest.approx(5.0, abs=0.05)
+    assert found(sightings=2).x_m > 5.5
 
 
 def test_an_agent_to_whom_one_landmark_does_not_fit_grows_no_less_sure_of_itself() -> None:
-    agent = _self(np.random.default_rng(1).normal(0.0, (0.3, 0.3, 0.01), (1000, 3)))
+    looker = agent(np.random.default_rng(1).normal(0.0, (0.3, 0.3, 0.01), (1000, 3)))
     for number in range(20):
-        agent = _localized(
-            agent,
+        looker = _localized(
+            looker,
             _landmark(20.0, 0.0),
             motions=_rows((0.1, 0.0, 1.0, 0.0, 0.0)),
             percepts=[percept("house", 2.0, 50.0)],
             identifier=f"{number}/localization",
         )
-    assert agent.attributes["astray"] == 20
-    assert float(agent.attributes["x_sd_m"]) < 0.4
+    assert looker.misfit_count == 20
+    assert looker.x_sd_m < 0.4
 
 
 def test_path_integration_alone_goes_on_beside_the_pose_that_landmarks_correct() -> None:
     motions = _rows((5.0, 0.0, 1.0, 0.5, 0.0))
     seen = [percept("house", 0.0, 14.0, range_sd_m=0.2)]
-    found = _localized(_self(), _landmark(20.0, 0.0), motions=motions, percepts=seen)
-    assert float(found.attributes["x_m"]) > 5.5
-    assert found.attributes["odometry_x_m"] == pytest.approx(5.0)
+    found = _localized(agent(), _landmark(20.0, 0.0), motions=motions, percepts=seen)
+    assert found.x_m > 5.5
+    assert found.odometry_x_m == pytest.approx(5.0)

@@ -8,16 +8,15 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-from benchmarks.localization.loop import Mind
+from benchmarks.localization.loop import LocalizationLoop
 from benchmarks.localization.senses import Moment
 from schemas.array import Array
-from schemas.graph import Node
+from schemas.nodes import Object, Self
 from schemas.sensing import Percept
-from services.codelets.localization.landmarks import locate_landmark
-from services.codelets.localization.localization import localize
-from services.codelets.mapping.object_place import place_object
-from services.codelets.module import Config
-from tests.support.scenes import node, percept, task
+from services.codelets.config import Config
+from tests.support.scenes import agent as self_node
+from tests.support.scenes import graph_of, percept, run, task
+from tests.support.scenes import landmark as object_node
 
 PLACES = {"mill": (20.0, 0.0), "tower": (0.0, 25.0), "church": (-15.0, -10.0), "inn": (30.0, 30.0)}
 Pose = tuple[float, float, float]
@@ -27,17 +26,28 @@ UNKNOWN_BEARING = {"bearing_sd_rad": 2 * math.pi}
 def _agent(
     pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
     sd: tuple[float, float, float] = (0.0, 0.0, 0.0),
-) -> Node:
+) -> Self:
     samples = np.random.default_rng(3).normal(pose, sd, (1000, 3))
-    return node("self", samples, "self", x_m=pose[0], y_m=pose[1], heading_rad=pose[2], stamp_ns=0)
+    x_m, y_m, heading_rad = pose
+    return self_node(
+        samples,
+        x_m=x_m,
+        y_m=y_m,
+        heading_rad=heading_rad,
+        odometry_x_m=x_m,
+        odometry_y_m=y_m,
+        odometry_heading_rad=heading_rad,
+        stamp_ns=0,
+    )
 
 
-def _known(*labels: str) -> list[Node]:
+def _known(*labels: str) -> list[Object]:
     rng = np.random.default_rng(4)
-    return [
-        node(f"object:{k}", rng.normal(PLACES[k], 0.01, (200, 2)), label=k, sightings=50)
-        for k in labels
-    ]
+    known = []
+    for label in labels:
+        samples_m = rng.normal(PLACES[label], 0.01, (200, 2))
+        known.append(object_node(label, samples_m, sightings=50))
+    return known
 
 
 def _seen(pose: Pose, label: str, **facts: float) -> Percept:
@@ -47,21 +57,19 @@ def _seen(pose: Pose, label: str, **facts: float) -> Percept:
 
 
 def _move(
-    agent: Node, number: int, landmarks: list[Node], seen: Iterable[Percept], config: Config
-) -> Node:
+    agent: Self, number: int, landmarks: list[Object], seen: Iterable[Percept], config: Config
+) -> Self:
     """The agent after a step of a metre and a look."""
     motions = Array.of(np.array([[1.0, 0.0, 1.0, 0.1, 0.0]]))
     facts = {"motions": motions, "percepts": list(seen), "stamp_ns": number}
-    found = localize(
-        task("localization", agent, *landmarks, identifier=f"{number}/l", **facts), config
-    )
-    return next(operation for operation in found if isinstance(operation, Node))
+    asked = task("localization", f"{number}/l", **facts)
+    found, _ = run(asked, graph_of(agent, *landmarks), config).operations
+    assert isinstance(found, Self)
+    return found
 
 
-def _off_m(agent: Node, true: Pose) -> float:
-    return math.hypot(
-        float(agent.attributes["x_m"]) - true[0], float(agent.attributes["y_m"]) - true[1]
-    )
+def _off_m(agent: Self, true: Pose) -> float:
+    return math.hypot(agent.x_m - true[0], agent.y_m - true[1])
 
 
 CONFIG = Config(correlated_views=1.0)
@@ -77,21 +85,21 @@ def test_an_agent_that_is_carried_away_finds_itself_by_the_landmarks_that_it_see
             agent, number, _known(*labels), [_seen(true, label) for label in labels[:2]], CONFIG
         )
     assert _off_m(agent, true) < 1.0
-    assert not agent.attributes["others"]
+    assert not agent.is_lost
 
 
 def test_an_agent_that_is_carried_away_finds_itself_by_landmarks_that_it_sees_one_at_a_time() -> (
     None
 ):
-    mind = Mind((0.0, 0.0, 0.0), CONFIG)
+    loop = LocalizationLoop((0.0, 0.0, 0.0), PLACES)
     labels = tuple(PLACES)
-    mind.learn(PLACES, surveyed=False)
     true = (60.0, -40.0, 2.0)
     for number in range(1, 30):
         true = (true[0] + math.cos(true[2]), true[1] + math.sin(true[2]), true[2])
         motions = np.array([[1.0, 0.0, 1.0, 0.1, 0.0]])
-        mind.live(Moment(float(number), motions, [_seen(true, labels[number % 4])], True))
-    assert math.dist(mind.pose[:2], true[:2]) < 2.0
+        loop.live(Moment(float(number), motions, [_seen(true, labels[number % 4])], True))
+    loop.close()
+    assert math.dist(loop.pose[:2], true[:2]) < 2.0
 
 
 def test_the_way_that_an_agent_was_carried_counts_as_a_step_of_its_path() -> None:
@@ -103,11 +111,9 @@ def test_the_way_that_an_agent_was_carried_counts_as_a_step_of_its_path() -> Non
         agent = _move(
             agent, number, _known(*labels), [_seen(true, label) for label in labels], CONFIG
         )
-    facts = agent.attributes
     assert _off_m(agent, true) < 0.5
-    assert (facts["odometry_x_m"], facts["odometry_y_m"]) == pytest.approx(
-        (facts["x_m"], facts["y_m"]), abs=5.0
-    )
+    odometry_m = (agent.odometry_x_m, agent.odometry_y_m)
+    assert odometry_m == pytest.approx((agent.x_m, agent.y_m), abs=5.0)
 
 
 def test_ranges_alone_to_three_landmarks_tell_the_position() -> None:
@@ -133,24 +139,21 @@ def test_a_new_landmark_that_is_seen_by_one_sense_alone_is_found_from_several_pl
     alone: dict[str, float],
 ) -> None:
     config = Config(correlated_views=1.0, landmark_samples=4000)
-    landmark: Node | None = None
+    landmark: Object | None = None
     for number, (x_m, y_m) in enumerate(
         ((0.0, 0.0), (4.0, 3.0), (8.0, 2.0), (12.0, 6.0), (8.0, 9.0), (4.0, 12.0))
     ):
         pose = (x_m, y_m, 0.0)
         agent = _agent(pose, (0.01, 0.01, 0.002))
         seen = [_seen(pose, "mill", **alone)]
-        agent.attributes["stamp_ns"] = number
         nodes = [agent] if landmark is None else [agent, landmark]
-        asked = task(
-            "landmark", *nodes, percepts=seen, identifier=f"{number}/mill", stamp_ns=number
-        )
-        found = place_object(asked, config) if landmark is None else locate_landmark(asked, config)
-        landmark = next(operation for operation in found if isinstance(operation, Node))
+        codelet = "object_place" if landmark is None else "landmark"
+        asked = task(codelet, f"{number}/mill", percepts=seen, stamp_ns=number)
+        found, _ = run(asked, graph_of(*nodes), config).operations
+        assert isinstance(found, Object)
+        landmark = found
     assert landmark is not None
-    assert (landmark.attributes["x_m"], landmark.attributes["y_m"]) == pytest.approx(
-        PLACES["mill"], abs=1.5
-    )
+    assert (landmark.x_m, landmark.y_m) == pytest.approx(PLACES["mill"], abs=1.5)
 
 
 def test_wheels_that_slip_all_the_time_are_found_out_by_landmarks() -> None:

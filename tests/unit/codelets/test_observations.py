@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from cogmap.geometry.se2 import compose, relative
-from schemas.graph import Node
+from schemas.nodes import Observations, PathSegment
 from services.codelets.correction.least_squares import optimize
 from services.codelets.correction.pose_graph import Constraints, PoseGraph
-from services.codelets.mapping.observations import Outlook, Sightings, recorded
+from services.codelets.mapping.observations import Sightings, Viewpoint, extended
 from tests.support.scenes import Desk, percept
 
 STILL = np.zeros(3)
@@ -19,12 +19,7 @@ TOWER_M = np.array([6.0, 8.0])
 
 
 def _seen(desk: Desk) -> dict[str, int]:
-    nodes = [node for node in desk.graph.nodes.values() if node.kind == "sighted"]
-    return {
-        str(node.attributes["landmark"]): len(node.samples.numpy())
-        for node in nodes
-        if node.samples is not None
-    }
+    return {node.landmark: len(node.rows.numpy()) for node in desk.graph.of_kind(Observations)}
 
 
 def _driven() -> np.ndarray:
@@ -37,20 +32,21 @@ def _driven() -> np.ndarray:
     return np.array(poses)
 
 
-def _sightings(poses: np.ndarray, wrong: tuple[int, ...] = ()) -> list[Node]:
-    node: Node | None = None
+def _sightings(poses: np.ndarray, wrong: tuple[int, ...] = ()) -> list[Observations]:
+    node: Observations | None = None
     for number, pose in enumerate(poses):
         off = (np.array([-40.0, 30.0]) if number in wrong else TOWER_M) - pose[:2]
         bearing = math.atan2(off[1], off[0]) - pose[2]
         seen = percept("tower", bearing, math.hypot(*off), bearing_sd_rad=0.01, range_sd_m=0.1)
-        node = recorded(node, Outlook(0, float(number), STILL, 0.0), seen)
+        node = extended(node, Viewpoint(0, float(number), STILL, 0.0), seen)
     return [node] if node else []
 
 
 def test_a_landmark_is_remembered_once_from_each_place_of_the_path() -> None:
     desk = Desk("w1")
     desk.drive(range(3), percept("a"))
-    places = len(desk.graph.nodes["path:0"].samples.numpy())  # type: ignore[union-attr]
+    (segment,) = desk.graph.of_kind(PathSegment)
+    places = len(segment.rows.numpy())
     assert _seen(desk) == {"a": places}
     desk.see(3, percept("a"), percept("b"), rows=((0.0, 0.0, 0.2, 0.0, 0.0),))
     desk.work()
@@ -59,13 +55,13 @@ def test_a_landmark_is_remembered_once_from_each_place_of_the_path() -> None:
 
 def test_what_is_seen_some_way_from_a_place_is_told_as_seen_from_the_place() -> None:
     ahead = percept("tower", 0.0, 10.0)
-    node = recorded(None, Outlook(0, 1.0, np.array([2.0, 1.0, math.pi / 2]), 0.0), ahead)
+    node = extended(None, Viewpoint(0, 1.0, np.array([2.0, 1.0, math.pi / 2]), 0.0), ahead)
     seen = Sightings.of([node], np.array([1.0]))
     assert seen.where_m[0] == pytest.approx((2.0, 11.0))
 
 
 def test_an_eye_that_sees_too_far_is_known_to() -> None:
-    node = recorded(None, Outlook(0, 1.0, STILL, 0.25), percept("tower", 0.0, 10.0))
+    node = extended(None, Viewpoint(0, 1.0, STILL, 0.25), percept("tower", 0.0, 10.0))
     assert Sightings.of([node], np.array([1.0])).where_m[0] == pytest.approx((8.0, 0.0))
 
 

@@ -2,175 +2,275 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import numpy as np
 import pytest
 
 from cogmap.bus.codec import encode
-from schemas.array import Array
+from cogmap.graph.graph import Graph
+from cogmap.runtime.codelet import Answer, Codelet, ConfiguredCodelet
+from cogmap.runtime.module import Module
+from schemas.array import Array, Matrix
 from schemas.base import Message
-from schemas.cognition import Coalitions, Task
-from schemas.graph import Cells, Link, Node, Proposal
+from schemas.codelets import Assignment, Leases, Proposal, Task
+from schemas.graph import Cells, Delta, Link, Phase
+from schemas.nodes import (
+    CORRECTION_ID,
+    AnyNode,
+    Correction,
+    LoopClosure,
+    Node,
+    Object,
+    PathSegment,
+    PlaceColumn,
+    Self,
+)
 from schemas.sensing import PlaceMatch
-from services.codelets.attention import NOVEL_SIGHTINGS, attend, coalition_activation
-from services.codelets.mapping.object_place import ROAD_REACH_M, place_object, place_road
-from services.codelets.module import BUILDERS, Config, build
-from tests.support.scenes import node, percept, task
+from services.codelets.attention.coalitions import coalition
+from services.codelets.attention.novelty import NOVEL_SIGHTINGS
+from services.codelets.config import Config
+from services.codelets.mapping.road_place import ROAD_REACH_M
+from services.codelets.module import build
+from services.codelets.table import CODELETS
+from tests.support.scenes import (
+    agent,
+    configured,
+    graph_of,
+    landmark,
+    percept,
+    run,
+    task,
+    thing,
+)
 
 CONFIG = Config(samples=60, kept_samples=30, landmark_samples=40)
+VERSION = 5
 
 
-def _self(x_m: float = 0.0, y_m: float = 0.0, heading_rad: float = 0.0, sd: float = 0.0) -> Node:
+def _self(x_m: float = 0.0, y_m: float = 0.0, heading_rad: float = 0.0, sd: float = 0.0) -> Self:
     samples = np.random.default_rng(2).normal((x_m, y_m, heading_rad), sd, (50, 3))
-    return node("self", samples, "self", x_m=x_m, y_m=y_m, heading_rad=heading_rad, stamp_ns=0)
+    return agent(samples, x_m=x_m, y_m=y_m, heading_rad=heading_rad, stamp_ns=0)
 
 
-def _object(label: str = "house", sightings: int = 1) -> Node:
+def _object(label: str = "house", sightings: int = 1) -> Object:
     samples = np.random.default_rng(3).normal((10.0, 0.0), 0.5, (40, 2))
-    return node(f"object:{label}", samples, label=label, sightings=sightings)
+    return landmark(label, samples, sightings=sightings)
 
 
-def _path() -> Node:
+def _path() -> PathSegment:
     rows = np.zeros((20, 9))
     rows[:, 0] = rows[:, 1] = rows[:, 4] = np.arange(20)
-    return node("path:0", rows, "path", number=0)
+    return PathSegment(id="path:0", number=0, rows=Matrix.of(rows))
 
 
-def _closure() -> Node:
-    facts = {
-        "ahead_m": 0.0,
-        "left_m": 0.0,
-        "range_m": 0.0,
-        "bearing_rad": 0.0,
-        "sd_m": 2.0,
-        "sd_rad": 0.2,
-    }
-    return node(
-        "closure:1:view-0", None, "closure", from_ns=0, to_ns=15 * 10**9, by="view-0", **facts
+def _closure() -> LoopClosure:
+    return LoopClosure(
+        id="closure:1:view-0",
+        from_ns=0,
+        to_ns=15 * 10**9,
+        cue="view-0",
+        ahead_m=0.0,
+        left_m=0.0,
+        range_m=0.0,
+        bearing_rad=0.0,
+        sd_m=2.0,
+        sd_rad=0.2,
     )
 
 
-def _correction() -> Node:
+def _correction() -> Correction:
     rows = np.zeros((20, 7))
     rows[:, 0] = rows[:, 1] = rows[:, 4] = np.arange(20)
     rows[:, 5] = np.arange(20) * 0.1
-    return node("correction", rows, "correction")
+    return Correction(id=CORRECTION_ID, rows=Matrix.of(rows))
+
+
+def _graph() -> Graph:
+    """What every codelet finds something to do with."""
+    return graph_of(_self(sd=0.1), _object(), _path(), _closure(), _correction())
 
 
 def _every_task() -> list[Task]:
     motions = Array.of(np.array([[2.0, 0.0, 1.0, 0.2, 0.05]]))
     road_m = Array.of(np.array([[2.0, 0.0], [3.0, 1.0]], np.float32))
+    house = [percept("house", 0.0, 8.0)]
     return [
-        task(
-            "localization",
-            _self(),
-            _object(),
-            motions=motions,
-            percepts=[percept("house", 0.0, 8.0)],
-        ),
-        task("landmark", _self(), _object(), percepts=[percept("house")]),
-        task("object_place", _self(sd=0.1), percepts=[percept("house")]),
-        task("road_place", _self(), road_m=road_m),
-        task("path", _self(), _path()),
-        task("revisit", _path(), matches=[PlaceMatch(frame=0, view_ns=0, score=0.9)]),
-        task("map_shift", _self(), _path(), _object(), _correction()),
-        task("map_correction", _path(), _closure()),
-        task("attention", _self(), _object()),
+        task("apply_correction"),
+        task("localization", motions=motions, percepts=house),
+        task("object_place", percepts=[percept("tower")]),
+        task("landmark", percepts=house),
+        task("road_place", road_m=road_m),
+        task("path", percepts=house),
+        task("loop_detection", matches=[PlaceMatch(frame=0, view_ns=0, score=0.9)]),
+        task("map_correction"),
+        task("whereabouts", percepts=house),
+        task("novelty", percepts=house),
     ]
 
 
-def _said(asked: Task, instance: str = "w") -> list[Message]:
-    return build(CONFIG, instance).feed(asked)
+def _worker(instance: str = "w") -> Module:
+    worker = build(instance, configured(CONFIG))
+    assert worker.graph is not None
+    worker.graph.load(_graph().snapshot())
+    return worker
 
 
-def _proposal(said: list[Message]) -> Proposal:
-    assert isinstance(said[-1], Proposal)
-    return said[-1]
+def _leases(asked: Task, worker: str = "w") -> Leases:
+    lease = Assignment(task_id=asked.task_id, worker=worker, attempt=0, version=asked.version)
+    return Leases(assignments=[lease])
+
+
+def _answers(worker: Module, asked: Task) -> list[Message]:
+    return worker.feed(asked) + worker.feed(_leases(asked, worker.instance))
+
+
+def _proposal(published: list[Message]) -> Proposal:
+    (proposal,) = published
+    assert isinstance(proposal, Proposal)
+    return proposal
+
+
+def _bytes(proposal: Proposal) -> bytes:
+    return encode(msgspec.structs.replace(proposal, seq=0, source=""))
 
 
 def test_every_codelet_is_tried_here() -> None:
-    assert [asked.codelet for asked in _every_task()] == [*BUILDERS, "map_correction", "attention"]
+    assert [asked.codelet for asked in _every_task()] == [codelet.name for codelet in CODELETS]
 
 
 @pytest.mark.parametrize("asked", _every_task(), ids=lambda asked: asked.codelet)
 def test_the_same_task_gives_the_same_bytes_at_any_time_on_any_worker(asked: Task) -> None:
-    old = build(CONFIG, "w")
+    old = _worker()
     for other in _every_task():
-        old.feed(other)
-    again = old.feed(asked)
-    asked.worker = "another"
-    fresh = _said(asked, "another")
-    for message in (*again, *fresh):
-        message.seq = 0
-        message.source = ""
-        if isinstance(message, Proposal):
-            message.worker = ""
-    assert [encode(message) for message in again] == [encode(message) for message in fresh]
-    assert _proposal(again).failure == ""
+        _answers(old, other)
+    again = _proposal(_answers(old, asked))
+    fresh = _proposal(_answers(_worker("another"), asked))
+    assert _bytes(again) == _bytes(fresh)
+    assert again.failure == ""
 
 
 @pytest.mark.parametrize("asked", _every_task(), ids=lambda asked: asked.codelet)
-def test_an_answer_names_its_task_its_worker_and_the_version_that_it_is_based_on(
-    asked: Task,
-) -> None:
-    asked.base_version = 17
-    proposal = _proposal(_said(asked))
-    assert (proposal.task_id, proposal.worker, proposal.base_version) == (asked.task_id, "w", 17)
+def test_what_a_codelet_proposes_it_may_write(asked: Task) -> None:
+    (codelet,) = [codelet for codelet in CODELETS if codelet.name == asked.codelet]
+    for operation in run(asked, _graph(), CONFIG).operations:
+        if isinstance(operation, AnyNode):
+            assert type(operation) in codelet.writes
+        elif isinstance(operation, Link):
+            assert operation.kind in codelet.writes
+        elif isinstance(operation, Cells):
+            assert operation.column in codelet.writes
 
 
-def test_a_task_for_another_worker_is_ignored() -> None:
-    assert [_said(asked, "v") for asked in _every_task()] == [[]] * len(_every_task())
+def test_a_proposal_names_its_task_and_the_version_that_was_read() -> None:
+    worker = _worker()
+    asked = task("road_place")
+    proposal = _proposal(_answers(worker, asked))
+    assert (proposal.task_id, proposal.source, proposal.base_version) == (asked.task_id, "w", 1)
 
 
-def test_a_codelet_that_there_is_not_is_said_to_be_missing_with_those_there_are() -> None:
-    proposal = _proposal(_said(task("dreaming", _self())))
-    assert proposal.failure.startswith("no codelet dreaming: there are localization, landmark")
+def test_a_task_that_another_worker_holds_is_not_done() -> None:
+    asked = task("road_place")
+    worker = _worker()
+    assert worker.feed(asked) + worker.feed(_leases(asked, "another")) == []
+
+
+def test_a_task_and_its_lease_may_come_in_any_order() -> None:
+    asked = task("road_place")
+    worker = _worker()
+    assert worker.feed(_leases(asked)) == []
+    assert _proposal(worker.feed(asked)).task_id == asked.task_id
+
+
+def _delta(version: int) -> Delta:
+    operations = [thing(f"thing:{version}")]
+    return Delta(version=version, cycle=1, phase=Phase.OBJECTS, operations=operations)
+
+
+def test_a_task_waits_until_the_graph_has_reached_its_version() -> None:
+    worker = _worker()
+    asked = task("road_place", version=3)
+    assert _answers(worker, asked) == []
+    assert worker.feed(_delta(2)) == []
+    assert _proposal(worker.feed(_delta(3))).base_version == 3
+
+
+def test_a_lease_of_another_version_of_the_task_waits_for_that_task() -> None:
+    worker = _worker()
+    asked = task("road_place")
+    later = msgspec.structs.replace(asked, version=2)
+    assert worker.feed(asked) + worker.feed(_leases(later)) == []
+    assert worker.feed(later) == []
+    assert _proposal(worker.feed(_delta(2))).base_version == 2
+
+
+def test_a_codelet_that_is_not_configured_is_a_failure_that_names_those_there_are() -> None:
+    proposal = _proposal(_answers(_worker(), task("dreaming")))
+    assert "no codelet dreaming: there are apply_correction, localization" in proposal.failure
     assert proposal.operations == []
 
 
-@pytest.mark.parametrize("codelet", [*BUILDERS])
-def test_a_task_that_lacks_what_its_codelet_reads_is_answered_with_a_failure(codelet: str) -> None:
-    proposal = _proposal(_said(task(codelet)))
+def _raise(asked: Task, graph: Graph, config: Config) -> Answer:
+    raise TypeError("a stranger's mistake")
+
+
+def test_whatever_a_codelet_raises_is_a_failure_of_its_task() -> None:
+    broken = Codelet(
+        name="broken",
+        phase=Phase.OBJECTS,
+        due=lambda context, graph, config: [],
+        run=_raise,
+        reads=frozenset(),
+        writes=frozenset(),
+        config=Config,
+        section="codelets",
+    )
+    worker = build("w", [ConfiguredCodelet(broken, CONFIG)])
+    asked = task("broken", version=0)
+    proposal = _proposal(_answers(worker, asked))
+    assert proposal.failure == "broken: TypeError: a stranger's mistake"
+
+
+@pytest.mark.parametrize(
+    "codelet",
+    ["apply_correction", "localization", "object_place", "landmark", "road_place", "path"],
+)
+def test_a_task_on_a_graph_that_lacks_what_it_reads_is_a_failure(codelet: str) -> None:
+    worker = build("w", configured(CONFIG))
+    asked = task(codelet, version=0, percepts=[percept("house")])
+    proposal = _proposal(_answers(worker, asked))
     assert proposal.failure.startswith(f"{codelet}: ")
     assert proposal.operations == []
 
 
-def test_an_attention_task_without_content_brings_coalitions_without_any() -> None:
-    said = _said(task("attention"))
-    assert [type(message) for message in said] == [Coalitions, Proposal]
-    assert isinstance(said[0], Coalitions)
-    assert said[0].coalitions == []
-
-
 def test_what_is_recognised_for_the_first_time_gets_a_node_with_samples_where_it_is_seen() -> None:
     seen = percept("house", math.pi / 2, 10.0, range_sd_m=0.5, bearing_sd_rad=0.01, width_m=7.0)
-    found, link = place_object(
-        task("object_place", _self(3.0, 4.0, math.pi / 2), percepts=[seen]), CONFIG
-    )
-    assert isinstance(found, Node)
-    assert (found.id, found.kind, found.attributes["label"]) == ("object:house", "object", "house")
-    assert (found.attributes["x_m"], found.attributes["y_m"]) == pytest.approx((-7.0, 4.0), abs=0.3)
-    assert found.attributes["x_sd_m"] == pytest.approx(0.5, rel=0.35)
-    assert found.attributes["width_m"] == 7.0
-    assert found.samples is not None
-    assert found.samples.shape == (CONFIG.landmark_samples, 2)
-    assert link == Link(source="object:house", target="place:-7:4")
+    graph = graph_of(_self(3.0, 4.0, math.pi / 2))
+    found, link = run(task("object_place", percepts=[seen]), graph, CONFIG).operations
+    assert isinstance(found, Object)
+    assert (found.id, found.label) == ("object:house", "house")
+    assert (found.x_m, found.y_m) == pytest.approx((-7.0, 4.0), abs=0.3)
+    assert found.x_sd_m == pytest.approx(0.5, rel=0.35)
+    assert found.width_m == 7.0
+    assert found.positions_m().shape == (CONFIG.landmark_samples, 2)
+    assert link == Link(source="object:house", target="place:map:0:-7:4")
 
 
 def test_an_agent_unsure_of_its_heading_is_unsure_across_of_where_a_far_object_stands() -> None:
     samples = np.zeros((500, 3))
     samples[:, 2] = np.random.default_rng(1).normal(0.0, 0.1, 500)
     seen = percept("house", 0.0, 30.0, range_sd_m=0.2, bearing_sd_rad=0.001)
-    asked = task("object_place", node("self", samples, "self"), percepts=[seen])
-    found = place_object(asked, Config(landmark_samples=2000))[0]
-    assert isinstance(found, Node)
-    assert found.attributes["y_sd_m"] == pytest.approx(3.0, rel=0.1)
-    assert float(found.attributes["x_sd_m"]) < 0.5
+    asked = task("object_place", percepts=[seen])
+    found = run(asked, graph_of(agent(samples)), Config(landmark_samples=2000)).operations[0]
+    assert isinstance(found, Object)
+    assert found.y_sd_m == pytest.approx(3.0, rel=0.1)
+    assert found.x_sd_m < 0.5
 
 
-def _road(asked: Task) -> dict[tuple[int, int], float]:
-    _, road = place_road(asked, CONFIG)
+def _road(node: Self, road_m: Array, cell_m: float = 1.0) -> dict[tuple[int, int], float]:
+    graph = graph_of(node, cell_m=cell_m)
+    _, road = run(task("road_place", road_m=road_m), graph, CONFIG).operations
     assert isinstance(road, Cells)
-    assert road.column == "road"
+    assert road.column is PlaceColumn.ROAD
     cells = road.cells.numpy().tolist()
     values = road.values.numpy().tolist()
     return {(i, j): value for (i, j), value in zip(cells, values, strict=True)}
@@ -178,7 +278,7 @@ def _road(asked: Task) -> dict[tuple[int, int], float]:
 
 def test_road_is_marked_on_the_place_nodes_where_it_lies_as_seen_from_where_the_agent_is() -> None:
     road_m = Array.of(np.array([[4.0, 0.0]] * 3 + [[4.0, 2.0]], np.float32))
-    assert _road(task("road_place", _self(10.0, 20.0, math.pi / 2), road_m=road_m)) == {
+    assert _road(_self(10.0, 20.0, math.pi / 2), road_m) == {
         (10, 24): 1.0,
         (8, 24): pytest.approx(1 / 3),
     }
@@ -186,71 +286,87 @@ def test_road_is_marked_on_the_place_nodes_where_it_lies_as_seen_from_where_the_
 
 def test_a_coarser_grid_gets_the_same_road_on_fewer_nodes() -> None:
     road_m = Array.of(np.array([[4.0, 0.0], [4.6, 0.4], [8.0, 0.0]], np.float32))
-    assert sorted(_road(task("road_place", _self(), road_m=road_m, cell_m=4.0))) == [(1, 0), (2, 0)]
+    assert sorted(_road(_self(), road_m, cell_m=4.0)) == [(1, 0), (2, 0)]
 
 
 def test_road_seen_from_afar_is_not_believed() -> None:
     road_m = Array.of(np.array([[2.0, 0.0], [ROAD_REACH_M + 1, 0.0]], np.float32))
-    assert list(_road(task("road_place", _self(), road_m=road_m))) == [(2, 0)]
+    assert list(_road(_self(), road_m)) == [(2, 0)]
 
 
 def test_the_place_node_that_the_agent_stands_on_is_active_even_where_no_road_is_seen() -> None:
-    (here,) = place_road(task("road_place", _self(-3.4, 2.6)), CONFIG)
+    (here,) = run(task("road_place"), graph_of(_self(-3.4, 2.6)), CONFIG).operations
     assert isinstance(here, Cells)
-    assert (here.column, here.cells.numpy().tolist(), here.values.numpy().tolist()) == (
-        "activation",
-        [[-3, 3]],
-        [1.0],
-    )
+    assert here.column is PlaceColumn.ACTIVATION
+    assert (here.cells.numpy().tolist(), here.values.numpy().tolist()) == ([[-3, 3]], [1.0])
 
 
-def _content(*activations: float, salience: float = 0.0) -> list[Node]:
+def _content(*activations: float, salience: float = 0.0) -> list[AnyNode]:
     return [
-        Node(id=f"{index}", kind="object", activation=activation, attributes={"salience": salience})
+        landmark(f"house {index}", activation=activation, salience=salience)
         for index, activation in enumerate(activations)
     ]
 
 
+def _activation(content: list[AnyNode], base_level: float = 1.0) -> float:
+    return coalition("test", content, graph_of(), base_level).activation
+
+
 def test_a_coalitions_activation_is_lidas_formula() -> None:
-    assert coalition_activation(_content(0.4, 0.8), 1.0) == pytest.approx((0.4 + 0.8) / 4)
-    assert coalition_activation(_content(0.4, 0.8), 0.5) == pytest.approx(0.5 * (0.4 + 0.8) / 4)
-    assert coalition_activation(_content(0.4, 0.8, salience=-0.6), 1.0) == pytest.approx(
-        (0.4 + 0.8 + 1.2) / 4
-    )
+    assert _activation(_content(0.4, 0.8)) == pytest.approx((0.4 + 0.8) / 4)
+    assert _activation(_content(0.4, 0.8), 0.5) == pytest.approx(0.5 * (0.4 + 0.8) / 4)
+    salient = _content(0.4, 0.8, salience=-0.6)
+    assert _activation(salient) == pytest.approx((0.4 + 0.8 + 1.2) / 4)
 
 
 def test_a_nodes_total_activation_is_base_level_and_current_together_at_most_one() -> None:
-    content = [Node(id="a", kind="object", activation=0.7, base_level=0.6)]
-    assert coalition_activation(content, 1.0) == 0.5
+    node = Node(id="a", kind="thing", activation=0.7, base_level=0.6)
+    assert _activation([node]) == 0.5
 
 
 def test_neutral_content_tops_out_at_exactly_a_half_and_only_salience_goes_beyond() -> None:
-    assert coalition_activation(_content(1.0, 1.0, 1.0), 1.0) == 0.5
-    assert coalition_activation(_content(1.0, 1.0, 1.0, salience=0.1), 1.0) > 0.5
+    assert _activation(_content(1.0, 1.0, 1.0)) == 0.5
+    assert _activation(_content(1.0, 1.0, 1.0, salience=0.1)) > 0.5
 
 
-def _coalitions(*nodes: Node) -> dict[str, list[Node]]:
-    found = attend(task("attention", *nodes), CONFIG).coalitions
-    return {coalition.codelet: coalition.content for coalition in found}
+def _found(codelet: str, *nodes: AnyNode) -> list[AnyNode]:
+    """The nodes of what an attention codelet finds while all objects are in view."""
+    seen = [percept(node.label) for node in nodes if isinstance(node, Object)]
+    answer = run(task(codelet, percepts=seen), graph_of(*nodes), CONFIG)
+    return [node for each in answer.coalitions for node in each.nodes]
 
 
 def test_attention_brings_where_the_agent_is_among_what_it_sees_and_what_is_new_to_it() -> None:
-    found = _coalitions(_self(), _object("old", NOVEL_SIGHTINGS + 1), _object("new", 1))
-    assert [item.id for item in found["whereabouts"]] == ["self", "object:old", "object:new"]
-    assert [item.id for item in found["novelty"]] == ["self", "object:new"]
+    nodes = (_self(), _object("old", NOVEL_SIGHTINGS + 1), _object("new", 1))
+    assert [item.id for item in _found("whereabouts", *nodes)] == [
+        "self",
+        "object:new",
+        "object:old",
+    ]
+    assert [item.id for item in _found("novelty", *nodes)] == ["self", "object:new"]
 
 
 def test_without_anything_new_there_is_no_coalition_about_novelty() -> None:
-    assert list(_coalitions(_self(), _object("old", 99))) == ["whereabouts"]
+    assert _found("novelty", _self(), _object("old", 99)) == []
 
 
 def test_an_object_is_the_more_salient_the_less_it_has_been_seen() -> None:
-    content = [_coalitions(_object("new", sightings))["novelty"][0] for sightings in (1, 3, 5)]
-    salience = [float(item.attributes["salience"]) for item in content]
+    salience = []
+    for sightings in (1, 3, 5):
+        found = _found("novelty", _self(), _object("new", sightings))[1]
+        assert isinstance(found, Object)
+        salience.append(found.salience)
     assert salience == sorted(salience, reverse=True)
     assert salience[-1] > 0
 
 
-def test_coalitions_leave_samples_behind() -> None:
-    found = _coalitions(_self(), _object())
-    assert all(item.samples is None for content in found.values() for item in content)
+def test_coalitions_leave_samples_behind_and_keep_links_and_maps() -> None:
+    at = Link(source="self", target="place:map:0:0:0")
+    graph = graph_of(_self(sd=0.1), _object(), at)
+    (found,) = run(task("whereabouts", percepts=[percept("house")]), graph, CONFIG).coalitions
+    own, house = found.nodes
+    assert isinstance(own, Self)
+    assert isinstance(house, Object)
+    assert own.samples.shape == (1, 3)
+    assert house.offsets_m is None
+    assert (found.links, found.maps) == ([at], ["map:0"])

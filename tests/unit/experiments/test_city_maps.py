@@ -163,6 +163,6 @@ def test_without_noise_and_confusions_the_map_is_right_and_the_same_each_time() 
 
 
 def test_loops_are_closed_only_where_that_is_asked_for() -> None:
-    assert settings("none", 5.0)["workspace"]["revisit_s"] > 1e6
-    assert "revisit_s" not in settings("positions", 5.0)["workspace"]
+    assert settings("none", 5.0)["codelets"]["revisit_s"] > 1e6
+    assert "revisit_s" not in settings("positions", 5.0)["codelets"]
     assert settings("heading", 5.0)["codelets"]["correct"] == "heading"

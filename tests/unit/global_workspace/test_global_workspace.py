@@ -37,7 +37,7 @@ class Arena:
         """Coalitions of attention codelets, by name, at a time in ticks."""
         self._cycle += 1
         coalitions = [
-            Coalition(codelet=name, activation=activation, content=[])
+            Coalition(codelet=name, activation=activation, nodes=[])
             for name, activation in activations.items()
         ]
         said = self.module.feed(
@@ -73,7 +73,7 @@ def test_the_first_coalition_ever_is_broadcast() -> None:
         Coalitions(
             stamp_ns=TICK_NS,
             cycle=1,
-            coalitions=[Coalition(codelet="a", activation=0.2, content=[])],
+            coalitions=[Coalition(codelet="a", activation=0.2, nodes=[])],
         )
     )
     assert [type(item) for item in said] == [Broadcast, Competition]

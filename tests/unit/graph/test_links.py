@@ -1,53 +1,88 @@
-"""Links in bulk, in the graph."""
+"""Links of the graph, one by one and in bulk, by source and by target."""
 
 from __future__ import annotations
 
 from cogmap.bus.codec import encode
 from cogmap.graph.graph import Graph
-from schemas.graph import DropLink, DropNode, Link, Links, Node
+from schemas.graph import DropLink, DropNode, Link, Links, Operation
+from schemas.nodes import LinkKind
+from tests.support.scenes import thing
+
+NEAR = "near"
 
 
-def linked(*operations: Link | Links | DropLink | Node | DropNode) -> list[Link]:
-    """Every link of a graph in which `operations` were carried out."""
+def _graph(*operations: Operation) -> Graph:
     graph = Graph()
     graph.change(list(operations))
-    return graph.snapshot().links
+    return graph
+
+
+def _link(source: str, target: str, weight: float = 1.0, kind: str = NEAR) -> Link:
+    return Link(source=source, target=target, kind=kind, weight=weight)
 
 
 def test_links_in_bulk_are_the_links_that_they_list() -> None:
-    assert linked(Links(kind="sees", weights={"b": {"c": 0.5}, "a": {"c": 0.25, "b": 1.0}})) == [
-        Link(source="a", kind="sees", target="b", weight=1.0),
-        Link(source="a", kind="sees", target="c", weight=0.25),
-        Link(source="b", kind="sees", target="c", weight=0.5),
+    links = Links(kind=NEAR, weights={"b": {"c": 0.5}, "a": {"c": 0.25, "b": 1.0}})
+    graph = _graph(links)
+    assert graph.links.targets("a", NEAR) == {"c": 0.25, "b": 1.0}
+    assert graph.links.sources("c", NEAR) == ("b", "a")
+    assert graph.snapshot().links == [
+        Links(kind=NEAR, weights={"a": {"b": 1.0, "c": 0.25}, "b": {"c": 0.5}})
     ]
 
 
-def test_links_in_bulk_leave_other_links_of_their_source_and_can_be_dropped_one_by_one() -> None:
-    here = Link(source="a", target="here", weight=0.5)
-
-    assert linked(
-        here, Links(weights={"a": {"there": 1.0}}), DropLink(source="a", target="there")
-    ) == [here]
-
-
-def test_links_in_bulk_applied_twice_are_links_applied_once() -> None:
-    links = Links(weights={"a": {"b": 0.5}})
-
-    assert linked(links, links) == linked(links)
+def test_links_in_bulk_leave_other_links_of_their_source() -> None:
+    graph = _graph(
+        _link("a", "here", 0.5),
+        Links(kind=NEAR, weights={"a": {"there": 1.0}}),
+        DropLink(source="a", target="there", kind=NEAR),
+    )
+    assert graph.links.targets("a", NEAR) == {"here": 0.5}
+    assert graph.links.sources("there", NEAR) == ()
 
 
-def test_a_forgotten_node_takes_bulk_links_to_it_and_from_it_along() -> None:
-    nodes = [Node(id=name, kind="object") for name in ("a", "b")]
-    links = Links(weights={"a": {"b": 0.5, "c": 0.25}, "b": {"a": 0.5}, "d": {"b": 1.0}})
+def test_links_applied_twice_are_links_applied_once() -> None:
+    links = Links(kind=NEAR, weights={"a": {"b": 0.5}})
+    at = _link("a", "place:map:0:1:2", kind=LinkKind.AT)
+    assert _graph(links, at, links, at).digest() == _graph(links, at).digest()
 
-    assert linked(*nodes, links, DropNode(id="b")) == [Link(source="a", target="c", weight=0.25)]
+
+def test_a_node_has_one_link_of_an_exclusive_kind() -> None:
+    graph = _graph(
+        _link("a", "here", kind=LinkKind.AT),
+        _link("b", "here", kind=LinkKind.AT),
+        _link("a", "there", 0.5, kind=LinkKind.AT),
+    )
+    assert graph.links.targets("a", LinkKind.AT) == {"there": 0.5}
+    assert graph.links.target("a", LinkKind.AT) == "there"
+    assert graph.links.sources("here", LinkKind.AT) == ("b",)
+    assert graph.links.sources("there", LinkKind.AT) == ("a",)
+
+
+def test_dropping_a_link_that_is_not_there_changes_nothing() -> None:
+    graph = _graph(_link("a", "b"), _link("a", "here", kind=LinkKind.AT))
+    before = graph.digest()
+    graph.change(
+        [
+            DropLink(source="a", target="c", kind=NEAR),
+            DropLink(source="a", target="there", kind=LinkKind.AT),
+            DropLink(source="x", target="y", kind="other"),
+        ]
+    )
+    assert graph.digest() == before
+
+
+def test_a_forgotten_node_takes_links_to_it_and_from_it_along() -> None:
+    weights = {"a": {"b": 0.5, "c": 0.25}, "b": {"a": 0.5}, "d": {"b": 1.0}}
+    links = Links(kind=NEAR, weights=weights)
+    at = [_link("b", "here", kind=LinkKind.AT), _link("e", "b", kind=LinkKind.INSTANCE)]
+    graph = _graph(thing("a"), thing("b"), links, *at, DropNode(id="b"))
+    assert graph.snapshot().links == [Links(kind=NEAR, weights={"a": {"c": 0.25}})]
+    assert graph.links.sources("here", LinkKind.AT) == ()
 
 
 def test_a_message_in_the_graph_is_not_changed_by_the_next_one() -> None:
-    graph = Graph()
-    first = Links(weights={"a": {"b": 0.5}})
+    first = Links(kind=NEAR, weights={"a": {"b": 0.5}})
     before = encode(first)
-
-    graph.change([first, Links(weights={"a": {"b": 1.0, "c": 1.0}}), Link(source="a", target="d")])
-
+    _graph(first, Links(kind=NEAR, weights={"a": {"b": 1.0, "c": 1.0}}), _link("a", "d"))
     assert encode(first) == before

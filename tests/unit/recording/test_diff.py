@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -12,9 +13,10 @@ from cogmap.bus.codec import encode
 from cogmap.recording.diff import Diff, diff
 from cogmap.recording.replaying.compare import describe, difference
 from schemas import topics
-from schemas.array import Array
+from schemas.array import Array, Matrix
 from schemas.base import Message
-from schemas.graph import Delta, DropNode, Link, Node
+from schemas.graph import Delta, DropNode, Link, Phase
+from schemas.nodes import Node
 from schemas.sensing import Odometry, RangeScan
 from tests.support.logs import odometry, scan, write_log
 
@@ -58,8 +60,8 @@ def test_logs_of_the_same_messages_are_the_same_however_they_travelled(tmp_path:
 
 def test_a_changed_value_is_found_and_named(tmp_path: Path) -> None:
     def change(other: list[Message]) -> None:
-        other[8].speed_m_s = 2.5
-        other[12].speed_m_s = 9.0
+        other[8] = msgspec.structs.replace(other[8], speed_m_s=2.5)
+        other[12] = msgspec.structs.replace(other[12], speed_m_s=9.0)
 
     found = compared(tmp_path, change)
     assert found.first == (
@@ -72,7 +74,7 @@ def test_a_changed_value_in_an_array_is_named_with_its_index(tmp_path: Path) -> 
     def change(other: list[Message]) -> None:
         values = np.arange(6, dtype=np.float32).reshape(2, 3) + 1
         values[1, 0] = 0.5
-        other[3].range_m = Array.of(values)
+        other[3] = msgspec.structs.replace(other[3], range_m=Array.of(values))
 
     assert compared(tmp_path, change).first == (
         "sensory/scan number 1 of sensory (stamp 0.100 s): "
@@ -96,7 +98,7 @@ def test_only_the_chosen_topics_are_compared(tmp_path: Path) -> None:
 
 
 def _delta(*operations: Node | Link | DropNode) -> Delta:
-    return Delta(version=1, cycle=1, phase="x", tasks=["t"], operations=list(operations))
+    return Delta(version=1, cycle=1, phase=Phase.OBJECTS, tasks=["t"], operations=list(operations))
 
 
 @pytest.mark.parametrize(
@@ -119,14 +121,14 @@ def _delta(*operations: Node | Link | DropNode) -> Delta:
             "operations.0.attributes.x is 1.0 in A, absent in B",
         ),
         (
-            _delta(Node(id="a", kind="k", samples=Array.of(np.zeros((2, 2))))),
-            _delta(Node(id="a", kind="k", samples=Array.of(np.zeros((3, 2))))),
+            _delta(Node(id="a", kind="k", samples=Matrix.of(np.zeros((2, 2))))),
+            _delta(Node(id="a", kind="k", samples=Matrix.of(np.zeros((3, 2))))),
             "the kind of operations.0.samples is <f8 (2, 2) in A, <f8 (3, 2) in B",
         ),
         (
-            _delta(Node(id="a", kind="k", samples=Array.of(np.array([0.0, -0.0])))),
-            _delta(Node(id="a", kind="k", samples=Array.of(np.array([0.0, 0.0])))),
-            "operations.0.samples.1 is -0.0 in A, 0.0 in B (1 of 2 values differ)",
+            _delta(Node(id="a", kind="k", samples=Matrix.of([[0.0, -0.0]]))),
+            _delta(Node(id="a", kind="k", samples=Matrix.of([[0.0, 0.0]]))),
+            "operations.0.samples.0.1 is -0.0 in A, 0.0 in B (1 of 2 values differ)",
         ),
     ],
 )

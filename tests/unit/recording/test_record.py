@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from cogmap.bus.codec import Envelope, encode
@@ -149,7 +150,7 @@ def test_what_is_no_message_is_counted_and_not_written(path: Path) -> None:
 def test_numbers_that_mcap_has_no_room_for_are_kept_in_the_envelope(path: Path) -> None:
     recorded = Recorded(path)
     far = scan(0)
-    far.seq = 2**40 + 3
+    far = msgspec.structs.replace(far, seq=2**40 + 3)
     recorded.publish_bytes(topics.SCAN, encode(far), Envelope("sensory", far.seq, 1, -5, -5))
     recorded.end()
     (record,) = LogReader(path).records()

@@ -7,8 +7,9 @@ import json
 import numpy as np
 import pytest
 
-from schemas.array import Array
-from schemas.graph import Delta, DropNode, Node
+from schemas.array import Array, Matrix
+from schemas.graph import Delta, DropNode, Phase
+from schemas.nodes import Node
 from schemas.render import field, to_jsonable, to_text
 
 DELTA = Delta(
@@ -16,14 +17,14 @@ DELTA = Delta(
     source="workspace",
     version=1,
     cycle=2,
-    phase="codelets",
+    phase=Phase.OBJECTS,
     tasks=[],
     operations=[
         Node(
             id="self",
-            kind="self",
+            kind="thing",
             attributes={"x_m": 1.5},
-            samples=Array.of(np.arange(6.0).reshape(3, 2)),
+            samples=Matrix.of(np.arange(6.0).reshape(3, 2)),
         ),
         DropNode(id="tree"),
     ],
@@ -56,21 +57,22 @@ def test_text_is_yaml_with_a_line_a_field() -> None:
         "source: workspace",
         "version: 1",
         "cycle: 2",
-        "phase: codelets",
+        "phase: objects",
         "tasks: []",
         "operations:",
         "- type: node",
         "  id: self",
-        "  kind: self",
         "  activation: 0.0",
         "  base_level: 0.0",
+        "  cycle: 0",
+        "  kind: thing",
         "  attributes:",
         "    x_m: 1.5",
         "  samples: <f8 3 x 2, 0.0 to 5.0",
         "- type: drop_node",
         "  id: tree",
-        "dropped: 0",
-        "refused: []",
+        "rejected: 0",
+        "reasons: []",
     ]
 
 

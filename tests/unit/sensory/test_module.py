@@ -148,8 +148,7 @@ def test_the_view_keeps_the_frames_image_and_its_calibration_where_nothing_is_to
 
 
 def _resized(frame: StereoFrame, name: str, values: np.ndarray) -> StereoFrame:
-    setattr(frame, name, Array.of(values))
-    return frame
+    return msgspec.structs.replace(frame, **{name: Array.of(values)})
 
 
 @pytest.mark.parametrize(

@@ -1,73 +1,74 @@
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 import pytest
 
 from cogmap.errors import MessageError
-from cogmap.graph.graph import TILE_SIDE, Graph
+from cogmap.graph.graph import Graph
 from schemas.array import Array
+from schemas.codelets import Proposal
 from schemas.graph import (
-    Activations,
+    TILE_SIDE,
     Cells,
+    Decay,
     Delta,
     DropLink,
     DropNode,
     Link,
-    Node,
+    Links,
     Operation,
+    Phase,
     PlaceTile,
-    Proposal,
 )
+from schemas.nodes import Node, PlaceColumn, object_id
 from services.workspace.commit import Ledger
-from tests.support.scenes import Desk, answer, node, percept, task
+from tests.support.scenes import Desk, agent, answer, landmark, percept, task, thing
 
-POSE = {"x_m": 0.0, "y_m": 0.0, "heading_rad": 0.0, "stamp_ns": 1}
+WRITABLE = frozenset({Node, *PlaceColumn})
 
 
-def _cells(
-    column: str = "road", where: object = ((0, 0),), dtype: str = "<i4", number: int = 1
-) -> Cells:
+def _may_write(written: object) -> bool:
+    return written in WRITABLE
+
+
+def _cells(where: object = ((0, 0),), dtype: str = "<i4", number: int = 1, **facts: str) -> Cells:
     return Cells(
-        column=column, cells=Array.of(where, dtype), values=Array.of(np.ones(number, np.float32))
+        column=PlaceColumn.ROAD,
+        cells=Array.of(where, dtype),
+        values=Array.of(np.ones(number, np.float32)),
+        **facts,
     )
-
-
-def _tile() -> PlaceTile:
-    column = Array.of(np.zeros((TILE_SIDE, TILE_SIDE), np.float32))
-    return PlaceTile(
-        x=0, y=0, side=TILE_SIDE, cell_m=1.0, activation=column, road=column, traversable=column
-    )
-
-
-def _activations() -> Activations:
-    one = Array.of(np.ones(1, np.float32))
-    return Activations(ids=["a"], values=one, base_levels=one)
 
 
 def _ledger() -> Ledger:
     """A ledger at version 3: `a` was written by the first commit, `b` by the third."""
-    ledger = Ledger(1.0)
+    ledger = Ledger({"dreaming": _may_write, "drawing": lambda written: False})
     for name in ("a", "c", "b"):
-        ledger.commit(0, 1, "objects", [node(name)])
+        ledger.commit(0, 1, Phase.OBJECTS, [thing(name)])
     return ledger
 
 
 def _proposal(*operations: Operation, base_version: int = 3, failure: str = "") -> Proposal:
-    return answer(task("object_place", base_version=base_version), operations, failure=failure)
+    return answer(task("dreaming", version=base_version), operations, failure=failure)
 
 
 SENSELESS: dict[str, Operation] = {
-    "codelets do not write PlaceTile": _tile(),
-    "codelets do not write Activations": _activations(),
-    "place nodes are written as cells": node("place:1:2"),
-    "with samples of shape (4,)": node("a", np.zeros(4)),
-    "with samples of shape (4, 5)": node("a", np.zeros((4, 5))),
-    "with samples of shape (0, 2)": node("a", np.zeros((0, 2))),
+    "PlaceTile is the workspace's own to write": PlaceTile(x=0, y=0, columns={}),
+    "Decay is the workspace's own to write": Decay(),
+    "place nodes are written as cells": thing("place:map:0:1:2"),
+    "may not write nodes of kind object": landmark("a"),
+    "may not write links of kind at": Link(source="a", target="b"),
+    "may not write links of kind instance": Links(kind="instance", weights={"a": {"b": 1.0}}),
+    "may not write links of kind observes": DropLink(source="a", target="b", kind="observes"),
+    "a is of kind object": Node(id=object_id("a"), kind="thing"),
+    "a generic node of the known kind object": Node(id="x", kind="object"),
+    "there is no map map:7": _cells(map="map:7"),
     "cells of shape (1, 3)": _cells(where=((0, 0, 0),)),
     "cells of shape (1, 2) with (2,) values": _cells(number=2),
     "cells of shape (2,)": _cells(where=(0, 0)),
     "cells of shape (1, 1, 2) with (1, 1) values": Cells(
-        column="road",
+        column=PlaceColumn.ROAD,
         cells=Array.of([[[0, 0]]], "<i4"),
         values=Array.of(np.ones((1, 1), np.float32)),
     ),
@@ -77,11 +78,8 @@ SENSELESS: dict[str, Operation] = {
     "cells in 1025 tiles": _cells(
         where=[(TILE_SIDE * tile, 0) for tile in range(1025)], number=1025
     ),
-    "place nodes have no column 'colour'": _cells(column="colour"),
-    "the self node is never forgotten": DropNode(id="self"),
-    "self without stamp_ns": node("self", np.zeros((4, 3)), x_m=0.0, y_m=0.0, heading_rad=0.0),
-    "self without x_m": node("self", np.zeros((4, 3)), **{**POSE, "x_m": "here"}),
-    "self without samples of its pose": node("self", np.zeros((4, 2)), **POSE),
+    "self is never forgotten": DropNode(id="self"),
+    "may not forget nodes of kind object": DropNode(id=object_id("a")),
 }
 
 
@@ -90,16 +88,17 @@ def test_a_senseless_proposal_is_refused_with_a_reason_and_the_next_delta_counts
     reason: str,
 ) -> None:
     ledger = _ledger()
-    proposal = _proposal(node("new"), SENSELESS[reason])
+    ledger.commit(0, 1, Phase.OBJECTS, [agent(), landmark("a")])
+    proposal = _proposal(thing("new"), SENSELESS[reason], base_version=4)
     with pytest.raises(MessageError) as refusal:
         ledger.check(proposal)
     assert reason in str(refusal.value)
     before = ledger.graph.digest()
-    assert ledger.judge([proposal]) == ([], [])
+    assert ledger.validate([proposal]) == []
     assert ledger.graph.digest() == before
-    told, later = (ledger.commit(0, 2, "decay", []) for _ in range(2))
-    assert (told.dropped, later.dropped, later.refused) == (1, 0, [])
-    assert [sentence for sentence in told.refused if reason in sentence]
+    told, later = (ledger.commit(0, 2, Phase.END, []) for _ in range(2))
+    assert (told.rejected, later.rejected, later.reasons) == (1, 0, [])
+    assert [sentence for sentence in told.reasons if reason in sentence]
 
 
 def test_a_cell_array_of_another_kind_of_number_is_refused() -> None:
@@ -109,26 +108,38 @@ def test_a_cell_array_of_another_kind_of_number_is_refused() -> None:
 
 def test_a_proposal_that_tells_of_a_failure_is_dropped_whatever_else_it_holds() -> None:
     ledger = _ledger()
-    assert ledger.judge([_proposal(node("new"), failure="too few samples")]) == ([], [])
-    assert ledger.commit(0, 2, "decay", []).refused == [
-        "proposal 1/object_place failed: too few samples"
+    assert ledger.validate([_proposal(thing("new"), failure="too few samples")]) == []
+    assert ledger.commit(0, 2, Phase.END, []).reasons == [
+        "proposal 1/dreaming failed: too few samples"
     ]
+
+
+def test_a_proposal_of_a_codelet_that_is_not_configured_is_rejected() -> None:
+    asked = task("flying", version=3)
+    with pytest.raises(MessageError, match="no codelet 'flying' is configured here"):
+        _ledger().check(answer(asked, [thing("new")]))
+
+
+def test_what_a_codelet_may_write_is_its_own() -> None:
+    with pytest.raises(MessageError, match="may not write nodes of kind node"):
+        _ledger().check(answer(task("drawing", version=3), [thing("new")]))
+    with pytest.raises(MessageError, match="may not write the place column road"):
+        _ledger().check(answer(task("drawing", version=3), [_cells()]))
 
 
 def test_reasons_are_told_of_the_first_few_and_in_short_and_the_rest_is_counted() -> None:
     ledger = _ledger()
-    ledger.judge([_proposal(failure=f"{number}" + "x" * 10_000) for number in range(100)])
-    delta = ledger.commit(0, 2, "decay", [])
-    assert delta.dropped == 100
-    assert [
-        sentence[len("proposal 1/object_place failed: ")] for sentence in delta.refused
-    ] == list("01234567")
-    assert max(map(len, delta.refused)) == 200
+    ledger.validate([_proposal(failure=f"{number}" + "x" * 10_000) for number in range(100)])
+    delta = ledger.commit(0, 2, Phase.END, [])
+    assert delta.rejected == 100
+    first = len("proposal 1/dreaming failed: ")
+    assert [sentence[first] for sentence in delta.reasons] == list("01234567")
+    assert max(map(len, delta.reasons)) == 200
 
 
-@pytest.mark.parametrize("name", ["place:here:there", "place:1:", "place::", "place:1"])
+@pytest.mark.parametrize("name", ["place:m:here:there", "place:m:1:", "place:::", "place:1"])
 def test_a_node_that_is_only_called_like_a_place_is_a_node_like_any_other(name: str) -> None:
-    _ledger().check(_proposal(node(name)))
+    _ledger().check(_proposal(thing(name)))
 
 
 def test_a_proposal_on_a_version_that_is_not_committed_yet_is_refused() -> None:
@@ -138,28 +149,34 @@ def test_a_proposal_on_a_version_that_is_not_committed_yet_is_refused() -> None:
 
 def test_a_proposal_is_late_only_for_nodes_that_have_changed_since_its_version() -> None:
     ledger = _ledger()
-    ledger.check(_proposal(node("a"), base_version=1))
-    with pytest.raises(MessageError, match="late: b has changed since version 2"):
-        ledger.check(_proposal(node("b"), base_version=2))
+    ledger.check(_proposal(thing("a"), base_version=1))
+    with pytest.raises(MessageError, match="late: b has changed since 2"):
+        ledger.check(_proposal(thing("b"), base_version=2))
     with pytest.raises(MessageError, match="late: b has changed"):
         ledger.check(_proposal(DropNode(id="b"), base_version=2))
 
 
-def test_links_and_cells_are_never_late() -> None:
-    _ledger().check(
-        _proposal(
-            Link(source="b", target="a"), DropLink(source="b", target="c"), _cells(), base_version=1
-        )
-    )
+def test_links_are_never_late() -> None:
+    near = Link(source="b", target="a", kind="near")
+    dropped = DropLink(source="b", target="c", kind="near")
+    _ledger().check(_proposal(near, dropped, base_version=1))
+
+
+def test_cells_are_late_where_their_tiles_column_has_changed_since() -> None:
+    ledger = _ledger()
+    ledger.commit(0, 1, Phase.OBJECTS, [_cells()])
+    ledger.check(_proposal(_cells(where=((TILE_SIDE, 0),)), base_version=3))
+    other = msgspec.structs.replace(_cells(), column=PlaceColumn.OBSTACLE)
+    ledger.check(_proposal(other, base_version=3))
+    with pytest.raises(MessageError, match="late: map:0 0 0 road has changed since 3"):
+        ledger.check(_proposal(_cells(where=((TILE_SIDE - 1, 0),)), base_version=3))
 
 
 def test_one_proposal_that_is_refused_keeps_no_other_from_being_committed() -> None:
     ledger = _ledger()
-    good = _proposal(node("new"))
-    bad = _proposal(_tile())
-    operations, tasks = ledger.judge([bad, good])
-    assert operations == good.operations
-    assert tasks == [good.task_id]
+    good = _proposal(thing("new"))
+    bad = _proposal(Decay())
+    assert ledger.validate([bad, good]) == [good]
 
 
 def test_a_refused_answer_lets_the_cycle_go_on() -> None:
@@ -167,20 +184,28 @@ def test_a_refused_answer_lets_the_cycle_go_on() -> None:
     desk.see(0, percept("a"))
     desk.feed(answer(desk.take()[0], [DropNode(id="self")]))
     desk.work()
-    assert [delta.phase for delta in desk.deltas] == ["percepts", "objects", "decay"]
-    assert [delta.dropped for delta in desk.deltas] == [0, 1, 0]
+    assert [delta.phase for delta in desk.deltas] == ["percepts", "objects", "end"]
+    assert [delta.rejected for delta in desk.deltas] == [0, 1, 0]
 
 
 def test_what_was_written_before_a_restart_still_counts_as_written() -> None:
     ledger = _ledger()
-    again = Ledger(1.0)
+    again = Ledger({"dreaming": _may_write})
     for version, name in enumerate(("a", "c", "b"), 1):
-        again.restore(
-            Delta(version=version, cycle=1, phase="objects", tasks=[], operations=[node(name)])
-        )
+        written = [thing(name)]
+        again.restore(Delta(version=version, cycle=1, phase=Phase.OBJECTS, operations=written))
     assert again.graph.digest() == ledger.graph.digest()
+    again.check(_proposal(thing("c"), base_version=2))
     with pytest.raises(MessageError, match="b has changed"):
-        again.check(_proposal(node("b"), base_version=2))
+        again.check(_proposal(thing("b"), base_version=2))
+
+
+def test_what_a_snapshot_holds_counts_as_written_at_its_version() -> None:
+    again = Ledger({"dreaming": _may_write})
+    again.restore(_ledger().graph.snapshot())
+    again.check(_proposal(thing("a"), base_version=3))
+    with pytest.raises(MessageError, match="a has changed since 2"):
+        again.check(_proposal(thing("a"), base_version=2))
 
 
 def test_applying_a_deltas_operations_twice_is_applying_them_once() -> None:
@@ -198,17 +223,23 @@ def test_applying_a_deltas_operations_twice_is_applying_them_once() -> None:
 def test_a_forgotten_node_takes_its_links_with_it() -> None:
     graph = Graph()
     graph.change(
-        [node("a"), node("b"), Link(source="a", target="b"), Link(source="b", target="a"), _cells()]
+        [
+            thing("a"),
+            thing("b"),
+            Link(source="a", target="b"),
+            Link(source="b", target="a"),
+            _cells(),
+        ]
     )
-    graph.change([Link(source="b", target="place:0:0"), DropNode(id="a")])
+    graph.change([Link(source="b", target="here", kind="near"), DropNode(id="a")])
     assert list(graph.nodes) == ["b"]
-    assert graph.snapshot().links == [Link(source="b", target="place:0:0")]
+    assert graph.snapshot().links == [Links(kind="near", weights={"b": {"here": 1.0}})]
 
 
 def test_the_ledger_keeps_the_nodes_of_a_commit_as_they_were_said() -> None:
-    said = Node(id="a", kind="object", activation=0.25, attributes={"x_m": 1.0})
-    ledger = Ledger(1.0)
-    delta = ledger.commit(5, 2, "objects", [said], ["2/object_place/a"])
+    said = Node(id="a", kind="thing", activation=0.25, attributes={"x_m": 1.0})
+    ledger = Ledger({})
+    delta = ledger.commit(5, 2, Phase.OBJECTS, [said], ["2/object_place/a"])
     assert (delta.stamp_ns, delta.version, delta.cycle, delta.tasks) == (
         5,
         1,

@@ -1,0 +1,124 @@
+"""Links of the graph, indexed by source and by target."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+
+from schemas.graph import Links
+from schemas.nodes import EXCLUSIVE_LINKS
+
+Weights = dict[str, float]
+
+
+class LinkIndex:
+    """Weighted links by kind: from each source to its targets, and back.
+
+    Of an exclusive kind a source has one link, kept as a pair; sources are kept as tuples. That is
+    a third of the memory that dicts would take on a map of a hundred thousand objects.
+    """
+
+    def __init__(self) -> None:
+        self._targets: defaultdict[str, dict[str, Weights]] = defaultdict(dict)
+        self._target: defaultdict[str, dict[str, tuple[str, float]]] = defaultdict(dict)
+        self._sources: defaultdict[str, dict[str, tuple[str, ...]]] = defaultdict(dict)
+
+    def put(self, kind: str, source: str, target: str, weight: float) -> None:
+        """Set the weight of a link; one of an exclusive kind replaces the source's link."""
+        if kind in EXCLUSIVE_LINKS:
+            self._put_exclusive(kind, source, target, weight)
+            return
+
+        weights = self._targets[kind].setdefault(source, {})
+        if target not in weights:
+            self._add_source(kind, target, source)
+        weights[target] = weight
+
+    def put_all(self, links: Links) -> None:
+        """Set the weights of many links of one kind."""
+        for source, weights in links.weights.items():
+            for target, weight in weights.items():
+                self.put(links.kind, source, target, weight)
+
+    def drop(self, kind: str, source: str, target: str) -> None:
+        """Remove a link, if it exists."""
+        if kind in EXCLUSIVE_LINKS:
+            link = self._target[kind].get(source)
+            if link is not None and link[0] == target:
+                del self._target[kind][source]
+                self._remove_source(kind, target, source)
+            return
+
+        weights = self._targets[kind].get(source, {})
+        if target in weights:
+            del weights[target]
+            self._remove_source(kind, target, source)
+        if not weights:
+            self._targets[kind].pop(source, None)
+
+    def drop_node(self, node: str) -> None:
+        """Remove all links from and to a node."""
+        for kind in self.kinds():
+            for target in list(self.targets(node, kind)):
+                self.drop(kind, node, target)
+            for source in self.sources(node, kind):
+                self.drop(kind, source, node)
+
+    def targets(self, source: str, kind: str) -> Weights:
+        """The targets of a source's links of a kind, and their weights."""
+        if kind in EXCLUSIVE_LINKS:
+            link = self._target[kind].get(source)
+            return {} if link is None else {link[0]: link[1]}
+        return dict(self._targets[kind].get(source, {}))
+
+    def target(self, source: str, kind: str) -> str | None:
+        """The target of a source's link of an exclusive kind; None where it has none."""
+        link = self._target[kind].get(source)
+        return None if link is None else link[0]
+
+    def sources(self, target: str, kind: str) -> tuple[str, ...]:
+        """The sources of the links of a kind to a target, in the order in which they were made."""
+        return self._sources[kind].get(target, ())
+
+    def kinds(self) -> list[str]:
+        """The kinds of links that exist or existed, by name."""
+        return sorted({*self._targets, *self._target})
+
+    def in_bulk(self) -> Iterator[Links]:
+        """All links by kind, in an order that depends on the content alone."""
+        for kind in self.kinds():
+            if kind in EXCLUSIVE_LINKS:
+                pairs = sorted(self._target[kind].items())
+                weights = {source: {target: weight} for source, (target, weight) in pairs}
+            else:
+                several = sorted(self._targets[kind].items())
+                weights = {source: dict(sorted(targets.items())) for source, targets in several}
+            if weights:
+                yield Links(kind=kind, weights=weights)
+
+    def clear(self) -> None:
+        """Remove all links."""
+        self._targets.clear()
+        self._target.clear()
+        self._sources.clear()
+
+    def _put_exclusive(self, kind: str, source: str, target: str, weight: float) -> None:
+        before = self._target[kind].get(source)
+        if before is None:
+            self._add_source(kind, target, source)
+        elif before[0] != target:
+            self._remove_source(kind, before[0], source)
+            self._add_source(kind, target, source)
+        self._target[kind][source] = (target, weight)
+
+    def _add_source(self, kind: str, target: str, source: str) -> None:
+        sources = self._sources[kind]
+        sources[target] = (*sources.get(target, ()), source)
+
+    def _remove_source(self, kind: str, target: str, source: str) -> None:
+        sources = self._sources[kind]
+        rest = tuple(other for other in sources[target] if other != source)
+        if rest:
+            sources[target] = rest
+        else:
+            del sources[target]

@@ -1,0 +1,196 @@
+"""Place nodes in bulk: tiles of columns, by map."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from cogmap.errors import MessageError
+from cogmap.geometry.arrays import Floats, Indices
+from schemas.array import Array
+from schemas.graph import TILE_SIDE, Cells, Link, PlaceTile
+from schemas.nodes import LinkKind, PlaceColumn, place_id
+
+Column = npt.NDArray[np.float32]
+TileKey = tuple[str, int, int]
+_SHAPE = (TILE_SIDE, TILE_SIDE)
+
+LINK_COLUMNS: dict[tuple[int, int], PlaceColumn] = {
+    (1, 0): PlaceColumn.WEIGHT_E,
+    (1, 1): PlaceColumn.WEIGHT_NE,
+    (0, 1): PlaceColumn.WEIGHT_N,
+    (-1, 1): PlaceColumn.WEIGHT_NW,
+}
+"""The column of the link to the neighbour at each offset; links the other way are the neighbour's."""
+
+DEFAULTS: dict[PlaceColumn, float] = dict.fromkeys(PlaceColumn, 0.0)
+DEFAULTS |= dict.fromkeys(LINK_COLUMNS.values(), 1.0)
+
+
+class Place(NamedTuple):
+    """One place node."""
+
+    id: str
+    x_m: float
+    y_m: float
+    activation: float
+    road: float
+    obstacle: float
+
+
+class Tile:
+    """TILE_SIDE x TILE_SIDE place nodes: float32 columns indexed [i, j] within the tile.
+
+    A column exists once it has been written. `activation_cycle` is int32, as the columns are.
+    """
+
+    def __init__(self) -> None:
+        self.columns: dict[PlaceColumn, Column] = {}
+        self.activation_cycle: npt.NDArray[np.int32] | None = None
+
+    def column(self, name: PlaceColumn) -> Column:
+        """A column to be written."""
+        if name not in self.columns:
+            self.columns[name] = np.full(_SHAPE, DEFAULTS[name], np.float32)
+        return self.columns[name]
+
+    def value(self, name: PlaceColumn, i: int, j: int) -> float:
+        """One cell's value in a column."""
+        column = self.columns.get(name)
+        return DEFAULTS[name] if column is None else float(column[i, j])
+
+    def set_activation(self, where: tuple[Indices, Indices], cycle: int) -> None:
+        """Note that the activation of some cells is as of `cycle`."""
+        if self.activation_cycle is None:
+            self.activation_cycle = np.zeros(_SHAPE, np.int32)
+        self.activation_cycle[where] = cycle
+
+    def activation(self, cycle: int, decay: float) -> Column:
+        """The activation of all cells in `cycle`, having decayed linearly by `decay` a cycle."""
+        column = self.columns.get(PlaceColumn.ACTIVATION)
+        if column is None or self.activation_cycle is None:
+            return np.zeros(_SHAPE, np.float32)
+        age = np.maximum(cycle - self.activation_cycle, 0)
+        now: Column = np.maximum(column - decay * age, 0.0).astype(np.float32)
+        return now
+
+
+class PlaceGrid:
+    """The place nodes of all maps; a map's tiles come into being as their cells are written."""
+
+    def __init__(self) -> None:
+        self.tiles: dict[TileKey, Tile] = {}
+
+    def put_cells(self, cells: Cells) -> None:
+        """Write one column of some cells. Raises MessageError where their arrays do not fit."""
+        where = cells.cells.numpy().astype(np.int64)
+        values = cells.values.numpy().astype(np.float32)
+        if where.ndim != 2 or where.shape != (values.size, 2):
+            raise MessageError(f"{where.shape} cells of {cells.column} with {values.shape} values")
+
+        tiles, inside = np.divmod(where, TILE_SIDE)
+        for x, y in np.unique(tiles, axis=0).tolist():
+            mine = (tiles[:, 0] == x) & (tiles[:, 1] == y)
+            tile = self.tiles.setdefault((cells.map, x, y), Tile())
+            rows = (inside[mine, 0], inside[mine, 1])
+            tile.column(cells.column)[rows] = values[mine]
+            if cells.column is PlaceColumn.ACTIVATION:
+                tile.set_activation(rows, cells.cycle)
+
+    def put_tile(self, message: PlaceTile) -> None:
+        """Write a whole tile. Raises MessageError where a column is of another shape."""
+        tile = Tile()
+        for name, array in message.columns.items():
+            tile.columns[name] = np.array(_square(name, array), np.float32)
+        if message.activation_cycle is not None:
+            cycles = _square("activation_cycle", message.activation_cycle)
+            tile.activation_cycle = np.array(cycles, np.int32)
+        self.tiles[message.map, message.x, message.y] = tile
+
+    def messages(self) -> Iterator[PlaceTile]:
+        """All tiles, in order of map and position."""
+        for key in sorted(self.tiles):
+            yield self.message(key)
+
+    def message(self, key: TileKey) -> PlaceTile:
+        """One tile as it travels. Its arrays share memory with the tile: encode it at once."""
+        map_id, x, y = key
+        tile = self.tiles[key]
+        columns = {name: Array.of(tile.columns[name]) for name in sorted(tile.columns)}
+        cycles = tile.activation_cycle
+        return PlaceTile(
+            map=map_id,
+            x=x,
+            y=y,
+            columns=columns,
+            activation_cycle=None if cycles is None else Array.of(cycles),
+        )
+
+    def of_map(self, map_id: str) -> Iterator[tuple[TileKey, Tile]]:
+        """The tiles of one map, in order of position."""
+        for key in sorted(self.tiles):
+            if key[0] == map_id:
+                yield key, self.tiles[key]
+
+    def written_cells(self, map_id: str, column: PlaceColumn) -> tuple[Indices, Floats]:
+        """The cells of a map whose value in a column is not 0, (k, 2), and the values, (k,)."""
+        cells = [np.zeros((0, 2), np.int64)]
+        values = [np.zeros(0)]
+        for (_, x, y), tile in self.of_map(map_id):
+            if column in tile.columns:
+                written = tile.columns[column]
+                i, j = np.nonzero(written)
+                cells.append(np.column_stack([i + x * TILE_SIDE, j + y * TILE_SIDE]))
+                values.append(written[i, j].astype(np.float64))
+        return np.vstack(cells), np.concatenate(values)
+
+    def value(self, map_id: str, i: int, j: int, column: PlaceColumn) -> float | None:
+        """One cell's value in a column; None where its tile does not exist."""
+        tile = self.tiles.get((map_id, i // TILE_SIDE, j // TILE_SIDE))
+        return None if tile is None else tile.value(column, i % TILE_SIDE, j % TILE_SIDE)
+
+    def place(
+        self, map_id: str, i: int, j: int, *, cell_m: float, cycle: int, decay: float
+    ) -> Place | None:
+        """One place node as of `cycle`; None where its tile does not exist."""
+        tile = self.tiles.get((map_id, i // TILE_SIDE, j // TILE_SIDE))
+        if tile is None:
+            return None
+        row = i % TILE_SIDE
+        column = j % TILE_SIDE
+        return Place(
+            id=place_id(i, j, map_id),
+            x_m=i * cell_m,
+            y_m=j * cell_m,
+            activation=float(tile.activation(cycle, decay)[row, column]),
+            road=tile.value(PlaceColumn.ROAD, row, column),
+            obstacle=tile.value(PlaceColumn.OBSTACLE, row, column),
+        )
+
+    def links(self, map_id: str, i: int, j: int) -> Iterator[Link]:
+        """The links from a place node to those of its eight neighbours that exist, by direction."""
+        here = place_id(i, j, map_id)
+        for (di, dj), column in LINK_COLUMNS.items():
+            forth = self.value(map_id, i, j, column)
+            beyond = self.value(map_id, i + di, j + dj, column)
+            if forth is not None and beyond is not None:
+                there = place_id(i + di, j + dj, map_id)
+                yield Link(source=here, target=there, kind=LinkKind.NEXT, weight=forth)
+
+            back = self.value(map_id, i - di, j - dj, column)
+            if back is not None and forth is not None:
+                there = place_id(i - di, j - dj, map_id)
+                yield Link(source=here, target=there, kind=LinkKind.NEXT, weight=back)
+
+    def clear(self) -> None:
+        """Remove all place nodes."""
+        self.tiles.clear()
+
+
+def _square(name: str, array: Array) -> npt.NDArray[np.generic]:
+    if array.shape != _SHAPE:
+        raise MessageError(f"tile column {name} of shape {array.shape}, not {_SHAPE}")
+    return array.numpy()

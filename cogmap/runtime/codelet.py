@@ -1,0 +1,134 @@
+"""A codelet: declared once, one function that runs; workspace and workers are driven by that."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from cogmap.graph.graph import Graph
+from schemas.array import Array
+from schemas.codelets import Task
+from schemas.cognition import Coalition, Replay
+from schemas.graph import Operation, Phase
+from schemas.nodes import GraphNode, LinkKind, PlaceColumn
+from schemas.sensing import Percept, Percepts, PlaceMatch
+
+ENTRY_POINTS = "cogmap.codelets"
+"""The group of entry points by which codelets of other packages are found."""
+
+Written = type[GraphNode] | LinkKind | PlaceColumn
+
+
+@dataclass(frozen=True)
+class CycleContext:
+    """What a cognitive cycle is about: a view's percepts, and the self-motion since the self node
+    was last moved, as in SelfMotion.
+    """
+
+    cycle: int
+    percepts: Percepts
+    motions: Array
+    version: int = 0
+
+    @property
+    def stamp_ns(self) -> int:
+        """The time of the view."""
+        return self.percepts.stamp_ns
+
+    def task(
+        self,
+        codelet: str,
+        about: Iterable[str] = (),
+        *,
+        subject: str = "",
+        percepts: Iterable[Percept] = (),
+        matches: Iterable[PlaceMatch] = (),
+        with_motions: bool = False,
+        with_road: bool = False,
+    ) -> Task:
+        """A task for `codelet` about nodes `about`, by id.
+
+        `subject` tells the tasks of one codelet in one cycle apart.
+        """
+        name = f"{self.cycle}/{codelet}"
+        return Task(
+            stamp_ns=self.stamp_ns,
+            task_id=f"{name}/{subject}" if subject else name,
+            codelet=codelet,
+            cycle=self.cycle,
+            version=self.version,
+            about=list(about),
+            percepts=list(percepts),
+            matches=list(matches),
+            motions=self.motions if with_motions else None,
+            road_m=self.percepts.road_m if with_road else None,
+        )
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a codelet proposes: operations on the graph, coalitions for the global workspace, and
+    events that are published once the operations are committed.
+    """
+
+    operations: list[Operation] = field(default_factory=list)
+    coalitions: list[Coalition] = field(default_factory=list)
+    events: list[Replay] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Codelet:
+    """One structure-building or attention codelet.
+
+    It runs in `phase` of each cycle, or beside the cycle (Phase.BACKGROUND, one task at a time).
+    `due(context, graph, config)` returns its tasks for this cycle, `run(task, graph, config)` its
+    answer to one. Both only read the graph. `reads` and `writes` are the kinds of nodes and links
+    and the place columns that it reads and may write. `config` is the type of its settings, from
+    the section `section` of the configuration.
+    """
+
+    name: str
+    phase: Phase
+    due: Callable[[CycleContext, Graph, Any], list[Task]]
+    run: Callable[[Task, Graph, Any], Answer]
+    reads: frozenset[Written]
+    writes: frozenset[Written]
+    config: type[msgspec.Struct]
+    section: str
+
+    def may_write(self, written: object) -> bool:
+        """Whether it may write nodes or links of that kind, or that place column.
+
+        Links of kinds that are not in the table of link kinds may be written by every codelet.
+        """
+        return written in self.writes
+
+
+@dataclass(frozen=True)
+class ConfiguredCodelet:
+    """A codelet with its settings."""
+
+    codelet: Codelet
+    config: Any
+
+    @property
+    def name(self) -> str:
+        """The codelet's name."""
+        return self.codelet.name
+
+    def due(self, context: CycleContext, graph: Graph) -> list[Task]:
+        """Its tasks for this cycle."""
+        return self.codelet.due(context, graph, self.config)
+
+    def run(self, task: Task, graph: Graph) -> Answer:
+        """Its answer to a task."""
+        return self.codelet.run(task, graph, self.config)
+
+
+def no_motions() -> Array:
+    """Rows of self-motion, none."""
+    return Array.of(np.zeros((0, 5)))

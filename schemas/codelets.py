@@ -1,0 +1,68 @@
+"""The messages by which codelets are given work and answer it, and others offer theirs."""
+
+from __future__ import annotations
+
+from schemas.array import Array
+from schemas.base import Count, Message, Name, Part
+from schemas.cognition import Coalition, Replay
+from schemas.graph import Operation
+from schemas.sensing import Percept, PlaceMatch
+
+
+class Task(Message, kw_only=True, frozen=True):
+    """Work for one codelet: what it is about, and what was sensed. All else is in the graph.
+
+    It reads the graph at `version`, or newer. `about` are ids of nodes. `motions` is as in
+    SelfMotion; `road_m` as in Percepts.
+    """
+
+    task_id: Name
+    codelet: Name
+    cycle: Count
+    version: Count
+    about: list[Name] = []
+    percepts: list[Percept] = []
+    matches: list[PlaceMatch] = []
+    motions: Array | None = None
+    road_m: Array | None = None
+
+
+class Assignment(Part, kw_only=True, frozen=True):
+    """That `worker` holds a task until its lease ends."""
+
+    task_id: Name
+    worker: Name
+    attempt: Count
+    version: Count
+
+
+class Leases(Message, kw_only=True, frozen=True):
+    """Which workers hold which tasks, of those published just before."""
+
+    assignments: list[Assignment]
+
+
+class Proposal(Message, kw_only=True, frozen=True):
+    """A codelet's answer to a task, of what it read in the graph at `base_version`.
+
+    The workspace commits `operations`, and then publishes `coalitions` and `events`.
+    """
+
+    task_id: Name
+    codelet: Name
+    base_version: Count
+    operations: list[Operation] = []
+    coalitions: list[Coalition] = []
+    events: list[Replay] = []
+    failure: str = ""
+
+
+class Offer(Message, kw_only=True, frozen=True):
+    """Operations that no task asked for: a goal from a person, a recall from memory.
+
+    They are committed at the start of the next cycle, in order of source and number. `cycle` is the
+    newest cycle that its source had seen end.
+    """
+
+    cycle: Count
+    operations: list[Operation]

@@ -1,0 +1,68 @@
+"""Coalitions: the content that attention codelets bring to the global workspace."""
+
+from __future__ import annotations
+
+import msgspec
+
+from cogmap.graph.graph import Graph
+from schemas.array import Matrix
+from schemas.cognition import Coalition
+from schemas.graph import Link
+from schemas.nodes import AnyNode, LinkKind, Object, Self, object_id
+from schemas.sensing import Percept
+
+
+def coalition(codelet: str, nodes: list[AnyNode], graph: Graph, base_level: float) -> Coalition:
+    """A coalition of `nodes`, with their links to places, and the maps they are on.
+
+    Its activation is base-level x sum(total activation + |incentive salience|) / 2n over its nodes,
+    as in LIDA's framework.
+    """
+    links = []
+    maps: dict[str, None] = {}
+    for node in nodes:
+        place = graph.links.target(node.id, LinkKind.AT)
+        if place is not None:
+            links.append(Link(source=node.id, target=place, kind=LinkKind.AT))
+        if isinstance(node, Self | Object):
+            maps[node.map] = None
+
+    total = sum(graph.total_activation(node) + abs(_salience(node)) for node in nodes)
+    return Coalition(
+        codelet=codelet,
+        activation=min(1.0, base_level * total / (2 * len(nodes))),
+        nodes=[_as_of_now(node, graph) for node in nodes],
+        links=links,
+        maps=list(maps),
+    )
+
+
+def objects_in_view(percepts: list[Percept], graph: Graph) -> list[Object]:
+    """The objects of the map that are in view, by label."""
+    found = []
+    for label in sorted(percept.label for percept in percepts):
+        node = graph.get(Object, object_id(label))
+        if node is not None:
+            found.append(node)
+    return found
+
+
+def _salience(node: AnyNode) -> float:
+    return node.salience if isinstance(node, Object) else 0.0
+
+
+def _as_of_now(node: AnyNode, graph: Graph) -> AnyNode:
+    """The node with its activation of this cycle, and with the mean of its samples alone: nothing
+    needs to become conscious of the others.
+    """
+    now = {
+        "activation": graph.activation(node),
+        "base_level": graph.base_level(node),
+        "cycle": graph.cycle,
+    }
+    if isinstance(node, Object):
+        return msgspec.structs.replace(node, offsets_m=None, **now)
+    if isinstance(node, Self):
+        mean = Matrix.of([[node.x_m, node.y_m, node.heading_rad]])
+        return msgspec.structs.replace(node, samples=mean, **now)
+    return msgspec.structs.replace(node, **now)

@@ -1,0 +1,72 @@
+"""The road-place codelet: place nodes that are seen as road, and the one that the agent is at
+(paper §5.2).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cogmap.errors import MessageError
+from cogmap.geometry.se2 import mean_pose, transform_from
+from cogmap.graph.graph import Graph
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from schemas.array import Array
+from schemas.codelets import Task
+from schemas.graph import Cells, Operation, Phase
+from schemas.nodes import SELF_ID, PlaceColumn, Self
+from services.codelets.config import SECTION, Config
+
+ROAD_REACH_M = 12.0
+ENOUGH_POINTS = 3
+
+
+def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
+    """One task in each cycle."""
+    return [context.task(CODELET.name, about=[SELF_ID], with_road=True)]
+
+
+def run(task: Task, graph: Graph, config: Config) -> Answer:
+    """Mark the place nodes near the agent that it sees as road, and activate the one it is at."""
+    agent = graph.agent
+    if agent is None or task.road_m is None:
+        raise MessageError(f"task {task.task_id}: no self node, or no road points")
+    pose = mean_pose(agent.samples.numpy())
+    cell_m = graph.cell_m(agent.map)
+    here = np.rint(pose[None, :2] / cell_m).astype(np.int32)
+    operations: list[Operation] = [
+        Cells(
+            map=agent.map,
+            column=PlaceColumn.ACTIVATION,
+            cells=Array.of(here),
+            values=Array.of(np.ones(1, np.float32)),
+            cycle=task.cycle,
+        )
+    ]
+
+    seen_m = np.asarray(task.road_m.numpy(), np.float64).reshape(-1, 2)
+    seen_m = seen_m[np.hypot(seen_m[:, 0], seen_m[:, 1]) < ROAD_REACH_M]
+    seen_cells = np.rint(transform_from(pose, seen_m) / cell_m).astype(np.int32)
+    cells, counts = np.unique(seen_cells, axis=0, return_counts=True)
+    if len(cells):
+        share = np.minimum(1.0, counts / ENOUGH_POINTS).astype(np.float32)
+        operations.append(
+            Cells(
+                map=agent.map,
+                column=PlaceColumn.ROAD,
+                cells=Array.of(cells, "<i4"),
+                values=Array.of(share),
+            )
+        )
+    return Answer(operations)
+
+
+CODELET = Codelet(
+    name="road_place",
+    phase=Phase.OBJECTS,
+    due=due,
+    run=run,
+    reads=frozenset({Self}),
+    writes=frozenset({PlaceColumn.ACTIVATION, PlaceColumn.ROAD}),
+    config=Config,
+    section=SECTION,
+)

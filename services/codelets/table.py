@@ -1,0 +1,59 @@
+"""The one table of codelets: ours, a row each, and those that other packages declare.
+
+A package declares its own by an entry point of the group `cogmap.codelets`, whose object is a
+Codelet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from importlib.metadata import entry_points
+
+from cogmap.errors import ConfigError
+from cogmap.runtime import config
+from cogmap.runtime.codelet import ENTRY_POINTS, Codelet, ConfiguredCodelet
+from services.codelets.attention import novelty, whereabouts
+from services.codelets.correction import apply_correction, map_correction
+from services.codelets.localization import landmarks, localization
+from services.codelets.mapping import loop_detection, object_place, path, road_place
+
+CODELETS: tuple[Codelet, ...] = (
+    apply_correction.CODELET,
+    localization.CODELET,
+    object_place.CODELET,
+    landmarks.CODELET,
+    road_place.CODELET,
+    path.CODELET,
+    loop_detection.CODELET,
+    map_correction.CODELET,
+    whereabouts.CODELET,
+    novelty.CODELET,
+)
+
+
+def all_codelets() -> tuple[Codelet, ...]:
+    """Our codelets, then those of other packages, by name.
+
+    Raises ConfigError where an entry point is no codelet, or a name is taken.
+    """
+    codelets = list(CODELETS)
+    names = {codelet.name for codelet in codelets}
+    for point in sorted(entry_points(group=ENTRY_POINTS), key=lambda point: point.name):
+        codelet = point.load()
+        if not isinstance(codelet, Codelet):
+            raise ConfigError(f"entry point {point.name} = {point.value} is no Codelet")
+        if codelet.name in names:
+            raise ConfigError(f"entry point {point.name}: there is a codelet {codelet.name!r}")
+        names.add(codelet.name)
+        codelets.append(codelet)
+    return tuple(codelets)
+
+
+def configured(
+    sections: config.Sections, codelets: Iterable[Codelet]
+) -> tuple[ConfiguredCodelet, ...]:
+    """`codelets` with their settings from `sections`. Raises ConfigError."""
+    return tuple(
+        ConfiguredCodelet(codelet, config.typed(sections, codelet.section, codelet.config))
+        for codelet in codelets
+    )

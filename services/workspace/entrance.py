@@ -1,0 +1,78 @@
+"""What enters the workspace at the start of a cycle."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+
+from cogmap.graph.graph import Graph
+from cogmap.runtime.codelet import CycleContext
+from schemas.array import Matrix
+from schemas.graph import Decay, Links, Operation
+from schemas.nodes import (
+    POSE_COLUMNS,
+    ROOT_MAP,
+    SELF_ID,
+    LinkKind,
+    Map,
+    Percept,
+    Self,
+    object_id,
+    percept_id,
+)
+from schemas.sensing import Percepts
+from services.workspace.config import Config
+
+
+def first_operations(graph: Graph, config: Config) -> list[Operation]:
+    """The root map, the self node and the rates of decay, as far as the graph lacks them.
+
+    The agent's first pose is the origin of its root map, for certain.
+    """
+    operations: list[Operation] = []
+    decay = Decay(
+        activation=config.decay,
+        base_level=config.base_level_decay,
+        place_activation=config.place_decay,
+        forget_below=config.forget_below,
+    )
+    if graph.decay != decay:
+        operations.append(decay)
+    if graph.get(Map, ROOT_MAP) is None:
+        operations.append(Map(id=ROOT_MAP, cell_m=config.cell_m))
+    if graph.agent is None:
+        zeros = Matrix.of(np.zeros((config.first_samples, POSE_COLUMNS)))
+        operations.append(Self(id=SELF_ID, activation=1.0, base_level=1.0, samples=zeros))
+    return operations
+
+
+def recognised(percepts: Percepts, threshold: float) -> Percepts:
+    """`percepts` without the objects whose activation is not above `threshold`: what they are is
+    too uncertain to map by.
+    """
+    objects = [percept for percept in percepts.objects if percept.activation > threshold]
+    if len(objects) == len(percepts.objects):
+        return percepts
+    return msgspec.structs.replace(percepts, objects=objects)
+
+
+def percept_operations(graph: Graph, context: CycleContext) -> list[Operation]:
+    """The PAM nodes over threshold, each linked to the object that it is an instance of."""
+    operations: list[Operation] = []
+    weights = {}
+    for percept in context.percepts.objects:
+        node = Percept(
+            id=percept_id(percept.label),
+            activation=percept.activation,
+            cycle=context.cycle,
+            label=percept.label,
+            bearing_rad=percept.bearing_rad,
+            range_m=percept.range_m,
+        )
+        operations.append(node)
+        target = object_id(percept.label)
+        if target in graph.nodes:
+            weights[node.id] = {target: 1.0}
+    if weights:
+        operations.append(Links(kind=LinkKind.INSTANCE, weights=weights))
+    return operations

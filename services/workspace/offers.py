@@ -1,0 +1,50 @@
+"""Offers: operations that no task asked for, committed when the next cycle begins."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from cogmap.errors import MessageError
+from schemas.codelets import Offer
+from schemas.graph import Operation
+from services.workspace.commit import Ledger
+from services.workspace.rules import may_offer
+
+
+class Offers:
+    """The offers that wait for the next cycle.
+
+    Each cycle waits for an offer of each of the instances `awaited`, made after the cycle before.
+    """
+
+    def __init__(self, awaited: Iterable[str]) -> None:
+        self._awaited = frozenset(awaited)
+        self._newest_cycle: dict[str, int] = {}
+        self._waiting: list[Offer] = []
+
+    def put(self, offer: Offer) -> None:
+        """Add an offer."""
+        self._waiting.append(offer)
+        newest = self._newest_cycle.get(offer.source, 0)
+        self._newest_cycle[offer.source] = max(newest, offer.cycle)
+
+    def complete(self, ended_cycle: int) -> bool:
+        """Whether every awaited instance has made its offer after `ended_cycle`."""
+        return all(self._newest_cycle.get(name, 0) >= ended_cycle for name in self._awaited)
+
+    def take(self, ledger: Ledger) -> list[Operation]:
+        """The operations of all valid offers, in order of source and number.
+
+        The ledger rejects the others.
+        """
+        waiting = sorted(self._waiting, key=lambda offer: (offer.source, offer.seq))
+        self._waiting = []
+        operations: list[Operation] = []
+        for offer in waiting:
+            try:
+                ledger.check_offer(offer, may_offer)
+            except MessageError as error:
+                ledger.reject(str(error))
+            else:
+                operations += offer.operations
+        return operations

@@ -1,0 +1,136 @@
+"""What a proposal or an offer may write: the rules of the kinds, and of who writes them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+
+from cogmap.errors import MessageError
+from cogmap.graph.graph import Graph
+from schemas.graph import (
+    TILE_SIDE,
+    Cells,
+    Decay,
+    DropLink,
+    DropNode,
+    Link,
+    Links,
+    Operation,
+    PlaceTile,
+)
+from schemas.nodes import (
+    KINDS,
+    ROOT_MAP,
+    GraphNode,
+    LinkKind,
+    Map,
+    Node,
+    kind_name,
+    place_cell,
+)
+
+Writer = Callable[[object], bool]
+"""Whether a writer may write a kind of nodes (a type), a kind of links, or a place column."""
+
+MAX_CELLS = 2**16
+MAX_TILES = 1024
+FARTHEST_CELL = 2**20
+_LINK_KINDS = frozenset(map(str, LinkKind))
+
+
+def may_offer(written: object) -> bool:
+    """The writer of offers: kinds that the table lets be offered, and links of other kinds."""
+    return isinstance(written, type) and KINDS[written].offered
+
+
+def written_by(operation: Operation) -> Iterable[str | tuple[str, int, int, str]]:
+    """What an operation rewrites: a node's id, or tiles' columns; nothing for links, which many may
+    write.
+    """
+    if isinstance(operation, Cells):
+        tiles = np.unique(operation.cells.numpy() // TILE_SIDE, axis=0)
+        for x, y in tiles.tolist():
+            yield operation.map, x, y, operation.column
+    elif isinstance(operation, (GraphNode, DropNode)):
+        yield operation.id
+
+
+def check_operation(name: str, operation: Operation, graph: Graph, writer: Writer) -> None:
+    """Raise MessageError where `writer` may not carry out `operation`, `name` being what asks."""
+    if isinstance(operation, PlaceTile | Decay):
+        raise MessageError(f"{name}: {type(operation).__name__} is the workspace's own to write")
+    if isinstance(operation, Link | Links | DropLink):
+        _check_link(name, operation, writer)
+    elif isinstance(operation, Cells):
+        _check_cells(name, operation, graph, writer)
+    elif isinstance(operation, DropNode):
+        _check_drop(name, operation, graph, writer)
+    else:
+        _check_node(name, operation, graph, writer)
+
+
+def _check_link(name: str, operation: Link | Links | DropLink, writer: Writer) -> None:
+    if operation.kind in _LINK_KINDS and not writer(LinkKind(operation.kind)):
+        raise MessageError(f"{name} may not write links of kind {operation.kind}")
+
+
+def _check_node(name: str, node: GraphNode, graph: Graph, writer: Writer) -> None:
+    if place_cell(node.id) is not None:
+        raise MessageError(f"{name}: place nodes are written as cells")
+    if not writer(type(node)):
+        raise MessageError(f"{name} may not write nodes of kind {kind_name(type(node))}")
+
+    before = graph.nodes.get(node.id)
+    if before is not None and type(before) is not type(node):
+        kind = kind_name(type(before))
+        raise MessageError(f"{name}: {node.id} is of kind {kind}, which a node keeps")
+    if isinstance(node, Node) and node.kind in _KIND_NAMES:
+        raise MessageError(f"{name}: {node.id} is a generic node of the known kind {node.kind}")
+
+
+_KIND_NAMES = frozenset(kind_name(kind) for kind in KINDS if kind is not Node)
+
+
+def _check_drop(name: str, drop: DropNode, graph: Graph, writer: Writer) -> None:
+    if place_cell(drop.id) is not None:
+        raise MessageError(f"{name}: place nodes are written as cells")
+    node = graph.nodes.get(drop.id)
+    if node is None:
+        return
+    if not KINDS[type(node)].droppable:
+        raise MessageError(f"{name}: {drop.id} is never forgotten")
+    if not writer(type(node)):
+        raise MessageError(f"{name} may not forget nodes of kind {kind_name(type(node))}")
+
+
+def _check_cells(name: str, operation: Cells, graph: Graph, writer: Writer) -> None:
+    """Place nodes are created by the tile, so their number and distance are bounded."""
+    if not writer(operation.column):
+        raise MessageError(f"{name} may not write the place column {operation.column}")
+    if operation.map != ROOT_MAP and graph.get(Map, operation.map) is None:
+        raise MessageError(f"{name}: there is no map {operation.map}")
+
+    cells = operation.cells
+    values = operation.values
+    number = cells.shape[0] if cells.shape else 0
+    cells_fit = (cells.shape, cells.dtype) == ((number, 2), "<i4")
+    values_fit = (values.shape, values.dtype) == ((number,), "<f4")
+    if not (cells_fit and values_fit):
+        raise MessageError(
+            f"{name}: cells of shape {cells.shape} with {values.shape} values, or of another dtype"
+        )
+    if number > MAX_CELLS:
+        raise MessageError(f"{name}: {number} cells, at most {MAX_CELLS} are taken at once")
+    _check_extent(name, np.asarray(cells.numpy(), np.int64))
+
+
+def _check_extent(name: str, cells: np.ndarray[tuple[int, ...], np.dtype[np.int64]]) -> None:
+    if not len(cells):
+        return
+    farthest = int(np.abs(cells).max())
+    if farthest > FARTHEST_CELL:
+        raise MessageError(f"{name}: a cell {farthest} cells away, at most {FARTHEST_CELL}")
+    tiles = len(np.unique(cells // TILE_SIDE, axis=0))
+    if tiles > MAX_TILES:
+        raise MessageError(f"{name}: cells in {tiles} tiles, at most {MAX_TILES} are taken at once")
