@@ -21,8 +21,8 @@ from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.recording.storage.reader import LogReader
 from cogmap.recording.storage.recover import recover
 from schemas import topics
-from schemas.sensing import Odometry
 from tests.support.disks import full_after
+from tests.support.logs import odometry
 from tests.support.networks import routed
 
 TIMEOUT_S = 30.0
@@ -38,13 +38,15 @@ def endpoint() -> Iterator[str]:
         yield address
 
 
-class Speaker:
-    """Says odometry on Zenoh, a few hundred times a second."""
+class Publisher:
+    """Publishes odometry on Zenoh, a few hundred times a second."""
 
     def __init__(self, endpoint: str) -> None:
         self.bus = ZenohBus(endpoint, AGENT)
         self.bus.declare(topics.ODOMETRY)
-        self.count, self._pause, self._here = 0, threading.Event(), threading.Event()
+        self.count = 0
+        self._pause = threading.Event()
+        self._here = threading.Event()
         self.bus.watch(self._saw)
 
     def _saw(self, member: Member, alive: bool) -> None:
@@ -54,39 +56,31 @@ class Speaker:
     def await_recorder(self) -> None:
         assert self._here.wait(TIMEOUT_S)
 
-    def speak(self) -> None:
+    def publish(self) -> None:
         now_ns = time.time_ns()
-        message = Odometry(
-            seq=self.count,
-            stamp_ns=now_ns,
-            source="sim",
-            speed_m_s=1.0,
-            turn_rate_rad_s=0.0,
-            dt_s=0.05,
-        )
-        self.bus.publish(
-            topics.ODOMETRY, encode(message), Envelope("sim", self.count, 2**62, now_ns, now_ns)
-        )
+        message = odometry(self.count, stamp_ns=now_ns)
+        envelope = Envelope("sim", self.count, 2**62, now_ns, now_ns)
+        self.bus.publish(topics.ODOMETRY, encode(message), envelope)
         self.count += 1
         self._pause.wait(0.002)
 
-    def speak_until_it_grows(self, path: Path, times: int) -> None:
+    def publish_until_it_grows(self, path: Path, times: int) -> None:
         """Go on until the file has grown so often."""
         size = path.stat().st_size
         deadline_s = time.monotonic() + TIMEOUT_S
         while times:
             assert time.monotonic() < deadline_s, "the file does not grow"
-            self.speak()
+            self.publish()
             grown = path.stat().st_size
             times -= grown > size
             size = grown
 
 
 @pytest.fixture
-def speaker(endpoint: str) -> Iterator[Speaker]:
-    speaker = Speaker(endpoint)
-    yield speaker
-    speaker.bus.close()
+def publisher(endpoint: str) -> Iterator[Publisher]:
+    publisher = Publisher(endpoint)
+    yield publisher
+    publisher.bus.close()
 
 
 def start(endpoint: str, path: Path, *options: str) -> subprocess.Popen[str]:
@@ -106,13 +100,13 @@ def numbers(path: Path) -> list[int]:
 
 
 def test_a_killed_recorder_loses_only_what_came_since_its_last_flush(
-    endpoint: str, speaker: Speaker, tmp_path: Path
+    endpoint: str, publisher: Publisher, tmp_path: Path
 ) -> None:
     path = tmp_path / "log.mcap"
     recorder = start(endpoint, path)
-    speaker.await_recorder()
-    speaker.speak_until_it_grows(path, 4)
-    speaker.speak()
+    publisher.await_recorder()
+    publisher.publish_until_it_grows(path, 4)
+    publisher.publish()
     recorder.kill()
     killed_ns = time.time_ns()
     recorder.wait()
@@ -126,12 +120,12 @@ def test_a_killed_recorder_loses_only_what_came_since_its_last_flush(
 
 @pytest.mark.parametrize("how", ["SIGTERM", "SIGINT", "end of input"])
 def test_a_recorder_that_is_asked_to_end_has_every_message(
-    endpoint: str, speaker: Speaker, tmp_path: Path, how: str
+    endpoint: str, publisher: Publisher, tmp_path: Path, how: str
 ) -> None:
     path = tmp_path / "log.mcap"
     recorder = start(endpoint, path, "--json", "--tied")
-    speaker.await_recorder()
-    speaker.speak_until_it_grows(path, 2)
+    publisher.await_recorder()
+    publisher.publish_until_it_grows(path, 2)
     if how == "end of input":
         assert recorder.stdin is not None
         recorder.stdin.close()
@@ -147,19 +141,30 @@ def test_a_recorder_that_is_asked_to_end_has_every_message(
 
 
 def test_a_recorder_on_a_full_disk_ends_with_one_sentence(
-    endpoint: str, speaker: Speaker, tmp_path: Path
+    endpoint: str, publisher: Publisher, tmp_path: Path
 ) -> None:
     path = tmp_path / "log.mcap"
     with full_after(FULL_BYTES):
         recorder = start(endpoint, path)
-    speaker.await_recorder()
+    publisher.await_recorder()
     deadline_s = time.monotonic() + TIMEOUT_S
     while recorder.poll() is None:
-        assert time.monotonic() < deadline_s, "the recorder goes on"
-        speaker.speak()
+        assert time.monotonic() < deadline_s, "the recorder does not end"
+        publisher.publish()
     _, errors = recorder.communicate()
     assert recorder.returncode == 2
     assert "Traceback" not in errors
     last = errors.strip().splitlines()[-1]
     assert last.startswith(f"cogmap: cannot write {path} (")
     assert last.endswith("free some space, or write to another disk")
+
+
+def test_a_recorder_that_cannot_write_its_file_ends_with_one_sentence(
+    endpoint: str, tmp_path: Path
+) -> None:
+    (tmp_path / "file").write_text("no folder")
+    recorder = start(endpoint, tmp_path / "file" / "log.mcap")
+    _, errors = recorder.communicate(timeout=TIMEOUT_S)
+    assert recorder.returncode == 2
+    assert "Traceback" not in errors
+    assert errors.strip().endswith("name a file in a folder that can be written to")

@@ -295,6 +295,15 @@ def test_what_is_wrong_is_named_with_the_remedy(
     assert not list(Path().iterdir())
 
 
+def test_a_picture_that_cannot_be_written_is_one_sentence(
+    run: Callable[..., Result], drive: Path
+) -> None:
+    Path("taken.png").mkdir()
+    for command in ("image", "perception"):
+        with pytest.raises(LogError, match=r"cannot write taken\.png \(Is a directory\)"):
+            run(command, drive, "-o", "taken.png")
+
+
 def test_a_log_without_views_or_percepts_names_the_command_that_helps(
     run: Callable[..., Result], tmp_path: Path
 ) -> None:
