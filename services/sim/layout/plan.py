@@ -111,7 +111,8 @@ def overlap(a: Rectangle, b: Rectangle, gap_m: float = 0.0) -> bool:
     a_west, a_south, a_east, a_north = a
     b_west, b_south, b_east, b_north = b
 
-    gap_x_m = max(a_west, b_west) - min(a_east, b_east)
-    gap_y_m = max(a_south, b_south) - min(a_north, b_north)
-
-    return max(gap_x_m, gap_y_m) < gap_m
+    a_begins_in_x = a_west < b_east + gap_m
+    b_begins_in_x = b_west < a_east + gap_m
+    a_begins_in_y = a_south < b_north + gap_m
+    b_begins_in_y = b_south < a_north + gap_m
+    return a_begins_in_x and b_begins_in_x and a_begins_in_y and b_begins_in_y
