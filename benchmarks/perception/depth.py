@@ -1,20 +1,24 @@
-"""How far depth is off."""
+"""The relative error of depth."""
 
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
+
+from cogmap.geometry.arrays import Singles
 
 NEAREST_M = 3.0
 FARTHEST_M = 30.0
-Floats32 = npt.NDArray[np.float32]
 
 
-def errors(depth_m: Floats32, true_m: Floats32) -> tuple[Floats32, float]:
-    """The relative errors where depth is known, from NEAREST_M to FARTHEST_M, and the share of
-    these that is.
+def errors(depth_m: Singles, true_m: Singles) -> tuple[Singles, float]:
+    """The relative errors (n,) where depth is known, from NEAREST_M to FARTHEST_M.
+
+    Returns too of which share of the pixels within these limits it is known.
     """
-    asked = (true_m >= NEAREST_M) & (true_m <= FARTHEST_M)
-    known = asked & (depth_m > 0)
-    off = np.abs(depth_m[known] - true_m[known]) / true_m[known]
-    return off.astype(np.float32, copy=False), float(known.sum() / max(1, asked.sum()))
+    is_within = (true_m >= NEAREST_M) & (true_m <= FARTHEST_M)
+    is_known = is_within & (depth_m > 0)
+    known_m = true_m[is_known]
+    relative = np.abs(depth_m[is_known] - known_m) / known_m
+
+    share = is_known.sum() / max(1, is_within.sum())
+    return relative.astype(np.float32, copy=False), float(share)

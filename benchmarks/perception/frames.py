@@ -6,23 +6,28 @@ import numpy as np
 
 from benchmarks.perception.pipeline import PERIOD_S, PerceptionPipeline
 from benchmarks.perception.scenes import drawn, drive
+from benchmarks.report import Metrics
 
 STEP_M = 0.3
 WARM_UP = 20
 
 
-def took_ms(seed: int, frames: int) -> list[float]:
+def times_ms(seed: int, frames: int) -> list[float]:
     """Of so many `frames` of a drive through the town of `seed`, after a few to warm up."""
-    with drawn(seed, 0, drive((WARM_UP + frames) * STEP_M, STEP_M)) as (_, camera, scenes):
+    path = drive((WARM_UP + frames) * STEP_M, STEP_M)
+
+    with drawn(seed, 0, path) as (_, camera, scenes):
         pairs = [(scene.left, scene.right) for scene in scenes]
-    eyes = PerceptionPipeline(camera)
-    results = [eyes.see(left, right, STEP_M / PERIOD_S) for left, right in pairs]
+
+    pipeline = PerceptionPipeline(camera)
+    speed_m_s = STEP_M / PERIOD_S
+    results = [pipeline.process(left, right, speed_m_s) for left, right in pairs]
     return [result.took_ms for result in results[WARM_UP:]]
 
 
-def figures(times_ms: list[float]) -> dict[str, float]:
-    """Their median and their 99th percentile."""
+def metrics(took_ms: list[float]) -> Metrics:
+    """The median and the 99th percentile of the times of frames."""
     return {
-        "frame_ms_p50": float(np.percentile(times_ms, 50)),
-        "frame_ms_p99": float(np.percentile(times_ms, 99)),
+        "frame_ms_p50": float(np.percentile(took_ms, 50)),
+        "frame_ms_p99": float(np.percentile(took_ms, 99)),
     }

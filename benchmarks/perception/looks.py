@@ -1,19 +1,19 @@
-"""What perception makes of one held-out town: a task for a process, and what it gives back."""
+"""What perception makes of one held-out town: a job for a process, and what it returns."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.perception import depth, road, streets
 from benchmarks.perception.novel import Meeting, Memory, remembered
 from benchmarks.perception.objects import Claim, Sight, claims, right_or_not, sight
-from benchmarks.perception.pipeline import CandidateProbe, PerceptionPipeline
+from benchmarks.perception.pipeline import CandidateProbe, PerceptionPipeline, Result
 from benchmarks.perception.scenes import Scene, anywhere, drawn, encounter, later, side_and_range
-from schemas.sensing import Pose
+from cogmap.geometry.arrays import Bytes, Floats, Singles
+from schemas.sensing import Calibration, Pose
 from services.epam.layout.road import load
 from services.sim.layout.catalogue import CATALOGUE
 from services.sim.layout.plan import STREET_WIDTH_M
@@ -23,14 +23,13 @@ from training.rendering.towns import KINDS
 TRAINED = frozenset(kind.name for kind in CATALOGUE)
 NOVEL = 20
 EVERY = 16
-Tick = Callable[[], None]
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """One town: what was seen of its buildings, `judged` pairs of activation and rightness, and
-    errors of each point, and of one pixel in EVERY.
+    """One town: what was seen of its buildings, `judged` pairs of activation and rightness.
+
+    Errors are of each point of the road's edge, and of the depth of one pixel in EVERY.
     """
 
     sights: list[Sight]
@@ -38,74 +37,110 @@ class Look:
     road_iou: float
     edge_errors_m: Floats
     edges_missed_m: Floats
-    depth_errors: npt.NDArray[np.float32]
+    depth_errors: Singles
     depth_known: float
 
 
-def town_look(seed: int, invented: int, views: int, tick: Tick) -> Look:
-    """Look at the town of `seed` from `views` places, with fresh eyes."""
-    sights = []
-    candidates = []
-    masks = []
-    surfaces = []
-    off = []
-    missed = []
-    depths = []
-    roads = load()
-    probe = CandidateProbe()
+def town_look(seed: int, invented: int, views: int) -> Look:
+    """Look at the town of `seed` from `views` places; nothing was learned before."""
     with drawn(seed, invented, anywhere(views)) as (place, camera, scenes):
-        eyes = PerceptionPipeline(camera)
-        edges = streets.edges([each.area(STREET_WIDTH_M / 2) for each in place.roads])
+        pipeline = PerceptionPipeline(camera)
+        tally = _Tally(place, camera)
+
         for scene in scenes:
-            result = eyes.see(scene.left, scene.right)
-            view = result.view
-            percepts = result.percepts
-            sights.append(_sight(claims(percepts.objects, scene.label.shape), place, scene))
-            candidates.append(_sight(probe.candidates(result), place, scene))
-            masks.append(roads.mask(view.image.numpy().astype(np.uint8, copy=False)))
-            surfaces.append(scene.surface)
-            boundary_m = percepts.road_boundary_m.numpy()
-            off.append(streets.distances_m(streets.in_town(boundary_m, scene.pose), edges))
-            missed.append(
-                road.road_edges_missed_m(boundary_m, scene.surface, scene.depth_m, camera)
-            )
-            depths.append(
-                depth.errors(view.depth_m.numpy().astype(np.float32, copy=False), scene.depth_m)
-            )
-            tick()
-    return Look(
-        sights=sights,
-        judged=right_or_not(candidates, sights, TRAINED),
-        road_iou=road.road_iou(np.asarray(masks), np.asarray(surfaces)),
-        edge_errors_m=np.concatenate(off),
-        edges_missed_m=np.concatenate(missed),
-        depth_errors=np.concatenate([errors[::EVERY] for errors, _ in depths]),
-        depth_known=float(np.mean([known for _, known in depths])),
-    )
+            tally.add(scene, pipeline.process(scene.left, scene.right))
+
+    return tally.look()
 
 
-def novel_look(seed: int, sightings: int, tick: Tick) -> Memory:
-    """Meet NOVEL invented buildings of the town of `seed` once each, then see each up to
-    `sightings` times more.
-    """
+@dataclass
+class _Tally:
+    """What has been seen so far of one town."""
+
+    place: Town
+    camera: Calibration
+    sights: list[Sight] = field(default_factory=list)
+    candidates: list[Sight] = field(default_factory=list)
+    masks: list[np.ndarray] = field(default_factory=list)
+    surfaces: list[Bytes] = field(default_factory=list)
+    edge_errors_m: list[Floats] = field(default_factory=list)
+    edges_missed_m: list[Floats] = field(default_factory=list)
+    depth_errors: list[Singles] = field(default_factory=list)
+    depth_known: list[float] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._roads = load()
+        self._probe = CandidateProbe()
+        areas = [street.area(STREET_WIDTH_M / 2) for street in self.place.roads]
+        self._edges = streets.edges(areas)
+
+    def add(self, scene: Scene, result: Result) -> None:
+        """One view, and what was made of it."""
+        percepts = claims(result.percepts.objects, scene.label.shape)
+        self.sights.append(_sight(percepts, self.place, scene))
+        self.candidates.append(_sight(self._probe.candidates(result), self.place, scene))
+        self._add_road(scene, result)
+        self._add_depth(scene, result)
+
+    def _add_road(self, scene: Scene, result: Result) -> None:
+        image = result.view.image.numpy().astype(np.uint8, copy=False)
+        self.masks.append(self._roads.mask(image))
+        self.surfaces.append(scene.surface)
+
+        boundary_m = result.percepts.road_boundary_m.numpy()
+        in_town_m = streets.in_town(boundary_m, scene.pose)
+        missed_m = road.road_edges_missed_m(boundary_m, scene.surface, scene.depth_m, self.camera)
+        self.edge_errors_m.append(streets.distances_m(in_town_m, self._edges))
+        self.edges_missed_m.append(missed_m)
+
+    def _add_depth(self, scene: Scene, result: Result) -> None:
+        depth_m = result.view.depth_m.numpy().astype(np.float32, copy=False)
+        relative, known = depth.errors(depth_m, scene.depth_m)
+        self.depth_errors.append(relative[::EVERY])
+        self.depth_known.append(known)
+
+    def look(self) -> Look:
+        """All views together."""
+        return Look(
+            sights=self.sights,
+            judged=right_or_not(self.candidates, self.sights, TRAINED),
+            road_iou=road.road_iou(np.asarray(self.masks), np.asarray(self.surfaces)),
+            edge_errors_m=np.concatenate(self.edge_errors_m),
+            edges_missed_m=np.concatenate(self.edges_missed_m),
+            depth_errors=np.concatenate(self.depth_errors),
+            depth_known=float(np.mean(self.depth_known)),
+        )
+
+
+def novel_look(seed: int, sightings: int) -> Memory:
+    """Meet NOVEL invented buildings of the town of `seed`, then see each up to `sightings` times."""
 
     def poses(place: Town, rng: np.random.Generator) -> list[Pose]:
         first = [encounter(place, target, rng) for target in range(NOVEL)]
-        order = rng.permutation(np.repeat(np.arange(NOVEL), sightings)).tolist()
-        again = [later(place, target, first[target], rng) for target in order]
-        return first + [pose for pose in again if pose is not None]
+        targets = np.repeat(np.arange(NOVEL), sightings)
+        again = []
+
+        for target in rng.permutation(targets).tolist():
+            pose = later(place, target, first[target], rng)
+            if pose is not None:
+                again.append(pose)
+
+        return first + again
 
     with drawn(seed, KINDS, poses, NOVEL) as (place, camera, scenes):
-        eyes = PerceptionPipeline(camera)
+        pipeline = PerceptionPipeline(camera)
         meetings = []
+
         for scene in scenes:
-            percepts = eyes.see(scene.left, scene.right).percepts.objects
-            seen = _sight(claims(percepts, scene.label.shape), place, scene)
+            result = pipeline.process(scene.left, scene.right)
+            percepts = claims(result.percepts.objects, scene.label.shape)
+            seen = _sight(percepts, place, scene)
             meetings.append(Meeting(seen, side_and_range(place, scene.pose)))
-            tick()
+
     return remembered(meetings[:NOVEL], meetings[NOVEL:], TRAINED)
 
 
 def _sight(made: Sequence[Claim], place: Town, scene: Scene) -> Sight:
     kinds = [plot.kind.name for plot in place.plots]
-    return sight(made, scene.label, kinds, side_and_range(place, scene.pose)[:, 1].tolist())
+    ranges_m = side_and_range(place, scene.pose)[:, 1].tolist()
+    return sight(made, scene.label, kinds, ranges_m)

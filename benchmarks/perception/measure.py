@@ -1,24 +1,24 @@
-"""All bars of perception: two processes draw held-out towns and look at them; what that adds up to."""
+"""The metrics of perception: processes draw held-out towns and look at them."""
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_EXCEPTION, ProcessPoolExecutor, wait
 from functools import partial
 from typing import Any
 
 import numpy as np
-from rich.progress import Progress
 
 from benchmarks.perception import frames, sequence
-from benchmarks.perception.looks import NOVEL, TRAINED, Look, Tick, novel_look, town_look
+from benchmarks.perception.looks import TRAINED, Look, novel_look, town_look
 from benchmarks.perception.novel import Memory
-from benchmarks.perception.objects import calibration_error, detection, named
+from benchmarks.perception.objects import Sight, calibration_error, detection, named
 from benchmarks.perception.road import road_edge_error_m
 from benchmarks.perception.scenes import FARTHEST_M, FIRST_SEED, NEAREST_M
+from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most
+from cli.log.progress import bar
+from cogmap.parallel import parallel_map
 
 THRESHOLDS = {
     "top1": at_least(0.97),
@@ -32,7 +32,7 @@ THRESHOLDS = {
     "sequence_recall_at_99p": at_least(0.80),
     "frame_ms_p50": at_most(60),
 }
-WORKERS = 2
+PROCESSES = 2
 # Of each town, up to how many of its kinds are invented.
 TOWNS = (0, 0, 14, 0, 0, 14, 0, 0)
 VIEWS = 90
@@ -41,86 +41,85 @@ SIGHTINGS = 7
 FRAMES = 150
 RANGES_M = ((5.0, 15.0), (15.0, 30.0), (30.0, 60.0))
 LARGER_SHARE = 0.03
-POLL_S = 0.2
 
 
-def measure() -> dict[str, float]:
-    """Every figure of THRESHOLDS, and others that tell how it came about."""
-    # Two processes, each on a core of its own: no library should start threads.
+def measure() -> Metrics:
+    """The metrics of THRESHOLDS, and others that explain them."""
+    # Each process is on a core of its own: no library should start threads.
     os.environ.update(OMP_NUM_THREADS="1", LP_NUM_THREADS="1")
-    seeds = range(FIRST_SEED, FIRST_SEED + len(TOWNS) + NOVEL_TOWNS)
+    first_novel = FIRST_SEED + len(TOWNS)
+    novel_seeds = range(first_novel, first_novel + NOVEL_TOWNS)
+    novel = [partial(novel_look, seed, SIGHTINGS) for seed in novel_seeds]
     towns = [
         partial(town_look, seed, invented, VIEWS)
-        for seed, invented in zip(seeds, TOWNS, strict=False)
+        for seed, invented in enumerate(TOWNS, start=FIRST_SEED)
     ]
-    novel = [partial(novel_look, seed, SIGHTINGS) for seed in seeds[len(TOWNS) :]]
-    spawning = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(WORKERS, spawning) as pool:
-        try:
-            # The longest first.
-            ways, memories, looks = _looked(pool, [sequence.measure], novel, towns)
-            places: dict[str, float] = ways[0]
-            # The last has the machine to itself.
-            times_ms = pool.submit(frames.took_ms, FIRST_SEED, FRAMES).result()
-        finally:
-            pool.shutdown(cancel_futures=True)
-    return seen(looks) | known_again(memories) | places | frames.figures(times_ms)
+    # The longest come first.
+    jobs: list[Callable[[], Any]] = [sequence.measure, *novel, *towns]
+
+    with bar("held-out towns") as progress:
+        found = parallel_map(_run, jobs, PROCESSES, progress)
+
+    places: Metrics = found[0]
+    memories = found[1 : 1 + NOVEL_TOWNS]
+    looks = found[1 + NOVEL_TOWNS :]
+    times_ms = frames.times_ms(FIRST_SEED, FRAMES)
+    return places | seen(looks) | recognised_again(memories) | frames.metrics(times_ms)
 
 
-def _looked(pool: ProcessPoolExecutor, *tasks: Sequence[Callable[[Tick], Any]]) -> list[list[Any]]:
-    """What each of `tasks` gives back, which `pool` works at, with a bar of progress."""
-    views = len(TOWNS) * VIEWS + NOVEL_TOWNS * NOVEL * (1 + SIGHTINGS) + sequence.views()
-    with Progress() as progress, multiprocessing.Manager() as manager:
-        ticks = manager.Queue()
-        task = progress.add_task("views of held-out towns", total=views)
-        running = [
-            [pool.submit(each, partial(ticks.put, None)) for each in group] for group in tasks
-        ]
-        left = {future for group in running for future in group}
-        while left:
-            done, left = wait(left, POLL_S, FIRST_EXCEPTION)
-            for future in done:
-                future.result()
-            progress.update(task, completed=ticks.qsize())
-        progress.update(task, completed=views)
-        return [[future.result() for future in group] for group in running]
+def _run(job: Callable[[], Any]) -> Any:
+    return job()
 
 
-def seen(looks: Sequence[Look]) -> dict[str, float]:
+def seen(looks: Sequence[Look]) -> Metrics:
     """What was seen in all towns together."""
     sights = [sight for look in looks for sight in look.sights]
-    names = named(sights, TRAINED, NEAREST_M, FARTHEST_M)
-    found, there, right, said = detection(sights)
-    found_large, there_large, _, _ = detection(sights, LARGER_SHARE)
-    edges_missed_m = np.concatenate([look.edges_missed_m for look in looks])
-    near = {
-        f"top1_{least:g}_{most:g}m": _share(names)
-        for least, most in RANGES_M
-        for names in [named(sights, TRAINED, least, most)]
-    }
-    return {
-        "top1": _share(names),
-        "top1_segments": float(len(names)),
-        **near,
-        "ece": calibration_error([pair for look in looks for pair in look.judged]),
-        "detect_recall": found / max(1, there),
-        "detect_precision": right / max(1, said),
-        "detect_buildings": float(there),
-        "detect_segments": float(said),
-        "detect_recall_3_percent": found_large / max(1, there_large),
+    judged = [pair for look in looks for pair in look.judged]
+    edge_errors_m = [look.edge_errors_m for look in looks]
+    edges_missed_m = [look.edges_missed_m for look in looks]
+    depth_errors = np.concatenate([look.depth_errors for look in looks])
+
+    metrics = _named(sights) | {"ece": calibration_error(judged)} | _detected(sights)
+    return metrics | {
         "road_iou": float(np.mean([look.road_iou for look in looks])),
-        "road_edge_error_m": road_edge_error_m([look.edge_errors_m for look in looks]),
-        "road_edge_missed_m": road_edge_error_m([edges_missed_m]),
-        "depth_error": float(np.median(np.concatenate([look.depth_errors for look in looks]))),
+        "road_edge_error_m": road_edge_error_m(edge_errors_m),
+        "road_edge_missed_m": road_edge_error_m(edges_missed_m),
+        "depth_error": float(np.median(depth_errors)),
         "depth_known": float(np.mean([look.depth_known for look in looks])),
     }
 
 
-def known_again(memories: Sequence[Memory]) -> dict[str, float]:
+def _named(sights: Sequence[Sight]) -> Metrics:
+    """The share of segments of trained kinds whose name is right, in all and by distance."""
+    right = named(sights, TRAINED, NEAREST_M, FARTHEST_M)
+    metrics = {"top1": _share(right), "top1_segments": float(len(right))}
+
+    for min_m, max_m in RANGES_M:
+        metrics[f"top1_{min_m:g}_{max_m:g}m"] = _share(named(sights, TRAINED, min_m, max_m))
+
+    return metrics
+
+
+def _detected(sights: Sequence[Sight]) -> Metrics:
+    found, there, right, claimed = detection(sights)
+    found_large, there_large, _, _ = detection(sights, LARGER_SHARE)
+
+    return {
+        "detect_recall": found / max(1, there),
+        "detect_precision": right / max(1, claimed),
+        "detect_buildings": float(there),
+        "detect_segments": float(claimed),
+        "detect_recall_3_percent": found_large / max(1, there_large),
+    }
+
+
+def recognised_again(memories: Sequence[Memory]) -> Metrics:
     """What became of the buildings that were met once, in all towns together."""
     sightings = sum(memory.later for memory in memories)
+    right = sum(memory.right for memory in memories)
+
     return {
-        "novel_top1": sum(memory.right for memory in memories) / max(1, sightings),
+        "novel_top1": right / max(1, sightings),
         "novel_buildings": float(sum(memory.met for memory in memories)),
         "novel_sightings": float(sightings),
         "novel_wrong_merges": float(sum(memory.merges for memory in memories)),

@@ -9,12 +9,13 @@ the laps: so there is much to mistake.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from benchmarks.report import Metrics
 from schemas.sensing import PlaceMatch, Pose
 from services.epam.places.recognizer import PlaceRecognizer
 from services.sensory.disparity import DepthFromStereo
@@ -28,7 +29,6 @@ from training.rendering import towns
 
 Floats = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
-Tick = Callable[[], None]
 
 # The last town is built of kinds that nobody was taught alone: no landmark in any view.
 TOWNS = ((3201, 0), (3202, 0), (3203, 28))
@@ -70,46 +70,39 @@ class Answer:
     match: PlaceMatch | None
 
 
-def measure(tick: Tick = lambda: None) -> dict[str, float]:
-    """The figures; `tick` is called after each of the `views()`."""
-    memory = PlaceRecognizer()
+def measure() -> Metrics:
+    """The metrics of place recognition, of all TOWNS driven one after the other."""
+    recognizer = PlaceRecognizer()
     answers = list[Answer]()
+
     for seed, invented in TOWNS:
-        answers += drive(memory, len(answers), seed, invented, tick)
-    return figures(answers)
+        answers += drive(recognizer, len(answers), _town(seed, invented))
+
+    return metrics(answers)
 
 
-def views() -> int:
-    """How many there are."""
-    return sum(
-        len(part.poses) for seed, invented in TOWNS for part in course(_town(seed, invented))
-    )
-
-
-def drive(
-    memory: PlaceRecognizer, first_frame: int, seed: int, invented: int, tick: Tick
-) -> Iterator[Answer]:
-    """Drive through the town of `seed` and ask `memory` at each view."""
-    place = _town(seed, invented)
+def drive(recognizer: PlaceRecognizer, first_frame: int, place: town.Town) -> Iterator[Answer]:
+    """Drive through a town and ask `recognizer` at each view; frames count from `first_frame`."""
     world = World(place)
+
     try:
         camera = StereoCamera(world, calibration())
-        rng = np.random.default_rng([seed, 0x5F])
         straight = rectification(camera.calibration)
         stereo = DepthFromStereo(straight.calibration, NEAREST_M)
+        rng = np.random.default_rng([place.seed, 0x5F])
         frame = first_frame
-        for part in course(place):
-            for pose in part.poses:
+
+        for stretch in course(place):
+            for pose in stretch.poses:
                 world.robot.place(pose)
-                left, right = straight.apply(
-                    *(eye.image for eye in camera.capture_labelled(part.light, rng))
-                )
-                matches, _ = memory.observe(
-                    frame, frame * FRAME_NS, left, stereo.depth_m(left, right)
-                )
-                yield Answer(seed, part.part, pose, matches[0] if matches else None)
+                eyes = camera.capture_labelled(stretch.light, rng)
+                left, right = straight.apply(*(eye.image for eye in eyes))
+
+                depth_m = stereo.depth_m(left, right)
+                matches, _ = recognizer.observe(frame, frame * FRAME_NS, left, depth_m)
+                best = matches[0] if matches else None
+                yield Answer(place.seed, stretch.part, pose, best)
                 frame += 1
-                tick()
     finally:
         world.close()
 
@@ -191,7 +184,7 @@ def _slowly(rng: np.random.Generator, at_m: Floats, every_m: float, most: float)
     return np.asarray(np.interp(at_m, knots, rng.uniform(-most, most, len(knots))))
 
 
-def figures(answers: Sequence[Answer]) -> dict[str, float]:
+def metrics(answers: Sequence[Answer]) -> Metrics:
     """Recall at 99 % precision, and what the answers are worth as they were given."""
     score = np.array([answer.match.score if answer.match else 0.0 for answer in answers])
     right = np.array(

@@ -18,7 +18,7 @@ from benchmarks.perception.sequence import (
     TURN_RAD,
     Answer,
     course,
-    figures,
+    metrics,
     poses,
     recall,
 )
@@ -72,7 +72,7 @@ def _answer(
 
 def test_a_match_is_right_only_at_the_same_place_of_the_same_town_looking_the_same_way() -> None:
     before = [_answer(FIRST_LAP, x_m) for x_m in (0.0, 10.0, 20.0)]
-    figure = figures(
+    measured = metrics(
         [
             *before,
             _answer(FIRST_LAP, 30.0, frame=0),
@@ -82,6 +82,6 @@ def test_a_match_is_right_only_at_the_same_place_of_the_same_town_looking_the_sa
             _answer(SECOND_LAP, 0.0, frame=0, seed=2),
         ]
     )
-    assert figure["sequence_precision"] == pytest.approx(1 / 5)
-    assert figure["sequence_recall"] == pytest.approx(1 / 2)
-    assert figure["sequence_false_outside_second_lap"] == 1
+    assert measured["sequence_precision"] == pytest.approx(1 / 5)
+    assert measured["sequence_recall"] == pytest.approx(1 / 2)
+    assert measured["sequence_false_outside_second_lap"] == 1
