@@ -14,4 +14,6 @@ def wrong_line(path: Path, number: int, line: str, expected: str) -> UsageError:
     shown = line.strip()
     if len(shown) > _MAX_SHOWN:
         shown = f"{shown[:_MAX_SHOWN]}…"
-    return UsageError(f"{path}, line {number}: expected {expected}, got '{shown}'")
+
+    place = f"{path}, line {number}"
+    return UsageError(f"{place}: expected {expected}, got '{shown}'")

@@ -42,7 +42,8 @@ class Robot:
     @property
     def landmark_observations(self) -> Floats:
         """The observations that are not of robots."""
-        is_landmark = self.observations[:, 1] > ROBOTS[-1]
+        subjects = self.observations[:, 1]
+        is_landmark = subjects > ROBOTS[-1]
         return self.observations[is_landmark]
 
 
@@ -100,12 +101,14 @@ def read(folder: Path) -> Recording:
         )
     barcodes = _table(folder, "Barcodes", _BARCODES)
     subject_of = {int(barcode): int(subject) for subject, barcode in barcodes}
-    surveyed = _table(folder, "Landmark_Groundtruth", _LANDMARKS)
-    landmarks = {int(row[0]): (float(row[1]), float(row[2])) for row in surveyed}
+    landmarks = {}
+    for subject, x_m, y_m, *_ in _table(folder, "Landmark_Groundtruth", _LANDMARKS).tolist():
+        landmarks[int(subject)] = (x_m, y_m)
 
     numbers = [n for n in ROBOTS if _path(folder, f"Robot{n}_Odometry") is not None]
     if not numbers:
         raise UsageError(f"{folder} has no Robot1_Odometry.dat: give the folder of an MRCLAM set")
+
     robots = [_robot(folder, number, subject_of) for number in numbers]
     return Recording(folder.name, robots, landmarks)
 

@@ -68,9 +68,10 @@ def read(path: Path) -> Extract:
 
 def _source(path: Path) -> str | osmium.io.FileBuffer:
     """What libosmium reads: the file, or its content where that is packed as it does not know."""
-    if path.suffix == ".xz":
-        return osmium.io.FileBuffer(lzma.decompress(path.read_bytes()), "osm")
-    return str(path)
+    if path.suffix != ".xz":
+        return str(path)
+    content = lzma.decompress(path.read_bytes())
+    return osmium.io.FileBuffer(content, "osm")
 
 
 def _add_node(extract: Extract, path: Path, node: Node) -> None:
@@ -89,4 +90,6 @@ def _add_way(extract: Extract, path: Path, way: ReadWay) -> None:
     nodes = [node.ref for node in way.nodes]
     if 0 in nodes:
         raise UsageError(f"{path}, way {way.id}: expected a node's id in each <nd>, as ref")
-    extract.ways.append(Way(way.id, nodes, dict(way.tags)))
+
+    tags = dict(way.tags)
+    extract.ways.append(Way(way.id, nodes, tags))

@@ -176,4 +176,6 @@ def _true_position(path: Path, number: int, line: str, words: list[str]) -> list
         raise wrong_line(path, number, line, _TRUE_POSE) from None
     if len(values) not in {3, 4} or not np.isfinite(values).all():
         raise wrong_line(path, number, line, _TRUE_POSE)
-    return values[-3:-1]
+
+    x_m, y_m, _heading_rad = values[-3:]
+    return [x_m, y_m]

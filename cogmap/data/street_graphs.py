@@ -49,15 +49,18 @@ class StreetGraph(msgspec.Struct):
         to_last = math.dist(points[-1], start)
         if to_first > to_last:
             points.reverse()
-        return [start, *points[1:-1], end]
+
+        inner = points[1:-1]
+        return [start, *inner, end]
 
 
 def read(path: Path) -> list[StreetGraph]:
     """Every city in a file. Raises UsageError naming file, line and what was expected there."""
     graphs = []
     for number, line in enumerate(lines(path, "street graphs as JSON Lines"), start=1):
-        if line.strip():
-            graphs.append(_graph(path, number, line.decode("utf-8", "replace")))
+        text = line.decode("utf-8", "replace")
+        if text.strip():
+            graphs.append(_graph(path, number, text))
     return graphs
 
 
