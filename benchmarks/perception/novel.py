@@ -1,20 +1,17 @@
-"""Buildings that nobody was taught, met once: is each known again, by the name that it was given?"""
+"""Buildings that nobody was taught, met once: whether each is recognised by the name it was given."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-
-import numpy as np
-import numpy.typing as npt
+from dataclasses import dataclass, field
 
 from benchmarks.perception.objects import Sight
-from benchmarks.perception.scenes import LEAST_TURN_RAD, other_distance
+from benchmarks.perception.scenes import MIN_TURN_RAD, other_distance
+from cogmap.geometry.arrays import Floats
 from services.workspace.config import Config
 
 RECOGNISED = Config().recognition_threshold
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -48,46 +45,85 @@ class Memory:
 def remembered(
     encounters: Sequence[Meeting], afterwards: Sequence[Meeting], trained: frozenset[str]
 ) -> Memory:
-    """How the buildings of a town, all novel, were known again, in views from other sides and
-    distances.
+    """How the buildings of a town, all novel, were recognised from other sides and distances.
 
     Each was to be met in the encounter of its number. Sides and distances are other than in that
-    one, and in every one that it was seen in by the way. Its name is the first that it was
+    one, and in every other encounter that it was seen in. Its name is the first that it was
     recognised by, with an activation over RECOGNISED. A building that they gave no name, or that of
     a trained class or of another building, has none: no later sighting of it is right. Of later
     sightings all count, however low their activation.
     """
-    names: dict[int, str] = {}
-    places = {number: [meeting.from_where[number]] for number, meeting in enumerate(encounters)}
-    merges = splits = mistaken = later = right = 0
+    tally = _Tally(trained)
+
+    for number, meeting in enumerate(encounters):
+        tally.places[number] = [meeting.from_where[number]]
     for meeting in encounters:
-        for number, label, activation in _sightings(meeting):
-            places[number].append(meeting.from_where[number])
-            if number not in names and activation > RECOGNISED:
-                taken = label in names.values()
-                merges += taken
-                names[number] = "" if taken or label in trained else label
+        tally.meet(meeting)
     for meeting in afterwards:
-        for number, label, _ in _sightings(meeting):
-            if not all(_elsewhere(meeting.from_where[number], at) for at in places[number]):
+        tally.see_again(meeting)
+
+    return tally.memory()
+
+
+@dataclass
+class _Tally:
+    """The names given so far, the places seen from, and the counts of a Memory."""
+
+    trained: frozenset[str]
+    names: dict[int, str] = field(default_factory=dict)
+    places: dict[int, list[Floats]] = field(default_factory=dict)
+    merges: int = 0
+    splits: int = 0
+    mistaken: int = 0
+    later: int = 0
+    right: int = 0
+
+    def meet(self, meeting: Meeting) -> None:
+        """Note the names that an encounter gives."""
+        for number, label, activation in _sightings(meeting):
+            self.places[number].append(meeting.from_where[number])
+
+            if number in self.names or activation <= RECOGNISED:
                 continue
-            later += 1
-            right += label == names.get(number)
-            mistaken += label in trained
-            merges += label != names.get(number) and label in names.values()
-            splits += label not in trained and label not in names.values()
-    return Memory(sum(map(bool, names.values())), later, right, merges, splits, mistaken)
+
+            is_taken = label in self.names.values()
+            self.merges += is_taken
+            self.names[number] = "" if is_taken or label in self.trained else label
+
+    def see_again(self, meeting: Meeting) -> None:
+        """Count the sightings of one later view."""
+        for number, label, _ in _sightings(meeting):
+            here = meeting.from_where[number]
+            if not all(_is_elsewhere(here, there) for there in self.places[number]):
+                continue
+
+            is_known = label in self.names.values()
+            is_right = label == self.names.get(number)
+            is_trained = label in self.trained
+            self.later += 1
+            self.right += is_right
+            self.mistaken += is_trained
+            self.merges += is_known and not is_right
+            self.splits += not is_trained and not is_known
+
+    def memory(self) -> Memory:
+        """All counts."""
+        met = sum(bool(name) for name in self.names.values())
+        return Memory(met, self.later, self.right, self.merges, self.splits, self.mistaken)
 
 
 def _sightings(meeting: Meeting) -> list[tuple[int, str, float]]:
-    """The buildings that a segment matches, what it is called, and how surely."""
-    segments = meeting.sight.segments
-    return [
-        (each.building.number, each.label, each.activation) for each in segments if each.building
-    ]
+    """The buildings that a segment matches, what it is called, and its activation."""
+    found = []
+
+    for segment in meeting.sight.segments:
+        if segment.building:
+            found.append((segment.building.number, segment.label, segment.activation))
+
+    return found
 
 
-def _elsewhere(now: Floats, then: Floats) -> bool:
-    """Whether the place `now` is at another side and distance of a building than `then`."""
-    turn_rad = abs(math.remainder(float(now[0] - then[0]), math.tau))
-    return turn_rad >= LEAST_TURN_RAD and other_distance(float(now[1]), float(then[1]))
+def _is_elsewhere(here: Floats, there: Floats) -> bool:
+    """Whether `here` is at another side and distance of a building than `there`."""
+    turn_rad = abs(math.remainder(float(here[0] - there[0]), math.tau))
+    return turn_rad >= MIN_TURN_RAD and other_distance(float(here[1]), float(there[1]))

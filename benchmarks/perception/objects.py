@@ -1,4 +1,4 @@
-"""What percepts are of: segments matched to true buildings, and what is right about them."""
+"""Segments matched to the true buildings of a view, and whether their labels are right."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from schemas.sensing import Percept
 MATCH_IOU = 0.5
 LARGE_SHARE = 0.01
 BINS = 15
+MAX_LABELS = 256
 Bools = npt.NDArray[np.bool_]
 Bytes = npt.NDArray[np.uint8]
 # Label, activation and pixels (h, w) of what is taken for a building.
@@ -59,26 +60,44 @@ def sight(
     """What is claimed of a view against its true `label` (h, w): 0 or 1 + place in `kinds` and
     `range_m`.
     """
-    numbers, counts = np.unique(label[label > 0], return_counts=True)
-    buildings = tuple(
-        Building(number - 1, kinds[number - 1], count / label.size, range_m[number - 1])
-        for number, count in zip(numbers.tolist(), counts.tolist(), strict=True)
-    )
+    buildings = _buildings(label, kinds, range_m)
     masks = [mask for _, _, mask in claims]
-    matched = match(overlaps(masks, label, [building.number + 1 for building in buildings]))
+    numbers = [building.number + 1 for building in buildings]
+    matched = match(overlaps(masks, label, numbers))
     segments = []
+
     for (name, activation, mask), place in zip(claims, matched, strict=True):
-        shown = np.bincount(label[mask], minlength=1)
-        most = [
-            each
-            for each in buildings
-            if each.number + 1 < len(shown) and 2 * shown[each.number + 1] >= mask.sum()
-        ]
         matching = None if place is None else buildings[place]
-        segments.append(
-            Segment(name, activation, float(mask.mean()), matching, most[0] if most else None)
-        )
+        share = float(mask.mean())
+        shown = _shown(mask, label, buildings)
+        segments.append(Segment(name, activation, share, matching, shown))
+
     return Sight(buildings, tuple(segments))
+
+
+def _buildings(
+    label: Bytes, kinds: Sequence[str], range_m: Sequence[float]
+) -> tuple[Building, ...]:
+    numbers, counts = np.unique(label[label > 0], return_counts=True)
+    buildings = []
+
+    for number, count in zip(numbers.tolist(), counts.tolist(), strict=True):
+        place = number - 1
+        share = count / label.size
+        buildings.append(Building(place, kinds[place], share, range_m[place]))
+
+    return tuple(buildings)
+
+
+def _shown(mask: Bools, label: Bytes, buildings: Sequence[Building]) -> Building | None:
+    """The building that at least half of the mask's pixels are of."""
+    counts = np.bincount(label[mask], minlength=MAX_LABELS)
+
+    for building in buildings:
+        if 2 * counts[building.number + 1] >= mask.sum():
+            return building
+
+    return None
 
 
 def claims(percepts: Sequence[Percept], shape: tuple[int, ...]) -> list[Claim]:
@@ -101,11 +120,14 @@ def overlaps(
     numbers).
     """
     iou = np.zeros((len(found), len(numbers)))
+
     for column, number in enumerate(numbers):
         true = label == number
         for row, mask in enumerate(found):
-            either = np.count_nonzero(mask | true)
-            iou[row, column] = np.count_nonzero(mask & true) / either if either else 0.0
+            union = np.count_nonzero(mask | true)
+            if union:
+                iou[row, column] = np.count_nonzero(mask & true) / union
+
     return iou
 
 
@@ -115,52 +137,61 @@ def match(iou: npt.NDArray[np.float64]) -> list[int | None]:
     """
     matched: list[int | None] = [None] * iou.shape[0]
     left = iou.copy()
+
     while left.size and left.max() >= MATCH_IOU:
         row, column = np.unravel_index(left.argmax(), left.shape)
         matched[int(row)] = int(column)
-        left[row] = left[:, column] = -1.0
+        left[row] = -1.0
+        left[:, column] = -1.0
+
     return matched
 
 
 def named(
-    sights: Iterable[Sight], trained: frozenset[str], least_m: float, most_m: float
+    sights: Iterable[Sight], trained: frozenset[str], min_m: float, max_m: float
 ) -> list[bool]:
-    """Of each segment that matches a building of a trained kind so far away, whether its label is
-    right.
+    """Of each segment that matches a building of a trained kind at that distance, whether its
+    label is right.
     """
-    return [
-        segment.label == segment.building.kind
-        for each in sights
-        for segment in each.segments
-        if segment.building
-        and segment.building.kind in trained
-        and least_m <= segment.building.range_m <= most_m
-    ]
+    right = []
+
+    for segment in (segment for view in sights for segment in view.segments):
+        building = segment.building
+        if building is None or building.kind not in trained:
+            continue
+        if min_m <= building.range_m <= max_m:
+            right.append(segment.label == building.kind)
+
+    return right
 
 
-def detection(
-    sights: Iterable[Sight], least_share: float = LARGE_SHARE
-) -> tuple[int, int, int, int]:
+def detection(sights: Iterable[Sight], min_share: float = LARGE_SHARE) -> tuple[int, int, int, int]:
     """Of large buildings how many were found, and how many there are; of large segments how many
     match, and all.
     """
-    found = there = right = said = 0
-    for each in sights:
-        matched = {segment.building.number for segment in each.segments if segment.building}
-        large = [building for building in each.buildings if building.share >= least_share]
-        there += len(large)
-        found += sum(building.number in matched for building in large)
-        segments = [segment for segment in each.segments if segment.share >= least_share]
-        said += len(segments)
+    found = 0
+    there = 0
+    right = 0
+    claimed = 0
+
+    for view in sights:
+        matched = {segment.building.number for segment in view.segments if segment.building}
+        buildings = [building for building in view.buildings if building.share >= min_share]
+        there += len(buildings)
+        found += sum(building.number in matched for building in buildings)
+
+        segments = [segment for segment in view.segments if segment.share >= min_share]
+        claimed += len(segments)
         right += sum(segment.building is not None for segment in segments)
-    return found, there, right, said
+
+    return found, there, right, claimed
 
 
 def right_or_not(
     candidates: Iterable[Sight], percepts: Iterable[Sight], trained: frozenset[str]
 ) -> list[tuple[float, bool]]:
-    """Activation of each candidate, and whether its label is right, over the views of one pair of
-    eyes in order.
+    """Activation of each candidate, and whether its label is right, over the views of one pipeline
+    in order.
 
     That of a trained class is right where the building is of that kind, that of a node that was
     learned where the building is the one whose percept it was first given to, and no label where
@@ -168,23 +199,29 @@ def right_or_not(
     """
     owner: dict[str, int | None] = {}
     judged: list[tuple[float, bool]] = []
+
     for before, after in zip(candidates, percepts, strict=True):
-        judged += [
-            (segment.activation, _right(segment, owner, trained)) for segment in before.segments
-        ]
-        for segment in (each for each in after.segments if each.label not in trained):
-            owner.setdefault(segment.label, segment.shows.number if segment.shows else None)
+        for segment in before.segments:
+            judged.append((segment.activation, _is_right(segment, owner, trained)))
+
+        for segment in after.segments:
+            if segment.label not in trained:
+                shown = segment.shows.number if segment.shows else None
+                owner.setdefault(segment.label, shown)
+
     return judged
 
 
-def _right(segment: Segment, owner: dict[str, int | None], trained: frozenset[str]) -> bool:
+def _is_right(segment: Segment, owner: dict[str, int | None], trained: frozenset[str]) -> bool:
     building = segment.shows
+
     if building is None:
         return not segment.label
     if segment.label in trained or building.kind in trained:
         return segment.label == building.kind
     if not segment.label:
         return building.number not in owner.values()
+
     return owner.get(segment.label) == building.number
 
 
@@ -194,7 +231,8 @@ def calibration_error(judged: Sequence[tuple[float, bool]]) -> float:
     """
     if not judged:
         return float("nan")
-    sure, right = (np.asarray(values, np.float64) for values in zip(*judged, strict=True))
-    which = np.minimum((sure * BINS).astype(int), BINS - 1)
-    gaps = np.bincount(which, right - sure, minlength=BINS)
-    return float(np.abs(gaps).sum() / len(sure))
+
+    activation, right = np.array(judged, np.float64).T
+    bins = np.minimum((activation * BINS).astype(int), BINS - 1)
+    gaps = np.bincount(bins, right - activation, minlength=BINS)
+    return float(np.abs(gaps).sum()) / len(activation)

@@ -22,8 +22,8 @@ from training.rendering import towns
 FIRST_SEED = 3101
 NEAREST_M = 5.0
 FARTHEST_M = 60.0
-LEAST_TURN_RAD = math.radians(45)
-LEAST_RATIO = 1.3
+MIN_TURN_RAD = math.radians(45)
+MIN_RATIO = 1.3
 ENCOUNTER_M = (11.0, 22.0)
 HALF_VIEW_RAD = math.radians(37.5)
 RAYS = 96
@@ -196,7 +196,7 @@ def later(place: town.Town, target: int, first: Pose, rng: np.random.Generator) 
     """
     side_rad, range_m = side_and_range(place, first)[target].tolist()
     for _ in range(TRIES):
-        turned = side_rad + float(rng.uniform(LEAST_TURN_RAD, math.tau - LEAST_TURN_RAD))
+        turned = side_rad + float(rng.uniform(MIN_TURN_RAD, math.tau - MIN_TURN_RAD))
         pose = facing(place, target, float(rng.uniform(NEAREST_M, FARTHEST_M)), turned)
         pose = Pose(
             x_m=pose.x_m, y_m=pose.y_m, heading_rad=pose.heading_rad + float(rng.normal(0, 0.2))
@@ -210,4 +210,4 @@ def later(place: town.Town, target: int, first: Pose, rng: np.random.Generator) 
 
 def other_distance(range_m: float, first_m: float) -> bool:
     """Whether `range_m` is another distance than `first_m`: a third more, or less by as much."""
-    return max(range_m, first_m) >= LEAST_RATIO * min(range_m, first_m)
+    return max(range_m, first_m) >= MIN_RATIO * min(range_m, first_m)
