@@ -71,14 +71,15 @@ def print_config(
 
 
 def file_schema() -> Schema:
-    """The JSON Schema (2020-12) of the configuration file: an object with one for each module."""
-    kinds = [registry.config_type(name) for name in registry.MODULES]
+    """The JSON Schema (2020-12) of the configuration file: an object with one for each section."""
+    names = registry.sections()
+    kinds = [registry.config_type(name) for name in names]
     references, definitions = msgspec.json.schema_components(kinds, ref_template="#/$defs/{name}")
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": "cogmap/config",
         "type": "object",
-        "properties": dict(zip(registry.MODULES, references, strict=True)),
+        "properties": dict(zip(names, references, strict=True)),
         "additionalProperties": False,
         "$defs": definitions,
     }

@@ -46,8 +46,8 @@ def effective(base: Sections, choices: Choices, awaits: dict[str, int]) -> Secti
     """The whole configuration of every module: `base`, the choices, the route through the town, and
     the default of every other key. Raises ConfigError.
     """
-    config.check_sections(base, registry.MODULES)
-    sections: Sections = {name: dict(base.get(name, {})) for name in registry.MODULES}
+    config.check_sections(base, registry.sections())
+    sections: Sections = {name: dict(base.get(name, {})) for name in registry.sections()}
 
     sim = sections["sim"]
     if choices.seed is not None:
@@ -58,7 +58,7 @@ def effective(base: Sections, choices: Choices, awaits: dict[str, int]) -> Secti
     for name in WITH_MODE:
         sections[name].setdefault("mode", "lockstep" if choices.lockstep else "real_time")
 
-    complete = {name: _complete(sections, name) for name in registry.MODULES}
+    complete = {name: _complete(sections, name) for name in registry.sections()}
     if not complete["action"]["route"]:
         complete["action"]["route"] = _route(complete["sim"]["seed"], complete["sim"]["laps"])
     return complete

@@ -72,3 +72,29 @@ def test_what_is_written_to_a_file_is_what_is_printed(tmp_path: Path) -> None:
     printed("-o", str(path))
 
     assert path.read_text(encoding="utf-8") == printed()
+
+
+def test_every_setting_has_a_description() -> None:
+    definitions = file_schema()["$defs"]
+    undescribed = [
+        f"{kind}.{key}"
+        for kind, definition in definitions.items()
+        for key, schema in definition["properties"].items()
+        if not schema.get("description")
+    ]
+
+    assert undescribed == []
+
+
+def test_every_number_among_the_settings_is_bounded() -> None:
+    definitions = file_schema()["$defs"]
+    unbounded = []
+    for kind, definition in definitions.items():
+        for key, schema in definition["properties"].items():
+            if schema.get("type") in ("integer", "number"):
+                has_least = {"minimum", "exclusiveMinimum"} & schema.keys()
+                has_greatest = {"maximum", "exclusiveMaximum"} & schema.keys()
+                if not (has_least and has_greatest):
+                    unbounded.append(f"{kind}.{key}")
+
+    assert unbounded == []
