@@ -89,9 +89,12 @@ def _affine(size: tuple[int, ...], how: Augmentation, rng: np.random.Generator) 
     down = zoom * HEIGHT_PX / height
     cos = np.cos(turn_rad)
     sin = np.sin(turn_rad)
-    linear = np.array([[mirror * across * cos, -down * sin], [mirror * across * sin, down * cos]])
+    top_row = [mirror * across * cos, -down * sin]
+    bottom_row = [mirror * across * sin, down * cos]
+    linear = np.array([top_row, bottom_row])
 
-    shift_px = rng.uniform(-how.shift, how.shift, 2) * (WIDTH_PX, HEIGHT_PX)
+    shift = rng.uniform(-how.shift, how.shift, 2)
+    shift_px = shift * (WIDTH_PX, HEIGHT_PX)
     centre_px = np.array([width - 1, height - 1]) / 2
     new_centre_px = np.array([WIDTH_PX - 1, HEIGHT_PX - 1]) / 2
     translation_px = new_centre_px + shift_px - linear @ centre_px
@@ -106,34 +109,44 @@ def _relit(image: Singles, how: Augmentation, rng: np.random.Generator) -> Bytes
     if rng.random() < how.shadow_share:
         image *= _shadow(rng)
 
-    levels = _response(how, rng)
-    image = levels[np.clip(image, 0, 255).astype(np.uint8), np.arange(3)]
+    levels = np.clip(image, 0, 255).astype(np.uint8)
+    response = _response(how, rng)
+    image = response[levels, np.arange(3)]
+
     noise = rng.standard_normal(image.shape, np.float32)
-    image += noise * np.float32(rng.uniform(0, how.noise))
+    noise_sd = np.float32(rng.uniform(0, how.noise))
+    image += noise * noise_sd
     return np.clip(image, 0, 255).astype(np.uint8)
 
 
 def _response(how: Augmentation, rng: np.random.Generator) -> Singles:
     """A camera's response: the new level of each of 256 levels in each colour, (256, 3)."""
     contrast = rng.uniform(-how.contrast, how.contrast)
-    gain = np.exp(contrast + rng.uniform(-how.cast, how.cast, 3))
+    cast = rng.uniform(-how.cast, how.cast, 3)
+    gain = np.exp(contrast + cast)
     gamma = np.exp(rng.uniform(-how.gamma, how.gamma))
     offset = rng.uniform(-how.brightness, how.brightness)
 
-    curve = 255 * (np.arange(256) / 255) ** gamma
-    return np.asarray(curve[:, None] * gain + offset, np.float32)
+    share = np.arange(256) / 255
+    curve = 255 * share**gamma
+    response = curve[:, None] * gain + offset
+    return np.asarray(response, np.float32)
 
 
 def _shadow(rng: np.random.Generator) -> Singles:
     """The share of light that is left, (HEIGHT_PX, WIDTH_PX, 1), by a shadow in a straight band."""
     rows, columns = np.indices((HEIGHT_PX, WIDTH_PX), dtype=np.float32, sparse=True)
     direction_rad = rng.uniform(0, np.pi)
-    right_px = np.cos(direction_rad) * (columns - WIDTH_PX / 2)
-    down_px = np.sin(direction_rad) * (rows - HEIGHT_PX / 2)
-    from_middle_px = right_px + down_px
+    right_px = columns - WIDTH_PX / 2
+    down_px = rows - HEIGHT_PX / 2
+    across_px = np.cos(direction_rad) * right_px + np.sin(direction_rad) * down_px
 
     middle_px = rng.uniform(-80, 80)
     half_px = rng.uniform(5, 60)
-    inside_px = half_px - np.abs(from_middle_px - middle_px)
-    shade = np.clip(inside_px / rng.uniform(0.5, 4.0) + 0.5, 0, 1)
-    return np.asarray(1 - rng.uniform(0.2, 0.65) * shade, np.float32)[..., None]
+    inside_px = half_px - np.abs(across_px - middle_px)
+    edge_px = rng.uniform(0.5, 4.0)
+    shade = np.clip(inside_px / edge_px + 0.5, 0, 1)
+
+    darkness = rng.uniform(0.2, 0.65)
+    light = 1 - darkness * shade
+    return np.asarray(light, np.float32)[..., None]

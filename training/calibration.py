@@ -55,7 +55,9 @@ class Trial:
 
     def correct(self, prototypes: Prototypes) -> Booleans:
         """Which of the segments are recognized, (n,)."""
-        return np.asarray(self.posteriors(prototypes).argmax(1) == self.wanted)
+        posterior = self.posteriors(prototypes)
+        claimed = posterior.argmax(1)
+        return np.asarray(claimed == self.wanted)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +101,8 @@ def _with_evidence(prototypes: Prototypes, log_odds: Singles, shown: Booleans) -
     """`prototypes` with the factor that makes log odds (n, 2) of what is `shown` likeliest."""
 
     def cost(tried: Prototypes) -> float:
-        return _surprise(np.abs(probability(log_odds, tried) - ~shown))
+        likelihood = np.abs(probability(log_odds, tried) - ~shown)
+        return _surprise(likelihood)
 
     tried = (msgspec.structs.replace(prototypes, evidence=evidence) for evidence in EVIDENCE)
     return min(tried, key=cost)
@@ -122,28 +125,39 @@ def _likeliest(
 
 def _columns(of: Crops, prototypes: Prototypes) -> Rows:
     """The column of the right posterior (n,): that of its name, or the one after all names."""
-    column_of = {name: column for column, name in enumerate(prototypes.names)}
-    return np.array([column_of.get(name, len(column_of)) for name in of.name.tolist()])
+    columns = {name: column for column, name in enumerate(prototypes.names)}
+    after_all = len(columns)
+    names = of.name.tolist()
+    return np.array([columns.get(name, after_all) for name in names])
 
 
 def _metrics(posterior: Floats, of: Crops, column: Rows) -> dict[str, float]:
     """Of segments with these posteriors (n, k + 2) and the columns that are right (n,)."""
     taught = posterior.shape[1] - 2
+    of_labels = posterior[:, :taught]
     unlabelled = posterior[:, taught:].sum(1, keepdims=True)
-    claims = np.concatenate([posterior[:, :taught], unlabelled], axis=1)
+    claims = np.concatenate([of_labels, unlabelled], axis=1)
     claimed = claims.argmax(1)
+    correct = claimed == column
+
     building = of.name != ""
     known = column < taught
-    background = posterior[:, -1]
+    unknown = building & ~known
+    claimed_background = posterior[:, -1] > 0.5
+    claimed_building = posterior[:, -1] < 0.5
 
     return {
         "segments": float(len(claims)),
-        "top1": float((claimed[known] == column[known]).mean()),
-        "unknown_recall": float((claimed[building & ~known] == taught).mean()),
-        "background_recall": float((background[~building] > 0.5).mean()),
-        "building_recall": float((background[building] < 0.5).mean()),
-        "ece": calibration_error(claims.max(1), claimed == column),
+        "top1": _share(correct[known]),
+        "unknown_recall": _share(claimed[unknown] == taught),
+        "background_recall": _share(claimed_background[~building]),
+        "building_recall": _share(claimed_building[building]),
+        "ece": calibration_error(claims.max(1), correct),
     }
+
+
+def _share(of: Booleans) -> float:
+    return float(of.mean())
 
 
 def _novel_metrics(prototypes: Prototypes, encounters: _Encounters) -> dict[str, float]:
@@ -155,7 +169,9 @@ def _novel_metrics(prototypes: Prototypes, encounters: _Encounters) -> dict[str,
 
 def _accuracy(prototypes: Prototypes, trials: Iterable[Trial]) -> float:
     correct = [trial.correct(prototypes) for trial in trials]
-    return float(np.concatenate(correct).mean()) if correct else 0.0
+    if not correct:
+        return 0.0
+    return _share(np.concatenate(correct))
 
 
 def _encounters(embeddings: Singles, cosines: Singles, of: Crops) -> _Encounters:
@@ -178,32 +194,41 @@ def _encounter(
 ) -> None:
     """Add the trials of the segments `here`, all of unlabelled buildings of one town."""
     names = sorted(set(of.name[here].tolist()))
-    first = []
-    for name in names:
-        segments = here[of.name[here] == name]
-        first.append(segments[of.area_px[segments].argmax()])
-
+    first = [_largest(here[of.name[here] == name], of) for name in names]
     rows = np.setdiff1d(here, first)
     column = np.searchsorted(names, of.name[rows])
+
     novel = embeddings[rows] @ embeddings[first].T
     never = novel.copy()
     never[np.arange(len(rows)), column] = IMPOSSIBLE_COSINE
 
     taught = cosines.shape[1]
     unknown = np.full(len(rows), taught + len(names))
-    encounters.known.append(Trial(cosines[rows], novel, taught + column))
-    encounters.unknown.append(Trial(cosines[rows], never, unknown))
+    known_trial = Trial(cosines[rows], novel, taught + column)
+    unknown_trial = Trial(cosines[rows], never, unknown)
+    encounters.known.append(known_trial)
+    encounters.unknown.append(unknown_trial)
+
+
+def _largest(segments: Rows, of: Crops) -> int:
+    """The first of the largest of these segments."""
+    area_px = of.area_px[segments]
+    return int(segments[area_px.argmax()])
 
 
 def _surprise(likelihood: Floats) -> float:
-    return float(-np.log(likelihood.clip(1e-6)).sum())
+    log_likelihood = np.log(likelihood.clip(1e-6))
+    return -float(log_likelihood.sum())
 
 
 def calibration_error(activation: Floats, correct: Booleans) -> float:
     """Return the expected calibration error, by BINS of equal width (Naeini, Cooper & Hauskrecht
     2015).
     """
-    number = np.minimum((activation * BINS).astype(np.intp), BINS - 1)
+    scaled = (activation * BINS).astype(np.intp)
+    number = np.minimum(scaled, BINS - 1)
     count = np.bincount(number, minlength=BINS)
-    gap = np.bincount(number, activation - correct, minlength=BINS)
+
+    excess = activation - correct
+    gap = np.bincount(number, excess, minlength=BINS)
     return float(np.abs(gap).sum() / max(count.sum(), 1))

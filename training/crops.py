@@ -49,7 +49,8 @@ def overlap(segment: Segment, label: Bytes) -> tuple[int, float]:
     intersection over union of the two.
     """
     number, common_px = _main_building(segment, label)
-    union_px = segment.area_px + int((label == number).sum()) - common_px
+    building_px = int(np.count_nonzero(label == number))
+    union_px = segment.area_px + building_px - common_px
     return number, common_px / max(union_px, 1)
 
 
@@ -92,7 +93,9 @@ def _of_town(index: int, town: Town, segmenter: Segmenter) -> Iterator[_Row]:
 def _shown(segment: Segment, label: Bytes, names: tuple[str, ...]) -> str:
     """The name of the building that at least MIN_PURITY of the segment shows, empty for none."""
     number, common_px = _main_building(segment, label)
-    return names[number - 1] if common_px >= MIN_PURITY * segment.area_px else ""
+    if common_px < MIN_PURITY * segment.area_px:
+        return ""
+    return names[number - 1]
 
 
 def _main_building(segment: Segment, label: Bytes) -> tuple[int, int]:

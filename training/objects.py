@@ -30,7 +30,7 @@ from services.epam.recognition.segments import load as load_segmenter
 from training.calibration import calibrate
 from training.crops import Crops, crops
 from training.networks.export import export
-from training.networks.loader import Batch, prefetch
+from training.networks.loader import Batch, prefetch, shuffled
 from training.networks.optimizer import Optimizer, seed_torch
 from training.networks.unet import convolution
 from training.rendering.reader import INVENTED, files, read
@@ -43,6 +43,7 @@ WEIGHT_DECAY = 5e-4
 SHARPNESS = 16.0
 MARGIN = 0.15
 INITIAL_LENGTH = 0.03
+HIDDEN_SHARE = 0.35
 EMBEDDED_AT_ONCE = 256
 
 
@@ -99,33 +100,42 @@ def augmented(values: npt.NDArray[np.float16], rng: np.random.Generator) -> Sing
     _hide_parts(varied, rng)
 
     shifts = rng.integers(-3, 4, (len(varied), 2))
-    for row, shift in enumerate(shifts):
-        varied[row, :5] = np.roll(varied[row, :5], shift, axis=(1, 2))
+    for crop, shift in zip(varied, shifts, strict=True):
+        crop[:5] = np.roll(crop[:5], shift, axis=(1, 2))
     return varied
 
 
 def _relight(values: Singles, rng: np.random.Generator) -> None:
     """Change the colours of segment, ground and sky alike, and the size a little, in place."""
     count = len(values)
-    mask = values[:, 3:4].copy()
     channel_gain = rng.normal(0, 0.06, (count, 3, 1, 1))
-    gain = np.exp(channel_gain + rng.normal(0, 0.15, (count, 1, 1, 1))).astype(np.float32)
+    overall_gain = rng.normal(0, 0.15, (count, 1, 1, 1))
+    gain = np.exp(channel_gain + overall_gain).astype(np.float32)
     offset = rng.normal(0, 0.06, (count, 1, 1, 1)).astype(np.float32)
-    values[:, :3] = ((values[:, :3] + 2 * mask) * gain - 2 * mask) + offset * mask
 
-    around = values[:, 6:].reshape(count, 2, 3, *values.shape[2:])
+    mask = values[:, 3:4]
+    colours = values[:, :3]
+    black = 2 * mask
+    colours[:] = ((colours + black) * gain - black) + offset * mask
+
+    around = values[:, 6:].reshape(count, 2, 3, SIDE_PX, SIDE_PX)
     visible = np.abs(around).max(axis=2, keepdims=True) > 0
     relit = (around + 2) * gain[:, None] - 2 + offset[:, None]
     around[:] = np.where(visible, relit, 0)
-    values[:, 5] += rng.normal(0, 0.04, (count, 1, 1)).astype(np.float32)
+
+    log_size = rng.normal(0, 0.04, (count, 1, 1))
+    values[:, 5] += log_size.astype(np.float32)
 
 
 def _hide_parts(values: Singles, rng: np.random.Generator) -> None:
     """Remove a rectangle from some of the segments, in place."""
-    for number in np.flatnonzero(rng.random(len(values)) < 0.35):
+    is_hidden = rng.random(len(values)) < HIDDEN_SHARE
+    for number in np.flatnonzero(is_hidden):
         left, top = rng.integers(0, SIDE_PX, 2)
         width, height = rng.integers(4, SIDE_PX // 2, 2)
-        values[number, :4, top : top + height, left : left + width] = 0.0
+        rows = slice(top, top + height)
+        columns = slice(left, left + width)
+        values[number, :4, rows, columns] = 0.0
 
 
 def train_on_renderings(
@@ -176,19 +186,26 @@ def _uncalibrated(folder: Path, fitted: Fitted) -> Prototypes:
 
 def _fit(known: Crops, rng: np.random.Generator, epochs: int, progress: Progress) -> Fitted:
     names = sorted(set(known.name.tolist()) - {""})
-    number = np.where(known.name == "", -1, np.searchsorted(names, known.name))
+    rows = np.searchsorted(names, known.name)
+    number = np.where(known.name == "", -1, rows)
     net = EmbeddingNet().to(memory_format=torch.channels_last)
     # Short ones turn fast at first: each of thousands of kinds is seldom seen.
-    directions = nn.Parameter(INITIAL_LENGTH * torch.randn(len(names), DIMENSIONS))
+    initial = INITIAL_LENGTH * torch.randn(len(names), DIMENSIONS)
+    directions = nn.Parameter(initial)
+
     steps = max(1, epochs * len(number) // BATCH)
-    optimizer = Optimizer([*net.parameters(), directions], steps, MAX_RATE, WEIGHT_DECAY)
+    parameters = [*net.parameters(), directions]
+    optimizer = Optimizer(parameters, steps, MAX_RATE, WEIGHT_DECAY)
     task = progress.add_task("training", total=steps)
 
     for values, wanted, whole in prefetch(partial(_batches, known, number, steps, rng)):
+        batch = values.contiguous(memory_format=torch.channels_last)
         with torch.autocast("cpu", torch.bfloat16):
-            embedding, log_odds = net(values.contiguous(memory_format=torch.channels_last))
+            embedding, log_odds = net(batch)
+
         unit = functional.normalize(directions)
-        value = optimizer.step(loss(embedding.float(), log_odds.float(), unit, wanted, whole))
+        lost = loss(embedding.float(), log_odds.float(), unit, wanted, whole)
+        value = optimizer.step(lost)
         progress.update(task, advance=1, description=f"training, loss {value:.3f}")
     return Fitted(net.eval(), directions, names)
 
@@ -200,40 +217,41 @@ def loss(
     of what each shows, -1 for no building, and whether it shows most of it.
     """
     building = wanted >= 0
+    labels = wanted[building]
     cosines = embedding[building] @ directions.T
-    cosines = cosines - MARGIN * functional.one_hot(wanted[building], len(directions))
-    label = functional.cross_entropy(SHARPNESS * cosines, wanted[building])
+    margin = MARGIN * functional.one_hot(labels, len(directions))
+    of_labels = functional.cross_entropy(SHARPNESS * (cosines - margin), labels)
 
     shown = torch.stack([building, whole], 1).float()
-    return label + functional.binary_cross_entropy_with_logits(log_odds, shown)
+    of_odds = functional.binary_cross_entropy_with_logits(log_odds, shown)
+    return of_labels + of_odds
 
 
 def _batches(
     known: Crops, number: npt.NDArray[np.intp], steps: int, rng: np.random.Generator
 ) -> Iterator[Batch]:
-    order = np.empty(0, np.intp)
-    for _ in range(steps):
-        if len(order) < BATCH:
-            order = rng.permutation(len(number))
-        chosen = order[:BATCH]
-        order = order[BATCH:]
-        yield augmented(known.values[chosen], rng), number[chosen], known.whole[chosen]
+    for chosen in shuffled(len(number), BATCH, steps, rng):
+        values = augmented(known.values[chosen], rng)
+        yield values, number[chosen], known.whole[chosen]
 
 
 def embed(net: EmbeddingNet, of: Crops) -> tuple[Singles, Singles]:
     """Return the embedding of each crop, float32 (n, DIMENSIONS), and its log odds (n, 2)."""
     embeddings = []
     log_odds = []
+    parts = len(of.values) // EMBEDDED_AT_ONCE + 1
     with torch.no_grad():
-        for part in np.array_split(of.values, len(of.values) // EMBEDDED_AT_ONCE + 1):
-            embedding, odds = net(torch.from_numpy(part.astype(np.float32)))
+        for part in np.array_split(of.values, parts):
+            values = torch.from_numpy(part.astype(np.float32))
+            embedding, odds = net(values)
             embeddings.append(embedding)
             log_odds.append(odds)
     return _array(embeddings), _array(log_odds)
 
 
 def _array(parts: list[Tensor]) -> Singles:
-    return torch.cat(parts).numpy().astype(np.float32)
+    joined = torch.cat(parts)
+    return joined.numpy().astype(np.float32)
 
 
 def sizes_m(folder: Path, names: list[str]) -> dict[str, tuple[float, float, float]]:
@@ -243,9 +261,9 @@ def sizes_m(folder: Path, names: list[str]) -> dict[str, tuple[float, float, flo
     found: dict[str, tuple[float, float, float]] = {}
     for path in files(folder, "train"):
         town = read(path)
-        for name, (width_m, depth_m, height_m) in zip(
-            town.names, town.size_m.tolist(), strict=True
-        ):
-            if name in names:
-                found[name] = max(width_m, depth_m), min(width_m, depth_m), height_m
+        for name, size_m in zip(town.names, town.size_m.tolist(), strict=True):
+            if name not in names:
+                continue
+            *sides_m, height_m = size_m
+            found[name] = (max(sides_m), min(sides_m), height_m)
     return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -64,7 +65,9 @@ def train_on_renderings(
         for image, surface in zip(town.left, town.surface, strict=True):
             images.append(_labelled(image, surface))
 
-    schedule = Schedule(epochs or EPOCHS, len(images), seed, Augmentation())
+    schedule = Schedule(
+        epochs=epochs or EPOCHS, images=len(images), seed=seed, augmentation=Augmentation()
+    )
     write(train(images, schedule), out)
     return {"road_iou": _iou(folder, out, len(held_out))}
 
@@ -89,9 +92,13 @@ def loss(net: UNet, values: Tensor, road: Tensor, known: Tensor) -> Tensor:
     """Return the mean cross entropy of the network's output for `values`, over the pixels that are
     `known` (n, h, w), where `road` (n, h, w) is right; both are shares of a pixel.
     """
-    output = net(values.to(memory_format=torch.channels_last))[:, 0, PADDING_PX:-PADDING_PX]
+    padded = net(values.to(memory_format=torch.channels_last))
+    output = padded[:, 0, PADDING_PX:-PADDING_PX]
     of_pixels = functional.binary_cross_entropy_with_logits(output, road, reduction="none")
-    return (of_pixels * known).sum() / known.sum().clamp(min=1)
+
+    total = (of_pixels * known).sum()
+    count = known.sum().clamp(min=1)
+    return total / count
 
 
 def write(net: UNet, path: Path) -> None:
@@ -106,37 +113,41 @@ def _batches(
     order = _order(len(images), steps * BATCH, rng)
     for chosen in order.reshape(steps, BATCH):
         batch = [augmented(images[number], schedule.augmentation, rng) for number in chosen]
-        values = network_input(np.stack([each.image for each in batch]))
+        pixels = np.stack([each.image for each in batch])
         road = _shares([each.road for each in batch])
         known = _shares([each.known for each in batch])
-        yield values, road, known
+        yield network_input(pixels), road, known
 
 
 def _order(count: int, wanted: int, rng: np.random.Generator) -> npt.NDArray[np.intp]:
     """Which image comes when, (wanted,): each once, in any order, then each once more."""
-    rounds = -(-wanted // count)
-    return np.concatenate([rng.permutation(count) for _ in range(rounds)])[:wanted]
+    rounds = math.ceil(wanted / count)
+    orders = [rng.permutation(count) for _ in range(rounds)]
+    return np.concatenate(orders)[:wanted]
 
 
 def _shares(levels: Sequence[Bytes]) -> Singles:
     """Levels of 0 to 255 as 0 to 1."""
-    return np.stack(levels).astype(np.float32) / np.float32(255)
+    stacked = np.stack(levels).astype(np.float32)
+    return stacked / np.float32(255)
 
 
 def _labelled(image: Bytes, surface: Bytes) -> LabelledImage:
-    road = (surface == ROAD).astype(np.uint8) * 255
-    return resized(LabelledImage(image, road, np.full_like(road, 255)))
+    is_road = surface == ROAD
+    road = is_road.astype(np.uint8) * 255
+    known = np.full_like(road, 255)
+    return resized(LabelledImage(image, road, known))
 
 
 def _iou(folder: Path, weights: Path, count: int) -> float:
     """The IoU of road in the `count` towns of `folder`/val."""
     segmenter = load(weights)
-    both = 0
-    either = 0
+    both_px = 0
+    either_px = 0
     for town in track(towns(folder, "val"), "testing", total=count):
         for image, surface in zip(town.left, town.surface, strict=True):
             found = segmenter.mask(image)
             road = surface == ROAD
-            both += int(np.count_nonzero(found & road))
-            either += int(np.count_nonzero(found | road))
-    return both / max(either, 1)
+            both_px += int(np.count_nonzero(found & road))
+            either_px += int(np.count_nonzero(found | road))
+    return both_px / max(either_px, 1)

@@ -15,7 +15,7 @@ from rich.progress import Progress
 from torch import Tensor, nn
 from torch.nn import functional
 
-from cogmap.geometry.arrays import Bytes, Singles
+from cogmap.geometry.arrays import Bytes, Floats, Singles
 from schemas.sensing import Calibration
 from services.epam.recognition.segments import (
     CHANNELS,
@@ -31,7 +31,7 @@ from services.epam.recognition.segments import (
 )
 from training.crops import MIN_OVERLAP, overlap
 from training.networks.export import export
-from training.networks.loader import prefetch
+from training.networks.loader import prefetch, shuffled
 from training.networks.optimizer import Optimizer, seed_torch
 from training.networks.unet import UNet
 from training.rendering.reader import Town, files, read, towns
@@ -86,9 +86,11 @@ def examples(towns: Iterable[Town]) -> Examples:
 
 def _example(image: Bytes, depth_m: Singles, camera: Calibration) -> npt.NDArray[np.float16]:
     size = (WIDTH_PX, HEIGHT_PX)
-    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
-    small_depth_m = cv2.resize(depth_m, size, interpolation=cv2.INTER_NEAREST)
-    values = network_input(small, np.asarray(small_depth_m, np.float32), camera)
+    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    small_m = cv2.resize(depth_m, size, interpolation=cv2.INTER_NEAREST)
+    values = network_input(
+        small.astype(np.uint8, copy=False), small_m.astype(np.float32, copy=False), camera
+    )
     return values.astype(np.float16)
 
 
@@ -119,29 +121,35 @@ def target(label: Bytes) -> Singles:
     return wanted
 
 
-def _bump(
-    size: tuple[int, ...], row: float, column: float, sd_px: float
-) -> npt.NDArray[np.generic]:
+def _bump(size: tuple[int, ...], row: float, column: float, sd_px: float) -> Floats:
     """A Gaussian of height 1 about that pixel, (h, w)."""
     height, width = size
-    rows = np.arange(height, dtype=np.float32)
-    columns = np.arange(width, dtype=np.float32)
-    down = np.exp(-((rows - row) ** 2) / (2 * sd_px**2))
-    across = np.exp(-((columns - column) ** 2) / (2 * sd_px**2))
+    down = _gaussian(height, row, sd_px)
+    across = _gaussian(width, column, sd_px)
     return np.outer(down, across)
+
+
+def _gaussian(count: int, middle: float, sd: float) -> Floats:
+    """A Gaussian of height 1 at 0, 1, and so on, (count,)."""
+    away = np.arange(count) - middle
+    squared = away**2
+    return np.asarray(np.exp(-squared / (2 * sd**2)))
 
 
 def loss(output: Tensor, wanted: Tensor) -> Tensor:
     """Return the loss of the network's output (n, 4, h, w); small buildings have more weight than
     their pixels.
     """
-    building = functional.binary_cross_entropy_with_logits(output[:, 0], wanted[:, 0])
-    squared = (output[:, 1] - wanted[:, 1]).square()
-    centre = (squared * (1 + 8 * wanted[:, 1])).mean()
-
+    wanted_centre = wanted[:, 1]
     weight = wanted[:, 4]
-    error = (output[:, 2:4] - wanted[:, 2:4]).abs().sum(1) * weight
-    offset = error.sum() / (weight.sum() + 1)
+    building = functional.binary_cross_entropy_with_logits(output[:, 0], wanted[:, 0])
+
+    squared = (output[:, 1] - wanted_centre).square()
+    centre = (squared * (1 + 8 * wanted_centre)).mean()
+
+    error = (output[:, 2:4] - wanted[:, 2:4]).abs()
+    weighted = error.sum(1) * weight
+    offset = weighted.sum() / (weight.sum() + 1)
     return building + 20 * centre + 2 * offset
 
 
@@ -155,11 +163,14 @@ def augmented(
         label = label[:, ::-1]
 
     channel_gain = rng.normal(0, 0.08, (3, 1, 1))
-    gain = np.exp(channel_gain + rng.normal(0, 0.12)).astype(np.float32)
-    varied[:3] = (varied[:3] + 2) * gain - 2 + rng.normal(0, 0.05)
+    overall_gain = rng.normal(0, 0.12)
+    gain = np.exp(channel_gain + overall_gain).astype(np.float32)
+    colours = varied[:3]
+    colours[:] = (colours + 2) * gain - 2 + rng.normal(0, 0.05)
 
     if rng.random() < 0.3:
-        field = cv2.resize(rng.random((15, 20), np.float32), (WIDTH_PX, HEIGHT_PX))
+        coarse = rng.random((15, 20), np.float32)
+        field = cv2.resize(coarse, (WIDTH_PX, HEIGHT_PX))
         lost = field < rng.uniform(0, 0.4)
         varied[3:6, lost] = 0.0
     return varied, label
@@ -191,10 +202,12 @@ def _fit(
     task = progress.add_task("training", total=steps)
 
     for values, wanted in prefetch(partial(_batches, known, steps, rng)):
+        batch = values.contiguous(memory_format=torch.channels_last)
         with torch.autocast("cpu", torch.bfloat16):
-            output = net(values.contiguous(memory_format=torch.channels_last))
-        unpadded = output[:, :, PADDING_PX:-PADDING_PX].float()
-        value = optimizer.step(loss(unpadded, wanted))
+            padded_output = net(batch)
+
+        output = padded_output[:, :, PADDING_PX:-PADDING_PX].float()
+        value = optimizer.step(loss(output, wanted))
         progress.update(task, advance=1, description=f"training, loss {value:.3f}")
     return net
 
@@ -202,13 +215,7 @@ def _fit(
 def _batches(
     known: Examples, steps: int, rng: np.random.Generator
 ) -> Iterator[tuple[Singles, Singles]]:
-    order = np.empty(0, np.intp)
-    for _ in range(steps):
-        if len(order) < BATCH:
-            order = rng.permutation(len(known.label))
-        chosen = order[:BATCH]
-        order = order[BATCH:]
-
+    for chosen in shuffled(len(known.label), BATCH, steps, rng):
         inputs = []
         targets = []
         for number in chosen:

@@ -35,3 +35,17 @@ def prefetch(generate: Callable[[], Iterator[Batch]]) -> DataLoader[list[Tensor]
         prefetch_factor=2,
         generator=torch.Generator(),
     )
+
+
+def shuffled(
+    count: int, batch: int, steps: int, rng: np.random.Generator
+) -> Iterator[npt.NDArray[np.intp]]:
+    """Return the numbers (batch,) of the examples of each step: all of `count` in any order, but
+    for a rest smaller than a batch, then all again.
+    """
+    order = np.empty(0, np.intp)
+    for _ in range(steps):
+        if len(order) < batch:
+            order = rng.permutation(count)
+        yield order[:batch]
+        order = order[batch:]

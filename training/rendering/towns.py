@@ -50,11 +50,15 @@ def viewpoints(place: town.Town, count: int, rng: np.random.Generator) -> Iterat
     anywhere free, about towards a building.
     """
     for number in range(count):
-        yield _on_a_street(place, rng) if number % 2 == 0 else _facing_a_building(place, rng)
+        if number % 2 == 0:
+            yield _on_a_street(place, rng)
+        else:
+            yield _facing_a_building(place, rng)
 
 
 def _facing_a_building(place: town.Town, rng: np.random.Generator) -> Pose:
-    plot = place.plots[int(rng.integers(len(place.plots)))]
+    number = int(rng.integers(len(place.plots)))
+    plot = place.plots[number]
     while True:
         range_m = rng.uniform(6, 60)
         bearing_rad = rng.uniform(-math.pi, math.pi)
@@ -68,9 +72,13 @@ def _facing_a_building(place: town.Town, rng: np.random.Generator) -> Pose:
 
 
 def _on_a_street(place: town.Town, rng: np.random.Generator) -> Pose:
-    road = place.roads[int(rng.integers(len(place.roads)))]
-    x_m, y_m = road.point(rng.uniform(0, road.length_m), rng.uniform(-3, 3))
-    direction_rad = road.heading_rad + math.pi * int(rng.integers(2))
+    number = int(rng.integers(len(place.roads)))
+    road = place.roads[number]
+    along_m = rng.uniform(0, road.length_m)
+    x_m, y_m = road.point(along_m, rng.uniform(-3, 3))
+
+    half_turns = int(rng.integers(2))
+    direction_rad = road.heading_rad + math.pi * half_turns
     heading_rad = direction_rad + rng.normal(0, 0.5)
     return Pose(x_m=x_m, y_m=y_m, heading_rad=math.remainder(heading_rad, math.tau))
 
@@ -96,8 +104,10 @@ def render_town(seed: int, count: int, invented_count: int = 0) -> Views:
     finally:
         world.close()
 
-    known = _known(world, camera)
-    return known | {key: np.asarray([view[key] for view in views]) for key in views[0]}
+    town_views = _known(world, camera)
+    for key in views[0]:
+        town_views[key] = np.asarray([view[key] for view in views])
+    return town_views
 
 
 def labelled(
