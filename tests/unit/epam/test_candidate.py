@@ -22,12 +22,12 @@ def _filled(*blocks: tuple[int, int, int, int]) -> tuple[Segment, np.ndarray]:
     return segment, held > 0
 
 
-def test_an_outline_holds_what_is_seen_and_no_more() -> None:
+def test_an_outline_encloses_the_segment_and_no_more() -> None:
     segment, held = _filled((50, 60, 80, 40))
     assert (held == segment.mask).all()
 
 
-def test_beside_a_gable_is_no_part_of_it() -> None:
+def test_the_outline_follows_a_gable() -> None:
     mask = np.zeros((240, 320), np.uint8)
     cv2.fillPoly(mask, [np.array([(100, 20), (110, 120), (90, 120)], np.int32)], 1)
     segment = Segment(mask > 0, cv2.boundingRect(mask))
@@ -49,7 +49,7 @@ def test_of_pieces_far_apart_the_largest_is_outlined() -> None:
     assert held.sum() == 90 * 40
 
 
-def test_a_speck_far_off_changes_nothing() -> None:
+def test_a_distant_speck_does_not_change_the_outline() -> None:
     _, held = _filled((10, 60, 90, 40), (250, 60, 4, 4))
     assert held.sum() == 90 * 40
 
@@ -76,7 +76,7 @@ def _candidates(*blocks: tuple[int, int, float]) -> tuple[list[Candidate], np.nd
     return found, disparity_px
 
 
-def test_pieces_beside_each_other_and_as_far_away_are_one() -> None:
+def test_adjacent_pieces_at_the_same_distance_are_one() -> None:
     pieces, disparity_px = _candidates((50, 60, 6.0), (115, 30, 6.5), (150, 20, 5.8))
     whole = joined(pieces, disparity_px)
 
@@ -86,7 +86,7 @@ def test_pieces_beside_each_other_and_as_far_away_are_one() -> None:
     assert whole.recognition == pieces[0].recognition
 
 
-def test_what_goes_by_the_same_name_elsewhere_is_left_out() -> None:
+def test_a_piece_elsewhere_with_the_same_label_is_left_out() -> None:
     for other in ((115, 30, 12.0), (115, 30, 3.0), (200, 30, 6.0)):
         pieces, disparity_px = _candidates((50, 60, 6.0), other)
         assert joined(pieces, disparity_px).segment.box_px == (50, 60, 60, 40)

@@ -1,4 +1,4 @@
-"""A segment as the network sees it: itself, what is around it, and the light."""
+"""A segment as the network receives it: itself, its surroundings, and the light."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def _segment(left: int, top: int) -> Segment:
     return Segment(mask, (left, top, 80, 40))
 
 
-def test_a_crop_shows_the_segment_alone_and_how_large_it_is() -> None:
+def test_a_crop_shows_the_segment_alone_and_its_size() -> None:
     image = np.full((*SIZE, 3), 200, np.uint8)
     segment = _segment(50, 100)
     near, far = (
@@ -35,7 +35,7 @@ def test_a_crop_shows_the_segment_alone_and_how_large_it_is() -> None:
     assert near[5, 0, 0] < far[5, 0, 0]
 
 
-def test_a_crop_shows_what_lies_farther_and_what_is_nearer_than_the_segment() -> None:
+def test_a_crop_shows_what_is_farther_and_nearer_than_the_segment() -> None:
     image = np.full((*SIZE, 3), 200, np.uint8)
     depth_m = np.full(SIZE, 20.0, np.float32)
     depth_m[40:, :40], depth_m[40:, 40:] = 15.0, 40.0
@@ -47,7 +47,7 @@ def test_a_crop_shows_what_lies_farther_and_what_is_nearer_than_the_segment() ->
     assert not relief[0].any()
 
 
-def test_the_light_is_known_by_the_colours_of_ground_and_sky() -> None:
+def test_the_light_is_described_by_the_colours_of_ground_and_sky() -> None:
     image, depth_m, _ = painted([])
     around = surroundings(image, depth_m, CAMERA)
     darker = surroundings((image * 0.5).astype(np.uint8), depth_m, CAMERA)

@@ -54,7 +54,7 @@ def test_the_centre_is_the_same_from_every_side(x_m: float, y_m: float, turn_rad
     assert place.misfit < 0.3
 
 
-def test_errors_are_about_as_large_as_the_deviations_say() -> None:
+def test_errors_agree_with_the_standard_deviations() -> None:
     rng = np.random.default_rng(2)
     scores = []
     for _ in range(30):
@@ -66,14 +66,14 @@ def test_errors_are_about_as_large_as_the_deviations_say() -> None:
     assert 0.2 < float(np.sqrt(np.mean(np.square(scores)))) < 1.5
 
 
-def test_a_building_of_which_less_is_seen_is_placed_with_less_confidence() -> None:
+def test_a_partly_visible_building_has_larger_standard_deviations() -> None:
     whole = locate([_seen(20.0, 0.0, 0.4)], CAMERA)[0]
     cut = locate([_seen(20.0, 0.0, 0.4, window=(0, 130))], CAMERA)[0]
     assert cut.range_sd_m > 1.5 * whole.range_sd_m
     assert cut.bearing_sd_rad > 2 * whole.bearing_sd_rad
 
 
-def test_several_objects_are_placed_as_each_alone_is_and_none_as_none() -> None:
+def test_several_objects_are_placed_as_each_alone_is() -> None:
     outlines = [_seen(20.0, 4.0, 0.2), _seen(35.0, -9.0, 1.0, noise_px=0.1)]
     together = locate(outlines, CAMERA)
     for place, outline in zip(together, outlines, strict=True):

@@ -1,5 +1,5 @@
-"""The extended PAM as a module: an answer to every view, nothing believed of a senseless one,
-nothing forgotten.
+"""The extended PAM as a module: percepts for every view, invalid views refused, nothing forgotten
+and nothing learned twice.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from tests.support.blocks import CAMERA
 from tests.support.rendered import seen
 from training.rendering.towns import render_town
 
-STRANGERS = 4005
+UNLABELLED = 4005
 
 
 @pytest.fixture(scope="module")
 def views() -> list[View]:
-    """Views of a town that has buildings nobody was taught."""
-    return seen(render_town(STRANGERS, 8, 28))
+    """Views of a town that has unlabelled buildings."""
+    return seen(render_town(UNLABELLED, 8, 28))
 
 
 def _percepts(module: Module, view: View) -> Percepts:
@@ -48,7 +48,7 @@ def _view(image: np.ndarray, depth_m: np.ndarray) -> View:
     )
 
 
-def test_every_view_is_answered_by_percepts_even_where_nothing_is_seen() -> None:
+def test_a_view_without_contrast_gives_empty_percepts() -> None:
     blank = _view(np.zeros((240, 320, 3), np.uint8), np.zeros((240, 320), np.float32))
     said = build(Config(), "epam").feed(blank)
 
@@ -60,7 +60,7 @@ def test_every_view_is_answered_by_percepts_even_where_nothing_is_seen() -> None
     assert (percepts.stamp_ns, percepts.frame) == (5, 3)
 
 
-def test_what_is_hardly_a_building_is_no_percept(views: list[View]) -> None:
+def test_a_segment_under_the_threshold_is_no_percept(views: list[View]) -> None:
     some, fewer, none = (
         sum(
             len(_percepts(build(Config(percept_threshold=threshold), "epam"), view).objects)
@@ -96,7 +96,7 @@ def test_a_percept_is_outlined_boxed_and_measured(views: list[View]) -> None:
         assert percept.width_m > 1.0
 
 
-def test_of_each_node_there_is_one_percept_in_a_view(views: list[View]) -> None:
+def test_a_view_has_one_percept_of_each_node(views: list[View]) -> None:
     module = build(Config(), "epam")
     for view in views:
         labels = [percept.label for percept in _percepts(module, view).objects]
@@ -112,7 +112,9 @@ def test_the_same_views_give_the_same_bytes(views: list[View]) -> None:
     assert answers[0] == answers[1]
 
 
-def test_what_was_learned_is_known_again_after_a_restart(views: list[View], tmp_path: Path) -> None:
+def test_objects_and_views_learned_before_a_restart_are_known_after_it(
+    views: list[View], tmp_path: Path
+) -> None:
     first = build(Config(), "epam")
     journal = Journal(tmp_path / "epam")
     assert list(journal.messages()) == []
@@ -220,12 +222,12 @@ def test_one_message_stands_for_all_that_was_learned(views: list[View]) -> None:
         (np.zeros((240, 320, 3), np.uint8), np.full((240, 320), -1, np.float32)),
     ],
 )
-def test_a_view_that_makes_no_sense_is_refused(image: np.ndarray, depth: np.ndarray) -> None:
+def test_an_invalid_view_is_refused(image: np.ndarray, depth: np.ndarray) -> None:
     with pytest.raises(MessageError, match="view"):
         build(Config(), "epam").feed(_view(image, depth))
 
 
-def test_noise_for_a_view_is_taken_in_and_gives_sound_messages() -> None:
+def test_a_view_of_noise_gives_valid_messages() -> None:
     module = build(Config(), "epam")
     for seed in range(4):
         rng = np.random.default_rng(seed)

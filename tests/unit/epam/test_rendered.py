@@ -1,4 +1,4 @@
-"""Sensing and recognising on renderings of a town that the committed networks have not seen."""
+"""Sensing and recognition on renderings of a town that the committed networks have not seen."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from training.rendering.towns import Views, render_town
 SEED = 4003
 COUNT = 24
 LARGE_PX = 2300
-RECOGNISED = 0.7
+RECOGNIZED = 0.7
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +26,7 @@ def views() -> Views:
 
 
 @pytest.fixture(scope="module")
-def recognised(views: Views) -> list[tuple[int, Percept]]:
+def recognized(views: Views) -> list[tuple[int, Percept]]:
     """The percepts of all views, each with the number of its view."""
     module = build(Config(), "epam")
     said = [message for view in seen(views) for message in module.feed(view)]
@@ -38,7 +38,7 @@ def recognised(views: Views) -> list[tuple[int, Percept]]:
     ]
 
 
-def test_depth_of_buildings_within_thirty_metres_is_right_to_four_percent(views: Views) -> None:
+def test_depth_of_buildings_within_30_m_has_errors_under_4_percent(views: Views) -> None:
     errors = []
     for view, true_m, label in zip(seen(views), views["depth_m"], views["label"], strict=True):
         depth_m = view.depth_m.numpy()
@@ -49,22 +49,22 @@ def test_depth_of_buildings_within_thirty_metres_is_right_to_four_percent(views:
     assert abs(np.median(error)) < 0.01
 
 
-def test_nearly_all_percepts_name_what_is_there(
-    views: Views, recognised: list[tuple[int, Percept]]
+def test_nearly_all_percepts_have_the_right_label(
+    views: Views, recognized: list[tuple[int, Percept]]
 ) -> None:
     names = views["names"].tolist()
-    known = [(number, percept) for number, percept in recognised if percept.label in names]
+    known = [(number, percept) for number, percept in recognized if percept.label in names]
     right = [1 + names.index(percept.label) in views["label"][number] for number, percept in known]
     assert len(right) > 2 * COUNT
-    assert len(known) > 0.9 * len(recognised)
+    assert len(known) > 0.9 * len(recognized)
     assert np.mean(right) > 0.95
 
 
-def test_nearly_all_large_buildings_are_recognised(
-    views: Views, recognised: list[tuple[int, Percept]]
+def test_nearly_all_large_buildings_are_recognized(
+    views: Views, recognized: list[tuple[int, Percept]]
 ) -> None:
     names = views["names"].tolist()
-    found = {(number, percept.label) for number, percept in recognised}
+    found = {(number, percept.label) for number, percept in recognized}
     large = [
         (number, names[label - 1])
         for number in range(COUNT)
@@ -77,13 +77,13 @@ def test_nearly_all_large_buildings_are_recognised(
     assert np.mean([seen in found for seen in large]) > 0.85
 
 
-def test_centres_are_right_to_a_metre_or_two_and_as_sure_as_they_say(
-    views: Views, recognised: list[tuple[int, Percept]]
+def test_centres_have_errors_of_a_metre_or_two_as_their_deviations_claim(
+    views: Views, recognized: list[tuple[int, Percept]]
 ) -> None:
     buildings = {building.name: building for building in town.generate(SEED).message().buildings}
     placed = [
         (percept, *_offset(percept, buildings[percept.label], views["pose"][number]))
-        for number, percept in recognised
+        for number, percept in recognized
         if percept.label in buildings and percept.range_m < 40
     ]
     assert np.median([math.hypot(x_m, y_m) for _, x_m, y_m in placed]) < 1.5
@@ -109,7 +109,7 @@ def _offset(percept: Percept, building: Building, pose: np.ndarray) -> tuple[flo
     return cos * away[0] + sin * away[1], -sin * away[0] + cos * away[1]
 
 
-def test_buildings_nobody_was_taught_get_nodes_at_first_sight_and_are_known_again() -> None:
+def test_unlabelled_buildings_get_nodes_and_are_recognized_again() -> None:
     views = render_town(4004, 20, 28)
     module = build(Config(), "epam")
     truths = views["label"]
@@ -120,7 +120,7 @@ def test_buildings_nobody_was_taught_get_nodes_at_first_sight_and_are_known_agai
             if isinstance(said, Learned):
                 learned += [known.label for known in said.objects]
             if isinstance(said, Percepts):
-                for percept in (one for one in said.objects if one.activation > RECOGNISED):
+                for percept in (one for one in said.objects if one.activation > RECOGNIZED):
                     labels.setdefault(
                         _shown(percept, truths[said.frame], views["names"].tolist()), []
                     ).append(percept.label)
@@ -133,8 +133,8 @@ def test_buildings_nobody_was_taught_get_nodes_at_first_sight_and_are_known_agai
     assert list(dict.fromkeys(learned)) == [
         f"new-building-{1 + number}" for number in range(len(set(learned)))
     ]
-    strangers = [name for name in labels if name.startswith("invented")]
-    assert 0.7 * len(strangers) <= len(set(learned)) <= 1.3 * len(strangers)
+    unlabelled = [name for name in labels if name.startswith("invented")]
+    assert 0.7 * len(unlabelled) <= len(set(learned)) <= 1.3 * len(unlabelled)
     assert len(kept) > 20
     assert np.mean(kept) > 0.7
 
@@ -147,5 +147,5 @@ def _shown(percept: Percept, label: np.ndarray, names: list[str]) -> str:
     return names[int(count.argmax()) - 1] if count.any() else "nothing"
 
 
-def test_the_topics_that_perception_says_are_those_it_declares() -> None:
+def test_perception_declares_the_topics_that_it_publishes() -> None:
     assert build(Config(), "epam").emits == {topics.PERCEPTS, topics.LEARNED}

@@ -1,4 +1,4 @@
-"""Where the road is and where it ends, in metres; and what is no road."""
+"""The road and its boundary, in metres; and what is no road."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ FOCAL_BASELINE = CAMERA.fx_px * CAMERA.baseline_m
 
 @dataclass(frozen=True, eq=False)
 class Street:
-    """A straight street, HALF_M to both sides, with blocks: which pixels show it, and true depth."""
+    """A straight street, HALF_M to both sides: which pixels show it, and true depth."""
 
     mask: np.ndarray
     depth_m: np.ndarray
@@ -59,7 +59,7 @@ def _projected(street: Street, depth_m: np.ndarray | None = None) -> tuple[np.nd
 
 
 @pytest.fixture(scope="module")
-def roads() -> RoadSegmenter:
+def segmenter() -> RoadSegmenter:
     return load()
 
 
@@ -72,7 +72,7 @@ def test_a_straight_street_ends_at_its_two_sides_and_nowhere_else() -> None:
     assert road_m[:, 0].max() > 14.0
 
 
-def test_both_are_one_point_a_cell_within_reach_and_float32() -> None:
+def test_road_and_boundary_are_float32_with_one_point_a_cell_in_range() -> None:
     for points in _projected(_street()):
         assert points.dtype == np.float32
         assert np.hypot(*points.T).max() <= MAX_RANGE_M
@@ -80,7 +80,7 @@ def test_both_are_one_point_a_cell_within_reach_and_float32() -> None:
         assert len(np.unique(cells, axis=0)) == len(cells)
 
 
-def test_the_end_of_the_road_is_found_between_pixels() -> None:
+def test_the_boundary_is_located_between_pixels() -> None:
     mask = np.zeros((240, 320), np.float32)
     mask[200:] = 1.0
     mask[199] = 0.4
@@ -92,7 +92,7 @@ def test_the_end_of_the_road_is_found_between_pixels() -> None:
     np.testing.assert_allclose(boundary_m[:, 0], expected_m, atol=0.01)
 
 
-def test_the_ground_is_where_depth_says_whatever_the_mount_is_said_to_be() -> None:
+def test_the_ground_follows_depth_where_the_mounts_height_is_wrong() -> None:
     low = _street(height_m=1.4)
     _, boundary_m = _projected(low)
     assert np.median(np.abs(np.abs(boundary_m[:, 1]) - HALF_M)) < 0.05
@@ -117,14 +117,14 @@ def test_without_any_depth_the_camera_is_level_at_its_mount() -> None:
     assert np.quantile(np.abs(np.abs(boundary_m[:, 1]) - HALF_M), 0.9) < 0.1
 
 
-def test_behind_something_upright_the_road_does_not_end() -> None:
+def test_no_boundary_is_claimed_behind_something_upright() -> None:
     block = Block(9.0, 0.0, 0.0, (2.0, 2.0), 1.5, (200, 30, 30))
     _, boundary_m = _projected(_street(block))
     assert len(boundary_m) > 20
     assert (np.abs(boundary_m[:, 1]) > HALF_M - 0.4).all()
 
 
-def test_where_the_image_ends_no_road_does() -> None:
+def test_no_boundary_is_claimed_where_the_image_ends() -> None:
     everywhere = np.ones((240, 320), np.float32)
     everywhere[:121] = 0.0
     road_m, boundary_m = project(everywhere, _street().depth_m, CAMERA)
@@ -132,7 +132,7 @@ def test_where_the_image_ends_no_road_does() -> None:
     assert boundary_m.shape == (0, 2)
 
 
-def test_the_outermost_pixels_tell_no_end() -> None:
+def test_no_boundary_is_claimed_at_the_outermost_pixels() -> None:
     almost = np.ones((240, 320), np.float32)
     almost[:121] = 0.0
     almost[:, :2] = almost[:, -2:] = almost[-2:] = 0.0
@@ -147,7 +147,7 @@ def test_left_is_positive() -> None:
     assert road_m[:, 1].max() > 3.0
 
 
-def test_what_stands_on_the_road_is_no_road_though_the_mask_says_so() -> None:
+def test_what_stands_on_the_road_is_no_road_though_it_is_in_the_mask() -> None:
     block = Block(8.0, 0.0, 0.0, (2.0, 3.0), 1.2, (90, 90, 90))
     street = _street(block)
     rows, columns = np.indices(street.depth_m.shape)
@@ -165,27 +165,29 @@ def test_no_road_in_the_image_is_no_road_on_the_ground() -> None:
 
 
 @pytest.mark.parametrize("level", [0, 3, 90, 255])
-def test_an_image_without_contrast_shows_no_road(roads: RoadSegmenter, level: int) -> None:
-    assert not roads.mask(np.full((240, 320, 3), level, np.uint8)).any()
+def test_an_image_without_contrast_shows_no_road(segmenter: RoadSegmenter, level: int) -> None:
+    assert not segmenter.mask(np.full((240, 320, 3), level, np.uint8)).any()
 
 
-def test_a_black_image_with_the_noise_of_a_camera_shows_no_road(roads: RoadSegmenter) -> None:
+def test_a_black_image_with_the_noise_of_a_camera_shows_no_road(segmenter: RoadSegmenter) -> None:
     noise = np.random.default_rng(0).normal(0, 3, (240, 320, 3))
-    assert not roads.mask(np.clip(noise, 0, 255).astype(np.uint8)).any()
+    assert not segmenter.mask(np.clip(noise, 0, 255).astype(np.uint8)).any()
 
 
 @pytest.mark.parametrize("size", [(240, 320), (360, 480), (121, 97)])
 def test_an_image_of_any_size_gets_a_mask_of_its_size_and_the_same_one_twice(
-    roads: RoadSegmenter, size: tuple[int, int]
+    segmenter: RoadSegmenter, size: tuple[int, int]
 ) -> None:
     image = cv2.resize(painted([])[0], size[::-1]).astype(np.uint8)
-    masks = [roads.mask(image) for _ in range(2)]
+    masks = [segmenter.mask(image) for _ in range(2)]
     assert masks[0].shape == size
     assert masks[0].dtype == np.bool_
     np.testing.assert_array_equal(*masks)
 
 
-def test_road_in_a_town_never_seen_is_found_and_its_ends_are_placed(roads: RoadSegmenter) -> None:
+def test_road_in_a_town_never_seen_is_found_and_its_ends_are_placed(
+    segmenter: RoadSegmenter,
+) -> None:
     views = render_town(SEED, VIEWS)
     rectified = rectification(msgspec.json.decode(views["calibration"].tobytes(), type=Calibration))
     matcher = DepthFromStereo(rectified.calibration, 2.5)
@@ -197,7 +199,7 @@ def test_road_in_a_town_never_seen_is_found_and_its_ends_are_placed(roads: RoadS
         *(views[key] for key in ("left", "right", "surface", "depth_m")), strict=True
     ):
         image, other = rectified.apply(left, right)
-        likelihood = roads.likelihood(image)
+        likelihood = segmenter.likelihood(image)
         _, boundary_m = project(likelihood, matcher.depth_m(image, other), camera)
         masks.append(likelihood >= 0.5)
         errors_m.append(road_edge_errors_m(boundary_m, surface, true_m, camera))
@@ -207,7 +209,7 @@ def test_road_in_a_town_never_seen_is_found_and_its_ends_are_placed(roads: RoadS
     assert road_edge_error_m(missed_m) < 0.5
 
 
-def test_weights_that_are_missing_broken_or_of_another_shape_are_named_with_the_remedy(
+def test_unusable_weights_are_named_with_the_remedy(
     tmp_path: Path,
 ) -> None:
     with pytest.raises(ConfigError, match=r"nowhere\.onnx.*cogmap train"):
@@ -221,7 +223,7 @@ def test_weights_that_are_missing_broken_or_of_another_shape_are_named_with_the_
         Network(DEFAULT_PATH, (1, 3, *INPUT_SHAPE[2:]), OUTPUT_SHAPES)
 
 
-def _photographs(folder: Path, roads: RoadSegmenter) -> tuple[Path, Path]:
+def _photographs(folder: Path, segmenter: RoadSegmenter) -> tuple[Path, Path]:
     """Two images with labels that say what the network finds in one, and in the other that nothing
     is known.
     """
@@ -231,16 +233,18 @@ def _photographs(folder: Path, roads: RoadSegmenter) -> tuple[Path, Path]:
     labels.mkdir()
     for number in range(2):
         image = painted([Block(20.0, 9.0, 0.2, (8.0, 8.0), 6.0, (180, 60, 50))], seed=number)[0]
-        label = np.where(roads.mask(image), 3, 4) if number == 0 else np.full(image.shape[:2], 11)
+        label = (
+            np.where(segmenter.mask(image), 3, 4) if number == 0 else np.full(image.shape[:2], 11)
+        )
         cv2.imwrite(str(images / f"{number}.png"), image[..., ::-1])
         cv2.imwrite(str(labels / f"{number}.png"), label.astype(np.uint8))
     return images, labels
 
 
 def test_iou_on_photographs_counts_what_is_labelled_and_nothing_else(
-    roads: RoadSegmenter, tmp_path: Path
+    segmenter: RoadSegmenter, tmp_path: Path
 ) -> None:
-    images, labels = _photographs(tmp_path, roads)
+    images, labels = _photographs(tmp_path, segmenter)
     assert camvid_iou(DEFAULT_PATH, images, labels) == 1.0
     label = cv2.imread(str(labels / "0.png"), cv2.IMREAD_UNCHANGED)
     assert (label == 3).any()
@@ -303,9 +307,9 @@ def _no_road(images: Path, labels: Path) -> None:
     ],
 )
 def test_photographs_that_cannot_be_used_are_named_with_the_remedy(
-    roads: RoadSegmenter, tmp_path: Path, spoil: object, said: str
+    segmenter: RoadSegmenter, tmp_path: Path, spoil: object, said: str
 ) -> None:
-    images, labels = _photographs(tmp_path, roads)
+    images, labels = _photographs(tmp_path, segmenter)
     spoil(images, labels)  # type: ignore[operator]
     with pytest.raises(UsageError, match=said):
         camvid_iou(DEFAULT_PATH, images, labels)

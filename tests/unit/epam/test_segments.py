@@ -55,7 +55,7 @@ def test_both_sides_of_what_a_lamp_hides_are_one_segment() -> None:
     assert found[0].box_px == pytest.approx((40, 40, 80, 80), abs=1)
 
 
-def test_a_speck_is_no_segment_and_neither_is_a_building_without_a_middle() -> None:
+def test_neither_a_speck_nor_a_building_without_a_centre_is_a_segment() -> None:
     assert _divided(_answer((20, 20, 23, 23), peaks=[(21, 21)])) == []
     without = _answer((20, 20, 60, 60), peaks=[(40, 40)])
     without[1] = 0.0
@@ -70,7 +70,7 @@ def test_a_black_image_and_one_without_contrast_have_no_segments() -> None:
     assert segmenter.segments(np.full((240, 320, 3), 90, np.uint8), depth_m, CAMERA) == []
 
 
-def test_the_network_sees_height_over_the_ground_and_where_depth_is_unknown() -> None:
+def test_the_network_receives_height_and_where_depth_is_unknown() -> None:
     small = np.zeros((HEIGHT_PX, WIDTH_PX, 3), np.uint8)
     depth_m = np.full((HEIGHT_PX, WIDTH_PX), 20.0, np.float32)
     depth_m[:10] = 0.0
@@ -98,7 +98,7 @@ def _scene(*slabs: tuple[int, int, float]) -> np.ndarray:
     return disparity
 
 
-def test_a_wall_before_something_farther_ends_where_it_seems_to() -> None:
+def test_a_wall_before_something_farther_has_true_ends() -> None:
     wall = walls(_segment(100, 160), _scene((60, 220, 4.0), (100, 160, 8.0)))
 
     assert wall is not None
@@ -110,7 +110,7 @@ def test_a_wall_before_something_farther_ends_where_it_seems_to() -> None:
 @pytest.mark.parametrize(
     ("nearer", "sides"), [((60, 100, 12.0), (False, True)), ((160, 200, 12.0), (True, False))]
 )
-def test_a_wall_beside_something_nearer_may_go_on_behind_it(
+def test_a_wall_beside_something_nearer_has_no_true_end_there(
     nearer: tuple[int, int, float], sides: tuple[bool, bool]
 ) -> None:
     wall = walls(_segment(100, 160), _scene((100, 160, 8.0), nearer))
@@ -119,7 +119,7 @@ def test_a_wall_beside_something_nearer_may_go_on_behind_it(
     assert (wall.left_true, wall.right_true) == sides
 
 
-def test_the_border_of_the_view_cuts_a_wall_on_the_left_as_far_in_as_its_disparity() -> None:
+def test_the_left_border_cuts_a_wall_as_many_columns_in_as_its_disparity() -> None:
     cut = walls(_segment(3, 60), _scene((3, 60, 8.0)))
     right = walls(_segment(280, 320), _scene((280, 320, 8.0)))
 
@@ -133,7 +133,7 @@ def test_a_segment_without_depth_has_no_walls() -> None:
     assert walls(_segment(100, 160), np.zeros((240, 320), np.float32)) is None
 
 
-def test_a_building_of_unknown_size_is_placed_behind_the_middle_of_what_is_seen() -> None:
+def test_a_building_of_unknown_size_is_placed_behind_its_visible_middle() -> None:
     wall = walls(_segment(130, 190), _scene((130, 190, 8.0)))
 
     assert wall is not None

@@ -1,0 +1,33 @@
+"""Settings of perception: each described, each bounded."""
+
+from __future__ import annotations
+
+import msgspec
+import pytest
+
+from services.epam.config import Config
+from services.epam.places.recognizer import PlaceConfig
+
+BOUNDED = [
+    "base_level",
+    "percept_threshold",
+    "learned_share",
+    "sure",
+    "narrowest_px",
+    "worst_misfit",
+    "worst_range_sd_share",
+]
+
+
+@pytest.mark.parametrize("config", [Config, PlaceConfig])
+def test_every_setting_has_a_description(config: type[msgspec.Struct]) -> None:
+    (schema,) = msgspec.json.schema(config)["$defs"].values()
+    for name, setting in schema["properties"].items():
+        assert setting.get("description"), name
+
+
+@pytest.mark.parametrize("key", BOUNDED)
+@pytest.mark.parametrize("value", [float("inf"), float("nan"), -1, 1e6])
+def test_infinite_and_absurd_settings_are_refused(key: str, value: float) -> None:
+    with pytest.raises(msgspec.ValidationError, match=key):
+        msgspec.convert({key: value}, Config)
