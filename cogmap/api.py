@@ -3,6 +3,7 @@
 A module:       Module, topics, run_module; its messages are in `schemas`
 The map:        Graph, Replica, snapshot_over (Module.following is the short form)
 Running:        InProcessRunner in one process; Client beside a running system
+A codelet:      Codelet, CycleContext, Answer; its tasks and nodes are in `schemas`
 Recorded logs:  open_log, Log, Entry
 Errors:         CogmapError and its kinds
 """
@@ -24,15 +25,19 @@ from cogmap.graph.graph import Graph
 from cogmap.graph.replica import Replica, snapshot_over
 from cogmap.recording import Entry, Log, open_log
 from cogmap.runtime.client import Client
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
 from cogmap.runtime.process import run_module
 from schemas import topics
 
 __all__ = [
+    "Answer",
     "Client",
+    "Codelet",
     "CogmapError",
     "ConfigError",
+    "CycleContext",
     "Entry",
     "Graph",
     "InProcessRunner",

@@ -7,9 +7,7 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
-from cogmap.errors import MessageError
-from cogmap.graph.graph import Graph
-from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from cogmap import Answer, Codelet, CycleContext, Graph, MessageError
 from schemas.codelets import Task
 from schemas.graph import Phase
 from schemas.nodes import Node
