@@ -73,8 +73,7 @@ def test_what_is_published_while_the_router_is_dead_arrives_afterwards(
     publish(publisher, *(odometry(seq) for seq in range(40, 40 + afterwards)))
 
     for peer in peers:
-        seqs = [arrival.envelope.seq for arrival in peer.take(40 + afterwards) if arrival.envelope]
-        assert seqs == list(range(40 + afterwards))
+        assert peer.take_seqs(40 + afterwards) == list(range(40 + afterwards))
     network.close()
 
 

@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from cogmap.bus.session import check_free
-from tests.support.live import Feeder, System, Witness, shared_memory
+from tests.support.live import Feeder, Witness
 from tests.support.networks import working
+from tests.support.processes import System, shared_memory
 
 
 @pytest.fixture
@@ -24,7 +25,7 @@ def system(tmp_path: Path) -> Iterator[System]:
 
 
 @pytest.fixture
-def mind(
+def agent(
     request: pytest.FixtureRequest, system: System
 ) -> Iterator[tuple[System, Feeder, Witness]]:
     """The workspace and two workers, with the settings in the fixture's parameter, fed and
@@ -35,5 +36,5 @@ def mind(
     feeder = Feeder(system.bus())
     witness = Witness(system.bus())
     with working(witness.shell), working(feeder.shell):
-        witness.goes_on(3)
+        witness.await_cycles(3)
         yield system, feeder, witness

@@ -20,8 +20,9 @@ from schemas.graph import Delta, Phase
 from schemas.sensing import Percept, Percepts, SelfMotion
 from schemas.topics import Delivery
 from tests.support.damage import damaged
-from tests.support.live import AGENT, System, Witness, wait_until
+from tests.support.live import Witness
 from tests.support.networks import working
+from tests.support.processes import AGENT, System, wait_until
 
 TRAVELLING = [topic for topic in topics.ALL if topic.delivery is not Delivery.ON_REQUEST]
 VIEWS = len(TRAVELLING)

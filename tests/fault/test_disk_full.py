@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from tests.support.disks import full_after
-from tests.support.live import Feeder, System, wait_until
+from tests.support.live import Feeder
 from tests.support.networks import working
+from tests.support.processes import System, wait_until
 
 FULL_BYTES = 20_000
 USAGE_EXIT = 2
@@ -21,6 +22,6 @@ def test_a_workspace_that_cannot_write_its_journal_ends_with_a_sentence(system: 
         wait_until(lambda: not workspace.is_alive, "the workspace ends")
 
     assert workspace.exit_code == USAGE_EXIT
-    last = workspace.said()[-1]
+    last = workspace.lines()[-1]
     assert last.startswith("cogmap: cannot write ")
     assert last.endswith("make room on its disk, or name another folder with --state")

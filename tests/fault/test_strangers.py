@@ -21,8 +21,9 @@ from schemas.base import Message
 from schemas.topics import Delivery, Topic
 from services import registry
 from tests.support.damage import damaged, golden
-from tests.support.live import AGENT, Feeder, System, Witness, wait_until
+from tests.support.live import Feeder, Witness
 from tests.support.networks import working
+from tests.support.processes import AGENT, Process, System, wait_until
 
 MODULES = ("sensory", "epam", "global_workspace", "action")
 CARRIED = tuple(
@@ -38,8 +39,9 @@ BLOCK = zenoh.CongestionControl.BLOCK
 
 
 class Stranger:
-    """A foreign session that puts bytes on topics, each from a source of its own so that none
-    replaces another.
+    """A foreign session that puts bytes on topics.
+
+    Each message is from a source of its own, so that none replaces another.
     """
 
     def __init__(self, endpoint: str) -> None:
@@ -49,71 +51,79 @@ class Stranger:
     def damage(self, topic: Topic) -> None:
         """Put everything on `topic` that is no message of it."""
         for payload in damaged(topic).values():
-            self._put(
-                topic, payload, encode(Envelope(f"stranger-{self.put[topic.name]}", 0, 1, 1, 1))
-            )
+            source = f"stranger-{self.put[topic.name]}"
+            self._put(topic, payload, encode(Envelope(source, 0, 1, 1, 1)))
         self._put(topic, golden(topic), b"\xc1 no envelope")
 
     def _put(self, topic: Topic, payload: bytes, attachment: bytes) -> None:
-        self.session.put(topic.key(AGENT), payload, attachment=attachment, congestion_control=BLOCK)
+        key = topic.key(AGENT)
+        self.session.put(key, payload, attachment=attachment, congestion_control=BLOCK)
         self.put[topic.name] += 1
 
 
 def auditor() -> Module:
-    """Subscribes to every topic, those that no module takes in among them."""
+    """Subscribes to every topic, those that no module handles among them."""
     module = Module("auditor")
     for topic in CARRIED:
-        module.on(topic, _pass_over)
+        module.on(topic, _ignore)
     return module
 
 
-def _pass_over(message: Message) -> None:
-    """What is believed is of no interest here."""
+def _ignore(message: Message) -> None:
+    """Only what is rejected matters here."""
 
 
-def taken_in(instance: str) -> set[str]:
-    """The topics whose messages come to an instance."""
-    handlers = registry.build(instance.partition("-")[0], {}).handlers
+def handled(instance: str) -> set[str]:
+    """The topics that an instance subscribes to."""
+    module, _, _ = instance.partition("-")
+    handlers = registry.build(module, {}).handlers
     return {topic.name for topic in handlers if topic is not topics.PRESENCE}
 
 
+def logged(process: Process) -> Counter[str]:
+    """How often a process logged that it rejected a message, by topic."""
+    lines = "\n".join(process.lines())
+    return Counter(re.findall(r"rejected ([\w/]+): ", lines))
+
+
 def test_bytes_that_are_no_message_are_counted_and_logged_and_change_nothing(
-    mind: tuple[System, Feeder, Witness],
+    agent: tuple[System, Feeder, Witness],
 ) -> None:
-    system, feeder, witness = mind
+    system, feeder, witness = agent
     system.modules(*MODULES)
     auditing = Shell(auditor(), system.bus())
     stranger = Stranger(system.endpoint)
     began_s = time.monotonic()
+
     with working(auditing):
         for topic in CARRIED:
             stranger.damage(topic)
         for payload in NO_REQUESTS:
             with pytest.raises(NoAnswerError):
                 auditing.bus.query(topics.SNAPSHOT_REQUEST, payload, 10.0)
-        expected = {
-            instance: {name: stranger.put[name] for name in taken_in(instance)}
-            for instance in (*MODULES, "workspace", "codelets-1", "codelets-2")
-        }
+
+        expected: dict[str, dict[str, int]] = {}
+        for instance in (*MODULES, "workspace", "codelets-1", "codelets-2"):
+            expected[instance] = {name: stranger.put[name] for name in handled(instance)}
         expected["workspace"][topics.SNAPSHOT_REQUEST.name] = len(NO_REQUESTS)
 
-        def counted() -> bool:
-            told = {name: health.rejected for name, health in witness.health.items()}
-            return all(told.get(name) == counts for name, counts in expected.items())
+        def are_counted() -> bool:
+            reported = {name: health.rejected for name, health in witness.health.items()}
+            return all(reported.get(name) == counts for name, counts in expected.items())
 
-        wait_until(counted, f"{expected} are counted")
+        wait_until(are_counted, f"{expected} are counted")
         wait_until(lambda: auditing.intake.rejected == stranger.put, f"{stranger.put} are counted")
         lasted_s = time.monotonic() - began_s
-        witness.goes_on(5)
+        witness.await_cycles(5)
         feeder.pause()
-        witness.agrees()
+        witness.await_same_graph()
+
     stranger.session.close()  # type: ignore[no-untyped-call]
     for instance, counts in expected.items():
-        assert system.processes[instance].is_alive
+        process = system.processes[instance]
+        times = logged(process)
+        assert process.is_alive
         assert not witness.health[instance].notes
         assert not witness.health[instance].gaps
-        named = Counter(
-            re.findall(r"rejected ([\w/]+): ", "\n".join(system.processes[instance].said()))
-        )
-        assert set(named) == set(counts)
-        assert max(named.values()) <= lasted_s + 1
+        assert set(times) == set(counts)
+        assert max(times.values()) <= lasted_s + 1

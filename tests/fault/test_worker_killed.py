@@ -11,8 +11,9 @@ from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.codelets import Assignment, Leases, Proposal
-from tests.support.live import Feeder, System, Witness, wait_until
+from tests.support.live import Feeder, Witness
 from tests.support.networks import working
+from tests.support.processes import System, wait_until
 
 PATIENT = ("workspace.deadline_ms=20000", "workspace.lease_ms=20000")
 STOPPED = "codelets-1"
@@ -21,20 +22,22 @@ ATTENTION = {"whereabouts", "novelty"}
 
 
 @pytest.mark.parametrize(
-    "mind", [PATIENT], indirect=True, ids=["only its death takes back what it holds"]
+    "agent", [PATIENT], indirect=True, ids=["only its death takes back what it holds"]
 )
 def test_the_task_of_a_killed_worker_is_done_by_another_and_committed_once(
-    mind: tuple[System, Feeder, Witness],
+    agent: tuple[System, Feeder, Witness],
 ) -> None:
-    system, feeder, witness = mind
+    system, feeder, witness = agent
     leases: list[Assignment] = []
     answers: list[Proposal] = []
 
     def keep(message: Leases) -> None:
         leases.extend(message.assignments)
 
-    looking = Module("looking").on(topics.LEASES, keep).on(topics.PROPOSAL, answers.append)
-    with working(Shell(looking, system.bus())):
+    observer = Module("observer").on(topics.LEASES, keep)
+    observer.on(topics.PROPOSAL, answers.append)
+
+    with working(Shell(observer, system.bus())):
         wait_until(
             lambda: any(lease.worker == STOPPED for lease in leases), f"{STOPPED} is given tasks"
         )
@@ -45,9 +48,10 @@ def test_the_task_of_a_killed_worker_is_done_by_another_and_committed_once(
             lambda: _latest_cycle(witness) > _cycle(held.task_id),
             f"the cycle of {held.task_id} ends",
         )
-        witness.goes_on(5)
+        witness.await_cycles(5)
         feeder.pause()
-        witness.agrees()
+        witness.await_same_graph()
+
     again = [lease for lease in leases if lease.task_id == held.task_id]
     assert [(lease.worker, lease.attempt) for lease in again] == [(STOPPED, 0), (OTHER, 1)]
     # What attention finds is not written into the graph, so no delta names its task.
@@ -57,15 +61,17 @@ def test_the_task_of_a_killed_worker_is_done_by_another_and_committed_once(
 
 
 def _held(leases: list[Assignment], answers: list[Proposal]) -> Assignment:
-    """The task that the stopped worker has not answered: twice in a row, as an answer may be on its
-    way.
+    """The task that the stopped worker has not answered.
+
+    It is looked for twice, as an answer may be under way.
     """
     open_before: set[str] = set()
 
     def holds() -> bool:
         nonlocal open_before
+        given = {lease.task_id for lease in leases if lease.worker == STOPPED}
         answered = {answer.task_id for answer in answers}
-        still_open = {lease.task_id for lease in leases if lease.worker == STOPPED} - answered
+        still_open = given - answered
         both = open_before & still_open
         open_before = still_open
         return bool(both)
@@ -75,7 +81,8 @@ def _held(leases: list[Assignment], answers: list[Proposal]) -> Assignment:
 
 
 def _latest_cycle(witness: Witness) -> int:
-    return max((_cycle(name) for name in witness.tasks_done), default=0)
+    cycles = [_cycle(task_id) for task_id in witness.tasks_done]
+    return max(cycles, default=0)
 
 
 def _cycle(task_id: str) -> int:

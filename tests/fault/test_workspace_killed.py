@@ -6,36 +6,42 @@ import signal
 
 import pytest
 
-from tests.support.live import Feeder, System, Witness, wait_until
+from tests.support.live import Feeder, Witness
+from tests.support.processes import System, wait_until
+
+TOLERANCE_M = 0.3
 
 
-def where(witness: Witness) -> tuple[float, int]:
-    """The self node's x and the view that it is of."""
+def believed(witness: Witness) -> tuple[float, int]:
+    """The self node's x, and the stamp of the view that it is of."""
     agent = witness.graph.agent
     assert agent is not None
     return agent.x_m, agent.stamp_ns
 
 
 def test_a_restarted_workspace_resumes_its_graph_and_the_missed_self_motion(
-    mind: tuple[System, Feeder, Witness],
+    agent: tuple[System, Feeder, Witness],
 ) -> None:
-    system, feeder, witness = mind
-    began_m, began_ns = where(witness)
+    system, feeder, witness = agent
+    began_m, began_ns = believed(witness)
+
     system.processes["workspace"].end(signal.SIGKILL)
     views = feeder.views
-    wait_until(lambda: feeder.views >= views + 10, "views go on without a workspace")
+    wait_until(lambda: feeder.views >= views + 10, "views continue without a workspace")
     seen = len(witness.deltas)
     version = witness.graph.version
     cycle = witness.graph.cycle
     system.modules("workspace")
-    witness.goes_on(5)
+    witness.await_cycles(5)
     feeder.pause()
-    witness.agrees()
-    assert witness.deltas[seen].version > version
-    assert witness.deltas[seen].cycle > cycle
+    witness.await_same_graph()
+
+    first = witness.deltas[seen]
+    assert first.version > version
+    assert first.cycle > cycle
     versions = witness.versions[seen:]
     assert versions == list(range(versions[0], versions[0] + len(versions)))
-    ended_m, ended_ns = where(witness)
-    assert ended_m - began_m == pytest.approx(
-        feeder.driven_m(ended_ns) - feeder.driven_m(began_ns), abs=0.3
-    )
+
+    ended_m, ended_ns = believed(witness)
+    driven_m = feeder.driven_m(ended_ns) - feeder.driven_m(began_ns)
+    assert ended_m - began_m == pytest.approx(driven_m, abs=TOLERANCE_M)

@@ -1,6 +1,4 @@
-"""What the contract tests share: networks of both kinds, peers on them, and ways to wait without
-sleeping.
-"""
+"""Networks of both kinds, peers on them, and ways to wait without sleeping."""
 
 from __future__ import annotations
 
@@ -54,6 +52,8 @@ class Network(Protocol):
 
 
 class InMemory:
+    """Members in this process."""
+
     def __init__(self) -> None:
         self.network = MemoryNetwork()
         self.buses: list[MemoryBus] = []
@@ -75,8 +75,11 @@ class InMemory:
 
 
 class OverZenoh:
+    """Members at a router, under an agent's name of their own."""
+
     def __init__(self, endpoint: str) -> None:
-        self.endpoint, self.agent = endpoint, f"contract{next(_numbers)}"
+        self.endpoint = endpoint
+        self.agent = f"contract{next(_numbers)}"
         self.buses: list[ZenohBus] = []
         self.stranger: zenoh.Session | None = None
 
@@ -85,10 +88,10 @@ class OverZenoh:
         return self.buses[-1]
 
     def put(self, topic: Topic, payload: bytes, attachment: bytes | None) -> None:
-        self.stranger = self.stranger or open_client(self.endpoint)
-        self.stranger.put(
-            topic.key(self.agent), payload, attachment=attachment, congestion_control=BLOCK
-        )
+        if self.stranger is None:
+            self.stranger = open_client(self.endpoint)
+        key = topic.key(self.agent)
+        self.stranger.put(key, payload, attachment=attachment, congestion_control=BLOCK)
 
     def close(self) -> None:
         for bus in self.buses:
@@ -98,10 +101,12 @@ class OverZenoh:
 
 
 class Peer:
-    """A member that takes in what it subscribed to only when asked."""
+    """A member that takes what it has received only when asked."""
 
     def __init__(self, bus: Bus, *subscribed: Topic, history: int = 0) -> None:
-        self.bus, self.inbox, self.arrived = bus, Inbox(), 0
+        self.bus = bus
+        self.inbox = Inbox()
+        self.arrived = 0
         self._changed = threading.Condition()
         for topic in subscribed:
             bus.subscribe(topic, self._deliver, lambda topic, number: None, history)
@@ -113,17 +118,27 @@ class Peer:
             self._changed.notify_all()
 
     def wait_for(self, number: int) -> None:
-        """Wait until so many have arrived, taken in or not."""
+        """Wait until so many have arrived, taken or not."""
         with self._changed:
-            assert self._changed.wait_for(lambda: self.arrived >= number, TIMEOUT_S), (
-                f"{self.arrived} of {number}"
-            )
+            arrived = self._changed.wait_for(lambda: self.arrived >= number, TIMEOUT_S)
+        assert arrived, f"{self.arrived} of {number}"
 
     def take(self, number: int) -> list[Arrival]:
         """The next `number` arrivals."""
-        taken = [self.inbox.take(TIMEOUT_S) for _ in range(number)]
-        assert all(isinstance(arrival, Arrival) for arrival in taken)
-        return [arrival for arrival in taken if isinstance(arrival, Arrival)]
+        taken = []
+        for _ in range(number):
+            arrival = self.inbox.take(TIMEOUT_S)
+            assert isinstance(arrival, Arrival), f"{len(taken)} of {number}"
+            taken.append(arrival)
+        return taken
+
+    def take_seqs(self, number: int) -> list[int]:
+        """The numbers of the next `number` arrivals, each of which has an envelope."""
+        seqs = []
+        for arrival in self.take(number):
+            assert arrival.envelope is not None
+            seqs.append(arrival.envelope.seq)
+        return seqs
 
 
 def meet(here: Bus, *others: Bus) -> None:
@@ -156,7 +171,7 @@ def await_members(here: Bus, *members: Member, then: Callable[[], None] = lambda
 
 
 def spin_until(condition: Callable[[], bool], *shells: Shell) -> None:
-    """Let the shells work until `condition` holds."""
+    """Spin the shells in turn until `condition` holds."""
     deadline_s = time.monotonic() + TIMEOUT_S
     while not condition():
         assert time.monotonic() < deadline_s, "the condition never held"
@@ -166,7 +181,7 @@ def spin_until(condition: Callable[[], bool], *shells: Shell) -> None:
 
 @contextmanager
 def working(shell: Shell) -> Iterator[None]:
-    """Let `shell` work on a thread of its own."""
+    """Run `shell` on a thread of its own."""
     ended = threading.Event()
 
     def work() -> None:
