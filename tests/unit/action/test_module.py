@@ -67,11 +67,13 @@ def test_the_threshold_falls_with_each_attempt_until_one_selects() -> None:
     route = {"route_ahead": 0.5}
     attempts = [selection.select(_nodes(self=0.4), route) for _ in range(10)]
     chosen = [number for number, attempt in enumerate(attempts) if attempt is not None]
+
     assert chosen == [3, 7]  # 0.45 + 0.2 is under 0.9, 0.8 and 0.7, and not under 0.6
 
 
 def test_a_scheme_less_active_than_is_instantiated_is_never_selected() -> None:
     selection = ActionSelection(Config(instantiation=0.8))
+
     assert [selection.select(_nodes(self=0.4), {"route_ahead": 0.5}) for _ in range(20)] == [
         None
     ] * 20
@@ -86,6 +88,7 @@ def test_the_end_of_the_route_calls_for_a_halt() -> None:
     chosen = ActionSelection(Config()).select(
         _nodes(self=1.0), {"route_ahead": 0.0, "route_end": 1.0}
     )
+
     assert chosen is not None
     assert chosen.chosen.scheme == HALT
 
@@ -94,13 +97,16 @@ def test_every_behaviour_is_reported_and_why_it_was_not_chosen() -> None:
     selection = ActionSelection(Config(selection_threshold=0.0, instantiation=0.5))
     nodes = _nodes(self=1.0)
     both = selection.select(nodes, {"route_ahead": 1.0, "route_end": 0.3})
+
     assert both is not None
     assert [(each.scheme, each.rejection) for each in both.considered] == [
         (FOLLOW_ROUTE, Rejection.NONE),
         (HALT, Rejection.LESS_ACTIVE),
     ]
+
     weak = selection.select(nodes, {"route_ahead": 1.0, "route_end": 0.1})
     missing = selection.select(nodes, {"route_ahead": 1.0})
+
     assert weak is not None
     assert missing is not None
     assert weak.considered[1].rejection is Rejection.NOT_INSTANTIATED
@@ -121,8 +127,10 @@ def _command(
     route = Route([*legs], config.corner_radius_m, config.overrun_m)
     for x_m in np.arange(0.0, pose.x_m, 1.0):
         route.advance(x_m, 0.0)
+
     route.advance(pose.x_m, pose.y_m)
     motor = SensoryMotorMemory(config, route)
+
     return motor.command(7, pose, clear_m, round(age_s * 1e9))
 
 
@@ -133,6 +141,7 @@ def _at(x_m: float = 0.0, y_m: float = 0.0, heading_rad: float = 0.0) -> Pose:
 def test_on_the_line_and_along_it_both_wheels_turn_at_cruising_speed() -> None:
     command = _command(_at(5.0))
     config = Config()
+
     assert (
         command.left_wheel_rad_s
         == command.right_wheel_rad_s
@@ -158,6 +167,7 @@ def test_right_of_the_line_or_headed_right_the_robot_turns_left(pose: Pose) -> N
 def test_a_robot_that_looks_backwards_turns_slowly() -> None:
     command = _command(_at(5.0, 0.0, 3.0))
     mean_m_s = (command.left_wheel_rad_s + command.right_wheel_rad_s) / 2 * Config().wheel_radius_m
+
     assert mean_m_s == pytest.approx(0.5)
     assert command.left_wheel_rad_s > command.right_wheel_rad_s
 
@@ -173,6 +183,7 @@ def test_the_arc_of_pure_pursuit_passes_through_the_point_ahead() -> None:
     )
     radius_m = speed_m_s / turn_rad_s
     centre = (10.0, 1.0 + radius_m)
+
     assert math.dist(centre, (10.0 + config.lookahead_m, 0.0)) == pytest.approx(
         abs(radius_m), rel=1e-6
     )
@@ -181,6 +192,7 @@ def test_the_arc_of_pure_pursuit_passes_through_the_point_ahead() -> None:
 def test_the_robot_slows_down_before_a_bend() -> None:
     legs = ((50.0, QUARTER), (50.0, 0.0))
     speeds = [_driven(_command(_at(x_m), legs=legs)) for x_m in (10.0, 49.0)]
+
     assert speeds[0] == Config().cruise_m_s
     assert speeds[1] < math.sqrt(Config().lateral_m_s2 * 3.5) + 0.1
 
@@ -191,10 +203,13 @@ def _driven(command: MotorCommand) -> float:
 
 def test_the_robot_slows_down_before_an_obstacle_and_stops_at_its_clearance() -> None:
     speeds = [_driven(_command(_at(5.0), clear_m)) for clear_m in (20.0, 4.0, 2.0)]
+
     assert speeds == sorted(speeds, reverse=True)
     assert speeds[0] == Config().cruise_m_s
     assert speeds[2] == pytest.approx(math.sqrt(2 * 2.5 * 0.5))
+
     stopped = _command(_at(5.0), 1.5)
+
     assert (stopped.left_wheel_rad_s, stopped.right_wheel_rad_s, stopped.halted_by) == (
         0.0,
         0.0,
@@ -206,6 +221,7 @@ def test_the_older_its_pose_the_slower_the_robot_until_it_stops() -> None:
     config = Config()
     commands = [_command(_at(5.0), age_s=age_s) for age_s in (0.0, 0.2, 0.5, 1.0, 2.1)]
     speeds = [_driven(command) for command in commands]
+
     assert speeds[:2] == [config.cruise_m_s] * 2
     assert speeds[2:] == pytest.approx([config.blind_m / 0.5, config.blind_m, 0.0])
     assert [command.slowed_by for command in commands[:4]] == [
@@ -229,6 +245,7 @@ def test_what_stands_aside_behind_or_alone_is_no_obstacle() -> None:
 def test_a_scan_whose_bearings_and_ranges_do_not_pair_is_refused() -> None:
     scan = _scan((0.0, 8.0), (0.1, 8.0))
     scan = msgspec.structs.replace(scan, range_m=Array.of(np.ones(3, np.float32)))
+
     with pytest.raises(MessageError, match="2,\\) bearings and \\(3"):
         obstacle_ahead_m(scan, 0.7)
 
@@ -273,8 +290,8 @@ def _motion(cycle: int = 1, speed_m_s: float = 2.0) -> SelfMotion:
     )
 
 
-def _commands(said: list[Message]) -> list[MotorCommand]:
-    return [message for message in said if isinstance(message, MotorCommand)]
+def _commands(messages: list[Message]) -> list[MotorCommand]:
+    return [message for message in messages if isinstance(message, MotorCommand)]
 
 
 def test_before_any_broadcast_the_robot_stands() -> None:
@@ -285,10 +302,13 @@ def test_before_any_broadcast_the_robot_stands() -> None:
 def test_a_broadcast_selects_an_action_and_the_next_pose_moves_the_robot() -> None:
     module = _module()
     (action,) = module.feed(_broadcast())
+
     assert isinstance(action, Action)
     assert (action.scheme, action.cycle) == (FOLLOW_ROUTE, 1)
     assert action.parameters == {"leg": 0, "length_m": 20.0, "turn_rad": 0.0, "travelled_m": 0.0}
+
     (command,) = _commands(module.feed(_delta()))
+
     assert command.left_wheel_rad_s > 0
     assert command.stamp_ns == PERIOD_NS
 
@@ -298,10 +318,14 @@ def test_at_the_end_of_the_route_a_broadcast_halts_the_robot() -> None:
     module.feed(_broadcast())
     for cycle in range(1, 20):
         module.feed(_delta(cycle, 0.5 * cycle))
+
     (action,) = module.feed(_broadcast(20))
+
     assert isinstance(action, Action)
     assert action.scheme == HALT
+
     (command,) = _commands(module.feed(_delta(20, 9.0)))
+
     assert (command.left_wheel_rad_s, command.right_wheel_rad_s, command.halted_by) == (
         0.0,
         0.0,
@@ -319,8 +343,11 @@ def test_an_obstacle_in_the_scan_halts_the_robot_until_it_has_gone() -> None:
     module = _module()
     module.feed(_broadcast())
     module.feed(_scan((0.0, 1.2), (0.05, 1.2)))
+
     assert [command.halted_by for command in _commands(module.feed(_delta(1)))] == ["obstacle"]
+
     module.feed(_scan(cycle=2))
+
     assert [command.halted_by for command in _commands(module.feed(_delta(2)))] == [""]
 
 
@@ -353,8 +380,11 @@ def test_in_lockstep_the_command_waits_for_the_broadcast_that_was_triggered() ->
     module.feed(_motion(2))
     module.feed(_scan(cycle=2))
     module.feed(_competition(1, Trigger.NO_BROADCAST))
+
     assert module.feed(_delta(2)) == []
+
     action, command = module.feed(_broadcast(1))
+
     assert isinstance(action, Action)
     assert isinstance(command, MotorCommand)
     assert command.left_wheel_rad_s > 0
@@ -364,12 +394,13 @@ def test_in_lockstep_the_first_cycle_waits_for_no_competition() -> None:
     module = _module("lockstep")
     module.feed(_motion())
     module.feed(_scan())
+
     assert len(_commands(module.feed(_delta(1)))) == 1
 
 
 def test_each_pose_leads_to_one_command() -> None:
     module = _module("lockstep")
-    said = [
+    answers = [
         module.feed(message)
         for message in (
             _motion(),
@@ -381,7 +412,8 @@ def test_each_pose_leads_to_one_command() -> None:
             _competition(1),
         )
     ]
-    assert [len(_commands(messages)) for messages in said] == [0, 0, 1, 0, 0, 0, 0]
+
+    assert [len(_commands(answer)) for answer in answers] == [0, 0, 1, 0, 0, 0, 0]
 
 
 def _answered_lockstep() -> tuple[Module, MotorCommand]:
@@ -389,32 +421,43 @@ def _answered_lockstep() -> tuple[Module, MotorCommand]:
     module = _module("lockstep")
     for message in (_broadcast(0), _motion(), _scan()):
         module.feed(message)
+
     (command,) = _commands(module.feed(_delta(1)))
+
     return module, command
 
 
 def test_in_lockstep_a_repeated_pose_is_answered_by_the_same_command() -> None:
     module, command = _answered_lockstep()
+
     assert command.left_wheel_rad_s > 0
+
     (again,) = _commands(module.feed(_delta(1)))
+
     assert (again.stamp_ns, again.left_wheel_rad_s) == (command.stamp_ns, command.left_wheel_rad_s)
     assert again.seq == command.seq + 1
 
 
 def test_in_lockstep_a_repeated_scan_ends_the_wait_for_a_lost_competition() -> None:
     module, _ = _answered_lockstep()
+
     for message in (_motion(2), _scan(cycle=2), _delta(2)):
         assert module.feed(message) == []
+
     module.feed(_motion(2))
     (command,) = _commands(module.feed(_scan(cycle=2)))
+
     assert command.stamp_ns == 2 * PERIOD_NS
 
 
 def test_in_lockstep_a_restarted_action_waits_for_no_past_competition() -> None:
     module = _module("lockstep")
+
     assert module.restore is not None
+
     (action,) = _module().feed(_broadcast(4))
     module.restore([action])
+
     for message in (_motion(6), _scan(cycle=6)):
         assert module.feed(message) == []
     assert len(_commands(module.feed(_delta(6)))) == 1
@@ -429,9 +472,11 @@ def test_a_pose_that_is_old_by_the_clock_moves_the_robot_more_slowly() -> None:
     slow = _module()
     for module in (fresh, slow):
         module.feed(_broadcast())
+
     slow.feed(_clock(0.2 + 1.0))
     (fast_command,) = _commands(fresh.feed(_delta(1)))
     (slow_command,) = _commands(slow.feed(_delta(1)))
+
     assert 0 < slow_command.left_wheel_rad_s < fast_command.left_wheel_rad_s
     assert (slow_command.slowed_by, slow_command.pose_age_ns) == (SpeedLimit.POSE_AGE, 10**9)
 
@@ -441,6 +486,7 @@ def test_a_moving_robot_that_gets_no_new_pose_is_halted_once() -> None:
     module.feed(_broadcast())
     module.feed(_delta(1))
     halts = [_commands(module.feed(_clock(0.2 + age_s))) for age_s in (1.0, 2.1, 2.2)]
+
     assert [len(commands) for commands in halts] == [0, 1, 0]
     assert halts[1][0].halted_by is SpeedLimit.POSE_AGE
 
@@ -452,7 +498,9 @@ def test_a_robot_that_is_commanded_to_move_and_stands_is_stuck() -> None:
     for cycle in range(1, 40):
         module.feed(_motion(cycle, speed_m_s=0.02))
         reasons += [command.halted_by for command in _commands(module.feed(_delta(cycle)))]
+
     halts = [cycle for cycle, reason in enumerate(reasons, start=1) if reason]
+
     assert {reasons[cycle - 1] for cycle in halts} == {SpeedLimit.STUCK}
     assert halts[0] == pytest.approx(Config().stuck_after_s * 1e9 / PERIOD_NS + 1, abs=1)
 
@@ -480,16 +528,22 @@ def test_a_restarted_action_module_continues_along_its_route() -> None:
     legs = ((20.0, 0.0), (20.0, 0.0))
     before = _module(route=legs)
     after = _module(route=legs)
-    said = before.feed(_broadcast())
+    messages = before.feed(_broadcast())
     for cycle in range(1, 13):
-        said += before.feed(_delta(cycle, 2.0 * cycle))
-    said += before.feed(_broadcast(12))
+        messages += before.feed(_delta(cycle, 2.0 * cycle))
+
+    messages += before.feed(_broadcast(12))
+
     assert before.compact is not None
     assert after.restore is not None
-    assert before.compact() == msgspec.structs.replace(said[-1], seq=0, source="")
-    after.restore([message for message in said if isinstance(message, Action)])
+    assert before.compact() == msgspec.structs.replace(messages[-1], seq=0, source="")
+
+    after.restore([message for message in messages if isinstance(message, Action)])
     (command,) = _commands(after.feed(_delta(13, 25.0)))
+
     assert command.left_wheel_rad_s > 0
+
     (action,) = after.feed(_broadcast(14))
+
     assert isinstance(action, Action)
     assert action.parameters == {"leg": 1, "length_m": 20.0, "turn_rad": 0.0, "travelled_m": 25.0}

@@ -68,6 +68,7 @@ class SlowMachine:
         messages: list[Message] = [Clock(stamp_ns=self._now_ns(), rate=1.0)]
         while self._pending and self._pending[0][0] <= self._ticks:
             messages.append(self._pending.popleft()[1])
+
         return messages
 
     def _move(self) -> None:
@@ -84,6 +85,7 @@ class SlowMachine:
     def _delta(self) -> Delta:
         x_m, y_m, heading_rad = self._pose
         cycle = self._ticks // CYCLE_TICKS
+
         return Delta(
             stamp_ns=self._now_ns(),
             version=cycle,
@@ -111,11 +113,13 @@ def _drive(age_s: float, seconds: float, config: Config) -> SlowMachine:
         for _ in range(round(seconds / TICK_S)):
             body.publish(machine.module.stamp(machine.tick()))
             runner.run()
+
     return machine
 
 
 def test_with_poses_over_a_second_old_the_robot_keeps_to_its_street() -> None:
     machine = _drive(1.2, 60.0, Config(route=ROUTE))
+
     assert machine.farthest_m < STREET_HALF_WIDTH_M / 2
     assert SpeedLimit.POSE_AGE in {command.slowed_by for command in machine.commands}
     assert max(command.pose_age_ns for command in machine.commands) == pytest.approx(1.2e9)

@@ -18,6 +18,7 @@ def _route(
 
 def test_a_straight_leg_is_a_line_along_x_with_its_overrun() -> None:
     route = _route((20.0, 0.0))
+
     assert route.length_m == 20.0
     assert route.points_m[0] == pytest.approx((0.0, 0.0))
     assert route.points_m[-1] == pytest.approx((25.0, 0.0), abs=STEP_M)
@@ -33,16 +34,19 @@ def test_a_turn_is_left_where_it_is_positive(turn_rad: float, end_m: tuple[float
     assert route.points_m[-1] == pytest.approx(end_m, abs=STEP_M)
 
 
-def test_a_corner_is_rounded_it_leaves_and_meets_the_legs_a_radius_away_and_cuts_the_corner() -> (
-    None
-):
+def test_a_rounded_corner_leaves_and_meets_its_legs_a_radius_away() -> None:
     route = _route((20.0, QUARTER), (20.0, 0.0))
     x_m, y_m = route.points_m.T
+
     assert (y_m[x_m < 16.4] == 0.0).all()
     assert x_m[y_m > 3.6] == pytest.approx(20.0)
+
     to_corner_m = np.hypot(x_m - 20.0, y_m).min()
+
     assert 0.5 < to_corner_m < 3.5 * (math.sqrt(2) - 1) + 0.5
+
     steps = np.diff(np.arctan2(*np.diff(route.points_m, axis=0).T[::-1]))
+
     assert np.abs(steps).max() < 0.25
 
 
@@ -55,6 +59,7 @@ def test_a_rounded_corner_is_shorter_than_its_legs() -> None:
 def test_between_short_legs_a_corner_is_as_wide_as_they_allow() -> None:
     route = _route((2.0, QUARTER), (2.0, QUARTER), (2.0, 0.0), overrun_m=2.0)
     x_m, y_m = route.points_m.T
+
     assert x_m.min() >= -2.01
     assert x_m.max() <= 2.0
     assert (y_m.min(), y_m.max()) == pytest.approx((0.0, 2.0), abs=0.01)
@@ -69,6 +74,7 @@ def test_points_lie_a_step_apart() -> None:
 def test_a_closed_loop_ends_where_it_began() -> None:
     route = _route(*[(40.0, QUARTER)] * 4)
     at_end = route.points_m[np.hypot(*route.points_m.T).argsort()[:5]]
+
     assert np.hypot(*at_end.T).min() < STEP_M
     assert route.length_m == 160.0
 
@@ -76,8 +82,11 @@ def test_a_closed_loop_ends_where_it_began() -> None:
 def test_the_agent_advances_along_the_line_and_never_back() -> None:
     route = _route((20.0, QUARTER), (20.0, 0.0))
     route.advance(5.0, 0.4)
+
     assert route.travelled_m == pytest.approx(5.0, abs=STEP_M)
+
     route.advance(2.0, 0.0)
+
     assert route.travelled_m == pytest.approx(5.0, abs=STEP_M)
 
 
@@ -85,17 +94,22 @@ def test_where_the_line_comes_by_again_the_agent_stays_on_its_lap() -> None:
     route = _route(*[(40.0, QUARTER)] * 8)
     for x_m in np.arange(0.0, 30.0, 1.0):
         route.advance(float(x_m), 0.0)
+
     assert route.travelled_m == pytest.approx(29.0, abs=STEP_M)
 
 
-def test_the_leg_that_the_agent_is_on_changes_in_the_middle_of_its_corner_on_every_lap() -> None:
+def test_the_leg_changes_in_the_middle_of_its_corner_on_every_lap() -> None:
     route = _route(*[(20.0, QUARTER)] * 8)
+
     assert len(route.leg_ends_m) == 8
+
     ends_m = [route.points_m[round(end_m / STEP_M)] for end_m in route.leg_ends_m]
+
     for end_m, corner_m in zip(
         ends_m, [(20.0, 0.0), (20.0, 20.0), (0.0, 20.0), (0.0, 0.0)] * 2, strict=True
     ):
         assert math.dist(end_m, corner_m) < 1.6
+
     for way_m in np.arange(0.0, 38.0, 1.0):
         route.advance(min(way_m, 20.0), max(0.0, way_m - 20.0))
         if abs(way_m - 20.0) > 2.0:

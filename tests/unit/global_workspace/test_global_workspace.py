@@ -40,13 +40,15 @@ class Arena:
             Coalition(codelet=name, activation=activation, nodes=[])
             for name, activation in activations.items()
         ]
-        said = self.module.feed(
+        messages = self.module.feed(
             Coalitions(stamp_ns=round(at_tick * TICK_NS), cycle=self._cycle, coalitions=coalitions)
         )
-        (competition,) = [item for item in said if isinstance(item, Competition)]
-        broadcast = next((item for item in said if isinstance(item, Broadcast)), None)
+        (competition,) = [item for item in messages if isinstance(item, Competition)]
+        broadcast = next((item for item in messages if isinstance(item, Broadcast)), None)
+
         assert (broadcast is not None) == bool(competition.trigger)
         assert broadcast is None or broadcast.trigger == competition.trigger
+
         return competition, broadcast
 
     def waiting(self, at_tick: float, **activations: float) -> dict[str, float]:
@@ -60,6 +62,7 @@ class Arena:
 
 def test_the_defaults_are_lidas_with_decay_told_per_cycle_of_forty_ticks() -> None:
     config = Config()
+
     assert (config.no_broadcast_ticks, config.no_new_coalition_ticks, config.refractory_ticks) == (
         100,
         50,
@@ -69,14 +72,15 @@ def test_the_defaults_are_lidas_with_decay_told_per_cycle_of_forty_ticks() -> No
 
 
 def test_the_first_coalition_ever_is_broadcast() -> None:
-    said = build(Config(), "global_workspace").feed(
+    messages = build(Config(), "global_workspace").feed(
         Coalitions(
             stamp_ns=TICK_NS,
             cycle=1,
             coalitions=[Coalition(codelet="a", activation=0.2, nodes=[])],
         )
     )
-    assert [type(item) for item in said] == [Broadcast, Competition]
+
+    assert [type(item) for item in messages] == [Broadcast, Competition]
 
 
 def test_without_any_coalition_nothing_is_broadcast_however_long_it_has_been() -> None:
@@ -92,6 +96,7 @@ def test_silence_of_a_hundred_ticks_triggers_a_broadcast() -> None:
 
 def test_fifty_ticks_without_a_new_coalition_trigger_a_broadcast() -> None:
     arena = Arena(no_new_coalition_ticks=50)
+
     assert arena.trigger(10, a=0.1) == ""
     assert arena.trigger(40, b=0.1) == ""
     assert arena.trigger(60, a=0.2, b=0.2) == ""
@@ -101,14 +106,13 @@ def test_fifty_ticks_without_a_new_coalition_trigger_a_broadcast() -> None:
 
 def test_activations_of_more_than_eight_tenths_together_trigger_a_broadcast() -> None:
     arena = Arena(aggregate_above=0.8)
+
     assert arena.trigger(10, a=0.5) == ""
     assert arena.trigger(20, b=0.25) == ""
     assert arena.trigger(30, b=0.375) == "aggregate activation over threshold"
 
 
-def test_one_coalition_of_more_than_a_half_triggers_a_broadcast_and_one_of_exactly_a_half_does_not() -> (
-    None
-):
+def test_one_coalition_of_more_than_a_half_triggers_a_broadcast() -> None:
     arena = Arena(coalition_above=0.5)
     assert arena.trigger(10, a=0.5) == ""
     assert arena.trigger(20, a=0.51) == "one coalition over threshold"
@@ -116,15 +120,17 @@ def test_one_coalition_of_more_than_a_half_triggers_a_broadcast_and_one_of_exact
 
 def test_in_the_forty_ticks_after_a_broadcast_nothing_triggers_another() -> None:
     arena = Arena(refractory_ticks=40, coalition_above=0.5)
+
     assert arena.trigger(39, a=0.9) == ""
     assert arena.trigger(40, a=0.9) == "one coalition over threshold"
     assert arena.trigger(79, a=0.9) == ""
     assert arena.trigger(80) == "one coalition over threshold"
 
 
-def test_the_most_active_coalition_wins_and_leaves_the_others_to_go_on_competing() -> None:
+def test_the_most_active_coalition_wins_and_the_others_compete_again() -> None:
     arena = Arena(aggregate_above=0.8)
     competition, broadcast = arena.compete(10, a=0.3, b=0.4, c=0.2)
+
     assert _with_fate(competition, Fate.WON) == {"b": 0.4}
     assert _with_fate(competition, Fate.WAITING) == {"a": 0.3, "c": 0.2}
     assert broadcast is not None
@@ -138,14 +144,18 @@ def test_of_equals_the_first_by_name_wins_whatever_the_order_they_came_in() -> N
         _, broadcast = Arena(aggregate_above=0.5).compete(10, **dict.fromkeys(names, 0.4))
         assert broadcast is not None
         winners.append(broadcast.coalition.codelet)
+
     assert winners == ["a", "a"]
 
 
 def test_coalitions_decay_by_a_tenth_a_tick_and_are_removed_at_zero() -> None:
     arena = Arena(decay=0.1, **LIDA)
     arena.compete(10, a=0.45, b=0.2)
+
     assert arena.waiting(11) == pytest.approx({"a": 0.35, "b": 0.1})
+
     competition, _ = arena.compete(13)
+
     assert _with_fate(competition, Fate.WAITING) == pytest.approx({"a": 0.15})
     assert _with_fate(competition, Fate.DECAYED) == {"b": 0.0}
     assert arena.waiting(15) == {}
@@ -162,12 +172,14 @@ def test_a_coalition_keeps_its_id_until_its_codelet_brings_a_newer_one() -> None
     (first,) = arena.compete(10, a=0.4)[0].contenders
     (again,) = arena.compete(11)[0].contenders
     displaced, newer = arena.compete(12, a=0.3)[0].contenders
+
     assert first.id == again.id == displaced.id != newer.id
     assert (displaced.fate, newer.fate) == (Fate.DISPLACED, Fate.WAITING)
 
 
 def test_every_cycle_has_its_competition_even_where_nothing_competes() -> None:
     competition, broadcast = Arena().compete(5)
+
     assert (competition.cycle, competition.contenders, competition.trigger, broadcast) == (
         2,
         [],
@@ -179,15 +191,15 @@ def test_every_cycle_has_its_competition_even_where_nothing_competes() -> None:
 def test_coalitions_of_an_earlier_time_turn_no_clock_back() -> None:
     arena = Arena(refractory_ticks=40, coalition_above=0.5)
     arena.compete(100, a=0.9)
+
     assert arena.trigger(60, b=0.9) == ""
     assert arena.trigger(140) == "one coalition over threshold"
 
 
-def test_the_coalitions_of_a_cycle_compete_once_whoever_sends_them_and_those_of_a_new_start_are_new() -> (
-    None
-):
+def test_the_coalitions_of_a_cycle_compete_once_whoever_sends_them() -> None:
     module = build(Config(), "global_workspace")
     first = Coalitions(stamp_ns=5, cycle=7, coalitions=[])
+
     assert module.feed(first)
     assert module.feed(Coalitions(stamp_ns=6, cycle=8, coalitions=[]))
     with pytest.raises(MessageError, match="cycle 7 came twice"):

@@ -39,6 +39,7 @@ def _texture() -> npt.NDArray[np.float32]:
         total += 12 * cv2.resize(
             rng.standard_normal((cells, 2 * cells)), (2048, 1024), interpolation=cv2.INTER_CUBIC
         )
+
     return total
 
 
@@ -66,6 +67,7 @@ def _wall(
         )
         picture = np.clip(picture + rng.normal(0, 1.5, picture.shape), 0, 255)
         images.append(np.repeat(picture[..., None], 3, axis=2).astype(np.uint8))
+
     return images
 
 
@@ -78,6 +80,7 @@ def _rays(distortion: float) -> npt.NDArray[np.float64]:
     plane = cv2.undistortPoints(pixels, camera, np.array([distortion, 0, 0, 0, 0])).reshape(
         HEIGHT, WIDTH, 2
     )
+
     return np.concatenate([plane, np.ones((HEIGHT, WIDTH, 1))], axis=2)
 
 
@@ -88,9 +91,12 @@ def test_depth_is_right_from_three_to_thirty_metres_over_the_whole_image(
     depth_m: float, bar: float
 ) -> None:
     depth = DepthFromStereo(CALIBRATION, 2.5).depth_m(*_wall(depth_m))
+
     assert depth.dtype == np.float32
+
     known = depth > 0
     overlap = known[:, 40:]
+
     assert overlap.mean() > 0.9
     assert np.median(np.abs(depth[known] - depth_m)) < bar * depth_m
 
@@ -114,11 +120,14 @@ def test_a_turned_right_camera_and_lens_distortion_are_undone() -> None:
     )
     images = _wall(10.0, turn_rad, distortion)
     rectified = rectification(given)
+
     assert rectified.calibration == CALIBRATION
+
     depth = DepthFromStereo(rectified.calibration, 2.5).depth_m(
         *rectified.apply(images[0], images[1])
     )
     middle = depth[40:-40, 60:-40]
+
     assert (middle > 0).mean() > 0.9
     assert np.median(np.abs(middle[middle > 0] - 10.0)) < 0.1
 
@@ -127,6 +136,7 @@ def test_rectified_images_are_passed_on_untouched_and_maps_are_made_once() -> No
     left, right = _wall(5.0)
     first = rectification(CALIBRATION)
     second = rectification(msgspec.structs.replace(CALIBRATION))
+
     assert first is second
     assert first.apply(left, right)[0] is left
 
@@ -139,29 +149,33 @@ def test_a_calibration_of_no_camera_is_refused(wrong: dict[str, float]) -> None:
         rectification(msgspec.structs.replace(CALIBRATION, **wrong))
 
 
-def test_the_scan_finds_an_obstacle_at_its_bearing_and_range_and_nothing_elsewhere() -> None:
+def test_the_scan_finds_an_obstacle_at_its_bearing_and_range_only() -> None:
     depth = np.zeros((HEIGHT, WIDTH), np.float32)
     depth[120:150, 40:60] = 8.0
     bearing_rad, range_m = scan(depth, CALIBRATION, 32)
     hit = range_m > 0
     x = 8.3
     y = (CALIBRATION.cx_px - 50) / FOCAL_PX * 8.0
+
     assert 1 <= hit.sum() <= 4
     assert abs(bearing_rad[hit].mean() - np.arctan2(y, x)) < 0.05
+
     np.testing.assert_allclose(range_m[hit], np.hypot(x, y), rtol=0.03)
 
 
-def test_the_scan_passes_over_the_ground_and_what_hangs_above_the_robot() -> None:
+def test_the_scan_ignores_the_ground_and_what_hangs_above_the_robot() -> None:
     depth = np.zeros((HEIGHT, WIDTH), np.float32)
     rows = np.arange(140, HEIGHT)
     depth[rows] = (1.5 * FOCAL_PX / (rows - CALIBRATION.cy_px))[:, None]
     depth[:60] = 6.0
+
     assert not scan(depth, CALIBRATION, 32)[1].any()
 
 
-def test_a_wrong_match_or_two_stop_nobody() -> None:
+def test_a_wrong_match_or_two_are_no_obstacle() -> None:
     depth = np.zeros((HEIGHT, WIDTH), np.float32)
     depth[120:122, 100] = 3.0
     depth[110:150, 90:110] = np.where(depth[110:150, 90:110] > 0, depth[110:150, 90:110], 20.0)
     range_m = scan(depth, CALIBRATION, 32)[1]
+
     assert range_m[range_m > 0].min() > 15

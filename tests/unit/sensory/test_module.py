@@ -47,20 +47,21 @@ def _frame(number: int, step: int, calibration: Calibration = CALIBRATION) -> St
     )
 
 
-def _said(messages: Iterable[Message]) -> list[Message]:
+def _published(messages: Iterable[Message]) -> list[Message]:
     module = build(Config(), "sensory")
-    return [said for message in messages for said in module.feed(message)]
+    return [answer for message in messages for answer in module.feed(message)]
 
 
-def test_a_frame_waits_for_the_odometry_up_to_its_stamp_and_then_says_motion_scan_and_view() -> (
-    None
-):
+def test_a_frame_waits_for_the_odometry_up_to_its_stamp() -> None:
     module = build(Config(), "sensory")
+
     assert module.feed(_frame(0, 2)) == []
     assert module.feed(_odometry(1)) == []
-    said = module.feed(_odometry(2))
-    assert [type(message) for message in said] == [SelfMotion, RangeScan, View]
-    assert {message.stamp_ns for message in said} == {2 * STEP_NS}
+
+    messages = module.feed(_odometry(2))
+
+    assert [type(message) for message in messages] == [SelfMotion, RangeScan, View]
+    assert {message.stamp_ns for message in messages} == {2 * STEP_NS}
 
 
 def test_any_interleaving_of_frames_with_their_odometry_gives_the_same_bytes() -> None:
@@ -73,23 +74,27 @@ def test_any_interleaving_of_frames_with_their_odometry_gives_the_same_bytes() -
         [rows[0], first, *rows[1:5], second, *rows[5:]],
         [first, *rows[:7], second, rows[7]],
     )
-    outputs = [[codec.encode(message) for message in _said(order)] for order in orders]
+    outputs = [[codec.encode(message) for message in _published(order)] for order in orders]
+
     assert len(outputs[0]) == 6
     assert all(output == outputs[0] for output in outputs)
 
 
 def test_motions_cover_exactly_what_came_since_the_last_view() -> None:
-    said = _said([*(_odometry(step) for step in range(1, 10)), _frame(0, 3), _frame(1, 8)])
-    first, second = [message for message in said if isinstance(message, SelfMotion)]
+    messages = _published([*(_odometry(step) for step in range(1, 10)), _frame(0, 3), _frame(1, 8)])
+    first, second = [message for message in messages if isinstance(message, SelfMotion)]
+
     assert (first.since_ns, first.motions.shape) == (0, (3, 5))
     assert (second.since_ns, second.stamp_ns) == (3 * STEP_NS, 8 * STEP_NS)
+
     turn_rates = [float(row[1]) for row in second.motions.numpy()]
     steps = [round(after - before, 9) for before, after in pairwise(turn_rates)]
+
     assert steps == [0.1] * 4  # odometry's own steps; what is seen moves them all alike
 
 
-def test_a_newer_frame_takes_the_place_of_a_waiting_one_and_no_motion_is_lost() -> None:
-    said = _said(
+def test_a_newer_frame_replaces_a_waiting_one_and_no_motion_is_lost() -> None:
+    messages = _published(
         [
             _odometry(1),
             _frame(0, 1),
@@ -98,20 +103,21 @@ def test_a_newer_frame_takes_the_place_of_a_waiting_one_and_no_motion_is_lost() 
             *(_odometry(s) for s in range(2, 6)),
         ]
     )
-    motions = [message for message in said if isinstance(message, SelfMotion)]
+    motions = [message for message in messages if isinstance(message, SelfMotion)]
+
     assert [message.frame for message in motions] == [0, 2]
     assert (motions[1].since_ns, motions[1].motions.shape) == (STEP_NS, (4, 5))
 
 
 def test_the_first_frame_without_earlier_odometry_has_no_motion() -> None:
-    motion = _said([_frame(0, 4), _odometry(5)])[0]
+    motion = _published([_frame(0, 4), _odometry(5)])[0]
     assert isinstance(motion, SelfMotion)
     assert (motion.since_ns, motion.motions.shape) == (4 * STEP_NS, (0, 5))
 
 
 def test_older_frames_and_odometry_are_ignored() -> None:
     messages = [_odometry(1), _odometry(2), _frame(0, 2)]
-    assert len(_said([*messages, _frame(7, 1), _odometry(2), _odometry(1)])) == 3
+    assert len(_published([*messages, _frame(7, 1), _odometry(2), _odometry(1)])) == 3
 
 
 def _plain(messages: Iterable[Message]) -> list[bytes]:
@@ -124,7 +130,9 @@ def test_the_last_frame_published_again_gets_the_same_answer_again() -> None:
     module = build(Config(), "sensory")
     for message in (*rows[:4], _frame(0, 4), *rows[4:]):
         module.feed(message)
+
     answer = module.feed(_frame(1, 8))
+
     for row in rows[4:]:
         assert module.feed(row) == []
     assert _plain(module.feed(_frame(1, 8))) == _plain(answer)
@@ -135,12 +143,14 @@ def test_a_frame_published_again_is_integrated_only_once() -> None:
     frames = [_frame(0, 4), _frame(1, 8), _frame(2, 12)]
     once = [*rows[:4], frames[0], *rows[4:8], frames[1], *rows[8:], frames[2]]
     twice = [*rows[:4], frames[0], *rows[4:8], frames[1], frames[1], *rows[8:], frames[2]]
-    assert _plain(_said(twice)[-3:]) == _plain(_said(once)[-3:])
+
+    assert _plain(_published(twice)[-3:]) == _plain(_published(once)[-3:])
 
 
-def test_the_view_keeps_the_frames_image_and_its_calibration_where_nothing_is_to_rectify() -> None:
+def test_a_rectified_frame_keeps_its_image_and_calibration() -> None:
     frame = _frame(0, 1)
-    view = _said([_odometry(1), frame])[2]
+    view = _published([_odometry(1), frame])[2]
+
     assert isinstance(view, View)
     assert view.image == frame.left
     assert view.calibration == CALIBRATION
@@ -164,6 +174,7 @@ def _resized(frame: StereoFrame, name: str, values: np.ndarray) -> StereoFrame:
 def test_a_frame_that_makes_no_sense_is_refused_and_changes_nothing(frame: StereoFrame) -> None:
     module = build(Config(), "sensory")
     module.feed(_odometry(1))
+
     with pytest.raises(MessageError):
         module.feed(frame)
     assert len(module.feed(_frame(0, 1))) == 3
@@ -173,15 +184,18 @@ def test_a_frame_that_makes_no_sense_is_refused_and_changes_nothing(frame: Stere
 def test_odometry_that_makes_no_sense_is_refused_and_changes_nothing(row: Odometry) -> None:
     module = build(Config(), "sensory")
     module.feed(_odometry(1))
+
     with pytest.raises(MessageError):
         module.feed(row)
+
     module.feed(_odometry(2))
     motion = module.feed(_frame(0, 2))[0]
+
     assert isinstance(motion, SelfMotion)
     assert motion.motions.shape == (2, 5)
 
 
-def test_it_takes_and_says_what_the_table_of_topics_names() -> None:
+def test_it_receives_and_publishes_what_the_table_of_topics_names() -> None:
     module = build(Config(), "sensory")
     assert set(module.handlers) == {topics.STEREO, topics.ODOMETRY}
     assert module.emits == {topics.SELF_MOTION, topics.SCAN, topics.VIEW}

@@ -37,6 +37,7 @@ def _view(distance_m: float, turn_rad: float) -> tuple[np.ndarray, np.ndarray]:
     across = (right * np.cos(turn_rad) - np.sin(turn_rad)) * depth
     at = [(1000 + 50 * across).astype(np.float32), (1000 + 50 * down * depth).astype(np.float32)]
     grey = cv2.remap(texture, at[0], at[1], cv2.INTER_LINEAR)
+
     return cv2.cvtColor(grey, cv2.COLOR_GRAY2RGB), depth.astype(np.float32)
 
 
@@ -45,12 +46,13 @@ def _view(distance_m: float, turn_rad: float) -> tuple[np.ndarray, np.ndarray]:
 )
 def test_views_measure_distance_and_turn_far_better_than_noisy_wheels(distance_m, turn_rad):
     odometry = VisualOdometry()
-    said = Motion(distance_m * 1.1, turn_rad + 0.03, 0.1 * distance_m + 1e-3, 0.03)
+    wheels = Motion(distance_m * 1.1, turn_rad + 0.03, 0.1 * distance_m + 1e-3, 0.03)
     odometry.update(*_view(0.0, 0.0), CAMERA, Motion(0.0, 0.0, 1e-3, 1e-3))
-    motion = odometry.update(*_view(distance_m, turn_rad), CAMERA, said)
+    motion = odometry.update(*_view(distance_m, turn_rad), CAMERA, wheels)
+
     assert motion.turn_rad == pytest.approx(turn_rad, abs=0.004)
     assert motion.distance_m == pytest.approx(distance_m, abs=0.04)
-    assert motion.turn_sd_rad < said.turn_sd_rad / 5
+    assert motion.turn_sd_rad < wheels.turn_sd_rad / 5
 
 
 def test_without_texture_the_motion_is_that_of_the_wheels():
@@ -58,6 +60,7 @@ def test_without_texture_the_motion_is_that_of_the_wheels():
     wheels = Motion(0.5, 0.1, 0.05, 0.02)
     blank = np.full((240, 320, 3), 90, np.uint8), np.full((240, 320), 9.0, np.float32)
     odometry.update(*blank, CAMERA, wheels)
+
     assert odometry.update(*blank, CAMERA, wheels) == wheels
 
 
@@ -65,6 +68,7 @@ def test_fused_rows_add_up_to_the_fused_motion_and_its_spread():
     rows = np.array([[2.0, 0.1, 0.05], [2.2, 0.3, 0.05], [2.4, 0.2, 0.05]])
     wheels = WheelNoise(0.1, 0.1, 0.02).total(rows)
     fused = fuse(rows, Motion(0.3, 0.05, 0.01, 0.002), wheels)
+
     assert (fused[:, 0] * fused[:, 2]).sum() == pytest.approx(0.3)
     assert (fused[:, 1] * fused[:, 2]).sum() == pytest.approx(0.05)
     assert np.sqrt(((fused[:, 4] * fused[:, 2]) ** 2).sum()) == pytest.approx(0.002)

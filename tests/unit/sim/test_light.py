@@ -22,6 +22,7 @@ def _bright(points_m: list[tuple[float, float, float]], light: Light = EVENING) 
         found.append(
             float(brightness(depth_m, rays, np.array([x, y, z + 100.0]), top_m, light)[4, 4])
         )
+
     return found
 
 

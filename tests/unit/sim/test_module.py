@@ -31,36 +31,38 @@ def _start(module: Module) -> list[Message]:
 
 def _lockstep(frames: int) -> list[Message]:
     module = build(Config(mode="lockstep", **SMALL))
-    said = _start(module)
+    messages = _start(module)
     for number in range(frames):
-        said += module.feed(_command(said[-1].stamp_ns, 15.0, 15.0 + number))
-    return said
+        messages += module.feed(_command(messages[-1].stamp_ns, 15.0, 15.0 + number))
+
+    return messages
 
 
 def _real_time(
     module: Module, ticks: int, first_ns: int = 10**12, answer: bool = True
 ) -> list[Message]:
-    said: list[Message] = []
+    messages: list[Message] = []
     for number in range(ticks):
         new = module.stamp(module.timers[0].handler(first_ns + number * TICK_NS))
-        said += new
+        messages += new
         if answer and new and isinstance(new[-1], StereoFrame):
             module.feed(_command(new[-1].stamp_ns))
-    return said
+
+    return messages
 
 
-def _of(kind: type[M], said: list[Message]) -> list[M]:
-    return [message for message in said if isinstance(message, kind)]
+def _of(kind: type[M], messages: list[Message]) -> list[M]:
+    return [message for message in messages if isinstance(message, kind)]
 
 
-def _check_that_frames_follow_their_odometry(said: list[Message]) -> None:
-    heard_ns = 0
-    for message in said:
+def _check_that_frames_follow_their_odometry(messages: list[Message]) -> None:
+    last_ns = 0
+    for message in messages:
         if isinstance(message, Odometry):
-            assert message.stamp_ns == heard_ns + TICK_NS
-            heard_ns = message.stamp_ns
+            assert message.stamp_ns == last_ns + TICK_NS
+            last_ns = message.stamp_ns
         elif isinstance(message, StereoFrame):
-            assert message.stamp_ns == heard_ns
+            assert message.stamp_ns == last_ns
 
 
 def test_two_lockstep_runs_of_one_seed_give_the_same_bytes() -> None:
@@ -70,36 +72,43 @@ def test_two_lockstep_runs_of_one_seed_give_the_same_bytes() -> None:
 
 
 def test_lockstep_moves_by_one_frame_for_each_answer_to_the_last_one() -> None:
-    said = _lockstep(4)
-    assert isinstance(said[0], TrueTown)
-    assert [frame.frame for frame in _of(StereoFrame, said)] == [0, 1, 2, 3, 4]
-    assert {clock.rate for clock in _of(Clock, said)} == {0.0}
-    _check_that_frames_follow_their_odometry(said)
+    messages = _lockstep(4)
+
+    assert isinstance(messages[0], TrueTown)
+    assert [frame.frame for frame in _of(StereoFrame, messages)] == [0, 1, 2, 3, 4]
+    assert {clock.rate for clock in _of(Clock, messages)} == {0.0}
+
+    _check_that_frames_follow_their_odometry(messages)
 
 
-def test_lockstep_passes_over_commands_that_answer_another_frame() -> None:
+def test_lockstep_ignores_commands_that_answer_another_frame() -> None:
     module = build(Config(mode="lockstep", **SMALL))
     stamp_ns = _start(module)[-1].stamp_ns
+
     assert module.feed(_command(stamp_ns + 1)) == []
     assert module.feed(_command(stamp_ns))
     assert module.feed(_command(stamp_ns)) == []
 
 
-def test_real_time_says_nothing_before_it_is_started() -> None:
+def test_real_time_publishes_nothing_before_it_is_started() -> None:
     module = build(Config(**SMALL))
+
     assert _real_time(module, 3) == []
+
     _start(module)
+
     assert _real_time(module, 1)
 
 
 def test_real_time_keeps_its_rates_and_frames_follow_their_odometry() -> None:
     module = build(Config(**SMALL))
     _start(module)
-    said = _real_time(module, 120)
+    messages = _real_time(module, 120)
     counts = {
-        kind.__name__: len(_of(kind, said))
+        kind.__name__: len(_of(kind, messages))
         for kind in (Clock, Odometry, TruePose, StereoFrame, TrueTown)
     }
+
     assert counts == {
         "Clock": 120,
         "Odometry": 120,
@@ -107,38 +116,43 @@ def test_real_time_keeps_its_rates_and_frames_follow_their_odometry() -> None:
         "StereoFrame": 30,
         "TrueTown": 2,
     }
-    assert _of(Clock, said)[-1].rate == pytest.approx(1.0)
-    _check_that_frames_follow_their_odometry(said)
-    poses = _of(TruePose, said)
+    assert _of(Clock, messages)[-1].rate == pytest.approx(1.0)
+
+    _check_that_frames_follow_their_odometry(messages)
+    poses = _of(TruePose, messages)
+
     assert 12.0 < poses[-1].travelled_m < 18.0
     assert 0.05 < poses[-1].progress < 0.15
 
 
-def test_real_time_slips_where_more_than_a_quarter_second_would_have_to_be_caught_up() -> None:
+def test_real_time_falls_behind_rather_than_catch_up_over_0_25_s() -> None:
     module = build(Config(**SMALL))
     _start(module)
     _real_time(module, 1)
     late = module.stamp(module.timers[0].handler(10**12 + 60 * TICK_NS))
+
     assert len(_of(Odometry, late)) == 5
     assert len(_of(StereoFrame, late)) == 1
     assert _of(Clock, late)[-1].rate < 0.2
 
 
-def test_a_robot_that_hears_no_command_for_a_second_brakes() -> None:
+def test_a_robot_that_receives_no_command_for_a_second_brakes() -> None:
     module = build(Config(**SMALL))
     _start(module)
     moving = _real_time(module, 60)
     standing = _real_time(module, 60, 10**12 + 60 * TICK_NS, answer=False)
     speeds = [abs(odometry.speed_m_s) for odometry in _of(Odometry, moving + standing)]
+
     assert np.mean(speeds[50:60]) > 2.0
     assert np.mean(speeds[-10:]) < 0.05
 
 
-def test_an_older_command_that_comes_late_does_not_replace_a_newer_one() -> None:
+def test_an_older_command_that_arrives_late_is_ignored() -> None:
     module = build(Config(**SMALL))
     _start(module)
-    said = _real_time(module, 20)
-    module.feed(_command(said[-1].stamp_ns - 4 * TICK_NS, -15.0, -15.0))
+    messages = _real_time(module, 20)
+    module.feed(_command(messages[-1].stamp_ns - 4 * TICK_NS, -15.0, -15.0))
+
     assert (
         _of(Odometry, _real_time(module, 10, 10**12 + 20 * TICK_NS, answer=False))[-1].speed_m_s
         > 1.0
@@ -148,10 +162,13 @@ def test_an_older_command_that_comes_late_does_not_replace_a_newer_one() -> None
 def test_a_command_older_than_the_limit_is_refused_and_moves_no_wheel() -> None:
     module = build(Config(command_timeout_s=100.0, **SMALL))
     _start(module)
-    said = _real_time(module, 55, answer=False)
+    messages = _real_time(module, 55, answer=False)
+
     with pytest.raises(MessageError, match=r"it is 2\.6 s old, .* none older than 2\.5 s"):
-        module.feed(_command(said[-1].stamp_ns - 52 * TICK_NS))
+        module.feed(_command(messages[-1].stamp_ns - 52 * TICK_NS))
+
     still = _real_time(module, 10, 10**12 + 55 * TICK_NS, answer=False)
+
     assert abs(_of(Odometry, still)[-1].speed_m_s) < 0.05
 
 
@@ -161,6 +178,7 @@ def test_the_wheels_stop_when_their_command_becomes_too_old() -> None:
     moving = _real_time(module, 60)
     last = _real_time(module, 80, 10**12 + 60 * TICK_NS, answer=False)
     speeds = [abs(odometry.speed_m_s) for odometry in _of(Odometry, moving + last)]
+
     assert np.mean(speeds[100:106]) > 2.0
     assert np.mean(speeds[-10:]) < 0.05
 
@@ -174,20 +192,24 @@ def _wait_for_command(module: Module, seconds: int) -> list[list[Message]]:
 def test_in_lockstep_a_frame_that_nobody_answers_is_published_again() -> None:
     module = build(Config(mode="lockstep", repeat_after_s=5.0, **SMALL))
     first = _start(module)
-    said = _wait_for_command(module, 13)
-    assert [second for second, messages in enumerate(said) if messages] == [5, 10]
+    messages = _wait_for_command(module, 13)
+
+    assert [second for second, repeated in enumerate(messages) if repeated] == [5, 10]
+
     for kind in (Odometry, StereoFrame):
-        again = _of(kind, said[5])
+        again = _of(kind, messages[5])
         assert [each.stamp_ns for each in again] == [each.stamp_ns for each in _of(kind, first)]
-    assert _of(StereoFrame, said[5])[0].left == _of(StereoFrame, first)[0].left
+
+    assert _of(StereoFrame, messages[5])[0].left == _of(StereoFrame, first)[0].left
 
 
 def test_in_lockstep_a_frame_published_again_is_answered_only_once() -> None:
     module = build(Config(mode="lockstep", repeat_after_s=5.0, **SMALL))
     stamp_ns = _start(module)[-1].stamp_ns
     _wait_for_command(module, 6)
-    said = module.feed(_command(stamp_ns))
-    assert _of(StereoFrame, said)[0].frame == 1
+    messages = module.feed(_command(stamp_ns))
+
+    assert _of(StereoFrame, messages)[0].frame == 1
     assert module.feed(_command(stamp_ns)) == []
     assert module.stamp(module.timers[0].handler(7 * 10**9)) == []
 
@@ -199,24 +221,29 @@ def test_rates_that_do_not_divide_one_another_are_refused_by_name(wrong: dict[st
 
 
 @pytest.mark.parametrize("mode", ["real_time", "lockstep"])
-def test_a_world_that_was_killed_goes_on_from_where_and_when_it_was_with_the_robot_at_rest(
+def test_a_restarted_world_continues_where_it_was_with_the_robot_at_rest(
     mode: str,
 ) -> None:
     config = Config(mode=mode, egl=False, **SMALL)  # type: ignore[arg-type]
     before = build(config)
     after = build(config)
-    said = _start(before)
-    said += (
-        before.feed(_command(said[-1].stamp_ns)) if mode == "lockstep" else _real_time(before, 90)
+    messages = _start(before)
+    messages += (
+        before.feed(_command(messages[-1].stamp_ns))
+        if mode == "lockstep"
+        else _real_time(before, 90)
     )
-    told = _of(TruePose, said)
-    last = _of(StereoFrame, said)[-1]
+    poses = _of(TruePose, messages)
+    last = _of(StereoFrame, messages)[-1]
+
     assert after.restore is not None
-    after.restore(told)
+
+    after.restore(poses)
     again = _start(after)
     again += [] if mode == "lockstep" else _real_time(after, 4)
-    assert _of(Odometry, again)[0].stamp_ns == told[-1].stamp_ns + TICK_NS
+
+    assert _of(Odometry, again)[0].stamp_ns == poses[-1].stamp_ns + TICK_NS
     assert _of(StereoFrame, again)[0].frame == last.frame + 1
-    assert _of(TruePose, again)[0].pose.x_m == pytest.approx(told[-1].pose.x_m, abs=0.1)
-    assert _of(TruePose, again)[0].travelled_m == pytest.approx(told[-1].travelled_m, abs=0.1)
-    assert _of(TruePose, again)[0].progress == pytest.approx(told[-1].progress, abs=0.005)
+    assert _of(TruePose, again)[0].pose.x_m == pytest.approx(poses[-1].pose.x_m, abs=0.1)
+    assert _of(TruePose, again)[0].travelled_m == pytest.approx(poses[-1].travelled_m, abs=0.1)
+    assert _of(TruePose, again)[0].progress == pytest.approx(poses[-1].progress, abs=0.005)

@@ -27,8 +27,9 @@ ORIGIN = Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)
 def test_noise_multiplies_speed_and_turn_rate_by_something_of_mean_one() -> None:
     wheels = WheelOdometry(Noise(speed=0.1, turn=0.2, drift_rad_per_sqrt_m=0.0), seed=3)
     after = _moved(4.0, 0.5)
-    said = [wheels.measure(ORIGIN, after, DT_S) for _ in range(4000)]
-    speeds, turns = np.array([(o.speed_m_s, o.turn_rate_rad_s) for o in said]).T
+    rows = [wheels.measure(ORIGIN, after, DT_S) for _ in range(4000)]
+    speeds, turns = np.array([(o.speed_m_s, o.turn_rate_rad_s) for o in rows]).T
+
     assert speeds.mean() == pytest.approx(4.0, rel=0.01)
     assert speeds.std() == pytest.approx(0.4, rel=0.1)
     assert turns.mean() == pytest.approx(0.5, rel=0.02)
@@ -36,8 +37,8 @@ def test_noise_multiplies_speed_and_turn_rate_by_something_of_mean_one() -> None
 
 
 def test_a_robot_that_stands_still_reports_no_motion() -> None:
-    said = WheelOdometry(Noise(), seed=1).measure(ORIGIN, ORIGIN, DT_S)
-    assert (said.speed_m_s, said.turn_rate_rad_s) == (0.0, 0.0)
+    row = WheelOdometry(Noise(), seed=1).measure(ORIGIN, ORIGIN, DT_S)
+    assert (row.speed_m_s, row.turn_rate_rad_s) == (0.0, 0.0)
 
 
 def test_drift_grows_with_the_square_root_of_the_way_whatever_the_steps() -> None:
@@ -79,10 +80,11 @@ def _error_after_a_lap(seed: int) -> float:
                 math.cos(heading + turned_rad / 2), math.sin(heading + turned_rad / 2)
             )
             heading += turned_rad
-            said = wheels.measure(
+            row = wheels.measure(
                 before, Pose(x_m=here.real, y_m=here.imag, heading_rad=heading), DT_S
             )
-            direction = guessed_heading + said.turn_rate_rad_s * DT_S / 2
-            guess += said.speed_m_s * DT_S * complex(math.cos(direction), math.sin(direction))
-            guessed_heading += said.turn_rate_rad_s * DT_S
+            direction = guessed_heading + row.turn_rate_rad_s * DT_S / 2
+            guess += row.speed_m_s * DT_S * complex(math.cos(direction), math.sin(direction))
+            guessed_heading += row.turn_rate_rad_s * DT_S
+
     return abs(guess - here)

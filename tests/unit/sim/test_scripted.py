@@ -42,10 +42,11 @@ def _ride(simulation: PerceptLevelSim) -> list[tuple[TruePose, SelfMotion, Perce
         truth = simulation.truth()
         motion, _, percepts = simulation.view()
         ride.append((truth, motion, percepts))
+
     return ride
 
 
-def test_self_motion_without_noise_adds_up_to_the_true_way() -> None:
+def test_self_motion_without_noise_adds_up_to_the_true_path() -> None:
     x = y = heading = 0.0
     for truth, motion, _ in _ride(_simulation()):
         for speed, turn_rate, dt, *_ in motion.motions.numpy():
@@ -71,7 +72,9 @@ def test_a_landmark_is_seen_where_it_stands() -> None:
         for truth, _, percepts in _ride(_simulation())
         for each in percepts.objects
     ]
+
     assert seen
+
     for pose, percept in seen:
         bearing = pose.heading_rad + percept.bearing_rad
         where = (
@@ -86,35 +89,40 @@ def test_houses_hide_what_is_not_along_the_street() -> None:
     seen_from = [
         truth.pose for truth, _, percepts in _ride(_simulation(around)) if percepts.objects
     ]
+
     assert seen_from
     assert all(pose.y_m < 1.0 for pose in seen_from)
 
 
-def test_the_same_seed_says_the_same() -> None:
+def test_the_same_seed_gives_the_same_messages() -> None:
     rides = [
         _ride(_simulation(noise=Noise(), errors=PerceptErrors(), seed=seed)) for seed in (4, 4, 5)
     ]
-    said = [
+    messages = [
         [(motion.motions.data, percepts.objects) for _, motion, percepts in ride] for ride in rides
     ]
-    assert said[0] == said[1] != said[2]
+
+    assert messages[0] == messages[1] != messages[2]
 
 
-def test_misses_confusions_and_noise_come_as_often_as_they_were_measured() -> None:
+def test_misses_confusions_and_noise_are_as_frequent_as_measured() -> None:
     landmarks = _landmarks(8)
     errors = PerceptErrors(named_phantoms=0.0)
     sense = PerceptSim(errors, landmarks, seed=2)
     views = [sense.perceive(Pose(x_m=0.0, y_m=0.0, heading_rad=0.0), [3]) for _ in range(4000)]
-    said = [view[0] for view in views if view]
-    assert len(said) / len(views) == pytest.approx(errors.detected, abs=0.02)
-    assert sum(each.label == "house 3" for each in said) / len(said) == pytest.approx(
+    messages = [view[0] for view in views if view]
+
+    assert len(messages) / len(views) == pytest.approx(errors.detected, abs=0.02)
+    assert sum(each.label == "house 3" for each in messages) / len(messages) == pytest.approx(
         errors.right_name, abs=0.01
     )
-    ranges = np.array([each.range_m for each in said])
+
+    ranges = np.array([each.range_m for each in messages])
+
     assert ranges.std() / 23.0 == pytest.approx(errors.range_sd_share, rel=0.1)
 
 
-def test_a_name_is_said_once_a_view() -> None:
+def test_a_name_is_perceived_once_a_view() -> None:
     sense = PerceptSim(PerceptErrors(right_name=0.2, detected=1.0), _landmarks(3), seed=3)
     for _ in range(50):
         labels = [
@@ -124,35 +132,45 @@ def test_a_name_is_said_once_a_view() -> None:
         assert len(labels) == len(set(labels))
 
 
-def test_a_place_is_known_again_coming_the_same_way_but_not_the_other() -> None:
+def test_a_place_is_recognized_in_the_same_direction_only() -> None:
     sure = PerceptErrors(place_recall=1.0, place_precision=1.0)
     line = Line(np.array([(0.0, 0.0), (200.0, 0.0)]))
     there = [line.at(5.0 * k) for k in range(40)]
     back = [Pose(x_m=pose.x_m, y_m=0.0, heading_rad=math.pi) for pose in reversed(there)]
     sense = PlaceSim(sure, seed=1)
-    said = [sense.recognize(k, 1000 * k, pose) for k, pose in enumerate([*there, *back, *there])]
-    assert not any(said[:80])
-    matched = [(k - 80, match[0].frame, match[0].view_ns) for k, match in enumerate(said) if match]
+    messages = [
+        sense.recognize(k, 1000 * k, pose) for k, pose in enumerate([*there, *back, *there])
+    ]
+
+    assert not any(messages[:80])
+
+    matched = [
+        (k - 80, match[0].frame, match[0].view_ns) for k, match in enumerate(messages) if match
+    ]
+
     assert matched == [(k, k, 1000 * k) for k in range(3, 40)]
 
 
-def test_the_module_goes_on_with_each_command_until_its_way_ends() -> None:
+def test_each_command_leads_to_a_frame_until_the_line_ends() -> None:
     trajectory = Trajectory(line_m=[(0.0, 0.0), (9.0, 0.0)], landmarks=[HOUSE], speed_m_s=3.0)
     module = build(Config(mode="lockstep", frame_hz=1, odometry_hz=1, trajectory=trajectory))
+
     assert module.start is not None
-    said = module.stamp(module.start())
+
+    messages = module.stamp(module.start())
     frames = 0
-    while said:
+    while messages:
         frames += 1
-        stamp_ns = next(message.stamp_ns for message in said if isinstance(message, Percepts))
-        said = module.feed(
+        stamp_ns = next(message.stamp_ns for message in messages if isinstance(message, Percepts))
+        messages = module.feed(
             MotorCommand(stamp_ns=stamp_ns, left_wheel_rad_s=0.0, right_wheel_rad_s=0.0)
         )
+
     assert frames == 3
     assert topics.STEREO not in module.emits
 
 
-def test_a_led_robot_in_real_time_is_refused() -> None:
+def test_a_trajectory_in_real_time_is_refused() -> None:
     trajectory = Trajectory(line_m=[(0.0, 0.0), (9.0, 0.0)], landmarks=[])
     with pytest.raises(ConfigError, match="lockstep"):
         build(Config(mode="real_time", trajectory=trajectory))

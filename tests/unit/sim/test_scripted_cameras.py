@@ -35,101 +35,119 @@ CINEMA = Landmark(name="cinema", x_m=50.0, y_m=-14.0)
 BENT = [(0.0, 0.0), (9.0, 0.0), (9.0, 6.0), (3.0, 12.0)]
 
 
-def _way(line=BENT, landmarks=(BAKERY, CINEMA)) -> Trajectory:
+def _trajectory(line=BENT, landmarks=(BAKERY, CINEMA)) -> Trajectory:
     return Trajectory(line_m=line, landmarks=list(landmarks), speed_m_s=3.0, sensing="cameras")
 
 
-def _led(way: Trajectory, **settings) -> Module:
+def _module(line: Trajectory, **settings) -> Module:
     return build(
-        Config(mode="lockstep", trajectory=way, frame_hz=1, odometry_hz=2, noise=SILENT, **settings)
+        Config(
+            mode="lockstep", trajectory=line, frame_hz=1, odometry_hz=2, noise=SILENT, **settings
+        )
     )
 
 
 def _ride(module: Module) -> list[list[Message]]:
-    """What is said until the way ends, frame by frame."""
+    """The messages until the line ends, frame by frame."""
     assert module.start is not None
+
     ride = []
-    said = module.stamp(module.start())
-    while said:
-        ride.append(said)
-        said = module.feed(
-            MotorCommand(stamp_ns=said[-1].stamp_ns, left_wheel_rad_s=0.0, right_wheel_rad_s=0.0)
+    messages = module.stamp(module.start())
+    while messages:
+        ride.append(messages)
+        messages = module.feed(
+            MotorCommand(
+                stamp_ns=messages[-1].stamp_ns, left_wheel_rad_s=0.0, right_wheel_rad_s=0.0
+            )
         )
+
     return ride
 
 
 @pytest.fixture(scope="module")
 def ride() -> list[list[Message]]:
-    return _ride(_led(_way(), width_px=64, height_px=64))
+    return _ride(_module(_trajectory(), width_px=64, height_px=64))
 
 
 @pytest.fixture(scope="module", params=[True, False], ids=["EGL", "TinyRenderer"])
 def far_world(request: pytest.FixtureRequest) -> Iterator[World]:
     line = [(0.0, 0.0), (3000.0, 1000.0)]
     world = World(
-        roadside.along(_way(line, [Landmark(name="bakery", x_m=3000.0, y_m=1014.0)]), 1),
+        roadside.along(_trajectory(line, [Landmark(name="bakery", x_m=3000.0, y_m=1014.0)]), 1),
         request.param,
     )
     yield world
     world.close()
 
 
-def test_epam_recognises_a_landmark_by_its_name_in_the_pictures_of_a_led_robot() -> None:
-    frames = _ride(_led(_way(line=[(0.0, 0.0), (6.0, 0.0)])))
+def test_epam_recognizes_a_landmark_in_the_images_along_a_trajectory() -> None:
+    frames = _ride(_module(_trajectory(line=[(0.0, 0.0), (6.0, 0.0)])))
     sensory = registry.build("sensory", {})
     epam = registry.build("epam", {})
     views = [
-        said
+        message
         for frame in frames
-        for told in frame
-        if isinstance(told, Odometry | StereoFrame)
-        for said in sensory.feed(told)
-        if isinstance(said, View)
+        for measured in frame
+        if isinstance(measured, Odometry | StereoFrame)
+        for message in sensory.feed(measured)
+        if isinstance(message, View)
     ]
-    seen = [said for view in views for said in epam.feed(view) if isinstance(said, Percepts)]
+    seen = [
+        message for view in views for message in epam.feed(view) if isinstance(message, Percepts)
+    ]
+
     assert len(seen) == 3
+
     (percept,) = [each for each in seen[-1].objects if each.label == "bakery"]
+
     assert percept.range_m == pytest.approx(math.hypot(34.0, 14.0), rel=0.15)
     assert percept.bearing_rad == pytest.approx(math.atan2(14.0, 34.0), abs=0.1)
 
 
-def test_wheels_without_noise_add_up_to_the_way_corners_and_all(ride: list[list[Message]]) -> None:
+def test_wheels_without_noise_add_up_to_the_line_with_its_corners(
+    ride: list[list[Message]],
+) -> None:
     x = y = heading = 0.0
-    heard_ns = 0
+    last_ns = 0
     for frame in ride:
-        for row in (said for said in frame if isinstance(said, Odometry)):
-            assert row.stamp_ns > heard_ns
-            heard_ns = row.stamp_ns
+        for row in (message for message in frame if isinstance(message, Odometry)):
+            assert row.stamp_ns > last_ns
+            last_ns = row.stamp_ns
             x += row.speed_m_s * row.dt_s * math.cos(heading)
             y += row.speed_m_s * row.dt_s * math.sin(heading)
             heading += row.turn_rate_rad_s * row.dt_s
-        (truth,) = [said for said in frame if isinstance(said, TruePose)]
+        (truth,) = [message for message in frame if isinstance(message, TruePose)]
         assert (x, y) == pytest.approx((truth.pose.x_m, truth.pose.y_m), abs=1e-9)
         assert math.remainder(heading - truth.pose.heading_rad, math.tau) == pytest.approx(
             0.0, abs=1e-9
         )
-        assert heard_ns == frame[-1].stamp_ns
+        assert last_ns == frame[-1].stamp_ns
 
 
-def test_it_takes_its_first_pictures_before_it_goes(ride: list[list[Message]]) -> None:
+def test_the_first_images_are_taken_before_the_robot_moves(ride: list[list[Message]]) -> None:
     travelled = [
-        said.travelled_m for frame in ride[:2] for said in frame if isinstance(said, TruePose)
+        message.travelled_m
+        for frame in ride[:2]
+        for message in frame
+        if isinstance(message, TruePose)
     ]
+
     assert travelled == [0.0, 3.0]
 
 
-def test_each_frame_ends_with_its_pictures_and_the_last_is_where_the_way_ends(
+def test_frames_end_with_their_images_and_the_last_is_at_the_lines_end(
     ride: list[list[Message]],
 ) -> None:
     assert all(isinstance(frame[-1], StereoFrame) for frame in ride)
-    (end,) = [said for said in ride[-1] if isinstance(said, TruePose)]
+    (end,) = [message for message in ride[-1] if isinstance(message, TruePose)]
     assert (end.pose.x_m, end.pose.y_m, end.progress) == pytest.approx((3.0, 12.0, 1.0))
 
 
 def test_the_truth_tells_the_buildings_as_large_as_their_kinds_are(
     ride: list[list[Message]],
 ) -> None:
-    (place,) = [said for said in ride[0] if isinstance(said, TrueTown)]
+    (place,) = [message for message in ride[0] if isinstance(message, TrueTown)]
+
     assert [(each.name, each.width_m) for each in place.buildings] == [
         ("bakery", 9.0),
         ("cinema", 13.0),
@@ -137,13 +155,14 @@ def test_the_truth_tells_the_buildings_as_large_as_their_kinds_are(
 
 
 def test_buildings_look_to_the_street() -> None:
-    plots = roadside.along(_way(line=[(0.0, 0.0), (60.0, 0.0)]), 1).plots
+    plots = roadside.along(_trajectory(line=[(0.0, 0.0), (60.0, 0.0)]), 1).plots
     fronts = [(math.sin(plot.heading_rad), -math.cos(plot.heading_rad)) for plot in plots]
+
     assert np.allclose(fronts, [(0.0, -1.0), (0.0, 1.0)])
     assert [plot.kind.name for plot in plots] == ["bakery", "cinema"]
 
 
-def test_kilometres_away_there_is_ground_underfoot_sky_above_and_the_building(
+def test_kilometres_away_there_are_ground_sky_and_the_building(
     far_world: World,
 ) -> None:
     heading_rad = math.atan2(1000.0, 3000.0)
@@ -151,6 +170,7 @@ def test_kilometres_away_there_is_ground_underfoot_sky_above_and_the_building(
     exposure, _ = StereoCamera(far_world, calibration()).capture_labelled()
     surface = towns.surfaces(far_world, exposure)
     names = {towns.SURFACES[number] for number in np.unique(surface)}
+
     assert names == {"sky", "ground", "road", "building"}
     assert (surface[:20] == towns.SURFACES.index("sky")).mean() > 0.9
     assert (surface[-20:, 140:180] == towns.SURFACES.index("road")).all()
@@ -159,13 +179,14 @@ def test_kilometres_away_there_is_ground_underfoot_sky_above_and_the_building(
 
 def test_a_landmark_that_no_building_is_called_is_refused_in_one_sentence() -> None:
     house = Landmark(name="house 3", x_m=20.0, y_m=14.0)
+
     with pytest.raises(
         ConfigError, match=r"^\[sim\] cameras see no 'house 3': name each landmark .*bakery"
     ) as error:
-        _led(_way(landmarks=[house]))
+        _module(_trajectory(landmarks=[house]))
     assert "\n" not in str(error.value)
 
 
 def test_a_landmark_that_would_stand_in_the_way_is_refused() -> None:
     with pytest.raises(ConfigError, match=r"the cinema at \(5, 2\) would stand in the way"):
-        _led(_way(landmarks=[Landmark(name="cinema", x_m=5.0, y_m=2.0)]))
+        _module(_trajectory(landmarks=[Landmark(name="cinema", x_m=5.0, y_m=2.0)]))

@@ -30,7 +30,7 @@ def test_every_town_has_at_least_20_buildings_and_none_of_them_twice() -> None:
         assert len(set(names)) == len(names)
 
 
-def test_no_building_stands_on_a_street_or_its_pavement_or_on_another_building() -> None:
+def test_no_building_stands_on_a_pavement_or_on_another_building() -> None:
     for place in TOWNS:
         for road, plot in itertools.product(place.roads, place.plots):
             assert not overlap(road.area(STREET_WIDTH_M / 2 + PAVEMENT_WIDTH_M), plot.footprint)
@@ -101,6 +101,7 @@ def test_progress_reaches_the_end_though_corners_are_cut_and_never_goes_back() -
             point = a + t * (b - a)
             inside = point * (1 - 2.0 / np.abs(line).max())
             shares.append(progress.advance(float(inside[0]), float(inside[1])))
+
     assert shares == sorted(shares)
     assert shares[0] < 0.02
     assert shares[-1] > 0.98
@@ -112,6 +113,7 @@ def test_each_kind_of_building_has_colours_of_its_own() -> None:
         np.histogramdd(picture, bins=(8, 8, 8), range=[(0, 256)] * 3)[0] / len(picture)
         for picture in pictures
     ]
+
     for one, other in itertools.combinations(bins, 2):
         assert np.minimum(one, other).sum() < 0.8
 

@@ -35,6 +35,7 @@ def _drive(world: World, left_rad_s: float, right_rad_s: float) -> tuple[Pose, P
     world.step(1.5)
     before = world.pose()
     world.step(1.0)
+
     return before, world.pose()
 
 
@@ -44,6 +45,7 @@ def test_equal_wheels_drive_straight_at_the_commanded_speed(
 ) -> None:
     before, after = _drive(world, wheels_rad_s, wheels_rad_s)
     distance_m = math.hypot(after.x_m - before.x_m, after.y_m - before.y_m)
+
     assert distance_m == pytest.approx(wheels_rad_s * WHEEL_RADIUS_M, rel=0.01)
     assert after.heading_rad == pytest.approx(OPEN_FIELD.heading_rad, abs=0.01)
 
@@ -54,6 +56,7 @@ def test_unequal_wheels_turn_as_a_differential_drive_does(
 ) -> None:
     before, after = _drive(world, *wheels_rad_s)
     rate = (wheels_rad_s[1] - wheels_rad_s[0]) * WHEEL_RADIUS_M / TRACK_M
+
     assert math.remainder(after.heading_rad - before.heading_rad, math.tau) == pytest.approx(
         rate, rel=0.03
     )
@@ -74,6 +77,7 @@ def test_a_building_stops_the_robot(world: World) -> None:
     world.robot.drive(10.0, 10.0)
     world.step(4.0)
     pose = world.pose()
+
     assert 1.5 < math.hypot(pose.x_m - x, pose.y_m - y) < 3.2
 
 
@@ -107,6 +111,7 @@ def test_a_known_building_stands_in_both_pictures_where_geometry_puts_it(world: 
         assert on_foot.min() == pytest.approx(columns[0], abs=1.5)
         assert on_foot.max() == pytest.approx(columns[1], abs=1.5)
         disparities.append(on_foot.mean())
+
     assert exposures[0].depth_m[120, 160] == pytest.approx(distance_m, abs=0.02)
     assert disparities[0] - disparities[1] > 0.5 * eye.fx_px * eye.baseline_m / distance_m
 
@@ -115,13 +120,15 @@ def test_the_same_view_gives_the_same_pictures(world: World) -> None:
     camera = StereoCamera(world, calibration())
     world.robot.place(world.town.start)
     first = [picture.tobytes() for picture in camera.capture()]
+
     assert [picture.tobytes() for picture in camera.capture()] == first
     assert first[0] != first[1]
 
 
-def test_a_second_world_that_would_draw_with_egl_is_refused_while_one_is_open(world: World) -> None:
+def test_a_second_world_rendered_by_egl_is_refused_while_one_is_open(world: World) -> None:
     if world.egl is None:
         pytest.skip("EGL does not work here")
+
     with pytest.raises(CogmapError, match="close it"):
         World(world.town)
 
@@ -140,6 +147,7 @@ def test_pictures_asked_for_on_another_thread_are_refused(world: World) -> None:
     thread = threading.Thread(target=shoot)
     thread.start()
     thread.join()
+
     assert caught
 
 
@@ -149,6 +157,7 @@ def test_tiny_renderer_draws_the_same_town(world: World) -> None:
     plain = World(world.town, want_egl=False)
     there = StereoCamera(plain, calibration()).capture()[0].astype(float)
     plain.close()
+
     assert plain.egl is None
     assert np.corrcoef(cv2.blur(here, (9, 9)).ravel(), cv2.blur(there, (9, 9)).ravel())[0, 1] > 0.9
 
