@@ -86,7 +86,7 @@ def read_chunk(path: Path, chunk: ChunkSpan) -> list[McapRecord]:
 
 
 def open_chunk(chunk: Chunk) -> list[McapRecord]:
-    """The schemas, channels and messages in a chunk. Raises DamageError where a checksum is wrong."""
+    """The schemas, channels and messages in a chunk. Raises DamageError for a wrong checksum."""
     try:
         return breakup_chunk(chunk, validate_crc=True)
     except Exception as error:  # each decompressor has errors of its own
