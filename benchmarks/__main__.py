@@ -1,4 +1,4 @@
-"""`python -m benchmarks`: measures, prints metrics beside their thresholds, and writes flat JSON."""
+"""`python -m benchmarks`: prints metrics beside their thresholds, and writes JSON."""
 
 from __future__ import annotations
 

@@ -80,7 +80,7 @@ def benchmarks() -> None:
     "--data",
     type=click.Path(exists=True, file_okay=False, path_type=Path),
     metavar="DIR",
-    help="Sets that others published: mrclam6, pose_graphs, stereo_cones and camvid, a folder each.",
+    help="Sets that others published, a folder each: mrclam6, pose_graphs, stereo_cones, camvid.",
 )
 @click.option(
     "--only", type=click.Choice(suite.NAMES), multiple=True, help="Just this one; repeatable."
@@ -174,8 +174,8 @@ def bus_command(pairs: int, number: int, json_path: Path | None) -> None:
     nargs=3,
     type=click.Path(path_type=Path),
     metavar="LEFT RIGHT DISPARITY",
-    help="Measure only the stereo matching, on a rectified pair of yours: its images, and the true disparities of the "
-    "left one, as an image of --scale times the pixels, 0 where unknown.",
+    help="Measure only the stereo matching, on a rectified pair of yours: its images, and the true "
+    "disparities of the left one, as an image of --scale times the pixels, 0 where unknown.",
 )
 @click.option(
     "--scale",
@@ -188,8 +188,8 @@ def bus_command(pairs: int, number: int, json_path: Path | None) -> None:
     nargs=2,
     type=click.Path(path_type=Path),
     metavar="IMAGES LABELS",
-    help="Measure only how well road is found in street photographs: two folders of PNG files with the same names, "
-    "labelled as CamVid's 12 classes are.",
+    help="Measure only how well road is found in street photographs: two folders of PNG files with "
+    "the same names, labelled as CamVid's 12 classes are.",
 )
 @click.option(
     "--road-weights",

@@ -19,7 +19,7 @@ Image = npt.NDArray[np.uint8]
 
 
 def machine_unit_ms() -> float:
-    """The CPU time of one StereoSGBM on a fixed image, 320 x 240 with 64 disparities in blocks of 5.
+    """The CPU time of one StereoSGBM on a fixed image: 320 x 240, 64 disparities, blocks of 5.
 
     It is the least of ROUNDS runs on one thread, so that other load on the machine hardly counts.
     """

@@ -140,7 +140,7 @@ def completed(name: str, thresholds: Thresholds, metrics: Metrics, failure: str 
 
 
 def merged(outcomes: Sequence[Outcome]) -> Metrics:
-    """All metrics under their own keys; a key that an earlier benchmark has gets its name before."""
+    """All metrics by key; a key that an earlier benchmark has gets the benchmark's name before."""
     found: Metrics = {}
 
     for outcome in outcomes:

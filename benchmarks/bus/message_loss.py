@@ -1,4 +1,4 @@
-"""Messages lost in a minute of the whole system, as every subscriber and the recorder count them."""
+"""Messages lost in a minute of the whole system, by every subscriber's and the recorder's count."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LAPS = 100.0
 def measure(folder: Path) -> Metrics:
     """How many NEVER_DROP messages were published, and how many the worst receiver never got.
 
-    A topic's loss is the largest that any subscriber counted. `folder` holds the files of the drive.
+    A topic's loss is the largest that any subscriber counted. `folder` holds the drive's files.
     """
     _, watch = drive(folder, laps=LAPS, seconds=RUN_S)
     recorded = recording(folder)

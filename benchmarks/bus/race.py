@@ -70,8 +70,8 @@ def pace(
 ) -> Pace:
     """Let a process `publish` `number` messages to REPLICAS that `receive` them.
 
-    The router at `endpoint` is one of the calling process, whose CPU time counts. Raises CogmapError
-    where a process does not answer within TIMEOUT_S.
+    The router at `endpoint` runs in the calling process, whose CPU time counts. Raises
+    CogmapError where a process does not answer within TIMEOUT_S.
     """
     race = Race.at(endpoint, number)
     receivers = [_spawn.Process(target=receive, args=(race,), daemon=True) for _ in range(REPLICAS)]

@@ -1,1 +1,1 @@
-"""The cognitive cycle on drives of the demo's town: how long it takes, and how well the agent localizes."""
+"""The cognitive cycle on drives of the demo's town: its latency, and the agent's error."""

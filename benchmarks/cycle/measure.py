@@ -1,4 +1,4 @@
-"""The cognitive cycle on a drive of the demo's loop, the replay of its log, and the agent's error."""
+"""The cycle on a drive of the demo's loop, the replay of its log, and the agent's error."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ def over_fused(processes: int) -> Metrics:
 
 
 def mean_errors(town: int, laps: float) -> MeanErrors:
-    """Drive `laps` of the town of that seed. Raises CogmapError where the route is not completed."""
+    """Drive `laps` of the town of that seed. Raises CogmapError where it does not end its route."""
     choices = Choices(seed=town, laps=laps, lockstep=True, record=False)
     sections = effective({}, choices, awaited(choices, observer=True))
     observer = Observer()

@@ -30,7 +30,7 @@ class Delay:
         return float(LAGS_S[self._errors_rad.argmin()]) if self._pairs >= MIN_PAIRS else 0.0
 
     def observe(self, rows: Floats, heading_rad: Callable[[Floats], Floats]) -> None:
-        """Take in (n, 4) rows of stamp, subject, range and bearing; `heading_rad` is the wheels'."""
+        """Add (n, 4) rows of stamp, subject, range and bearing; `heading_rad` is the wheels'."""
         for stamp_s, subject, _, bearing_rad in rows.tolist():
             before = self._last.get(subject)
             self._last[subject] = (stamp_s, bearing_rad)

@@ -139,7 +139,7 @@ def recovery_s(robot: Robot, landmarks: dict[int, tuple[float, float]]) -> float
 
 
 def true_poses(robot: Robot, stamps_s: Floats) -> tuple[Floats, np.ndarray]:
-    """(n, 3) true poses at `stamps_s`, and (n,) whether motion capture saw the robot around each."""
+    """(n, 3) true poses at `stamps_s`, and (n,) whether motion capture saw the robot then."""
     known_s = robot.truth[:, 0]
     heading_rad = np.unwrap(robot.truth[:, 3])
     columns = (robot.truth[:, 1], robot.truth[:, 2], heading_rad)

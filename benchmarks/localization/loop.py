@@ -142,7 +142,7 @@ class LocalizationLoop:
 
     @property
     def path(self) -> Floats:
-        """(n, 7) rows of the path as it is on the map now: stamp_s, pose, and path integration's."""
+        """(n, 7) rows of the path on the map now: stamp_s, pose, and path integration's."""
         return nodes.path(self._graph)
 
     def _on_delta(self, delta: Delta) -> None:

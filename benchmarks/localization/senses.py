@@ -1,4 +1,4 @@
-"""An MRCLAM robot's log as percepts and self-motion, as sensory memory and EPAM publish the town's."""
+"""An MRCLAM robot's log as the percepts and self-motion that sensory memory and EPAM publish."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ SEED = 11
 
 
 class Circle:
-    """A robot on a circle with its ten nearest landmarks in view, and others far away on the map."""
+    """A robot on a circle with its nearest landmarks in view, and others far away on the map."""
 
     def __init__(self, landmarks: int) -> None:
         self._rng = np.random.default_rng(SEED)

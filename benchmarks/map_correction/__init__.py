@@ -1,1 +1,1 @@
-"""Loop closing on pose graphs that others recorded, against exact least squares and against gtsam."""
+"""Loop closing on pose graphs that others recorded, against exact least squares and gtsam."""

@@ -63,7 +63,7 @@ class Gtsam:
             self._constrain(constraints, number)
 
     def solve(self) -> Any:
-        """Levenberg and Marquardt's method, as gtsam has it by default; `poses` reads the result."""
+        """Levenberg and Marquardt's method, with gtsam's defaults; `poses` reads the result."""
         optimizer = self._gtsam.LevenbergMarquardtOptimizer(
             self._graph, self._start, self._parameters
         )

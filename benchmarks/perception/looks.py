@@ -113,7 +113,7 @@ class _Tally:
 
 
 def novel_look(seed: int, sightings: int) -> Memory:
-    """Meet NOVEL invented buildings of the town of `seed`, then see each up to `sightings` times."""
+    """Meet NOVEL invented buildings of a town, then see each up to `sightings` times."""
 
     def poses(place: Town, rng: np.random.Generator) -> list[Pose]:
         first = [encounter(place, target, rng) for target in range(NOVEL)]

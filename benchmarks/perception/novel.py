@@ -1,4 +1,4 @@
-"""Buildings that nobody was taught, met once: whether each is recognised by the name it was given."""
+"""Buildings that nobody was taught, met once: whether each is recognised by its name."""
 
 from __future__ import annotations
 

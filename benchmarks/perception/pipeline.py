@@ -1,4 +1,4 @@
-"""Sensory memory and EPAM of the running system, in one process: a stereo frame in, percepts out."""
+"""Sensory memory and EPAM as they run, in one process: a stereo frame in, percepts out."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ PERIOD_NS = round(PERIOD_S * 1e9)
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What was made of one frame: the view, the percepts, the objects learned, and the time taken."""
+    """What was made of one frame: view, percepts, objects learned, and the time taken."""
 
     view: View
     percepts: Percepts

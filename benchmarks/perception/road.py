@@ -31,8 +31,8 @@ def road_iou(found: Booleans, surface: Bytes) -> float:
 def road_edge_errors_m(
     boundary_m: npt.ArrayLike, surface: Bytes, depth_m: Singles, camera: Calibration
 ) -> Floats:
-    """The distance of each point of `boundary_m` (n, 2), in the robot's frame, from the nearest true
-    one of the view.
+    """The distance of each point of `boundary_m` (n, 2), in the robot's frame, from the nearest
+    true one of the view.
 
     `surface` and true `depth_m` are (h, w). Infinite where no road ends in the view.
     """
@@ -44,7 +44,7 @@ def road_edge_errors_m(
 def road_edges_missed_m(
     boundary_m: npt.ArrayLike, surface: Bytes, depth_m: Singles, camera: Calibration
 ) -> Floats:
-    """The distance of each true point where road ends within WITHIN_M from the nearest found one."""
+    """The distance of each true point where road ends, within WITHIN_M, from the nearest found."""
     points_m = _points_m(boundary_m)
     true_m = true_boundary_m(surface, depth_m, camera, WITHIN_M)
     return _nearest_m(true_m, points_m)

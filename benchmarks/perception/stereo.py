@@ -130,7 +130,7 @@ def _truth(path: Path, scale: float) -> Floats32:
         )
     if true_px.max() >= values.shape[1]:
         raise UsageError(
-            f"{path} holds disparities wider than the image: give the --scale that it was written with"
+            f"{path} holds disparities wider than the image: give the --scale of its writing"
         )
     return true_px
 

@@ -46,7 +46,8 @@ def figure(scenes: list[Scene], seeds: list[int]) -> Figure:
         _draw_raster(panels["raster"], spikes)
         _draw_agreement(panels["agreement"], scenes)
         sheet.suptitle(
-            f"Cue integration by coincidence: {scene.spikes} spikes of place cells, samples of the posterior",
+            f"Cue integration by coincidence: {scene.spikes} spikes of place cells, "
+            "samples of the posterior",
             x=0.01,
             ha="left",
             color=INK,

@@ -49,12 +49,14 @@ Examples:
     "all_in",
     type=click.Path(path_type=Path),
     metavar="DIR",
-    help="Every extract (.osm, packed or not, .osm.pbf) and street graph (.jsonl, packed or not) in a folder.",
+    help="Every extract (.osm, packed or not, .osm.pbf) and street graph (.jsonl, packed or not) "
+    "in a folder.",
 )
 @click.option(
     "--maps",
     type=click.IntRange(1, 1000),
-    help=f"So many maps of eight buildings.  [default: {MAPS} from a seed or --osm, one a city with --all]",
+    help="So many maps of eight buildings.  "
+    f"[default: {MAPS} from a seed or --osm, one a city with --all]",
 )
 @click.option(
     "--traversals",

@@ -9,7 +9,8 @@ from cli.experiment.cue_integration import cue_integration
 from cli.experiment.loop_closing import loop_closing
 
 _EPILOG = """\b
-Each leaves a folder with its figure as PNG and PDF, and a JSON file of every figure printed, the seed and the command.
+Each leaves a folder with its figure as PNG and PDF, and a JSON file of every metric printed,
+the seed and the command.
 """
 
 

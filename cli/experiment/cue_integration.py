@@ -16,7 +16,7 @@ _EPILOG = """\b
 Examples:
   cogmap experiment cue-integration --json cue.json
   cogmap experiment cue-integration --fit             fit the noise of self-motion anew
-  cogmap experiment cue-integration --distance-noise 0.1   landmarks that are about as good as self-motion
+  cogmap experiment cue-integration --distance-noise 0.1   landmarks about as good as self-motion
 """
 
 

@@ -77,7 +77,8 @@ def _title(maps: Sequence[CityMap], metrics: dict[str, Any]) -> str:
     times = "once" if len(maps[0].learned) == 1 else f"{len(maps[0].learned)} times"
     return (
         f"Learned maps of {len(maps)} environments, traversed {times} each, {SENSING}.\n"
-        f"Corrected over uncorrected error: {metrics['error_corrected_over_uncorrected']:.2f} with headings, "
+        "Corrected over uncorrected error: "
+        f"{metrics['error_corrected_over_uncorrected']:.2f} with headings, "
         f"{metrics['error_positions_over_uncorrected']:.2f} positions only"
     )
 

@@ -59,8 +59,11 @@ def figure(found: Outcome) -> Figure:
 def _title(found: Outcome) -> str:
     noise = found.noise
     number = len(found.errors_m[Condition.BOTH])
-    senses = f"{noise.distance:.0%} of distance, {noise.speed:.0%} of speed and {noise.turn:.0%} of turn rate"
-    return f"Cue integration in Nardini's room, {number} trials a condition\nsimulated senses err by {senses}"
+    self_motion = f"{noise.speed:.0%} of speed and {noise.turn:.0%} of turn rate"
+    return (
+        f"Cue integration in Nardini's room, {number} trials a condition\n"
+        f"simulated senses err by {noise.distance:.0%} of distance, {self_motion}"
+    )
 
 
 def _draw_room(axes: Axes) -> None:

@@ -82,8 +82,11 @@ def _draw_map(axes: Axes, drawn: Map, colour: str, title: str) -> None:
     axes.plot(*drawn.path_m[-1], "o", ms=8, color=colour, mec="white", zorder=6)
     axes.set_aspect("equal", adjustable="box")
     axes.set_title(title, loc="left", fontsize=10)
-    said = f"error: path {drawn.path_error_m:.1f} m, buildings {drawn.object_error_m:.1f} m, end {drawn.end_error_m:.1f} m"
-    _label(axes, said, "m")
+    errors = (
+        f"error: path {drawn.path_error_m:.1f} m, buildings {drawn.object_error_m:.1f} m, "
+        f"end {drawn.end_error_m:.1f} m"
+    )
+    _label(axes, errors, "m")
 
 
 def _draw_shifts(axes: Axes, before: Map, after: Map) -> None:

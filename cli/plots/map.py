@@ -113,7 +113,10 @@ def _draw_scale(axes: Axes, west_m: float, south_m: float, length_m: float = 10.
 
 
 def _title(axes: Axes, figures: RecordedMetrics) -> None:
-    driven = f"Town {figures.seed}, driven through for {figures.distance_m:.0f} m in {figures.drive_s:.0f} s"
+    driven = (
+        f"Town {figures.seed}, driven through for {figures.distance_m:.0f} m "
+        f"in {figures.drive_s:.0f} s"
+    )
     learned = f"{figures.objects} buildings and {figures.road_m2:.0f} m² of street learned"
     errors = (
         f"position error {figures.estimate.mean_m:.2f} m on average; "

@@ -32,7 +32,7 @@ FIELD_OF_VIEW_RAD = math.pi
 
 @dataclass(frozen=True)
 class Tour:
-    """A traversal of an environment: the first building, the direction, and the seed of its noise."""
+    """A traversal of an environment: first building, direction, and the seed of its noise."""
 
     start: int
     backward: bool

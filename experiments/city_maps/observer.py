@@ -103,7 +103,7 @@ class Observer:
         return {WHEELS: self._seen_from(wheels), FUSED: self._seen_from(fused)}
 
     def _seen_from(self, poses: Points) -> Points:
-        """(8, 2): the median of all observations of each building, made from `poses` of the path."""
+        """(8, 2): the median of all observations of each building, from `poses` of the path."""
         seen = reading.observations(self._graph)
         where_m = transform_from(poses[seen.place], seen.where_m)
         numbers = {label: number for number, label in enumerate(seen.labels)}

@@ -1,4 +1,4 @@
-"""Cities to take environments from: OpenStreetMap extracts, street graphs, cities grown from seeds."""
+"""Cities to take environments from: OpenStreetMap extracts, street graphs, grown cities."""
 
 from __future__ import annotations
 

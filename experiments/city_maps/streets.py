@@ -1,4 +1,4 @@
-"""A street network of straight pieces between points: what is nearest to it, and the paths on it."""
+"""A street network of straight pieces between points, and the shortest paths on it."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Response:
-    """Where the participant put the first post back, in room coordinates, after how many movements."""
+    """Where the participant put the first post back, in the room, after how many movements."""
 
     x_m: float
     y_m: float

@@ -1,1 +1,1 @@
-"""Loop closing (paper §5.6, figure 6): a way round some blocks, before and after it is corrected."""
+"""Loop closing (paper §5.6, figure 6): a path round some blocks, before and after correction."""

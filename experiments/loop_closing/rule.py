@@ -22,7 +22,7 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Laps:
-    """Root mean square errors (n,) of the positions along n laps, before and after each is closed."""
+    """Root mean square errors (n,) of the positions of n laps, before and after each is closed."""
 
     before_m: Floats
     after_m: Floats

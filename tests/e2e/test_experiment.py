@@ -21,7 +21,7 @@ def _run(*arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_cue_integration_leaves_figures_and_json_and_says_the_same_bytes_through_real_processes(
+def test_cue_integration_gives_the_same_bytes_through_real_processes(
     tmp_path: Path,
 ) -> None:
     out = tmp_path / "out"

@@ -82,9 +82,7 @@ def test_an_outline_holds_its_corners_and_what_is_between_them() -> None:
     )
 
 
-def test_a_claim_matches_the_building_that_it_covers_by_half_and_each_building_is_matched_once() -> (
-    None
-):
+def test_a_claim_matches_the_building_it_half_covers_and_no_other_claim_does() -> None:
     whole = _mask(slice(2, 7), slice(0, 4))
     half = _mask(slice(2, 7), slice(0, 2))
     other = _mask(slice(0, 3), slice(8, 10))
@@ -119,7 +117,7 @@ def test_a_name_counts_where_a_trained_building_in_range_is_matched() -> None:
     assert objects.named(sights, TRAINED, 5.0, 60.0) == [False, True]
 
 
-def test_detection_counts_large_buildings_found_and_large_segments_that_match() -> None:
+def test_detection_counts_large_buildings_found_and_large_segments_right() -> None:
     large = Building(0, "bakery", 0.2, 10.0)
     small = Building(1, "bank", 0.009, 50.0)
     speck = _segment("bank", None, share=0.005)
@@ -132,9 +130,7 @@ def test_detection_counts_large_buildings_found_and_large_segments_that_match() 
     assert objects.detection(sights) == (1, 2, 2, 3)
 
 
-def test_a_learned_label_is_right_for_the_building_that_it_was_given_to_and_none_before_that() -> (
-    None
-):
+def test_a_learned_label_is_right_for_the_building_it_was_given_to() -> None:
     taught = Building(0, "bakery", 0.2, 10.0)
     novel = Building(1, "invented-1", 0.2, 9.0)
     other = Building(2, "invented-2", 0.2, 9.0)
@@ -178,7 +174,7 @@ def test_a_learned_label_is_right_for_the_building_that_it_was_given_to_and_none
     ]
 
 
-def test_calibration_error_is_the_gap_between_how_sure_and_how_often_right_by_bin() -> None:
+def test_calibration_error_is_the_gap_of_activation_and_accuracy_by_bin() -> None:
     sure = [(0.95, True)] * 3 + [(0.95, False)]
     assert objects.calibration_error(sure) == pytest.approx(0.2)
     assert objects.calibration_error(sure + [(0.3, False)] * 4) == pytest.approx((0.2 + 0.3) / 2)
@@ -197,7 +193,7 @@ def _meeting(side_rad: float, range_m: float, *claims: tuple[int, str]) -> Meeti
     return Meeting(Sight((), segments), np.array([[side_rad, range_m]] * 3))
 
 
-def test_a_building_met_once_is_known_again_by_its_name_from_another_side_and_distance() -> None:
+def test_a_building_met_once_is_recognised_from_another_side_and_distance() -> None:
     met = [
         _meeting(0.0, 10.0, (0, "new-1")),
         _meeting(0.0, 10.0, (1, "new-2")),
@@ -217,9 +213,7 @@ def test_a_building_met_once_is_known_again_by_its_name_from_another_side_and_di
     assert (memory.merges, memory.splits, memory.mistaken) == (1, 2, 1)
 
 
-def test_a_building_that_was_taken_for_another_or_for_a_trained_one_when_met_is_never_known_again() -> (
-    None
-):
+def test_a_building_met_under_the_name_of_another_is_never_recognised() -> None:
     met = [_meeting(0.0, 10.0, (0, "new-1"), (1, "new-1"), (2, "bakery"))] * 3
     later = [_meeting(math.pi, 20.0, (0, "new-1"), (1, "new-1"), (2, "bakery"))]
 
@@ -228,7 +222,7 @@ def test_a_building_that_was_taken_for_another_or_for_a_trained_one_when_met_is_
     assert (memory.later, memory.right, memory.merges, memory.mistaken) == (3, 1, 2, 1)
 
 
-def test_a_building_has_the_name_that_it_was_first_recognised_by_and_a_guess_is_none() -> None:
+def test_a_building_has_the_name_it_was_first_recognised_by_not_guessed() -> None:
     surely = _meeting(0.0, 10.0, (0, "new-1"))
     guessed = _meeting(0.0, 10.0, (0, "new-2"))
     unsure = replace(guessed.sight.segments[0], activation=0.7)
@@ -266,7 +260,7 @@ def test_points_ahead_of_a_robot_that_looks_north_are_north_of_it() -> None:
     )
 
 
-def test_a_later_view_is_from_another_side_and_distance_and_shows_the_building() -> None:
+def test_a_later_view_is_from_elsewhere_and_shows_the_building() -> None:
     place = town.generate(3001, towns.kinds(3001, 30))
     rng = np.random.default_rng(1)
     for target in range(5):
@@ -283,7 +277,7 @@ def test_a_later_view_is_from_another_side_and_distance_and_shows_the_building()
         assert (scenes.skyline(place, again) == target).any()
 
 
-def test_a_pixel_is_off_where_it_is_wrong_or_unmatched_though_the_truth_is_known() -> None:
+def test_a_pixel_errs_where_it_is_wrong_or_unmatched_and_the_truth_known() -> None:
     true_px = np.array([[10.0, 10.0, 10.0, 10.0, 0.0]], np.float32)
     found_px = np.array([[10.5, 12.0, 14.0, 0.0, 3.0]], np.float32)
 

@@ -70,7 +70,7 @@ def _answer(
     return Answer(seed, part, Pose(x_m=x_m, y_m=0.0, heading_rad=heading_rad), match)
 
 
-def test_a_match_is_right_only_at_the_same_place_of_the_same_town_looking_the_same_way() -> None:
+def test_a_match_is_right_only_at_the_same_place_of_the_town_and_heading() -> None:
     before = [_answer(FIRST_LAP, x_m) for x_m in (0.0, 10.0, 20.0)]
     measured = metrics(
         [

@@ -72,7 +72,7 @@ def test_only_the_connected_part_is_kept() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_an_environment_has_eight_buildings_in_four_square_kilometres_and_a_tour_past_them(
+def test_an_environment_has_eight_buildings_in_4_km2_and_a_tour_past_them(
     seed: int,
 ) -> None:
     (environment,) = environments(grown(seed), 1, seed)
@@ -147,7 +147,7 @@ def test_the_ratio_is_the_mean_of_the_maps_own_ratios() -> None:
     assert json.loads(json.dumps(metrics)) == metrics
 
 
-def test_without_noise_and_confusions_the_map_is_right_and_the_same_each_time() -> None:
+def test_without_noise_and_confusions_the_map_is_right_and_repeatable() -> None:
     (environment,) = environments(grown(7), 1, 7)
     quiet = Noise(speed=0.0, turn=0.0, drift_rad_per_sqrt_m=0.0)
     configured = sections(environment, Tour(start=0, backward=True, seed=1), quiet, "none")

@@ -29,7 +29,7 @@ def _trial(condition: Condition, number: int = 0, noise: Noise = NOISY) -> Trial
     return Trial(condition, number, noise, seed=5)
 
 
-def test_every_route_ends_at_post_8_and_a_turn_of_15_degrees_moves_its_target_by_46_cm() -> None:
+def test_every_route_ends_at_post_8_and_15_degrees_move_its_target_46_cm() -> None:
     assert len(set(ROUTES)) == 8
     for target, _, last in ROUTES:
         assert last == 8
@@ -54,7 +54,7 @@ def test_self_motion_is_multiplied_by_noise_of_mean_one() -> None:
     assert (ways.mean(), ways.std()) == pytest.approx((0.5, 0.05), rel=0.05)
 
 
-def test_how_unsure_self_motion_is_follows_from_what_is_felt_and_from_nothing_else() -> None:
+def test_the_uncertainty_of_self_motion_follows_from_what_is_sensed_alone() -> None:
     noise = Noise(0.2, 0.2)
     seeds = range(50)
     one = np.array([self_motion(1.0, 0.5, noise, np.random.default_rng(seed)) for seed in seeds])
@@ -157,9 +157,7 @@ def _outcome(conflict_m: np.ndarray) -> Outcome:
     return Outcome(NOISY, {**single, Condition.CONFLICT: conflict_m}, 0.457)
 
 
-def test_responses_between_the_cues_speak_for_integration_and_responses_at_either_for_alternation() -> (
-    None
-):
+def test_responses_between_the_cues_are_likelier_under_integration() -> None:
     rng = np.random.default_rng(2)
     weight = 0.35**2 / (0.35**2 + 0.28**2)
     between = rng.normal((weight * 0.457, 0), 0.22, (400, 2))
@@ -171,9 +169,7 @@ def test_responses_between_the_cues_speak_for_integration_and_responses_at_eithe
     assert _outcome(either).metrics()["integration_over_alternation"] < 0
 
 
-def test_one_lost_trial_turns_the_sum_of_likelihoods_but_not_the_median_nor_the_share_and_it_is_counted() -> (
-    None
-):
+def test_one_lost_trial_turns_the_sum_of_likelihoods_but_not_the_median() -> None:
     rng = np.random.default_rng(2)
     weight = 0.35**2 / (0.35**2 + 0.28**2)
     between = rng.normal((weight * 0.457, 0), 0.22, (400, 2))

@@ -60,7 +60,7 @@ def test_pairs_are_close_where_their_fields_are_before_and_after() -> None:
     assert replayed.nearer_m[-1] == pytest.approx(97.5)
 
 
-def test_synapses_of_close_places_change_by_the_decay_times_the_shift_and_others_do_not() -> None:
+def test_synapses_of_close_places_change_by_the_decay_times_the_shift() -> None:
     metrics = loop_metrics({method: _loop(3.0) for method in METHODS})
     expected = DECAY * np.exp(-DECAY * 2.375)
     assert metrics["strength_change_per_m_close_pairs"] == pytest.approx(expected, rel=0.05)
@@ -69,7 +69,7 @@ def test_synapses_of_close_places_change_by_the_decay_times_the_shift_and_others
     assert metrics["close_pairs"] == 38
 
 
-def test_errors_are_told_before_and_after_the_first_correction_and_in_the_end() -> None:
+def test_errors_are_measured_before_and_after_correction_and_in_the_end() -> None:
     metrics = loop_metrics({method: _loop(3.0) for method in METHODS})
     told = [
         metrics[f"{name}_error_{when}_m_positions"]
@@ -82,7 +82,7 @@ def test_errors_are_told_before_and_after_the_first_correction_and_in_the_end() 
     assert metrics["path_error_fused_alone_m"] == 0.0
 
 
-def test_where_only_distances_err_the_rule_leaves_a_bridge_of_what_was_a_random_walk() -> None:
+def test_where_only_distances_err_the_rule_leaves_a_brownian_bridge() -> None:
     distances = Noise(speed=0.05, turn=0.0, drift_rad_per_sqrt_m=0.0)
     square = ((0.0, 0.0), (50.0, 0.0), (50.0, 50.0), (0.0, 50.0), (0.0, 0.0))
     laps = close_laps(square, 1.0, distances, 400, seed=3)

@@ -40,9 +40,7 @@ def _heard(configured: Sections, modules: Sequence[Module]) -> Transcript:
     return heard
 
 
-def test_another_mind_that_is_given_what_was_sensed_says_what_it_would_with_the_senses_themselves() -> (
-    None
-):
+def test_a_replayed_sensor_log_gives_the_bytes_that_the_senses_would() -> None:
     shares: list[float] = []
     both = by_cameras({"first": _short(), "again": _short()}, COGNITION, _heard, shares.append)
     names = [each.name for each in (topics.PERCEPTS, topics.DELTA, topics.MOTOR_COMMAND)]
@@ -53,9 +51,7 @@ def test_another_mind_that_is_given_what_was_sensed_says_what_it_would_with_the_
     assert shares == sorted(shares) and shares[-1] == 1.0
 
 
-def test_with_cameras_landmarks_become_buildings_of_the_catalogue_and_nobody_is_told_percepts() -> (
-    None
-):
+def test_with_cameras_landmarks_become_buildings_of_the_catalogue() -> None:
     told = sections(1, "heading")
     seeing = with_cameras(told)
     assert [each["name"] for each in seeing["sim"]["trajectory"]["landmarks"][:2]] == [
