@@ -11,6 +11,7 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from cogmap.bus.codec import Envelope, encode
 from cogmap.bus.interface import Member
@@ -225,8 +226,8 @@ def test_inputs_from_a_restarted_source_are_told_apart_by_its_incarnation(path: 
     session.enter()
     for incarnation in (1, 2):
         for seq in range(6):
-            message = odometry(seq)
-            message.stamp_ns += incarnation
+            plain = odometry(seq)
+            message = replace(plain, stamp_ns=plain.stamp_ns + incarnation)
             session.say(message, 100 * incarnation + seq, incarnation)
         session.settle()
     session.end()
