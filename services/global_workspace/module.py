@@ -117,7 +117,7 @@ class GlobalWorkspace:
                 self._new_ns = self._now_ns
             else:
                 displaced.append(before.with_fate(Fate.DISPLACED))
-            name = f"{codelet}/{coalitions.cycle}"
+            name = coalition.id or f"{codelet}/{coalitions.cycle}"
             self._candidates[codelet] = Candidate(name, coalition, coalition.activation)
 
         return displaced

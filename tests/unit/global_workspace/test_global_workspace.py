@@ -205,3 +205,13 @@ def test_the_coalitions_of_a_cycle_compete_once_whoever_sends_them() -> None:
     with pytest.raises(MessageError, match="cycle 7 came twice"):
         module.feed(first)
     assert module.feed(Coalitions(stamp_ns=1000, cycle=7, coalitions=[]))
+
+
+def test_a_contender_goes_by_the_id_that_the_workspace_gave_its_coalition() -> None:
+    coalition = Coalition(id="7:attention", codelet="attention", activation=0.2, nodes=[])
+    module = build(Config(), "global_workspace")
+
+    *_, competition = module.feed(Coalitions(stamp_ns=5, cycle=7, coalitions=[coalition]))
+
+    assert isinstance(competition, Competition)
+    assert [each.id for each in competition.contenders] == ["7:attention"]
