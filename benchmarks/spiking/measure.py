@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from benchmarks.report import Metrics
 from benchmarks.threshold import at_most, within
 from cogmap.parallel import Progress, parallel_map
 from experiments.spiking.cells import Values
@@ -90,28 +91,30 @@ def measure(seed: int, processes: int, progress: Progress = lambda share: None) 
     return parallel_map(scene, seeds(seed), processes, progress)
 
 
-def metrics(scenes: list[Scene]) -> dict[str, float]:
-    """Every figure: ratios of standard deviations, along x and y; errors of means in exact standard
-    deviations.
-    """
-    found: dict[str, float] = {}
-    for name in ("spiking", "rejection"):
-        posteriors = [getattr(scene, name) for scene in scenes]
-        ratios: Values = np.array(
-            [p.sd_m / s.exact.sd_m for p, s in zip(posteriors, scenes, strict=True)]
-        )
-        errors = [s.exact.off(p.mean_m) for p, s in zip(posteriors, scenes, strict=True)]
-        prefix = "posterior" if name == "spiking" else name
-        found |= {
-            f"{prefix}_sd_ratio": float(ratios.mean()),
-            f"{prefix}_sd_ratio_least": float(ratios.min()),
-            f"{prefix}_sd_ratio_most": float(ratios.max()),
-            f"{prefix}_mean_error": float(np.mean(errors)),
-            f"{prefix}_mean_error_most": float(np.max(errors)),
-        }
-    spikes = float(np.median([scene.spikes for scene in scenes]))
-    return found | {
-        "place_spikes_a_scene": spikes,
+def metrics(scenes: list[Scene]) -> Metrics:
+    """Ratios of standard deviations, along x and y; errors of means in exact SDs."""
+    spiking = [(scene.exact, scene.spiking) for scene in scenes]
+    rejection = [(scene.exact, scene.rejection) for scene in scenes]
+    spikes = [scene.spikes for scene in scenes]
+
+    return {
+        **_compared("posterior", spiking),
+        **_compared("rejection", rejection),
+        "place_spikes_a_scene": float(np.median(spikes)),
         "recorded_s": RECORDED_S,
         "scenes": float(len(scenes)),
+    }
+
+
+def _compared(name: str, pairs: list[tuple[Posterior, Posterior]]) -> Metrics:
+    """Of pairs of the exact posterior and another."""
+    ratios: Values = np.array([other.sd_m / exact.sd_m for exact, other in pairs])
+    errors = [exact.off(other.mean_m) for exact, other in pairs]
+
+    return {
+        f"{name}_sd_ratio": float(ratios.mean()),
+        f"{name}_sd_ratio_least": float(ratios.min()),
+        f"{name}_sd_ratio_most": float(ratios.max()),
+        f"{name}_mean_error": float(np.mean(errors)),
+        f"{name}_mean_error_most": float(np.max(errors)),
     }

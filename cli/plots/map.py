@@ -23,7 +23,7 @@ DASHED = (0, (4, 2))
 DOTTED = (0, (1, 1.2))
 
 
-def draw(path: Path, observer: Observer, graph: Graph, figures: RecordedMetrics) -> None:
+def draw(path: Path, observer: Observer, graph: Graph, metrics: RecordedMetrics) -> None:
     """Write the map to `path` as a PNG."""
     with mpl.rc_context(
         {"font.family": "sans-serif", "font.size": 9, "axes.edgecolor": palette.KERB}
@@ -35,7 +35,7 @@ def draw(path: Path, observer: Observer, graph: Graph, figures: RecordedMetrics)
         layers.draw_road(axes, observer, graph)
         layers.draw_objects(axes, observer, graph)
         _draw_paths(axes, observer)
-        _dress(axes, observer, figures)
+        _dress(axes, observer, metrics)
         figure.savefig(path, facecolor=PAPER)
 
 
@@ -60,7 +60,7 @@ def _draw_paths(axes: Axes, observer: Observer) -> None:
         )
 
 
-def _dress(axes: Axes, observer: Observer, figures: RecordedMetrics) -> None:
+def _dress(axes: Axes, observer: Observer, metrics: RecordedMetrics) -> None:
     """Limits, scale, title and legend."""
     town = observer.town
     corners = [point for street in (town.streets if town else []) for point in street.line_m]
@@ -87,7 +87,7 @@ def _dress(axes: Axes, observer: Observer, figures: RecordedMetrics) -> None:
     axes.tick_params(colors=FAINT, length=3)
     axes.set_xlabel("x, metres east", color=FAINT)
     axes.set_ylabel("y, metres north", color=FAINT)
-    _title(axes, figures)
+    _title(axes, metrics)
     axes.legend(
         handles=_legend(),
         loc="upper center",
@@ -112,16 +112,16 @@ def _draw_scale(axes: Axes, west_m: float, south_m: float, length_m: float = 10.
     )
 
 
-def _title(axes: Axes, figures: RecordedMetrics) -> None:
+def _title(axes: Axes, metrics: RecordedMetrics) -> None:
     driven = (
-        f"Town {figures.seed}, driven through for {figures.distance_m:.0f} m "
-        f"in {figures.drive_s:.0f} s"
+        f"Town {metrics.seed}, driven through for {metrics.distance_m:.0f} m "
+        f"in {metrics.drive_s:.0f} s"
     )
-    learned = f"{figures.objects} buildings and {figures.road_m2:.0f} m² of street learned"
+    learned = f"{metrics.objects} buildings and {metrics.road_m2:.0f} m² of street learned"
     errors = (
-        f"position error {figures.estimate.mean_m:.2f} m on average; "
-        f"{figures.fused_alone.mean_m:.2f} m by fused self-motion alone, "
-        f"{figures.wheels_alone.mean_m:.2f} m by wheels alone"
+        f"position error {metrics.estimate.mean_m:.2f} m on average; "
+        f"{metrics.fused_alone.mean_m:.2f} m by fused self-motion alone, "
+        f"{metrics.wheels_alone.mean_m:.2f} m by wheels alone"
     )
     axes.set_title(f"{driven}\n\n", loc="left", color=INK, fontsize=14, fontweight="bold")
     axes.text(

@@ -8,62 +8,71 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cogmap.geometry.se2 import rotate
 from experiments.cue_integration.geometry import CONFLICT_RAD, Points
 from experiments.cue_integration.trial import Response, Trial
 
 FAR = 5.0
+SHARES = 201
 
 
 def errors(trials: Sequence[Trial], responses: Sequence[Response]) -> Points:
-    """Where the post was put, seen from where it stood: (n, 2) metres, along and inward.
+    """Where the post was put, relative to where it stood: (n, 2) metres, along and inward.
 
-    Along is the way that turned landmarks move the target, whether or not they did, inward is
-    across it, on the side of post 8: trials of every route, and of landmarks turned either way,
-    then fall together.
+    Along is the direction in which turned landmarks move the target, whether or not they did,
+    inward is across it, on the side of post 8: trials of every route, and of landmarks turned
+    either way, then fall together.
     """
-    targets = np.array([trial.target for trial in trials])
-    moved = np.array([trial.turned_target for trial in trials]) - targets
-    along = moved / np.hypot(*moved.T)[:, None]
-    inward = np.column_stack([-along[:, 1], along[:, 0]]) * np.array(
-        [[trial.side] for trial in trials]
-    )
-    off = np.array([(response.x_m, response.y_m) for response in responses]) - targets
-    return np.column_stack([(off * along).sum(axis=1), (off * inward).sum(axis=1)])
+    targets_m = np.array([trial.target for trial in trials])
+    turned_m = np.array([trial.turned_target for trial in trials])
+    sides = np.array([[trial.side] for trial in trials])
+    placed_m = np.array([(response.x_m, response.y_m) for response in responses])
+
+    moved_m = turned_m - targets_m
+    along = moved_m / np.hypot(*moved_m.T)[:, None]
+    left = np.column_stack([-along[:, 1], along[:, 0]])
+    inward = left * sides
+
+    offset_m = placed_m - targets_m
+    along_m = (offset_m * along).sum(axis=1)
+    inward_m = (offset_m * inward).sum(axis=1)
+    return np.column_stack([along_m, inward_m])
 
 
 def turned_errors(errors_m: Points, shift: float) -> Points:
-    """Errors about the target as they are about the turned one, `shift` metres along: turned by 15°
-    with all else.
+    """Errors about the target as they are about the turned one, `shift` metres along.
+
+    All is turned by 15°.
     """
-    cos = math.cos(CONFLICT_RAD)
-    sin = math.sin(CONFLICT_RAD)
-    turned: Points = errors_m @ np.array([[cos, sin], [-sin, cos]]) + np.array([shift, 0.0])
-    return turned
+    return np.asarray(rotate(errors_m, CONFLICT_RAD) + np.array([shift, 0.0]))
 
 
 def shift_m(trials: Sequence[Trial]) -> float:
     """How far turned landmarks move the target."""
-    return float(
-        np.mean([np.hypot(*(np.array(trial.turned_target) - trial.target)) for trial in trials])
-    )
+    distances_m = [math.dist(trial.turned_target, trial.target) for trial in trials]
+    return float(np.mean(distances_m))
 
 
 def sd_m(errors_m: Points) -> float:
     """The standard deviation in the plane about the mean of (n, 2) errors."""
-    return float(np.sqrt(errors_m.var(axis=0, ddof=1).sum()))
+    variances_m2 = errors_m.var(axis=0, ddof=1)
+    return float(np.sqrt(variances_m2.sum()))
 
 
 def rmse_m(errors_m: Points) -> float:
     """The root mean squared distance from where the post stood."""
-    return float(np.sqrt((errors_m**2).sum(axis=1).mean()))
+    squared_m2 = (errors_m**2).sum(axis=1)
+    return float(np.sqrt(squared_m2.mean()))
 
 
 def lost(errors_m: Points) -> int:
-    """How many responses lie where no normal distribution has any: five times the median distance
+    """How many responses lie where no normal distribution has any: FAR times the median distance
     from the median.
     """
-    away_m = np.hypot(*(errors_m - np.median(errors_m, axis=0)).T)
-    return int((away_m > FAR * np.median(away_m)).sum())
+    offsets_m = errors_m - np.median(errors_m, axis=0)
+    distances_m = np.hypot(*offsets_m.T)
+    is_lost = distances_m > FAR * np.median(distances_m)
+    return int(is_lost.sum())
 
 
 def landmark_weight(self_motion_sd_m: float, landmarks_sd_m: float) -> float:
@@ -91,21 +100,22 @@ class Gaussian:
 
     def log_density(self, points_m: Points) -> Points:
         """The log of the density at (n, 2) points."""
-        off = points_m - self.mean_m
-        squared = np.einsum("ni,ij,nj->n", off, np.linalg.inv(self.covariance_m2), off)
-        result: Points = (
-            -squared / 2 - np.log(2 * np.pi) - np.log(np.linalg.det(self.covariance_m2)) / 2
-        )
-        return result
+        offsets_m = points_m - self.mean_m
+        precision = np.linalg.inv(self.covariance_m2)
+        mahalanobis2 = np.einsum("ni,ij,nj->n", offsets_m, precision, offsets_m)
+
+        log_determinant = np.log(np.linalg.det(self.covariance_m2))
+        log_norm = np.log(2 * np.pi) + log_determinant / 2
+        return np.asarray(-mahalanobis2 / 2 - log_norm)
 
 
 def combined(first: Gaussian, second: Gaussian) -> Gaussian:
     """The optimal combination, direction by direction: precisions add, means weigh by them."""
-    precisions = [np.linalg.inv(each.covariance_m2) for each in (first, second)]
-    covariance = np.linalg.inv(precisions[0] + precisions[1])
-    return Gaussian(
-        covariance @ (precisions[0] @ first.mean_m + precisions[1] @ second.mean_m), covariance
-    )
+    first_precision = np.linalg.inv(first.covariance_m2)
+    second_precision = np.linalg.inv(second.covariance_m2)
+    covariance = np.linalg.inv(first_precision + second_precision)
+    weighed = first_precision @ first.mean_m + second_precision @ second.mean_m
+    return Gaussian(covariance @ weighed, covariance)
 
 
 def alternation_log_densities(
@@ -115,20 +125,21 @@ def alternation_log_densities(
     landmarks in that share.
     """
     with np.errstate(divide="ignore"):
-        shares = np.log([landmarks_share, 1 - landmarks_share])
-    followed: Points = np.logaddexp(
-        shares[0] + landmarks.log_density(conflict_m),
-        shares[1] + self_motion.log_density(conflict_m),
-    )
-    return followed
+        log_share, log_rest = np.log([landmarks_share, 1 - landmarks_share])
+
+    by_landmarks = log_share + landmarks.log_density(conflict_m)
+    by_self_motion = log_rest + self_motion.log_density(conflict_m)
+    return np.asarray(np.logaddexp(by_landmarks, by_self_motion))
 
 
 def best_alternation_log_likelihood(
     conflict_m: Points, self_motion: Gaussian, landmarks: Gaussian
 ) -> float:
     """The same, with the share that makes it most."""
-    shares = np.linspace(0.0, 1.0, 201)
-    return max(
-        float(alternation_log_densities(conflict_m, self_motion, landmarks, float(share)).sum())
-        for share in shares
-    )
+    likelihoods = []
+
+    for share in np.linspace(0.0, 1.0, SHARES).tolist():
+        densities = alternation_log_densities(conflict_m, self_motion, landmarks, share)
+        likelihoods.append(float(densities.sum()))
+
+    return max(likelihoods)

@@ -44,32 +44,49 @@ def close_laps(
     """`laps` times once round `corners_m`, which end where they begin, in steps of `step_m`, with
     `noise` each.
     """
-    line = Line(np.array(corners_m, float))
-    stops = np.append(np.arange(0.0, line.length_m, step_m), line.length_m)
-    # Straight on, then turn on the spot: with drift on the way, and noise in proportion to both.
-    legs = np.array(
-        [leg for pair in itertools.pairwise(stops.tolist()) for leg in line.legs(*pair)]
-    )
+    distance_m, turn_rad, begins_rad = _legs(corners_m, step_m)
+    heading_rad = begins_rad + _sum_before(turn_rad)
+    drift_sd_rad = noise.drift_rad_per_sqrt_m * np.sqrt(distance_m)
+
     rng = np.random.default_rng(seed)
-    speed, drift, turn = rng.normal(0.0, 1.0, (3, laps, len(legs)))
-    way, turned = legs.T
-    heading = line.heading_rad[0] + np.cumsum(turned) - turned
-    drifted = noise.drift_rad_per_sqrt_m * drift * np.sqrt(way)
-    off = (
-        np.cumsum(drifted + noise.turn * turn * turned, axis=1)
-        - noise.turn * turn * turned
-        - drifted / 2
-    )
-    felt = way * (1 + noise.speed * speed)
-    errors = [
-        np.cumsum(felt * part(heading + off) - way * part(heading), axis=1)
-        for part in (np.cos, np.sin)
-    ]
-    error = np.stack(errors, axis=-1)
-    share = (np.cumsum(way) / way.sum())[:, None]
-    return Laps(_rms(error), _rms(error - share * error[:, -1:]))
+    speed, drift, turn = rng.normal(0.0, 1.0, (3, laps, len(distance_m)))
+    drifted_rad = drift_sd_rad * drift
+    turn_error_rad = noise.turn * turn * turn_rad
+    measured_m = distance_m * (1 + noise.speed * speed)
+
+    # A leg's own drift counts half on the leg, its turn comes after it.
+    heading_error_rad = _sum_before(drifted_rad + turn_error_rad) + drifted_rad / 2
+    measured_rad = heading_rad + heading_error_rad
+    error_x_m = measured_m * np.cos(measured_rad) - distance_m * np.cos(heading_rad)
+    error_y_m = measured_m * np.sin(measured_rad) - distance_m * np.sin(heading_rad)
+    error_m = np.cumsum(np.stack([error_x_m, error_y_m], axis=-1), axis=1)
+
+    along_m = np.cumsum(distance_m)
+    share = (along_m / along_m[-1])[:, None]
+    closed_m = error_m - share * error_m[:, -1:]
+    return Laps(_rms_m(error_m), _rms_m(closed_m))
 
 
-def _rms(error: Floats) -> Floats:
-    result: Floats = np.sqrt(np.square(error).sum(axis=-1).mean(axis=-1))
-    return result
+def _legs(corners_m: Sequence[tuple[float, float]], step_m: float) -> tuple[Floats, Floats, float]:
+    """Distance and turn (n,) of each leg, first straight on and then on the spot; first heading."""
+    line = Line(np.array(corners_m, float))
+    stops_m = [*np.arange(0.0, line.length_m, step_m).tolist(), line.length_m]
+    legs = []
+
+    for start_m, end_m in itertools.pairwise(stops_m):
+        legs += line.legs(start_m, end_m)
+
+    distance_m, turn_rad = np.array(legs).T
+    return distance_m, turn_rad, float(line.heading_rad[0])
+
+
+def _sum_before(values: Floats) -> Floats:
+    """The sum of all values before each, along the last axis."""
+    sums: Floats = np.cumsum(values, axis=-1) - values
+    return sums
+
+
+def _rms_m(error_m: Floats) -> Floats:
+    """Of (laps, n, 2) errors, one a lap."""
+    squared_m2 = np.square(error_m).sum(axis=-1)
+    return np.asarray(np.sqrt(squared_m2.mean(axis=-1)))

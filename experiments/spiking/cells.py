@@ -48,32 +48,35 @@ class GridModule:
         """How much of its peak each cell fires at positions (n, 2): (cells, n), 1 in the middle of
         a field.
         """
-        steps = np.stack(
-            np.meshgrid(np.arange(PHASES), np.arange(PHASES), indexing="ij"), axis=-1
-        ).reshape(-1, 2)
-        centres_m = steps / PHASES @ self.lattice_m.T
-        angles = np.radians([30, 90, 150])
-        waves = (
-            4
-            * np.pi
-            / (np.sqrt(3) * self.spacing_m)
-            * np.column_stack([np.cos(angles), np.sin(angles)])
-        )
-        own = (centres_m @ waves.T).astype(np.float32)
+        waves = self._waves()
+        own = (self._centres_m() @ waves.T).astype(np.float32)
         there = (where_m @ waves.T).astype(np.float32)
-        total = np.full((len(own), len(there)), -3.0, np.float32)
-        for wave in range(3):
-            total += np.cos(there[None, :, wave] - own[:, None, wave])
-        tuning: npt.NDArray[np.float32] = np.exp(SHARPNESS * total)
-        return tuning
+        total = np.full((len(own), len(there)), -float(len(waves)), np.float32)
+
+        for wave in range(len(waves)):
+            phase = there[None, :, wave] - own[:, None, wave]
+            total += np.cos(phase)
+
+        return np.asarray(np.exp(SHARPNESS * total), np.float32)
+
+    def _centres_m(self) -> Values:
+        """(cells, 2): a field of each cell."""
+        phases = np.arange(PHASES)
+        steps = np.stack(np.meshgrid(phases, phases, indexing="ij"), axis=-1).reshape(-1, 2)
+        return steps / PHASES @ self.lattice_m.T
+
+    def _waves(self) -> Values:
+        """(3, 2): the wave vectors, in radians a metre, whose sum peaks in the fields."""
+        angles = np.radians([30, 90, 150])
+        directions = np.column_stack([np.cos(angles), np.sin(angles)])
+        per_metre = 4 * np.pi / (np.sqrt(3) * self.spacing_m)
+        return np.asarray(per_metre * directions)
 
     def nearest(self, centres_m: Values) -> Indices:
         """Of positions (n, 2), the cell that has a field there."""
-        steps = (
-            np.rint(centres_m @ np.linalg.inv(self.lattice_m).T * PHASES).astype(np.intp) % PHASES
-        )
-        nearest: Indices = steps[:, 0] * PHASES + steps[:, 1]
-        return nearest
+        fields = centres_m @ np.linalg.inv(self.lattice_m).T
+        steps = np.rint(fields * PHASES).astype(np.intp) % PHASES
+        return np.asarray(steps[:, 0] * PHASES + steps[:, 1])
 
 
 @dataclass(frozen=True)
@@ -89,7 +92,8 @@ class BorderCells:
 
     def tuning(self, sensed_m: float, sd_m: float) -> npt.NDArray[np.float32]:
         """How much of its peak each cell fires at a sensed distance of that precision: (cells,)."""
-        return np.exp(-(((self.distances_m - sensed_m) / sd_m) ** 2) / 2).astype(np.float32)
+        deviations = (self.distances_m - sensed_m) / sd_m
+        return np.exp(-(deviations**2) / 2).astype(np.float32)
 
     def nearest(self, distances_m: Values) -> Indices:
         """Of distances (n,), the cell that prefers it."""
