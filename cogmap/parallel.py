@@ -1,4 +1,4 @@
-"""Independent jobs spread over processes; the results do not depend on how many processes there are."""
+"""Independent jobs spread over processes; the results do not depend on how many there are."""
 
 from __future__ import annotations
 

@@ -96,7 +96,8 @@ class ExtendedPam:
     def restore(self, objects: Iterable[LearnedObject]) -> None:
         """Recognize these nodes again."""
         for known in objects:
-            self._recognizer.learn(known.label, known.embedding.numpy().astype(np.float32))
+            embedding = known.embedding.numpy().astype(np.float32)
+            self._recognizer.learn(known.label, embedding)
 
     @property
     def learned(self) -> list[LearnedObject]:
@@ -149,20 +150,29 @@ class ExtendedPam:
 
     def _is_new(self, candidate: Candidate) -> bool:
         """Whether it is well visible, and likelier an unknown building than anything else."""
-        recognition = candidate.recognition
         segment = candidate.segment
-        large = segment.area_px >= self._config.learned_share * segment.mask.size
-        whole = recognition.appearance.whole > self._config.percept_threshold
-        return large and whole and recognition.unknown > LIKELIER_THAN_NOT
+        min_area_px = self._config.learned_share * segment.mask.size
+        if segment.area_px < min_area_px:
+            return False
+
+        recognition = candidate.recognition
+        if recognition.appearance.whole <= self._config.percept_threshold:
+            return False
+        return recognition.unknown > LIKELIER_THAN_NOT
 
     def _looks_new(self, recognition: Recognition) -> bool:
         """Whether it is surely a learned building, in an appearance that was not learned."""
-        certainty = min(recognition.activation, recognition.appearance.whole)
-        return certainty > self._config.sure and self._recognizer.is_new_appearance(recognition)
+        whole = recognition.appearance.whole
+        certainty = min(recognition.activation, whole)
+        if certainty <= self._config.sure:
+            return False
+        return self._recognizer.is_new_appearance(recognition)
 
     def _next_label(self) -> str:
-        labels = {label for label, _ in self._recognizer.learned}
-        return NEW_LABEL.format(1 + len(labels))
+        learned = self._recognizer.learned
+        labels = {label for label, _ in learned}
+        number = 1 + len(labels)
+        return NEW_LABEL.format(number)
 
     def _learn(self, label: str, appearance: Appearance) -> LearnedObject:
         self._recognizer.learn(label, appearance.embedding)
@@ -185,8 +195,10 @@ class ExtendedPam:
         return poses
 
     def _is_credible(self, pose: ObjectPose) -> bool:
-        precise = pose.range_sd_m <= self._config.worst_range_sd_share * pose.range_m
-        return precise and pose.misfit <= self._config.worst_misfit
+        max_range_sd_m = self._config.worst_range_sd_share * pose.range_m
+        if pose.range_sd_m > max_range_sd_m:
+            return False
+        return pose.misfit <= self._config.worst_misfit
 
     def _percept(self, candidate: Candidate, pose: ObjectPose, camera: Calibration) -> Percept:
         recognition = candidate.recognition

@@ -12,27 +12,27 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from cogmap.geometry.arrays import Booleans, Floats
+from cogmap.geometry.arrays import Floats
 from schemas.sensing import Calibration
+from services.epam.layout.footprint_model import (
+    COLUMNS,
+    MIN_RANGE_M,
+    FootprintProblem,
+    linearized,
+)
 
 ORIENTATIONS = 10
-COLUMNS = 20
 ITERATIONS = 9
 # Errors of neighbouring columns are correlated: this many columns count as one.
 CORRELATED_COLUMNS = 5
 DISPARITY_SD_PX = 0.14
 DISPARITY_BIAS_SD_PX = 0.03
 NARROW_BIAS_PX = 0.4
-EDGE_SD_PX = 1.2
 HUBER = 1.5
-MIN_RANGE_M = 0.5
 MIN_BEARING_SD_RAD = 0.003
 MIN_RANGE_SD_M = 0.1
 HIDDEN_SD_M = 0.2
-# Of differences: x and z in metres, orientation in radians.
-STEPS = (1e-3, 1e-3, 1e-4)
 # Largest step of one iteration: x and z in metres, orientation in radians.
 MAX_STEP = (5, 5, 0.4)
 
@@ -64,35 +64,6 @@ class ObjectPose:
     bearing_sd_rad: float
     range_sd_m: float
     misfit: float
-
-
-@dataclass(frozen=True, eq=False)
-class _Problem:
-    """s stacked silhouettes: ray slopes and disparities (s, COLUMNS), edge columns and whether each
-    is hidden (s, 2), half sides (s, 2), standard deviations of disparity and of its bias (s,).
-    """
-
-    slope: Floats
-    disparity_px: Floats
-    edge_px: Floats
-    hidden: Booleans
-    half_m: Floats
-    sd_px: Floats
-    bias_sd_px: Floats
-    camera: Calibration
-
-    def take(self, rows: npt.NDArray[np.intp]) -> _Problem:
-        """The problem of these rows, each of which may be taken several times."""
-        return _Problem(
-            self.slope[rows],
-            self.disparity_px[rows],
-            self.edge_px[rows],
-            self.hidden[rows],
-            self.half_m[rows],
-            self.sd_px[rows],
-            self.bias_sd_px[rows],
-            self.camera,
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +100,7 @@ def locate(silhouettes: list[Silhouette], camera: Calibration) -> list[ObjectPos
     ]
 
 
-def _stack(silhouettes: list[Silhouette], camera: Calibration) -> _Problem:
+def _stack(silhouettes: list[Silhouette], camera: Calibration) -> FootprintProblem:
     columns = np.empty((len(silhouettes), COLUMNS))
     disparity_px = np.empty((len(silhouettes), COLUMNS))
     for row, silhouette in enumerate(silhouettes):
@@ -144,7 +115,7 @@ def _stack(silhouettes: list[Silhouette], camera: Calibration) -> _Problem:
     sides_m = [each.sides_m for each in silhouettes]
     redundancy = np.maximum(1.0, COLUMNS * CORRELATED_COLUMNS / width_px)
 
-    return _Problem(
+    return FootprintProblem(
         slope=(columns - camera.cx_px) / camera.fx_px,
         disparity_px=disparity_px,
         edge_px=np.array(edges_px),
@@ -156,7 +127,7 @@ def _stack(silhouettes: list[Silhouette], camera: Calibration) -> _Problem:
     )
 
 
-def _starts(objects: _Problem) -> Floats:
+def _starts(objects: FootprintProblem) -> Floats:
     """ORIENTATIONS starts an object (s * ORIENTATIONS, 3), behind the middle of what is seen."""
     camera = objects.camera
     median_px = np.median(objects.disparity_px, axis=1)
@@ -178,100 +149,16 @@ def _starts(objects: _Problem) -> Floats:
     return starts
 
 
-def _residuals(parameters: Floats, problem: _Problem) -> Floats:
-    """(s, COLUMNS + 2) residuals in standard deviations, of (s, 3) parameters."""
-    camera = problem.camera
-    focal_baseline = camera.fx_px * camera.baseline_m
-    disparity_px = focal_baseline * _inverse_depths(parameters, problem)
-    error_px = disparity_px - problem.disparity_px
-
-    of_columns = error_px / problem.sd_px[:, None]
-    of_edges = _edge_residuals(parameters, problem)
-    return np.concatenate([of_columns, of_edges], axis=1)
-
-
-def _inverse_depths(parameters: Floats, problem: _Problem) -> Floats:
-    """1 / depth in metres, (s, COLUMNS), at which the rays meet the sides that face the camera."""
-    x, z, orientation = parameters.T
-    cos = np.cos(orientation)
-    sin = np.sin(orientation)
-    inverse = np.full(problem.slope.shape, np.inf)
-
-    axes = ((cos, sin), (-sin, cos))
-    for (axis_x, axis_z), half in zip(axes, problem.half_m.T, strict=True):
-        along = x * axis_x + z * axis_z
-        gap = np.abs(along) - half
-        facing = gap > 1e-3
-        safe_gap = np.where(facing, gap, 1.0)
-
-        across = problem.slope * axis_x[:, None] + axis_z[:, None]
-        towards = across * np.sign(along)[:, None]
-        of_side = towards / safe_gap[:, None]
-        nearer = np.minimum(inverse, of_side)
-        inverse = np.where(facing[:, None], nearer, inverse)
-
-    met = np.isfinite(inverse)
-    return np.where(met, inverse, 1 / MIN_RANGE_M)
-
-
-def _edge_residuals(parameters: Floats, problem: _Problem) -> Floats:
-    """(s, 2): from each edge to the outermost corner of the rectangle, in standard deviations. The
-    true end at a hidden edge may lie anywhere farther out.
-    """
-    corners_px = _corner_columns(parameters, problem)
-    outermost_px = np.stack([corners_px.min(1), corners_px.max(1)], axis=1)
-    error_px = outermost_px - problem.edge_px
-
-    outward_px = error_px * np.array([-1.0, 1.0])
-    is_free = problem.hidden & (outward_px > 0)
-    return np.where(is_free, 0.0, error_px) / EDGE_SD_PX
-
-
-def _corner_columns(parameters: Floats, problem: _Problem) -> Floats:
-    """The columns (s, 4) of the rectangle's corners."""
-    camera = problem.camera
-    x, z, orientation = parameters.T[:, :, None]
-    cos = np.cos(orientation)
-    sin = np.sin(orientation)
-    a = problem.half_m[:, :1] * np.array([1, 1, -1, -1])
-    b = problem.half_m[:, 1:] * np.array([1, -1, 1, -1])
-
-    corner_x = x + a * cos - b * sin
-    corner_z = z + a * sin + b * cos
-    depth_m = np.maximum(corner_z, MIN_RANGE_M)
-    right_px = camera.fx_px * corner_x / depth_m
-    return np.asarray(camera.cx_px + right_px)
-
-
-def _linearized(parameters: Floats, problem: _Problem) -> tuple[Floats, Floats]:
-    """Residuals (s, r) and their derivatives (s, r, 3), by forward differences."""
-    evaluated = [parameters]
-    for axis, step in enumerate(STEPS):
-        shifted = parameters.copy()
-        shifted[:, axis] += step
-        evaluated.append(shifted)
-
-    # All at once: one call of numpy for four evaluations.
-    rows = np.tile(np.arange(len(parameters)), len(evaluated))
-    values = _residuals(np.concatenate(evaluated), problem.take(rows))
-    residuals, *others = np.split(values, len(evaluated))
-
-    derivatives = []
-    for other, step in zip(others, STEPS, strict=True):
-        derivatives.append((other - residuals) / step)
-    return residuals, np.stack(derivatives, axis=2)
-
-
-def _solve(parameters: Floats, problem: _Problem) -> _Solution:
+def _solve(parameters: Floats, problem: FootprintProblem) -> _Solution:
     """Levenberg-Marquardt with Huber's weights (1964), every start with a damping of its own."""
     damping = np.full(len(parameters), 0.1)
     best_cost = np.full(len(parameters), np.inf)
     best = parameters
     candidate = parameters
-    residuals, jacobian = _linearized(parameters, problem)
+    residuals, jacobian = linearized(parameters, problem)
 
     for _ in range(ITERATIONS):
-        new_residuals, new_jacobian = _linearized(candidate, problem)
+        new_residuals, new_jacobian = linearized(candidate, problem)
         cost = _huber_cost(new_residuals)
         better = cost < best_cost
         better_row = better[:, None]
@@ -287,7 +174,7 @@ def _solve(parameters: Floats, problem: _Problem) -> _Solution:
 
 
 def _solution(
-    parameters: Floats, residuals: Floats, jacobian: Floats, problem: _Problem
+    parameters: Floats, residuals: Floats, jacobian: Floats, problem: FootprintProblem
 ) -> _Solution:
     weight = _huber_weight(residuals)
     weighted = jacobian * weight[..., None]
@@ -319,18 +206,22 @@ def _damped_step(residuals: Floats, jacobian: Floats, damping: Floats) -> Floats
 
 def _huber_weight(residuals: Floats) -> Floats:
     size = np.abs(residuals)
-    ratio = HUBER / np.maximum(size, 1e-12)
-    return np.asarray(np.minimum(1.0, ratio))
+    safe_size = np.maximum(size, 1e-12)
+    weight = np.minimum(1.0, HUBER / safe_size)
+    return np.asarray(weight)
 
 
 def _huber_cost(residuals: Floats) -> Floats:
     size = np.abs(residuals)
+    quadratic = size**2
     linear = HUBER * (2 * size - HUBER)
-    cost = np.where(size < HUBER, size**2, linear)
+
+    is_inlier = size < HUBER
+    cost = np.where(is_inlier, quadratic, linear)
     return np.asarray(cost.sum(1))
 
 
-def _covariances(solution: _Solution, problem: _Problem) -> Floats:
+def _covariances(solution: _Solution, problem: FootprintProblem) -> Floats:
     """(s, 3, 3): of independent errors, of a bias that all disparities share, and of what a hidden
     edge leaves open.
     """
@@ -352,12 +243,15 @@ def _outer(vectors: Floats) -> Floats:
     return columns * rows
 
 
-def _misfits(solution: _Solution, problem: _Problem) -> Floats:
+def _misfits(solution: _Solution, problem: FootprintProblem) -> Floats:
     """(s,): root mean square disparity residual, in standard deviations of one column."""
     of_columns = solution.residuals[:, :COLUMNS]
-    error_px = of_columns * problem.sd_px[:, None]
-    mean_square_px2 = (error_px**2).mean(1)
-    return np.asarray(np.sqrt(mean_square_px2) / DISPARITY_SD_PX)
+    sd_px = problem.sd_px[:, None]
+    error_px = of_columns * sd_px
+
+    squared_px2 = error_px**2
+    rms_px = np.sqrt(squared_px2.mean(1))
+    return np.asarray(rms_px / DISPARITY_SD_PX)
 
 
 def _pose(

@@ -115,14 +115,17 @@ def _crossings(
     """Rows and columns where the likelihood is 0.5 between neighbours in a row, if both show
     visible ground.
     """
-    visible = visible_ground[:, :-1] & visible_ground[:, 1:]
-    changes = mask[:, :-1] != mask[:, 1:]
+    left = slice(None, -1)
+    right = slice(1, None)
+    visible = visible_ground[:, left] & visible_ground[:, right]
+    changes = mask[:, left] != mask[:, right]
     rows, columns = np.nonzero(visible & changes)
 
     first = likelihood[rows, columns]
     second = likelihood[rows, columns + 1]
     rise = second - first
     share = (0.5 - first) / rise
+
     crossed = np.asarray(columns + share, np.float64)
     return rows.astype(np.float64), crossed
 
@@ -161,6 +164,6 @@ def _cell_numbers(points_m: Floats) -> npt.NDArray[np.intp]:
     """The number of the cell of each point (n, 2), x before y."""
     reach = round(MAX_RANGE_M / CELL_M) + 1
     cells = np.floor(points_m / CELL_M).astype(np.intp)
-    rows = cells[:, 0] + reach
-    columns = cells[:, 1] + reach
-    return np.asarray(rows * 2 * reach + columns)
+    row, column = cells.T + reach
+    numbers = row * 2 * reach + column
+    return np.asarray(numbers)

@@ -96,8 +96,11 @@ def ray_slopes(
 ) -> tuple[Floats, Floats]:
     """The slopes of the pixels' rays to the right and downwards."""
     right_px = np.asarray(columns, np.float64) - camera.cx_px
+    right = right_px / camera.fx_px
+
     below_px = np.asarray(rows, np.float64) - camera.cy_px
-    return right_px / camera.fx_px, below_px / camera.fy_px
+    below = below_px / camera.fy_px
+    return right, below
 
 
 def _sampled_pixels(

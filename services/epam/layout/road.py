@@ -96,7 +96,8 @@ def network_input(small: Bytes) -> Singles:
 def _gain(small: Bytes) -> Singles:
     """The factor (n, 1, 1, 1) by which each image's mean becomes MEAN_GREY."""
     brightness = small.mean((1, 2, 3), dtype=np.float32)
-    gain = MEAN_GREY / np.maximum(brightness, MIN_GREY)
+    safe_brightness = np.maximum(brightness, MIN_GREY)
+    gain = MEAN_GREY / safe_brightness
     return np.asarray(gain[:, None, None, None])
 
 

@@ -89,7 +89,10 @@ def unit_vectors(codes: Bytes) -> Singles:
     """Return `codes` (n, DESCRIPTOR_BYTES) as float32 vectors of length 1, whose inner product is
     the similarity of two views.
     """
-    values = codes.astype(np.float32) - np.float32(128)
+    middle = np.float32(128)
+    values = codes.astype(np.float32) - middle
     length = np.linalg.norm(values, axis=1, keepdims=True)
+
     divisor = np.maximum(length, np.float32(1))
-    return np.asarray(values / divisor, np.float32)
+    vectors = values / divisor
+    return np.asarray(vectors, np.float32)

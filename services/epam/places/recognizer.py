@@ -223,9 +223,12 @@ class PlaceRecognizer:
 
     def _forget(self, oldest: int) -> None:
         """Forget this number of the oldest views."""
+        forgotten = self._belief[:oldest]
+        self._p_new += float(forgotten.sum())
+
         count = len(self._views)
-        self._p_new += float(self._belief[:oldest].sum())
-        self._vectors[: count - oldest] = self._vectors[oldest:count]
+        kept = self._vectors[oldest:count]
+        self._vectors[: len(kept)] = kept
         self._views = self._views[oldest:]
         self._step_of_view = self._step_of_view[oldest:]
         self._belief = self._belief[oldest:]

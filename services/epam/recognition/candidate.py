@@ -71,13 +71,17 @@ def outline_px(segment: Segment) -> list[tuple[int, int]]:
     If its pieces are farther apart, the polygon is around the largest.
     """
     left, top, width, height = segment.box_px
-    shown = segment.mask[top : top + height, left : left + width]
-    piece = _main_piece(shown.astype(np.uint8)).astype(np.uint8)
+    rows = slice(top, top + height)
+    columns = slice(left, left + width)
+    shown = segment.mask[rows, columns].astype(np.uint8)
+    piece = _main_piece(shown).astype(np.uint8)
 
     contours, _ = cv2.findContours(piece, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     longest = max(contours, key=len)
     polygon = cv2.approxPolyDP(longest, OUTLINE_TOLERANCE_PX, True)
-    return [(left + int(column), top + int(row)) for column, row in polygon[:, 0]]
+
+    corners = polygon[:, 0].tolist()
+    return [(left + column, top + row) for column, row in corners]
 
 
 def _main_piece(shown: Bytes) -> Booleans:
@@ -111,9 +115,11 @@ def _largest_piece(shown: Bytes, bridged_px: int) -> Booleans:
 def height_m(candidate: Candidate, camera: Calibration) -> float:
     """Return the height over the ground of the top of what is seen."""
     nearest_px = float(candidate.walls.disparity_px.max())
-    depth_m = camera.fx_px * camera.baseline_m / max(nearest_px, 1e-3)
+    safe_px = max(nearest_px, 1e-3)
+    depth_m = camera.fx_px * camera.baseline_m / safe_px
 
     _, top, _, _ = candidate.segment.box_px
-    slope = (camera.cy_px - top) / camera.fy_px
-    top_m = camera.mount_height_m + slope * depth_m
+    above_px = camera.cy_px - top
+    above_m = above_px / camera.fy_px * depth_m
+    top_m = camera.mount_height_m + above_m
     return float(np.clip(top_m, MIN_HEIGHT_M, MAX_HEIGHT_M))

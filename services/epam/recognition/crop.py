@@ -46,8 +46,10 @@ def surroundings(image: Bytes, depth_m: Singles, camera: Calibration) -> Singles
 
 def _downward_slopes(count: int, camera: Calibration) -> Singles:
     """The slopes of the rays of `count` rows, every STRIDE_PX, (count, 1)."""
-    rows = STRIDE_PX * np.arange(count, dtype=np.float32)
+    numbers = np.arange(count, dtype=np.float32)
+    rows = STRIDE_PX * numbers
     below_px = rows - np.float32(camera.cy_px)
+
     slopes = below_px / np.float32(camera.fy_px)
     return np.asarray(slopes[:, None])
 
@@ -136,4 +138,7 @@ def _overlap(
 def _overlap_1d(start: int, length: int, size: int) -> tuple[slice, slice]:
     first = max(start, 0)
     last = min(start + length, size)
-    return slice(first, last), slice(first - start, last - start)
+
+    source = slice(first, last)
+    target = slice(first - start, last - start)
+    return source, target

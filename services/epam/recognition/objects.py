@@ -160,8 +160,10 @@ class ObjectRecognizer:
 
     def learn(self, label: str, embedding: Singles) -> None:
         """Recognize from now on what is similar to `embedding` as `label`."""
+        known = self._embeddings
+        added = embedding[None]
         self._labels.append(label)
-        self._embeddings = np.concatenate([self._embeddings, embedding[None]])
+        self._embeddings = np.concatenate([known, added])
 
     def is_new_appearance(self, recognition: Recognition) -> bool:
         """Return whether a learned building differs from every appearance of it that was learned,
@@ -243,5 +245,6 @@ def posteriors(
 def probability(log_odds: Singles, prototypes: Prototypes) -> Floats:
     """Return the calibrated probability of the network's log odds."""
     clipped = log_odds.astype(np.float64).clip(-50, 50)
-    odds_against = np.exp(-prototypes.evidence * clipped)
+    calibrated = prototypes.evidence * clipped
+    odds_against = np.exp(-calibrated)
     return np.asarray(1 / (1 + odds_against))

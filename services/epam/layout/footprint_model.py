@@ -1,0 +1,132 @@
+"""The measurement model of a footprint fit: what a rectangle at a pose predicts for the columns of
+a view, and its residuals.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from cogmap.geometry.arrays import Booleans, Floats
+from schemas.sensing import Calibration
+
+COLUMNS = 20
+EDGE_SD_PX = 1.2
+MIN_RANGE_M = 0.5
+# Of differences: x and z in metres, orientation in radians.
+STEPS = (1e-3, 1e-3, 1e-4)
+
+
+@dataclass(frozen=True, eq=False)
+class FootprintProblem:
+    """s stacked silhouettes: ray slopes and disparities (s, COLUMNS), edge columns and whether each
+    is hidden (s, 2), half sides (s, 2), standard deviations of disparity and of its bias (s,).
+    """
+
+    slope: Floats
+    disparity_px: Floats
+    edge_px: Floats
+    hidden: Booleans
+    half_m: Floats
+    sd_px: Floats
+    bias_sd_px: Floats
+    camera: Calibration
+
+    def take(self, rows: npt.NDArray[np.intp]) -> FootprintProblem:
+        """The problem of these rows, each of which may be taken several times."""
+        return FootprintProblem(
+            self.slope[rows],
+            self.disparity_px[rows],
+            self.edge_px[rows],
+            self.hidden[rows],
+            self.half_m[rows],
+            self.sd_px[rows],
+            self.bias_sd_px[rows],
+            self.camera,
+        )
+
+
+def _residuals(parameters: Floats, problem: FootprintProblem) -> Floats:
+    """(s, COLUMNS + 2) residuals in standard deviations, of (s, 3) parameters."""
+    camera = problem.camera
+    focal_baseline = camera.fx_px * camera.baseline_m
+    disparity_px = focal_baseline * _inverse_depths(parameters, problem)
+    error_px = disparity_px - problem.disparity_px
+
+    of_columns = error_px / problem.sd_px[:, None]
+    of_edges = _edge_residuals(parameters, problem)
+    return np.concatenate([of_columns, of_edges], axis=1)
+
+
+def _inverse_depths(parameters: Floats, problem: FootprintProblem) -> Floats:
+    """1 / depth in metres, (s, COLUMNS), at which the rays meet the sides that face the camera."""
+    x, z, orientation = parameters.T
+    cos = np.cos(orientation)
+    sin = np.sin(orientation)
+    inverse = np.full(problem.slope.shape, np.inf)
+
+    axes = ((cos, sin), (-sin, cos))
+    for (axis_x, axis_z), half in zip(axes, problem.half_m.T, strict=True):
+        along = x * axis_x + z * axis_z
+        gap = np.abs(along) - half
+        facing = gap > 1e-3
+        safe_gap = np.where(facing, gap, 1.0)
+
+        across = problem.slope * axis_x[:, None] + axis_z[:, None]
+        towards = across * np.sign(along)[:, None]
+        of_side = towards / safe_gap[:, None]
+        nearer = np.minimum(inverse, of_side)
+        inverse = np.where(facing[:, None], nearer, inverse)
+
+    met = np.isfinite(inverse)
+    return np.where(met, inverse, 1 / MIN_RANGE_M)
+
+
+def _edge_residuals(parameters: Floats, problem: FootprintProblem) -> Floats:
+    """(s, 2): from each edge to the outermost corner of the rectangle, in standard deviations. The
+    true end at a hidden edge may lie anywhere farther out.
+    """
+    corners_px = _corner_columns(parameters, problem)
+    outermost_px = np.stack([corners_px.min(1), corners_px.max(1)], axis=1)
+    error_px = outermost_px - problem.edge_px
+
+    outward_px = error_px * np.array([-1.0, 1.0])
+    is_free = problem.hidden & (outward_px > 0)
+    return np.where(is_free, 0.0, error_px) / EDGE_SD_PX
+
+
+def _corner_columns(parameters: Floats, problem: FootprintProblem) -> Floats:
+    """The columns (s, 4) of the rectangle's corners."""
+    camera = problem.camera
+    x, z, orientation = parameters.T[:, :, None]
+    cos = np.cos(orientation)
+    sin = np.sin(orientation)
+    a = problem.half_m[:, :1] * np.array([1, 1, -1, -1])
+    b = problem.half_m[:, 1:] * np.array([1, -1, 1, -1])
+
+    corner_x = x + a * cos - b * sin
+    corner_z = z + a * sin + b * cos
+    depth_m = np.maximum(corner_z, MIN_RANGE_M)
+    right_px = camera.fx_px * corner_x / depth_m
+    return np.asarray(camera.cx_px + right_px)
+
+
+def linearized(parameters: Floats, problem: FootprintProblem) -> tuple[Floats, Floats]:
+    """Residuals (s, r) and their derivatives (s, r, 3), by forward differences."""
+    evaluated = [parameters]
+    for axis, step in enumerate(STEPS):
+        shifted = parameters.copy()
+        shifted[:, axis] += step
+        evaluated.append(shifted)
+
+    # All at once: one call of numpy for four evaluations.
+    rows = np.tile(np.arange(len(parameters)), len(evaluated))
+    values = _residuals(np.concatenate(evaluated), problem.take(rows))
+    residuals, *others = np.split(values, len(evaluated))
+
+    derivatives = []
+    for other, step in zip(others, STEPS, strict=True):
+        derivatives.append((other - residuals) / step)
+    return residuals, np.stack(derivatives, axis=2)
