@@ -49,7 +49,7 @@ class Follower:
                 f"deltas are missing and no snapshot is to be had from the workspace"
             )
         if replica.mended:
-            notes.append(f"gaps of the graph that a snapshot mended: {replica.mended}")
+            notes.append(f"snapshots that replaced the graph after a gap: {replica.mended}")
         return notes
 
     def _fetch(self, request: SnapshotRequest) -> Fetched:

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from types import TracebackType
-from typing import Any
 
-from cogmap.bus.codec import decode
-from cogmap.bus.interface import Arrival
 from cogmap.bus.memory import MemoryBus, MemoryNetwork
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
-from schemas.topics import Topic
 
 
 class InProcessRunner:
@@ -19,8 +15,8 @@ class InProcessRunner:
 
     A run depends on the modules' seeds alone. Use it in a `with` statement, or `close()` it.
 
-        with InProcessRunner([mapper, planner]) as runner:
-            runner.observe(topics.MOTOR_COMMAND, commands.append)
+        observer = Module("observer").on(topics.MOTOR_COMMAND, commands.append)
+        with InProcessRunner([mapper, planner, observer]) as runner:
             runner.run(until=lambda: len(commands) >= 20)
     """
 
@@ -40,14 +36,6 @@ class InProcessRunner:
         trace: TracebackType | None,
     ) -> None:
         self.close()
-
-    def observe(self, topic: Topic, handler: Callable[[Any], object]) -> None:
-        """Call `handler` with every message of `topic` from now on, when it is published."""
-
-        def deliver(arrival: Arrival) -> None:
-            handler(decode(arrival.topic, arrival.payload))
-
-        MemoryBus(self.network).subscribe(topic, deliver, lambda name, number: None)
 
     def run(self, until: Callable[[], bool] = lambda: False) -> None:
         """Run until `until()` is true, or no message is left to process."""

@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 from types import FrameType
 
-from cogmap.bus.session import DEFAULT_AGENT, DEFAULT_ENDPOINT, open_router
+from cogmap.bus.session import DEFAULT_AGENT, DEFAULT_ENDPOINT, check_name, open_router
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
@@ -66,8 +66,10 @@ def run_module(
     """Run `module` as this process, until `stop` is asked: by default, until a signal to end.
 
     It connects to the router at `endpoint` as one of `agent`'s; what it must keep is in the folder
-    `state`. Raises NoRouterError, and StorageError where that folder cannot be written.
+    `state`. Raises NoRouterError, StorageError where that folder cannot be written, and UsageError
+    for an instance's name that cannot be part of a key.
     """
+    check_name("--instance", module.instance)
     stop = stop or Stop()
     journal = None
     counts = None

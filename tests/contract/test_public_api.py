@@ -87,8 +87,8 @@ def test_modules_run_in_one_process() -> None:
     )
     commands: list[MotorCommand] = []
 
-    with cogmap.InProcessRunner([sim, action]) as runner:
-        runner.observe(cogmap.topics.MOTOR_COMMAND, commands.append)
+    observer = cogmap.Module("observer").on(cogmap.topics.MOTOR_COMMAND, commands.append)
+    with cogmap.InProcessRunner([sim, action, observer]) as runner:
         runner.run()
 
     assert [command.seq for command in commands] == [0, 1]

@@ -111,6 +111,6 @@ def test_a_loss_beyond_the_cache_is_counted_and_a_snapshot_mends_the_graph(
         spin_until(lambda: replica.version == graph.version, follower)
 
     assert replica.digest() == graph.digest()
-    assert follower.notes == ["gaps of the graph that a snapshot mended: 1"]
+    assert follower.notes == ["snapshots that replaced the graph after a gap: 1"]
     assert dict(follower.intake.gaps) == {topics.DELTA.name: lost}
     follower.close()
