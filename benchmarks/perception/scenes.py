@@ -4,11 +4,13 @@ knows of them.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 
@@ -29,6 +31,9 @@ HALF_VIEW_RAD = math.radians(37.5)
 RAYS = 96
 MARGIN_RAYS = 4
 TRIES = 40
+LOOKING_SD_RAD = 0.3
+LATER_SD_RAD = 0.2
+LANE_M = 3.5
 Bytes = npt.NDArray[np.uint8]
 Floats32 = npt.NDArray[np.float32]
 Floats = npt.NDArray[np.float64]
@@ -100,41 +105,57 @@ def anywhere(count: int) -> Poses:
 
 
 def drive(metres: float, step_m: float) -> Poses:
-    """A way along the town's loop from its start, corners turned on the spot."""
+    """A path along the town's loop from its start, corners turned on the spot."""
 
     def poses(place: town.Town, rng: np.random.Generator) -> list[Pose]:
-        line = np.asarray(place.line(1.0))
-        made = []
-        for (x0, y0), (x1, y1) in zip(line[:-1].tolist(), line[1:].tolist(), strict=True):
-            heading = math.atan2(y1 - y0, x1 - x0)
-            length = math.hypot(x1 - x0, y1 - y0)
-            steps = np.arange(0.0, length, step_m) / length
-            made += [
-                Pose(x_m=x0 + s * (x1 - x0), y_m=y0 + s * (y1 - y0), heading_rad=heading)
-                for s in steps.tolist()
-            ]
+        corners_m = np.asarray(place.line(1.0)).tolist()
+        made: list[Pose] = []
+
+        for start_m, end_m in itertools.pairwise(corners_m):
+            made += _straight(start_m, end_m, step_m)
+
         return made[: round(metres / step_m)]
 
     return poses
 
 
+def _straight(start_m: Sequence[float], end_m: Sequence[float], step_m: float) -> list[Pose]:
+    """Poses every `step_m` from one point towards another."""
+    x_m, y_m = start_m
+    ahead_x_m = end_m[0] - x_m
+    ahead_y_m = end_m[1] - y_m
+    heading_rad = math.atan2(ahead_y_m, ahead_x_m)
+    length_m = math.hypot(ahead_x_m, ahead_y_m)
+    made = []
+
+    for share in (np.arange(0.0, length_m, step_m) / length_m).tolist():
+        here_x_m = x_m + share * ahead_x_m
+        here_y_m = y_m + share * ahead_y_m
+        made.append(Pose(x_m=here_x_m, y_m=here_y_m, heading_rad=heading_rad))
+
+    return made
+
+
+def _turned(pose: Pose, turn_rad: float) -> Pose:
+    return msgspec.structs.replace(pose, heading_rad=pose.heading_rad + turn_rad)
+
+
 def _towards(place: town.Town, target: int, rng: np.random.Generator) -> Pose:
+    """About towards a building, from anywhere that is free."""
     while True:
-        pose = facing(
-            place,
-            target,
-            float(rng.uniform(NEAREST_M, FARTHEST_M)),
-            float(rng.uniform(-math.pi, math.pi)),
-        )
+        range_m = float(rng.uniform(NEAREST_M, FARTHEST_M))
+        side_rad = float(rng.uniform(-math.pi, math.pi))
+        pose = facing(place, target, range_m, side_rad)
+
         if towns.is_free(place, pose.x_m, pose.y_m):
-            return Pose(
-                x_m=pose.x_m, y_m=pose.y_m, heading_rad=pose.heading_rad + float(rng.normal(0, 0.3))
-            )
+            return _turned(pose, float(rng.normal(0, LOOKING_SD_RAD)))
 
 
 def _on_a_street(place: town.Town, rng: np.random.Generator) -> Pose:
     road = place.roads[int(rng.integers(len(place.roads)))]
-    x_m, y_m = road.point(float(rng.uniform(0, road.length_m)), float(rng.uniform(-3.5, 3.5)))
+    along_m = float(rng.uniform(0, road.length_m))
+    aside_m = float(rng.uniform(-LANE_M, LANE_M))
+    x_m, y_m = road.point(along_m, aside_m)
     return Pose(x_m=x_m, y_m=y_m, heading_rad=float(rng.uniform(-math.pi, math.pi)))
 
 
@@ -150,23 +171,30 @@ def facing(place: town.Town, target: int, range_m: float, side_rad: float) -> Po
 
 def side_and_range(place: town.Town, pose: Pose) -> Floats:
     """In which direction of each plot's middle the robot is, and how far away, (plots, 2)."""
-    off = np.array([(pose.x_m - plot.x_m, pose.y_m - plot.y_m) for plot in place.plots])
-    return np.stack([np.arctan2(off[:, 1], off[:, 0]), np.hypot(off[:, 0], off[:, 1])], axis=1)
+    middles_m = np.array([(plot.x_m, plot.y_m) for plot in place.plots])
+    offsets_m = np.array([pose.x_m, pose.y_m]) - middles_m
+    side_rad = np.arctan2(offsets_m[:, 1], offsets_m[:, 0])
+    range_m = np.hypot(offsets_m[:, 0], offsets_m[:, 1])
+    return np.stack([side_rad, range_m], axis=1)
 
 
 def skyline(place: town.Town, pose: Pose) -> npt.NDArray[np.intp]:
     """The nearest plot in each of RAYS directions across the view, from left to right, -1 where
     there is none.
     """
-    bearing = pose.heading_rad + np.linspace(HALF_VIEW_RAD, -HALF_VIEW_RAD, RAYS)
-    way = np.stack([np.cos(bearing), np.sin(bearing)], axis=1)[:, None]
-    area = np.array([plot.footprint for plot in place.plots]).reshape(1, -1, 2, 2)
+    bearing_rad = pose.heading_rad + np.linspace(HALF_VIEW_RAD, -HALF_VIEW_RAD, RAYS)
+    ray = np.stack([np.cos(bearing_rad), np.sin(bearing_rad)], axis=1)[:, None]
+    areas_m = np.array([plot.footprint for plot in place.plots]).reshape(1, -1, 2, 2)
+
     with np.errstate(divide="ignore"):
-        hits = (area - (pose.x_m, pose.y_m)) / way[:, :, None]
-    enter = hits.min(axis=2).max(axis=2)
-    leave = hits.max(axis=2).min(axis=2)
-    range_m = np.where((enter <= leave) & (enter > 0), enter, np.inf)
-    return np.where(np.isfinite(range_m.min(axis=1)), range_m.argmin(axis=1), -1)
+        hits_m = (areas_m - (pose.x_m, pose.y_m)) / ray[:, :, None]
+
+    enter_m = hits_m.min(axis=2).max(axis=2)
+    leave_m = hits_m.max(axis=2).min(axis=2)
+    is_hit = (enter_m <= leave_m) & (enter_m > 0)
+    range_m = np.where(is_hit, enter_m, np.inf)
+    nearest = range_m.argmin(axis=1)
+    return np.where(is_hit.any(axis=1), nearest, -1)
 
 
 def encounter(place: town.Town, target: int, rng: np.random.Generator) -> Pose:
@@ -174,20 +202,27 @@ def encounter(place: town.Town, target: int, rng: np.random.Generator) -> Pose:
     tries find.
     """
     best = None
-    fewest = 2 * RAYS
+    min_cost = 2 * RAYS
+
     for _ in range(TRIES):
-        pose = facing(
-            place, target, float(rng.uniform(*ENCOUNTER_M)), float(rng.uniform(-math.pi, math.pi))
-        )
-        seen = skyline(place, pose)
-        own = np.count_nonzero(seen == target)
-        others = np.count_nonzero((seen >= 0) & (seen != target))
-        whole = seen[0] != target != seen[-1] and own >= RAYS // 8
-        score = int(others - own) + (0 if whole else RAYS)
-        if towns.is_free(place, pose.x_m, pose.y_m) and score < fewest:
+        range_m = float(rng.uniform(*ENCOUNTER_M))
+        side_rad = float(rng.uniform(-math.pi, math.pi))
+        pose = facing(place, target, range_m, side_rad)
+        cost = _encounter_cost(skyline(place, pose), target)
+
+        if cost < min_cost and towns.is_free(place, pose.x_m, pose.y_m):
             best = pose
-            fewest = score
+            min_cost = cost
+
     return best or _towards(place, target, rng)
+
+
+def _encounter_cost(seen: npt.NDArray[np.intp], target: int) -> int:
+    """How much more of others is seen than of the target; RAYS more where it is not seen whole."""
+    own = np.count_nonzero(seen == target)
+    others = np.count_nonzero((seen >= 0) & (seen != target))
+    is_whole = seen[0] != target != seen[-1] and own >= RAYS // 8
+    return int(others - own) + (0 if is_whole else RAYS)
 
 
 def later(place: town.Town, target: int, first: Pose, rng: np.random.Generator) -> Pose | None:
@@ -195,16 +230,19 @@ def later(place: town.Town, target: int, first: Pose, rng: np.random.Generator) 
     None if hidden.
     """
     side_rad, range_m = side_and_range(place, first)[target].tolist()
+
     for _ in range(TRIES):
-        turned = side_rad + float(rng.uniform(MIN_TURN_RAD, math.tau - MIN_TURN_RAD))
-        pose = facing(place, target, float(rng.uniform(NEAREST_M, FARTHEST_M)), turned)
-        pose = Pose(
-            x_m=pose.x_m, y_m=pose.y_m, heading_rad=pose.heading_rad + float(rng.normal(0, 0.2))
-        )
+        turn_rad = float(rng.uniform(MIN_TURN_RAD, math.tau - MIN_TURN_RAD))
+        distance_m = float(rng.uniform(NEAREST_M, FARTHEST_M))
+        pose = facing(place, target, distance_m, side_rad + turn_rad)
+        pose = _turned(pose, float(rng.normal(0, LATER_SD_RAD)))
+
         there_m = side_and_range(place, pose)[target, 1]
-        clear = np.count_nonzero(skyline(place, pose) == target) >= MARGIN_RAYS
-        if clear and other_distance(there_m, range_m) and towns.is_free(place, pose.x_m, pose.y_m):
+        visible = np.count_nonzero(skyline(place, pose) == target)
+        is_clear = visible >= MARGIN_RAYS and towns.is_free(place, pose.x_m, pose.y_m)
+        if is_clear and other_distance(there_m, range_m):
             return pose
+
     return None
 
 
