@@ -282,6 +282,7 @@ class Shell:
         self._invoke(call, cause)
 
     def _publish_health(self, now_ns: int) -> None:
-        ready = not self.missing
-        health = self.meter.report(self.intake, self.inbox, self.publisher, ready, self.notes)
+        health = self.meter.report(
+            self.intake, self.inbox, self.publisher, self._started, self.notes
+        )
         self.publisher.send_health(health)

@@ -346,6 +346,27 @@ def test_a_module_that_waits_for_others_is_not_ready(network: Network) -> None:
     shell.close()
 
 
+def test_a_module_that_has_started_stays_ready_when_another_leaves(network: Network) -> None:
+    started: list[bool] = []
+    module = Module("sim").on_start(lambda: started.append(True), requires={"recorder": 1})
+    shell = Shell(module, network.join())
+    peer = Peer(network.join(), topics.HEALTH)
+    shell.open()
+    recorder = network.join()
+    recorder.announce(Member("recorder", "recorder"))
+    spin_until(lambda: bool(started), shell)
+
+    recorder.close()
+    spin_until(lambda: shell.missing == {"recorder": 1}, shell)
+    before = peer.arrived
+    spin_until(lambda: peer.arrived > before, shell)
+
+    health = decode(topics.HEALTH, peer.take(1)[0].payload)
+    assert isinstance(health, Health)
+    assert health.ready
+    shell.close()
+
+
 def test_those_that_a_start_requires_miss_nothing(network: Network) -> None:
     heard: dict[str, list[int]] = {"one": [], "two": []}
     first = [odometry(seq) for seq in range(20)]
