@@ -180,7 +180,8 @@ def kill(container: str) -> None:
     docker(*host, "cogmap", "-c", f"kill -9 {pid}")
 
 
-def test_when_recording_has_ended_the_doctor_misses_nobody(compose: Compose) -> None:
+def test_when_recording_has_ended_the_doctor_misses_nobody(watch: Watch, compose: Compose) -> None:
+    wait_until(watch, lambda: watch.tally.observer.travelled_m > 0.0)
     compose("stop", "drive")
     findings = json.loads(compose.cogmap("sim", "doctor --json").stdout)
     missed = {finding["about"] for finding in findings} & {"recorder", "observer", *SERVICES}
