@@ -161,7 +161,8 @@ class Drive:
             shutil.rmtree(self.folder / STATE_NAME, ignore_errors=True)
 
     def _note(self, milestone: str) -> None:
-        self.start_s.setdefault(milestone, round(time.monotonic() - self.began_s, 3))
+        elapsed_s = time.monotonic() - self.began_s
+        self.start_s.setdefault(milestone, round(elapsed_s, 3))
 
 
 def _situation(watch: Watch, missing: list[str]) -> Situation:

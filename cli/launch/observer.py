@@ -121,11 +121,15 @@ class Observer:
     @property
     def elapsed_s(self) -> float:
         """Time of the drive so far, by the stamps of its messages."""
-        return max(0, self._now_ns - self._began_ns) / 1e9
+        elapsed_ns = self._now_ns - self._began_ns
+        return max(0, elapsed_ns) / 1e9
 
     def to_world(self, points_m: Floats) -> Floats:
         """Points (n, 2) of the agent's frame in the world's."""
-        start = self.start or Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)
+        start = self.start
+        if start is None:
+            return points_m
+
         pose = np.array([start.x_m, start.y_m, start.heading_rad])
         return se2.transform_from(pose, points_m)
 
@@ -137,41 +141,48 @@ class Observer:
     @property
     def estimated_path_m(self) -> Floats:
         """(n, 2): the self node's positions."""
-        return self.to_world(self._estimate.points_m)
+        points_m = self._estimate.points_m
+        return self.to_world(points_m)
 
     @property
     def wheels_path_m(self) -> Floats:
         """(n, 2): the wheels' odometry integrated, nothing else."""
-        return self.to_world(self._wheels.track.points_m)
+        points_m = self._wheels.track.points_m
+        return self.to_world(points_m)
 
     @property
     def fused_path_m(self) -> Floats:
         """(n, 2): the fused self-motion (`sensory/motion`) integrated, nothing else."""
-        return self.to_world(self._fused.track.points_m)
+        points_m = self._fused.track.points_m
+        return self.to_world(points_m)
 
     def errors(self) -> Errors:
         """The errors at the stamp of every estimate that truth, wheels and fused self-motion all
         cover.
         """
-        tracks = (self._true, self._wheels.track, self._fused.track)
-        stamps_ns = self._estimate.stamps_ns
-        known = np.logical_and.reduce([track.covers(stamps_ns) for track in tracks])
-        stamps_ns = stamps_ns[known]
-
+        stamps_ns = self._compared_ns()
         if not stamps_ns.size:
             nothing = np.zeros(0)
             return Errors(stamps_ns, nothing, nothing, nothing)
 
-        true_m = self._true.at(stamps_ns)
-
-        def distances_m(points_m: Floats) -> Floats:
-            offsets_m = self.to_world(points_m) - true_m
-            distances: Floats = np.hypot(*offsets_m.T)
-            return distances
-
         return Errors(
             stamps_ns,
-            estimate_m=distances_m(self._estimate.points_m[known]),
-            wheels_m=distances_m(self._wheels.track.at(stamps_ns)),
-            fused_m=distances_m(self._fused.track.at(stamps_ns)),
+            estimate_m=self._distances_m(self._estimate, stamps_ns),
+            wheels_m=self._distances_m(self._wheels.track, stamps_ns),
+            fused_m=self._distances_m(self._fused.track, stamps_ns),
         )
+
+    def _compared_ns(self) -> Indices:
+        """The stamps of the estimates that every other track covers, (n,)."""
+        stamps_ns = self._estimate.stamps_ns
+        for track in (self._true, self._wheels.track, self._fused.track):
+            is_covered = track.covers(stamps_ns)
+            stamps_ns = stamps_ns[is_covered]
+        return stamps_ns
+
+    def _distances_m(self, track: Track, stamps_ns: Indices) -> Floats:
+        """How far the positions of `track` at (n,) stamps are from the true ones, (n,)."""
+        true_m = self._true.at(stamps_ns)
+        believed_m = self.to_world(track.at(stamps_ns))
+        distances_m: Floats = np.hypot(*(believed_m - true_m).T)
+        return distances_m

@@ -23,7 +23,6 @@ LOG_NAME = "log.mcap"
 CONFIG_NAME = "config.toml"
 STATE_NAME = "state"
 REPLICATED = "codelets"
-WITH_MODE = ("sim", "workspace", "action")
 
 
 @dataclass(frozen=True)
@@ -47,26 +46,39 @@ def effective(base: Sections, choices: Choices, awaits: dict[str, int]) -> Secti
     the default of every other key. Raises ConfigError.
     """
     config.check_sections(base, registry.sections())
-    sections: Sections = {name: dict(base.get(name, {})) for name in registry.sections()}
+    chosen = _chosen(base, choices, awaits)
+    complete = {name: _complete(chosen, name) for name in registry.sections()}
+
+    sim = complete["sim"]
+    action = complete["action"]
+    if not action["route"]:
+        action["route"] = _route(sim["seed"], sim["laps"])
+    return complete
+
+
+def _chosen(base: Sections, choices: Choices, awaits: dict[str, int]) -> Sections:
+    """Every section there may be, as in `base` where it is, with the choices in it."""
+    mode = "lockstep" if choices.lockstep else "real_time"
+    sections: Sections = {}
+    for name in registry.sections():
+        section = dict(base.get(name, {}))
+        if "mode" in registry.config_type(name).__struct_fields__:
+            section.setdefault("mode", mode)
+        sections[name] = section
 
     sim = sections["sim"]
+    sim.setdefault("awaits", awaits)
     if choices.seed is not None:
         sim["seed"] = choices.seed
     if choices.laps is not None:
         sim["laps"] = choices.laps
-    sim.setdefault("awaits", awaits)
-    for name in WITH_MODE:
-        sections[name].setdefault("mode", "lockstep" if choices.lockstep else "real_time")
-
-    complete = {name: _complete(sections, name) for name in registry.sections()}
-    if not complete["action"]["route"]:
-        complete["action"]["route"] = _route(complete["sim"]["seed"], complete["sim"]["laps"])
-    return complete
+    return sections
 
 
 def _complete(sections: Sections, name: str) -> dict[str, Any]:
     """The section of a module with every key that has a value."""
-    typed = config.typed(sections, name, registry.config_type(name))
+    kind = registry.config_type(name)
+    typed = config.typed(sections, name, kind)
     settings: dict[str, Any] = msgspec.to_builtins(typed)
     return {key: value for key, value in settings.items() if value is not None}
 
@@ -105,9 +117,8 @@ def infrastructure(folder: Path, endpoint: str, agent: str, choices: Choices) ->
     def record(starts: int) -> list[str]:
         """A recorder that died leaves its log as it is, and the next one writes another."""
         name = LOG_NAME if starts == 0 else f"log-{starts + 1}.mcap"
-        return cogmap_command(
-            "log", "record", *_options(folder, endpoint, agent), "-o", str(folder / name)
-        )
+        options = _options(folder, endpoint, agent)
+        return cogmap_command("log", "record", *options, "-o", str(folder / name))
 
     if choices.record:
         programs.append(Program(RECORDER, record))
@@ -125,8 +136,9 @@ def modules(folder: Path, endpoint: str, agent: str, choices: Choices) -> list[P
 
 
 def _options(folder: Path, endpoint: str, agent: str) -> list[str]:
+    config_path = folder / CONFIG_NAME
     where = ["--tied", "--connect", endpoint, "--agent", agent]
-    return [*where, "--config", str(folder / CONFIG_NAME)]
+    return [*where, "--config", str(config_path)]
 
 
 def _instances(name: str, choices: Choices) -> list[str]:

@@ -42,10 +42,16 @@ def _environment() -> dict[str, str]:
     """This process's, with one thread a process for linear algebra: there are more processes than
     cores.
     """
-    paths = [str(_SOURCES), os.environ.get("PYTHONPATH", "")]
-    search_path = os.pathsep.join(path for path in paths if path)
-    one_thread = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-    return os.environ | {"PYTHONPATH": search_path} | one_thread
+    environment = dict(os.environ)
+    environment["OPENBLAS_NUM_THREADS"] = "1"
+    environment["OMP_NUM_THREADS"] = "1"
+
+    paths = [str(_SOURCES)]
+    inherited = environment.get("PYTHONPATH")
+    if inherited:
+        paths.append(inherited)
+    environment["PYTHONPATH"] = os.pathsep.join(paths)
+    return environment
 
 
 class Child:

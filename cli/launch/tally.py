@@ -5,6 +5,7 @@ processes. Pure.
 from __future__ import annotations
 
 from collections import Counter, deque
+from collections.abc import Mapping
 
 from cli.launch.observer import Observer
 from cogmap.bus.codec import Envelope
@@ -76,7 +77,8 @@ class Tally:
 
     def _on_health(self, health: Health) -> None:
         self.health[health.instance] = health
-        self._busy.setdefault(health.instance, []).append(health.busy)
+        shares = self._busy.setdefault(health.instance, [])
+        shares.append(health.busy)
 
     def _on_command(self, command: MotorCommand, envelope: Envelope, received_ns: int) -> None:
         cycle_ns = received_ns - envelope.born_ns
@@ -98,16 +100,24 @@ class Tally:
     @property
     def busy(self) -> dict[str, float]:
         """The mean share of its time that each instance was computing."""
-        shares = sorted(self._busy.items())
-        return {instance: sum(each) / len(each) for instance, each in shares}
+        means = {}
+        for instance in sorted(self._busy):
+            shares = self._busy[instance]
+            means[instance] = sum(shares) / len(shares)
+        return means
 
     def gaps(self, own: Counter[str]) -> dict[str, int]:
         """Messages lost for good on each NEVER_DROP topic, by the count of whoever lost most: the
         modules, or this process with its `own` count.
         """
-        counts = [own, *(health.gaps for health in self.health.values())]
-        names = [topic.name for topic in topics.ALL if topic.delivery is Delivery.NEVER_DROP]
-        return {name: max(count.get(name, 0) for count in counts) for name in names}
+        reported = [health.gaps for health in self.health.values()]
+        counts: list[Mapping[str, int]] = [own, *reported]
+
+        gaps = {}
+        for topic in topics.ALL:
+            if topic.delivery is Delivery.NEVER_DROP:
+                gaps[topic.name] = max(count.get(topic.name, 0) for count in counts)
+        return gaps
 
     def rejected(self, own: Counter[str]) -> dict[str, int]:
         """Messages that were rejected, by topic, summed over the modules and `own`."""

@@ -45,7 +45,8 @@ class Track:
     @property
     def points_m(self) -> Floats:
         """(n, 2)."""
-        return np.array(self._points_m, np.float64).reshape(-1, 2)
+        points_m = np.array(self._points_m, np.float64)
+        return points_m.reshape(-1, 2)
 
     def covers(self, stamps_ns: Indices) -> Booleans:
         """Which of the stamps lie between the first and the last position, any shape."""
@@ -81,7 +82,8 @@ class PathIntegrator:
         """Whether the path is there already: in lockstep a message is repeated to a module that was
         restarted.
         """
-        return self.track.last_ns is not None and stamp_ns <= self.track.last_ns
+        last_ns = self.track.last_ns
+        return last_ns is not None and stamp_ns <= last_ns
 
     def move(self, speed_m_s: float, turn_rate_rad_s: float, dt_s: float) -> None:
         """Integrate one step by its midpoint: it heads where the robot did half-way through it."""

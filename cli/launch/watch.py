@@ -71,7 +71,11 @@ class Watch:
     def missing(self, awaited: Mapping[str, int]) -> list[str]:
         """The modules of which not all instances are ready yet."""
         ready = Counter(member.module for member in self.present)
-        return [name for name, number in awaited.items() if ready[name] < number]
+        missing = []
+        for name, number in awaited.items():
+            if ready[name] < number:
+                missing.append(name)
+        return missing
 
     def gaps(self) -> dict[str, int]:
         """Messages lost for good on each NEVER_DROP topic, by the count of whoever lost most."""

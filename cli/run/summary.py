@@ -112,7 +112,10 @@ def drive_rows(metrics: DriveMetrics) -> list[tuple[str, str]]:
 def _limits(metrics: DriveMetrics) -> str:
     """What kept the robot below its cruising speed, by how many of the commands."""
     limits = Counter(metrics.halted) + Counter(metrics.slowed)
-    shares = [f"{name} {number / metrics.commands:.0%}" for name, number in limits.most_common()]
+    shares = []
+    for name, number in limits.most_common():
+        share = number / metrics.commands
+        shares.append(f"{name} {share:.0%}")
     return ", ".join(shares) or "never"
 
 
