@@ -138,18 +138,25 @@ class _Inputs:
         topic, source, seq = cause
         current = self._incarnation.get(source)
         if current is None:
-            fitting = [r for r in candidates if _sent_ns(r) >= self._since_ns]
+            fitting = [record for record in candidates if _sent_ns(record) >= self._since_ns]
         else:
-            is_past = seq <= self._last.get((topic, source), -1)
-            first = current + 1 if is_past else current
-            fitting = [r for r in candidates if _envelope(r).incarnation >= first]
-        return min(fitting or candidates[-1:], key=lambda record: _envelope(record).incarnation)
+            last = self._last.get((topic, source), -1)
+            first = current + 1 if seq <= last else current
+            fitting = [record for record in candidates if _incarnation(record) >= first]
+
+        if not fitting:
+            return candidates[-1]
+        return min(fitting, key=_incarnation)
 
 
 def _envelope(record: Record) -> Envelope:
     if record.envelope is None:
         raise LogError("a message in the log has no envelope")
     return record.envelope
+
+
+def _incarnation(record: Record) -> int:
+    return _envelope(record).incarnation
 
 
 def _sent_ns(record: Record) -> int:

@@ -68,7 +68,9 @@ class ModuleRun:
             return []
 
     def _refusal(self, step: Step, error: Exception) -> str:
-        name = step.record.topic.name if step.record is not None else step.kind.name.lower()
+        name = step.kind.name.lower()
+        if step.record is not None:
+            name = step.record.topic.name
         kind = type(error).__name__
         return f"{name}: {self._job.instance} refuses what it received: {kind}: {error}"
 
@@ -155,9 +157,13 @@ class ModuleRun:
 
         self.outcome.missing_outputs = len(missing)
         if missing and not self.outcome.first:
-            first = min(missing, key=_order)
-            title = compare.title(first.topic, self._reader.message(first))
-            self._differ(f"{title} is in {SIDES[0]} and not published in {SIDES[1]}")
+            self._name_missing(min(missing, key=_order))
+
+    def _name_missing(self, record: Record) -> None:
+        message = self._reader.message(record)
+        title = compare.title(record.topic, message)
+        log, replay = SIDES
+        self._differ(f"{title} is in {log} and not published in {replay}")
 
     def _notes(self) -> list[str]:
         """What else is to be known before the outcome is judged."""

@@ -86,8 +86,13 @@ class Player:
         )
 
     def _chosen(self) -> list[Topic]:
+        """What of the log is played, in the order of the table."""
         recorded = {channel.topic for channel in self._reader.channels.values()}
-        return [topic for topic in topics.ALL if topic.name in recorded and self._is_chosen(topic)]
+        chosen = []
+        for topic in topics.ALL:
+            if topic.name in recorded and self._is_chosen(topic):
+                chosen.append(topic)
+        return chosen
 
     def _is_chosen(self, topic: Topic) -> bool:
         chosen = self._choices.topics
