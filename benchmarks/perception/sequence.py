@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.report import Metrics
+from cogmap.geometry.polylines import distances_along
 from schemas.sensing import PlaceMatch, Pose
 from services.epam.places.recognizer import PlaceRecognizer
 from services.sensory.disparity import DepthFromStereo
@@ -133,77 +134,91 @@ def poses(
     How long a step is and how far off the robot is, up to `offset_m` and `turn_rad`, changes slowly
     along the way.
     """
-    at_m, points = _rounded(line)
+    at_m, points_m = _rounded(line)
     step = _slowly(rng, at_m, SPEED_CHANGES_M, 1.0)
     offset = _slowly(rng, at_m, OFFSET_CHANGES_M, offset_m)
     turn = _slowly(rng, at_m, TURN_CHANGES_M, turn_rad)
-    heading = np.unwrap(np.arctan2(*np.gradient(points, axis=0).T[::-1]))
-    middle = sum(steps_m) / 2
-    range_m = (steps_m[1] - steps_m[0]) / 2
+    x_ahead, y_ahead = np.gradient(points_m, axis=0).T
+    heading_rad = np.unwrap(np.arctan2(y_ahead, x_ahead))
+    columns = np.column_stack([points_m, heading_rad, offset, turn, step])
+
+    mean_step_m = sum(steps_m) / 2
+    half_range_m = (steps_m[1] - steps_m[0]) / 2
     found = []
     here_m = 0.0
+
     while here_m <= at_m[-1]:
-        x, y, along, left, by, speed = (
-            float(np.interp(here_m, at_m, values))
-            for values in (*points.T, heading, offset, turn, step)
+        here = [float(np.interp(here_m, at_m, column)) for column in columns.T]
+        x_m, y_m, along_rad, left_m, turned_rad, speed = here
+        pose = Pose(
+            x_m=x_m - left_m * math.sin(along_rad),
+            y_m=y_m + left_m * math.cos(along_rad),
+            heading_rad=along_rad + turned_rad,
         )
-        found.append(
-            Pose(
-                x_m=x - left * math.sin(along),
-                y_m=y + left * math.cos(along),
-                heading_rad=along + by,
-            )
-        )
-        here_m += middle + range_m * speed
+        found.append(pose)
+        here_m += mean_step_m + half_range_m * speed
+
     return found
 
 
 def _rounded(line: Sequence[Point]) -> tuple[Floats, Floats]:
-    """Points (n, 2) close to each other along `line`, and how far from its start each is; corners
-    are cut smoothly.
+    """How far along `line` each of (n,) points close to each other is, and the points (n, 2).
+
+    Corners are cut smoothly.
     """
-    corners = np.asarray(line, np.float64)
-    far_m = _far(corners)
-    every = np.linspace(0, far_m[-1], math.ceil(far_m[-1] / SPACING_M))
+    corners_m = np.asarray(line, np.float64)
+    along_m = distances_along(corners_m)
+    count = math.ceil(along_m[-1] / SPACING_M)
+    even_m = np.linspace(0, along_m[-1], count)
+
     half = round(CORNER_M / SPACING_M / 2)
-    window = np.full(2 * half + 1, 1 / (2 * half + 1))
-    rows = (np.interp(every, far_m, values) for values in corners.T)
-    points = np.stack(
-        [np.convolve(np.pad(row, half, mode="edge"), window, mode="valid") for row in rows], axis=1
-    )
-    return _far(points), points
+    width = 2 * half + 1
+    window = np.full(width, 1 / width)
+    columns = []
+
+    for values in corners_m.T:
+        column = np.interp(even_m, along_m, values)
+        padded = np.pad(column, half, mode="edge")
+        columns.append(np.convolve(padded, window, mode="valid"))
+
+    points_m = np.stack(columns, axis=1)
+    return distances_along(points_m), points_m
 
 
-def _far(points: Floats) -> Floats:
-    return np.concatenate([[0.0], np.hypot(*np.diff(points, axis=0).T).cumsum()])
-
-
-def _slowly(rng: np.random.Generator, at_m: Floats, every_m: float, most: float) -> Floats:
-    """Values up to `most` to both sides, between ones drawn at every so many metres."""
-    knots = np.arange(0.0, at_m[-1] + 2 * every_m, every_m)
-    return np.asarray(np.interp(at_m, knots, rng.uniform(-most, most, len(knots))))
+def _slowly(rng: np.random.Generator, at_m: Floats, every_m: float, limit: float) -> Floats:
+    """Values up to `limit` to both sides, between ones drawn at every so many metres."""
+    knots_m = np.arange(0.0, at_m[-1] + 2 * every_m, every_m)
+    values = rng.uniform(-limit, limit, len(knots_m))
+    return np.asarray(np.interp(at_m, knots_m, values))
 
 
 def metrics(answers: Sequence[Answer]) -> Metrics:
-    """Recall at 99 % precision, and what the answers are worth as they were given."""
+    """Recall at 99 % precision, and that of the answers as they were given."""
     score = np.array([answer.match.score if answer.match else 0.0 for answer in answers])
-    right = np.array(
-        [
-            answer.match is not None and same(answer, answers[answer.match.frame])
-            for answer in answers
-        ]
-    )
+    right = np.array([_is_right(answer, answers) for answer in answers])
     again = np.array([answer.part == SECOND_LAP for answer in answers])
     first = [answer for answer in answers if answer.part == FIRST_LAP]
-    wanted = again & np.array([any(same(answer, other) for other in first) for answer in answers])
-    said = score > 0
+    was_seen = np.array([any(same(answer, other) for other in first) for answer in answers])
+
+    wanted = again & was_seen
+    matched = score > 0
+    false_elsewhere = matched & ~right & ~again
     return {
         "sequence_recall_at_99p": recall(score, right, wanted, PRECISION),
-        "sequence_recall": float((right & wanted).sum() / max(1, wanted.sum())),
-        "sequence_precision": float(right.sum() / max(1, said.sum())),
+        "sequence_recall": _ratio(right & wanted, wanted),
+        "sequence_precision": _ratio(right, matched),
         "sequence_views": float(len(answers)),
-        "sequence_false_outside_second_lap": float((said & ~right & ~again).sum()),
+        "sequence_false_outside_second_lap": float(false_elsewhere.sum()),
     }
+
+
+def _is_right(answer: Answer, answers: Sequence[Answer]) -> bool:
+    """Whether it matches a view of the same place."""
+    return answer.match is not None and same(answer, answers[answer.match.frame])
+
+
+def _ratio(some: Flags, of_all: Flags) -> float:
+    return float(some.sum() / max(1, of_all.sum()))
 
 
 def recall(score: Floats, right: Flags, wanted: Flags, precision: float) -> float:
@@ -212,10 +227,11 @@ def recall(score: Floats, right: Flags, wanted: Flags, precision: float) -> floa
 
     0 where no score does; a view of score 0 is not matched.
     """
-    for least in np.unique(score[score > 0]):
-        said = score >= least
-        if right[said].mean() >= precision:
-            return float((said & right & wanted).sum() / max(1, wanted.sum()))
+    for min_score in np.unique(score[score > 0]):
+        matched = score >= min_score
+        if right[matched].mean() >= precision:
+            return _ratio(matched & right & wanted, wanted)
+
     return 0.0
 
 

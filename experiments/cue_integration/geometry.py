@@ -67,18 +67,20 @@ class Pose:
         """Bearing, left positive, and distance of `goal`."""
         dx_m = goal[0] - self.x_m
         dy_m = goal[1] - self.y_m
-        return math.remainder(math.atan2(dy_m, dx_m) - self.heading_rad, math.tau), math.hypot(
-            dx_m, dy_m
-        )
+        direction_rad = math.atan2(dy_m, dx_m)
+        bearing_rad = math.remainder(direction_rad - self.heading_rad, math.tau)
+        return bearing_rad, math.hypot(dx_m, dy_m)
 
 
 def step(bearing_rad: float, distance_m: float) -> tuple[float, float]:
-    """The next movement, until a goal is within reach: a turn, and a way forward, short while it is
-    not yet ahead.
+    """The next movement, until a goal is within reach: a turn, and a distance forward.
+
+    The distance is short while the goal is not yet ahead.
     """
     turn_rad = max(-STEP_RAD, min(STEP_RAD, bearing_rad))
-    longest_m = STEP_M if turn_rad == bearing_rad else WHILE_TURNING_M
-    return turn_rad, max(0.0, min(distance_m - REACH_M, longest_m))
+    max_m = STEP_M if turn_rad == bearing_rad else WHILE_TURNING_M
+    forward_m = min(distance_m - REACH_M, max_m)
+    return turn_rad, max(0.0, forward_m)
 
 
 def turned(
@@ -89,7 +91,13 @@ def turned(
     """
     cos = math.cos(angle_rad)
     sin = math.sin(angle_rad)
-    off = [(x_m - about[0], y_m - about[1]) for x_m, y_m in points]
-    return tuple(
-        (about[0] + cos * x_m - sin * y_m, about[1] + sin * x_m + cos * y_m) for x_m, y_m in off
-    )
+    found = []
+
+    for x_m, y_m in points:
+        dx_m = x_m - about[0]
+        dy_m = y_m - about[1]
+        turned_x_m = about[0] + cos * dx_m - sin * dy_m
+        turned_y_m = about[1] + sin * dx_m + cos * dy_m
+        found.append((turned_x_m, turned_y_m))
+
+    return tuple(found)

@@ -70,9 +70,12 @@ def exact(cues: Cues) -> Posterior:
     """Bayes' rule for normal distributions: precisions add, means weigh by them."""
     precision = np.linalg.inv(np.array(cues.covariance_m2))
     weighed = precision @ np.array(cues.mean_m)
+
     for border in cues.borders:
-        precision[border.axis, border.axis] += border.sd_m**-2
-        weighed[border.axis] += border.sensed_m * border.sd_m**-2
+        own_precision = border.sd_m**-2
+        precision[border.axis, border.axis] += own_precision
+        weighed[border.axis] += border.sensed_m * own_precision
+
     covariance = np.linalg.inv(precision)
     return Posterior(covariance @ weighed, covariance)
 
@@ -103,10 +106,11 @@ class Recording:
         counts = self.counts
         if counts.sum() < 2:
             raise ValueError("place cells hardly fire: record for longer")
-        mean = counts @ self.centres_m / counts.sum()
-        return Posterior(
-            mean, np.cov(self.centres_m, rowvar=False, fweights=counts.astype(np.int64))
-        )
+
+        mean_m = counts @ self.centres_m / counts.sum()
+        weights = counts.astype(np.int64)
+        covariance_m2 = np.cov(self.centres_m, rowvar=False, fweights=weights)
+        return Posterior(mean_m, covariance_m2)
 
 
 def record(cues: Cues, side_m: float, seconds: float, rng: np.random.Generator) -> Recording:
