@@ -176,6 +176,7 @@ class SpeedLimit(enum.StrEnum):
     POSE_AGE = "pose age"
     STUCK = "stuck"
     NO_ACTION = "no action"
+    NO_POSE = "no pose"
     NO_ROUTE = "no route"
     OTHER = "other"
 

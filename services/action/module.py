@@ -100,13 +100,19 @@ class ActionModule:
         return self._command()
 
     def on_scan(self, scan: RangeScan) -> MotorCommand | None:
-        """Measure how far it is free ahead. A repeated scan means that nobody waits any longer."""
+        """Measure how far it is free ahead.
+
+        In lockstep a repeated scan is answered at once: by the command for the pose that waits, or
+        by a halt where no pose has come since a restart.
+        """
         self._clear_m = obstacle_ahead_m(scan, self._config.half_width_m)
         is_repeated = scan.stamp_ns == self._gate.scan_ns
 
         self._gate.scan_ns = scan.stamp_ns
         self._newest_ns = max(self._newest_ns, scan.stamp_ns)
 
+        if is_repeated and self._is_lockstep and self._has_no_pose:
+            return self._remember(halted(scan.stamp_ns, SpeedLimit.NO_POSE))
         return self._command(at_once=is_repeated)
 
     def on_delta(self, delta: Delta) -> MotorCommand | None:
@@ -212,6 +218,13 @@ class ActionModule:
     def _age_ns(self, stamp_ns: int) -> int:
         """How much older than the newest message a stamp is; 0 in lockstep, where time waits."""
         return 0 if self._is_lockstep else max(0, self._newest_ns - stamp_ns)
+
+    @property
+    def _has_no_pose(self) -> bool:
+        """Whether no pose has come since the start: after a restart, the last one is not published
+        again.
+        """
+        return self._answered is None and self._waiting is None
 
     def _is_answered(self, delta: Delta) -> bool:
         last = self._answered

@@ -450,6 +450,17 @@ def test_in_lockstep_a_repeated_scan_ends_the_wait_for_a_lost_competition() -> N
     assert command.stamp_ns == 2 * PERIOD_NS
 
 
+def test_in_lockstep_a_restarted_action_without_a_pose_halts_for_a_frame() -> None:
+    module = _module("lockstep")
+    module.feed(_motion(6))
+    assert module.feed(_scan(cycle=6)) == []
+
+    module.feed(_motion(6))
+    (command,) = _commands(module.feed(_scan(cycle=6)))
+
+    assert (command.stamp_ns, command.halted_by) == (6 * PERIOD_NS, SpeedLimit.NO_POSE)
+
+
 def test_in_lockstep_a_restarted_action_waits_for_no_past_competition() -> None:
     module = _module("lockstep")
 
