@@ -17,7 +17,7 @@ class Client:
     """Runs `module` on a thread of its own while in a `with` statement.
 
     It is connected to the router at `endpoint`, as one of `agent`'s. Raises NoRouterError where
-    none answers. Handlers are called on that thread.
+    none answers. Handlers are called on that thread; what ends it early is raised at the end.
 
         graph = Graph()
         with Client(Module("notebook").following(graph)):
@@ -33,6 +33,7 @@ class Client:
         self._agent = agent
         self._ended = threading.Event()
         self._thread: threading.Thread | None = None
+        self._error: Exception | None = None
 
     def __enter__(self) -> Client:
         shell = Shell(self.module, ZenohBus(self._endpoint, self._agent))
@@ -51,8 +52,14 @@ class Client:
         self._ended.set()
         if self._thread is not None:
             self._thread.join()
+        if self._error is not None:
+            raise self._error
 
     def _work(self, shell: Shell) -> None:
-        while not self._ended.is_set():
-            shell.spin_once(IDLE_S)
-        shell.close()
+        try:
+            while not self._ended.is_set():
+                shell.spin_once(IDLE_S)
+        except Exception as error:
+            self._error = error
+        finally:
+            shell.close()

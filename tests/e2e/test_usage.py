@@ -63,6 +63,9 @@ def endpoint() -> Iterator[str]:
             "`workspace.decay`",
             "Expected `float` <= 1",
         ),
+        (["module", "action", "--agent", "a/b"], "--agent 'a/b'", "letters, digits, '.', '-'"),
+        (["module", "action", "--instance", "a/b"], "--instance 'a/b'", "letters, digits, '.'"),
+        (["module", "action", "--state", "/proc/x"], "/proc/x/action", "folder with --state"),
         (["module", "workspace", "--set", "decay"], "--set decay", "write it as module.key=value"),
         (
             ["module", "workspace", "--config", "nowhere.toml"],
