@@ -31,7 +31,7 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Block:
-    """A block: centre in the robot's frame, x forward, y left, its turn, sides, height and colour."""
+    """A block: centre in the robot's frame (x forward, y left), turn, sides, height and colour."""
 
     x_m: float
     y_m: float

@@ -175,6 +175,17 @@ def test_a_restart_amid_a_view_learns_nothing_from_it_twice(
     assert codec.encode(second.compact()) == codec.encode(first.compact())
 
 
+def test_the_last_view_learned_from_before_a_restart_teaches_nothing(views: list[View]) -> None:
+    view = views[1]
+    fresh = build(Config(), "epam")
+    restarted = build(Config(), "epam")
+    assert restarted.restore is not None
+    restarted.restore([Learned(stamp_ns=view.stamp_ns, frame=view.frame)])
+
+    assert [type(message) for message in fresh.feed(view)] == [Learned, Percepts]
+    assert [type(message) for message in restarted.feed(view)] == [Percepts]
+
+
 def test_after_a_restart_the_next_view_is_learned_from(views: list[View]) -> None:
     first = build(Config(), "epam")
     second = build(Config(), "epam")
