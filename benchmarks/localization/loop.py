@@ -45,6 +45,8 @@ def sections(surveyed: bool) -> dict[str, dict[str, Any]]:
         "kept_samples": 100,
         "landmark_samples": 1000,
         "correlated_views": 1.0,
+        "correlated_sightings": 1.0,
+        "landmark_sides": 1,
         "landmark_jitter_m": 0.003,
         "speed_gain_sd": SPEED,
         "turn_gain_sd": TURN,

@@ -176,6 +176,25 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             "(eq. 9), or headings too, by nonlinear least squares"
         ),
     ] = "heading"
+    landmark_sides: Annotated[
+        int,
+        Meta(
+            description="sides of a landmark, by the direction in which it is seen, whose views "
+            "share an error: each is a landmark of its own for map correction, 1 to 360; 1: views "
+            "from all directions have the same error",
+            ge=1,
+            le=360,
+        ),
+    ] = 16
+    correlated_sightings: Annotated[
+        float,
+        Meta(
+            description="successive sightings of a landmark along the path whose errors are "
+            "alike, so that together they count as one in map correction, 1 to 1000",
+            ge=1,
+            le=1000,
+        ),
+    ] = 5.0
     place_match_sd_m: Annotated[
         Metres,
         Meta(

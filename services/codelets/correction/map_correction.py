@@ -21,6 +21,7 @@ from schemas.graph import Operation, Phase
 from schemas.nodes import CORRECTION_ID, Correction, LoopClosure, Observations, PathSegment
 from services.codelets.config import SECTION, Config
 from services.codelets.correction.gnc import inliers
+from services.codelets.correction.joint import optimize_jointly
 from services.codelets.correction.least_squares import optimize
 from services.codelets.correction.pairwise_consistency import MIN_AGREEING, Views, consistent
 from services.codelets.correction.pose_graph import (
@@ -38,7 +39,6 @@ MIN_ROWS = 10
 IMPOSSIBLE_SD = 5.0
 MAX_ROUNDS = 3
 SAME_RAD = 0.05
-ROUNDS = 5
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
@@ -159,14 +159,7 @@ def corrected(graph: PoseGraph, seen: Sightings, config: Config) -> tuple[Floats
         positions = close_loops(_positions_only(graph))
         return np.column_stack([positions.positions_m, graph.poses[:, 2]]), positions.replays
 
-    poses = optimize(graph)
-    landmarks_m = seen.landmarks_m(poses)
-    rounds = ROUNDS if len(landmarks_m) else 0
-    for _ in range(rounds):
-        joint = optimize(seen.joined(PoseGraph(poses, graph.steps, graph.closures), landmarks_m))
-        landmarks_m = joint[len(poses) :, :2]
-        poses = joint[: len(poses)]
-    return poses, 1 + rounds
+    return optimize_jointly(graph, seen, config)
 
 
 def _positions_only(graph: PoseGraph) -> PoseGraph:

@@ -38,6 +38,7 @@ from services.codelets.localization.measurement_model import (
     Sighting,
     compare,
     log_likelihood,
+    novelty,
     sightings,
 )
 from services.codelets.localization.motion_model import dead_reckon, move, with_gains
@@ -111,12 +112,15 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     stationary_since_ns = _stationary_since(agent, bool(motions[:, :2].any()))
     seen = sightings(task.percepts, graph, config.largest_landmark_sd_m, stationary_since_ns)
     past = _past(agent, moved, task.stamp_ns)
-    found = past if seen is None else _correct(past, seen, config, rng)
+    moved_sd = motions[:, 3:5] * motions[:, 2:3]
+    variances = variances_of(agent) + np.square(moved_sd).sum(axis=0)
+    found = past
+    if seen is not None:
+        weights = novelty(moved, seen, variances) / config.correlated_views
+        found = _correct(past, seen, weights, config, rng)
 
     gains = found.samples[:, POSE_COLUMNS:].mean(axis=0)
     odometry = dead_reckon(odometry_of(agent), motions, gains)
-    moved_sd = motions[:, 3:5] * motions[:, 2:3]
-    variances = variances_of(agent) + np.square(moved_sd).sum(axis=0)
     if seen is not None and found.is_lost:
         percepts = _all_seen(task.percepts, seen_before(graph, odometry))
         found = _relocalize(found, percepts, graph, config, rng)
@@ -168,8 +172,10 @@ def _past(agent: Self, moved: Samples, stamp_ns: int) -> Estimate:
     return Estimate(moved, 1.0, agent.misfit_count, agent.first_misfit, agent.is_lost)
 
 
-def _correct(past: Estimate, seen: Sighting, config: Config, rng: np.random.Generator) -> Estimate:
-    """Reject samples by what is in view.
+def _correct(
+    past: Estimate, seen: Sighting, weights: Samples, config: Config, rng: np.random.Generator
+) -> Estimate:
+    """Reject samples by what is in view, each landmark by its weight (k,).
 
     Where most of that fits no sample, all are kept, until the agent must be elsewhere. Where
     rejection would keep too few, it is done in stages: each by a part of the likelihood, the
@@ -190,7 +196,7 @@ def _correct(past: Estimate, seen: Sighting, config: Config, rng: np.random.Gene
     exponent_left = 1.0
     share = 1.0
     for stage in range(STAGES):
-        scores = log_likelihood(compared.density, config.outlier_share) / config.correlated_views
+        scores = log_likelihood(compared.density, config.outlier_share, weights)
         exponent = exponent_left
         if stage < STAGES - 1:
             bearable = tempering_exponent(scores, config.kept_samples / len(scores))

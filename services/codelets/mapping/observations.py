@@ -17,7 +17,7 @@ from cogmap.geometry.se2 import rotation_matrices
 from schemas.array import Matrix
 from schemas.nodes import ObservationColumn, Observations, observations_id
 from schemas.sensing import Percept
-from services.codelets.correction.pose_graph import Constraints, PoseGraph
+from services.codelets.correction.pose_graph import Constraints
 
 COLUMNS = len(ObservationColumn)
 STAMP = ObservationColumn.STAMP_S
@@ -145,11 +145,3 @@ class Sightings(NamedTuple):
         information[:, :2, :2] = self.information * weights[:, None, None]
         information[:, 2, 2] = NO_HEADING
         return Constraints(self.place, first_landmark + self.landmark, measured, information)
-
-    def joined(self, graph: PoseGraph, landmarks_m: Floats) -> PoseGraph:
-        """`graph` with the landmarks as poses behind those of the path, bound to it by what was
-        seen.
-        """
-        poses = np.vstack([graph.poses, np.column_stack([landmarks_m, np.zeros(len(landmarks_m))])])
-        seen = self.constraints(len(graph.poses), self.weights(graph.poses, landmarks_m))
-        return PoseGraph(poses, graph.steps, graph.closures + seen)

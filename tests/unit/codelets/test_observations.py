@@ -9,6 +9,7 @@ import pytest
 
 from cogmap.geometry.se2 import compose, relative
 from schemas.nodes import Observations, PathSegment
+from services.codelets.correction.joint import with_landmarks
 from services.codelets.correction.least_squares import optimize
 from services.codelets.correction.pose_graph import Constraints, PoseGraph
 from services.codelets.mapping.observations import Sightings, Viewpoint, extended
@@ -93,7 +94,7 @@ def test_a_path_that_turned_too_much_is_straightened_by_what_was_seen_along_it()
     seen = Sightings.of(_sightings(poses), np.arange(len(poses), dtype=float))
     for _ in range(5):
         landmarks_m = seen.landmarks_m(graph.poses)
-        joint = optimize(seen.joined(graph, landmarks_m))
+        joint = optimize(with_landmarks(graph, seen, landmarks_m))
         graph = PoseGraph(joint[: len(poses)], graph.steps, none)
     before, after = (
         np.hypot(*(path[:, :2] - poses[:, :2]).T).mean() for path in (start, graph.poses)

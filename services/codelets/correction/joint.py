@@ -1,0 +1,69 @@
+"""The path optimized together with the landmarks seen along it (beyond the paper)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cogmap.geometry.arrays import Floats, Indices
+from cogmap.geometry.se2 import FULL_TURN_RAD
+from services.codelets.config import Config
+from services.codelets.correction.least_squares import optimize
+from services.codelets.correction.pose_graph import PoseGraph
+from services.codelets.mapping.observations import Sightings
+
+ROUNDS = 5
+
+
+def optimize_jointly(graph: PoseGraph, seen: Sightings, config: Config) -> tuple[Floats, int]:
+    """(n, 3) poses with the loops of `graph` closed, and bound to what was seen along the path, and
+    how often the whole path was solved for that.
+
+    Where a landmark seems to be depends on the side that it is seen from: of a building the front
+    is measured, and its depth assumed. So each of its sides is taken for a landmark of its own,
+    which binds one pass to the next past the same side, and bends neither. Sightings in a row err
+    alike: `config.correlated_sightings` of them count as one.
+    """
+    poses = optimize(graph)
+    if not len(seen.place):
+        return poses, 1
+
+    sides = by_side(seen, poses, config.landmark_sides)
+    landmarks_m = sides.landmarks_m(poses)
+    for _ in range(ROUNDS):
+        path = PoseGraph(poses, graph.steps, graph.closures)
+        joint = optimize(with_landmarks(path, sides, landmarks_m, config.correlated_sightings))
+        poses = joint[: len(poses)]
+        landmarks_m = joint[len(poses) :, :2]
+    return poses, 1 + ROUNDS
+
+
+def with_landmarks(
+    graph: PoseGraph, seen: Sightings, landmarks_m: Floats, correlated: float = 1.0
+) -> PoseGraph:
+    """`graph` with (k, 2) landmarks as poses after those of the path, bound to it by sightings of
+    which `correlated` count as one.
+    """
+    headings_rad = np.zeros(len(landmarks_m))
+    landmarks = np.column_stack([landmarks_m, headings_rad])
+    weights = seen.weights(graph.poses, landmarks_m) / correlated
+    constraints = seen.constraints(len(graph.poses), weights)
+
+    poses = np.vstack([graph.poses, landmarks])
+    return PoseGraph(poses, graph.steps, graph.closures + constraints)
+
+
+def by_side(seen: Sightings, poses: Floats, sides: int) -> Sightings:
+    """The same sightings with a landmark for each of so many sides, by the direction in which the
+    landmark is seen in the world.
+    """
+    bearing_rad = np.arctan2(seen.where_m[:, 1], seen.where_m[:, 0])
+    direction_rad = poses[seen.place, 2] + bearing_rad
+    side = np.rint(direction_rad / FULL_TURN_RAD * sides).astype(np.int64) % sides
+
+    numbers, landmark = np.unique(seen.landmark * sides + side, return_inverse=True)
+    labels = tuple(seen.labels[number // sides] for number in numbers.tolist())
+    return seen._replace(labels=labels, landmark=_indices(landmark))
+
+
+def _indices(numbers: Indices) -> Indices:
+    return np.asarray(numbers, np.int64).ravel()

@@ -1,0 +1,106 @@
+"""The path optimized together with what was seen along it, side by side of each landmark."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cogmap.geometry.se2 import integrate, transform_to
+from services.codelets.config import Config
+from services.codelets.correction.joint import by_side, optimize_jointly
+from services.codelets.correction.least_squares import optimize
+from services.codelets.correction.pose_graph import Constraints, PoseGraph
+from services.codelets.mapping.observations import Sightings
+
+SIDE = 20
+LAP = 4 * SIDE
+LANDMARKS = {"tower": np.array([10.0, 10.0]), "mill": np.array([25.0, 5.0])}
+STEP_VARIANCE = np.array([1e-3, 1e-3, 1e-5])
+SIGHTING_SD_M = 0.5
+NEARER_M = 1.0
+
+
+def _steps(laps: int, turn_error_rad: float = 0.0) -> Constraints:
+    """Metre by metre round a square, counter-clockwise."""
+    measurement = np.tile([1.0, 0.0, turn_error_rad], (laps * LAP, 1))
+    measurement[SIDE - 1 :: SIDE, 2] += np.pi / 2
+    information = np.tile(np.diag(1 / STEP_VARIANCE), (len(measurement), 1, 1))
+    at = np.arange(len(measurement))
+    return Constraints(at, at + 1, measurement, information)
+
+
+def _sightings(truth: np.ndarray) -> Sightings:
+    """Both landmarks from every place; each seems to stand nearer than it does, as a wide building
+    seems whose front alone is seen.
+    """
+    seen_m = []
+    for position_m in LANDMARKS.values():
+        where_m = transform_to(truth, position_m)
+        range_m = np.hypot(*where_m.T)
+        seen_m.append(where_m * (1 - NEARER_M / range_m)[:, None])
+
+    count = len(truth)
+    places = np.tile(np.arange(count), len(LANDMARKS))
+    landmark = np.repeat(np.arange(len(LANDMARKS)), count)
+    information = np.tile(np.eye(2) / SIGHTING_SD_M**2, (len(places), 1, 1))
+    return Sightings(tuple(LANDMARKS), places, landmark, np.vstack(seen_m), information)
+
+
+def _graph(steps: Constraints) -> PoseGraph:
+    poses = integrate(np.zeros(3), steps.measurement)
+    return PoseGraph(poses, steps, steps.select(slice(0, 0)))
+
+
+def _error_m(poses: np.ndarray, truth: np.ndarray) -> float:
+    return float(np.hypot(*(poses - truth)[:, :2].T).mean())
+
+
+def test_a_landmark_has_a_label_for_each_side_that_it_is_seen_from() -> None:
+    truth = _graph(_steps(1)).poses
+    sides = by_side(_sightings(truth), truth, 4)
+    of_tower = [label for label in sides.labels if label == "tower"]
+    assert len(of_tower) == 4
+    opposite = sides.landmark[[2, LAP // 2 + 2]]
+    assert opposite[0] != opposite[1]
+
+
+def test_with_one_side_a_landmark_stays_one() -> None:
+    truth = _graph(_steps(1)).poses
+    seen = _sightings(truth)
+    assert by_side(seen, truth, 1).landmark.tolist() == seen.landmark.tolist()
+
+
+@pytest.mark.parametrize("sides", [1, 16])
+def test_what_seems_elsewhere_from_each_side_bends_a_good_path_only_as_one_landmark(
+    sides: int,
+) -> None:
+    graph = _graph(_steps(1))
+    seen = _sightings(graph.poses)
+    poses, _ = optimize_jointly(graph, seen, Config(landmark_sides=sides))
+    bent_m = _error_m(poses, graph.poses)
+    assert bent_m > 0.2 if sides == 1 else bent_m < 0.1
+
+
+def test_sides_bind_the_second_lap_to_the_first() -> None:
+    truth = _graph(_steps(2)).poses
+    drifted = _graph(_steps(2, turn_error_rad=0.0005))
+    seen = _sightings(truth)
+    first = slice(0, LAP)
+    second = slice(LAP, 2 * LAP)
+
+    def gap_m(poses: np.ndarray) -> float:
+        return _error_m(poses[second], poses[first])
+
+    alone_m = gap_m(optimize(drifted))
+    joint, _ = optimize_jointly(drifted, seen, Config())
+    joint_m = gap_m(joint)
+    assert joint_m < 0.5 * alone_m
+
+
+def test_a_path_without_sightings_is_optimized_alone() -> None:
+    graph = _graph(_steps(1))
+    nothing = Sightings(
+        (), np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2)), np.zeros((0, 2, 2))
+    )
+    poses, _ = optimize_jointly(graph, nothing, Config())
+    assert poses == pytest.approx(optimize(graph))
