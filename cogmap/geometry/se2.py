@@ -16,13 +16,16 @@ FULL_TURN_RAD = 2 * np.pi
 
 def wrap_angle(angle_rad: Floats) -> Floats:
     """The same angles in (-pi, pi], any shape."""
-    wrapped: Floats = np.pi - (np.pi - angle_rad) % FULL_TURN_RAD
+    from_pi = (np.pi - angle_rad) % FULL_TURN_RAD
+    wrapped: Floats = np.pi - from_pi
     return wrapped
 
 
 def mean_angle(angles_rad: Floats) -> float:
     """The mean direction of (n,) angles, in radians."""
-    return float(np.arctan2(np.sin(angles_rad).mean(), np.cos(angles_rad).mean()))
+    sin = np.sin(angles_rad).mean()
+    cos = np.cos(angles_rad).mean()
+    return float(np.arctan2(sin, cos))
 
 
 def rotation_matrices(heading_rad: Floats) -> Floats:
@@ -39,46 +42,58 @@ def rotate(vectors: Floats, angle_rad: Floats | float) -> Floats:
     """(..., 2) vectors rotated counter-clockwise, all by one angle or each by its own (...)."""
     cos = np.cos(angle_rad)
     sin = np.sin(angle_rad)
+    x = vectors[..., 0]
+    y = vectors[..., 1]
 
-    x = cos * vectors[..., 0] - sin * vectors[..., 1]
-    y = sin * vectors[..., 0] + cos * vectors[..., 1]
-    return np.stack([x, y], axis=-1)
+    rotated_x = cos * x - sin * y
+    rotated_y = sin * x + cos * y
+    return np.stack([rotated_x, rotated_y], axis=-1)
 
 
 def polar(range_m: Floats, bearing_rad: Floats) -> Floats:
     """(..., 2) vectors as long as `range_m`, `bearing_rad` counter-clockwise from x."""
-    return np.stack([range_m * np.cos(bearing_rad), range_m * np.sin(bearing_rad)], axis=-1)
+    x = range_m * np.cos(bearing_rad)
+    y = range_m * np.sin(bearing_rad)
+    return np.stack([x, y], axis=-1)
 
 
 def transform_from(pose: Floats, points_m: Floats) -> Floats:
     """(..., 2) points of the frame of `pose`, in the frame that `pose` is given in."""
-    placed: Floats = pose[..., :2] + rotate(points_m, pose[..., 2])
+    rotated_m = rotate(points_m, pose[..., 2])
+    placed: Floats = pose[..., :2] + rotated_m
     return placed
 
 
 def transform_to(pose: Floats, points_m: Floats) -> Floats:
     """(..., 2) points of the frame that `pose` is given in, in the frame of `pose`."""
-    return rotate(points_m - pose[..., :2], -pose[..., 2])
+    offset_m = points_m - pose[..., :2]
+    return rotate(offset_m, -pose[..., 2])
 
 
 def compose(pose: Floats, step: Floats) -> Floats:
     """The pose that is `step` in the frame of `pose`, (..., 3)."""
     position_m = transform_from(pose, step[..., :2])
-    heading_rad = wrap_angle(pose[..., 2] + step[..., 2])
-    return np.concatenate([position_m, heading_rad[..., None]], axis=-1)
+    heading_rad = pose[..., 2] + step[..., 2]
+    return _pose(position_m, heading_rad)
 
 
 def relative(origin: Floats, pose: Floats) -> Floats:
     """`pose` in the frame of `origin`, (..., 3); `compose` undoes it."""
     position_m = transform_to(origin, pose[..., :2])
-    heading_rad = wrap_angle(pose[..., 2] - origin[..., 2])
-    return np.concatenate([position_m, heading_rad[..., None]], axis=-1)
+    heading_rad = pose[..., 2] - origin[..., 2]
+    return _pose(position_m, heading_rad)
+
+
+def _pose(position_m: Floats, heading_rad: Floats) -> Floats:
+    wrapped = wrap_angle(heading_rad)
+    return np.concatenate([position_m, wrapped[..., None]], axis=-1)
 
 
 def move_with(points_m: Floats, before: Floats, after: Floats) -> Floats:
     """(..., 2) points that stand to the poses `after` as they stood to the poses `before`."""
     turned_rad = after[..., 2] - before[..., 2]
-    moved: Floats = after[..., :2] + rotate(points_m - before[..., :2], turned_rad)
+    offset_m = points_m - before[..., :2]
+    moved: Floats = after[..., :2] + rotate(offset_m, turned_rad)
     return moved
 
 
@@ -101,11 +116,14 @@ def mean_pose(poses: Floats) -> Floats:
     mean: Floats = (weights @ poses)[:3]
 
     headings_rad = np.ascontiguousarray(poses[:, 2])
-    mean[2] = np.arctan2(weights @ np.sin(headings_rad), weights @ np.cos(headings_rad))
+    sin = weights @ np.sin(headings_rad)
+    cos = weights @ np.cos(headings_rad)
+    mean[2] = np.arctan2(sin, cos)
     return mean
 
 
 def cumulative(values: Floats) -> Floats:
     """(n + 1, ...): sums of the first 0, 1, ... n of (n, ...) values."""
-    nothing = np.zeros((1, *values.shape[1:]))
-    return np.concatenate([nothing, np.cumsum(values, axis=0)])
+    zero = np.zeros((1, *values.shape[1:]))
+    sums = np.cumsum(values, axis=0)
+    return np.concatenate([zero, sums])

@@ -56,14 +56,20 @@ def by_side(seen: Sightings, poses: Floats, sides: int) -> Sightings:
     """The same sightings with a landmark for each of so many sides, by the direction in which the
     landmark is seen in the world.
     """
-    bearing_rad = np.arctan2(seen.where_m[:, 1], seen.where_m[:, 0])
+    side = _sides(seen, poses, sides)
+    keys, landmark = np.unique(seen.landmark * sides + side, return_inverse=True)
+
+    of_side = (keys // sides).tolist()
+    labels = tuple(seen.labels[number] for number in of_side)
+    return seen._replace(labels=labels, landmark=landmark)
+
+
+def _sides(seen: Sightings, poses: Floats, sides: int) -> Indices:
+    """(m,): from which side each sighting is, 0 to `sides` - 1."""
+    forward_m, left_m = seen.where_m.T
+    bearing_rad = np.arctan2(left_m, forward_m)
     direction_rad = poses[seen.place, 2] + bearing_rad
-    side = np.rint(direction_rad / FULL_TURN_RAD * sides).astype(np.int64) % sides
 
-    numbers, landmark = np.unique(seen.landmark * sides + side, return_inverse=True)
-    labels = tuple(seen.labels[number // sides] for number in numbers.tolist())
-    return seen._replace(labels=labels, landmark=_indices(landmark))
-
-
-def _indices(numbers: Indices) -> Indices:
-    return np.asarray(numbers, np.int64).ravel()
+    sector = np.rint(direction_rad / FULL_TURN_RAD * sides)
+    side: Indices = sector.astype(np.int64) % sides
+    return side

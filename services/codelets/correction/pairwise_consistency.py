@@ -90,30 +90,46 @@ class _DeadReckoning:
 
     def __init__(self, steps: Constraints) -> None:
         self.poses = integrate(np.zeros(3), steps.measurement)
-        lengths_m = np.hypot(*steps.measurement[:, :2].T)
+        lengths_m = _lengths(steps.measurement[:, :2])
+        step_m2 = 1 / steps.information[:, 0, 0]
+        step_rad2 = 1 / steps.information[:, 2, 2]
+
         self._length_m = cumulative(lengths_m)
-        self._variance_m2 = cumulative(1 / steps.information[:, 0, 0])
-        self._variance_rad2 = cumulative(1 / steps.information[:, 2, 2])
+        self._variance_m2 = cumulative(step_m2)
+        self._variance_rad2 = cumulative(step_rad2)
 
     def between_m(self, one: Indices, one_m: Floats, other: Indices, other_m: Floats) -> Floats:
         """(m,): the distance between points seen from two places each, given in their frames."""
         first_m = transform_from(self.poses[one], one_m)
         second_m = transform_from(self.poses[other], other_m)
-        return np.asarray(np.hypot(*(first_m - second_m).T))
+        return _lengths(first_m - second_m)
 
     def variance_m2(self, one: Indices, one_m: Floats, other: Indices, other_m: Floats) -> Floats:
         """(m,): the variance of `between_m`: of the steps, and of the turns at their lever arm."""
-        length_m = np.abs(self._length_m[one] - self._length_m[other])
-        position_m2 = np.abs(self._variance_m2[one] - self._variance_m2[other])
-        lever_arm_m = np.maximum(np.hypot(*one_m.T), np.hypot(*other_m.T))
-
+        length_m = _between(self._length_m, one, other)
+        lever_arm_m = np.maximum(_lengths(one_m), _lengths(other_m))
         lever_m2 = length_m**2 / 3 + lever_arm_m**2
-        variance: Floats = position_m2 + self.variance_rad2(one, other) * lever_m2
-        return variance
+
+        by_steps_m2 = _between(self._variance_m2, one, other)
+        by_turns_m2 = self.variance_rad2(one, other) * lever_m2
+        variance_m2: Floats = by_steps_m2 + by_turns_m2
+        return variance_m2
 
     def variance_rad2(self, one: Indices, other: Indices) -> Floats:
         """(m,): the variance of the heading between two places each."""
-        return np.abs(self._variance_rad2[one] - self._variance_rad2[other])
+        return _between(self._variance_rad2, one, other)
+
+
+def _between(summed: Floats, one: Indices, other: Indices) -> Floats:
+    """(m,): how much a running sum changes between two places each, in either direction."""
+    change = summed[one] - summed[other]
+    return np.asarray(np.abs(change))
+
+
+def _lengths(vectors: Floats) -> Floats:
+    """(m,): the lengths of (m, 2) vectors."""
+    x, y = vectors.T
+    return np.asarray(np.hypot(x, y))
 
 
 def _agree(one: Views, other: Views, path: _DeadReckoning, false_closure: float) -> Booleans:
@@ -121,15 +137,20 @@ def _agree(one: Views, other: Views, path: _DeadReckoning, false_closure: float)
     there = (one.i, one.there_m, other.i, other.there_m)
     here = (one.j, one.here_m, other.j, other.here_m)
     difference_m = path.between_m(*there) - path.between_m(*here)
+
     path_m2 = path.variance_m2(*there) + path.variance_m2(*here)
-    squared = difference_m**2 / (one.sd_m**2 + other.sd_m**2 + path_m2)
+    variance_m2 = one.sd_m**2 + other.sd_m**2 + path_m2
+    squared = difference_m**2 / variance_m2
 
     has_heading = (one.sd_rad > 0) & (other.sd_rad > 0)
     squared += np.where(has_heading, _turn_squared(one, other, path), 0.0)
 
     degrees = np.where(has_heading, 3, 2)
-    comparable = (path_m2 <= MAX_SD_M**2) & (one.j != other.j)
-    agree: Booleans = comparable & (squared <= chdtri(degrees, false_closure))
+    is_consistent = squared <= chdtri(degrees, false_closure)
+
+    is_near = path_m2 <= MAX_SD_M**2
+    is_apart = one.j != other.j
+    agree: Booleans = is_consistent & is_near & is_apart
     return agree
 
 
@@ -140,7 +161,10 @@ def _turn_squared(one: Views, other: Views, path: _DeadReckoning) -> Floats:
     there = headings[one.i] - headings[other.i]
     turned = wrap_angle(here - there)
 
-    path_rad2 = path.variance_rad2(one.i, other.i) + path.variance_rad2(one.j, other.j)
-    variance = one.sd_rad**2 + other.sd_rad**2 + path_rad2
-    squared: Floats = turned**2 / np.maximum(variance, 1e-12)
+    there_rad2 = path.variance_rad2(one.i, other.i)
+    here_rad2 = path.variance_rad2(one.j, other.j)
+    seen_rad2 = one.sd_rad**2 + other.sd_rad**2
+    variance_rad2 = seen_rad2 + there_rad2 + here_rad2
+
+    squared: Floats = turned**2 / np.maximum(variance_rad2, 1e-12)
     return squared

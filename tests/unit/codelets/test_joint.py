@@ -71,7 +71,7 @@ def test_with_one_side_a_landmark_stays_one() -> None:
 
 
 @pytest.mark.parametrize("sides", [1, 16])
-def test_what_seems_elsewhere_from_each_side_bends_a_good_path_only_as_one_landmark(
+def test_a_bias_by_side_bends_a_good_path_only_as_a_single_landmark(
     sides: int,
 ) -> None:
     graph = _graph(_steps(1))

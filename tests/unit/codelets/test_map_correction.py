@@ -63,9 +63,7 @@ def _path_error_m(drive: LoopDrive) -> float:
     return float(np.hypot(*(rows[:, POSE][:, :2] - drive.poses[frames, :2]).T).mean())
 
 
-def test_the_path_has_a_place_for_every_metre_and_the_steps_between_as_path_integration_had_them() -> (
-    None
-):
+def test_the_path_has_places_at_its_spacing_and_steps_by_path_integration() -> None:
     drive = LoopDrive()
     drive.go(70, {})
     path = list(drive.desk.graph.of_kind(PathSegment))
@@ -86,7 +84,7 @@ def test_an_agent_that_stands_still_adds_nothing_to_its_path() -> None:
 
 
 @pytest.mark.parametrize("by", ["landmark", "view"])
-def test_a_place_met_again_corrects_the_path_the_agent_and_the_objects_on_the_way(by: str) -> None:
+def test_a_closed_loop_corrects_the_path_the_agent_and_its_objects(by: str) -> None:
     drive = _round_once(LoopDrive())
     before_m = drive.error_m()
     path_m = _path_error_m(drive)
@@ -105,7 +103,7 @@ def test_a_place_met_again_corrects_the_path_the_agent_and_the_objects_on_the_wa
     assert (tower.x_m, tower.y_m) == pytest.approx(TOWER["tower"], abs=0.5)
 
 
-def test_headings_are_corrected_too_where_that_is_asked_for_and_only_there() -> None:
+def test_headings_are_corrected_only_where_configured() -> None:
     errors = {}
     for correct in ("positions", "heading"):
         drive = _round_once(
@@ -118,7 +116,7 @@ def test_headings_are_corrected_too_where_that_is_asked_for_and_only_there() -> 
     assert errors["heading"] < 0.8 * errors["positions"]
 
 
-def test_road_moves_with_the_way_that_it_lies_along() -> None:
+def test_road_moves_with_the_path_that_it_lies_along() -> None:
     drive = _round_once(LoopDrive())
     drive.meet(3)
     drive.go(5, {})
@@ -131,7 +129,7 @@ def test_road_moves_with_the_way_that_it_lies_along() -> None:
     assert on_road.max() < 1.5
 
 
-def test_the_agent_goes_on_while_a_loop_is_corrected_and_keeps_what_it_writes_meanwhile() -> None:
+def test_what_the_agent_writes_during_a_correction_is_kept() -> None:
     drive = _round_once(LoopDrive(background_cycles=4))
     desk = drive.desk
     drive.meet(3)
@@ -151,7 +149,7 @@ def test_the_agent_goes_on_while_a_loop_is_corrected_and_keeps_what_it_writes_me
     assert all(not delta.reasons for delta in desk.deltas)
 
 
-def test_in_lockstep_the_answer_is_waited_for_at_its_cycle_and_not_taken_before() -> None:
+def test_lockstep_commits_the_correction_at_its_cycle_and_not_before() -> None:
     drive = _round_once(LoopDrive(background_cycles=2))
     desk = drive.desk
     desk.withhold = "map_correction"
@@ -167,7 +165,7 @@ def test_in_lockstep_the_answer_is_waited_for_at_its_cycle_and_not_taken_before(
     assert desk.deltas[-1].cycle == cycle + 2
 
 
-def test_in_real_time_the_cycle_goes_on_without_the_answer_and_others_do_its_work() -> None:
+def test_real_time_continues_without_the_correction_by_other_workers() -> None:
     drive = _round_once(LoopDrive(mode="real_time", workers=2))
     desk = drive.desk
     desk.withhold = "map_correction"
@@ -182,7 +180,7 @@ def test_in_real_time_the_cycle_goes_on_without_the_answer_and_others_do_its_wor
     assert _accepted(desk) == [True] * 3
 
 
-def test_the_same_drive_gives_the_same_bytes_whatever_the_number_of_workers() -> None:
+def test_the_same_drive_gives_the_same_graph_with_any_number_of_workers() -> None:
     digests = []
     for workers in (1, 3):
         drive = _round_once(LoopDrive(workers=workers))
@@ -193,7 +191,7 @@ def test_the_same_drive_gives_the_same_bytes_whatever_the_number_of_workers() ->
 
 
 @pytest.mark.parametrize("by", ["landmark", "view"])
-def test_one_view_of_another_place_than_it_seems_never_moves_the_map(by: str) -> None:
+def test_one_view_mistaken_for_another_place_never_moves_the_map(by: str) -> None:
     believed = []
     for mistaken in (False, True):
         drive = _round_once(LoopDrive())
@@ -209,7 +207,7 @@ def test_one_view_of_another_place_than_it_seems_never_moves_the_map(by: str) ->
     assert believed[1] == pytest.approx(believed[0], abs=1e-6)
 
 
-def test_one_false_view_among_true_ones_does_not_hold() -> None:
+def test_one_false_view_among_true_ones_is_rejected() -> None:
     drive = _round_once(LoopDrive())
     drive.meet(2)
     drive.go(1, {}, match=40)
@@ -220,7 +218,7 @@ def test_one_false_view_among_true_ones_does_not_hold() -> None:
     assert len(judged) == 5
 
 
-def test_two_views_are_too_few_to_agree() -> None:
+def test_two_views_are_too_few_to_close_a_loop() -> None:
     drive = _round_once(LoopDrive())
     before_m = drive.error_m()
     drive.meet(2)
@@ -229,7 +227,7 @@ def test_two_views_are_too_few_to_agree() -> None:
     assert drive.error_m() == pytest.approx(before_m, abs=0.5)
 
 
-def test_closures_that_agree_but_cannot_be_true_do_not_hold() -> None:
+def test_closures_that_agree_beyond_possible_drift_are_rejected() -> None:
     drive = LoopDrive()
     drive.go(LAP // 2, {})
     before_m = drive.error_m()
@@ -242,7 +240,7 @@ def test_closures_that_agree_but_cannot_be_true_do_not_hold() -> None:
     assert CORRECTION_ID not in drive.desk.graph.nodes
 
 
-def test_closures_that_were_believed_are_undone_when_those_after_them_speak_against_them() -> None:
+def test_accepted_closures_are_undone_when_later_ones_contradict_them() -> None:
     drive = _round_once(LoopDrive())
     # Sixteen metres off: not more than path integration may have been wrong by.
     drive.meet(3, late=8)
@@ -279,7 +277,7 @@ def test_a_replay_counts_the_replays_of_the_rule_that_was_applied() -> None:
     assert _replay(_round_once(LoopDrive(with_headings))).replays == 1 + ROUNDS
 
 
-def test_a_replay_goes_backwards_from_the_place_met_again_and_shifts_each_place_less() -> None:
+def test_a_replay_runs_backwards_and_shifts_each_place_less_than_the_last() -> None:
     replay = _replay(_round_once(LoopDrive()))
     stamps = replay.stamps_ns.numpy().astype(np.int64)
     assert (np.diff(stamps) < 0).all()
@@ -291,9 +289,7 @@ def test_a_replay_goes_backwards_from_the_place_met_again_and_shifts_each_place_
     assert (len(replay.closed), replay.undone) == (3, [])
 
 
-def test_the_synapse_of_two_fields_of_one_place_grows_with_how_far_the_fields_shift_together() -> (
-    None
-):
+def test_the_synapse_of_two_fields_grows_as_they_shift_together() -> None:
     replay = _replay(_round_once(LoopDrive()))
     pairs = replay.pairs.numpy().astype(int)
     changes = np.asarray(replay.strength_changes.numpy(), np.float64)

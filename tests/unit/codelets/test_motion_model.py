@@ -75,7 +75,7 @@ def _off_m(agent: Self, true: Pose) -> float:
 CONFIG = Config(correlated_views=1.0)
 
 
-def test_an_agent_that_is_carried_away_finds_itself_by_the_landmarks_that_it_sees_there() -> None:
+def test_a_kidnapped_agent_relocalizes_by_landmarks_in_view() -> None:
     agent = _agent()
     labels = ("mill", "tower", "church")
     true = (60.0, -40.0, 2.0)
@@ -88,9 +88,7 @@ def test_an_agent_that_is_carried_away_finds_itself_by_the_landmarks_that_it_see
     assert not agent.is_lost
 
 
-def test_an_agent_that_is_carried_away_finds_itself_by_landmarks_that_it_sees_one_at_a_time() -> (
-    None
-):
+def test_a_kidnapped_agent_relocalizes_by_landmarks_seen_one_at_a_time() -> None:
     loop = LocalizationLoop((0.0, 0.0, 0.0), PLACES)
     labels = tuple(PLACES)
     true = (60.0, -40.0, 2.0)
@@ -102,7 +100,7 @@ def test_an_agent_that_is_carried_away_finds_itself_by_landmarks_that_it_sees_on
     assert math.dist(loop.pose[:2], true[:2]) < 2.0
 
 
-def test_the_way_that_an_agent_was_carried_counts_as_a_step_of_its_path() -> None:
+def test_the_distance_that_an_agent_was_carried_is_a_step_of_its_path() -> None:
     agent = _agent()
     labels = ("mill", "tower")
     true = (-20.0, 30.0, 2.0)
@@ -116,7 +114,7 @@ def test_the_way_that_an_agent_was_carried_counts_as_a_step_of_its_path() -> Non
     assert odometry_m == pytest.approx((agent.x_m, agent.y_m), abs=5.0)
 
 
-def test_ranges_alone_to_three_landmarks_tell_the_position() -> None:
+def test_ranges_alone_to_three_landmarks_give_the_position() -> None:
     true = (1.5, 0.8, 0.0)
     labels = ("mill", "tower", "church")
     agent = _agent((0.0, 0.0, 0.0), (1.0, 1.0, 0.01))
@@ -125,7 +123,7 @@ def test_ranges_alone_to_three_landmarks_tell_the_position() -> None:
     assert _off_m(found, true) < 0.4
 
 
-def test_bearings_alone_to_three_landmarks_tell_the_position() -> None:
+def test_bearings_alone_to_three_landmarks_give_the_position() -> None:
     true = (1.5, 0.8, 0.0)
     labels = ("mill", "tower", "church")
     agent = _agent((0.0, 0.0, 0.0), (1.0, 1.0, 0.01))
@@ -135,7 +133,7 @@ def test_bearings_alone_to_three_landmarks_tell_the_position() -> None:
 
 
 @pytest.mark.parametrize("alone", [UNKNOWN_BEARING, {"range_sd_m": 1e3}], ids=["range", "bearing"])
-def test_a_new_landmark_that_is_seen_by_one_sense_alone_is_found_from_several_places(
+def test_range_or_bearing_alone_places_a_new_landmark_from_several_places(
     alone: dict[str, float],
 ) -> None:
     config = Config(correlated_views=1.0, landmark_samples=4000)
@@ -156,7 +154,7 @@ def test_a_new_landmark_that_is_seen_by_one_sense_alone_is_found_from_several_pl
     assert (landmark.x_m, landmark.y_m) == pytest.approx(PLACES["mill"], abs=1.5)
 
 
-def test_wheels_that_slip_all_the_time_are_found_out_by_landmarks() -> None:
+def test_landmarks_calibrate_wheels_that_always_slip() -> None:
     def off_m(speed_gain_sd: float) -> float:
         config = Config(
             samples=1000,

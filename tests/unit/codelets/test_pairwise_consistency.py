@@ -39,7 +39,7 @@ def _agreeing(views: Views) -> list[bool]:
     return agrees
 
 
-def test_three_views_of_one_landmark_agree_wherever_path_integration_has_led_meanwhile() -> None:
+def test_three_views_of_a_landmark_agree_whatever_the_drift_between_passes() -> None:
     assert _agreeing(_views((2, 57), (4, 59), (6, 61))) == [True] * 3
 
 
@@ -48,7 +48,7 @@ def test_two_views_or_three_from_one_place_are_too_few() -> None:
     assert _agreeing(_views((2, 57), (4, 57), (6, 57))) == [False] * 3
 
 
-def test_a_view_that_leads_elsewhere_agrees_with_none_and_spoils_none() -> None:
+def test_a_view_of_elsewhere_agrees_with_none_and_spoils_none() -> None:
     assert _agreeing(_views((2, 57), (4, 59), (6, 61), (8, 63), off_m=40.0)) == [
         True,
         True,
@@ -58,11 +58,11 @@ def test_a_view_that_leads_elsewhere_agrees_with_none_and_spoils_none() -> None:
     assert _agreeing(_views((2, 57), (4, 59), (6, 61), off_m=40.0)) == [False] * 3
 
 
-def test_nothing_agrees_where_there_is_nothing() -> None:
+def test_without_views_none_agree() -> None:
     assert _agreeing(_views((2, 57), (4, 59)).select(np.zeros(2, bool))) == []
 
 
-def test_a_landmark_tells_where_the_agent_stands_around_it_but_not_how_it_is_turned() -> None:
+def test_a_landmark_constrains_the_position_around_it_but_not_the_heading() -> None:
     views = _views((2, 57))
     made = constraints_of(views, _rows()[:, 1:4])
     away = np.array([[0.1, 0.0, 0.0], [0.0, 0.1, 0.0]])

@@ -86,7 +86,7 @@ def _error_m(poses: np.ndarray, truth: np.ndarray) -> float:
     return float(np.sqrt(((poses - truth)[:, :2] ** 2).sum(axis=1).mean()))
 
 
-def test_one_loop_is_closed_by_eq_9_each_place_by_the_share_of_the_way_before_it() -> None:
+def test_eq_9_shifts_each_place_by_the_share_of_variance_before_it() -> None:
     straight = _followed(np.zeros(3), np.array([(1.0, 0.0, 0.0)] * 10))
     at = np.arange(10)
     sd = np.ones(3)
@@ -102,7 +102,7 @@ def test_one_loop_is_closed_by_eq_9_each_place_by_the_share_of_the_way_before_it
     assert found.replays == 1
 
 
-def test_an_uncertain_closure_moves_the_path_by_its_precision_against_path_integrations() -> None:
+def test_an_uncertain_closure_moves_the_path_by_its_share_of_precision() -> None:
     at = np.arange(4)
     straight = _followed(np.zeros(3), np.array([(1.0, 0.0, 0.0)] * 4))
     steps = _between(at, at + 1, np.array([(1.0, 0.0, 0.0)] * 4), np.ones(3))
@@ -114,7 +114,7 @@ def test_an_uncertain_closure_moves_the_path_by_its_precision_against_path_integ
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_replays_of_many_overlapping_loops_come_to_exact_least_squares(seed: int) -> None:
+def test_replays_of_overlapping_loops_converge_to_least_squares(seed: int) -> None:
     _, graph, _ = _laps(seed=seed, false=2)
     exact = best_positions(graph)
     known = displacements(graph.poses, graph.constraints)
@@ -129,7 +129,7 @@ def test_replays_of_many_overlapping_loops_come_to_exact_least_squares(seed: int
     assert loose.replays < close.replays
 
 
-def test_the_costs_that_end_the_replays_are_eq_7_and_a_bound_below_its_least() -> None:
+def test_the_costs_that_end_replay_are_eq_7_and_a_lower_bound_of_it() -> None:
     _, graph, _ = _laps()
     loops = Loops(graph)
     known = displacements(graph.poses, graph.constraints)
@@ -142,7 +142,7 @@ def test_the_costs_that_end_the_replays_are_eq_7_and_a_bound_below_its_least() -
     assert bound < least < total
 
 
-def test_a_loop_told_backwards_is_the_same_loop() -> None:
+def test_a_closure_measured_backwards_is_the_same_closure() -> None:
     _, graph, _ = _laps()
     headings = graph.poses[:, 2]
     ends = graph.closures
@@ -157,7 +157,7 @@ def test_a_loop_told_backwards_is_the_same_loop() -> None:
     assert backwards.positions_m == pytest.approx(close_loops(graph, 1e-6).positions_m, abs=1e-2)
 
 
-def test_headings_and_the_first_position_stay_and_without_loops_all_does() -> None:
+def test_reverse_replay_keeps_headings_and_the_first_position() -> None:
     _, graph, _ = _laps()
     assert close_loops(graph).positions_m[0] == pytest.approx(graph.poses[0, :2])
     alone = PoseGraph(graph.poses, graph.steps, graph.closures.select(slice(0, 0)))
@@ -188,7 +188,7 @@ def test_the_jacobians_are_those_of_finite_differences() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_correcting_headings_too_comes_nearer_to_the_truth_and_to_a_minimum(seed: int) -> None:
+def test_optimizing_headings_comes_nearer_to_the_truth_at_a_minimum(seed: int) -> None:
     truth, graph, _ = _laps(seed=seed)
     poses = optimize(graph)
     assert _error_m(poses, truth) < 0.5 * _error_m(graph.poses, truth)
@@ -213,7 +213,7 @@ def test_one_more_closure_is_taken_in_as_if_all_had_been_solved_together() -> No
     assert solved.graph.poses == pytest.approx(together, abs=2e-2)
 
 
-def test_a_closure_that_turns_the_path_far_is_solved_anew() -> None:
+def test_a_closure_that_turns_the_path_far_is_optimized_anew() -> None:
     _, graph, _ = _laps(laps=2)
     alone = PoseGraph(graph.poses, graph.steps, graph.closures.select(slice(0, 0)))
     solved = IncrementalSolver(alone)
@@ -223,7 +223,7 @@ def test_a_closure_that_turns_the_path_far_is_solved_anew() -> None:
     assert cost(poses, solved.graph.constraints) <= 1.02 * cost(together, solved.graph.constraints)
 
 
-def test_what_a_closure_leaves_undone_is_done_when_there_is_time(
+def test_relinearizing_completes_what_added_closures_left_undone(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     _, graph, _ = _laps(laps=2)
@@ -239,9 +239,7 @@ def test_what_a_closure_leaves_undone_is_done_when_there_is_time(
     assert cost(hasty.graph.poses, graph.steps + far) == pytest.approx(least, rel=0.02)
 
 
-def test_a_root_times_its_transpose_is_the_information_though_nothing_is_known_of_the_heading() -> (
-    None
-):
+def test_sqrt_information_is_a_root_of_singular_information_too() -> None:
     random = np.random.default_rng(0).normal(size=(4, 3, 3))
     information = random @ random.transpose(0, 2, 1)
     information[2, 2, :] = information[2, :, 2] = 0.0
@@ -266,7 +264,7 @@ def test_a_closures_chi_square_is_what_it_adds_to_the_cost() -> None:
 
 @pytest.mark.parametrize("false", [0, 1, 5, 12])
 @pytest.mark.parametrize("headings", [True, False])
-def test_false_closures_are_undone_and_the_true_ones_hold(false: int, headings: bool) -> None:
+def test_false_closures_are_outliers_and_true_ones_inliers(false: int, headings: bool) -> None:
     for seed in range(2):
         truth, graph, true = _laps(seed=seed, false=false)
         if not headings:
@@ -279,14 +277,14 @@ def test_false_closures_are_undone_and_the_true_ones_hold(false: int, headings: 
         assert _error_m(optimize(kept), truth) < 1.2 * _error_m(optimize(best), truth) + 0.05
 
 
-def test_a_lone_true_closure_after_a_long_way_holds_and_one_beyond_all_drift_does_not() -> None:
+def test_a_lone_closure_is_an_inlier_within_drift_and_an_outlier_beyond() -> None:
     _, graph, _ = _laps(laps=2)
     for off_m, holds in ((0.0, True), (60.0, False)):
         closure = _between(np.array([0]), np.array([80]), np.array([[off_m, 0.0, 0.0]]), CLOSURE_SD)
         assert inliers(PoseGraph(graph.poses, graph.steps, closure), 1e-3).tolist() == [holds]
 
 
-def test_discrepancies_of_headings_are_the_short_way_round() -> None:
+def test_residuals_of_headings_are_wrapped() -> None:
     poses = np.array([[0.0, 0.0, 3.0], [0.0, 0.0, -3.0]])
     known = _between(np.array([0]), np.array([1]), np.zeros((1, 3)), np.ones(3))
     assert residuals(poses, known)[0, 2] == pytest.approx(2 * np.pi - 6.0)
