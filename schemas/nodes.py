@@ -200,8 +200,7 @@ class Object(GraphNode, kw_only=True, frozen=True, tag="object"):
     to a thousandth of their spread. `sightings` is
     the number of views that agree with the position, `misses` that of views in a row that did not.
     One that is `surveyed` was given, and stays where it is. `last_seen_ns` and `created_ns` are
-    times of views; `placed_variance_m2` and `placed_variance_rad2` are the self's variances of path
-    integration at the latter, whose error it shares.
+    times of views.
     """
 
     label: Name
@@ -216,8 +215,6 @@ class Object(GraphNode, kw_only=True, frozen=True, tag="object"):
     misses: Count = 0
     last_seen_ns: Stamp = NEVER_NS
     created_ns: Stamp = 0
-    placed_variance_m2: Spread = 0.0
-    placed_variance_rad2: Spread = 0.0
     surveyed: bool = False
     salience: Annotated[float, msgspec.Meta(ge=-1, le=1)] = 0.0
     offsets_m: Matrix | None = None

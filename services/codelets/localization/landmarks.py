@@ -107,12 +107,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     if misses < min(config.misses, record.sightings + 1):
         record = Record(record.sightings, misses)
         return _kept_answer(task, graph, landmark, record)
-    anew = msgspec.structs.replace(
-        landmark,
-        created_ns=task.stamp_ns,
-        placed_variance_m2=agent.odometry_variance_m2,
-        placed_variance_rad2=agent.odometry_variance_rad2,
-    )
+    anew = msgspec.structs.replace(landmark, created_ns=task.stamp_ns)
     positions_m = first_positions(selves, percept, config, rng)
     return object_answer(task, graph, anew, positions_m, FIRST)
 

@@ -52,7 +52,7 @@ from services.codelets.localization.sampling import (
     resample,
     tempering_exponent,
 )
-from services.codelets.mapping.path import odometry_of, variances_of
+from services.codelets.mapping.path import odometry_of, variances_at, variances_of
 
 INFLATION = 1.5
 MAX_INFLATIONS = 6
@@ -116,7 +116,8 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     variances = variances_of(agent) + np.square(moved_sd).sum(axis=0)
     found = past
     if seen is not None:
-        weights = novelty(moved, seen, variances) / config.correlated_views
+        since = variances - _placed(graph, seen)
+        weights = novelty(moved, seen, since) / config.correlated_views
         found = _correct(past, seen, weights, config, rng)
 
     gains = found.samples[:, POSE_COLUMNS:].mean(axis=0)
@@ -154,6 +155,16 @@ CODELET = Codelet(
     config=Config,
     section=SECTION,
 )
+
+
+def _placed(graph: Graph, seen: Sighting) -> Samples:
+    """(k, 2): path integration's variances at which each landmark in view was placed."""
+    placed = []
+    for label in seen.labels:
+        landmark = graph.get(Object, object_id(label))
+        created_ns = NEVER_NS if landmark is None else landmark.created_ns
+        placed.append(variances_at(graph, created_ns))
+    return np.array(placed)
 
 
 def _stationary_since(agent: Self, moves: bool) -> int:

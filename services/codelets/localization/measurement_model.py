@@ -18,8 +18,6 @@ from services.codelets.localization.sampling import centred
 
 MAX_SD_SHARE = 0.5
 MIN_SIGHTINGS = 2
-# A surveyed landmark has no error in common with the agent's path.
-SURVEYED = np.full(2, -np.inf)
 FULL_TURN_RAD = np.float32(2 * np.pi)
 # Beyond this squared distance densities would be denormal numbers, with which everything is slow.
 MAX_MAHALANOBIS2 = np.float32(150.0)
@@ -28,16 +26,14 @@ MAX_MAHALANOBIS2 = np.float32(150.0)
 class Sighting(NamedTuple):
     """k known landmarks in view: where each is believed to be and where it is seen.
 
-    `mean_m` (k, 2) and `covariance_m2` (k, 2, 2) are of the landmark on the map, and `placed` (k,
-    2) the variances of path integration, in m^2 and rad^2, at which it was placed there. The rest,
-    (k,) each, is of the percept: a bearing is unknown where its standard deviation is at least a
-    half turn, a range where it is at least the range.
+    `mean_m` (k, 2) and `covariance_m2` (k, 2, 2) are of the landmark on the map; the rest, (k,)
+    each, of the percept. A bearing is unknown where its standard deviation is at least a half turn,
+    a range where it is at least the range.
     """
 
     labels: tuple[str, ...]
     mean_m: Floats
     covariance_m2: Floats
-    placed: Floats
     bearing_rad: Floats
     range_m: Floats
     bearing_sd_rad: Floats
@@ -134,9 +130,9 @@ def _single(numbers: Floats) -> Singles:
     return numbers.astype(np.float32)
 
 
-def novelty(samples: Floats, seen: Sighting, variances: Floats) -> Floats:
+def novelty(samples: Floats, seen: Sighting, since: Floats) -> Floats:
     """(k,): the share, 0 to 1, of the uncertainty of (n, 7) samples' position that came since each
-    landmark was placed; `variances` (2,) are those of path integration now, in m^2 and rad^2.
+    landmark was placed: `since` (k, 2), by path integration's variances in m^2 and rad^2.
 
     A landmark was placed from where the agent took itself to be, and shares the error of that. It
     can correct only the error that came since; taken for independent, it would pull the agent after
@@ -146,7 +142,7 @@ def novelty(samples: Floats, seen: Sighting, variances: Floats) -> Floats:
     variances_m2 = np.square(deviations).mean(axis=0)
     position_m2 = max(float(variances_m2.sum()), 1e-9)
 
-    since_m2, since_rad2 = (variances - seen.placed).T
+    since_m2, since_rad2 = since.T
     by_turns_m2 = since_rad2 * seen.range_m**2
     share: Floats = (2 * since_m2 + by_turns_m2) / position_m2
     return share.clip(0.0, 1.0)
@@ -166,13 +162,10 @@ def log_likelihood(density: Singles, outlier: float, weights: Floats | None = No
 
 
 class Landmark(NamedTuple):
-    """A landmark on the map: the mean (2,) and covariance (2, 2) of its position, and the variances
-    (2,) of path integration at which it was placed.
-    """
+    """A landmark on the map: the mean (2,) and covariance (2, 2) of its position."""
 
     mean_m: Floats
     covariance_m2: Floats
-    placed: Floats
 
 
 def sightings(
@@ -211,7 +204,6 @@ def _sighting(chosen: list[tuple[Percept, Landmark]]) -> Sighting:
         labels=tuple(percept.label for percept in percepts),
         mean_m=np.array([landmark.mean_m for landmark in landmarks]),
         covariance_m2=np.array([landmark.covariance_m2 for landmark in landmarks]),
-        placed=np.array([landmark.placed for landmark in landmarks]),
         bearing_rad=np.array([percept.bearing_rad for percept in percepts]),
         range_m=np.array([percept.range_m for percept in percepts]),
         bearing_sd_rad=np.array([percept.bearing_sd_rad for percept in percepts]),
@@ -224,11 +216,7 @@ def _landmark(node: Object) -> Landmark:
     mean_m = np.full(len(samples), 1 / len(samples)) @ samples
     offset_m = samples - mean_m
     covariance_m2 = offset_m.T @ offset_m / max(1, len(samples) - 1)
-
-    placed = np.array([node.placed_variance_m2, node.placed_variance_rad2], np.float64)
-    if node.surveyed:
-        placed = SURVEYED
-    return Landmark(mean_m, covariance_m2, placed)
+    return Landmark(mean_m, covariance_m2)
 
 
 def _informs(node: Object, stationary_since_ns: int) -> bool:

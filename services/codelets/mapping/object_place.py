@@ -56,8 +56,6 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         x_m=agent.x_m,
         y_m=agent.y_m,
         created_ns=task.stamp_ns,
-        placed_variance_m2=agent.odometry_variance_m2,
-        placed_variance_rad2=agent.odometry_variance_rad2,
     )
     positions_m = first_positions(selves, percept, config, rng)
     return object_answer(task, graph, node, positions_m, FIRST)

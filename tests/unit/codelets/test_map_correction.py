@@ -22,7 +22,7 @@ from schemas.nodes import (
     nearest_place,
     object_id,
 )
-from services.codelets.correction.map_correction import ROUNDS
+from services.codelets.correction.joint import ROUNDS
 from services.codelets.mapping.path import ODOMETRY, POSE, STAMP, rows_of
 from tests.support.loop_drive import LAP, QUIET, SLIP, LoopDrive
 from tests.support.scenes import Desk, stamp_ns

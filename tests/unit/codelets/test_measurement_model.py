@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
+from schemas.nodes import NEVER_NS
 from services.codelets.config import Config
 from services.codelets.localization.measurement_model import (
     Sighting,
@@ -13,10 +16,11 @@ from services.codelets.localization.measurement_model import (
     novelty,
     sightings,
 )
-from tests.support.scenes import node, percept
+from services.codelets.mapping.path import segments, variances_at
+from tests.support.scenes import graph_of, landmark, percept
 
 CONFIG = Config()
-NOW = np.array([0.5, 0.0])
+RANGE_M = 10.0
 AGENT_SD_M = 0.5
 
 
@@ -26,34 +30,42 @@ def _agent() -> np.ndarray:
     return samples
 
 
-def _seen(**placed: float) -> Sighting:
-    """A house ten metres ahead, placed when path integration had the given variances."""
-    where_m = np.random.default_rng(1).normal((10.0, 0.0), 0.1, (200, 2))
-    house = node("object:house", where_m, label="house", sightings=5, **placed)
-    found = sightings([percept("house")], [house], CONFIG, -1, NOW)
+def _seen() -> Sighting:
+    """A house ten metres ahead."""
+    where_m = np.random.default_rng(1).normal((RANGE_M, 0.0), 0.1, (200, 2))
+    graph = graph_of(landmark("house", where_m, sightings=5))
+    found = sightings([percept("house")], graph, CONFIG.largest_landmark_sd_m, NEVER_NS)
     assert found is not None
     return found
 
 
-def test_a_landmark_placed_just_now_informs_of_nothing_new() -> None:
-    seen = _seen(placed_variance_m2=0.5, placed_variance_rad2=0.0)
-    assert novelty(_agent(), seen) == pytest.approx([0.0])
+@pytest.mark.parametrize(
+    ("since", "share"),
+    [
+        ((0.0, 0.0), 0.0),
+        ((0.1, 0.0), 0.1 / AGENT_SD_M**2),
+        ((0.0, 1e-3), 1e-3 * RANGE_M**2 / (2 * AGENT_SD_M**2)),
+        ((9.0, 0.0), 1.0),
+        ((math.inf, math.inf), 1.0),
+    ],
+    ids=["just now", "distance since", "turns since", "long ago", "before the path"],
+)
+def test_a_landmark_informs_by_the_uncertainty_since_it_was_placed(
+    since: tuple[float, float], share: float
+) -> None:
+    found = novelty(_agent(), _seen(), np.array([since]))
+    assert found == pytest.approx([share], rel=0.1)
 
 
-def test_a_landmark_informs_by_the_share_of_uncertainty_since_it_was_placed() -> None:
-    since_m2 = 0.1
-    seen = _seen(placed_variance_m2=0.5 - since_m2, placed_variance_rad2=0.0)
-    assert novelty(_agent(), seen) == pytest.approx([since_m2 / AGENT_SD_M**2], rel=0.1)
-
-
-def test_turns_since_a_landmark_was_placed_count_by_its_distance() -> None:
-    seen = _seen(placed_variance_m2=0.5, placed_variance_rad2=-1e-3)
-    assert novelty(_agent(), seen) == pytest.approx([1e-3 * 100 / (2 * AGENT_SD_M**2)], rel=0.1)
-
-
-@pytest.mark.parametrize("placed", [{}, {"placed_variance_m2": -9.0, "placed_variance_rad2": 0.0}])
-def test_a_surveyed_landmark_and_one_from_long_ago_inform_fully(placed: dict[str, float]) -> None:
-    assert novelty(_agent(), _seen(**placed)) == pytest.approx([1.0])
+def test_the_variance_when_a_landmark_was_placed_is_that_of_the_path() -> None:
+    rows = np.zeros((100, 9))
+    rows[:, 0] = np.arange(1.0, 101.0)
+    rows[:, 7] = np.arange(100.0)
+    graph = graph_of(*segments(rows))
+    assert variances_at(graph, 70_500_000_000).tolist() == [69.0, 0.0]
+    assert variances_at(graph, 500_000_000_000).tolist() == [99.0, 0.0]
+    assert variances_at(graph, 500_000_000).tolist() == [-math.inf, -math.inf]
+    assert variances_at(graph_of(), 1).tolist() == [-math.inf, -math.inf]
 
 
 def test_a_landmark_of_no_weight_leaves_all_samples_as_likely() -> None:
