@@ -45,6 +45,7 @@ class Lockstep:
     def __init__(self, simulation: SteppedSim, repeat_after_s: float) -> None:
         self._simulation = simulation
         self._repeat_after_ns = round(repeat_after_s * 1e9)
+
         self._frame_ns: int | None = None
         self._senses: list[Message] = []
         self._timed_frame_ns: int | None = None

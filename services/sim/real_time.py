@@ -119,6 +119,9 @@ class RealTime:
 
         first_wall_ns, first_ns = history[0]
         passed_ns = wall_ns - first_wall_ns
+        if not passed_ns:
+            return 1.0
+
         simulated_ns = self._simulation.now_ns - first_ns
 
-        return simulated_ns / passed_ns if passed_ns else 1.0
+        return simulated_ns / passed_ns

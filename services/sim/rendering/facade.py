@@ -95,8 +95,10 @@ def _shutters(wall: Wall, middle_m: float, sill_m: float) -> None:
     accent = wall.kind.accent
     bottom_m = sill_m - 0.1
 
-    wall.box(middle_m - 1.2, bottom_m, 0.6, 1.6, accent)
-    wall.box(middle_m + 0.6, bottom_m, 0.6, 1.6, accent)
+    left_m = middle_m - 1.2
+    wall.box(left_m, bottom_m, 0.6, 1.6, accent)
+    right_m = middle_m + 0.6
+    wall.box(right_m, bottom_m, 0.6, 1.6, accent)
 
 
 def _entrance(wall: Wall) -> None:

@@ -97,6 +97,7 @@ def _cell(side_m: float) -> int:
     """The row or column of a coordinate, at least 0."""
     middle = _CELLS // 2
     cell = middle + round(side_m / _CELL_M)
+
     return max(cell, 0)
 
 

@@ -75,6 +75,7 @@ def timber(wall: Wall) -> None:
 def frame(wall: Wall) -> None:
     """A frame along the top and both edges."""
     accent = wall.kind.accent
+
     band_m = 0.14 * wall.height_m
     bottom_m = wall.height_m - band_m
     wall.box(0, bottom_m, wall.width_m, band_m, accent)

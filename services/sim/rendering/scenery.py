@@ -71,6 +71,7 @@ def _lines(roads: tuple[Road, ...]) -> Mesh:
     for road in roads:
         end_m = road.length_m - STREET_WIDTH_M
         starts_m = np.arange(STREET_WIDTH_M, end_m, 2 * _DASH_M)
+
         for along_m in starts_m.tolist():
             dash = Road(road.name, road.point(along_m), road.point(along_m + _DASH_M))
             _pave(mesh, dash, 0.08, 0.045, (1.0, 4.0))

@@ -28,7 +28,8 @@ class Arena:
             "refractory_ticks": 0,
             "decay": 0.0,
         }
-        self.module: Module = build(Config(**(never | settings)), "global_workspace")  # type: ignore[arg-type]
+        config = Config(**(never | settings))  # type: ignore[arg-type]
+        self.module: Module = build(config, "global_workspace")
         self._cycle = 0
         # Nothing was ever broadcast, so this is: silence is counted from here.
         self.compete(0, first=0.01)
