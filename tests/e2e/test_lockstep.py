@@ -12,7 +12,7 @@ from tests.support.runs import DRIVING, Run
 SHORT = ("--lockstep", "--laps", "0.04", "--seed", "6", "--codelets", "2")
 
 
-def test_two_lockstep_drives_of_one_seed_publish_the_same_bytes_on_every_topic(
+def test_two_lockstep_drives_of_one_seed_publish_the_same_bytes(
     start: Callable[..., Run],
 ) -> None:
     logs = []
