@@ -22,6 +22,7 @@ from benchmarks.spiking import measure as spiking
 from benchmarks.threshold import Thresholds
 from cli.experiment.outcome import save_figure
 from cli.log.progress import bar
+from cli.options import FiniteRange
 from services.epam.layout.road import DEFAULT_PATH as ROAD_WEIGHTS
 from training.photographs import camvid_iou
 
@@ -179,7 +180,7 @@ def bus_command(pairs: int, number: int, json_path: Path | None) -> None:
 )
 @click.option(
     "--scale",
-    type=click.FloatRange(0, min_open=True),
+    type=FiniteRange(0, min_open=True),
     metavar="N",
     help="Of --stereo; 1 if not given.",
 )

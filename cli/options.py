@@ -2,11 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
+from typing import Any
 
 import click
 
 from cogmap.bus.session import DEFAULT_AGENT, DEFAULT_ENDPOINT, check_name
+
+
+class FiniteRange(click.FloatRange):
+    """A range of finite numbers: click's own takes nan, and inf where an end is open."""
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        number = float(super().convert(value, param, ctx))
+        if not math.isfinite(number):
+            self.fail(f"{value} is not a finite number.", param, ctx)
+        return number
+
 
 connect_option = click.option(
     "--connect",

@@ -9,6 +9,7 @@ import click
 from cli.experiment import live, outcome
 from cli.experiment.options import Common, common_options
 from cli.log.progress import bar
+from cli.options import FiniteRange
 from cogmap.errors import UsageError
 from experiments.city_maps.drive import MODULES
 from experiments.city_maps.environment import Environment, environments
@@ -68,7 +69,7 @@ Examples:
 @click.option(
     "--noise",
     nargs=3,
-    type=click.FloatRange(0, 1),
+    type=FiniteRange(0, 1),
     default=(NOISE.speed, NOISE.turn, NOISE.drift_rad_per_sqrt_m),
     show_default=True,
     metavar="SPEED TURN DRIFT",

@@ -7,6 +7,7 @@ import click
 from cli.experiment import live, outcome
 from cli.experiment.options import Common, common_options
 from cli.log.progress import bar
+from cli.options import FiniteRange
 from experiments.cue_integration import agent, camera_level
 from experiments.cue_integration.run import FIT_TRIALS, FITTED, Budget, Session, fitted, measure
 from experiments.cue_integration.trial import Condition, Noise, Trial
@@ -30,7 +31,7 @@ Examples:
 )
 @click.option(
     "--distance-noise",
-    type=click.FloatRange(0.001, 0.5),
+    type=FiniteRange(0.001, 0.5),
     default=FITTED.distance,
     show_default=True,
     help="Of distances to landmarks, and of directions in rad.",

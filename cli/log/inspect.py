@@ -13,7 +13,7 @@ import msgspec
 
 from cli.log import formatting
 from cli.log.progress import bar
-from cli.options import json_option
+from cli.options import FiniteRange, json_option
 from cogmap.errors import MessageError
 from cogmap.recording import diff as differ
 from cogmap.recording import info as informer
@@ -55,7 +55,7 @@ def info(log: Path, as_json: bool) -> None:
 @click.option("-n", "number", type=click.IntRange(min=1), help="At most so many messages.")
 @click.option(
     "--start-offset",
-    type=click.FloatRange(min=0),
+    type=FiniteRange(min=0),
     default=0.0,
     help="Begin so many seconds into the log.",
 )

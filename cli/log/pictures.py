@@ -11,7 +11,7 @@ import msgspec
 from cli.log import formatting
 from cli.log.files import save
 from cli.log.progress import bar
-from cli.options import json_option
+from cli.options import FiniteRange, json_option
 from cogmap.errors import LogError, UsageError
 from cogmap.recording import views
 from cogmap.recording.storage.reader import LogReader
@@ -64,7 +64,7 @@ def _frame_options(command: _Command) -> _Command:
         click.option(
             "--at",
             "at_s",
-            type=click.FloatRange(min=0),
+            type=FiniteRange(min=0),
             metavar="SECONDS",
             help="Nearest to this time.",
         ),

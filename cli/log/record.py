@@ -9,7 +9,14 @@ from pathlib import Path
 import click
 
 from cli.log import formatting
-from cli.options import agent_option, config_option, connect_option, json_option, set_option
+from cli.options import (
+    FiniteRange,
+    agent_option,
+    config_option,
+    connect_option,
+    json_option,
+    set_option,
+)
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.errors import LogError
 from cogmap.recording import recorder, selection
@@ -39,7 +46,7 @@ Examples:
 @click.option(
     "-d",
     "--max-duration",
-    type=click.FloatRange(min=0, min_open=True),
+    type=FiniteRange(min=0, min_open=True),
     help="End after so many seconds.",
 )
 @click.option(

@@ -10,7 +10,14 @@ import click
 from cli.log import formatting
 from cli.log.keys import Keys
 from cli.log.progress import bar
-from cli.options import agent_option, config_option, connect_option, json_option, set_option
+from cli.options import (
+    FiniteRange,
+    agent_option,
+    config_option,
+    connect_option,
+    json_option,
+    set_option,
+)
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.recording import selection
 from cogmap.recording.replaying.player import Choices, Player
@@ -33,13 +40,9 @@ Examples:
 
 @click.command(epilog=_EPILOG)
 @click.argument("log", type=click.Path(path_type=Path))
-@click.option(
-    "-r", "--rate", type=click.FloatRange(min=0, min_open=True), help="So many times as fast."
-)
+@click.option("-r", "--rate", type=FiniteRange(min=0, min_open=True), help="So many times as fast.")
 @click.option("--topics", multiple=True, metavar="TOPIC", help="Only this one; repeat at will.")
-@click.option(
-    "--start-offset", type=click.FloatRange(min=0), help="Begin so many seconds into the log."
-)
+@click.option("--start-offset", type=FiniteRange(min=0), help="Begin so many seconds into the log.")
 @click.option("-l", "--loop", is_flag=True, help="Begin again at the end.")
 @click.option(
     "--start-paused", is_flag=True, help="Begin paused; the space bar continues and pauses."
@@ -47,7 +50,7 @@ Examples:
 @click.option(
     "--clock",
     "clock_hz",
-    type=click.FloatRange(min=0, min_open=True),
+    type=FiniteRange(min=0, min_open=True),
     is_flag=False,
     flag_value=CLOCK_HZ,
     metavar="[HZ]",

@@ -14,7 +14,7 @@ from rich.console import Console
 
 from cli.launch.drive import Drive
 from cli.launch.plan import CONFIG_NAME, Choices, awaited, effective
-from cli.options import agent_option, config_option, connect_option, set_option
+from cli.options import FiniteRange, agent_option, config_option, connect_option, set_option
 from cli.run import summary
 from cli.run.display import Display, display_on
 from cogmap.bus.session import check_free
@@ -31,7 +31,7 @@ seed_option = click.option(
     "--seed", type=click.IntRange(0, 2**32), help="Which town, and which noise.  [default: 1]"
 )
 laps_option = click.option(
-    "--laps", type=click.FloatRange(0, 1000, min_open=True), help="How far.  [default: 1]"
+    "--laps", type=FiniteRange(0, 1000, min_open=True), help="How far.  [default: 1]"
 )
 codelets_option = click.option(
     "--codelets", type=click.IntRange(1, 64), default=1, show_default=True, help="How many workers."
@@ -58,7 +58,7 @@ lockstep_option = click.option(
 )
 @click.option(
     "--time-limit",
-    type=click.FloatRange(5, 1e6),
+    type=FiniteRange(5, 1e6),
     metavar="SECONDS",
     help=f"End after so long, start and end included.  [default: {LAP_LIMIT_S:g} for each lap]",
 )

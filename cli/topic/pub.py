@@ -7,7 +7,7 @@ import time
 import click
 import msgspec
 
-from cli.options import agent_option, connect_option
+from cli.options import FiniteRange, agent_option, connect_option
 from cli.topic.argument import streamed_argument
 from cli.topic.observing import CLI, RouterWatch, observing
 from cli.topic.parse import parse
@@ -25,7 +25,7 @@ from schemas.topics import Topic
 @click.option(
     "-r",
     "--rate",
-    type=click.FloatRange(min=0, min_open=True),
+    type=FiniteRange(min=0, min_open=True),
     default=1.0,
     show_default=True,
     help="Hz.",

@@ -1,0 +1,25 @@
+"""Options of `cogmap run`: their ranges, and what they are without being given."""
+
+from __future__ import annotations
+
+import click
+import pytest
+
+from cli.options import FiniteRange
+from cli.run.command import LAP_LIMIT_S, default_limit_s
+
+
+def test_the_time_limit_grows_with_the_laps_and_is_one_laps_at_least() -> None:
+    assert default_limit_s(1.0) == LAP_LIMIT_S
+    assert default_limit_s(2.0) == 2 * LAP_LIMIT_S
+    assert default_limit_s(0.05) == LAP_LIMIT_S
+
+
+@pytest.mark.parametrize("number", ["nan", "inf", "-1"])
+def test_a_number_that_is_not_finite_or_out_of_range_is_refused(number: str) -> None:
+    with pytest.raises(click.BadParameter):
+        FiniteRange(min=0).convert(number, None, None)
+
+
+def test_a_number_in_range_is_taken() -> None:
+    assert FiniteRange(min=0).convert("2.5", None, None) == 2.5
