@@ -11,9 +11,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import zenoh
 
 from cogmap.bus.discovery import discover
-from cogmap.bus.session import open_client
+from cogmap.bus.session import free_endpoint, open_client
 from tests.support.networks import routed
 
 TIMEOUT_S = 30.0
@@ -129,22 +130,27 @@ def test_whoever_finds_no_router_within_five_seconds_names_it(
     assert not (tmp_path / "log.mcap").exists()
 
 
-def wait_for_processes(endpoint: str, names: set[str]) -> None:
+def wait_for_processes(session: zenoh.Session, names: set[str]) -> None:
     """Return once processes of all `names` are on the bus."""
-    session = open_client(endpoint)
     deadline_s = time.monotonic() + TIMEOUT_S
     seen: set[str] = set()
     while not names <= seen and time.monotonic() < deadline_s:
         seen = {process.name for process in discover(session, "agent").processes}
-    session.close()  # type: ignore[no-untyped-call]
     assert names <= seen
 
 
 def test_a_router_that_ends_is_named_by_whoever_watches_a_topic() -> None:
+    endpoint = free_endpoint()
+    router = start("router", "--connect", endpoint)
+    session = open_client(endpoint, TIMEOUT_S)
     commands = ("echo", "hz")
-    with routed() as endpoint:
-        watching = [start("topic", name, "clock", "--connect", endpoint) for name in commands]
-        wait_for_processes(endpoint, {f"cli-topic-{name}" for name in commands})
+    watching = [start("topic", name, "clock", "--connect", endpoint) for name in commands]
+    try:
+        wait_for_processes(session, {f"cli-topic-{name}" for name in commands})
+    finally:
+        session.close()  # type: ignore[no-untyped-call]
+        router.terminate()
+        router.communicate(timeout=TIMEOUT_S)
 
     for process in watching:
         _, errors = process.communicate(timeout=TIMEOUT_S)
