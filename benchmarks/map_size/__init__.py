@@ -1,0 +1,1 @@
+"""How compute, traffic and memory depend on the size of the map."""

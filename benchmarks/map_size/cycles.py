@@ -1,0 +1,132 @@
+"""The cognitive cycle on a map that is there already: CPU time, bytes of deltas and of tasks."""
+
+from __future__ import annotations
+
+import gc
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from benchmarks.map_size.maps import CELL_M
+from cogmap.bus.interface import Arrival
+from cogmap.bus.memory import MemoryBus
+from cogmap.errors import CogmapError
+from cogmap.runtime.config import Sections
+from cogmap.runtime.in_process import InProcessRunner
+from schemas import topics
+from schemas.graph import Snapshot
+from services import registry
+
+COGNITION = ("workspace", "codelets", "global_workspace", "action")
+MODULES = ("sim", *COGNITION)
+WARM_UP = 10
+CYCLES = 60
+SPEED_M_S = 2.0
+LENGTH_M = 400.0
+APART_M = 12.0
+ASIDE_M = 8.0
+
+
+@dataclass
+class Cycles:
+    """What was measured of each cycle: the CPU time of all modules and the bytes of its deltas; and
+    the bytes of every task.
+    """
+
+    cpu_s: list[float] = field(default_factory=list)
+    delta_bytes: list[int] = field(default_factory=list)
+    task_bytes: list[int] = field(default_factory=list)
+
+    @property
+    def mean_cpu_s(self) -> float:
+        """The mean over the cycles after the first few."""
+        return float(np.mean(self.cpu_s[WARM_UP:]))
+
+    @property
+    def mean_delta_bytes(self) -> float:
+        """The mean over the cycles after the first few."""
+        return float(np.mean(self.delta_bytes[WARM_UP:]))
+
+    @property
+    def task_bytes_p99(self) -> float:
+        """99 % of the tasks have at most so many bytes."""
+        return float(np.percentile(self.task_bytes, 99))
+
+
+def sections() -> Sections:
+    """Percept-level sensing along a street with buildings on both sides, in lockstep."""
+    landmarks = []
+    for number, x_m in enumerate(np.arange(0.0, LENGTH_M, APART_M).tolist()):
+        side = 1 if number % 2 else -1
+        landmarks.append({"name": f"house-{number:02d}", "x_m": x_m, "y_m": side * ASIDE_M})
+    trajectory = {
+        "line_m": [[0.0, 0.0], [LENGTH_M, 0.0]],
+        "landmarks": landmarks,
+        "speed_m_s": SPEED_M_S,
+    }
+    sim = {
+        "mode": "lockstep",
+        "trajectory": trajectory,
+        "frame_hz": 1,
+        "odometry_hz": 5,
+        "awaits": dict.fromkeys(COGNITION, 1),
+    }
+    return {
+        "sim": sim,
+        "workspace": {"mode": "lockstep", "cell_m": CELL_M, "base_level_decay": 0.0},
+        "action": {"mode": "lockstep"},
+    }
+
+
+class _Meter:
+    """Notes what each cycle took, as its deltas and tasks are published."""
+
+    def __init__(self) -> None:
+        self.cycles = Cycles()
+        self._began_s = time.process_time()
+        self._bytes = 0
+
+    def on_delta(self, arrival: Arrival) -> None:
+        self._bytes += len(arrival.payload)
+
+    def on_task(self, arrival: Arrival) -> None:
+        self.cycles.task_bytes.append(len(arrival.payload))
+
+    def on_command(self, arrival: Arrival) -> None:
+        """The last message of a cycle in lockstep."""
+        now_s = time.process_time()
+        self.cycles.cpu_s.append(now_s - self._began_s)
+        self.cycles.delta_bytes.append(self._bytes)
+        self._began_s = now_s
+        self._bytes = 0
+
+
+def drive(learned: Snapshot) -> Cycles:
+    """Run some cycles on a map that was learned before. Raises CogmapError where a module rejected
+    a message.
+    """
+    configured = sections()
+    workspace = registry.build("workspace", configured)
+    if workspace.restore is not None:
+        workspace.restore([learned])
+    others = [registry.build(name, configured) for name in MODULES if name != "workspace"]
+
+    runner = InProcessRunner([workspace, *others])
+    meter = _Meter()
+    bus = MemoryBus(runner.network)
+    handlers = {
+        topics.DELTA: meter.on_delta,
+        topics.TASK: meter.on_task,
+        topics.MOTOR_COMMAND: meter.on_command,
+    }
+    for topic, handler in handlers.items():
+        bus.subscribe(topic, handler, lambda name, number: None)
+
+    gc.collect()
+    runner.run(lambda: len(meter.cycles.cpu_s) >= WARM_UP + CYCLES)
+    for shell in runner.shells:
+        if shell.intake.rejected:
+            raise CogmapError(f"{shell.module.name} rejected {dict(shell.intake.rejected)}")
+    runner.close()
+    return meter.cycles

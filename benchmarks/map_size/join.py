@@ -1,0 +1,135 @@
+"""A worker that joins a running system with a large map, over Zenoh, and the memory it takes."""
+
+from __future__ import annotations
+
+import gc
+import threading
+import time
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from typing import Any, NamedTuple
+
+import numpy as np
+import psutil
+
+from benchmarks.map_size.cycles import sections
+from cogmap.bus.session import free_endpoint, open_router
+from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.errors import CogmapError
+from cogmap.runtime.module import Handler, Module, Reply
+from cogmap.runtime.shell import Shell
+from schemas import topics
+from schemas.array import Array
+from schemas.graph import Snapshot
+from schemas.sensing import Percepts, SelfMotion
+from services import registry
+
+AGENT = "benchmark"
+TIMEOUT_S = 120.0
+PERIOD_S = 0.01
+
+
+class Joined(NamedTuple):
+    """Seconds from opening the bus to the first proposal, and what memory of the process grew by,
+    in MB, with the message that the graph came in released.
+    """
+
+    join_s: float
+    memory_mb: float
+
+
+def join(learned: Snapshot) -> Joined:
+    """Measure a worker of its own process. Raises CogmapError where it answers nothing in time."""
+    endpoint = free_endpoint()
+    router = open_router(endpoint)
+    workspace = registry.build("workspace", sections())
+    if workspace.restore is not None:
+        workspace.restore([learned])
+
+    shell = Shell(workspace, ZenohBus(endpoint, AGENT), health=False)
+    senses = Shell(_senses(), ZenohBus(endpoint, AGENT), health=False)
+    shell.open()
+    senses.open()
+    senses.publish(senses.module.stamp(_first_view()))
+
+    ended = threading.Event()
+    thread = threading.Thread(target=_serve, args=(shell, ended))
+    thread.start()
+    context = get_context("spawn")
+    ours, theirs = context.Pipe()
+    worker = context.Process(target=_work, args=(endpoint, theirs))
+    worker.start()
+    try:
+        theirs.close()
+        if not ours.poll(TIMEOUT_S):
+            raise CogmapError(f"the worker that joined answered nothing in {TIMEOUT_S:g} s")
+        return Joined(*ours.recv())
+    finally:
+        worker.terminate()
+        worker.join()
+        ended.set()
+        thread.join()
+        senses.close()
+        shell.close()
+        router.close()  # type: ignore[no-untyped-call]
+
+
+def _senses() -> Module:
+    module = Module("senses")
+    module.emits.update((topics.SELF_MOTION, topics.PERCEPTS))
+    return module
+
+
+def _first_view() -> list[SelfMotion | Percepts]:
+    """A view of nothing, and the motion up to it."""
+    stamp_ns = 1_000_000_000
+    road_m = Array.of(np.zeros((0, 2), np.float32))
+    motions = Array.of(np.array([[1.0, 0.0, 1.0, 0.1, 0.01]]))
+    return [
+        SelfMotion(stamp_ns=stamp_ns, frame=0, since_ns=0, motions=motions),
+        Percepts(stamp_ns=stamp_ns, frame=0, objects=[], road_m=road_m),
+    ]
+
+
+def _serve(shell: Shell, ended: threading.Event) -> None:
+    while not ended.is_set():
+        shell.spin_once(PERIOD_S)
+
+
+def _watch_answers(module: Module) -> threading.Event:
+    """Set once a handler of the module has answered something."""
+    answered = threading.Event()
+
+    def watched(handler: Handler) -> Handler:
+        def handle(message: Any) -> Reply:
+            reply = handler(message)
+            if reply:
+                answered.set()
+            return reply
+
+        return handle
+
+    for topic, handler in module.handlers.items():
+        module.handlers[topic] = watched(handler)
+    return answered
+
+
+def _work(endpoint: str, connection: Connection) -> None:
+    """The process of the worker."""
+    module = registry.build("codelets", sections(), "codelets-late")
+    answered = _watch_answers(module)
+    process = psutil.Process()
+    gc.collect()
+    before = process.memory_info().rss
+
+    began_s = time.monotonic()
+    shell = Shell(module, ZenohBus(endpoint, AGENT), health=False)
+    shell.open()
+    while not answered.is_set():
+        shell.spin_once(PERIOD_S)
+    join_s = time.monotonic() - began_s
+
+    gc.collect()
+    memory_mb = (process.memory_info().rss - before) / 1e6
+    connection.send((join_s, memory_mb))
+    shell.close()

@@ -1,0 +1,105 @@
+"""Cognitive maps of any size, made up: objects and place nodes around the origin."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from schemas.array import Array, Matrix
+from schemas.graph import TILE_SIDE, Decay, Links, PlaceTile, Snapshot
+from schemas.nodes import (
+    ROOT_MAP,
+    AnyNode,
+    LinkKind,
+    Map,
+    Object,
+    PlaceColumn,
+    nearest_place,
+    object_id,
+)
+from services.codelets.config import Config
+
+SPREAD_M = 0.3
+CELL_M = 1.0
+SEED = 17
+# Objects are farther away than anything is seen, so that none of them is taken for one in view.
+CLEAR_M = 150.0
+
+
+@dataclass(frozen=True)
+class Size:
+    """How much a map holds: objects, and place nodes, rounded up to whole tiles."""
+
+    objects: int
+    places: int
+
+
+SMALL = Size(objects=100, places=1_000)
+LARGE = Size(objects=100_000, places=500_000)
+
+
+def cognitive_map(size: Size, cycle: int = 1000) -> Snapshot:
+    """A map as of `cycle`: every object with as many samples as the codelets keep and linked to its
+    place, every place node with all columns.
+    """
+    rng = np.random.default_rng(SEED)
+    objects = _objects(size.objects, cycle, rng)
+    weights = {node.id: {nearest_place(node.x_m, node.y_m, CELL_M): 1.0} for node in objects}
+    nodes: list[AnyNode] = [Map(id=ROOT_MAP, cell_m=CELL_M), *objects]
+    return Snapshot(
+        version=1,
+        cycle=cycle,
+        decay=Decay(),
+        nodes=nodes,
+        links=[Links(kind=LinkKind.AT, weights=weights)],
+        tiles=_tiles(size.places, rng),
+    )
+
+
+def _objects(number: int, cycle: int, rng: np.random.Generator) -> list[Object]:
+    samples = Config().landmark_samples
+    radius_m = CLEAR_M + 2 * np.sqrt(number)
+    positions_m = rng.uniform(-radius_m, radius_m, (number, 2))
+    positions_m[:, 1] += np.where(positions_m[:, 1] < 0, -CLEAR_M, CLEAR_M)
+
+    objects = []
+    for index, (x_m, y_m) in enumerate(positions_m.tolist()):
+        label = f"building-{index:06d}"
+        offsets_m = rng.normal(0.0, SPREAD_M, (samples, 2))
+        objects.append(
+            Object(
+                id=object_id(label),
+                activation=0.4,
+                base_level=0.9,
+                cycle=cycle,
+                label=label,
+                x_m=x_m,
+                y_m=y_m,
+                x_sd_m=SPREAD_M + index * 1e-9,
+                y_sd_m=SPREAD_M + index * 2e-9,
+                width_m=9.0 + index * 1e-9,
+                height_m=6.0 + index * 1e-9,
+                sightings=5,
+                last_seen_ns=10**12 + index,
+                created_ns=10**11 + index,
+                offsets_m=Matrix.of(offsets_m, "<f2"),
+            )
+        )
+    return objects
+
+
+def _tiles(places: int, rng: np.random.Generator) -> list[PlaceTile]:
+    """Tiles in rows of a square, that the agent is in the middle of."""
+    number = -(-places // TILE_SIDE**2)
+    side = int(np.ceil(np.sqrt(number)))
+    shape = (TILE_SIDE, TILE_SIDE)
+    cycles = Array.of(np.zeros(shape, np.int32))
+
+    tiles = []
+    for index in range(number):
+        columns = {name: Array.of(rng.random(shape, np.float32)) for name in PlaceColumn}
+        x = index // side - side // 2
+        y = index % side - side // 2
+        tiles.append(PlaceTile(x=x, y=y, columns=columns, activation_cycle=cycles))
+    return tiles
