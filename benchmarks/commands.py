@@ -15,6 +15,7 @@ from benchmarks.bus import measure as bus
 from benchmarks.cycle import measure as cycle
 from benchmarks.localization import measure as localization
 from benchmarks.map_correction import measure as map_correction
+from benchmarks.map_size import measure as map_size
 from benchmarks.perception import measure as perception
 from benchmarks.perception import photographs, stereo
 from benchmarks.report import Metrics, report, summary, write
@@ -136,6 +137,18 @@ def cycle_command(processes: int, json_path: Path | None) -> None:
         metrics = cycle.measure(Path(folder), processes, _announce)
 
     _report("cycle", cycle.THRESHOLDS, metrics, json_path)
+
+
+@benchmarks.command(name="map_size")
+@json_option
+def map_size_command(json_path: Path | None) -> None:
+    """The cycle, its deltas and tasks, a late worker and a replica, on a map of 100,000 objects.
+
+    The cognitive modules run on the in-memory bus with percept-level sensing, once on a map of 100
+    objects and 1,000 place nodes, once on one of 100,000 and 500,000. A worker of its own process
+    then joins over Zenoh. Takes about two minutes.
+    """
+    _report("map_size", map_size.THRESHOLDS, map_size.measure(_announce), json_path)
 
 
 @benchmarks.command(name="bus")

@@ -12,6 +12,7 @@ from benchmarks.cycle import measure as cycle
 from benchmarks.localization import measure as localization
 from benchmarks.machine import machine_unit_ms
 from benchmarks.map_correction import measure as map_correction
+from benchmarks.map_size import measure as map_size
 from benchmarks.perception import measure as perception
 from benchmarks.perception import photographs, stereo
 from benchmarks.report import Metrics, Outcome
@@ -89,6 +90,10 @@ def _map_correction(setting: Setting) -> Metrics:
     return map_correction.measure(graph, truth)
 
 
+def _map_size(setting: Setting) -> Metrics:
+    return map_size.measure(setting.announce)
+
+
 def _cue_integration(setting: Setting) -> Metrics:
     return paper.measure_cue_integration(setting.processes)
 
@@ -106,6 +111,7 @@ SUITE = (
     Benchmark("spiking", spiking.THRESHOLDS, _spiking),
     Benchmark("localization", localization.THRESHOLDS, _localization),
     Benchmark("map_correction", map_correction.THRESHOLDS, _map_correction),
+    Benchmark("map_size", map_size.THRESHOLDS, _map_size),
     Benchmark("cue-integration", paper.CUE_INTEGRATION_THRESHOLDS, _cue_integration),
     Benchmark("city-maps", paper.CITY_MAPS_THRESHOLDS, _city_maps),
 )

@@ -26,7 +26,7 @@ def _check(dtype: str, shape: tuple[int, ...], data: memoryview | bytes) -> None
         raise ValueError(f"array shape {shape} is not one of up to {MAX_DIMENSIONS} sizes")
     if len(data) != expected:
         raise ValueError(f"array of shape {shape} needs {expected} bytes, got {len(data)}")
-    if dtype[1] == "f" and not np.isfinite(np.frombuffer(data, dtype)).all():
+    if dtype[1] == "f" and not np.logical_and.reduce(np.isfinite(np.frombuffer(data, dtype))):
         raise ValueError("array holds NaN or infinity")
 
 

@@ -1,4 +1,4 @@
-"""A worker that joins a running system with a large map, over Zenoh, and the memory it takes."""
+"""A worker that joins a running system with a large map, over Zenoh, and the memory of a replica."""
 
 from __future__ import annotations
 
@@ -13,9 +13,11 @@ import numpy as np
 import psutil
 
 from benchmarks.map_size.cycles import sections
+from cogmap.bus.codec import decode, encode
 from cogmap.bus.session import free_endpoint, open_router
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.errors import CogmapError
+from cogmap.graph.graph import Graph
 from cogmap.runtime.module import Handler, Module, Reply
 from cogmap.runtime.shell import Shell
 from schemas import topics
@@ -30,12 +32,46 @@ PERIOD_S = 0.01
 
 
 class Joined(NamedTuple):
-    """Seconds from opening the bus to the first proposal, and what memory of the process grew by,
-    in MB, with the message that the graph came in released.
+    """Seconds from opening the bus to the first proposal, and by how much the worker's process grew
+    in that time, buffers of the transport included, in MB.
     """
 
     join_s: float
-    memory_mb: float
+    worker_memory_mb: float
+
+
+def replica_memory_mb(learned: Snapshot) -> float:
+    """By how much a process grows that decodes a snapshot, loads it and releases the message."""
+    context = get_context("spawn")
+    ours, theirs = context.Pipe()
+    process = context.Process(target=_hold, args=(theirs,))
+    process.start()
+    theirs.close()
+    try:
+        ours.send_bytes(encode(learned))
+        memory_mb: float = ours.recv()
+        return memory_mb
+    finally:
+        process.join()
+
+
+def _hold(connection: Connection) -> None:
+    """The process of the replica."""
+    payload = connection.recv_bytes()
+    with_message = psutil.Process().memory_info().rss
+    size = len(payload)
+    graph = Graph()
+    graph.load(_decoded(payload))
+    del payload
+    gc.collect()
+    grown = psutil.Process().memory_info().rss - (with_message - size)
+    connection.send(grown / 1e6)
+
+
+def _decoded(payload: bytes) -> Snapshot:
+    snapshot = decode(topics.SNAPSHOT, payload)
+    assert isinstance(snapshot, Snapshot)
+    return snapshot
 
 
 def join(learned: Snapshot) -> Joined:

@@ -44,6 +44,7 @@ class Replica:
         self.graph = Graph() if graph is None else graph
         self.mended = 0
         self.is_behind = False
+        self.has_joined = False
         self._fetch = fetch
         self._on_load = on_load
         self._incarnation: int | None = None
@@ -51,12 +52,15 @@ class Replica:
         self._wanted_version = 0
 
     def join(self) -> None:
-        """Load the graph as it is now. It stays empty where no workspace answers."""
+        """Load the graph as it is now. It stays empty where no workspace answers: join again then,
+        unless a delta has come since.
+        """
         try:
             fetched = self._fetch(SnapshotRequest())
         except NoAnswerError:
             return
 
+        self.has_joined = True
         self._incarnation = fetched.incarnation
         if fetched.snapshot.version > 0:
             self._load(fetched)
@@ -84,6 +88,7 @@ class Replica:
             return False
 
         self._incarnation = incarnation
+        self.has_joined = True
         self.graph.apply(delta)
         return self.graph.version >= delta.version
 

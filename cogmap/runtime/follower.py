@@ -12,7 +12,7 @@ from cogmap.graph.replica import Fetched, Replica, snapshot_over
 from schemas.graph import Delta, SnapshotRequest
 
 RETRY_S = 0.5
-TIMEOUT_S = 5.0
+TIMEOUT_S = 20.0
 
 
 class Follower:
@@ -35,9 +35,11 @@ class Follower:
         return self._replica.follow(delta, incarnation)
 
     def retry(self) -> None:
-        """Mend the graph, if it is behind."""
+        """Mend the graph, if it is behind, or join, if no workspace has answered yet."""
         if self._replica.is_behind:
             self._replica.mend()
+        elif not self._replica.has_joined:
+            self._replica.join()
 
     def notes(self) -> list[str]:
         """What there is to report: whether it is behind, and how often it was mended."""

@@ -1,0 +1,40 @@
+"""The benchmark of map size, on maps that are small enough for a test."""
+
+from __future__ import annotations
+
+from benchmarks.map_size import cycles
+from benchmarks.map_size.join import join, replica_memory_mb
+from benchmarks.map_size.maps import Size, cognitive_map
+from cogmap.graph.graph import Graph
+from schemas.graph import TILE_SIDE
+from schemas.nodes import LinkKind, Object, PlaceColumn
+
+TINY = Size(objects=5, places=2_000)
+
+
+def test_a_made_up_map_has_the_objects_and_places_it_should() -> None:
+    graph = Graph()
+    graph.load(cognitive_map(TINY))
+    assert graph.count(Object) == 5
+    assert len(graph.places.tiles) * TILE_SIDE**2 >= 2_000
+    (tile, *_) = graph.places.tiles.values()
+    assert set(tile.columns) == set(PlaceColumn)
+    assert all(graph.links.target(node.id, LinkKind.AT) for node in graph.of_kind(Object))
+
+
+def test_every_cycle_is_measured_and_the_learned_map_stays() -> None:
+    measured = cycles.drive(cognitive_map(TINY))
+    assert len(measured.cpu_s) == len(measured.delta_bytes) == cycles.WARM_UP + cycles.CYCLES
+    assert measured.mean_cpu_s > 0
+    assert measured.mean_delta_bytes > 0
+    assert 0 < measured.task_bytes_p99 < 65536
+
+
+def test_a_worker_that_joins_is_timed_until_its_first_proposal() -> None:
+    assert join(cognitive_map(TINY)).join_s > 0
+
+
+def test_the_memory_of_a_replica_grows_with_its_map() -> None:
+    small = replica_memory_mb(cognitive_map(TINY))
+    large = replica_memory_mb(cognitive_map(Size(objects=5_000, places=50_000)))
+    assert large > small + 5
