@@ -25,12 +25,13 @@ def parallel_map(
 ) -> list[Result]:
     """Return `work` of every job, in the order of `jobs`; `progress` is called with the share done.
 
-    `work` is pickled. One process, or one job, runs in the calling process.
+    `work` and the jobs are pickled, arrays of any size too. One process, or one job, runs in the calling process.
     """
     count = max(1, min(processes, len(jobs)))
     pool = Parallel(
         n_jobs=count,
         backend="loky",
+        max_nbytes=None,
         initializer=_end_with,
         initargs=(os.getpid(),),
         return_as="generator",
