@@ -25,7 +25,8 @@ def parallel_map(
 ) -> list[Result]:
     """Return `work` of every job, in the order of `jobs`; `progress` is called with the share done.
 
-    `work` and the jobs are pickled, arrays of any size too. One process, or one job, runs in the calling process.
+    `work` and the jobs are pickled, arrays of any size too. One process, or one job, runs in the
+    calling process.
     """
     count = max(1, min(processes, len(jobs)))
     pool = Parallel(
