@@ -28,7 +28,7 @@ def test_two_lockstep_drives_of_one_seed_publish_the_same_bytes(
     assert counts["motor/command"] == counts["epam/percepts"] > 10
 
 
-@pytest.mark.parametrize("instance", ["epam", "workspace"])
+@pytest.mark.parametrize("instance", ["epam", "workspace", "action"])
 def test_a_lockstep_drive_survives_the_kill_of_a_module(
     start: Callable[..., Run], instance: str
 ) -> None:

@@ -24,6 +24,7 @@ import numpy as np
 from cli.launch.plan import Choices, effective
 from cogmap.bus.interface import Arrival
 from cogmap.bus.memory import MemoryBus
+from cogmap.errors import LogError
 from cogmap.graph.graph import Graph
 from cogmap.recording.diff import Diff, diff
 from cogmap.recording.recorder import Recorder
@@ -147,12 +148,24 @@ def compared(left: Path, right: Path) -> Diff:
     return diff(left, right, [topic for topic in topics.ALL if topic.about is not About.PROCESS])
 
 
+def _compared_with_reference(fresh: Path) -> Diff | None:
+    """How a drive compares with the reference; None where there is none that this version reads."""
+    if not REFERENCE.exists():
+        return None
+    try:
+        return compared(REFERENCE, fresh)
+    except LogError:
+        return None
+
+
 def update() -> Diff | None:
-    """Record the reference anew; how it compares with the old one, None where there was none."""
+    """Record the reference anew; how it compares with the old one, None where there was none that
+    this version reads.
+    """
     with tempfile.TemporaryDirectory() as folder:
         fresh = Path(folder) / "recorded anew"
         drive(log=fresh)
-        changed = compared(REFERENCE, fresh) if REFERENCE.exists() else None
+        changed = _compared_with_reference(fresh)
         if changed is None or not changed.same or other_arithmetic():
             REFERENCE.write_bytes(fresh.read_bytes())
     return changed
