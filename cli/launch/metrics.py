@@ -76,8 +76,9 @@ class DriveMetrics(msgspec.Struct, kw_only=True):
     `error_over_fused` over that of fused self-motion. `cycle_*_ms`: camera frame stamped to motor
     command received; `bus_share`: the part of the mean spent in anything but computing. `halted`
     and `slowed` count the commands that stopped the robot or kept it below cruising, by reason.
-    `dropped` answers of codelets are in no delta; `refused` gives the reasons of the last few. `gaps`:
-    messages lost for good, by NEVER_DROP topic.
+    `dropped` answers of codelets are in no delta; `refused` gives the reasons of the last few.
+    `forgotten` are the objects that left the map, having been seen too seldom. `gaps`: messages
+    lost for good, by NEVER_DROP topic.
     """
 
     drive_s: float
@@ -97,6 +98,7 @@ class DriveMetrics(msgspec.Struct, kw_only=True):
     cycle_p99_ms: float
     bus_share: float
     objects: int
+    forgotten: list[str]
     object_error_mean_m: float
     object_error_median_m: float
     road_m2: float
@@ -202,6 +204,7 @@ def drive_metrics(tally: Tally, gaps: dict[str, int], rejected: dict[str, int]) 
         cycle_p99_ms=float(np.percentile(cycle_ms, 99)),
         bus_share=sum(tally.bus_ms) / max(1e-9, sum(cycle_ms)),
         objects=len(objects(graph)),
+        forgotten=list(tally.forgotten),
         object_error_mean_m=float(object_m.mean()) if object_m.size else 0.0,
         object_error_median_m=float(np.median(object_m)) if object_m.size else 0.0,
         road_m2=road_m2(graph),

@@ -13,7 +13,8 @@ from cogmap.graph.replica import Replica
 from schemas import topics
 from schemas.base import Message
 from schemas.cognition import Broadcast
-from schemas.graph import Delta
+from schemas.graph import Delta, DropNode
+from schemas.nodes import Object
 from schemas.process import Health
 from schemas.sensing import MotorCommand, SpeedLimit
 from schemas.topics import Delivery
@@ -37,7 +38,8 @@ class Tally:
 
     `cycle_ms`: of each command, the time from the stamping of its camera frame until it was
     received; `bus_ms`: the part of it spent in anything but computing. `refused`: why the last few
-    answers of codelets were dropped. `halted` and `slowed`: how many commands stopped the robot or
+    answers of codelets were dropped. `forgotten`: the labels of objects whose activation had decayed,
+    so that they are no longer on the map. `halted` and `slowed`: how many commands stopped the robot or
     kept it below its cruising speed, by reason; `command` is the newest.
     """
 
@@ -49,6 +51,7 @@ class Tally:
         self.broadcasts = 0
         self.dropped = 0
         self.refused: deque[str] = deque(maxlen=MAX_REASONS)
+        self.forgotten: list[str] = []
         self.halted: Counter[str] = Counter()
         self.slowed: Counter[str] = Counter()
         self.command: MotorCommand | None = None
@@ -73,7 +76,17 @@ class Tally:
     def _on_delta(self, delta: Delta) -> None:
         self.dropped += delta.rejected
         self.refused.extend(delta.reasons)
+        self._note_forgotten(delta)
         self.replica.follow(delta)
+
+    def _note_forgotten(self, delta: Delta) -> None:
+        """Name the objects that the delta drops: the graph still has them."""
+        for operation in delta.operations:
+            if not isinstance(operation, DropNode):
+                continue
+            node = self.replica.graph.get(Object, operation.id)
+            if node is not None:
+                self.forgotten.append(node.label)
 
     def _on_health(self, health: Health) -> None:
         self.health[health.instance] = health

@@ -96,6 +96,7 @@ def drive_rows(metrics: DriveMetrics) -> list[tuple[str, str]]:
         f"{metrics.objects} buildings, half of them within {metrics.object_error_median_m:.2f} m; "
         f"{metrics.road_m2:.0f} m² of street"
     )
+    forgotten = ", ".join(metrics.forgotten) or "nothing"
     cycle = f"{metrics.cycle_p50_ms:.0f} ms, 99 % within {metrics.cycle_p99_ms:.0f} ms"
     return [
         ("driven", f"{driven}, {metrics.progress:.0%} of the route"),
@@ -104,6 +105,7 @@ def drive_rows(metrics: DriveMetrics) -> list[tuple[str, str]]:
         ("path integration alone, wheels", _errors(metrics.wheels_alone)),
         ("error ratio", ratios),
         ("learned", learned),
+        ("forgotten", forgotten),
         ("cycle", cycle),
         ("slowed or halted", _limits(metrics)),
     ]

@@ -16,7 +16,7 @@ from cogmap.bus.memory import MemoryBus, MemoryNetwork
 from schemas import topics
 from schemas.array import Array
 from schemas.base import Message
-from schemas.graph import Cells, Delta, Phase
+from schemas.graph import Cells, Delta, DropNode, Phase
 from schemas.nodes import PlaceColumn
 from schemas.process import Health
 from schemas.sensing import MotorCommand, Odometry, Pose, SelfMotion, SpeedLimit, TruePose
@@ -218,6 +218,16 @@ def test_dropped_answers_are_counted_and_the_last_reasons_kept(
     metrics = metrics_of(watch)
     assert metrics.dropped == 22
     assert metrics.refused == [f"proposal {version} is late" for version in range(4, 12)]
+
+
+def test_an_object_that_left_the_map_is_named(watch: Watch, publisher: Publisher) -> None:
+    inn = landmark("inn")
+    for seq, operation in enumerate((inn, DropNode(id=inn.id), DropNode(id="object:nowhere"))):
+        version = seq + 1
+        delta = Delta(seq=seq, version=version, cycle=1, phase=Phase.END, operations=[operation])
+        publisher.publish(delta)
+    metrics = metrics_of(watch)
+    assert (metrics.objects, metrics.forgotten) == (0, ["inn"])
 
 
 def test_it_is_quiet_when_only_health_arrives(watch: Watch, publisher: Publisher) -> None:
