@@ -15,7 +15,6 @@ from schemas.graph import Delta
 from schemas.nodes import Self
 from schemas.sensing import Odometry, Pose, SelfMotion, TruePose, TrueTown
 
-SELF_NODE = "self"
 MOTION_COLUMNS = 5
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import msgspec
 
 from schemas.cognition import Behaviour, Rejection
-from schemas.nodes import GraphNode, kind_of
+from schemas.nodes import GraphNode, Self, kind_name, kind_of
 from services.action.config import Config
 
 Context = dict[str, float]
@@ -48,7 +48,7 @@ class Scheme:
 def procedural_memory() -> list[Scheme]:
     """The schemes. Following the route needs a self node; the end of the route calls for a halt."""
     return [
-        Scheme(FOLLOW_ROUTE, context=("self", "route_ahead"), adding={"further": 0.2}),
+        Scheme(FOLLOW_ROUTE, context=(kind_name(Self), "route_ahead"), adding={"further": 0.2}),
         Scheme(HALT, context=("route_end",), adding={"rest": 0.3}),
     ]
 

@@ -12,15 +12,15 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.geometry.se2 import wrap_angle
+from schemas.nodes import POSE_COLUMNS, SelfColumn
 from services.codelets.config import Config
 from services.codelets.localization.sampling import Samples, standard_normal
 
-POSE_COLUMNS = 3
-SPEED = 3
-TURN = 4
-DRIFT = 5
-RANGE = 6
-COLUMNS = 7
+SPEED = SelfColumn.SPEED_GAIN
+TURN = SelfColumn.TURN_GAIN
+DRIFT = SelfColumn.DRIFT_RAD_PER_M
+RANGE = SelfColumn.RANGE_GAIN
+COLUMNS = len(SelfColumn)
 GAINS = COLUMNS - POSE_COLUMNS
 
 
