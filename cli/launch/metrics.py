@@ -164,15 +164,20 @@ def object_errors_m(observer: Observer, graph: Graph) -> Floats:
         true = buildings.get(node.label)
         if true is None:
             continue
-        learned_m = observer.to_world(np.array([position_m(node)]))[0]
-        errors_m.append(math.dist(learned_m, (true.x_m, true.y_m)))
+
+        learned_m = observer.to_world(np.array([position_m(node)]))
+        true_m = (true.x_m, true.y_m)
+        errors_m.append(math.dist(learned_m[0], true_m))
+
     return np.array(errors_m)
 
 
 def road_m2(graph: Graph) -> float:
     """The area of the place nodes that are taken for road."""
     _, road = graph.places.written_cells(ROOT_MAP, PlaceColumn.ROAD)
-    return int((road > ROAD_THRESHOLD).sum()) * graph.cell_m() ** 2
+    is_road = road > ROAD_THRESHOLD
+    area_m2 = graph.cell_m() ** 2
+    return int(is_road.sum()) * area_m2
 
 
 def drive_metrics(tally: Tally, gaps: dict[str, int], rejected: dict[str, int]) -> DriveMetrics:

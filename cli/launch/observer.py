@@ -86,7 +86,9 @@ class Observer:
             self.start = true.pose
             self._began_ns = true.stamp_ns
 
-        self._true.add(true.stamp_ns, true.pose.x_m, true.pose.y_m)
+        pose = true.pose
+        self._true.add(true.stamp_ns, pose.x_m, pose.y_m)
+
         self._now_ns = max(self._now_ns, true.stamp_ns)
         self.travelled_m = true.travelled_m
         self.progress = true.progress
@@ -95,7 +97,8 @@ class Observer:
         if self._wheels.reached(odometry.stamp_ns):
             return
 
-        self._wheels.start(odometry.stamp_ns - round(odometry.dt_s * 1e9))
+        dt_ns = round(odometry.dt_s * 1e9)
+        self._wheels.start(odometry.stamp_ns - dt_ns)
         self._wheels.move(odometry.speed_m_s, odometry.turn_rate_rad_s, odometry.dt_s)
         self._wheels.mark(odometry.stamp_ns)
 
@@ -183,5 +186,7 @@ class Observer:
         """How far the positions of `track` at (n,) stamps are from the true ones, (n,)."""
         true_m = self._true.at(stamps_ns)
         believed_m = self.to_world(track.at(stamps_ns))
-        distances_m: Floats = np.hypot(*(believed_m - true_m).T)
+
+        x_m, y_m = (believed_m - true_m).T
+        distances_m: Floats = np.hypot(x_m, y_m)
         return distances_m

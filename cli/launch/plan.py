@@ -79,8 +79,12 @@ def _complete(sections: Sections, name: str) -> dict[str, Any]:
     """The section of a module with every key that has a value."""
     kind = registry.config_type(name)
     typed = config.typed(sections, name, kind)
-    settings: dict[str, Any] = msgspec.to_builtins(typed)
-    return {key: value for key, value in settings.items() if value is not None}
+
+    complete: dict[str, Any] = {}
+    for key, value in msgspec.to_builtins(typed).items():
+        if value is not None:
+            complete[key] = value
+    return complete
 
 
 def _route(seed: int, laps: float) -> list[list[float]]:
@@ -117,8 +121,9 @@ def infrastructure(folder: Path, endpoint: str, agent: str, choices: Choices) ->
     def record(starts: int) -> list[str]:
         """A recorder that died leaves its log as it is, and the next one writes another."""
         name = LOG_NAME if starts == 0 else f"log-{starts + 1}.mcap"
+        log = folder / name
         options = _options(folder, endpoint, agent)
-        return cogmap_command("log", "record", *options, "-o", str(folder / name))
+        return cogmap_command("log", "record", *options, "-o", str(log))
 
     if choices.record:
         programs.append(Program(RECORDER, record))
@@ -130,8 +135,11 @@ def modules(folder: Path, endpoint: str, agent: str, choices: Choices) -> list[P
     options = [*_options(folder, endpoint, agent), "--state", str(folder / STATE_NAME)]
     programs = []
     for name in registry.MODULES:
-        if name not in choices.without:
-            programs += [_module(name, each, options) for each in _instances(name, choices)]
+        if name in choices.without:
+            continue
+        for instance in _instances(name, choices):
+            program = _module(name, instance, options)
+            programs.append(program)
     return programs
 
 

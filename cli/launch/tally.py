@@ -96,8 +96,9 @@ class Tally:
     def _on_command(self, command: MotorCommand, envelope: Envelope, received_ns: int) -> None:
         cycle_ns = received_ns - envelope.born_ns
         compute_ns = sum(compute for _, compute, _ in envelope.stages)
+        bus_ns = cycle_ns - compute_ns
         self.cycle_ms.append(cycle_ns / 1e6)
-        self.bus_ms.append((cycle_ns - compute_ns) / 1e6)
+        self.bus_ms.append(bus_ns / 1e6)
 
         self.command = command
         if command.halted_by:
@@ -107,8 +108,10 @@ class Tally:
 
     def share_limited_by(self, limit: SpeedLimit) -> float:
         """The share of the commands that it slowed or halted; 0 where there is none."""
-        limited = self.halted[limit.value] + self.slowed[limit.value]
-        return limited / max(1, len(self.cycle_ms))
+        halted = self.halted[limit.value]
+        slowed = self.slowed[limit.value]
+        commands = max(1, len(self.cycle_ms))
+        return (halted + slowed) / commands
 
     @property
     def busy(self) -> dict[str, float]:
@@ -128,8 +131,10 @@ class Tally:
 
         gaps = {}
         for topic in topics.ALL:
-            if topic.delivery is Delivery.NEVER_DROP:
-                gaps[topic.name] = max(count.get(topic.name, 0) for count in counts)
+            if topic.delivery is not Delivery.NEVER_DROP:
+                continue
+            lost = [count.get(topic.name, 0) for count in counts]
+            gaps[topic.name] = max(lost)
         return gaps
 
     def rejected(self, own: Counter[str]) -> dict[str, int]:

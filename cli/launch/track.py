@@ -21,13 +21,14 @@ class Track:
         """Append a position. It replaces one of the same stamp; one that is out of order is
         ignored.
         """
-        if self._stamps_ns and stamp_ns < self._stamps_ns[-1]:
-            return
-        if self._stamps_ns and stamp_ns == self._stamps_ns[-1]:
-            self._points_m[-1] = (x_m, y_m)
-            return
-        self._stamps_ns.append(stamp_ns)
-        self._points_m.append((x_m, y_m))
+        point_m = (x_m, y_m)
+        last_ns = self.last_ns
+
+        if last_ns is None or stamp_ns > last_ns:
+            self._stamps_ns.append(stamp_ns)
+            self._points_m.append(point_m)
+        elif stamp_ns == last_ns:
+            self._points_m[-1] = point_m
 
     @property
     def last_ns(self) -> int | None:
@@ -52,15 +53,21 @@ class Track:
         """Which of the stamps lie between the first and the last position, any shape."""
         if not self._stamps_ns:
             return np.zeros(stamps_ns.shape, bool)
-        after_first: Booleans = stamps_ns >= self._stamps_ns[0]
-        before_last: Booleans = stamps_ns <= self._stamps_ns[-1]
+
+        first_ns = self._stamps_ns[0]
+        last_ns = self._stamps_ns[-1]
+        after_first: Booleans = stamps_ns >= first_ns
+        before_last: Booleans = stamps_ns <= last_ns
         return after_first & before_last
 
     def at(self, stamps_ns: Indices) -> Floats:
         """Positions (k, 2) at (k,) stamps that it covers, interpolated."""
         first_ns = self._stamps_ns[0]
-        known_s = (self.stamps_ns - first_ns) / 1e9
-        wanted_s = (stamps_ns - first_ns) / 1e9
+        known_ns = self.stamps_ns - first_ns
+        wanted_ns = stamps_ns - first_ns
+
+        known_s = known_ns / 1e9
+        wanted_s = wanted_ns / 1e9
         return interpolate(known_s, self.points_m, wanted_s)
 
 

@@ -144,13 +144,14 @@ def default_limit_s(laps: float) -> float:
 
 
 def _introduce(screen: Display, drive: Drive) -> None:
-    screen.show(f"town {drive.sections['sim']['seed']}, files in {drive.folder}")
-    if drive.choices.without:
-        names = ", ".join(drive.choices.without)
-        screen.show(
-            f"start {names} yourself with --connect {drive.endpoint} "
-            f"--config {drive.folder / CONFIG_NAME}"
-        )
+    seed = drive.sections["sim"]["seed"]
+    screen.show(f"town {seed}, files in {drive.folder}")
+    if not drive.choices.without:
+        return
+
+    names = ", ".join(drive.choices.without)
+    config_path = drive.folder / CONFIG_NAME
+    screen.show(f"start {names} yourself with --connect {drive.endpoint} --config {config_path}")
 
 
 def _new_folder(out: Path | None) -> Path:
@@ -173,9 +174,10 @@ def _new_folder(out: Path | None) -> Path:
 
 def _link_latest(folder: Path) -> None:
     """Let the link `latest` beside `folder` lead to it, at no moment nowhere."""
+    latest = folder.with_name("latest")
     new = folder.with_name(f".latest-{folder.name}")
     new.symlink_to(folder.name)
-    new.replace(folder.with_name("latest"))
+    new.replace(latest)
 
 
 @contextmanager

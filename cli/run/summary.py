@@ -30,8 +30,11 @@ MAP_NAME = "map.png"
 def finish(drive: Drive, watch: Watch, ending: Ending) -> RunMetrics:
     """Write the summary and the map of a drive that has ended so."""
     metrics = _run_metrics(drive, watch, ending)
-    encoded = msgspec.json.format(msgspec.json.encode(metrics))
-    (drive.folder / SUMMARY_NAME).write_bytes(encoded + b"\n")
+    encoded = msgspec.json.encode(metrics)
+    indented = msgspec.json.format(encoded)
+
+    summary_path = drive.folder / SUMMARY_NAME
+    summary_path.write_bytes(indented + b"\n")
     _draw_map(drive.folder / MAP_NAME, watch, metrics)
     return metrics
 
@@ -67,15 +70,17 @@ def _draw_map(path: Path, watch: Watch, metrics: RunMetrics) -> None:
 def table(metrics: RunMetrics, folder: Path) -> Table:
     """The metrics that matter most."""
     title = f"{metrics.ended_by}: {metrics.reason}\n{folder}"
-    return _table(
-        title, [*drive_rows(metrics), *_loss_rows(metrics, "not recorded"), *_process_rows(metrics)]
-    )
+    rows = drive_rows(metrics)
+    rows += _loss_rows(metrics, "not recorded")
+    rows += _process_rows(metrics)
+    return _table(title, rows)
 
 
 def recorded_table(metrics: RecordedMetrics, log: Path) -> Table:
     """The metrics that matter most, of a log."""
-    losses = _loss_rows(metrics, "the recording was not finished")
-    return _table(str(log), [*drive_rows(metrics), *losses])
+    rows = drive_rows(metrics)
+    rows += _loss_rows(metrics, "the recording was not finished")
+    return _table(str(log), rows)
 
 
 def _table(title: str, rows: list[tuple[str, str]]) -> Table:
@@ -118,7 +123,10 @@ def _limits(metrics: DriveMetrics) -> str:
     for name, number in limits.most_common():
         share = number / metrics.commands
         shares.append(f"{name} {share:.0%}")
-    return ", ".join(shares) or "never"
+
+    if not shares:
+        return "never"
+    return ", ".join(shares)
 
 
 def _errors(errors: ErrorMetrics) -> str:
@@ -128,13 +136,22 @@ def _errors(errors: ErrorMetrics) -> str:
 def _loss_rows(metrics: RecordedMetrics, without_log: str) -> list[tuple[str, str]]:
     dropped = "none"
     if metrics.refused:
-        dropped = f"{metrics.dropped}, the last: {metrics.refused[-1]}"
-    return [("lost messages", _losses(metrics, without_log)), ("dropped answers", dropped)]
+        last_reason = metrics.refused[-1]
+        dropped = f"{metrics.dropped}, the last: {last_reason}"
+
+    return [
+        ("lost messages", _losses(metrics, without_log)),
+        ("dropped answers", dropped),
+    ]
 
 
 def _process_rows(metrics: RunMetrics) -> list[tuple[str, str]]:
-    restarts = [f"{name} {number}" for name, number in metrics.restarts.items()]
-    return [("restarts", ", ".join(restarts) or "none")]
+    restarts = []
+    for name, number in metrics.restarts.items():
+        restarts.append(f"{name} {number}")
+
+    shown = ", ".join(restarts)
+    return [("restarts", shown or "none")]
 
 
 def _losses(metrics: RecordedMetrics, without_log: str) -> str:
