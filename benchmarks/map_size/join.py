@@ -1,4 +1,4 @@
-"""A worker that joins a running system with a large map, over Zenoh, and the memory of a replica."""
+"""A worker that joins a running system with a large map over Zenoh; a replica's memory."""
 
 from __future__ import annotations
 

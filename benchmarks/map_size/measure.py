@@ -22,8 +22,8 @@ REPEATS = 3
 def measure(announce: Callable[[str], None]) -> Metrics:
     """Every metric of THRESHOLDS, and the values that the ratios are of.
 
-    Workers join several times, and each size is driven several times in turn; the least time counts,
-    for other jobs of the machine only add to it.
+    Workers join several times, and each size is driven several times in turn; the least time
+    counts, for other jobs of the machine only add to it.
     """
     announce(f"making maps of {SMALL.objects} and of {LARGE.objects} objects")
     small_map = cognitive_map(SMALL)

@@ -38,9 +38,9 @@ class Tally:
 
     `cycle_ms`: of each command, the time from the stamping of its camera frame until it was
     received; `bus_ms`: the part of it spent in anything but computing. `refused`: why the last few
-    answers of codelets were dropped. `forgotten`: the labels of objects whose activation had decayed,
-    so that they are no longer on the map. `halted` and `slowed`: how many commands stopped the robot or
-    kept it below its cruising speed, by reason; `command` is the newest.
+    answers of codelets were dropped. `forgotten`: the labels of objects that left the map as their
+    activation had decayed. `halted` and `slowed`: how many commands stopped the robot or kept it
+    below its cruising speed, by reason; `command` is the newest.
     """
 
     def __init__(self, replica: Replica) -> None:

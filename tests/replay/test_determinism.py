@@ -57,7 +57,10 @@ def test_two_lockstep_drives_of_one_seed_give_the_same_bytes_on_every_topic(firs
 
 
 def test_another_process_with_other_hashes_of_strings_says_the_same(first: Said) -> None:
-    script = "import sys; from tests.support import reference; sys.stdout.buffer.write(b''.join(reference.drive(3)['motor/command']))"
+    script = (
+        "import sys; from tests.support import reference; "
+        "sys.stdout.buffer.write(b''.join(reference.drive(3)['motor/command']))"
+    )
     environment = os.environ | {"PYTHONHASHSEED": "4711", "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
         [sys.executable, "-c", script], env=environment, capture_output=True, check=True

@@ -1,4 +1,4 @@
-"""Replaying a small stateful module from a log: the same bytes, or the first difference in words."""
+"""Replaying a small stateful module from a log: the same bytes, or the first difference."""
 
 from __future__ import annotations
 
@@ -267,7 +267,8 @@ def test_the_first_difference_names_message_field_and_both_values(
     )
     value = expected.range_m.numpy()[1, 1].item()
     assert report.first == (
-        f"sensory/scan number 4 of mixer (stamp {expected.stamp_ns / 1e9:.3f} s): range_m.1.1 is {value!r} in the log, "
+        f"sensory/scan number 4 of mixer (stamp {expected.stamp_ns / 1e9:.3f} s): "
+        f"range_m.1.1 is {value!r} in the log, "
         f"{np.float32(value + 1).item()!r} in the replay (1 of 8 values differ)"
     )
 
