@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-import math
-
 import msgspec
 import numpy as np
 import pytest
@@ -15,28 +13,17 @@ from schemas.cognition import (
     Broadcast,
     Coalition,
     Competition,
-    Rejection,
     Trigger,
 )
 from schemas.graph import Delta, Phase
 from schemas.nodes import Node
 from schemas.process import Clock
-from schemas.sensing import MotorCommand, Pose, RangeScan, SelfMotion, SpeedLimit
+from schemas.sensing import MotorCommand, RangeScan, SelfMotion, SpeedLimit
 from services.action.module import Config, build
-from services.action.motor import SensoryMotorMemory, obstacle_ahead_m
-from services.action.route import Route
-from services.action.selection import FOLLOW_ROUTE, HALT, ActionSelection, Scheme
+from services.action.selection import FOLLOW_ROUTE, HALT
 from tests.support.scenes import agent
 
 PERIOD_NS = 200_000_000
-QUARTER = math.pi / 2
-
-
-def _nodes(**activations: float) -> list[Node]:
-    """Nodes of these kinds, as activated; of the generic node, for its kind is what counts here."""
-    return [
-        Node(id=kind, kind=kind, activation=activation) for kind, activation in activations.items()
-    ]
 
 
 def _scan(*obstacles: tuple[float, float], cycle: int = 1) -> RangeScan:
@@ -47,210 +34,6 @@ def _scan(*obstacles: tuple[float, float], cycle: int = 1) -> RangeScan:
         bearing_rad=Array.of(bearing_rad),
         range_m=Array.of(range_m),
     )
-
-
-# Procedural memory and action selection
-
-
-def test_a_schemes_activation_is_mean_context_plus_mean_salience() -> None:
-    scheme = Scheme("s", context=("a", "b"), adding={"c": 0.2, "d": -0.4})
-    assert scheme.activation({"a": 0.3, "b": 0.1}) == pytest.approx(0.2 + 0.3)
-    assert scheme.activation({"a": 1.0, "b": 1.0}) == 1.0
-
-
-def test_a_scheme_lacking_part_of_its_context_is_not_active() -> None:
-    assert Scheme("s", context=("a", "b"), adding={"c": 1.0}).activation({"a": 1.0}) == 0.0
-
-
-def test_the_threshold_falls_with_each_attempt_until_one_selects() -> None:
-    selection = ActionSelection(Config())
-    route = {"route_ahead": 0.5}
-    attempts = [selection.select(_nodes(self=0.4), route) for _ in range(10)]
-    chosen = [number for number, attempt in enumerate(attempts) if attempt is not None]
-
-    assert chosen == [3, 7]  # 0.45 + 0.2 is under 0.9, 0.8 and 0.7, and not under 0.6
-
-
-def test_a_scheme_less_active_than_is_instantiated_is_never_selected() -> None:
-    selection = ActionSelection(Config(instantiation=0.8))
-
-    assert [selection.select(_nodes(self=0.4), {"route_ahead": 0.5}) for _ in range(20)] == [
-        None
-    ] * 20
-
-
-def test_following_the_route_needs_an_agent_that_knows_where_it_is() -> None:
-    selection = ActionSelection(Config(selection_threshold=0.0))
-    assert selection.select(_nodes(object=1.0), {"route_ahead": 1.0, "route_end": 0.0}) is None
-
-
-def test_the_end_of_the_route_calls_for_a_halt() -> None:
-    chosen = ActionSelection(Config()).select(
-        _nodes(self=1.0), {"route_ahead": 0.0, "route_end": 1.0}
-    )
-
-    assert chosen is not None
-    assert chosen.chosen.scheme == HALT
-
-
-def test_every_behaviour_is_reported_and_why_it_was_not_chosen() -> None:
-    selection = ActionSelection(Config(selection_threshold=0.0, instantiation=0.5))
-    nodes = _nodes(self=1.0)
-    both = selection.select(nodes, {"route_ahead": 1.0, "route_end": 0.3})
-
-    assert both is not None
-    assert [(each.scheme, each.rejection) for each in both.considered] == [
-        (FOLLOW_ROUTE, Rejection.NONE),
-        (HALT, Rejection.LESS_ACTIVE),
-    ]
-
-    weak = selection.select(nodes, {"route_ahead": 1.0, "route_end": 0.1})
-    missing = selection.select(nodes, {"route_ahead": 1.0})
-
-    assert weak is not None
-    assert missing is not None
-    assert weak.considered[1].rejection is Rejection.NOT_INSTANTIATED
-    assert missing.considered[1].rejection is Rejection.CONTEXT_MISSING
-    assert missing.considered[1].activation == 0.0
-
-
-# Sensory-motor memory
-
-
-def _command(
-    pose: Pose,
-    clear_m: float = math.inf,
-    legs: tuple[tuple[float, float], ...] = ((50.0, 0.0),),
-    age_s: float = 0.0,
-) -> MotorCommand:
-    config = Config()
-    route = Route([*legs], config.corner_radius_m, config.overrun_m)
-    for x_m in np.arange(0.0, pose.x_m, 1.0):
-        route.advance(x_m, 0.0)
-
-    route.advance(pose.x_m, pose.y_m)
-    motor = SensoryMotorMemory(config, route)
-
-    return motor.command(7, pose, clear_m, round(age_s * 1e9))
-
-
-def _at(x_m: float = 0.0, y_m: float = 0.0, heading_rad: float = 0.0) -> Pose:
-    return Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad)
-
-
-def test_on_the_line_and_along_it_both_wheels_turn_at_cruising_speed() -> None:
-    command = _command(_at(5.0))
-    config = Config()
-
-    assert (
-        command.left_wheel_rad_s
-        == command.right_wheel_rad_s
-        == config.cruise_m_s / config.wheel_radius_m
-    )
-    assert (command.halted_by, command.stamp_ns) == ("", 7)
-
-
-@pytest.mark.parametrize("pose", [_at(5.0, 1.0), _at(5.0, 0.0, 0.3), _at(5.0, 0.5, 2 * math.pi)])
-def test_left_of_the_line_or_headed_left_the_robot_turns_right(pose: Pose) -> None:
-    command = _command(pose)
-    assert command.left_wheel_rad_s > command.right_wheel_rad_s
-
-
-@pytest.mark.parametrize(
-    "pose", [_at(5.0, -1.0), _at(5.0, 0.0, -0.3), _at(5.0, -0.5, -4 * math.pi)]
-)
-def test_right_of_the_line_or_headed_right_the_robot_turns_left(pose: Pose) -> None:
-    command = _command(pose)
-    assert command.left_wheel_rad_s < command.right_wheel_rad_s
-
-
-def test_a_robot_that_looks_backwards_turns_slowly() -> None:
-    command = _command(_at(5.0, 0.0, 3.0))
-    mean_m_s = (command.left_wheel_rad_s + command.right_wheel_rad_s) / 2 * Config().wheel_radius_m
-
-    assert mean_m_s == pytest.approx(0.5)
-    assert command.left_wheel_rad_s > command.right_wheel_rad_s
-
-
-def test_the_arc_of_pure_pursuit_passes_through_the_point_ahead() -> None:
-    config = Config()
-    command = _command(_at(10.0, 1.0))
-    speed_m_s = (command.left_wheel_rad_s + command.right_wheel_rad_s) / 2 * config.wheel_radius_m
-    turn_rad_s = (
-        (command.right_wheel_rad_s - command.left_wheel_rad_s)
-        * config.wheel_radius_m
-        / config.track_m
-    )
-    radius_m = speed_m_s / turn_rad_s
-    centre = (10.0, 1.0 + radius_m)
-
-    assert math.dist(centre, (10.0 + config.lookahead_m, 0.0)) == pytest.approx(
-        abs(radius_m), rel=1e-6
-    )
-
-
-def test_the_robot_slows_down_before_a_bend() -> None:
-    legs = ((50.0, QUARTER), (50.0, 0.0))
-    speeds = [_driven(_command(_at(x_m), legs=legs)) for x_m in (10.0, 49.0)]
-
-    assert speeds[0] == Config().cruise_m_s
-    assert speeds[1] < math.sqrt(Config().lateral_m_s2 * 3.5) + 0.1
-
-
-def _driven(command: MotorCommand) -> float:
-    return (command.left_wheel_rad_s + command.right_wheel_rad_s) / 2 * Config().wheel_radius_m
-
-
-def test_the_robot_slows_down_before_an_obstacle_and_stops_at_its_clearance() -> None:
-    speeds = [_driven(_command(_at(5.0), clear_m)) for clear_m in (20.0, 4.0, 2.0)]
-
-    assert speeds == sorted(speeds, reverse=True)
-    assert speeds[0] == Config().cruise_m_s
-    assert speeds[2] == pytest.approx(math.sqrt(2 * 2.5 * 0.5))
-
-    stopped = _command(_at(5.0), 1.5)
-
-    assert (stopped.left_wheel_rad_s, stopped.right_wheel_rad_s, stopped.halted_by) == (
-        0.0,
-        0.0,
-        "obstacle",
-    )
-
-
-def test_the_older_its_pose_the_slower_the_robot_until_it_stops() -> None:
-    config = Config()
-    commands = [_command(_at(5.0), age_s=age_s) for age_s in (0.0, 0.2, 0.5, 1.0, 2.1)]
-    speeds = [_driven(command) for command in commands]
-
-    assert speeds[:2] == [config.cruise_m_s] * 2
-    assert speeds[2:] == pytest.approx([config.blind_m / 0.5, config.blind_m, 0.0])
-    assert [command.slowed_by for command in commands[:4]] == [
-        SpeedLimit.NONE,
-        SpeedLimit.NONE,
-        SpeedLimit.POSE_AGE,
-        SpeedLimit.POSE_AGE,
-    ]
-    assert commands[4].halted_by is SpeedLimit.POSE_AGE
-    assert commands[3].pose_age_ns == 10**9
-
-
-def test_what_stands_aside_behind_or_alone_is_no_obstacle() -> None:
-    assert obstacle_ahead_m(_scan((0.0, 8.0), (0.05, 8.2)), 0.7) == pytest.approx(8.2, abs=0.05)
-    assert obstacle_ahead_m(_scan((0.0, 8.0)), 0.7) == math.inf
-    assert obstacle_ahead_m(_scan((0.5, 8.0), (0.55, 8.0)), 0.7) == math.inf
-    assert obstacle_ahead_m(_scan((3.1, 8.0), (3.14, 8.0)), 0.7) == math.inf
-    assert obstacle_ahead_m(_scan((0.0, 0.0), (0.05, 0.0)), 0.7) == math.inf
-
-
-def test_a_scan_whose_bearings_and_ranges_do_not_pair_is_refused() -> None:
-    scan = _scan((0.0, 8.0), (0.1, 8.0))
-    scan = msgspec.structs.replace(scan, range_m=Array.of(np.ones(3, np.float32)))
-
-    with pytest.raises(MessageError, match="2,\\) bearings and \\(3"):
-        obstacle_ahead_m(scan, 0.7)
-
-
-# The module
 
 
 def _module(
@@ -272,7 +55,8 @@ def _delta(cycle: int = 1, x_m: float = 0.0, phase: Phase = Phase.LOCALIZATION) 
 
 
 def _broadcast(cycle: int = 1) -> Broadcast:
-    coalition = Coalition(codelet="whereabouts", activation=0.5, nodes=[*_nodes(self=1.0)])
+    knowing = Node(id="self", kind="self", activation=1.0)
+    coalition = Coalition(codelet="whereabouts", activation=0.5, nodes=[knowing])
     return Broadcast(stamp_ns=cycle * PERIOD_NS, cycle=cycle, trigger="t", coalition=coalition)
 
 

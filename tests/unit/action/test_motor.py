@@ -1,0 +1,158 @@
+from __future__ import annotations
+
+import math
+
+import msgspec
+import numpy as np
+import pytest
+
+from cogmap.errors import MessageError
+from schemas.array import Array
+from schemas.sensing import MotorCommand, Pose, RangeScan, SpeedLimit
+from services.action.config import Config
+from services.action.motor import SensoryMotorMemory, obstacle_ahead_m
+from services.action.route import Route
+
+QUARTER = math.pi / 2
+
+
+def _scan(*obstacles: tuple[float, float]) -> RangeScan:
+    bearing_rad, range_m = np.array(obstacles, np.float32).reshape(-1, 2).T
+    return RangeScan(
+        frame=1,
+        bearing_rad=Array.of(bearing_rad),
+        range_m=Array.of(range_m),
+    )
+
+
+def _command(
+    pose: Pose,
+    clear_m: float = math.inf,
+    legs: tuple[tuple[float, float], ...] = ((50.0, 0.0),),
+    age_s: float = 0.0,
+) -> MotorCommand:
+    config = Config()
+    route = Route([*legs], config.corner_radius_m, config.overrun_m)
+    for x_m in np.arange(0.0, pose.x_m, 1.0):
+        route.advance(x_m, 0.0)
+
+    route.advance(pose.x_m, pose.y_m)
+    motor = SensoryMotorMemory(config, route)
+
+    return motor.command(7, pose, clear_m, round(age_s * 1e9))
+
+
+def _at(x_m: float = 0.0, y_m: float = 0.0, heading_rad: float = 0.0) -> Pose:
+    return Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad)
+
+
+def test_on_the_line_and_along_it_both_wheels_turn_at_cruising_speed() -> None:
+    command = _command(_at(5.0))
+    config = Config()
+
+    assert (
+        command.left_wheel_rad_s
+        == command.right_wheel_rad_s
+        == config.cruise_m_s / config.wheel_radius_m
+    )
+    assert (command.halted_by, command.stamp_ns) == ("", 7)
+
+
+@pytest.mark.parametrize("pose", [_at(5.0, 1.0), _at(5.0, 0.0, 0.3), _at(5.0, 0.5, 2 * math.pi)])
+def test_left_of_the_line_or_headed_left_the_robot_turns_right(pose: Pose) -> None:
+    command = _command(pose)
+    assert command.left_wheel_rad_s > command.right_wheel_rad_s
+
+
+@pytest.mark.parametrize(
+    "pose", [_at(5.0, -1.0), _at(5.0, 0.0, -0.3), _at(5.0, -0.5, -4 * math.pi)]
+)
+def test_right_of_the_line_or_headed_right_the_robot_turns_left(pose: Pose) -> None:
+    command = _command(pose)
+    assert command.left_wheel_rad_s < command.right_wheel_rad_s
+
+
+def test_a_robot_that_looks_backwards_turns_slowly() -> None:
+    command = _command(_at(5.0, 0.0, 3.0))
+    mean_m_s = (command.left_wheel_rad_s + command.right_wheel_rad_s) / 2 * Config().wheel_radius_m
+
+    assert mean_m_s == pytest.approx(0.5)
+    assert command.left_wheel_rad_s > command.right_wheel_rad_s
+
+
+def test_the_arc_of_pure_pursuit_passes_through_the_point_ahead() -> None:
+    config = Config()
+    command = _command(_at(10.0, 1.0))
+    speed_m_s = (command.left_wheel_rad_s + command.right_wheel_rad_s) / 2 * config.wheel_radius_m
+    turn_rad_s = (
+        (command.right_wheel_rad_s - command.left_wheel_rad_s)
+        * config.wheel_radius_m
+        / config.track_m
+    )
+    radius_m = speed_m_s / turn_rad_s
+    centre = (10.0, 1.0 + radius_m)
+
+    assert math.dist(centre, (10.0 + config.lookahead_m, 0.0)) == pytest.approx(
+        abs(radius_m), rel=1e-6
+    )
+
+
+def test_the_robot_slows_down_before_a_bend() -> None:
+    legs = ((50.0, QUARTER), (50.0, 0.0))
+    speeds = [_driven(_command(_at(x_m), legs=legs)) for x_m in (10.0, 49.0)]
+
+    assert speeds[0] == Config().cruise_m_s
+    assert speeds[1] < math.sqrt(Config().lateral_m_s2 * 3.5) + 0.1
+
+
+def _driven(command: MotorCommand) -> float:
+    return (command.left_wheel_rad_s + command.right_wheel_rad_s) / 2 * Config().wheel_radius_m
+
+
+def test_the_robot_slows_down_before_an_obstacle_and_stops_at_its_clearance() -> None:
+    speeds = [_driven(_command(_at(5.0), clear_m)) for clear_m in (20.0, 4.0, 2.0)]
+
+    assert speeds == sorted(speeds, reverse=True)
+    assert speeds[0] == Config().cruise_m_s
+    assert speeds[2] == pytest.approx(math.sqrt(2 * 2.5 * 0.5))
+
+    stopped = _command(_at(5.0), 1.5)
+
+    assert (stopped.left_wheel_rad_s, stopped.right_wheel_rad_s, stopped.halted_by) == (
+        0.0,
+        0.0,
+        "obstacle",
+    )
+
+
+def test_the_older_its_pose_the_slower_the_robot_until_it_stops() -> None:
+    config = Config()
+    commands = [_command(_at(5.0), age_s=age_s) for age_s in (0.0, 0.2, 0.5, 1.0, 2.1)]
+    speeds = [_driven(command) for command in commands]
+
+    assert speeds[:2] == [config.cruise_m_s] * 2
+    assert speeds[2:] == pytest.approx([config.blind_m / 0.5, config.blind_m, 0.0])
+    assert [command.slowed_by for command in commands[:4]] == [
+        SpeedLimit.NONE,
+        SpeedLimit.NONE,
+        SpeedLimit.POSE_AGE,
+        SpeedLimit.POSE_AGE,
+    ]
+    assert commands[4].halted_by is SpeedLimit.POSE_AGE
+    assert commands[3].pose_age_ns == 10**9
+
+
+def test_what_stands_aside_behind_or_alone_is_no_obstacle() -> None:
+    assert obstacle_ahead_m(_scan((0.0, 8.0), (0.05, 8.2)), 0.7) == pytest.approx(8.2, abs=0.05)
+    assert obstacle_ahead_m(_scan((0.0, 8.0)), 0.7) == math.inf
+    assert obstacle_ahead_m(_scan((0.5, 8.0), (0.55, 8.0)), 0.7) == math.inf
+    assert obstacle_ahead_m(_scan((3.1, 8.0), (3.14, 8.0)), 0.7) == math.inf
+    assert obstacle_ahead_m(_scan((0.0, 0.0), (0.05, 0.0)), 0.7) == math.inf
+
+
+def test_a_scan_whose_bearings_and_ranges_do_not_pair_is_refused() -> None:
+    scan = _scan((0.0, 8.0), (0.1, 8.0))
+    scan = msgspec.structs.replace(scan, range_m=Array.of(np.ones(3, np.float32)))
+
+    with pytest.raises(MessageError, match="2,\\) bearings and \\(3"):
+        obstacle_ahead_m(scan, 0.7)
