@@ -39,13 +39,13 @@ SHOWN = {
     "heading": "headings too",
 }
 COLOURS = {WHEELS_ALONE: FAINT, "none": WHEELS, "positions": SEVERAL[1], "heading": ESTIMATE}
-MOST_SHEETS = 8
+MAX_SHEETS = 8
 MARGIN_M = 120.0
 SCALE_M = 200.0
 
 
 def figure(maps: Sequence[CityMap], metrics: dict[str, Any]) -> Figure:
-    """The sheet: errors on top, below true and learned maps, a column each, of at most MOST_SHEETS
+    """The sheet: errors on top, below true and learned maps, a column each, of at most MAX_SHEETS
     of them.
     """
     chosen = _spread(maps)
@@ -84,10 +84,10 @@ def _title(maps: Sequence[CityMap], metrics: dict[str, Any]) -> str:
 
 
 def _spread(maps: Sequence[CityMap]) -> list[CityMap]:
-    """MOST_SHEETS of the maps, from the shortest tour to the longest."""
+    """MAX_SHEETS of the maps, from the shortest tour to the longest."""
     ordered = sorted(maps, key=lambda each: each.environment.tour_m)
     picks = np.unique(
-        np.linspace(0, len(ordered) - 1, min(MOST_SHEETS, len(ordered))).round().astype(int)
+        np.linspace(0, len(ordered) - 1, min(MAX_SHEETS, len(ordered))).round().astype(int)
     )
     return [ordered[pick] for pick in picks.tolist()]
 

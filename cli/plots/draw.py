@@ -28,7 +28,7 @@ WIDE_PX = 960
 SCALE_PX = 90
 DPI = 100
 NEAREST_SHARE = 0.01
-LEAST_DISPARITY_PX = 2.0
+MIN_DISPARITY_PX = 2.0
 TICKS = (1.0, 2.0, 5.0)
 
 
@@ -78,7 +78,7 @@ def show_depth(axes: Axes, depth_m: Depth, camera: Calibration) -> AxesImage:
     """
     known = depth_m[depth_m > 0]
     nearest_m = float(np.quantile(known, NEAREST_SHARE)) if known.size else 1.0
-    farthest_m = camera.fx_px * camera.baseline_m / LEAST_DISPARITY_PX
+    farthest_m = camera.fx_px * camera.baseline_m / MIN_DISPARITY_PX
     norm = LogNorm(nearest_m, max(farthest_m, 2 * nearest_m))
     colours = mpl.colormaps["viridis_r"].with_extremes(bad=KERB)
     return axes.imshow(

@@ -20,10 +20,10 @@ from services.epam.layout.ground import CELL_M
 
 Floats = npt.NDArray[np.float64]
 NEAREST_M = 0.4
-LEAST_M = 18.0
+MIN_AHEAD_M = 18.0
 MARGIN_M = 3.0
 RING_M = 10.0
-MOST_ABOVE_M = 2.0
+MAX_ABOVE_M = 2.0
 ROBOT_PER_M = 40.0
 FINER = 4
 _SHIFT = 4
@@ -109,7 +109,7 @@ def name_in_plan(axes: Axes, objects: list[Percept], size: float) -> None:
     for percept, colour in zip(objects, colours_of(objects), strict=True):
         x, y = _from_above(_position_m(percept)[None])[0].tolist()
         labels.append(
-            Label(spoken(percept.label), x, y + min(2 * percept.range_sd_m, MOST_ABOVE_M), colour)
+            Label(spoken(percept.label), x, y + min(2 * percept.range_sd_m, MAX_ABOVE_M), colour)
         )
     place(axes, labels, size)
 
@@ -162,4 +162,4 @@ def _farthest_m(percepts: Percepts) -> float:
     objects_m = [
         float(_position_m(percept)[0]) + 2 * percept.range_sd_m for percept in percepts.objects
     ]
-    return max([*road_m, *objects_m, LEAST_M]) + MARGIN_M
+    return max([*road_m, *objects_m, MIN_AHEAD_M]) + MARGIN_M

@@ -145,7 +145,7 @@ def read(
 
 
 def _uses(agent: str, members: dict[str, Member], admin_key: str, payload: bytes) -> set[Use]:
-    """What one fact, such as `@/ZID/router/publisher/KEY`, tells about `agent`'s keys."""
+    """The uses of `agent`'s keys in one fact, such as `@/ZID/router/publisher/KEY`."""
     path = admin_key.split("/", 3)[-1]
     word, _, key = path.partition("/")
     role = _ROLES.get(word)

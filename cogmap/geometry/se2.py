@@ -21,13 +21,6 @@ def wrap_angle(angle_rad: Floats) -> Floats:
     return wrapped
 
 
-def mean_angle(angles_rad: Floats) -> float:
-    """The mean direction of (n,) angles, in radians."""
-    sin = np.sin(angles_rad).mean()
-    cos = np.cos(angles_rad).mean()
-    return float(np.arctan2(sin, cos))
-
-
 def rotation_matrices(heading_rad: Floats) -> Floats:
     """(..., 2, 2) matrices that rotate by angles of any shape (...): from a robot's axes to the
     world's.
@@ -48,13 +41,6 @@ def rotate(vectors: Floats, angle_rad: Floats | float) -> Floats:
     rotated_x = cos * x - sin * y
     rotated_y = sin * x + cos * y
     return np.stack([rotated_x, rotated_y], axis=-1)
-
-
-def polar(range_m: Floats, bearing_rad: Floats) -> Floats:
-    """(..., 2) vectors as long as `range_m`, `bearing_rad` counter-clockwise from x."""
-    x = range_m * np.cos(bearing_rad)
-    y = range_m * np.sin(bearing_rad)
-    return np.stack([x, y], axis=-1)
 
 
 def transform_from(pose: Floats, points_m: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""Records what travels on a bus: checks every message, counts every loss, holds up nobody."""
+"""Records what travels on a bus: checks every message, counts every loss, blocks no publisher."""
 
 from __future__ import annotations
 

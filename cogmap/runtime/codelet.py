@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import msgspec
-import numpy as np
 
 from cogmap.graph.graph import Graph
 from schemas.array import Array
@@ -52,7 +51,7 @@ class CycleContext:
     ) -> Task:
         """A task for `codelet` about nodes `about`, by id.
 
-        `subject` tells the tasks of one codelet in one cycle apart.
+        `subject` distinguishes the tasks of one codelet in one cycle.
         """
         name = f"{self.cycle}/{codelet}"
         return Task(
@@ -127,8 +126,3 @@ class ConfiguredCodelet:
     def run(self, task: Task, graph: Graph) -> Answer:
         """Its answer to a task."""
         return self.codelet.run(task, graph, self.config)
-
-
-def no_motions() -> Array:
-    """Rows of self-motion, none."""
-    return Array.of(np.zeros((0, 5)))

@@ -86,7 +86,7 @@ class _Rescue:
         return self._recovery
 
     def _library(self) -> str:
-        """The program that wrote the log, which says what its messages are; ours if damaged."""
+        """The program that wrote the log, which determines its messages; ours if damaged."""
         for span in self._source.all_records(_ignore):
             header = self._parsed(span)
             return header.library if isinstance(header, Header) else layout.SOFTWARE

@@ -19,10 +19,6 @@ def test_angles_are_wrapped_to_a_half_turn_to_either_side() -> None:
     assert se2.wrap_angle(angles) == pytest.approx(expected)
 
 
-def test_the_mean_of_headings_is_taken_on_the_circle() -> None:
-    assert se2.mean_angle(np.array([np.pi - 0.1, -np.pi + 0.3])) == pytest.approx(-np.pi + 0.1)
-
-
 def test_a_step_in_a_poses_frame_starts_along_its_heading() -> None:
     facing_north = np.array([1.0, 2.0, np.pi / 2])
     assert se2.compose(facing_north, np.array([3.0, 1.0, 0.2])) == pytest.approx(
@@ -66,8 +62,3 @@ def test_integrated_steps_are_those_between_the_poses() -> None:
 def test_the_mean_of_poses_has_the_mean_position_and_direction() -> None:
     poses = np.array([[0.0, 2.0, 3.0], [2.0, 4.0, -3.0]])
     assert se2.mean_pose(poses) == pytest.approx([1.0, 3.0, np.pi])
-
-
-def test_a_vector_by_range_and_bearing_has_that_length_and_direction() -> None:
-    vector = se2.polar(np.array([2.0]), np.array([np.pi / 2]))
-    assert vector[0] == pytest.approx([0.0, 2.0])
