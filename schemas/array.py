@@ -18,16 +18,21 @@ def _check(dtype: str, shape: tuple[int, ...], data: memoryview | bytes) -> None
     """Raise ValueError where the parts of an array do not fit together, or it is not finite."""
     expected = _ITEM_BYTES.get(dtype, 0)
     if not expected:
-        raise ValueError(f"array dtype {dtype!r} is none of {', '.join(sorted(_ITEM_BYTES))}")
+        known = ", ".join(sorted(_ITEM_BYTES))
+        raise ValueError(f"array dtype {dtype!r} is none of {known}")
 
-    for side in shape:
-        expected *= side if side >= 0 else 0
     if len(shape) > MAX_DIMENSIONS or min(shape, default=0) < 0:
         raise ValueError(f"array shape {shape} is not one of up to {MAX_DIMENSIONS} sizes")
+
+    for side in shape:
+        expected *= side
     if len(data) != expected:
         raise ValueError(f"array of shape {shape} needs {expected} bytes, got {len(data)}")
-    if dtype[1] == "f" and not np.logical_and.reduce(np.isfinite(np.frombuffer(data, dtype))):
-        raise ValueError("array holds NaN or infinity")
+
+    if dtype[1] == "f":
+        is_finite = np.isfinite(np.frombuffer(data, dtype))
+        if not np.logical_and.reduce(is_finite):
+            raise ValueError("array holds NaN or infinity")
 
 
 class Array(msgspec.Struct, frozen=True, eq=False, gc=False):
@@ -48,7 +53,8 @@ class Array(msgspec.Struct, frozen=True, eq=False, gc=False):
     def of(cls, values: npt.ArrayLike, dtype: str | None = None) -> Array:
         """Wrap `values`, without a copy where they are contiguous and of that dtype already."""
         array = np.ascontiguousarray(values, dtype)
-        return cls(array.dtype.str, array.shape, array.reshape(-1).view(np.uint8).data)
+        content = array.reshape(-1).view(np.uint8)
+        return cls(array.dtype.str, array.shape, content.data)
 
     def numpy(self) -> npt.NDArray[np.generic]:
         """The values, read-only, sharing memory with the message."""
@@ -59,11 +65,14 @@ class Array(msgspec.Struct, frozen=True, eq=False, gc=False):
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Array):
             return NotImplemented
-        same_type = (self.dtype, self.shape) == (other.dtype, other.shape)
-        return same_type and self.data == other.data
+
+        if self.dtype != other.dtype or self.shape != other.shape:
+            return False
+        return self.data == other.data
 
     def __hash__(self) -> int:
-        return hash((self.dtype, self.shape, bytes(self.data)))
+        content = bytes(self.data)
+        return hash((self.dtype, self.shape, content))
 
 
 class Matrix(msgspec.Struct, frozen=True, gc=False):
@@ -89,4 +98,5 @@ class Matrix(msgspec.Struct, frozen=True, gc=False):
 
     def numpy(self) -> npt.NDArray[np.float64]:
         """The values, read-only, sharing memory with the matrix, of its dtype."""
-        return np.frombuffer(self.data, self.dtype).reshape(self.shape)
+        values = np.frombuffer(self.data, self.dtype)
+        return values.reshape(self.shape)

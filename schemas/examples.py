@@ -18,8 +18,10 @@ _STAMP_NS = 1_200_000_000
 def _ramp(*shape: int, dtype: str) -> Array:
     """The numbers 0, 1, 2 … in that shape, scaled into [0, 1) where they are floats."""
     count = int(np.prod(shape))
-    ramp = np.arange(count, dtype=np.float64) / (count if dtype[1] == "f" else 1)
-    return Array.of(ramp.astype(dtype).reshape(shape))
+    scale = count if dtype[1] == "f" else 1
+    ramp = np.arange(count, dtype=np.float64) / scale
+    values = ramp.astype(dtype)
+    return Array.of(values.reshape(shape))
 
 
 def _calibration() -> sensing.Calibration:
@@ -56,7 +58,9 @@ def _percept() -> sensing.Percept:
 
 
 def _matrix(rows: int, columns: int, dtype: MatrixType = "<f8") -> Matrix:
-    return Matrix.of(np.arange(rows * columns, dtype=dtype).reshape(rows, columns) / 8, dtype)
+    numbers = np.arange(rows * columns, dtype=dtype)
+    values = numbers.reshape(rows, columns) / 8
+    return Matrix.of(values, dtype)
 
 
 def _node() -> nodes.Node:

@@ -23,7 +23,8 @@ GOLDEN = Path(__file__).parent / "golden"
 
 def file_name(topic: Topic, suffix: str) -> str:
     """The name of a file about `topic`."""
-    return topic.name.replace("/", ".") + suffix
+    stem = topic.name.replace("/", ".")
+    return stem + suffix
 
 
 def json_schema(topic: Topic) -> dict[str, Any]:
@@ -37,37 +38,42 @@ def json_schema(topic: Topic) -> dict[str, Any]:
 
 def export_schemas(folder: Path) -> list[Path]:
     """Write a JSON Schema for every topic into `folder`; the files written."""
-    files = {
-        file_name(topic, ".json"): msgspec.json.format(msgspec.json.encode(json_schema(topic)))
-        + b"\n"
-        for topic in topics.ALL
-    }
+    files = {}
+    for topic in topics.ALL:
+        compact = msgspec.json.encode(json_schema(topic))
+        text = msgspec.json.format(compact)
+        files[file_name(topic, ".json")] = text + b"\n"
+
     return _write(folder, files)
 
 
 def export_golden(folder: Path) -> list[Path]:
     """Write the bytes of one message of every type into `folder`; the files written."""
-    encode = msgspec.msgpack.encode
-    return _write(
-        folder,
-        {file_name(topics.of(message), ".msgpack"): encode(message) for message in samples()},
-    )
+    files = {}
+    for message in samples():
+        name = file_name(topics.of(message), ".msgpack")
+        files[name] = msgspec.msgpack.encode(message)
+
+    return _write(folder, files)
 
 
 def _write(folder: Path, files: dict[str, bytes]) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     for name, content in files.items():
         (folder / name).write_bytes(content)
+
     return [folder / name for name in files]
 
 
 def main() -> None:
-    """Write what the command line asks for, and say how much it was."""
+    """Write what the command line asks for, and print how many files that is."""
     parser = argparse.ArgumentParser(prog="python -m schemas.export", description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--golden", action="store_true", help="write the golden bytes instead")
     arguments = parser.parse_args()
-    written = (export_golden if arguments.golden else export_schemas)(arguments.folder)
+
+    export = export_golden if arguments.golden else export_schemas
+    written = export(arguments.folder)
     print(f"{len(written)} files in {arguments.folder}")  # noqa: T201
 
 

@@ -197,10 +197,9 @@ class Object(GraphNode, kw_only=True, frozen=True, tag="object"):
     """An object of the cognitive map, with samples of its position (paper §5.2).
 
     `offsets_m`: float16 (n, 2), the samples relative to their mean (`x_m`, `y_m`), which keeps them
-    to a thousandth of their spread. `sightings` is
-    the number of views that agree with the position, `misses` that of views in a row that did not.
-    One that is `surveyed` was given, and stays where it is. `last_seen_ns` and `created_ns` are
-    times of views.
+    to a thousandth of their spread. `sightings` is the number of views that agree with the
+    position, `misses` that of views in a row that do not. One that is `surveyed` was given, and
+    stays where it is. `last_seen_ns` and `created_ns` are times of views.
     """
 
     label: Name
@@ -382,6 +381,7 @@ def place_cell(identifier: str) -> tuple[str, int, int] | None:
     """The map and the grid cell of a place node's id; None for any other node's."""
     if not identifier.startswith("place:"):
         return None
+
     try:
         map_id, i, j = identifier.removeprefix("place:").rsplit(":", 2)
         return map_id, int(i), int(j)
@@ -391,7 +391,9 @@ def place_cell(identifier: str) -> tuple[str, int, int] | None:
 
 def nearest_place(x_m: float, y_m: float, cell_m: float, map_id: str = ROOT_MAP) -> str:
     """The id of the place node nearest to a position, in a grid of `cell_m`."""
-    return place_id(round(x_m / cell_m), round(y_m / cell_m), map_id)
+    i = round(x_m / cell_m)
+    j = round(y_m / cell_m)
+    return place_id(i, j, map_id)
 
 
 def _check_matrix(node: str, matrix: Matrix, dtype: str, columns: tuple[int, ...]) -> None:
@@ -400,5 +402,6 @@ def _check_matrix(node: str, matrix: Matrix, dtype: str, columns: tuple[int, ...
     if matrix.dtype != dtype or width not in columns:
         wanted = " or ".join(map(str, columns))
         raise ValueError(f"{node}: {matrix.dtype} of {width} columns, not {dtype} of {wanted}")
+
     if not 1 <= rows <= MAX_SAMPLES:
         raise ValueError(f"{node}: {rows} rows, not 1 to {MAX_SAMPLES}")

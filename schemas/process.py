@@ -6,7 +6,7 @@ from schemas.base import Count, Finite, Message, Name
 
 
 class Clock(Message, kw_only=True, frozen=True):
-    """The time that messages are stamped in. `rate` is its speed against wall time, 0 in lockstep."""
+    """The time that stamps messages. `rate` is its speed relative to wall time, 0 in lockstep."""
 
     rate: Finite = 1.0
 

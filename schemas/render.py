@@ -25,7 +25,8 @@ def to_jsonable(message: Any, full: bool = False) -> Any:
     if isinstance(message, enum.Enum):
         return message.value
     if isinstance(message, msgspec.Struct):
-        return {name: to_jsonable(value, full) for name, value in _fields(message).items()}
+        message = _fields(message)
+
     if isinstance(message, dict):
         return {str(name): to_jsonable(value, full) for name, value in message.items()}
     if isinstance(message, list | tuple):
@@ -36,10 +37,12 @@ def to_jsonable(message: Any, full: bool = False) -> Any:
 def to_text(message: Any, full: bool = False) -> str:
     """`message`, or a part of one, as YAML without a line break at its end.
 
-    An array becomes one line: its dtype, shape, least and greatest value, or with `full` all values.
+    An array becomes one line: its dtype, shape, least and greatest value; with `full`, its dtype,
+    shape and all values.
     """
+    parts = _arrays_as_text(message, full)
     text: str = yaml.dump(
-        _arrays_as_text(message, full),
+        parts,
         Dumper=yaml.CSafeDumper,
         sort_keys=False,
         allow_unicode=True,
@@ -60,28 +63,36 @@ def field(message: Any, path: str) -> Any:
 
 
 def _fields(struct: msgspec.Struct) -> dict[str, Any]:
-    tag = struct.__struct_config__.tag
-    fields = {name: getattr(struct, name) for name in struct.__struct_fields__}
-    return fields if tag is None else {str(struct.__struct_config__.tag_field): tag, **fields}
+    config = struct.__struct_config__
+    fields = {}
+    if config.tag is not None:
+        fields[str(config.tag_field)] = config.tag
+
+    for name in struct.__struct_fields__:
+        fields[name] = getattr(struct, name)
+    return fields
 
 
 def _array(array: Array | Matrix, full: bool) -> dict[str, Any]:
     values = array.numpy()
-    facts: dict[str, Any] = {"dtype": array.dtype, "shape": list(array.shape)}
+    facts: dict[str, Any] = {
+        "dtype": array.dtype,
+        "shape": list(array.shape),
+    }
     if full:
-        return {**facts, "data": values.tolist()}
-    ends = (values.min().item(), values.max().item()) if values.size else (None, None)
-    return {**facts, "min": ends[0], "max": ends[1]}
+        facts["data"] = values.tolist()
+        return facts
+
+    is_empty = not values.size
+    facts["min"] = None if is_empty else values.min().item()
+    facts["max"] = None if is_empty else values.max().item()
+    return facts
 
 
 def _step(value: Any, step: str, path: str) -> Any:
     if isinstance(value, _NAMED) and not isinstance(value, Array | Matrix):
-        fields = _fields(value) if isinstance(value, msgspec.Struct) else value
-        if step in fields:
-            return fields[step]
-        raise LookupError(
-            f"no {step!r} on the way to {path!r}: there are {', '.join(map(str, fields)) or 'no fields'}"
-        )
+        return _named_part(value, step, path)
+
     if not isinstance(value, list | tuple | Array | Matrix):
         raise LookupError(f"nothing is inside {value!r}, so no {step!r} on the way to {path!r}")
     try:
@@ -94,11 +105,23 @@ def _step(value: Any, step: str, path: str) -> Any:
         raise LookupError(f"no element {step} on the way to {path!r}") from None
 
 
+def _named_part(value: Any, name: str, path: str) -> Any:
+    fields = _fields(value) if isinstance(value, msgspec.Struct) else value
+    if name in fields:
+        return fields[name]
+
+    names = ", ".join(map(str, fields)) or "no fields"
+    raise LookupError(f"no {name!r} on the way to {path!r}: there are {names}")
+
+
 def _element(value: Any, index: int) -> Any:
     if not isinstance(value, Array | Matrix):
         return value[index]
+
     part = value.numpy()[index]
-    return Array.of(part) if part.ndim else part.item()
+    if part.ndim:
+        return Array.of(part)
+    return part.item()
 
 
 def _arrays_as_text(value: Any, full: bool) -> Any:

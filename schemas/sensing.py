@@ -118,7 +118,8 @@ class PlaceMatch(Part, kw_only=True, frozen=True):
 
 
 def _no_points() -> Array:
-    return Array.of(np.empty((0, 2), np.float32))
+    points_m = np.empty((0, 2), np.float32)
+    return Array.of(points_m)
 
 
 class Percepts(Message, kw_only=True, frozen=True):

@@ -1,5 +1,5 @@
-"""Linear decay, computed when it is asked for: what is kept is a value and the cycle of its
-writing, so that a cycle costs nothing for what did not change in it.
+"""Linear decay, computed on demand: a node keeps a value and the cycle in which it was written, so
+that a cycle costs nothing for nodes that it does not change.
 """
 
 from __future__ import annotations
@@ -10,26 +10,32 @@ from schemas.graph import Decay
 from schemas.nodes import KINDS, GraphNode
 
 NEVER = 2**62
-_LONGEST = 2**40
+_MAX_AGE = 2**40
 
 
 def activation(node: GraphNode, cycle: int, decay: Decay) -> float:
     """A node's activation in `cycle`."""
     if KINDS[type(node)].persistent:
         return node.activation
-    return max(0.0, node.activation - decay.activation * max(0, cycle - node.cycle))
+
+    age = max(0, cycle - node.cycle)
+    return max(0.0, node.activation - decay.activation * age)
 
 
 def base_level(node: GraphNode, cycle: int, decay: Decay) -> float:
     """A node's base-level activation in `cycle`."""
     if KINDS[type(node)].persistent:
         return node.base_level
-    return max(0.0, node.base_level - decay.base_level * max(0, cycle - node.cycle))
+
+    age = max(0, cycle - node.cycle)
+    return max(0.0, node.base_level - decay.base_level * age)
 
 
 def total_activation(node: GraphNode, cycle: int, decay: Decay) -> float:
     """min(1, base-level + current), LIDA's total activation, in `cycle`."""
-    return min(1.0, activation(node, cycle, decay) + base_level(node, cycle, decay))
+    current = activation(node, cycle, decay)
+    base = base_level(node, cycle, decay)
+    return min(1.0, current + base)
 
 
 def cycle_of_forgetting(node: GraphNode, decay: Decay) -> int:
@@ -42,7 +48,10 @@ def cycle_of_forgetting(node: GraphNode, decay: Decay) -> int:
         return NEVER
 
     def is_below(age: int) -> bool:
-        return total_activation(node, node.cycle + age, decay) < decay.forget_below
+        total = total_activation(node, node.cycle + age, decay)
+        return total < decay.forget_below
 
-    age = bisect_left(range(_LONGEST), True, lo=1, key=is_below)
-    return NEVER if age == _LONGEST else node.cycle + age - 1
+    age = bisect_left(range(_MAX_AGE), True, lo=1, key=is_below)
+    if age == _MAX_AGE:
+        return NEVER
+    return node.cycle + age - 1

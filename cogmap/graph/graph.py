@@ -43,9 +43,9 @@ _INDEXED = frozenset(kind for kind, rules in KINDS.items() if rules.indexed)
 class Graph:
     """Nodes, links and place nodes at one version.
 
-    `phase` is that of the newest commit but late ones, in the course of cognitive cycle `cycle`. Nodes are shared
-    and never changed: a commit puts another in their place. All nodes of an indexed kind are found
-    without a search.
+    `phase` is that of the newest commit that was not late, in cognitive cycle `cycle`. Nodes are
+    shared and never changed: a commit replaces them. All nodes of an indexed kind are found without
+    a search.
     """
 
     def __init__(self) -> None:
@@ -53,10 +53,12 @@ class Graph:
         self.cycle = 0
         self.phase = Phase.END
         self.decay = Decay()
+
         self.nodes: dict[str, AnyNode] = {}
         self.links = LinkIndex()
         self.places = PlaceGrid()
         self._by_kind: defaultdict[type[GraphNode], dict[str, None]] = defaultdict(dict)
+
         self._appliers: dict[type, Callable[[Any], None]] = {
             Link: self._put_link,
             Links: self.links.put_all,
@@ -74,6 +76,7 @@ class Graph:
         """
         if delta.version != self.version + 1:
             return False
+
         self.change(delta.operations)
         self.version = delta.version
         self.cycle = delta.cycle
@@ -108,6 +111,7 @@ class Graph:
     def of_kind(self, kind: type[K]) -> Iterator[K]:
         """All nodes of a kind, by id. Of a kind that is not indexed it searches every node."""
         names = self._by_kind[kind] if kind in _INDEXED else self.nodes
+
         for name in sorted(names):
             node = self.nodes[name]
             if isinstance(node, kind):
@@ -120,12 +124,15 @@ class Graph:
     @property
     def last_segment(self) -> PathSegment | None:
         """The newest segment of the path."""
-        return self.get(PathSegment, segment_id(self.count(PathSegment) - 1))
+        number = self.count(PathSegment) - 1
+        return self.get(PathSegment, segment_id(number))
 
     def cell_m(self, map_id: str = ROOT_MAP) -> float:
         """The distance between neighbouring place nodes of a map."""
         node = self.get(Map, map_id)
-        return 1.0 if node is None else node.cell_m
+        if node is None:
+            return 1.0
+        return node.cell_m
 
     def activation(self, node: GraphNode) -> float:
         """A node's activation in the current cycle."""
@@ -141,9 +148,14 @@ class Graph:
 
     def place(self, i: int, j: int, map_id: str = ROOT_MAP) -> Place | None:
         """The place node of a cell; None where its tile does not exist."""
-        cell_m = self.cell_m(map_id)
-        decay_rate = self.decay.place_activation
-        return self.places.place(map_id, i, j, cell_m=cell_m, cycle=self.cycle, decay=decay_rate)
+        return self.places.place(
+            map_id,
+            i,
+            j,
+            cell_m=self.cell_m(map_id),
+            cycle=self.cycle,
+            decay=self.decay.place_activation,
+        )
 
     def place_links(self, i: int, j: int, map_id: str = ROOT_MAP) -> Iterator[Link]:
         """The links from a place node to its neighbours."""
@@ -154,12 +166,13 @@ class Graph:
 
         Its tiles share memory with the graph: encode it before the graph changes.
         """
+        nodes = [self.nodes[identifier] for identifier in sorted(self.nodes)]
         return Snapshot(
             version=self.version,
             cycle=self.cycle,
             phase=self.phase,
             decay=self.decay,
-            nodes=[self.nodes[identifier] for identifier in sorted(self.nodes)],
+            nodes=nodes,
             links=list(self.links.in_bulk()),
             tiles=list(self.places.messages()),
         )
@@ -170,6 +183,7 @@ class Graph:
         self.links.clear()
         self.places.clear()
         self._by_kind.clear()
+
         self.change([snapshot.decay, *snapshot.nodes, *snapshot.links, *snapshot.tiles])
         self.version = snapshot.version
         self.cycle = snapshot.cycle
@@ -177,7 +191,8 @@ class Graph:
 
     def digest(self) -> str:
         """A hash of the content: two graphs are equal if and only if their digests are."""
-        return hashlib.blake2b(encode(self.snapshot()), digest_size=16).hexdigest()
+        content = encode(self.snapshot())
+        return hashlib.blake2b(content, digest_size=16).hexdigest()
 
     def _put_link(self, link: Link) -> None:
         self.links.put(link.kind, link.source, link.target, link.weight)
@@ -189,6 +204,7 @@ class Graph:
         node = self.nodes.pop(drop.id, None)
         if node is None:
             return
+
         self._by_kind[type(node)].pop(drop.id, None)
         self.links.drop_node(drop.id)
 

@@ -9,6 +9,9 @@ from schemas.graph import Links
 from schemas.nodes import EXCLUSIVE_LINKS
 
 Weights = dict[str, float]
+Targets = dict[str, Weights]
+SingleTargets = dict[str, tuple[str, float]]
+Sources = dict[str, tuple[str, ...]]
 
 
 class LinkIndex:
@@ -19,9 +22,9 @@ class LinkIndex:
     """
 
     def __init__(self) -> None:
-        self._targets: defaultdict[str, dict[str, Weights]] = defaultdict(dict)
-        self._target: defaultdict[str, dict[str, tuple[str, float]]] = defaultdict(dict)
-        self._sources: defaultdict[str, dict[str, tuple[str, ...]]] = defaultdict(dict)
+        self._targets: defaultdict[str, Targets] = defaultdict(dict)
+        self._target: defaultdict[str, SingleTargets] = defaultdict(dict)
+        self._sources: defaultdict[str, Sources] = defaultdict(dict)
 
     def put(self, kind: str, source: str, target: str, weight: float) -> None:
         """Set the weight of a link; one of an exclusive kind replaces the source's link."""
@@ -43,16 +46,14 @@ class LinkIndex:
     def drop(self, kind: str, source: str, target: str) -> None:
         """Remove a link, if it exists."""
         if kind in EXCLUSIVE_LINKS:
-            link = self._target[kind].get(source)
-            if link is not None and link[0] == target:
-                del self._target[kind][source]
-                self._remove_source(kind, target, source)
+            self._drop_exclusive(kind, source, target)
             return
 
         weights = self._targets[kind].get(source, {})
         if target in weights:
             del weights[target]
             self._remove_source(kind, target, source)
+
         if not weights:
             self._targets[kind].pop(source, None)
 
@@ -61,24 +62,34 @@ class LinkIndex:
         for kind in self.kinds():
             for target in list(self.targets(node, kind)):
                 self.drop(kind, node, target)
+
             for source in self.sources(node, kind):
                 self.drop(kind, source, node)
 
     def targets(self, source: str, kind: str) -> Weights:
         """The targets of a source's links of a kind, and their weights."""
-        if kind in EXCLUSIVE_LINKS:
-            link = self._target[kind].get(source)
-            return {} if link is None else {link[0]: link[1]}
-        return dict(self._targets[kind].get(source, {}))
+        if kind not in EXCLUSIVE_LINKS:
+            weights = self._targets[kind].get(source, {})
+            return dict(weights)
+
+        link = self._target[kind].get(source)
+        if link is None:
+            return {}
+        target, weight = link
+        return {target: weight}
 
     def target(self, source: str, kind: str) -> str | None:
         """The target of a source's link of an exclusive kind; None where it has none."""
         link = self._target[kind].get(source)
-        return None if link is None else link[0]
+        if link is None:
+            return None
+        target, _ = link
+        return target
 
     def sources(self, target: str, kind: str) -> tuple[str, ...]:
         """The sources of the links of a kind to a target, in the order in which they were made."""
-        return self._sources[kind].get(target, ())
+        sources = self._sources[kind]
+        return sources.get(target, ())
 
     def kinds(self) -> list[str]:
         """The kinds of links that exist or existed, by name."""
@@ -93,6 +104,7 @@ class LinkIndex:
             else:
                 several = sorted(self._targets[kind].items())
                 weights = {source: dict(sorted(targets.items())) for source, targets in several}
+
             if weights:
                 yield Links(kind=kind, weights=weights)
 
@@ -104,20 +116,32 @@ class LinkIndex:
 
     def _put_exclusive(self, kind: str, source: str, target: str, weight: float) -> None:
         before = self._target[kind].get(source)
+
         if before is None:
             self._add_source(kind, target, source)
         elif before[0] != target:
             self._remove_source(kind, before[0], source)
             self._add_source(kind, target, source)
+
         self._target[kind][source] = (target, weight)
+
+    def _drop_exclusive(self, kind: str, source: str, target: str) -> None:
+        link = self._target[kind].get(source)
+        if link is None or link[0] != target:
+            return
+
+        del self._target[kind][source]
+        self._remove_source(kind, target, source)
 
     def _add_source(self, kind: str, target: str, source: str) -> None:
         sources = self._sources[kind]
-        sources[target] = (*sources.get(target, ()), source)
+        before = sources.get(target, ())
+        sources[target] = (*before, source)
 
     def _remove_source(self, kind: str, target: str, source: str) -> None:
         sources = self._sources[kind]
         rest = tuple(other for other in sources[target] if other != source)
+
         if rest:
             sources[target] = rest
         else:

@@ -24,7 +24,7 @@ LINK_COLUMNS: dict[tuple[int, int], PlaceColumn] = {
     (0, 1): PlaceColumn.WEIGHT_N,
     (-1, 1): PlaceColumn.WEIGHT_NW,
 }
-"""The column of the link to the neighbour at each offset; links the other way are the neighbour's."""
+"""The column of the link to the neighbour at each offset. Links back are the neighbour's own."""
 
 DEFAULTS: dict[PlaceColumn, float] = dict.fromkeys(PlaceColumn, 0.0)
 DEFAULTS |= dict.fromkeys(LINK_COLUMNS.values(), 1.0)
@@ -53,14 +53,20 @@ class Tile:
 
     def column(self, name: PlaceColumn) -> Column:
         """A column to be written."""
-        if name not in self.columns:
-            self.columns[name] = np.full(_SHAPE, DEFAULTS[name], np.float32)
-        return self.columns[name]
+        column = self.columns.get(name)
+        if column is not None:
+            return column
+
+        column = np.full(_SHAPE, DEFAULTS[name], np.float32)
+        self.columns[name] = column
+        return column
 
     def value(self, name: PlaceColumn, i: int, j: int) -> float:
         """One cell's value in a column."""
         column = self.columns.get(name)
-        return DEFAULTS[name] if column is None else float(column[i, j])
+        if column is None:
+            return DEFAULTS[name]
+        return float(column[i, j])
 
     def set_activation(self, where: tuple[Indices, Indices], cycle: int) -> None:
         """Note that the activation of some cells is as of `cycle`."""
@@ -73,8 +79,10 @@ class Tile:
         column = self.columns.get(PlaceColumn.ACTIVATION)
         if column is None or self.activation_cycle is None:
             return np.zeros(_SHAPE, np.float32)
+
         age = np.maximum(cycle - self.activation_cycle, 0)
-        now: Column = np.maximum(column - decay * age, 0.0).astype(np.float32)
+        decayed = column - decay * age
+        now: Column = np.maximum(decayed, 0.0).astype(np.float32)
         return now
 
 
@@ -93,21 +101,27 @@ class PlaceGrid:
 
         tiles, inside = np.divmod(where, TILE_SIDE)
         for x, y in np.unique(tiles, axis=0).tolist():
-            mine = (tiles[:, 0] == x) & (tiles[:, 1] == y)
+            is_in_tile = (tiles[:, 0] == x) & (tiles[:, 1] == y)
+            rows = inside[is_in_tile, 0]
+            columns = inside[is_in_tile, 1]
+
             tile = self.tiles.setdefault((cells.map, x, y), Tile())
-            rows = (inside[mine, 0], inside[mine, 1])
-            tile.column(cells.column)[rows] = values[mine]
+            column = tile.column(cells.column)
+            column[rows, columns] = values[is_in_tile]
             if cells.column is PlaceColumn.ACTIVATION:
-                tile.set_activation(rows, cells.cycle)
+                tile.set_activation((rows, columns), cells.cycle)
 
     def put_tile(self, message: PlaceTile) -> None:
         """Write a whole tile. Raises MessageError where a column is of another shape."""
         tile = Tile()
         for name, array in message.columns.items():
-            tile.columns[name] = np.array(_square(name, array), np.float32)
+            values = _square(name, array)
+            tile.columns[name] = np.array(values, np.float32)
+
         if message.activation_cycle is not None:
             cycles = _square("activation_cycle", message.activation_cycle)
             tile.activation_cycle = np.array(cycles, np.int32)
+
         self.tiles[message.map, message.x, message.y] = tile
 
     def messages(self) -> Iterator[PlaceTile]:
@@ -120,13 +134,16 @@ class PlaceGrid:
         map_id, x, y = key
         tile = self.tiles[key]
         columns = {name: Array.of(tile.columns[name]) for name in sorted(tile.columns)}
-        cycles = tile.activation_cycle
+        cycles = None
+        if tile.activation_cycle is not None:
+            cycles = Array.of(tile.activation_cycle)
+
         return PlaceTile(
             map=map_id,
             x=x,
             y=y,
             columns=columns,
-            activation_cycle=None if cycles is None else Array.of(cycles),
+            activation_cycle=cycles,
         )
 
     def of_map(self, map_id: str) -> Iterator[tuple[TileKey, Tile]]:
@@ -140,34 +157,45 @@ class PlaceGrid:
         cells = [np.zeros((0, 2), np.int64)]
         values = [np.zeros(0)]
         for (_, x, y), tile in self.of_map(map_id):
-            if column in tile.columns:
-                written = tile.columns[column]
-                i, j = np.nonzero(written)
-                cells.append(np.column_stack([i + x * TILE_SIDE, j + y * TILE_SIDE]))
-                values.append(written[i, j].astype(np.float64))
+            written = tile.columns.get(column)
+            if written is None:
+                continue
+
+            i, j = np.nonzero(written)
+            map_i = i + x * TILE_SIDE
+            map_j = j + y * TILE_SIDE
+            cells.append(np.column_stack([map_i, map_j]))
+            values.append(written[i, j].astype(np.float64))
+
         return np.vstack(cells), np.concatenate(values)
 
     def value(self, map_id: str, i: int, j: int, column: PlaceColumn) -> float | None:
         """One cell's value in a column; None where its tile does not exist."""
-        tile = self.tiles.get((map_id, i // TILE_SIDE, j // TILE_SIDE))
-        return None if tile is None else tile.value(column, i % TILE_SIDE, j % TILE_SIDE)
+        x, row = divmod(i, TILE_SIDE)
+        y, line = divmod(j, TILE_SIDE)
+        tile = self.tiles.get((map_id, x, y))
+        if tile is None:
+            return None
+        return tile.value(column, row, line)
 
     def place(
         self, map_id: str, i: int, j: int, *, cell_m: float, cycle: int, decay: float
     ) -> Place | None:
         """One place node as of `cycle`; None where its tile does not exist."""
-        tile = self.tiles.get((map_id, i // TILE_SIDE, j // TILE_SIDE))
+        x, row = divmod(i, TILE_SIDE)
+        y, line = divmod(j, TILE_SIDE)
+        tile = self.tiles.get((map_id, x, y))
         if tile is None:
             return None
-        row = i % TILE_SIDE
-        column = j % TILE_SIDE
+
+        activation = tile.activation(cycle, decay)
         return Place(
             id=place_id(i, j, map_id),
             x_m=i * cell_m,
             y_m=j * cell_m,
-            activation=float(tile.activation(cycle, decay)[row, column]),
-            road=tile.value(PlaceColumn.ROAD, row, column),
-            obstacle=tile.value(PlaceColumn.OBSTACLE, row, column),
+            activation=float(activation[row, line]),
+            road=tile.value(PlaceColumn.ROAD, row, line),
+            obstacle=tile.value(PlaceColumn.OBSTACLE, row, line),
         )
 
     def links(self, map_id: str, i: int, j: int) -> Iterator[Link]:
@@ -175,13 +203,16 @@ class PlaceGrid:
         here = place_id(i, j, map_id)
         for (di, dj), column in LINK_COLUMNS.items():
             forth = self.value(map_id, i, j, column)
-            beyond = self.value(map_id, i + di, j + dj, column)
-            if forth is not None and beyond is not None:
+            if forth is None:
+                continue
+
+            ahead = self.value(map_id, i + di, j + dj, column)
+            if ahead is not None:
                 there = place_id(i + di, j + dj, map_id)
                 yield Link(source=here, target=there, kind=LinkKind.NEXT, weight=forth)
 
             back = self.value(map_id, i - di, j - dj, column)
-            if back is not None and forth is not None:
+            if back is not None:
                 there = place_id(i - di, j - dj, map_id)
                 yield Link(source=here, target=there, kind=LinkKind.NEXT, weight=back)
 

@@ -45,6 +45,7 @@ class Replica:
         self.mended = 0
         self.is_behind = False
         self.has_joined = False
+
         self._fetch = fetch
         self._on_load = on_load
         self._incarnation: int | None = None

@@ -29,8 +29,10 @@ class Ledger:
     def __init__(self, writers: Mapping[str, Writer]) -> None:
         self.graph = Graph()
         self._writers = writers
+
         self._rejected = 0
         self._reasons: list[str] = []
+
         self._written: dict[object, int] = {}
         self._written_before = 0
 
@@ -53,7 +55,7 @@ class Ledger:
     ) -> Delta:
         """Number `operations`, carry them out, and return the delta.
 
-        It tells how many answers were rejected since the one before, and why.
+        It has the number of answers rejected since the delta before, and the reasons.
         """
         delta = Delta(
             stamp_ns=stamp_ns,
@@ -67,6 +69,7 @@ class Ledger:
         )
         self._rejected = 0
         self._reasons = []
+
         self.graph.apply(delta)
         self._note(delta)
         return delta
@@ -94,13 +97,16 @@ class Ledger:
         name = f"proposal {proposal.task_id}"
         if proposal.failure:
             raise MessageError(f"{name} failed: {proposal.failure}")
+
         if proposal.base_version > self.graph.version:
             raise MessageError(
                 f"{name} is on version {proposal.base_version}, which is not committed yet"
             )
+
         writer = self._writers.get(proposal.codelet)
         if writer is None:
             raise MessageError(f"{name}: no codelet {proposal.codelet!r} is configured here")
+
         for operation in proposal.operations:
             check_operation(name, operation, self.graph, writer)
             self._check_late(name, operation, proposal.base_version)
@@ -114,12 +120,16 @@ class Ledger:
     def _check_late(self, name: str, operation: Operation, base_version: int) -> None:
         for key in written_by(operation):
             version = self._written.get(key, self._written_before)
-            if version > base_version:
-                what = key if isinstance(key, str) else " ".join(map(str, key))
-                raise MessageError(f"{name} is late: {what} has changed since {base_version}")
+            if version <= base_version:
+                continue
+
+            what = key if isinstance(key, str) else " ".join(map(str, key))
+            raise MessageError(f"{name} is late: {what} has changed since {base_version}")
 
     def _note(self, delta: Delta) -> None:
         for operation in delta.operations:
-            if not isinstance(operation, Decay):
-                for key in written_by(operation):
-                    self._written[key] = delta.version
+            if isinstance(operation, Decay):
+                continue
+
+            for key in written_by(operation):
+                self._written[key] = delta.version

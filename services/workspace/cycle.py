@@ -41,17 +41,19 @@ class Workspace:
     def __init__(self, config: Config, codelets: Sequence[ConfiguredCodelet]) -> None:
         self._config = config
         self._codelets = codelets
-        self._ledger = Ledger({codelet.name: codelet.codelet.may_write for codelet in codelets})
-        self._lanes = [
-            Lane(codelet, config)
-            for codelet in codelets
-            if codelet.codelet.phase is Phase.BACKGROUND
-        ]
-        self._dispatch = Dispatch(
-            int(config.lease_ms * 1e6), config.attempts, lambda: [x.dispatch for x in self._lanes]
-        )
+
+        writers = {codelet.name: codelet.codelet.may_write for codelet in codelets}
+        self._ledger = Ledger(writers)
+        self._lanes: list[Lane] = []
+        for codelet in codelets:
+            if codelet.codelet.phase is Phase.BACKGROUND:
+                self._lanes.append(Lane(codelet, config))
+
+        lease_ns = int(config.lease_ms * 1e6)
+        self._dispatch = Dispatch(lease_ns, config.attempts, self._background)
         self._forgetting = Forgetting()
         self._offers = Offers(config.offering if self._is_lockstep else ())
+
         self._motions: list[SelfMotion] = []
         self._waiting: Percepts | None = None
         self._context: CycleContext | None = None
@@ -63,12 +65,13 @@ class Workspace:
     def restore(self, past: Iterable[Message]) -> None:
         """Restore the graph as it was left.
 
-        A cycle that was interrupted goes on from its last commit when its percepts come again.
+        A cycle that was interrupted continues from its last commit when its percepts come again.
         """
         for message in past:
             if isinstance(message, Snapshot | Delta):
                 self._ledger.restore(message)
                 self._begun_ns = max(self._begun_ns, message.stamp_ns)
+
         self._forgetting.restore(self._ledger.graph)
 
     def snapshot(self, request: SnapshotRequest | None = None) -> Snapshot:
@@ -86,19 +89,26 @@ class Workspace:
     def on_motion(self, motion: SelfMotion) -> list[Message]:
         """Keep what moved until a cycle moves the self node by it."""
         shape = motion.motions.shape
-        is_valid = len(shape) == 2 and shape[1] == SELF_MOTION_COLUMNS
-        if motion.motions.dtype != "<f8" or not is_valid:
-            raise MessageError(f"self-motion of shape {shape} and dtype {motion.motions.dtype}")
-        if motion.stamp_ns > self._moved_until_ns and not self._is_known(motion):
+        dtype = motion.motions.dtype
+        has_columns = len(shape) == 2 and shape[1] == SELF_MOTION_COLUMNS
+        if dtype != "<f8" or not has_columns:
+            raise MessageError(f"self-motion of shape {shape} and dtype {dtype}")
+
+        is_new = motion.stamp_ns > self._moved_until_ns
+        if is_new and not self._is_known(motion):
             self._motions.append(motion)
         return self._begin()
 
     def on_percepts(self, percepts: Percepts) -> list[Message]:
         """Begin a cycle with the view's percepts, as soon as the one before has ended."""
-        if len(percepts.road_m.shape) != 2 or percepts.road_m.shape[1] != 2:
-            raise MessageError(f"road points of shape {percepts.road_m.shape}")
-        if percepts.stamp_ns <= self._begun_ns and not self._is_interrupted(percepts):
+        shape = percepts.road_m.shape
+        if len(shape) != 2 or shape[1] != 2:
+            raise MessageError(f"road points of shape {shape}")
+
+        is_past = percepts.stamp_ns <= self._begun_ns
+        if is_past and not self._is_interrupted(percepts):
             return []
+
         self._waiting = recognised(percepts, self._config.recognition_threshold)
         return self._begin()
 
@@ -115,22 +125,30 @@ class Workspace:
         """
         if self._dispatch.answer(proposal):
             return self._continue_if_complete([])
-        if any(lane.dispatch.answer(proposal) for lane in self._lanes):
-            return self._end() if self._phase == len(PHASES) else []
+
+        for lane in self._lanes:
+            if lane.dispatch.answer(proposal):
+                return self._end() if self._is_ending else []
+
         if proposal.task_id not in self._late:
             return []
         del self._late[proposal.task_id]
         return self._commit_late(proposal)
 
     def on_presence(self, presence: Presence) -> list[Message]:
-        """A worker came or went; the cycle goes on without a task that has failed."""
+        """A worker came or went; the cycle continues without a task that has failed."""
         if presence.module != WORKERS:
             return []
+
+        worker = presence.instance
+        is_alive = presence.alive
+        version = self._ledger.graph.version
         published: list[Message] = []
         for lane in self._lanes:
-            lane.dispatch.refresh(self._ledger.graph.version)
-            published += lane.dispatch.presence(presence.instance, presence.alive, self._now_ns)
-        published += self._dispatch.presence(presence.instance, presence.alive, self._now_ns)
+            lane.dispatch.refresh(version)
+            published += lane.dispatch.presence(worker, is_alive, self._now_ns)
+
+        published += self._dispatch.presence(worker, is_alive, self._now_ns)
         return self._continue_if_complete(published)
 
     def on_clock(self, clock: Clock) -> list[Message]:
@@ -142,56 +160,85 @@ class Workspace:
         self._now_ns = clock.stamp_ns
         if self._is_lockstep:
             return []
+
         published: list[Message] = []
         for lane in self._lanes:
             lane.dispatch.refresh(self._ledger.graph.version)
             published += lane.dispatch.expire(self._now_ns)
         if self._context is None:
             return published
-        if self._now_ns > self._context.stamp_ns + self._config.deadline_ms * 1e6:
+
+        deadline_ns = self._context.stamp_ns + self._config.deadline_ms * 1e6
+        if self._now_ns > deadline_ns:
             return [*published, *self._commit_answers(), *self._end()]
-        return self._continue_if_complete(published + self._dispatch.expire(self._now_ns))
+
+        published += self._dispatch.expire(self._now_ns)
+        return self._continue_if_complete(published)
 
     @property
     def _is_lockstep(self) -> bool:
         return self._config.mode == "lockstep"
 
     @property
+    def _is_ending(self) -> bool:
+        """Whether the last phase has ended, and the cycle has not."""
+        return self._phase == len(PHASES)
+
+    @property
     def _moved_until_ns(self) -> int:
         agent = self._ledger.graph.agent
-        return -1 if agent is None else agent.stamp_ns
+        if agent is None:
+            return -1
+        return agent.stamp_ns
+
+    def _background(self) -> list[Dispatch]:
+        return [lane.dispatch for lane in self._lanes]
 
     def _is_known(self, motion: SelfMotion) -> bool:
-        return any(motion.stamp_ns == known.stamp_ns for known in self._motions)
+        stamps_ns = [known.stamp_ns for known in self._motions]
+        return motion.stamp_ns in stamps_ns
 
     def _is_interrupted(self, percepts: Percepts) -> bool:
         """Whether those are the percepts of a cycle that ended before its last phase."""
-        has_ended = self._ledger.graph.phase is Phase.END
-        return percepts.stamp_ns == self._begun_ns and self._context is None and not has_ended
+        if self._context is not None or percepts.stamp_ns != self._begun_ns:
+            return False
+        return self._ledger.graph.phase is not Phase.END
 
     def _begin(self) -> list[Message]:
         """Begin a cycle if none runs, a view waits, and the self-motion up to it has come."""
         percepts = self._waiting
         if self._context is not None or percepts is None:
             return []
-        newest_ns = self._motions[-1].stamp_ns if self._motions else -1
-        if max(newest_ns, self._moved_until_ns) < percepts.stamp_ns:
+        if not self._has_motion_until(percepts.stamp_ns):
             return []
 
+        if self._is_interrupted(percepts):
+            return self._continue_interrupted(percepts)
+        if not self._offers.complete(self._ledger.graph.cycle):
+            return []
+        return self._begin_cycle(percepts)
+
+    def _has_motion_until(self, stamp_ns: int) -> bool:
+        newest_ns = self._motions[-1].stamp_ns if self._motions else -1
+        return max(newest_ns, self._moved_until_ns) >= stamp_ns
+
+    def _continue_interrupted(self, percepts: Percepts) -> list[Message]:
         graph = self._ledger.graph
         motions = self._motions_until(percepts.stamp_ns)
-        if self._is_interrupted(percepts):
-            self._waiting = None
-            self._context = CycleContext(graph.cycle, percepts, motions, graph.version)
-            self._phase = PHASES.index(graph.phase) if graph.phase in PHASES else -1
-            return self._next_phase()
-        if not self._offers.complete(graph.cycle):
-            return []
+        self._waiting = None
+        self._context = CycleContext(graph.cycle, percepts, motions, graph.version)
 
+        self._phase = PHASES.index(graph.phase) if graph.phase in PHASES else -1
+        return self._next_phase()
+
+    def _begin_cycle(self, percepts: Percepts) -> list[Message]:
+        graph = self._ledger.graph
+        motions = self._motions_until(percepts.stamp_ns)
         self._waiting = None
         self._begun_ns = percepts.stamp_ns
         self._context = CycleContext(graph.cycle + 1, percepts, motions, graph.version)
         self._phase = -1
+
         entering = first_operations(graph, self._config)
         entering += percept_operations(graph, self._context)
         entering += self._offers.take(self._ledger)
@@ -202,8 +249,11 @@ class Workspace:
         moved_ns = self._moved_until_ns
         rows = [np.zeros((0, SELF_MOTION_COLUMNS))]
         for motion in self._motions:
-            if motion.since_ns >= moved_ns and motion.stamp_ns <= stamp_ns:
-                rows.append(np.asarray(motion.motions.numpy(), np.float64))
+            is_due = motion.since_ns >= moved_ns and motion.stamp_ns <= stamp_ns
+            if is_due:
+                values = motion.motions.numpy()
+                rows.append(np.asarray(values, np.float64))
+
         return Array.of(np.vstack(rows), "<f8")
 
     def _commit(
@@ -211,6 +261,7 @@ class Workspace:
     ) -> Delta:
         if self._context is None:
             raise MessageError("nothing is committed between cycles")
+
         delta = self._ledger.commit(
             self._context.stamp_ns, self._context.cycle, phase, operations, tasks
         )
@@ -220,21 +271,23 @@ class Workspace:
     def _next_phase(self) -> list[Message]:
         """Give out the next phase's tasks; after the last, end the cycle."""
         self._phase += 1
-        if self._context is None or self._phase == len(PHASES):
+        if self._context is None or self._is_ending:
             return self._end()
 
         phase = PHASES[self._phase]
         graph = self._ledger.graph
-        self._context = replace(self._context, version=graph.version)
+        context = replace(self._context, version=graph.version)
+        self._context = context
         published: list[Message] = []
         if phase is LANES_BEGIN:
             for lane in self._lanes:
-                published += lane.begin(self._context, self._ledger, self._now_ns)
+                published += lane.begin(context, self._ledger, self._now_ns)
 
         tasks = []
         for codelet in self._codelets:
             if codelet.codelet.phase is phase:
-                tasks += codelet.due(self._context, graph)
+                tasks += codelet.due(context, graph)
+
         published += self._dispatch.begin(tasks, self._now_ns)
         if tasks:
             return published
@@ -244,33 +297,43 @@ class Workspace:
         """`published`, and the next phase where no answer is waited for in this one."""
         if self._context is None or not self._dispatch.complete:
             return published
-        if self._phase == len(PHASES):
+
+        if self._is_ending:
             return [*published, *self._end()]
         return [*published, *self._commit_answers(), *self._next_phase()]
 
     def _commit_answers(self) -> list[Message]:
         """Commit the answers of the current phase; unanswered tasks may be answered later."""
-        if self._phase == len(PHASES):
+        if self._is_ending:
             return []
+
         self._reject_failed(self._dispatch.failed)
         answers, unanswered = self._dispatch.collect()
         self._late |= {task.task_id: None for task in unanswered}
         while len(self._late) > MAX_LATE_TASKS:
-            del self._late[next(iter(self._late))]
+            oldest = next(iter(self._late))
+            del self._late[oldest]
+
         return self._commit_proposals(PHASES[self._phase], answers)
 
     def _commit_proposals(self, phase: Phase, proposals: list[Proposal]) -> list[Message]:
         """Commit valid proposals, then publish their events; of ATTENTION, their coalitions."""
         if self._context is None:
             return []
+
         valid = self._ledger.validate(proposals)
-        operations = [operation for proposal in valid for operation in proposal.operations]
+        operations: list[Operation] = []
+        for proposal in valid:
+            operations += proposal.operations
+
         published: list[Message] = []
         if operations:
             tasks = [proposal.task_id for proposal in valid]
             published.append(self._commit(phase, operations, tasks))
+
         for proposal in valid:
             published += proposal.events
+
         if phase is Phase.ATTENTION:
             published.append(_coalitions(self._context, valid))
         return published
@@ -280,6 +343,7 @@ class Workspace:
             return []
         if proposal.coalitions:
             self._ledger.reject(f"the coalitions of {proposal.task_id} came after its cycle")
+
         graph = self._ledger.graph
         delta = self._ledger.commit(
             proposal.stamp_ns, graph.cycle, Phase.LATE, proposal.operations, [proposal.task_id]
@@ -291,19 +355,27 @@ class Workspace:
         """Forget what has decayed and begin the next cycle, unless a lane holds this one up."""
         self._phase = len(PHASES)
         context = self._context
-        if context is None or any(lane.holds_up(context.cycle) for lane in self._lanes):
+        if context is None:
             return []
+        if any(lane.holds_up(context.cycle) for lane in self._lanes):
+            return []
+
         published: list[Message] = []
         for lane in self._lanes:
             answers, failed = lane.collect(context.cycle)
             self._reject_failed(failed)
             published += self._commit_proposals(Phase.BACKGROUND, answers)
-        published.append(self._commit(Phase.END, [*self._forgetting.due(self._ledger.graph)]))
 
-        moved_ns = self._moved_until_ns
-        self._motions = [motion for motion in self._motions if motion.stamp_ns > moved_ns]
+        forgotten: list[Operation] = [*self._forgetting.due(self._ledger.graph)]
+        published.append(self._commit(Phase.END, forgotten))
+        self._discard_motions()
         self._context = None
         return [*published, *self._begin()]
+
+    def _discard_motions(self) -> None:
+        """Discard the self-motion that has moved the self node."""
+        moved_ns = self._moved_until_ns
+        self._motions = [motion for motion in self._motions if motion.stamp_ns > moved_ns]
 
     def _reject_failed(self, tasks: list[str]) -> None:
         for name in tasks:

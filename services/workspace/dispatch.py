@@ -35,8 +35,8 @@ class Lease:
 
 
 class Dispatch:
-    """Gives tasks to the least loaded worker, and again to the one that lost it only where there is
-    no other.
+    """Gives each task to the least loaded worker; to one that has lost it, only where there is no
+    other.
 
     The same workers and tasks give the same choice. Workers that hold a task of one of the
     dispatches in `background` count as busy.
@@ -55,6 +55,7 @@ class Dispatch:
         """Add `tasks`; what is to be published now. Where there is no worker they wait for one."""
         for task in tasks:
             self._leases[task.task_id] = Lease(task, now_ns)
+
         return self._assign(now_ns)
 
     def presence(self, worker: str, alive: bool, now_ns: int) -> list[Message]:
@@ -64,17 +65,26 @@ class Dispatch:
         else:
             self._workers.discard(worker)
             self._revoke(lambda lease: lease.worker == worker)
+
         return self._assign(now_ns)
 
     def expire(self, now_ns: int) -> list[Message]:
-        """Give tasks whose lease has ended to another worker; where there is no other, they stay."""
-        self._revoke(lambda lease: now_ns > lease.until_ns and not self._workers <= {lease.worker})
+        """Give tasks whose lease has ended to another worker; they stay where there is no other."""
+
+        def has_ended(lease: Lease) -> bool:
+            if now_ns <= lease.until_ns:
+                return False
+            others = self._workers - {lease.worker}
+            return bool(others)
+
+        self._revoke(has_ended)
         return self._assign(now_ns)
 
     def refresh(self, version: int) -> None:
         """Have open tasks without a worker read the graph at `version`."""
         for lease in self._leases.values():
-            if lease.is_open and not lease.worker:
+            is_waiting = lease.is_open and not lease.worker
+            if is_waiting:
                 lease.task = msgspec.structs.replace(lease.task, version=version)
 
     def answer(self, proposal: Proposal) -> bool:
@@ -85,6 +95,7 @@ class Dispatch:
         lease = self._leases.get(proposal.task_id)
         if lease is None or not lease.is_open:
             return False
+
         lease.proposal = proposal
         return True
 
@@ -96,62 +107,96 @@ class Dispatch:
     @property
     def complete(self) -> bool:
         """Whether every task is answered, or has failed."""
-        return all(not lease.is_open or self._has_failed(lease) for lease in self._leases.values())
+        for lease in self._leases.values():
+            if lease.is_open and not self._has_failed(lease):
+                return False
+
+        return True
 
     @property
     def failed(self) -> list[str]:
         """The tasks that were given out as often as is allowed, and lost each time."""
-        return [name for name, lease in self._leases.items() if self._has_failed(lease)]
+        names = []
+        for name, lease in self._leases.items():
+            if self._has_failed(lease):
+                names.append(name)
+
+        return names
 
     def collect(self) -> tuple[list[Proposal], list[Task]]:
         """The answers, in the order of the tasks, and the tasks without one; both are removed."""
-        leases = self._leases
+        answers = []
+        unanswered = []
+        for lease in self._leases.values():
+            if lease.proposal is None:
+                unanswered.append(lease.task)
+            else:
+                answers.append(lease.proposal)
+
         self._leases = {}
-        answers = [lease.proposal for lease in leases.values() if lease.proposal is not None]
-        unanswered = [lease.task for lease in leases.values() if lease.proposal is None]
         return answers, unanswered
 
     def load(self) -> Counter[str]:
         """How many open tasks each worker holds."""
-        held = (lease.worker for lease in self._leases.values() if lease.is_open and lease.worker)
-        return Counter(held)
+        load: Counter[str] = Counter()
+        for lease in self._leases.values():
+            if lease.is_open and lease.worker:
+                load[lease.worker] += 1
+
+        return load
 
     def _has_failed(self, lease: Lease) -> bool:
-        return lease.is_open and not lease.worker and lease.attempt >= self._attempts
+        is_waiting = lease.is_open and not lease.worker
+        return is_waiting and lease.attempt >= self._attempts
 
     def _revoke(self, is_lost: Callable[[Lease], bool]) -> None:
         for lease in self._leases.values():
-            if lease.is_open and lease.worker and is_lost(lease):
+            is_held = lease.is_open and bool(lease.worker)
+            if is_held and is_lost(lease):
                 lease.lost_by = lease.worker
                 lease.worker = ""
                 lease.attempt += 1
 
     def _assign(self, now_ns: int) -> list[Message]:
         """Assign open tasks: each task, then one message of all leases."""
-        load = self.load()
-        for other in self._background():
-            for worker, tasks in other.load().items():
-                load[worker] += BUSY * tasks
+        if not self._workers:
+            return []
 
+        load = self._load_with_background()
         published: list[Message] = []
         assignments: list[Assignment] = []
         for lease in self._leases.values():
             is_waiting = lease.is_open and not lease.worker
-            if not is_waiting or not self._workers or self._has_failed(lease):
+            if not is_waiting or self._has_failed(lease):
                 continue
+
             worker = self._least_loaded(load, lease.lost_by)
             load[worker] += 1
             lease.worker = worker
             lease.until_ns = now_ns + self._lease_ns
             published.append(lease.task)
             assignments.append(_assignment(lease))
+
         if assignments:
             stamp_ns = max(task.stamp_ns for task in published)
             published.append(Leases(stamp_ns=stamp_ns, assignments=assignments))
         return published
 
+    def _load_with_background(self) -> Counter[str]:
+        """How loaded each worker is, where a background task counts as BUSY others."""
+        load = self.load()
+        for other in self._background():
+            for worker, tasks in other.load().items():
+                load[worker] += BUSY * tasks
+
+        return load
+
     def _least_loaded(self, load: Counter[str], lost_by: str) -> str:
-        return min(self._workers, key=lambda name: (name == lost_by, load[name], name))
+        def rank(name: str) -> tuple[bool, int, str]:
+            has_lost_it = name == lost_by
+            return has_lost_it, load[name], name
+
+        return min(self._workers, key=rank)
 
 
 def _assignment(lease: Lease) -> Assignment:

@@ -38,11 +38,14 @@ def first_operations(graph: Graph, config: Config) -> list[Operation]:
     )
     if graph.decay != decay:
         operations.append(decay)
+
     if graph.get(Map, ROOT_MAP) is None:
         operations.append(Map(id=ROOT_MAP, cell_m=config.cell_m))
+
     if graph.agent is None:
-        zeros = Matrix.of(np.zeros((config.first_samples, POSE_COLUMNS)))
-        operations.append(Self(id=SELF_ID, activation=1.0, base_level=1.0, samples=zeros))
+        zeros = np.zeros((config.first_samples, POSE_COLUMNS))
+        samples = Matrix.of(zeros)
+        operations.append(Self(id=SELF_ID, activation=1.0, base_level=1.0, samples=samples))
     return operations
 
 
@@ -70,9 +73,11 @@ def percept_operations(graph: Graph, context: CycleContext) -> list[Operation]:
             range_m=percept.range_m,
         )
         operations.append(node)
+
         target = object_id(percept.label)
         if target in graph.nodes:
             weights[node.id] = {target: 1.0}
+
     if weights:
         operations.append(Links(kind=LinkKind.INSTANCE, weights=weights))
     return operations

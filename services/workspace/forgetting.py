@@ -9,6 +9,8 @@ from cogmap.graph.graph import Graph
 from schemas.graph import Delta, DropNode
 from schemas.nodes import GraphNode
 
+Buckets = defaultdict[int, dict[str, None]]
+
 
 class Forgetting:
     """Nodes by the cycle at whose end they may be forgotten.
@@ -18,7 +20,7 @@ class Forgetting:
     """
 
     def __init__(self) -> None:
-        self._buckets: defaultdict[int, dict[str, None]] = defaultdict(dict)
+        self._buckets: Buckets = defaultdict(dict)
         self._bucket_of: dict[str, int] = {}
         self._newest = -1
 
@@ -27,6 +29,7 @@ class Forgetting:
         self._buckets.clear()
         self._bucket_of.clear()
         self._newest = graph.cycle - 1
+
         for node in graph.nodes.values():
             self._put(node, graph)
 
@@ -40,25 +43,36 @@ class Forgetting:
         """The nodes to be forgotten at the end of the current cycle, by id."""
         forgotten = []
         for cycle in range(self._newest + 1, graph.cycle + 1):
-            for name in self._buckets.pop(cycle, {}):
-                self._bucket_of.pop(name, None)
-                node = graph.nodes.get(name)
-                if node is None:
-                    continue
+            for node in self._take(cycle, graph):
                 if decay.cycle_of_forgetting(node, graph.decay) <= graph.cycle:
-                    forgotten.append(name)
+                    forgotten.append(node.id)
                 else:
                     self._put(node, graph)
+
         self._newest = max(self._newest, graph.cycle)
         return [DropNode(id=name) for name in sorted(forgotten)]
 
+    def _take(self, cycle: int, graph: Graph) -> list[GraphNode]:
+        """Empty the bucket of `cycle`; its nodes that the graph still has."""
+        nodes: list[GraphNode] = []
+        for name in self._buckets.pop(cycle, {}):
+            self._bucket_of.pop(name, None)
+            node = graph.nodes.get(name)
+            if node is not None:
+                nodes.append(node)
+
+        return nodes
+
     def _put(self, node: GraphNode, graph: Graph) -> None:
-        cycle = max(decay.cycle_of_forgetting(node, graph.decay), self._newest + 1)
+        end_cycle = decay.cycle_of_forgetting(node, graph.decay)
+        cycle = max(end_cycle, self._newest + 1)
         if cycle >= decay.NEVER:
             return
+
         bucket = self._bucket_of.get(node.id)
         if bucket is not None and bucket <= cycle:
             return
+
         if bucket is not None:
             self._buckets[bucket].pop(node.id, None)
         self._buckets[cycle][node.id] = None

@@ -19,31 +19,42 @@ class Lane:
 
     def __init__(self, codelet: ConfiguredCodelet, config: Config) -> None:
         self.codelet = codelet
+        lease_ns = int(config.background_lease_ms * 1e6)
+        self.dispatch = Dispatch(lease_ns, config.attempts)
+
         self._is_lockstep = config.mode == "lockstep"
         self._cycles = config.background_cycles
-        self.dispatch = Dispatch(int(config.background_lease_ms * 1e6), config.attempts)
         self._due_cycle = 0
 
     def begin(self, context: CycleContext, ledger: Ledger, now_ns: int) -> list[Message]:
         """Begin a task where none runs and one is due; what is to be published."""
         if not self.dispatch.is_idle:
             return []
+
         tasks = self.codelet.due(context, ledger.graph)[:1]
         if not tasks:
             return []
+
         self._due_cycle = context.cycle + self._cycles
         return self.dispatch.begin(tasks, now_ns)
 
     def holds_up(self, cycle: int) -> bool:
         """Whether `cycle` cannot end before the task is answered."""
-        is_due = not self.dispatch.is_idle and cycle >= self._due_cycle
-        return self._is_lockstep and is_due and not self.dispatch.complete
+        if not self._is_lockstep or self.dispatch.is_idle:
+            return False
+
+        is_due = cycle >= self._due_cycle
+        return is_due and not self.dispatch.complete
 
     def collect(self, cycle: int) -> tuple[list[Proposal], list[str]]:
         """The answer, where it is to be committed at the end of `cycle`, and tasks that failed."""
-        is_early = self._is_lockstep and cycle < self._due_cycle
-        if self.dispatch.is_idle or not self.dispatch.complete or is_early:
+        if self.dispatch.is_idle or not self.dispatch.complete:
             return [], []
+
+        is_early = self._is_lockstep and cycle < self._due_cycle
+        if is_early:
+            return [], []
+
         failed = self.dispatch.failed
         answers, _ = self.dispatch.collect()
         return answers, failed

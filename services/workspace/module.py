@@ -16,6 +16,7 @@ __all__ = ["Config", "Workspace", "build"]
 def build(config: Config, instance: str, codelets: Sequence[ConfiguredCodelet]) -> Module:
     """The module `workspace`, the single writer of the graph, which calls `codelets`."""
     workspace = Workspace(config, codelets)
+
     published = (topics.DELTA, topics.TASK, topics.LEASES, topics.COALITIONS, topics.REPLAY)
     return (
         Module("workspace", instance, emits={topics.PRESENCE})

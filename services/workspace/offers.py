@@ -25,12 +25,18 @@ class Offers:
     def put(self, offer: Offer) -> None:
         """Add an offer."""
         self._waiting.append(offer)
+
         newest = self._newest_cycle.get(offer.source, 0)
         self._newest_cycle[offer.source] = max(newest, offer.cycle)
 
     def complete(self, ended_cycle: int) -> bool:
         """Whether every awaited instance has made its offer after `ended_cycle`."""
-        return all(self._newest_cycle.get(name, 0) >= ended_cycle for name in self._awaited)
+        for name in self._awaited:
+            newest = self._newest_cycle.get(name, 0)
+            if newest < ended_cycle:
+                return False
+
+        return True
 
     def take(self, ledger: Ledger) -> list[Operation]:
         """The operations of all valid offers, in order of source and number.
@@ -39,6 +45,7 @@ class Offers:
         """
         waiting = sorted(self._waiting, key=lambda offer: (offer.source, offer.seq))
         self._waiting = []
+
         operations: list[Operation] = []
         for offer in waiting:
             try:
@@ -47,4 +54,5 @@ class Offers:
                 ledger.reject(str(error))
             else:
                 operations += offer.operations
+
         return operations

@@ -8,6 +8,7 @@ import numpy as np
 
 from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
+from schemas.array import Array
 from schemas.graph import (
     TILE_SIDE,
     Cells,
@@ -41,7 +42,9 @@ _LINK_KINDS = frozenset(map(str, LinkKind))
 
 def may_offer(written: object) -> bool:
     """The writer of offers: kinds that the table lets be offered, and links of other kinds."""
-    return isinstance(written, type) and KINDS[written].offered
+    if not isinstance(written, type):
+        return False
+    return KINDS[written].offered
 
 
 def written_by(operation: Operation) -> Iterable[str | tuple[str, int, int, str]]:
@@ -49,7 +52,8 @@ def written_by(operation: Operation) -> Iterable[str | tuple[str, int, int, str]
     write.
     """
     if isinstance(operation, Cells):
-        tiles = np.unique(operation.cells.numpy() // TILE_SIDE, axis=0)
+        tile_of = operation.cells.numpy() // TILE_SIDE
+        tiles = np.unique(tile_of, axis=0)
         for x, y in tiles.tolist():
             yield operation.map, x, y, operation.column
     elif isinstance(operation, (GraphNode, DropNode)):
@@ -59,7 +63,9 @@ def written_by(operation: Operation) -> Iterable[str | tuple[str, int, int, str]
 def check_operation(name: str, operation: Operation, graph: Graph, writer: Writer) -> None:
     """Raise MessageError where `writer` may not carry out `operation`, `name` being what asks."""
     if isinstance(operation, PlaceTile | Decay):
-        raise MessageError(f"{name}: {type(operation).__name__} is the workspace's own to write")
+        kind = type(operation).__name__
+        raise MessageError(f"{name}: {kind} is the workspace's own to write")
+
     if isinstance(operation, Link | Links | DropLink):
         _check_link(name, operation, writer)
     elif isinstance(operation, Cells):
@@ -71,20 +77,26 @@ def check_operation(name: str, operation: Operation, graph: Graph, writer: Write
 
 
 def _check_link(name: str, operation: Link | Links | DropLink, writer: Writer) -> None:
-    if operation.kind in _LINK_KINDS and not writer(LinkKind(operation.kind)):
+    if operation.kind not in _LINK_KINDS:
+        return
+
+    if not writer(LinkKind(operation.kind)):
         raise MessageError(f"{name} may not write links of kind {operation.kind}")
 
 
 def _check_node(name: str, node: GraphNode, graph: Graph, writer: Writer) -> None:
     if place_cell(node.id) is not None:
         raise MessageError(f"{name}: place nodes are written as cells")
-    if not writer(type(node)):
-        raise MessageError(f"{name} may not write nodes of kind {kind_name(type(node))}")
+
+    kind = type(node)
+    if not writer(kind):
+        raise MessageError(f"{name} may not write nodes of kind {kind_name(kind)}")
 
     before = graph.nodes.get(node.id)
-    if before is not None and type(before) is not type(node):
-        kind = kind_name(type(before))
-        raise MessageError(f"{name}: {node.id} is of kind {kind}, which a node keeps")
+    if before is not None and type(before) is not kind:
+        kept = kind_name(type(before))
+        raise MessageError(f"{name}: {node.id} is of kind {kept}, which a node keeps")
+
     if isinstance(node, Node) and node.kind in _KIND_NAMES:
         raise MessageError(f"{name}: {node.id} is a generic node of the known kind {node.kind}")
 
@@ -95,13 +107,16 @@ _KIND_NAMES = frozenset(kind_name(kind) for kind in KINDS if kind is not Node)
 def _check_drop(name: str, drop: DropNode, graph: Graph, writer: Writer) -> None:
     if place_cell(drop.id) is not None:
         raise MessageError(f"{name}: place nodes are written as cells")
+
     node = graph.nodes.get(drop.id)
     if node is None:
         return
-    if not KINDS[type(node)].droppable:
+
+    kind = type(node)
+    if not KINDS[kind].droppable:
         raise MessageError(f"{name}: {drop.id} is never forgotten")
-    if not writer(type(node)):
-        raise MessageError(f"{name} may not forget nodes of kind {kind_name(type(node))}")
+    if not writer(kind):
+        raise MessageError(f"{name} may not forget nodes of kind {kind_name(kind)}")
 
 
 def _check_cells(name: str, operation: Cells, graph: Graph, writer: Writer) -> None:
@@ -111,26 +126,32 @@ def _check_cells(name: str, operation: Cells, graph: Graph, writer: Writer) -> N
     if operation.map != ROOT_MAP and graph.get(Map, operation.map) is None:
         raise MessageError(f"{name}: there is no map {operation.map}")
 
-    cells = operation.cells
-    values = operation.values
+    _check_arrays(name, operation.cells, operation.values)
+    number = operation.cells.shape[0]
+    if number > MAX_CELLS:
+        raise MessageError(f"{name}: {number} cells, at most {MAX_CELLS} are taken at once")
+
+    _check_extent(name, np.asarray(operation.cells.numpy(), np.int64))
+
+
+def _check_arrays(name: str, cells: Array, values: Array) -> None:
     number = cells.shape[0] if cells.shape else 0
-    cells_fit = (cells.shape, cells.dtype) == ((number, 2), "<i4")
-    values_fit = (values.shape, values.dtype) == ((number,), "<f4")
+    cells_fit = cells.shape == (number, 2) and cells.dtype == "<i4"
+    values_fit = values.shape == (number,) and values.dtype == "<f4"
     if not (cells_fit and values_fit):
         raise MessageError(
             f"{name}: cells of shape {cells.shape} with {values.shape} values, or of another dtype"
         )
-    if number > MAX_CELLS:
-        raise MessageError(f"{name}: {number} cells, at most {MAX_CELLS} are taken at once")
-    _check_extent(name, np.asarray(cells.numpy(), np.int64))
 
 
 def _check_extent(name: str, cells: np.ndarray[tuple[int, ...], np.dtype[np.int64]]) -> None:
     if not len(cells):
         return
+
     farthest = int(np.abs(cells).max())
     if farthest > FARTHEST_CELL:
         raise MessageError(f"{name}: a cell {farthest} cells away, at most {FARTHEST_CELL}")
+
     tiles = len(np.unique(cells // TILE_SIDE, axis=0))
     if tiles > MAX_TILES:
         raise MessageError(f"{name}: cells in {tiles} tiles, at most {MAX_TILES} are taken at once")
