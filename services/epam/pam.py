@@ -63,7 +63,8 @@ class ExtendedPam:
 
     def perceive(self, view: ViewArrays, camera: Calibration, learning: bool = True) -> Perceived:
         """Return what is recognized in `view`; with `learning`, new buildings get nodes."""
-        found, learned = self._labelled(self.candidates(view, camera), view, learning)
+        candidates = self.candidates(view, camera)
+        found, learned = self._labelled(candidates, view, learning)
         poses = self._poses(found, camera)
         objects = [
             self._percept(candidate, pose, camera)
@@ -102,7 +103,10 @@ class ExtendedPam:
     @property
     def learned(self) -> list[LearnedObject]:
         """Every node learned since the teaching."""
-        return [_learned(label, embedding) for label, embedding in self._recognizer.learned]
+        nodes = []
+        for label, embedding in self._recognizer.learned:
+            nodes.append(_learned(label, embedding))
+        return nodes
 
     def _labelled(
         self, candidates: list[Candidate], view: ViewArrays, learning: bool
@@ -231,10 +235,15 @@ def _activation(candidate: Candidate) -> float:
 def _silhouette(candidate: Candidate) -> Silhouette | None:
     """None unless the size is known and at least one true end is seen."""
     size_m = candidate.recognition.size_m
-    if size_m is None or not (candidate.walls.left_true or candidate.walls.right_true):
+    if size_m is None:
         return None
+
+    seen = candidate.walls
+    if not seen.left_true and not seen.right_true:
+        return None
+
     longer_m, shorter_m, _ = size_m
-    return candidate.walls.silhouette((longer_m, shorter_m))
+    return seen.silhouette((longer_m, shorter_m))
 
 
 def _learned(label: str, embedding: Singles) -> LearnedObject:

@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from cogmap.geometry.arrays import Floats
 from schemas.sensing import Calibration
@@ -104,8 +105,7 @@ def _stack(silhouettes: list[Silhouette], camera: Calibration) -> FootprintProbl
     columns = np.empty((len(silhouettes), COLUMNS))
     disparity_px = np.empty((len(silhouettes), COLUMNS))
     for row, silhouette in enumerate(silhouettes):
-        last = len(silhouette.columns) - 1
-        picked = np.linspace(0, last, COLUMNS).round().astype(np.intp)
+        picked = _evenly_spaced(len(silhouette.columns))
         columns[row] = silhouette.columns[picked]
         disparity_px[row] = silhouette.disparity_px[picked]
 
@@ -127,26 +127,47 @@ def _stack(silhouettes: list[Silhouette], camera: Calibration) -> FootprintProbl
     )
 
 
+def _evenly_spaced(count: int) -> npt.NDArray[np.intp]:
+    """COLUMNS indices (COLUMNS,) of `count` columns, the first and the last among them."""
+    last = count - 1
+    spaced = np.linspace(0, last, COLUMNS)
+    return spaced.round().astype(np.intp)
+
+
 def _starts(objects: FootprintProblem) -> Floats:
     """ORIENTATIONS starts an object (s * ORIENTATIONS, 3), behind the middle of what is seen."""
-    camera = objects.camera
-    median_px = np.median(objects.disparity_px, axis=1)
-    depth_m = camera.fx_px * camera.baseline_m / median_px
-    middle_px = objects.edge_px.mean(1)
-    slope = (middle_px - camera.cx_px) / camera.fx_px
-
-    distance_m = depth_m * np.hypot(slope, 1)
-    behind = 1 + 0.8 * objects.half_m.mean(1) / distance_m
-    x_m = slope * depth_m * behind
-    z_m = depth_m * behind
-    centre = np.stack([x_m, z_m, np.zeros_like(depth_m)], axis=1)
+    slope = _middle_slope(objects)
+    centre = _usual_centre(objects, slope)
 
     orientations = np.linspace(0, np.pi, ORIENTATIONS, endpoint=False)
     facing = np.arctan(slope)
     starts = np.repeat(centre, ORIENTATIONS, axis=0)
-    starts[:, 2] = np.tile(orientations, len(depth_m))
+    starts[:, 2] = np.tile(orientations, len(centre))
     starts[:, 2] -= np.repeat(facing, ORIENTATIONS)
     return starts
+
+
+def _middle_slope(objects: FootprintProblem) -> Floats:
+    """The slope (s,) of the ray through the middle of what is seen of each object."""
+    camera = objects.camera
+    middle_px = objects.edge_px.mean(1)
+    right_px = middle_px - camera.cx_px
+    return np.asarray(right_px / camera.fx_px)
+
+
+def _usual_centre(objects: FootprintProblem, slope: Floats) -> Floats:
+    """x_m, z_m and an orientation of 0 (s, 3), behind the wall that the ray of `slope` meets."""
+    camera = objects.camera
+    median_px = np.median(objects.disparity_px, axis=1)
+    depth_m = camera.fx_px * camera.baseline_m / median_px
+    distance_m = depth_m * np.hypot(slope, 1)
+
+    half_m = objects.half_m.mean(1)
+    behind = 1 + 0.8 * half_m / distance_m
+    x_m = slope * depth_m * behind
+    z_m = depth_m * behind
+    orientation_rad = np.zeros_like(depth_m)
+    return np.stack([x_m, z_m, orientation_rad], axis=1)
 
 
 def _solve(parameters: Floats, problem: FootprintProblem) -> _Solution:
@@ -177,15 +198,14 @@ def _solution(
     parameters: Floats, residuals: Floats, jacobian: Floats, problem: FootprintProblem
 ) -> _Solution:
     weight = _huber_weight(residuals)
-    weighted = jacobian * weight[..., None]
-    normal = np.einsum("sri,srj->sij", weighted, jacobian)
+    weighted, normal = _weighted_normal(jacobian, weight)
 
     bias_share = problem.bias_sd_px / problem.sd_px
     of_columns = weighted[:, :COLUMNS].sum(1)
     return _Solution(
         parameters=parameters,
         residuals=residuals * np.sqrt(weight),
-        normal=np.asarray(normal),
+        normal=normal,
         bias_gradient=of_columns * bias_share[:, None],
     )
 
@@ -193,15 +213,24 @@ def _solution(
 def _damped_step(residuals: Floats, jacobian: Floats, damping: Floats) -> Floats:
     """The step (s, 3) to subtract, at most MAX_STEP."""
     weight = _huber_weight(residuals)
-    weighted = jacobian * weight[..., None]
-    normal = np.einsum("sri,srj->sij", weighted, jacobian)
+    weighted, normal = _weighted_normal(jacobian, weight)
     gradient = np.einsum("sri,sr->si", weighted, residuals)
 
     diagonal = np.einsum("sii->si", normal)
     added = diagonal * damping[:, None] + 1e-9
     damped = normal + added[:, :, None] * np.eye(3)
-    step = np.linalg.solve(damped, gradient[..., None])
-    return np.asarray(step[..., 0].clip(np.negative(MAX_STEP), MAX_STEP))
+
+    solved = np.linalg.solve(damped, gradient[..., None])
+    step = solved[..., 0]
+    largest = np.array(MAX_STEP)
+    return np.asarray(step.clip(-largest, largest))
+
+
+def _weighted_normal(jacobian: Floats, weight: Floats) -> tuple[Floats, Floats]:
+    """The derivatives (s, r, 3) times the weights (s, r), and the normal matrices (s, 3, 3)."""
+    weighted = jacobian * weight[..., None]
+    normal = np.einsum("sri,srj->sij", weighted, jacobian)
+    return weighted, np.asarray(normal)
 
 
 def _huber_weight(residuals: Floats) -> Floats:
@@ -231,8 +260,9 @@ def _covariances(solution: _Solution, problem: FootprintProblem) -> Floats:
     covariances = np.asarray(independent + _outer(common))
 
     is_hidden = problem.hidden.any(1)
-    hidden_variance = np.where(is_hidden, HIDDEN_SD_M**2, 0.0)
-    covariances[:, :2, :2] += hidden_variance[:, None, None] * np.eye(2)
+    hidden_m2 = np.where(is_hidden, HIDDEN_SD_M**2, 0.0)
+    of_centre = covariances[:, :2, :2]
+    of_centre += hidden_m2[:, None, None] * np.eye(2)
     return covariances
 
 
@@ -260,8 +290,7 @@ def _pose(
     """Mean and covariance over all orientations, weighted by likelihood, as bearing and range from
     the robot.
     """
-    likelihood = np.exp(-0.5 * (costs - costs.min()))
-    weight = likelihood / likelihood.sum()
+    weight = _likelihood_weight(costs)
     centres = parameters[:, :2]
     mean = weight @ centres
     scatter = _outer(centres - mean)
@@ -282,6 +311,13 @@ def _pose(
         range_sd_m=float(np.hypot(range_sd_m, MIN_RANGE_SD_M)),
         misfit=float(misfit),
     )
+
+
+def _likelihood_weight(costs: Floats) -> Floats:
+    """The share (s,) of each solution in the likelihood of all, by their costs (s,)."""
+    excess = costs - costs.min()
+    likelihood = np.exp(-0.5 * excess)
+    return np.asarray(likelihood / likelihood.sum())
 
 
 def _sd(covariance: Floats, direction: Floats) -> Floats:

@@ -70,18 +70,25 @@ def _inverse_depths(parameters: Floats, problem: FootprintProblem) -> Floats:
     axes = ((cos, sin), (-sin, cos))
     for (axis_x, axis_z), half in zip(axes, problem.half_m.T, strict=True):
         along = x * axis_x + z * axis_z
-        gap = np.abs(along) - half
-        facing = gap > 1e-3
-        safe_gap = np.where(facing, gap, 1.0)
-
         across = problem.slope * axis_x[:, None] + axis_z[:, None]
         towards = across * np.sign(along)[:, None]
-        of_side = towards / safe_gap[:, None]
-        nearer = np.minimum(inverse, of_side)
-        inverse = np.where(facing[:, None], nearer, inverse)
+
+        gap_m = np.abs(along) - half
+        of_side = _inverse_depths_of_side(towards, gap_m)
+        inverse = np.minimum(inverse, of_side)
 
     met = np.isfinite(inverse)
     return np.where(met, inverse, 1 / MIN_RANGE_M)
+
+
+def _inverse_depths_of_side(towards: Floats, gap_m: Floats) -> Floats:
+    """1 / depth in metres, (s, COLUMNS), at which rays that approach a side by `towards` for each
+    metre of depth cross the gap (s,) before it; infinite where it does not face the camera.
+    """
+    facing = gap_m > 1e-3
+    safe_gap_m = np.where(facing, gap_m, 1.0)
+    inverse = towards / safe_gap_m[:, None]
+    return np.where(facing[:, None], inverse, np.inf)
 
 
 def _edge_residuals(parameters: Floats, problem: FootprintProblem) -> Floats:
@@ -89,12 +96,15 @@ def _edge_residuals(parameters: Floats, problem: FootprintProblem) -> Floats:
     true end at a hidden edge may lie anywhere farther out.
     """
     corners_px = _corner_columns(parameters, problem)
-    outermost_px = np.stack([corners_px.min(1), corners_px.max(1)], axis=1)
+    first_px = corners_px.min(1)
+    last_px = corners_px.max(1)
+    outermost_px = np.stack([first_px, last_px], axis=1)
     error_px = outermost_px - problem.edge_px
 
     outward_px = error_px * np.array([-1.0, 1.0])
     is_free = problem.hidden & (outward_px > 0)
-    return np.where(is_free, 0.0, error_px) / EDGE_SD_PX
+    counted_px = np.where(is_free, 0.0, error_px)
+    return counted_px / EDGE_SD_PX
 
 
 def _corner_columns(parameters: Floats, problem: FootprintProblem) -> Floats:
@@ -103,8 +113,10 @@ def _corner_columns(parameters: Floats, problem: FootprintProblem) -> Floats:
     x, z, orientation = parameters.T[:, :, None]
     cos = np.cos(orientation)
     sin = np.sin(orientation)
-    a = problem.half_m[:, :1] * np.array([1, 1, -1, -1])
-    b = problem.half_m[:, 1:] * np.array([1, -1, 1, -1])
+    a_signs = np.array([1, 1, -1, -1])
+    b_signs = np.array([1, -1, 1, -1])
+    a = problem.half_m[:, :1] * a_signs
+    b = problem.half_m[:, 1:] * b_signs
 
     corner_x = x + a * cos - b * sin
     corner_z = z + a * sin + b * cos
@@ -128,5 +140,6 @@ def linearized(parameters: Floats, problem: FootprintProblem) -> tuple[Floats, F
 
     derivatives = []
     for other, step in zip(others, STEPS, strict=True):
-        derivatives.append((other - residuals) / step)
+        change = other - residuals
+        derivatives.append(change / step)
     return residuals, np.stack(derivatives, axis=2)

@@ -85,7 +85,8 @@ def _visible_ground(upright_px: Singles, ground_px: Floats) -> Booleans:
 
     limit_px = HIDING_SHARE * ground_px - HIDING_PX
     is_hidden = nearest_px >= limit_px
-    return np.asarray((ground_px > 0) & ~is_hidden)
+    is_ground = ground_px > 0
+    return np.asarray(is_ground & ~is_hidden)
 
 
 def _boundary_pixels(
@@ -98,7 +99,9 @@ def _boundary_pixels(
     rows = np.concatenate([across_rows, down_rows])
     columns = np.concatenate([across_columns, down_columns])
     height, width = mask.shape
-    inside = _inside(rows, height) & _inside(columns, width)
+    inside_rows = _inside(rows, height)
+    inside_columns = _inside(columns, width)
+    inside = inside_rows & inside_columns
     return rows[inside], columns[inside]
 
 
@@ -117,17 +120,22 @@ def _crossings(
     """
     left = slice(None, -1)
     right = slice(1, None)
-    visible = visible_ground[:, left] & visible_ground[:, right]
+    left_visible = visible_ground[:, left]
+    right_visible = visible_ground[:, right]
+    visible = left_visible & right_visible
+
     changes = mask[:, left] != mask[:, right]
     rows, columns = np.nonzero(visible & changes)
 
     first = likelihood[rows, columns]
     second = likelihood[rows, columns + 1]
     rise = second - first
-    share = (0.5 - first) / rise
+    missing = 0.5 - first
+    share = missing / rise
 
-    crossed = np.asarray(columns + share, np.float64)
-    return rows.astype(np.float64), crossed
+    crossed_rows = rows.astype(np.float64)
+    crossed_columns = np.asarray(columns + share, np.float64)
+    return crossed_rows, crossed_columns
 
 
 def _on_ground(
@@ -136,10 +144,11 @@ def _on_ground(
     """The ground points (n, 2) that these pixels show; those beyond MAX_RANGE_M are left out."""
     disparity_px = plane.disparity_px(rows, columns, camera)
     near = disparity_px > min_disparity_px(camera)
-    right, _ = ray_slopes(rows, columns, camera)
-
-    depth_m = focal_baseline(camera) / disparity_px[near]
+    near_px = disparity_px[near]
+    depth_m = focal_baseline(camera) / near_px
     forward_m = depth_m + camera.mount_forward_m
+
+    right, _ = ray_slopes(rows, columns, camera)
     left_m = -right[near] * depth_m
     return np.stack([forward_m, left_m], axis=1)
 
@@ -150,12 +159,13 @@ def thin(points_m: Floats) -> Singles:
     near_m = points_m[ranges_m <= MAX_RANGE_M]
     cell = _cell_numbers(near_m)
 
+    x_m, y_m = near_m.T
+    sum_x_m = np.bincount(cell, x_m, minlength=1)
+    sum_y_m = np.bincount(cell, y_m, minlength=1)
+    sums_m = np.stack([sum_x_m, sum_y_m], axis=1)
+
     count = np.bincount(cell, minlength=1)
     occupied = np.flatnonzero(count)
-    sum_x_m = np.bincount(cell, near_m[:, 0], minlength=1)
-    sum_y_m = np.bincount(cell, near_m[:, 1], minlength=1)
-
-    sums_m = np.stack([sum_x_m, sum_y_m], axis=1)
     means_m = sums_m[occupied] / count[occupied, None]
     return np.asarray(means_m, np.float32)
 
@@ -163,7 +173,10 @@ def thin(points_m: Floats) -> Singles:
 def _cell_numbers(points_m: Floats) -> npt.NDArray[np.intp]:
     """The number of the cell of each point (n, 2), x before y."""
     reach = round(MAX_RANGE_M / CELL_M) + 1
-    cells = np.floor(points_m / CELL_M).astype(np.intp)
+    cells_m = points_m / CELL_M
+    cells = np.floor(cells_m).astype(np.intp)
+
     row, column = cells.T + reach
-    numbers = row * 2 * reach + column
+    columns = 2 * reach
+    numbers = row * columns + column
     return np.asarray(numbers)

@@ -61,23 +61,41 @@ def fit(mask: Booleans, disparity_px: Floats, camera: Calibration) -> GroundPlan
     right, below = ray_slopes(rows, columns, camera)
     slopes = np.stack([right, below, np.ones_like(right)], axis=1)
 
-    down_px = focal_baseline(camera) / camera.mount_height_m
-    prior = np.array([0.0, down_px, 0.0])
-    prior_sd = down_px * np.array([ROLL_SD_RAD, HEIGHT_SD_SHARE, PITCH_SD_RAD])
-    information = np.diag(1 / prior_sd**2)
-    variance_px2 = CORRELATED_PIXELS * DISPARITY_SD_PX**2
-    observed_px = disparity_px[rows, columns] - slopes @ prior
-
-    correction = np.zeros(3)
-    for cutoff_px in CUTOFFS_PX:
-        misfit_px = observed_px - slopes @ correction
-        weight = _biweight(misfit_px / cutoff_px) / variance_px2
-        weighted = slopes.T * weight
-        normal = weighted @ slopes + information
-        correction = np.linalg.solve(normal, weighted @ observed_px)
+    prior, information = _prior(camera)
+    predicted_px = slopes @ prior
+    observed_px = disparity_px[rows, columns] - predicted_px
+    correction = _correction(slopes, observed_px, information)
 
     across, down, level = (prior + correction).tolist()
     return GroundPlane(across, down, level)
+
+
+def _prior(camera: Calibration) -> tuple[Floats, Floats]:
+    """The coefficients (3,) of the plane below a level camera, and their information matrix."""
+    down_px = focal_baseline(camera) / camera.mount_height_m
+    coefficients = np.array([0.0, down_px, 0.0])
+
+    relative_sd = np.array([ROLL_SD_RAD, HEIGHT_SD_SHARE, PITCH_SD_RAD])
+    sd = down_px * relative_sd
+    information = np.diag(1 / sd**2)
+    return coefficients, information
+
+
+def _correction(slopes: Floats, observed_px: Floats, information: Floats) -> Floats:
+    """What to add to the coefficients (3,) of the prior, by the disparities (n,) observed in excess
+    of it along rays of these slopes (n, 3): weighted least squares, again for each of CUTOFFS_PX.
+    """
+    variance_px2 = CORRELATED_PIXELS * DISPARITY_SD_PX**2
+    correction: Floats = np.zeros(3)
+    for cutoff_px in CUTOFFS_PX:
+        misfit_px = observed_px - slopes @ correction
+        weight = _biweight(misfit_px / cutoff_px) / variance_px2
+
+        weighted = slopes.T * weight
+        normal = weighted @ slopes + information
+        solved = np.linalg.solve(normal, weighted @ observed_px)
+        correction = np.asarray(solved)
+    return correction
 
 
 def _biweight(misfit: Floats) -> Floats:
@@ -114,5 +132,6 @@ def _sampled_pixels(
     wanted = mask[every, every]
     known = disparity_px[every, every] > 0
 
-    rows, columns = np.nonzero(wanted & known)
-    return STRIDE_PX * rows + first, STRIDE_PX * columns + first
+    numbers = np.nonzero(wanted & known)
+    rows, columns = (STRIDE_PX * number + first for number in numbers)
+    return rows, columns

@@ -50,12 +50,11 @@ class RoadSegmenter:
         if small.std() < MIN_CONTRAST:
             return np.zeros((height, width), np.float32)
 
-        (output,) = self._network(network_input(small[None]))
+        values = network_input(small[None])
+        (output,) = self._network(values)
         unpadded = output[0, 0, PADDING_PX:-PADDING_PX]
         log_odds = cv2.resize(unpadded, (width, height), interpolation=cv2.INTER_LINEAR)
-        odds_against = np.exp(-log_odds)
-        probability = np.asarray(1 / (1 + odds_against), np.float32)
-        return _denoised(probability)
+        return _denoised(_probability(np.asarray(log_odds, np.float32)))
 
     def mask(self, image: Bytes) -> Booleans:
         """Return which pixels of an RGB image (h, w, 3) show road, (h, w)."""
@@ -82,15 +81,22 @@ def network_input(small: Bytes) -> Singles:
 
     rows = (PADDING_PX, PADDING_PX)
     padded = np.pad(small, ((0, 0), rows, (0, 0), (0, 0)), mode="edge")
+    scale = _gain(small) / 64
     colours = values[:, :3]
     colours[:] = padded.transpose(0, 3, 1, 2)
-    colours[:] = colours * (_gain(small) / 64) - 2
+    colours[:] = colours * scale - 2
 
     across = np.linspace(-1, 1, width, dtype=np.float32)
     down = np.linspace(-1, 1, height, dtype=np.float32)
     values[:, 3] = across
     values[:, 4] = down[:, None]
     return values
+
+
+def _probability(log_odds: Singles) -> Singles:
+    odds_against = np.exp(-log_odds)
+    odds_sum = 1 + odds_against
+    return np.asarray(1 / odds_sum, np.float32)
 
 
 def _gain(small: Bytes) -> Singles:

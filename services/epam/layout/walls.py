@@ -107,7 +107,9 @@ class Walls:
         slopes = (columns_px - camera.cx_px) / camera.fx_px
         right_m = slopes * forward_m
 
-        width_m = np.hypot(np.ptp(right_m), np.ptp(forward_m))
+        across_m = np.ptp(right_m)
+        deep_m = np.ptp(forward_m)
+        width_m = np.hypot(across_m, deep_m)
         return float(min(width_m, MAX_RANGE_M))
 
 
@@ -138,12 +140,15 @@ def _column_medians(values: Singles) -> Singles:
     than MIN_PIXELS.
     """
     height, width = values.shape
-    count = (values > 0).sum(0)
-    ascending = np.sort(values, axis=0)
-
+    is_known = values > 0
+    count = is_known.sum(0)
     above_median = np.maximum(count - 1, 0) // 2
+
+    # The unknown ones are 0 and come first.
+    ascending = np.sort(values, axis=0)
     row = height - 1 - above_median
     medians = ascending[row, np.arange(width)]
+
     enough = count >= MIN_PIXELS
     return np.where(enough, medians, 0.0).astype(np.float32)
 
@@ -171,4 +176,7 @@ def _truly_ends(segment: Segment, disparity_px: Singles, medians_px: Singles, ou
     known_px = beside_px[beside_px > 0]
     if len(known_px) < MIN_PIXELS:
         return True
-    return bool(np.median(known_px) <= own_px + NEARER_PX)
+
+    neighbour_px = np.median(known_px)
+    nearer_px = own_px + NEARER_PX
+    return bool(neighbour_px <= nearer_px)

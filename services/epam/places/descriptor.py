@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from cogmap.geometry.arrays import Bytes, Singles
 
@@ -53,9 +54,15 @@ def descriptors(image: Bytes) -> Bytes | None:
     mean = patches.mean(axis=(3, 5), keepdims=True)
     divisor = contrast + np.float32(FLAT_CONTRAST)
     normalized = (patches - mean) / divisor
+    codes = _quantized(normalized)
+    return codes.reshape(len(SHIFTS), DESCRIPTOR_BYTES)
+
+
+def _quantized(normalized: npt.NDArray[np.floating]) -> Bytes:
+    """Normalized values as bytes, LEVELS for each unit about 128."""
     levels = np.rint(128 + LEVELS * normalized)
-    codes = np.clip(levels, 0, 255).astype(np.uint8)
-    return np.asarray(codes.reshape(len(SHIFTS), DESCRIPTOR_BYTES))
+    limited = np.clip(levels, 0, 255)
+    return np.asarray(limited.astype(np.uint8))
 
 
 def _cells(image: Bytes) -> Singles:
@@ -68,7 +75,10 @@ def _cells(image: Bytes) -> Singles:
     red, green, blue = np.moveaxis(light, 2, 0)
 
     brightness = (red + green + blue) / 3
-    channels = cv2.merge([brightness, red - green, blue - green])
+    red_green = red - green
+    blue_green = blue - green
+    channels = cv2.merge([brightness, red_green, blue_green])
+
     cell = (CELL, CELL)
     means = cv2.boxFilter(channels, -1, cell, anchor=(0, 0), borderType=cv2.BORDER_REPLICATE)
     return np.asarray(means[::CELL], np.float32)

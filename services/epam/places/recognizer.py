@@ -159,7 +159,8 @@ class PlaceRecognizer:
         count = len(self._views)
         predicted = np.zeros(count)
         for steps, p_advance in enumerate(P_ADVANCE[:count]):
-            before = self._belief[: count - steps]
+            last = count - steps
+            before = self._belief[:last]
             predicted[steps:] += p_advance * before
         return predicted
 
@@ -171,7 +172,8 @@ class PlaceRecognizer:
         similarities = known @ vectors.T
         highest = similarities.max(axis=1).astype(np.float64)
         log_odds = LOG_ODDS_SLOPE * (highest - EVEN_SIMILARITY)
-        ratios = np.exp(log_odds.clip(-MAX_LOG_ODDS, MAX_LOG_ODDS))
+        limited = log_odds.clip(-MAX_LOG_ODDS, MAX_LOG_ODDS)
+        ratios = np.exp(limited)
 
         first_recent_step = self._step - self._config.recent + 1
         is_recent = self._step_of_view >= first_recent_step
@@ -209,17 +211,20 @@ class PlaceRecognizer:
         self._belief = np.concatenate([self._belief, unlikely])
 
         # Several at once, since all other vectors move up.
-        if count > self._config.capacity:
-            kept = round(self._config.capacity * (1 - FORGOTTEN_SHARE))
+        capacity = self._config.capacity
+        if count > capacity:
+            kept = round(capacity * (1 - FORGOTTEN_SHARE))
             self._forget(count - kept)
 
     def _reserve(self, count: int) -> None:
         """Make room for `count` vectors."""
         if count <= len(self._vectors):
             return
+
         known = self._vectors[: len(self._views)]
-        self._vectors = np.empty((2 * count, DESCRIPTOR_BYTES), np.float32)
-        self._vectors[: len(known)] = known
+        larger = np.empty((2 * count, DESCRIPTOR_BYTES), np.float32)
+        larger[: len(known)] = known
+        self._vectors = larger
 
     def _forget(self, oldest: int) -> None:
         """Forget this number of the oldest views."""

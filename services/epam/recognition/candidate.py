@@ -54,7 +54,8 @@ def is_beside(one: Candidate, other: Candidate) -> bool:
     """
     begin = max(one.walls.left, other.walls.left)
     end = min(one.walls.right, other.walls.right)
-    if begin - end > BRIDGED_PX[-1]:
+    gap_px = begin - end
+    if gap_px > BRIDGED_PX[-1]:
         return False
 
     one_px = float(np.median(one.walls.disparity_px))
@@ -73,15 +74,23 @@ def outline_px(segment: Segment) -> list[tuple[int, int]]:
     left, top, width, height = segment.box_px
     rows = slice(top, top + height)
     columns = slice(left, left + width)
-    shown = segment.mask[rows, columns].astype(np.uint8)
-    piece = _main_piece(shown).astype(np.uint8)
+    boxed = segment.mask[rows, columns]
+    piece = _main_piece(boxed.astype(np.uint8))
+    polygon = _polygon(piece.astype(np.uint8))
 
+    corners = []
+    for column, row in polygon:
+        corners.append((left + column, top + row))
+    return corners
+
+
+def _polygon(piece: Bytes) -> list[list[int]]:
+    """Column and row of each corner of the outline of `piece` (h, w)."""
     contours, _ = cv2.findContours(piece, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     longest = max(contours, key=len)
     polygon = cv2.approxPolyDP(longest, OUTLINE_TOLERANCE_PX, True)
-
-    corners = polygon[:, 0].tolist()
-    return [(left + column, top + row) for column, row in corners]
+    corners: list[list[int]] = polygon[:, 0].tolist()
+    return corners
 
 
 def _main_piece(shown: Bytes) -> Booleans:
@@ -99,17 +108,24 @@ def _largest_piece(shown: Bytes, bridged_px: int) -> Booleans:
     """The largest connected piece of `shown` (h, w), to which gaps of fewer than `bridged_px`
     columns belong.
     """
-    # At a border, closing would fill what lies between it and the segment.
-    border = (0, 0, bridged_px, bridged_px)
-    bordered = cv2.copyMakeBorder(shown, *border, cv2.BORDER_CONSTANT, value=0)
-    kernel = np.ones((1, bridged_px), np.uint8)
-    closed = cv2.morphologyEx(bordered, cv2.MORPH_CLOSE, kernel)
-    bridged = closed[:, bridged_px:-bridged_px]
-
+    bridged = _bridged(shown, bridged_px)
     _, component, stats, _ = cv2.connectedComponentsWithStats(bridged)
+
     area_px = stats[1:, cv2.CC_STAT_AREA]
     largest = 1 + int(area_px.argmax())
     return np.asarray(component == largest)
+
+
+def _bridged(shown: Bytes, bridged_px: int) -> Bytes:
+    """`shown` (h, w) with gaps of fewer than `bridged_px` columns closed."""
+    # At a border, closing would fill what lies between it and the segment.
+    border = (0, 0, bridged_px, bridged_px)
+    bordered = cv2.copyMakeBorder(shown, *border, cv2.BORDER_CONSTANT, value=0)
+
+    kernel = np.ones((1, bridged_px), np.uint8)
+    closed = cv2.morphologyEx(bordered, cv2.MORPH_CLOSE, kernel)
+    inside = closed[:, bridged_px:-bridged_px]
+    return np.asarray(inside, np.uint8)
 
 
 def height_m(candidate: Candidate, camera: Calibration) -> float:
@@ -120,6 +136,8 @@ def height_m(candidate: Candidate, camera: Calibration) -> float:
 
     _, top, _, _ = candidate.segment.box_px
     above_px = camera.cy_px - top
-    above_m = above_px / camera.fy_px * depth_m
+    upward = above_px / camera.fy_px
+    above_m = upward * depth_m
+
     top_m = camera.mount_height_m + above_m
     return float(np.clip(top_m, MIN_HEIGHT_M, MAX_HEIGHT_M))

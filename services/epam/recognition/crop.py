@@ -37,8 +37,10 @@ def surroundings(image: Bytes, depth_m: Singles, camera: Calibration) -> Singles
     below_camera_m = down * depth_m
     height_m = camera.mount_height_m - below_camera_m
 
-    ground = known & (down > 0) & (height_m < GROUND_M)
+    is_low = height_m < GROUND_M
+    ground = known & (down > 0) & is_low
     sky = ~known & (down < 0)
+
     of_ground = _median_colour(image[ground])
     of_sky = _median_colour(image[sky])
     return np.concatenate([of_ground, of_sky])
@@ -73,28 +75,40 @@ def crop(
     Channels are three colours, 0 outside the segment; its mask; how much farther than the segment
     each pixel is; the logarithm of the side's length in metres; and the `surroundings`.
     """
-    left, top, width, height = segment.box_px
-    side = round(max(width, height) * (1 + 2 * MARGIN))
-    first_column = left + width // 2 - side // 2
-    first_row = top + height // 2 - side // 2
+    first_column, first_row, side = _square(segment)
     source, target = _overlap(first_column, first_row, side, depth_m.shape)
     mask = segment.mask[source]
     distance_m = _distance_m(depth_m[source], mask)
 
-    square = np.zeros((side, side, 4), np.float32)
-    inside = square[target]
+    shown = np.zeros((side, side, 4), np.float32)
+    inside = shown[target]
     inside[..., :3] = colours(image[source]) * mask[..., None]
     inside[..., 3] = mask
     relief = np.zeros((side, side), np.float32)
     relief[target] = _relief(depth_m[source], distance_m)
 
-    values = np.empty((CHANNELS, SIDE_PX, SIDE_PX), np.float32)
-    values[:4] = _resized(square).transpose(2, 0, 1)
-    values[4] = _resized(relief)
     side_m = side * distance_m / focal_px
-    values[5] = np.log(max(side_m, 1.0)) / 2.0 - 1.0
+    log_side = np.log(max(side_m, 1.0))
+    values = np.empty((CHANNELS, SIDE_PX, SIDE_PX), np.float32)
+    values[:4] = _resized(shown).transpose(2, 0, 1)
+    values[4] = _resized(relief)
+    values[5] = log_side / 2.0 - 1.0
     values[6:] = around[:, None, None]
     return values
+
+
+def _square(segment: Segment) -> tuple[int, int, int]:
+    """The first column and row, and the side, of the square about `segment` with its margin, in
+    pixels; parts of it may be outside the image.
+    """
+    left, top, width, height = segment.box_px
+    longer = max(width, height)
+    side = round(longer * (1 + 2 * MARGIN))
+    half = side // 2
+
+    middle_column = left + width // 2
+    middle_row = top + height // 2
+    return middle_column - half, middle_row - half, side
 
 
 def _resized(square: Singles) -> Singles:

@@ -116,13 +116,15 @@ class ObjectRecognizer:
 
     def _embed(self, crops: list[Singles]) -> list[Appearance]:
         """Of at most BATCH crops."""
+        count = len(crops)
         batch = np.zeros(INPUT_SHAPE, np.float32)
-        batch[: len(crops)] = crops
+        batch[:count] = crops
+
         embeddings, log_odds = self._network(batch)
         probabilities = probability(log_odds, self._prototypes)
 
         appearances = []
-        for row in range(len(crops)):
+        for row in range(count):
             building, whole = probabilities[row].tolist()
             appearances.append(Appearance(embeddings[row], building, whole))
         return appearances
@@ -176,7 +178,8 @@ class ObjectRecognizer:
 
         embedding = recognition.appearance.embedding
         cosines = [known @ embedding for known in embeddings]
-        return bool(max(cosines) < SAME_COSINE)
+        highest = max(cosines)
+        return bool(highest < SAME_COSINE)
 
     @property
     def sizes_m(self) -> dict[str, tuple[float, float, float]]:
@@ -233,18 +236,28 @@ def posteriors(
     *leading, _ = taught.shape
     unknown = np.zeros((*leading, 1))
     log_weights = np.concatenate([possible, unknown], axis=-1)
-    highest = log_weights.max(axis=-1, keepdims=True)
-    weights = np.exp(log_weights - highest)
+    weights = _scaled_weights(log_weights)
     total = weights.sum(axis=-1, keepdims=True)
 
-    of_building = np.asarray(building, np.float64)[..., None]
+    probabilities = np.asarray(building, np.float64)
+    of_building = probabilities[..., None]
+    background = 1 - of_building
     labels = of_building * weights / total
-    return np.concatenate([labels, 1 - of_building], axis=-1)
+    return np.concatenate([labels, background], axis=-1)
+
+
+def _scaled_weights(log_weights: Floats) -> Floats:
+    """The exponentials, scaled so that the largest along the last axis is 1."""
+    highest = log_weights.max(axis=-1, keepdims=True)
+    below = log_weights - highest
+    return np.asarray(np.exp(below))
 
 
 def probability(log_odds: Singles, prototypes: Prototypes) -> Floats:
     """Return the calibrated probability of the network's log odds."""
     clipped = log_odds.astype(np.float64).clip(-50, 50)
     calibrated = prototypes.evidence * clipped
+
     odds_against = np.exp(-calibrated)
-    return np.asarray(1 / (1 + odds_against))
+    odds_sum = 1 + odds_against
+    return np.asarray(1 / odds_sum)

@@ -101,13 +101,16 @@ def network_input(small: Bytes, depth_m: Singles, camera: Calibration) -> Single
     colours[:] = colours / 64.0 - 2.0
 
     known = depth_m > 0
-    log_depth = np.log(np.clip(depth_m, 1.0, 100.0))
-    height_m = _height_m(depth_m, camera)
+    limited_m = np.clip(depth_m, 1.0, 100.0)
+    log_depth = np.log(limited_m)
     values[3] = log_depth / 2.0 - 1.0
     values[4] = known
+
+    height_m = _height_m(depth_m, camera)
     values[5] = np.clip(height_m / 5.0, -1.0, 3.0)
-    values[3][~known] = 0.0
-    values[5][~known] = 0.0
+    unknown = ~known
+    values[3][unknown] = 0.0
+    values[5][unknown] = 0.0
 
     down = np.linspace(-1, 1, HEIGHT_PX, dtype=np.float32)
     across = np.linspace(-1, 1, WIDTH_PX, dtype=np.float32)
@@ -120,6 +123,7 @@ def _height_m(depth_m: Singles, camera: Calibration) -> Singles:
     """Height over the ground of what each pixel of (HEIGHT_PX, WIDTH_PX) shows."""
     small_row = np.arange(HEIGHT_PX, dtype=np.float32)
     row = small_row * camera.height_px / HEIGHT_PX
+
     below_px = row[:, None] - np.float32(camera.cy_px)
     down = below_px / np.float32(camera.fy_px)
 
@@ -149,8 +153,10 @@ def _instances(output: Singles) -> npt.NDArray[np.intp]:
     """The number of the object at each pixel, -1 for none, by the network's output (4, h, w)."""
     log_odds, centre, right, down = output
     numbers = np.full(log_odds.shape, -1, np.intp)
-    building = log_odds > np.log(MIN_BUILDING / (1 - MIN_BUILDING))
+    min_odds = MIN_BUILDING / (1 - MIN_BUILDING)
+    building = log_odds > np.log(min_odds)
     rows, columns = np.nonzero(building)
+
     centres = _centres(centre)
     if not len(centres) or not len(rows):
         return numbers
