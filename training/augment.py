@@ -81,8 +81,23 @@ def _affine(size: tuple[int, ...], how: Augmentation, rng: np.random.Generator) 
     perhaps mirrored.
     """
     height, width = size
-    zoom = np.exp(rng.uniform(*np.log(how.zoom)))
-    turn_rad = np.radians(rng.uniform(-how.turn_deg, how.turn_deg))
+    linear = _linear(size, how, rng)
+    shift = rng.uniform(-how.shift, how.shift, 2)
+    shift_px = shift * (WIDTH_PX, HEIGHT_PX)
+
+    centre_px = _centre_px(width, height)
+    new_centre_px = _centre_px(WIDTH_PX, HEIGHT_PX)
+    translation_px = new_centre_px + shift_px - linear @ centre_px
+    return np.column_stack([linear, translation_px])
+
+
+def _linear(size: tuple[int, ...], how: Augmentation, rng: np.random.Generator) -> Floats:
+    """The linear part (2, 2) of that map: zoom, turn and mirror."""
+    height, width = size
+    log_zoom = rng.uniform(*np.log(how.zoom))
+    zoom = np.exp(log_zoom)
+    turn_deg = rng.uniform(-how.turn_deg, how.turn_deg)
+    turn_rad = np.radians(turn_deg)
     mirror = rng.choice((-1.0, 1.0))
 
     across = zoom * WIDTH_PX / width
@@ -91,14 +106,13 @@ def _affine(size: tuple[int, ...], how: Augmentation, rng: np.random.Generator) 
     sin = np.sin(turn_rad)
     top_row = [mirror * across * cos, -down * sin]
     bottom_row = [mirror * across * sin, down * cos]
-    linear = np.array([top_row, bottom_row])
+    return np.array([top_row, bottom_row])
 
-    shift = rng.uniform(-how.shift, how.shift, 2)
-    shift_px = shift * (WIDTH_PX, HEIGHT_PX)
-    centre_px = np.array([width - 1, height - 1]) / 2
-    new_centre_px = np.array([WIDTH_PX - 1, HEIGHT_PX - 1]) / 2
-    translation_px = new_centre_px + shift_px - linear @ centre_px
-    return np.column_stack([linear, translation_px])
+
+def _centre_px(width: int, height: int) -> Floats:
+    """The column and row (2,) in the middle of an image of this size."""
+    last_px = np.array([width - 1, height - 1])
+    return np.asarray(last_px / 2)
 
 
 def _relit(image: Singles, how: Augmentation, rng: np.random.Generator) -> Bytes:
@@ -124,7 +138,8 @@ def _response(how: Augmentation, rng: np.random.Generator) -> Singles:
     contrast = rng.uniform(-how.contrast, how.contrast)
     cast = rng.uniform(-how.cast, how.cast, 3)
     gain = np.exp(contrast + cast)
-    gamma = np.exp(rng.uniform(-how.gamma, how.gamma))
+    log_gamma = rng.uniform(-how.gamma, how.gamma)
+    gamma = np.exp(log_gamma)
     offset = rng.uniform(-how.brightness, how.brightness)
 
     share = np.arange(256) / 255
@@ -136,14 +151,18 @@ def _response(how: Augmentation, rng: np.random.Generator) -> Singles:
 def _shadow(rng: np.random.Generator) -> Singles:
     """The share of light that is left, (HEIGHT_PX, WIDTH_PX, 1), by a shadow in a straight band."""
     rows, columns = np.indices((HEIGHT_PX, WIDTH_PX), dtype=np.float32, sparse=True)
-    direction_rad = rng.uniform(0, np.pi)
     right_px = columns - WIDTH_PX / 2
     down_px = rows - HEIGHT_PX / 2
-    across_px = np.cos(direction_rad) * right_px + np.sin(direction_rad) * down_px
+
+    direction_rad = rng.uniform(0, np.pi)
+    cos = np.cos(direction_rad)
+    sin = np.sin(direction_rad)
+    across_px = cos * right_px + sin * down_px
 
     middle_px = rng.uniform(-80, 80)
     half_px = rng.uniform(5, 60)
-    inside_px = half_px - np.abs(across_px - middle_px)
+    from_middle_px = np.abs(across_px - middle_px)
+    inside_px = half_px - from_middle_px
     edge_px = rng.uniform(0.5, 4.0)
     shade = np.clip(inside_px / edge_px + 0.5, 0, 1)
 

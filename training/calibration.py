@@ -51,7 +51,9 @@ class Trial:
     def cost(self, prototypes: Prototypes) -> float:
         """The negative log likelihood of the right answers."""
         rows = np.arange(len(self.wanted))
-        return _surprise(self.posteriors(prototypes)[rows, self.wanted])
+        posterior = self.posteriors(prototypes)
+        likelihood = posterior[rows, self.wanted]
+        return _surprise(likelihood)
 
     def correct(self, prototypes: Prototypes) -> Booleans:
         """Which of the segments are recognized, (n,)."""
@@ -127,8 +129,11 @@ def _columns(of: Crops, prototypes: Prototypes) -> Rows:
     """The column of the right posterior (n,): that of its name, or the one after all names."""
     columns = {name: column for column, name in enumerate(prototypes.names)}
     after_all = len(columns)
-    names = of.name.tolist()
-    return np.array([columns.get(name, after_all) for name in names])
+
+    right = []
+    for name in of.name.tolist():
+        right.append(columns.get(name, after_all))
+    return np.array(right)
 
 
 def _metrics(posterior: Floats, of: Crops, column: Rows) -> dict[str, float]:
@@ -194,7 +199,7 @@ def _encounter(
 ) -> None:
     """Add the trials of the segments `here`, all of unlabelled buildings of one town."""
     names = sorted(set(of.name[here].tolist()))
-    first = [_largest(here[of.name[here] == name], of) for name in names]
+    first = _first_encounters(here, names, of)
     rows = np.setdiff1d(here, first)
     column = np.searchsorted(names, of.name[rows])
 
@@ -203,11 +208,23 @@ def _encounter(
     never[np.arange(len(rows)), column] = IMPOSSIBLE_COSINE
 
     taught = cosines.shape[1]
-    unknown = np.full(len(rows), taught + len(names))
-    known_trial = Trial(cosines[rows], novel, taught + column)
-    unknown_trial = Trial(cosines[rows], never, unknown)
+    after_all = taught + len(names)
+    unknown = np.full(len(rows), after_all)
+    of_taught = cosines[rows]
+    known_trial = Trial(of_taught, novel, taught + column)
+    unknown_trial = Trial(of_taught, never, unknown)
     encounters.known.append(known_trial)
     encounters.unknown.append(unknown_trial)
+
+
+def _first_encounters(here: Rows, names: list[str], of: Crops) -> list[int]:
+    """The largest of the segments `here` of each of the buildings `names`."""
+    names_here = of.name[here]
+    first = []
+    for name in names:
+        segments = here[names_here == name]
+        first.append(_largest(segments, of))
+    return first
 
 
 def _largest(segments: Rows, of: Crops) -> int:
@@ -231,4 +248,6 @@ def calibration_error(activation: Floats, correct: Booleans) -> float:
 
     excess = activation - correct
     gap = np.bincount(number, excess, minlength=BINS)
-    return float(np.abs(gap).sum() / max(count.sum(), 1))
+    total_gap = np.abs(gap).sum()
+    total = max(count.sum(), 1)
+    return float(total_gap / total)

@@ -49,9 +49,13 @@ def overlap(segment: Segment, label: Bytes) -> tuple[int, float]:
     intersection over union of the two.
     """
     number, common_px = _main_building(segment, label)
-    building_px = int(np.count_nonzero(label == number))
-    union_px = segment.area_px + building_px - common_px
-    return number, common_px / max(union_px, 1)
+    is_building = label == number
+    building_px = int(np.count_nonzero(is_building))
+
+    both_px = segment.area_px + building_px
+    union_px = both_px - common_px
+    share = common_px / max(union_px, 1)
+    return number, share
 
 
 def crops(towns: Iterable[Town], segmenter: Segmenter) -> Crops:
@@ -100,7 +104,10 @@ def _shown(segment: Segment, label: Bytes, names: tuple[str, ...]) -> str:
 
 def _main_building(segment: Segment, label: Bytes) -> tuple[int, int]:
     """The building that most pixels of `segment` show, and how many do; 0 pixels if none does."""
-    count = np.bincount(label[segment.mask], minlength=2)
+    labels = label[segment.mask]
+    count = np.bincount(labels, minlength=2)
     count[0] = 0
+
     number = int(count.argmax())
-    return number, int(count[number])
+    common_px = int(count[number])
+    return number, common_px

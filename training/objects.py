@@ -113,18 +113,32 @@ def _relight(values: Singles, rng: np.random.Generator) -> None:
     gain = np.exp(channel_gain + overall_gain).astype(np.float32)
     offset = rng.normal(0, 0.06, (count, 1, 1, 1)).astype(np.float32)
 
+    _relight_segments(values, gain, offset)
+    _relight_surroundings(values, gain, offset)
+    log_size = rng.normal(0, 0.04, (count, 1, 1))
+    values[:, 5] += log_size.astype(np.float32)
+
+
+def _relight_segments(values: Singles, gain: Singles, offset: Singles) -> None:
+    """Change the colours of the segments, in place; outside of them they stay 0."""
     mask = values[:, 3:4]
     colours = values[:, :3]
     black = 2 * mask
-    colours[:] = ((colours + black) * gain - black) + offset * mask
 
-    around = values[:, 6:].reshape(count, 2, 3, SIDE_PX, SIDE_PX)
-    visible = np.abs(around).max(axis=2, keepdims=True) > 0
-    relit = (around + 2) * gain[:, None] - 2 + offset[:, None]
+    light = colours + black
+    relit = light * gain - black
+    colours[:] = relit + offset * mask
+
+
+def _relight_surroundings(values: Singles, gain: Singles, offset: Singles) -> None:
+    """Change the colours of ground and sky, in place; where there is none they stay 0."""
+    around = values[:, 6:].reshape(len(values), 2, 3, SIDE_PX, SIDE_PX)
+    brightest = np.abs(around).max(axis=2, keepdims=True)
+    visible = brightest > 0
+
+    light = around + 2
+    relit = light * gain[:, None] - 2 + offset[:, None]
     around[:] = np.where(visible, relit, 0)
-
-    log_size = rng.normal(0, 0.04, (count, 1, 1))
-    values[:, 5] += log_size.astype(np.float32)
 
 
 def _hide_parts(values: Singles, rng: np.random.Generator) -> None:
@@ -148,17 +162,25 @@ def train_on_renderings(
     Raises UsageError if there are no renderings.
     """
     seed_torch(seed)
+    training_files = files(folder, "train") + files(folder, "unlabelled")
+    rng = np.random.default_rng(seed)
     with Progress() as progress:
-        training = _crops(files(folder, "train") + files(folder, "unlabelled"), progress)
+        training = _crops(training_files, progress)
         held_out = _crops(files(folder, "val"), progress)
-        fitted = _fit(training, np.random.default_rng(seed), epochs or EPOCHS, progress)
+        fitted = _fit(training, rng, epochs or EPOCHS, progress)
 
     export(fitted.net, out, "seen", INPUT_SHAPE, OUTPUT_SHAPES)
     embeddings, log_odds = embed(fitted.net, held_out)
-    found = calibrate(embeddings, log_odds, held_out, _uncalibrated(folder, fitted))
-    encoded = msgspec.json.format(msgspec.json.encode(found.prototypes), indent=1)
-    out.with_suffix(".json").write_bytes(encoded + b"\n")
+    uncalibrated = _uncalibrated(folder, fitted)
+    found = calibrate(embeddings, log_odds, held_out, uncalibrated)
+    _write(found.prototypes, out.with_suffix(".json"))
     return found.metrics
+
+
+def _write(prototypes: Prototypes, path: Path) -> None:
+    encoded = msgspec.json.encode(prototypes)
+    indented = msgspec.json.format(encoded, indent=1)
+    path.write_bytes(indented + b"\n")
 
 
 def _crops(paths: list[Path], progress: Progress) -> Crops:
@@ -187,7 +209,9 @@ def _uncalibrated(folder: Path, fitted: Fitted) -> Prototypes:
 def _fit(known: Crops, rng: np.random.Generator, epochs: int, progress: Progress) -> Fitted:
     names = sorted(set(known.name.tolist()) - {""})
     rows = np.searchsorted(names, known.name)
-    number = np.where(known.name == "", -1, rows)
+    is_nameless = known.name == ""
+    number = np.where(is_nameless, -1, rows)
+
     net = EmbeddingNet().to(memory_format=torch.channels_last)
     # Short ones turn fast at first: each of thousands of kinds is seldom seen.
     initial = INITIAL_LENGTH * torch.randn(len(names), DIMENSIONS)
@@ -220,7 +244,8 @@ def loss(
     labels = wanted[building]
     cosines = embedding[building] @ directions.T
     margin = MARGIN * functional.one_hot(labels, len(directions))
-    of_labels = functional.cross_entropy(SHARPNESS * (cosines - margin), labels)
+    scores = SHARPNESS * (cosines - margin)
+    of_labels = functional.cross_entropy(scores, labels)
 
     shown = torch.stack([building, whole], 1).float()
     of_odds = functional.binary_cross_entropy_with_logits(log_odds, shown)
@@ -232,7 +257,9 @@ def _batches(
 ) -> Iterator[Batch]:
     for chosen in shuffled(len(number), BATCH, steps, rng):
         values = augmented(known.values[chosen], rng)
-        yield values, number[chosen], known.whole[chosen]
+        wanted = number[chosen]
+        whole = known.whole[chosen]
+        yield values, wanted, whole
 
 
 def embed(net: EmbeddingNet, of: Crops) -> tuple[Singles, Singles]:
@@ -265,5 +292,7 @@ def sizes_m(folder: Path, names: list[str]) -> dict[str, tuple[float, float, flo
             if name not in names:
                 continue
             *sides_m, height_m = size_m
-            found[name] = (max(sides_m), min(sides_m), height_m)
+            longer_m = max(sides_m)
+            shorter_m = min(sides_m)
+            found[name] = (longer_m, shorter_m, height_m)
     return found

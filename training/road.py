@@ -80,9 +80,10 @@ def train(images: Sequence[LabelledImage], schedule: Schedule) -> UNet:
     optimizer = Optimizer(net.parameters(), steps, MAX_RATE, WEIGHT_DECAY, WARM_UP)
     net.train()
 
+    batches = partial(_batches, images, schedule, steps)
     with Progress() as progress:
         task = progress.add_task("training", total=steps)
-        for values, road, known in prefetch(partial(_batches, images, schedule, steps)):
+        for values, road, known in prefetch(batches):
             value = optimizer.step(loss(net, values, road, known))
             progress.update(task, advance=1, description=f"training, loss {value:.3f}")
     return net.eval()
@@ -96,7 +97,8 @@ def loss(net: UNet, values: Tensor, road: Tensor, known: Tensor) -> Tensor:
     output = padded[:, 0, PADDING_PX:-PADDING_PX]
     of_pixels = functional.binary_cross_entropy_with_logits(output, road, reduction="none")
 
-    total = (of_pixels * known).sum()
+    of_known = of_pixels * known
+    total = of_known.sum()
     count = known.sum().clamp(min=1)
     return total / count
 
@@ -114,16 +116,19 @@ def _batches(
     for chosen in order.reshape(steps, BATCH):
         batch = [augmented(images[number], schedule.augmentation, rng) for number in chosen]
         pixels = np.stack([each.image for each in batch])
+        values = network_input(pixels)
+
         road = _shares([each.road for each in batch])
         known = _shares([each.known for each in batch])
-        yield network_input(pixels), road, known
+        yield values, road, known
 
 
 def _order(count: int, wanted: int, rng: np.random.Generator) -> npt.NDArray[np.intp]:
     """Which image comes when, (wanted,): each once, in any order, then each once more."""
     rounds = math.ceil(wanted / count)
     orders = [rng.permutation(count) for _ in range(rounds)]
-    return np.concatenate(orders)[:wanted]
+    order = np.concatenate(orders)
+    return order[:wanted]
 
 
 def _shares(levels: Sequence[Bytes]) -> Singles:
@@ -148,6 +153,8 @@ def _iou(folder: Path, weights: Path, count: int) -> float:
         for image, surface in zip(town.left, town.surface, strict=True):
             found = segmenter.mask(image)
             road = surface == ROAD
-            both_px += int(np.count_nonzero(found & road))
-            either_px += int(np.count_nonzero(found | road))
+            both = found & road
+            either = found | road
+            both_px += int(np.count_nonzero(both))
+            either_px += int(np.count_nonzero(either))
     return both_px / max(either_px, 1)

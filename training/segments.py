@@ -79,18 +79,21 @@ def examples(towns: Iterable[Town]) -> Examples:
     size = (WIDTH_PX, HEIGHT_PX)
     for town in towns:
         for image, depth_m, label in zip(town.left, town.stereo_m, town.label, strict=True):
-            values.append(_example(image, depth_m, town.calibration))
-            labels.append(cv2.resize(label, size, interpolation=cv2.INTER_NEAREST))
+            example = _example(image, depth_m, town.calibration)
+            small_label = cv2.resize(label, size, interpolation=cv2.INTER_NEAREST)
+            values.append(example)
+            labels.append(small_label)
     return Examples(np.asarray(values), np.asarray(labels, np.uint8))
 
 
 def _example(image: Bytes, depth_m: Singles, camera: Calibration) -> npt.NDArray[np.float16]:
     size = (WIDTH_PX, HEIGHT_PX)
-    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-    small_m = cv2.resize(depth_m, size, interpolation=cv2.INTER_NEAREST)
-    values = network_input(
-        small.astype(np.uint8, copy=False), small_m.astype(np.float32, copy=False), camera
-    )
+    resized = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    small = resized.astype(np.uint8, copy=False)
+
+    resized_m = cv2.resize(depth_m, size, interpolation=cv2.INTER_NEAREST)
+    small_m = resized_m.astype(np.float32, copy=False)
+    values = network_input(small, small_m, camera)
     return values.astype(np.float16)
 
 
@@ -114,10 +117,14 @@ def target(label: Bytes) -> Singles:
         bump = _bump(label.shape, centre_row[one], centre_column[one], sd_px)
         np.maximum(wanted[1], bump, out=wanted[1])
 
-    wanted[2, rows, columns] = (centre_column[number] - columns) / OFFSET_PX
-    wanted[3, rows, columns] = (centre_row[number] - rows) / OFFSET_PX
+    right_px = centre_column[number] - columns
+    down_px = centre_row[number] - rows
+    wanted[2, rows, columns] = right_px / OFFSET_PX
+    wanted[3, rows, columns] = down_px / OFFSET_PX
+
     weight = large[number] / np.sqrt(divisor[number])
-    wanted[4, rows, columns] = weight * (len(rows) / max(float(weight.sum()), 1e-9))
+    scale = len(rows) / max(float(weight.sum()), 1e-9)
+    wanted[4, rows, columns] = weight * scale
     return wanted
 
 
@@ -133,7 +140,9 @@ def _gaussian(count: int, middle: float, sd: float) -> Floats:
     """A Gaussian of height 1 at 0, 1, and so on, (count,)."""
     away = np.arange(count) - middle
     squared = away**2
-    return np.asarray(np.exp(-squared / (2 * sd**2)))
+    variance = sd**2
+    exponent = -squared / (2 * variance)
+    return np.asarray(np.exp(exponent))
 
 
 def loss(output: Tensor, wanted: Tensor) -> Tensor:
@@ -145,9 +154,11 @@ def loss(output: Tensor, wanted: Tensor) -> Tensor:
     building = functional.binary_cross_entropy_with_logits(output[:, 0], wanted[:, 0])
 
     squared = (output[:, 1] - wanted_centre).square()
-    centre = (squared * (1 + 8 * wanted_centre)).mean()
+    emphasis = 1 + 8 * wanted_centre
+    centre = (squared * emphasis).mean()
 
-    error = (output[:, 2:4] - wanted[:, 2:4]).abs()
+    wanted_offset = wanted[:, 2:4]
+    error = (output[:, 2:4] - wanted_offset).abs()
     weighted = error.sum(1) * weight
     offset = weighted.sum() / (weight.sum() + 1)
     return building + 20 * centre + 2 * offset
@@ -165,8 +176,10 @@ def augmented(
     channel_gain = rng.normal(0, 0.08, (3, 1, 1))
     overall_gain = rng.normal(0, 0.12)
     gain = np.exp(channel_gain + overall_gain).astype(np.float32)
+    offset = rng.normal(0, 0.05)
     colours = varied[:3]
-    colours[:] = (colours + 2) * gain - 2 + rng.normal(0, 0.05)
+    light = colours + 2
+    colours[:] = light * gain - 2 + offset
 
     if rng.random() < 0.3:
         coarse = rng.random((15, 20), np.float32)
@@ -187,7 +200,8 @@ def train_on_renderings(
     with Progress() as progress:
         paths = progress.track(files(folder, "train"), description="reading")
         known = examples(read(path) for path in paths)
-        net = _fit(known, np.random.default_rng(seed), epochs or EPOCHS, progress)
+        rng = np.random.default_rng(seed)
+        net = _fit(known, rng, epochs or EPOCHS, progress)
 
     export(net, out, "seen", INPUT_SHAPE, OUTPUT_SHAPES)
     return metrics(folder, out)
@@ -201,7 +215,8 @@ def _fit(
     optimizer = Optimizer(net.parameters(), steps, MAX_RATE, WEIGHT_DECAY)
     task = progress.add_task("training", total=steps)
 
-    for values, wanted in prefetch(partial(_batches, known, steps, rng)):
+    batches = partial(_batches, known, steps, rng)
+    for values, wanted in prefetch(batches):
         batch = values.contiguous(memory_format=torch.channels_last)
         with torch.autocast("cpu", torch.bfloat16):
             padded_output = net(batch)

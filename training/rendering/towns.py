@@ -39,8 +39,10 @@ def kinds(seed: int, invented_count: int) -> tuple[BuildingType, ...]:
     if not invented_count:
         return CATALOGUE
 
-    order = np.random.default_rng([seed, 0xCA]).permutation(len(CATALOGUE))
-    chosen = order[: max(0, KINDS - invented_count)]
+    rng = np.random.default_rng([seed, 0xCA])
+    order = rng.permutation(len(CATALOGUE))
+    known_count = max(0, KINDS - invented_count)
+    chosen = order[:known_count]
     known = [CATALOGUE[number] for number in chosen]
     return (*invented(seed, invented_count), *known)
 
@@ -75,7 +77,8 @@ def _on_a_street(place: town.Town, rng: np.random.Generator) -> Pose:
     number = int(rng.integers(len(place.roads)))
     road = place.roads[number]
     along_m = rng.uniform(0, road.length_m)
-    x_m, y_m = road.point(along_m, rng.uniform(-3, 3))
+    across_m = rng.uniform(-3, 3)
+    x_m, y_m = road.point(along_m, across_m)
 
     half_turns = int(rng.integers(2))
     direction_rad = road.heading_rad + math.pi * half_turns
@@ -145,7 +148,8 @@ def labels(world: World, exposure: Exposure) -> Bytes:
     """
     label = np.zeros(exposure.body.shape, np.uint8)
     for number, body in enumerate(world.building_of_body):
-        label[exposure.body == body] = 1 + number
+        is_shown = exposure.body == body
+        label[is_shown] = 1 + number
     return label
 
 
