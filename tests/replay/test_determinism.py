@@ -82,7 +82,7 @@ def test_three_workers_give_the_bytes_of_one_on_every_topic_but_proposals(first:
     assert graph(_deltas(three)).digest() == graph(_deltas(first)).digest()
 
 
-def test_proposals_of_three_workers_differ_from_those_of_one_in_source_and_number_alone(
+def test_proposals_of_three_workers_differ_in_source_and_number_alone(
     first: Said,
 ) -> None:
     three = drive(3, workers=3)

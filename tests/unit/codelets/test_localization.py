@@ -162,7 +162,7 @@ def test_a_landmark_whose_place_is_hardly_known_corrects_nothing() -> None:
     assert found.kept_share == 1.0
 
 
-def test_where_every_sample_is_unlikely_the_answer_is_still_a_pose_from_among_them() -> None:
+def test_where_all_samples_are_unlikely_the_pose_is_still_one_of_them() -> None:
     for outlier_share in (0.0, 1e-9):
         config = Config(samples=100, kept_samples=50, outlier_share=outlier_share)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -213,7 +213,7 @@ def test_an_agent_that_stands_still_does_not_grow_surer_of_itself_by_looking() -
 
 
 @pytest.mark.parametrize("number", range(4))
-def test_an_agent_that_was_turned_about_knows_its_heading_again_by_three_landmarks(
+def test_a_turned_agent_recovers_its_heading_by_three_landmarks(
     number: int,
 ) -> None:
     rng = np.random.default_rng(number)
@@ -243,7 +243,7 @@ def test_an_agent_that_was_turned_about_knows_its_heading_again_by_three_landmar
     assert math.remainder(heading_rad - heading, math.tau) == pytest.approx(0.0, abs=0.06)
 
 
-def test_the_self_node_is_linked_to_the_place_of_its_mean_and_no_longer_to_the_one_before() -> None:
+def test_the_self_node_is_linked_to_the_place_of_its_mean_alone() -> None:
     before = Link(source="self", target="place:map:0:0:0")
     graph = graph_of(agent(), before, cell_m=2.0)
     asked = task("localization", motions=_rows((6.2, 0.0, 1.0, 0.0, 0.0)))
@@ -312,9 +312,7 @@ def test_the_number_of_a_landmarks_samples_stays() -> None:
     assert len(found.positions_m()) == 200
 
 
-def test_a_landmark_seen_elsewhere_stays_until_it_has_been_missed_as_often_as_configured_then_starts_anew() -> (
-    None
-):
+def test_a_landmark_seen_elsewhere_starts_anew_after_the_configured_misses() -> None:
     house = _landmark(10.0, 0.0, 0.1)
     places = []
     for number in range(3):
@@ -370,7 +368,7 @@ def test_refilling_draws_from_those_kept_and_jitters_each() -> None:
     assert len({tuple(row) for row in resample(kept, 50, 0.1, generator("a")).tolist()}) == 50
 
 
-def test_a_landmark_that_was_seen_but_once_and_then_twice_elsewhere_starts_anew_there() -> None:
+def test_a_landmark_seen_once_and_then_twice_elsewhere_starts_anew_there() -> None:
     house = _landmark(300.0, 0.0, 0.5, sightings=1)
     for number in range(2):
         house = _located(house, 0.0, 10.0, number)

@@ -242,7 +242,7 @@ def test_a_task_on_a_graph_that_lacks_what_it_reads_is_a_failure(codelet: str) -
     assert proposal.operations == []
 
 
-def test_what_is_recognised_for_the_first_time_gets_a_node_with_samples_where_it_is_seen() -> None:
+def test_an_object_first_recognised_gets_a_node_with_samples_where_it_is_seen() -> None:
     seen = percept("house", math.pi / 2, 10.0, range_sd_m=0.5, bearing_sd_rad=0.01, width_m=7.0)
     graph = graph_of(_self(3.0, 4.0, math.pi / 2))
     found, link = run(task("object_place", percepts=[seen]), graph, CONFIG).operations
@@ -255,7 +255,7 @@ def test_what_is_recognised_for_the_first_time_gets_a_node_with_samples_where_it
     assert link == Link(source="object:house", target="place:map:0:-7:4")
 
 
-def test_an_agent_unsure_of_its_heading_is_unsure_across_of_where_a_far_object_stands() -> None:
+def test_an_unsure_heading_spreads_a_far_object_across_the_line_of_sight() -> None:
     samples = np.zeros((500, 3))
     samples[:, 2] = np.random.default_rng(1).normal(0.0, 0.1, 500)
     seen = percept("house", 0.0, 30.0, range_sd_m=0.2, bearing_sd_rad=0.001)
@@ -276,7 +276,7 @@ def _road(node: Self, road_m: Array, cell_m: float = 1.0) -> dict[tuple[int, int
     return {(i, j): value for (i, j), value in zip(cells, values, strict=True)}
 
 
-def test_road_is_marked_on_the_place_nodes_where_it_lies_as_seen_from_where_the_agent_is() -> None:
+def test_road_is_marked_on_the_place_nodes_where_it_is_seen_from_the_pose() -> None:
     road_m = Array.of(np.array([[4.0, 0.0]] * 3 + [[4.0, 2.0]], np.float32))
     assert _road(_self(10.0, 20.0, math.pi / 2), road_m) == {
         (10, 24): 1.0,
@@ -294,7 +294,7 @@ def test_road_seen_from_afar_is_not_believed() -> None:
     assert list(_road(_self(), road_m)) == [(2, 0)]
 
 
-def test_the_place_node_that_the_agent_stands_on_is_active_even_where_no_road_is_seen() -> None:
+def test_the_place_node_under_the_agent_is_active_even_without_road_in_view() -> None:
     (here,) = run(task("road_place"), graph_of(_self(-3.4, 2.6)), CONFIG).operations
     assert isinstance(here, Cells)
     assert here.column is PlaceColumn.ACTIVATION
@@ -336,7 +336,7 @@ def _found(codelet: str, *nodes: AnyNode) -> list[AnyNode]:
     return [node for each in answer.coalitions for node in each.nodes]
 
 
-def test_attention_brings_where_the_agent_is_among_what_it_sees_and_what_is_new_to_it() -> None:
+def test_attention_brings_the_agents_whereabouts_and_what_is_new_to_it() -> None:
     nodes = (_self(), _object("old", NOVEL_SIGHTINGS + 1), _object("new", 1))
     assert [item.id for item in _found("whereabouts", *nodes)] == [
         "self",

@@ -84,7 +84,7 @@ SENSELESS: dict[str, Operation] = {
 
 
 @pytest.mark.parametrize("reason", SENSELESS)
-def test_a_senseless_proposal_is_refused_with_a_reason_and_the_next_delta_counts_it(
+def test_an_invalid_proposal_is_rejected_and_the_next_delta_counts_it(
     reason: str,
 ) -> None:
     ledger = _ledger()

@@ -94,7 +94,7 @@ def test_deltas_are_numbered_without_a_gap() -> None:
     assert [delta.seq for delta in desk.deltas] == list(range(len(desk.deltas)))
 
 
-def test_answers_are_committed_in_the_order_of_the_tasks_whatever_the_order_they_come_in() -> None:
+def test_answers_are_committed_in_the_order_of_their_tasks_not_of_arrival() -> None:
     said = []
     for order in ((0, 1, 2, 3), (2, 0, 3, 1)):
         desk = Desk("w1")
@@ -128,9 +128,7 @@ def test_an_answer_to_what_was_never_asked_changes_nothing() -> None:
     assert desk.feed(answer(other, [_moved_self(0)])) == []
 
 
-def test_of_the_views_that_come_during_a_cycle_the_newest_is_next_and_the_motion_covers_those_passed_over() -> (
-    None
-):
+def test_the_newest_view_is_next_and_its_motion_covers_those_skipped() -> None:
     desk = Desk("w1")
     desk.drive(range(1))
     desk.see(1)
@@ -211,9 +209,7 @@ def _restored(past: list[Message]) -> Desk:
     return desk
 
 
-def test_a_workspace_restored_from_its_deltas_or_from_a_snapshot_has_the_same_graph_and_goes_on_numbering() -> (
-    None
-):
+def test_a_restored_workspace_has_the_same_graph_and_continues_its_numbers() -> None:
     desk = Desk("w1")
     desk.drive(range(4), percept("a"), percept("b", 0.5))
     assert desk.module.compact is not None

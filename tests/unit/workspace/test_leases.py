@@ -114,7 +114,7 @@ def test_with_its_only_worker_gone_a_task_waits_for_the_next_one() -> None:
 
 
 @pytest.mark.parametrize("workers", [("w1", "w2"), ("w2", "w1"), ("a", "b", "c")])
-def test_in_real_time_a_task_whose_lease_has_ended_goes_to_another_worker_and_is_committed_once(
+def test_a_task_whose_lease_has_ended_is_done_by_another_and_committed_once(
     workers: tuple[str, ...],
 ) -> None:
     desk, asked = _real_time(*workers)
@@ -130,7 +130,7 @@ def test_in_real_time_a_task_whose_lease_has_ended_goes_to_another_worker_and_is
     assert _committed(desk, asked) == 1
 
 
-def test_the_only_worker_keeps_its_task_when_the_lease_has_ended_until_there_is_another() -> None:
+def test_the_only_worker_keeps_its_task_past_the_lease_until_another_joins() -> None:
     desk, asked = _real_time("w1")
     assert desk.clock(stamp_ns(0) + 101 * MS) == []
     desk.presence("w2")
@@ -139,7 +139,7 @@ def test_the_only_worker_keeps_its_task_when_the_lease_has_ended_until_there_is_
     assert _held(desk, asked) == ("w2", 1)
 
 
-def test_a_task_that_nobody_has_is_given_to_the_first_worker_however_long_it_has_waited() -> None:
+def test_a_task_that_no_worker_holds_is_given_to_the_first_that_joins() -> None:
     desk = Desk(mode="real_time", deadline_ms=10_000.0)
     desk.see(0)
     desk.clock(stamp_ns(0) + 5_000 * MS)
@@ -147,9 +147,7 @@ def test_a_task_that_nobody_has_is_given_to_the_first_worker_however_long_it_has
     assert [_held(desk, asked) for asked in desk.take()] == [("w1", 0)]
 
 
-def test_a_task_that_is_lost_as_often_as_it_may_be_given_out_is_given_up_and_the_cycle_goes_on() -> (
-    None
-):
+def test_a_task_lost_at_every_attempt_is_given_up_and_the_cycle_continues() -> None:
     desk = Desk("w1", "w2", mode="real_time", lease_ms=10.0, deadline_ms=10_000.0, attempts=3)
     desk.clock(stamp_ns(0))
     desk.see(0)
@@ -240,9 +238,7 @@ def test_a_late_answer_is_committed_between_two_cycles_too() -> None:
     assert desk.deltas[-1].tasks == [asked.task_id]
 
 
-def test_a_late_answer_about_a_node_that_has_changed_since_is_dropped_and_the_next_delta_counts_it() -> (
-    None
-):
+def test_a_late_answer_about_a_changed_node_is_dropped_and_counted() -> None:
     desk, asked = _real_time("w1", "w2")
     desk.clock(stamp_ns(0) + 181 * MS)
     desk.see(1)
