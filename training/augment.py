@@ -48,15 +48,18 @@ def augmented(
     labelled: LabelledImage, how: Augmentation, rng: np.random.Generator
 ) -> LabelledImage:
     """Return a variation of `labelled`, HEIGHT_PX by WIDTH_PX."""
-    matrix = _affine(labelled.image.shape[:2], how, rng)
+    original_size = labelled.image.shape[:2]
+    matrix = _affine(original_size, how, rng)
     size = (WIDTH_PX, HEIGHT_PX)
     image = cv2.warpAffine(
         labelled.image, matrix, size, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
     )
     road = cv2.warpAffine(labelled.road, matrix, size, flags=cv2.INTER_LINEAR)
     known = cv2.warpAffine(labelled.known, matrix, size, flags=cv2.INTER_LINEAR)
+
+    relit = _relit(image.astype(np.float32), how, rng)
     return LabelledImage(
-        image=_relit(image.astype(np.float32), how, rng),
+        image=relit,
         road=road.astype(np.uint8),
         known=known.astype(np.uint8),
     )
@@ -87,7 +90,9 @@ def _affine(size: tuple[int, ...], how: Augmentation, rng: np.random.Generator) 
 
     centre_px = _centre_px(width, height)
     new_centre_px = _centre_px(WIDTH_PX, HEIGHT_PX)
-    translation_px = new_centre_px + shift_px - linear @ centre_px
+    mapped_px = linear @ centre_px
+
+    translation_px = new_centre_px + shift_px - mapped_px
     return np.column_stack([linear, translation_px])
 
 

@@ -77,12 +77,16 @@ def calibrate(
     of the segments `of` held-out towns.
     """
     building = of.name != ""
-    prototypes = _with_evidence(prototypes, log_odds, np.stack([building, of.whole], 1))
+    shown = np.stack([building, of.whole], 1)
+    prototypes = _with_evidence(prototypes, log_odds, shown)
 
-    cosines = embeddings @ np.asarray(prototypes.directions, np.float32).T
+    directions = np.asarray(prototypes.directions, np.float32)
+    cosines = embeddings @ directions.T
     column = _columns(of, prototypes)
+
     rows = np.flatnonzero(building)
-    taught = Trial(cosines[rows], np.empty((len(rows), 0), np.float32), column[rows])
+    none_learned = np.empty((len(rows), 0), np.float32)
+    taught = Trial(cosines[rows], none_learned, column[rows])
     prototypes = _likeliest(prototypes, [taught], "sharpness", "unknown")
 
     encounters = _encounters(embeddings, cosines, of)
@@ -95,7 +99,8 @@ def calibrate(
         probability(log_odds, prototypes)[:, 0],
         prototypes,
     )
-    metrics = _metrics(posterior, of, column) | _novel_metrics(prototypes, encounters)
+    metrics = _metrics(posterior, of, column)
+    metrics |= _novel_metrics(prototypes, encounters)
     return Calibrated(prototypes, metrics)
 
 
@@ -103,7 +108,8 @@ def _with_evidence(prototypes: Prototypes, log_odds: Singles, shown: Booleans) -
     """`prototypes` with the factor that makes log odds (n, 2) of what is `shown` likeliest."""
 
     def cost(tried: Prototypes) -> float:
-        likelihood = np.abs(probability(log_odds, tried) - ~shown)
+        probabilities = probability(log_odds, tried)
+        likelihood = np.abs(probabilities - ~shown)
         return _surprise(likelihood)
 
     tried = (msgspec.structs.replace(prototypes, evidence=evidence) for evidence in EVIDENCE)

@@ -77,9 +77,12 @@ class EmbeddingNet(nn.Module):
             pooled.append(values.amax((2, 3)))
 
         features = torch.cat(pooled, 1)
+        log_odds = self.odds(features)
         embedding = self.head(features)
-        length = embedding.square().sum(1, keepdim=True).add(1e-6).sqrt()
-        return embedding / length, self.odds(features)
+
+        squared_length = embedding.square().sum(1, keepdim=True)
+        length = squared_length.add(1e-6).sqrt()
+        return embedding / length, log_odds
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +104,9 @@ def augmented(values: npt.NDArray[np.float16], rng: np.random.Generator) -> Sing
 
     shifts = rng.integers(-3, 4, (len(varied), 2))
     for crop, shift in zip(varied, shifts, strict=True):
-        crop[:5] = np.roll(crop[:5], shift, axis=(1, 2))
+        shown = crop[:5]
+        shown[:] = np.roll(shown, shift, axis=(1, 2))
+
     return varied
 
 
@@ -127,7 +132,8 @@ def _relight_segments(values: Singles, gain: Singles, offset: Singles) -> None:
 
     light = colours + black
     relit = light * gain - black
-    colours[:] = relit + offset * mask
+    added = offset * mask
+    colours[:] = relit + added
 
 
 def _relight_surroundings(values: Singles, gain: Singles, offset: Singles) -> None:
@@ -163,17 +169,21 @@ def train_on_renderings(
     """
     seed_torch(seed)
     training_files = files(folder, "train") + files(folder, "unlabelled")
+    held_out_files = files(folder, "val")
     rng = np.random.default_rng(seed)
+
     with Progress() as progress:
         training = _crops(training_files, progress)
-        held_out = _crops(files(folder, "val"), progress)
+        held_out = _crops(held_out_files, progress)
         fitted = _fit(training, rng, epochs or EPOCHS, progress)
 
     export(fitted.net, out, "seen", INPUT_SHAPE, OUTPUT_SHAPES)
     embeddings, log_odds = embed(fitted.net, held_out)
     uncalibrated = _uncalibrated(folder, fitted)
     found = calibrate(embeddings, log_odds, held_out, uncalibrated)
-    _write(found.prototypes, out.with_suffix(".json"))
+
+    beside = out.with_suffix(".json")
+    _write(found.prototypes, beside)
     return found.metrics
 
 
@@ -243,12 +253,14 @@ def loss(
     building = wanted >= 0
     labels = wanted[building]
     cosines = embedding[building] @ directions.T
-    margin = MARGIN * functional.one_hot(labels, len(directions))
+    is_wanted = functional.one_hot(labels, len(directions))
+    margin = MARGIN * is_wanted
     scores = SHARPNESS * (cosines - margin)
     of_labels = functional.cross_entropy(scores, labels)
 
     shown = torch.stack([building, whole], 1).float()
     of_odds = functional.binary_cross_entropy_with_logits(log_odds, shown)
+
     return of_labels + of_odds
 
 
@@ -269,7 +281,8 @@ def embed(net: EmbeddingNet, of: Crops) -> tuple[Singles, Singles]:
     parts = len(of.values) // EMBEDDED_AT_ONCE + 1
     with torch.no_grad():
         for part in np.array_split(of.values, parts):
-            values = torch.from_numpy(part.astype(np.float32))
+            inputs = part.astype(np.float32)
+            values = torch.from_numpy(inputs)
             embedding, odds = net(values)
             embeddings.append(embedding)
             log_odds.append(odds)
@@ -288,11 +301,13 @@ def sizes_m(folder: Path, names: list[str]) -> dict[str, tuple[float, float, flo
     found: dict[str, tuple[float, float, float]] = {}
     for path in files(folder, "train"):
         town = read(path)
-        for name, size_m in zip(town.names, town.size_m.tolist(), strict=True):
+        buildings = zip(town.names, town.size_m.tolist(), strict=True)
+        for name, size_m in buildings:
             if name not in names:
                 continue
             *sides_m, height_m = size_m
             longer_m = max(sides_m)
             shorter_m = min(sides_m)
             found[name] = (longer_m, shorter_m, height_m)
+
     return found

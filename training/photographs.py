@@ -67,7 +67,9 @@ def _photograph(path: Path, label_path: Path) -> Photograph:
         )
 
     rgb = cv2.cvtColor(image, cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)
-    return Photograph(path.stem, rgb, road=label == ROAD, known=label != UNLABELLED)
+    is_road = label == ROAD
+    is_known = label != UNLABELLED
+    return Photograph(path.stem, rgb, road=is_road, known=is_known)
 
 
 def camvid_iou(weights: Path, images: Path, labels: Path) -> float:

@@ -62,13 +62,15 @@ def train_on_renderings(
     images: list[LabelledImage] = []
     for path in track(files(folder, "train"), "reading"):
         town = read(path)
-        for image, surface in zip(town.left, town.surface, strict=True):
+        views = zip(town.left, town.surface, strict=True)
+        for image, surface in views:
             images.append(_labelled(image, surface))
 
     schedule = Schedule(
         epochs=epochs or EPOCHS, images=len(images), seed=seed, augmentation=Augmentation()
     )
-    write(train(images, schedule), out)
+    net = train(images, schedule)
+    write(net, out)
     return {"road_iou": _iou(folder, out, len(held_out))}
 
 
@@ -93,7 +95,8 @@ def loss(net: UNet, values: Tensor, road: Tensor, known: Tensor) -> Tensor:
     """Return the mean cross entropy of the network's output for `values`, over the pixels that are
     `known` (n, h, w), where `road` (n, h, w) is right; both are shares of a pixel.
     """
-    padded = net(values.to(memory_format=torch.channels_last))
+    arranged = values.to(memory_format=torch.channels_last)
+    padded = net(arranged)
     output = padded[:, 0, PADDING_PX:-PADDING_PX]
     of_pixels = functional.binary_cross_entropy_with_logits(output, road, reduction="none")
 
@@ -150,11 +153,13 @@ def _iou(folder: Path, weights: Path, count: int) -> float:
     both_px = 0
     either_px = 0
     for town in track(towns(folder, "val"), "testing", total=count):
-        for image, surface in zip(town.left, town.surface, strict=True):
+        views = zip(town.left, town.surface, strict=True)
+        for image, surface in views:
             found = segmenter.mask(image)
             road = surface == ROAD
             both = found & road
             either = found | road
             both_px += int(np.count_nonzero(both))
             either_px += int(np.count_nonzero(either))
+
     return both_px / max(either_px, 1)

@@ -78,12 +78,15 @@ def examples(towns: Iterable[Town]) -> Examples:
     labels = []
     size = (WIDTH_PX, HEIGHT_PX)
     for town in towns:
-        for image, depth_m, label in zip(town.left, town.stereo_m, town.label, strict=True):
+        views = zip(town.left, town.stereo_m, town.label, strict=True)
+        for image, depth_m, label in views:
             example = _example(image, depth_m, town.calibration)
             small_label = cv2.resize(label, size, interpolation=cv2.INTER_NEAREST)
             values.append(example)
             labels.append(small_label)
-    return Examples(np.asarray(values), np.asarray(labels, np.uint8))
+
+    stacked_labels = np.asarray(labels, np.uint8)
+    return Examples(np.asarray(values), stacked_labels)
 
 
 def _example(image: Bytes, depth_m: Singles, camera: Calibration) -> npt.NDArray[np.float16]:
@@ -197,10 +200,11 @@ def train_on_renderings(
     Raises UsageError if there are no renderings.
     """
     seed_torch(seed)
+    rng = np.random.default_rng(seed)
+
     with Progress() as progress:
         paths = progress.track(files(folder, "train"), description="reading")
         known = examples(read(path) for path in paths)
-        rng = np.random.default_rng(seed)
         net = _fit(known, rng, epochs or EPOCHS, progress)
 
     export(net, out, "seen", INPUT_SHAPE, OUTPUT_SHAPES)

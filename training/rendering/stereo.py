@@ -18,7 +18,8 @@ def with_stereo_depth(views: Views) -> Views:
     `right` image, the depth `stereo_m` float32 (n, h, w), 0 where it is unknown.
     """
     cv2.setNumThreads(1)
-    calibration = msgspec.json.decode(views["calibration"].tobytes(), type=Calibration)
+    encoded = views["calibration"].tobytes()
+    calibration = msgspec.json.decode(encoded, type=Calibration)
     rectified = rectification(calibration)
     matcher = DepthFromStereo(rectified.calibration, Config().nearest_m)
 
@@ -26,12 +27,14 @@ def with_stereo_depth(views: Views) -> Views:
     depths_m = []
     for raw_left, raw_right in zip(views["left"], views["right"], strict=True):
         left, right = rectified.apply(raw_left, raw_right)
+        depth_m = matcher.depth_m(left, right)
         lefts.append(left)
-        depths_m.append(matcher.depth_m(left, right))
+        depths_m.append(depth_m)
 
+    rectified_encoded = msgspec.json.encode(rectified.calibration)
     unchanged = {key: value for key, value in views.items() if key not in ("left", "right")}
     return unchanged | {
         "left": np.asarray(lefts),
         "stereo_m": np.asarray(depths_m),
-        "calibration": np.frombuffer(msgspec.json.encode(rectified.calibration), np.uint8),
+        "calibration": np.frombuffer(rectified_encoded, np.uint8),
     }
