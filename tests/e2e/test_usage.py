@@ -18,7 +18,7 @@ from cogmap.bus.session import free_endpoint, open_client
 from tests.support.networks import routed
 
 TIMEOUT_S = 30.0
-NOBODY = "tcp/127.0.0.1:1"
+NO_ROUTER = "tcp/127.0.0.1:1"
 FREE = "tcp/127.0.0.1:0"
 
 
@@ -81,7 +81,7 @@ def endpoint() -> Iterator[str]:
             "write it as tcp/HOST:PORT",
         ),
         (
-            ["module", "workspace", "--state", "/dev/null/x", "--connect", NOBODY],
+            ["module", "workspace", "--state", "/dev/null/x", "--connect", NO_ROUTER],
             "/dev/null/x",
             "with --state",
         ),
@@ -122,10 +122,10 @@ def test_whoever_finds_no_router_within_five_seconds_names_it(
         ["topic", "hz", "clock"],
         ["graph"],
     )
-    for process in [start(*command, "--connect", NOBODY) for command in commands]:
+    for process in [start(*command, "--connect", NO_ROUTER) for command in commands]:
         said = sentence_of(process)
         assert said.startswith(
-            f"cogmap: no router at {NOBODY} within 5 s: start one with `cogmap run`"
+            f"cogmap: no router at {NO_ROUTER} within 5 s: start one with `cogmap run`"
         )
     assert not (tmp_path / "log.mcap").exists()
 

@@ -99,7 +99,7 @@ def numbers(value: Any) -> list[float]:
     return []
 
 
-def judge(topic: Topic, payload: bytes) -> bool:
+def is_accepted(topic: Topic, payload: bytes) -> bool:
     """Whether `payload` is taken for a message; whatever is, has finite numbers and can be said
     again.
     """
@@ -118,9 +118,9 @@ def test_mutated_bytes_are_refused_by_name_or_finite_messages(topic: Topic) -> N
     rng = random.Random(topic.name)
     whole = (GOLDEN / file_name(topic, ".msgpack")).read_bytes()
 
-    taken = [judge(topic, mutated(whole, rng)) for _ in range(ROUNDS)]
+    taken = [is_accepted(topic, mutated(whole, rng)) for _ in range(ROUNDS)]
 
-    assert judge(topic, whole)
+    assert is_accepted(topic, whole)
     assert taken.count(False) > ROUNDS / 4
 
 
@@ -132,7 +132,8 @@ def test_wellformed_bytes_of_wrong_content_are_refused_or_finite_messages(
     plain = msgspec.msgpack.decode((GOLDEN / file_name(topic, ".msgpack")).read_bytes())
 
     taken = [
-        judge(topic, msgspec.msgpack.encode(rewritten(plain, rng, 0.1))) for _ in range(ROUNDS)
+        is_accepted(topic, msgspec.msgpack.encode(rewritten(plain, rng, 0.1)))
+        for _ in range(ROUNDS)
     ]
 
     assert False in taken

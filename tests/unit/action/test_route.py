@@ -110,10 +110,10 @@ def test_the_leg_changes_in_the_middle_of_its_corner_on_every_lap() -> None:
     ):
         assert math.dist(end_m, corner_m) < 1.6
 
-    for way_m in np.arange(0.0, 38.0, 1.0):
-        route.advance(min(way_m, 20.0), max(0.0, way_m - 20.0))
-        if abs(way_m - 20.0) > 2.0:
-            assert route.leg == int(way_m > 20.0)
+    for distance_m in np.arange(0.0, 38.0, 1.0):
+        route.advance(min(distance_m, 20.0), max(0.0, distance_m - 20.0))
+        if abs(distance_m - 20.0) > 2.0:
+            assert route.leg == int(distance_m > 20.0)
 
 
 def test_curvature_is_that_of_the_bend_ahead_and_none_on_the_straight() -> None:

@@ -85,17 +85,17 @@ def test_the_samples_spread_as_the_motions_noise_says() -> None:
 
 
 def test_a_landmark_ahead_corrects_the_way_to_the_exact_gaussian_posterior() -> None:
-    way_m = 5.5
-    way_sd_m = 0.5
+    distance_m = 5.5
+    distance_sd_m = 0.5
     seen_m = 14.0
     seen_sd_m = 0.4
-    prior = 1 / way_sd_m**2
+    prior = 1 / distance_sd_m**2
     sensed = 1 / seen_sd_m**2
-    exact_m = (prior * way_m + sensed * (20.0 - seen_m)) / (prior + sensed)
+    exact_m = (prior * distance_m + sensed * (20.0 - seen_m)) / (prior + sensed)
     found = _localized(
         agent(),
         _landmark(20.0, 0.0),
-        motions=_rows((way_m, 0.0, 1.0, way_sd_m, 0.0)),
+        motions=_rows((distance_m, 0.0, 1.0, distance_sd_m, 0.0)),
         percepts=[percept("house", 0.0, seen_m, range_sd_m=seen_sd_m)],
     )
     assert found.x_m == pytest.approx(exact_m, abs=0.03)
@@ -121,16 +121,16 @@ def test_a_bearing_corrects_the_heading_to_the_exact_gaussian_posterior() -> Non
 
 
 def test_two_landmarks_weigh_as_much_as_their_noise_allows() -> None:
-    way_sd_m = 1.0
+    distance_sd_m = 1.0
     near_sd_m = 0.2
     far_sd_m = 0.8
-    weights = np.array([way_sd_m, near_sd_m, far_sd_m]) ** -2.0
+    weights = np.array([distance_sd_m, near_sd_m, far_sd_m]) ** -2.0
     exact_m = weights @ [5.0, 5.4, 4.4] / weights.sum()
     found = _localized(
         agent(),
         _landmark(20.0, 0.0, 1e-3, "near"),
         _landmark(40.0, 0.0, 1e-3, "far"),
-        motions=_rows((5.0, 0.0, 1.0, way_sd_m, 0.0)),
+        motions=_rows((5.0, 0.0, 1.0, distance_sd_m, 0.0)),
         percepts=[
             percept("near", 0.0, 14.6, range_sd_m=near_sd_m),
             percept("far", 0.0, 35.6, range_sd_m=far_sd_m),
