@@ -1,4 +1,4 @@
-"""A codelet: declared once, one function that runs; workspace and workers are driven by that."""
+"""A codelet, declared once: workspace and workers work from that declaration alone."""
 
 from __future__ import annotations
 
@@ -53,10 +53,13 @@ class CycleContext:
 
         `subject` distinguishes the tasks of one codelet in one cycle.
         """
-        name = f"{self.cycle}/{codelet}"
+        task_id = f"{self.cycle}/{codelet}"
+        if subject:
+            task_id = f"{task_id}/{subject}"
+
         return Task(
             stamp_ns=self.stamp_ns,
-            task_id=f"{name}/{subject}" if subject else name,
+            task_id=task_id,
             codelet=codelet,
             cycle=self.cycle,
             version=self.version,

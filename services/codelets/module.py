@@ -1,4 +1,4 @@
-"""A worker: it does the tasks that the workspace leases to it, on the graph that it follows."""
+"""A worker: it runs the tasks that the workspace leases to it, on its replica of the graph."""
 
 from __future__ import annotations
 
@@ -29,6 +29,7 @@ class Worker:
         self._instance = instance
         self._graph = graph
         self._codelets = {codelet.name: codelet for codelet in codelets}
+
         self._tasks: dict[str, Task] = {}
         self._leases: dict[str, Assignment] = {}
 
@@ -37,7 +38,9 @@ class Worker:
         self._tasks.pop(task.task_id, None)
         self._tasks[task.task_id] = task
         if len(self._tasks) > MAX_WAITING:
-            del self._tasks[next(iter(self._tasks))]
+            oldest = next(iter(self._tasks))
+            del self._tasks[oldest]
+
         return self._run_ready()
 
     def on_leases(self, leases: Leases) -> list[Proposal]:
@@ -47,6 +50,7 @@ class Worker:
                 self._leases[assignment.task_id] = assignment
             else:
                 self._leases.pop(assignment.task_id, None)
+
         return self._run_ready()
 
     def on_delta(self, delta: Delta) -> list[Proposal]:
@@ -54,6 +58,7 @@ class Worker:
         for name in delta.tasks:
             self._tasks.pop(name, None)
             self._leases.pop(name, None)
+
         return self._run_ready()
 
     def on_load(self) -> list[Proposal]:
@@ -66,10 +71,12 @@ class Worker:
             task = self._tasks.get(name)
             if task is None or task.version != lease.version:
                 continue
+
             if self._graph.version >= task.version:
                 del self._leases[name]
                 del self._tasks[name]
                 proposals.append(self._run(task))
+
         return proposals
 
     def _run(self, task: Task) -> Proposal:
@@ -82,6 +89,7 @@ class Worker:
             failure = f"{task.codelet}: {error}"
         except Exception as error:  # another package's codelet may raise anything: it is named here
             failure = f"{task.codelet}: {type(error).__name__}: {error}"
+
         return Proposal(
             stamp_ns=task.stamp_ns,
             task_id=task.task_id,
@@ -98,6 +106,7 @@ class Worker:
         if codelet is None:
             there_are = ", ".join(self._codelets)
             raise MessageError(f"no codelet {task.codelet}: there are {there_are}")
+
         return codelet
 
 
@@ -105,6 +114,7 @@ def build(instance: str, codelets: Iterable[ConfiguredCodelet]) -> Module:
     """The module `codelets`, one worker of it."""
     graph = Graph()
     worker = Worker(instance, graph, codelets)
+
     published = (topics.PROPOSAL,)
     return (
         Module("codelets", instance)

@@ -38,14 +38,18 @@ def all_codelets() -> tuple[Codelet, ...]:
     """
     codelets = list(CODELETS)
     names = {codelet.name for codelet in codelets}
-    for point in sorted(entry_points(group=ENTRY_POINTS), key=lambda point: point.name):
+    points = sorted(entry_points(group=ENTRY_POINTS), key=lambda point: point.name)
+
+    for point in points:
         codelet = point.load()
         if not isinstance(codelet, Codelet):
             raise ConfigError(f"entry point {point.name} = {point.value} is no Codelet")
         if codelet.name in names:
             raise ConfigError(f"entry point {point.name}: there is a codelet {codelet.name!r}")
+
         names.add(codelet.name)
         codelets.append(codelet)
+
     return tuple(codelets)
 
 

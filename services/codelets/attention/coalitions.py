@@ -24,13 +24,15 @@ def coalition(codelet: str, nodes: list[AnyNode], graph: Graph, base_level: floa
         place = graph.links.target(node.id, LinkKind.AT)
         if place is not None:
             links.append(Link(source=node.id, target=place, kind=LinkKind.AT))
+
         if isinstance(node, Self | Object):
             maps[node.map] = None
 
     total = sum(graph.total_activation(node) + abs(_salience(node)) for node in nodes)
+    activation = base_level * total / (2 * len(nodes))
     return Coalition(
         codelet=codelet,
-        activation=min(1.0, base_level * total / (2 * len(nodes))),
+        activation=min(1.0, activation),
         nodes=[_as_of_now(node, graph) for node in nodes],
         links=links,
         maps=list(maps),
@@ -44,16 +46,19 @@ def objects_in_view(percepts: list[Percept], graph: Graph) -> list[Object]:
         node = graph.get(Object, object_id(label))
         if node is not None:
             found.append(node)
+
     return found
 
 
 def _salience(node: AnyNode) -> float:
-    return node.salience if isinstance(node, Object) else 0.0
+    if isinstance(node, Object):
+        return node.salience
+    return 0.0
 
 
 def _as_of_now(node: AnyNode, graph: Graph) -> AnyNode:
-    """The node with its activation of this cycle, and with the mean of its samples alone: nothing
-    needs to become conscious of the others.
+    """The node with its activation in this cycle, and the mean of its samples in place of them all:
+    the global workspace broadcasts no more than that.
     """
     now = {
         "activation": graph.activation(node),
@@ -62,7 +67,9 @@ def _as_of_now(node: AnyNode, graph: Graph) -> AnyNode:
     }
     if isinstance(node, Object):
         return msgspec.structs.replace(node, offsets_m=None, **now)
+
     if isinstance(node, Self):
         mean = Matrix.of([[node.x_m, node.y_m, node.heading_rad]])
         return msgspec.structs.replace(node, samples=mean, **now)
+
     return msgspec.structs.replace(node, **now)

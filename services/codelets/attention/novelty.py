@@ -21,6 +21,7 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     percepts = context.percepts.objects
     if not novel_objects(percepts, graph):
         return []
+
     return [context.task(CODELET.name, about=[SELF_ID], percepts=percepts)]
 
 
@@ -29,6 +30,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     novel = novel_objects(task.percepts, graph)
     if not novel or graph.agent is None:
         return Answer()
+
     nodes: list[AnyNode] = [graph.agent, *novel]
     found = coalition(CODELET.name, nodes, graph, config.attention_base_level)
     return Answer(coalitions=[found])
@@ -53,4 +55,5 @@ def novel_objects(percepts: list[Percept], graph: Graph) -> list[Object]:
         if node.sightings <= NOVEL_SIGHTINGS:
             salience = 1.0 - node.sightings / (NOVEL_SIGHTINGS + 1)
             found.append(msgspec.structs.replace(node, salience=salience))
+
     return found

@@ -13,7 +13,9 @@ from services.codelets.config import SECTION, Config
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     """One task in each cycle."""
-    return [context.task(CODELET.name, about=[SELF_ID], percepts=context.percepts.objects)]
+    percepts = context.percepts.objects
+    task = context.task(CODELET.name, about=[SELF_ID], percepts=percepts)
+    return [task]
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
@@ -24,6 +26,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     nodes += objects_in_view(task.percepts, graph)
     if not nodes:
         return Answer()
+
     found = coalition(CODELET.name, nodes, graph, config.attention_base_level)
     return Answer(coalitions=[found])
 

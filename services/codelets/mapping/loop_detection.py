@@ -49,8 +49,10 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     matches = _places_again(percepts.matches, graph, context.stamp_ns, config)
     if not again and not matches:
         return []
+
     about = [object_id(percept.label) for percept in again]
-    return [context.task(CODELET.name, about, percepts=again, matches=matches)]
+    task = context.task(CODELET.name, about, percepts=again, matches=matches)
+    return [task]
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
@@ -62,12 +64,14 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     """
     if not task.percepts and not task.matches:
         raise MessageError(f"task {task.task_id} has nothing that was seen again")
+
     newest = newest_closures(graph)
     operations: list[Operation] = []
     for percept in _seen_again(task.percepts, graph, task.stamp_ns, config):
         closure = _closure_by_landmark(percept, task, graph, newest.get(percept.label), config)
         if closure is not None:
             operations.append(closure)
+
     for match in task.matches:
         operations.append(_closure_by_place(match, task, config))
     return Answer(operations)
@@ -88,9 +92,12 @@ CODELET = Codelet(
 def newest_closures(graph: Graph) -> dict[str, LoopClosure]:
     """The newest closure by each landmark, and by places, under PLACE_CUE."""
     newest: dict[str, LoopClosure] = {}
-    for closure in sorted(graph.of_kind(LoopClosure), key=lambda closure: closure.to_ns):
+    closures = sorted(graph.of_kind(LoopClosure), key=lambda closure: closure.to_ns)
+
+    for closure in closures:
         cue = PLACE_CUE if closure.sd_rad else closure.cue
         newest[cue] = closure
+
     return newest
 
 
@@ -113,12 +120,15 @@ def _seen_again(
     for percept in known:
         landmark = graph.get(Object, object_id(percept.label))
         closure = newest.get(percept.label)
+
         if closure is not None and closure.to_ns > long_ago_ns:
             is_again = grows and closure.to_ns <= soon_ns
         else:
             is_again = landmark is not None and 0 <= landmark.last_seen_ns <= long_ago_ns
+
         if is_again:
             again.append(percept)
+
     return again
 
 
@@ -126,11 +136,14 @@ def _places_again(
     matches: Iterable[PlaceMatch], graph: Graph, now_ns: int, config: Config
 ) -> list[PlaceMatch]:
     """The matches of places that were seen long ago, where the path has grown since the last."""
-    found = [match for match in matches if match.view_ns <= now_ns - config.revisit_s * 1e9]
+    long_ago_ns = now_ns - config.revisit_s * 1e9
+    found = [match for match in matches if match.view_ns <= long_ago_ns]
     if not found or not path_grows(graph, config):
         return []
+
     newest = newest_closures(graph).get(PLACE_CUE)
-    if newest is not None and newest.to_ns > now_ns - config.closure_spacing_s * 1e9:
+    soon_ns = now_ns - config.closure_spacing_s * 1e9
+    if newest is not None and newest.to_ns > soon_ns:
         return []
     return found
 
@@ -145,8 +158,9 @@ def _closure_by_landmark(
     landmark = graph.get(Object, object_id(percept.label))
     if landmark is None or not (has_bearing(percept) and has_range(percept)):
         return None
-    is_this_pass = newest is not None and newest.to_ns > task.stamp_ns - config.revisit_s * 1e9
-    if newest is not None and is_this_pass:
+
+    long_ago_ns = task.stamp_ns - config.revisit_s * 1e9
+    if newest is not None and newest.to_ns > long_ago_ns:
         before_ns = newest.before_ns
         view = newest.view
     else:
@@ -160,14 +174,16 @@ def _closure_by_landmark(
         return None
 
     chosen = int(there[view % len(there)])
+    from_s = float(rows[seen.place[chosen], STAMP])
     ahead_m, left_m = seen.where_m[chosen].tolist()
     variance_there_m2 = 1 / float(np.linalg.eigvalsh(seen.information[chosen])[0])
+
     across_sd_m = percept.range_m * percept.bearing_sd_rad
     variance_here_m2 = percept.range_sd_m**2 + across_sd_m**2
     return LoopClosure(
         id=_closure_id(task, percept.label),
         base_level=1.0,
-        from_ns=round(float(rows[seen.place[chosen], STAMP]) * 1e9),
+        from_ns=round(from_s * 1e9),
         to_ns=task.stamp_ns,
         cue=percept.label,
         ahead_m=ahead_m,
@@ -215,6 +231,7 @@ def _observed(landmark: Object, graph: Graph) -> tuple[list[Observations], Float
         segment = graph.get(PathSegment, segment_id(number))
         if segment is not None:
             path.append(segment)
+
     return observations, rows_of(path)
 
 
@@ -224,13 +241,23 @@ def _clearest(seen: Sightings, rows: Floats, before_ns: int) -> Indices:
 
     On one pass by, they lead to the same place by path integration alone.
     """
-    known = np.flatnonzero(rows[seen.place, STAMP] <= before_ns * 1e-9 + 1e-6)
+    until_s = before_ns * 1e-9 + 1e-6
+    known = np.flatnonzero(rows[seen.place, STAMP] <= until_s)
+    if not len(known):
+        return known
+
     stood = rows[seen.place[known], ODOMETRY]
     turn = rotation_matrices(stood[:, 2])
-    where = stood[:, :2] + np.einsum("mab,mb->ma", turn, seen.where_m[known])
-    same = np.hypot(*(where[:, None] - where).transpose(2, 0, 1)) <= SAME_M
-    chosen = known[same[same.sum(axis=1).argmax()]] if len(known) else known
-    order: Indices = chosen[np.argsort(np.hypot(*seen.where_m[chosen].T), kind="stable")]
+    where_m = stood[:, :2] + np.einsum("mab,mb->ma", turn, seen.where_m[known])
+    apart_m = np.hypot(*(where_m[:, None] - where_m).transpose(2, 0, 1))
+
+    is_same = apart_m <= SAME_M
+    agreeing = is_same.sum(axis=1)
+    chosen = known[is_same[agreeing.argmax()]]
+
+    distance_m = np.hypot(*seen.where_m[chosen].T)
+    nearest_first = np.argsort(distance_m, kind="stable")
+    order: Indices = chosen[nearest_first]
     return order
 
 
@@ -238,29 +265,40 @@ def views_of(closures: list[LoopClosure], rows: Floats) -> Views:
     """The closures as views from rows of the path."""
     range_m = np.array([closure.range_m for closure in closures])
     bearing_rad = np.array([closure.bearing_rad for closure in closures])
-    here_m = range_m[:, None] * np.column_stack([np.cos(bearing_rad), np.sin(bearing_rad)])
+    direction = np.column_stack([np.cos(bearing_rad), np.sin(bearing_rad)])
+    here_m = range_m[:, None] * direction
 
-    there_m = np.array([[closure.ahead_m, closure.left_m] for closure in closures])
-    stamps_ns = np.array([[closure.from_ns, closure.to_ns] for closure in closures]).reshape(-1, 2)
-    ends = np.abs(rows[:, STAMP] - stamps_ns[..., None] * 1e-9).argmin(axis=2)
+    ahead_left_m = [[closure.ahead_m, closure.left_m] for closure in closures]
+    there_m = np.array(ahead_left_m).reshape(-1, 2)
+
+    from_to_ns = [[closure.from_ns, closure.to_ns] for closure in closures]
+    stamps_ns = np.array(from_to_ns).reshape(-1, 2)
+    away_s = np.abs(rows[:, STAMP] - stamps_ns[..., None] * 1e-9)
+    ends = away_s.argmin(axis=2)
+
     sd_m = np.array([closure.sd_m for closure in closures]).clip(MIN_SD_M)
     sd_rad = np.array([closure.sd_rad for closure in closures])
-    return Views(ends[:, 0], ends[:, 1], there_m.reshape(-1, 2), here_m, sd_m, sd_rad)
+    return Views(ends[:, 0], ends[:, 1], there_m, here_m, sd_m, sd_rad)
 
 
 def constraints_of(views: Views, poses: Floats) -> Constraints:
     """The views as constraints between (n, 3) poses, near those.
 
-    A landmark tells where the agent stands but for its heading: who is turned further stands
-    elsewhere around it.
+    A landmark determines the agent's position given its heading alone: with another heading the
+    agent stands elsewhere around it.
     """
-    turn = relative(poses[views.i], poses[views.j])[:, 2]
-    turn = np.where(views.sd_rad > 0, 0.0, turn)
-    off = np.einsum("mab,mb->ma", rotation_matrices(turn), views.here_m)
-    by_pose = np.zeros((len(turn), 2, 3))
-    by_pose[:, 0, 0] = by_pose[:, 1, 1] = 1.0
-    by_pose[:, :, 2] = np.column_stack([-off[:, 1], off[:, 0]])
-    information = by_pose.transpose(0, 2, 1) @ by_pose / views.sd_m[:, None, None] ** 2
-    known = views.sd_rad > 0
-    information[known, 2, 2] += views.sd_rad[known] ** -2
-    return Constraints(views.i, views.j, np.column_stack([views.there_m - off, turn]), information)
+    has_heading = views.sd_rad > 0
+    step = relative(poses[views.i], poses[views.j])
+    turn_rad = np.where(has_heading, 0.0, step[:, 2])
+    seen_m = np.einsum("mab,mb->ma", rotation_matrices(turn_rad), views.here_m)
+    measured = np.column_stack([views.there_m - seen_m, turn_rad])
+
+    jacobian = np.zeros((len(turn_rad), 2, 3))
+    jacobian[:, 0, 0] = 1.0
+    jacobian[:, 1, 1] = 1.0
+    jacobian[:, :, 2] = np.column_stack([-seen_m[:, 1], seen_m[:, 0]])
+
+    variance_m2 = views.sd_m[:, None, None] ** 2
+    information = jacobian.transpose(0, 2, 1) @ jacobian / variance_m2
+    information[has_heading, 2, 2] += views.sd_rad[has_heading] ** -2
+    return Constraints(views.i, views.j, measured, information)

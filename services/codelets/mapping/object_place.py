@@ -30,6 +30,7 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
         if object_id(percept.label) not in graph.nodes:
             task = context.task(CODELET.name, [SELF_ID], subject=percept.label, percepts=[percept])
             tasks.append(task)
+
     return tasks
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cogmap.geometry.arrays import Floats, Indices
+from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.geometry.se2 import rotation_matrices
 from schemas.array import Matrix
 from schemas.nodes import ObservationColumn, Observations, observations_id
@@ -48,16 +48,19 @@ class Viewpoint(NamedTuple):
 
 def extended(before: Observations | None, viewpoint: Viewpoint, percept: Percept) -> Observations:
     """The observations of a landmark along a path segment, with one more."""
-    direction_rad = viewpoint.step[2] + percept.bearing_rad
+    step = viewpoint.step
+    direction_rad = step[2] + percept.bearing_rad
     range_m = percept.range_m / (1 + viewpoint.range_gain)
-    forwards_m = viewpoint.step[0] + range_m * math.cos(direction_rad)
-    left_m = viewpoint.step[1] + range_m * math.sin(direction_rad)
+
+    forwards_m = step[0] + range_m * math.cos(direction_rad)
+    left_m = step[1] + range_m * math.sin(direction_rad)
     across_sd_m = range_m * percept.bearing_sd_rad
 
     row = [viewpoint.stamp_s, forwards_m, left_m, percept.range_sd_m, across_sd_m, direction_rad]
     rows = np.array([row])
     if before is not None:
         rows = np.vstack([before.rows.numpy(), rows])
+
     return Observations(
         id=observations_id(viewpoint.number, percept.label),
         base_level=1.0,
@@ -68,8 +71,13 @@ def extended(before: Observations | None, viewpoint: Viewpoint, percept: Percept
 
 
 def is_observed_from(observations: Observations | None, stamp_s: float) -> bool:
-    """Whether the newest of the observations is from the place at `stamp_s`, or from a later one."""
-    return observations is not None and float(observations.rows.numpy()[-1, STAMP]) >= stamp_s
+    """Whether the newest observation is from the place at `stamp_s`, or from a later one."""
+    if observations is None:
+        return False
+
+    rows = observations.rows.numpy()
+    newest_s = float(rows[-1, STAMP])
+    return newest_s >= stamp_s
 
 
 class Sightings(NamedTuple):
@@ -92,56 +100,92 @@ class Sightings(NamedTuple):
 
         parts = [record.rows.numpy() for record in records]
         rows = np.vstack([np.zeros((0, COLUMNS)), *parts])
+        lengths = [len(part) for part in parts]
         numbers = np.array([number_of[record.landmark] for record in records], np.int64)
-        landmark = np.repeat(numbers, [len(part) for part in parts])
+        landmark = np.repeat(numbers, lengths)
 
-        place = np.searchsorted(stamps_s, rows[:, STAMP]).clip(0, max(0, len(stamps_s) - 1))
-        if len(stamps_s):
-            is_known = np.abs(stamps_s[place] - rows[:, STAMP]) < SAME_PLACE_S
-        else:
-            is_known = np.zeros(len(rows), bool)
-
+        place, is_known = _places_at(rows[:, STAMP], stamps_s)
         rows = rows[is_known]
-        turn = rotation_matrices(rows[:, DIRECTION])
-        weights = rows[:, None, SPREAD].clip(MIN_SD_M) ** -2
-        information = turn * weights @ turn.transpose(0, 2, 1)
-        return cls(labels, place[is_known], landmark[is_known], rows[:, WHERE], information)
+        place = place[is_known]
+        landmark = landmark[is_known]
+        return cls(labels, place, landmark, rows[:, WHERE], _information(rows))
 
     def weights(self, poses: Floats, landmarks_m: Floats) -> Floats:
         """(m,) how much each counts, the path being at (n, 3) `poses` and landmarks at (k, 2):
         Cauchy's weights.
         """
         turn = rotation_matrices(poses[self.place, 2])
-        seen = np.einsum("mba,mb->ma", turn, landmarks_m[self.landmark] - poses[self.place, :2])
-        off = seen - self.where_m
-        squared = np.einsum("ma,mab,mb->m", off, self.information, off)
+        offset_m = landmarks_m[self.landmark] - poses[self.place, :2]
+        expected_m = np.einsum("mba,mb->ma", turn, offset_m)
+
+        residual_m = expected_m - self.where_m
+        squared = np.einsum("ma,mab,mb->m", residual_m, self.information, residual_m)
         result: Floats = 1 / (1 + squared / DOUBTED**2)
         return result
 
     def landmarks_m(self, poses: Floats) -> Floats:
         """(k, 2): where the landmarks are most likely, the path being at (n, 3) `poses`."""
         turn = rotation_matrices(poses[self.place, 2])
-        seen = poses[self.place, :2] + np.einsum("mab,mb->ma", turn, self.where_m)
+        seen_m = poses[self.place, :2] + np.einsum("mab,mb->ma", turn, self.where_m)
         information = turn @ self.information @ turn.transpose(0, 2, 1)
-        count = len(self.labels)
-        found = np.array(
-            [np.median(seen[self.landmark == k], axis=0) for k in range(count)]
-        ).reshape(-1, 2)
+
+        landmarks_m = self._medians_m(seen_m)
         for _ in range(ROUNDS):
-            weighed = information * self.weights(poses, found)[:, None, None]
-            whole = np.zeros((count, 2, 2))
-            pull = np.zeros((count, 2))
-            np.add.at(whole, self.landmark, weighed)
-            np.add.at(pull, self.landmark, np.einsum("mab,mb->ma", weighed, seen))
-            found = np.linalg.solve(whole, pull[..., None])[..., 0]
-        return found
+            weights = self.weights(poses, landmarks_m)
+            weighed = information * weights[:, None, None]
+            landmarks_m = self._means_m(seen_m, weighed)
+        return landmarks_m
+
+    def _medians_m(self, seen_m: Floats) -> Floats:
+        """(k, 2): the median of where each landmark was seen, (m, 2)."""
+        medians = []
+        for number in range(len(self.labels)):
+            is_seen = self.landmark == number
+            medians.append(np.median(seen_m[is_seen], axis=0))
+
+        return np.array(medians).reshape(-1, 2)
+
+    def _means_m(self, seen_m: Floats, information: Floats) -> Floats:
+        """(k, 2): the mean of where each landmark was seen, (m, 2), by (m, 2, 2) information."""
+        count = len(self.labels)
+        total = np.zeros((count, 2, 2))
+        np.add.at(total, self.landmark, information)
+
+        pull = np.zeros((count, 2))
+        np.add.at(pull, self.landmark, np.einsum("mab,mb->ma", information, seen_m))
+        means_m = np.linalg.solve(total, pull[..., None])[..., 0]
+        return np.asarray(means_m, np.float64)
 
     def constraints(self, first_landmark: int, weights: Floats) -> Constraints:
         """Between places of the path and landmarks, the latter as poses from number
         `first_landmark` on.
         """
-        measured = np.column_stack([self.where_m, np.zeros(len(self.place))])
-        information = np.zeros((len(self.place), 3, 3))
+        count = len(self.place)
+        headings_rad = np.zeros(count)
+        measured = np.column_stack([self.where_m, headings_rad])
+
+        information = np.zeros((count, 3, 3))
         information[:, :2, :2] = self.information * weights[:, None, None]
         information[:, 2, 2] = NO_HEADING
-        return Constraints(self.place, first_landmark + self.landmark, measured, information)
+
+        landmark = first_landmark + self.landmark
+        return Constraints(self.place, landmark, measured, information)
+
+
+def _places_at(stamps_s: Floats, path_s: Floats) -> tuple[Indices, Booleans]:
+    """(m,) each: the place of the path at each stamp, and whether it is of that very time."""
+    last = max(0, len(path_s) - 1)
+    place = np.searchsorted(path_s, stamps_s).clip(0, last)
+    if not len(path_s):
+        return place, np.zeros(len(stamps_s), bool)
+
+    away_s = np.abs(path_s[place] - stamps_s)
+    return place, away_s < SAME_PLACE_S
+
+
+def _information(rows: Floats) -> Floats:
+    """(m, 2, 2): the information, forwards and left, of (m, COLUMNS) observations."""
+    turn = rotation_matrices(rows[:, DIRECTION])
+    sd_m = rows[:, None, SPREAD].clip(MIN_SD_M)
+    information = turn * sd_m**-2 @ turn.transpose(0, 2, 1)
+    return np.asarray(information, np.float64)

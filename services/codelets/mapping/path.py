@@ -51,14 +51,10 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     percepts = context.percepts.objects
     last = graph.last_segment
     if last is not None and not path_grows(graph, config):
-        stamp_s = float(last.rows.numpy()[-1, STAMP])
-        percepts = [
-            percept
-            for percept in percepts
-            if not is_observed_from(_observations(graph, last.number, percept.label), stamp_s)
-        ]
+        percepts = _not_observed(percepts, last, graph)
         if not percepts:
             return []
+
     return [context.task(CODELET.name, about=[SELF_ID], percepts=percepts)]
 
 
@@ -71,6 +67,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     agent = graph.agent
     if agent is None:
         raise MessageError(f"task {task.task_id}: the graph has no self node")
+
     last = graph.last_segment
     number = 0 if last is None else last.number
     rows = np.zeros((0, COLUMNS)) if last is None else last.rows.numpy()
@@ -93,6 +90,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     )
     for percept in task.percepts:
         operations += _observe(percept, viewpoint, graph)
+
     return Answer(operations)
 
 
@@ -119,15 +117,21 @@ def path_grows(graph: Graph, config: Config) -> bool:
     last = graph.last_segment
     if agent is None or last is None:
         return True
+
     rows = last.rows.numpy()
-    return _is_lost_since(rows, agent) or _is_apart(rows, agent, config.path_spacing_m)
+    if _is_lost_since(rows, agent):
+        return True
+    return _is_apart(rows, agent, config.path_spacing_m)
 
 
 def rows_of(path: Iterable[PathSegment]) -> Floats:
     """(n, COLUMNS): the rows of path segments, the oldest first."""
     ordered = sorted(path, key=lambda segment: segment.number)
-    rows = [segment.rows.numpy() for segment in ordered]
-    return np.vstack([np.zeros((0, COLUMNS)), *rows])
+
+    rows = [np.zeros((0, COLUMNS))]
+    for segment in ordered:
+        rows.append(segment.rows.numpy())
+    return np.vstack(rows)
 
 
 def segments(rows: Floats, first: int = 0) -> list[PathSegment]:
@@ -135,21 +139,33 @@ def segments(rows: Floats, first: int = 0) -> list[PathSegment]:
     parts = []
     for start in range(0, len(rows), ROWS):
         number = first + start // ROWS
-        part = Matrix.of(rows[start : start + ROWS])
-        parts.append(PathSegment(id=segment_id(number), base_level=1.0, number=number, rows=part))
+        part = PathSegment(
+            id=segment_id(number),
+            base_level=1.0,
+            number=number,
+            rows=Matrix.of(rows[start : start + ROWS]),
+        )
+        parts.append(part)
+
     return parts
 
 
 def odometry_of(agent: Self) -> Floats:
     """(3,): the agent's pose by path integration alone."""
-    return np.array([agent.odometry_x_m, agent.odometry_y_m, agent.odometry_heading_rad])
+    pose = [
+        agent.odometry_x_m,
+        agent.odometry_y_m,
+        agent.odometry_heading_rad,
+    ]
+    return np.array(pose)
 
 
 def variances_of(agent: Self) -> Floats:
     """(2,): the variance of path integration since the start, of the distance, in m^2, and of the
     heading, in rad^2.
     """
-    return np.array([agent.odometry_variance_m2, agent.odometry_variance_rad2])
+    variances = [agent.odometry_variance_m2, agent.odometry_variance_rad2]
+    return np.array(variances)
 
 
 def variances_at(graph: Graph, stamp_ns: int) -> Floats:
@@ -160,9 +176,11 @@ def variances_at(graph: Graph, stamp_ns: int) -> Floats:
     segment = _segment_at(graph, stamp_s)
     if segment is None:
         return np.full(2, -np.inf)
+
     rows = segment.rows.numpy()
     following = int(np.searchsorted(rows[:, STAMP], stamp_s, side="right"))
-    return np.asarray(rows[following - 1, VARIANCES], np.float64)
+    variances = rows[following - 1, VARIANCES]
+    return np.asarray(variances, np.float64)
 
 
 def _segment_at(graph: Graph, stamp_s: float) -> PathSegment | None:
@@ -170,6 +188,7 @@ def _segment_at(graph: Graph, stamp_s: float) -> PathSegment | None:
     found = None
     low = 0
     high = graph.count(PathSegment)
+
     while low < high:
         middle = (low + high) // 2
         segment = graph.get(PathSegment, segment_id(middle))
@@ -178,6 +197,7 @@ def _segment_at(graph: Graph, stamp_s: float) -> PathSegment | None:
         else:
             found = segment
             low = middle + 1
+
     return found
 
 
@@ -188,6 +208,7 @@ def steps_of(rows: Floats, config: Config) -> Constraints:
     at = np.arange(max(0, len(rows) - 1))
     odometry = rows[:, ODOMETRY]
     steps = relative(odometry[:-1], odometry[1:])
+
     length_m = np.hypot(steps[:, 0], steps[:, 1]).clip(config.path_spacing_m / 2)
     turned_rad = np.abs(steps[:, 2])
 
@@ -195,17 +216,23 @@ def steps_of(rows: Floats, config: Config) -> Constraints:
     least_m2 = config.path_variance_per_m * length_m
     least_rad2 = config.heading_variance_per_m * length_m
     least_rad2 = least_rad2 + config.heading_variance_per_rad * turned_rad
+    variance_m2 = np.maximum(least_m2, stated_m2)
+    variance_rad2 = np.maximum(least_rad2, stated_rad2)
 
     information = np.zeros((len(length_m), 3, 3))
-    information[:, 0, 0] = 1 / np.maximum(least_m2, stated_m2)
-    information[:, 1, 1] = information[:, 0, 0]
-    information[:, 2, 2] = 1 / np.maximum(least_rad2, stated_rad2)
+    information[:, 0, 0] = 1 / variance_m2
+    information[:, 1, 1] = 1 / variance_m2
+    information[:, 2, 2] = 1 / variance_rad2
     return Constraints(at, at + 1, steps, information)
 
 
 def _row(stamp_ns: int, agent: Self) -> Floats:
+    stamp_s = stamp_ns * 1e-9
     pose = mean_pose(agent.samples.numpy())
-    row = np.concatenate([[stamp_ns * 1e-9], pose, odometry_of(agent), variances_of(agent)])
+    odometry = odometry_of(agent)
+    variances = variances_of(agent)
+
+    row = np.concatenate([[stamp_s], pose, odometry, variances])
     return row[None]
 
 
@@ -213,19 +240,41 @@ def _is_apart(rows: Floats, agent: Self, spacing_m: float) -> bool:
     """Whether path integration leads `spacing_m` or more from the last row, or there is none."""
     if not len(rows):
         return True
-    moved_m = odometry_of(agent)[:2] - rows[-1, ODOMETRY][:2]
-    return bool(np.hypot(*moved_m) >= spacing_m)
+
+    before = rows[-1, ODOMETRY]
+    moved_m = odometry_of(agent)[:2] - before[:2]
+    distance_m = np.hypot(*moved_m)
+    return bool(distance_m >= spacing_m)
 
 
 def _is_lost_since(rows: Floats, agent: Self) -> bool:
     """Whether the agent has got lost since the last row: what it sees now, it may see from
     elsewhere.
     """
-    return agent.is_lost and float(rows[-1, STAMP]) <= agent.last_fit_ns * 1e-9
+    if not agent.is_lost:
+        return False
+
+    last_s = float(rows[-1, STAMP])
+    last_fit_s = agent.last_fit_ns * 1e-9
+    return last_s <= last_fit_s
 
 
 def _observations(graph: Graph, number: int, label: str) -> Observations | None:
-    return graph.get(Observations, observations_id(number, label))
+    name = observations_id(number, label)
+    return graph.get(Observations, name)
+
+
+def _not_observed(percepts: list[Percept], last: PathSegment, graph: Graph) -> list[Percept]:
+    """The percepts of landmarks that were not observed from the last place of the path."""
+    rows = last.rows.numpy()
+    last_s = float(rows[-1, STAMP])
+
+    new = []
+    for percept in percepts:
+        observations = _observations(graph, last.number, percept.label)
+        if not is_observed_from(observations, last_s):
+            new.append(percept)
+    return new
 
 
 def _observe(percept: Percept, viewpoint: Viewpoint, graph: Graph) -> list[Operation]:
@@ -235,6 +284,7 @@ def _observe(percept: Percept, viewpoint: Viewpoint, graph: Graph) -> list[Opera
         return []
     if is_observed_from(before, viewpoint.stamp_s):
         return []
+
     after = extended(before, viewpoint, percept)
     if before is not None:
         return [after]
@@ -255,7 +305,9 @@ def objects_along(graph: Graph, segment: PathSegment) -> list[tuple[Observations
         observations = graph.get(Observations, name)
         if observations is None:
             continue
+
         landmark = graph.get(Object, object_id(observations.landmark))
         if landmark is not None:
             found.append((observations, landmark))
+
     return found

@@ -5,24 +5,30 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from cogmap.errors import MessageError
+from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import mean_pose, transform_from
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.array import Array
 from schemas.codelets import Task
-from schemas.graph import Cells, Operation, Phase
+from schemas.graph import Cells, Phase
 from schemas.nodes import SELF_ID, PlaceColumn, Self
 from services.codelets.config import SECTION, Config
 
 ROAD_REACH_M = 12.0
 ENOUGH_POINTS = 3
 
+Cell32 = npt.NDArray[np.int32]
+Share32 = npt.NDArray[np.float32]
+
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     """One task in each cycle."""
-    return [context.task(CODELET.name, about=[SELF_ID], with_road=True)]
+    task = context.task(CODELET.name, about=[SELF_ID], with_road=True)
+    return [task]
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
@@ -30,34 +36,29 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     agent = graph.agent
     if agent is None or task.road_m is None:
         raise MessageError(f"task {task.task_id}: no self node, or no road points")
+
     pose = mean_pose(agent.samples.numpy())
     cell_m = graph.cell_m(agent.map)
     here = np.rint(pose[None, :2] / cell_m).astype(np.int32)
-    operations: list[Operation] = [
-        Cells(
-            map=agent.map,
-            column=PlaceColumn.ACTIVATION,
-            cells=Array.of(here),
-            values=Array.of(np.ones(1, np.float32)),
-            cycle=task.cycle,
-        )
-    ]
+    active = Cells(
+        map=agent.map,
+        column=PlaceColumn.ACTIVATION,
+        cells=Array.of(here),
+        values=Array.of(np.ones(1, np.float32)),
+        cycle=task.cycle,
+    )
 
-    seen_m = np.asarray(task.road_m.numpy(), np.float64).reshape(-1, 2)
-    seen_m = seen_m[np.hypot(seen_m[:, 0], seen_m[:, 1]) < ROAD_REACH_M]
-    seen_cells = np.rint(transform_from(pose, seen_m) / cell_m).astype(np.int32)
-    cells, counts = np.unique(seen_cells, axis=0, return_counts=True)
-    if len(cells):
-        share = np.minimum(1.0, counts / ENOUGH_POINTS).astype(np.float32)
-        operations.append(
-            Cells(
-                map=agent.map,
-                column=PlaceColumn.ROAD,
-                cells=Array.of(cells, "<i4"),
-                values=Array.of(share),
-            )
-        )
-    return Answer(operations)
+    cells, shares = _road_cells(task.road_m, pose, cell_m)
+    if not len(cells):
+        return Answer([active])
+
+    road = Cells(
+        map=agent.map,
+        column=PlaceColumn.ROAD,
+        cells=Array.of(cells, "<i4"),
+        values=Array.of(shares),
+    )
+    return Answer([active, road])
 
 
 CODELET = Codelet(
@@ -70,3 +71,18 @@ CODELET = Codelet(
     config=Config,
     section=SECTION,
 )
+
+
+def _road_cells(points_m: Array, pose: Floats, cell_m: float) -> tuple[Cell32, Share32]:
+    """(k, 2) cells that are seen as road by (n, 2) points in the robot's frame, and how much, (k,),
+    0 to 1.
+    """
+    seen_m = np.asarray(points_m.numpy(), np.float64).reshape(-1, 2)
+    range_m = np.hypot(seen_m[:, 0], seen_m[:, 1])
+    near_m = seen_m[range_m < ROAD_REACH_M]
+
+    on_map_m = transform_from(pose, near_m)
+    seen_cells = np.rint(on_map_m / cell_m).astype(np.int32)
+    cells, counts = np.unique(seen_cells, axis=0, return_counts=True)
+    shares = np.minimum(1.0, counts / ENOUGH_POINTS).astype(np.float32)
+    return cells, shares
