@@ -63,10 +63,12 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     tasks = []
     for percept in sorted(context.percepts.objects, key=lambda percept: percept.label):
         name = object_id(percept.label)
-        if name in graph.nodes:
-            about = [SELF_ID, name]
-            task = context.task(CODELET.name, about, subject=percept.label, percepts=[percept])
-            tasks.append(task)
+        if name not in graph.nodes:
+            continue
+
+        about = [SELF_ID, name]
+        task = context.task(CODELET.name, about, subject=percept.label, percepts=[percept])
+        tasks.append(task)
     return tasks
 
 
@@ -84,6 +86,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     landmark = graph.get(Object, object_id(percept.label))
     if agent is None or landmark is None:
         raise MessageError(f"task {task.task_id}: the graph lacks the self or the landmark")
+
     before = landmark.positions_m()
     record = Record(landmark.sightings, landmark.misses)
     if _stays(agent, landmark):
@@ -94,12 +97,9 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     selves = rng.permutation(resample(selves, len(before), 0.0, rng))
     mahalanobis2 = _mahalanobis2(before, selves, percept)
     if mahalanobis2.min() < config.gate**2:
-        kept = before[rejection_mask(-mahalanobis2 / 2 / config.correlated_views, rng)]
-        # Few that are kept stand for all between them: of a ring or a ray, the next view must find
-        # some again.
-        gaps_m = GAP * spread(kept, kept.mean(axis=0)) / len(kept)
-        jitter_m = np.maximum(config.landmark_jitter_m, gaps_m)
-        after = resample(kept, len(before), jitter_m, rng)
+        log_likelihood = -mahalanobis2 / 2 / config.correlated_views
+        kept = before[rejection_mask(log_likelihood, rng)]
+        after = resample(kept, len(before), _jitter_m(kept, config), rng)
         record = Record(record.sightings + 1, 0)
         return object_answer(task, graph, landmark, after, record)
 
@@ -107,6 +107,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     if misses < min(config.misses, record.sightings + 1):
         record = Record(record.sightings, misses)
         return _kept_answer(task, graph, landmark, record)
+
     anew = msgspec.structs.replace(landmark, created_ns=task.stamp_ns)
     positions_m = first_positions(selves, percept, config, rng)
     return object_answer(task, graph, anew, positions_m, FIRST)
@@ -125,8 +126,8 @@ CODELET = Codelet(
 
 
 def nearby_selves(selves: Samples, config: Config) -> Samples:
-    """(n, 7) samples of the self for where a landmark stands as seen from it, which is known
-    however lost the agent is.
+    """(n, 7) samples of the self for placing landmarks relative to it, which is known however lost
+    the agent is.
 
     The paper's samples start from their mean at each step (§5.4), so that landmarks are as certain
     as the last step was. Here the self's samples keep all that is uncertain since the start; drawn
@@ -134,13 +135,16 @@ def nearby_selves(selves: Samples, config: Config) -> Samples:
     """
     mean = mean_pose(selves)
     sd = spread(selves[:, :POSE_COLUMNS], mean)
+
     position_sd_m = max(float(np.hypot(sd[0], sd[1])), 1e-9)
     share = min(1.0, LOCAL_SHARE * config.largest_landmark_sd_m / position_sd_m)
     if share == 1.0:
         return selves
-    off = selves[:, :POSE_COLUMNS] - mean
-    off[:, 2] = wrap_angle(off[:, 2])
-    return np.hstack([mean + share * off, selves[:, POSE_COLUMNS:]])
+
+    offset = selves[:, :POSE_COLUMNS] - mean
+    offset[:, 2] = wrap_angle(offset[:, 2])
+    poses = mean + share * offset
+    return np.hstack([poses, selves[:, POSE_COLUMNS:]])
 
 
 def first_positions(
@@ -152,16 +156,19 @@ def first_positions(
     Seen by range alone it is on a ring, by bearing alone on a ray as long as `config.farthest_m`.
     """
     number = len(selves)
+
     if has_bearing(percept):
         seen_rad = rng.normal(percept.bearing_rad, percept.bearing_sd_rad, number)
         direction_rad = selves[:, SelfColumn.HEADING_RAD] + seen_rad
     else:
         direction_rad = rng.uniform(-np.pi, np.pi, number)
+
     if has_range(percept):
         seen_m = rng.normal(percept.range_m, percept.range_sd_m, number).clip(MIN_RANGE_M)
         distance_m = seen_m / (1 + selves[:, SelfColumn.RANGE_GAIN])
     else:
         distance_m = rng.uniform(0.0, config.farthest_m, number)
+
     direction = np.column_stack([np.cos(direction_rad), np.sin(direction_rad)])
     positions_m: Samples = selves[:, :2] + distance_m[:, None] * direction
     return positions_m
@@ -202,13 +209,28 @@ def _kept_answer(task: Task, graph: Graph, node: Object, record: Record) -> Answ
         misses=record.misses,
         last_seen_ns=task.stamp_ns,
     )
-    place = nearest_place(seen.x_m, seen.y_m, graph.cell_m(node.map), node.map)
-    return Answer([seen, Link(source=seen.id, target=place, kind=LinkKind.AT)])
+    cell_m = graph.cell_m(node.map)
+    place = nearest_place(seen.x_m, seen.y_m, cell_m, node.map)
+    link = Link(source=seen.id, target=place, kind=LinkKind.AT)
+    return Answer([seen, link])
+
+
+def _jitter_m(kept: Samples, config: Config) -> Samples:
+    """The standard deviations of the noise that resampling adds to (n, 2) samples.
+
+    Few samples represent all positions between them: of a ring or a ray, the next view must find
+    some again.
+    """
+    sd_m = spread(kept, kept.mean(axis=0))
+    gaps_m = GAP * sd_m / len(kept)
+    jitter_m: Samples = np.maximum(config.landmark_jitter_m, gaps_m)
+    return jitter_m
 
 
 def _stays(agent: Self, landmark: Object) -> bool:
     if landmark.surveyed or agent.is_lost:
         return True
+
     return is_seen_from_here(landmark, agent.stationary_since_ns)
 
 
@@ -216,13 +238,17 @@ def _mahalanobis2(positions_m: Samples, selves: Samples, percept: Percept) -> Sa
     """(n,): squared deviations of the percept from what each pair of landmark and self predicts."""
     offset_m = positions_m - selves[:, :2]
     mahalanobis2 = np.zeros(len(offset_m))
+
     if has_bearing(percept):
         direction_rad = np.arctan2(offset_m[:, 1], offset_m[:, 0])
         bearing_rad = direction_rad - selves[:, SelfColumn.HEADING_RAD]
         residual_rad = wrap_angle(bearing_rad - percept.bearing_rad)
         mahalanobis2 += (residual_rad / percept.bearing_sd_rad) ** 2
+
     if has_range(percept):
         distance_m = np.hypot(offset_m[:, 0], offset_m[:, 1])
-        seen_m = distance_m * (1 + selves[:, SelfColumn.RANGE_GAIN])
-        mahalanobis2 += ((seen_m - percept.range_m) / percept.range_sd_m) ** 2
+        expected_m = distance_m * (1 + selves[:, SelfColumn.RANGE_GAIN])
+        residual_m = expected_m - percept.range_m
+        mahalanobis2 += (residual_m / percept.range_sd_m) ** 2
+
     return mahalanobis2

@@ -86,11 +86,14 @@ class Estimate:
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     """One task in each cycle."""
     percepts = context.percepts.objects
-    labels = sorted(percept.label for percept in percepts)
-    known = [object_id(label) for label in labels if object_id(label) in graph.nodes]
-    return [
-        context.task(CODELET.name, about=[SELF_ID, *known], percepts=percepts, with_motions=True)
-    ]
+    about = [SELF_ID]
+    for label in sorted(percept.label for percept in percepts):
+        name = object_id(label)
+        if name in graph.nodes:
+            about.append(name)
+
+    task = context.task(CODELET.name, about, percepts=percepts, with_motions=True)
+    return [task]
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
@@ -104,6 +107,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     agent = graph.agent
     if agent is None or task.motions is None:
         raise MessageError(f"task {task.task_id}: no self node, or no self-motion")
+
     rng = generator(task.task_id)
     motions = np.asarray(task.motions.numpy(), np.float64)
     before = with_gains(agent.samples.numpy(), config, rng)
@@ -111,27 +115,30 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
 
     stationary_since_ns = _stationary_since(agent, bool(motions[:, :2].any()))
     seen = sightings(task.percepts, graph, config.largest_landmark_sd_m, stationary_since_ns)
-    past = _past(agent, moved, task.stamp_ns)
     moved_sd = motions[:, 3:5] * motions[:, 2:3]
     variances = variances_of(agent) + np.square(moved_sd).sum(axis=0)
-    found = past
+
+    found = _past(agent, moved, task.stamp_ns)
     if seen is not None:
         since = variances - _placed(graph, seen)
         weights = novelty(moved, seen, since) / config.correlated_views
-        found = _correct(past, seen, weights, config, rng)
+        found = _correct(found, seen, weights, config, rng)
 
     gains = found.samples[:, POSE_COLUMNS:].mean(axis=0)
     odometry = dead_reckon(odometry_of(agent), motions, gains)
     if seen is not None and found.is_lost:
         percepts = _all_seen(task.percepts, seen_before(graph, odometry))
         found = _relocalize(found, percepts, graph, config, rng)
+
     if found.was_kidnapped:
-        # A kidnapped agent felt nothing of it: the path there counts as one that was driven, as
-        # certain as the pose that was found.
+        # Self-motion did not measure the kidnapping: the step there counts as one that was driven,
+        # as certain as the pose that was found.
         step = relative(mean_pose(moved), mean_pose(found.samples))
         odometry = compose(odometry, step)
-        _, off = centred(found.samples)
-        variances += np.square(off).mean(axis=0)[1:POSE_COLUMNS]
+        _, offsets = centred(found.samples)
+        found_variances = np.square(offsets).mean(axis=0)
+        variances += found_variances[1:POSE_COLUMNS]
+
     estimate = _self_node(task, agent, found)
     after = msgspec.structs.replace(
         estimate,
@@ -164,6 +171,7 @@ def _placed(graph: Graph, seen: Sighting) -> Samples:
         landmark = graph.get(Object, object_id(label))
         created_ns = NEVER_NS if landmark is None else landmark.created_ns
         placed.append(variances_at(graph, created_ns))
+
     return np.array(placed)
 
 
@@ -171,6 +179,7 @@ def _stationary_since(agent: Self, moves: bool) -> int:
     """The stamp at which the agent stopped; NEVER_NS where it moves."""
     if moves:
         return NEVER_NS
+
     if agent.stationary_since_ns == NEVER_NS:
         return max(0, agent.stamp_ns)
     return agent.stationary_since_ns
@@ -178,9 +187,16 @@ def _stationary_since(agent: Self, moves: bool) -> int:
 
 def _past(agent: Self, moved: Samples, stamp_ns: int) -> Estimate:
     """The estimate before; misfits are forgotten where nothing has followed for long."""
-    if stamp_ns > agent.last_misfit_ns + FORGOTTEN_NS:
+    forgotten_ns = agent.last_misfit_ns + FORGOTTEN_NS
+    if stamp_ns > forgotten_ns:
         return Estimate(moved)
-    return Estimate(moved, 1.0, agent.misfit_count, agent.first_misfit, agent.is_lost)
+
+    return Estimate(
+        moved,
+        misfit_count=agent.misfit_count,
+        first_misfit=agent.first_misfit,
+        is_lost=agent.is_lost,
+    )
 
 
 def _correct(
@@ -195,11 +211,13 @@ def _correct(
     determine which headings are tried.
     """
     if _is_heading_unknown(past.samples[:, 2]) and seen.has_bearing.any():
-        return Estimate(turn_about(past.samples, seen, config, rng), 0.0)
+        turned = turn_about(past.samples, seen, config, rng)
+        return Estimate(turned, 0.0)
 
     compared = compare(past.samples, seen)
     is_fitting = compared.squared < config.gate**2
-    fitting = int(np.add.reduce(is_fitting, axis=0, dtype=np.uint8).max())
+    fitting_of = np.add.reduce(is_fitting, axis=0, dtype=np.uint8)
+    fitting = int(fitting_of.max())
     if 2 * fitting < len(seen.labels) or not fitting:
         return _misfit(past, seen, rng)
 
@@ -212,13 +230,16 @@ def _correct(
         if stage < STAGES - 1:
             bearable = tempering_exponent(scores, config.kept_samples / len(scores))
             exponent = min(exponent_left, bearable)
+
         kept, kept_share = rejection_resample(samples, exponent * scores, config.kept_samples, rng)
         share *= kept_share
         exponent_left -= exponent
         if exponent_left <= 0:
             break
+
         samples = resample(kept, len(samples), 0.0, rng)
         compared = compare(samples, seen)
+
     return Estimate(kept, share)
 
 
@@ -226,7 +247,10 @@ def _is_heading_unknown(headings_rad: Samples) -> bool:
     """Whether the headings (n,) are so far apart that nearly any may be the agent's."""
     if np.ptp(headings_rad) <= TURNED_RAD:
         return False
-    mean_length = np.hypot(np.cos(headings_rad).mean(), np.sin(headings_rad).mean())
+
+    mean_x = np.cos(headings_rad).mean()
+    mean_y = np.sin(headings_rad).mean()
+    mean_length = np.hypot(mean_x, mean_y)
     return bool(mean_length < ALIKE)
 
 
@@ -237,17 +261,25 @@ def _misfit(past: Estimate, seen: Sighting, rng: np.random.Generator) -> Estimat
     """
     count = past.misfit_count + 1
     first = past.first_misfit or seen.labels[0]
-    is_lost = past.is_lost or any(label != first for label in seen.labels)
+    has_other = any(label != first for label in seen.labels)
+    is_lost = past.is_lost or has_other
+
     samples = past.samples
     if is_lost and count <= MAX_INFLATIONS:
         samples = inflate(samples, INFLATION, rng)
+
     return Estimate(samples, 0.0, count, first, is_lost)
 
 
 def _all_seen(in_view: list[Percept], before: list[Percept]) -> list[Percept]:
     """The percepts in view, and those of landmarks that were seen before and are not in view."""
     labels = {percept.label for percept in in_view}
-    return in_view + [percept for percept in before if percept.label not in labels]
+
+    percepts = list(in_view)
+    for percept in before:
+        if percept.label not in labels:
+            percepts.append(percept)
+    return percepts
 
 
 def _relocalize(
@@ -267,20 +299,29 @@ def _relocalize(
     if seen is None:
         return lost
 
-    enough = config.astray if len(seen.labels) > 1 else ALONE * config.astray
-    _, off_m = centred(lost.samples[:, :2])
-    variance_m2 = float(np.square(off_m).sum(axis=1).mean())
-    is_unsure = variance_m2 > float(seen.range_m.min()) ** 2
-    if lost.misfit_count < (SEVERAL if is_unsure else enough):
+    _, offsets_m = centred(lost.samples[:, :2])
+    variance_m2 = float(np.square(offsets_m).sum(axis=1).mean())
+    nearest_m = float(seen.range_m.min())
+    is_unsure = variance_m2 > nearest_m**2
+
+    if is_unsure:
+        enough = SEVERAL
+    elif len(seen.labels) > 1:
+        enough = config.astray
+    else:
+        enough = ALONE * config.astray
+    if lost.misfit_count < enough:
         return lost
+
     samples = look_around(lost.samples, seen, config, rng)
     return Estimate(samples, 0.0, was_kidnapped=not is_unsure)
 
 
 def _self_node(task: Task, agent: Self, found: Estimate) -> Self:
     """The self node after localization; what path integration measured is as before."""
-    mean, off = centred(found.samples)
-    sd = np.sqrt(np.einsum("nd,nd->d", off, off) / len(off))
+    mean, offsets = centred(found.samples)
+    variance = np.einsum("nd,nd->d", offsets, offsets) / len(offsets)
+    sd = np.sqrt(variance)
     has_gains = bool(sd[POSE_COLUMNS:].any())
     samples = found.samples if has_gains else found.samples[:, :POSE_COLUMNS]
 
@@ -311,5 +352,7 @@ def _self_node(task: Task, agent: Self, found: Estimate) -> Self:
 
 
 def _operations(agent: Self, graph: Graph) -> list[Operation]:
-    place = nearest_place(agent.x_m, agent.y_m, graph.cell_m(agent.map), agent.map)
-    return [agent, Link(source=agent.id, target=place, kind=LinkKind.AT)]
+    cell_m = graph.cell_m(agent.map)
+    place = nearest_place(agent.x_m, agent.y_m, cell_m, agent.map)
+    link = Link(source=agent.id, target=place, kind=LinkKind.AT)
+    return [agent, link]

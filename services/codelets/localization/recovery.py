@@ -1,6 +1,4 @@
-"""Where an agent may be that was carried away: anywhere from where the landmarks that it sees look
-as they do.
-"""
+"""Relocalization of a kidnapped agent: it may be wherever the landmarks in view look as they do."""
 
 from __future__ import annotations
 
@@ -8,6 +6,7 @@ import math
 
 import numpy as np
 
+from cogmap.geometry.arrays import Singles
 from cogmap.geometry.se2 import compose, relative
 from cogmap.graph.graph import Graph
 from schemas.sensing import Percept
@@ -19,7 +18,7 @@ from services.codelets.mapping.observations import Sightings
 from services.codelets.mapping.path import ODOMETRY, STAMP, objects_along
 
 CANDIDATES = 16
-# What path integration may be off by since a landmark was seen, as a share of the way.
+# The error of path integration since a landmark was seen, as a share of the distance.
 DRIFT_SHARE = 0.05
 
 
@@ -33,8 +32,10 @@ def seen_before(graph: Graph, odometry: Samples) -> list[Percept]:
     last = graph.last_segment
     if agent is None or last is None:
         return []
+
     rows = last.rows.numpy()
-    rows = rows[rows[:, STAMP] > agent.last_fit_ns * 1e-9]
+    last_fit_s = agent.last_fit_ns * 1e-9
+    rows = rows[rows[:, STAMP] > last_fit_s]
     observations = [each for each, _ in objects_along(graph, last)]
     seen = Sightings.of(observations, rows[:, STAMP])
 
@@ -45,15 +46,21 @@ def seen_before(graph: Graph, odometry: Samples) -> list[Percept]:
     percepts = []
     for label, index in latest.items():
         then = rows[seen.place[index], ODOMETRY]
-        landmark_pose = compose(then, np.append(seen.where_m[index], 0.0))
-        forwards_m, left_m, _ = relative(odometry, landmark_pose).tolist()
+        step = np.append(seen.where_m[index], 0.0)
+        forwards_m, left_m, _ = relative(odometry, compose(then, step)).tolist()
 
-        covariance_m2 = np.linalg.inv(seen.information[index])
-        variance_m2 = float(np.linalg.eigvalsh(covariance_m2).max())
-        drift_m = DRIFT_SHARE * float(np.hypot(*(then - odometry)[:2]))
-        sd_m = math.sqrt(variance_m2 + drift_m**2)
+        moved_m = float(np.hypot(*(then - odometry)[:2]))
+        sd_m = _remembered_sd_m(seen.information[index], moved_m)
         percepts.append(_percept(label, forwards_m, left_m, sd_m))
     return percepts
+
+
+def _remembered_sd_m(information: Samples, moved_m: float) -> float:
+    """The standard deviation of a landmark's position, seen `moved_m` ago with (2, 2) information."""
+    covariance_m2 = np.linalg.inv(information)
+    variance_m2 = float(np.linalg.eigvalsh(covariance_m2).max())
+    drift_m = DRIFT_SHARE * moved_m
+    return math.sqrt(variance_m2 + drift_m**2)
 
 
 def _percept(label: str, forwards_m: float, left_m: float, sd_m: float) -> Percept:
@@ -79,58 +86,75 @@ def look_around(
     `gains`.
 
     Each candidate stands on a circle around one of the landmarks, turned to see it as it is seen,
-    and is drawn with the likelihood of all others in view. One landmark gives a ring, which the
-    next ones break.
+    and is drawn with the likelihood of all others in view. One landmark gives a ring, of which the
+    next ones leave parts.
     """
     number = len(gains) * CANDIDATES
     candidates = np.empty((number, COLUMNS))
     candidates[:] = np.tile(gains, (CANDIDATES, 1))
     which = rng.integers(len(seen.labels), size=number)
-    direction = rng.uniform(-np.pi, np.pi, number)
-    where = seen.mean_m[which] + np.einsum(
-        "nij,nj->ni", _roots(seen.covariance_m2)[which], rng.normal(0.0, 1.0, (number, 2))
-    )
-    near = rng.normal(seen.range_m[which], seen.range_sd_m[which]) / (1 + candidates[:, RANGE])
-    distance = np.where(
-        seen.has_range[which], near, rng.uniform(0.0, config.farthest_m, number)
-    ).clip(0.0)
-    candidates[:, 0] = where[:, 0] + distance * np.cos(direction)
-    candidates[:, 1] = where[:, 1] + distance * np.sin(direction)
-    bearing = rng.normal(seen.bearing_rad[which], seen.bearing_sd_rad[which])
-    turned = np.where(seen.has_bearing[which], bearing, rng.uniform(-np.pi, np.pi, number))
-    candidates[:, 2] = direction + np.pi - turned
+    direction_rad = rng.uniform(-np.pi, np.pi, number)
+
+    root_m = _roots(seen.covariance_m2)[which]
+    drawn = rng.normal(0.0, 1.0, (number, 2))
+    landmark_m = seen.mean_m[which] + np.einsum("nij,nj->ni", root_m, drawn)
+
+    measured_m = rng.normal(seen.range_m[which], seen.range_sd_m[which])
+    near_m = measured_m / (1 + candidates[:, RANGE])
+    any_m = rng.uniform(0.0, config.farthest_m, number)
+    distance_m = np.where(seen.has_range[which], near_m, any_m).clip(0.0)
+    candidates[:, 0] = landmark_m[:, 0] + distance_m * np.cos(direction_rad)
+    candidates[:, 1] = landmark_m[:, 1] + distance_m * np.sin(direction_rad)
+
+    measured_rad = rng.normal(seen.bearing_rad[which], seen.bearing_sd_rad[which])
+    any_rad = rng.uniform(-np.pi, np.pi, number)
+    bearing_rad = np.where(seen.has_bearing[which], measured_rad, any_rad)
+    candidates[:, 2] = direction_rad + np.pi - bearing_rad
+
     density = compare(candidates, seen).density
     density[which, np.arange(number)] = 1.0  # it was drawn by that one
-    scores = log_likelihood(density, config.outlier_share)
-    chances = np.exp(scores - scores.max())
-    return candidates[rng.choice(number, size=len(gains), p=chances / chances.sum())]
+    return _drawn(candidates, density, len(gains), config, rng)
 
 
 def turn_about(
     samples: Samples, seen: Sighting, config: Config, rng: np.random.Generator
 ) -> Samples:
-    """(n, 7) samples of the self, who knows about where it stands but not how it is turned: turned
-    by what is in view.
+    """(n, 7) samples of the self, its position known, its heading unknown: turned by what is in
+    view.
 
     Each candidate stands as one of `samples`, turned to see one of the landmarks as it is seen, and
     is drawn with the likelihood of all that is in view but that one's bearing.
     """
     candidates = np.tile(samples, (CANDIDATES, 1))
     number = len(candidates)
-    which = rng.choice(np.flatnonzero(seen.has_bearing), size=number)
-    off = seen.mean_m[which] - candidates[:, :2]
+    with_bearing = np.flatnonzero(seen.has_bearing)
+    which = rng.choice(with_bearing, size=number)
+
+    offset_m = seen.mean_m[which] - candidates[:, :2]
+    direction_rad = np.arctan2(offset_m[:, 1], offset_m[:, 0])
     drawn = rng.normal(0.0, 1.0, number)
-    bearing = seen.bearing_rad[which] + drawn * seen.bearing_sd_rad[which]
-    candidates[:, 2] = np.arctan2(off[:, 1], off[:, 0]) - bearing
+    bearing_rad = seen.bearing_rad[which] + drawn * seen.bearing_sd_rad[which]
+    candidates[:, 2] = direction_rad - bearing_rad
+
     density = compare(candidates, seen).density
     density[which, np.arange(number)] *= np.exp(drawn**2 / 2)  # it was turned by that one's bearing
+    return _drawn(candidates, density, len(samples), config, rng)
+
+
+def _drawn(
+    candidates: Samples, density: Singles, count: int, config: Config, rng: np.random.Generator
+) -> Samples:
+    """`count` of (n, 7) candidates, drawn by the (k, n) densities of the landmarks in view."""
     scores = log_likelihood(density, config.outlier_share)
-    chances = np.exp(scores - scores.max())
-    return candidates[rng.choice(number, size=len(samples), p=chances / chances.sum())]
+    weights = np.exp(scores - scores.max())
+    probabilities = weights / weights.sum()
+    chosen = rng.choice(len(candidates), size=count, p=probabilities)
+    return candidates[chosen]
 
 
 def _roots(covariances: Samples) -> Samples:
     """A square root of each (k, 2, 2) covariance, which may be singular."""
     values, vectors = np.linalg.eigh(covariances)
-    roots: Samples = vectors * np.sqrt(values.clip(0.0))[:, None, :]
+    sd = np.sqrt(values.clip(0.0))
+    roots: Samples = vectors * sd[:, None, :]
     return roots
