@@ -92,11 +92,14 @@ class Perception:
 def build(config: Config, instance: str) -> Module:
     """Build the extended PAM as a module. Raises ConfigError if its networks cannot be read."""
     cv2.setNumThreads(1)
+    segments_path = _path(config.segments_weights, segments.DEFAULT_PATH)
+    objects_path = _path(config.object_weights, objects.DEFAULT_PATH)
+    road_path = _path(config.road_weights, road.DEFAULT_PATH)
     pam = ExtendedPam(
         config,
-        segments.load(_path(config.segments_weights, segments.DEFAULT_PATH)),
-        objects.load(_path(config.object_weights, objects.DEFAULT_PATH)),
-        road.load(_path(config.road_weights, road.DEFAULT_PATH)),
+        segments.load(segments_path),
+        objects.load(objects_path),
+        road.load(road_path),
     )
     perception = Perception(pam, PlaceRecognizer())
 

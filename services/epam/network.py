@@ -80,8 +80,11 @@ def _input_channels(path: Path) -> int:
     OpenCV's new engine, which runs the network, accepts any number, so the classic one is asked.
     """
     net = cv2.dnn.readNetFromONNX(str(path), cv2.dnn.ENGINE_CLASSIC)
-    for number in range(1, len(net.getLayerNames()) + 1):
+    layers = len(net.getLayerNames())
+
+    for number in range(1, layers + 1):
         blobs = net.getLayer(number).blobs
         if blobs:
-            return int(blobs[0].shape[1])
+            weights = blobs[0]
+            return int(weights.shape[1])
     return 0

@@ -65,6 +65,7 @@ class ExtendedPam:
         """Return what is recognized in `view`; with `learning`, new buildings get nodes."""
         candidates = self.candidates(view, camera)
         found, learned = self._labelled(candidates, view, learning)
+
         poses = self._poses(found, camera)
         objects = [
             self._percept(candidate, pose, camera)
@@ -81,10 +82,12 @@ class ExtendedPam:
         """
         segments = []
         standing = []
+        narrowest_px = self._config.narrowest_px
+
         for segment in self._segmenter.segments(view.image, view.depth_m, camera):
             _, _, width, _ = segment.box_px
             of_segment = walls(segment, view.disparity_px)
-            if of_segment is not None and width >= self._config.narrowest_px:
+            if of_segment is not None and width >= narrowest_px:
                 segments.append(segment)
                 standing.append(of_segment)
 
@@ -187,8 +190,8 @@ class ExtendedPam:
         the usual size.
         """
         silhouettes = [_silhouette(candidate) for candidate in found]
-        fitted = locate([each for each in silhouettes if each is not None], camera)
-        remaining = iter(fitted)
+        located = [each for each in silhouettes if each is not None]
+        remaining = iter(locate(located, camera))
 
         poses = []
         for candidate, silhouette in zip(found, silhouettes, strict=True):
@@ -196,6 +199,7 @@ class ExtendedPam:
             if pose is None or not self._is_credible(pose):
                 pose = candidate.walls.usual_pose(camera)
             poses.append(pose)
+
         return poses
 
     def _is_credible(self, pose: ObjectPose) -> bool:

@@ -93,7 +93,8 @@ def locate(silhouettes: list[Silhouette], camera: Calibration) -> list[ObjectPos
     parameters = solution.parameters.reshape(*shape, 3)
     costs = (solution.residuals**2).sum(1).reshape(shape)
     covariances = _covariances(solution, problem).reshape(*shape, 3, 3)
-    misfits = _misfits(solution, problem).reshape(shape).min(1)
+    misfits_of_starts = _misfits(solution, problem).reshape(shape)
+    misfits = misfits_of_starts.min(1)
 
     return [
         _pose(parameters[row], costs[row], covariances[row], misfits[row], camera)
@@ -144,6 +145,7 @@ def _starts(objects: FootprintProblem) -> Floats:
     starts = np.repeat(centre, ORIENTATIONS, axis=0)
     starts[:, 2] = np.tile(orientations, len(centre))
     starts[:, 2] -= np.repeat(facing, ORIENTATIONS)
+
     return starts
 
 
@@ -159,11 +161,14 @@ def _usual_centre(objects: FootprintProblem, slope: Floats) -> Floats:
     """x_m, z_m and an orientation of 0 (s, 3), behind the wall that the ray of `slope` meets."""
     camera = objects.camera
     median_px = np.median(objects.disparity_px, axis=1)
-    depth_m = camera.fx_px * camera.baseline_m / median_px
-    distance_m = depth_m * np.hypot(slope, 1)
+    focal_baseline = camera.fx_px * camera.baseline_m
+    depth_m = focal_baseline / median_px
+    ray_length = np.hypot(slope, 1)
+    distance_m = depth_m * ray_length
 
     half_m = objects.half_m.mean(1)
     behind = 1 + 0.8 * half_m / distance_m
+
     x_m = slope * depth_m * behind
     z_m = depth_m * behind
     orientation_rad = np.zeros_like(depth_m)
@@ -183,13 +188,15 @@ def _solve(parameters: Floats, problem: FootprintProblem) -> _Solution:
         cost = _huber_cost(new_residuals)
         better = cost < best_cost
         better_row = better[:, None]
+        better_matrix = better_row[..., None]
 
         best_cost = np.where(better, cost, best_cost)
         best = np.where(better_row, candidate, best)
         residuals = np.where(better_row, new_residuals, residuals)
-        jacobian = np.where(better_row[..., None], new_jacobian, jacobian)
+        jacobian = np.where(better_matrix, new_jacobian, jacobian)
         damping = np.where(better, damping * 0.2, damping * 8)
-        candidate = best - _damped_step(residuals, jacobian, damping)
+        step = _damped_step(residuals, jacobian, damping)
+        candidate = best - step
 
     return _solution(best, residuals, jacobian, problem)
 
@@ -276,6 +283,7 @@ def _outer(vectors: Floats) -> Floats:
 def _misfits(solution: _Solution, problem: FootprintProblem) -> Floats:
     """(s,): root mean square disparity residual, in standard deviations of one column."""
     of_columns = solution.residuals[:, :COLUMNS]
+
     sd_px = problem.sd_px[:, None]
     error_px = of_columns * sd_px
 
@@ -294,11 +302,14 @@ def _pose(
     centres = parameters[:, :2]
     mean = weight @ centres
     scatter = _outer(centres - mean)
-    covariance = np.einsum("s,sij->ij", weight, covariances[:, :2, :2] + scatter)
+    spread = covariances[:, :2, :2] + scatter
+    covariance = np.einsum("s,sij->ij", weight, spread)
 
     forward_m = mean[1] + camera.mount_forward_m
     left_m = -mean[0]
-    range_m = max(float(np.hypot(forward_m, left_m)), MIN_RANGE_M)
+    distance_m = float(np.hypot(forward_m, left_m))
+    range_m = max(distance_m, MIN_RANGE_M)
+
     radial = np.array([-left_m, forward_m]) / range_m
     tangential = np.array([radial[1], -radial[0]])
     range_sd_m = _sd(covariance, radial)

@@ -52,10 +52,12 @@ def _residuals(parameters: Floats, problem: FootprintProblem) -> Floats:
     """(s, COLUMNS + 2) residuals in standard deviations, of (s, 3) parameters."""
     camera = problem.camera
     focal_baseline = camera.fx_px * camera.baseline_m
-    disparity_px = focal_baseline * _inverse_depths(parameters, problem)
+    inverse_m = _inverse_depths(parameters, problem)
+    disparity_px = focal_baseline * inverse_m
     error_px = disparity_px - problem.disparity_px
 
-    of_columns = error_px / problem.sd_px[:, None]
+    sd_px = problem.sd_px[:, None]
+    of_columns = error_px / sd_px
     of_edges = _edge_residuals(parameters, problem)
     return np.concatenate([of_columns, of_edges], axis=1)
 
@@ -101,7 +103,8 @@ def _edge_residuals(parameters: Floats, problem: FootprintProblem) -> Floats:
     outermost_px = np.stack([first_px, last_px], axis=1)
     error_px = outermost_px - problem.edge_px
 
-    outward_px = error_px * np.array([-1.0, 1.0])
+    outwards = np.array([-1.0, 1.0])
+    outward_px = error_px * outwards
     is_free = problem.hidden & (outward_px > 0)
     counted_px = np.where(is_free, 0.0, error_px)
     return counted_px / EDGE_SD_PX
@@ -135,11 +138,13 @@ def linearized(parameters: Floats, problem: FootprintProblem) -> tuple[Floats, F
 
     # All at once: one call of numpy for four evaluations.
     rows = np.tile(np.arange(len(parameters)), len(evaluated))
-    values = _residuals(np.concatenate(evaluated), problem.take(rows))
+    repeated = problem.take(rows)
+    values = _residuals(np.concatenate(evaluated), repeated)
     residuals, *others = np.split(values, len(evaluated))
 
     derivatives = []
     for other, step in zip(others, STEPS, strict=True):
         change = other - residuals
         derivatives.append(change / step)
+
     return residuals, np.stack(derivatives, axis=2)

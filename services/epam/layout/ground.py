@@ -42,11 +42,13 @@ def project(likelihood: Singles, depth_m: Singles, camera: Calibration) -> tuple
 
     upright = _upright(disparity_px, ground_px)
     near = ground_px > min_disparity_px(camera)
-    road_rows, road_columns = np.nonzero(mask & ~upright & near)
+    near_road = mask & ~upright & near
+    road_rows, road_columns = np.nonzero(near_road)
     road_m = _on_ground(road_rows, road_columns, plane, camera)
 
-    upright_px = np.where(upright, disparity_px, 0.0)
-    visible_ground = _visible_ground(upright_px.astype(np.float32), ground_px)
+    upright_px = np.where(upright, disparity_px, 0.0).astype(np.float32)
+    visible_ground = _visible_ground(upright_px, ground_px)
+
     end_rows, end_columns = _boundary_pixels(likelihood, mask, visible_ground)
     boundary_m = _on_ground(end_rows, end_columns, plane, camera)
 
@@ -72,7 +74,8 @@ def _upright(disparity_px: Floats, ground_px: Floats) -> Booleans:
     limit_px = UPRIGHT_PX + UPRIGHT_SHARE * disparity_px
 
     nearer = nearer_px > limit_px
-    opened = cv2.morphologyEx(nearer.astype(np.uint8), cv2.MORPH_OPEN, _SPECK)
+    as_bytes = nearer.astype(np.uint8)
+    opened = cv2.morphologyEx(as_bytes, cv2.MORPH_OPEN, _SPECK)
     return np.asarray(opened > 0)
 
 
@@ -166,15 +169,17 @@ def thin(points_m: Floats) -> Singles:
 
     count = np.bincount(cell, minlength=1)
     occupied = np.flatnonzero(count)
-    means_m = sums_m[occupied] / count[occupied, None]
+    divisor = count[occupied, None]
+    means_m = sums_m[occupied] / divisor
     return np.asarray(means_m, np.float32)
 
 
 def _cell_numbers(points_m: Floats) -> npt.NDArray[np.intp]:
     """The number of the cell of each point (n, 2), x before y."""
     reach = round(MAX_RANGE_M / CELL_M) + 1
-    cells_m = points_m / CELL_M
-    cells = np.floor(cells_m).astype(np.intp)
+    in_cells = points_m / CELL_M
+    lower = np.floor(in_cells)
+    cells = lower.astype(np.intp)
 
     row, column = cells.T + reach
     columns = 2 * reach

@@ -77,7 +77,9 @@ def _prior(camera: Calibration) -> tuple[Floats, Floats]:
 
     relative_sd = np.array([ROLL_SD_RAD, HEIGHT_SD_SHARE, PITCH_SD_RAD])
     sd = down_px * relative_sd
-    information = np.diag(1 / sd**2)
+    variance = sd**2
+    information = np.diag(1 / variance)
+
     return coefficients, information
 
 
@@ -89,7 +91,8 @@ def _correction(slopes: Floats, observed_px: Floats, information: Floats) -> Flo
     correction: Floats = np.zeros(3)
     for cutoff_px in CUTOFFS_PX:
         misfit_px = observed_px - slopes @ correction
-        weight = _biweight(misfit_px / cutoff_px) / variance_px2
+        relative = misfit_px / cutoff_px
+        weight = _biweight(relative) / variance_px2
 
         weighted = slopes.T * weight
         normal = weighted @ slopes + information

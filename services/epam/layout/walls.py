@@ -80,7 +80,9 @@ class Walls:
     def usual_pose(self, camera: Calibration) -> ObjectPose:
         """Return the pose of a building of the usual size, behind the middle of what is seen."""
         median_px = float(np.median(self.disparity_px))
-        depth_m = camera.fx_px * camera.baseline_m / max(median_px, MIN_DISPARITY_PX)
+        safe_px = max(median_px, MIN_DISPARITY_PX)
+        depth_m = camera.fx_px * camera.baseline_m / safe_px
+
         middle_px = (self.left + self.right) / 2
         slope = (camera.cx_px - middle_px) / camera.fx_px
         forward_m = depth_m + camera.mount_forward_m
@@ -119,8 +121,10 @@ def walls(segment: Segment, disparity_px: Singles) -> Walls | None:
     """
     left, _, width, _ = segment.box_px
     span = slice(left, left + width)
-    own_px = np.where(segment.mask[:, span], disparity_px[:, span], 0.0)
+    own = segment.mask[:, span]
+    own_px = np.where(own, disparity_px[:, span], 0.0)
     medians_px = _column_medians(own_px)
+
     known = np.flatnonzero(medians_px)
     if len(known) < MIN_COLUMNS:
         return None

@@ -90,9 +90,11 @@ def has_near_structure(depth_m: Singles) -> bool:
     """
     horizon = len(depth_m) // 2
     above_m = depth_m[:horizon]
+
     known = above_m > 0
     near = known & (above_m < NEAR_M)
-    return float(near.mean()) >= MIN_NEAR_SHARE
+    share = float(near.mean())
+    return share >= MIN_NEAR_SHARE
 
 
 def unit_vectors(codes: Bytes) -> Singles:

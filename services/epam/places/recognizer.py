@@ -162,6 +162,7 @@ class PlaceRecognizer:
             last = count - steps
             before = self._belief[:last]
             predicted[steps:] += p_advance * before
+
         return predicted
 
     def _likelihood_ratios(self, vectors: Singles) -> Floats:
@@ -170,7 +171,8 @@ class PlaceRecognizer:
         """
         known = self._vectors[: len(self._views)]
         similarities = known @ vectors.T
-        highest = similarities.max(axis=1).astype(np.float64)
+        most_similar = similarities.max(axis=1)
+        highest = most_similar.astype(np.float64)
         log_odds = LOG_ODDS_SLOPE * (highest - EVEN_SIMILARITY)
         limited = log_odds.clip(-MAX_LOG_ODDS, MAX_LOG_ODDS)
         ratios = np.exp(limited)
@@ -178,6 +180,7 @@ class PlaceRecognizer:
         first_recent_step = self._step - self._config.recent + 1
         is_recent = self._step_of_view >= first_recent_step
         ratios[is_recent] = 0.0
+
         return np.asarray(ratios)
 
     def _best_match(self) -> list[PlaceMatch]:
@@ -207,6 +210,7 @@ class PlaceRecognizer:
         self._vectors[before:count] = vectors
         steps = np.arange(self._step - len(views), self._step) + 1
         unlikely = np.zeros(len(views))
+
         self._step_of_view = np.concatenate([self._step_of_view, steps])
         self._belief = np.concatenate([self._belief, unlikely])
 

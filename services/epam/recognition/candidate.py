@@ -42,7 +42,8 @@ def joined(pieces: Sequence[Candidate], disparity_px: Singles) -> Candidate:
     for piece in pieces[1:]:
         if not is_beside(whole, piece):
             continue
-        segment = Segment.of(whole.segment.mask | piece.segment.mask)
+        mask = whole.segment.mask | piece.segment.mask
+        segment = Segment.of(mask)
         joined_walls = walls(segment, disparity_px) or whole.walls
         whole = replace(whole, segment=segment, walls=joined_walls)
     return whole
@@ -52,17 +53,23 @@ def is_beside(one: Candidate, other: Candidate) -> bool:
     """Return whether both may be pieces of one object: hardly a gap between them, and at the same
     distance.
     """
-    begin = max(one.walls.left, other.walls.left)
-    end = min(one.walls.right, other.walls.right)
-    gap_px = begin - end
+    gap_px = _gap_px(one.walls, other.walls)
     if gap_px > BRIDGED_PX[-1]:
         return False
 
     one_px = float(np.median(one.walls.disparity_px))
     other_px = float(np.median(other.walls.disparity_px))
+
     near_px = max(one_px, other_px)
     far_px = min(one_px, other_px)
     return near_px <= MAX_DISPARITY_RATIO * far_px
+
+
+def _gap_px(one: Walls, other: Walls) -> float:
+    """The columns between both, negative where they overlap."""
+    begin = max(one.left, other.left)
+    end = min(one.right, other.right)
+    return begin - end
 
 
 def outline_px(segment: Segment) -> list[tuple[int, int]]:
@@ -132,7 +139,8 @@ def height_m(candidate: Candidate, camera: Calibration) -> float:
     """Return the height over the ground of the top of what is seen."""
     nearest_px = float(candidate.walls.disparity_px.max())
     safe_px = max(nearest_px, 1e-3)
-    depth_m = camera.fx_px * camera.baseline_m / safe_px
+    focal_baseline = camera.fx_px * camera.baseline_m
+    depth_m = focal_baseline / safe_px
 
     _, top, _, _ = candidate.segment.box_px
     above_px = camera.cy_px - top

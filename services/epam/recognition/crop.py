@@ -36,9 +36,10 @@ def surroundings(image: Bytes, depth_m: Singles, camera: Calibration) -> Singles
     down = _downward_slopes(len(depth_m), camera)
     below_camera_m = down * depth_m
     height_m = camera.mount_height_m - below_camera_m
+    is_below_horizon = down > 0
 
     is_low = height_m < GROUND_M
-    ground = known & (down > 0) & is_low
+    ground = known & is_below_horizon & is_low
     sky = ~known & (down < 0)
 
     of_ground = _median_colour(image[ground])

@@ -110,8 +110,10 @@ class ObjectRecognizer:
 
         appearances: list[Appearance] = []
         for first in range(0, len(crops), BATCH):
-            some = crops[first : first + BATCH]
+            end = first + BATCH
+            some = crops[first:end]
             appearances += self._embed(some)
+
         return appearances
 
     def _embed(self, crops: list[Singles]) -> list[Appearance]:
@@ -158,6 +160,7 @@ class ObjectRecognizer:
         lowest = np.float32(-1.0)
         highest = np.full(len(novel), lowest)
         np.maximum.at(highest, rows, cosines)
+
         return highest
 
     def learn(self, label: str, embedding: Singles) -> None:

@@ -128,7 +128,8 @@ def _height_m(depth_m: Singles, camera: Calibration) -> Singles:
     down = below_px / np.float32(camera.fy_px)
 
     below_camera_m = down * depth_m
-    return np.asarray(camera.mount_height_m - below_camera_m)
+    height_m = camera.mount_height_m - below_camera_m
+    return np.asarray(height_m)
 
 
 def padded(values: Singles) -> Singles:
@@ -164,6 +165,7 @@ def _instances(output: Singles) -> npt.NDArray[np.intp]:
     pointed_row = rows + OFFSET_PX * down[building]
     pointed_column = columns + OFFSET_PX * right[building]
     pointed_at = np.stack([pointed_row, pointed_column], 1)
+
     away_px = pointed_at[:, None] - centres[None]
     squared_px2 = (away_px**2).sum(2)
 
