@@ -1,5 +1,4 @@
-"""The apply-correction codelet: it carries out a correction of the path on the map as it is now
-(paper §5.6).
+"""The apply-correction codelet: it applies a correction of the path to the current map (paper §5.6).
 
 Each object and each road node moves with the place of the path that is nearest to it. What was
 written since the correction was computed is kept: places that the path has gained move with its
@@ -50,14 +49,17 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     """One task where a correction waits to be applied."""
     if CORRECTION_ID not in graph.nodes:
         return []
-    return [context.task(CODELET.name, about=[CORRECTION_ID])]
+
+    task = context.task(CODELET.name, about=[CORRECTION_ID])
+    return [task]
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
-    """Everything on the map where the correction puts it, and the correction forgotten."""
+    """Move everything on the map as the correction states, and forget the correction."""
     correction = graph.get(Correction, CORRECTION_ID)
     if correction is None:
         raise MessageError(f"task {task.task_id}: the correction was applied before")
+
     rows = correction.rows.numpy()
     path = _corrected_path(graph, rows)
     operations: list[Operation] = [DropNode(id=CORRECTION_ID), *segments(path)]
@@ -65,11 +67,14 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         operations += _move_self(graph, graph.agent, rows[-1:])
 
     seen = Sightings.of(graph.of_kind(Observations), path[:, STAMP])
-    landmarks_m = dict(zip(seen.labels, seen.landmarks_m(path[:, POSE]), strict=True))
+    positions_m = seen.landmarks_m(path[:, POSE])
+    landmarks_m = dict(zip(seen.labels, positions_m, strict=True))
     for node in graph.of_kind(Object):
         if not node.surveyed:
             operations += _move_object(graph, node, rows, landmarks_m.get(node.label))
-    return Answer([*operations, *_move_road(graph, rows)])
+
+    operations += _move_road(graph, rows)
+    return Answer(operations)
 
 
 CODELET = Codelet(
@@ -87,24 +92,30 @@ CODELET = Codelet(
 def _corrected_path(graph: Graph, rows: Floats) -> Floats:
     """The rows of the whole path, with its places corrected."""
     path = rows_of(graph.of_kind(PathSegment))
-    at = np.searchsorted(rows[:, STAMP], path[:, STAMP]).clip(0, len(rows) - 1)
+
+    following = np.searchsorted(rows[:, STAMP], path[:, STAMP])
+    at = following.clip(0, len(rows) - 1)
     path[:, POSE] = _moved_poses(path[:, POSE], rows[at])
     return path
 
 
 def _moved_poses(poses: Floats, rows: Floats) -> Floats:
     """(n, 3) poses, each moved as a row of the correction is."""
-    positions_m = move_with(poses[:, :2], rows[:, OLD], rows[:, NEW])
-    turned_rad = rows[:, NEW][:, 2] - rows[:, OLD][:, 2]
-    return np.column_stack([positions_m, wrap_angle(poses[:, 2] + turned_rad)])
+    old = rows[:, OLD]
+    new = rows[:, NEW]
+    positions_m = move_with(poses[:, :2], old, new)
+
+    turned_rad = new[:, 2] - old[:, 2]
+    headings_rad = wrap_angle(poses[:, 2] + turned_rad)
+    return np.column_stack([positions_m, headings_rad])
 
 
 def _move_self(graph: Graph, agent: Self, last: Floats) -> list[Operation]:
     """The agent moves with the last place of its path."""
     samples = agent.samples.numpy()
-    moved = np.column_stack(
-        [_moved_poses(samples[:, :POSE_COLUMNS], last), samples[:, POSE_COLUMNS:]]
-    )
+    poses = _moved_poses(samples[:, :POSE_COLUMNS], last)
+    moved = np.column_stack([poses, samples[:, POSE_COLUMNS:]])
+
     x_m, y_m = moved[:, :2].mean(axis=0).tolist()
     after = msgspec.structs.replace(
         agent,
@@ -126,20 +137,26 @@ def _move_object(
     """
     positions_m = node.positions_m()
     mean_m = positions_m.mean(axis=0)
+
     if seen_m is not None:
         moved_m = positions_m + seen_m - mean_m
     else:
         row = _row_of(node, mean_m, rows)
         moved_m = move_with(positions_m, row[:, OLD], row[:, NEW])
+
     if np.array_equal(moved_m, positions_m):
         return []
 
     mean_m = moved_m.mean(axis=0)
+    offsets_m = None
+    if node.offsets_m is not None:
+        offsets_m = Matrix.of(moved_m - mean_m, "<f2")
+
     after = msgspec.structs.replace(
         node,
         x_m=float(mean_m[0]),
         y_m=float(mean_m[1]),
-        offsets_m=None if node.offsets_m is None else Matrix.of(moved_m - mean_m, "<f2"),
+        offsets_m=offsets_m,
     )
     return [after, _place_link(after, graph)]
 
@@ -149,13 +166,18 @@ def _row_of(node: Object, mean_m: Floats, rows: Floats) -> Floats:
     since_s = node.created_ns * 1e-9
     until_s = node.last_seen_ns * 1e-9
     stamps_s = rows[:, STAMP]
-    known = np.flatnonzero((stamps_s >= since_s) & (stamps_s <= until_s))
+    is_known = (stamps_s >= since_s) & (stamps_s <= until_s)
+    known = np.flatnonzero(is_known)
     if not len(known):
-        # One seen since the correction was computed goes with the path's last place.
-        known = np.array([int(np.abs(stamps_s - since_s).argmin())])
+        # One seen since the correction was computed moves with the path's last place.
+        away_s = np.abs(stamps_s - since_s)
+        known = np.array([int(away_s.argmin())])
+
     near = rows[known]
-    away_m = np.hypot(*(near[:, OLD_POSITION] - mean_m).T)
-    return near[[_first_pass(away_m)]]
+    offset_m = near[:, OLD_POSITION] - mean_m
+    away_m = np.hypot(*offset_m.T)
+    nearest = _first_pass(away_m)
+    return near[[nearest]]
 
 
 def _first_pass(away_m: Floats) -> int:
@@ -164,30 +186,39 @@ def _first_pass(away_m: Floats) -> int:
     Not the nearest of all: where a loop has drifted, its end may lie nearer than the beginning that
     an object was seen from.
     """
-    passing = np.flatnonzero(away_m <= max(2 * away_m.min(), away_m.min() + BESIDE_M))
-    gone = np.flatnonzero(np.diff(passing) > 1)
-    first = passing[: gone[0] + 1] if len(gone) else passing
-    return int(first[away_m[first].argmin()])
+    nearest_m = away_m.min()
+    near_m = max(2 * nearest_m, nearest_m + BESIDE_M)
+    passing = np.flatnonzero(away_m <= near_m)
+
+    gaps = np.flatnonzero(np.diff(passing) > 1)
+    first = passing
+    if len(gaps):
+        first = passing[: gaps[0] + 1]
+    index = away_m[first].argmin()
+    return int(first[index])
 
 
 def _place_link(node: Self | Object, graph: Graph) -> Link:
-    place = nearest_place(node.x_m, node.y_m, graph.cell_m(node.map), node.map)
+    cell_m = graph.cell_m(node.map)
+    place = nearest_place(node.x_m, node.y_m, cell_m, node.map)
     return Link(source=node.id, target=place, kind=LinkKind.AT)
 
 
 def _move_road(graph: Graph, rows: Floats) -> list[Operation]:
-    """Each road node moves with the place nearest to it; what a turn would leave open between them
-    is filled.
+    """Move each road node with the place nearest to it, and fill the gaps that a turn would leave
+    between them.
     """
     cells, values = graph.places.written_cells(ROOT_MAP, PlaceColumn.ROAD)
     if not len(cells):
         return []
+
     cell_m = graph.cell_m()
-    arrived_m = _moved_with_nearest(cells.astype(np.float64) * cell_m, rows[:, OLD], rows[:, NEW])
-    arrived = np.rint(arrived_m / cell_m).astype(np.int64)
-    around = np.unique((arrived[:, None, :] + AROUND).reshape(-1, 2), axis=0)
-    origin_m = _moved_with_nearest(around.astype(np.float64) * cell_m, rows[:, NEW], rows[:, OLD])
-    origin = np.rint(origin_m / cell_m).astype(np.int64)
+    old = rows[:, OLD]
+    new = rows[:, NEW]
+    arrived = _moved_cells(cells, old, new, cell_m)
+    neighbours = arrived[:, None, :] + AROUND
+    around = np.unique(neighbours.reshape(-1, 2), axis=0)
+    origin = _moved_cells(around, new, old, cell_m)
 
     before = dict(zip(_keys(cells), values.tolist(), strict=True))
     after = dict.fromkeys(before, 0.0)
@@ -195,6 +226,7 @@ def _move_road(graph: Graph, rows: Floats) -> list[Operation]:
         value = before.get(source, 0.0)
         if value > 0:
             after[cell] = max(after.get(cell, 0.0), value)
+
     for cell, value in zip(_keys(arrived), values.tolist(), strict=True):
         after[cell] = max(after.get(cell, 0.0), value)
 
@@ -206,29 +238,36 @@ def _move_road(graph: Graph, rows: Floats) -> list[Operation]:
 
 
 def _keys(cells: Indices) -> list[tuple[int, int]]:
-    return [(i, j) for i, j in cells.tolist()]
+    keys = []
+    for i, j in cells.tolist():
+        keys.append((i, j))
+
+    return keys
 
 
 def _cells(values: dict[tuple[int, int], float]) -> list[Operation]:
     """New values of road nodes, at most as many at once as the workspace takes."""
     cells = np.array(list(values), np.int32).reshape(-1, 2)
     roads = np.array(list(values.values()), np.float32)
+
     parts: list[Operation] = []
     for start in range(0, len(cells), MAX_CELLS):
         some = slice(start, start + MAX_CELLS)
-        parts.append(
-            Cells(
-                map=ROOT_MAP,
-                column=PlaceColumn.ROAD,
-                cells=Array.of(cells[some]),
-                values=Array.of(roads[some]),
-            )
+        part = Cells(
+            map=ROOT_MAP,
+            column=PlaceColumn.ROAD,
+            cells=Array.of(cells[some]),
+            values=Array.of(roads[some]),
         )
+        parts.append(part)
+
     return parts
 
 
-def _moved_with_nearest(points_m: Floats, old: Floats, new: Floats) -> Floats:
-    """(k, 2) points moved as the pose nearest to each is."""
+def _moved_cells(cells: Indices, old: Floats, new: Floats, cell_m: float) -> Indices:
+    """(k, 2) cells, each moved as the pose nearest to it is, from (n, 3) `old` to `new`."""
+    points_m = cells.astype(np.float64) * cell_m
     _, nearest = cKDTree(old[:, :2]).query(points_m)
-    moved_m: Floats = move_with(points_m, old[nearest], new[nearest])
-    return moved_m
+
+    moved_m = move_with(points_m, old[nearest], new[nearest])
+    return np.rint(moved_m / cell_m).astype(np.int64)

@@ -47,17 +47,22 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     """
     if CORRECTION_ID in graph.nodes:
         return []
+
     closures = list(graph.of_kind(LoopClosure))
-    fresh = [closure for closure in closures if closure.accepted is None]
+    fresh = [closure.id for closure in closures if closure.accepted is None]
     late_ns = context.stamp_ns - config.revisit_s * 1e9
     late = [closure for closure in closures if closure.to_ns > late_ns]
     if not fresh or len(late) < MIN_AGREEING:
         return []
 
     judged_ns = [closure.to_ns for closure in closures if closure.accepted is not None]
-    if judged_ns and context.stamp_ns < max(judged_ns) + config.closure_spacing_s * 1e9:
-        return []
-    return [context.task(CODELET.name, about=[closure.id for closure in fresh])]
+    if judged_ns:
+        next_ns = max(judged_ns) + config.closure_spacing_s * 1e9
+        if context.stamp_ns < next_ns:
+            return []
+
+    task = context.task(CODELET.name, about=fresh)
+    return [task]
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
@@ -71,6 +76,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     steps = steps_of(rows, config)
     is_consistent = consistent(views, steps, config.false_closure)
     is_consistent &= views.j - views.i >= MIN_ROWS
+
     start = _start(rows[:, POSE], steps)
     path, accepted = _accepted(start, steps, views.select(is_consistent), config)
     is_accepted = np.zeros(len(closures), bool)
@@ -82,6 +88,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     for closure, holds in zip(closures, is_accepted.tolist(), strict=True):
         if holds:
             accepted_now.add(closure.id)
+
     if accepted_now == accepted_before:
         return Answer(operations)
 
@@ -89,6 +96,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     poses, replays = corrected(path, seen, config)
     correction = np.column_stack([rows[:, STAMP], rows[:, POSE], poses])
     operations.append(Correction(id=CORRECTION_ID, base_level=1.0, rows=Matrix.of(correction)))
+
     replay = msgspec.structs.replace(
         _replay(rows, poses, path.closures, config),
         stamp_ns=task.stamp_ns,
@@ -113,38 +121,45 @@ CODELET = Codelet(
 
 
 def _start(poses: Floats, steps: Constraints) -> Floats:
-    """(n, 3) poses to correct from: those believed, but where no step could have led from one to
-    the next.
+    """(n, 3) poses to correct from: those believed, and where no step can have led from one to the
+    next, those by path integration.
 
-    There the path goes on as it was felt. Who was lost for a while believed what would lead astray
-    for good.
+    Beliefs of an agent that was lost for a while would mislead the optimization for good.
     """
     believed = residuals(poses, steps)
-    possible = mahalanobis2(believed, steps.information) <= IMPOSSIBLE_SD**2
-    measured = steps.measurement + np.where(possible[:, None], believed, 0.0)
-    heading = poses[0, 2] + np.concatenate([[0.0], np.cumsum(measured[:, 2])])
-    moved = np.einsum("mab,mb->ma", rotation_matrices(heading[:-1]), measured[:, :2])
-    where = poses[0, :2] + np.vstack([np.zeros(2), np.cumsum(moved, axis=0)])
-    return np.column_stack([where, wrap_angle(heading)])
+    is_possible = mahalanobis2(believed, steps.information) <= IMPOSSIBLE_SD**2
+    measured = steps.measurement + np.where(is_possible[:, None], believed, 0.0)
+
+    turned_rad = np.concatenate([[0.0], np.cumsum(measured[:, 2])])
+    heading_rad = poses[0, 2] + turned_rad
+    turn = rotation_matrices(heading_rad[:-1])
+    steps_m = np.einsum("mab,mb->ma", turn, measured[:, :2])
+
+    moved_m = np.vstack([np.zeros(2), np.cumsum(steps_m, axis=0)])
+    positions_m = poses[0, :2] + moved_m
+    return np.column_stack([positions_m, wrap_angle(heading_rad)])
 
 
 def _accepted(
     poses: Floats, steps: Constraints, views: Views, config: Config
 ) -> tuple[PoseGraph, Booleans]:
-    """The path with the loops that hold, and which of `views` those are.
+    """The path with the loops that are accepted, and which of `views` those are.
 
-    What a landmark tells of where the agent stands is worked out again where its heading turns out
-    to be another.
+    A landmark's constraint depends on the agent's heading: it is computed again where the
+    optimization changes that.
     """
     loops = constraints_of(views, poses)
     for _ in range(MAX_ROUNDS):
         holds = inliers(PoseGraph(poses, steps, loops), config.false_closure)
         graph = PoseGraph(poses, steps, loops.select(holds))
         again = constraints_of(views, optimize(graph))
-        turned = np.abs(wrap_angle(again.measurement[:, 2] - loops.measurement[:, 2]))
-        if turned.max(initial=0.0) < SAME_RAD:
+
+        turned_rad = again.measurement[:, 2] - loops.measurement[:, 2]
+        change_rad = np.abs(wrap_angle(turned_rad))
+        if change_rad.max(initial=0.0) < SAME_RAD:
             break
         loops = again
+
     return graph, holds
 
 
@@ -157,13 +172,14 @@ def corrected(graph: PoseGraph, seen: Sightings, config: Config) -> tuple[Floats
     """
     if config.correct == "positions":
         positions = close_loops(_positions_only(graph))
-        return np.column_stack([positions.positions_m, graph.poses[:, 2]]), positions.replays
+        poses = np.column_stack([positions.positions_m, graph.poses[:, 2]])
+        return poses, positions.replays
 
     return optimize_jointly(graph, seen, config)
 
 
 def _positions_only(graph: PoseGraph) -> PoseGraph:
-    """The path where headings are not corrected: what those are wrong by is left to the positions.
+    """The path where headings are not corrected: the positions take up their errors.
 
     A turn of variance h somewhere on a loop of length L moves its end by a variance of h L^2 / 3 on
     the mean. Where a landmark is seen from, the headings of all the loop turn.
@@ -172,24 +188,32 @@ def _positions_only(graph: PoseGraph) -> PoseGraph:
     loops = graph.closures
     if not len(loops):
         return graph
-    way_m = np.concatenate(
-        [[0.0], np.cumsum(np.hypot(steps.measurement[:, 0], steps.measurement[:, 1]))]
-    )
-    lengths_m = np.abs(way_m[loops.j] - way_m[loops.i])
-    turning = 1 / steps.information[:, 2, 2]
-    variance = 1 / steps.information[:, 0, 0] + (lengths_m**2).mean() / 3 * turning
+
+    steps_m = np.hypot(steps.measurement[:, 0], steps.measurement[:, 1])
+    distance_m = _cumulative(steps_m)
+    lengths_m = np.abs(distance_m[loops.j] - distance_m[loops.i])
+
+    heading_variance = 1 / steps.information[:, 2, 2]
+    by_heading_m2 = (lengths_m**2).mean() / 3 * heading_variance
+    variance_m2 = 1 / steps.information[:, 0, 0] + by_heading_m2
     information = np.zeros_like(steps.information)
-    information[:, 0, 0] = information[:, 1, 1] = 1 / variance
+    information[:, 0, 0] = 1 / variance_m2
+    information[:, 1, 1] = 1 / variance_m2
     information[:, 2, 2] = steps.information[:, 2, 2]
-    turned = np.concatenate([[0.0], np.cumsum(turning)])
+    weakened = Constraints(steps.i, steps.j, steps.measurement, information)
+
+    turned = _cumulative(heading_variance)
+    loop_variance = np.abs(turned[loops.j] - turned[loops.i])
     levers = loops.information[:, :2, 2]
-    unsure = (
-        (levers**2).sum(axis=1)
-        / loops.information[:, 0, 0]
-        * np.abs(turned[loops.j] - turned[loops.i])
-    )
-    steps = Constraints(steps.i, steps.j, steps.measurement, information)
-    return PoseGraph(graph.poses, steps, loops.weighted(1 / (1 + unsure)))
+    levers2 = (levers**2).sum(axis=1)
+    added_share = levers2 / loops.information[:, 0, 0] * loop_variance
+    weights = 1 / (1 + added_share)
+    return PoseGraph(graph.poses, weakened, loops.weighted(weights))
+
+
+def _cumulative(values: Floats) -> Floats:
+    """(n + 1,): the sum of the first 0 to n of (n,) values."""
+    return np.concatenate([[0.0], np.cumsum(values)])
 
 
 def _judged(
@@ -202,6 +226,7 @@ def _judged(
         judged = msgspec.structs.replace(closure, consistent=consistent_now, accepted=accepted_now)
         if judged != closure:
             changed.append(judged)
+
     return changed
 
 
@@ -211,15 +236,18 @@ def _replay(rows: Floats, new: Floats, loops: Constraints, config: Config) -> Re
     backwards = slice(None, first - 1 if first else None, -1)
     before_m = rows[backwards, POSE][:, :2]
     after_m = new[backwards, :2]
+    stamps_ns = np.rint(rows[backwards, STAMP] * 1e9).astype(np.int64)
+
     pairs = _pairs(after_m, loops, len(rows), config)
     decay_per_m = config.synapse_decay_per_m
-    change = _strengths(after_m, pairs, decay_per_m) - _strengths(before_m, pairs, decay_per_m)
+    strength = _strengths(after_m, pairs, decay_per_m)
+    change = strength - _strengths(before_m, pairs, decay_per_m)
     return Replay(
         cycle=0,
         replays=0,
         closed=[],
         undone=[],
-        stamps_ns=Array.of(np.rint(rows[backwards, STAMP] * 1e9).astype(np.int64)),
+        stamps_ns=Array.of(stamps_ns),
         positions_m=Array.of(before_m),
         shifts_m=Array.of(after_m - before_m),
         pairs=Array.of(pairs.astype(np.int32)),
@@ -230,24 +258,33 @@ def _replay(rows: Floats, new: Floats, loops: Constraints, config: Config) -> Re
 
 def _strengths(positions_m: Floats, pairs: Indices, decay_per_m: float) -> Floats:
     """(m,): the synaptic strengths of pairs of place cells (paper §5.6)."""
-    apart_m = positions_m[pairs[:, 0]] - positions_m[pairs[:, 1]]
-    strengths: Floats = np.exp(-decay_per_m * np.hypot(apart_m[:, 0], apart_m[:, 1]))
+    first_m = positions_m[pairs[:, 0]]
+    second_m = positions_m[pairs[:, 1]]
+    apart_m = first_m - second_m
+
+    distance_m = np.hypot(apart_m[:, 0], apart_m[:, 1])
+    strengths: Floats = np.exp(-decay_per_m * distance_m)
     return strengths
 
 
 def _pairs(after: Floats, loops: Constraints, count: int, config: Config) -> Indices:
-    """Place cells whose synapse changes most: those of one place, met on different ways; and
-    neighbours on the way.
+    """(m, 2): place cells whose synapse changes most, those of one place on different passes, and
+    neighbours along the path.
     """
-    neighbours = np.column_stack([np.arange(len(after) - 1), np.arange(1, len(after))])
+    order = np.arange(len(after))
+    neighbours = np.column_stack([order[:-1], order[1:]])
     ends = np.column_stack([count - 1 - loops.j, count - 1 - loops.i])
-    reach = 1 / config.synapse_decay_per_m
-    near = [
-        (here, there)
-        for one, there in ends.tolist()
-        for here in np.flatnonzero(np.hypot(*(after - after[there]).T) < reach).tolist()
-        if abs(here - one) < abs(here - there)
-    ]
-    pairs = np.vstack([neighbours, np.array(near, np.int64).reshape(-1, 2)])
+    reach_m = 1 / config.synapse_decay_per_m
+
+    near = []
+    for newer, older in ends.tolist():
+        distance_m = np.hypot(*(after - after[older]).T)
+        for cell in np.flatnonzero(distance_m < reach_m).tolist():
+            is_of_newer_pass = abs(cell - newer) < abs(cell - older)
+            if is_of_newer_pass:
+                near.append((cell, older))
+
+    crossings = np.array(near, np.int64).reshape(-1, 2)
+    pairs = np.vstack([neighbours, crossings])
     result: Indices = np.unique(pairs, axis=0)
     return result
