@@ -87,7 +87,8 @@ def locate(silhouettes: list[Silhouette], camera: Calibration) -> list[ObjectPos
     objects = _stack(silhouettes, camera)
     rows = np.repeat(np.arange(len(silhouettes)), ORIENTATIONS)
     problem = objects.take(rows)
-    solution = _solve(_starts(objects), problem)
+    starts = _starts(objects)
+    solution = _solve(starts, problem)
 
     shape = (len(silhouettes), ORIENTATIONS)
     parameters = solution.parameters.reshape(*shape, 3)
@@ -143,8 +144,9 @@ def _starts(objects: FootprintProblem) -> Floats:
     orientations = np.linspace(0, np.pi, ORIENTATIONS, endpoint=False)
     facing = np.arctan(slope)
     starts = np.repeat(centre, ORIENTATIONS, axis=0)
-    starts[:, 2] = np.tile(orientations, len(centre))
-    starts[:, 2] -= np.repeat(facing, ORIENTATIONS)
+    turns = starts[:, 2]
+    turns[:] = np.tile(orientations, len(centre))
+    turns -= np.repeat(facing, ORIENTATIONS)
 
     return starts
 
@@ -186,6 +188,7 @@ def _solve(parameters: Floats, problem: FootprintProblem) -> _Solution:
     for _ in range(ITERATIONS):
         new_residuals, new_jacobian = linearized(candidate, problem)
         cost = _huber_cost(new_residuals)
+
         better = cost < best_cost
         better_row = better[:, None]
         better_matrix = better_row[..., None]

@@ -101,6 +101,7 @@ def _edge_residuals(parameters: Floats, problem: FootprintProblem) -> Floats:
     first_px = corners_px.min(1)
     last_px = corners_px.max(1)
     outermost_px = np.stack([first_px, last_px], axis=1)
+
     error_px = outermost_px - problem.edge_px
 
     outwards = np.array([-1.0, 1.0])

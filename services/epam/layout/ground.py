@@ -42,7 +42,8 @@ def project(likelihood: Singles, depth_m: Singles, camera: Calibration) -> tuple
 
     upright = _upright(disparity_px, ground_px)
     near = ground_px > min_disparity_px(camera)
-    near_road = mask & ~upright & near
+    is_flat = ~upright
+    near_road = mask & is_flat & near
     road_rows, road_columns = np.nonzero(near_road)
     road_m = _on_ground(road_rows, road_columns, plane, camera)
 
@@ -52,7 +53,9 @@ def project(likelihood: Singles, depth_m: Singles, camera: Calibration) -> tuple
     end_rows, end_columns = _boundary_pixels(likelihood, mask, visible_ground)
     boundary_m = _on_ground(end_rows, end_columns, plane, camera)
 
-    return thin(road_m), thin(boundary_m)
+    thinned_road_m = thin(road_m)
+    thinned_boundary_m = thin(boundary_m)
+    return thinned_road_m, thinned_boundary_m
 
 
 def min_disparity_px(camera: Calibration) -> float:
@@ -76,6 +79,7 @@ def _upright(disparity_px: Floats, ground_px: Floats) -> Booleans:
     nearer = nearer_px > limit_px
     as_bytes = nearer.astype(np.uint8)
     opened = cv2.morphologyEx(as_bytes, cv2.MORPH_OPEN, _SPECK)
+
     return np.asarray(opened > 0)
 
 
@@ -127,7 +131,9 @@ def _crossings(
     right_visible = visible_ground[:, right]
     visible = left_visible & right_visible
 
-    changes = mask[:, left] != mask[:, right]
+    left_road = mask[:, left]
+    right_road = mask[:, right]
+    changes = left_road != right_road
     rows, columns = np.nonzero(visible & changes)
 
     first = likelihood[rows, columns]
@@ -152,7 +158,8 @@ def _on_ground(
     forward_m = depth_m + camera.mount_forward_m
 
     right, _ = ray_slopes(rows, columns, camera)
-    left_m = -right[near] * depth_m
+    left = -right[near]
+    left_m = left * depth_m
     return np.stack([forward_m, left_m], axis=1)
 
 

@@ -169,7 +169,8 @@ class PlaceRecognizer:
         """How much likelier each remembered view's place makes the observed one than another place;
         0 for recent views.
         """
-        known = self._vectors[: len(self._views)]
+        count = len(self._views)
+        known = self._vectors[:count]
         similarities = known @ vectors.T
         most_similar = similarities.max(axis=1)
         highest = most_similar.astype(np.float64)
@@ -225,9 +226,10 @@ class PlaceRecognizer:
         if count <= len(self._vectors):
             return
 
-        known = self._vectors[: len(self._views)]
+        known_count = len(self._views)
+        known = self._vectors[:known_count]
         larger = np.empty((2 * count, DESCRIPTOR_BYTES), np.float32)
-        larger[: len(known)] = known
+        larger[:known_count] = known
         self._vectors = larger
 
     def _forget(self, oldest: int) -> None:

@@ -38,9 +38,10 @@ def surroundings(image: Bytes, depth_m: Singles, camera: Calibration) -> Singles
     height_m = camera.mount_height_m - below_camera_m
     is_below_horizon = down > 0
 
+    is_above_horizon = down < 0
     is_low = height_m < GROUND_M
     ground = known & is_below_horizon & is_low
-    sky = ~known & (down < 0)
+    sky = ~known & is_above_horizon
 
     of_ground = _median_colour(image[ground])
     of_sky = _median_colour(image[sky])

@@ -136,13 +136,14 @@ class ObjectRecognizer:
         novel = list(dict.fromkeys(self._labels))
         taught = self._prototypes.names
         labels = [*taught, *novel]
+        is_excluded = np.array([label in excluded for label in labels])
 
         *posterior, unknown, background = posteriors(
             self._directions @ appearance.embedding,
             self._novel_cosines(appearance, novel),
             appearance.building,
             self._prototypes,
-            np.array([label in excluded for label in labels]),
+            is_excluded,
         ).tolist()
         best = int(np.argmax(posterior))
         activation = min(posterior[best], 1.0)
@@ -165,9 +166,10 @@ class ObjectRecognizer:
 
     def learn(self, label: str, embedding: Singles) -> None:
         """Recognize from now on what is similar to `embedding` as `label`."""
+        self._labels.append(label)
+
         known = self._embeddings
         added = embedding[None]
-        self._labels.append(label)
         self._embeddings = np.concatenate([known, added])
 
     def is_new_appearance(self, recognition: Recognition) -> bool:
@@ -258,7 +260,8 @@ def _scaled_weights(log_weights: Floats) -> Floats:
 
 def probability(log_odds: Singles, prototypes: Prototypes) -> Floats:
     """Return the calibrated probability of the network's log odds."""
-    clipped = log_odds.astype(np.float64).clip(-50, 50)
+    precise = log_odds.astype(np.float64)
+    clipped = precise.clip(-50, 50)
     calibrated = prototypes.evidence * clipped
 
     odds_against = np.exp(-calibrated)

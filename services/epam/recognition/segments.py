@@ -96,6 +96,7 @@ def network_input(small: Bytes, depth_m: Singles, camera: Calibration) -> Single
     ground, and the pixel's row and column, from -1 to 1.
     """
     values = np.empty((CHANNELS, HEIGHT_PX, WIDTH_PX), np.float32)
+
     colours = values[:3]
     colours[:] = small.transpose(2, 0, 1)
     colours[:] = colours / 64.0 - 2.0
@@ -107,7 +108,9 @@ def network_input(small: Bytes, depth_m: Singles, camera: Calibration) -> Single
     values[4] = known
 
     height_m = _height_m(depth_m, camera)
-    values[5] = np.clip(height_m / 5.0, -1.0, 3.0)
+    scaled_height = height_m / 5.0
+    values[5] = np.clip(scaled_height, -1.0, 3.0)
+
     unknown = ~known
     values[3][unknown] = 0.0
     values[5][unknown] = 0.0
@@ -122,12 +125,14 @@ def network_input(small: Bytes, depth_m: Singles, camera: Calibration) -> Single
 def _height_m(depth_m: Singles, camera: Calibration) -> Singles:
     """Height over the ground of what each pixel of (HEIGHT_PX, WIDTH_PX) shows."""
     small_row = np.arange(HEIGHT_PX, dtype=np.float32)
-    row = small_row * camera.height_px / HEIGHT_PX
+    enlarged_row = small_row * camera.height_px
+    row = enlarged_row / HEIGHT_PX
 
     below_px = row[:, None] - np.float32(camera.cy_px)
     down = below_px / np.float32(camera.fy_px)
 
     below_camera_m = down * depth_m
+
     height_m = camera.mount_height_m - below_camera_m
     return np.asarray(height_m)
 
@@ -155,7 +160,8 @@ def _instances(output: Singles) -> npt.NDArray[np.intp]:
     log_odds, centre, right, down = output
     numbers = np.full(log_odds.shape, -1, np.intp)
     min_odds = MIN_BUILDING / (1 - MIN_BUILDING)
-    building = log_odds > np.log(min_odds)
+    min_log_odds = np.log(min_odds)
+    building = log_odds > min_log_odds
     rows, columns = np.nonzero(building)
 
     centres = _centres(centre)
@@ -167,7 +173,8 @@ def _instances(output: Singles) -> npt.NDArray[np.intp]:
     pointed_at = np.stack([pointed_row, pointed_column], 1)
 
     away_px = pointed_at[:, None] - centres[None]
-    squared_px2 = (away_px**2).sum(2)
+    squared_away_px2 = away_px**2
+    squared_px2 = squared_away_px2.sum(2)
 
     numbers[building] = squared_px2.argmin(1)
     return numbers
