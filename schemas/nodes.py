@@ -227,6 +227,7 @@ class Object(GraphNode, kw_only=True, frozen=True, tag="object"):
         mean = np.array([[self.x_m, self.y_m]])
         if self.offsets_m is None:
             return mean
+
         return mean + self.offsets_m.numpy()
 
 
@@ -344,6 +345,7 @@ def kind_of(node: GraphNode) -> str:
     """The name of a node's kind, as it travels."""
     if isinstance(node, Node):
         return node.kind
+
     return kind_name(type(node))
 
 

@@ -59,6 +59,7 @@ def field(message: Any, path: str) -> Any:
     value = message
     for step in path.split("."):
         value = _step(value, step, path)
+
     return value
 
 
@@ -95,6 +96,7 @@ def _step(value: Any, step: str, path: str) -> Any:
 
     if not isinstance(value, list | tuple | Array | Matrix):
         raise LookupError(f"nothing is inside {value!r}, so no {step!r} on the way to {path!r}")
+
     try:
         return _element(value, int(step))
     except ValueError:

@@ -342,7 +342,7 @@ def test_the_same_task_gives_the_same_samples_and_another_task_gives_others() ->
     assert first.tobytes() != other.tobytes()
 
 
-def test_rejection_keeps_samples_in_proportion_to_their_likelihood_and_never_none() -> None:
+def test_rejection_keeps_samples_by_their_likelihood_and_never_none() -> None:
     rng = generator("a test")
     kept = rejection_mask(np.log(np.repeat([1.0, 0.5, 0.1], 20_000)), rng)
     assert kept.reshape(3, -1).mean(axis=1) == pytest.approx([1.0, 0.5, 0.1], abs=0.02)
@@ -388,7 +388,7 @@ def test_a_landmark_that_was_seen_but_once_moves_nobody() -> None:
     assert found(sightings=2).x_m > 5.5
 
 
-def test_an_agent_to_whom_one_landmark_does_not_fit_grows_no_less_sure_of_itself() -> None:
+def test_one_landmark_that_does_not_fit_leaves_the_pose_as_certain() -> None:
     looker = agent(np.random.default_rng(1).normal(0.0, (0.3, 0.3, 0.01), (1000, 3)))
     for number in range(20):
         looker = _localized(
@@ -402,7 +402,7 @@ def test_an_agent_to_whom_one_landmark_does_not_fit_grows_no_less_sure_of_itself
     assert looker.x_sd_m < 0.4
 
 
-def test_path_integration_alone_goes_on_beside_the_pose_that_landmarks_correct() -> None:
+def test_path_integration_continues_beside_the_pose_landmarks_correct() -> None:
     motions = _rows((5.0, 0.0, 1.0, 0.5, 0.0))
     seen = [percept("house", 0.0, 14.0, range_sd_m=0.2)]
     found = _localized(agent(), _landmark(20.0, 0.0), motions=motions, percepts=seen)

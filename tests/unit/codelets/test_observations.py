@@ -80,7 +80,7 @@ def test_sightings_from_places_that_the_path_has_not_are_left_out() -> None:
     assert seen.place.tolist() == [0, 1]
 
 
-def test_a_path_that_turned_too_much_is_straightened_by_what_was_seen_along_it() -> None:
+def test_observations_along_a_path_correct_its_excess_of_turning() -> None:
     poses = _driven()
     at = np.arange(len(poses) - 1)
     measured = relative(poses[:-1], poses[1:]) + np.array([0.0, 0.0, 0.03])

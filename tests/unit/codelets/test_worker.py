@@ -203,7 +203,7 @@ def test_a_lease_of_another_version_of_the_task_waits_for_that_task() -> None:
     assert _proposal(worker.feed(_delta(2))).base_version == 2
 
 
-def test_a_codelet_that_is_not_configured_is_a_failure_that_names_those_there_are() -> None:
+def test_an_unknown_codelet_is_a_failure_that_names_the_known_ones() -> None:
     proposal = _proposal(_answers(_worker(), task("dreaming")))
     assert "no codelet dreaming: there are apply_correction, localization" in proposal.failure
     assert proposal.operations == []
@@ -242,7 +242,7 @@ def test_a_task_on_a_graph_that_lacks_what_it_reads_is_a_failure(codelet: str) -
     assert proposal.operations == []
 
 
-def test_an_object_first_recognised_gets_a_node_with_samples_where_it_is_seen() -> None:
+def test_a_new_object_gets_a_node_with_samples_where_it_is_seen() -> None:
     seen = percept("house", math.pi / 2, 10.0, range_sd_m=0.5, bearing_sd_rad=0.01, width_m=7.0)
     graph = graph_of(_self(3.0, 4.0, math.pi / 2))
     found, link = run(task("object_place", percepts=[seen]), graph, CONFIG).operations
@@ -319,12 +319,12 @@ def test_a_coalitions_activation_is_lidas_formula() -> None:
     assert _activation(salient) == pytest.approx((0.4 + 0.8 + 1.2) / 4)
 
 
-def test_a_nodes_total_activation_is_base_level_and_current_together_at_most_one() -> None:
+def test_total_activation_is_base_level_plus_current_at_most_one() -> None:
     node = Node(id="a", kind="thing", activation=0.7, base_level=0.6)
     assert _activation([node]) == 0.5
 
 
-def test_neutral_content_tops_out_at_exactly_a_half_and_only_salience_goes_beyond() -> None:
+def test_activation_exceeds_a_half_only_where_content_is_salient() -> None:
     assert _activation(_content(1.0, 1.0, 1.0)) == 0.5
     assert _activation(_content(1.0, 1.0, 1.0, salience=0.1)) > 0.5
 

@@ -106,7 +106,7 @@ def test_a_cell_array_of_another_kind_of_number_is_refused() -> None:
         _ledger().check(_proposal(_cells(dtype="<i8")))
 
 
-def test_a_proposal_that_tells_of_a_failure_is_dropped_whatever_else_it_holds() -> None:
+def test_a_proposal_with_a_failure_is_rejected_whatever_else_it_holds() -> None:
     ledger = _ledger()
     assert ledger.validate([_proposal(thing("new"), failure="too few samples")]) == []
     assert ledger.commit(0, 2, Phase.END, []).reasons == [
@@ -127,7 +127,7 @@ def test_what_a_codelet_may_write_is_its_own() -> None:
         _ledger().check(answer(task("drawing", version=3), [_cells()]))
 
 
-def test_reasons_are_told_of_the_first_few_and_in_short_and_the_rest_is_counted() -> None:
+def test_the_first_reasons_are_reported_in_short_and_the_rest_counted() -> None:
     ledger = _ledger()
     ledger.validate([_proposal(failure=f"{number}" + "x" * 10_000) for number in range(100)])
     delta = ledger.commit(0, 2, Phase.END, [])
@@ -147,7 +147,7 @@ def test_a_proposal_on_a_version_that_is_not_committed_yet_is_refused() -> None:
         _ledger().check(_proposal(base_version=4))
 
 
-def test_a_proposal_is_late_only_for_nodes_that_have_changed_since_its_version() -> None:
+def test_a_proposal_is_late_only_for_nodes_changed_since_its_version() -> None:
     ledger = _ledger()
     ledger.check(_proposal(thing("a"), base_version=1))
     with pytest.raises(MessageError, match="late: b has changed since 2"):

@@ -73,7 +73,7 @@ def test_a_phase_begins_when_every_task_of_the_one_before_is_answered() -> None:
     assert [asked.codelet for asked in desk.take()] == ["whereabouts"]
 
 
-def test_what_is_recognised_with_too_little_activation_is_no_object_of_the_map() -> None:
+def test_a_percept_below_the_threshold_is_no_object_of_the_map() -> None:
     desk = Desk("w1")
     desk.see(0, percept("a"), percept("b", activation=0.7))
     (localization,) = desk.take()
@@ -162,7 +162,7 @@ def test_a_known_object_is_located_and_an_unknown_one_is_placed() -> None:
     ]
 
 
-def test_a_percept_becomes_a_node_linked_to_the_object_that_it_is_an_instance_of() -> None:
+def test_a_percept_becomes_a_node_linked_to_the_object_it_is_of() -> None:
     desk = Desk("w1")
     desk.drive(range(1), percept("a"))
     assert desk.graph.links.target(percept_id("a"), LinkKind.INSTANCE) is None
@@ -266,7 +266,7 @@ def test_coalitions_are_published_once_after_the_phase_with_an_id_each() -> None
     assert whereabouts.maps == ["map:0"]
 
 
-def test_offers_are_committed_when_the_next_cycle_begins_by_source_and_number() -> None:
+def test_offers_are_committed_at_the_next_cycle_by_source_and_number() -> None:
     desk = Desk("w1")
     for source, seq, name in (("b", 0, "x"), ("a", 1, "y"), ("a", 0, "z")):
         offer = Offer(cycle=0, operations=[thing(name)], source=source, seq=seq)

@@ -70,7 +70,7 @@ def test_tasks_of_one_phase_are_spread_over_the_workers() -> None:
     ]
 
 
-def test_the_task_of_a_worker_that_goes_is_given_to_another_and_committed_once() -> None:
+def test_a_lost_workers_task_is_given_to_another_and_committed_once() -> None:
     desk = Desk("w1", "w2")
     desk.see(0)
     (asked,) = desk.take()
@@ -182,7 +182,7 @@ def test_in_lockstep_neither_lease_nor_deadline_ends() -> None:
     assert desk.clock(stamp_ns(1000)) == []
 
 
-def test_at_its_deadline_a_cycle_commits_what_has_come_and_the_next_one_begins() -> None:
+def test_a_cycle_commits_the_answers_at_its_deadline_and_the_next_begins() -> None:
     desk, asked = _real_time("w1", "w2")
     desk.feed(answer(asked, [_moved_self(0)]))
     road, *_ = desk.take()
@@ -259,7 +259,7 @@ def test_a_late_answer_is_taken_once() -> None:
     assert desk.feed(answer(asked, [_moved_self(0)])) == []
 
 
-def test_motion_that_no_answer_has_used_is_given_to_the_next_cycles_localization() -> None:
+def test_unused_motion_is_given_to_the_next_cycles_localization() -> None:
     desk, _ = _real_time("w1", "w2")
     desk.clock(stamp_ns(0) + 181 * MS)
     desk.see(1)
