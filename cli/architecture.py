@@ -10,10 +10,12 @@ from pathlib import Path
 import click
 
 from cogmap.errors import CogmapError, UsageError
+from cogmap.runtime.codelet import Written
 from cogmap.runtime.module import Module
 from schemas import topics
 from schemas.topics import Delivery, Topic
 from services import registry
+from services.codelets.table import CODELETS
 
 PAGE = Path("docs/architecture.md")
 OBSERVERS = "observers"
@@ -27,7 +29,7 @@ _WITHOUT_SCREEN = {"sim": {"egl": False}}
 def architecture(check: bool, page: Path) -> None:
     """Write the generated parts of docs/architecture.md.
 
-    They are the diagram and the table of topics, from the topic table and the modules.
+    They are the diagram, the table of topics and that of codelets, from the tables and the modules.
     """
     try:
         before = page.read_text()
@@ -91,7 +93,7 @@ def _arrows(modules: list[Module]) -> Iterator[str]:
 def topic_table(modules: list[Module]) -> str:
     """The table of topics, with their publishers and subscribers."""
     lines = [
-        "| topic | message | rate | delivery | about | from | to |",
+        "| topic | message | rate | delivery | scope | from | to |",
         "|---|---|---|---|---|---|---|",
     ]
     for topic in topics.ALL:
@@ -101,12 +103,29 @@ def topic_table(modules: list[Module]) -> str:
             topic.type.__name__,
             f"{topic.rate_hz:g} Hz" if topic.rate_hz else "as it happens",
             topic.delivery.value,
-            topic.about.value,
+            topic.scope.value,
             ", ".join(senders) or "every process",
             ", ".join(receivers),
         ]
         lines.append(f"| {' | '.join(facts)} |")
     return "\n".join([*lines, ""])
+
+
+def codelet_table(modules: list[Module]) -> str:
+    """The table of codelets: when they run, what they read, and what they may write."""
+    lines = ["| codelet | phase | reads | writes |", "|---|---|---|---|"]
+    for codelet in CODELETS:
+        reads = _kinds(codelet.reads)
+        writes = _kinds(codelet.writes)
+        lines.append(f"| `{codelet.name}` | {codelet.phase} | {reads} | {writes} |")
+    return "\n".join([*lines, ""])
+
+
+def _kinds(written: frozenset[Written]) -> str:
+    """Kinds of nodes, then of links and place columns, by name."""
+    nodes = sorted(kind.__name__ for kind in written if isinstance(kind, type))
+    others = sorted(f"`{kind}`" for kind in written if not isinstance(kind, type))
+    return ", ".join(nodes + others) or "nothing"
 
 
 def _ends(topic: Topic, modules: list[Module]) -> tuple[list[str], list[str]]:
@@ -130,4 +149,8 @@ def _ends_on_request(topic: Topic, modules: list[Module]) -> tuple[list[str], li
     return replying or [OBSERVERS], asked or [OBSERVERS]
 
 
-_PARTS: dict[str, Callable[[list[Module]], str]] = {"diagram": diagram, "topics": topic_table}
+_PARTS: dict[str, Callable[[list[Module]], str]] = {
+    "diagram": diagram,
+    "topics": topic_table,
+    "codelets": codelet_table,
+}

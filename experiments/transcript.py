@@ -8,14 +8,14 @@ from cogmap.bus.codec import encode
 from cogmap.runtime.module import Module
 from schemas import topics
 from schemas.base import Message
-from schemas.topics import About, Delivery, Topic
+from schemas.topics import Delivery, Scope, Topic
 
 NAME = "listener"
 # What the model publishes and nobody may miss.
 MODEL = tuple(
     topic
     for topic in topics.ALL
-    if topic.about is About.MODEL and topic.delivery is Delivery.NEVER_DROP
+    if topic.scope is Scope.MODEL and topic.delivery is Delivery.NEVER_DROP
 )
 
 

@@ -22,7 +22,7 @@ class Delivery(enum.Enum):
     ON_REQUEST = "on request"
 
 
-class About(enum.Enum):
+class Scope(enum.Enum):
     """MODEL: what the agent senses, thinks and does, the same bytes for the same seed in lockstep.
 
     PROCESS: how the processes fare, which differs from run to run. TRUTH: the simulator's; no
@@ -47,7 +47,7 @@ class Topic:
     type: type[Message]
     rate_hz: float
     delivery: Delivery
-    about: About = About.MODEL
+    scope: Scope = Scope.MODEL
     max_bytes: int = MIB
     keep_in_log: bool = True
     sensed: bool = False
@@ -70,7 +70,7 @@ SCAN = Topic("sensory/scan", sensing.RangeScan, 5, _LATEST)
 PERCEPTS = Topic("epam/percepts", sensing.Percepts, 5, _NEVER)
 LEARNED = Topic("epam/learned", sensing.Learned, 0, _NEVER, max_bytes=64 * MIB)
 TASK = Topic("workspace/task", codelets.Task, 0, _NEVER)
-LEASES = Topic("workspace/leases", codelets.Leases, 0, _NEVER, About.PROCESS)
+LEASES = Topic("workspace/leases", codelets.Leases, 0, _NEVER, Scope.PROCESS)
 PROPOSAL = Topic("codelets/proposal", codelets.Proposal, 0, _NEVER, max_bytes=64 * MIB)
 OFFER = Topic("workspace/offer", codelets.Offer, 0, _NEVER, max_bytes=16 * MIB)
 DELTA = Topic("workspace/delta", graph.Delta, 0, _NEVER, max_bytes=64 * MIB)
@@ -82,10 +82,10 @@ COMPETITION = Topic("global_workspace/competition", cognition.Competition, 5, _N
 BROADCAST = Topic("global_workspace/broadcast", cognition.Broadcast, 0, _NEVER)
 ACTION = Topic("action/selected", cognition.Action, 0, _NEVER)
 MOTOR_COMMAND = Topic("motor/command", sensing.MotorCommand, 5, _NEVER)
-TRUE_POSE = Topic("truth/pose", sensing.TruePose, 20, _LATEST, About.TRUTH, sensed=True)
-TRUE_TOWN = Topic("truth/town", sensing.TrueTown, 0.2, _NEVER, About.TRUTH, sensed=True)
-PRESENCE = Topic("presence", process.Presence, 0, _NEVER, About.PROCESS)
-HEALTH = Topic("health", process.Health, 0, _LATEST, About.PROCESS)
+TRUE_POSE = Topic("truth/pose", sensing.TruePose, 20, _LATEST, Scope.TRUTH, sensed=True)
+TRUE_TOWN = Topic("truth/town", sensing.TrueTown, 0.2, _NEVER, Scope.TRUTH, sensed=True)
+PRESENCE = Topic("presence", process.Presence, 0, _NEVER, Scope.PROCESS)
+HEALTH = Topic("health", process.Health, 0, _LATEST, Scope.PROCESS)
 
 ALL: tuple[Topic, ...] = tuple(
     value for value in list(globals().values()) if isinstance(value, Topic)

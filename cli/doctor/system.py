@@ -12,7 +12,7 @@ from cogmap.bus.interface import Member
 from schemas import topics
 from schemas.base import Message
 from schemas.process import Clock, Health
-from schemas.topics import About, Topic
+from schemas.topics import Scope, Topic
 
 RATE_TOLERANCE = 0.3
 MIN_MEASURED_HZ = 1.0
@@ -167,7 +167,7 @@ def truth_leaks(expected: Iterable[str], system: System) -> Iterator[Finding]:
     """Modules that subscribe to the simulator's ground truth."""
     modules = set(expected)
     for topic in topics.ALL:
-        if topic.about is not About.TRUTH:
+        if topic.scope is not Scope.TRUTH:
             continue
         for process in system.doing(Role.SUBSCRIBES, topic):
             if process.member is not None and process.member.module in modules:

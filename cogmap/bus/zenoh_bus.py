@@ -16,7 +16,7 @@ from cogmap.bus.discovery import identify
 from cogmap.bus.interface import CACHED_MESSAGES, Answer, Arrival, Job, Member
 from cogmap.bus.session import check_name, open_client, ready_key
 from cogmap.errors import MessageError, NoAnswerError
-from schemas.topics import About, Delivery, Topic
+from schemas.topics import Delivery, Scope, Topic
 
 # Zenoh delivers on a thread of its own, which at Python's default would wait 5 ms for a module that
 # computes.
@@ -197,7 +197,7 @@ def encoding(topic: Topic) -> zenoh.Encoding:
 def _priority(topic: Topic) -> zenoh.Priority:
     """Images and facts about processes give way to what the cycle waits for."""
     is_image = topic.max_bytes > _LARGE_BYTES and topic.delivery is Delivery.LATEST_WINS
-    if is_image or topic.about is not About.MODEL:
+    if is_image or topic.scope is not Scope.MODEL:
         return zenoh.Priority.DATA_LOW
     return zenoh.Priority.DATA_HIGH
 

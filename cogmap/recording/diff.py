@@ -11,7 +11,7 @@ import msgspec
 from cogmap.recording.replaying import compare
 from cogmap.recording.storage.reader import LogReader, Progress, Record
 from schemas import topics
-from schemas.topics import About, Topic
+from schemas.topics import Scope, Topic
 
 Key = tuple[str, str, int, int]
 
@@ -45,7 +45,7 @@ class Diff(msgspec.Struct, kw_only=True):
 
 def model_topics() -> list[Topic]:
     """The topics whose bytes are the same for the same seed."""
-    return [topic for topic in topics.ALL if topic.about is About.MODEL]
+    return [topic for topic in topics.ALL if topic.scope is Scope.MODEL]
 
 
 def diff(

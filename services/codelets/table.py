@@ -7,7 +7,7 @@ Codelet.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 
 from cogmap.errors import ConfigError
 from cogmap.runtime import config
@@ -41,7 +41,7 @@ def all_codelets() -> tuple[Codelet, ...]:
     points = sorted(entry_points(group=ENTRY_POINTS), key=lambda point: point.name)
 
     for point in points:
-        codelet = point.load()
+        codelet = _loaded(point)
         if not isinstance(codelet, Codelet):
             raise ConfigError(f"entry point {point.name} = {point.value} is no Codelet")
         if codelet.name in names:
@@ -51,6 +51,18 @@ def all_codelets() -> tuple[Codelet, ...]:
         codelets.append(codelet)
 
     return tuple(codelets)
+
+
+def _loaded(point: EntryPoint) -> object:
+    """What an entry point names. Raises ConfigError where it cannot be imported."""
+    try:
+        return point.load()
+    except Exception as error:  # another package's code may raise anything as it is imported
+        reason = f"{type(error).__name__}: {error}"
+        raise ConfigError(
+            f"entry point {point.name} = {point.value} cannot be imported ({reason}): "
+            "mend or uninstall its package"
+        ) from error
 
 
 def configured(

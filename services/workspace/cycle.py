@@ -73,6 +73,7 @@ class Workspace:
                 self._begun_ns = max(self._begun_ns, message.stamp_ns)
 
         self._forgetting.restore(self._ledger.graph)
+        self._offers.restore(self._ledger.graph.cycle)
 
     def snapshot(self, request: SnapshotRequest | None = None) -> Snapshot:
         """The whole graph.
@@ -241,7 +242,7 @@ class Workspace:
 
         entering = first_operations(graph, self._config)
         entering += percept_operations(graph, self._context)
-        entering += self._offers.take(self._ledger)
+        entering += self._offers.take(self._ledger, self._context.cycle)
         return [self._commit(Phase.PERCEPTS, entering), *self._next_phase()]
 
     def _motions_until(self, stamp_ns: int) -> Array:

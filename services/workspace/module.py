@@ -28,6 +28,9 @@ def build(config: Config, instance: str, codelets: Sequence[ConfiguredCodelet]) 
         .on(topics.CLOCK, workspace.on_clock, emits=published)
         .serve(topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, workspace.snapshot)
         .journaling(
-            topics.DELTA, workspace.restore, workspace.snapshot, backfill=[topics.SELF_MOTION]
+            topics.DELTA,
+            workspace.restore,
+            workspace.snapshot,
+            backfill=[topics.SELF_MOTION, topics.OFFER],
         )
     )

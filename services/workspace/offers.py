@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+import msgspec
+
 from cogmap.errors import MessageError
 from schemas.codelets import Offer
 from schemas.graph import Operation
+from schemas.nodes import GraphNode
 from services.workspace.commit import Ledger
 from services.workspace.rules import may_offer
 
@@ -21,10 +24,16 @@ class Offers:
         self._awaited = frozenset(awaited)
         self._newest_cycle: dict[str, int] = {}
         self._waiting: list[Offer] = []
+        self._restored_cycle = 0
+
+    def restore(self, cycle: int) -> None:
+        """Ignore offers made before `cycle`, which a restored graph has ended: they were committed."""
+        self._restored_cycle = cycle
 
     def put(self, offer: Offer) -> None:
         """Add an offer."""
-        self._waiting.append(offer)
+        if offer.cycle >= self._restored_cycle:
+            self._waiting.append(offer)
 
         newest = self._newest_cycle.get(offer.source, 0)
         self._newest_cycle[offer.source] = max(newest, offer.cycle)
@@ -38,8 +47,8 @@ class Offers:
 
         return True
 
-    def take(self, ledger: Ledger) -> list[Operation]:
-        """The operations of all valid offers, in order of source and number.
+    def take(self, ledger: Ledger, cycle: int) -> list[Operation]:
+        """The operations of all valid offers, in order of source and number, as of `cycle`.
 
         The ledger rejects the others.
         """
@@ -53,6 +62,13 @@ class Offers:
             except MessageError as error:
                 ledger.reject(str(error))
             else:
-                operations += offer.operations
+                operations += [_as_of(operation, cycle) for operation in offer.operations]
 
         return operations
+
+
+def _as_of(operation: Operation, cycle: int) -> Operation:
+    """A node whose activation is given without a cycle is as active now as it states."""
+    if isinstance(operation, GraphNode) and operation.cycle == 0:
+        return msgspec.structs.replace(operation, cycle=cycle)
+    return operation

@@ -27,6 +27,8 @@ from schemas.nodes import (
     LinkKind,
     Map,
     Node,
+    Object,
+    Self,
     kind_name,
     place_cell,
 )
@@ -67,7 +69,7 @@ def check_operation(name: str, operation: Operation, graph: Graph, writer: Write
         raise MessageError(f"{name}: {kind} is the workspace's own to write")
 
     if isinstance(operation, Link | Links | DropLink):
-        _check_link(name, operation, writer)
+        _check_link(name, operation, graph, writer)
     elif isinstance(operation, Cells):
         _check_cells(name, operation, graph, writer)
     elif isinstance(operation, DropNode):
@@ -76,12 +78,25 @@ def check_operation(name: str, operation: Operation, graph: Graph, writer: Write
         _check_node(name, operation, graph, writer)
 
 
-def _check_link(name: str, operation: Link | Links | DropLink, writer: Writer) -> None:
+def _check_link(
+    name: str, operation: Link | Links | DropLink, graph: Graph, writer: Writer
+) -> None:
     if operation.kind not in _LINK_KINDS:
         return
 
     if not writer(LinkKind(operation.kind)):
         raise MessageError(f"{name} may not write links of kind {operation.kind}")
+
+    if operation.kind == LinkKind.AT and isinstance(operation, Link):
+        place = place_cell(operation.target)
+        if place is None:
+            raise MessageError(f"{name}: {operation.target} is no place node")
+        _check_map(name, place[0], graph)
+
+
+def _check_map(name: str, map_id: str, graph: Graph) -> None:
+    if map_id != ROOT_MAP and graph.get(Map, map_id) is None:
+        raise MessageError(f"{name}: there is no map {map_id}")
 
 
 def _check_node(name: str, node: GraphNode, graph: Graph, writer: Writer) -> None:
@@ -97,6 +112,8 @@ def _check_node(name: str, node: GraphNode, graph: Graph, writer: Writer) -> Non
         kept = kind_name(type(before))
         raise MessageError(f"{name}: {node.id} is of kind {kept}, which a node keeps")
 
+    if isinstance(node, Self | Object):
+        _check_map(name, node.map, graph)
     if isinstance(node, Node) and node.kind in _KIND_NAMES:
         raise MessageError(f"{name}: {node.id} is a generic node of the known kind {node.kind}")
 
@@ -123,8 +140,7 @@ def _check_cells(name: str, operation: Cells, graph: Graph, writer: Writer) -> N
     """Place nodes are created by the tile, so their number and distance are bounded."""
     if not writer(operation.column):
         raise MessageError(f"{name} may not write the place column {operation.column}")
-    if operation.map != ROOT_MAP and graph.get(Map, operation.map) is None:
-        raise MessageError(f"{name}: there is no map {operation.map}")
+    _check_map(name, operation.map, graph)
 
     _check_arrays(name, operation.cells, operation.values)
     number = operation.cells.shape[0]

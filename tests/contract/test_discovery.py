@@ -13,7 +13,7 @@ from cogmap.bus.interface import Answer, Member
 from cogmap.bus.session import open_client
 from cogmap.runtime.shell import Shell
 from schemas import topics
-from schemas.topics import About
+from schemas.topics import Scope
 from services import registry
 from tests.support.networks import TIMEOUT_S, OverZenoh, Peer, meet
 
@@ -68,7 +68,7 @@ def test_no_module_subscribes_to_the_truth(over_zenoh: OverZenoh) -> None:
     )
     assert names(system, Role.PUBLISHES, topics.TRUE_POSE) == ["sim"]
     for topic in topics.ALL:
-        if topic.about is About.TRUTH:
+        if topic.scope is Scope.TRUTH:
             assert names(system, Role.SUBSCRIBES, topic) == []
 
 

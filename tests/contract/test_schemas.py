@@ -18,7 +18,7 @@ from schemas import topics
 from schemas.base import Message
 from schemas.examples import samples
 from schemas.export import GOLDEN, export_golden, export_schemas, file_name, json_schema
-from schemas.topics import About, Delivery, Topic
+from schemas.topics import Delivery, Scope, Topic
 from tests.support.damage import golden
 
 BY_TOPIC = {topics.of(message): message for message in samples()}
@@ -115,7 +115,7 @@ def test_a_row_of_the_table_makes_sense(topic: Topic) -> None:
     assert topic.rate_hz >= 0
     assert topic.max_bytes >= len(golden(topic))
     assert topic.delivery is not Delivery.ON_REQUEST or topic.rate_hz == 0
-    assert (topic.about is About.TRUTH) == topic.name.startswith("truth/")
+    assert (topic.scope is Scope.TRUTH) == topic.name.startswith("truth/")
 
 
 def _floats(kind: object) -> Iterator[FloatType]:

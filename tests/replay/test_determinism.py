@@ -14,7 +14,7 @@ from cogmap.bus.codec import decode, encode
 from schemas import topics
 from schemas.codelets import Proposal
 from schemas.graph import Delta
-from schemas.topics import About, Delivery
+from schemas.topics import Delivery, Scope
 from tests.support.reference import Said, drive, graph
 
 FRAMES = 8
@@ -39,7 +39,7 @@ def _check_that_all_is_the_same(left: Said, right: Said, but: frozenset[str] = f
 
 def test_a_drive_says_something_on_every_topic_of_the_model_and_of_the_truth(first: Said) -> None:
     spoken = {topic.name for topic in topics.ALL if topic.delivery is not Delivery.ON_REQUEST}
-    processes = {topic.name for topic in topics.ALL if topic.about is About.PROCESS}
+    processes = {topic.name for topic in topics.ALL if topic.scope is Scope.PROCESS}
     # No loop closes on so short a path, and nobody offers anything.
     assert set(first) == spoken - processes - {topics.REPLAY.name, topics.OFFER.name}
     assert len(first[topics.MOTOR_COMMAND.name]) == FRAMES

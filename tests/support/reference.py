@@ -35,7 +35,7 @@ from cogmap.runtime.config import Sections
 from cogmap.runtime.in_process import InProcessRunner
 from schemas import topics
 from schemas.graph import Delta
-from schemas.topics import About
+from schemas.topics import Scope
 from services import registry
 
 REFERENCE = Path(__file__).parents[1] / "replay" / "reference.mcap"
@@ -70,7 +70,7 @@ def drive(frames: int = FRAMES, seed: int = 1, workers: int = 1, log: Path | Non
     said: Said = defaultdict(list)
     bus = MemoryBus(runner.network)
     for topic in topics.ALL:
-        if topic.about is not About.PROCESS:
+        if topic.scope is not Scope.PROCESS:
             bus.subscribe(topic, lambda arrival: _keep(said, arrival), lambda name, number: None)
     recorder = None if log is None else _recorder(MemoryBus(runner.network), log, configured)
     runner.run(lambda: len(said[topics.MOTOR_COMMAND.name]) >= frames)
@@ -145,7 +145,7 @@ def other_arithmetic(log: Path = REFERENCE) -> str:
 
 def compared(left: Path, right: Path) -> Diff:
     """How two drives compare, the truth included."""
-    return diff(left, right, [topic for topic in topics.ALL if topic.about is not About.PROCESS])
+    return diff(left, right, [topic for topic in topics.ALL if topic.scope is not Scope.PROCESS])
 
 
 def _compared_with_reference(fresh: Path) -> Diff | None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from cogmap.errors import LogError
 from cogmap.recording.storage import format as layout
 from cogmap.recording.storage.reader import LogReader, Record
-from schemas.topics import PRESENCE, About
+from schemas.topics import PRESENCE, Scope
 
 
 class Kind(enum.Enum):
@@ -89,7 +89,7 @@ def of_model(records: Iterable[tuple[int, Record]]) -> Expected:
     """The records (number, record) whose bytes a replay must reproduce, by topic and number."""
     expected: Expected = defaultdict(dict)
     for seq, record in records:
-        if record.topic.about is About.MODEL:
+        if record.topic.scope is Scope.MODEL:
             expected[record.topic.name][seq] = record
     return dict(expected)
 

@@ -15,7 +15,7 @@ from cogmap.errors import UsageError
 from cogmap.recording.replaying.pacing import ClockPublisher, Control, Pacer
 from cogmap.recording.storage.reader import LogReader, Record
 from schemas import topics
-from schemas.topics import About, Topic
+from schemas.topics import Scope, Topic
 
 SOURCE = "replay"
 
@@ -99,7 +99,7 @@ class Player:
         if topic is topics.CLOCK and self._choices.clock_hz > 0:
             return False
         if chosen is None:
-            return topic.about is not About.PROCESS
+            return topic.scope is not Scope.PROCESS
         return topic in chosen
 
     def _play_once(self) -> None:

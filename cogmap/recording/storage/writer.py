@@ -99,7 +99,7 @@ class LogWriter:
         schema = layout.schema_of(topic)
         facts = {
             "delivery": topic.delivery.name,
-            "about": topic.about.name,
+            "about": topic.scope.name,
         }
         return self._channel(topic.name, schema, facts)
 

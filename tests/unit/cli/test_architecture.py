@@ -11,7 +11,7 @@ from cli.architecture import architecture, diagram, renewed, topic_table
 from cogmap.errors import CogmapError, UsageError
 from cogmap.runtime.module import Module
 from schemas import topics
-from schemas.topics import About
+from schemas.topics import Scope
 
 PAGE = Path(__file__).parents[3] / "docs" / "architecture.md"
 
@@ -47,7 +47,7 @@ def test_the_table_has_a_row_for_each_topic() -> None:
 
 
 def test_the_page_shows_no_arrow_of_the_truth_into_a_module() -> None:
-    truth = [topic.name for topic in topics.ALL if topic.about is About.TRUTH]
+    truth = [topic.name for topic in topics.ALL if topic.scope is Scope.TRUTH]
     arrows = [
         line
         for line in PAGE.read_text().splitlines()

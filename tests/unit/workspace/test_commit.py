@@ -120,6 +120,19 @@ def test_a_proposal_of_a_codelet_that_is_not_configured_is_rejected() -> None:
         _ledger().check(answer(asked, [thing("new")]))
 
 
+@pytest.mark.parametrize("target", ["object:house", "place:map:9:1:2"])
+def test_a_node_is_linked_to_a_place_of_a_map_that_exists(target: str) -> None:
+    ledger = Ledger({"dreaming": lambda written: True})
+    with pytest.raises(MessageError, match=r"is no place node|there is no map map:9"):
+        ledger.check(answer(task("dreaming", version=0), [Link(source="self", target=target)]))
+
+
+def test_an_object_is_on_a_map_that_exists() -> None:
+    ledger = Ledger({"dreaming": lambda written: True})
+    with pytest.raises(MessageError, match="there is no map map:9"):
+        ledger.check(answer(task("dreaming", version=0), [landmark("a", map="map:9")]))
+
+
 def test_what_a_codelet_may_write_is_its_own() -> None:
     with pytest.raises(MessageError, match="may not write nodes of kind node"):
         _ledger().check(answer(task("drawing", version=3), [thing("new")]))

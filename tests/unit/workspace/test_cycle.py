@@ -312,3 +312,25 @@ def test_an_interrupted_cycle_goes_on_from_its_last_commit(committed: int) -> No
     assert [delta.version for delta in again.deltas] == [
         delta.version for delta in whole.deltas[len(past) :]
     ]
+
+
+def test_an_offer_made_before_a_restart_is_not_committed_again() -> None:
+    desk = Desk("w1")
+    desk.drive(range(3))
+    again = _restored([*desk.deltas])
+    again.feed(Offer(cycle=1, operations=[thing("old")], source="goal"))
+    again.feed(Offer(cycle=3, operations=[thing("new")], source="goal"))
+    again.drive(range(3, 4))
+    names = {
+        item.id for delta in again.deltas for item in delta.operations if isinstance(item, Node)
+    }
+    assert names == {"new"}
+
+
+def test_an_offered_node_is_as_active_as_it_states_when_it_enters() -> None:
+    desk = Desk("w1")
+    desk.drive(range(5))
+    desk.feed(Offer(cycle=5, operations=[thing("goal")], source="goal"))
+    desk.drive(range(5, 6))
+    graph = desk.graph
+    assert graph.activation(graph.nodes["goal"]) == 1.0
