@@ -1,4 +1,4 @@
-"""The apply-correction codelet: it applies a correction of the path to the current map (paper §5.6).
+"""The apply-correction codelet: it applies a correction of the path to the map (paper §5.6).
 
 Each object and each road node moves with the place of the path that is nearest to it. What was
 written since the correction was computed is kept: places that the path has gained move with its

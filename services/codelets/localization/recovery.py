@@ -56,7 +56,9 @@ def seen_before(graph: Graph, odometry: Samples) -> list[Percept]:
 
 
 def _remembered_sd_m(information: Samples, moved_m: float) -> float:
-    """The standard deviation of a landmark's position, seen `moved_m` ago with (2, 2) information."""
+    """The standard deviation, m, of where a landmark is that was seen `moved_m` ago with (2, 2)
+    information.
+    """
     covariance_m2 = np.linalg.inv(information)
     variance_m2 = float(np.linalg.eigvalsh(covariance_m2).max())
     drift_m = DRIFT_SHARE * moved_m
