@@ -113,7 +113,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         Seconds,
         Meta(description="correlation time of the gain error of range, in s, above 0, at most 1e9"),
     ] = 300.0
-    astray: Annotated[
+    misfits_to_relocalize: Annotated[
         int,
         Meta(
             description="successive views that fit no sample, of two landmarks or more, after "

@@ -27,7 +27,7 @@ class Offers:
         self._restored_cycle = 0
 
     def restore(self, cycle: int) -> None:
-        """Ignore offers made before `cycle`, which a restored graph has ended: they were committed."""
+        """Ignore offers made before `cycle`: what ended before a restore was committed."""
         self._restored_cycle = cycle
 
     def put(self, offer: Offer) -> None:

@@ -42,7 +42,7 @@ from services.codelets.localization.measurement_model import (
     sightings,
 )
 from services.codelets.localization.motion_model import dead_reckon, move, with_gains
-from services.codelets.localization.recovery import look_around, seen_before, turn_about
+from services.codelets.localization.recovery import relocalize, relocalize_heading, seen_before
 from services.codelets.localization.sampling import (
     Samples,
     centred,
@@ -211,7 +211,7 @@ def _correct(
     determine which headings are tried.
     """
     if _is_heading_unknown(past.samples[:, 2]) and seen.has_bearing.any():
-        turned = turn_about(past.samples, seen, config, rng)
+        turned = relocalize_heading(past.samples, seen, config, rng)
         return Estimate(turned, 0.0)
 
     compared = compare(past.samples, seen)
@@ -228,8 +228,8 @@ def _correct(
         scores = log_likelihood(compared.density, config.outlier_share, weights)
         exponent = exponent_left
         if stage < STAGES - 1:
-            bearable = tempering_exponent(scores, config.kept_samples / len(scores))
-            exponent = min(exponent_left, bearable)
+            largest_step = tempering_exponent(scores, config.kept_samples / len(scores))
+            exponent = min(exponent_left, largest_step)
 
         kept, kept_share = rejection_resample(samples, exponent * scores, config.kept_samples, rng)
         share *= kept_share
@@ -307,13 +307,13 @@ def _relocalize(
     if is_unsure:
         enough = SEVERAL
     elif len(seen.labels) > 1:
-        enough = config.astray
+        enough = config.misfits_to_relocalize
     else:
-        enough = ALONE * config.astray
+        enough = ALONE * config.misfits_to_relocalize
     if lost.misfit_count < enough:
         return lost
 
-    samples = look_around(lost.samples, seen, config, rng)
+    samples = relocalize(lost.samples, seen, config, rng)
     return Estimate(samples, 0.0, was_kidnapped=not is_unsure)
 
 

@@ -81,9 +81,7 @@ def _percept(label: str, forwards_m: float, left_m: float, sd_m: float) -> Perce
     )
 
 
-def look_around(
-    gains: Samples, seen: Sighting, config: Config, rng: np.random.Generator
-) -> Samples:
+def relocalize(gains: Samples, seen: Sighting, config: Config, rng: np.random.Generator) -> Samples:
     """(n, 7) samples of the self by what is in view alone; the senses' gains are those of (n, 7)
     `gains`.
 
@@ -118,7 +116,7 @@ def look_around(
     return _drawn(candidates, density, len(gains), config, rng)
 
 
-def turn_about(
+def relocalize_heading(
     samples: Samples, seen: Sighting, config: Config, rng: np.random.Generator
 ) -> Samples:
     """(n, 7) samples of the self, its position known, its heading unknown: turned by what is in
