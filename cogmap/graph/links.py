@@ -39,9 +39,22 @@ class LinkIndex:
 
     def put_all(self, links: Links) -> None:
         """Set the weights of many links of one kind."""
+        if links.kind in EXCLUSIVE_LINKS:
+            for source, weights in links.weights.items():
+                for target, weight in weights.items():
+                    self._put_exclusive(links.kind, source, target, weight)
+            return
+
+        targets = self._targets[links.kind]
         for source, weights in links.weights.items():
-            for target, weight in weights.items():
-                self.put(links.kind, source, target, weight)
+            if not weights:
+                continue
+
+            known = targets.setdefault(source, {})
+            for target in weights:
+                if target not in known:
+                    self._add_source(links.kind, target, source)
+            known.update(weights)
 
     def drop(self, kind: str, source: str, target: str) -> None:
         """Remove a link, if it exists."""
