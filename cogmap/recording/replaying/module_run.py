@@ -26,6 +26,7 @@ class ModuleRun:
         self._module = module
         self._logged_graph = LoggedGraph(reader)
         self._untimed = 0
+        self._refusals: list[str] = []
         self._published: dict[str, set[int]] = {name: set() for name in job.expected}
         self.outcome = Outcome(
             module=job.module,
@@ -63,8 +64,11 @@ class ModuleRun:
         except LogError:
             raise
         except Exception as error:
+            refusal = self._refusal(step, error)
             if self._job.exact:
-                self._differ(self._refusal(step, error))
+                self._differ(refusal)
+            else:
+                self._refusals.append(refusal)
             return []
 
     def _refusal(self, step: Step, error: Exception) -> str:
@@ -176,6 +180,8 @@ class ModuleRun:
             notes.append(f"{self.outcome.extra_outputs} outputs that the log lacks")
         if not self._job.exact:
             notes.append("the log has no envelopes: inputs were fed in the order of the log")
+        if self._refusals:
+            notes.append(f"{len(self._refusals)} inputs refused, the first: {self._refusals[0]}")
         if self._untimed:
             timers = len(self._module.timers)
             notes.append(
