@@ -40,6 +40,7 @@ def _alive(pid: int) -> bool:
 
 def test_results_come_in_the_order_of_the_jobs_and_progress_reaches_one() -> None:
     shares: list[float] = []
+
     assert parallel_map(abs, [-3, 2, -1], 2, shares.append) == [3, 2, 1]
     assert shares[-1] == 1.0 and shares == sorted(shares)
 
@@ -51,7 +52,9 @@ def test_nothing_is_left_of_the_processes_of_one_that_is_killed(tmp_path: Path) 
     process = subprocess.Popen(
         [sys.executable, str(script)], stdout=subprocess.PIPE, text=True, env=environment
     )
+
     assert process.stdout is not None
+
     while process.stdout.readline() != "waiting\n":
         assert process.poll() is None
     deadline_s = time.monotonic() + 30

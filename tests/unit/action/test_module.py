@@ -80,6 +80,7 @@ def _commands(messages: list[Message]) -> list[MotorCommand]:
 
 def test_before_any_broadcast_the_robot_stands() -> None:
     (command,) = _commands(_module().feed(_delta()))
+
     assert (command.left_wheel_rad_s, command.halted_by) == (0.0, "no action")
 
 
@@ -120,6 +121,7 @@ def test_at_the_end_of_the_route_a_broadcast_halts_the_robot() -> None:
 def test_without_a_route_the_robot_is_halted_for_want_of_one() -> None:
     module = _module(route=())
     module.feed(_broadcast())
+
     assert [command.halted_by for command in _commands(module.feed(_delta()))] == ["no route"]
 
 
@@ -309,12 +311,14 @@ def test_a_robot_that_moves_or_is_not_commanded_to_is_not_stuck() -> None:
         idle.feed(_motion(cycle, speed_m_s=0.0))
         (moved,) = _commands(moving.feed(_delta(cycle)))
         (stood,) = _commands(idle.feed(_delta(cycle)))
+
         assert moved.halted_by is SpeedLimit.NONE
         assert stood.halted_by is SpeedLimit.NO_ACTION
 
 
 def test_a_self_motion_of_another_shape_is_refused_by_name() -> None:
     motion = msgspec.structs.replace(_motion(), motions=Array.of(np.zeros((2, 3))))
+
     with pytest.raises(MessageError, match="rows of 5 columns"):
         _module().feed(motion)
 

@@ -61,6 +61,7 @@ def test_on_the_line_and_along_it_both_wheels_turn_at_cruising_speed() -> None:
 @pytest.mark.parametrize("pose", [_at(5.0, 1.0), _at(5.0, 0.0, 0.3), _at(5.0, 0.5, 2 * math.pi)])
 def test_left_of_the_line_or_headed_left_the_robot_turns_right(pose: Pose) -> None:
     command = _command(pose)
+
     assert command.left_wheel_rad_s > command.right_wheel_rad_s
 
 
@@ -69,6 +70,7 @@ def test_left_of_the_line_or_headed_left_the_robot_turns_right(pose: Pose) -> No
 )
 def test_right_of_the_line_or_headed_right_the_robot_turns_left(pose: Pose) -> None:
     command = _command(pose)
+
     assert command.left_wheel_rad_s < command.right_wheel_rad_s
 
 

@@ -127,15 +127,18 @@ def test_with_poses_over_a_second_old_the_robot_keeps_to_its_street() -> None:
 
 def test_at_full_speed_it_would_leave_the_street() -> None:
     reckless = Config(route=ROUTE, blind_m=1000.0)
+
     assert _drive(1.2, 20.0, reckless).farthest_m > STREET_HALF_WIDTH_M
 
 
 def test_with_fresh_poses_it_reaches_the_corner_at_full_speed() -> None:
     machine = _drive(0.1, 12.0, Config(route=ROUTE))
+
     assert machine.farthest_m < STREET_HALF_WIDTH_M / 2
     assert SpeedLimit.POSE_AGE not in {command.slowed_by for command in machine.commands}
 
 
 def test_poses_older_than_the_limit_move_no_wheel() -> None:
     machine = _drive(2.2, 10.0, Config(route=ROUTE))
+
     assert {command.halted_by for command in machine.commands} == {SpeedLimit.POSE_AGE}

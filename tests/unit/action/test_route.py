@@ -31,6 +31,7 @@ def test_a_straight_leg_is_a_line_along_x_with_its_overrun() -> None:
 )
 def test_a_turn_is_left_where_it_is_positive(turn_rad: float, end_m: tuple[float, float]) -> None:
     route = _route((20.0, turn_rad), (30.0, 0.0))
+
     assert route.points_m[-1] == pytest.approx(end_m, abs=STEP_M)
 
 
@@ -53,6 +54,7 @@ def test_a_rounded_corner_leaves_and_meets_its_legs_a_radius_away() -> None:
 def test_a_rounded_corner_is_shorter_than_its_legs() -> None:
     sharp = _route((20.0, QUARTER), (20.0, 0.0), corner_radius_m=0.01)
     round_ = _route((20.0, QUARTER), (20.0, 0.0))
+
     assert round_.left_m == pytest.approx(sharp.left_m - 2 * 3.5 + 1.62 * 3.5, abs=2 * STEP_M)
 
 
@@ -68,6 +70,7 @@ def test_between_short_legs_a_corner_is_as_wide_as_they_allow() -> None:
 def test_points_lie_a_step_apart() -> None:
     route = _route((20.0, QUARTER), (10.0, -QUARTER), (15.0, 0.3), (8.0, 0.0))
     apart_m = np.hypot(*np.diff(route.points_m, axis=0).T)
+
     assert apart_m == pytest.approx(STEP_M, abs=0.02)
 
 
@@ -118,11 +121,13 @@ def test_the_leg_changes_in_the_middle_of_its_corner_on_every_lap() -> None:
 
 def test_curvature_is_that_of_the_bend_ahead_and_none_on_the_straight() -> None:
     route = _route((40.0, QUARTER), (40.0, 0.0))
+
     assert route.sharpest(10.0) == 0.0
     assert 1 / 3.5 < route.sharpest(60.0) < 2 / 3.5
 
 
 def test_the_point_ahead_stops_at_the_end_of_the_line() -> None:
     route = _route((10.0, 0.0))
+
     assert route.ahead(4.0) == pytest.approx((4.0, 0.0))
     assert route.ahead(400.0) == pytest.approx(route.points_m[-1])

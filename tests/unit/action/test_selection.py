@@ -17,6 +17,7 @@ def _nodes(**activations: float) -> list[Node]:
 
 def test_a_schemes_activation_is_mean_context_plus_mean_salience() -> None:
     scheme = Scheme("s", context=("a", "b"), adding={"c": 0.2, "d": -0.4})
+
     assert scheme.activation({"a": 0.3, "b": 0.1}) == pytest.approx(0.2 + 0.3)
     assert scheme.activation({"a": 1.0, "b": 1.0}) == 1.0
 
@@ -44,6 +45,7 @@ def test_a_scheme_less_active_than_is_instantiated_is_never_selected() -> None:
 
 def test_following_the_route_needs_an_agent_that_knows_where_it_is() -> None:
     selection = ActionSelection(Config(selection_threshold=0.0))
+
     assert selection.select(_nodes(object=1.0), {"route_ahead": 1.0, "route_end": 0.0}) is None
 
 

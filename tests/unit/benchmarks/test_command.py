@@ -60,6 +60,7 @@ def test_a_report_shows_what_is_met_and_missed_and_writes_flat_json(
         for line in capsys.readouterr().out.splitlines()
         if line.startswith("│")
     }
+
     assert "met" in lines["low"]
     assert "missed" in lines["high"]
     assert "7" in lines["why"]
@@ -93,6 +94,7 @@ def test_all_ends_with_1_where_a_threshold_is_missed_and_writes_every_key(
 
     assert result.exit_code == 1
     assert "missed" in result.output
+
     metrics = json.loads(path.read_text())
     assert metrics["slow_ms"] == 3.0 and metrics["fast_ms"] == 1.0
     assert metrics["runs"] == 2.0 and metrics["bus_runs"] == 5.0

@@ -39,6 +39,7 @@ def test_a_graph_is_measured_against_exact_least_squares_and_gtsam(tmp_path: Pat
     truth = tmp_path / "truth.txt"
     truth.write_text("0 0 0\n1 0 1.57\n1 1 3.14\n0 1 -1.57\n0 0 0\n")
     metrics = measure(_square(tmp_path), truth)
+
     assert metrics["positions_cost_ratio"] <= 1.05
     assert metrics["ate_m"] < metrics["ate_uncorrected_m"]
     assert metrics["ate_vs_gtsam"] == pytest.approx(1.0, abs=0.02)
@@ -53,6 +54,7 @@ def test_where_gtsam_gives_up_it_is_compared_with_by_its_slower_factors(
     path.write_text(SQUARE.replace("100 0 0 100 0 100", "1e20 0 0 1e20 0 1e-3"))
     graph = read_graph(path)
     peer = reference.Gtsam(graph.poses, graph.constraints)
+
     assert peer.gives_up() and not peer.gives_up()
     assert cost(peer.poses(peer.solve()), graph.constraints) < cost(graph.poses, graph.constraints)
 
@@ -65,6 +67,7 @@ def test_the_best_positions_are_exact_where_a_loop_is_certain(tmp_path: Path) ->
     graph = read_graph(path)
     known = displacements(graph.poses, graph.constraints)
     exact = position_cost(reference.best_positions(graph), graph.constraints, known)
+
     assert position_cost(
         close_loops(graph, 1e-9).positions_m, graph.constraints, known
     ) >= exact * (1 - 1e-9)
@@ -72,6 +75,7 @@ def test_the_best_positions_are_exact_where_a_loop_is_certain(tmp_path: Path) ->
 
 def test_without_gtsam_the_remedy_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "gtsam", None)
+
     with pytest.raises(UsageError, match="run make bench-setup"):
         measure(_square(tmp_path), None)
 
@@ -93,5 +97,6 @@ def test_without_evo_the_remedy_is_named(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_a_truth_of_another_length_is_refused(tmp_path: Path) -> None:
     truth = tmp_path / "truth.txt"
     truth.write_text("0 0 0\n")
+
     with pytest.raises(UsageError, match="has 1 poses"):
         measure(_square(tmp_path), truth)

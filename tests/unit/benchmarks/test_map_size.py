@@ -17,6 +17,7 @@ def test_a_made_up_map_has_the_objects_and_places_it_should() -> None:
     graph.load(cognitive_map(TINY))
     assert graph.count(Object) == 5
     assert len(graph.places.tiles) * TILE_SIDE**2 >= 2_000
+
     (tile, *_) = graph.places.tiles.values()
     assert set(tile.columns) == set(PlaceColumn)
     assert all(graph.links.target(node.id, LinkKind.AT) for node in graph.of_kind(Object))
@@ -24,6 +25,7 @@ def test_a_made_up_map_has_the_objects_and_places_it_should() -> None:
 
 def test_every_cycle_is_measured_and_the_learned_map_stays() -> None:
     measured = cycles.drive(cognitive_map(TINY))
+
     assert len(measured.cpu_s) == len(measured.delta_bytes) == cycles.WARM_UP + cycles.CYCLES
     assert measured.mean_cpu_s > 0
     assert measured.mean_delta_bytes > 0
@@ -37,4 +39,5 @@ def test_a_worker_that_joins_is_timed_until_its_first_proposal() -> None:
 def test_the_memory_of_a_replica_grows_with_its_map() -> None:
     small = replica_memory_mb(cognitive_map(TINY))
     large = replica_memory_mb(cognitive_map(Size(objects=5_000, places=50_000)))
+
     assert large > small + 5

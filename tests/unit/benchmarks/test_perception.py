@@ -77,6 +77,7 @@ def test_an_outline_holds_its_corners_and_what_is_between_them() -> None:
         box_px=(2, 1, 4, 3),
         outline_px=[(2, 1), (5, 1), (5, 3), (2, 3)],
     )
+
     np.testing.assert_array_equal(
         objects.filled(percept, (10, 10)), _mask(slice(1, 4), slice(2, 6))
     )
@@ -176,6 +177,7 @@ def test_a_learned_label_is_right_for_the_building_it_was_given_to() -> None:
 
 def test_calibration_error_is_the_gap_of_activation_and_accuracy_by_bin() -> None:
     sure = [(0.95, True)] * 3 + [(0.95, False)]
+
     assert objects.calibration_error(sure) == pytest.approx(0.2)
     assert objects.calibration_error(sure + [(0.3, False)] * 4) == pytest.approx((0.2 + 0.3) / 2)
     assert objects.calibration_error([(1.0, True), (0.0, False)]) == 0.0
@@ -255,6 +257,7 @@ def test_streets_end_at_the_outline_of_them_all_and_not_where_they_cross() -> No
 
 def test_points_ahead_of_a_robot_that_looks_north_are_north_of_it() -> None:
     pose = Pose(x_m=1.0, y_m=2.0, heading_rad=math.pi / 2)
+
     np.testing.assert_allclose(
         streets.in_town([(3.0, 0.0), (0.0, 1.0)], pose), [(1.0, 5.0), (0.0, 2.0)], atol=1e-12
     )
@@ -268,9 +271,11 @@ def test_a_later_view_is_from_elsewhere_and_shows_the_building() -> None:
         again = scenes.later(place, target, first, rng)
         assert np.count_nonzero(scenes.skyline(place, first) == target) > 8
         assert again is not None
+
         (side, near), (other, far) = (
             scenes.side_and_range(place, pose)[target] for pose in (first, again)
         )
+
         assert abs(math.remainder(side - other, math.tau)) >= math.radians(45) - 1e-9
         assert max(near, far) / min(near, far) >= 1.3
         assert 5 <= far <= 60
@@ -314,8 +319,10 @@ def test_a_pair_of_ones_own_is_matched_by_ours_and_by_plain(tmp_path: Path) -> N
 
     assert result.exit_code == 0, result.output
     assert '"stereo_off_1px"' in json_path.read_text()
+
     metrics = stereo.measure(*_pair(tmp_path), 4.0)
     assert metrics["stereo_off_1px"] < 0.1
+
     ratio = metrics["stereo_off_1px"] / metrics["plain_off_1px"]
     assert metrics["stereo_off_1px_over_plain"] == pytest.approx(ratio)
 
@@ -337,6 +344,7 @@ def test_a_file_that_is_missing_or_no_image_or_of_another_size_is_named(
             path.write_bytes(wrong)
         elif wrong is not None:
             cv2.imwrite(str(path), wrong + 4)
+
         with pytest.raises(UsageError, match=said) as refused:
             stereo.measure(paths[0], paths[1], paths[2], 4.0)
         assert "wrong.png" in str(refused.value)
@@ -348,6 +356,7 @@ def test_disparities_without_sense_are_refused(tmp_path: Path) -> None:
         stereo.measure(left, right, disparity, 0.1)
     with pytest.raises(UsageError, match="one channel"):
         stereo.measure(left, right, left, 1.0)
+
     cv2.imwrite(str(disparity), np.zeros((96, 160), np.uint8))
     with pytest.raises(UsageError, match="no disparity over 0"):
         stereo.measure(left, right, disparity, 1.0)

@@ -32,6 +32,7 @@ def test_a_lap_takes_even_steps_and_rounds_its_corners() -> None:
     lap = poses(LINE, np.random.default_rng(0), STEP_M)
     steps_m = [math.hypot(b.x_m - a.x_m, b.y_m - a.y_m) for a, b in itertools.pairwise(lap)]
     turns = [b.heading_rad - a.heading_rad for a, b in itertools.pairwise(lap)]
+
     assert np.allclose(steps_m, STEP_M[0], atol=0.02)
     assert max(turns) < 0.4
     assert lap[0].heading_rad == pytest.approx(0.0, abs=1e-6)
@@ -42,14 +43,17 @@ def test_another_lap_keeps_near_the_line_and_its_direction() -> None:
     lap = poses([(0.0, 0.0), (80.0, 0.0)], np.random.default_rng(3), STEPS_M, OFFSET_M, TURN_RAD)
     aside_m = np.abs([pose.y_m for pose in lap])
     turned = np.abs([pose.heading_rad for pose in lap])
+
     assert 0.2 < aside_m.max() <= OFFSET_M
     assert 0.02 < turned.max() <= TURN_RAD
+
     steps_m = np.diff([pose.x_m for pose in lap])
     assert STEPS_M[0] - 0.05 < steps_m.min() < 0.8 < steps_m.max() < STEPS_M[1] + 0.05
 
 
 def test_the_second_lap_has_another_light() -> None:
     first, side, second = course(town.generate(5))
+
     assert [first.part, side.part, second.part] == [FIRST_LAP, SIDE_STREET, SECOND_LAP]
     assert first.light == side.light != second.light
 
@@ -58,6 +62,7 @@ def test_recall_is_that_at_the_lowest_score_precise_enough() -> None:
     score = np.array([0.9, 0.8, 0.7, 0.6, 0.5, 0.0])
     right = np.array([True, True, True, False, True, False])
     wanted = np.ones(6, bool)
+
     assert recall(score, right, wanted, 0.99) == pytest.approx(3 / 6)
     assert recall(score, right, wanted, 0.8) == pytest.approx(4 / 6)
     assert recall(score, ~right, wanted, 0.99) == 0.0
@@ -82,6 +87,7 @@ def test_a_match_is_right_only_at_the_same_place_of_the_town_and_heading() -> No
             _answer(SECOND_LAP, 0.0, frame=0, seed=2),
         ]
     )
+
     assert measured["sequence_precision"] == pytest.approx(1 / 5)
     assert measured["sequence_recall"] == pytest.approx(1 / 2)
     assert measured["sequence_false_outside_second_lap"] == 1

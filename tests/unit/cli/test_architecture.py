@@ -31,6 +31,7 @@ def test_the_page_is_what_the_code_generates() -> None:
 
 def test_modules_are_boxes_and_topics_are_arrows_by_their_delivery() -> None:
     drawn = diagram(_modules())
+
     assert '    camera["camera"]\n' in drawn
     assert '    camera -->|"camera/stereo"| memory\n' in drawn
     assert '    camera ==>|"odometry"| memory\n' in drawn
@@ -40,6 +41,7 @@ def test_modules_are_boxes_and_topics_are_arrows_by_their_delivery() -> None:
 
 def test_the_table_has_a_row_for_each_topic() -> None:
     rows = topic_table(_modules()).splitlines()[2:]
+
     assert [row.split("`")[1] for row in rows] == [topic.name for topic in topics.ALL]
     assert (
         "| `camera/stereo` | StereoFrame | 5 Hz | latest wins | model | camera | memory |" in rows
@@ -53,6 +55,7 @@ def test_the_page_shows_no_arrow_of_the_truth_into_a_module() -> None:
         for line in PAGE.read_text().splitlines()
         if "|" in line and any(name in line for name in truth)
     ]
+
     assert arrows
     assert all(line.rstrip(" |").endswith("observers") for line in arrows)
 
@@ -63,6 +66,7 @@ def test_a_page_that_is_out_of_date_fails_the_check(
     page = tmp_path / "page.md"
     page.write_text(PAGE.read_text().replace("sensory/view", "sensory/sight"))
     run = CliRunner().invoke(architecture, ["--check", str(page)])
+
     assert isinstance(run.exception, CogmapError)
     assert "cogmap architecture" in str(run.exception)
     assert CliRunner().invoke(architecture, [str(page)]).exit_code == 0
@@ -77,5 +81,6 @@ def test_a_page_without_a_place_for_a_part_is_named(text: str) -> None:
 
 def test_a_page_that_is_not_there_is_named_with_the_remedy(tmp_path: Path) -> None:
     run = CliRunner().invoke(architecture, [str(tmp_path / "none.md")])
+
     assert isinstance(run.exception, UsageError)
     assert "run this in the sources" in str(run.exception)

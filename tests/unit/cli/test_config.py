@@ -62,6 +62,7 @@ def test_the_schema_has_an_object_a_module() -> None:
 
     assert schema == json.loads(json.dumps(file_schema()))
     assert list(schema["properties"]) == list(registry.MODULES)
+
     for section in schema["properties"].values():
         name = section["$ref"].removeprefix("#/$defs/")
         assert schema["$defs"][name]["type"] == "object"

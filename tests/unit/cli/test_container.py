@@ -24,6 +24,7 @@ def test_the_image_gets_every_package() -> None:
     found = project["tool"]["setuptools"]["packages"]["find"]["include"]
     packages = {pattern.rstrip("*") for pattern in found}
     copied = (ROOT / ".dockerignore").read_text().splitlines()
+
     assert packages <= {line.removeprefix("!") for line in copied}
 
 

@@ -92,6 +92,7 @@ def test_a_queue_that_grows_is_named_and_one_that_shrinks_is_not() -> None:
     falling = [health(10 + i, queued=queued) for i, queued in enumerate((5, 40, 20))]
 
     assert findings(observed(*falling)) == []
+
     (finding,) = findings(observed(*growing))
     assert finding.startswith("sensory: its queue grows, to 40 messages")
 
@@ -134,6 +135,7 @@ def test_an_old_python_is_named() -> None:
 
 def test_a_python_or_platform_without_the_simulator_is_named() -> None:
     assert list(installation.simulator((3, 11), "linux", "x86_64")) == []
+
     for elsewhere in (((3, 12), "linux", "x86_64"), ((3, 11), "darwin", "arm64")):
         (finding,) = installation.simulator(*elsewhere)
         assert "needs Python 3.11 on Linux x86-64" in finding.wrong
@@ -167,5 +169,6 @@ def test_a_place_for_runs_that_cannot_be_written_to_is_named(tmp_path: Path) -> 
     (tmp_path / "file").write_text("")
 
     assert list(installation.write_access(tmp_path / "runs")) == []
+
     (finding,) = installation.write_access(tmp_path / "file" / "runs")
     assert "is a file" in finding.wrong

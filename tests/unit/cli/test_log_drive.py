@@ -61,6 +61,7 @@ def run() -> Callable[..., Result]:
 
 def test_a_summary_has_the_drive_and_its_settings(run: Callable[..., Result], drive: Path) -> None:
     found = json.loads(run("summary", drive, "--json").stdout)
+
     assert (found["seed"], found["laps"], found["mode"]) == (7, 0.5, "lockstep")
     assert (found["drive_s"], found["distance_m"]) == (5.0, 5.0)
     assert found["completed"]
@@ -70,6 +71,7 @@ def test_a_summary_has_the_drive_and_its_settings(run: Callable[..., Result], dr
 
 def test_a_summary_is_a_table_for_people(run: Callable[..., Result], drive: Path) -> None:
     shown = run("summary", drive).stdout
+
     assert "5.0 m in 5.0 s" in shown
     assert "path integration alone, wheels" in shown
     assert "the recording was not finished" in shown
@@ -80,6 +82,7 @@ def test_settings_that_a_log_lacks_are_the_defaults(
 ) -> None:
     log = write(tmp_path / "bare.mcap", [true_pose(0)])
     found = json.loads(run("summary", log, "--json").stdout)
+
     assert (found["seed"], found["laps"]) == (1, 1.0)
 
 
@@ -87,6 +90,7 @@ def test_a_log_without_true_poses_is_said_to_have_none(
     run: Callable[..., Result], tmp_path: Path
 ) -> None:
     result = run("summary", write(tmp_path / "blind.mcap", [turn_of_wheels(0)]), "--json")
+
     assert "holds no truth/pose: distances and errors are 0" in result.stderr
     assert json.loads(result.stdout)["distance_m"] == 0.0
 
@@ -95,12 +99,14 @@ def test_a_map_is_drawn_as_an_image_named_by_its_log(
     run: Callable[..., Result], drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
+
     assert "drive-map.png: 5 m of driving" in run("map", drive).stdout
     assert (tmp_path / "drive-map.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_a_map_can_be_a_pdf(run: Callable[..., Result], drive: Path, tmp_path: Path) -> None:
     run("map", drive, "-o", tmp_path / "town.pdf")
+
     assert (tmp_path / "town.pdf").read_bytes().startswith(b"%PDF")
 
 

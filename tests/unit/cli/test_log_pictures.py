@@ -134,6 +134,7 @@ def test_an_image_has_the_pixels_of_the_view_one_for_one(
     run: Callable[..., Result], drive: Path
 ) -> None:
     printed = run("image", drive, "--frame", "4").stdout
+
     assert printed == f"drive-frame-4-view.png: sensory/view, frame 4 at 2.000 s of {drive}\n"
     assert np.array_equal(read("drive-frame-4-view.png"), shade(4))
 
@@ -143,6 +144,7 @@ def test_it_is_the_view_in_the_middle_or_the_nearest_to_a_time(
 ) -> None:
     middle = json.loads(run("image", drive, "--json").stdout)
     assert (middle["frame"], middle["topic"], middle["objects"]) == (5, "sensory/view", None)
+
     near = json.loads(run("image", drive, "--json", "--at", "3.2").stdout)
     assert (near["frame"], near["at_s"], near["stamp_ns"]) == (4, 2.0, 4)
     assert np.array_equal(read(near["path"]), shade(4))
@@ -151,6 +153,7 @@ def test_it_is_the_view_in_the_middle_or_the_nearest_to_a_time(
 def test_a_camera_is_shown_as_it_gave_its_image(run: Callable[..., Result], drive: Path) -> None:
     run("image", drive, "--frame", "6", "--camera", "right", "-o", "right.png")
     assert np.array_equal(read("right.png"), 255 - shade(6))
+
     run("image", drive, "--frame", "6", "--camera", "left", "-o", "left.JPG")
     assert np.abs(read("left.JPG").astype(int) - shade(6)).mean() < 6
 
@@ -161,9 +164,11 @@ def test_depth_is_coloured_by_distance_grey_where_unknown_and_has_a_scale(
     run("image", drive, "--frame", "6", "--depth", "-o", "depth.png")
     shown = read("depth.png")
     assert shown.shape == (3 * 240, 3 * 320 + draw.SCALE_PX, 3)
+
     pixels = shown[1 : 3 * 240 : 3, 1 : 3 * 320 : 3].astype(int)
     grey = np.round(np.array(to_rgb(KERB)) * 255)
     assert np.array_equal(np.abs(pixels - grey).max(-1) <= 1, DEPTH_M == 0)
+
     rows = pixels[130:, 310]
     assert len(np.unique(rows, axis=0)) > 50
     assert (np.diff(rows[:, 1]) >= 0).all()
@@ -175,10 +180,12 @@ def test_percepts_are_outlined_where_they_are_and_leave_the_rest_of_the_view(
 ) -> None:
     facts = json.loads(run("image", drive, "--frame", "5", "--percepts", "--json").stdout)
     assert facts["objects"] == ["town_hall_0", "town_hall_1"]
+
     shown = read(facts["path"])[1::3, 1::3].astype(int)
     assert shown.shape == (240, 320, 3)
     for (column, row), colour in (((40, 110), SEVERAL[0]), ((219, 110), SEVERAL[1])):
         assert np.abs(shown[row, column] - np.array(to_rgb(colour)) * 255).max() < 12
+
     changed = np.abs(shown - shade(5)).max(-1) > 1
     assert changed[75:145, 45:115].all()
     assert not changed[:, :20].any()
@@ -189,6 +196,7 @@ def test_with_percepts_only_views_that_were_answered_are_chosen(
     run: Callable[..., Result], drive: Path
 ) -> None:
     facts = json.loads(run("image", drive, "--percepts", "--json", "--at", "7.4").stdout)
+
     assert facts["frame"] == 5
     with pytest.raises(
         UsageError, match=r"no frame 6 in .*: there are 3, from 4 to 7, and 5 is the nearest"
@@ -203,6 +211,7 @@ def test_the_plot_has_the_most_percepts_and_the_same_bytes_each_time(
     assert (facts["path"], facts["frame"]) == ("drive-frame-5-perception.png", 5)
     assert facts["objects"] == ["town_hall_0", "town_hall_1"]
     assert read(facts["path"]).shape == (949, 1690, 3)
+
     for name in ("first.pdf", "second.pdf"):
         run("perception", drive, "--frame", "4", "-o", name)
     assert Path("first.pdf").read_bytes().startswith(b"%PDF")
@@ -217,12 +226,14 @@ def test_a_view_in_which_nothing_was_recognised_has_a_plot_too(
     unknown = msgspec.structs.replace(view(0), depth_m=nothing)
     log = write(tmp_path / "empty.mcap", [unknown, Percepts(frame=0, objects=[], road_m=empty)])
     run("perception", log, "-o", "figure.png")
+
     assert read("figure.png").shape == (949, 1690, 3)
     assert "with nothing recognised" in run("image", log, "--percepts", "--depth").stdout
 
 
 def test_the_reference_drive_has_its_plot(run: Callable[..., Result]) -> None:
     facts = json.loads(run("perception", REFERENCE, "-o", "reference.png", "--json").stdout)
+
     assert facts["objects"]
 
 
@@ -240,6 +251,7 @@ def test_ground_is_laid_into_the_image_where_the_camera_sees_it() -> None:
             ground.to_image(np.stack([ahead, np.full_like(ahead, y_m)], axis=1), CAMERA)
         ).astype(int)
         column, row = pixels[((pixels >= 0) & (pixels < (320, 240))).all(axis=1)].T
+
         assert len(row) > 10
         assert np.abs(image[row, column] - colour).max() < 20
 
@@ -247,6 +259,7 @@ def test_ground_is_laid_into_the_image_where_the_camera_sees_it() -> None:
 def test_labels_stay_inside_and_hide_none_of_the_others() -> None:
     axes, boxes = placed([Label(f"number {n}", 9.7, 0.1 * n, "#000000") for n in range(6)])
     inside = axes.get_window_extent()
+
     for number, box in enumerate(boxes):
         assert inside.x0 <= box.x0 < box.x1 <= inside.x1
         assert inside.y0 <= box.y0 < box.y1 <= inside.y1
@@ -299,6 +312,7 @@ def test_a_picture_that_cannot_be_written_is_one_sentence(
     run: Callable[..., Result], drive: Path
 ) -> None:
     Path("taken.png").mkdir()
+
     for command in ("image", "perception"):
         with pytest.raises(LogError, match=r"cannot write taken\.png \(Is a directory\)"):
             run(command, drive, "-o", "taken.png")
@@ -317,6 +331,7 @@ def test_a_log_without_views_or_percepts_names_the_command_that_helps(
 
 def test_a_view_whose_image_is_none_is_named(run: Callable[..., Result], tmp_path: Path) -> None:
     log = write(tmp_path / "grey.mcap", [view(4, SCENE[..., 0]), answer(4)])
+
     for command in ("image", "perception"):
         with pytest.raises(
             LogError, match=r"grey.mcap, frame 4: expected a uint8 image \(height, width, 3\), got"

@@ -96,6 +96,7 @@ def test_truth_between_two_poses_is_interpolated() -> None:
         observer.update(odometry(tick, 0.0))
         observer.update(self_motion(tick, 0.0))
     observer.update(estimate(3, 3.0, 6.0))
+
     assert observer.errors().estimate_m == pytest.approx([0.0])
 
 
@@ -103,6 +104,7 @@ def test_an_estimate_that_no_truth_surrounds_does_not_count() -> None:
     observer = Observer()
     straight_drive(observer, 4, wheel_speed_m_s=1.0)
     observer.update(estimate(5, 0.25, 0.0))
+
     assert observer.errors().stamps_ns.size == 0
     assert (observer.errors().over_wheels, observer.errors().over_fused) == (1.0, 1.0)
 
@@ -112,6 +114,7 @@ def test_the_last_of_several_estimates_of_one_stamp_counts() -> None:
     straight_drive(observer, 4, wheel_speed_m_s=1.0)
     observer.update(estimate(4, 9.0, 9.0, version=1))
     observer.update(estimate(4, 0.2, 0.0, version=2))
+
     assert observer.errors().estimate_m == pytest.approx([0.0], abs=1e-12)
 
 
@@ -119,6 +122,7 @@ def test_the_agents_frame_starts_in_the_first_true_pose() -> None:
     observer = Observer()
     observer.update(true_pose(0, 5.0, -2.0, math.pi / 2))
     observer.update(true_pose(1, 5.0, -1.0, math.pi / 2))
+
     assert observer.to_world(np.array([[1.0, 0.0], [0.0, 2.0]])) == pytest.approx(
         np.array([[5.0, -1.0], [3.0, -2.0]])
     )
@@ -145,6 +149,7 @@ def test_a_repeated_motion_moves_nothing() -> None:
     before_m = [observer.wheels_path_m, observer.fused_path_m]
     observer.update(odometry(4, 1.0))
     observer.update(self_motion(4, 1.0))
+
     for path_m, after_m in zip(
         before_m, [observer.wheels_path_m, observer.fused_path_m], strict=True
     ):
@@ -153,6 +158,7 @@ def test_a_repeated_motion_moves_nothing() -> None:
 
 def test_self_motion_without_its_five_columns_is_refused() -> None:
     motion = SelfMotion(frame=1, since_ns=0, motions=Array.of([[1.0, 0.0, 0.05]], "<f8"))
+
     with pytest.raises(MessageError, match=r"it needs \(n, 5\)"):
         Observer().update(motion)
 
@@ -160,6 +166,7 @@ def test_self_motion_without_its_five_columns_is_refused() -> None:
 def test_distance_progress_and_time_are_those_of_the_newest_pose() -> None:
     observer = Observer()
     straight_drive(observer, 20, wheel_speed_m_s=1.0)
+
     assert (observer.travelled_m, observer.progress, observer.elapsed_s) == (1.0, 0.5, 1.0)
 
 
@@ -168,6 +175,7 @@ def test_other_messages_and_nodes_change_nothing() -> None:
     straight_drive(observer, 4, wheel_speed_m_s=1.0)
     observer.update(Competition(stamp_ns=4, cycle=1, contenders=[]))
     observer.update(Delta(version=1, cycle=1, phase=Phase.OBJECTS, operations=[thing("x")]))
+
     assert len(observer.estimated_path_m) == 0
 
 
@@ -175,5 +183,6 @@ def test_a_track_keeps_its_order_when_an_old_position_comes_late() -> None:
     track = Track()
     for stamp_ns in (1, 3, 2):
         track.add(stamp_ns, float(stamp_ns), 0.0)
+
     assert track.stamps_ns.tolist() == [1, 3]
     assert track.covers(np.array([0, 1, 2, 3, 4])).tolist() == [False, True, True, True, False]

@@ -75,6 +75,7 @@ def test_each_restart_waits_longer_than_the_one_before(
 
     with pytest.raises(ProcessFailedError):
         wait_until(lambda: bool(supervisor.check()))
+
     times_s = [float(line) for line in said(tmp_path, "mind")]
     pauses_s = [later - earlier for earlier, later in itertools.pairwise(times_s)]
     assert pauses_s[2] > pauses_s[0] + 0.3
@@ -83,6 +84,7 @@ def test_each_restart_waits_longer_than_the_one_before(
 def test_a_child_that_ends_with_code_2_is_the_users_to_mend(supervisor: Supervisor) -> None:
     code = "import sys; print('cogmap: no such file: name one', file=sys.stderr); sys.exit(2)"
     supervisor.start(python("sim", code))
+
     with pytest.raises(ProcessFailedError, match=r"^sim has ended: no such file: name one$"):
         wait_until(lambda: bool(supervisor.check()))
 
@@ -92,6 +94,7 @@ def test_a_child_that_dies_again_and_again_fails_with_its_last_words(
 ) -> None:
     supervisor.start(python("mind", "raise OSError(28, 'No space left on device')"))
     words = r"mind died 4 times .*mind.log are: OSError: \[Errno 28\] No space left on device$"
+
     with pytest.raises(ProcessFailedError, match=words):
         wait_until(lambda: bool(supervisor.check()))
     assert supervisor.restarts == {"mind": 3}
@@ -103,6 +106,7 @@ def test_a_child_that_does_not_listen_is_killed(supervisor: Supervisor, tmp_path
     wait_until(lambda: said(tmp_path, "deaf") == ["deaf"])
     pid = supervisor.children["deaf"].pid
     supervisor.end(["deaf"], grace_s=0.1)
+
     assert supervisor.killed == ["deaf"]
     assert not is_running(pid)
 
@@ -113,6 +117,7 @@ def test_a_stopped_child_is_ended_all_the_same(supervisor: Supervisor, tmp_path:
     pid = supervisor.children["mind"].pid
     os.kill(pid, signal.SIGSTOP)
     supervisor.end(["mind"], grace_s=0.1)
+
     assert not is_running(pid)
 
 
@@ -141,11 +146,14 @@ def test_no_child_outlives_a_launcher_that_is_killed(tmp_path: Path) -> None:
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as launcher:
         assert launcher.stdout is not None
+
         pids = [int(word) for word in launcher.stdout.readline().split()]
         wait_until(
             lambda: all("listens" in " ".join(said(tmp_path, name)) for name in ("one", "two"))
         )
+
         assert len(pids) == 2 and all(is_running(pid) for pid in pids)
+
         launcher.kill()
         launcher.wait()
         wait_until(lambda: not any(is_running(pid) for pid in pids))

@@ -13,6 +13,7 @@ S = 1_000_000_000
 def test_a_rate_needs_two_messages() -> None:
     rate = Rate(10)
     assert rate.periods_s() is None
+
     rate.add(0)
     assert rate.periods_s() is None
 

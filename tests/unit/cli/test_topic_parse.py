@@ -102,6 +102,7 @@ def test_echo_leaves_the_numbers_of_arrays_out_where_asked() -> None:
 
 def test_a_message_may_be_written_as_yaml_as_for_ros2_topic_pub() -> None:
     message = parse(topics.MOTOR_COMMAND, "{left_wheel_rad_s: 1.5, right_wheel_rad_s: -2}")
+
     assert message == MotorCommand(left_wheel_rad_s=1.5, right_wheel_rad_s=-2.0)
 
 

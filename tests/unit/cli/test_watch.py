@@ -147,6 +147,7 @@ def test_the_metrics_are_of_the_drive_and_of_what_was_learned(
 ) -> None:
     drive(publisher)
     metrics = metrics_of(watch)
+
     assert metrics.estimates == 1
     assert (metrics.objects, metrics.road_m2, metrics.deltas) == (1, 2.0, 1)
     assert metrics.object_error_mean_m == pytest.approx(1.0)
@@ -157,6 +158,7 @@ def test_errors_of_the_estimate_the_wheels_and_fused_self_motion_are_apart(
 ) -> None:
     drive(publisher)
     metrics = metrics_of(watch)
+
     assert metrics.estimate.mean_m == pytest.approx(0.1)
     assert metrics.wheels_alone.mean_m == pytest.approx(0.2)
     assert metrics.fused_alone.mean_m == pytest.approx(0.3)
@@ -171,6 +173,7 @@ def test_a_cycle_is_timed_from_the_frame_to_the_command(watch: Watch, publisher:
     stages = [("sensory", 20 * MS, 5 * MS), ("action", 10 * MS, 5 * MS)]
     publisher.publish(command, sent_ns=40 * MS, stages=stages)
     metrics = metrics_of(watch)
+
     assert (metrics.commands, metrics.halted) == (1, {"obstacle": 1})
     assert metrics.cycle_p50_ms == pytest.approx(40.0)
     assert metrics.bus_share == pytest.approx(0.25)
@@ -184,6 +187,7 @@ def test_what_slowed_or_halted_the_robot_is_counted_by_reason(
             seq=seq, left_wheel_rad_s=1.0, right_wheel_rad_s=1.0, slowed_by=slowed_by
         )
         publisher.publish(command)
+
     assert metrics_of(watch).slowed == {"pose age": 1, "bend": 1}
     assert watch.tally.share_limited_by(SpeedLimit.POSE_AGE) == pytest.approx(1 / 3)
 
@@ -192,6 +196,7 @@ def test_gaps_are_those_of_whoever_missed_most(watch: Watch, publisher: Publishe
     publisher.publish(health("epam", {"odometry": 3}, busy=0.2))
     publisher.publish(health("sensory", {"odometry": 5, "camera/stereo": 9}))
     publisher.publish(health("epam", {"odometry": 3}, busy=0.4))
+
     assert watch.gaps()["odometry"] == 5
     assert "camera/stereo" not in watch.gaps()
     assert watch.rejected() == {"odometry": 4}
@@ -216,6 +221,7 @@ def test_dropped_answers_are_counted_and_the_last_reasons_kept(
             )
         )
     metrics = metrics_of(watch)
+
     assert metrics.dropped == 22
     assert metrics.refused == [f"proposal {version} is late" for version in range(4, 12)]
 
@@ -227,6 +233,7 @@ def test_an_object_that_left_the_map_is_named(watch: Watch, publisher: Publisher
         delta = Delta(seq=seq, version=version, cycle=1, phase=Phase.END, operations=[operation])
         publisher.publish(delta)
     metrics = metrics_of(watch)
+
     assert (metrics.objects, metrics.forgotten) == (0, ["inn"])
 
 
@@ -244,6 +251,7 @@ def test_the_map_of_a_drive_and_of_none_is_drawn(
             tmp_path / name, watch.tally.observer, watch.tally.replica.graph, run_metrics(watch)
         )
         drive(publisher)
+
     assert (tmp_path / "none.png").stat().st_size < (tmp_path / "drive.png").stat().st_size
 
 

@@ -43,6 +43,7 @@ def test_a_robot_that_stays_where_it_is_ends_the_drive_with_the_reason(
     facts: dict[str, object], outcome: Outcome, words: str
 ) -> None:
     ending = after(STUCK_S, STUCK_S, **facts)
+
     assert ending is not None
     assert ending.outcome is outcome
     assert words in ending.reason
@@ -50,6 +51,7 @@ def test_a_robot_that_stays_where_it_is_ends_the_drive_with_the_reason(
 
 def test_time_that_stands_still_ends_the_drive_with_who_is_missing() -> None:
     ending = after(STALLED_S, 0.0, missing=["epam", "workspace"])
+
     assert ending is not None
     assert ending.outcome is Outcome.STALLED
     assert "epam, workspace is not ready" in ending.reason
@@ -71,6 +73,7 @@ def test_each_move_begins_the_wait_anew() -> None:
 
 def test_only_a_completed_route_exits_with_0() -> None:
     codes = {outcome: outcome.exit_code for outcome in Outcome}
+
     assert codes.pop(Outcome.ROUTE_COMPLETE) == 0
     assert codes.pop(Outcome.INTERRUPTED) == 130
     assert set(codes.values()) == {1}

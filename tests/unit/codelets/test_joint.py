@@ -59,7 +59,9 @@ def test_a_landmark_has_a_label_for_each_side_that_it_is_seen_from() -> None:
     truth = _graph(_steps(1)).poses
     sides = by_side(_sightings(truth), truth, 4)
     of_tower = [label for label in sides.labels if label == "tower"]
+
     assert len(of_tower) == 4
+
     opposite = sides.landmark[[2, LAP // 2 + 2]]
     assert opposite[0] != opposite[1]
 
@@ -67,6 +69,7 @@ def test_a_landmark_has_a_label_for_each_side_that_it_is_seen_from() -> None:
 def test_with_one_side_a_landmark_stays_one() -> None:
     truth = _graph(_steps(1)).poses
     seen = _sightings(truth)
+
     assert by_side(seen, truth, 1).landmark.tolist() == seen.landmark.tolist()
 
 
@@ -78,6 +81,7 @@ def test_a_bias_by_side_bends_a_good_path_only_as_a_single_landmark(
     seen = _sightings(graph.poses)
     poses, _ = optimize_jointly(graph, seen, Config(landmark_sides=sides))
     bent_m = _error_m(poses, graph.poses)
+
     assert bent_m > 0.2 if sides == 1 else bent_m < 0.1
 
 
@@ -94,6 +98,7 @@ def test_sides_bind_the_second_lap_to_the_first() -> None:
     alone_m = gap_m(optimize(drifted))
     joint, _ = optimize_jointly(drifted, seen, Config())
     joint_m = gap_m(joint)
+
     assert joint_m < 0.5 * alone_m
 
 
@@ -103,4 +108,5 @@ def test_a_path_without_sightings_is_optimized_alone() -> None:
         (), np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2)), np.zeros((0, 2, 2))
     )
     poses, _ = optimize_jointly(graph, nothing, Config())
+
     assert poses == pytest.approx(optimize(graph))

@@ -60,17 +60,21 @@ def test_without_landmarks_the_samples_move_by_the_motion() -> None:
     found = _localized(
         agent(), motions=_rows((2.0, 0.0, 1.0, 0.0, 0.0), (0.0, math.pi / 2, 1.0, 0.0, 0.0))
     )
+
     assert _pose(found) == pytest.approx((2.0, 0.0, math.pi / 2))
+
     again = _localized(
         agent(_samples(found)),
         motions=_rows((3.0, 0.0, 1.0, 0.0, 0.0)),
         identifier="2/localization",
     )
+
     assert _pose(again) == pytest.approx((2.0, 3.0, math.pi / 2))
 
 
 def test_a_quarter_circle_ends_where_its_chord_does() -> None:
     rows = [(math.pi / 2, math.pi / 2, 0.05, 0.0, 0.0)] * 20
+
     assert _pose(_localized(agent(), motions=_rows(*rows))) == pytest.approx(
         (1.0, 1.0, math.pi / 2), abs=1e-3
     )
@@ -80,6 +84,7 @@ def test_the_samples_spread_as_the_motions_noise_says() -> None:
     found = _localized(agent(), motions=_rows((4.0, 0.0, 1.0, 0.5, 0.0)))
     assert found.x_sd_m == pytest.approx(0.5, rel=0.1)
     assert found.y_sd_m == 0.0
+
     turned = _localized(agent(), motions=_rows((0.0, 1.0, 1.0, 0.0, 0.2)))
     assert turned.heading_sd_rad == pytest.approx(0.2, rel=0.1)
 
@@ -98,6 +103,7 @@ def test_a_landmark_ahead_corrects_the_way_to_the_exact_gaussian_posterior() -> 
         motions=_rows((distance_m, 0.0, 1.0, distance_sd_m, 0.0)),
         percepts=[percept("house", 0.0, seen_m, range_sd_m=seen_sd_m)],
     )
+
     assert found.x_m == pytest.approx(exact_m, abs=0.03)
     assert found.x_sd_m == pytest.approx((prior + sensed) ** -0.5, rel=0.1)
 
@@ -116,6 +122,7 @@ def test_a_bearing_corrects_the_heading_to_the_exact_gaussian_posterior() -> Non
             percept("house", bearing_rad, 50.0, bearing_sd_rad=bearing_sd_rad, range_sd_m=5.0)
         ],
     )
+
     assert found.heading_rad == pytest.approx(-sensed * bearing_rad / (prior + sensed), abs=0.006)
     assert found.heading_sd_rad == pytest.approx((prior + sensed) ** -0.5, rel=0.1)
 
@@ -136,6 +143,7 @@ def test_two_landmarks_weigh_as_much_as_their_noise_allows() -> None:
             percept("far", 0.0, 35.6, range_sd_m=far_sd_m),
         ],
     )
+
     assert found.x_m == pytest.approx(exact_m, abs=0.03)
 
 
@@ -159,6 +167,7 @@ def test_a_landmark_whose_place_is_hardly_known_corrects_nothing() -> None:
         motions=_rows((5.0, 0.0, 1.0, 0.5, 0.0)),
         percepts=[percept("house", 0.0, 12.0)],
     )
+
     assert found.kept_share == 1.0
 
 
@@ -174,6 +183,7 @@ def test_where_all_samples_are_unlikely_the_pose_is_still_one_of_them() -> None:
                 percepts=[percept("house", 2.0, 500.0, range_sd_m=1e-3, bearing_sd_rad=1e-3)],
             )
         x_m, y_m, heading_rad = _pose(found)
+
         assert len(_samples(found)) >= 1
         assert x_m == pytest.approx(5.0, abs=0.1)
         assert abs(y_m) + abs(heading_rad) < 0.2
@@ -194,6 +204,7 @@ def test_one_landmark_taken_for_another_does_not_outvote_the_rest() -> None:
         motions=_rows((5.0, 0.0, 1.0, 0.5, 0.05)),
         percepts=[*seen, percept("c", -1.0, 40.0)],
     )
+
     assert _pose(found)[:2] == pytest.approx((5.0, 0.0), abs=0.15)
 
 
@@ -239,6 +250,7 @@ def test_a_turned_agent_recovers_its_heading_by_three_landmarks(
         percepts=seen,
     )
     x_m, y_m, heading_rad = _pose(found)
+
     assert (x_m, y_m) == pytest.approx((2.0, 1.0), abs=0.2)
     assert math.remainder(heading_rad - heading, math.tau) == pytest.approx(0.0, abs=0.06)
 
@@ -248,6 +260,7 @@ def test_the_self_node_is_linked_to_the_place_of_its_mean_alone() -> None:
     graph = graph_of(agent(), before, cell_m=2.0)
     asked = task("localization", motions=_rows((6.2, 0.0, 1.0, 0.0, 0.0)))
     graph.change(run(asked, graph, Config()).operations)
+
     assert graph.links.targets("self", LinkKind.AT) == {"place:map:0:3:0": 1.0}
 
 
@@ -263,6 +276,7 @@ def test_the_number_of_samples_does_not_fall_from_one_task_to_the_next() -> None
             percepts=[percept("house", 0.0, 20.0 - 0.2 * (frame + 1))],
         )
         assert len(_samples(current)) >= 50
+
     assert current.x_m == pytest.approx(2.0, abs=0.15)
 
 
@@ -290,6 +304,7 @@ def test_seeing_a_landmark_again_shrinks_its_spread_around_where_it_is() -> None
     for number in range(12):
         house = _located(house, 0.0, 10.5, number)
         spreads.append(math.hypot(house.x_sd_m, house.y_sd_m))
+
     assert spreads[0] < 0.6
     assert spreads[-1] < 0.5 * spreads[0]
     assert (house.x_m, house.y_m) == pytest.approx((10.5, 0.0), abs=0.25)
@@ -303,12 +318,14 @@ def test_a_landmarks_samples_become_the_exact_gaussian_posterior_of_eq_4() -> No
     house = landmark("house", samples)
     config = Config(landmark_jitter_m=1e-6, correlated_views=1.0)
     found = _located(house, 0.0, 11.0, config=config)
+
     assert found.x_m == pytest.approx((prior * 10 + sensed * 11) / (prior + sensed), abs=0.03)
     assert found.x_sd_m == pytest.approx((prior + sensed) ** -0.5, rel=0.1)
 
 
 def test_the_number_of_a_landmarks_samples_stays() -> None:
     found = _located(_landmark(10.0, 0.0, 0.5), 0.0, 10.0)
+
     assert len(found.positions_m()) == 200
 
 
@@ -318,6 +335,7 @@ def test_a_landmark_seen_elsewhere_starts_anew_after_the_configured_misses() -> 
     for number in range(3):
         house = _located(house, math.pi / 2, 6.0, number)
         places.append((house.x_m, house.y_m))
+
     assert places[0] == pytest.approx((10.0, 0.0), abs=0.1)
     assert places[1] == places[0]
     assert places[2] == pytest.approx((0.0, 6.0), abs=0.2)
@@ -330,6 +348,7 @@ def test_a_landmark_that_is_seen_in_its_place_again_is_forgiven_its_misses() -> 
         [(1.5, 6.0), (1.5, 6.0), (0.0, 10.0), (1.5, 6.0), (1.5, 6.0)]
     ):
         house = _located(house, bearing_rad, range_m, number)
+
     assert house.misses == 2
     assert house.x_m == pytest.approx(10.0, abs=0.2)
 
@@ -338,6 +357,7 @@ def test_the_same_task_gives_the_same_samples_and_another_task_gives_others() ->
     motions = _rows((2.0, 0.1, 1.0, 0.3, 0.1))
     first, second = (_samples(_localized(agent(), motions=motions)) for _ in range(2))
     other = _samples(_localized(agent(), motions=motions, identifier="2/localization"))
+
     assert first.tobytes() == second.tobytes()
     assert first.tobytes() != other.tobytes()
 
@@ -345,6 +365,7 @@ def test_the_same_task_gives_the_same_samples_and_another_task_gives_others() ->
 def test_rejection_keeps_samples_by_their_likelihood_and_never_none() -> None:
     rng = generator("a test")
     kept = rejection_mask(np.log(np.repeat([1.0, 0.5, 0.1], 20_000)), rng)
+
     assert kept.reshape(3, -1).mean(axis=1) == pytest.approx([1.0, 0.5, 0.1], abs=0.02)
     assert rejection_mask(np.array([-1e300, -1e301]), rng).tolist() == [True, False]
 
@@ -352,6 +373,7 @@ def test_rejection_keeps_samples_by_their_likelihood_and_never_none() -> None:
 def test_means_and_spreads_of_headings_are_taken_on_the_circle() -> None:
     poses = np.array([[0.0, 0.0, math.pi - 0.1], [2.0, 0.0, -math.pi + 0.1]])
     mean = mean_pose(poses)
+
     assert abs(mean[2]) == pytest.approx(math.pi)
     assert spread(poses, mean) == pytest.approx([1.0, 0.0, 0.1])
     assert wrap_angle(np.array([3 * math.pi, -0.5, math.pi])) == pytest.approx(
@@ -361,6 +383,7 @@ def test_means_and_spreads_of_headings_are_taken_on_the_circle() -> None:
 
 def test_refilling_draws_from_those_kept_and_jitters_each() -> None:
     kept = np.array([[1.0, 2.0], [3.0, 4.0]])
+
     assert {tuple(row) for row in resample(kept, 50, 0.0, generator("a")).tolist()} == {
         (1.0, 2.0),
         (3.0, 4.0),
@@ -372,6 +395,7 @@ def test_a_landmark_seen_once_and_then_twice_elsewhere_starts_anew_there() -> No
     house = _landmark(300.0, 0.0, 0.5, sightings=1)
     for number in range(2):
         house = _located(house, 0.0, 10.0, number)
+
     assert house.x_m == pytest.approx(10.0, abs=0.5)
     assert (house.sightings, house.misses) == (1, 0)
 
@@ -398,6 +422,7 @@ def test_one_landmark_that_does_not_fit_leaves_the_pose_as_certain() -> None:
             percepts=[percept("house", 2.0, 50.0)],
             identifier=f"{number}/localization",
         )
+
     assert looker.misfit_count == 20
     assert looker.x_sd_m < 0.4
 
@@ -406,5 +431,6 @@ def test_path_integration_continues_beside_the_pose_landmarks_correct() -> None:
     motions = _rows((5.0, 0.0, 1.0, 0.5, 0.0))
     seen = [percept("house", 0.0, 14.0, range_sd_m=0.2)]
     found = _localized(agent(), _landmark(20.0, 0.0), motions=motions, percepts=seen)
+
     assert found.x_m > 5.5
     assert found.odometry_x_m == pytest.approx(5.0)

@@ -54,6 +54,7 @@ def test_a_landmark_informs_by_the_uncertainty_since_it_was_placed(
     since: tuple[float, float], share: float
 ) -> None:
     found = novelty(_agent(), _seen(), np.array([since]))
+
     assert found == pytest.approx([share], rel=0.1)
 
 
@@ -62,6 +63,7 @@ def test_the_variance_when_a_landmark_was_placed_is_that_of_the_path() -> None:
     rows[:, 0] = np.arange(1.0, 101.0)
     rows[:, 7] = np.arange(100.0)
     graph = graph_of(*segments(rows))
+
     assert variances_at(graph, 70_500_000_000).tolist() == [69.0, 0.0]
     assert variances_at(graph, 500_000_000_000).tolist() == [99.0, 0.0]
     assert variances_at(graph, 500_000_000).tolist() == [-math.inf, -math.inf]
@@ -70,5 +72,6 @@ def test_the_variance_when_a_landmark_was_placed_is_that_of_the_path() -> None:
 
 def test_a_landmark_of_no_weight_leaves_all_samples_as_likely() -> None:
     density = compare(_agent(), _seen()).density
+
     assert np.ptp(log_likelihood(density, CONFIG.outlier_share)) > 1.0
     assert np.ptp(log_likelihood(density, CONFIG.outlier_share, np.zeros(1))) == 0.0

@@ -84,6 +84,7 @@ def test_a_kidnapped_agent_relocalizes_by_landmarks_in_view() -> None:
         agent = _move(
             agent, number, _known(*labels), [_seen(true, label) for label in labels[:2]], CONFIG
         )
+
     assert _off_m(agent, true) < 1.0
     assert not agent.is_lost
 
@@ -97,6 +98,7 @@ def test_a_kidnapped_agent_relocalizes_by_landmarks_seen_one_at_a_time() -> None
         motions = np.array([[1.0, 0.0, 1.0, 0.1, 0.0]])
         loop.live(Moment(float(number), motions, [_seen(true, labels[number % 4])], True))
     loop.close()
+
     assert math.dist(loop.pose[:2], true[:2]) < 2.0
 
 
@@ -109,7 +111,9 @@ def test_the_distance_that_an_agent_was_carried_is_a_step_of_its_path() -> None:
         agent = _move(
             agent, number, _known(*labels), [_seen(true, label) for label in labels], CONFIG
         )
+
     assert _off_m(agent, true) < 0.5
+
     odometry_m = (agent.odometry_x_m, agent.odometry_y_m)
     assert odometry_m == pytest.approx((agent.x_m, agent.y_m), abs=5.0)
 
@@ -120,6 +124,7 @@ def test_ranges_alone_to_three_landmarks_give_the_position() -> None:
     agent = _agent((0.0, 0.0, 0.0), (1.0, 1.0, 0.01))
     seen = [_seen(true, label, **UNKNOWN_BEARING) for label in labels]
     found = _move(agent, 1, _known(*labels), seen, CONFIG)
+
     assert _off_m(found, true) < 0.4
 
 
@@ -129,6 +134,7 @@ def test_bearings_alone_to_three_landmarks_give_the_position() -> None:
     agent = _agent((0.0, 0.0, 0.0), (1.0, 1.0, 0.01))
     seen = [_seen(true, label, range_sd_m=1e3) for label in labels]
     found = _move(agent, 1, _known(*labels), seen, CONFIG)
+
     assert _off_m(found, true) < 0.5
 
 
@@ -148,8 +154,11 @@ def test_range_or_bearing_alone_places_a_new_landmark_from_several_places(
         codelet = "object_place" if landmark is None else "landmark"
         asked = task(codelet, f"{number}/mill", percepts=seen, stamp_ns=number)
         found, _ = run(asked, graph_of(*nodes), config).operations
+
         assert isinstance(found, Object)
+
         landmark = found
+
     assert landmark is not None
     assert (landmark.x_m, landmark.y_m) == pytest.approx(PLACES["mill"], abs=1.5)
 
@@ -179,4 +188,5 @@ def test_what_is_not_seen_costs_nothing() -> None:
     true = (1.0, 0.0, 0.0)
     few = _move(agent, 1, _known("mill"), [_seen(true, "mill")], CONFIG)
     many = _move(agent, 1, _known("mill", "tower", "church", "inn"), [_seen(true, "mill")], CONFIG)
+
     assert few == many

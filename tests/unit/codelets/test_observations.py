@@ -48,7 +48,9 @@ def test_a_landmark_is_remembered_once_from_each_place_of_the_path() -> None:
     desk.drive(range(3), percept("a"))
     (segment,) = desk.graph.of_kind(PathSegment)
     places = len(segment.rows.numpy())
+
     assert _seen(desk) == {"a": places}
+
     desk.see(3, percept("a"), percept("b"), rows=((0.0, 0.0, 0.2, 0.0, 0.0),))
     desk.work()
     assert _seen(desk) == {"a": places, "b": 1}
@@ -58,11 +60,13 @@ def test_what_is_seen_some_way_from_a_place_is_told_as_seen_from_the_place() -> 
     ahead = percept("tower", 0.0, 10.0)
     node = extended(None, Viewpoint(0, 1.0, np.array([2.0, 1.0, math.pi / 2]), 0.0), ahead)
     seen = Sightings.of([node], np.array([1.0]))
+
     assert seen.where_m[0] == pytest.approx((2.0, 11.0))
 
 
 def test_an_eye_that_sees_too_far_is_known_to() -> None:
     node = extended(None, Viewpoint(0, 1.0, STILL, 0.25), percept("tower", 0.0, 10.0))
+
     assert Sightings.of([node], np.array([1.0])).where_m[0] == pytest.approx((8.0, 0.0))
 
 
@@ -71,12 +75,14 @@ def test_a_landmark_stands_where_most_of_its_sightings_put_it() -> None:
     stamps = np.arange(len(poses), dtype=float)
     wrong = tuple(range(0, 40, 3))
     (found,) = Sightings.of(_sightings(poses, wrong), stamps).landmarks_m(poses)
+
     assert found == pytest.approx(TOWER_M, abs=0.05)
 
 
 def test_sightings_from_places_that_the_path_has_not_are_left_out() -> None:
     poses = _driven()
     seen = Sightings.of(_sightings(poses), np.array([3.0, 4.0]))
+
     assert seen.place.tolist() == [0, 1]
 
 
@@ -99,5 +105,6 @@ def test_observations_along_a_path_correct_its_excess_of_turning() -> None:
     before, after = (
         np.hypot(*(path[:, :2] - poses[:, :2]).T).mean() for path in (start, graph.poses)
     )
+
     assert before > 2.0
     assert after < 0.3 * before

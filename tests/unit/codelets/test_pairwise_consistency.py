@@ -66,7 +66,9 @@ def test_a_landmark_constrains_the_position_around_it_but_not_the_heading() -> N
     views = _views((2, 57))
     made = constraints_of(views, _rows()[:, 1:4])
     away = np.array([[0.1, 0.0, 0.0], [0.0, 0.1, 0.0]])
+
     assert np.linalg.matrix_rank(made.information[0]) == 2
+
     # Turned on the spot it would see the tower elsewhere; gone round the tower, as it is.
     turn = 0.05
     cos = np.cos(turn)
@@ -75,5 +77,6 @@ def test_a_landmark_constrains_the_position_around_it_but_not_the_heading() -> N
     round_it = np.append(
         off - np.array([cos * off[0] - sin * off[1], sin * off[0] + cos * off[1]]), turn
     )
+
     assert round_it @ made.information[0] @ round_it < 1e-2
     assert all(step @ made.information[0] @ step > 9e-3 for step in away)

@@ -96,6 +96,7 @@ def test_eq_9_shifts_each_place_by_the_share_of_variance_before_it() -> None:
     )
     found = close_loops(PoseGraph(straight, steps, certain))
     share = np.minimum(np.arange(11), 8) / 8
+
     assert found.positions_m - straight[:, :2] == pytest.approx(
         share[:, None] * [-2.0, 4.0], abs=1e-6
     )
@@ -110,6 +111,7 @@ def test_an_uncertain_closure_moves_the_path_by_its_share_of_precision() -> None
         np.array([0]), np.array([4]), np.array([[0.0, 0.0, 0.0]]), np.array([2.0, 2.0, 1.0])
     )
     found = close_loops(PoseGraph(straight, steps, closure), tolerance=1e-9)
+
     assert found.positions_m[-1] == pytest.approx([4.0 - 4.0 * 4 / (4 + 4), 0.0])
 
 
@@ -120,6 +122,7 @@ def test_replays_of_overlapping_loops_converge_to_least_squares(seed: int) -> No
     known = displacements(graph.poses, graph.constraints)
     least = position_cost(exact, graph.constraints, known)
     loose, close = (close_loops(graph, tolerance) for tolerance in (0.05, 1e-9))
+
     assert (
         least * 0.999999
         <= position_cost(loose.positions_m, graph.constraints, known)
@@ -136,6 +139,7 @@ def test_the_costs_that_end_replay_are_eq_7_and_a_lower_bound_of_it() -> None:
     least = position_cost(best_positions(graph), graph.constraints, known)
     forces = np.random.default_rng(0).normal(0.0, 0.1, (len(graph.closures), 2))
     total, bound = loops.costs(forces)
+
     assert total == pytest.approx(
         position_cost(loops.positions_m(forces), graph.constraints, known)
     )
@@ -154,12 +158,14 @@ def test_a_closure_measured_backwards_is_the_same_closure() -> None:
     turned.measurement[:, 0] = cos * off[:, 0] + sin * off[:, 1]
     turned.measurement[:, 1] = cos * off[:, 1] - sin * off[:, 0]
     backwards = close_loops(PoseGraph(graph.poses, graph.steps, turned), 1e-6)
+
     assert backwards.positions_m == pytest.approx(close_loops(graph, 1e-6).positions_m, abs=1e-2)
 
 
 def test_reverse_replay_keeps_headings_and_the_first_position() -> None:
     _, graph, _ = _laps()
     assert close_loops(graph).positions_m[0] == pytest.approx(graph.poses[0, :2])
+
     alone = PoseGraph(graph.poses, graph.steps, graph.closures.select(slice(0, 0)))
     assert close_loops(alone).positions_m == pytest.approx(graph.poses[:, :2])
     assert optimize(alone) == pytest.approx(graph.poses)
@@ -168,6 +174,7 @@ def test_reverse_replay_keeps_headings_and_the_first_position() -> None:
 def test_a_path_that_lacks_a_step_is_refused() -> None:
     _, graph, _ = _laps()
     missing = graph.constraints.select(np.arange(len(graph.constraints)) != 7)
+
     with pytest.raises(MessageError, match="from pose 7 to the next"):
         PoseGraph.of(graph.poses, missing)
 
@@ -191,7 +198,9 @@ def test_the_jacobians_are_those_of_finite_differences() -> None:
 def test_optimizing_headings_comes_nearer_to_the_truth_at_a_minimum(seed: int) -> None:
     truth, graph, _ = _laps(seed=seed)
     poses = optimize(graph)
+
     assert _error_m(poses, truth) < 0.5 * _error_m(graph.poses, truth)
+
     least = cost(poses, graph.constraints)
     rng = np.random.default_rng(seed)
     for _ in range(20):
@@ -208,7 +217,9 @@ def test_one_more_closure_is_taken_in_as_if_all_had_been_solved_together() -> No
     for index in range(len(apart)):
         poses = solved.add(apart.select(np.array([index])))
     together = optimize(PoseGraph(graph.poses, graph.steps, before + apart))
+
     assert cost(poses, graph.constraints) <= 1.01 * cost(together, graph.constraints)
+
     solved.relinearize()
     assert solved.graph.poses == pytest.approx(together, abs=2e-2)
 
@@ -220,6 +231,7 @@ def test_a_closure_that_turns_the_path_far_is_optimized_anew() -> None:
     far = _between(np.array([0]), np.array([80]), np.array([[15.0, -15.0, 1.0]]), CLOSURE_SD / 10)
     poses = solved.add(far)
     together = optimize(PoseGraph(graph.poses, graph.steps, far))
+
     assert cost(poses, solved.graph.constraints) <= 1.02 * cost(together, solved.graph.constraints)
 
 
@@ -234,7 +246,9 @@ def test_relinearizing_completes_what_added_closures_left_undone(
         PoseGraph(graph.poses, graph.steps, graph.closures.select(slice(0, 0)))
     )
     poses = hasty.add(far)
+
     assert cost(poses, graph.steps + far) > 1.1 * least
+
     hasty.relinearize()
     assert cost(hasty.graph.poses, graph.steps + far) == pytest.approx(least, rel=0.02)
 
@@ -244,6 +258,7 @@ def test_sqrt_information_is_a_root_of_singular_information_too() -> None:
     information = random @ random.transpose(0, 2, 1)
     information[2, 2, :] = information[2, :, 2] = 0.0
     root = sqrt_information(information)
+
     assert root @ root.transpose(0, 2, 1) == pytest.approx(information)
 
 
@@ -257,6 +272,7 @@ def test_a_closures_chi_square_is_what_it_adds_to_the_cost() -> None:
     chi_square = solved.chi_square(one)
     solved.add(one)
     solved.relinearize()
+
     assert cost(solved.graph.poses, solved.graph.constraints) - before == pytest.approx(
         chi_square, rel=0.05
     )
@@ -270,8 +286,10 @@ def test_false_closures_are_outliers_and_true_ones_inliers(false: int, headings:
         if not headings:
             graph.closures.information[:, 2, :] = 0.0
         hold = inliers(graph, 1e-3)
+
         assert not hold[~true].any()
         assert hold[true].mean() > 0.9
+
         kept = PoseGraph(graph.poses, graph.steps, graph.closures.select(hold))
         best = PoseGraph(graph.poses, graph.steps, graph.closures.select(true))
         assert _error_m(optimize(kept), truth) < 1.2 * _error_m(optimize(best), truth) + 0.05
@@ -287,4 +305,5 @@ def test_a_lone_closure_is_an_inlier_within_drift_and_an_outlier_beyond() -> Non
 def test_residuals_of_headings_are_wrapped() -> None:
     poses = np.array([[0.0, 0.0, 3.0], [0.0, 0.0, -3.0]])
     known = _between(np.array([0]), np.array([1]), np.zeros((1, 3)), np.ones(3))
+
     assert residuals(poses, known)[0, 2] == pytest.approx(2 * np.pi - 6.0)

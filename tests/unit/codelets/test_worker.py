@@ -145,6 +145,7 @@ def test_the_same_task_gives_the_same_bytes_at_any_time_on_any_worker(asked: Tas
         _answers(old, other)
     again = _proposal(_answers(old, asked))
     fresh = _proposal(_answers(_worker("another"), asked))
+
     assert _bytes(again) == _bytes(fresh)
     assert again.failure == ""
 
@@ -152,6 +153,7 @@ def test_the_same_task_gives_the_same_bytes_at_any_time_on_any_worker(asked: Tas
 @pytest.mark.parametrize("asked", _every_task(), ids=lambda asked: asked.codelet)
 def test_what_a_codelet_proposes_it_may_write(asked: Task) -> None:
     (codelet,) = [codelet for codelet in CODELETS if codelet.name == asked.codelet]
+
     for operation in run(asked, _graph(), CONFIG).operations:
         if isinstance(operation, AnyNode):
             assert type(operation) in codelet.writes
@@ -165,18 +167,21 @@ def test_a_proposal_names_its_task_and_the_version_that_was_read() -> None:
     worker = _worker()
     asked = task("road_place")
     proposal = _proposal(_answers(worker, asked))
+
     assert (proposal.task_id, proposal.source, proposal.base_version) == (asked.task_id, "w", 1)
 
 
 def test_a_task_that_another_worker_holds_is_not_done() -> None:
     asked = task("road_place")
     worker = _worker()
+
     assert worker.feed(asked) + worker.feed(_leases(asked, "another")) == []
 
 
 def test_a_task_and_its_lease_may_come_in_any_order() -> None:
     asked = task("road_place")
     worker = _worker()
+
     assert worker.feed(_leases(asked)) == []
     assert _proposal(worker.feed(asked)).task_id == asked.task_id
 
@@ -189,6 +194,7 @@ def _delta(version: int) -> Delta:
 def test_a_task_waits_until_the_graph_has_reached_its_version() -> None:
     worker = _worker()
     asked = task("road_place", version=3)
+
     assert _answers(worker, asked) == []
     assert worker.feed(_delta(2)) == []
     assert _proposal(worker.feed(_delta(3))).base_version == 3
@@ -198,6 +204,7 @@ def test_a_lease_of_another_version_of_the_task_waits_for_that_task() -> None:
     worker = _worker()
     asked = task("road_place")
     later = msgspec.structs.replace(asked, version=2)
+
     assert worker.feed(asked) + worker.feed(_leases(later)) == []
     assert worker.feed(later) == []
     assert _proposal(worker.feed(_delta(2))).base_version == 2
@@ -205,6 +212,7 @@ def test_a_lease_of_another_version_of_the_task_waits_for_that_task() -> None:
 
 def test_an_unknown_codelet_is_a_failure_that_names_the_known_ones() -> None:
     proposal = _proposal(_answers(_worker(), task("dreaming")))
+
     assert "no codelet dreaming: there are apply_correction, localization" in proposal.failure
     assert proposal.operations == []
 
@@ -227,6 +235,7 @@ def test_whatever_a_codelet_raises_is_a_failure_of_its_task() -> None:
     worker = build("w", [ConfiguredCodelet(broken, CONFIG)])
     asked = task("broken", version=0)
     proposal = _proposal(_answers(worker, asked))
+
     assert proposal.failure == "broken: TypeError: a stranger's mistake"
 
 
@@ -238,6 +247,7 @@ def test_a_task_on_a_graph_that_lacks_what_it_reads_is_a_failure(codelet: str) -
     worker = build("w", configured(CONFIG))
     asked = task(codelet, version=0, percepts=[percept("house")])
     proposal = _proposal(_answers(worker, asked))
+
     assert proposal.failure.startswith(f"{codelet}: ")
     assert proposal.operations == []
 
@@ -246,6 +256,7 @@ def test_a_new_object_gets_a_node_with_samples_where_it_is_seen() -> None:
     seen = percept("house", math.pi / 2, 10.0, range_sd_m=0.5, bearing_sd_rad=0.01, width_m=7.0)
     graph = graph_of(_self(3.0, 4.0, math.pi / 2))
     found, link = run(task("object_place", percepts=[seen]), graph, CONFIG).operations
+
     assert isinstance(found, Object)
     assert (found.id, found.label) == ("object:house", "house")
     assert (found.x_m, found.y_m) == pytest.approx((-7.0, 4.0), abs=0.3)
@@ -261,6 +272,7 @@ def test_an_unsure_heading_spreads_a_far_object_across_the_line_of_sight() -> No
     seen = percept("house", 0.0, 30.0, range_sd_m=0.2, bearing_sd_rad=0.001)
     asked = task("object_place", percepts=[seen])
     found = run(asked, graph_of(agent(samples)), Config(landmark_samples=2000)).operations[0]
+
     assert isinstance(found, Object)
     assert found.y_sd_m == pytest.approx(3.0, rel=0.1)
     assert found.x_sd_m < 0.5
@@ -278,6 +290,7 @@ def _road(node: Self, road_m: Array, cell_m: float = 1.0) -> dict[tuple[int, int
 
 def test_road_is_marked_on_the_place_nodes_where_it_is_seen_from_the_pose() -> None:
     road_m = Array.of(np.array([[4.0, 0.0]] * 3 + [[4.0, 2.0]], np.float32))
+
     assert _road(_self(10.0, 20.0, math.pi / 2), road_m) == {
         (10, 24): 1.0,
         (8, 24): pytest.approx(1 / 3),
@@ -286,16 +299,19 @@ def test_road_is_marked_on_the_place_nodes_where_it_is_seen_from_the_pose() -> N
 
 def test_a_coarser_grid_gets_the_same_road_on_fewer_nodes() -> None:
     road_m = Array.of(np.array([[4.0, 0.0], [4.6, 0.4], [8.0, 0.0]], np.float32))
+
     assert sorted(_road(_self(), road_m, cell_m=4.0)) == [(1, 0), (2, 0)]
 
 
 def test_road_seen_from_afar_is_not_believed() -> None:
     road_m = Array.of(np.array([[2.0, 0.0], [ROAD_REACH_M + 1, 0.0]], np.float32))
+
     assert list(_road(_self(), road_m)) == [(2, 0)]
 
 
 def test_the_place_node_under_the_agent_is_active_even_without_road_in_view() -> None:
     (here,) = run(task("road_place"), graph_of(_self(-3.4, 2.6)), CONFIG).operations
+
     assert isinstance(here, Cells)
     assert here.column is PlaceColumn.ACTIVATION
     assert (here.cells.numpy().tolist(), here.values.numpy().tolist()) == ([[-3, 3]], [1.0])
@@ -315,12 +331,14 @@ def _activation(content: list[AnyNode], base_level: float = 1.0) -> float:
 def test_a_coalitions_activation_is_lidas_formula() -> None:
     assert _activation(_content(0.4, 0.8)) == pytest.approx((0.4 + 0.8) / 4)
     assert _activation(_content(0.4, 0.8), 0.5) == pytest.approx(0.5 * (0.4 + 0.8) / 4)
+
     salient = _content(0.4, 0.8, salience=-0.6)
     assert _activation(salient) == pytest.approx((0.4 + 0.8 + 1.2) / 4)
 
 
 def test_total_activation_is_base_level_plus_current_at_most_one() -> None:
     node = Node(id="a", kind="thing", activation=0.7, base_level=0.6)
+
     assert _activation([node]) == 0.5
 
 
@@ -338,6 +356,7 @@ def _found(codelet: str, *nodes: AnyNode) -> list[AnyNode]:
 
 def test_attention_brings_the_agents_whereabouts_and_what_is_new_to_it() -> None:
     nodes = (_self(), _object("old", NOVEL_SIGHTINGS + 1), _object("new", 1))
+
     assert [item.id for item in _found("whereabouts", *nodes)] == [
         "self",
         "object:new",
@@ -356,6 +375,7 @@ def test_an_object_is_the_more_salient_the_less_it_has_been_seen() -> None:
         found = _found("novelty", _self(), _object("new", sightings))[1]
         assert isinstance(found, Object)
         salience.append(found.salience)
+
     assert salience == sorted(salience, reverse=True)
     assert salience[-1] > 0
 
@@ -365,6 +385,7 @@ def test_coalitions_leave_samples_behind_and_keep_links_and_maps() -> None:
     graph = graph_of(_self(sd=0.1), _object(), at)
     (found,) = run(task("whereabouts", percepts=[percept("house")]), graph, CONFIG).coalitions
     own, house = found.nodes
+
     assert isinstance(own, Self)
     assert isinstance(house, Object)
     assert own.samples.shape == (1, 3)

@@ -33,6 +33,7 @@ def test_a_set_is_read_with_barcodes_as_subjects_and_by_time(
 ) -> None:
     recording = read(_folder(tmp_path))
     assert recording.landmarks == {6: (1.0, -2.0), 7: (0.5, 4.0)}
+
     (robot,) = recording.robots
     assert robot.observations[:, 1].tolist() == [7, 6, 1]
     assert robot.landmark_observations[:, 1].tolist() == [7, 6]
@@ -44,6 +45,7 @@ def test_files_packed_with_xz_are_read_as_they_are(tmp_path: Path) -> None:
     for path in list(tmp_path.glob("*.dat")):
         path.with_suffix(".dat.xz").write_bytes(lzma.compress(path.read_bytes()))
         path.unlink()
+
     assert (read(tmp_path).robots[0].odometry == plain).all()
 
 

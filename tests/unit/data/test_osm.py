@@ -27,6 +27,7 @@ def _write(path: Path, text: str) -> Path:
 
 def test_nodes_ways_and_their_tags_are_read(tmp_path: Path) -> None:
     extract = osm.read(_write(tmp_path / "a.osm", EXTRACT))
+
     assert extract.nodes == {1: (15.6, 48.4), 2: (15.7, 48.5)}
     assert extract.node_tags == {1: {"name": "Café", "amenity": "cafe"}}
     assert [(way.id, way.nodes, way.tags) for way in extract.ways] == [
@@ -41,6 +42,7 @@ def test_a_packed_extract_reads_as_a_plain_one(tmp_path: Path, suffix: str, open
     path = tmp_path / f"a.osm{suffix}"
     with opener(path, "wt", encoding="utf-8") as file:
         file.write(EXTRACT)
+
     assert osm.read(path) == osm.read(_write(tmp_path / "a.osm", EXTRACT))
 
 
@@ -49,6 +51,7 @@ def test_a_pbf_extract_reads_as_an_xml_one(tmp_path: Path) -> None:
     with osmium.SimpleWriter(tmp_path / "a.osm.pbf") as writer:
         for element in osmium.FileProcessor(xml):
             writer.add(element)
+
     assert osm.read(tmp_path / "a.osm.pbf") == osm.read(xml)
 
 
@@ -69,6 +72,7 @@ def test_what_is_wrong_in_an_extract_is_named(
     tmp_path: Path, wrong: str, right: str, expected: str
 ) -> None:
     path = _write(tmp_path / "a.osm", EXTRACT.replace(wrong, right))
+
     with pytest.raises(UsageError) as caught:
         osm.read(path)
     assert str(caught.value).startswith(f"{path}")
@@ -77,12 +81,14 @@ def test_what_is_wrong_in_an_extract_is_named(
 
 def test_an_extract_that_stops_in_the_middle_names_its_last_line(tmp_path: Path) -> None:
     path = _write(tmp_path / "a.osm", "\n".join(EXTRACT.splitlines()[:4]))
+
     with pytest.raises(UsageError, match="error at line 4"):
         osm.read(path)
 
 
 def test_entities_are_refused(tmp_path: Path) -> None:
     bomb = '<?xml version="1.0"?>\n<!DOCTYPE osm [<!ENTITY a "aaaa">]>\n<osm>&a;</osm>\n'
+
     with pytest.raises(UsageError, match="XML entities are not supported"):
         osm.read(_write(tmp_path / "a.osm", bomb))
 
@@ -95,6 +101,7 @@ def test_what_is_no_extract_is_one_sentence(
     path = tmp_path / f"a{suffix}"
     if content is not None:
         path.write_bytes(content)
+
     with pytest.raises(UsageError, match=r"cannot be read .*: give an OpenStreetMap extract"):
         osm.read(path)
 
@@ -106,6 +113,7 @@ def test_an_extract_that_was_cut_off_is_one_sentence(tmp_path: Path, name: str) 
             writer.add(element)
     content = (tmp_path / name).read_bytes()
     (tmp_path / name).write_bytes(content[: len(content) // 2])
+
     with pytest.raises(UsageError, match="cannot be read"):
         osm.read(tmp_path / name)
 
@@ -117,6 +125,7 @@ GRAPH = (
 
 def test_street_graphs_are_read_a_city_a_line(tmp_path: Path) -> None:
     graphs = street_graphs.read(_write(tmp_path / "a.jsonl", GRAPH + GRAPH.replace('"A"', '"B"')))
+
     assert [graph.city for graph in graphs] == ["A", "B"]
     assert graphs[0].line(graphs[0].edges[0]) == [(1.0, 2.0), (1.1, 2.0)]
 

@@ -32,6 +32,7 @@ def _file(folder: Path, text: str, name: str = "a.g2o") -> Path:
 
 def test_a_g2o_file_is_read_with_the_upper_triangle_row_by_row(tmp_path: Path) -> None:
     graph = read_g2o(_file(tmp_path, G2O))
+
     assert graph.poses.tolist() == [[0, 0, 0], [1.5, -2, 0.25]]
     assert (graph.i.tolist(), graph.j.tolist(), graph.measurement.tolist()) == (
         [0],
@@ -45,6 +46,7 @@ def test_a_toro_file_is_read_in_its_own_order_of_information(
     tmp_path: Path,
 ) -> None:
     graph = read_toro(_file(tmp_path, TORO))
+
     assert (graph.ids.tolist(), graph.i.tolist(), graph.j.tolist()) == ([0, 7], [1], [0])
     assert graph.information[0].tolist() == SYMMETRIC
 
@@ -52,6 +54,7 @@ def test_a_toro_file_is_read_in_its_own_order_of_information(
 def test_a_packed_file_is_read_as_it_is(tmp_path: Path) -> None:
     path = tmp_path / "a.g2o.xz"
     path.write_bytes(lzma.compress(G2O.encode()))
+
     assert len(read_g2o(path).poses) == 2
 
 
@@ -73,6 +76,7 @@ def test_a_wrong_line_is_named_with_file_number_and_what_was_expected(
     tmp_path: Path, line: str, expected: str
 ) -> None:
     path = _file(tmp_path, G2O + line + "\n")
+
     with pytest.raises(UsageError, match=f"{path}, line 6: expected .*{expected}"):
         read_g2o(path)
 

@@ -31,6 +31,7 @@ def test_edges_lead_from_node_to_node_whichever_way_their_polyline_goes(
         )
     )
     nodes = [tuple(node) for node in NODES]
+
     assert graph.line(graph.edges[0]) == nodes[:2]
     assert graph.line(graph.edges[1]) == [nodes[0], (1.0005, 2.0007), nodes[2]]
 

@@ -24,6 +24,7 @@ def _filled(*blocks: tuple[int, int, int, int]) -> tuple[Segment, np.ndarray]:
 
 def test_an_outline_encloses_the_segment_and_no_more() -> None:
     segment, held = _filled((50, 60, 80, 40))
+
     assert (held == segment.mask).all()
 
 
@@ -33,6 +34,7 @@ def test_the_outline_follows_a_gable() -> None:
     segment = Segment(mask > 0, cv2.boundingRect(mask))
     held = np.zeros((240, 320), np.uint8)
     cv2.fillPoly(held, [np.array(outline_px(segment), np.int32)], 1)
+
     assert np.count_nonzero(held != mask) < 0.05 * segment.area_px
 
 
@@ -45,12 +47,14 @@ def test_a_lamp_or_a_tree_before_a_building_does_not_divide_it() -> None:
 
 def test_of_pieces_far_apart_the_largest_is_outlined() -> None:
     _, held = _filled((10, 60, 90, 40), (250, 60, 40, 40))
+
     assert held[60:100, 10:100].all()
     assert held.sum() == 90 * 40
 
 
 def test_a_distant_speck_does_not_change_the_outline() -> None:
     _, held = _filled((10, 60, 90, 40), (250, 60, 4, 4))
+
     assert held.sum() == 90 * 40
 
 

@@ -64,5 +64,6 @@ def test_the_light_is_described_by_the_colours_of_ground_and_sky() -> None:
 def test_what_is_not_in_view_has_no_colour() -> None:
     image, _, _ = painted([])
     walled = surroundings(image, np.full(SIZE, 4.0, np.float32), CAMERA)
+
     assert not walled[3:].any()
     assert not surroundings(image, np.full(SIZE, 0.01, np.float32), CAMERA).any()

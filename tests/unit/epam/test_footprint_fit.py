@@ -50,6 +50,7 @@ def _error_m(place: ObjectPose, x_m: float, y_m: float) -> float:
 @pytest.mark.parametrize(("x_m", "y_m"), [(20.0, 0.0), (22.0, 9.0), (30.0, -12.0)])
 def test_the_centre_is_the_same_from_every_side(x_m: float, y_m: float, turn_rad: float) -> None:
     place = locate([_seen(x_m, y_m, turn_rad)], CAMERA)[0]
+
     assert _error_m(place, x_m, y_m) < 0.4
     assert place.misfit < 0.3
 
@@ -63,12 +64,14 @@ def test_errors_agree_with_the_standard_deviations() -> None:
         turn_rad = rng.uniform(0, math.pi)
         place = locate([_seen(x_m, y_m, turn_rad, noise_px=0.12)], CAMERA)[0]
         scores.append((place.range_m - math.hypot(x_m, y_m)) / place.range_sd_m)
+
     assert 0.2 < float(np.sqrt(np.mean(np.square(scores)))) < 1.5
 
 
 def test_a_partly_visible_building_has_larger_standard_deviations() -> None:
     whole = locate([_seen(20.0, 0.0, 0.4)], CAMERA)[0]
     cut = locate([_seen(20.0, 0.0, 0.4, window=(0, 130))], CAMERA)[0]
+
     assert cut.range_sd_m > 1.5 * whole.range_sd_m
     assert cut.bearing_sd_rad > 2 * whole.bearing_sd_rad
 
@@ -81,5 +84,6 @@ def test_several_objects_are_placed_as_each_alone_is() -> None:
         assert (place.bearing_rad, place.range_m) == pytest.approx(
             (alone.bearing_rad, alone.range_m), abs=1e-9
         )
+
     assert together == locate(outlines, CAMERA)
     assert locate([], CAMERA) == []

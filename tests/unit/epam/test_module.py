@@ -53,6 +53,7 @@ def test_a_view_without_contrast_gives_empty_percepts() -> None:
     said = build(Config(), "epam").feed(blank)
 
     assert len(said) == 1
+
     percepts = said[0]
     assert isinstance(percepts, Percepts)
     assert (percepts.objects, percepts.matches) == ([], [])
@@ -68,6 +69,7 @@ def test_a_segment_under_the_threshold_is_no_percept(views: list[View]) -> None:
         )
         for threshold in (0.0, 0.9, 1.0)
     )
+
     assert some > fewer > none == 0
 
 
@@ -79,6 +81,7 @@ def test_base_level_activation_adds_to_the_current_one(views: list[View]) -> Non
         ]
         for level in (0.0, 0.3)
     )
+
     assert raised == pytest.approx([min(1.0, activation + 0.3) for activation in bare])
 
 
@@ -87,9 +90,11 @@ def test_a_percept_is_outlined_boxed_and_measured(views: list[View]) -> None:
     found = [percept for view in views for percept in _percepts(module, view).objects]
 
     assert len(found) > 5
+
     for percept in found:
         columns, rows = np.array(percept.outline_px).T
         left, top, wide, high = percept.box_px
+
         assert left - 1 <= columns.min() <= columns.max() <= left + wide
         assert top - 1 <= rows.min() <= rows.max() <= top + high
         assert percept.height_m > 1.0
@@ -118,19 +123,23 @@ def test_objects_and_views_learned_before_a_restart_are_known_after_it(
     first = build(Config(), "epam")
     journal = Journal(tmp_path / "epam")
     assert list(journal.messages()) == []
+
     for view in views:
         for said in first.feed(view):
             if isinstance(said, Learned):
                 journal.append(said, codec.encode(said))
     journal.close()
     again = build(Config(), "epam")
+
     assert again.restore is not None
+
     again.restore(Journal(tmp_path / "epam").messages())
 
     assert first.journal is topics.LEARNED
     assert first.compact is not None
     assert again.compact is not None
     assert codec.encode(again.compact()) == codec.encode(first.compact())
+
     labels = {percept.label for percept in _percepts(first, views[1]).objects}
     assert any(label.startswith("new-building-") for label in labels)
     assert {percept.label for percept in _percepts(again, views[1]).objects} == labels
@@ -154,16 +163,19 @@ def test_a_restart_amid_a_view_learns_nothing_from_it_twice(
     first = build(Config(), "epam")
     journal = Journal(tmp_path / "epam")
     assert list(journal.messages()) == []
+
     for view in views[:2]:
         learned, percepts = first.feed(view)
         journal.append(learned, codec.encode(learned))
     journal.close()
+
     assert isinstance(learned, Learned)
     assert learned.objects
     assert learned.views
 
     second = build(Config(), "epam")
     assert second.restore is not None
+
     second.restore(Journal(tmp_path / "epam").messages())
     (again,) = second.feed(views[1])
 
@@ -179,7 +191,9 @@ def test_the_last_view_learned_from_before_a_restart_teaches_nothing(views: list
     view = views[1]
     fresh = build(Config(), "epam")
     restarted = build(Config(), "epam")
+
     assert restarted.restore is not None
+
     restarted.restore([Learned(stamp_ns=view.stamp_ns, frame=view.frame)])
 
     assert [type(message) for message in fresh.feed(view)] == [Learned, Percepts]
@@ -189,7 +203,9 @@ def test_the_last_view_learned_from_before_a_restart_teaches_nothing(views: list
 def test_after_a_restart_the_next_view_is_learned_from(views: list[View]) -> None:
     first = build(Config(), "epam")
     second = build(Config(), "epam")
+
     assert second.restore is not None
+
     second.restore(first.feed(views[0]))
 
     for view in views[1:]:
@@ -203,6 +219,7 @@ def test_after_a_restart_the_next_view_is_learned_from(views: list[View]) -> Non
 def test_a_first_view_at_time_0_is_learned_from(views: list[View]) -> None:
     at_start = msgspec.structs.replace(views[0], stamp_ns=0, frame=0)
     learned, _ = build(Config(), "epam").feed(at_start)
+
     assert isinstance(learned, Learned)
 
 
@@ -215,7 +232,9 @@ def test_one_message_stands_for_all_that_was_learned(views: list[View]) -> None:
         if isinstance(said, Learned)
         for known in said.objects
     ]
+
     assert module.compact is not None
+
     everything = module.compact()
 
     assert isinstance(everything, Learned)

@@ -92,6 +92,7 @@ def test_background_is_neither_a_known_nor_an_unknown_building(
 ) -> None:
     for number in (1, 5):
         found = recognizer.recognize(_appearance(number, building=0.1))
+
         assert not found.known
         assert found.background == pytest.approx(0.9)
         assert found.unknown < 0.1
@@ -124,6 +125,7 @@ def test_an_appearance_is_new_if_it_differs_from_the_few_that_are_known(
         True,
         False,
     ]
+
     for number in range(MAX_APPEARANCES - 1):
         recognizer.learn("new-building-1", _direction(10 + number))
     assert not recognizer.is_new_appearance(other)
@@ -161,6 +163,7 @@ def test_weights_of_another_shape_are_refused(tmp_path: Path) -> None:
 
     with pytest.raises(ConfigError, match=r"road\.onnx"):
         Network(other, INPUT_SHAPE, OUTPUT_SHAPES)
+
     broken = tmp_path / "broken.onnx"
     broken.write_bytes(b"no network")
     with pytest.raises(ConfigError, match=r"broken\.onnx"):

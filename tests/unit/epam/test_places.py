@@ -74,6 +74,7 @@ def test_a_route_is_recognized_in_other_light_at_other_speed_and_heading() -> No
     errors = [
         abs(match.frame - place) for match, place in zip(matches, places, strict=True) if match
     ]
+
     assert len(errors) >= 0.8 * len(places)
     assert max(errors) <= 2.0
     assert all(
@@ -86,6 +87,7 @@ def test_a_route_is_recognized_in_other_light_at_other_speed_and_heading() -> No
 def test_on_a_new_route_nothing_matches_and_every_view_is_remembered() -> None:
     recognizer = _recognizer_after(Route(1))
     matches, remembered = _drive(recognizer, _lap(Route(2)), LENGTH)
+
     assert not any(matches)
     assert [view.frame for view in remembered] == list(range(LENGTH, 2 * LENGTH))
 
@@ -96,6 +98,7 @@ def test_a_single_view_is_no_match() -> None:
     recognizer = _recognizer_after(route)
     elsewhere = [other.view(place) for place in range(20)]
     matches, _ = _drive(recognizer, [*elsewhere[:10], route.view(15), *elsewhere[10:]], LENGTH)
+
     assert not any(matches)
 
 
@@ -103,6 +106,7 @@ def test_the_most_recent_views_do_not_match() -> None:
     route = Route(1)
     there = [route.view(place) for place in range(12)]
     matches, _ = _drive(PlaceRecognizer(), [*there, *there])
+
     assert not any(matches)
 
 
@@ -112,6 +116,7 @@ def test_a_recognized_place_is_not_remembered_again() -> None:
     matches, remembered = _drive(
         recognizer, [route.view(place, evening=True) for place in range(30)], LENGTH
     )
+
     assert len(remembered) == sum(match is None for match in matches) <= 6
 
 
@@ -123,6 +128,7 @@ def test_a_robot_at_rest_remembers_one_view() -> None:
         np.clip(image + rng.normal(0, 5, image.shape), 0, 255).astype(np.uint8) for _ in range(20)
     ]
     _, remembered = _drive(recognizer, noisy)
+
     assert len(remembered) == 1
 
 
@@ -132,6 +138,7 @@ def test_at_rest_the_last_match_is_returned_again() -> None:
     matches, _ = _drive(
         recognizer, [route.view(place) for place in (5, 6, 7, 8, 9, 10, 10, 10)], LENGTH
     )
+
     assert matches[-1] is not None
     assert matches[-3] == matches[-2] == matches[-1]
 
@@ -152,6 +159,7 @@ def test_a_view_that_shows_no_place_is_neither_remembered_nor_matched(
     route = Route(1)
     recognizer = _recognizer_after(route)
     matches, _ = _drive(recognizer, [route.view(place) for place in range(10)], LENGTH)
+
     assert matches[-1] is not None
     assert recognizer.observe(99, 99, image, depth_m) == ([], [])
 
@@ -162,7 +170,9 @@ def test_views_remembered_before_a_restart_are_recognized_after_it() -> None:
     restarted = PlaceRecognizer()
     for view in recognizer.all:
         restarted.restore([view])
+
     assert list(restarted.all) == list(recognizer.all)
+
     again = [route.view(place, evening=True) for place in range(30)]
     matches, _ = _drive(restarted, again, LENGTH)
     assert [match.frame for match in matches[5:] if match] == list(range(5, 30))
@@ -173,6 +183,7 @@ def test_at_rest_after_a_restart_no_view_is_remembered_again() -> None:
     restarted = PlaceRecognizer()
     restarted.restore(recognizer.all)
     last = Route(1).view(LENGTH - 1)
+
     assert restarted.observe(LENGTH, LENGTH, last, NEAR) == ([], [])
 
 
@@ -183,6 +194,7 @@ def test_beyond_the_capacity_the_oldest_views_are_forgotten() -> None:
     recognizer = PlaceRecognizer(PlaceConfig(capacity=150))
     _drive(recognizer, [*_lap(first), *_lap(second), *_lap(third)])
     kept = [view.frame for view in recognizer.all]
+
     assert len(kept) <= 150
     assert kept == list(range(kept[0], 3 * LENGTH))
     assert not any(_drive(recognizer, [first.view(place) for place in range(20)], 200)[0])
@@ -192,6 +204,7 @@ def test_beyond_the_capacity_the_oldest_views_are_forgotten() -> None:
 def test_the_same_views_give_the_same_answers() -> None:
     route = Route(1)
     views = [*_lap(route), *(route.view(place, 6, evening=True) for place in range(20))]
+
     assert _drive(PlaceRecognizer(), views) == _drive(PlaceRecognizer(), views)
 
 

@@ -45,6 +45,7 @@ def test_depth_of_buildings_within_30_m_has_errors_under_4_percent(views: Views)
         sure = (depth_m > 0) & (label > 0) & (true_m > 3) & (true_m < 30)
         errors.append(depth_m[sure] / true_m[sure] - 1)
     error = np.concatenate(errors)
+
     assert np.median(np.abs(error)) < 0.04
     assert abs(np.median(error)) < 0.01
 
@@ -55,6 +56,7 @@ def test_nearly_all_percepts_have_the_right_label(
     names = views["names"].tolist()
     known = [(number, percept) for number, percept in recognized if percept.label in names]
     right = [1 + names.index(percept.label) in views["label"][number] for number, percept in known]
+
     assert len(right) > 2 * COUNT
     assert len(known) > 0.9 * len(recognized)
     assert np.mean(right) > 0.95
@@ -73,6 +75,7 @@ def test_nearly_all_large_buildings_are_recognized(
         )
         if label > 0 and pixels > LARGE_PX
     ]
+
     assert len(large) > COUNT
     assert np.mean([seen in found for seen in large]) > 0.85
 
@@ -86,11 +89,14 @@ def test_centres_have_errors_of_a_metre_or_two_as_their_deviations_claim(
         for number, percept in recognized
         if percept.label in buildings and percept.range_m < 40
     ]
+
     assert np.median([math.hypot(x_m, y_m) for _, x_m, y_m in placed]) < 1.5
+
     bearing = [
         math.atan2(y_m, percept.range_m) / percept.bearing_sd_rad for percept, _, y_m in placed
     ]
     reach = [x_m / percept.range_sd_m for percept, x_m, _ in placed]
+
     assert np.median(np.abs(bearing)) < 1.2
     assert np.median(np.abs(reach)) < 1.2
 
@@ -130,9 +136,11 @@ def test_unlabelled_buildings_get_nodes_and_are_recognized_again() -> None:
         if name.startswith("invented") and len(given) > 1
     }
     kept = [label == given[0] for given in again.values() for label in given[1:]]
+
     assert list(dict.fromkeys(learned)) == [
         f"new-building-{1 + number}" for number in range(len(set(learned)))
     ]
+
     unlabelled = [name for name in labels if name.startswith("invented")]
     assert 0.7 * len(unlabelled) <= len(set(learned)) <= 1.3 * len(unlabelled)
     assert len(kept) > 20

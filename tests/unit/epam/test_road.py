@@ -65,6 +65,7 @@ def segmenter() -> RoadSegmenter:
 
 def test_a_straight_street_ends_at_its_two_sides_and_nowhere_else() -> None:
     road_m, boundary_m = _projected(_street())
+
     assert len(boundary_m) > 30
     assert np.quantile(np.abs(np.abs(boundary_m[:, 1]) - HALF_M), 0.9) < 0.1
     assert (np.abs(road_m[:, 1]) < HALF_M).all()
@@ -76,6 +77,7 @@ def test_road_and_boundary_are_float32_with_one_point_a_cell_in_range() -> None:
     for points in _projected(_street()):
         assert points.dtype == np.float32
         assert np.hypot(*points.T).max() <= MAX_RANGE_M
+
         cells = np.floor(points / CELL_M)
         assert len(np.unique(cells, axis=0)) == len(cells)
 
@@ -89,12 +91,14 @@ def test_the_boundary_is_located_between_pixels() -> None:
     expected_m = (
         CAMERA.mount_height_m * CAMERA.fy_px / (row - CAMERA.cy_px) + CAMERA.mount_forward_m
     )
+
     np.testing.assert_allclose(boundary_m[:, 0], expected_m, atol=0.01)
 
 
 def test_the_ground_follows_depth_where_the_mounts_height_is_wrong() -> None:
     low = _street(height_m=1.4)
     _, boundary_m = _projected(low)
+
     assert np.median(np.abs(np.abs(boundary_m[:, 1]) - HALF_M)) < 0.05
 
 
@@ -108,18 +112,21 @@ def test_wrong_disparities_on_a_third_of_the_road_do_not_move_the_plane() -> Non
     plane = fit(street.mask, np.where(wrong, rng.uniform(1, 60, true_px.shape), true_px), CAMERA)
     rows, columns = np.nonzero(street.mask)
     error_px = plane.disparity_px(rows, columns, CAMERA) - true_px[rows, columns]
+
     assert np.abs(error_px).max() < 0.5
 
 
 def test_without_any_depth_the_camera_is_level_at_its_mount() -> None:
     street = _street()
     _, boundary_m = _projected(street, np.zeros_like(street.depth_m))
+
     assert np.quantile(np.abs(np.abs(boundary_m[:, 1]) - HALF_M), 0.9) < 0.1
 
 
 def test_no_boundary_is_claimed_behind_something_upright() -> None:
     block = Block(9.0, 0.0, 0.0, (2.0, 2.0), 1.5, (200, 30, 30))
     _, boundary_m = _projected(_street(block))
+
     assert len(boundary_m) > 20
     assert (np.abs(boundary_m[:, 1]) > HALF_M - 0.4).all()
 
@@ -128,6 +135,7 @@ def test_no_boundary_is_claimed_where_the_image_ends() -> None:
     everywhere = np.ones((240, 320), np.float32)
     everywhere[:121] = 0.0
     road_m, boundary_m = project(everywhere, _street().depth_m, CAMERA)
+
     assert len(road_m) > 100
     assert boundary_m.shape == (0, 2)
 
@@ -136,6 +144,7 @@ def test_no_boundary_is_claimed_at_the_outermost_pixels() -> None:
     almost = np.ones((240, 320), np.float32)
     almost[:121] = 0.0
     almost[:, :2] = almost[:, -2:] = almost[-2:] = 0.0
+
     assert project(almost, _street().depth_m, CAMERA)[1].shape == (0, 2)
 
 
@@ -143,6 +152,7 @@ def test_left_is_positive() -> None:
     street = _street()
     left_half = street.mask & (np.arange(320) < 160)
     road_m, _ = project(left_half.astype(np.float32), street.depth_m, CAMERA)
+
     assert (road_m[:, 1] > -0.1).all()
     assert road_m[:, 1].max() > 3.0
 
@@ -155,6 +165,7 @@ def test_what_stands_on_the_road_is_no_road_though_it_is_in_the_mask() -> None:
     everything = ((rows > CAMERA.cy_px) & (np.abs(across_m) < HALF_M)).astype(np.float32)
     road_m, _ = project(everything, street.depth_m, CAMERA)
     behind = (np.abs(road_m[:, 1]) < 1.0) & (road_m[:, 0] > 9.0)
+
     assert len(road_m) > 100
     assert not behind.any()
 
@@ -171,6 +182,7 @@ def test_an_image_without_contrast_shows_no_road(segmenter: RoadSegmenter, level
 
 def test_a_black_image_with_the_noise_of_a_camera_shows_no_road(segmenter: RoadSegmenter) -> None:
     noise = np.random.default_rng(0).normal(0, 3, (240, 320, 3))
+
     assert not segmenter.mask(np.clip(noise, 0, 255).astype(np.uint8)).any()
 
 
@@ -180,6 +192,7 @@ def test_an_image_of_any_size_gets_a_mask_of_its_size_and_the_same_one_twice(
 ) -> None:
     image = cv2.resize(painted([])[0], size[::-1]).astype(np.uint8)
     masks = [segmenter.mask(image) for _ in range(2)]
+
     assert masks[0].shape == size
     assert masks[0].dtype == np.bool_
     np.testing.assert_array_equal(*masks)
@@ -204,6 +217,7 @@ def test_road_in_a_town_never_seen_is_found_and_its_ends_are_placed(
         masks.append(likelihood >= 0.5)
         errors_m.append(road_edge_errors_m(boundary_m, surface, true_m, camera))
         missed_m.append(road_edges_missed_m(boundary_m, surface, true_m, camera))
+
     assert road_iou(np.array(masks), np.asarray(views["surface"], np.uint8)) > 0.9
     assert road_edge_error_m(errors_m) < 0.25
     assert road_edge_error_m(missed_m) < 0.5
@@ -214,6 +228,7 @@ def test_unusable_weights_are_named_with_the_remedy(
 ) -> None:
     with pytest.raises(ConfigError, match=r"nowhere\.onnx.*cogmap train"):
         load(tmp_path / "nowhere.onnx")
+
     (tmp_path / "broken.onnx").write_bytes(b"no network")
     with pytest.raises(ConfigError, match=r"broken\.onnx.*cogmap train"):
         load(tmp_path / "broken.onnx")
@@ -246,14 +261,17 @@ def test_iou_on_photographs_counts_what_is_labelled_and_nothing_else(
 ) -> None:
     images, labels = _photographs(tmp_path, segmenter)
     assert camvid_iou(DEFAULT_PATH, images, labels) == 1.0
+
     label = cv2.imread(str(labels / "0.png"), cv2.IMREAD_UNCHANGED)
     assert (label == 3).any()
+
     rows = np.flatnonzero((label == 3).any(1))
     label[rows[len(rows) // 2] :][label[rows[len(rows) // 2] :] == 3] = 4
     share = (label == 3).sum() / (
         cv2.imread(str(labels / "0.png"), cv2.IMREAD_UNCHANGED) == 3
     ).sum()
     cv2.imwrite(str(labels / "0.png"), label)
+
     assert camvid_iou(DEFAULT_PATH, images, labels) == pytest.approx(share)
 
 
@@ -311,5 +329,6 @@ def test_photographs_that_cannot_be_used_are_named_with_the_remedy(
 ) -> None:
     images, labels = _photographs(tmp_path, segmenter)
     spoil(images, labels)  # type: ignore[operator]
+
     with pytest.raises(UsageError, match=said):
         camvid_iou(DEFAULT_PATH, images, labels)

@@ -57,6 +57,7 @@ def test_both_sides_of_what_a_lamp_hides_are_one_segment() -> None:
 
 def test_neither_a_speck_nor_a_building_without_a_centre_is_a_segment() -> None:
     assert _divided(_answer((20, 20, 23, 23), peaks=[(21, 21)])) == []
+
     without = _answer((20, 20, 60, 60), peaks=[(40, 40)])
     without[1] = 0.0
     assert _divided(without) == []
@@ -79,6 +80,7 @@ def test_the_network_receives_height_and_where_depth_is_unknown() -> None:
     assert values[4, :10].max() == 0.0
     assert values[4, 10:].min() == 1.0
     assert not values[[3, 5], :10].any()
+
     horizon = round(CAMERA.cy_px / 2)
     assert values[5, horizon, 50] == pytest.approx(CAMERA.mount_height_m / 5, abs=0.02)
     assert values[5, 20, 50] > values[5, 100, 50]
@@ -137,6 +139,7 @@ def test_a_building_of_unknown_size_is_placed_behind_its_visible_middle() -> Non
     wall = walls(_segment(130, 190), _scene((130, 190, 8.0)))
 
     assert wall is not None
+
     place = wall.usual_pose(CAMERA)
     assert place.range_m == pytest.approx(208 * 0.5 / 8.0 + CAMERA.mount_forward_m + 4.5, abs=0.1)
     assert abs(place.bearing_rad) < 0.01

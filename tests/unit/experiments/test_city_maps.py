@@ -34,6 +34,7 @@ def test_the_tour_is_as_short_as_any(seed: int) -> None:
     lengths = [
         sum(distance[a, b] for a, b in zip(tour, [*tour[1:], 0], strict=True)) for tour in every
     ]
+
     assert length == pytest.approx(min(lengths))
     assert sum(
         distance[a, b] for a, b in zip(order, [*order[1:], 0], strict=True)
@@ -43,6 +44,7 @@ def test_the_tour_is_as_short_as_any(seed: int) -> None:
 
 def test_a_tour_past_what_cannot_be_reached_is_refused() -> None:
     distance = np.full((4, 4), np.inf)
+
     with pytest.raises(CogmapError, match="cannot be reached"):
         shortest_tour(distance)
 
@@ -51,6 +53,7 @@ def test_ways_follow_the_streets_between_points_put_on_them() -> None:
     streets, (east, north) = CROSS.with_points(np.array([(60.0, 9.0), (-5.0, 80.0)]))
     distance, before = streets.shortest_paths(np.array([east, north]))
     assert distance[0, north] == pytest.approx(140.0)
+
     way = streets.points_m[shortest_path(before[0], int(north))]
     assert way.tolist() == [[60.0, 0.0], [0.0, 0.0], [0.0, 80.0]]
 
@@ -58,6 +61,7 @@ def test_ways_follow_the_streets_between_points_put_on_them() -> None:
 def test_two_points_on_one_piece_stand_in_order() -> None:
     streets, (far, near) = CROSS.with_points(np.array([(80.0, 1.0), (20.0, 1.0)]))
     distance, _ = streets.shortest_paths(np.array([near]))
+
     assert distance[0, far] == pytest.approx(60.0)
     assert distance[0, 0] == pytest.approx(20.0)
     assert streets.length_m == pytest.approx(CROSS.length_m)
@@ -68,6 +72,7 @@ def test_only_the_connected_part_is_kept() -> None:
         np.vstack([CROSS.points_m, [(500.0, 0.0), (600.0, 0.0)]]),
         np.vstack([CROSS.pieces, [(4, 5)]]),
     )
+
     assert apart.connected().points_m.tolist() == CROSS.points_m.tolist()
 
 
@@ -76,6 +81,7 @@ def test_an_environment_has_eight_buildings_in_4_km2_and_a_tour_past_them(
     seed: int,
 ) -> None:
     (environment,) = environments(grown(seed), 1, seed)
+
     assert environment.buildings_m.shape == (BUILDINGS, 2)
     assert len(set(environment.names)) == BUILDINGS
     assert environment.area_km2 <= MAX_KM2
@@ -110,6 +116,7 @@ def test_a_city_with_too_few_buildings_is_named() -> None:
 
 def test_degrees_become_metres() -> None:
     metres = plane_m(np.array([(15.0, 48.001), (15.001, 48.0)]), np.array([15.0, 48.0]))
+
     assert metres[0] == pytest.approx([0.0, 111.2], abs=0.1)
     assert metres[1] == pytest.approx([74.4, 0.0], abs=0.1)
 
@@ -117,6 +124,7 @@ def test_degrees_become_metres() -> None:
 def test_an_extract_without_streets_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "sea.osm"
     path.write_text('<osm version="0.6"><node id="1" lat="1" lon="1"/></osm>')
+
     with pytest.raises(UsageError, match="has no streets"):
         from_osm(path)
 
@@ -125,6 +133,7 @@ def test_the_error_is_the_sum_of_squares_in_square_kilometres() -> None:
     true = np.zeros((8, 2))
     learned = np.tile([300.0, 400.0], (8, 1))
     assert map_error_km2(learned, true) == pytest.approx(8 * 0.25)
+
     learned[:4] = np.nan
     assert map_error_km2(learned, true) == pytest.approx(8 * 0.25)
 
@@ -141,6 +150,7 @@ def test_the_ratio_is_the_mean_of_the_maps_own_ratios() -> None:
         for error in errors
     ]
     metrics = map_metrics(maps, NOISE)
+
     assert metrics["error_corrected_over_uncorrected"] == pytest.approx((0.25 + 0.5) / 2)
     assert metrics["error_uncorrected_km2"] == pytest.approx(3.0)
     assert metrics["sensing"] == "percept-level sensing"
@@ -154,7 +164,9 @@ def test_without_noise_and_confusions_the_map_is_right_and_repeatable() -> None:
     configured["sim"]["trajectory"]["line_m"] = configured["sim"]["trajectory"]["line_m"][:12]
     configured["sim"]["percepts"] |= {"right_name": 1.0, "precision": 1.0, "place_precision": 1.0}
     made, again = (traverse(configured) for _ in range(2))
+
     assert made.believed[:, :2] == pytest.approx(made.true[:, :2], abs=1.0)
+
     known = ~np.isnan(made.buildings_m[:, 0])
     assert known.any()
     assert np.hypot(*(made.buildings_m - environment.buildings_m)[known].T).max() < 5.0

@@ -31,6 +31,7 @@ def _trial(condition: Condition, number: int = 0, noise: Noise = NOISY) -> Trial
 
 def test_every_route_ends_at_post_8_and_15_degrees_move_its_target_46_cm() -> None:
     assert len(set(ROUTES)) == 8
+
     for target, _, last in ROUTES:
         assert last == 8
         (moved,) = turned((POSTS[target],), CONFLICT_RAD)
@@ -42,6 +43,7 @@ def test_steps_lead_to_a_goal_behind_one_until_it_is_within_reach() -> None:
     goal = (-2.0, 2.5)
     for _ in range(12):
         pose = pose.after(*step(*pose.towards(goal)))
+
     assert pose.towards(goal) == pytest.approx((0.0, REACH_M))
 
 
@@ -50,6 +52,7 @@ def test_self_motion_is_multiplied_by_noise_of_mean_one() -> None:
     rows = np.array([self_motion(1.0, 0.5, Noise(0.1, 0.2), rng) for _ in range(4000)])
     turns = rows[:, 0, 1] * rows[:, 0, 2]
     ways = rows[:, 1, 0] * rows[:, 1, 2]
+
     assert (turns.mean(), turns.std()) == pytest.approx((1.0, 0.2), rel=0.05)
     assert (ways.mean(), ways.std()) == pytest.approx((0.5, 0.05), rel=0.05)
 
@@ -69,6 +72,7 @@ def test_distances_err_by_three_percent_and_directions_by_as_much_across() -> No
     seen = [
         sightings(Pose(0, 0, 0), {"star": (4.0, 0.0)}, Noise(0.1, 0.1), rng)[0] for _ in range(4000)
     ]
+
     assert np.std([percept.range_m for percept in seen]) == pytest.approx(0.12, rel=0.05)
     assert np.std([percept.bearing_rad for percept in seen]) == pytest.approx(0.03, rel=0.05)
 
@@ -79,12 +83,14 @@ def test_with_senses_that_hardly_err_the_post_is_put_back_where_it_stood(
 ) -> None:
     trial = _trial(condition, 3, STILL)
     response = Session(trial).run()
+
     assert math.dist((response.x_m, response.y_m), trial.target) < 0.15
 
 
 def test_after_disorientation_landmarks_lead_back() -> None:
     trial = _trial(Condition.LANDMARKS, 2)
     response = Session(trial).run()
+
     assert math.dist((response.x_m, response.y_m), trial.target) < 0.5
 
 
@@ -92,6 +98,7 @@ def test_landmarks_that_are_turned_lead_to_where_they_say() -> None:
     trial = _trial(Condition.CONFLICT, 9)
     response = Session(trial).run()
     where = (response.x_m, response.y_m)
+
     assert math.dist(where, trial.turned_target) < math.dist(where, trial.target)
 
 
@@ -99,6 +106,7 @@ def test_a_trial_says_the_same_bytes_each_time_and_others_in_another() -> None:
     sessions = [Session(_trial(Condition.BOTH, number)) for number in (4, 4, 12)]
     responses = [session.run() for session in sessions]
     first, again, other = (session.transcript.messages for session in sessions)
+
     assert responses[0] == responses[1] and first == again
     assert first["workspace/delta"] and first["workspace/delta"] != other["workspace/delta"]
 
@@ -106,16 +114,19 @@ def test_a_trial_says_the_same_bytes_each_time_and_others_in_another() -> None:
 def test_the_figures_do_not_depend_on_the_number_of_processes() -> None:
     few = (Condition.SELF_MOTION,)
     one, two = (measure(NOISY, Budget(2, 7, processes), few) for processes in (1, 2))
+
     assert np.array_equal(one.errors_m[few[0]], two.errors_m[few[0]])
 
 
 def test_errors_lie_along_the_way_that_turned_landmarks_move_the_target() -> None:
     trials = [_trial(Condition.CONFLICT, number) for number in range(16)]
     assert {trial.side for trial in trials} == {1, -1}
+
     exactly = [Response(*trial.turned_target, 0) for trial in trials]
     assert analysis.errors(trials, exactly) == pytest.approx(
         np.tile([0.4569, 0.0], (16, 1)), abs=1e-4
     )
+
     at_post_8 = [Response(*POSTS[8], 0) for _ in trials]
     assert (analysis.errors(trials, at_post_8)[:, 1] > 1.7).all()
 
@@ -133,16 +144,19 @@ def test_errors_turn_with_the_landmarks() -> None:
     ]
     shift_m = analysis.shift_m(trials)
     expected = analysis.turned_errors(analysis.errors(trials, put), shift_m)
+
     assert analysis.errors(trials, moved) == pytest.approx(expected, abs=1e-4)
 
 
 def test_two_cues_combine_by_their_precision() -> None:
     assert analysis.landmark_weight(0.5, 0.4) == pytest.approx(0.25 / 0.41)
     assert analysis.optimal_sd_m(0.5, 0.4) == pytest.approx((0.5**-2 + 0.4**-2) ** -0.5)
+
     first, second = (
         Gaussian(np.array([x, 0.0]), np.eye(2) * sd**2) for x, sd in ((0.0, 0.5), (1.0, 0.4))
     )
     both = analysis.combined(first, second)
+
     assert both.mean_m == pytest.approx([0.25 / 0.41, 0.0])
     assert both.covariance_m2[0, 0] ** 0.5 == pytest.approx(analysis.optimal_sd_m(0.5, 0.4))
 
@@ -165,6 +179,7 @@ def test_responses_between_the_cues_are_likelier_under_integration() -> None:
     either = np.where(
         follows, rng.normal((0.457, 0), 0.28, (400, 2)), rng.normal(0, 0.35, (400, 2))
     )
+
     assert _outcome(between).metrics()["integration_over_best_alternation"] > 0
     assert _outcome(either).metrics()["integration_over_alternation"] < 0
 
@@ -175,6 +190,7 @@ def test_one_lost_trial_turns_the_sum_of_likelihoods_but_not_the_median() -> Non
     between = rng.normal((weight * 0.457, 0), 0.22, (400, 2))
     between[7] = (9.0, 7.0)
     figures = _outcome(between).metrics()
+
     assert figures["integration_over_alternation"] < 0
     assert figures["integration_over_alternation_median_of_a_trial"] > 0
     assert figures["integration_likelier_share"] > 0.5

@@ -56,6 +56,7 @@ def _loop(error_m: float) -> Loop:
 
 def test_pairs_are_close_where_their_fields_are_before_and_after() -> None:
     replayed = _squeezed()
+
     assert replayed.close.tolist() == [True] * 38 + [False, False]
     assert replayed.nearer_m[-1] == pytest.approx(97.5)
 
@@ -63,6 +64,7 @@ def test_pairs_are_close_where_their_fields_are_before_and_after() -> None:
 def test_synapses_of_close_places_change_by_the_decay_times_the_shift() -> None:
     metrics = loop_metrics({method: _loop(3.0) for method in METHODS})
     expected = DECAY * np.exp(-DECAY * 2.375)
+
     assert metrics["strength_change_per_m_close_pairs"] == pytest.approx(expected, rel=0.05)
     assert metrics["strength_and_shift_correlation_close_pairs"] > 0.99
     assert metrics["strength_change_per_m_all_pairs"] < 0.02
@@ -76,6 +78,7 @@ def test_errors_are_measured_before_and_after_correction_and_in_the_end() -> Non
         for name in ("path", "object")
         for when in ("before", "after")
     ]
+
     assert told == pytest.approx([3.0, 0.0, 3.0, 0.0])
     assert metrics["end_error_in_the_end_m_heading"] == pytest.approx(3.0)
     assert metrics["path_error_wheels_alone_m"] == pytest.approx(6.0)
@@ -86,6 +89,7 @@ def test_where_only_distances_err_the_rule_leaves_a_brownian_bridge() -> None:
     distances = Noise(speed=0.05, turn=0.0, drift_rad_per_sqrt_m=0.0)
     square = ((0.0, 0.0), (50.0, 0.0), (50.0, 50.0), (0.0, 50.0), (0.0, 0.0))
     laps = close_laps(square, 1.0, distances, 400, seed=3)
+
     # Half of the whole variance on the mean before, a sixth of it after.
     assert np.mean(laps.after_m**2) / np.mean(laps.before_m**2) == pytest.approx(1 / 3, rel=0.15)
     assert laps.helped > 0.8
@@ -94,6 +98,7 @@ def test_where_only_distances_err_the_rule_leaves_a_brownian_bridge() -> None:
 def test_where_headings_err_the_rule_hardly_helps() -> None:
     headings = Noise(speed=0.0, turn=0.03, drift_rad_per_sqrt_m=0.01)
     laps = close_laps(CORNERS_M, 5.0, headings, 400, seed=3)
+
     assert 0.8 < laps.ratio < 1.0
     assert laps.helped < 0.7
 
@@ -102,6 +107,7 @@ def test_without_noise_nothing_errs() -> None:
     laps = close_laps(
         CORNERS_M, 2.5, Noise(speed=0.0, turn=0.0, drift_rad_per_sqrt_m=0.0), 2, seed=3
     )
+
     assert laps.before_m == pytest.approx(0.0, abs=1e-9) and laps.after_m == pytest.approx(
         0.0, abs=1e-9
     )
@@ -109,4 +115,5 @@ def test_without_noise_nothing_errs() -> None:
 
 def test_the_way_ends_on_the_street_where_it_began() -> None:
     line = trajectory()["line_m"]
+
     assert line[0] == line[-2] and line[-1][1] == line[0][1] and 0 < line[-1][0] < line[1][0]

@@ -45,6 +45,7 @@ def test_a_replayed_sensor_log_gives_the_bytes_that_the_senses_would() -> None:
     both = by_cameras({"first": _short(), "again": _short()}, COGNITION, _heard, shares.append)
     names = [each.name for each in (topics.PERCEPTS, topics.DELTA, topics.MOTOR_COMMAND)]
     first, again = (both[name].messages for name in ("first", "again"))
+
     assert [len(first[name]) for name in (names[0], names[2])] == [FRAMES, FRAMES]
     assert first[names[1]] == again[names[1]]
     assert first[names[2]] == again[names[2]]
@@ -54,6 +55,7 @@ def test_a_replayed_sensor_log_gives_the_bytes_that_the_senses_would() -> None:
 def test_with_cameras_landmarks_become_buildings_of_the_catalogue() -> None:
     told = sections(1, "heading")
     seeing = with_cameras(told)
+
     assert [each["name"] for each in seeing["sim"]["trajectory"]["landmarks"][:2]] == [
         "bakery",
         "library",
@@ -74,11 +76,14 @@ def test_the_room_with_cameras_sees_its_landmarks_where_they_are() -> None:
         _, percepts = room.begin()
     finally:
         room.close()
+
     assert isinstance(percepts, Percepts)
+
     seen = {each.label: each for each in percepts.objects}
     for name, (x_m, y_m) in zip(("bakery", "library", "town_hall"), LANDMARKS, strict=True):
         forward_m = y_m - 0.0
         left_m = 2.5 - x_m
+
         assert seen[name].range_m == pytest.approx(math.hypot(forward_m, left_m), rel=0.1)
         assert seen[name].bearing_rad == pytest.approx(math.atan2(left_m, forward_m), abs=0.05)
 
@@ -98,6 +103,7 @@ def test_nothing_is_seen_in_the_dark() -> None:
         )
     finally:
         room.close()
+
     assert isinstance(percepts, Percepts)
     assert percepts.objects == []
 
@@ -109,8 +115,10 @@ def test_bytes_that_differ_are_named_by_their_topic_and_end_the_command() -> Non
         heard.module().feed(
             MotorCommand(stamp_ns=1, left_wheel_rad_s=speed_rad_s, right_wheel_rad_s=1.0)
         )
+
     assert one.has_as_many_as(other)
     assert one.differs_from(other) == ["motor/command"]
+
     live.check(one.differs_from(one))
     with pytest.raises(CogmapError, match="other bytes on motor/command"):
         live.check(one.differs_from(other))

@@ -20,6 +20,7 @@ ROUND = Cues((2.5, 2.5), ((0.09, 0.0), (0.0, 0.09)), (Border(0, 2.8, 0.3),))
 def test_a_grid_cells_field_repeats_on_a_hexagonal_lattice() -> None:
     module = GridModule(0.8)
     where_m = np.random.default_rng(1).uniform(-3, 3, (40, 2))
+
     for neighbour in module.lattice_m.T:
         assert module.tuning(where_m + neighbour) == pytest.approx(module.tuning(where_m), abs=1e-4)
 
@@ -30,14 +31,17 @@ def test_every_place_has_a_grid_cell_and_a_border_cell_that_fire_there() -> None
         module = GridModule(spacing_m)
         tuning = module.tuning(centres_m)
         chosen = module.nearest(centres_m)
+
         assert (tuning[chosen, np.arange(len(centres_m))] > 0.6).all()
     cells = BorderCells(5.0)
+
     assert cells.distances_m[cells.nearest(centres_m[:, 0])] == pytest.approx(centres_m[:, 0])
 
 
 def test_cells_fire_as_often_as_their_tuning_says() -> None:
     share = np.repeat(np.array([[0.0], [0.5], [1.0]], np.float32), 20_000, axis=1)
     fired = np.unpackbits(generate(share, np.random.default_rng(1)), axis=1)
+
     assert fired.mean(axis=1) == pytest.approx([0.0, PEAK / 2, PEAK], abs=0.01)
 
 
@@ -57,6 +61,7 @@ def test_place_cells_fire_only_where_all_their_inputs_do() -> None:
 
 def test_the_exact_posterior_lies_between_the_cues_by_their_precision() -> None:
     found = exact(ROUND)
+
     assert found.mean_m == pytest.approx([2.65, 2.5])
     assert found.sd_m == pytest.approx([0.3 / 2**0.5, 0.3])
 
@@ -64,6 +69,7 @@ def test_the_exact_posterior_lies_between_the_cues_by_their_precision() -> None:
 def test_a_border_moves_the_estimate_along_it_where_the_prior_is_slanted() -> None:
     slanted = Cues((2.5, 2.5), ((0.09, 0.06), (0.06, 0.09)), (Border(0, 2.8, 0.3),))
     spikes = record(slanted, 5.0, 300.0, np.random.default_rng(1)).posterior
+
     assert exact(slanted).mean_m[1] > 2.59
     assert spikes.mean_m == pytest.approx(exact(slanted).mean_m, abs=0.05)
 
@@ -71,6 +77,7 @@ def test_a_border_moves_the_estimate_along_it_where_the_prior_is_slanted() -> No
 def test_spikes_are_samples_of_the_posterior() -> None:
     scenes = [spiking.scene(seed) for seed in range(4)]
     figures = spiking.metrics(scenes)
+
     assert figures["posterior_sd_ratio"] == pytest.approx(1.0, abs=0.1)
     assert figures["posterior_mean_error"] < 0.1
 
@@ -79,10 +86,12 @@ def test_the_same_seed_gives_the_same_spikes() -> None:
     first, again = (
         record(ROUND, 5.0, 8 * GAMMA_S, np.random.default_rng(4)).place for _ in range(2)
     )
+
     assert np.array_equal(first, again)
 
 
 def test_a_recording_without_spikes_has_no_posterior() -> None:
     far = Cues((2.5, 2.5), ((1e-4, 0.0), (0.0, 1e-4)), (Border(0, 0.2, 0.01),))
+
     with pytest.raises(ValueError, match="record for longer"):
         _ = record(far, 5.0, 1.0, np.random.default_rng(1)).posterior

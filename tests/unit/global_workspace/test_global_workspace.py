@@ -86,11 +86,13 @@ def test_the_first_coalition_ever_is_broadcast() -> None:
 
 def test_without_any_coalition_nothing_is_broadcast_however_long_it_has_been() -> None:
     arena = Arena(no_broadcast_ticks=100)
+
     assert arena.trigger(10_000) == ""
 
 
 def test_silence_of_a_hundred_ticks_triggers_a_broadcast() -> None:
     arena = Arena(no_broadcast_ticks=100)
+
     assert arena.trigger(99, a=0.1) == ""
     assert arena.trigger(100, a=0.1) == "no broadcast for long"
 
@@ -115,6 +117,7 @@ def test_activations_of_more_than_eight_tenths_together_trigger_a_broadcast() ->
 
 def test_one_coalition_of_more_than_a_half_triggers_a_broadcast() -> None:
     arena = Arena(coalition_above=0.5)
+
     assert arena.trigger(10, a=0.5) == ""
     assert arena.trigger(20, a=0.51) == "one coalition over threshold"
 
@@ -165,6 +168,7 @@ def test_coalitions_decay_by_a_tenth_a_tick_and_are_removed_at_zero() -> None:
 def test_a_codelet_that_brings_its_coalition_again_renews_it() -> None:
     arena = Arena(decay=0.1, **LIDA)
     arena.compete(10, a=0.4)
+
     assert arena.waiting(13, a=0.4) == {"a": 0.4}
 
 

@@ -24,6 +24,7 @@ def _link(source: str, target: str, weight: float = 1.0, kind: str = NEAR) -> Li
 def test_links_in_bulk_are_the_links_that_they_list() -> None:
     links = Links(kind=NEAR, weights={"b": {"c": 0.5}, "a": {"c": 0.25, "b": 1.0}})
     graph = _graph(links)
+
     assert graph.links.targets("a", NEAR) == {"c": 0.25, "b": 1.0}
     assert graph.links.sources("c", NEAR) == ("b", "a")
     assert graph.snapshot().links == [
@@ -37,6 +38,7 @@ def test_links_in_bulk_leave_other_links_of_their_source() -> None:
         Links(kind=NEAR, weights={"a": {"there": 1.0}}),
         DropLink(source="a", target="there", kind=NEAR),
     )
+
     assert graph.links.targets("a", NEAR) == {"here": 0.5}
     assert graph.links.sources("there", NEAR) == ()
 
@@ -44,6 +46,7 @@ def test_links_in_bulk_leave_other_links_of_their_source() -> None:
 def test_links_applied_twice_are_links_applied_once() -> None:
     links = Links(kind=NEAR, weights={"a": {"b": 0.5}})
     at = _link("a", "place:map:0:1:2", kind=LinkKind.AT)
+
     assert _graph(links, at, links, at).digest() == _graph(links, at).digest()
 
 
@@ -53,6 +56,7 @@ def test_a_node_has_one_link_of_an_exclusive_kind() -> None:
         _link("b", "here", kind=LinkKind.AT),
         _link("a", "there", 0.5, kind=LinkKind.AT),
     )
+
     assert graph.links.targets("a", LinkKind.AT) == {"there": 0.5}
     assert graph.links.target("a", LinkKind.AT) == "there"
     assert graph.links.sources("here", LinkKind.AT) == ("b",)
@@ -69,6 +73,7 @@ def test_dropping_a_link_that_is_not_there_changes_nothing() -> None:
             DropLink(source="x", target="y", kind="other"),
         ]
     )
+
     assert graph.digest() == before
 
 
@@ -77,6 +82,7 @@ def test_a_forgotten_node_takes_links_to_it_and_from_it_along() -> None:
     links = Links(kind=NEAR, weights=weights)
     at = [_link("b", "here", kind=LinkKind.AT), _link("e", "b", kind=LinkKind.INSTANCE)]
     graph = _graph(thing("a"), thing("b"), links, *at, DropNode(id="b"))
+
     assert graph.snapshot().links == [Links(kind=NEAR, weights={"a": {"c": 0.25}})]
     assert graph.links.sources("here", LinkKind.AT) == ()
 
@@ -85,4 +91,5 @@ def test_a_message_in_the_graph_is_not_changed_by_the_next_one() -> None:
     first = Links(kind=NEAR, weights={"a": {"b": 0.5}})
     before = encode(first)
     _graph(first, Links(kind=NEAR, weights={"a": {"b": 1.0, "c": 1.0}}), _link("a", "d"))
+
     assert encode(first) == before

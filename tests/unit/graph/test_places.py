@@ -31,6 +31,7 @@ def test_a_tile_comes_into_being_with_its_first_cell() -> None:
     graph = _graph(_cells(PlaceColumn.ROAD, [(-1, TILE_SIDE)], [0.5]))
     assert list(graph.places.tiles) == [(ROOT_MAP, -1, 1)]
     assert graph.place(0, 0) is None
+
     road = {cell: graph.place(*cell) for cell in ((-1, TILE_SIDE), (-2, TILE_SIDE))}
     assert [place.road for place in road.values() if place is not None] == [0.5, 0.0]
 
@@ -41,6 +42,7 @@ def test_maps_have_place_nodes_of_their_own() -> None:
         _cells(PlaceColumn.ROAD, [(2, 3)], [1.0], "map:1"),
     )
     place = graph.place(2, 3, "map:1")
+
     assert place is not None
     assert (place.id, place.x_m, place.y_m) == ("place:map:1:2:3", 8.0, 12.0)
     assert graph.place(2, 3) is None
@@ -55,12 +57,14 @@ def test_each_of_the_eight_links_of_a_place_node_is_kept_once() -> None:
     }
     graph = _graph(*[_cells(column, [(5, 5)], [value]) for column, value in weights.items()])
     links = {link.target: link.weight for link in graph.place_links(5, 5)}
+
     assert len(links) == 8
     assert links["place:map:0:6:5"] == pytest.approx(0.1)
     assert links["place:map:0:6:6"] == pytest.approx(0.2)
     assert links["place:map:0:5:6"] == pytest.approx(0.3)
     assert links["place:map:0:4:6"] == pytest.approx(0.4)
     assert links["place:map:0:4:5"] == 1.0
+
     back = {link.target: link.weight for link in graph.place_links(6, 6)}
     assert back["place:map:0:5:5"] == pytest.approx(0.2)
 
@@ -68,6 +72,7 @@ def test_each_of_the_eight_links_of_a_place_node_is_kept_once() -> None:
 def test_links_lead_to_place_nodes_that_exist_alone() -> None:
     graph = _graph(_cells(PlaceColumn.ROAD, [(0, 0)], [1.0]))
     targets = {link.target for link in graph.place_links(0, 0)}
+
     assert targets == {"place:map:0:1:0", "place:map:0:1:1", "place:map:0:0:1"}
 
 
@@ -75,6 +80,7 @@ def test_written_cells_are_those_whose_value_is_not_zero() -> None:
     graph = _graph(_cells(PlaceColumn.ROAD, [(40, -3), (1, 1), (2, 2)], [0.5, 1.0, 0.0]))
     cells, values = graph.places.written_cells(ROOT_MAP, PlaceColumn.ROAD)
     found = dict(zip(map(tuple, cells.tolist()), values.tolist(), strict=True))
+
     assert found == {(40, -3): 0.5, (1, 1): 1.0}
 
 
@@ -82,6 +88,7 @@ def test_a_snapshot_has_the_columns_that_were_written() -> None:
     graph = _graph(_cells(PlaceColumn.ROAD, [(0, 0)], [1.0]))
     (tile,) = graph.snapshot().tiles
     assert list(tile.columns) == [PlaceColumn.ROAD]
+
     again = Graph()
     again.load(graph.snapshot())
     assert again.digest() == graph.digest()
@@ -89,5 +96,6 @@ def test_a_snapshot_has_the_columns_that_were_written() -> None:
 
 def test_a_tile_of_another_side_is_rejected() -> None:
     column = Array.of(np.zeros((TILE_SIDE, TILE_SIDE + 1), np.float32))
+
     with pytest.raises(MessageError, match="road of shape"):
         _graph(PlaceTile(x=0, y=0, columns={PlaceColumn.ROAD: column}))

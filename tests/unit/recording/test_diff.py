@@ -85,6 +85,7 @@ def test_a_changed_value_in_an_array_is_named_with_its_index(tmp_path: Path) -> 
 def test_a_message_in_one_log_only_is_named(tmp_path: Path) -> None:
     found = compared(tmp_path, lambda other: other.pop(18))
     assert found.first == "odometry number 9 of sim (stamp 0.900 s) is in a.mcap and not in b.mcap"
+
     first = found.topics[0]
     assert (first.left, first.right, first.left_only) == (10, 9, 1)
 
@@ -93,6 +94,7 @@ def test_only_the_chosen_topics_are_compared(tmp_path: Path) -> None:
     left = record(tmp_path / "a.mcap", messages())
     scans = [message for message in messages() if isinstance(message, RangeScan)]
     right = record(tmp_path / "b.mcap", scans)
+
     assert not diff(left, right).same
     assert diff(left, right, [topics.SCAN]).same
 
@@ -136,6 +138,7 @@ def test_a_difference_deep_in_a_message_is_put_in_words(
     left: Delta, right: Delta, words: str
 ) -> None:
     found = difference(left, right)
+
     assert found is not None
     assert found.in_words(("A", "B")) == words
 
@@ -144,6 +147,8 @@ def test_the_same_values_in_other_bytes_are_told_by_the_first_byte() -> None:
     row = Odometry(speed_m_s=2.0, turn_rate_rad_s=0.0, dt_s=0.05)
     left = encode(row)
     right = left.replace(b"\xcb\x40\x00\x00\x00\x00\x00\x00\x00", b"\x02")
+
     assert left != right
+
     words = describe(topics.ODOMETRY, left, right, ("A", "B"))
     assert "the same values in other bytes, from byte" in words

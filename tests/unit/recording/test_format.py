@@ -53,6 +53,7 @@ def raw(path: Path, library: str) -> Iterator[Writer]:
 
 def test_mcap_doctor_has_nothing_to_warn_of(path: Path) -> None:
     write(path, [5, 6, 6, 7, 9])
+
     assert Doctor().examine(path) == []
 
 
@@ -61,12 +62,14 @@ def test_mcap_doctor_has_nothing_to_warn_of_in_a_recovered_log(path: Path, tmp_p
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(path.read_bytes()[:-3000])
     recover(cut, tmp_path / "saved.mcap")
+
     assert Doctor().examine(tmp_path / "saved.mcap") == []
 
 
 def test_log_times_never_go_back_where_the_clock_is_set_back(path: Path) -> None:
     write(path, [50, 60, 20, 30, 70])
     records = list(LogReader(path).records())
+
     assert [record.log_time_ns for record in records] == [50, 60, 60, 60, 70]
     assert [record.sequence for record in records] == [0, 1, 2, 3, 4]
     assert [record.envelope and record.envelope.sent_ns for record in records][2] == 20
@@ -77,12 +80,15 @@ def test_every_channel_names_its_message_type_and_encoding(path: Path) -> None:
     write(path, [1])
     with path.open("rb") as file:
         summary = make_reader(file).get_summary()
+
     assert summary is not None
+
     named = {}
     for channel in summary.channels.values():
         schema = summary.schemas[channel.schema_id]
         assert (channel.message_encoding, schema.encoding) == ("msgpack", "jsonschema")
         named[channel.topic] = schema.name
+
     assert named.pop("_envelope") == "EnvelopeRecord"
     assert named == {topic.name: topic.type.__name__ for topic in topics_to_record()}
 
@@ -91,7 +97,9 @@ def test_the_schema_of_a_channel_describes_its_message_fields(path: Path) -> Non
     write(path, [1])
     with path.open("rb") as file:
         ((schema, _, _),) = make_reader(file).iter_messages(topics=["odometry"])
+
     assert isinstance(schema, Schema)
+
     fields = json.loads(schema.data)["$defs"]["Odometry"]["properties"]
     assert {"speed_m_s", "turn_rate_rad_s", "stamp_ns"} <= fields.keys()
 
@@ -100,6 +108,7 @@ def test_a_log_names_the_version_that_wrote_it(path: Path) -> None:
     write(path, [1])
     with path.open("rb") as file:
         assert make_reader(file).get_header().library == f"cogmap {VERSION}"
+
     assert LogReader(path).about("recording")["software"] == f"cogmap {VERSION}"
 
 
@@ -110,6 +119,7 @@ def test_a_log_of_another_version_is_refused_with_the_one_that_reads_it(
     with raw(path, software) as writer:
         writer.add_metadata("recording", {"software": software})
     version = software.removeprefix("cogmap ")
+
     with pytest.raises(LogError, match=f"recorded by {software}.*read it with cogmap {version}"):
         LogReader(path)
 
@@ -120,7 +130,9 @@ def test_the_oldest_version_read_is_one_constant(
     with raw(path, "cogmap 0.1.0"):
         pass
     monkeypatch.setattr(versions, "OLDEST_READABLE", "0.1.0")
+
     assert list(LogReader(path).records()) == []
+
     monkeypatch.setattr(versions, "OLDEST_READABLE", "0.2.0")
     with pytest.raises(LogError, match=r"reads logs from 0\.2\.0 on"):
         LogReader(path)
@@ -129,12 +141,14 @@ def test_the_oldest_version_read_is_one_constant(
 def test_a_log_that_another_tool_copied_is_known_by_its_recording(path: Path) -> None:
     with raw(path, "mcap go v1.7.0") as writer:
         writer.add_metadata("recording", {"software": f"cogmap {VERSION}"})
+
     assert LogReader(path).about("recording")
 
 
 def test_a_file_of_another_program_is_refused_with_its_name(path: Path) -> None:
     with raw(path, "rosbag2"):
         pass
+
     with pytest.raises(LogError, match="is not one of our logs: rosbag2 wrote it"):
         LogReader(path)
 
@@ -143,5 +157,6 @@ def test_a_recovered_log_keeps_the_version_that_recorded_it(path: Path, tmp_path
     with raw(path, "cogmap 0.0.9"):
         pass
     recover(path, tmp_path / "saved.mcap")
+
     with pytest.raises(LogError, match="read it with cogmap 0\\.0\\.9"):
         LogReader(tmp_path / "saved.mcap")

@@ -40,6 +40,7 @@ def path(tmp_path: Path) -> Path:
 
 def test_messages_come_typed_and_in_the_order_of_their_receipt(path: Path) -> None:
     entries = list(open_log(path).messages())
+
     assert [type(entry.message).__name__ for entry in entries[:3]] == [
         "Odometry",
         "Delta",
@@ -50,6 +51,7 @@ def test_messages_come_typed_and_in_the_order_of_their_receipt(path: Path) -> No
 
 def test_messages_can_be_chosen_by_topic_and_time(path: Path) -> None:
     entries = list(open_log(str(path)).messages("odometry", start_s=1.0, end_s=3.0))
+
     assert [entry.message for entry in entries] == [odometry(1), odometry(2)]
     assert [entry.topic for entry in entries] == ["odometry", "odometry"]
     assert entries[0].log_time_ns == START_NS + SECOND_NS
@@ -57,12 +59,14 @@ def test_messages_can_be_chosen_by_topic_and_time(path: Path) -> None:
 
 def test_an_entry_has_the_envelope_that_its_message_came_with(path: Path) -> None:
     entry = next(open_log(path).messages("workspace/delta"))
+
     assert entry.envelope is not None
     assert (entry.envelope.source, entry.envelope.seq) == ("workspace", 1)
 
 
 def test_a_log_knows_its_recorder_agent_configuration_and_length(path: Path) -> None:
     log = open_log(path)
+
     assert (log.software, log.agent, log.duration_s) == (f"cogmap {VERSION}", "a", 3.0)
     assert log.config == {"workspace": {"cell_m": 0.5}}
     assert {"odometry", "workspace/delta"} <= set(log.topics)
@@ -71,6 +75,7 @@ def test_a_log_knows_its_recorder_agent_configuration_and_length(path: Path) -> 
 def test_the_graph_at_a_time_has_every_delta_received_up_to_it(path: Path) -> None:
     log = open_log(path)
     assert log.graph_at(0.0).version == 0
+
     graph = log.graph_at(1.5)
     assert graph.version == 2
     assert log.graph_at(1e6).version == 3
@@ -78,6 +83,7 @@ def test_the_graph_at_a_time_has_every_delta_received_up_to_it(path: Path) -> No
 
 def test_a_log_that_lacks_a_delta_gives_no_graph_after_it(tmp_path: Path) -> None:
     log = open_log(write(tmp_path / "log.mcap", (0.0, delta(1)), (1.0, delta(3))))
+
     assert log.graph_at(0.5).version == 1
     with pytest.raises(LogError, match="holds delta 3 after delta 1"):
         log.graph_at(1.0)
@@ -93,6 +99,7 @@ def test_a_message_that_does_not_fit_its_topic_is_named(tmp_path: Path) -> None:
     writer = LogWriter(path, [topics.ODOMETRY], {"agent": "a"})
     writer.write(topics.ODOMETRY, b"\xc1", None, 1)
     writer.close()
+
     with pytest.raises(LogError, match="a message cannot be read: odometry"):
         list(open_log(path).messages())
 

@@ -98,6 +98,7 @@ def test_the_model_is_played_in_order_with_its_own_numbers_and_age(path: Path) -
     listener, played = play(path, Choices(rate=FAST))
     assert [message.seq for message in listener.of(topics.ODOMETRY)] == list(range(COUNT))
     assert played.messages == {"odometry": COUNT, "clock": COUNT}
+
     envelope = listener.arrivals[0].envelope
     assert envelope is not None
     assert (envelope.source, envelope.stages) == ("sim", [("sim", 1, 2)])
@@ -107,11 +108,13 @@ def test_the_model_is_played_in_order_with_its_own_numbers_and_age(path: Path) -
 
 def test_only_the_chosen_topics_are_played_even_those_about_processes(path: Path) -> None:
     _, played = play(path, Choices(rate=FAST, topics=[topics.PRESENCE]))
+
     assert played.messages == {"presence": COUNT}
 
 
 def test_a_start_offset_leaves_out_what_was_before_it(path: Path) -> None:
     listener, _ = play(path, Choices(rate=FAST, start_offset_s=0.045))
+
     assert [message.seq for message in listener.of(topics.ODOMETRY)] == list(range(5, COUNT))
 
 
@@ -133,16 +136,19 @@ def test_each_round_of_a_loop_is_accepted_with_numbers_from_0(path: Path) -> Non
 @pytest.mark.parametrize("rate", [1.0, 3.0])
 def test_the_rate_sets_the_pace(path: Path, rate: float) -> None:
     _, played = play(path, Choices(rate=rate))
+
     assert played.wall_s >= 0.090 / rate
 
 
 def test_a_pause_stops_time_and_nothing_is_skipped(path: Path) -> None:
     listener, _ = play(path, Choices(rate=1.0), Script(pauses=(3, 2000)))
+
     assert len(listener.of(topics.ODOMETRY)) == COUNT
 
 
 def test_it_ends_when_asked(path: Path) -> None:
     listener, played = play(path, Choices(rate=1e-3), Script(end_after=50))
+
     assert len(listener.of(topics.ODOMETRY)) == 1
     assert played.rounds == 1
 
@@ -151,6 +157,7 @@ def test_the_clock_has_the_newest_stamp_in_place_of_the_recorded_clock(path: Pat
     listener, _ = play(path, Choices(rate=1.0, clock_hz=500.0))
     clocks = listener.of(topics.CLOCK)
     stamps = [clock.stamp_ns for clock in clocks]
+
     assert {clock.source for clock in clocks} == {"replay"}
     assert stamps == sorted(stamps)
     assert stamps[-1] == COUNT - 1
@@ -160,6 +167,7 @@ def test_the_clock_has_the_newest_stamp_in_place_of_the_recorded_clock(path: Pat
 def test_others_see_that_a_replay_is_there(path: Path) -> None:
     network = MemoryNetwork()
     Player(LogReader(path), MemoryBus(network), Choices(rate=FAST), Script()).play()
+
     assert Member("replay", "replay") in network.members
 
 

@@ -60,6 +60,7 @@ def test_a_log_gives_back_bytes_times_and_envelopes_in_order_of_arrival(path: Pa
 
     reader = LogReader(path)
     records = list(reader.records())
+
     assert [reader.payload(record) for record in records] == published
     assert [record.log_time_ns for record in records] == [100, 101, 102, 103, 105]
     assert [record.sequence for record in records] == [0, 0, 1, 1, 2]
@@ -74,6 +75,7 @@ def test_a_summary_counts_messages_by_topic_and_that_none_is_missing(
     recorded.publish(odometry(0), 1)
     recorded.publish(scan(0), 2)
     summary = recorded.end()
+
     assert summary.messages == {"odometry": 1, "sensory/scan": 1}
     assert summary.never_drop_whole
     assert (summary.gaps, summary.rejected, summary.size_bytes) == ([], {}, path.stat().st_size)
@@ -84,6 +86,7 @@ def test_a_gap_is_named_with_its_source_and_its_numbers(path: Path) -> None:
     for seq in (0, 1, 4, 5, 7):
         recorded.publish(odometry(seq), seq)
     summary = recorded.end()
+
     assert summary.lost == {"odometry": 3}
     assert summary.gaps == ["odometry (never drop): 3 of sim missing, number 2 to 3, 6"]
     assert not summary.never_drop_whole
@@ -96,6 +99,7 @@ def test_a_gap_in_a_latest_wins_topic_leaves_never_drop_topics_whole(
     recorded.publish(scan(0), 0)
     recorded.publish(scan(3), 1)
     summary = recorded.end()
+
     assert summary.gaps == ["sensory/scan (latest wins): 2 of sensory missing, number 1 to 2"]
     assert summary.never_drop_whole
 
@@ -107,6 +111,7 @@ def test_a_source_begun_after_the_recorder_is_awaited_from_number_0(
     recorded.publish(odometry(5), 1, incarnation=1)
     recorded.publish(odometry(2, source="later"), 2, incarnation=2**62)
     summary = recorded.end()
+
     assert summary.gaps == ["odometry (never drop): 2 of later missing, number 0 to 1"]
 
 
@@ -115,6 +120,7 @@ def test_a_restarted_source_begins_anew_and_that_is_no_gap(path: Path) -> None:
     for incarnation in (1, 2):
         for seq in (0, 1):
             recorded.publish(odometry(seq), seq, incarnation)
+
     assert recorded.end().gaps == []
 
 
@@ -125,6 +131,7 @@ def test_what_a_source_published_before_its_restart_and_is_missing_is_a_gap(path
         envelope = Envelope("sim", seq, incarnation, seq, seq, earlier=earlier)
         recorded.publish_bytes(topics.ODOMETRY, encode(message), envelope)
     summary = recorded.end()
+
     assert summary.gaps == ["odometry (never drop): 3 of sim missing, number 2 to 4"]
     assert summary.lost == {"odometry": 3}
 
@@ -134,6 +141,7 @@ def test_a_restart_after_which_nothing_is_missing_is_no_gap(path: Path) -> None:
     for seq, incarnation, earlier in ((0, 1, 10), (1, 1, 10), (0, 2, 12)):
         envelope = Envelope("sim", seq, incarnation, seq, seq, earlier=earlier)
         recorded.publish_bytes(topics.ODOMETRY, encode(odometry(seq)), envelope)
+
     assert recorded.end().gaps == []
 
 
@@ -143,6 +151,7 @@ def test_what_is_no_message_is_counted_and_not_written(path: Path) -> None:
     recorded.publish_bytes(topics.ODOMETRY, b"\xc1", Envelope("sim", 1, 1, 2, 2))
     recorded.publish_bytes(topics.ODOMETRY, encode(odometry(1)), Envelope("mallory", 1, 1, 3, 3))
     summary = recorded.end()
+
     assert summary.rejected == {"odometry": 2}
     assert len(list(LogReader(path).records())) == 1
 
@@ -154,6 +163,7 @@ def test_numbers_that_mcap_has_no_room_for_are_kept_in_the_envelope(path: Path) 
     recorded.publish_bytes(topics.SCAN, encode(far), Envelope("sensory", far.seq, 1, -5, -5))
     recorded.end()
     (record,) = LogReader(path).records()
+
     assert (record.sequence, record.publish_ns, record.log_time_ns) == (3, 0, 0)
     assert record.envelope is not None
     assert (record.envelope.seq, record.envelope.sent_ns) == (2**40 + 3, -5)
@@ -168,6 +178,7 @@ def test_what_finds_no_room_is_counted_and_never_drop_topics_have_more(
     for seq in range(5):
         recorded.publish(odometry(seq), seq)
     summary = recorded.end()
+
     assert summary.messages["odometry"] == 5
     assert 0 < summary.messages["sensory/scan"] < 50
     assert summary.dropped == {"sensory/scan": 50 - summary.messages["sensory/scan"]}
@@ -180,20 +191,24 @@ def test_latest_wins_messages_are_all_recorded_by_a_late_recorder(
     recorded = Recorded(path)
     for seq in range(20):
         recorded.publish(scan(seq), seq)
+
     assert recorded.end().messages == {"sensory/scan": 20}
 
 
 def test_others_can_wait_for_the_recorder_and_it_notes_who_is_there(path: Path) -> None:
     recorded = Recorded(path)
     assert Member("recorder", "recorder") in recorded.network.members
+
     recorded.bus.announce(Member("codelets", "codelets-1"))
     recorded.end()
     members = [facts["instance"] for name, facts in LogReader(path).metadata if name == "member"]
+
     assert members[:2] == ["recorder", "codelets-1"]
 
 
 def test_an_existing_file_is_never_overwritten(path: Path) -> None:
     path.write_text("precious")
+
     with pytest.raises(LogError, match="exists already"):
         Recorded(path)
     assert path.read_text() == "precious"

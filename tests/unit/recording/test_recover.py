@@ -77,8 +77,10 @@ def test_a_file_cut_at_any_byte_keeps_every_chunk_that_was_finished(
         path = _altered(whole, tmp_path, content[:cut])
         finished = sum(end <= cut for _, end in chunks)
         assert _numbers(path) == list(range(finished * EACH))
+
         target = tmp_path / f"{cut}.mcap"
         recovery = recover(path, target)
+
         assert (recovery.messages, recovery.chunks, recovery.whole) == (
             finished * EACH,
             finished,
@@ -91,6 +93,7 @@ def test_a_cut_file_says_how_many_bytes_at_its_end_are_lost(whole: Path, tmp_pat
     start, end = _chunks(whole)[3]
     path = _altered(whole, tmp_path, whole.read_bytes()[: end - 10])
     assert LogReader(path).cut_bytes == end - 10 - start
+
     recovery = recover(path, tmp_path / "out.mcap")
     assert recovery.lost_bytes == end - 10 - start
     assert recovery.damaged == [f"bytes {start} to {end - 10}: the file is cut off here"]
@@ -104,10 +107,13 @@ def test_a_damaged_chunk_is_left_out_and_its_messages_are_counted(
     content = bytearray(whole.read_bytes())
     content[end - 20] ^= 0xFF
     path = _altered(whole, tmp_path, bytes(content))
+
     with pytest.raises(LogError, match="cogmap log recover"):
         list(LogReader(path).records())
+
     recovery = recover(path, tmp_path / "out.mcap")
     lost = range(number * EACH, (number + 1) * EACH)
+
     assert (recovery.lost_bytes, recovery.messages) == (end - start, (CHUNKS - 1) * EACH)
     assert recovery.lost_messages == EACH
     assert _numbers(tmp_path / "out.mcap") == [
@@ -123,6 +129,7 @@ def test_a_record_with_a_wrong_length_costs_only_its_own_chunk(
     content = bytearray(whole.read_bytes())
     struct.pack_into("<Q", content, start + 1, length)
     recover(_altered(whole, tmp_path, bytes(content)), tmp_path / "out.mcap")
+
     assert set(_numbers(tmp_path / "out.mcap")) >= set(range(CHUNKS * EACH)) - set(
         range(2 * EACH, 3 * EACH)
     )
@@ -130,6 +137,7 @@ def test_a_record_with_a_wrong_length_costs_only_its_own_chunk(
 
 def test_a_whole_file_is_copied_as_it_is(whole: Path, tmp_path: Path) -> None:
     recovery = recover(whole, tmp_path / "out.mcap")
+
     assert (recovery.whole, recovery.lost_bytes) == (True, 0)
     assert _numbers(tmp_path / "out.mcap") == list(range(CHUNKS * EACH))
     assert LogReader(tmp_path / "out.mcap").about("recording") == LogReader(whole).about(
@@ -148,6 +156,7 @@ def test_random_bytes_after_the_first_record_never_break_recovery(
         altered[at : at + 64] = generator.bytes(64)
         target = tmp_path / f"{trial}.mcap"
         recovery = recover(_altered(whole, tmp_path, bytes(altered)), target)
+
         assert recovery.messages >= (CHUNKS - 2) * EACH
         assert len(_numbers(target)) == recovery.messages
 
@@ -173,6 +182,7 @@ def test_a_damaged_log_is_read_or_is_one_sentence(whole: Path, tmp_path: Path) -
         except LogError as error:
             refused += 1
             assert "altered.mcap" in str(error)
+
     assert 0 < refused < 60
 
 
@@ -180,6 +190,7 @@ def test_a_log_whose_beginning_cannot_be_read_has_none(whole: Path, tmp_path: Pa
     content = whole.read_bytes().replace(
         b"began_ns\x02\x00\x00\x0017", b"began_ns\x02\x00\x00\x00x7"
     )
+
     assert info(_altered(whole, tmp_path, content)).began_ns == 0
 
 

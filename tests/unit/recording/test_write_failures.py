@@ -57,6 +57,7 @@ class Disk:
 def test_a_full_disk_ends_the_recorder_with_one_sentence(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
     disk = Disk(path)
+
     with (
         full_after(FULL_BYTES),
         pytest.raises(LogError, match=r"cannot write .*log\.mcap \(.*\): free some space"),
@@ -71,6 +72,7 @@ def test_what_was_flushed_before_the_disk_was_full_can_be_recovered(tmp_path: Pa
     disk = Disk(path)
     with full_after(FULL_BYTES), pytest.raises(LogError):
         run(disk.recorder, disk.stop)
+
     recovery = recover(path, tmp_path / "saved.mcap")
     assert recovery.messages * MESSAGE_BYTES >= CHUNK_BYTES
     assert len(list(LogReader(tmp_path / "saved.mcap").records())) == recovery.messages
@@ -80,12 +82,14 @@ def test_a_recovery_onto_a_full_disk_is_one_sentence(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
     disk = Disk(path)
     run(disk.recorder, lambda: disk.stop() or disk.published == 40)
+
     with full_after(FULL_BYTES), pytest.raises(LogError, match=r"saved\.mcap .*free some space"):
         recover(path, tmp_path / "saved.mcap")
 
 
 def test_a_folder_that_cannot_be_written_to_is_named_with_a_remedy(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("no folder")
+
     for path in (tmp_path / "file" / "log.mcap", tmp_path / "file" / "deeper" / "log.mcap"):
         with pytest.raises(LogError, match="name a file in a folder that can be written to"):
             Disk(path)

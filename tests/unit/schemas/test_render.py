@@ -33,6 +33,7 @@ DELTA = Delta(
 
 def test_json_abbreviates_arrays_and_names_the_kind_of_each_operation() -> None:
     node, drop = json.loads(json.dumps(to_jsonable(DELTA)))["operations"]
+
     assert (node["type"], node["attributes"]) == ("node", {"x_m": 1.5})
     assert node["samples"] == {"dtype": "<f8", "shape": [3, 2], "min": 0.0, "max": 5.0}
     assert drop == {"type": "drop_node", "id": "tree"}

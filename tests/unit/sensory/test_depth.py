@@ -103,11 +103,13 @@ def test_depth_is_right_from_three_to_thirty_metres_over_the_whole_image(
 
 def test_distant_things_have_depth_at_the_left_border_too() -> None:
     depth = DepthFromStereo(CALIBRATION, 2.5).depth_m(*_wall(25.0))
+
     assert (depth[:, 8:40] > 0).mean() > 0.8
 
 
 def test_a_view_without_texture_has_no_depth() -> None:
     blank = np.full((HEIGHT, WIDTH, 3), 128, np.uint8)
+
     assert (DepthFromStereo(CALIBRATION, 2.5).depth_m(blank, blank) > 0).mean() < 0.01
 
 

@@ -111,12 +111,14 @@ def test_a_newer_frame_replaces_a_waiting_one_and_no_motion_is_lost() -> None:
 
 def test_the_first_frame_without_earlier_odometry_has_no_motion() -> None:
     motion = _published([_frame(0, 4), _odometry(5)])[0]
+
     assert isinstance(motion, SelfMotion)
     assert (motion.since_ns, motion.motions.shape) == (4 * STEP_NS, (0, 5))
 
 
 def test_older_frames_and_odometry_are_ignored() -> None:
     messages = [_odometry(1), _odometry(2), _frame(0, 2)]
+
     assert len(_published([*messages, _frame(7, 1), _odometry(2), _odometry(1)])) == 3
 
 
@@ -197,5 +199,6 @@ def test_odometry_that_makes_no_sense_is_refused_and_changes_nothing(row: Odomet
 
 def test_it_receives_and_publishes_what_the_table_of_topics_names() -> None:
     module = build(Config(), "sensory")
+
     assert set(module.handlers) == {topics.STEREO, topics.ODOMETRY}
     assert module.emits == {topics.SELF_MOTION, topics.SCAN, topics.VIEW}

@@ -76,4 +76,5 @@ def test_fused_rows_add_up_to_the_fused_motion_and_its_spread():
 
 def test_wheels_that_stand_still_have_no_noise():
     still = WheelNoise(0.1, 0.1, 0.02).total(np.array([[0.0, 0.0, 0.05]] * 4))
+
     assert (still.distance_sd_m, still.turn_sd_rad) == (0.0, 0.0)

@@ -38,6 +38,7 @@ def test_noise_multiplies_speed_and_turn_rate_by_something_of_mean_one() -> None
 
 def test_a_robot_that_stands_still_reports_no_motion() -> None:
     row = WheelOdometry(Noise(), seed=1).measure(ORIGIN, ORIGIN, DT_S)
+
     assert (row.speed_m_s, row.turn_rate_rad_s) == (0.0, 0.0)
 
 
@@ -50,16 +51,19 @@ def test_drift_grows_with_the_square_root_of_the_way_whatever_the_steps() -> Non
             sum(wheels.measure(ORIGIN, after, DT_S).turn_rate_rad_s for _ in range(steps))
             for _ in range(2000)
         ]
+
         assert np.std(rates) * DT_S == pytest.approx(0.02 * math.sqrt(4.0 * DT_S), rel=0.1)
 
 
 def test_driving_backwards_is_reported_as_a_negative_speed() -> None:
     quiet = WheelOdometry(Noise(speed=0.0, turn=0.0, drift_rad_per_sqrt_m=0.0), seed=0)
+
     assert quiet.measure(ORIGIN, _moved(-1.5, 0.0), DT_S).speed_m_s == pytest.approx(-1.5)
 
 
 def test_path_integration_alone_ends_a_lap_some_metres_off() -> None:
     errors = [_error_after_a_lap(seed) for seed in range(30)]
+
     assert 3.0 < np.mean(errors) < 12.0
 
 

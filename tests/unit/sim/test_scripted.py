@@ -172,5 +172,6 @@ def test_each_command_leads_to_a_frame_until_the_line_ends() -> None:
 
 def test_a_trajectory_in_real_time_is_refused() -> None:
     trajectory = Trajectory(line_m=[(0.0, 0.0), (9.0, 0.0)], landmarks=[])
+
     with pytest.raises(ConfigError, match="lockstep"):
         build(Config(mode="real_time", trajectory=trajectory))

@@ -117,6 +117,7 @@ def test_wheels_without_noise_add_up_to_the_line_with_its_corners(
             y += row.speed_m_s * row.dt_s * math.sin(heading)
             heading += row.turn_rate_rad_s * row.dt_s
         (truth,) = [message for message in frame if isinstance(message, TruePose)]
+
         assert (x, y) == pytest.approx((truth.pose.x_m, truth.pose.y_m), abs=1e-9)
         assert math.remainder(heading - truth.pose.heading_rad, math.tau) == pytest.approx(
             0.0, abs=1e-9
@@ -139,6 +140,7 @@ def test_frames_end_with_their_images_and_the_last_is_at_the_lines_end(
     ride: list[list[Message]],
 ) -> None:
     assert all(isinstance(frame[-1], StereoFrame) for frame in ride)
+
     (end,) = [message for message in ride[-1] if isinstance(message, TruePose)]
     assert (end.pose.x_m, end.pose.y_m, end.progress) == pytest.approx((3.0, 12.0, 1.0))
 

@@ -19,6 +19,7 @@ TOWNS = [town.generate(seed) for seed in SEEDS]
 
 def test_one_seed_gives_one_town_and_another_seed_another() -> None:
     again = [encode(town.generate(seed).message()) for seed in SEEDS]
+
     assert again == [encode(place.message()) for place in TOWNS]
     assert len(set(again)) == len(again)
 
@@ -81,6 +82,7 @@ def test_the_route_of_one_lap_closes_the_loop_along_the_streets() -> None:
             y = y + length_m * math.sin(heading)
             heading = heading + turn_rad
             assert any(overlap((x, y, x, y), road.area(0.01)) for road in place.roads[:4])
+
         assert (x, y) == pytest.approx((place.start.x_m, place.start.y_m))
         assert math.remainder(heading - place.start.heading_rad, math.tau) == pytest.approx(0)
 
@@ -88,6 +90,7 @@ def test_the_route_of_one_lap_closes_the_loop_along_the_streets() -> None:
 @pytest.mark.parametrize("laps", [0.1, 0.5, 1.0, 1.7, 3.0])
 def test_a_route_is_as_long_as_its_laps(laps: float) -> None:
     place = TOWNS[3]
+
     assert sum(length_m for length_m, _ in place.route(laps)) == pytest.approx(laps * place.lap_m)
     assert place.route(laps)[-1][1] == 0.0
 
@@ -121,6 +124,7 @@ def test_each_kind_of_building_has_colours_of_its_own() -> None:
 def test_a_building_is_as_large_as_its_type_says_and_its_picture_lies_within() -> None:
     for kind in CATALOGUE:
         surface, picture = mesh.building(kind)
+
         assert np.ptp(surface.vertices, axis=0) == pytest.approx(
             (kind.width_m, kind.depth_m, kind.height_m)
         )

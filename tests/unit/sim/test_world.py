@@ -64,6 +64,7 @@ def test_unequal_wheels_turn_as_a_differential_drive_does(
 
 def test_a_robot_without_a_command_stays_where_it_is(world: World) -> None:
     before, after = _drive(world, 0.0, 0.0)
+
     assert math.hypot(after.x_m - before.x_m, after.y_m - before.y_m) < 1e-3
 
 
@@ -108,8 +109,10 @@ def test_a_known_building_stands_in_both_pictures_where_geometry_puts_it(world: 
         rows = eye.fy_px * seen[:, 1] / seen[:, 2] + eye.cy_px
         facing = towns.labels(world, exposure) == 1 + world.town.plots.index(plot)
         on_foot = np.flatnonzero(facing[round(rows.mean()) - 4])
+
         assert on_foot.min() == pytest.approx(columns[0], abs=1.5)
         assert on_foot.max() == pytest.approx(columns[1], abs=1.5)
+
         disparities.append(on_foot.mean())
 
     assert exposures[0].depth_m[120, 160] == pytest.approx(distance_m, abs=0.02)
@@ -167,4 +170,5 @@ def test_no_file_is_left_of_building_a_world(
 ) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     World(town.generate(2), want_egl=False).close()
+
     assert not list(tmp_path.iterdir())

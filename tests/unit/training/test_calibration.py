@@ -48,6 +48,7 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
 
 def test_clear_embeddings_are_recognized_taught_novel_and_unknown() -> None:
     metrics = _calibrated(noise=0.05).metrics
+
     assert metrics["top1"] > 0.8
     assert metrics["novel_top1"] > 0.95
     assert metrics["novel_unknown_recall"] > 0.95
@@ -65,12 +66,14 @@ def test_overconfident_log_odds_are_scaled_down() -> None:
 def test_noisier_embeddings_get_a_lower_sharpness() -> None:
     clear = _calibrated(noise=0.1).prototypes
     noisy = _calibrated(noise=0.4).prototypes
+
     assert clear.novel_sharpness > noisy.novel_sharpness
     assert clear.sharpness > noisy.sharpness
 
 
 def test_calibration_error_is_the_gap_between_activation_and_accuracy() -> None:
     correct = np.arange(1000) % 2 == 0
+
     assert calibration_error(np.full(1000, 0.5), correct) == pytest.approx(0.0)
     assert calibration_error(np.full(1000, 0.9), correct) == pytest.approx(0.4)
     assert calibration_error(np.where(correct, 0.99, 0.01), correct) == pytest.approx(0.01)

@@ -21,8 +21,10 @@ def test_no_town_is_in_two_splits_and_each_has_untaught_buildings() -> None:
     seeds = [job.seed for job in wanted]
 
     assert len(seeds) == len(set(seeds)) == sum(split.towns for split in SPLITS)
+
     for split in SPLITS:
         here = [job for job in wanted if job.target.parent.name == split.name]
+
         assert len(here) == split.towns
         assert {job.invented for job in here} == set(split.invented)
         assert max(split.invented) >= 20
@@ -57,6 +59,7 @@ def test_a_file_that_exists_is_kept(tmp_path: Path) -> None:
     target.parent.mkdir()
     target.write_bytes(b"from yesterday")
     render(Job(1001, 110, 0, target))
+
     assert target.read_bytes() == b"from yesterday"
 
 
@@ -69,6 +72,7 @@ def test_a_failure_names_the_town_and_leaves_no_file(tmp_path: Path) -> None:
 def test_damaged_and_missing_renderings_are_named_with_the_remedy(tmp_path: Path) -> None:
     damaged = tmp_path / "town-1.npz"
     damaged.write_bytes(b"no archive")
+
     with pytest.raises(UsageError, match=r"town-1\.npz.*cogmap train render"):
         read(damaged)
     with pytest.raises(UsageError, match=r"train.*cogmap train render"):
@@ -78,6 +82,7 @@ def test_damaged_and_missing_renderings_are_named_with_the_remedy(tmp_path: Path
 @pytest.mark.parametrize("scale", ["0", "-1", "nan", "inf", "1e9"])
 def test_a_scale_of_nothing_or_without_bound_is_refused(tmp_path: Path, scale: str) -> None:
     run = CliRunner().invoke(train, ["render", str(tmp_path), f"--scale={scale}"])
+
     assert isinstance(run.exception, UsageError)
     assert "--scale must be over 0" in str(run.exception)
     assert list(tmp_path.iterdir()) == []

@@ -82,10 +82,12 @@ def test_one_seed_gives_the_same_weights_and_another_seed_others(
 ) -> None:
     done = _python("-c", TRAINING, str(folder), str(tmp_path))
     assert done.returncode == 0, done.stderr
+
     first, again, other = ((tmp_path / f"{name}.onnx").read_bytes() for name in "abc")
 
     assert again == first
     assert other != first
+
     image = painted([])[0]
     assert load(tmp_path / "a.onnx").mask(image).shape == image.shape[:2]
 
@@ -93,11 +95,13 @@ def test_one_seed_gives_the_same_weights_and_another_seed_others(
 @needs_torch
 def test_prefetched_batches_come_in_order_without_using_torchs_random_state() -> None:
     done = _python("-c", BATCHES)
+
     assert done.returncode == 0, done.stderr
 
 
 def test_train_is_a_command_of_cogmap() -> None:
     shown = CliRunner().invoke(cogmap, ["train", "--help"])
+
     assert shown.exit_code == 0
     for name in ("render", "segments", "objects", "road"):
         assert f"\n  {name}" in shown.output
@@ -120,6 +124,7 @@ def test_without_torch_the_remedy_is_named(
 @pytest.mark.parametrize("arguments", [[], ["DATA", "--camvid", "PHOTOGRAPHS"]])
 def test_roads_are_learned_from_one_kind_of_folder(arguments: list[str]) -> None:
     run = CliRunner().invoke(train, ["road", *arguments])
+
     assert isinstance(run.exception, UsageError)
     assert "either DATA_DIR" in str(run.exception)
 
@@ -138,11 +143,13 @@ def test_segments_and_objects_are_learned_from_renderings_the_same_each_time(
     for name in ("segments", "objects"):
         printed = [_trained(name, tmp_path, out) for out in ("a", "b")]
         assert printed[0] == printed[1]
+
     for name in ("segments.onnx", "objects.onnx", "objects.json"):
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
 
     recognizer = objects.load(tmp_path / "a" / "objects.onnx")
     assert recognizer.sizes_m.keys() <= {kind.name for kind in CATALOGUE}
+
     image, depth_m, _ = painted([])
     found = segments.load(tmp_path / "a" / "segments.onnx").segments(image, depth_m, CAMERA)
     assert all(segment.mask.shape == depth_m.shape for segment in found)
@@ -160,6 +167,7 @@ def _trained(name: str, folder: Path, out: str) -> str:
 @needs_torch
 def test_a_folder_without_renderings_is_named_before_training(tmp_path: Path) -> None:
     done = _python("-m", "training", "road", str(tmp_path), "--out", str(tmp_path / "a.onnx"))
+
     assert done.returncode == 2
     assert "cogmap train render" in done.stderr
     assert "Traceback" not in done.stderr
@@ -169,5 +177,6 @@ def test_photographs_are_tested_by_weights_that_must_exist(folder: Path, tmp_pat
     out = tmp_path / "none.onnx"
     pair = (str(folder / "train"), str(folder / "trainannot"))
     run = CliRunner().invoke(train, ["road", "--camvid-test", *pair, "--out", str(out)])
+
     assert isinstance(run.exception, UsageError)
     assert "none.onnx" in str(run.exception)

@@ -90,12 +90,15 @@ def test_an_invalid_proposal_is_rejected_and_the_next_delta_counts_it(
     ledger = _ledger()
     ledger.commit(0, 1, Phase.OBJECTS, [agent(), landmark("a")])
     proposal = _proposal(thing("new"), SENSELESS[reason], base_version=4)
+
     with pytest.raises(MessageError) as refusal:
         ledger.check(proposal)
     assert reason in str(refusal.value)
+
     before = ledger.graph.digest()
     assert ledger.validate([proposal]) == []
     assert ledger.graph.digest() == before
+
     told, later = (ledger.commit(0, 2, Phase.END, []) for _ in range(2))
     assert (told.rejected, later.rejected, later.reasons) == (1, 0, [])
     assert [sentence for sentence in told.reasons if reason in sentence]
@@ -108,6 +111,7 @@ def test_a_cell_array_of_another_kind_of_number_is_refused() -> None:
 
 def test_a_proposal_with_a_failure_is_rejected_whatever_else_it_holds() -> None:
     ledger = _ledger()
+
     assert ledger.validate([_proposal(thing("new"), failure="too few samples")]) == []
     assert ledger.commit(0, 2, Phase.END, []).reasons == [
         "proposal 1/dreaming failed: too few samples"
@@ -116,6 +120,7 @@ def test_a_proposal_with_a_failure_is_rejected_whatever_else_it_holds() -> None:
 
 def test_a_proposal_of_a_codelet_that_is_not_configured_is_rejected() -> None:
     asked = task("flying", version=3)
+
     with pytest.raises(MessageError, match="no codelet 'flying' is configured here"):
         _ledger().check(answer(asked, [thing("new")]))
 
@@ -123,12 +128,14 @@ def test_a_proposal_of_a_codelet_that_is_not_configured_is_rejected() -> None:
 @pytest.mark.parametrize("target", ["object:house", "place:map:9:1:2"])
 def test_a_node_is_linked_to_a_place_of_a_map_that_exists(target: str) -> None:
     ledger = Ledger({"dreaming": lambda written: True})
+
     with pytest.raises(MessageError, match=r"is no place node|there is no map map:9"):
         ledger.check(answer(task("dreaming", version=0), [Link(source="self", target=target)]))
 
 
 def test_an_object_is_on_a_map_that_exists() -> None:
     ledger = Ledger({"dreaming": lambda written: True})
+
     with pytest.raises(MessageError, match="there is no map map:9"):
         ledger.check(answer(task("dreaming", version=0), [landmark("a", map="map:9")]))
 
@@ -144,7 +151,9 @@ def test_the_first_reasons_are_reported_in_short_and_the_rest_counted() -> None:
     ledger = _ledger()
     ledger.validate([_proposal(failure=f"{number}" + "x" * 10_000) for number in range(100)])
     delta = ledger.commit(0, 2, Phase.END, [])
+
     assert delta.rejected == 100
+
     first = len("proposal 1/dreaming failed: ")
     assert [sentence[first] for sentence in delta.reasons] == list("01234567")
     assert max(map(len, delta.reasons)) == 200
@@ -163,6 +172,7 @@ def test_a_proposal_on_a_version_that_is_not_committed_yet_is_refused() -> None:
 def test_a_proposal_is_late_only_for_nodes_changed_since_its_version() -> None:
     ledger = _ledger()
     ledger.check(_proposal(thing("a"), base_version=1))
+
     with pytest.raises(MessageError, match="late: b has changed since 2"):
         ledger.check(_proposal(thing("b"), base_version=2))
     with pytest.raises(MessageError, match="late: b has changed"):
@@ -181,6 +191,7 @@ def test_cells_are_late_where_their_tiles_column_has_changed_since() -> None:
     ledger.check(_proposal(_cells(where=((TILE_SIDE, 0),)), base_version=3))
     other = msgspec.structs.replace(_cells(), column=PlaceColumn.OBSTACLE)
     ledger.check(_proposal(other, base_version=3))
+
     with pytest.raises(MessageError, match="late: map:0 0 0 road has changed since 3"):
         ledger.check(_proposal(_cells(where=((TILE_SIDE - 1, 0),)), base_version=3))
 
@@ -189,6 +200,7 @@ def test_one_proposal_that_is_refused_keeps_no_other_from_being_committed() -> N
     ledger = _ledger()
     good = _proposal(thing("new"))
     bad = _proposal(Decay())
+
     assert ledger.validate([bad, good]) == [good]
 
 
@@ -197,6 +209,7 @@ def test_a_refused_answer_lets_the_cycle_go_on() -> None:
     desk.see(0, percept("a"))
     desk.feed(answer(desk.take()[0], [DropNode(id="self")]))
     desk.work()
+
     assert [delta.phase for delta in desk.deltas] == ["percepts", "objects", "end"]
     assert [delta.rejected for delta in desk.deltas] == [0, 1, 0]
 
@@ -207,7 +220,9 @@ def test_what_was_written_before_a_restart_still_counts_as_written() -> None:
     for version, name in enumerate(("a", "c", "b"), 1):
         written = [thing(name)]
         again.restore(Delta(version=version, cycle=1, phase=Phase.OBJECTS, operations=written))
+
     assert again.graph.digest() == ledger.graph.digest()
+
     again.check(_proposal(thing("c"), base_version=2))
     with pytest.raises(MessageError, match="b has changed"):
         again.check(_proposal(thing("b"), base_version=2))
@@ -217,6 +232,7 @@ def test_what_a_snapshot_holds_counts_as_written_at_its_version() -> None:
     again = Ledger({"dreaming": _may_write})
     again.restore(_ledger().graph.snapshot())
     again.check(_proposal(thing("a"), base_version=3))
+
     with pytest.raises(MessageError, match="a has changed since 2"):
         again.check(_proposal(thing("a"), base_version=2))
 
@@ -230,6 +246,7 @@ def test_applying_a_deltas_operations_twice_is_applying_them_once() -> None:
         once.apply(delta)
         twice.change(delta.operations)
         twice.apply(delta)
+
         assert twice.digest() == once.digest()
 
 
@@ -245,6 +262,7 @@ def test_a_forgotten_node_takes_its_links_with_it() -> None:
         ]
     )
     graph.change([Link(source="b", target="here", kind="near"), DropNode(id="a")])
+
     assert list(graph.nodes) == ["b"]
     assert graph.snapshot().links == [Links(kind="near", weights={"b": {"here": 1.0}})]
 
@@ -253,6 +271,7 @@ def test_the_ledger_keeps_the_nodes_of_a_commit_as_they_were_said() -> None:
     said = Node(id="a", kind="thing", activation=0.25, attributes={"x_m": 1.0})
     ledger = Ledger({})
     delta = ledger.commit(5, 2, Phase.OBJECTS, [said], ["2/object_place/a"])
+
     assert (delta.stamp_ns, delta.version, delta.cycle, delta.tasks) == (
         5,
         1,

@@ -53,6 +53,7 @@ def test_activation_decays_by_a_tenth_a_cycle_and_base_level_by_far_less() -> No
     run = _Run(_node("a", 0.9, 0.5))
     run.end_cycles(3)
     node = run.graph.nodes["a"]
+
     assert run.graph.activation(node) == pytest.approx(0.6)
     assert run.graph.base_level(node) == pytest.approx(0.4985)
     assert run.graph.total_activation(node) == 1.0
@@ -61,18 +62,21 @@ def test_activation_decays_by_a_tenth_a_cycle_and_base_level_by_far_less() -> No
 def test_activation_never_falls_below_zero() -> None:
     run = _Run(_node("a", 0.05, 0.5))
     run.end_cycles(3)
+
     assert run.graph.activation(run.graph.nodes["a"]) == 0.0
 
 
 def test_persistent_kinds_do_not_decay() -> None:
     run = _Run(agent())
     assert run.end_cycles(100) == []
+
     node = run.graph.nodes["self"]
     assert (run.graph.activation(node), run.graph.base_level(node)) == (1.0, 1.0)
 
 
 def test_what_falls_below_threshold_is_forgotten_with_its_links() -> None:
     run = _Run(_node("a", 0.3), _node("b", 1.0, 0.5), Link(source="b", target="a", kind="near"))
+
     assert run.end_cycles(2) == []
     assert run.end_cycles() == ["a"]
     assert sorted(run.graph.nodes) == ["b"]
@@ -82,6 +86,7 @@ def test_what_falls_below_threshold_is_forgotten_with_its_links() -> None:
 def test_base_level_keeps_a_node_that_activation_alone_would_not() -> None:
     run = _Run(_node("seen once", 1.0, 0.0), _node("learned", 0.0, 0.2))
     run.end_cycles(20)
+
     assert list(run.graph.nodes) == ["learned"]
 
 
@@ -90,6 +95,7 @@ def test_a_node_that_is_written_again_is_forgotten_later() -> None:
     run.end_cycles(2)
     again = Node(id="a", kind="thing", activation=0.3, cycle=run.graph.cycle)
     run.commit(Phase.OBJECTS, [again])
+
     assert run.end_cycles(2) == []
     assert run.end_cycles() == ["a"]
 
@@ -101,6 +107,7 @@ def test_a_restored_graph_forgets_what_the_one_before_would_have() -> None:
     after = _Run()
     after.graph.load(before.graph.snapshot())
     after.forgetting.restore(after.graph)
+
     assert [after.end_cycles() for _ in range(8)] == [before.end_cycles() for _ in range(8)]
 
 
@@ -111,6 +118,7 @@ def test_the_cycle_of_forgetting_is_the_last_above_threshold(
 ) -> None:
     node = Node(id="a", kind="thing", activation=activation, base_level=base_level, cycle=7)
     cycle = decay.cycle_of_forgetting(node, RATES)
+
     assert decay.total_activation(node, cycle + 1, RATES) < RATES.forget_below
     if cycle > 7:
         assert decay.total_activation(node, cycle, RATES) >= RATES.forget_below
@@ -135,6 +143,7 @@ def test_the_activation_of_place_nodes_decays_to_zero() -> None:
     for _ in range(4):
         trace.append(_activation(run.graph))
         run.end_cycles()
+
     assert trace == pytest.approx([0.05, 0.03, 0.01, 0.0], abs=1e-6)
 
 
@@ -144,6 +153,7 @@ def test_road_does_not_decay() -> None:
     run = _Run(Cells(column=PlaceColumn.ROAD, cells=here, values=value))
     run.end_cycles(10)
     place = run.graph.place(-3, 70)
+
     assert place is not None
     assert place.road == 1.0
 
@@ -151,6 +161,7 @@ def test_road_does_not_decay() -> None:
 def test_a_cycle_in_which_nothing_is_forgotten_writes_nothing_at_its_end() -> None:
     desk = Desk("w1")
     desk.drive(range(3), percept("a"))
+
     assert [delta.operations for delta in desk.deltas if delta.phase is Phase.END] == [[], [], []]
 
 
@@ -159,7 +170,9 @@ def test_an_object_that_is_no_longer_seen_stays_and_its_percept_is_forgotten() -
     desk.drive(range(3), percept("a"))
     desk.drive(range(3, 15))
     expected = {"self", "map:0", "path:0", "observations:0:a", "object:a"}
+
     assert set(desk.graph.nodes) == expected
+
     dropped = [item for delta in desk.deltas for item in delta.operations]
     assert [item.id for item in dropped if isinstance(item, DropNode)] == ["percept:a"]
 
@@ -169,6 +182,7 @@ def test_a_replica_decays_as_the_workspace_does() -> None:
     desk.drive(range(2), percept("a"), percept("b", 0.7))
     desk.drive(range(2, 12))
     expected = {"self", "map:0", "path:0", "observations:0:a", "observations:0:b"}
+
     assert set(desk.graph.nodes) == expected
     assert desk.graph.digest() == desk.digest
 

@@ -50,6 +50,7 @@ def test_tasks_wait_where_there_is_no_worker_and_go_out_when_one_comes() -> None
     desk = Desk()
     desk.see(0)
     assert desk.tasks == []
+
     desk.presence("w1")
     (asked,) = desk.take()
     assert _held(desk, asked) == ("w1", 0)
@@ -59,6 +60,7 @@ def test_tasks_of_one_phase_are_spread_over_the_workers() -> None:
     desk = Desk("w1", "w2", "w3")
     desk.see(0, percept("a"), percept("b"), percept("c"), percept("d"), percept("e"))
     desk.feed(answer(desk.take()[0]))
+
     assert sorted(_held(desk, asked)[0] for asked in desk.take()) == [
         "w1",
         "w1",
@@ -78,8 +80,10 @@ def test_a_lost_workers_task_is_given_to_another_and_committed_once() -> None:
     desk.presence(first, alive=False)
     (again,) = desk.take()
     second, attempt = _held(desk, again)
+
     assert (again.task_id, attempt) == (asked.task_id, 1)
     assert {first, second} == {"w1", "w2"}
+
     desk.feed(answer(again, [_moved_self(0)]))
     desk.feed(answer(asked, [_moved_self(0, 7.0)]))
     assert _committed(desk, asked) == 1
@@ -91,12 +95,14 @@ def test_a_worker_that_goes_without_a_task_changes_nothing() -> None:
     desk.see(0)
     (asked,) = desk.take()
     idle = next(worker for worker in ("w1", "w2", "w3") if worker != _held(desk, asked)[0])
+
     assert desk.presence(idle, alive=False) == []
 
 
 def test_presence_of_other_modules_is_nothing_to_the_dispatch() -> None:
     desk = Desk()
     desk.see(0)
+
     assert (
         desk.feed(Presence(module="epam", instance="epam", alive=True, observer="workspace"))[1:]
         == []
@@ -108,7 +114,9 @@ def test_with_its_only_worker_gone_a_task_waits_for_the_next_one() -> None:
     desk = Desk("w1")
     desk.see(0)
     desk.take()
+
     assert not [said for said in desk.presence("w1", alive=False) if isinstance(said, Task)]
+
     desk.presence("w9")
     assert [_held(desk, asked) for asked in desk.tasks] == [("w9", 1)]
 
@@ -120,11 +128,14 @@ def test_a_task_whose_lease_has_ended_is_done_by_another_and_committed_once(
     desk, asked = _real_time(*workers)
     first, _ = _held(desk, asked)
     assert desk.clock(stamp_ns(0) + 100 * MS) == []
+
     desk.clock(stamp_ns(0) + 101 * MS)
     (again,) = desk.take()
     second, attempt = _held(desk, again)
+
     assert (again.task_id, attempt) == (asked.task_id, 1)
     assert second != first
+
     desk.feed(answer(asked, [_moved_self(0)]))
     desk.feed(answer(again, [_moved_self(0, 7.0)]))
     assert _committed(desk, asked) == 1
@@ -133,6 +144,7 @@ def test_a_task_whose_lease_has_ended_is_done_by_another_and_committed_once(
 def test_the_only_worker_keeps_its_task_past_the_lease_until_another_joins() -> None:
     desk, asked = _real_time("w1")
     assert desk.clock(stamp_ns(0) + 101 * MS) == []
+
     desk.presence("w2")
     desk.clock(stamp_ns(0) + 102 * MS)
     assert [again.task_id for again in desk.take()] == [asked.task_id]
@@ -144,6 +156,7 @@ def test_a_task_that_no_worker_holds_is_given_to_the_first_that_joins() -> None:
     desk.see(0)
     desk.clock(stamp_ns(0) + 5_000 * MS)
     desk.presence("w1")
+
     assert [_held(desk, asked) for asked in desk.take()] == [("w1", 0)]
 
 
@@ -157,6 +170,7 @@ def test_a_task_lost_at_every_attempt_is_given_up_and_the_cycle_continues() -> N
         attempts.append((asked.codelet, _held(desk, asked)[1]))
         desk.clock(stamp_ns(0) + ms * MS)
     road, _ = desk.take()
+
     assert attempts == [("localization", number) for number in range(3)]
     assert (road.codelet, _held(desk, road)[1]) == ("road_place", 0)
 
@@ -170,6 +184,7 @@ def test_in_lockstep_a_task_that_kills_every_worker_is_given_up_and_told_of() ->
         desk.presence(f"w{number}", alive=False)
     desk.presence("steady")
     desk.work()
+
     assert desk.deltas[-1].phase == "end"
     assert [delta.reasons for delta in desk.deltas if delta.rejected] == [
         ["task 1/localization was given to 3 workers and lost each time"]
@@ -179,6 +194,7 @@ def test_in_lockstep_a_task_that_kills_every_worker_is_given_up_and_told_of() ->
 def test_in_lockstep_neither_lease_nor_deadline_ends() -> None:
     desk = Desk("w1")
     desk.see(0)
+
     assert desk.clock(stamp_ns(1000)) == []
 
 
@@ -187,10 +203,13 @@ def test_a_cycle_commits_the_answers_at_its_deadline_and_the_next_begins() -> No
     desk.feed(answer(asked, [_moved_self(0)]))
     road, *_ = desk.take()
     desk.clock(stamp_ns(0) + 180 * MS)
+
     assert desk.deltas[-1].phase == "localization"
+
     desk.feed(motion(1))
     desk.feed(percepts(1))
     desk.clock(stamp_ns(0) + 181 * MS)
+
     assert [delta.phase for delta in desk.deltas] == [
         "percepts",
         "localization",
@@ -204,9 +223,11 @@ def test_a_clock_that_once_ran_far_ahead_spoils_no_later_cycle() -> None:
     desk, _ = _real_time("w1", "w2")
     desk.clock(stamp_ns(1000))
     assert desk.deltas[-1].phase == "end"
+
     desk.clock(stamp_ns(1))
     desk.see(1)
     desk.clock(stamp_ns(1) + 50 * MS)
+
     assert desk.deltas[-1].phase == "percepts"
 
 
@@ -217,6 +238,7 @@ def test_a_part_of_the_answers_is_committed_at_the_deadline() -> None:
     first, second, *_ = desk.take()
     desk.feed(answer(second, [landmark("b")]))
     desk.clock(stamp_ns(0) + 500 * MS)
+
     assert [delta.tasks for delta in desk.deltas if delta.phase == "objects"] == [[second.task_id]]
     assert _committed(desk, first) == 0
 
@@ -227,6 +249,7 @@ def test_a_late_answer_is_committed_in_the_next_cycle_if_it_still_applies() -> N
     desk.see(1)
     desk.feed(answer(asked, [_moved_self(0)]))
     late = desk.deltas[-1]
+
     assert (late.phase, late.tasks, late.cycle, late.rejected) == ("late", [asked.task_id], 2, 0)
     assert desk.agent.stamp_ns == stamp_ns(0)
 
@@ -235,6 +258,7 @@ def test_a_late_answer_is_committed_between_two_cycles_too() -> None:
     desk, asked = _real_time("w1", "w2")
     desk.clock(stamp_ns(0) + 181 * MS)
     desk.feed(answer(asked, [_moved_self(0)]))
+
     assert desk.deltas[-1].tasks == [asked.task_id]
 
 
@@ -245,8 +269,10 @@ def test_a_late_answer_about_a_changed_node_is_dropped_and_counted() -> None:
     (newer,) = desk.take()
     desk.feed(answer(newer, [_moved_self(1, 3.0)]))
     before = len(desk.deltas)
+
     assert desk.feed(answer(asked, [_moved_self(0)])) == []
     assert _committed(desk, asked) == 0
+
     desk.clock(stamp_ns(1) + 181 * MS)
     assert [delta.rejected for delta in desk.deltas[before:]] == [1]
     assert desk.agent.x_m == 3.0
@@ -255,6 +281,7 @@ def test_a_late_answer_about_a_changed_node_is_dropped_and_counted() -> None:
 def test_a_late_answer_is_taken_once() -> None:
     desk, asked = _real_time("w1", "w2")
     desk.clock(stamp_ns(0) + 181 * MS)
+
     assert desk.feed(answer(asked, [_moved_self(0)]))
     assert desk.feed(answer(asked, [_moved_self(0)])) == []
 
@@ -264,6 +291,7 @@ def test_unused_motion_is_given_to_the_next_cycles_localization() -> None:
     desk.clock(stamp_ns(0) + 181 * MS)
     desk.see(1)
     (asked,) = desk.take()
+
     assert asked.motions is not None
     assert asked.motions.shape == (2, 5)
 
@@ -273,5 +301,6 @@ def test_workers_that_never_answer_leave_the_deltas_without_a_gap() -> None:
     for frame in range(5):
         desk.see(frame, percept("a"))
         desk.clock(stamp_ns(frame) + PERIOD_NS)
+
     assert [delta.version for delta in desk.deltas] == list(range(1, 11))
     assert all(isinstance(delta, Delta) and not delta.tasks for delta in desk.deltas)
