@@ -15,7 +15,7 @@ from typing import Any
 import msgspec
 
 from schemas import topics
-from schemas.examples import samples
+from schemas.examples import example_messages
 from schemas.topics import Topic
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -50,7 +50,7 @@ def export_schemas(folder: Path) -> list[Path]:
 def export_golden(folder: Path) -> list[Path]:
     """Write the bytes of one message of every type into `folder`; the files written."""
     files = {}
-    for message in samples():
+    for message in example_messages():
         name = file_name(topics.of(message), ".msgpack")
         files[name] = msgspec.msgpack.encode(message)
 

@@ -13,13 +13,13 @@ from cogmap.bus.interface import Answer, Job, Member
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.errors import NoAnswerError, UsageError
 from schemas import topics
-from schemas.examples import samples
+from schemas.examples import example_messages
 from schemas.process import Clock
 from schemas.sensing import Odometry
 from schemas.topics import Delivery
 from tests.support.networks import TIMEOUT_S, Network, OverZenoh, Peer, meet, publish
 
-MESSAGES = {topics.of(message): message for message in samples()}
+MESSAGES = {topics.of(message): message for message in example_messages()}
 TRAVELLING = [topic for topic in topics.ALL if topic.delivery is not Delivery.ON_REQUEST]
 SNAPSHOTS = (topics.SNAPSHOT_REQUEST, topics.SNAPSHOT)
 ENVELOPE = Envelope("workspace", 0, 7, 2, 1)

@@ -16,12 +16,12 @@ from msgspec.inspect import FloatType
 from cogmap.bus.codec import Envelope, decode, encode
 from schemas import topics
 from schemas.base import Message
-from schemas.examples import samples
+from schemas.examples import example_messages
 from schemas.export import GOLDEN, export_golden, export_schemas, file_name, json_schema
 from schemas.topics import Delivery, Scope, Topic
 from tests.support.damage import golden
 
-BY_TOPIC = {topics.of(message): message for message in samples()}
+BY_TOPIC = {topics.of(message): message for message in example_messages()}
 each_topic = pytest.mark.parametrize("topic", topics.ALL, ids=lambda topic: topic.name)
 
 

@@ -14,13 +14,13 @@ import pytest
 
 from cogmap import Client, Module, topics
 from schemas.base import Message
-from schemas.examples import samples
+from schemas.examples import example_messages
 from schemas.sensing import MotorCommand, Odometry
 from tests.support.networks import routed
 
 TIMEOUT_S = 30.0
 PERIOD_NS = 20_000_000
-EXAMPLES = {topics.of(message): message for message in samples()}
+EXAMPLES = {topics.of(message): message for message in example_messages()}
 
 
 class Robot:

@@ -20,7 +20,7 @@ from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.array import Array
 from schemas.base import Message
-from schemas.examples import samples
+from schemas.examples import example_messages
 from schemas.sensing import StereoFrame
 from schemas.topics import Topic
 from tests.support.live import Feeder, Witness
@@ -39,7 +39,7 @@ def camera() -> Module:
     queues in between can hold.
     """
     image = Array.of(np.zeros((240, 320, 3), np.uint8))
-    example = next(message for message in samples() if isinstance(message, StereoFrame))
+    example = next(message for message in example_messages() if isinstance(message, StereoFrame))
 
     def frame(now_ns: int) -> StereoFrame:
         return msgspec.structs.replace(example, stamp_ns=now_ns, left=image, right=image)

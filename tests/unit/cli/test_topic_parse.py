@@ -11,11 +11,11 @@ from cli.topic.echo import formatter
 from cli.topic.parse import parse
 from cogmap.errors import UsageError
 from schemas import topics
-from schemas.examples import samples
+from schemas.examples import example_messages
 from schemas.sensing import MotorCommand, Odometry
 from schemas.topics import Topic
 
-BY_TOPIC = {topics.of(message): message for message in samples()}
+BY_TOPIC = {topics.of(message): message for message in example_messages()}
 ODOMETRY = Odometry(speed_m_s=1.5, turn_rate_rad_s=0.0, dt_s=0.05, stamp_ns=7, seq=3, source="sim")
 
 

@@ -13,7 +13,7 @@ from cogmap.recording.storage.writer import LogWriter
 from cogmap.version import VERSION
 from schemas import topics
 from schemas.base import Message
-from schemas.examples import samples
+from schemas.examples import example_messages
 from schemas.graph import Delta
 from tests.support.logs import SECOND_NS, odometry, write_log
 
@@ -21,7 +21,7 @@ START_NS = 100 * SECOND_NS
 
 
 def delta(version: int) -> Delta:
-    example = next(message for message in samples() if isinstance(message, Delta))
+    example = next(message for message in example_messages() if isinstance(message, Delta))
     return structs.replace(example, seq=version, source="workspace", version=version, operations=[])
 
 

@@ -1,0 +1,91 @@
+"""Examples of the messages of the cognitive cycle."""
+
+from __future__ import annotations
+
+from schemas.base import Message
+from schemas.cognition import (
+    Action,
+    Behaviour,
+    Broadcast,
+    Coalition,
+    Coalitions,
+    Competition,
+    Contender,
+    Fate,
+    Rejection,
+    Replay,
+    Trigger,
+)
+from schemas.examples import nodes
+from schemas.examples.arrays import ramp
+from schemas.examples.graph import instance_link
+
+
+def messages() -> list[Message]:
+    """A message of every type but the replay, from coalitions to the selected action."""
+    return [
+        Coalitions(cycle=6, coalitions=[coalition()]),
+        _competition(),
+        Broadcast(cycle=6, trigger="aggregate", coalition=coalition()),
+        _action(),
+    ]
+
+
+def coalition() -> Coalition:
+    """The agent and an object, linked."""
+    return Coalition(
+        id="6/whereabouts/0",
+        codelet="whereabouts",
+        activation=0.375,
+        nodes=[nodes.self_node(), nodes.object_node()],
+        links=[instance_link(weight=1.0)],
+        maps=["map:1"],
+    )
+
+
+def replay() -> Replay:
+    """A loop closed by reverse replay."""
+    return Replay(
+        cycle=6,
+        replays=4,
+        closed=["closure:0"],
+        undone=["closure:1"],
+        stamps_ns=ramp(3, dtype="<i8"),
+        positions_m=ramp(3, 2, dtype="<f8"),
+        shifts_m=ramp(3, 2, dtype="<f8"),
+        pairs=ramp(1, 2, dtype="<i4"),
+        strength_changes=ramp(1, dtype="<f8"),
+        decay_per_m=0.2,
+    )
+
+
+def _competition() -> Competition:
+    won = Contender(
+        id="attention/6",
+        codelet="attention",
+        activation=0.375,
+        fate=Fate.WON,
+    )
+    waiting = Contender(
+        id="road/5",
+        codelet="road",
+        activation=0.25,
+        fate=Fate.WAITING,
+    )
+    return Competition(cycle=6, contenders=[won, waiting], trigger=Trigger.AGGREGATE)
+
+
+def _action() -> Action:
+    chosen = Behaviour(scheme="follow-route", activation=0.5)
+    rejected = Behaviour(
+        scheme="halt",
+        activation=0.0,
+        rejection=Rejection.CONTEXT_MISSING,
+    )
+    return Action(
+        cycle=6,
+        scheme="follow-route",
+        activation=0.5,
+        parameters={"speed_m_s": 3.0, "turn": "left"},
+        behaviours=[chosen, rejected],
+    )

@@ -1,0 +1,169 @@
+"""A node of every kind, every field of it other than its default."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from schemas.examples.arrays import matrix
+from schemas.nodes import (
+    CORRECTION_ID,
+    ROOT_MAP,
+    SELF_ID,
+    AnyNode,
+    Correction,
+    LoopClosure,
+    Map,
+    Node,
+    Object,
+    Observations,
+    PathSegment,
+    Percept,
+    Self,
+    object_id,
+    observations_id,
+    percept_id,
+    segment_id,
+)
+
+_USUAL: dict[str, Any] = {"activation": 0.5, "base_level": 0.25, "cycle": 6}
+
+
+def every_kind() -> list[AnyNode]:
+    """A node of every kind."""
+    return [
+        unknown_kind(),
+        self_node(),
+        _percept(),
+        object_node(),
+        PathSegment(id=segment_id(1), number=1, rows=matrix(2, 9), **_USUAL),
+        _observations(),
+        _closure(),
+        Correction(id=CORRECTION_ID, rows=matrix(2, 7), **_USUAL),
+        _map(),
+    ]
+
+
+def unknown_kind() -> Node:
+    """A node of a kind that is not in the table of kinds."""
+    return Node(
+        id="post:3",
+        kind="post",
+        activation=0.5,
+        base_level=0.125,
+        cycle=5,
+        attributes={"x_m": 1.5, "count": 3, "name": "Häuserzeile", "moving": True},
+        samples=matrix(4, 3),
+    )
+
+
+def self_node() -> Self:
+    """The agent."""
+    return Self(
+        id=SELF_ID,
+        activation=1.0,
+        base_level=1.0,
+        cycle=6,
+        map="map:1",
+        stamp_ns=1_100_000_000,
+        x_m=3.5,
+        y_m=-1.25,
+        heading_rad=0.5,
+        x_sd_m=0.25,
+        y_sd_m=0.125,
+        heading_sd_rad=0.0625,
+        kept_share=0.375,
+        misfit_count=2,
+        first_misfit="building-03",
+        is_lost=True,
+        last_misfit_ns=1_000_000_000,
+        last_fit_ns=900_000_000,
+        stationary_since_ns=800_000_000,
+        speed_gain=0.03125,
+        turn_gain=-0.03125,
+        range_gain=0.015625,
+        odometry_x_m=3.25,
+        odometry_y_m=-1.5,
+        odometry_heading_rad=0.625,
+        odometry_variance_m2=0.5,
+        odometry_variance_rad2=0.25,
+        samples=matrix(2, 7),
+    )
+
+
+def object_node() -> Object:
+    """An object of the cognitive map."""
+    return Object(
+        id=object_id("building-07"),
+        activation=0.75,
+        base_level=0.25,
+        cycle=6,
+        label="building-07",
+        map="map:1",
+        x_m=12.5,
+        y_m=4.25,
+        x_sd_m=0.5,
+        y_sd_m=0.25,
+        width_m=9.0,
+        height_m=6.5,
+        sightings=4,
+        misses=1,
+        last_seen_ns=1_100_000_000,
+        created_ns=700_000_000,
+        surveyed=True,
+        salience=0.5,
+        offsets_m=matrix(3, 2, "<f2"),
+    )
+
+
+def _percept() -> Percept:
+    return Percept(
+        id=percept_id("building-07"),
+        label="building-07",
+        bearing_rad=0.25,
+        range_m=9.5,
+        **_USUAL,
+    )
+
+
+def _observations() -> Observations:
+    return Observations(
+        id=observations_id(1, "building-07"),
+        number=1,
+        landmark="building-07",
+        rows=matrix(2, 6),
+        **_USUAL,
+    )
+
+
+def _closure() -> LoopClosure:
+    return LoopClosure(
+        id="closure:6:building-07",
+        activation=0.5,
+        base_level=1.0,
+        cycle=6,
+        from_ns=200_000_000,
+        to_ns=1_100_000_000,
+        cue="building-07",
+        ahead_m=8.5,
+        left_m=-2.25,
+        range_m=9.5,
+        bearing_rad=0.25,
+        sd_m=0.5,
+        sd_rad=0.125,
+        before_ns=400_000_000,
+        view=2,
+        consistent=True,
+        accepted=False,
+    )
+
+
+def _map() -> Map:
+    return Map(
+        id="map:1",
+        cell_m=0.5,
+        parent=ROOT_MAP,
+        x_m=3.0,
+        y_m=-2.0,
+        heading_rad=0.25,
+        **_USUAL,
+    )

@@ -1,0 +1,69 @@
+"""The kinds of nodes, links and place columns: each is named here once, with its fields and rules.
+
+A node of the graph is a struct of its kind, so that the decoder validates it. A kind that is not
+known here travels as the generic `Node`: a codelet of somebody else's package needs no change of
+this table. Positions are in metres in the frame of the map that the node is on, x east, y north.
+"""
+
+from schemas.nodes.base import NEVER_NS, GraphNode, Node
+from schemas.nodes.columns import (
+    POSE_COLUMNS,
+    CorrectionColumn,
+    ObservationColumn,
+    PathColumn,
+    PlaceColumn,
+    SelfColumn,
+)
+from schemas.nodes.ids import (
+    CORRECTION_ID,
+    ROOT_MAP,
+    SELF_ID,
+    nearest_place,
+    object_id,
+    observations_id,
+    percept_id,
+    place_cell,
+    place_id,
+    segment_id,
+)
+from schemas.nodes.links import EXCLUSIVE_LINKS, LinkKind
+from schemas.nodes.path import Correction, LoopClosure, Observations, PathSegment
+from schemas.nodes.rules import KINDS, AnyNode, KindRules, kind_name, kind_of
+from schemas.nodes.situation import Map, Object, Percept, Self
+
+__all__ = [
+    "CORRECTION_ID",
+    "EXCLUSIVE_LINKS",
+    "KINDS",
+    "NEVER_NS",
+    "POSE_COLUMNS",
+    "ROOT_MAP",
+    "SELF_ID",
+    "AnyNode",
+    "Correction",
+    "CorrectionColumn",
+    "GraphNode",
+    "KindRules",
+    "LinkKind",
+    "LoopClosure",
+    "Map",
+    "Node",
+    "Object",
+    "ObservationColumn",
+    "Observations",
+    "PathColumn",
+    "PathSegment",
+    "Percept",
+    "PlaceColumn",
+    "Self",
+    "SelfColumn",
+    "kind_name",
+    "kind_of",
+    "nearest_place",
+    "object_id",
+    "observations_id",
+    "percept_id",
+    "place_cell",
+    "place_id",
+    "segment_id",
+]

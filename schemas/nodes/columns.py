@@ -1,0 +1,96 @@
+"""The columns of place nodes, and of the matrices that nodes keep."""
+
+from __future__ import annotations
+
+import enum
+
+from schemas.array import Matrix
+
+POSE_COLUMNS = 3
+MAX_ROWS = 100_000
+
+
+class PlaceColumn(enum.StrEnum):
+    """The columns of place nodes, float32 each.
+
+    A cell holds the links to four of its eight neighbours, the other four being the neighbours'
+    own: their weight, from 0 (not traversable) to 1, and the evidence accumulated for it.
+    """
+
+    ACTIVATION = "activation"
+    ROAD = "road"
+    OBSTACLE = "obstacle"
+    WEIGHT_E = "weight_e"
+    WEIGHT_NE = "weight_ne"
+    WEIGHT_N = "weight_n"
+    WEIGHT_NW = "weight_nw"
+    EVIDENCE_E = "evidence_e"
+    EVIDENCE_NE = "evidence_ne"
+    EVIDENCE_N = "evidence_n"
+    EVIDENCE_NW = "evidence_nw"
+
+
+class SelfColumn(enum.IntEnum):
+    """Columns of the samples of the self: its pose and, optionally, the gains of its senses."""
+
+    X_M = 0
+    Y_M = 1
+    HEADING_RAD = 2
+    SPEED_GAIN = 3
+    TURN_GAIN = 4
+    DRIFT_RAD_PER_M = 5
+    RANGE_GAIN = 6
+
+
+class PathColumn(enum.IntEnum):
+    """Columns of a path segment: when, the pose believed, the pose by path integration alone, and
+    the variance of the latter since the start, of the distance and of the heading.
+    """
+
+    STAMP_S = 0
+    X_M = 1
+    Y_M = 2
+    HEADING_RAD = 3
+    ODOMETRY_X_M = 4
+    ODOMETRY_Y_M = 5
+    ODOMETRY_HEADING_RAD = 6
+    VARIANCE_M2 = 7
+    VARIANCE_RAD2 = 8
+
+
+class ObservationColumn(enum.IntEnum):
+    """Columns of observations of a landmark from places of the path.
+
+    Where it stood as seen from the place, forwards and left; the standard deviations along and
+    across the line of sight, and that line's direction.
+    """
+
+    STAMP_S = 0
+    FORWARDS_M = 1
+    LEFT_M = 2
+    ALONG_SD_M = 3
+    ACROSS_SD_M = 4
+    DIRECTION_RAD = 5
+
+
+class CorrectionColumn(enum.IntEnum):
+    """Columns of a correction: when, and the pose of the path before and after."""
+
+    STAMP_S = 0
+    OLD_X_M = 1
+    OLD_Y_M = 2
+    OLD_HEADING_RAD = 3
+    NEW_X_M = 4
+    NEW_Y_M = 5
+    NEW_HEADING_RAD = 6
+
+
+def check_matrix(node: str, matrix: Matrix, dtype: str, columns: tuple[int, ...]) -> None:
+    """Raise ValueError where a matrix is of another dtype or width, or has no rows or too many."""
+    rows, width = matrix.shape
+    if matrix.dtype != dtype or width not in columns:
+        wanted = " or ".join(map(str, columns))
+        raise ValueError(f"{node}: {matrix.dtype} of {width} columns, not {dtype} of {wanted}")
+
+    if not 1 <= rows <= MAX_ROWS:
+        raise ValueError(f"{node}: {rows} rows, not 1 to {MAX_ROWS}")

@@ -1,0 +1,51 @@
+"""The ids of nodes: how each is made of what the node is about."""
+
+from __future__ import annotations
+
+ROOT_MAP = "map:0"
+SELF_ID = "self"
+CORRECTION_ID = "correction"
+
+
+def object_id(label: str) -> str:
+    """The id of the object that perception calls `label`."""
+    return f"object:{label}"
+
+
+def percept_id(label: str) -> str:
+    """The id of the percept of the object that perception calls `label`."""
+    return f"percept:{label}"
+
+
+def segment_id(number: int) -> str:
+    """The id of a path segment."""
+    return f"path:{number}"
+
+
+def observations_id(number: int, label: str) -> str:
+    """The id of the observations of landmark `label` along path segment `number`."""
+    return f"observations:{number}:{label}"
+
+
+def place_id(i: int, j: int, map_id: str = ROOT_MAP) -> str:
+    """The id of the place node of grid cell (i, j)."""
+    return f"place:{map_id}:{i}:{j}"
+
+
+def place_cell(identifier: str) -> tuple[str, int, int] | None:
+    """The map and the grid cell of a place node's id; None for any other node's."""
+    if not identifier.startswith("place:"):
+        return None
+
+    try:
+        map_id, i, j = identifier.removeprefix("place:").rsplit(":", 2)
+        return map_id, int(i), int(j)
+    except ValueError:
+        return None
+
+
+def nearest_place(x_m: float, y_m: float, cell_m: float, map_id: str = ROOT_MAP) -> str:
+    """The id of the place node nearest to a position, in a grid of `cell_m`."""
+    i = round(x_m / cell_m)
+    j = round(y_m / cell_m)
+    return place_id(i, j, map_id)

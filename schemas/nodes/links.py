@@ -1,0 +1,25 @@
+"""The kinds of links, and which of them a node has one of."""
+
+from __future__ import annotations
+
+import enum
+
+
+class LinkKind(enum.StrEnum):
+    """The kinds of links that the architecture itself uses; a codelet may use others.
+
+    AT: from the self or an object to the place node nearest to it. INSTANCE: from a percept to the
+    object that it is a sighting of. OBSERVES and ALONG: from observations to the object observed,
+    and to the path segment that they were made along. NEXT: between neighbouring place nodes; these
+    are kept in the tiles' columns.
+    """
+
+    AT = "at"
+    INSTANCE = "instance"
+    OBSERVES = "observes"
+    ALONG = "along"
+    NEXT = "next"
+
+
+EXCLUSIVE_LINKS = frozenset({LinkKind.AT, LinkKind.INSTANCE, LinkKind.OBSERVES, LinkKind.ALONG})
+"""Kinds of which a node has one link: a new one replaces it."""

@@ -1,0 +1,71 @@
+"""The path of the agent, what was observed along it, and what corrects it."""
+
+from __future__ import annotations
+
+from schemas.array import Matrix
+from schemas.base import Count, Finite, Name
+from schemas.nodes.base import GraphNode, Metres, Spread, Stamp
+from schemas.nodes.columns import CorrectionColumn, ObservationColumn, PathColumn, check_matrix
+
+
+class PathSegment(GraphNode, kw_only=True, frozen=True, tag="path_segment"):
+    """Places of the agent's path in a row, `rows`: float64 (n, 9), see PathColumn.
+
+    Segments are numbered from 0.
+    """
+
+    number: Count
+    rows: Matrix
+
+    def __post_init__(self) -> None:
+        check_matrix(self.id, self.rows, "<f8", (len(PathColumn),))
+
+
+class Observations(GraphNode, kw_only=True, frozen=True, tag="observations"):
+    """Observations of one landmark from places of path segment `number`.
+
+    `rows`: float64 (n, 6), see ObservationColumn.
+    """
+
+    number: Count
+    landmark: Name
+    rows: Matrix
+
+    def __post_init__(self) -> None:
+        check_matrix(self.id, self.rows, "<f8", (len(ObservationColumn),))
+
+
+class LoopClosure(GraphNode, kw_only=True, frozen=True, tag="loop_closure"):
+    """A view that may close a loop (paper §5.6).
+
+    What stands `ahead_m` and `left_m` of where the agent was at `from_ns` was seen at `range_m` and
+    `bearing_rad` at `to_ns`, within `sd_m`. `cue` is the landmark, or the place; of a place the
+    heading is known within `sd_rad`, which is 0 for a landmark. `before_ns` is when the landmark
+    was last seen on the pass before, and `view` how many closures it has given on this pass.
+    `consistent` and `accepted` are None until map correction has judged it.
+    """
+
+    from_ns: Stamp
+    to_ns: Stamp
+    cue: Name
+    ahead_m: Finite
+    left_m: Finite
+    range_m: Metres
+    bearing_rad: Finite
+    sd_m: Spread
+    sd_rad: Spread
+    before_ns: Stamp = 0
+    view: Count = 0
+    consistent: bool | None = None
+    accepted: bool | None = None
+
+
+class Correction(GraphNode, kw_only=True, frozen=True, tag="correction"):
+    """A correction of the path that waits to be applied, `rows`: float64 (n, 7), see
+    CorrectionColumn.
+    """
+
+    rows: Matrix
+
+    def __post_init__(self) -> None:
+        check_matrix(self.id, self.rows, "<f8", (len(CorrectionColumn),))

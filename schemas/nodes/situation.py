@@ -1,0 +1,112 @@
+"""The agent, what it perceives, the objects around it and the maps that they are on."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from schemas.array import Matrix
+from schemas.base import Count, Finite, Name, Unit
+from schemas.nodes.base import NEVER_NS, GraphNode, Metres, Positive, Spread, Stamp
+from schemas.nodes.columns import POSE_COLUMNS, SelfColumn, check_matrix
+from schemas.nodes.ids import ROOT_MAP
+
+
+class Self(GraphNode, kw_only=True, frozen=True, tag="self"):
+    """The agent: samples of its pose (paper §5.4), and what localization keeps between cycles.
+
+    `samples`: float64 (n, 3) or (n, 7), see SelfColumn. The pose is their mean. `kept_share` is the
+    share of the samples that rejection kept. `misfit_count` is the number of views in a row in
+    which nothing fitted, `first_misfit` the landmark that did not fit first, and `is_lost` whether
+    another did not fit since. `stationary_since_ns` is NEVER_NS while the agent moves.
+    """
+
+    map: Name = ROOT_MAP
+    stamp_ns: Stamp = NEVER_NS
+    x_m: Finite = 0.0
+    y_m: Finite = 0.0
+    heading_rad: Finite = 0.0
+    x_sd_m: Spread = 0.0
+    y_sd_m: Spread = 0.0
+    heading_sd_rad: Spread = 0.0
+    kept_share: Unit = 1.0
+    misfit_count: Count = 0
+    first_misfit: str = ""
+    is_lost: bool = False
+    last_misfit_ns: Stamp = 0
+    last_fit_ns: Stamp = 0
+    stationary_since_ns: Stamp = NEVER_NS
+    speed_gain: Finite = 0.0
+    turn_gain: Finite = 0.0
+    range_gain: Finite = 0.0
+    odometry_x_m: Finite = 0.0
+    odometry_y_m: Finite = 0.0
+    odometry_heading_rad: Finite = 0.0
+    odometry_variance_m2: Spread = 0.0
+    odometry_variance_rad2: Spread = 0.0
+    samples: Matrix
+
+    def __post_init__(self) -> None:
+        check_matrix(self.id, self.samples, "<f8", (POSE_COLUMNS, len(SelfColumn)))
+
+
+class Percept(GraphNode, kw_only=True, frozen=True, tag="percept"):
+    """A PAM node over threshold: an object recognised in the view of this cycle."""
+
+    label: Name
+    bearing_rad: Finite
+    range_m: Positive
+
+
+class Object(GraphNode, kw_only=True, frozen=True, tag="object"):
+    """An object of the cognitive map, with samples of its position (paper §5.2).
+
+    `offsets_m`: float16 (n, 2), the samples relative to their mean (`x_m`, `y_m`), which keeps them
+    to a thousandth of their spread. `sightings` is the number of views that agree with the
+    position, `misses` that of views in a row that do not. One that is `surveyed` was given, and
+    stays where it is. `last_seen_ns` and `created_ns` are times of views.
+    """
+
+    label: Name
+    map: Name = ROOT_MAP
+    x_m: Finite
+    y_m: Finite
+    x_sd_m: Spread = 0.0
+    y_sd_m: Spread = 0.0
+    width_m: Metres = 0.0
+    height_m: Metres = 0.0
+    sightings: Count = 0
+    misses: Count = 0
+    last_seen_ns: Stamp = NEVER_NS
+    created_ns: Stamp = 0
+    surveyed: bool = False
+    salience: Annotated[float, msgspec.Meta(ge=-1, le=1)] = 0.0
+    offsets_m: Matrix | None = None
+
+    def __post_init__(self) -> None:
+        if self.offsets_m is not None:
+            check_matrix(self.id, self.offsets_m, "<f2", (2,))
+
+    def positions_m(self) -> npt.NDArray[np.float64]:
+        """(n, 2) samples of its position; one, the mean, where it has none."""
+        mean = np.array([[self.x_m, self.y_m]])
+        if self.offsets_m is None:
+            return mean
+
+        return mean + self.offsets_m.numpy()
+
+
+class Map(GraphNode, kw_only=True, frozen=True, tag="map"):
+    """A cognitive map: a grid of place nodes `cell_m` apart, in a frame of its own.
+
+    The frame's origin and direction are in the frame of `parent`; the root map has none.
+    """
+
+    cell_m: Annotated[float, msgspec.Meta(gt=0, le=1e4)]
+    parent: str = ""
+    x_m: Finite = 0.0
+    y_m: Finite = 0.0
+    heading_rad: Finite = 0.0
