@@ -314,6 +314,18 @@ def test_inputs_that_the_log_lacks_are_counted_by_topic(path: Path, tmp_path: Pa
     assert not report.same
 
 
+def without_envelopes(path: Path, folder: Path) -> Path:
+    """A copy of the log, as one that another program has recorded."""
+    bare = folder / "bare.mcap"
+    reader = LogReader(path)
+    writer = LogWriter(bare, to_record(), {"config": "{}"})
+    for record in reader.records():
+        writer.write(record.topic, reader.payload(record), None, record.log_time_ns)
+
+    writer.close()
+    return bare
+
+
 def test_without_envelopes_inputs_are_fed_in_the_order_of_the_log(
     path: Path, tmp_path: Path
 ) -> None:
@@ -324,18 +336,24 @@ def test_without_envelopes_inputs_are_fed_in_the_order_of_the_log(
         session.say(odometry(seq), 10 * seq)
         session.settle()
     session.end()
-    bare = tmp_path / "bare.mcap"
-    reader = LogReader(path)
-    writer = LogWriter(bare, to_record(), {"config": "{}"})
-    for r in reader.records():
-        writer.write(r.topic, reader.payload(r), None, r.log_time_ns)
-    writer.close()
-    report = replay(bare)
+    report = replay(without_envelopes(path, tmp_path))
     assert report.same, report.first
     assert report.outcomes[0].same == 27
     assert report.outcomes[0].notes == [
         "the log has no envelopes: inputs were fed in the order of the log"
     ]
+
+
+def test_without_envelopes_refused_inputs_are_counted_in_the_notes(
+    path: Path, tmp_path: Path
+) -> None:
+    record(path)
+    bare = without_envelopes(path, tmp_path)
+
+    (outcome,) = replay(bare, _refusing).outcomes
+
+    refusal = "clock: mixer refuses what it received: ZeroDivisionError: division by zero"
+    assert f"30 inputs refused, the first: {refusal}" in outcome.notes
 
 
 def test_a_module_that_published_nothing_is_named_with_those_that_did(path: Path) -> None:
