@@ -17,6 +17,7 @@ import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Bytes, Floats, Singles
 from schemas.sensing import Calibration
+from services.sensory.reprojection import Points, points_at, project_back, surface
 
 CORNERS = 160
 MIN_TRACKED = 12
@@ -33,7 +34,6 @@ TILT_SD_RAD = 0.01
 SIDEWAYS_SD_M = 0.01
 SCALE_SD = 0.005
 MIN_SCALED_M = 0.05
-MIN_AHEAD_M = 0.3
 
 
 @dataclass(frozen=True)
@@ -145,10 +145,10 @@ def _estimate(pair: _Pair, corners_px: Singles, guess: Floats, wheels: Motion) -
     if tracks.is_found.sum() < MIN_TRACKED:
         return None
 
-    points_m = _points(corners_px[tracks.is_found], pair.depth_m, pair.calibration)
+    points = points_at(corners_px[tracks.is_found], pair.depth_m, pair.calibration)
     before_px = tracks.before_px[tracks.is_found]
 
-    return _solve(points_m, before_px, guess, wheels, pair.calibration)
+    return _solve(points, before_px, guess, wheels, pair.calibration)
 
 
 def _corners(grey: Bytes, depth_m: Singles) -> Singles:
@@ -162,17 +162,6 @@ def _corners(grey: Bytes, depth_m: Singles) -> Singles:
         return np.empty((0, 2), np.float32)
 
     return np.asarray(found, np.float32).reshape(-1, 2)
-
-
-def _points(pixels: Singles, depth_m: Singles, calibration: Calibration) -> Floats:
-    """(n, 3) points ahead, left and above the camera, from the robot's origin, at (n, 2) pixels."""
-    column, row = np.rint(pixels).astype(int).T
-
-    ahead_m = depth_m[row, column].astype(np.float64)
-    left_m = -(pixels[:, 0] - calibration.cx_px) / calibration.fx_px * ahead_m
-    up_m = -(pixels[:, 1] - calibration.cy_px) / calibration.fy_px * ahead_m
-
-    return np.column_stack([ahead_m + calibration.mount_forward_m, left_m, up_m])
 
 
 def _track_back(pair: _Pair, corners_px: Singles, guess: Floats) -> _Tracks:
@@ -204,14 +193,11 @@ def _redraw(pair: _Pair, guess: Floats) -> tuple[Bytes, Singles]:
     """The last view as it would look after the motion `guess`, and where each of its pixels was,
     (h, w, 2).
     """
-    row, column = np.indices(pair.last.shape, np.float32)
-    pixels = np.column_stack([column.ravel(), row.ravel()])
-
     depth_m = np.where(pair.depth_m > 0, pair.depth_m, HORIZON_M).astype(np.float32)
+    points = surface(depth_m, pair.calibration)
+    column_px, row_px = project_back(points, guess, pair.calibration)
 
-    points_m = _points(pixels, depth_m, pair.calibration)
-    before = _project(points_m, guess, pair.calibration).astype(np.float32)
-    before = before.reshape(*pair.last.shape, 2)
+    before = np.dstack([column_px, row_px]).astype(np.float32)
     redrawn = cv2.remap(
         pair.last,
         before[..., 0],
@@ -223,34 +209,8 @@ def _redraw(pair: _Pair, guess: Floats) -> tuple[Bytes, Singles]:
     return np.asarray(redrawn, np.uint8), before
 
 
-def _project(points_m: Floats, motion: Floats, calibration: Calibration) -> Floats:
-    """(n, 2) pixels of (n, 3) points as they were before `motion`: distance, sideways, turn, pitch,
-    roll.
-
-    The motion is an arc: it leads in the direction half-way through the turn.
-    """
-    distance_m, sideways_m, turn_rad, pitch_rad, roll_rad = motion
-    cos = np.cos(turn_rad)
-    sin = np.sin(turn_rad)
-    ahead_m = cos * points_m[:, 0] - sin * points_m[:, 1]
-    left_m = sin * points_m[:, 0] + cos * points_m[:, 1]
-
-    cos = np.cos(turn_rad / 2)
-    sin = np.sin(turn_rad / 2)
-    ahead_m = ahead_m + cos * distance_m - sin * sideways_m
-    left_m = left_m + sin * distance_m + cos * sideways_m
-
-    ahead_m = np.maximum(ahead_m - calibration.mount_forward_m, MIN_AHEAD_M)
-    x = -left_m / ahead_m
-    y = -points_m[:, 2] / ahead_m
-    tilted = np.column_stack([x - roll_rad * y, y + roll_rad * x + pitch_rad])
-    focal_px = (calibration.fx_px, calibration.fy_px)
-
-    return tilted * focal_px + (calibration.cx_px, calibration.cy_px)
-
-
 def _solve(
-    points_m: Floats,
+    points: Points,
     before_px: Floats,
     guess: Floats,
     wheels: Motion,
@@ -264,7 +224,7 @@ def _solve(
     motion = guess.copy()
     information = prior
     for _ in range(ITERATIONS):
-        fit = _linearize(points_m, before_px, motion, calibration)
+        fit = _linearize(points, before_px, motion, calibration)
         information = prior + np.einsum("nik,n,nil->kl", fit.jacobian, fit.weight, fit.jacobian)
         pull = np.einsum("nik,n,ni->k", fit.jacobian, fit.weight, fit.residual_px)
         gradient = pull - prior @ (motion - expected)
@@ -273,7 +233,7 @@ def _solve(
         if np.abs(step).max() < CONVERGED:
             break
 
-    residual_px = before_px - _project(points_m, motion, calibration)
+    residual_px = before_px - np.column_stack(project_back(points, motion, calibration))
     distance_px = np.hypot(*residual_px.T)
     if (distance_px < OUTLIER_PX).mean() < MIN_INLIER_SHARE:
         return None
@@ -296,20 +256,17 @@ def _prior(wheels: Motion) -> Floats:
     return np.diag(1 / np.maximum(deviations, 1e-6) ** 2)
 
 
-def _linearize(
-    points_m: Floats, before_px: Floats, motion: Floats, calibration: Calibration
-) -> _Fit:
+def _linearize(points: Points, before_px: Floats, motion: Floats, calibration: Calibration) -> _Fit:
     """Residuals at `motion`, their Jacobian by differences, and Geman-McClure weights."""
-    predicted_px = _project(points_m, motion, calibration)
+    differences = np.vstack([np.zeros(5), np.diag(np.full(5, DIFFERENCE))])
+    motions = motion + differences
+    column_px, row_px = project_back(points, motions.T[..., None], calibration)
+    projected_px = np.stack([column_px, row_px], axis=2)
+
+    predicted_px = projected_px[0]
     residual_px = before_px - predicted_px
-
-    steps = np.diag(np.full(5, DIFFERENCE))
-    columns = []
-    for step in steps:
-        moved_px = _project(points_m, motion + step, calibration)
-        columns.append((moved_px - predicted_px) / DIFFERENCE)
-
-    jacobian = np.stack(columns, axis=2)
+    changes = (projected_px[1:] - predicted_px) / DIFFERENCE
+    jacobian = np.ascontiguousarray(np.moveaxis(changes, 0, 2))
 
     distance_px = np.hypot(residual_px[:, 0], residual_px[:, 1])
     weight = 1 / (1 + (distance_px / OUTLIER_PX) ** 2) ** 2 / TRACK_SD_PX**2

@@ -1,0 +1,77 @@
+"""What a camera sees, and where it was in the image before the robot moved."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from cogmap.geometry.arrays import Floats, Singles
+from schemas.sensing import Calibration
+
+MIN_AHEAD_M = 0.3
+
+
+class Points(NamedTuple):
+    """Where points are from the robot's origin, in m at the camera's height: arrays of one shape,
+    or of shapes that broadcast.
+    """
+
+    ahead_m: Floats
+    left_m: Floats
+    up_m: Floats
+
+
+def points_at(pixels: Singles, depth_m: Singles, calibration: Calibration) -> Points:
+    """The (n,) points at (n, 2) pixels of an image whose depth is `depth_m` (h, w)."""
+    column, row = np.rint(pixels).astype(int).T
+    ahead_m = depth_m[row, column].astype(np.float64)
+
+    return _points(pixels[:, 0], pixels[:, 1], ahead_m, calibration)
+
+
+def surface(depth_m: Singles, calibration: Calibration) -> Points:
+    """The (h, w) points that all pixels of an image with the depth `depth_m` (h, w) show."""
+    height_px, width_px = depth_m.shape
+    column = np.arange(width_px, dtype=np.float32)
+    row = np.arange(height_px, dtype=np.float32)
+
+    return _points(column, row[:, None], depth_m.astype(np.float64), calibration)
+
+
+def _points(column: Singles, row: Singles, ahead_m: Floats, calibration: Calibration) -> Points:
+    left_m = -(column - calibration.cx_px) / calibration.fx_px * ahead_m
+    up_m = -(row - calibration.cy_px) / calibration.fy_px * ahead_m
+
+    return Points(ahead_m + calibration.mount_forward_m, left_m, up_m)
+
+
+def project_back(
+    points: Points, motion: npt.NDArray[np.float64], calibration: Calibration
+) -> tuple[Floats, Floats]:
+    """The columns and rows in pixels of `points` as they were before `motion` (5, ...): distance,
+    sideways, turn, pitch, roll. Several motions broadcast with the points.
+
+    The motion is an arc: it leads in the direction half-way through the turn.
+    """
+    distance_m, sideways_m, turn_rad, pitch_rad, roll_rad = motion
+    cos = np.cos(turn_rad)
+    sin = np.sin(turn_rad)
+    ahead_m = cos * points.ahead_m - sin * points.left_m
+    left_m = sin * points.ahead_m + cos * points.left_m
+
+    cos = np.cos(turn_rad / 2)
+    sin = np.sin(turn_rad / 2)
+    ahead_m = ahead_m + cos * distance_m - sin * sideways_m
+    left_m = left_m + sin * distance_m + cos * sideways_m
+
+    ahead_m = np.maximum(ahead_m - calibration.mount_forward_m, MIN_AHEAD_M)
+    x = -left_m / ahead_m
+    y = -points.up_m / ahead_m
+    tilted_x = x - roll_rad * y
+    tilted_y = y + roll_rad * x + pitch_rad
+
+    column_px = tilted_x * calibration.fx_px + calibration.cx_px
+    row_px = tilted_y * calibration.fy_px + calibration.cy_px
+    return column_px, row_px
