@@ -52,7 +52,6 @@ def test_nothing_is_left_of_the_processes_of_one_that_is_killed(tmp_path: Path) 
     process = subprocess.Popen(
         [sys.executable, str(script)], stdout=subprocess.PIPE, text=True, env=environment
     )
-
     assert process.stdout is not None
 
     while process.stdout.readline() != "waiting\n":

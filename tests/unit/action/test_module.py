@@ -249,7 +249,6 @@ def test_in_lockstep_a_restarted_action_without_a_pose_halts_for_a_frame() -> No
 
 def test_in_lockstep_a_restarted_action_waits_for_no_past_competition() -> None:
     module = _module("lockstep")
-
     assert module.restore is not None
 
     (action,) = _module().feed(_broadcast(4))

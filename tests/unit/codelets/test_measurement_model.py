@@ -25,15 +25,18 @@ AGENT_SD_M = 0.5
 
 
 def _agent() -> np.ndarray:
+    rng = np.random.default_rng(0)
     samples = np.zeros((2000, 7))
-    samples[:, :2] = np.random.default_rng(0).normal(0.0, AGENT_SD_M, (2000, 2))
+    samples[:, :2] = rng.normal(0.0, AGENT_SD_M, (2000, 2))
     return samples
 
 
 def _seen() -> Sighting:
     """A house ten metres ahead."""
-    where_m = np.random.default_rng(1).normal((RANGE_M, 0.0), 0.1, (200, 2))
+    rng = np.random.default_rng(1)
+    where_m = rng.normal((RANGE_M, 0.0), 0.1, (200, 2))
     graph = graph_of(landmark("house", where_m, sightings=5))
+
     found = sightings([percept("house")], graph, CONFIG.largest_landmark_sd_m, NEVER_NS)
     assert found is not None
     return found
@@ -64,14 +67,21 @@ def test_the_variance_when_a_landmark_was_placed_is_that_of_the_path() -> None:
     rows[:, 7] = np.arange(100.0)
     graph = graph_of(*segments(rows))
 
-    assert variances_at(graph, 70_500_000_000).tolist() == [69.0, 0.0]
-    assert variances_at(graph, 500_000_000_000).tolist() == [99.0, 0.0]
-    assert variances_at(graph, 500_000_000).tolist() == [-math.inf, -math.inf]
-    assert variances_at(graph_of(), 1).tolist() == [-math.inf, -math.inf]
+    between = variances_at(graph, 70_500_000_000)
+    after = variances_at(graph, 500_000_000_000)
+    before = variances_at(graph, 500_000_000)
+    without_path = variances_at(graph_of(), 1)
+
+    assert between.tolist() == [69.0, 0.0]
+    assert after.tolist() == [99.0, 0.0]
+    assert before.tolist() == [-math.inf, -math.inf]
+    assert without_path.tolist() == [-math.inf, -math.inf]
 
 
 def test_a_landmark_of_no_weight_leaves_all_samples_as_likely() -> None:
     density = compare(_agent(), _seen()).density
+    weighted = log_likelihood(density, CONFIG.outlier_share)
+    weightless = log_likelihood(density, CONFIG.outlier_share, np.zeros(1))
 
-    assert np.ptp(log_likelihood(density, CONFIG.outlier_share)) > 1.0
-    assert np.ptp(log_likelihood(density, CONFIG.outlier_share, np.zeros(1))) == 0.0
+    assert np.ptp(weighted) > 1.0
+    assert np.ptp(weightless) == 0.0

@@ -154,7 +154,6 @@ def test_range_or_bearing_alone_places_a_new_landmark_from_several_places(
         codelet = "object_place" if landmark is None else "landmark"
         asked = task(codelet, f"{number}/mill", percepts=seen, stamp_ns=number)
         found, _ = run(asked, graph_of(*nodes), config).operations
-
         assert isinstance(found, Object)
 
         landmark = found

@@ -9,6 +9,7 @@ import pytest
 
 from cogmap.geometry.se2 import compose, relative
 from schemas.nodes import Observations, PathSegment
+from schemas.sensing import Percept
 from services.codelets.correction.joint import with_landmarks
 from services.codelets.correction.least_squares import optimize
 from services.codelets.correction.pose_graph import Constraints, PoseGraph
@@ -17,30 +18,61 @@ from tests.support.scenes import Desk, percept
 
 STILL = np.zeros(3)
 TOWER_M = np.array([6.0, 8.0])
+ELSEWHERE_M = np.array([-40.0, 30.0])
+SIDE_STEPS = 10
 
 
 def _seen(desk: Desk) -> dict[str, int]:
-    return {node.landmark: len(node.rows.numpy()) for node in desk.graph.of_kind(Observations)}
+    counts = {}
+    for node in desk.graph.of_kind(Observations):
+        counts[node.landmark] = len(node.rows.numpy())
+    return counts
 
 
 def _driven() -> np.ndarray:
     """(41, 3): round a square of 10 m sides, a step a metre."""
-    poses = [np.zeros(3)]
+    poses = [STILL]
     for number in range(1, 41):
-        poses.append(
-            compose(poses[-1], np.array([1.0, 0.0, math.pi / 2 if number % 10 == 0 else 0.0]))
-        )
+        at_corner = number % SIDE_STEPS == 0
+        turn_rad = math.pi / 2 if at_corner else 0.0
+        poses.append(compose(poses[-1], np.array([1.0, 0.0, turn_rad])))
+
     return np.array(poses)
 
 
+def _tower(bearing_rad: float = 0.0, range_m: float = 10.0, **facts: float) -> Percept:
+    return percept("tower", bearing_rad, range_m, **facts)
+
+
 def _sightings(poses: np.ndarray, wrong: tuple[int, ...] = ()) -> list[Observations]:
+    """The tower from every pose, and something elsewhere from those numbered `wrong`."""
     node: Observations | None = None
     for number, pose in enumerate(poses):
-        off = (np.array([-40.0, 30.0]) if number in wrong else TOWER_M) - pose[:2]
-        bearing = math.atan2(off[1], off[0]) - pose[2]
-        seen = percept("tower", bearing, math.hypot(*off), bearing_sd_rad=0.01, range_sd_m=0.1)
+        off_m = ELSEWHERE_M if number in wrong else TOWER_M - pose[:2]
+        bearing_rad = math.atan2(off_m[1], off_m[0]) - pose[2]
+        seen = _tower(bearing_rad, math.hypot(*off_m), bearing_sd_rad=0.01, range_sd_m=0.1)
         node = extended(node, Viewpoint(0, float(number), STILL, 0.0), seen)
+
     return [node] if node else []
+
+
+def _turning_excess(poses: np.ndarray) -> PoseGraph:
+    """The path integrated with 0.03 rad more of turning a step, and no closures."""
+    at = np.arange(len(poses) - 1)
+    measured = relative(poses[:-1], poses[1:]) + np.array([0.0, 0.0, 0.03])
+    information = np.tile(np.diag([1e2, 1e2, 1e3]), (len(at), 1, 1))
+    steps = Constraints(at, at + 1, measured, information)
+
+    bent = [poses[0]]
+    for step in measured:
+        bent.append(compose(bent[-1], step))
+
+    return PoseGraph(np.array(bent), steps, steps.select(slice(0, 0)))
+
+
+def _error_m(poses: np.ndarray, truth: np.ndarray) -> float:
+    off_m = poses[:, :2] - truth[:, :2]
+    return float(np.hypot(*off_m.T).mean())
 
 
 def test_a_landmark_is_remembered_once_from_each_place_of_the_path() -> None:
@@ -48,7 +80,6 @@ def test_a_landmark_is_remembered_once_from_each_place_of_the_path() -> None:
     desk.drive(range(3), percept("a"))
     (segment,) = desk.graph.of_kind(PathSegment)
     places = len(segment.rows.numpy())
-
     assert _seen(desk) == {"a": places}
 
     desk.see(3, percept("a"), percept("b"), rows=((0.0, 0.0, 0.2, 0.0, 0.0),))
@@ -57,25 +88,28 @@ def test_a_landmark_is_remembered_once_from_each_place_of_the_path() -> None:
 
 
 def test_what_is_seen_some_way_from_a_place_is_told_as_seen_from_the_place() -> None:
-    ahead = percept("tower", 0.0, 10.0)
-    node = extended(None, Viewpoint(0, 1.0, np.array([2.0, 1.0, math.pi / 2]), 0.0), ahead)
+    since_place = np.array([2.0, 1.0, math.pi / 2])
+    node = extended(None, Viewpoint(0, 1.0, since_place, 0.0), _tower())
     seen = Sightings.of([node], np.array([1.0]))
 
     assert seen.where_m[0] == pytest.approx((2.0, 11.0))
 
 
 def test_an_eye_that_sees_too_far_is_known_to() -> None:
-    node = extended(None, Viewpoint(0, 1.0, STILL, 0.25), percept("tower", 0.0, 10.0))
+    too_far = 0.25
+    node = extended(None, Viewpoint(0, 1.0, STILL, too_far), _tower())
+    seen = Sightings.of([node], np.array([1.0]))
 
-    assert Sightings.of([node], np.array([1.0])).where_m[0] == pytest.approx((8.0, 0.0))
+    assert seen.where_m[0] == pytest.approx((8.0, 0.0))
 
 
 def test_a_landmark_stands_where_most_of_its_sightings_put_it() -> None:
     poses = _driven()
-    stamps = np.arange(len(poses), dtype=float)
     wrong = tuple(range(0, 40, 3))
-    (found,) = Sightings.of(_sightings(poses, wrong), stamps).landmarks_m(poses)
+    stamps = np.arange(len(poses), dtype=float)
+    seen = Sightings.of(_sightings(poses, wrong), stamps)
 
+    (found,) = seen.landmarks_m(poses)
     assert found == pytest.approx(TOWER_M, abs=0.05)
 
 
@@ -87,24 +121,17 @@ def test_sightings_from_places_that_the_path_has_not_are_left_out() -> None:
 
 
 def test_observations_along_a_path_correct_its_excess_of_turning() -> None:
-    poses = _driven()
-    at = np.arange(len(poses) - 1)
-    measured = relative(poses[:-1], poses[1:]) + np.array([0.0, 0.0, 0.03])
-    information = np.tile(np.diag([1e2, 1e2, 1e3]), (len(at), 1, 1))
-    bent = [poses[0]]
-    for step in measured:
-        bent.append(compose(bent[-1], step))
-    start = np.array(bent)
-    none = Constraints(at[:0], at[:0], np.zeros((0, 3)), np.zeros((0, 3, 3)))
-    graph = PoseGraph(start, Constraints(at, at + 1, measured, information), none)
-    seen = Sightings.of(_sightings(poses), np.arange(len(poses), dtype=float))
+    truth = _driven()
+    stamps = np.arange(len(truth), dtype=float)
+    seen = Sightings.of(_sightings(truth), stamps)
+
+    graph = _turning_excess(truth)
+    before_m = _error_m(graph.poses, truth)
     for _ in range(5):
         landmarks_m = seen.landmarks_m(graph.poses)
         joint = optimize(with_landmarks(graph, seen, landmarks_m))
-        graph = PoseGraph(joint[: len(poses)], graph.steps, none)
-    before, after = (
-        np.hypot(*(path[:, :2] - poses[:, :2]).T).mean() for path in (start, graph.poses)
-    )
+        graph = PoseGraph(joint[: len(truth)], graph.steps, graph.closures)
+    after_m = _error_m(graph.poses, truth)
 
-    assert before > 2.0
-    assert after < 0.3 * before
+    assert before_m > 2.0
+    assert after_m < 0.3 * before_m

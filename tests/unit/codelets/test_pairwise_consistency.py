@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cogmap.geometry.se2 import rotate
 from services.codelets.config import Config
 from services.codelets.correction.pairwise_consistency import Views, consistent
 from services.codelets.mapping.loop_detection import constraints_of
@@ -11,72 +12,92 @@ from services.codelets.mapping.path import steps_of
 
 FALSE_CLOSURE = 1e-3
 TOWER = np.array([30.0, 8.0])
+STREET_M = np.arange(15.0) * 4.0
+SECOND_PASS = 55
 
 
 def _rows() -> np.ndarray:
-    """A street gone along twice, with a long way between that path integration has wrong."""
-    once = np.column_stack([np.arange(0.0, 60.0, 4.0), np.zeros(15), np.zeros(15)])
-    between = np.column_stack([np.full(40, 100.0), np.arange(40.0) * 4.0, np.full(40, np.pi / 2)])
+    """A street driven along twice, with a long drive between that path integration has wrong."""
+    once = np.zeros((15, 3))
+    once[:, 0] = STREET_M
+
+    between = np.full((40, 3), (100.0, 0.0, np.pi / 2))
+    between[:, 1] = np.arange(40.0) * 4.0
+
     again = once + np.array([-35.0, 22.0, 0.0])
     poses = np.vstack([once, between, again])
-    return np.column_stack(
-        [np.arange(len(poses), dtype=float), poses, poses, np.zeros((len(poses), 2))]
-    )
+    stamps = np.arange(len(poses), dtype=float)
+    variances = np.zeros((len(poses), 2))
+    return np.column_stack([stamps, poses, poses, variances])
 
 
 def _views(*pairs: tuple[int, int], off_m: float = 0.0) -> Views:
     """Of the tower, from row `first` and row `second`, the last of them wrong by `off_m`."""
+    count = len(pairs)
     first, second = np.array(pairs).T
-    street = np.arange(15.0) * 4.0
-    there = TOWER - np.column_stack([street[first], np.zeros(len(first))])
-    here = TOWER - np.column_stack([street[second - 55], np.zeros(len(first))])
+    there = _tower_from(STREET_M[first])
+    here = _tower_from(STREET_M[second - SECOND_PASS])
     here[-1, 1] += off_m
-    return Views(first, second, there, here, np.full(len(first), 1.0), np.zeros(len(first)))
+
+    return Views(first, second, there, here, np.full(count, 1.0), np.zeros(count))
+
+
+def _tower_from(along_m: np.ndarray) -> np.ndarray:
+    """Where the tower is from points of the street, (n, 2)."""
+    across_m = np.zeros(len(along_m))
+    return TOWER - np.column_stack([along_m, across_m])
 
 
 def _agreeing(views: Views) -> list[bool]:
-    agrees: list[bool] = consistent(views, steps_of(_rows(), Config()), FALSE_CLOSURE).tolist()
+    steps = steps_of(_rows(), Config())
+    agrees: list[bool] = consistent(views, steps, FALSE_CLOSURE).tolist()
     return agrees
 
 
+def _around(centre_m: np.ndarray, turn_rad: float) -> np.ndarray:
+    """The step (x, y, heading) from the origin round a centre, turning with it."""
+    to_origin_m = rotate(-centre_m, np.array(turn_rad))
+    return np.append(centre_m + to_origin_m, turn_rad)
+
+
 def test_three_views_of_a_landmark_agree_whatever_the_drift_between_passes() -> None:
-    assert _agreeing(_views((2, 57), (4, 59), (6, 61))) == [True] * 3
+    views = _views((2, 57), (4, 59), (6, 61))
+
+    assert _agreeing(views) == [True] * 3
 
 
 def test_two_views_or_three_from_one_place_are_too_few() -> None:
-    assert _agreeing(_views((2, 57), (4, 59))) == [False] * 2
-    assert _agreeing(_views((2, 57), (4, 57), (6, 57))) == [False] * 3
+    two = _views((2, 57), (4, 59))
+    from_one_place = _views((2, 57), (4, 57), (6, 57))
+
+    assert _agreeing(two) == [False] * 2
+    assert _agreeing(from_one_place) == [False] * 3
 
 
 def test_a_view_of_elsewhere_agrees_with_none_and_spoils_none() -> None:
-    assert _agreeing(_views((2, 57), (4, 59), (6, 61), (8, 63), off_m=40.0)) == [
-        True,
-        True,
-        True,
-        False,
-    ]
-    assert _agreeing(_views((2, 57), (4, 59), (6, 61), off_m=40.0)) == [False] * 3
+    three_and_one = _views((2, 57), (4, 59), (6, 61), (8, 63), off_m=40.0)
+    two_and_one = _views((2, 57), (4, 59), (6, 61), off_m=40.0)
+
+    assert _agreeing(three_and_one) == [True, True, True, False]
+    assert _agreeing(two_and_one) == [False] * 3
 
 
 def test_without_views_none_agree() -> None:
-    assert _agreeing(_views((2, 57), (4, 59)).select(np.zeros(2, bool))) == []
+    none = _views((2, 57), (4, 59)).select(np.zeros(2, bool))
+
+    assert _agreeing(none) == []
 
 
 def test_a_landmark_constrains_the_position_around_it_but_not_the_heading() -> None:
     views = _views((2, 57))
     made = constraints_of(views, _rows()[:, 1:4])
-    away = np.array([[0.1, 0.0, 0.0], [0.0, 0.1, 0.0]])
+    information = made.information[0]
+    assert np.linalg.matrix_rank(information) == 2
 
-    assert np.linalg.matrix_rank(made.information[0]) == 2
+    # Turned on the spot it would see the tower elsewhere; moved round the tower, as it is.
+    round_it = _around(views.here_m[0], 0.05)
+    ahead, aside = 0.1 * np.eye(3)[:2]
 
-    # Turned on the spot it would see the tower elsewhere; gone round the tower, as it is.
-    turn = 0.05
-    cos = np.cos(turn)
-    sin = np.sin(turn)
-    off = views.here_m[0]
-    round_it = np.append(
-        off - np.array([cos * off[0] - sin * off[1], sin * off[0] + cos * off[1]]), turn
-    )
-
-    assert round_it @ made.information[0] @ round_it < 1e-2
-    assert all(step @ made.information[0] @ step > 9e-3 for step in away)
+    assert round_it @ information @ round_it < 1e-2
+    assert ahead @ information @ ahead > 9e-3
+    assert aside @ information @ aside > 9e-3

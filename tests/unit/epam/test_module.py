@@ -130,7 +130,6 @@ def test_objects_and_views_learned_before_a_restart_are_known_after_it(
                 journal.append(said, codec.encode(said))
     journal.close()
     again = build(Config(), "epam")
-
     assert again.restore is not None
 
     again.restore(Journal(tmp_path / "epam").messages())
@@ -191,7 +190,6 @@ def test_the_last_view_learned_from_before_a_restart_teaches_nothing(views: list
     view = views[1]
     fresh = build(Config(), "epam")
     restarted = build(Config(), "epam")
-
     assert restarted.restore is not None
 
     restarted.restore([Learned(stamp_ns=view.stamp_ns, frame=view.frame)])
@@ -203,7 +201,6 @@ def test_the_last_view_learned_from_before_a_restart_teaches_nothing(views: list
 def test_after_a_restart_the_next_view_is_learned_from(views: list[View]) -> None:
     first = build(Config(), "epam")
     second = build(Config(), "epam")
-
     assert second.restore is not None
 
     second.restore(first.feed(views[0]))
@@ -219,7 +216,6 @@ def test_after_a_restart_the_next_view_is_learned_from(views: list[View]) -> Non
 def test_a_first_view_at_time_0_is_learned_from(views: list[View]) -> None:
     at_start = msgspec.structs.replace(views[0], stamp_ns=0, frame=0)
     learned, _ = build(Config(), "epam").feed(at_start)
-
     assert isinstance(learned, Learned)
 
 
@@ -232,7 +228,6 @@ def test_one_message_stands_for_all_that_was_learned(views: list[View]) -> None:
         if isinstance(said, Learned)
         for known in said.objects
     ]
-
     assert module.compact is not None
 
     everything = module.compact()

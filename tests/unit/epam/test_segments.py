@@ -137,7 +137,6 @@ def test_a_segment_without_depth_has_no_walls() -> None:
 
 def test_a_building_of_unknown_size_is_placed_behind_its_visible_middle() -> None:
     wall = walls(_segment(130, 190), _scene((130, 190, 8.0)))
-
     assert wall is not None
 
     place = wall.usual_pose(CAMERA)

@@ -76,7 +76,6 @@ def test_the_room_with_cameras_sees_its_landmarks_where_they_are() -> None:
         _, percepts = room.begin()
     finally:
         room.close()
-
     assert isinstance(percepts, Percepts)
 
     seen = {each.label: each for each in percepts.objects}

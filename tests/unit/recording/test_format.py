@@ -80,7 +80,6 @@ def test_every_channel_names_its_message_type_and_encoding(path: Path) -> None:
     write(path, [1])
     with path.open("rb") as file:
         summary = make_reader(file).get_summary()
-
     assert summary is not None
 
     named = {}
@@ -97,7 +96,6 @@ def test_the_schema_of_a_channel_describes_its_message_fields(path: Path) -> Non
     write(path, [1])
     with path.open("rb") as file:
         ((schema, _, _),) = make_reader(file).iter_messages(topics=["odometry"])
-
     assert isinstance(schema, Schema)
 
     fields = json.loads(schema.data)["$defs"]["Odometry"]["properties"]

@@ -12,10 +12,12 @@ from schemas.base import Message
 from schemas.process import Clock
 from schemas.sensing import MotorCommand, Odometry, StereoFrame, TruePose, TrueTown
 from services.sim.module import Config, build
+from tests.support.messages import of_type
 
 M = TypeVar("M", bound=Message)
 TICK_NS = 50_000_000
 SMALL = {"width_px": 64, "height_px": 64}
+START_NS = 10**12
 
 
 def _command(stamp_ns: int, left_rad_s: float = 15.0, right_rad_s: float = 15.0) -> MotorCommand:
@@ -38,21 +40,22 @@ def _lockstep(frames: int) -> list[Message]:
     return messages
 
 
+def _tick(module: Module, at_ns: int) -> list[Message]:
+    """What the timer of the simulation publishes at a time."""
+    return module.stamp(module.timers[0].handler(at_ns))
+
+
 def _real_time(
-    module: Module, ticks: int, first_ns: int = 10**12, answer: bool = True
+    module: Module, ticks: int, first_tick: int = 0, answer: bool = True
 ) -> list[Message]:
     messages: list[Message] = []
-    for number in range(ticks):
-        new = module.stamp(module.timers[0].handler(first_ns + number * TICK_NS))
+    for number in range(first_tick, first_tick + ticks):
+        new = _tick(module, START_NS + number * TICK_NS)
         messages += new
         if answer and new and isinstance(new[-1], StereoFrame):
             module.feed(_command(new[-1].stamp_ns))
 
     return messages
-
-
-def _of(kind: type[M], messages: list[Message]) -> list[M]:
-    return [message for message in messages if isinstance(message, kind)]
 
 
 def _check_that_frames_follow_their_odometry(messages: list[Message]) -> None:
@@ -75,19 +78,29 @@ def test_lockstep_moves_by_one_frame_for_each_answer_to_the_last_one() -> None:
     messages = _lockstep(4)
 
     assert isinstance(messages[0], TrueTown)
-    assert [frame.frame for frame in _of(StereoFrame, messages)] == [0, 1, 2, 3, 4]
-    assert {clock.rate for clock in _of(Clock, messages)} == {0.0}
+    assert [frame.frame for frame in of_type(StereoFrame, messages)] == [0, 1, 2, 3, 4]
+    assert {clock.rate for clock in of_type(Clock, messages)} == {0.0}
 
     _check_that_frames_follow_their_odometry(messages)
+
+
+def _speeds_m_s(messages: list[Message]) -> list[float]:
+    return [abs(odometry.speed_m_s) for odometry in of_type(Odometry, messages)]
+
+
+def _stamps_ns(kind: type[Message], messages: list[Message]) -> list[int]:
+    return [message.stamp_ns for message in of_type(kind, messages)]
 
 
 def test_lockstep_ignores_commands_that_answer_another_frame() -> None:
     module = build(Config(mode="lockstep", **SMALL))
     stamp_ns = _start(module)[-1].stamp_ns
+    other = _command(stamp_ns + 1)
+    asked = _command(stamp_ns)
 
-    assert module.feed(_command(stamp_ns + 1)) == []
-    assert module.feed(_command(stamp_ns))
-    assert module.feed(_command(stamp_ns)) == []
+    assert module.feed(other) == []
+    assert module.feed(asked)
+    assert module.feed(asked) == []
 
 
 def test_real_time_publishes_nothing_before_it_is_started() -> None:
@@ -105,7 +118,7 @@ def test_real_time_keeps_its_rates_and_frames_follow_their_odometry() -> None:
     _start(module)
     messages = _real_time(module, 120)
     counts = {
-        kind.__name__: len(_of(kind, messages))
+        kind.__name__: len(of_type(kind, messages))
         for kind in (Clock, Odometry, TruePose, StereoFrame, TrueTown)
     }
 
@@ -116,10 +129,10 @@ def test_real_time_keeps_its_rates_and_frames_follow_their_odometry() -> None:
         "StereoFrame": 30,
         "TrueTown": 2,
     }
-    assert _of(Clock, messages)[-1].rate == pytest.approx(1.0)
+    assert of_type(Clock, messages)[-1].rate == pytest.approx(1.0)
 
     _check_that_frames_follow_their_odometry(messages)
-    poses = _of(TruePose, messages)
+    poses = of_type(TruePose, messages)
 
     assert 12.0 < poses[-1].travelled_m < 18.0
     assert 0.05 < poses[-1].progress < 0.15
@@ -129,19 +142,22 @@ def test_real_time_falls_behind_rather_than_catch_up_over_0_25_s() -> None:
     module = build(Config(**SMALL))
     _start(module)
     _real_time(module, 1)
-    late = module.stamp(module.timers[0].handler(10**12 + 60 * TICK_NS))
 
-    assert len(_of(Odometry, late)) == 5
-    assert len(_of(StereoFrame, late)) == 1
-    assert _of(Clock, late)[-1].rate < 0.2
+    late = _tick(module, START_NS + 60 * TICK_NS)
+    clocks = of_type(Clock, late)
+
+    assert len(of_type(Odometry, late)) == 5
+    assert len(of_type(StereoFrame, late)) == 1
+    assert clocks[-1].rate < 0.2
 
 
 def test_a_robot_that_receives_no_command_for_a_second_brakes() -> None:
     module = build(Config(**SMALL))
     _start(module)
+
     moving = _real_time(module, 60)
-    standing = _real_time(module, 60, 10**12 + 60 * TICK_NS, answer=False)
-    speeds = [abs(odometry.speed_m_s) for odometry in _of(Odometry, moving + standing)]
+    standing = _real_time(module, 60, first_tick=60, answer=False)
+    speeds = _speeds_m_s(moving + standing)
 
     assert np.mean(speeds[50:60]) > 2.0
     assert np.mean(speeds[-10:]) < 0.05
@@ -151,33 +167,34 @@ def test_an_older_command_that_arrives_late_is_ignored() -> None:
     module = build(Config(**SMALL))
     _start(module)
     messages = _real_time(module, 20)
-    module.feed(_command(messages[-1].stamp_ns - 4 * TICK_NS, -15.0, -15.0))
 
-    assert (
-        _of(Odometry, _real_time(module, 10, 10**12 + 20 * TICK_NS, answer=False))[-1].speed_m_s
-        > 1.0
-    )
+    old_ns = messages[-1].stamp_ns - 4 * TICK_NS
+    module.feed(_command(old_ns, -15.0, -15.0))
+    after = _real_time(module, 10, first_tick=20, answer=False)
+
+    assert of_type(Odometry, after)[-1].speed_m_s > 1.0
 
 
 def test_a_command_older_than_the_limit_is_refused_and_moves_no_wheel() -> None:
     module = build(Config(command_timeout_s=100.0, **SMALL))
     _start(module)
     messages = _real_time(module, 55, answer=False)
+    old_ns = messages[-1].stamp_ns - 52 * TICK_NS
 
     with pytest.raises(MessageError, match=r"it is 2\.6 s old, .* none older than 2\.5 s"):
-        module.feed(_command(messages[-1].stamp_ns - 52 * TICK_NS))
+        module.feed(_command(old_ns))
 
-    still = _real_time(module, 10, 10**12 + 55 * TICK_NS, answer=False)
-
-    assert abs(_of(Odometry, still)[-1].speed_m_s) < 0.05
+    still = _real_time(module, 10, first_tick=55, answer=False)
+    assert _speeds_m_s(still)[-1] < 0.05
 
 
 def test_the_wheels_stop_when_their_command_becomes_too_old() -> None:
     module = build(Config(command_timeout_s=100.0, **SMALL))
     _start(module)
+
     moving = _real_time(module, 60)
-    last = _real_time(module, 80, 10**12 + 60 * TICK_NS, answer=False)
-    speeds = [abs(odometry.speed_m_s) for odometry in _of(Odometry, moving + last)]
+    last = _real_time(module, 80, first_tick=60, answer=False)
+    speeds = _speeds_m_s(moving + last)
 
     assert np.mean(speeds[100:106]) > 2.0
     assert np.mean(speeds[-10:]) < 0.05
@@ -185,33 +202,34 @@ def test_the_wheels_stop_when_their_command_becomes_too_old() -> None:
 
 def _wait_for_command(module: Module, seconds: int) -> list[list[Message]]:
     """What the timer of a simulation in lockstep publishes, second by second."""
-    timer = module.timers[0]
-    return [module.stamp(timer.handler(second * 10**9)) for second in range(seconds)]
+    return [_tick(module, second * 10**9) for second in range(seconds)]
 
 
 def test_in_lockstep_a_frame_that_nobody_answers_is_published_again() -> None:
     module = build(Config(mode="lockstep", repeat_after_s=5.0, **SMALL))
     first = _start(module)
     messages = _wait_for_command(module, 13)
+    repeated = [second for second, published in enumerate(messages) if published]
+    assert repeated == [5, 10]
 
-    assert [second for second, repeated in enumerate(messages) if repeated] == [5, 10]
+    again = messages[5]
+    assert _stamps_ns(Odometry, again) == _stamps_ns(Odometry, first)
+    assert _stamps_ns(StereoFrame, again) == _stamps_ns(StereoFrame, first)
 
-    for kind in (Odometry, StereoFrame):
-        again = _of(kind, messages[5])
-        assert [each.stamp_ns for each in again] == [each.stamp_ns for each in _of(kind, first)]
-
-    assert _of(StereoFrame, messages[5])[0].left == _of(StereoFrame, first)[0].left
+    frame = of_type(StereoFrame, first)[0]
+    assert of_type(StereoFrame, again)[0].left == frame.left
 
 
 def test_in_lockstep_a_frame_published_again_is_answered_only_once() -> None:
     module = build(Config(mode="lockstep", repeat_after_s=5.0, **SMALL))
-    stamp_ns = _start(module)[-1].stamp_ns
+    asked = _command(_start(module)[-1].stamp_ns)
     _wait_for_command(module, 6)
-    messages = module.feed(_command(stamp_ns))
 
-    assert _of(StereoFrame, messages)[0].frame == 1
-    assert module.feed(_command(stamp_ns)) == []
-    assert module.stamp(module.timers[0].handler(7 * 10**9)) == []
+    messages = module.feed(asked)
+
+    assert of_type(StereoFrame, messages)[0].frame == 1
+    assert module.feed(asked) == []
+    assert _tick(module, 7 * 10**9) == []
 
 
 @pytest.mark.parametrize("wrong", [{"frame_hz": 6}, {"odometry_hz": 35, "frame_hz": 5}])
@@ -226,24 +244,26 @@ def test_a_restarted_world_continues_where_it_was_with_the_robot_at_rest(
 ) -> None:
     config = Config(mode=mode, egl=False, **SMALL)  # type: ignore[arg-type]
     before = build(config)
-    after = build(config)
     messages = _start(before)
-    messages += (
-        before.feed(_command(messages[-1].stamp_ns))
-        if mode == "lockstep"
-        else _real_time(before, 90)
-    )
-    poses = _of(TruePose, messages)
-    last = _of(StereoFrame, messages)[-1]
+    if mode == "lockstep":
+        messages += before.feed(_command(messages[-1].stamp_ns))
+    else:
+        messages += _real_time(before, 90)
+    poses = of_type(TruePose, messages)
 
+    after = build(config)
     assert after.restore is not None
-
     after.restore(poses)
     again = _start(after)
-    again += [] if mode == "lockstep" else _real_time(after, 4)
+    if mode == "real_time":
+        again += _real_time(after, 4)
 
-    assert _of(Odometry, again)[0].stamp_ns == poses[-1].stamp_ns + TICK_NS
-    assert _of(StereoFrame, again)[0].frame == last.frame + 1
-    assert _of(TruePose, again)[0].pose.x_m == pytest.approx(poses[-1].pose.x_m, abs=0.1)
-    assert _of(TruePose, again)[0].travelled_m == pytest.approx(poses[-1].travelled_m, abs=0.1)
-    assert _of(TruePose, again)[0].progress == pytest.approx(poses[-1].progress, abs=0.005)
+    assert of_type(Odometry, again)[0].stamp_ns == poses[-1].stamp_ns + TICK_NS
+
+    last = of_type(StereoFrame, messages)[-1]
+    assert of_type(StereoFrame, again)[0].frame == last.frame + 1
+
+    start = of_type(TruePose, again)[0]
+    assert start.pose.x_m == pytest.approx(poses[-1].pose.x_m, abs=0.1)
+    assert start.travelled_m == pytest.approx(poses[-1].travelled_m, abs=0.1)
+    assert start.progress == pytest.approx(poses[-1].progress, abs=0.005)

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import cmath
+import itertools
 import math
 
 import numpy as np
@@ -10,6 +12,9 @@ from services.sim.layout import town
 from services.sim.odometry import Noise, WheelOdometry
 
 DT_S = 0.05
+WITHOUT_NOISE = Noise(speed=0.0, turn=0.0, drift_rad_per_sqrt_m=0.0)
+PACE_M = 0.2
+STEPS_OF_A_CORNER = 20
 
 
 def _moved(speed: float, turn_rate: float) -> Pose:
@@ -28,7 +33,8 @@ def test_noise_multiplies_speed_and_turn_rate_by_something_of_mean_one() -> None
     wheels = WheelOdometry(Noise(speed=0.1, turn=0.2, drift_rad_per_sqrt_m=0.0), seed=3)
     after = _moved(4.0, 0.5)
     rows = [wheels.measure(ORIGIN, after, DT_S) for _ in range(4000)]
-    speeds, turns = np.array([(o.speed_m_s, o.turn_rate_rad_s) for o in rows]).T
+    speeds = np.array([row.speed_m_s for row in rows])
+    turns = np.array([row.turn_rate_rad_s for row in rows])
 
     assert speeds.mean() == pytest.approx(4.0, rel=0.01)
     assert speeds.std() == pytest.approx(0.4, rel=0.1)
@@ -37,28 +43,39 @@ def test_noise_multiplies_speed_and_turn_rate_by_something_of_mean_one() -> None
 
 
 def test_a_robot_that_stands_still_reports_no_motion() -> None:
-    row = WheelOdometry(Noise(), seed=1).measure(ORIGIN, ORIGIN, DT_S)
+    wheels = WheelOdometry(Noise(), seed=1)
+    row = wheels.measure(ORIGIN, ORIGIN, DT_S)
 
-    assert (row.speed_m_s, row.turn_rate_rad_s) == (0.0, 0.0)
+    assert row.speed_m_s == 0.0
+    assert row.turn_rate_rad_s == 0.0
 
 
-def test_drift_grows_with_the_square_root_of_the_way_whatever_the_steps() -> None:
+def _drift_rad(wheels: WheelOdometry, distance_m: float, steps: int) -> float:
+    """How far the heading by the wheels drifts over a distance straight ahead."""
+    after = _moved(distance_m / DT_S / steps, 0.0)
+    turned_rad = 0.0
+    for _ in range(steps):
+        row = wheels.measure(ORIGIN, after, DT_S)
+        turned_rad += row.turn_rate_rad_s * DT_S
+
+    return turned_rad
+
+
+@pytest.mark.parametrize("steps", [1, 10])
+def test_drift_grows_with_the_square_root_of_the_distance_whatever_the_steps(steps: int) -> None:
     noise = Noise(speed=0.0, turn=0.0, drift_rad_per_sqrt_m=0.02)
-    for steps in (1, 10):
-        wheels = WheelOdometry(noise, seed=5)
-        after = _moved(4.0 / steps, 0.0)
-        rates = [
-            sum(wheels.measure(ORIGIN, after, DT_S).turn_rate_rad_s for _ in range(steps))
-            for _ in range(2000)
-        ]
+    wheels = WheelOdometry(noise, seed=5)
+    distance_m = 4.0 * DT_S
+    drifts_rad = [_drift_rad(wheels, distance_m, steps) for _ in range(2000)]
 
-        assert np.std(rates) * DT_S == pytest.approx(0.02 * math.sqrt(4.0 * DT_S), rel=0.1)
+    assert np.std(drifts_rad) == pytest.approx(0.02 * math.sqrt(distance_m), rel=0.1)
 
 
 def test_driving_backwards_is_reported_as_a_negative_speed() -> None:
-    quiet = WheelOdometry(Noise(speed=0.0, turn=0.0, drift_rad_per_sqrt_m=0.0), seed=0)
+    wheels = WheelOdometry(WITHOUT_NOISE, seed=0)
+    row = wheels.measure(ORIGIN, _moved(-1.5, 0.0), DT_S)
 
-    assert quiet.measure(ORIGIN, _moved(-1.5, 0.0), DT_S).speed_m_s == pytest.approx(-1.5)
+    assert row.speed_m_s == pytest.approx(-1.5)
 
 
 def test_path_integration_alone_ends_a_lap_some_metres_off() -> None:
@@ -67,28 +84,34 @@ def test_path_integration_alone_ends_a_lap_some_metres_off() -> None:
     assert 3.0 < np.mean(errors) < 12.0
 
 
-def _error_after_a_lap(seed: int) -> float:
-    place = town.generate(seed % 5)
-    wheels = WheelOdometry(Noise(), seed)
+def _lap(seed: int) -> list[Pose]:
+    """The true poses of a lap of a town, a pace apart, its corners rounded on the spot."""
+    turns_rad: list[float] = []
+    for length_m, turn_rad in town.generate(seed).route():
+        turns_rad += [0.0] * round(length_m / PACE_M)
+        if turn_rad:
+            turns_rad += [turn_rad / STEPS_OF_A_CORNER] * STEPS_OF_A_CORNER
+
+    here = 0j
     heading = 0.0
+    poses = [ORIGIN]
+    for turn_rad in turns_rad:
+        here += cmath.rect(PACE_M, heading + turn_rad / 2)
+        heading += turn_rad
+        poses.append(Pose(x_m=here.real, y_m=here.imag, heading_rad=heading))
+
+    return poses
+
+
+def _error_after_a_lap(seed: int) -> float:
+    wheels = WheelOdometry(Noise(), seed)
+    lap = _lap(seed % 5)
     guess = 0j
     guessed_heading = 0.0
-    here = 0j
-    for length_m, turn_rad in place.route():
-        steps = [(0.2, 0.0)] * round(length_m / 0.2) + [(0.2, turn_rad / 20)] * (
-            20 if turn_rad else 0
-        )
-        for forward_m, turned_rad in steps:
-            before = Pose(x_m=here.real, y_m=here.imag, heading_rad=heading)
-            here += forward_m * complex(
-                math.cos(heading + turned_rad / 2), math.sin(heading + turned_rad / 2)
-            )
-            heading += turned_rad
-            row = wheels.measure(
-                before, Pose(x_m=here.real, y_m=here.imag, heading_rad=heading), DT_S
-            )
-            direction = guessed_heading + row.turn_rate_rad_s * DT_S / 2
-            guess += row.speed_m_s * DT_S * complex(math.cos(direction), math.sin(direction))
-            guessed_heading += row.turn_rate_rad_s * DT_S
+    for before, after in itertools.pairwise(lap):
+        row = wheels.measure(before, after, DT_S)
+        turned_rad = row.turn_rate_rad_s * DT_S
+        guess += cmath.rect(row.speed_m_s * DT_S, guessed_heading + turned_rad / 2)
+        guessed_heading += turned_rad
 
-    return abs(guess - here)
+    return abs(guess - complex(lap[-1].x_m, lap[-1].y_m))

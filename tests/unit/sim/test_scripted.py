@@ -7,7 +7,7 @@ import pytest
 
 from cogmap.errors import ConfigError
 from schemas import topics
-from schemas.sensing import MotorCommand, Percepts, Pose, SelfMotion, TruePose
+from schemas.sensing import MotorCommand, Percept, Percepts, Pose, SelfMotion, TruePose
 from services.sim.module import Config, build
 from services.sim.odometry import Noise
 from services.sim.scripted.percept_level import PerceptLevelSim
@@ -21,10 +21,14 @@ EXACT = PerceptErrors(
 )
 SQUARE = [(0.0, 0.0), (40.0, 0.0), (40.0, 40.0), (0.0, 40.0), (0.0, 0.0)]
 HOUSE = Landmark(name="house", x_m=30.0, y_m=8.0)
+AT_ORIGIN = Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)
 
 
 def _landmarks(number: int) -> list[Landmark]:
-    return [Landmark(name=f"house {k}", x_m=20.0 + k, y_m=0.0) for k in range(number)]
+    landmarks = []
+    for k in range(number):
+        landmarks.append(Landmark(name=f"house {k}", x_m=20.0 + k, y_m=0.0))
+    return landmarks
 
 
 def _simulation(
@@ -50,20 +54,22 @@ def test_self_motion_without_noise_adds_up_to_the_true_path() -> None:
     x = y = heading = 0.0
     for truth, motion, _ in _ride(_simulation()):
         for speed, turn_rate, dt, *_ in motion.motions.numpy():
-            x += speed * dt * math.cos(heading + turn_rate * dt / 2)
-            y += speed * dt * math.sin(heading + turn_rate * dt / 2)
+            middle = heading + turn_rate * dt / 2
+            x += speed * dt * math.cos(middle)
+            y += speed * dt * math.sin(middle)
             heading += turn_rate * dt
-        assert (x, y) == pytest.approx((truth.pose.x_m, truth.pose.y_m), abs=1e-9)
-        assert math.remainder(heading - truth.pose.heading_rad, math.tau) == pytest.approx(
-            0.0, abs=1e-9
-        )
+
+        turned_rad = math.remainder(heading - truth.pose.heading_rad, math.tau)
+        assert x == pytest.approx(truth.pose.x_m, abs=1e-9)
+        assert y == pytest.approx(truth.pose.y_m, abs=1e-9)
+        assert turned_rad == pytest.approx(0.0, abs=1e-9)
 
 
 def test_the_rows_of_a_view_take_as_long_as_the_view() -> None:
-    assert all(
-        motion.motions.numpy()[:, 2].sum() == pytest.approx(1.0)
-        for _, motion, _ in _ride(_simulation())
-    )
+    for _, motion, _ in _ride(_simulation()):
+        durations_s = motion.motions.numpy()[:, 2]
+
+        assert durations_s.sum() == pytest.approx(1.0)
 
 
 def test_a_landmark_is_seen_where_it_stands() -> None:
@@ -94,67 +100,67 @@ def test_houses_hide_what_is_not_along_the_street() -> None:
     assert all(pose.y_m < 1.0 for pose in seen_from)
 
 
-def test_the_same_seed_gives_the_same_messages() -> None:
-    rides = [
-        _ride(_simulation(noise=Noise(), errors=PerceptErrors(), seed=seed)) for seed in (4, 4, 5)
-    ]
-    messages = [
-        [(motion.motions.data, percepts.objects) for _, motion, percepts in ride] for ride in rides
-    ]
+def _sensed(seed: int) -> list[tuple[bytes, list[Percept]]]:
+    """The motions and percepts of a drive with noise and errors."""
+    simulation = _simulation(noise=Noise(), errors=PerceptErrors(), seed=seed)
+    ride = _ride(simulation)
+    return [(motion.motions.data, percepts.objects) for _, motion, percepts in ride]
 
-    assert messages[0] == messages[1] != messages[2]
+
+def test_the_same_seed_gives_the_same_messages() -> None:
+    first = _sensed(seed=4)
+
+    assert _sensed(seed=4) == first
+    assert _sensed(seed=5) != first
 
 
 def test_misses_confusions_and_noise_are_as_frequent_as_measured() -> None:
-    landmarks = _landmarks(8)
     errors = PerceptErrors(named_phantoms=0.0)
-    sense = PerceptSim(errors, landmarks, seed=2)
-    views = [sense.perceive(Pose(x_m=0.0, y_m=0.0, heading_rad=0.0), [3]) for _ in range(4000)]
-    messages = [view[0] for view in views if view]
+    sense = PerceptSim(errors, _landmarks(8), seed=2)
+    views = [sense.perceive(AT_ORIGIN, [3]) for _ in range(4000)]
+    percepts = [view[0] for view in views if view]
 
-    assert len(messages) / len(views) == pytest.approx(errors.detected, abs=0.02)
-    assert sum(each.label == "house 3" for each in messages) / len(messages) == pytest.approx(
-        errors.right_name, abs=0.01
-    )
+    assert len(percepts) / len(views) == pytest.approx(errors.detected, abs=0.02)
 
-    ranges = np.array([each.range_m for each in messages])
+    right = [percept.label == "house 3" for percept in percepts]
+    assert np.mean(right) == pytest.approx(errors.right_name, abs=0.01)
 
-    assert ranges.std() / 23.0 == pytest.approx(errors.range_sd_share, rel=0.1)
+    ranges_m = np.array([percept.range_m for percept in percepts])
+    assert ranges_m.std() / 23.0 == pytest.approx(errors.range_sd_share, rel=0.1)
 
 
 def test_a_name_is_perceived_once_a_view() -> None:
     sense = PerceptSim(PerceptErrors(right_name=0.2, detected=1.0), _landmarks(3), seed=3)
     for _ in range(50):
-        labels = [
-            each.label
-            for each in sense.perceive(Pose(x_m=0.0, y_m=0.0, heading_rad=0.0), [0, 1, 2])
-        ]
+        percepts = sense.perceive(AT_ORIGIN, [0, 1, 2])
+        labels = [percept.label for percept in percepts]
+
         assert len(labels) == len(set(labels))
 
 
 def test_a_place_is_recognized_in_the_same_direction_only() -> None:
-    sure = PerceptErrors(place_recall=1.0, place_precision=1.0)
     line = Line(np.array([(0.0, 0.0), (200.0, 0.0)]))
     there = [line.at(5.0 * k) for k in range(40)]
     back = [Pose(x_m=pose.x_m, y_m=0.0, heading_rad=math.pi) for pose in reversed(there)]
-    sense = PlaceSim(sure, seed=1)
-    messages = [
-        sense.recognize(k, 1000 * k, pose) for k, pose in enumerate([*there, *back, *there])
-    ]
 
-    assert not any(messages[:80])
+    sense = PlaceSim(PerceptErrors(place_recall=1.0, place_precision=1.0), seed=1)
+    messages = []
+    for frame, pose in enumerate([*there, *back, *there]):
+        messages.append(sense.recognize(frame, 1000 * frame, pose))
+    first_pass, again = messages[:80], messages[80:]
 
-    matched = [
-        (k - 80, match[0].frame, match[0].view_ns) for k, match in enumerate(messages) if match
-    ]
+    matched = {}
+    for number, match in enumerate(again):
+        if match:
+            matched[number] = (match[0].frame, match[0].view_ns)
 
-    assert matched == [(k, k, 1000 * k) for k in range(3, 40)]
+    assert not any(first_pass)
+    assert matched == {number: (number, 1000 * number) for number in range(3, 40)}
 
 
 def test_each_command_leads_to_a_frame_until_the_line_ends() -> None:
     trajectory = Trajectory(line_m=[(0.0, 0.0), (9.0, 0.0)], landmarks=[HOUSE], speed_m_s=3.0)
     module = build(Config(mode="lockstep", frame_hz=1, odometry_hz=1, trajectory=trajectory))
-
     assert module.start is not None
 
     messages = module.stamp(module.start())

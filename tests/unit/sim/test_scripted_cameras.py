@@ -27,6 +27,7 @@ from services.sim.rendering.camera import StereoCamera, calibration
 from services.sim.scripted.percepts import Landmark
 from services.sim.scripted.trajectory import Trajectory
 from services.sim.world import World
+from tests.support.messages import of_type
 from training.rendering import towns
 
 SILENT = Noise(speed=0.0, turn=0.0, drift_rad_per_sqrt_m=0.0)
@@ -36,7 +37,12 @@ BENT = [(0.0, 0.0), (9.0, 0.0), (9.0, 6.0), (3.0, 12.0)]
 
 
 def _trajectory(line=BENT, landmarks=(BAKERY, CINEMA)) -> Trajectory:
-    return Trajectory(line_m=line, landmarks=list(landmarks), speed_m_s=3.0, sensing="cameras")
+    return Trajectory(
+        line_m=line,
+        landmarks=list(landmarks),
+        speed_m_s=3.0,
+        sensing="cameras",
+    )
 
 
 def _module(line: Trajectory, **settings) -> Module:
@@ -80,26 +86,27 @@ def far_world(request: pytest.FixtureRequest) -> Iterator[World]:
     world.close()
 
 
-def test_epam_recognizes_a_landmark_in_the_images_along_a_trajectory() -> None:
-    frames = _ride(_module(_trajectory(line=[(0.0, 0.0), (6.0, 0.0)])))
+def _percepts(ride: list[list[Message]]) -> list[Percepts]:
+    """What sensory memory and perceptual associative memory make of a ride."""
     sensory = registry.build("sensory", {})
     epam = registry.build("epam", {})
-    views = [
-        message
-        for frame in frames
-        for measured in frame
-        if isinstance(measured, Odometry | StereoFrame)
-        for message in sensory.feed(measured)
-        if isinstance(message, View)
-    ]
-    seen = [
-        message for view in views for message in epam.feed(view) if isinstance(message, Percepts)
-    ]
+    found = []
+    for frame in ride:
+        for measured in frame:
+            if not isinstance(measured, Odometry | StereoFrame):
+                continue
+            for view in of_type(View, sensory.feed(measured)):
+                found += of_type(Percepts, epam.feed(view))
 
+    return found
+
+
+def test_epam_recognizes_a_landmark_in_the_images_along_a_trajectory() -> None:
+    ride = _ride(_module(_trajectory(line=[(0.0, 0.0), (6.0, 0.0)])))
+    seen = _percepts(ride)
     assert len(seen) == 3
 
     (percept,) = [each for each in seen[-1].objects if each.label == "bakery"]
-
     assert percept.range_m == pytest.approx(math.hypot(34.0, 14.0), rel=0.15)
     assert percept.bearing_rad == pytest.approx(math.atan2(14.0, 34.0), abs=0.1)
 
@@ -110,18 +117,20 @@ def test_wheels_without_noise_add_up_to_the_line_with_its_corners(
     x = y = heading = 0.0
     last_ns = 0
     for frame in ride:
-        for row in (message for message in frame if isinstance(message, Odometry)):
+        for row in of_type(Odometry, frame):
             assert row.stamp_ns > last_ns
             last_ns = row.stamp_ns
-            x += row.speed_m_s * row.dt_s * math.cos(heading)
-            y += row.speed_m_s * row.dt_s * math.sin(heading)
-            heading += row.turn_rate_rad_s * row.dt_s
-        (truth,) = [message for message in frame if isinstance(message, TruePose)]
 
-        assert (x, y) == pytest.approx((truth.pose.x_m, truth.pose.y_m), abs=1e-9)
-        assert math.remainder(heading - truth.pose.heading_rad, math.tau) == pytest.approx(
-            0.0, abs=1e-9
-        )
+            distance_m = row.speed_m_s * row.dt_s
+            x += distance_m * math.cos(heading)
+            y += distance_m * math.sin(heading)
+            heading += row.turn_rate_rad_s * row.dt_s
+
+        (truth,) = of_type(TruePose, frame)
+        turned_rad = math.remainder(heading - truth.pose.heading_rad, math.tau)
+        assert x == pytest.approx(truth.pose.x_m, abs=1e-9)
+        assert y == pytest.approx(truth.pose.y_m, abs=1e-9)
+        assert turned_rad == pytest.approx(0.0, abs=1e-9)
         assert last_ns == frame[-1].stamp_ns
 
 
@@ -139,10 +148,13 @@ def test_the_first_images_are_taken_before_the_robot_moves(ride: list[list[Messa
 def test_frames_end_with_their_images_and_the_last_is_at_the_lines_end(
     ride: list[list[Message]],
 ) -> None:
-    assert all(isinstance(frame[-1], StereoFrame) for frame in ride)
+    last_of_each = [frame[-1] for frame in ride]
+    assert len(of_type(StereoFrame, last_of_each)) == len(ride)
 
-    (end,) = [message for message in ride[-1] if isinstance(message, TruePose)]
-    assert (end.pose.x_m, end.pose.y_m, end.progress) == pytest.approx((3.0, 12.0, 1.0))
+    (end,) = of_type(TruePose, ride[-1])
+    assert end.pose.x_m == pytest.approx(3.0)
+    assert end.pose.y_m == pytest.approx(12.0)
+    assert end.progress == pytest.approx(1.0)
 
 
 def test_the_truth_tells_the_buildings_as_large_as_their_kinds_are(
@@ -157,11 +169,16 @@ def test_the_truth_tells_the_buildings_as_large_as_their_kinds_are(
 
 
 def test_buildings_look_to_the_street() -> None:
-    plots = roadside.along(_trajectory(line=[(0.0, 0.0), (60.0, 0.0)]), 1).plots
-    fronts = [(math.sin(plot.heading_rad), -math.cos(plot.heading_rad)) for plot in plots]
+    street = _trajectory(line=[(0.0, 0.0), (60.0, 0.0)])
+    plots = roadside.along(street, 1).plots
+    kinds = [plot.kind.name for plot in plots]
 
+    fronts = []
+    for plot in plots:
+        fronts.append((math.sin(plot.heading_rad), -math.cos(plot.heading_rad)))
+
+    assert kinds == ["bakery", "cinema"]
     assert np.allclose(fronts, [(0.0, -1.0), (0.0, 1.0)])
-    assert [plot.kind.name for plot in plots] == ["bakery", "cinema"]
 
 
 def test_kilometres_away_there_are_ground_sky_and_the_building(
@@ -169,13 +186,17 @@ def test_kilometres_away_there_are_ground_sky_and_the_building(
 ) -> None:
     heading_rad = math.atan2(1000.0, 3000.0)
     far_world.place_robot(Pose(x_m=2970.0, y_m=990.0, heading_rad=heading_rad))
-    exposure, _ = StereoCamera(far_world, calibration()).capture_labelled()
+    camera = StereoCamera(far_world, calibration())
+
+    exposure, _ = camera.capture_labelled()
     surface = towns.surfaces(far_world, exposure)
     names = {towns.SURFACES[number] for number in np.unique(surface)}
+    sky = surface == towns.SURFACES.index("sky")
+    road = surface == towns.SURFACES.index("road")
 
     assert names == {"sky", "ground", "road", "building"}
-    assert (surface[:20] == towns.SURFACES.index("sky")).mean() > 0.9
-    assert (surface[-20:, 140:180] == towns.SURFACES.index("road")).all()
+    assert sky[:20].mean() > 0.9
+    assert road[-20:, 140:180].all()
     assert exposure.body.min() >= 0
 
 
@@ -190,5 +211,7 @@ def test_a_landmark_that_no_building_is_called_is_refused_in_one_sentence() -> N
 
 
 def test_a_landmark_that_would_stand_in_the_way_is_refused() -> None:
+    on_the_line = Landmark(name="cinema", x_m=5.0, y_m=2.0)
+
     with pytest.raises(ConfigError, match=r"the cinema at \(5, 2\) would stand in the way"):
-        _module(_trajectory(landmarks=[Landmark(name="cinema", x_m=5.0, y_m=2.0)]))
+        _module(_trajectory(landmarks=[on_the_line]))

@@ -15,26 +15,37 @@ from services.sim.rendering import facade, mesh
 
 SEEDS = range(25)
 TOWNS = [town.generate(seed) for seed in SEEDS]
+LOOP_ROADS = 4
+
+
+def _on_loop(place: town.Town, x_m: float, y_m: float, margin_m: float) -> bool:
+    """Whether a point is within a margin of a street of the loop."""
+    point = (x_m, y_m, x_m, y_m)
+    return any(overlap(point, road.area(margin_m)) for road in place.roads[:LOOP_ROADS])
 
 
 def test_one_seed_gives_one_town_and_another_seed_another() -> None:
+    first = [encode(place.message()) for place in TOWNS]
     again = [encode(town.generate(seed).message()) for seed in SEEDS]
 
-    assert again == [encode(place.message()) for place in TOWNS]
+    assert again == first
     assert len(set(again)) == len(again)
 
 
 def test_every_town_has_at_least_20_buildings_and_none_of_them_twice() -> None:
     for place in TOWNS:
         names = [building.name for building in place.message().buildings]
+
         assert len(names) >= 20
         assert len(set(names)) == len(names)
 
 
 def test_no_building_stands_on_a_pavement_or_on_another_building() -> None:
+    half_width_m = STREET_WIDTH_M / 2 + PAVEMENT_WIDTH_M
     for place in TOWNS:
         for road, plot in itertools.product(place.roads, place.plots):
-            assert not overlap(road.area(STREET_WIDTH_M / 2 + PAVEMENT_WIDTH_M), plot.footprint)
+            assert not overlap(road.area(half_width_m), plot.footprint)
+
         for one, other in itertools.combinations(place.plots, 2):
             assert not overlap(one.footprint, other.footprint)
 
@@ -42,92 +53,108 @@ def test_no_building_stands_on_a_pavement_or_on_another_building() -> None:
 def test_no_prop_stands_on_a_street_or_in_a_building_or_in_another_prop() -> None:
     for place in TOWNS:
         assert len(place.props) > 20
-        for prop in place.props:
-            assert not any(
-                overlap(prop.area, road.area(STREET_WIDTH_M / 2)) for road in place.roads
-            )
-            assert not any(overlap(prop.area, plot.footprint) for plot in place.plots)
-        assert not any(
-            overlap(one.area, other.area) for one, other in itertools.combinations(place.props, 2)
-        )
+
+        streets = [road.area(STREET_WIDTH_M / 2) for road in place.roads]
+        buildings = [plot.footprint for plot in place.plots]
+        for prop, taken in itertools.product(place.props, streets + buildings):
+            assert not overlap(prop.area, taken)
+
+        for one, other in itertools.combinations(place.props, 2):
+            assert not overlap(one.area, other.area)
 
 
 def test_invented_kinds_are_the_same_for_a_seed_and_of_no_catalogue() -> None:
     kinds = invented(7, 20)
+    others = invented(8, 20)
+    walls = {kind.wall for kind in (*kinds, *others)}
+    names = {kind.name for kind in kinds}
+    known = {kind.name for kind in CATALOGUE}
 
     assert kinds == invented(7, 20)
-    assert len({kind.wall for kind in (*kinds, *invented(8, 20))}) == 40
-    assert not {kind.name for kind in kinds} & {kind.name for kind in CATALOGUE}
-    assert len(town.generate(3, invented(3, 28)).plots) >= town.MIN_BUILDINGS
+    assert len(walls) == 40
+    assert not names & known
+
+    built = town.generate(3, invented(3, 28))
+    assert len(built.plots) >= town.MIN_BUILDINGS
 
 
 def test_every_front_looks_at_a_street_of_the_loop() -> None:
     for place in TOWNS:
         for plot in place.plots:
             ahead_m = plot.kind.depth_m / 2 + 2.0 + PAVEMENT_WIDTH_M + STREET_WIDTH_M / 2
-            x = plot.x_m + ahead_m * math.sin(plot.heading_rad)
-            y = plot.y_m - ahead_m * math.cos(plot.heading_rad)
-            assert any(
-                overlap((x, y, x, y), road.area(STREET_WIDTH_M / 2)) for road in place.roads[:4]
-            )
+            x_m = plot.x_m + ahead_m * math.sin(plot.heading_rad)
+            y_m = plot.y_m - ahead_m * math.cos(plot.heading_rad)
+
+            assert _on_loop(place, x_m, y_m, STREET_WIDTH_M / 2)
 
 
 def test_the_route_of_one_lap_closes_the_loop_along_the_streets() -> None:
     for place in TOWNS:
-        x = place.start.x_m
-        y = place.start.y_m
-        heading = place.start.heading_rad
+        start = place.start
+        x_m = start.x_m
+        y_m = start.y_m
+        heading = start.heading_rad
         for length_m, turn_rad in place.route():
-            x = x + length_m * math.cos(heading)
-            y = y + length_m * math.sin(heading)
-            heading = heading + turn_rad
-            assert any(overlap((x, y, x, y), road.area(0.01)) for road in place.roads[:4])
+            x_m += length_m * math.cos(heading)
+            y_m += length_m * math.sin(heading)
+            heading += turn_rad
+            assert _on_loop(place, x_m, y_m, 0.01)
 
-        assert (x, y) == pytest.approx((place.start.x_m, place.start.y_m))
-        assert math.remainder(heading - place.start.heading_rad, math.tau) == pytest.approx(0)
+        assert x_m == pytest.approx(start.x_m)
+        assert y_m == pytest.approx(start.y_m)
+        assert math.remainder(heading - start.heading_rad, math.tau) == pytest.approx(0)
 
 
 @pytest.mark.parametrize("laps", [0.1, 0.5, 1.0, 1.7, 3.0])
 def test_a_route_is_as_long_as_its_laps(laps: float) -> None:
     place = TOWNS[3]
+    route = place.route(laps)
+    lengths_m = [length_m for length_m, _ in route]
+    _, last_turn_rad = route[-1]
 
-    assert sum(length_m for length_m, _ in place.route(laps)) == pytest.approx(laps * place.lap_m)
-    assert place.route(laps)[-1][1] == 0.0
+    assert sum(lengths_m) == pytest.approx(laps * place.lap_m)
+    assert last_turn_rad == 0.0
 
 
 def test_progress_reaches_the_end_though_corners_are_cut_and_never_goes_back() -> None:
-    progress = Progress(TOWNS[0].line(1.5))
     line = np.asarray(TOWNS[0].line(1.5))
+    inward = 1 - 2.0 / np.abs(line).max()
+
+    progress = Progress(TOWNS[0].line(1.5))
     shares = []
     for a, b in itertools.pairwise(line):
         for t in np.linspace(0, 1, 60):
-            point = a + t * (b - a)
-            inside = point * (1 - 2.0 / np.abs(line).max())
-            shares.append(progress.advance(float(inside[0]), float(inside[1])))
+            x_m, y_m = (a + t * (b - a)) * inward
+            shares.append(progress.advance(float(x_m), float(y_m)))
 
     assert shares == sorted(shares)
     assert shares[0] < 0.02
     assert shares[-1] > 0.98
 
 
-def test_each_kind_of_building_has_colours_of_its_own() -> None:
-    pictures = [facade.side(kind, kind.width_m, 0).reshape(-1, 3) for kind in CATALOGUE]
-    bins = [
-        np.histogramdd(picture, bins=(8, 8, 8), range=[(0, 256)] * 3)[0] / len(picture)
-        for picture in pictures
-    ]
+def _histogram(picture: np.ndarray) -> np.ndarray:
+    """Which share of a picture's pixels has each of 512 colours."""
+    colours = picture.reshape(-1, 3)
+    counts, _ = np.histogramdd(colours, bins=(8, 8, 8), range=[(0, 256)] * 3)
+    return counts / len(colours)
 
-    for one, other in itertools.combinations(bins, 2):
+
+def test_each_kind_of_building_has_colours_of_its_own() -> None:
+    histograms = []
+    for kind in CATALOGUE:
+        front = facade.side(kind, kind.width_m, 0)
+        histograms.append(_histogram(front))
+
+    for one, other in itertools.combinations(histograms, 2):
         assert np.minimum(one, other).sum() < 0.8
 
 
 def test_a_building_is_as_large_as_its_type_says_and_its_picture_lies_within() -> None:
     for kind in CATALOGUE:
         surface, picture = mesh.building(kind)
+        sides_m = np.ptp(surface.vertices, axis=0)
 
-        assert np.ptp(surface.vertices, axis=0) == pytest.approx(
-            (kind.width_m, kind.depth_m, kind.height_m)
-        )
+        assert sides_m == pytest.approx((kind.width_m, kind.depth_m, kind.height_m))
         assert np.min(surface.uvs) >= 0
         assert np.max(surface.uvs) <= 1
         assert picture.shape[1] % 4 == 0
