@@ -7,16 +7,17 @@ Correction node for the apply-correction codelet.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import msgspec
 import numpy as np
 
-from cogmap.geometry.arrays import Booleans, Floats, Indices
-from cogmap.geometry.se2 import rotation_matrices, wrap_angle
+from cogmap.geometry.arrays import Booleans, Floats
+from cogmap.geometry.se2 import cumulative, rotation_matrices, wrap_angle
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
-from schemas.array import Array, Matrix
+from schemas.array import Matrix
 from schemas.codelets import Task
-from schemas.cognition import Replay
 from schemas.graph import Operation, Phase
 from schemas.nodes import CORRECTION_ID, Correction, LoopClosure, Observations, PathSegment
 from services.codelets.config import SECTION, Config
@@ -27,10 +28,12 @@ from services.codelets.correction.pairwise_consistency import MIN_AGREEING, View
 from services.codelets.correction.pose_graph import (
     Constraints,
     PoseGraph,
+    diagonal_information,
     mahalanobis2,
     residuals,
 )
 from services.codelets.correction.reverse_replay import close_loops
+from services.codelets.correction.synapses import replay_of
 from services.codelets.mapping.loop_detection import constraints_of, views_of
 from services.codelets.mapping.observations import Sightings
 from services.codelets.mapping.path import POSE, STAMP, rows_of, steps_of
@@ -55,11 +58,8 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     if not fresh or len(late) < MIN_AGREEING:
         return []
 
-    judged_ns = [closure.to_ns for closure in closures if closure.accepted is not None]
-    if judged_ns:
-        next_ns = max(judged_ns) + config.closure_spacing_s * 1e9
-        if context.stamp_ns < next_ns:
-            return []
+    if context.stamp_ns < _next_judgement_ns(closures, config):
+        return []
 
     task = context.task(CODELET.name, about=fresh)
     return [task]
@@ -72,38 +72,33 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     if not closures or len(rows) < 2:
         return Answer()
 
-    views = views_of(closures, rows)
     steps = steps_of(rows, config)
+    views = views_of(closures, rows)
     is_consistent = consistent(views, steps, config.false_closure)
     is_consistent &= views.j - views.i >= MIN_ROWS
 
     start = _start(rows[:, POSE], steps)
-    path, accepted = _accepted(start, steps, views.select(is_consistent), config)
+    path, holds = _accepted(start, steps, views.select(is_consistent), config)
     is_accepted = np.zeros(len(closures), bool)
-    is_accepted[is_consistent] = accepted
+    is_accepted[is_consistent] = holds
 
     operations = _judged(closures, is_consistent, is_accepted)
-    accepted_before = {closure.id for closure in closures if closure.accepted}
-    accepted_now = set()
-    for closure, holds in zip(closures, is_accepted.tolist(), strict=True):
-        if holds:
-            accepted_now.add(closure.id)
-
-    if accepted_now == accepted_before:
+    closed = set(_ids(closures, is_accepted))
+    closed_before = {closure.id for closure in closures if closure.accepted}
+    if closed == closed_before:
         return Answer(operations)
 
     seen = Sightings.of(graph.of_kind(Observations), rows[:, STAMP])
     poses, replays = corrected(path, seen, config)
-    correction = np.column_stack([rows[:, STAMP], rows[:, POSE], poses])
-    operations.append(Correction(id=CORRECTION_ID, base_level=1.0, rows=Matrix.of(correction)))
+    operations.append(_correction(rows, poses))
 
     replay = msgspec.structs.replace(
-        _replay(rows, poses, path.closures, config),
+        replay_of(rows, poses, path.closures, config.synapse_decay_per_m),
         stamp_ns=task.stamp_ns,
         cycle=task.cycle,
         replays=replays,
-        closed=sorted(accepted_now),
-        undone=sorted(accepted_before - accepted_now),
+        closed=sorted(closed),
+        undone=sorted(closed_before - closed),
     )
     return Answer(operations, events=[replay])
 
@@ -120,6 +115,15 @@ CODELET = Codelet(
 )
 
 
+def _next_judgement_ns(closures: list[LoopClosure], config: Config) -> float:
+    """When closures may be judged again, by those judged so far; 0 where none was."""
+    judged_ns = [closure.to_ns for closure in closures if closure.accepted is not None]
+    if not judged_ns:
+        return 0.0
+
+    return max(judged_ns) + config.closure_spacing_s * 1e9
+
+
 def _start(poses: Floats, steps: Constraints) -> Floats:
     """(n, 3) poses to correct from: those believed, and where no step can have led from one to the
     next, those by path integration.
@@ -128,15 +132,14 @@ def _start(poses: Floats, steps: Constraints) -> Floats:
     """
     believed = residuals(poses, steps)
     is_possible = mahalanobis2(believed, steps.information) <= IMPOSSIBLE_SD**2
-    measured = steps.measurement + np.where(is_possible[:, None], believed, 0.0)
+    deviation = np.where(is_possible[:, None], believed, 0.0)
+    measured = steps.measurement + deviation
 
-    turned_rad = np.concatenate([[0.0], np.cumsum(measured[:, 2])])
-    heading_rad = poses[0, 2] + turned_rad
+    heading_rad = poses[0, 2] + cumulative(measured[:, 2])
     turn = rotation_matrices(heading_rad[:-1])
     steps_m = np.einsum("mab,mb->ma", turn, measured[:, :2])
+    positions_m = poses[0, :2] + cumulative(steps_m)
 
-    moved_m = np.vstack([np.zeros(2), np.cumsum(steps_m, axis=0)])
-    positions_m = poses[0, :2] + moved_m
     return np.column_stack([positions_m, wrap_angle(heading_rad)])
 
 
@@ -154,13 +157,20 @@ def _accepted(
         graph = PoseGraph(poses, steps, loops.select(holds))
         again = constraints_of(views, optimize(graph))
 
-        turned_rad = again.measurement[:, 2] - loops.measurement[:, 2]
-        change_rad = np.abs(wrap_angle(turned_rad))
-        if change_rad.max(initial=0.0) < SAME_RAD:
+        if _turned_rad(loops, again) < SAME_RAD:
             break
         loops = again
 
     return graph, holds
+
+
+def _turned_rad(before: Constraints, after: Constraints) -> float:
+    """By how much any of the same constraints turned, at most."""
+    before_rad = before.measurement[:, 2]
+    after_rad = after.measurement[:, 2]
+
+    change_rad = np.abs(wrap_angle(after_rad - before_rad))
+    return float(change_rad.max(initial=0.0))
 
 
 def corrected(graph: PoseGraph, seen: Sightings, config: Config) -> tuple[Floats, int]:
@@ -171,9 +181,10 @@ def corrected(graph: PoseGraph, seen: Sightings, config: Config) -> tuple[Floats
     also bound to what was seen along it.
     """
     if config.correct == "positions":
-        positions = close_loops(_positions_only(graph))
-        poses = np.column_stack([positions.positions_m, graph.poses[:, 2]])
-        return poses, positions.replays
+        found = close_loops(_positions_only(graph))
+        headings_rad = graph.poses[:, 2]
+        poses = np.column_stack([found.positions_m, headings_rad])
+        return poses, found.replays
 
     return optimize_jointly(graph, seen, config)
 
@@ -184,36 +195,47 @@ def _positions_only(graph: PoseGraph) -> PoseGraph:
     A turn of variance h somewhere on a loop of length L moves its end by a variance of h L^2 / 3 on
     the mean. Where a landmark is seen from, the headings of all the loop turn.
     """
-    steps = graph.steps
-    loops = graph.closures
-    if not len(loops):
+    if not len(graph.closures):
         return graph
 
-    steps_m = np.hypot(steps.measurement[:, 0], steps.measurement[:, 1])
-    distance_m = _cumulative(steps_m)
-    lengths_m = np.abs(distance_m[loops.j] - distance_m[loops.i])
+    steps = _weakened_steps(graph.steps, graph.closures)
+    weights = _weights(graph.steps, graph.closures)
+    return PoseGraph(graph.poses, steps, graph.closures.weighted(weights))
 
-    heading_variance = 1 / steps.information[:, 2, 2]
-    by_heading_m2 = (lengths_m**2).mean() / 3 * heading_variance
-    variance_m2 = 1 / steps.information[:, 0, 0] + by_heading_m2
-    information = np.zeros_like(steps.information)
-    information[:, 0, 0] = 1 / variance_m2
-    information[:, 1, 1] = 1 / variance_m2
-    information[:, 2, 2] = steps.information[:, 2, 2]
-    weakened = Constraints(steps.i, steps.j, steps.measurement, information)
 
-    turned = _cumulative(heading_variance)
-    loop_variance = np.abs(turned[loops.j] - turned[loops.i])
+def _weakened_steps(steps: Constraints, loops: Constraints) -> Constraints:
+    """The steps, whose positions take up what their turns move the ends of the loops by."""
+    steps_m = np.hypot(*steps.measurement[:, :2].T)
+    lengths_m = _between_ends(loops, steps_m)
+    mean_m2 = (lengths_m**2).mean()
+
+    by_heading_m2 = mean_m2 / 3 * steps.variance_rad2
+    variance_m2 = steps.variance_m2 + by_heading_m2
+
+    information = diagonal_information(
+        position=1 / variance_m2,
+        heading=steps.information[:, 2, 2],
+    )
+    return replace(steps, information=information)
+
+
+def _weights(steps: Constraints, loops: Constraints) -> Floats:
+    """(m,): the weights of loops whose lever arms turn with the headings along them."""
+    loop_rad2 = _between_ends(loops, steps.variance_rad2)
+
     levers = loops.information[:, :2, 2]
     levers2 = (levers**2).sum(axis=1)
-    added_share = levers2 / loops.information[:, 0, 0] * loop_variance
-    weights = 1 / (1 + added_share)
-    return PoseGraph(graph.poses, weakened, loops.weighted(weights))
+    added_share = levers2 / loops.information[:, 0, 0] * loop_rad2
+
+    weights: Floats = 1 / (1 + added_share)
+    return weights
 
 
-def _cumulative(values: Floats) -> Floats:
-    """(n + 1,): the sum of the first 0 to n of (n,) values."""
-    return np.concatenate([[0.0], np.cumsum(values)])
+def _between_ends(loops: Constraints, values: Floats) -> Floats:
+    """(m,): the sum of (n,) values of the steps between the ends of each loop."""
+    summed = cumulative(values)
+    change = summed[loops.j] - summed[loops.i]
+    return np.asarray(np.abs(change))
 
 
 def _judged(
@@ -223,68 +245,35 @@ def _judged(
     changed: list[Operation] = []
     judgements = zip(closures, is_consistent.tolist(), is_accepted.tolist(), strict=True)
     for closure, consistent_now, accepted_now in judgements:
-        judged = msgspec.structs.replace(closure, consistent=consistent_now, accepted=accepted_now)
+        judged = msgspec.structs.replace(
+            closure,
+            consistent=consistent_now,
+            accepted=accepted_now,
+        )
         if judged != closure:
             changed.append(judged)
 
     return changed
 
 
-def _replay(rows: Floats, new: Floats, loops: Constraints, config: Config) -> Replay:
-    """The replay of a correction, the newest place first, from where the loops begin."""
-    first = int(min(loops.i.min(), loops.j.min())) if len(loops) else 0
-    backwards = slice(None, first - 1 if first else None, -1)
-    before_m = rows[backwards, POSE][:, :2]
-    after_m = new[backwards, :2]
-    stamps_ns = np.rint(rows[backwards, STAMP] * 1e9).astype(np.int64)
+def _ids(closures: list[LoopClosure], is_chosen: Booleans) -> list[str]:
+    """The ids of the chosen closures."""
+    ids = []
+    for closure, chosen in zip(closures, is_chosen.tolist(), strict=True):
+        if chosen:
+            ids.append(closure.id)
 
-    pairs = _pairs(after_m, loops, len(rows), config)
-    decay_per_m = config.synapse_decay_per_m
-    strength = _strengths(after_m, pairs, decay_per_m)
-    change = strength - _strengths(before_m, pairs, decay_per_m)
-    return Replay(
-        cycle=0,
-        replays=0,
-        closed=[],
-        undone=[],
-        stamps_ns=Array.of(stamps_ns),
-        positions_m=Array.of(before_m),
-        shifts_m=Array.of(after_m - before_m),
-        pairs=Array.of(pairs.astype(np.int32)),
-        strength_changes=Array.of(change),
-        decay_per_m=decay_per_m,
+    return ids
+
+
+def _correction(rows: Floats, poses: Floats) -> Correction:
+    """The correction of path `rows` to (n, 3) `poses`, for the apply-correction codelet."""
+    stamps_s = rows[:, STAMP]
+    before = rows[:, POSE]
+    corrections = np.column_stack([stamps_s, before, poses])
+
+    return Correction(
+        id=CORRECTION_ID,
+        base_level=1.0,
+        rows=Matrix.of(corrections),
     )
-
-
-def _strengths(positions_m: Floats, pairs: Indices, decay_per_m: float) -> Floats:
-    """(m,): the synaptic strengths of pairs of place cells (paper §5.6)."""
-    first_m = positions_m[pairs[:, 0]]
-    second_m = positions_m[pairs[:, 1]]
-    apart_m = first_m - second_m
-
-    distance_m = np.hypot(apart_m[:, 0], apart_m[:, 1])
-    strengths: Floats = np.exp(-decay_per_m * distance_m)
-    return strengths
-
-
-def _pairs(after: Floats, loops: Constraints, count: int, config: Config) -> Indices:
-    """(m, 2): place cells whose synapse changes most, those of one place on different passes, and
-    neighbours along the path.
-    """
-    order = np.arange(len(after))
-    neighbours = np.column_stack([order[:-1], order[1:]])
-    ends = np.column_stack([count - 1 - loops.j, count - 1 - loops.i])
-    reach_m = 1 / config.synapse_decay_per_m
-
-    near = []
-    for newer, older in ends.tolist():
-        distance_m = np.hypot(*(after - after[older]).T)
-        for cell in np.flatnonzero(distance_m < reach_m).tolist():
-            is_of_newer_pass = abs(cell - newer) < abs(cell - older)
-            if is_of_newer_pass:
-                near.append((cell, older))
-
-    crossings = np.array(near, np.int64).reshape(-1, 2)
-    pairs = np.vstack([neighbours, crossings])
-    result: Indices = np.unique(pairs, axis=0)
-    return result

@@ -4,7 +4,7 @@ loops (paper eq. 5-7).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,6 +29,18 @@ class Constraints:
     def __len__(self) -> int:
         return len(self.i)
 
+    @property
+    def variance_m2(self) -> Floats:
+        """(m,): the variance of the positions, where it is the same by either axis."""
+        variance_m2: Floats = 1 / self.information[:, 0, 0]
+        return variance_m2
+
+    @property
+    def variance_rad2(self) -> Floats:
+        """(m,): the variance of the headings, where they are measured by themselves."""
+        variance_rad2: Floats = 1 / self.information[:, 2, 2]
+        return variance_rad2
+
     def select(self, chosen: Booleans | Indices | slice) -> Constraints:
         """The chosen ones, by mask, indices or slice."""
         return Constraints(
@@ -40,8 +52,8 @@ class Constraints:
 
     def weighted(self, weights: Floats) -> Constraints:
         """The same with their information multiplied by (m,) weights."""
-        information = self.information * weights[:, None, None]
-        return Constraints(self.i, self.j, self.measurement, information)
+        weighted = self.information * weights[:, None, None]
+        return replace(self, information=weighted)
 
     def __add__(self, other: Constraints) -> Constraints:
         return Constraints(
@@ -69,18 +81,20 @@ class PoseGraph:
 
         Raises MessageError where a pose has no step to the next.
         """
-        successive = np.flatnonzero(constraints.j == constraints.i + 1)
-        _, first = np.unique(constraints.i[successive], return_index=True)
-        steps = successive[first]
-
+        steps = _first_steps(constraints)
         if len(steps) != len(poses) - 1:
-            missing = np.setdiff1d(np.arange(len(poses) - 1), constraints.i[steps])
+            pose = _pose_without_step(len(poses), constraints.i[steps])
             raise MessageError(
-                f"no constraint leads from pose {missing[0]} to the next: a path needs every step"
+                f"no constraint leads from pose {pose} to the next: a path needs every step"
             )
 
-        closures = np.setdiff1d(np.arange(len(constraints)), steps)
+        numbers = np.arange(len(constraints))
+        closures = np.setdiff1d(numbers, steps)
         return cls(poses, constraints.select(steps), constraints.select(closures))
+
+    def with_closures(self, closures: Constraints) -> PoseGraph:
+        """The same path with other closures."""
+        return replace(self, closures=closures)
 
     @property
     def constraints(self) -> Constraints:
@@ -88,12 +102,40 @@ class PoseGraph:
         return self.steps + self.closures
 
 
+def _first_steps(constraints: Constraints) -> Indices:
+    """The first constraint from each pose to the next, by number."""
+    successive = np.flatnonzero(constraints.j == constraints.i + 1)
+    origins = constraints.i[successive]
+
+    _, first = np.unique(origins, return_index=True)
+    steps: Indices = successive[first]
+    return steps
+
+
+def _pose_without_step(poses: int, origins: Indices) -> int:
+    """The first of the poses, but the last, that no step leads from."""
+    expected = np.arange(poses - 1)
+    missing = np.setdiff1d(expected, origins)
+    return int(missing[0])
+
+
+def diagonal_information(position: Floats, heading: Floats) -> Floats:
+    """(m, 3, 3): the information of positions, (m,) by either axis, and of headings, (m,)."""
+    information = np.zeros((len(position), 3, 3))
+    information[:, 0, 0] = position
+    information[:, 1, 1] = position
+    information[:, 2, 2] = heading
+    return information
+
+
 def residuals(poses: Floats, constraints: Constraints) -> Floats:
     """(m, 3): what the poses make of each constraint less what it measures, in the frame of pose
     i.
     """
-    predicted = relative(poses[constraints.i], poses[constraints.j])
-    residual = predicted - constraints.measurement
+    origins = poses[constraints.i]
+    ends = poses[constraints.j]
+
+    residual = relative(origins, ends) - constraints.measurement
     residual[:, 2] = wrap_angle(residual[:, 2])
     return residual
 
@@ -106,16 +148,18 @@ def mahalanobis2(residual: Floats, information: Floats) -> Floats:
 
 def cost(poses: Floats, constraints: Constraints) -> float:
     """Eq. 7, headings included."""
-    terms = mahalanobis2(residuals(poses, constraints), constraints.information)
+    residual = residuals(poses, constraints)
+    terms = mahalanobis2(residual, constraints.information)
     return float(terms.sum())
 
 
 def jacobians(poses: Floats, constraints: Constraints) -> tuple[Floats, Floats]:
     """(m, 3, 3) each: the derivative of each residual by pose i, and by pose j."""
-    predicted = relative(poses[constraints.i], poses[constraints.j])
+    origins = poses[constraints.i]
+    predicted = relative(origins, poses[constraints.j])
 
     by_j = np.zeros((len(constraints), 3, 3))
-    by_j[:, :2, :2] = rotation_matrices(-poses[constraints.i, 2])
+    by_j[:, :2, :2] = rotation_matrices(-origins[:, 2])
     by_j[:, 2, 2] = 1.0
 
     by_i = -by_j
@@ -127,5 +171,6 @@ def jacobians(poses: Floats, constraints: Constraints) -> tuple[Floats, Floats]:
 def sqrt_information(information: Floats) -> Floats:
     """(m, 3, 3) matrices R with R R' = `information`, which may be singular."""
     values, vectors = np.linalg.eigh(information)
-    root: Floats = vectors * np.sqrt(values.clip(0.0))[:, None, :]
+    scales = np.sqrt(values.clip(0.0))
+    root: Floats = vectors * scales[:, None, :]
     return root

@@ -1,0 +1,95 @@
+"""What a correction predicts of place cells: their fields shift, and their synapses change (paper
+§5.6).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cogmap.geometry.arrays import Floats, Indices
+from schemas.array import Array
+from schemas.cognition import Replay
+from services.codelets.correction.pose_graph import Constraints
+from services.codelets.mapping.path import POSE, STAMP
+
+
+def replay_of(rows: Floats, poses: Floats, loops: Constraints, decay_per_m: float) -> Replay:
+    """The replay of a correction of path `rows` to (n, 3) `poses`: the newest place first, to where
+    the loops begin. It is of no cycle yet, and names no closures.
+    """
+    first = _first_place(loops)
+    before = rows[first:][::-1]
+    before_m = before[:, POSE][:, :2]
+    after_m = poses[first:][::-1, :2]
+
+    stamps_ns = np.rint(before[:, STAMP] * 1e9)
+    pairs = _pairs(after_m, loops, len(rows), 1 / decay_per_m)
+    strength_before = _strengths(before_m, pairs, decay_per_m)
+    strength_after = _strengths(after_m, pairs, decay_per_m)
+    return Replay(
+        cycle=0,
+        replays=0,
+        closed=[],
+        undone=[],
+        stamps_ns=Array.of(stamps_ns.astype(np.int64)),
+        positions_m=Array.of(before_m),
+        shifts_m=Array.of(after_m - before_m),
+        pairs=Array.of(pairs.astype(np.int32)),
+        strength_changes=Array.of(strength_after - strength_before),
+        decay_per_m=decay_per_m,
+    )
+
+
+def _first_place(loops: Constraints) -> int:
+    """The first place of the path that a loop joins; 0 where there is no loop."""
+    if not len(loops):
+        return 0
+
+    places = np.concatenate([loops.i, loops.j])
+    return int(places.min())
+
+
+def _strengths(positions_m: Floats, pairs: Indices, decay_per_m: float) -> Floats:
+    """(m,): the synaptic strengths of pairs of place cells."""
+    first_m = positions_m[pairs[:, 0]]
+    second_m = positions_m[pairs[:, 1]]
+    apart_m = first_m - second_m
+
+    distance_m = np.hypot(apart_m[:, 0], apart_m[:, 1])
+    strengths: Floats = np.exp(-decay_per_m * distance_m)
+    return strengths
+
+
+def _pairs(fields_m: Floats, loops: Constraints, places: int, reach_m: float) -> Indices:
+    """(m, 2): place cells whose synapse changes most, those of one place on different passes, and
+    neighbours along the path.
+
+    Cells are numbered from the newest of the path's `places` on.
+    """
+    cells = np.arange(len(fields_m))
+    neighbours = np.column_stack([cells[:-1], cells[1:]])
+
+    newest = places - 1
+    ends = np.column_stack([newest - loops.j, newest - loops.i])
+    crossings = []
+    for newer, older in ends.tolist():
+        for cell in _same_place(fields_m, newer, older, reach_m):
+            crossings.append((cell, older))
+
+    crossing = np.array(crossings, np.int64).reshape(-1, 2)
+    pairs: Indices = np.unique(np.vstack([neighbours, crossing]), axis=0)
+    return pairs
+
+
+def _same_place(fields_m: Floats, newer: int, older: int, reach_m: float) -> list[int]:
+    """The cells of the newer pass within reach of the place cell `older`."""
+    apart_m = fields_m - fields_m[older]
+    distance_m = np.hypot(*apart_m.T)
+
+    near = []
+    for cell in np.flatnonzero(distance_m < reach_m).tolist():
+        is_of_newer_pass = abs(cell - newer) < abs(cell - older)
+        if is_of_newer_pass:
+            near.append(cell)
+
+    return near
