@@ -30,6 +30,7 @@ def inliers(graph: PoseGraph, false_closure: float) -> Booleans:
     """(m,): which closures of `graph` are inliers, headings included."""
     if not len(graph.closures):
         return np.zeros(0, bool)
+
     threshold = thresholds(graph.closures, false_closure)
     accepted = _by_weights(graph, threshold)
     return _readmit(graph, accepted, threshold)
@@ -40,37 +41,50 @@ def thresholds(closures: Constraints, false_closure: float) -> Floats:
     `false_closure`; its degrees of freedom are the rank of its information.
     """
     eigenvalues = np.linalg.eigvalsh(closures.information)
-    measured = eigenvalues > 1e-9 * eigenvalues[:, -1:]
-    threshold: Floats = chdtri(measured.sum(axis=1), false_closure)
+    largest = eigenvalues[:, -1:]
+    is_measured = eigenvalues > 1e-9 * largest
+
+    degrees = is_measured.sum(axis=1)
+    threshold: Floats = chdtri(degrees, false_closure)
     return threshold
 
 
 def _by_weights(graph: PoseGraph, threshold: Floats) -> Booleans:
-    closures = graph.closures
-    weights = np.ones(len(closures))
+    """(m,): which closures keep their weight."""
+    weights = np.ones(len(graph.closures))
     convexity = 0.0
 
     for _ in range(MAX_ROUNDS):
-        poses = optimize(PoseGraph(graph.poses, graph.steps, closures.weighted(weights)))
-        squared = mahalanobis2(residuals(poses, closures), closures.information)
-        excess = squared / threshold
-
+        excess = _excess(graph, weights, threshold)
         if not convexity:
-            if excess.max() <= 1:
+            worst = excess.max()
+            if worst <= 1:
                 break
-            convexity = 1 / (2 * excess.max() - 1)
+            convexity = 1 / (2 * worst - 1)
 
         weights = _weights(excess, convexity)
-        decided = (weights == MIN_WEIGHT) | (weights == 1.0)
-        if decided.all():
+        is_decided = (weights == MIN_WEIGHT) | (weights == 1.0)
+        if is_decided.all():
             break
         convexity *= CONVEXITY_FACTOR
+
     return weights > 0.5
+
+
+def _excess(graph: PoseGraph, weights: Floats, threshold: Floats) -> Floats:
+    """(m,): each closure's misfit of the path that so weighted ones lead to, over its threshold."""
+    closures = graph.closures
+    weighted = graph.with_closures(closures.weighted(weights))
+    poses = optimize(weighted)
+
+    residual = residuals(poses, closures)
+    return mahalanobis2(residual, closures.information) / threshold
 
 
 def _weights(excess: Floats, convexity: float) -> Floats:
     """The weights of the surrogate of truncated least squares."""
-    surrogate = np.sqrt(convexity * (convexity + 1) / excess.clip(1e-12)) - convexity
+    squared = convexity * (convexity + 1) / excess.clip(1e-12)
+    surrogate = np.sqrt(squared) - convexity
     return surrogate.clip(MIN_WEIGHT, 1.0)
 
 
@@ -78,11 +92,14 @@ def _readmit(graph: PoseGraph, accepted: Booleans, threshold: Floats) -> Boolean
     """Accept outliers that agree with all inliers: the path between the two may be long and
     uncertain.
     """
-    solver = IncrementalSolver(PoseGraph(graph.poses, graph.steps, graph.closures.select(accepted)))
+    closures = graph.closures
+    solver = IncrementalSolver(graph.with_closures(closures.select(accepted)))
+
     result = accepted.copy()
     for index in np.flatnonzero(~accepted):
-        closure = graph.closures.select(np.array([index]))
+        closure = closures.select(np.array([index]))
         if solver.chi_square(closure) <= threshold[index]:
             solver.add(closure)
             result[index] = True
+
     return result

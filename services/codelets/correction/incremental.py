@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -50,8 +51,8 @@ class IncrementalSolver:
 
     def _relinearize(self, graph: PoseGraph, max_iterations: int = MAX_ITERATIONS) -> None:
         poses = optimize(graph, max_iterations)
-        self.graph = PoseGraph(poses, graph.steps, graph.closures)
-        constraints = self.graph.constraints
+        self.graph = replace(graph, poses=poses)
+        constraints = graph.constraints
 
         self._normal = NormalEquations(len(poses), constraints)
         self._factors = factor(self._normal.matrix(poses, constraints))
@@ -70,15 +71,23 @@ class IncrementalSolver:
         """Take in one more closure. Returns the (n, 3) poses after it."""
         graph = self.graph
         update = self._update(closure)
-
-        poses = self._normal.moved(graph.poses, -update.step)
-        self.graph = PoseGraph(poses, graph.steps, graph.closures + closure)
         self._update_columns.append(update.columns)
 
+        poses = self._normal.moved(graph.poses, -update.step)
+        closures = graph.closures + closure
+        self.graph = PoseGraph(poses, graph.steps, closures)
+
         self._cost += update.chi_square
-        if cost(poses, self.graph.constraints) > (1 + TOLERANCE) * self._cost:
+        if self._is_inaccurate():
             self._relinearize(self.graph, ITERATIONS_PER_CLOSURE)
+
         return self.graph.poses
+
+    def _is_inaccurate(self) -> bool:
+        """Whether the cost of the path is above what the linear updates predict."""
+        graph = self.graph
+        predicted = (1 + TOLERANCE) * self._cost
+        return cost(graph.poses, graph.constraints) > predicted
 
     def _update(self, closure: Constraints) -> _Update:
         root = sqrt_information(closure.information)[0]
@@ -89,26 +98,33 @@ class IncrementalSolver:
         left = np.linalg.cholesky(np.eye(3) + gram)
         update_columns = np.linalg.solve(left, solved.T).T
 
-        whitened = root.T @ residuals(self.graph.poses, closure)[0]
-        misfit = np.linalg.solve(left, whitened)
-        return _Update(update_columns @ misfit, float(misfit @ misfit), update_columns)
+        residual = residuals(self.graph.poses, closure)[0]
+        misfit = np.linalg.solve(left, root.T @ residual)
+        step = update_columns @ misfit
+        chi_square = float(misfit @ misfit)
+        return _Update(step, chi_square, update_columns)
 
     def _columns(self, closure: Constraints, root: Floats) -> tuple[Floats, Indices]:
         """(u, 3): the closure's whitened Jacobian, transposed, and which of its rows are used."""
-        columns = np.zeros((3 * (len(self.graph.poses) - 1), 3))
-        used = [np.zeros(0, np.int64)]
         by_i, by_j = jacobians(self.graph.poses, closure)
 
+        columns = np.zeros((self._normal.unknown_count, 3))
+        used = [np.zeros(0, np.int64)]
         for end, by_end in ((closure.i, by_i), (closure.j, by_j)):
-            unknowns, free = self._normal.unknowns(end)
-            if free[0]:
-                columns[unknowns[0]] = by_end[0].T @ root
-                used.append(unknowns[0])
+            unknowns, is_free = self._normal.unknowns(end)
+            if is_free[0]:
+                rows = unknowns[0]
+                columns[rows] = by_end[0].T @ root
+                used.append(rows)
+
         return columns, np.concatenate(used)
 
     def _solve(self, columns: Floats, used: Indices) -> Floats:
         """(u, 3): the solution of the normal equations, all closures so far included."""
+        used_columns = columns[used]
         solved = self._factors.solve(columns)
         for update in self._update_columns:
-            solved -= update @ (update[used].T @ columns[used])
+            overlap = update[used].T @ used_columns
+            solved -= update @ overlap
+
         return np.asarray(solved, np.float64)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from cogmap.geometry.arrays import Floats, Indices
@@ -30,10 +32,13 @@ def optimize_jointly(graph: PoseGraph, seen: Sightings, config: Config) -> tuple
     sides = by_side(seen, poses, config.landmark_sides)
     landmarks_m = sides.landmarks_m(poses)
     for _ in range(ROUNDS):
-        path = PoseGraph(poses, graph.steps, graph.closures)
-        joint = optimize(with_landmarks(path, sides, landmarks_m, config.correlated_sightings))
-        poses = joint[: len(poses)]
-        landmarks_m = joint[len(poses) :, :2]
+        path = replace(graph, poses=poses)
+        joint = with_landmarks(path, sides, landmarks_m, config.correlated_sightings)
+        optimized = optimize(joint)
+
+        poses = optimized[: len(poses)]
+        landmarks_m = optimized[len(poses) :, :2]
+
     return poses, 1 + ROUNDS
 
 
@@ -45,11 +50,12 @@ def with_landmarks(
     """
     headings_rad = np.zeros(len(landmarks_m))
     landmarks = np.column_stack([landmarks_m, headings_rad])
-    weights = seen.weights(graph.poses, landmarks_m) / correlated
-    constraints = seen.constraints(len(graph.poses), weights)
-
     poses = np.vstack([graph.poses, landmarks])
-    return PoseGraph(poses, graph.steps, graph.closures + constraints)
+
+    weights = seen.weights(graph.poses, landmarks_m) / correlated
+    sightings = seen.constraints(len(graph.poses), weights)
+    closures = graph.closures + sightings
+    return PoseGraph(poses, graph.steps, closures)
 
 
 def by_side(seen: Sightings, poses: Floats, sides: int) -> Sightings:
@@ -57,10 +63,11 @@ def by_side(seen: Sightings, poses: Floats, sides: int) -> Sightings:
     landmark is seen in the world.
     """
     side = _sides(seen, poses, sides)
-    keys, landmark = np.unique(seen.landmark * sides + side, return_inverse=True)
+    key = seen.landmark * sides + side
+    keys, landmark = np.unique(key, return_inverse=True)
 
-    of_side = (keys // sides).tolist()
-    labels = tuple(seen.labels[number] for number in of_side)
+    numbers = keys // sides
+    labels = tuple(seen.labels[number] for number in numbers.tolist())
     return seen._replace(labels=labels, landmark=landmark)
 
 
@@ -70,6 +77,7 @@ def _sides(seen: Sightings, poses: Floats, sides: int) -> Indices:
     bearing_rad = np.arctan2(left_m, forward_m)
     direction_rad = poses[seen.place, 2] + bearing_rad
 
-    sector = np.rint(direction_rad / FULL_TURN_RAD * sides)
-    side: Indices = sector.astype(np.int64) % sides
+    turns = direction_rad / FULL_TURN_RAD
+    sector = np.rint(turns * sides).astype(np.int64)
+    side: Indices = sector % sides
     return side

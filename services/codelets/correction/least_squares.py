@@ -43,15 +43,12 @@ class NormalEquations:
         self._order = _elimination_order(count, constraints)
         self._position = np.full(count, -1)
         self._position[self._order] = np.arange(count - 1)
-        self._side = 3 * (count - 1)
+        self.unknown_count = 3 * (count - 1)
 
         i = self._position[constraints.i]
         j = self._position[constraints.j]
         self._analyse_blocks(i, j, count - 1)
-
-        ends = np.concatenate([i, j])
-        used = np.flatnonzero(ends >= 0)
-        self._sum_ends = _summing(ends[used], used, count - 1, len(ends))
+        self._analyse_ends(i, j, count - 1)
 
     def _analyse_blocks(self, i: Indices, j: Indices, unknown_poses: int) -> None:
         """Where the four 3 x 3 blocks of each constraint go: by i and i, i and j, j and i, j and
@@ -59,30 +56,33 @@ class NormalEquations:
         """
         rows = np.concatenate([i, i, j, j])
         columns = np.concatenate([i, j, i, j])
-        used = np.flatnonzero((rows >= 0) & (columns >= 0))
+        is_used = (rows >= 0) & (columns >= 0)
+        used = np.flatnonzero(is_used)
 
         keys = columns[used] * unknown_poses + rows[used]
         blocks, target = np.unique(keys, return_inverse=True)
-        self._sum_blocks = _summing(target, used, len(blocks), len(rows))
 
+        self._sum_blocks = _summing(target, used, len(blocks), len(rows))
+        block_rows = blocks % unknown_poses
         column_keys = np.arange(unknown_poses + 1) * unknown_poses
-        self._indices = (blocks % unknown_poses).astype(np.int32)
+        self._indices = block_rows.astype(np.int32)
         self._starts = np.searchsorted(blocks, column_keys).astype(np.int32)
+
+    def _analyse_ends(self, i: Indices, j: Indices, unknown_poses: int) -> None:
+        """Where the gradient by i and by j of each constraint goes."""
+        ends = np.concatenate([i, j])
+        used = np.flatnonzero(ends >= 0)
+
+        self._sum_ends = _summing(ends[used], used, unknown_poses, len(ends))
 
     def matrix(self, poses: Floats, constraints: Constraints) -> sparse.csc_matrix:
         """J' S^-1 J at `poses`."""
-        by_i, by_j = jacobians(poses, constraints)
-        weighted_i = by_i.transpose(0, 2, 1) @ constraints.information
-        weighted_j = by_j.transpose(0, 2, 1) @ constraints.information
-        across = weighted_i @ by_j
+        blocks = _blocks(poses, constraints)
+        data = self._sum_blocks @ blocks.reshape(-1, 9)
 
-        # Columns are stored, and blocks by rows: each is transposed.
-        parts = [weighted_i @ by_i, across.transpose(0, 2, 1), across, weighted_j @ by_j]
-        blocks = np.concatenate(parts).reshape(-1, 9)
-        data = (self._sum_blocks @ blocks).reshape(-1, 3, 3)
-
-        shape = (self._side, self._side)
-        rows = sparse.bsr_matrix((data, self._indices, self._starts), shape=shape).tocsr()
+        shape = (self.unknown_count, self.unknown_count)
+        stored = (data.reshape(-1, 3, 3), self._indices, self._starts)
+        rows = sparse.bsr_matrix(stored, shape=shape).tocsr()
         return sparse.csc_matrix((rows.data, rows.indices, rows.indptr), shape=shape)
 
     def gradient(self, poses: Floats, constraints: Constraints) -> Floats:
@@ -94,13 +94,17 @@ class NormalEquations:
         at_i = np.einsum("mba,mb->ma", by_i, weighted)
         at_j = np.einsum("mba,mb->ma", by_j, weighted)
 
-        gradient: Floats = (self._sum_ends @ np.concatenate([at_i, at_j])).reshape(-1)
+        at_ends = np.concatenate([at_i, at_j])
+
+        by_pose = self._sum_ends @ at_ends
+        gradient: Floats = by_pose.reshape(-1)
         return gradient
 
     def unknowns(self, pose: Indices) -> tuple[Indices, Booleans]:
         """(k, 3): the unknowns of k poses, and (k,) which poses have any: the first has none."""
         position = self._position[pose]
-        return 3 * position[:, None] + np.arange(3), position >= 0
+        unknowns = 3 * position[:, None] + np.arange(3)
+        return unknowns, position >= 0
 
     def moved(self, poses: Floats, step: Floats) -> Floats:
         """`poses` after a step of the unknowns."""
@@ -109,24 +113,50 @@ class NormalEquations:
         return result
 
 
+def _blocks(poses: Floats, constraints: Constraints) -> Floats:
+    """(4 m, 3, 3): the blocks of J' S^-1 J by constraint, in the order of their analysis.
+
+    Columns are stored, and blocks by rows: each is transposed.
+    """
+    by_i, by_j = jacobians(poses, constraints)
+    weighted_i = by_i.mT @ constraints.information
+    weighted_j = by_j.mT @ constraints.information
+
+    at_i = weighted_i @ by_i
+    at_j = weighted_j @ by_j
+    across = weighted_i @ by_j
+    return np.concatenate([at_i, across.mT, across, at_j])
+
+
 def _elimination_order(count: int, constraints: Constraints) -> Indices:
     """The poses but the first, in an order of little fill (minimum degree)."""
-    rows = np.concatenate([constraints.i, constraints.j])
-    columns = np.concatenate([constraints.j, constraints.i])
-    adjacency = sparse.csc_matrix((np.ones(len(rows)), (rows, columns)), shape=(count, count))
-    pattern = adjacency[1:, 1:]
+    pattern = _adjacency(count, constraints)[1:, 1:]
     pattern.data[:] = 1.0
 
     # A dominant diagonal, so that the order is decided by the pattern alone.
-    dominant = (pattern + count * sparse.identity(count - 1)).tocsc()
-    factors = splu(dominant, **(FACTORING | {"permc_spec": "MMD_AT_PLUS_A"}))
+    diagonal = count * sparse.identity(count - 1)
+    dominant = (pattern + diagonal).tocsc()
+
+    by_degree = FACTORING | {"permc_spec": "MMD_AT_PLUS_A"}
+    factors = splu(dominant, **by_degree)
     order: Indices = np.argsort(factors.perm_c) + 1
     return order
 
 
+def _adjacency(count: int, constraints: Constraints) -> sparse.csc_matrix:
+    """Which of `count` poses are joined, in either direction, and by how many constraints."""
+    rows = np.concatenate([constraints.i, constraints.j])
+    columns = np.concatenate([constraints.j, constraints.i])
+
+    ones = np.ones(len(rows))
+    return sparse.csc_matrix((ones, (rows, columns)), shape=(count, count))
+
+
 def _summing(target: Indices, source: Indices, targets: int, sources: int) -> sparse.csr_matrix:
     """A matrix that adds row `source[k]` of what it is multiplied with to row `target[k]`."""
-    return sparse.csr_matrix((np.ones(len(target)), (target, source)), shape=(targets, sources))
+    ones = np.ones(len(target))
+    shape = (targets, sources)
+    return sparse.csr_matrix((ones, (target, source)), shape=shape)
 
 
 def factor(matrix: sparse.csc_matrix) -> SuperLU:
@@ -147,9 +177,7 @@ def optimize(graph: PoseGraph, max_iterations: int = MAX_ITERATIONS) -> Floats:
     before = cost(poses, constraints)
 
     for _ in range(max_iterations):
-        gradient = normal.gradient(poses, constraints)
-        matrix = _damped(normal.matrix(poses, constraints), damping)
-        step = factor(matrix).solve(gradient)
+        step, predicted_decrease = _step(normal, poses, constraints, damping)
         moved = normal.moved(poses, -step)
         after = cost(moved, constraints)
 
@@ -159,20 +187,44 @@ def optimize(graph: PoseGraph, max_iterations: int = MAX_ITERATIONS) -> Floats:
                 break
             continue
 
-        predicted = before - float(gradient @ step)
+        predicted = before - predicted_decrease
         decrease = before - after
         poses = moved
         before = after
 
         # What the linear model did not predict is about what another step would gain.
-        is_linear = not damping and after - predicted <= RELATIVE_DECREASE * after
-        if decrease <= RELATIVE_DECREASE * after or is_linear:
+        least_decrease = RELATIVE_DECREASE * after
+        is_linear = not damping and after - predicted <= least_decrease
+        if decrease <= least_decrease or is_linear:
             break
-        damping = damping / DAMPING_FACTOR if damping > MIN_DAMPING else 0.0
+        damping = _less(damping)
+
     return poses
+
+
+def _step(
+    normal: NormalEquations, poses: Floats, constraints: Constraints, damping: float
+) -> tuple[Floats, float]:
+    """The step of the unknowns against their gradient, and the decrease of the cost that it would
+    make if the constraints were linear.
+    """
+    gradient = normal.gradient(poses, constraints)
+    matrix = normal.matrix(poses, constraints)
+
+    damped = _damped(matrix, damping)
+    step: Floats = factor(damped).solve(gradient)
+    return step, float(gradient @ step)
 
 
 def _damped(matrix: sparse.csc_matrix, damping: float) -> sparse.csc_matrix:
     if not damping:
         return matrix
-    return matrix + damping * sparse.diags(matrix.diagonal(), format="csc")
+
+    diagonal = sparse.diags(matrix.diagonal(), format="csc")
+    return matrix + damping * diagonal
+
+
+def _less(damping: float) -> float:
+    if damping <= MIN_DAMPING:
+        return 0.0
+    return damping / DAMPING_FACTOR

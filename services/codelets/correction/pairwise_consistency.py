@@ -26,6 +26,13 @@ MAX_SD_M = 5.0
 NEIGHBOURS = 31
 
 
+class Points(NamedTuple):
+    """m points `at_m` (m, 2), each in the frame of the path's place `place` (m,)."""
+
+    place: Indices
+    at_m: Floats
+
+
 class Views(NamedTuple):
     """m views from places `j` (m,) of the path, of what was seen from places `i` (m,) before.
 
@@ -40,6 +47,16 @@ class Views(NamedTuple):
     here_m: Floats
     sd_m: Floats
     sd_rad: Floats
+
+    @property
+    def there(self) -> Points:
+        """What was seen, from the places before."""
+        return Points(self.i, self.there_m)
+
+    @property
+    def here(self) -> Points:
+        """What was seen, from the later places."""
+        return Points(self.j, self.here_m)
 
     def select(self, chosen: Booleans | Indices) -> Views:
         """The chosen ones, by mask or indices."""
@@ -59,29 +76,38 @@ def consistent(views: Views, steps: Constraints, false_closure: float) -> Boolea
     `steps` are those of the path; views that agree are taken for disagreeing with probability
     `false_closure`.
     """
+    path = _DeadReckoning(steps)
     one, other = _pairs(views)
-    agree = _agree(views.select(one), views.select(other), _DeadReckoning(steps), false_closure)
-    one = one[agree]
-    other = other[agree]
+    agree = _agree(views.select(one), views.select(other), path, false_closure)
 
-    count = len(views.i)
+    adjacency = _adjacency(one[agree], other[agree], len(views.i))
+    joined_twice = adjacency @ adjacency
+    triangles = joined_twice.multiply(adjacency).sum(axis=1)
+    return np.asarray(triangles).ravel() > 0
+
+
+def _adjacency(one: Indices, other: Indices, count: int) -> sparse.csr_array:
+    """(count, count): which views are joined, by the numbers of either of a pair."""
     rows = np.concatenate([one, other])
     columns = np.concatenate([other, one])
-    adjacency = sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
-    triangles = (adjacency @ adjacency).multiply(adjacency).sum(axis=1)
-    return np.asarray(triangles).ravel() > 0
+
+    ones = np.ones(len(rows))
+    return sparse.csr_array((ones, (rows, columns)), shape=(count, count))
 
 
 def _pairs(views: Views) -> tuple[Indices, Indices]:
     """Pairs of views to compare, by number: each with those that follow it along the path."""
     count = len(views.i)
-    order = np.lexsort((np.arange(count), views.j))
+    numbers = np.arange(count)
+    order = np.lexsort((numbers, views.j))
+
     nothing = np.zeros(0, np.int64)
     ones = [nothing]
     others = [nothing]
     for apart in range(1, min(NEIGHBOURS + 1, count)):
         ones.append(order[:-apart])
         others.append(order[apart:])
+
     return np.concatenate(ones), np.concatenate(others)
 
 
@@ -89,34 +115,43 @@ class _DeadReckoning:
     """A path by path integration alone, from its beginning, and the variances summed along it."""
 
     def __init__(self, steps: Constraints) -> None:
-        self.poses = integrate(np.zeros(3), steps.measurement)
+        origin = np.zeros(3)
+        self.poses = integrate(origin, steps.measurement)
+
         lengths_m = _lengths(steps.measurement[:, :2])
-        step_m2 = 1 / steps.information[:, 0, 0]
-        step_rad2 = 1 / steps.information[:, 2, 2]
-
         self._length_m = cumulative(lengths_m)
-        self._variance_m2 = cumulative(step_m2)
-        self._variance_rad2 = cumulative(step_rad2)
+        self._variance_m2 = cumulative(steps.variance_m2)
+        self._variance_rad2 = cumulative(steps.variance_rad2)
 
-    def between_m(self, one: Indices, one_m: Floats, other: Indices, other_m: Floats) -> Floats:
-        """(m,): the distance between points seen from two places each, given in their frames."""
-        first_m = transform_from(self.poses[one], one_m)
-        second_m = transform_from(self.poses[other], other_m)
-        return _lengths(first_m - second_m)
+    def between_m(self, one: Points, other: Points) -> Floats:
+        """(m,): the distance between the points of either."""
+        pose = self.poses[one.place]
+        other_pose = self.poses[other.place]
 
-    def variance_m2(self, one: Indices, one_m: Floats, other: Indices, other_m: Floats) -> Floats:
+        point_m = transform_from(pose, one.at_m)
+        other_point_m = transform_from(other_pose, other.at_m)
+        return _lengths(point_m - other_point_m)
+
+    def variance_m2(self, one: Points, other: Points) -> Floats:
         """(m,): the variance of `between_m`: of the steps, and of the turns at their lever arm."""
-        length_m = _between(self._length_m, one, other)
-        lever_arm_m = np.maximum(_lengths(one_m), _lengths(other_m))
+        length_m = _between(self._length_m, one.place, other.place)
+        lever_arm_m = np.maximum(_lengths(one.at_m), _lengths(other.at_m))
         lever_m2 = length_m**2 / 3 + lever_arm_m**2
 
-        by_steps_m2 = _between(self._variance_m2, one, other)
-        by_turns_m2 = self.variance_rad2(one, other) * lever_m2
+        by_steps_m2 = _between(self._variance_m2, one.place, other.place)
+        by_turns_m2 = self.variance_rad2(one.place, other.place) * lever_m2
         variance_m2: Floats = by_steps_m2 + by_turns_m2
         return variance_m2
 
+    def turn_rad(self, one: Indices, other: Indices) -> Floats:
+        """(m,): the heading at one place less that at another."""
+        headings_rad = self.poses[:, 2]
+
+        turn_rad: Floats = headings_rad[one] - headings_rad[other]
+        return turn_rad
+
     def variance_rad2(self, one: Indices, other: Indices) -> Floats:
-        """(m,): the variance of the heading between two places each."""
+        """(m,): the variance of `turn_rad`."""
         return _between(self._variance_rad2, one, other)
 
 
@@ -134,15 +169,12 @@ def _lengths(vectors: Floats) -> Floats:
 
 def _agree(one: Views, other: Views, path: _DeadReckoning, false_closure: float) -> Booleans:
     """(m,): which pairs of views agree."""
-    there = (one.i, one.there_m, other.i, other.there_m)
-    here = (one.j, one.here_m, other.j, other.here_m)
-    difference_m = path.between_m(*there) - path.between_m(*here)
-
-    path_m2 = path.variance_m2(*there) + path.variance_m2(*here)
-    variance_m2 = one.sd_m**2 + other.sd_m**2 + path_m2
-    squared = difference_m**2 / variance_m2
+    there_m2 = path.variance_m2(one.there, other.there)
+    here_m2 = path.variance_m2(one.here, other.here)
+    path_m2 = there_m2 + here_m2
 
     has_heading = (one.sd_rad > 0) & (other.sd_rad > 0)
+    squared = _distance_squared(one, other, path, path_m2)
     squared += np.where(has_heading, _turn_squared(one, other, path), 0.0)
 
     degrees = np.where(has_heading, 3, 2)
@@ -154,17 +186,30 @@ def _agree(one: Views, other: Views, path: _DeadReckoning, false_closure: float)
     return agree
 
 
+def _distance_squared(one: Views, other: Views, path: _DeadReckoning, path_m2: Floats) -> Floats:
+    """(m,): the squared Mahalanobis distance of how far apart two views' points are on either pass,
+    path integration being uncertain by `path_m2`.
+    """
+    there_m = path.between_m(one.there, other.there)
+    here_m = path.between_m(one.here, other.here)
+    difference_m = there_m - here_m
+
+    variance_m2 = one.sd_m**2 + other.sd_m**2 + path_m2
+    squared: Floats = difference_m**2 / variance_m2
+    return squared
+
+
 def _turn_squared(one: Views, other: Views, path: _DeadReckoning) -> Floats:
     """(m,): the squared Mahalanobis distance of the turn between two views on either pass."""
-    headings = path.poses[:, 2]
-    here = headings[one.j] - headings[other.j]
-    there = headings[one.i] - headings[other.i]
-    turned = wrap_angle(here - there)
+    here_rad = path.turn_rad(one.j, other.j)
+    there_rad = path.turn_rad(one.i, other.i)
+    turned_rad = wrap_angle(here_rad - there_rad)
 
+    seen_rad2 = one.sd_rad**2 + other.sd_rad**2
     there_rad2 = path.variance_rad2(one.i, other.i)
     here_rad2 = path.variance_rad2(one.j, other.j)
-    seen_rad2 = one.sd_rad**2 + other.sd_rad**2
     variance_rad2 = seen_rad2 + there_rad2 + here_rad2
 
-    squared: Floats = turned**2 / np.maximum(variance_rad2, 1e-12)
+    positive_rad2 = np.maximum(variance_rad2, 1e-12)
+    squared: Floats = turned_rad**2 / positive_rad2
     return squared

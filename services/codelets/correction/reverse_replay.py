@@ -61,14 +61,17 @@ def displacements(poses: Floats, constraints: Constraints) -> Displacements:
     turn = rotation_matrices(heading_rad)
     return Displacements(
         rotate(expected_m, heading_rad),
-        turn @ covariance @ turn.transpose(0, 2, 1),
+        turn @ covariance @ turn.mT,
     )
 
 
 def position_cost(positions_m: Floats, constraints: Constraints, known: Displacements) -> float:
     """Eq. 7 for (n, 2) positions."""
-    offset_m = positions_m[constraints.j] - positions_m[constraints.i]
-    return _weighted_squares(offset_m - known.offset_m, known.covariance_m2)
+    origin_m = positions_m[constraints.i]
+    offset_m = positions_m[constraints.j] - origin_m
+
+    error_m = offset_m - known.offset_m
+    return _weighted_squares(error_m, known.covariance_m2)
 
 
 class Loops:
@@ -81,12 +84,14 @@ class Loops:
         self._end = np.where(backwards, closures.i, closures.j)
 
         closing = displacements(graph.poses, closures)
-        self._closing_m = np.where(backwards[:, None], -closing.offset_m, closing.offset_m)
+        offset_m = closing.offset_m
+        self._closing_m = np.where(backwards[:, None], -offset_m, offset_m)
         self._closing_m2 = closing.covariance_m2
 
         step = displacements(graph.poses, graph.steps)
+        moved_m = cumulative(step.offset_m)
         self._step_m2 = step.covariance_m2
-        self._integrated_m = graph.poses[0, :2] + cumulative(step.offset_m)
+        self._integrated_m = graph.poses[0, :2] + moved_m
 
         along_m2 = self._across(cumulative(step.covariance_m2))
         self.gain = _inverse(along_m2 + self._closing_m2)
@@ -94,20 +99,26 @@ class Loops:
     @property
     def discrepancy_m(self) -> Floats:
         """(m, 2): d_i of every loop, after path integration alone."""
-        return self._closing_m - self._across(self._integrated_m)
+        integrated_m = self._across(self._integrated_m)
+        return self._closing_m - integrated_m
 
     def shifts(self, forces: Floats) -> Floats:
         """One reverse replay: (n, 2) shifts of the positions under (m, 2) forces (eq. 9's alpha A d
         p, summed up).
         """
-        change = self._summed(self._end, forces) - self._summed(self._start, forces)
+        entering = self._summed(self._end, forces)
+        leaving = self._summed(self._start, forces)
+        change = entering - leaving
+
         pull = np.cumsum(change[::-1], axis=0)[::-1]
-        return cumulative(_times(self._step_m2, pull[1:]))
+        stretched_m = _times(self._step_m2, pull[1:])
+        return cumulative(stretched_m)
 
     def yielded(self, forces: Floats) -> Floats:
         """(m, 2): how far `forces` close each loop: the path yields, and so does the closure."""
         by_path_m = self._across(self.shifts(forces))
-        return by_path_m + _times(self._closing_m2, forces)
+        by_closure_m = _times(self._closing_m2, forces)
+        return by_path_m + by_closure_m
 
     def positions_m(self, forces: Floats) -> Floats:
         """(n, 2): the path under `forces`."""
@@ -117,14 +128,15 @@ class Loops:
         """Eq. 7 of the path under `forces`, and a lower bound for any forces (its dual)."""
         yielded_m = self.yielded(forces)
         by_closure_m = _times(self._closing_m2, forces)
-        work = float(np.sum(forces * yielded_m))
-        in_steps = work - float(np.sum(forces * by_closure_m))
+        work = _dot(forces, yielded_m)
+        in_steps = work - _dot(forces, by_closure_m)
 
         # A closure is misfitted by what the path does not yield.
-        misfit_m = self.discrepancy_m - yielded_m + by_closure_m
+        discrepancy_m = self.discrepancy_m
+        misfit_m = discrepancy_m - yielded_m + by_closure_m
         in_closures = _weighted_squares(misfit_m, self._closing_m2)
 
-        bound = 2 * float(np.sum(forces * self.discrepancy_m)) - work
+        bound = 2 * _dot(forces, discrepancy_m) - work
         return in_steps + in_closures, bound
 
     def _across(self, along: Floats) -> Floats:
@@ -135,8 +147,9 @@ class Loops:
     def _summed(self, places: Indices, forces: Floats) -> Floats:
         """(n, 2): the forces that act at each place."""
         count = len(self._integrated_m)
-        axes = [np.bincount(places, forces[:, axis], count) for axis in (0, 1)]
-        return np.column_stack(axes)
+        x = np.bincount(places, forces[:, 0], count)
+        y = np.bincount(places, forces[:, 1], count)
+        return np.column_stack([x, y])
 
 
 def close_loops(graph: PoseGraph, tolerance: float = 0.01, max_replays: int = 5000) -> Correction:
@@ -145,33 +158,52 @@ def close_loops(graph: PoseGraph, tolerance: float = 0.01, max_replays: int = 50
     The headings of `graph.poses` stay, and its first position.
     """
     loops = Loops(graph)
-    forces = np.zeros((len(graph.closures), 2))
-    left_m = loops.discrepancy_m
-    correction = _times(loops.gain, left_m)
-    direction = correction
-    gained = float(np.sum(left_m * correction))
+    search = _ConjugateGradients(loops)
 
-    replays = 0
-    total, bound = loops.costs(forces)
+    total, bound = loops.costs(search.forces)
     while total > (1 + tolerance) * max(bound, 0.0) + 1e-12:
-        if replays >= max_replays or gained <= 0:
+        if search.replays >= max_replays or search.gained <= 0:
             break
-        yielded_m = loops.yielded(direction)
-        rate = gained / float(np.sum(direction * yielded_m))
-        forces = forces + rate * direction
-        left_m = left_m - rate * yielded_m
+        search.replay()
+        if search.replays % CHECK_EVERY == 0 or search.replays < CHECK_EVERY:
+            total, bound = loops.costs(search.forces)
 
-        correction = _times(loops.gain, left_m)
-        before = gained
-        gained = float(np.sum(left_m * correction))
-        direction = correction + gained / before * direction
+    total, bound = loops.costs(search.forces)
+    positions_m = loops.positions_m(search.forces)
+    return Correction(positions_m, search.replays, total, bound)
 
-        replays += 1
-        if replays % CHECK_EVERY == 0 or replays < CHECK_EVERY:
-            total, bound = loops.costs(forces)
 
-    total, bound = loops.costs(forces)
-    return Correction(loops.positions_m(forces), replays, total, bound)
+class _ConjugateGradients:
+    """The forces of `loops`, corrected replay by replay, as many as `replays` so far.
+
+    `gained` is what the next replay would gain; it is not above 0 where nothing is left to gain.
+    """
+
+    def __init__(self, loops: Loops) -> None:
+        self._loops = loops
+        self._left_m = loops.discrepancy_m
+        self._direction = _times(loops.gain, self._left_m)
+
+        self.forces = np.zeros_like(self._left_m)
+        self.gained = _dot(self._left_m, self._direction)
+        self.replays = 0
+
+    def replay(self) -> None:
+        """Replay once, and correct each force by what is left of its loop's discrepancy."""
+        yielded_m = self._loops.yielded(self._direction)
+        rate = self.gained / _dot(self._direction, yielded_m)
+        self.forces = self.forces + rate * self._direction
+        self._left_m = self._left_m - rate * yielded_m
+
+        correction = _times(self._loops.gain, self._left_m)
+        before = self.gained
+        self.gained = _dot(self._left_m, correction)
+        self._direction = correction + self.gained / before * self._direction
+        self.replays += 1
+
+
+def _dot(one: Floats, other: Floats) -> float:
+    return float(np.sum(one * other))
 
 
 def _inverse(matrices: Floats) -> Floats:
@@ -186,5 +218,6 @@ def _times(matrices: Floats, vectors: Floats) -> Floats:
 
 def _weighted_squares(errors_m: Floats, covariance_m2: Floats) -> float:
     """The sum of d' S^-1 d over (m, 2) errors."""
-    solved = np.linalg.solve(covariance_m2, errors_m[..., None])[..., 0]
-    return float(np.sum(errors_m * solved))
+    solved = np.linalg.solve(covariance_m2, errors_m[..., None])
+    squares = errors_m * solved[..., 0]
+    return float(np.sum(squares))
