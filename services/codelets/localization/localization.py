@@ -38,10 +38,10 @@ from services.codelets.localization.measurement_model import (
     Sighting,
     compare,
     log_likelihood,
-    novelty,
     sightings,
 )
 from services.codelets.localization.motion_model import dead_reckon, move, with_gains
+from services.codelets.localization.novelty import novelty, variances_when_placed
 from services.codelets.localization.recovery import relocalize, relocalize_heading, seen_before
 from services.codelets.localization.sampling import (
     Samples,
@@ -52,7 +52,7 @@ from services.codelets.localization.sampling import (
     resample,
     tempering_exponent,
 )
-from services.codelets.mapping.path import odometry_of, variances_at, variances_of
+from services.codelets.mapping.path import odometry_of, variances_of
 
 INFLATION = 1.5
 MAX_INFLATIONS = 6
@@ -120,7 +120,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
 
     found = _past(agent, moved, task.stamp_ns)
     if seen is not None:
-        since = variances - _placed(graph, seen)
+        since = variances - variances_when_placed(graph, seen)
         weights = novelty(moved, seen, since) / config.correlated_views
         found = _correct(found, seen, weights, config, rng)
 
@@ -162,17 +162,6 @@ CODELET = Codelet(
     config=Config,
     section=SECTION,
 )
-
-
-def _placed(graph: Graph, seen: Sighting) -> Samples:
-    """(k, 2): path integration's variances at which each landmark in view was placed."""
-    placed = []
-    for label in seen.labels:
-        landmark = graph.get(Object, object_id(label))
-        created_ns = NEVER_NS if landmark is None else landmark.created_ns
-        placed.append(variances_at(graph, created_ns))
-
-    return np.array(placed)
 
 
 def _stationary_since(agent: Self, moves: bool) -> int:

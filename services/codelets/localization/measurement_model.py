@@ -14,7 +14,6 @@ from cogmap.graph.graph import Graph
 from schemas.nodes import NEVER_NS, Object, object_id
 from schemas.sensing import Percept
 from services.codelets.localization.motion_model import RANGE
-from services.codelets.localization.sampling import centred
 
 MAX_SD_SHARE = 0.5
 MIN_SIGHTINGS = 2
@@ -130,24 +129,6 @@ def _single(numbers: Floats) -> Singles:
     return numbers.astype(np.float32)
 
 
-def novelty(samples: Floats, seen: Sighting, since: Floats) -> Floats:
-    """(k,): the share, 0 to 1, of the uncertainty of (n, 7) samples' position that came since each
-    landmark was placed: `since` (k, 2), by path integration's variances in m^2 and rad^2.
-
-    A landmark was placed from where the agent took itself to be, and shares the error of that. It
-    can correct only the error that came since; taken for independent, it would pull the agent after
-    its own mistakes. (In a filter of the joint state their correlation does this.)
-    """
-    _, deviations = centred(samples[:, :2])
-    variances_m2 = np.square(deviations).mean(axis=0)
-    position_m2 = max(float(variances_m2.sum()), 1e-9)
-
-    since_m2, since_rad2 = since.T
-    by_turns_m2 = since_rad2 * seen.range_m**2
-    share: Floats = (2 * since_m2 + by_turns_m2) / position_m2
-    return share.clip(0.0, 1.0)
-
-
 def log_likelihood(density: Singles, outlier: float, weights: Floats | None = None) -> Floats:
     """(n,): the logarithm of the product over landmarks of p(o_j | l_j, x), from (k, n) densities
     (eq. 1), each to the power of its weight (k,), or of 1.
@@ -193,7 +174,7 @@ def _is_sharp(landmark: Landmark, percept: Percept, largest_sd_m: float) -> bool
     limit_m = largest_sd_m
     if has_range(percept):
         limit_m = min(limit_m, MAX_SD_SHARE * percept.range_m)
-    variance_m2 = float(np.trace(landmark.covariance_m2))
+    variance_m2 = float(landmark.covariance_m2[0, 0] + landmark.covariance_m2[1, 1])
     return variance_m2 <= 2 * limit_m**2
 
 

@@ -134,9 +134,10 @@ def rejection_resample(
     effective = float(probability.sum() ** 2 / np.square(probability).sum())
 
     expected = probability * max(1.0, min_kept / probability.sum())
-    drawn = np.floor(np.cumsum(expected) + rng.random())
-    copies = np.diff(drawn, prepend=0.0).astype(np.int64)
-    kept = samples[np.repeat(order, copies)]
+    drawn = np.zeros(len(samples) + 1)
+    np.floor(np.cumsum(expected) + rng.random(), out=drawn[1:])
+    copies = (drawn[1:] - drawn[:-1]).astype(np.int64)
+    kept = samples.take(order.repeat(copies), axis=0)
     if not len(kept):
         kept = samples[[int(log_likelihood.argmax())]]
     return kernel_smooth(kept, effective, rng), share

@@ -168,39 +168,6 @@ def variances_of(agent: Self) -> Floats:
     return np.array(variances)
 
 
-def variances_at(graph: Graph, stamp_ns: int) -> Floats:
-    """(2,): `variances_of` the agent at the path's place of `stamp_ns`, or the next before it; -inf
-    each before the path begins.
-    """
-    stamp_s = stamp_ns * 1e-9
-    segment = _segment_at(graph, stamp_s)
-    if segment is None:
-        return np.full(2, -np.inf)
-
-    rows = segment.rows.numpy()
-    following = int(np.searchsorted(rows[:, STAMP], stamp_s, side="right"))
-    variances = rows[following - 1, VARIANCES]
-    return np.asarray(variances, np.float64)
-
-
-def _segment_at(graph: Graph, stamp_s: float) -> PathSegment | None:
-    """The last segment that begins at `stamp_s` or before, by bisection; None where none does."""
-    found = None
-    low = 0
-    high = graph.count(PathSegment)
-
-    while low < high:
-        middle = (low + high) // 2
-        segment = graph.get(PathSegment, segment_id(middle))
-        if segment is None or float(segment.rows.numpy()[0, STAMP]) > stamp_s:
-            high = middle
-        else:
-            found = segment
-            low = middle + 1
-
-    return found
-
-
 def steps_of(rows: Floats, config: Config) -> Constraints:
     """The steps of path integration from each row to the next, as certain as self-motion states, or
     less, by the distance.

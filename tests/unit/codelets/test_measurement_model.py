@@ -13,10 +13,10 @@ from services.codelets.localization.measurement_model import (
     Sighting,
     compare,
     log_likelihood,
-    novelty,
     sightings,
 )
-from services.codelets.mapping.path import segments, variances_at
+from services.codelets.localization.novelty import novelty, variances_at
+from services.codelets.mapping.path import segments
 from tests.support.scenes import graph_of, landmark, percept
 
 CONFIG = Config()
@@ -72,10 +72,10 @@ def test_the_variance_when_a_landmark_was_placed_is_that_of_the_path() -> None:
     before = variances_at(graph, 500_000_000)
     without_path = variances_at(graph_of(), 1)
 
-    assert between.tolist() == [69.0, 0.0]
-    assert after.tolist() == [99.0, 0.0]
-    assert before.tolist() == [-math.inf, -math.inf]
-    assert without_path.tolist() == [-math.inf, -math.inf]
+    assert between == (69.0, 0.0)
+    assert after == (99.0, 0.0)
+    assert before == (-math.inf, -math.inf)
+    assert without_path == (-math.inf, -math.inf)
 
 
 def test_a_landmark_of_no_weight_leaves_all_samples_as_likely() -> None:

@@ -1,0 +1,76 @@
+"""How much a view of a landmark informs: less, the less has happened since the landmark was placed.
+
+A landmark was placed from where the agent took itself to be, and shares the error of that. It can
+correct only the error that came since; taken for independent, it would pull the agent after its own
+mistakes. (In a filter of the joint state their correlation does this.)
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from bisect import bisect_right
+from functools import partial
+
+import numpy as np
+
+from cogmap.graph.graph import Graph
+from schemas.nodes import NEVER_NS, Object, PathColumn, PathSegment, object_id, segment_id
+from services.codelets.localization.measurement_model import Sighting
+from services.codelets.localization.sampling import Samples, centred
+
+VARIANCES = slice(PathColumn.VARIANCE_M2, PathColumn.VARIANCE_RAD2 + 1)
+STAMP_FORMAT = struct.Struct("<d")
+STAMP_OFFSET = PathColumn.STAMP_S * STAMP_FORMAT.size
+
+
+def novelty(samples: Samples, seen: Sighting, since: Samples) -> Samples:
+    """(k,): the share, 0 to 1, of the uncertainty of (n, 7) samples' position that came since each
+    landmark was placed: `since` (k, 2), by path integration's variances in m^2 and rad^2.
+    """
+    _, deviations = centred(samples[:, :2])
+    variances_m2 = np.square(deviations).mean(axis=0)
+    position_m2 = max(float(variances_m2.sum()), 1e-9)
+
+    since_m2, since_rad2 = since.T
+    by_turns_m2 = since_rad2 * seen.range_m**2
+    share: Samples = (2 * since_m2 + by_turns_m2) / position_m2
+    return share.clip(0.0, 1.0)
+
+
+def variances_when_placed(graph: Graph, seen: Sighting) -> Samples:
+    """(k, 2): path integration's variances at which each landmark in view was placed."""
+    variances = []
+    for label in seen.labels:
+        landmark = graph.get(Object, object_id(label))
+        created_ns = NEVER_NS if landmark is None else landmark.created_ns
+        variances.append(variances_at(graph, created_ns))
+
+    return np.array(variances)
+
+
+def variances_at(graph: Graph, stamp_ns: int) -> tuple[float, float]:
+    """Path integration's variances, in m^2 and rad^2, at the path's place of `stamp_ns`, or the
+    next before it; -inf each before the path begins.
+    """
+    stamp_s = stamp_ns * 1e-9
+    numbers = range(graph.count(PathSegment))
+    number = bisect_right(numbers, stamp_s, key=partial(_begin_s, graph)) - 1
+    segment = graph.get(PathSegment, segment_id(number))
+    if segment is None:
+        return -math.inf, -math.inf
+
+    rows = segment.rows.numpy()
+    following = int(rows[:, PathColumn.STAMP_S].searchsorted(stamp_s, side="right"))
+    variance_m2, variance_rad2 = rows[following - 1, VARIANCES].tolist()
+    return variance_m2, variance_rad2
+
+
+def _begin_s(graph: Graph, number: int) -> float:
+    """The stamp of a path segment's first place; infinity where there is no such segment."""
+    segment = graph.get(PathSegment, segment_id(number))
+    if segment is None:
+        return math.inf
+
+    (begin_s,) = STAMP_FORMAT.unpack_from(segment.rows.data, STAMP_OFFSET)
+    return float(begin_s)
