@@ -10,7 +10,7 @@ import pytest
 from cogmap.errors import CogmapError, UsageError
 from experiments.city_maps.correction import settings
 from experiments.city_maps.drive import Tour, sections, traverse
-from experiments.city_maps.environment import BUILDINGS, MAX_KM2, City, environments
+from experiments.city_maps.environment import BUILDINGS, MAX_KM2, City, Environment, environments
 from experiments.city_maps.measure import NOISE, CityMap, Learned, map_error_km2
 from experiments.city_maps.metrics import map_metrics
 from experiments.city_maps.observer import WHEELS
@@ -25,20 +25,29 @@ CROSS = Streets(
 )
 
 
+def _environment(seed: int) -> Environment:
+    """One environment in a grown city."""
+    (environment,) = environments(grown(seed), 1, seed)
+    return environment
+
+
+def _length(distance: np.ndarray, order: list[int]) -> float:
+    """The length of a closed tour."""
+    following = [*order[1:], order[0]]
+    return sum(distance[a, b] for a, b in zip(order, following, strict=True))
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_the_tour_is_as_short_as_any(seed: int) -> None:
     points = np.random.default_rng(seed).uniform(0, 1, (6, 2))
     distance = np.hypot(*(points[:, None] - points).transpose(2, 0, 1))
-    length, order = shortest_tour(distance)
     every = [[0, *rest] for rest in itertools.permutations(range(1, 6))]
-    lengths = [
-        sum(distance[a, b] for a, b in zip(tour, [*tour[1:], 0], strict=True)) for tour in every
-    ]
+    shortest = min(_length(distance, order) for order in every)
 
-    assert length == pytest.approx(min(lengths))
-    assert sum(
-        distance[a, b] for a, b in zip(order, [*order[1:], 0], strict=True)
-    ) == pytest.approx(length)
+    length, order = shortest_tour(distance)
+
+    assert length == pytest.approx(shortest)
+    assert _length(distance, order) == pytest.approx(length)
     assert sorted(order) == list(range(6))
 
 
@@ -50,16 +59,19 @@ def test_a_tour_past_what_cannot_be_reached_is_refused() -> None:
 
 
 def test_ways_follow_the_streets_between_points_put_on_them() -> None:
-    streets, (east, north) = CROSS.with_points(np.array([(60.0, 9.0), (-5.0, 80.0)]))
+    points_m = np.array([(60.0, 9.0), (-5.0, 80.0)])
+    streets, (east, north) = CROSS.with_points(points_m)
     distance, before = streets.shortest_paths(np.array([east, north]))
     assert distance[0, north] == pytest.approx(140.0)
 
-    way = streets.points_m[shortest_path(before[0], int(north))]
-    assert way.tolist() == [[60.0, 0.0], [0.0, 0.0], [0.0, 80.0]]
+    path = shortest_path(before[0], int(north))
+    path_m = streets.points_m[path]
+    assert path_m.tolist() == [[60.0, 0.0], [0.0, 0.0], [0.0, 80.0]]
 
 
 def test_two_points_on_one_piece_stand_in_order() -> None:
-    streets, (far, near) = CROSS.with_points(np.array([(80.0, 1.0), (20.0, 1.0)]))
+    points_m = np.array([(80.0, 1.0), (20.0, 1.0)])
+    streets, (far, near) = CROSS.with_points(points_m)
     distance, _ = streets.shortest_paths(np.array([near]))
 
     assert distance[0, far] == pytest.approx(60.0)
@@ -68,10 +80,9 @@ def test_two_points_on_one_piece_stand_in_order() -> None:
 
 
 def test_only_the_connected_part_is_kept() -> None:
-    apart = Streets(
-        np.vstack([CROSS.points_m, [(500.0, 0.0), (600.0, 0.0)]]),
-        np.vstack([CROSS.pieces, [(4, 5)]]),
-    )
+    points_m = np.vstack([CROSS.points_m, [(500.0, 0.0), (600.0, 0.0)]])
+    pieces = np.vstack([CROSS.pieces, [(4, 5)]])
+    apart = Streets(points_m, pieces)
 
     assert apart.connected().points_m.tolist() == CROSS.points_m.tolist()
 
@@ -80,25 +91,29 @@ def test_only_the_connected_part_is_kept() -> None:
 def test_an_environment_has_eight_buildings_in_4_km2_and_a_tour_past_them(
     seed: int,
 ) -> None:
-    (environment,) = environments(grown(seed), 1, seed)
-
+    environment = _environment(seed)
     assert environment.buildings_m.shape == (BUILDINGS, 2)
     assert len(set(environment.names)) == BUILDINGS
     assert environment.area_km2 <= MAX_KM2
-    for leg, building in zip(environment.legs_m, environment.buildings_m, strict=True):
+
+    legs_m = environment.legs_m
+    following_m = [*legs_m[1:], legs_m[0]]
+    for leg, building in zip(legs_m, environment.buildings_m, strict=True):
         assert np.hypot(*(leg[0] - building)) < 40.0
-    for leg, following in zip(
-        environment.legs_m, [*environment.legs_m[1:], environment.legs_m[0]], strict=True
-    ):
+
+    for leg, following in zip(legs_m, following_m, strict=True):
         assert leg[-1] == pytest.approx(following[0])
 
 
-def test_the_line_of_a_tour_comes_up_to_its_start_and_goes_on_beyond_its_end() -> None:
-    (environment,) = environments(grown(3), 1, 3)
-    for backward in (False, True):
-        line = environment.line(2, backward, 70.0, 100.0)
-        length = np.hypot(*np.diff(line, axis=0).T).sum()
-        assert length == pytest.approx(environment.tour_m + 170.0, abs=0.1)
+@pytest.mark.parametrize("backward", [False, True])
+def test_the_line_of_a_tour_comes_up_to_its_start_and_goes_on_beyond_its_end(
+    backward: bool,
+) -> None:
+    environment = _environment(3)
+    line = environment.line(2, backward, 70.0, 100.0)
+    steps_m = np.hypot(*np.diff(line, axis=0).T)
+
+    assert steps_m.sum() == pytest.approx(environment.tour_m + 170.0, abs=0.1)
 
 
 def test_the_same_seed_grows_the_same_city() -> None:
@@ -110,15 +125,19 @@ def test_the_same_seed_grows_the_same_city() -> None:
 
 
 def test_a_city_with_too_few_buildings_is_named() -> None:
+    hamlet = City("hamlet", CROSS, ("a",), np.array([(50.0, 10.0)]))
+
     with pytest.raises(UsageError, match="hamlet: no 8 buildings"):
-        environments(City("hamlet", CROSS, ("a",), np.array([(50.0, 10.0)])), 1, 1)
+        environments(hamlet, 1, 1)
 
 
 def test_degrees_become_metres() -> None:
-    metres = plane_m(np.array([(15.0, 48.001), (15.001, 48.0)]), np.array([15.0, 48.0]))
+    origin = np.array([15.0, 48.0])
+    points = np.array([(15.0, 48.001), (15.001, 48.0)])
+    north_m, east_m = plane_m(points, origin)
 
-    assert metres[0] == pytest.approx([0.0, 111.2], abs=0.1)
-    assert metres[1] == pytest.approx([74.4, 0.0], abs=0.1)
+    assert north_m == pytest.approx([0.0, 111.2], abs=0.1)
+    assert east_m == pytest.approx([74.4, 0.0], abs=0.1)
 
 
 def test_an_extract_without_streets_is_refused(tmp_path: Path) -> None:
@@ -131,24 +150,27 @@ def test_an_extract_without_streets_is_refused(tmp_path: Path) -> None:
 
 def test_the_error_is_the_sum_of_squares_in_square_kilometres() -> None:
     true = np.zeros((8, 2))
-    learned = np.tile([300.0, 400.0], (8, 1))
-    assert map_error_km2(learned, true) == pytest.approx(8 * 0.25)
+    half_km_away = np.tile([300.0, 400.0], (8, 1))
+    assert map_error_km2(half_km_away, true) == pytest.approx(8 * 0.25)
 
-    learned[:4] = np.nan
-    assert map_error_km2(learned, true) == pytest.approx(8 * 0.25)
+    half_missing = half_km_away.copy()
+    half_missing[:4] = np.nan
+    assert map_error_km2(half_missing, true) == pytest.approx(8 * 0.25)
+
+
+def _map(environment: Environment, errors_km2: dict[str, float]) -> CityMap:
+    """A map learned in one traverse, of which only the errors count."""
+    nothing = dict.fromkeys(errors_km2, np.zeros((0, 2)))
+    learned = Learned(errors_km2, 0, nothing, nothing, nothing)
+    return CityMap(environment, (learned,))
 
 
 def test_the_ratio_is_the_mean_of_the_maps_own_ratios() -> None:
-    (environment,) = environments(grown(1), 1, 1)
-    nothing = dict.fromkeys((WHEELS, "none", "positions", "heading"), np.zeros((0, 2)))
-    errors = [(3.0, 4.0, 2.0, 1.0), (3.0, 2.0, 2.0, 1.0)]
-    maps = [
-        CityMap(
-            environment,
-            (Learned(dict(zip(nothing, error, strict=True)), 0, nothing, nothing, nothing),),
-        )
-        for error in errors
-    ]
+    environment = _environment(1)
+    quarter = {WHEELS: 3.0, "none": 4.0, "positions": 2.0, "heading": 1.0}
+    half = {WHEELS: 3.0, "none": 2.0, "positions": 2.0, "heading": 1.0}
+    maps = [_map(environment, quarter), _map(environment, half)]
+
     metrics = map_metrics(maps, NOISE)
 
     assert metrics["error_corrected_over_uncorrected"] == pytest.approx((0.25 + 0.5) / 2)
@@ -158,23 +180,32 @@ def test_the_ratio_is_the_mean_of_the_maps_own_ratios() -> None:
 
 
 def test_without_noise_and_confusions_the_map_is_right_and_repeatable() -> None:
-    (environment,) = environments(grown(7), 1, 7)
+    environment = _environment(7)
     quiet = Noise(speed=0.0, turn=0.0, drift_rad_per_sqrt_m=0.0)
     configured = sections(environment, Tour(start=0, backward=True, seed=1), quiet, "none")
-    configured["sim"]["trajectory"]["line_m"] = configured["sim"]["trajectory"]["line_m"][:12]
-    configured["sim"]["percepts"] |= {"right_name": 1.0, "precision": 1.0, "place_precision": 1.0}
-    made, again = (traverse(configured) for _ in range(2))
+    simulated = configured["sim"]
+    simulated["trajectory"]["line_m"] = simulated["trajectory"]["line_m"][:12]
+    simulated["percepts"] |= {"right_name": 1.0, "precision": 1.0, "place_precision": 1.0}
+
+    made = traverse(configured)
+    again = traverse(configured)
 
     assert made.believed[:, :2] == pytest.approx(made.true[:, :2], abs=1.0)
+    assert made.believed.tolist() == again.believed.tolist()
 
     known = ~np.isnan(made.buildings_m[:, 0])
+    off_m = (made.buildings_m - environment.buildings_m)[known]
+    off_by_wheels_m = (made.alone_m[WHEELS] - environment.buildings_m)[known]
     assert known.any()
-    assert np.hypot(*(made.buildings_m - environment.buildings_m)[known].T).max() < 5.0
-    assert np.hypot(*(made.alone_m[WHEELS] - environment.buildings_m)[known].T).max() < 5.0
-    assert made.believed.tolist() == again.believed.tolist()
+    assert np.hypot(*off_m.T).max() < 5.0
+    assert np.hypot(*off_by_wheels_m.T).max() < 5.0
 
 
 def test_loops_are_closed_only_where_that_is_asked_for() -> None:
-    assert settings("none", 5.0)["codelets"]["revisit_s"] > 1e6
-    assert "revisit_s" not in settings("positions", 5.0)["codelets"]
-    assert settings("heading", 5.0)["codelets"]["correct"] == "heading"
+    never = settings("none", 5.0)["codelets"]
+    positions = settings("positions", 5.0)["codelets"]
+    headings = settings("heading", 5.0)["codelets"]
+
+    assert never["revisit_s"] > 1e6
+    assert "revisit_s" not in positions
+    assert headings["correct"] == "heading"

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pytest
@@ -23,6 +24,11 @@ from experiments.cue_integration.trial import Condition, Noise, Response, Trial
 
 STILL = Noise(speed=1e-9, turn=1e-9, distance=1e-3)
 NOISY = Noise(speed=0.15, turn=0.15)
+Point = tuple[float, float]
+SELF_MOTION_SD_M = 0.35
+LANDMARKS_SD_M = 0.28
+BOTH_SD_M = 0.22
+SHIFT_M = 0.457
 
 
 def _trial(condition: Condition, number: int = 0, noise: Noise = NOISY) -> Trial:
@@ -33,48 +39,67 @@ def test_every_route_ends_at_post_8_and_15_degrees_move_its_target_46_cm() -> No
     assert len(set(ROUTES)) == 8
 
     for target, _, last in ROUTES:
-        assert last == 8
         (moved,) = turned((POSTS[target],), CONFLICT_RAD)
-        assert math.dist(moved, POSTS[target]) == pytest.approx(0.457, abs=5e-4)
+
+        assert last == 8
+        assert math.dist(moved, POSTS[target]) == pytest.approx(SHIFT_M, abs=5e-4)
 
 
 def test_steps_lead_to_a_goal_behind_one_until_it_is_within_reach() -> None:
     pose = Pose(1.0, 2.0, 0.0)
     goal = (-2.0, 2.5)
     for _ in range(12):
-        pose = pose.after(*step(*pose.towards(goal)))
+        towards = pose.towards(goal)
+        pose = pose.after(*step(*towards))
 
     assert pose.towards(goal) == pytest.approx((0.0, REACH_M))
 
 
 def test_self_motion_is_multiplied_by_noise_of_mean_one() -> None:
     rng = np.random.default_rng(3)
-    rows = np.array([self_motion(1.0, 0.5, Noise(0.1, 0.2), rng) for _ in range(4000)])
-    turns = rows[:, 0, 1] * rows[:, 0, 2]
-    ways = rows[:, 1, 0] * rows[:, 1, 2]
+    noise = Noise(0.1, 0.2)
+    rows = np.array([self_motion(1.0, 0.5, noise, rng) for _ in range(4000)])
+    turns_rad = rows[:, 0, 1] * rows[:, 0, 2]
+    distances_m = rows[:, 1, 0] * rows[:, 1, 2]
 
-    assert (turns.mean(), turns.std()) == pytest.approx((1.0, 0.2), rel=0.05)
-    assert (ways.mean(), ways.std()) == pytest.approx((0.5, 0.05), rel=0.05)
+    assert turns_rad.mean() == pytest.approx(1.0, rel=0.05)
+    assert turns_rad.std() == pytest.approx(0.2, rel=0.05)
+    assert distances_m.mean() == pytest.approx(0.5, rel=0.05)
+    assert distances_m.std() == pytest.approx(0.05, rel=0.05)
 
 
 def test_the_uncertainty_of_self_motion_follows_from_what_is_sensed_alone() -> None:
     noise = Noise(0.2, 0.2)
-    seeds = range(50)
-    one = np.array([self_motion(1.0, 0.5, noise, np.random.default_rng(seed)) for seed in seeds])
-    for row, column, felt in ((0, 4, 1), (1, 3, 0)):
-        share = one[:, row, column] / np.abs(one[:, row, felt])
-        assert share == pytest.approx(np.full(50, share[0]))
-        assert 0.2 < share[0] < 0.25
+    motions = []
+    for seed in range(50):
+        rng = np.random.default_rng(seed)
+        motions.append(self_motion(1.0, 0.5, noise, rng))
+    rows = np.array(motions)
+
+    turn_shares = rows[:, 0, 4] / np.abs(rows[:, 0, 1])
+    speed_shares = rows[:, 1, 3] / np.abs(rows[:, 1, 0])
+
+    for shares in (turn_shares, speed_shares):
+        assert shares == pytest.approx(np.full(50, shares[0]))
+        assert 0.2 < shares[0] < 0.25
 
 
 def test_distances_err_by_three_percent_and_directions_by_as_much_across() -> None:
     rng = np.random.default_rng(3)
-    seen = [
-        sightings(Pose(0, 0, 0), {"star": (4.0, 0.0)}, Noise(0.1, 0.1), rng)[0] for _ in range(4000)
-    ]
+    noise = Noise(0.1, 0.1)
+    star = {"star": (4.0, 0.0)}
+    seen = [sightings(Pose(0, 0, 0), star, noise, rng)[0] for _ in range(4000)]
+    ranges_m = [percept.range_m for percept in seen]
+    bearings_rad = [percept.bearing_rad for percept in seen]
 
-    assert np.std([percept.range_m for percept in seen]) == pytest.approx(0.12, rel=0.05)
-    assert np.std([percept.bearing_rad for percept in seen]) == pytest.approx(0.03, rel=0.05)
+    assert np.std(ranges_m) == pytest.approx(0.12, rel=0.05)
+    assert np.std(bearings_rad) == pytest.approx(0.03, rel=0.05)
+
+
+def _response(trial: Trial) -> Point:
+    """Where the post is put back."""
+    response = Session(trial).run()
+    return response.x_m, response.y_m
 
 
 @pytest.mark.parametrize("condition", [Condition.SELF_MOTION, Condition.BOTH])
@@ -82,124 +107,160 @@ def test_with_senses_that_hardly_err_the_post_is_put_back_where_it_stood(
     condition: Condition,
 ) -> None:
     trial = _trial(condition, 3, STILL)
-    response = Session(trial).run()
+    put_m = _response(trial)
 
-    assert math.dist((response.x_m, response.y_m), trial.target) < 0.15
+    assert math.dist(put_m, trial.target) < 0.15
 
 
 def test_after_disorientation_landmarks_lead_back() -> None:
     trial = _trial(Condition.LANDMARKS, 2)
-    response = Session(trial).run()
+    put_m = _response(trial)
 
-    assert math.dist((response.x_m, response.y_m), trial.target) < 0.5
+    assert math.dist(put_m, trial.target) < 0.5
 
 
 def test_landmarks_that_are_turned_lead_to_where_they_say() -> None:
     trial = _trial(Condition.CONFLICT, 9)
-    response = Session(trial).run()
-    where = (response.x_m, response.y_m)
+    put_m = _response(trial)
+    to_turned_m = math.dist(put_m, trial.turned_target)
+    to_target_m = math.dist(put_m, trial.target)
 
-    assert math.dist(where, trial.turned_target) < math.dist(where, trial.target)
+    assert to_turned_m < to_target_m
+
+
+def _run(number: int) -> tuple[Response, Mapping[str, Sequence[bytes]]]:
+    """The response of a trial with both cues, and the messages of its session."""
+    session = Session(_trial(Condition.BOTH, number))
+    response = session.run()
+    return response, session.transcript.messages
 
 
 def test_a_trial_says_the_same_bytes_each_time_and_others_in_another() -> None:
-    sessions = [Session(_trial(Condition.BOTH, number)) for number in (4, 4, 12)]
-    responses = [session.run() for session in sessions]
-    first, again, other = (session.transcript.messages for session in sessions)
+    response, messages = _run(4)
+    same_response, same_messages = _run(4)
+    _, others = _run(12)
 
-    assert responses[0] == responses[1] and first == again
-    assert first["workspace/delta"] and first["workspace/delta"] != other["workspace/delta"]
+    assert same_response == response
+    assert same_messages == messages
+    assert messages["workspace/delta"]
+    assert messages["workspace/delta"] != others["workspace/delta"]
 
 
 def test_the_figures_do_not_depend_on_the_number_of_processes() -> None:
-    few = (Condition.SELF_MOTION,)
-    one, two = (measure(NOISY, Budget(2, 7, processes), few) for processes in (1, 2))
+    condition = Condition.SELF_MOTION
+    one = measure(NOISY, Budget(2, 7, 1), (condition,))
+    two = measure(NOISY, Budget(2, 7, 2), (condition,))
 
-    assert np.array_equal(one.errors_m[few[0]], two.errors_m[few[0]])
+    assert np.array_equal(one.errors_m[condition], two.errors_m[condition])
+
+
+def _trials(condition: Condition) -> list[Trial]:
+    return [_trial(condition, number) for number in range(16)]
 
 
 def test_errors_lie_along_the_way_that_turned_landmarks_move_the_target() -> None:
-    trials = [_trial(Condition.CONFLICT, number) for number in range(16)]
+    trials = _trials(Condition.CONFLICT)
     assert {trial.side for trial in trials} == {1, -1}
 
-    exactly = [Response(*trial.turned_target, 0) for trial in trials]
-    assert analysis.errors(trials, exactly) == pytest.approx(
-        np.tile([0.4569, 0.0], (16, 1)), abs=1e-4
-    )
+    at_turned = [Response(*trial.turned_target, 0) for trial in trials]
+    along_and_aside_m = analysis.errors(trials, at_turned)
+    expected_m = np.tile([0.4569, 0.0], (16, 1))
+    assert along_and_aside_m == pytest.approx(expected_m, abs=1e-4)
 
     at_post_8 = [Response(*POSTS[8], 0) for _ in trials]
-    assert (analysis.errors(trials, at_post_8)[:, 1] > 1.7).all()
+    aside_m = analysis.errors(trials, at_post_8)[:, 1]
+    assert (aside_m > 1.7).all()
 
 
 def test_errors_turn_with_the_landmarks() -> None:
-    trials = [_trial(Condition.LANDMARKS, number) for number in range(16)]
-    off = [(0.1, -0.3)] * 16
-    put = [
-        Response(trial.target[0] + x, trial.target[1] + y, 0)
-        for trial, (x, y) in zip(trials, off, strict=True)
-    ]
-    moved = [
-        Response(*turned(((response.x_m, response.y_m),), trial.side * CONFLICT_RAD)[0], 0)
-        for trial, response in zip(trials, put, strict=True)
-    ]
-    shift_m = analysis.shift_m(trials)
-    expected = analysis.turned_errors(analysis.errors(trials, put), shift_m)
+    trials = _trials(Condition.LANDMARKS)
+    put = []
+    moved = []
+    for trial in trials:
+        x_m, y_m = trial.target[0] + 0.1, trial.target[1] - 0.3
+        (turned_m,) = turned(((x_m, y_m),), trial.side * CONFLICT_RAD)
+        put.append(Response(x_m, y_m, 0))
+        moved.append(Response(*turned_m, 0))
 
-    assert analysis.errors(trials, moved) == pytest.approx(expected, abs=1e-4)
+    errors_m = analysis.errors(trials, put)
+    expected_m = analysis.turned_errors(errors_m, analysis.shift_m(trials))
+
+    assert analysis.errors(trials, moved) == pytest.approx(expected_m, abs=1e-4)
 
 
 def test_two_cues_combine_by_their_precision() -> None:
-    assert analysis.landmark_weight(0.5, 0.4) == pytest.approx(0.25 / 0.41)
-    assert analysis.optimal_sd_m(0.5, 0.4) == pytest.approx((0.5**-2 + 0.4**-2) ** -0.5)
+    weight = 0.25 / 0.41
+    sd_m = (0.5**-2 + 0.4**-2) ** -0.5
+    assert analysis.landmark_weight(0.5, 0.4) == pytest.approx(weight)
+    assert analysis.optimal_sd_m(0.5, 0.4) == pytest.approx(sd_m)
 
-    first, second = (
-        Gaussian(np.array([x, 0.0]), np.eye(2) * sd**2) for x, sd in ((0.0, 0.5), (1.0, 0.4))
-    )
-    both = analysis.combined(first, second)
+    self_motion_cue = Gaussian(np.array([0.0, 0.0]), np.eye(2) * 0.5**2)
+    landmark_cue = Gaussian(np.array([1.0, 0.0]), np.eye(2) * 0.4**2)
+    both = analysis.combined(self_motion_cue, landmark_cue)
+    variance_m2 = both.covariance_m2[0, 0]
 
-    assert both.mean_m == pytest.approx([0.25 / 0.41, 0.0])
-    assert both.covariance_m2[0, 0] ** 0.5 == pytest.approx(analysis.optimal_sd_m(0.5, 0.4))
+    assert both.mean_m == pytest.approx([weight, 0.0])
+    assert variance_m2**0.5 == pytest.approx(sd_m)
 
 
 def _outcome(conflict_m: np.ndarray) -> Outcome:
     rng = np.random.default_rng(1)
-    single = {
-        Condition.SELF_MOTION: rng.normal(0, 0.35, (400, 2)),
-        Condition.LANDMARKS: rng.normal(0, 0.28, (400, 2)),
-        Condition.BOTH: rng.normal(0, 0.22, (400, 2)),
+    errors_m = {
+        Condition.SELF_MOTION: rng.normal(0, SELF_MOTION_SD_M, (400, 2)),
+        Condition.LANDMARKS: rng.normal(0, LANDMARKS_SD_M, (400, 2)),
+        Condition.BOTH: rng.normal(0, BOTH_SD_M, (400, 2)),
+        Condition.CONFLICT: conflict_m,
     }
-    return Outcome(NOISY, {**single, Condition.CONFLICT: conflict_m}, 0.457)
+    return Outcome(NOISY, errors_m, SHIFT_M)
+
+
+def _landmark_weight() -> float:
+    """The weight of landmarks in a response that combines both cues by their precision."""
+    self_motion_m2 = SELF_MOTION_SD_M**2
+    landmarks_m2 = LANDMARKS_SD_M**2
+    return self_motion_m2 / (self_motion_m2 + landmarks_m2)
+
+
+def _between(rng: np.random.Generator) -> np.ndarray:
+    """(400, 2): errors of responses between the cues, weighted by their precision."""
+    return rng.normal((_landmark_weight() * SHIFT_M, 0), BOTH_SD_M, (400, 2))
 
 
 def test_responses_between_the_cues_are_likelier_under_integration() -> None:
     rng = np.random.default_rng(2)
-    weight = 0.35**2 / (0.35**2 + 0.28**2)
-    between = rng.normal((weight * 0.457, 0), 0.22, (400, 2))
-    follows = rng.random((400, 1)) < weight
-    either = np.where(
-        follows, rng.normal((0.457, 0), 0.28, (400, 2)), rng.normal(0, 0.35, (400, 2))
-    )
+    between = _between(rng)
+    follows = rng.random((400, 1)) < _landmark_weight()
+    by_landmarks = rng.normal((SHIFT_M, 0), LANDMARKS_SD_M, (400, 2))
+    by_self_motion = rng.normal(0, SELF_MOTION_SD_M, (400, 2))
+    either = np.where(follows, by_landmarks, by_self_motion)
 
-    assert _outcome(between).metrics()["integration_over_best_alternation"] > 0
-    assert _outcome(either).metrics()["integration_over_alternation"] < 0
+    integrating = _outcome(between).metrics()
+    alternating = _outcome(either).metrics()
+
+    assert integrating["integration_over_best_alternation"] > 0
+    assert alternating["integration_over_alternation"] < 0
 
 
 def test_one_lost_trial_turns_the_sum_of_likelihoods_but_not_the_median() -> None:
-    rng = np.random.default_rng(2)
-    weight = 0.35**2 / (0.35**2 + 0.28**2)
-    between = rng.normal((weight * 0.457, 0), 0.22, (400, 2))
+    between = _between(np.random.default_rng(2))
     between[7] = (9.0, 7.0)
-    figures = _outcome(between).metrics()
+    metrics = _outcome(between).metrics()
 
-    assert figures["integration_over_alternation"] < 0
-    assert figures["integration_over_alternation_median_of_a_trial"] > 0
-    assert figures["integration_likelier_share"] > 0.5
-    assert figures["lost_trials_conflict"] == 1.0 and figures["lost_trials_both"] == 0.0
+    assert metrics["integration_over_alternation"] < 0
+    assert metrics["integration_over_alternation_median_of_a_trial"] > 0
+    assert metrics["integration_likelier_share"] > 0.5
+    assert metrics["lost_trials_conflict"] == 1.0
+    assert metrics["lost_trials_both"] == 0.0
 
 
 def test_coordinate_descent_finds_the_lowest_cost() -> None:
     def cost(noise: Noise) -> float:
-        return math.log(noise.speed / 0.3) ** 2 + math.log(noise.turn / 0.07) ** 2
+        off_speed = math.log(noise.speed / 0.3)
+        off_turn = math.log(noise.turn / 0.07)
+        return off_speed**2 + off_turn**2
 
-    found = coordinate_descent(cost, Noise(0.1, 0.1), (1.5, 1.2, 1.05))
-    assert (found.speed, found.turn) == pytest.approx((0.3, 0.07), rel=0.05)
+    start = Noise(0.1, 0.1)
+    found = coordinate_descent(cost, start, (1.5, 1.2, 1.05))
+
+    assert found.speed == pytest.approx(0.3, rel=0.05)
+    assert found.turn == pytest.approx(0.07, rel=0.05)

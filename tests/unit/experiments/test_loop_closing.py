@@ -16,9 +16,15 @@ from services.sim.odometry import Noise
 DECAY = 0.2
 
 
+def _strength(positions_m: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """The strength of the synapse of each pair of places."""
+    between_m = positions_m[pairs[:, 0]] - positions_m[pairs[:, 1]]
+    return np.exp(-DECAY * np.hypot(*between_m.T))
+
+
 def _replayed(before: np.ndarray, after: np.ndarray, pairs: np.ndarray) -> Replayed:
-    apart = [np.hypot(*(where[pairs[:, 0]] - where[pairs[:, 1]]).T) for where in (before, after)]
-    told = Replay(
+    changes = _strength(after, pairs) - _strength(before, pairs)
+    replay = Replay(
         cycle=1,
         replays=3,
         closed=["closure:1"],
@@ -27,30 +33,37 @@ def _replayed(before: np.ndarray, after: np.ndarray, pairs: np.ndarray) -> Repla
         positions_m=Array.of(before),
         shifts_m=Array.of(after - before),
         pairs=Array.of(pairs.astype(np.int32)),
-        strength_changes=Array.of(np.exp(-DECAY * apart[1]) - np.exp(-DECAY * apart[0])),
+        strength_changes=Array.of(changes),
         decay_per_m=DECAY,
     )
-    return Replayed.of(told)
+    return Replayed.of(replay)
 
 
 def _squeezed() -> Replayed:
     """A straight path of places 2.5 m apart, each step shortened by chance, and its ends brought
     together.
     """
-    before = np.column_stack([np.arange(0.0, 100.0, 2.5), np.zeros(40)])
-    after = before * (0.9, 1.0) + np.random.default_rng(0).normal(0.0, 0.05, before.shape)
+    before = np.zeros((40, 2))
+    before[:, 0] = np.arange(0.0, 100.0, 2.5)
+
+    rng = np.random.default_rng(0)
+    after = before * (0.9, 1.0) + rng.normal(0.0, 0.05, before.shape)
     after[-1] = after[0]
-    neighbours = np.column_stack([np.arange(39), np.arange(1, 40)])
-    return _replayed(before, after, np.vstack([neighbours, [[0, 39]]]))
+
+    numbers = np.arange(40)
+    neighbours = np.column_stack([numbers[:-1], numbers[1:]])
+    ends = [[0, 39]]
+    return _replayed(before, after, np.vstack([neighbours, ends]))
 
 
 def _loop(error_m: float) -> Loop:
     there = np.zeros((5, 2))
-    off = Map(
-        there + np.array([error_m, 0.0]), there, there + np.array([0.0, error_m]), there, there
-    )
-    exact = Map(there, there, there, there, there)
+    ahead = there + np.array([error_m, 0.0])
+    aside = there + np.array([0.0, error_m])
     wheels_m = there + np.array([2 * error_m, 0.0])
+
+    off = Map(ahead, there, aside, there, there)
+    exact = Map(there, there, there, there, there)
     return Loop(off, exact, off, there, wheels_m, [_squeezed()])
 
 
@@ -89,9 +102,10 @@ def test_where_only_distances_err_the_rule_leaves_a_brownian_bridge() -> None:
     distances = Noise(speed=0.05, turn=0.0, drift_rad_per_sqrt_m=0.0)
     square = ((0.0, 0.0), (50.0, 0.0), (50.0, 50.0), (0.0, 50.0), (0.0, 0.0))
     laps = close_laps(square, 1.0, distances, 400, seed=3)
+    variance_ratio = np.mean(laps.after_m**2) / np.mean(laps.before_m**2)
 
     # Half of the whole variance on the mean before, a sixth of it after.
-    assert np.mean(laps.after_m**2) / np.mean(laps.before_m**2) == pytest.approx(1 / 3, rel=0.15)
+    assert variance_ratio == pytest.approx(1 / 3, rel=0.15)
     assert laps.helped > 0.8
 
 
@@ -115,5 +129,9 @@ def test_without_noise_nothing_errs() -> None:
 
 def test_the_way_ends_on_the_street_where_it_began() -> None:
     line = trajectory()["line_m"]
+    start, corner = line[:2]
+    back, end = line[-2:]
 
-    assert line[0] == line[-2] and line[-1][1] == line[0][1] and 0 < line[-1][0] < line[1][0]
+    assert back == start
+    assert end[1] == start[1]
+    assert 0 < end[0] < corner[0]

@@ -43,31 +43,35 @@ def _heard(configured: Sections, modules: Sequence[Module]) -> Transcript:
 def test_a_replayed_sensor_log_gives_the_bytes_that_the_senses_would() -> None:
     shares: list[float] = []
     both = by_cameras({"first": _short(), "again": _short()}, COGNITION, _heard, shares.append)
-    names = [each.name for each in (topics.PERCEPTS, topics.DELTA, topics.MOTOR_COMMAND)]
-    first, again = (both[name].messages for name in ("first", "again"))
+    first = both["first"].messages
+    again = both["again"].messages
 
-    assert [len(first[name]) for name in (names[0], names[2])] == [FRAMES, FRAMES]
-    assert first[names[1]] == again[names[1]]
-    assert first[names[2]] == again[names[2]]
-    assert shares == sorted(shares) and shares[-1] == 1.0
+    assert len(first[topics.PERCEPTS.name]) == FRAMES
+    assert len(first[topics.MOTOR_COMMAND.name]) == FRAMES
+    assert first[topics.DELTA.name] == again[topics.DELTA.name]
+    assert first[topics.MOTOR_COMMAND.name] == again[topics.MOTOR_COMMAND.name]
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
 
 
 def test_with_cameras_landmarks_become_buildings_of_the_catalogue() -> None:
     told = sections(1, "heading")
-    seeing = with_cameras(told)
+    simulated = with_cameras(told)["sim"]
+    seen_along = simulated["trajectory"]
+    names = [landmark["name"] for landmark in seen_along["landmarks"]]
 
-    assert [each["name"] for each in seeing["sim"]["trajectory"]["landmarks"][:2]] == [
-        "bakery",
-        "library",
-    ]
-    assert "percepts" not in seeing["sim"] and seeing["sim"]["trajectory"]["sensing"] == "cameras"
-    assert seeing["sim"]["awaits"] == {**told["sim"]["awaits"], "sensory": 1, "epam": 1}
+    assert names[:2] == ["bakery", "library"]
+    assert seen_along["sensing"] == "cameras"
+    assert "percepts" not in simulated
+    assert simulated["awaits"] == {**told["sim"]["awaits"], "sensory": 1, "epam": 1}
     assert "sensing" not in told["sim"]["trajectory"]
 
 
 def test_more_landmarks_than_there_are_kinds_of_building_are_refused() -> None:
+    landmarks = [{"x_m": 20.0 * k, "y_m": 14.0} for k in range(25)]
+
     with pytest.raises(CogmapError, match="too few for 25"):
-        named([{"x_m": 20.0 * k, "y_m": 14.0} for k in range(25)])
+        named(landmarks)
 
 
 def test_the_room_with_cameras_sees_its_landmarks_where_they_are() -> None:
@@ -76,30 +80,29 @@ def test_the_room_with_cameras_sees_its_landmarks_where_they_are() -> None:
         _, percepts = room.begin()
     finally:
         room.close()
-    assert isinstance(percepts, Percepts)
 
+    assert isinstance(percepts, Percepts)
     seen = {each.label: each for each in percepts.objects}
-    for name, (x_m, y_m) in zip(("bakery", "library", "town_hall"), LANDMARKS, strict=True):
+    names = ("bakery", "library", "town_hall")
+    for name, (x_m, y_m) in zip(names, LANDMARKS, strict=True):
         forward_m = y_m - 0.0
         left_m = 2.5 - x_m
+        range_m = math.hypot(forward_m, left_m)
+        bearing_rad = math.atan2(left_m, forward_m)
 
-        assert seen[name].range_m == pytest.approx(math.hypot(forward_m, left_m), rel=0.1)
-        assert seen[name].bearing_rad == pytest.approx(math.atan2(left_m, forward_m), abs=0.05)
+        assert seen[name].range_m == pytest.approx(range_m, rel=0.1)
+        assert seen[name].bearing_rad == pytest.approx(bearing_rad, abs=0.05)
 
 
 def test_nothing_is_seen_in_the_dark() -> None:
+    wait = Action(stamp_ns=1, cycle=1, scheme="wait", activation=1.0, parameters={})
+    step = {"turn_rad": 0.0, "forward_m": 0.1}
+    walk = Action(stamp_ns=2, cycle=2, scheme="walk", activation=1.0, parameters=step)
+
     room = PicturedRoom(Trial(Condition.SELF_MOTION, 0, FITTED, 1))
     try:
-        room.act(Action(stamp_ns=1, cycle=1, scheme="wait", activation=1.0, parameters={}))
-        _, percepts = room.act(
-            Action(
-                stamp_ns=2,
-                cycle=2,
-                scheme="walk",
-                activation=1.0,
-                parameters={"turn_rad": 0.0, "forward_m": 0.1},
-            )
-        )
+        room.act(wait)
+        _, percepts = room.act(walk)
     finally:
         room.close()
 
@@ -107,13 +110,17 @@ def test_nothing_is_seen_in_the_dark() -> None:
     assert percepts.objects == []
 
 
+def _commanded(left_rad_s: float) -> Transcript:
+    """A transcript of one command to the wheels."""
+    heard = Transcript([topics.MOTOR_COMMAND, topics.DELTA])
+    command = MotorCommand(stamp_ns=1, left_wheel_rad_s=left_rad_s, right_wheel_rad_s=1.0)
+    heard.module().feed(command)
+    return heard
+
+
 def test_bytes_that_differ_are_named_by_their_topic_and_end_the_command() -> None:
-    one = Transcript([topics.MOTOR_COMMAND, topics.DELTA])
-    other = Transcript([topics.MOTOR_COMMAND, topics.DELTA])
-    for heard, speed_rad_s in ((one, 1.0), (other, 2.0)):
-        heard.module().feed(
-            MotorCommand(stamp_ns=1, left_wheel_rad_s=speed_rad_s, right_wheel_rad_s=1.0)
-        )
+    one = _commanded(1.0)
+    other = _commanded(2.0)
 
     assert one.has_as_many_as(other)
     assert one.differs_from(other) == ["motor/command"]
