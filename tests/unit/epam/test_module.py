@@ -4,6 +4,7 @@ and nothing learned twice.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import msgspec
@@ -20,6 +21,7 @@ from schemas.base import Message
 from schemas.sensing import Learned, Percepts, View
 from services.epam.module import Config, build
 from tests.support.blocks import CAMERA
+from tests.support.messages import of_type
 from tests.support.rendered import seen
 from training.rendering.towns import render_town
 
@@ -33,13 +35,8 @@ def views() -> list[View]:
 
 
 def _percepts(module: Module, view: View) -> Percepts:
-    (said,) = (message for message in module.feed(view) if isinstance(message, Percepts))
-    return said
-
-
-def _content(message: Message) -> bytes:
-    """Its bytes, apart from how many were published before."""
-    return codec.encode(msgspec.structs.replace(message, seq=0, source=""))
+    (found,) = of_type(Percepts, module.feed(view))
+    return found
 
 
 def _view(image: np.ndarray, depth_m: np.ndarray) -> View:
@@ -48,16 +45,27 @@ def _view(image: np.ndarray, depth_m: np.ndarray) -> View:
     )
 
 
+def _learned(module: Module, view: View) -> list[Learned]:
+    return of_type(Learned, module.feed(view))
+
+
+def _contents(messages: Sequence[Message]) -> list[bytes]:
+    """Their bytes, apart from how many were published before."""
+    return [
+        codec.encode(msgspec.structs.replace(message, seq=0, source="")) for message in messages
+    ]
+
+
 def test_a_view_without_contrast_gives_empty_percepts() -> None:
-    blank = _view(np.zeros((240, 320, 3), np.uint8), np.zeros((240, 320), np.float32))
-    said = build(Config(), "epam").feed(blank)
+    black = np.zeros((240, 320, 3), np.uint8)
+    unknown = np.zeros((240, 320), np.float32)
+    (percepts,) = build(Config(), "epam").feed(_view(black, unknown))
 
-    assert len(said) == 1
-
-    percepts = said[0]
     assert isinstance(percepts, Percepts)
-    assert (percepts.objects, percepts.matches) == ([], [])
-    assert (percepts.road_m.shape, percepts.road_boundary_m.shape) == ((0, 2), (0, 2))
+    assert percepts.objects == []
+    assert percepts.matches == []
+    assert percepts.road_m.shape == (0, 2)
+    assert percepts.road_boundary_m.shape == (0, 2)
     assert (percepts.stamp_ns, percepts.frame) == (5, 3)
 
 
@@ -87,8 +95,9 @@ def test_base_level_activation_adds_to_the_current_one(views: list[View]) -> Non
 
 def test_a_percept_is_outlined_boxed_and_measured(views: list[View]) -> None:
     module = build(Config(), "epam")
-    found = [percept for view in views for percept in _percepts(module, view).objects]
-
+    found = []
+    for view in views:
+        found += _percepts(module, view).objects
     assert len(found) > 5
 
     for percept in found:
@@ -103,45 +112,46 @@ def test_a_percept_is_outlined_boxed_and_measured(views: list[View]) -> None:
 
 def test_a_view_has_one_percept_of_each_node(views: list[View]) -> None:
     module = build(Config(), "epam")
+
     for view in views:
-        labels = [percept.label for percept in _percepts(module, view).objects]
+        percepts = _percepts(module, view).objects
+        labels = [percept.label for percept in percepts]
         assert len(labels) == len(set(labels))
 
 
 def test_the_same_views_give_the_same_bytes(views: list[View]) -> None:
-    answers = []
-    for _ in range(2):
-        module = build(Config(), "epam")
-        answers.append([codec.encode(said) for view in views for said in module.feed(view)])
+    first = build(Config(), "epam")
+    second = build(Config(), "epam")
 
-    assert answers[0] == answers[1]
+    for view in views:
+        answers = [codec.encode(answer) for answer in first.feed(view)]
+        again = [codec.encode(answer) for answer in second.feed(view)]
+        assert answers == again
 
 
 def test_objects_and_views_learned_before_a_restart_are_known_after_it(
     views: list[View], tmp_path: Path
 ) -> None:
     first = build(Config(), "epam")
+    assert first.journal is topics.LEARNED
     journal = Journal(tmp_path / "epam")
     assert list(journal.messages()) == []
-
     for view in views:
-        for said in first.feed(view):
-            if isinstance(said, Learned):
-                journal.append(said, codec.encode(said))
+        for learned in _learned(first, view):
+            journal.append(learned, codec.encode(learned))
     journal.close()
+
     again = build(Config(), "epam")
     assert again.restore is not None
-
     again.restore(Journal(tmp_path / "epam").messages())
-
-    assert first.journal is topics.LEARNED
     assert first.compact is not None
     assert again.compact is not None
     assert codec.encode(again.compact()) == codec.encode(first.compact())
 
     labels = {percept.label for percept in _percepts(first, views[1]).objects}
+    labels_again = {percept.label for percept in _percepts(again, views[1]).objects}
     assert any(label.startswith("new-building-") for label in labels)
-    assert {percept.label for percept in _percepts(again, views[1]).objects} == labels
+    assert labels_again == labels
 
 
 def test_a_view_published_again_gets_its_percepts_again_and_teaches_nothing(
@@ -153,7 +163,7 @@ def test_a_view_published_again_gets_its_percepts_again_and_teaches_nothing(
         again = module.feed(view)
 
         assert len(learned) <= 1
-        assert [_content(message) for message in again] == [_content(percepts)]
+        assert _contents(again) == _contents([percepts])
 
 
 def test_a_restart_amid_a_view_learns_nothing_from_it_twice(
@@ -189,33 +199,37 @@ def test_a_restart_amid_a_view_learns_nothing_from_it_twice(
 def test_the_last_view_learned_from_before_a_restart_teaches_nothing(views: list[View]) -> None:
     view = views[1]
     fresh = build(Config(), "epam")
+    answers = [type(message) for message in fresh.feed(view)]
+    assert answers == [Learned, Percepts]
+
     restarted = build(Config(), "epam")
     assert restarted.restore is not None
-
     restarted.restore([Learned(stamp_ns=view.stamp_ns, frame=view.frame)])
-
-    assert [type(message) for message in fresh.feed(view)] == [Learned, Percepts]
-    assert [type(message) for message in restarted.feed(view)] == [Percepts]
+    answers = [type(message) for message in restarted.feed(view)]
+    assert answers == [Percepts]
 
 
 def test_after_a_restart_the_next_view_is_learned_from(views: list[View]) -> None:
     first = build(Config(), "epam")
     second = build(Config(), "epam")
     assert second.restore is not None
-
     second.restore(first.feed(views[0]))
 
+    learned = []
     for view in views[1:]:
-        expected = [message for message in first.feed(view) if isinstance(message, Learned)]
-        found = [message for message in second.feed(view) if isinstance(message, Learned)]
-        assert [_content(message) for message in found] == [
-            _content(message) for message in expected
-        ]
+        expected = _learned(first, view)
+        found = _learned(second, view)
+        assert _contents(found) == _contents(expected)
+        learned += found
+
+    assert learned
 
 
 def test_a_first_view_at_time_0_is_learned_from(views: list[View]) -> None:
+    module = build(Config(), "epam")
     at_start = msgspec.structs.replace(views[0], stamp_ns=0, frame=0)
-    learned, _ = build(Config(), "epam").feed(at_start)
+
+    learned, _ = module.feed(at_start)
     assert isinstance(learned, Learned)
 
 
@@ -248,8 +262,11 @@ def test_one_message_stands_for_all_that_was_learned(views: list[View]) -> None:
     ],
 )
 def test_an_invalid_view_is_refused(image: np.ndarray, depth: np.ndarray) -> None:
+    module = build(Config(), "epam")
+    invalid = _view(image, depth)
+
     with pytest.raises(MessageError, match="view"):
-        build(Config(), "epam").feed(_view(image, depth))
+        module.feed(invalid)
 
 
 def test_a_view_of_noise_gives_valid_messages() -> None:
@@ -257,13 +274,17 @@ def test_a_view_of_noise_gives_valid_messages() -> None:
     for seed in range(4):
         rng = np.random.default_rng(seed)
         image = rng.integers(0, 256, (240, 320, 3), np.uint8)
-        depth_m = (10.0 ** rng.uniform(-30, 30, (240, 320))).astype(np.float32)
+        exponent = rng.uniform(-30, 30, (240, 320))
+        depth_m = (10.0**exponent).astype(np.float32)
         view = msgspec.structs.replace(_view(image, depth_m), frame=seed)
-        for said in module.feed(view):
-            codec.decode(topics.of(said), codec.encode(said))
+
+        for answer in module.feed(view):
+            codec.decode(topics.of(answer), codec.encode(answer))
 
 
 @pytest.mark.parametrize("weights", ["segments_weights", "object_weights", "road_weights"])
 def test_missing_weights_are_named_with_the_remedy(weights: str, tmp_path: Path) -> None:
+    config = Config(**{weights: str(tmp_path / "nowhere.onnx")})
+
     with pytest.raises(ConfigError, match=r"nowhere\.onnx.*cogmap train"):
-        build(Config(**{weights: str(tmp_path / "nowhere.onnx")}), "epam")
+        build(config, "epam")

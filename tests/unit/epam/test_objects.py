@@ -80,8 +80,9 @@ def test_an_unknown_object_has_no_label_until_it_is_learned(
 
 
 def test_an_excluded_label_is_not_considered(recognizer: ObjectRecognizer) -> None:
-    found = recognizer.recognize(_appearance(1, 0, 0.35))
-    other = recognizer.recognize(_appearance(1, 0, 0.35), {"bank"})
+    bank = _appearance(1, 0, 0.35)
+    found = recognizer.recognize(bank)
+    other = recognizer.recognize(bank, {"bank"})
 
     assert (found.label, other.label) == ("bank", "bakery")
     assert other.activation > found.unknown
@@ -105,11 +106,13 @@ def test_an_objects_cosine_is_that_of_its_most_similar_appearance(
     before = recognizer.recognize(_appearance(6))
     recognizer.learn("new-building-1", _direction(6))
     after = recognizer.recognize(_appearance(6))
+    first_side = recognizer.recognize(_appearance(5))
+    labels = [label for label, _ in recognizer.learned]
 
     assert not before.known
     assert after.label == "new-building-1"
-    assert after.activation == recognizer.recognize(_appearance(5)).activation
-    assert [label for label, _ in recognizer.learned] == ["new-building-1", "new-building-1"]
+    assert after.activation == first_side.activation
+    assert labels == ["new-building-1", "new-building-1"]
 
 
 def test_an_appearance_is_new_if_it_differs_from_the_few_that_are_known(
@@ -134,18 +137,21 @@ def test_an_appearance_is_new_if_it_differs_from_the_few_that_are_known(
 def test_posteriors_sum_to_1_over_labels_unknown_building_and_background() -> None:
     taught = np.array([[0.9, 0.1], [0.1, 0.2]] * 2, np.float32)
     novel = np.full((4, 1), 0.2, np.float32)
-    posterior = posteriors(taught, novel, np.array([1.0, 0.9, 0.2, 0.0]), PROTOTYPES)
+    building = np.array([1.0, 0.9, 0.2, 0.0])
+    posterior = posteriors(taught, novel, building, PROTOTYPES)
+    sums = posterior.sum(axis=1)
 
     assert posterior.shape == (4, 5)
-    np.testing.assert_allclose(posterior.sum(1), 1.0)
-    assert posterior.argmax(1).tolist() == [0, 3, 4, 4]
+    np.testing.assert_allclose(sums, 1.0)
+    assert posterior.argmax(axis=1).tolist() == [0, 3, 4, 4]
 
 
 def test_the_committed_prototypes_have_the_catalogues_names_and_sizes() -> None:
     recognizer = load()
     for kind in CATALOGUE:
-        longer, shorter = sorted((kind.width_m, kind.depth_m), reverse=True)
-        assert recognizer.sizes_m[kind.name] == pytest.approx((longer, shorter, kind.height_m))
+        longer_m, shorter_m = sorted((kind.width_m, kind.depth_m), reverse=True)
+        expected_m = (longer_m, shorter_m, kind.height_m)
+        assert recognizer.sizes_m[kind.name] == pytest.approx(expected_m)
 
 
 def test_weights_without_their_prototypes_are_refused_with_the_remedy(tmp_path: Path) -> None:

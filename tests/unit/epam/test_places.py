@@ -4,6 +4,8 @@ another heading.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import cv2
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +22,7 @@ HEIGHT = 240
 WIDTH = 320
 LENGTH = 60
 NEAR = np.full((HEIGHT, WIDTH), 10.0, np.float32)
+PERIOD_NS = 200_000_000
 
 
 class Route:
@@ -47,15 +50,21 @@ def _drive(
     matches: list[PlaceMatch | None] = []
     remembered = []
     for number, image in enumerate(views, first):
-        found, new = recognizer.observe(number, 200_000_000 * number, image, NEAR)
+        found, new = recognizer.observe(number, PERIOD_NS * number, image, NEAR)
         assert len(found) <= 1
         matches.append(found[0] if found else None)
         remembered += new
+
     return matches, remembered
 
 
+def _along(route: Route, places: Iterable[float]) -> list[Image]:
+    """The views of a route at some of its places."""
+    return [route.view(place) for place in places]
+
+
 def _lap(route: Route) -> list[Image]:
-    return [route.view(place) for place in range(LENGTH)]
+    return _along(route, range(LENGTH))
 
 
 def _recognizer_after(route: Route) -> PlaceRecognizer:
@@ -86,25 +95,26 @@ def test_a_route_is_recognized_in_other_light_at_other_speed_and_heading() -> No
 
 def test_on_a_new_route_nothing_matches_and_every_view_is_remembered() -> None:
     recognizer = _recognizer_after(Route(1))
-    matches, remembered = _drive(recognizer, _lap(Route(2)), LENGTH)
+    new_route = Route(2)
+    matches, remembered = _drive(recognizer, _lap(new_route), LENGTH)
+    frames = [view.frame for view in remembered]
 
     assert not any(matches)
-    assert [view.frame for view in remembered] == list(range(LENGTH, 2 * LENGTH))
+    assert frames == list(range(LENGTH, 2 * LENGTH))
 
 
 def test_a_single_view_is_no_match() -> None:
     route = Route(1)
-    other = Route(2)
     recognizer = _recognizer_after(route)
-    elsewhere = [other.view(place) for place in range(20)]
-    matches, _ = _drive(recognizer, [*elsewhere[:10], route.view(15), *elsewhere[10:]], LENGTH)
+    before = _along(Route(2), range(10))
+    after = _along(Route(2), range(10, 20))
+    matches, _ = _drive(recognizer, [*before, route.view(15), *after], LENGTH)
 
     assert not any(matches)
 
 
 def test_the_most_recent_views_do_not_match() -> None:
-    route = Route(1)
-    there = [route.view(place) for place in range(12)]
+    there = _along(Route(1), range(12))
     matches, _ = _drive(PlaceRecognizer(), [*there, *there])
 
     assert not any(matches)
@@ -121,13 +131,14 @@ def test_a_recognized_place_is_not_remembered_again() -> None:
 
 
 def test_a_robot_at_rest_remembers_one_view() -> None:
-    recognizer = PlaceRecognizer()
     rng = np.random.default_rng(0)
     image = Route(1).view(3).astype(np.int16)
-    noisy = [
-        np.clip(image + rng.normal(0, 5, image.shape), 0, 255).astype(np.uint8) for _ in range(20)
-    ]
-    _, remembered = _drive(recognizer, noisy)
+    noisy = []
+    for _ in range(20):
+        values = image + rng.normal(0, 5, image.shape)
+        noisy.append(np.clip(values, 0, 255).astype(np.uint8))
+
+    _, remembered = _drive(PlaceRecognizer(), noisy)
 
     assert len(remembered) == 1
 
@@ -135,9 +146,8 @@ def test_a_robot_at_rest_remembers_one_view() -> None:
 def test_at_rest_the_last_match_is_returned_again() -> None:
     route = Route(1)
     recognizer = _recognizer_after(route)
-    matches, _ = _drive(
-        recognizer, [route.view(place) for place in (5, 6, 7, 8, 9, 10, 10, 10)], LENGTH
-    )
+    until_rest = _along(route, (5, 6, 7, 8, 9, 10, 10, 10))
+    matches, _ = _drive(recognizer, until_rest, LENGTH)
 
     assert matches[-1] is not None
     assert matches[-3] == matches[-2] == matches[-1]
@@ -158,9 +168,9 @@ def test_a_view_that_shows_no_place_is_neither_remembered_nor_matched(
 ) -> None:
     route = Route(1)
     recognizer = _recognizer_after(route)
-    matches, _ = _drive(recognizer, [route.view(place) for place in range(10)], LENGTH)
-
+    matches, _ = _drive(recognizer, _along(route, range(10)), LENGTH)
     assert matches[-1] is not None
+
     assert recognizer.observe(99, 99, image, depth_m) == ([], [])
 
 
@@ -170,40 +180,44 @@ def test_views_remembered_before_a_restart_are_recognized_after_it() -> None:
     restarted = PlaceRecognizer()
     for view in recognizer.all:
         restarted.restore([view])
-
     assert list(restarted.all) == list(recognizer.all)
 
     again = [route.view(place, evening=True) for place in range(30)]
     matches, _ = _drive(restarted, again, LENGTH)
-    assert [match.frame for match in matches[5:] if match] == list(range(5, 30))
+    frames = [match.frame for match in matches[5:] if match]
+    assert frames == list(range(5, 30))
 
 
 def test_at_rest_after_a_restart_no_view_is_remembered_again() -> None:
-    recognizer = _recognizer_after(Route(1))
+    route = Route(1)
+    recognizer = _recognizer_after(route)
     restarted = PlaceRecognizer()
     restarted.restore(recognizer.all)
-    last = Route(1).view(LENGTH - 1)
+    last = route.view(LENGTH - 1)
 
     assert restarted.observe(LENGTH, LENGTH, last, NEAR) == ([], [])
 
 
 def test_beyond_the_capacity_the_oldest_views_are_forgotten() -> None:
     first = Route(1)
-    second = Route(2)
     third = Route(3)
     recognizer = PlaceRecognizer(PlaceConfig(capacity=150))
-    _drive(recognizer, [*_lap(first), *_lap(second), *_lap(third)])
+    _drive(recognizer, [*_lap(first), *_lap(Route(2)), *_lap(third)])
     kept = [view.frame for view in recognizer.all]
 
     assert len(kept) <= 150
     assert kept == list(range(kept[0], 3 * LENGTH))
-    assert not any(_drive(recognizer, [first.view(place) for place in range(20)], 200)[0])
-    assert any(_drive(recognizer, [third.view(place) for place in range(20)], 300)[0])
+
+    forgotten, _ = _drive(recognizer, _along(first, range(20)), 200)
+    known, _ = _drive(recognizer, _along(third, range(20)), 300)
+    assert not any(forgotten)
+    assert any(known)
 
 
 def test_the_same_views_give_the_same_answers() -> None:
     route = Route(1)
-    views = [*_lap(route), *(route.view(place, 6, evening=True) for place in range(20))]
+    again = [route.view(place, 6, evening=True) for place in range(20)]
+    views = [*_lap(route), *again]
 
     assert _drive(PlaceRecognizer(), views) == _drive(PlaceRecognizer(), views)
 
@@ -212,5 +226,7 @@ def test_the_same_views_give_the_same_answers() -> None:
     "code", [np.zeros(DESCRIPTOR_BYTES - 1, np.uint8), np.zeros(DESCRIPTOR_BYTES, np.float32)]
 )
 def test_a_descriptor_of_another_type_or_size_is_refused(code: npt.NDArray[np.generic]) -> None:
+    view = RememberedView(frame=5, view_ns=5, code=Array.of(code))
+
     with pytest.raises(MessageError, match="remembered view 5: expected a uint8 code of 384"):
-        PlaceRecognizer().restore([RememberedView(frame=5, view_ns=5, code=Array.of(code))])
+        PlaceRecognizer().restore([view])

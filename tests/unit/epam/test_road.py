@@ -33,6 +33,11 @@ HALF_M = 4.0
 SEED = 4001
 VIEWS = 6
 FOCAL_BASELINE = CAMERA.fx_px * CAMERA.baseline_m
+SIZE = (240, 320)
+HORIZON = 121
+ROAD = 3
+OTHER = 4
+VOID = 11
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,18 +49,19 @@ class Street:
 
 
 def _street(*blocks: Block, height_m: float = CAMERA.mount_height_m) -> Street:
-    _, depth_m, label = painted(list(blocks))
-    rows, columns = np.indices(depth_m.shape)
-    depth_m = np.where(label > 0, depth_m, depth_m * np.float32(height_m / CAMERA.mount_height_m))
+    _, painted_m, label = painted(list(blocks))
+    lower = np.float32(height_m / CAMERA.mount_height_m)
+    depth_m = np.where(label > 0, painted_m, painted_m * lower)
+
+    rows, columns = np.indices(SIZE)
     left_m = (CAMERA.cx_px - columns) / CAMERA.fx_px * depth_m
     ground = (rows > CAMERA.cy_px) & (label == 0) & (depth_m > 0)
     return Street((np.abs(left_m) < HALF_M) & ground, depth_m)
 
 
 def _projected(street: Street, depth_m: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    return project(
-        street.mask.astype(np.float32), street.depth_m if depth_m is None else depth_m, CAMERA
-    )
+    likelihood = street.mask.astype(np.float32)
+    return project(likelihood, street.depth_m if depth_m is None else depth_m, CAMERA)
 
 
 @pytest.fixture(scope="module")
@@ -63,14 +69,21 @@ def segmenter() -> RoadSegmenter:
     return load()
 
 
+def _edge_errors_m(boundary_m: np.ndarray) -> np.ndarray:
+    """How far points of the boundary are from the two sides of the street."""
+    aside_m = np.abs(boundary_m[:, 1])
+    return np.abs(aside_m - HALF_M)
+
+
 def test_a_straight_street_ends_at_its_two_sides_and_nowhere_else() -> None:
     road_m, boundary_m = _projected(_street())
-
     assert len(boundary_m) > 30
-    assert np.quantile(np.abs(np.abs(boundary_m[:, 1]) - HALF_M), 0.9) < 0.1
-    assert (np.abs(road_m[:, 1]) < HALF_M).all()
-    assert road_m[:, 0].min() < 4.0
-    assert road_m[:, 0].max() > 14.0
+    assert np.quantile(_edge_errors_m(boundary_m), 0.9) < 0.1
+
+    ahead_m, left_m = road_m.T
+    assert (np.abs(left_m) < HALF_M).all()
+    assert ahead_m.min() < 4.0
+    assert ahead_m.max() > 14.0
 
 
 def test_road_and_boundary_are_float32_with_one_point_a_cell_in_range() -> None:
@@ -83,15 +96,15 @@ def test_road_and_boundary_are_float32_with_one_point_a_cell_in_range() -> None:
 
 
 def test_the_boundary_is_located_between_pixels() -> None:
-    mask = np.zeros((240, 320), np.float32)
+    mask = np.zeros(SIZE, np.float32)
     mask[200:] = 1.0
     mask[199] = 0.4
-    _, boundary_m = project(mask, _street().depth_m, CAMERA)
     row = 199 + (0.5 - 0.4) / (1.0 - 0.4)
-    expected_m = (
-        CAMERA.mount_height_m * CAMERA.fy_px / (row - CAMERA.cy_px) + CAMERA.mount_forward_m
-    )
+    depth_m = CAMERA.mount_height_m * CAMERA.fy_px / (row - CAMERA.cy_px)
 
+    _, boundary_m = project(mask, _street().depth_m, CAMERA)
+
+    expected_m = depth_m + CAMERA.mount_forward_m
     np.testing.assert_allclose(boundary_m[:, 0], expected_m, atol=0.01)
 
 
@@ -99,41 +112,44 @@ def test_the_ground_follows_depth_where_the_mounts_height_is_wrong() -> None:
     low = _street(height_m=1.4)
     _, boundary_m = _projected(low)
 
-    assert np.median(np.abs(np.abs(boundary_m[:, 1]) - HALF_M)) < 0.05
+    assert np.median(_edge_errors_m(boundary_m)) < 0.05
 
 
 def test_wrong_disparities_on_a_third_of_the_road_do_not_move_the_plane() -> None:
     street = _street()
+    true_px = np.zeros(SIZE)
+    np.divide(FOCAL_BASELINE, street.depth_m, out=true_px, where=street.depth_m > 0)
+
     rng = np.random.default_rng(1)
-    true_px = np.divide(
-        FOCAL_BASELINE, street.depth_m, out=np.zeros((240, 320)), where=street.depth_m > 0
-    )
-    wrong = rng.random(true_px.shape) < 0.3
-    plane = fit(street.mask, np.where(wrong, rng.uniform(1, 60, true_px.shape), true_px), CAMERA)
+    is_wrong = rng.random(SIZE) < 0.3
+    disparity_px = np.where(is_wrong, rng.uniform(1, 60, SIZE), true_px)
+    plane = fit(street.mask, disparity_px, CAMERA)
+
     rows, columns = np.nonzero(street.mask)
     error_px = plane.disparity_px(rows, columns, CAMERA) - true_px[rows, columns]
-
     assert np.abs(error_px).max() < 0.5
 
 
 def test_without_any_depth_the_camera_is_level_at_its_mount() -> None:
     street = _street()
-    _, boundary_m = _projected(street, np.zeros_like(street.depth_m))
+    unknown = np.zeros_like(street.depth_m)
+    _, boundary_m = _projected(street, unknown)
 
-    assert np.quantile(np.abs(np.abs(boundary_m[:, 1]) - HALF_M), 0.9) < 0.1
+    assert np.quantile(_edge_errors_m(boundary_m), 0.9) < 0.1
 
 
 def test_no_boundary_is_claimed_behind_something_upright() -> None:
     block = Block(9.0, 0.0, 0.0, (2.0, 2.0), 1.5, (200, 30, 30))
-    _, boundary_m = _projected(_street(block))
+    street = _street(block)
+    _, boundary_m = _projected(street)
 
     assert len(boundary_m) > 20
     assert (np.abs(boundary_m[:, 1]) > HALF_M - 0.4).all()
 
 
 def test_no_boundary_is_claimed_where_the_image_ends() -> None:
-    everywhere = np.ones((240, 320), np.float32)
-    everywhere[:121] = 0.0
+    everywhere = np.ones(SIZE, np.float32)
+    everywhere[:HORIZON] = 0.0
     road_m, boundary_m = project(everywhere, _street().depth_m, CAMERA)
 
     assert len(road_m) > 100
@@ -141,101 +157,120 @@ def test_no_boundary_is_claimed_where_the_image_ends() -> None:
 
 
 def test_no_boundary_is_claimed_at_the_outermost_pixels() -> None:
-    almost = np.ones((240, 320), np.float32)
-    almost[:121] = 0.0
-    almost[:, :2] = almost[:, -2:] = almost[-2:] = 0.0
+    almost = np.zeros(SIZE, np.float32)
+    almost[HORIZON:-2, 2:-2] = 1.0
+    _, boundary_m = project(almost, _street().depth_m, CAMERA)
 
-    assert project(almost, _street().depth_m, CAMERA)[1].shape == (0, 2)
+    assert boundary_m.shape == (0, 2)
 
 
 def test_left_is_positive() -> None:
     street = _street()
     left_half = street.mask & (np.arange(320) < 160)
     road_m, _ = project(left_half.astype(np.float32), street.depth_m, CAMERA)
+    left_m = road_m[:, 1]
 
-    assert (road_m[:, 1] > -0.1).all()
-    assert road_m[:, 1].max() > 3.0
+    assert (left_m > -0.1).all()
+    assert left_m.max() > 3.0
 
 
 def test_what_stands_on_the_road_is_no_road_though_it_is_in_the_mask() -> None:
     block = Block(8.0, 0.0, 0.0, (2.0, 3.0), 1.2, (90, 90, 90))
     street = _street(block)
-    rows, columns = np.indices(street.depth_m.shape)
+    rows, columns = np.indices(SIZE)
     across_m = (CAMERA.cx_px - columns) / CAMERA.fx_px * street.depth_m
-    everything = ((rows > CAMERA.cy_px) & (np.abs(across_m) < HALF_M)).astype(np.float32)
-    road_m, _ = project(everything, street.depth_m, CAMERA)
-    behind = (np.abs(road_m[:, 1]) < 1.0) & (road_m[:, 0] > 9.0)
+    everything = (rows > CAMERA.cy_px) & (np.abs(across_m) < HALF_M)
 
+    road_m, _ = project(everything.astype(np.float32), street.depth_m, CAMERA)
+
+    ahead_m, left_m = road_m.T
+    behind = (np.abs(left_m) < 1.0) & (ahead_m > 9.0)
     assert len(road_m) > 100
     assert not behind.any()
 
 
 def test_no_road_in_the_image_is_no_road_on_the_ground() -> None:
-    for points in project(np.zeros((240, 320), np.float32), _street().depth_m, CAMERA):
-        assert (points.shape, points.dtype) == ((0, 2), np.float32)
+    nowhere = np.zeros(SIZE, np.float32)
+
+    for points in project(nowhere, _street().depth_m, CAMERA):
+        assert points.shape == (0, 2)
+        assert points.dtype == np.float32
 
 
 @pytest.mark.parametrize("level", [0, 3, 90, 255])
 def test_an_image_without_contrast_shows_no_road(segmenter: RoadSegmenter, level: int) -> None:
-    assert not segmenter.mask(np.full((240, 320, 3), level, np.uint8)).any()
+    flat = np.full((*SIZE, 3), level, np.uint8)
+
+    assert not segmenter.mask(flat).any()
 
 
 def test_a_black_image_with_the_noise_of_a_camera_shows_no_road(segmenter: RoadSegmenter) -> None:
-    noise = np.random.default_rng(0).normal(0, 3, (240, 320, 3))
+    noise = np.random.default_rng(0).normal(0, 3, (*SIZE, 3))
+    black = np.clip(noise, 0, 255).astype(np.uint8)
 
-    assert not segmenter.mask(np.clip(noise, 0, 255).astype(np.uint8)).any()
+    assert not segmenter.mask(black).any()
 
 
 @pytest.mark.parametrize("size", [(240, 320), (360, 480), (121, 97)])
 def test_an_image_of_any_size_gets_a_mask_of_its_size_and_the_same_one_twice(
     segmenter: RoadSegmenter, size: tuple[int, int]
 ) -> None:
-    image = cv2.resize(painted([])[0], size[::-1]).astype(np.uint8)
-    masks = [segmenter.mask(image) for _ in range(2)]
+    street, _, _ = painted([])
+    image = cv2.resize(street, size[::-1]).astype(np.uint8)
+    mask = segmenter.mask(image)
+    again = segmenter.mask(image)
 
-    assert masks[0].shape == size
-    assert masks[0].dtype == np.bool_
-    np.testing.assert_array_equal(*masks)
+    assert mask.shape == size
+    assert mask.dtype == np.bool_
+    np.testing.assert_array_equal(mask, again)
 
 
 def test_road_in_a_town_never_seen_is_found_and_its_ends_are_placed(
     segmenter: RoadSegmenter,
 ) -> None:
     views = render_town(SEED, VIEWS)
-    rectified = rectification(msgspec.json.decode(views["calibration"].tobytes(), type=Calibration))
-    matcher = DepthFromStereo(rectified.calibration, 2.5)
+    calibration = msgspec.json.decode(views["calibration"].tobytes(), type=Calibration)
+    rectified = rectification(calibration)
     camera = rectified.calibration
+    matcher = DepthFromStereo(camera, 2.5)
+
     masks = []
     errors_m = []
     missed_m = []
-    for left, right, surface, true_m in zip(
-        *(views[key] for key in ("left", "right", "surface", "depth_m")), strict=True
-    ):
+    columns = [views[key] for key in ("left", "right", "surface", "depth_m")]
+    for left, right, surface, true_m in zip(*columns, strict=True):
         image, other = rectified.apply(left, right)
         likelihood = segmenter.likelihood(image)
-        _, boundary_m = project(likelihood, matcher.depth_m(image, other), camera)
         masks.append(likelihood >= 0.5)
+
+        _, boundary_m = project(likelihood, matcher.depth_m(image, other), camera)
         errors_m.append(road_edge_errors_m(boundary_m, surface, true_m, camera))
         missed_m.append(road_edges_missed_m(boundary_m, surface, true_m, camera))
 
-    assert road_iou(np.array(masks), np.asarray(views["surface"], np.uint8)) > 0.9
+    surfaces = np.asarray(views["surface"], np.uint8)
+    assert road_iou(np.array(masks), surfaces) > 0.9
     assert road_edge_error_m(errors_m) < 0.25
     assert road_edge_error_m(missed_m) < 0.5
 
 
-def test_unusable_weights_are_named_with_the_remedy(
-    tmp_path: Path,
-) -> None:
-    with pytest.raises(ConfigError, match=r"nowhere\.onnx.*cogmap train"):
-        load(tmp_path / "nowhere.onnx")
+@pytest.mark.parametrize("content", [None, b"no network"], ids=["missing", "broken"])
+def test_unusable_weights_are_named_with_the_remedy(tmp_path: Path, content: bytes | None) -> None:
+    weights = tmp_path / "mine.onnx"
+    if content is not None:
+        weights.write_bytes(content)
 
-    (tmp_path / "broken.onnx").write_bytes(b"no network")
-    with pytest.raises(ConfigError, match=r"broken\.onnx.*cogmap train"):
-        load(tmp_path / "broken.onnx")
+    with pytest.raises(ConfigError, match=r"mine\.onnx.*cogmap train"):
+        load(weights)
+
+
+def test_weights_of_other_shapes_are_named_with_the_remedy() -> None:
+    one_channel_more = {"road": (1, 2, *OUTPUT_SHAPES["road"][2:])}
     with pytest.raises(ConfigError, match=r"road\.onnx.*cogmap train"):
-        Network(DEFAULT_PATH, INPUT_SHAPE, {"road": (1, 2, *OUTPUT_SHAPES["road"][2:])})
+        Network(DEFAULT_PATH, INPUT_SHAPE, one_channel_more)
+
+    colour_alone = (1, 3, *INPUT_SHAPE[2:])
     with pytest.raises(ConfigError, match=r"road\.onnx.*cogmap train"):
-        Network(DEFAULT_PATH, (1, 3, *INPUT_SHAPE[2:]), OUTPUT_SHAPES)
+        Network(DEFAULT_PATH, colour_alone, OUTPUT_SHAPES)
 
 
 def _photographs(folder: Path, segmenter: RoadSegmenter) -> tuple[Path, Path]:
@@ -246,13 +281,16 @@ def _photographs(folder: Path, segmenter: RoadSegmenter) -> tuple[Path, Path]:
     labels = folder / "labels"
     images.mkdir()
     labels.mkdir()
-    for number in range(2):
-        image = painted([Block(20.0, 9.0, 0.2, (8.0, 8.0), 6.0, (180, 60, 50))], seed=number)[0]
-        label = (
-            np.where(segmenter.mask(image), 3, 4) if number == 0 else np.full(image.shape[:2], 11)
-        )
+
+    block = Block(20.0, 9.0, 0.2, (8.0, 8.0), 6.0, (180, 60, 50))
+    known, _, _ = painted([block], seed=0)
+    label = np.where(segmenter.mask(known), ROAD, OTHER)
+    unknown, _, _ = painted([block], seed=1)
+    void = np.full(SIZE, VOID)
+
+    for number, (image, shown) in enumerate([(known, label), (unknown, void)]):
         cv2.imwrite(str(images / f"{number}.png"), image[..., ::-1])
-        cv2.imwrite(str(labels / f"{number}.png"), label.astype(np.uint8))
+        cv2.imwrite(str(labels / f"{number}.png"), shown.astype(np.uint8))
     return images, labels
 
 
@@ -262,16 +300,17 @@ def test_iou_on_photographs_counts_what_is_labelled_and_nothing_else(
     images, labels = _photographs(tmp_path, segmenter)
     assert camvid_iou(DEFAULT_PATH, images, labels) == 1.0
 
-    label = cv2.imread(str(labels / "0.png"), cv2.IMREAD_UNCHANGED)
-    assert (label == 3).any()
+    path = str(labels / "0.png")
+    label = cv2.imread(path, cv2.IMREAD_UNCHANGED)
+    was_road = label == ROAD
+    assert was_road.any()
 
-    rows = np.flatnonzero((label == 3).any(1))
-    label[rows[len(rows) // 2] :][label[rows[len(rows) // 2] :] == 3] = 4
-    share = (label == 3).sum() / (
-        cv2.imread(str(labels / "0.png"), cv2.IMREAD_UNCHANGED) == 3
-    ).sum()
-    cv2.imwrite(str(labels / "0.png"), label)
+    rows = np.flatnonzero(was_road.any(axis=1))
+    lower = slice(rows[len(rows) // 2], None)
+    label[lower][was_road[lower]] = OTHER
+    cv2.imwrite(path, label)
 
+    share = (label == ROAD).sum() / was_road.sum()
     assert camvid_iou(DEFAULT_PATH, images, labels) == pytest.approx(share)
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from services.epam.layout.walls import walls
+from services.epam.layout.walls import Walls, walls
 from services.epam.recognition.segments import (
     HEIGHT_PX,
     OFFSET_PX,
@@ -19,8 +19,12 @@ from services.epam.recognition.segments import (
 )
 from tests.support.blocks import CAMERA
 
+SIZE = (240, 320)
+WALL_PX = 8.0
+Box = tuple[int, int, int, int]
 
-def _answer(*boxes: tuple[int, int, int, int], peaks: list[tuple[int, int]]) -> np.ndarray:
+
+def _answer(*boxes: Box, peaks: list[tuple[int, int]]) -> np.ndarray:
     """Buildings in boxes (left, top, right, bottom), each pixel of which points to the peak
     (column, row).
     """
@@ -30,9 +34,10 @@ def _answer(*boxes: tuple[int, int, int, int], peaks: list[tuple[int, int]]) -> 
     for (left, top, right, bottom), (column, row) in zip(boxes, peaks, strict=True):
         area = slice(top, bottom), slice(left, right)
         shown[0][area] = 8.0
+        shown[1, row, column] = 0.9
         shown[2][area] = (column - columns[area]) / OFFSET_PX
         shown[3][area] = (row - rows[area]) / OFFSET_PX
-        shown[1, row, column] = 0.9
+
     return shown
 
 
@@ -41,34 +46,40 @@ def _divided(shown: np.ndarray) -> list[Segment]:
 
 
 def test_two_buildings_side_by_side_are_two_segments_from_left_to_right() -> None:
-    found = _divided(_answer((60, 30, 100, 60), (20, 20, 60, 60), peaks=[(80, 45), (40, 40)]))
+    right_box = (60, 30, 100, 60)
+    left_box = (20, 20, 60, 60)
+    left, right = _divided(_answer(right_box, left_box, peaks=[(80, 45), (40, 40)]))
 
-    assert [segment.box_px[0] for segment in found] == pytest.approx([40, 120], abs=1)
-    assert [segment.area_px for segment in found] == pytest.approx([80 * 80, 80 * 60], rel=0.03)
-    assert not (found[0].mask & found[1].mask).any()
+    assert left.box_px[0] == pytest.approx(40, abs=1)
+    assert right.box_px[0] == pytest.approx(120, abs=1)
+    assert left.area_px == pytest.approx(80 * 80, rel=0.03)
+    assert right.area_px == pytest.approx(80 * 60, rel=0.03)
+    assert not (left.mask & right.mask).any()
 
 
 def test_both_sides_of_what_a_lamp_hides_are_one_segment() -> None:
-    found = _divided(_answer((20, 20, 38, 60), (42, 20, 60, 60), peaks=[(40, 40), (40, 40)]))
+    left_box = (20, 20, 38, 60)
+    right_box = (42, 20, 60, 60)
+    (whole,) = _divided(_answer(left_box, right_box, peaks=[(40, 40), (40, 40)]))
 
-    assert len(found) == 1
-    assert found[0].box_px == pytest.approx((40, 40, 80, 80), abs=1)
+    assert whole.box_px == pytest.approx((40, 40, 80, 80), abs=1)
 
 
 def test_neither_a_speck_nor_a_building_without_a_centre_is_a_segment() -> None:
-    assert _divided(_answer((20, 20, 23, 23), peaks=[(21, 21)])) == []
+    speck = _answer((20, 20, 23, 23), peaks=[(21, 21)])
+    assert _divided(speck) == []
 
-    without = _answer((20, 20, 60, 60), peaks=[(40, 40)])
-    without[1] = 0.0
-    assert _divided(without) == []
+    without_centre = _answer((20, 20, 60, 60), peaks=[(40, 40)])
+    without_centre[1] = 0.0
+    assert _divided(without_centre) == []
 
 
-def test_a_black_image_and_one_without_contrast_have_no_segments() -> None:
-    segmenter = load()
-    depth_m = np.full((240, 320), 20.0, np.float32)
+@pytest.mark.parametrize("level", [0, 90], ids=["black", "grey"])
+def test_an_image_without_contrast_has_no_segments(level: int) -> None:
+    image = np.full((*SIZE, 3), level, np.uint8)
+    depth_m = np.full(SIZE, 20.0, np.float32)
 
-    assert segmenter.segments(np.zeros((240, 320, 3), np.uint8), depth_m, CAMERA) == []
-    assert segmenter.segments(np.full((240, 320, 3), 90, np.uint8), depth_m, CAMERA) == []
+    assert load().segments(image, depth_m, CAMERA) == []
 
 
 def test_the_network_receives_height_and_where_depth_is_unknown() -> None:
@@ -76,37 +87,46 @@ def test_the_network_receives_height_and_where_depth_is_unknown() -> None:
     depth_m = np.full((HEIGHT_PX, WIDTH_PX), 20.0, np.float32)
     depth_m[:10] = 0.0
     values = network_input(small, depth_m, CAMERA)
+    height = values[5]
 
     assert values[4, :10].max() == 0.0
     assert values[4, 10:].min() == 1.0
     assert not values[[3, 5], :10].any()
 
     horizon = round(CAMERA.cy_px / 2)
-    assert values[5, horizon, 50] == pytest.approx(CAMERA.mount_height_m / 5, abs=0.02)
-    assert values[5, 20, 50] > values[5, 100, 50]
+    assert height[horizon, 50] == pytest.approx(CAMERA.mount_height_m / 5, abs=0.02)
+    assert height[20, 50] > height[100, 50]
 
 
 def _segment(left: int, right: int) -> Segment:
-    mask = np.zeros((240, 320), np.bool_)
+    mask = np.zeros(SIZE, np.bool_)
     mask[80:130, left:right] = True
     return Segment(mask, (left, 80, right - left, 50))
 
 
 def _scene(*slabs: tuple[int, int, float]) -> np.ndarray:
     """Disparity of walls (first column, last column + 1, pixels) before nothing."""
-    disparity = np.zeros((240, 320), np.float32)
+    disparity = np.zeros(SIZE, np.float32)
     for left, right, disparity_px in slabs:
         disparity[80:130, left:right] = disparity_px
     return disparity
 
 
+def _walls(left: int, right: int, *others: tuple[int, int, float]) -> Walls:
+    """The walls of a segment WALL_PX away, beside others."""
+    found = walls(_segment(left, right), _scene((left, right, WALL_PX), *others))
+    assert found is not None
+    return found
+
+
 def test_a_wall_before_something_farther_has_true_ends() -> None:
-    wall = walls(_segment(100, 160), _scene((60, 220, 4.0), (100, 160, 8.0)))
+    scene = _scene((60, 220, 4.0), (100, 160, WALL_PX))
+    wall = walls(_segment(100, 160), scene)
 
     assert wall is not None
     assert wall.whole
     assert (wall.left, wall.right) == (99.5, 159.5)
-    assert set(wall.disparity_px.tolist()) == {8.0}
+    assert set(wall.disparity_px.tolist()) == {WALL_PX}
 
 
 @pytest.mark.parametrize(
@@ -115,33 +135,33 @@ def test_a_wall_before_something_farther_has_true_ends() -> None:
 def test_a_wall_beside_something_nearer_has_no_true_end_there(
     nearer: tuple[int, int, float], sides: tuple[bool, bool]
 ) -> None:
-    wall = walls(_segment(100, 160), _scene((100, 160, 8.0), nearer))
+    wall = _walls(100, 160, nearer)
 
-    assert wall is not None
     assert (wall.left_true, wall.right_true) == sides
 
 
 def test_the_left_border_cuts_a_wall_as_many_columns_in_as_its_disparity() -> None:
-    cut = walls(_segment(3, 60), _scene((3, 60, 8.0)))
-    right = walls(_segment(280, 320), _scene((280, 320, 8.0)))
+    at_left = _walls(3, 60)
+    at_right = _walls(280, 320)
 
-    assert cut is not None
-    assert right is not None
-    assert (cut.left_true, cut.right_true) == (False, True)
-    assert (right.left_true, right.right_true) == (True, False)
+    assert (at_left.left_true, at_left.right_true) == (False, True)
+    assert (at_right.left_true, at_right.right_true) == (True, False)
 
 
 def test_a_segment_without_depth_has_no_walls() -> None:
-    assert walls(_segment(100, 160), np.zeros((240, 320), np.float32)) is None
+    segment = _segment(100, 160)
+    unknown = np.zeros(SIZE, np.float32)
+
+    assert walls(segment, unknown) is None
 
 
 def test_a_building_of_unknown_size_is_placed_behind_its_visible_middle() -> None:
-    wall = walls(_segment(130, 190), _scene((130, 190, 8.0)))
-    assert wall is not None
-
+    wall = _walls(130, 190)
+    wall_m = CAMERA.fx_px * CAMERA.baseline_m / WALL_PX
     place = wall.usual_pose(CAMERA)
-    assert place.range_m == pytest.approx(208 * 0.5 / 8.0 + CAMERA.mount_forward_m + 4.5, abs=0.1)
+
+    assert place.range_m == pytest.approx(wall_m + CAMERA.mount_forward_m + 4.5, abs=0.1)
     assert abs(place.bearing_rad) < 0.01
     assert place.range_sd_m > 1.0
-    assert wall.width_m(CAMERA) == pytest.approx(60 / 208 * 13.0, rel=0.01)
+    assert wall.width_m(CAMERA) == pytest.approx(60 / CAMERA.fx_px * wall_m, rel=0.01)
     assert math.isfinite(place.bearing_sd_rad)
