@@ -18,25 +18,37 @@ def coalition(codelet: str, nodes: list[AnyNode], graph: Graph, base_level: floa
     Its activation is base-level x sum(total activation + |incentive salience|) / 2n over its nodes,
     as in LIDA's framework.
     """
+    total = sum(graph.total_activation(node) + abs(_salience(node)) for node in nodes)
+    activation = base_level * total / (2 * len(nodes))
+
+    return Coalition(
+        codelet=codelet,
+        activation=min(1.0, activation),
+        nodes=[_as_of_now(node, graph) for node in nodes],
+        links=_links_to_places(nodes, graph),
+        maps=_maps_of(nodes),
+    )
+
+
+def _links_to_places(nodes: list[AnyNode], graph: Graph) -> list[Link]:
+    """The links of nodes to the places where they are."""
     links = []
-    maps: dict[str, None] = {}
     for node in nodes:
         place = graph.links.target(node.id, LinkKind.AT)
         if place is not None:
             links.append(Link(source=node.id, target=place, kind=LinkKind.AT))
 
+    return links
+
+
+def _maps_of(nodes: list[AnyNode]) -> list[str]:
+    """The maps that nodes are on, each once, in the order of the nodes."""
+    maps: dict[str, None] = {}
+    for node in nodes:
         if isinstance(node, Self | Object):
             maps[node.map] = None
 
-    total = sum(graph.total_activation(node) + abs(_salience(node)) for node in nodes)
-    activation = base_level * total / (2 * len(nodes))
-    return Coalition(
-        codelet=codelet,
-        activation=min(1.0, activation),
-        nodes=[_as_of_now(node, graph) for node in nodes],
-        links=links,
-        maps=list(maps),
-    )
+    return list(maps)
 
 
 def objects_in_view(percepts: list[Percept], graph: Graph) -> list[Object]:

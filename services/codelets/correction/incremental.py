@@ -86,8 +86,10 @@ class IncrementalSolver:
     def _is_inaccurate(self) -> bool:
         """Whether the cost of the path is above what the linear updates predict."""
         graph = self.graph
+        after = cost(graph.poses, graph.constraints)
+
         predicted = (1 + TOLERANCE) * self._cost
-        return cost(graph.poses, graph.constraints) > predicted
+        return after > predicted
 
     def _update(self, closure: Constraints) -> _Update:
         root = sqrt_information(closure.information)[0]

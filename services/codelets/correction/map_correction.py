@@ -34,9 +34,9 @@ from services.codelets.correction.pose_graph import (
 )
 from services.codelets.correction.reverse_replay import close_loops
 from services.codelets.correction.synapses import replay_of
-from services.codelets.mapping.loop_detection import constraints_of, views_of
 from services.codelets.mapping.observations import Sightings
 from services.codelets.mapping.path import POSE, STAMP, rows_of, steps_of
+from services.codelets.mapping.views import constraints_of, views_of
 
 MIN_ROWS = 10
 IMPOSSIBLE_SD = 5.0

@@ -49,6 +49,11 @@ class Views(NamedTuple):
     sd_rad: Floats
 
     @property
+    def has_heading(self) -> Booleans:
+        """(m,): whether the heading between the two places is known."""
+        return self.sd_rad > 0
+
+    @property
     def there(self) -> Points:
         """What was seen, from the places before."""
         return Points(self.i, self.there_m)
@@ -139,7 +144,8 @@ class _DeadReckoning:
         lever_m2 = length_m**2 / 3 + lever_arm_m**2
 
         by_steps_m2 = _between(self._variance_m2, one.place, other.place)
-        by_turns_m2 = self.variance_rad2(one.place, other.place) * lever_m2
+        turn_rad2 = self.variance_rad2(one.place, other.place)
+        by_turns_m2 = turn_rad2 * lever_m2
         variance_m2: Floats = by_steps_m2 + by_turns_m2
         return variance_m2
 
@@ -173,7 +179,7 @@ def _agree(one: Views, other: Views, path: _DeadReckoning, false_closure: float)
     here_m2 = path.variance_m2(one.here, other.here)
     path_m2 = there_m2 + here_m2
 
-    has_heading = (one.sd_rad > 0) & (other.sd_rad > 0)
+    has_heading = one.has_heading & other.has_heading
     squared = _distance_squared(one, other, path, path_m2)
     squared += np.where(has_heading, _turn_squared(one, other, path), 0.0)
 

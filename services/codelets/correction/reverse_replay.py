@@ -122,7 +122,8 @@ class Loops:
 
     def positions_m(self, forces: Floats) -> Floats:
         """(n, 2): the path under `forces`."""
-        return self._integrated_m + self.shifts(forces)
+        shifts_m = self.shifts(forces)
+        return self._integrated_m + shifts_m
 
     def costs(self, forces: Floats) -> tuple[float, float]:
         """Eq. 7 of the path under `forces`, and a lower bound for any forces (its dual)."""
@@ -147,6 +148,7 @@ class Loops:
     def _summed(self, places: Indices, forces: Floats) -> Floats:
         """(n, 2): the forces that act at each place."""
         count = len(self._integrated_m)
+
         x = np.bincount(places, forces[:, 0], count)
         y = np.bincount(places, forces[:, 1], count)
         return np.column_stack([x, y])

@@ -12,7 +12,7 @@ import numpy as np
 
 from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Floats, Indices
-from cogmap.geometry.se2 import relative, rotation_matrices
+from cogmap.geometry.se2 import rotation_matrices
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.codelets import Task
@@ -29,14 +29,12 @@ from schemas.nodes import (
 )
 from schemas.sensing import Percept, PlaceMatch
 from services.codelets.config import SECTION, Config
-from services.codelets.correction.pairwise_consistency import MIN_AGREEING, Views
-from services.codelets.correction.pose_graph import Constraints
+from services.codelets.correction.pairwise_consistency import MIN_AGREEING
 from services.codelets.localization.measurement_model import has_bearing, has_range
 from services.codelets.mapping.observations import Sightings
 from services.codelets.mapping.path import ODOMETRY, STAMP, path_grows, rows_of
 
 SAME_M = 6.0
-MIN_SD_M = 1e-3
 PLACE_CUE = ""
 
 
@@ -107,8 +105,6 @@ def _seen_again(
     """The percepts of landmarks that come again: last seen, or closing a loop, long ago; or closing
     one on this pass, where the path has grown since.
     """
-    long_ago_ns = now_ns - config.revisit_s * 1e9
-    soon_ns = now_ns - config.closure_spacing_s * 1e9
     known = [percept for percept in percepts if percept.whole]
     known = [percept for percept in known if object_id(percept.label) in graph.nodes]
     if not known:
@@ -116,15 +112,14 @@ def _seen_again(
 
     grows = path_grows(graph, config)
     newest = newest_closures(graph)
+    long_ago_ns = _long_ago_ns(now_ns, config)
     again = []
     for percept in known:
-        landmark = graph.get(Object, object_id(percept.label))
         closure = newest.get(percept.label)
-
         if closure is not None and closure.to_ns > long_ago_ns:
-            is_again = grows and closure.to_ns <= soon_ns
+            is_again = grows and closure.to_ns <= _recently_ns(now_ns, config)
         else:
-            is_again = landmark is not None and 0 <= landmark.last_seen_ns <= long_ago_ns
+            is_again = _is_last_seen_by(long_ago_ns, percept.label, graph)
 
         if is_again:
             again.append(percept)
@@ -132,19 +127,38 @@ def _seen_again(
     return again
 
 
+def _is_last_seen_by(stamp_ns: float, label: str, graph: Graph) -> bool:
+    """Whether the map has a landmark that was seen, and not since `stamp_ns`."""
+    landmark = graph.get(Object, object_id(label))
+    if landmark is None:
+        return False
+
+    return 0 <= landmark.last_seen_ns <= stamp_ns
+
+
+def _long_ago_ns(now_ns: int, config: Config) -> float:
+    """What was seen last up to then, and is seen now, comes again."""
+    return now_ns - config.revisit_s * 1e9
+
+
+def _recently_ns(now_ns: int, config: Config) -> float:
+    """A loop that was closed since then is not closed again."""
+    return now_ns - config.closure_spacing_s * 1e9
+
+
 def _places_again(
     matches: Iterable[PlaceMatch], graph: Graph, now_ns: int, config: Config
 ) -> list[PlaceMatch]:
     """The matches of places that were seen long ago, where the path has grown since the last."""
-    long_ago_ns = now_ns - config.revisit_s * 1e9
+    long_ago_ns = _long_ago_ns(now_ns, config)
     found = [match for match in matches if match.view_ns <= long_ago_ns]
     if not found or not path_grows(graph, config):
         return []
 
     newest = newest_closures(graph).get(PLACE_CUE)
-    soon_ns = now_ns - config.closure_spacing_s * 1e9
-    if newest is not None and newest.to_ns > soon_ns:
+    if newest is not None and newest.to_ns > _recently_ns(now_ns, config):
         return []
+
     return found
 
 
@@ -159,14 +173,8 @@ def _closure_by_landmark(
     if landmark is None or not (has_bearing(percept) and has_range(percept)):
         return None
 
-    long_ago_ns = task.stamp_ns - config.revisit_s * 1e9
-    if newest is not None and newest.to_ns > long_ago_ns:
-        before_ns = newest.before_ns
-        view = newest.view
-    else:
-        before_ns = landmark.last_seen_ns
-        view = 0
-
+    long_ago_ns = _long_ago_ns(task.stamp_ns, config)
+    before_ns, view = _earlier_pass(landmark, newest, long_ago_ns)
     observations, rows = _observed(landmark, graph)
     seen = Sightings.of(observations, rows[:, STAMP])
     there = _clearest(seen, rows, before_ns)
@@ -176,10 +184,6 @@ def _closure_by_landmark(
     chosen = int(there[view % len(there)])
     from_s = float(rows[seen.place[chosen], STAMP])
     ahead_m, left_m = seen.where_m[chosen].tolist()
-    variance_there_m2 = 1 / float(np.linalg.eigvalsh(seen.information[chosen])[0])
-
-    across_sd_m = percept.range_m * percept.bearing_sd_rad
-    variance_here_m2 = percept.range_sd_m**2 + across_sd_m**2
     return LoopClosure(
         id=_closure_id(task, percept.label),
         base_level=1.0,
@@ -190,11 +194,37 @@ def _closure_by_landmark(
         left_m=left_m,
         range_m=percept.range_m,
         bearing_rad=percept.bearing_rad,
-        sd_m=float(np.sqrt(variance_there_m2 + variance_here_m2)),
+        sd_m=_sd_m(percept, seen.information[chosen]),
         sd_rad=0.0,
         before_ns=before_ns,
         view=view + 1,
     )
+
+
+def _earlier_pass(
+    landmark: Object, newest: LoopClosure | None, long_ago_ns: float
+) -> tuple[int, int]:
+    """Until when the pass before saw the landmark, and how many closures to it were made on this
+    pass.
+    """
+    if newest is not None and newest.to_ns > long_ago_ns:
+        return newest.before_ns, newest.view
+
+    return landmark.last_seen_ns, 0
+
+
+def _sd_m(percept: Percept, information: Floats) -> float:
+    """The standard deviation of a closure: of the percept now, and of the observation before, by
+    its (2, 2) information.
+    """
+    least_information = np.linalg.eigvalsh(information)[0]
+    variance_there_m2 = 1 / float(least_information)
+
+    across_sd_m = percept.range_m * percept.bearing_sd_rad
+    variance_here_m2 = percept.range_sd_m**2 + across_sd_m**2
+
+    sd_m = np.sqrt(variance_there_m2 + variance_here_m2)
+    return float(sd_m)
 
 
 def _closure_by_place(match: PlaceMatch, task: Task, config: Config) -> LoopClosure:
@@ -242,16 +272,13 @@ def _clearest(seen: Sightings, rows: Floats, before_ns: int) -> Indices:
     On one pass by, they lead to the same place by path integration alone.
     """
     until_s = before_ns * 1e-9 + 1e-6
-    known = np.flatnonzero(rows[seen.place, STAMP] <= until_s)
+    stamps_s = rows[seen.place, STAMP]
+    known = np.flatnonzero(stamps_s <= until_s)
     if not len(known):
         return known
 
-    stood = rows[seen.place[known], ODOMETRY]
-    turn = rotation_matrices(stood[:, 2])
-    where_m = stood[:, :2] + np.einsum("mab,mb->ma", turn, seen.where_m[known])
-    apart_m = np.hypot(*(where_m[:, None] - where_m).transpose(2, 0, 1))
-
-    is_same = apart_m <= SAME_M
+    where_m = _where_by_odometry_m(seen, rows, known)
+    is_same = _apart_m(where_m) <= SAME_M
     agreeing = is_same.sum(axis=1)
     chosen = known[is_same[agreeing.argmax()]]
 
@@ -261,44 +288,21 @@ def _clearest(seen: Sightings, rows: Floats, before_ns: int) -> Indices:
     return order
 
 
-def views_of(closures: list[LoopClosure], rows: Floats) -> Views:
-    """The closures as views from rows of the path."""
-    range_m = np.array([closure.range_m for closure in closures])
-    bearing_rad = np.array([closure.bearing_rad for closure in closures])
-    direction = np.column_stack([np.cos(bearing_rad), np.sin(bearing_rad)])
-    here_m = range_m[:, None] * direction
+def _where_by_odometry_m(seen: Sightings, rows: Floats, known: Indices) -> Floats:
+    """(k, 2): where the `known` sightings place their landmark by path integration alone."""
+    places = seen.place[known]
+    poses = rows[places, ODOMETRY]
 
-    ahead_left_m = [[closure.ahead_m, closure.left_m] for closure in closures]
-    there_m = np.array(ahead_left_m).reshape(-1, 2)
-
-    from_to_ns = [[closure.from_ns, closure.to_ns] for closure in closures]
-    stamps_ns = np.array(from_to_ns).reshape(-1, 2)
-    away_s = np.abs(rows[:, STAMP] - stamps_ns[..., None] * 1e-9)
-    ends = away_s.argmin(axis=2)
-
-    sd_m = np.array([closure.sd_m for closure in closures]).clip(MIN_SD_M)
-    sd_rad = np.array([closure.sd_rad for closure in closures])
-    return Views(ends[:, 0], ends[:, 1], there_m, here_m, sd_m, sd_rad)
+    turn = rotation_matrices(poses[:, 2])
+    offset_m = np.einsum("mab,mb->ma", turn, seen.where_m[known])
+    where_m: Floats = poses[:, :2] + offset_m
+    return where_m
 
 
-def constraints_of(views: Views, poses: Floats) -> Constraints:
-    """The views as constraints between (n, 3) poses, near those.
+def _apart_m(points_m: Floats) -> Floats:
+    """(k, k): how far (k, 2) points are from one another."""
+    offset_m = points_m[:, None] - points_m
+    x_m, y_m = offset_m.transpose(2, 0, 1)
 
-    A landmark determines the agent's position given its heading alone: with another heading the
-    agent stands elsewhere around it.
-    """
-    has_heading = views.sd_rad > 0
-    step = relative(poses[views.i], poses[views.j])
-    turn_rad = np.where(has_heading, 0.0, step[:, 2])
-    seen_m = np.einsum("mab,mb->ma", rotation_matrices(turn_rad), views.here_m)
-    measured = np.column_stack([views.there_m - seen_m, turn_rad])
-
-    jacobian = np.zeros((len(turn_rad), 2, 3))
-    jacobian[:, 0, 0] = 1.0
-    jacobian[:, 1, 1] = 1.0
-    jacobian[:, :, 2] = np.column_stack([-seen_m[:, 1], seen_m[:, 0]])
-
-    variance_m2 = views.sd_m[:, None, None] ** 2
-    information = jacobian.transpose(0, 2, 1) @ jacobian / variance_m2
-    information[has_heading, 2, 2] += views.sd_rad[has_heading] ** -2
-    return Constraints(views.i, views.j, measured, information)
+    apart_m: Floats = np.hypot(x_m, y_m)
+    return apart_m

@@ -46,18 +46,11 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
 
     (percept,) = task.percepts
     rng = generator(task.task_id)
-    selves = nearby_selves(with_gains(agent.samples.numpy(), config, rng), config)
-    selves = resample(selves, config.landmark_samples, 0.0, rng)
-    node = Object(
-        id=object_id(percept.label),
-        base_level=FIRST_BASE_LEVEL,
-        cycle=task.cycle,
-        label=percept.label,
-        map=agent.map,
-        x_m=agent.x_m,
-        y_m=agent.y_m,
-        created_ns=task.stamp_ns,
-    )
+    samples = with_gains(agent.samples.numpy(), config, rng)
+    nearby = nearby_selves(samples, config)
+    selves = resample(nearby, config.landmark_samples, 0.0, rng)
+
+    node = _new(percept.label, agent, task)
     positions_m = first_positions(selves, percept, config, rng)
     return object_answer(task, graph, node, positions_m, FIRST)
 
@@ -72,3 +65,17 @@ CODELET = Codelet(
     config=Config,
     section=SECTION,
 )
+
+
+def _new(label: str, agent: Self, task: Task) -> Object:
+    """An object that the map lacks, on the map where the agent is."""
+    return Object(
+        id=object_id(label),
+        base_level=FIRST_BASE_LEVEL,
+        cycle=task.cycle,
+        label=label,
+        map=agent.map,
+        x_m=agent.x_m,
+        y_m=agent.y_m,
+        created_ns=task.stamp_ns,
+    )

@@ -48,15 +48,7 @@ class Viewpoint(NamedTuple):
 
 def extended(before: Observations | None, viewpoint: Viewpoint, percept: Percept) -> Observations:
     """The observations of a landmark along a path segment, with one more."""
-    step = viewpoint.step
-    direction_rad = step[2] + percept.bearing_rad
-    range_m = percept.range_m / (1 + viewpoint.range_gain)
-
-    forwards_m = step[0] + range_m * math.cos(direction_rad)
-    left_m = step[1] + range_m * math.sin(direction_rad)
-    across_sd_m = range_m * percept.bearing_sd_rad
-
-    row = [viewpoint.stamp_s, forwards_m, left_m, percept.range_sd_m, across_sd_m, direction_rad]
+    row = _row(viewpoint, percept)
     rows = np.array([row])
     if before is not None:
         rows = np.vstack([before.rows.numpy(), rows])
@@ -68,6 +60,25 @@ def extended(before: Observations | None, viewpoint: Viewpoint, percept: Percept
         landmark=percept.label,
         rows=Matrix.of(rows),
     )
+
+
+def _row(viewpoint: Viewpoint, percept: Percept) -> list[float]:
+    """One observation, in the columns of ObservationColumn."""
+    forwards_m, left_m, turned_rad = viewpoint.step.tolist()
+    direction_rad = turned_rad + percept.bearing_rad
+    range_m = percept.range_m / (1 + viewpoint.range_gain)
+
+    forwards_m += range_m * math.cos(direction_rad)
+    left_m += range_m * math.sin(direction_rad)
+    across_sd_m = range_m * percept.bearing_sd_rad
+    return [
+        viewpoint.stamp_s,
+        forwards_m,
+        left_m,
+        percept.range_sd_m,
+        across_sd_m,
+        direction_rad,
+    ]
 
 
 def is_observed_from(observations: Observations | None, stamp_s: float) -> bool:
@@ -96,19 +107,21 @@ class Sightings(NamedTuple):
         """The observations that were made from the places of the path at `stamps_s`, (n,)."""
         records = list(observations)
         labels = tuple(sorted({record.landmark for record in records}))
-        number_of = {label: number for number, label in enumerate(labels)}
 
         parts = [record.rows.numpy() for record in records]
         rows = np.vstack([np.zeros((0, COLUMNS)), *parts])
         lengths = [len(part) for part in parts]
-        numbers = np.array([number_of[record.landmark] for record in records], np.int64)
-        landmark = np.repeat(numbers, lengths)
+        landmark = np.repeat(_numbers(records, labels), lengths)
 
         place, is_known = _places_at(rows[:, STAMP], stamps_s)
-        rows = rows[is_known]
-        place = place[is_known]
-        landmark = landmark[is_known]
-        return cls(labels, place, landmark, rows[:, WHERE], _information(rows))
+        known = rows[is_known]
+        return cls(
+            labels=labels,
+            place=place[is_known],
+            landmark=landmark[is_known],
+            where_m=known[:, WHERE],
+            information=_information(known),
+        )
 
     def weights(self, poses: Floats, landmarks_m: Floats) -> Floats:
         """(m,) how much each counts, the path being at (n, 3) `poses` and landmarks at (k, 2):
@@ -120,20 +133,23 @@ class Sightings(NamedTuple):
 
         residual_m = expected_m - self.where_m
         squared = np.einsum("ma,mab,mb->m", residual_m, self.information, residual_m)
-        result: Floats = 1 / (1 + squared / DOUBTED**2)
-        return result
+        doubt = squared / DOUBTED**2
+        weights: Floats = 1 / (1 + doubt)
+        return weights
 
     def landmarks_m(self, poses: Floats) -> Floats:
         """(k, 2): where the landmarks are most likely, the path being at (n, 3) `poses`."""
         turn = rotation_matrices(poses[self.place, 2])
-        seen_m = poses[self.place, :2] + np.einsum("mab,mb->ma", turn, self.where_m)
-        information = turn @ self.information @ turn.transpose(0, 2, 1)
+        offset_m = np.einsum("mab,mb->ma", turn, self.where_m)
+        seen_m = poses[self.place, :2] + offset_m
+        information = turn @ self.information @ turn.mT
 
         landmarks_m = self._medians_m(seen_m)
         for _ in range(ROUNDS):
             weights = self.weights(poses, landmarks_m)
             weighed = information * weights[:, None, None]
             landmarks_m = self._means_m(seen_m, weighed)
+
         return landmarks_m
 
     def _medians_m(self, seen_m: Floats) -> Floats:
@@ -141,7 +157,8 @@ class Sightings(NamedTuple):
         medians = []
         for number in range(len(self.labels)):
             is_seen = self.landmark == number
-            medians.append(np.median(seen_m[is_seen], axis=0))
+            median = np.median(seen_m[is_seen], axis=0)
+            medians.append(median)
 
         return np.array(medians).reshape(-1, 2)
 
@@ -151,10 +168,12 @@ class Sightings(NamedTuple):
         total = np.zeros((count, 2, 2))
         np.add.at(total, self.landmark, information)
 
+        weighed_m = np.einsum("mab,mb->ma", information, seen_m)
         pull = np.zeros((count, 2))
-        np.add.at(pull, self.landmark, np.einsum("mab,mb->ma", information, seen_m))
-        means_m = np.linalg.solve(total, pull[..., None])[..., 0]
-        return np.asarray(means_m, np.float64)
+        np.add.at(pull, self.landmark, weighed_m)
+
+        means_m = np.linalg.solve(total, pull[..., None])
+        return np.asarray(means_m[..., 0], np.float64)
 
     def constraints(self, first_landmark: int, weights: Floats) -> Constraints:
         """Between places of the path and landmarks, the latter as poses from number
@@ -164,21 +183,34 @@ class Sightings(NamedTuple):
         headings_rad = np.zeros(count)
         measured = np.column_stack([self.where_m, headings_rad])
 
+        weighed = self.information * weights[:, None, None]
         information = np.zeros((count, 3, 3))
-        information[:, :2, :2] = self.information * weights[:, None, None]
+        information[:, :2, :2] = weighed
         information[:, 2, 2] = NO_HEADING
 
-        landmark = first_landmark + self.landmark
-        return Constraints(self.place, landmark, measured, information)
+        return Constraints(
+            i=self.place,
+            j=first_landmark + self.landmark,
+            measurement=measured,
+            information=information,
+        )
+
+
+def _numbers(records: list[Observations], labels: tuple[str, ...]) -> Indices:
+    """The number in `labels` of the landmark of each of `records`."""
+    number_of = {label: number for number, label in enumerate(labels)}
+    numbers = [number_of[record.landmark] for record in records]
+    return np.array(numbers, np.int64)
 
 
 def _places_at(stamps_s: Floats, path_s: Floats) -> tuple[Indices, Booleans]:
     """(m,) each: the place of the path at each stamp, and whether it is of that very time."""
-    last = max(0, len(path_s) - 1)
-    place = np.searchsorted(path_s, stamps_s).clip(0, last)
+    following = np.searchsorted(path_s, stamps_s)
     if not len(path_s):
-        return place, np.zeros(len(stamps_s), bool)
+        return following, np.zeros(len(stamps_s), bool)
 
+    last = len(path_s) - 1
+    place = following.clip(0, last)
     away_s = np.abs(path_s[place] - stamps_s)
     return place, away_s < SAME_PLACE_S
 
@@ -187,5 +219,6 @@ def _information(rows: Floats) -> Floats:
     """(m, 2, 2): the information, forwards and left, of (m, COLUMNS) observations."""
     turn = rotation_matrices(rows[:, DIRECTION])
     sd_m = rows[:, None, SPREAD].clip(MIN_SD_M)
-    information = turn * sd_m**-2 @ turn.transpose(0, 2, 1)
+
+    information = turn * sd_m**-2 @ turn.mT
     return np.asarray(information, np.float64)

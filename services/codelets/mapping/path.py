@@ -32,7 +32,7 @@ from schemas.nodes import (
 )
 from schemas.sensing import Percept
 from services.codelets.config import SECTION, Config
-from services.codelets.correction.pose_graph import Constraints
+from services.codelets.correction.pose_graph import Constraints, diagonal_information
 from services.codelets.localization.measurement_model import has_bearing, has_range
 from services.codelets.mapping.observations import Viewpoint, extended, is_observed_from
 
@@ -68,10 +68,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     if agent is None:
         raise MessageError(f"task {task.task_id}: the graph has no self node")
 
-    last = graph.last_segment
-    number = 0 if last is None else last.number
-    rows = np.zeros((0, COLUMNS)) if last is None else last.rows.numpy()
-
+    number, rows = _last_rows(graph)
     operations: list[Operation] = []
     if _is_apart(rows, agent, config.path_spacing_m) or _is_lost_since(rows, agent):
         row = _row(task.stamp_ns, agent)
@@ -82,12 +79,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
             rows = np.vstack([rows, row])
         operations += segments(rows, number)
 
-    viewpoint = Viewpoint(
-        number=number,
-        stamp_s=float(rows[-1, STAMP]),
-        step=relative(rows[-1, ODOMETRY], odometry_of(agent)),
-        range_gain=agent.range_gain,
-    )
+    viewpoint = _viewpoint(agent, number, rows[-1])
     for percept in task.percepts:
         operations += _observe(percept, viewpoint, graph)
 
@@ -172,28 +164,56 @@ def steps_of(rows: Floats, config: Config) -> Constraints:
     """The steps of path integration from each row to the next, as certain as self-motion states, or
     less, by the distance.
     """
-    at = np.arange(max(0, len(rows) - 1))
+    places = np.arange(max(0, len(rows) - 1))
     odometry = rows[:, ODOMETRY]
     steps = relative(odometry[:-1], odometry[1:])
 
-    length_m = np.hypot(steps[:, 0], steps[:, 1]).clip(config.path_spacing_m / 2)
-    turned_rad = np.abs(steps[:, 2])
-
     stated_m2, stated_rad2 = np.diff(rows[:, VARIANCES], axis=0).T
-    least_m2 = config.path_variance_per_m * length_m
-    least_rad2 = config.heading_variance_per_m * length_m
-    least_rad2 = least_rad2 + config.heading_variance_per_rad * turned_rad
+    least_m2, least_rad2 = _least_variances(steps, config)
     variance_m2 = np.maximum(least_m2, stated_m2)
     variance_rad2 = np.maximum(least_rad2, stated_rad2)
 
-    information = np.zeros((len(length_m), 3, 3))
-    information[:, 0, 0] = 1 / variance_m2
-    information[:, 1, 1] = 1 / variance_m2
-    information[:, 2, 2] = 1 / variance_rad2
-    return Constraints(at, at + 1, steps, information)
+    information = diagonal_information(
+        position=1 / variance_m2,
+        heading=1 / variance_rad2,
+    )
+    return Constraints(places, places + 1, steps, information)
+
+
+def _least_variances(steps: Floats, config: Config) -> tuple[Floats, Floats]:
+    """(m,) each: the least variance of (m, 3) steps, of the position and of the heading."""
+    moved_m = np.hypot(steps[:, 0], steps[:, 1])
+    length_m = moved_m.clip(config.path_spacing_m / 2)
+    turned_rad = np.abs(steps[:, 2])
+
+    variance_m2 = config.path_variance_per_m * length_m
+    by_length_rad2 = config.heading_variance_per_m * length_m
+    by_turn_rad2 = config.heading_variance_per_rad * turned_rad
+    return variance_m2, by_length_rad2 + by_turn_rad2
+
+
+def _last_rows(graph: Graph) -> tuple[int, Floats]:
+    """The number and the rows of the path's last segment; 0 and none before the path begins."""
+    last = graph.last_segment
+    if last is None:
+        return 0, np.zeros((0, COLUMNS))
+
+    return last.number, last.rows.numpy()
+
+
+def _viewpoint(agent: Self, number: int, row: Floats) -> Viewpoint:
+    """Where the agent is, from the place `row` of path segment `number`."""
+    step = relative(row[ODOMETRY], odometry_of(agent))
+    return Viewpoint(
+        number=number,
+        stamp_s=float(row[STAMP]),
+        step=step,
+        range_gain=agent.range_gain,
+    )
 
 
 def _row(stamp_ns: int, agent: Self) -> Floats:
+    """(1, COLUMNS): the place where the agent is, as a row of the path."""
     stamp_s = stamp_ns * 1e-9
     pose = mean_pose(agent.samples.numpy())
     odometry = odometry_of(agent)

@@ -39,14 +39,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
 
     pose = mean_pose(agent.samples.numpy())
     cell_m = graph.cell_m(agent.map)
-    here = np.rint(pose[None, :2] / cell_m).astype(np.int32)
-    active = Cells(
-        map=agent.map,
-        column=PlaceColumn.ACTIVATION,
-        cells=Array.of(here),
-        values=Array.of(np.ones(1, np.float32)),
-        cycle=task.cycle,
-    )
+    active = _activated(agent.map, pose, cell_m, task.cycle)
 
     cells, shares = _road_cells(task.road_m, pose, cell_m)
     if not len(cells):
@@ -73,16 +66,34 @@ CODELET = Codelet(
 )
 
 
+def _activated(map_id: str, pose: Floats, cell_m: float, cycle: int) -> Cells:
+    """The activation of the place node at `pose`."""
+    position_m = pose[None, :2]
+    here = np.rint(position_m / cell_m).astype(np.int32)
+    full = np.ones(1, np.float32)
+
+    return Cells(
+        map=map_id,
+        column=PlaceColumn.ACTIVATION,
+        cells=Array.of(here),
+        values=Array.of(full),
+        cycle=cycle,
+    )
+
+
 def _road_cells(points_m: Array, pose: Floats, cell_m: float) -> tuple[Cell32, Share32]:
     """(k, 2) cells that are seen as road by (n, 2) points in the robot's frame, and how much, (k,),
     0 to 1.
     """
-    seen_m = np.asarray(points_m.numpy(), np.float64).reshape(-1, 2)
-    range_m = np.hypot(seen_m[:, 0], seen_m[:, 1])
-    near_m = seen_m[range_m < ROAD_REACH_M]
+    points = np.asarray(points_m.numpy(), np.float64)
+    seen_m = points.reshape(-1, 2)
 
-    on_map_m = transform_from(pose, near_m)
+    range_m = np.hypot(seen_m[:, 0], seen_m[:, 1])
+    is_near = range_m < ROAD_REACH_M
+
+    on_map_m = transform_from(pose, seen_m[is_near])
     seen_cells = np.rint(on_map_m / cell_m).astype(np.int32)
     cells, counts = np.unique(seen_cells, axis=0, return_counts=True)
-    shares = np.minimum(1.0, counts / ENOUGH_POINTS).astype(np.float32)
-    return cells, shares
+
+    shares = np.minimum(1.0, counts / ENOUGH_POINTS)
+    return cells, shares.astype(np.float32)

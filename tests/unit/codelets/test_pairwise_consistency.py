@@ -7,8 +7,8 @@ import numpy as np
 from cogmap.geometry.se2 import rotate
 from services.codelets.config import Config
 from services.codelets.correction.pairwise_consistency import Views, consistent
-from services.codelets.mapping.loop_detection import constraints_of
 from services.codelets.mapping.path import steps_of
+from services.codelets.mapping.views import constraints_of
 
 FALSE_CLOSURE = 1e-3
 TOWER = np.array([30.0, 8.0])
