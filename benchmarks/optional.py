@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
+import numpy as np
+
 from cogmap.errors import UsageError
+from cogmap.geometry.arrays import Floats
 
 REMEDY = "is not installed, and this benchmark needs it: run make bench-setup"
 
@@ -17,3 +21,13 @@ def gtsam() -> Any:
         raise UsageError(f"gtsam {REMEDY}") from None
 
     return gtsam
+
+
+def gtsam_poses(values: Any, keys: Iterable[int]) -> Floats:
+    """(n, 3) poses in the plane, of gtsam's `values` at `keys`: x_m, y_m, heading_rad."""
+    poses = []
+    for key in keys:
+        pose = values.atPose2(key)
+        poses.append((pose.x(), pose.y(), pose.theta()))
+
+    return np.array(poses)

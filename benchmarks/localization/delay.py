@@ -27,18 +27,27 @@ class Delay:
     @property
     def lag_s(self) -> float:
         """0 until there are MIN_PAIRS of observations."""
-        return float(LAGS_S[self._errors_rad.argmin()]) if self._pairs >= MIN_PAIRS else 0.0
+        if self._pairs < MIN_PAIRS:
+            return 0.0
+
+        best = self._errors_rad.argmin()
+        return float(LAGS_S[best])
 
     def observe(self, rows: Floats, heading_rad: Callable[[Floats], Floats]) -> None:
         """Add (n, 4) rows of stamp, subject, range and bearing; `heading_rad` is the wheels'."""
         for stamp_s, subject, _, bearing_rad in rows.tolist():
             before = self._last.get(subject)
             self._last[subject] = (stamp_s, bearing_rad)
-
-            if before is None or not 0 < stamp_s - before[0] < MAX_GAP_S:
+            if before is None:
                 continue
 
-            turned_rad = heading_rad(stamp_s - LAGS_S) - heading_rad(before[0] - LAGS_S)
-            error_rad = bearing_rad - before[1] + turned_rad
-            self._errors_rad += np.abs(np.remainder(error_rad + np.pi, 2 * np.pi) - np.pi)
+            before_s, before_rad = before
+            if not 0 < stamp_s - before_s < MAX_GAP_S:
+                continue
+
+            headings_rad = heading_rad(stamp_s - LAGS_S)
+            turned_rad = headings_rad - heading_rad(before_s - LAGS_S)
+            error_rad = bearing_rad - before_rad + turned_rad
+            wrapped_rad = np.remainder(error_rad + np.pi, 2 * np.pi) - np.pi
+            self._errors_rad += np.abs(wrapped_rad)
             self._pairs += 1

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,15 +10,14 @@ import numpy as np
 from benchmarks.localization import smoother
 from benchmarks.localization.loop import Landmarks, LocalizationLoop
 from benchmarks.localization.senses import Moment, label_of, moments
+from benchmarks.localization.truth import Truth
 from benchmarks.report import Metrics
-from benchmarks.trajectory import trajectory_error_m
 from cogmap.data.mrclam import Robot
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import compose, relative
 
 SEEDS = (0, 1)
 ORIGIN = (0.0, 0.0, 0.0)
-TRUTH_GAP_S = 0.5
 KIDNAPPED_S = (300.0, 360.0)
 FOUND_M = 0.5
 STAMP_COLUMN = 0
@@ -42,8 +41,10 @@ class Drive(NamedTuple):
 
         Each is by path integration from the last place of the path before it.
         """
-        later = np.searchsorted(self.path[:, STAMP_COLUMN], stamps_s + STAMP_TOLERANCE_S)
-        places = self.path[(later - 1).clip(0)]
+        place_stamps_s = self.path[:, STAMP_COLUMN]
+        later = np.searchsorted(place_stamps_s, stamps_s + STAMP_TOLERANCE_S)
+        before = (later - 1).clip(0)
+        places = self.path[before]
         poses = []
 
         for place, now in zip(places, self.odometry, strict=True):
@@ -86,29 +87,28 @@ def evaluate(robot: Robot, landmarks: dict[int, tuple[float, float]]) -> Metrics
     it. `*_even_m` is of the moments at even times alone.
     """
     log = list(moments(robot))
-    stamps_s = np.array([moment.stamp_s for moment in log])
-    truth, is_known = true_poses(robot, stamps_s)
-    is_even = is_known & np.array([moment.tick for moment in log])
+    stamps_s = _stamps_s(log)
+    truth = Truth.at(robot, stamps_s)
+    is_tick = np.array([moment.tick for moment in log])
+    even = truth.only(is_tick)
     start = _start(robot)
 
     known = [follow(log, landmarks, start, seed) for seed in SEEDS]
     slam = [follow(log, {}, ORIGIN, seed) for seed in SEEDS]
 
-    def aligned_error_m(path: Floats) -> float:
-        return trajectory_error_m(path[is_known, :2], truth[is_known, :2])
-
-    known_m = [_rmse_m(drive.online[is_known], truth[is_known]) for drive in known]
-    known_even_m = [_rmse_m(drive.online[is_even], truth[is_even]) for drive in known]
-    slam_m = [aligned_error_m(drive.corrected(stamps_s)) for drive in slam]
-    slam_online_m = [aligned_error_m(drive.online) for drive in slam]
+    known_m = [truth.rmse_m(drive.online) for drive in known]
+    known_even_m = [even.rmse_m(drive.online) for drive in known]
+    slam_m = [truth.aligned_error_m(drive.corrected(stamps_s)) for drive in slam]
+    slam_online_m = [truth.aligned_error_m(drive.online) for drive in slam]
+    smoothed = smoother.smooth(log)
 
     return {
         "known_map_rmse_m": float(np.mean(known_m)),
         "known_map_rmse_even_m": float(np.mean(known_even_m)),
         "slam_rmse_m": float(np.mean(slam_m)),
         "slam_online_rmse_m": float(np.mean(slam_online_m)),
-        "path_integration_rmse_m": aligned_error_m(slam[0].odometry),
-        "smoother_rmse_m": aligned_error_m(smoother.smooth(log)),
+        "path_integration_rmse_m": truth.aligned_error_m(slam[0].odometry),
+        "smoother_rmse_m": truth.aligned_error_m(smoothed),
         "recovery_s": recovery_s(robot, landmarks),
     }
 
@@ -120,44 +120,42 @@ def recovery_s(robot: Robot, landmarks: dict[int, tuple[float, float]]) -> float
     next observation on.
     """
     begin_s = float(robot.odometry[0, 0])
-    end_s = begin_s + 2 * KIDNAPPED_S[1]
+    _, released_s = KIDNAPPED_S
+    end_s = begin_s + 2 * released_s
     log = [moment for moment in moments(robot, KIDNAPPED_S) if moment.stamp_s < end_s]
-    stamps_s = np.array([moment.stamp_s for moment in log])
-    truth, is_known = true_poses(robot, stamps_s)
+    stamps_s = _stamps_s(log)
+    truth = Truth.at(robot, stamps_s)
     online = follow(log, landmarks, _start(robot), 0).online
 
+    is_after = stamps_s > begin_s + released_s
     observes = np.array([bool(moment.percepts) for moment in log])
-    is_after = stamps_s > begin_s + KIDNAPPED_S[1]
-    after = np.flatnonzero(observes & is_known & is_after)
+    after = np.flatnonzero(observes & truth.is_known & is_after)
     if not len(after):
         return 0.0
 
-    error_m = np.hypot(*(online[after, :2] - truth[after, :2]).T)
+    offset_m = online[after, :2] - truth.poses[after, :2]
+    error_m = np.hypot(offset_m[:, 0], offset_m[:, 1])
+    observed_s = stamps_s[after]
+    found_s = observed_s[_first_found(error_m)]
+    return float(found_s - observed_s[0])
+
+
+def _first_found(error_m: Floats) -> int:
+    """The index from which on no error is over FOUND_M; the last one where there is none."""
     lost = np.flatnonzero(error_m > FOUND_M)
-    first_found = min(lost[-1] + 1, len(after) - 1) if len(lost) else 0
-    return float(stamps_s[after[first_found]] - stamps_s[after[0]])
+    if not len(lost):
+        return 0
+
+    return min(int(lost[-1]) + 1, len(error_m) - 1)
 
 
-def true_poses(robot: Robot, stamps_s: Floats) -> tuple[Floats, np.ndarray]:
-    """(n, 3) true poses at `stamps_s`, and (n,) whether motion capture saw the robot then."""
-    known_s = robot.truth[:, 0]
-    heading_rad = np.unwrap(robot.truth[:, 3])
-    columns = (robot.truth[:, 1], robot.truth[:, 2], heading_rad)
-    poses = np.column_stack([np.interp(stamps_s, known_s, column) for column in columns])
-
-    after = np.searchsorted(known_s, stamps_s).clip(1, len(known_s) - 1)
-    is_near = known_s[after] - known_s[after - 1] <= TRUTH_GAP_S
-    is_covered = (stamps_s >= known_s[0]) & (stamps_s <= known_s[-1])
-    return poses, is_near & is_covered
+def _stamps_s(log: Sequence[Moment]) -> Floats:
+    return np.array([moment.stamp_s for moment in log])
 
 
 def _start(robot: Robot) -> tuple[float, float, float]:
     """The true pose at the beginning of the log."""
-    poses, _ = true_poses(robot, robot.odometry[:1, 0])
+    begin_s = robot.odometry[:1, 0]
+    poses = Truth.at(robot, begin_s).poses
     x_m, y_m, heading_rad = poses[0].tolist()
     return x_m, y_m, heading_rad
-
-
-def _rmse_m(path: Floats, truth: Floats) -> float:
-    offset_m = path[:, :2] - truth[:, :2]
-    return float(np.sqrt(np.square(offset_m).sum(axis=1).mean()))

@@ -79,48 +79,34 @@ class LocalizationLoop:
         surveyed: bool = False,
         seed: int = 0,
     ) -> None:
-        configured = sections(surveyed)
-        initial = nodes.initial_map(
-            start, landmarks or {}, surveyed, SAMPLES, cycle=seed * CYCLES_A_SEED
-        )
-        workspace = registry.build("workspace", configured)
-        if workspace.restore is not None:
-            workspace.restore([initial])
-
-        worker = registry.build("codelets", configured)
-        worker.handlers[topics.LEASES] = self._timed(worker.handlers[topics.LEASES])
-
         self.task_s: list[tuple[str, float]] = []
         self._graph = Graph()
         self._dropped: list[str] = []
         self._frame = 0
         self._until_ns = 0
+
+        configured = sections(surveyed)
+        workspace = registry.build("workspace", configured)
+        if workspace.restore is not None:
+            first_cycle = seed * CYCLES_A_SEED
+            initial = nodes.initial_map(start, landmarks or {}, surveyed, SAMPLES, first_cycle)
+            workspace.restore([initial])
+
+        worker = registry.build("codelets", configured)
+        on_leases = worker.handlers[topics.LEASES]
+        worker.handlers[topics.LEASES] = self._timed(on_leases)
+
+        observer = Module("observer").following(self._graph, self._on_delta)
         self._senses = Module("senses")
         self._senses.emits.update((topics.SELF_MOTION, topics.PERCEPTS))
-        observer = Module("observer").following(self._graph, self._on_delta)
         self._runner = InProcessRunner([workspace, worker, observer, self._senses])
 
     def live(self, moment: Moment) -> None:
         """Run one cycle to its end. Raises CogmapError where an answer was not committed."""
         self.task_s = []
-        stamp_ns = round(moment.stamp_s * 1e9)
-        motion = SelfMotion(
-            stamp_ns=stamp_ns,
-            frame=self._frame,
-            since_ns=self._until_ns,
-            motions=Array.of(moment.motions),
-        )
-        percepts = Percepts(
-            stamp_ns=stamp_ns,
-            frame=self._frame,
-            objects=moment.percepts,
-            road_m=Array.of(np.zeros((0, 2), np.float32)),
-        )
-        self._frame += 1
-        self._until_ns = stamp_ns
-
         senses = self._runner.shells[-1]
-        senses.publish(self._senses.stamp([motion, percepts]))
+        sensed = self._messages(moment)
+        senses.publish(self._senses.stamp(sensed))
         self._runner.run()
 
         for shell in self._runner.shells:
@@ -147,6 +133,25 @@ class LocalizationLoop:
         """(n, 7) rows of the path on the map now: stamp_s, pose, and path integration's."""
         return nodes.path(self._graph)
 
+    def _messages(self, moment: Moment) -> list[SelfMotion | Percepts]:
+        """The next frame's self-motion and percepts."""
+        stamp_ns = round(moment.stamp_s * 1e9)
+        motion = SelfMotion(
+            stamp_ns=stamp_ns,
+            frame=self._frame,
+            since_ns=self._until_ns,
+            motions=Array.of(moment.motions),
+        )
+        percepts = Percepts(
+            stamp_ns=stamp_ns,
+            frame=self._frame,
+            objects=moment.percepts,
+            road_m=Array.of(np.zeros((0, 2), np.float32)),
+        )
+        self._frame += 1
+        self._until_ns = stamp_ns
+        return [motion, percepts]
+
     def _on_delta(self, delta: Delta) -> None:
         self._dropped += delta.reasons
 
@@ -155,7 +160,9 @@ class LocalizationLoop:
             began_s = time.process_time()
             reply = handler(leases)
             took_s = time.process_time() - began_s
-            _, codelet, *_ = leases.assignments[0].task_id.split("/")
+
+            first = leases.assignments[0]
+            _, codelet, *_ = first.task_id.split("/")
             self.task_s.append((codelet, took_s))
             return reply
 

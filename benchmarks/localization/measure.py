@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
@@ -39,18 +40,32 @@ def measure(folder: Path, processes: int) -> Metrics:
         work = partial(evaluate, landmarks=recording.landmarks)
         rows = parallel_map(work, recording.robots, processes, progress)
 
-    metrics = {key: float(np.mean([row[key] for row in rows])) for key in rows[0]}
-    metrics["slam_vs_smoother"] = metrics["slam_rmse_m"] / metrics["smoother_rmse_m"]
-    metrics |= timings
+    metrics: Metrics = {}
+    for key in rows[0]:
+        of_robots = [row[key] for row in rows]
+        metrics[key] = float(np.mean(of_robots))
 
+    metrics["slam_vs_smoother"] = metrics["slam_rmse_m"] / metrics["smoother_rmse_m"]
+    return metrics | timings | _of_each_robot(recording, rows) | _counts(recording)
+
+
+def _of_each_robot(recording: Recording, rows: Sequence[Metrics]) -> Metrics:
+    metrics = {}
     for robot, row in zip(recording.robots, rows, strict=True):
         for key in OF_EACH_ROBOT:
             metrics[f"robot{robot.number}_{key}"] = row[key]
 
-    return metrics | _counts(recording)
+    return metrics
 
 
 def _counts(recording: Recording) -> Metrics:
-    observations = sum(len(robot.landmark_observations) for robot in recording.robots)
-    unread = sum(robot.unread for robot in recording.robots)
-    return {"landmark_sightings": float(observations), "unread_barcodes": float(unread)}
+    observations = 0
+    unread = 0
+    for robot in recording.robots:
+        observations += len(robot.landmark_observations)
+        unread += robot.unread
+
+    return {
+        "landmark_sightings": float(observations),
+        "unread_barcodes": float(unread),
+    }

@@ -39,6 +39,7 @@ def initial_map(
     """
     nodes: list[AnyNode] = [Map(id=ROOT_MAP, cell_m=1.0), _self_node(start, samples)]
     offsets_m = np.random.default_rng(0).normal(0.0, CERTAIN_M, (LANDMARK_SAMPLES, 2))
+
     for label, (x_m, y_m) in landmarks.items():
         landmark = Object(
             id=object_id(label),
@@ -53,11 +54,14 @@ def initial_map(
             offsets_m=Matrix.of(offsets_m, "<f2"),
         )
         nodes.append(landmark)
+
     return Snapshot(version=1, cycle=cycle, decay=Decay(), nodes=nodes, links=[], tiles=[])
 
 
 def _self_node(start: Pose, samples: int) -> Self:
     x_m, y_m, heading_rad = start
+    certain = np.tile(np.array(start), (samples, 1))
+
     return Self(
         id=SELF_ID,
         activation=1.0,
@@ -68,7 +72,7 @@ def _self_node(start: Pose, samples: int) -> Self:
         odometry_x_m=x_m,
         odometry_y_m=y_m,
         odometry_heading_rad=heading_rad,
-        samples=Matrix.of(np.tile(np.array(start), (samples, 1))),
+        samples=Matrix.of(certain),
     )
 
 
@@ -81,7 +85,13 @@ def pose(graph: Graph) -> Floats:
 def odometry(graph: Graph) -> Floats:
     """(3,): where path integration alone would have the agent."""
     agent = _agent(graph)
-    return np.array([agent.odometry_x_m, agent.odometry_y_m, agent.odometry_heading_rad])
+    return np.array(
+        [
+            agent.odometry_x_m,
+            agent.odometry_y_m,
+            agent.odometry_heading_rad,
+        ]
+    )
 
 
 def path(graph: Graph) -> Floats:

@@ -61,10 +61,10 @@ def percept_of(row: Floats) -> Percept:
     What a set calls range is how high an upright barcode looks, which is its depth along the
     camera's axis.
     """
-    depth_m = float(row[2])
-    bearing_rad = float(row[3])
-    range_m = depth_m / max(float(np.cos(bearing_rad)), MIN_COSINE)
-    return seen(label_of(int(row[1])), bearing_rad, range_m)
+    _, subject, depth_m, bearing_rad = row.tolist()
+    label = label_of(int(subject))
+    cosine = max(float(np.cos(bearing_rad)), MIN_COSINE)
+    return seen(label, bearing_rad, depth_m / cosine)
 
 
 class Wheels:
@@ -77,8 +77,11 @@ class Wheels:
     def __init__(self, odometry: Floats) -> None:
         self._stamps = odometry[:, 0]
         self._speeds = odometry[:, 1:3]
-        turns = odometry[:-1, 2] * np.diff(self._stamps)
-        self._turned = np.concatenate([[0.0], np.cumsum(turns)])
+
+        turn_rates = odometry[:-1, 2]
+        turns = turn_rates * np.diff(self._stamps)
+        turned = np.cumsum(turns)
+        self._turned = np.concatenate([[0.0], turned])
 
     def heading_rad(self, stamps_s: Floats) -> Floats:
         """What the turns add up to at each of `stamps_s`."""
@@ -93,9 +96,12 @@ class Wheels:
 
         speeds, lasts_s = self._commands(since_s, begin_s, until_s)
         speed, turn_rate = speeds.T
-        speed_sd = NOISE.speed_noise * np.abs(speed) / np.sqrt(lasts_s)
-        drift_variance = NOISE.drift_rad_per_sqrt_m**2 * np.abs(speed)
-        turn_variance = (NOISE.turn_noise * turn_rate) ** 2 + drift_variance
+        magnitude = np.abs(speed)
+        speed_sd = NOISE.speed_noise * magnitude / np.sqrt(lasts_s)
+
+        drift_variance = NOISE.drift_rad_per_sqrt_m**2 * magnitude
+        rate_sd = NOISE.turn_noise * turn_rate
+        turn_variance = rate_sd**2 + drift_variance
         turn_sd = np.sqrt(turn_variance / lasts_s)
         return np.column_stack([speed, turn_rate, lasts_s, speed_sd, turn_sd])
 
@@ -103,16 +109,20 @@ class Wheels:
         """The speeds (n, 2) commanded in between, equal ones in a row as one, and how long each
         lasts.
         """
-        first = max(0, int(np.searchsorted(self._stamps, since_s, "right")) - 1)
+        after = int(np.searchsorted(self._stamps, since_s, "right"))
+        first = max(0, after - 1)
         last = int(np.searchsorted(self._stamps, until_s, "left"))
         speeds = self._speeds[first:last]
-        edges_s = np.concatenate([[begin_s], self._stamps[first + 1 : last], [until_s]])
+        starts_s = np.append(begin_s, self._stamps[first + 1 : last])
 
-        changes = (speeds[1:] != speeds[:-1]).any(axis=1)
-        begins = np.flatnonzero(np.append(True, changes))
-        lasts_s = np.diff(np.append(edges_s[begins], until_s))
+        differs = speeds[1:] != speeds[:-1]
+        is_change = np.append(True, differs.any(axis=1))
+        changes = np.flatnonzero(is_change)
+        edges_s = np.append(starts_s[changes], until_s)
+        lasts_s = np.diff(edges_s)
+
         some = lasts_s > 0
-        return speeds[begins[some]], lasts_s[some]
+        return speeds[changes[some]], lasts_s[some]
 
 
 def moments(robot: Robot, skipped_s: tuple[float, float] | None = None) -> Iterator[Moment]:
@@ -122,12 +132,11 @@ def moments(robot: Robot, skipped_s: tuple[float, float] | None = None) -> Itera
     """
     begin_s = float(robot.odometry[0, 0])
     end_s = float(robot.odometry[-1, 0])
-    observed = robot.landmark_observations
-    observed = observed[(observed[:, 0] > begin_s) & (observed[:, 0] <= end_s)]
-    observed[:, 0] = observed[:, 0].round(STAMP_DECIMALS)
+    observed = _observed(robot, begin_s, end_s)
     ticks = np.arange(begin_s + TICK_S, end_s, TICK_S).round(STAMP_DECIMALS)
     stamps = np.union1d(ticks, observed[:, 0])
     is_tick = np.isin(stamps, ticks)
+
     wheels = Wheels(robot.odometry)
     delay = Delay()
     moved_until_s = begin_s
@@ -138,20 +147,37 @@ def moments(robot: Robot, skipped_s: tuple[float, float] | None = None) -> Itera
         sensed_s = max(moved_until_s, stamp_s - delay.lag_s)
 
         if not _is_within(stamp_s - begin_s, skipped_s):
-            yield Moment(stamp_s, wheels.rows(moved_until_s, sensed_s), _percepts(here), tick)
+            motions = wheels.rows(moved_until_s, sensed_s)
+            yield Moment(stamp_s, motions, _percepts(here), tick)
 
         moved_until_s = sensed_s
 
 
+def _observed(robot: Robot, begin_s: float, end_s: float) -> Floats:
+    """The observations of landmarks in that time, their stamps rounded as those of ticks are."""
+    every = robot.landmark_observations
+    stamps_s = every[:, 0]
+    is_during = (stamps_s > begin_s) & (stamps_s <= end_s)
+
+    observed = every[is_during]
+    observed[:, 0] = observed[:, 0].round(STAMP_DECIMALS)
+    return observed
+
+
 def _at(observed: Floats, stamp_s: float) -> Floats:
     """The rows of that stamp; they are in order of time."""
-    first = np.searchsorted(observed[:, 0], stamp_s, "left")
-    last = np.searchsorted(observed[:, 0], stamp_s, "right")
+    stamps_s = observed[:, 0]
+    first = np.searchsorted(stamps_s, stamp_s, "left")
+    last = np.searchsorted(stamps_s, stamp_s, "right")
     return observed[first:last]
 
 
 def _is_within(time_s: float, limits_s: tuple[float, float] | None) -> bool:
-    return limits_s is not None and limits_s[0] <= time_s < limits_s[1]
+    if limits_s is None:
+        return False
+
+    begin_s, end_s = limits_s
+    return begin_s <= time_s < end_s
 
 
 def _percepts(rows: Floats) -> list[Percept]:
@@ -159,6 +185,7 @@ def _percepts(rows: Floats) -> list[Percept]:
     found: dict[int, Percept] = {}
 
     for row in rows:
-        found.setdefault(int(row[1]), percept_of(row))
+        subject = int(row[1])
+        found.setdefault(subject, percept_of(row))
 
     return list(found.values())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from benchmarks import optional
@@ -43,20 +45,24 @@ class Problem:
         self._count = 0
         self._pose = self._gtsam.Pose2(0.0, 0.0, 0.0)
 
+        first = self._key(0)
         fixed = self._gtsam.noiseModel.Constrained.All(3)
-        self._start.insert(self._key(0), self._pose)
-        self._graph.add(self._gtsam.PriorFactorPose2(self._key(0), self._pose, fixed))
+        prior = self._gtsam.PriorFactorPose2(first, self._pose, fixed)
+        self._start.insert(first, self._pose)
+        self._graph.add(prior)
 
     def add(self, moment: Moment) -> None:
         """Add the next pose, by path integration from the last, and what is seen from it."""
-        step, sd = _step(moment.motions)
-        motion = self._gtsam.Pose2(*step)
-        noise = self._gtsam.noiseModel.Diagonal.Sigmas(sd)
         before = self._key(self._count)
         self._count += 1
         here = self._key(self._count)
 
-        self._graph.add(self._gtsam.BetweenFactorPose2(before, here, motion, noise))
+        step, sd = _step(moment.motions)
+        motion = self._gtsam.Pose2(*step)
+        noise = self._gtsam.noiseModel.Diagonal.Sigmas(sd)
+        factor = self._gtsam.BetweenFactorPose2(before, here, motion, noise)
+        self._graph.add(factor)
+
         self._pose = self._pose.compose(motion)
         self._start.insert(here, self._pose)
 
@@ -68,23 +74,31 @@ class Problem:
         parameters = self._gtsam.LevenbergMarquardtParams()
         parameters.setMaxIterations(STEPS)
         optimizer = self._gtsam.LevenbergMarquardtOptimizer(self._graph, self._start, parameters)
-        found = optimizer.optimize()
-        poses = [found.atPose2(self._key(number)) for number in range(1, self._count + 1)]
-        return np.array([(pose.x(), pose.y(), pose.theta()) for pose in poses])
+        keys = [self._key(number) for number in range(1, self._count + 1)]
+        return optional.gtsam_poses(optimizer.optimize(), keys)
 
     def _observe(self, here: int, percept: Percept) -> None:
-        gtsam = self._gtsam
-        landmark = gtsam.symbol("l", int(percept.label.rpartition("-")[2]))
-        sds = np.array([percept.bearing_sd_rad, percept.range_sd_m])
-        robust = gtsam.noiseModel.mEstimator.Cauchy.Create(CAUCHY)
-        noise = gtsam.noiseModel.Robust.Create(robust, gtsam.noiseModel.Diagonal.Sigmas(sds))
-        bearing = gtsam.Rot2(percept.bearing_rad)
-        self._graph.add(gtsam.BearingRangeFactor2D(here, landmark, bearing, percept.range_m, noise))
+        _, _, number = percept.label.rpartition("-")
+        landmark = self._gtsam.symbol("l", int(number))
+        bearing = self._gtsam.Rot2(percept.bearing_rad)
+        noise = self._robust_noise(percept)
+        factor = self._gtsam.BearingRangeFactor2D(here, landmark, bearing, percept.range_m, noise)
+        self._graph.add(factor)
 
         if not self._start.exists(landmark):
-            direction = np.array([np.cos(percept.bearing_rad), np.sin(percept.bearing_rad)])
-            where = self._pose.transformFrom(percept.range_m * direction)
+            cosine = np.cos(percept.bearing_rad)
+            sine = np.sin(percept.bearing_rad)
+            offset_m = percept.range_m * np.array([cosine, sine])
+            where = self._pose.transformFrom(offset_m)
             self._start.insert(landmark, where)
+
+    def _robust_noise(self, percept: Percept) -> Any:
+        """The noise of bearing and range, weighed by Cauchy's function."""
+        models = self._gtsam.noiseModel
+        sds = np.array([percept.bearing_sd_rad, percept.range_sd_m])
+        gaussian = models.Diagonal.Sigmas(sds)
+        cauchy = models.mEstimator.Cauchy.Create(CAUCHY)
+        return models.Robust.Create(cauchy, gaussian)
 
     def _key(self, number: int) -> int:
         key: int = self._gtsam.symbol("x", number)
@@ -94,15 +108,21 @@ class Problem:
 def _step(rows: Floats) -> tuple[Floats, Floats]:
     """The pose that (n, 5) rows of motion lead to from 0, and its standard deviations."""
     speed, turn_rate, dt, speed_sd, turn_rate_sd = rows.T
-    turn = turn_rate * dt
-    middle_rad = np.cumsum(turn) - turn / 2
+    turn_rad = turn_rate * dt
+    middle_rad = np.cumsum(turn_rad) - turn_rad / 2
     distance_m = speed * dt
 
-    forwards_m = (distance_m * np.cos(middle_rad)).sum()
-    left_m = (distance_m * np.sin(middle_rad)).sum()
-    distance_sd_m = float(np.sqrt(np.square(speed_sd * dt).sum()))
-    turn_sd_rad = float(np.sqrt(np.square(turn_rate_sd * dt).sum()))
+    forwards_m = distance_m * np.cos(middle_rad)
+    left_m = distance_m * np.sin(middle_rad)
+    step = np.array([forwards_m.sum(), left_m.sum(), turn_rad.sum()])
 
-    step = np.array([forwards_m, left_m, turn.sum()])
+    distance_sd_m = _root_sum_square(speed_sd * dt)
+    turn_sd_rad = _root_sum_square(turn_rate_sd * dt)
     sds = np.array([distance_sd_m, SIDEWAYS_SHARE * distance_sd_m, turn_sd_rad])
     return step, sds + MIN_SD
+
+
+def _root_sum_square(deviations: Floats) -> float:
+    """The standard deviation of a sum of independent terms."""
+    variances = np.square(deviations)
+    return float(np.sqrt(variances.sum()))

@@ -23,23 +23,28 @@ def best_positions(graph: PoseGraph) -> Floats:
     # Forces and positions together: the normal equations lose what a certain constraint leaves to
     # uncertain ones.
     blocks = [[covariance, differences], [differences.T, None]]
-    unknowns = differences.shape[1]
-    right_side = np.concatenate([known.offset_m.reshape(-1), np.zeros(unknowns)])
-    found = spsolve(sparse.bmat(blocks, format="csc"), right_side)
+    left_side = sparse.bmat(blocks, format="csc")
+    _, unknowns = differences.shape
+    offsets_m = known.offset_m.reshape(-1)
+    right_side = np.concatenate([offsets_m, np.zeros(unknowns)])
+    found = spsolve(left_side, right_side)
 
-    positions_m = found[-unknowns:].reshape(-1, 2)
-    result: Floats = graph.poses[0, :2] + np.vstack([np.zeros(2), positions_m])
-    return result
+    others_m = found[-unknowns:].reshape(-1, 2)
+    from_first_m = np.vstack([np.zeros(2), others_m])
+    positions_m: Floats = graph.poses[0, :2] + from_first_m
+    return positions_m
 
 
 def _differences(constraints: Constraints, count: int) -> sparse.csc_matrix:
     """(2m, 2(n - 1)): takes all positions but the first to the m differences between two each."""
-    edges = np.arange(len(constraints))
-    signs = np.repeat([1.0, -1.0], len(constraints))
-    ends = np.concatenate([constraints.j, constraints.i])
-    shape = (len(constraints), count)
-    of_one_axis = sparse.csr_matrix((signs, (np.tile(edges, 2), ends)), shape=shape)
-    return sparse.kron(of_one_axis[:, 1:], sparse.identity(2), format="csc")
+    number = len(constraints)
+    rows = np.tile(np.arange(number), 2)
+    columns = np.concatenate([constraints.j, constraints.i])
+    signs = np.repeat([1.0, -1.0], number)
+
+    of_one_axis = sparse.csr_matrix((signs, (rows, columns)), shape=(number, count))
+    without_first = of_one_axis[:, 1:]
+    return sparse.kron(without_first, sparse.identity(2), format="csc")
 
 
 class Gtsam:
@@ -53,11 +58,13 @@ class Gtsam:
         self._parameters = self._gtsam.LevenbergMarquardtParams()
 
         for number, pose in enumerate(poses):
-            self._start.insert(number, self._gtsam.Pose2(*pose))
+            guess = self._gtsam.Pose2(*pose)
+            self._start.insert(number, guess)
 
-        fixed = self._gtsam.noiseModel.Constrained.All(3)
         first = self._gtsam.Pose2(*poses[0])
-        self._graph.add(self._gtsam.PriorFactorPose2(0, first, fixed))
+        fixed = self._gtsam.noiseModel.Constrained.All(3)
+        prior = self._gtsam.PriorFactorPose2(0, first, fixed)
+        self._graph.add(prior)
 
         for number in range(len(constraints)):
             self._constrain(constraints, number)
@@ -74,7 +81,8 @@ class Gtsam:
 
         `solve` factors by QR from then on.
         """
-        gives_up = bool(self._graph.error(self.solve()) >= self._graph.error(self._start))
+        error = self._graph.error(self.solve())
+        gives_up = bool(error >= self._graph.error(self._start))
 
         if gives_up:
             self._parameters.setLinearSolverType("MULTIFRONTAL_QR")
@@ -83,12 +91,13 @@ class Gtsam:
 
     def poses(self, values: Any) -> Floats:
         """(n, 3) poses of a result of `solve`."""
-        found = [values.atPose2(number) for number in range(self._count)]
-        return np.array([(pose.x(), pose.y(), pose.theta()) for pose in found])
+        return optional.gtsam_poses(values, range(self._count))
 
     def _constrain(self, constraints: Constraints, number: int) -> None:
         i = int(constraints.i[number])
         j = int(constraints.j[number])
         measurement = self._gtsam.Pose2(*constraints.measurement[number])
-        noise = self._gtsam.noiseModel.Gaussian.Information(constraints.information[number])
-        self._graph.add(self._gtsam.BetweenFactorPose2(i, j, measurement, noise))
+        information = constraints.information[number]
+        noise = self._gtsam.noiseModel.Gaussian.Information(information)
+        factor = self._gtsam.BetweenFactorPose2(i, j, measurement, noise)
+        self._graph.add(factor)
