@@ -125,7 +125,8 @@ def sections() -> tuple[str, ...]:
 
 def build(name: str, settings: config.Sections, instance: str = "") -> Module:
     """Module `name`, configured from its section. Raises UsageError, ConfigError."""
-    config.check_sections(settings, sections())
+    if not settings.keys() <= _ENTRIES.keys():
+        config.check_sections(settings, sections())
     if name not in _ENTRIES:
         raise UsageError(f"no module {name!r}: there are {', '.join(MODULES)}")
     return _ENTRIES[name]().build(settings, instance or name)
