@@ -1,12 +1,12 @@
-"""ONNX networks, run by OpenCV's dnn module on one thread; running them needs no torch."""
+"""ONNX networks, run by ONNX Runtime on one thread; running them needs no torch."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
 
-import cv2
 import numpy as np
+import onnxruntime
 
 from cogmap.errors import ConfigError
 from cogmap.geometry.arrays import Singles
@@ -23,68 +23,47 @@ class Network:
     """
 
     def __init__(self, path: Path, input_shape: Shape, output_shapes: Mapping[str, Shape]) -> None:
-        cv2.setNumThreads(1)
+        self._session = _session(path)
         self._input_shape = input_shape
         self._output_names = list(output_shapes)
-        self._load(path)
-        self._check(path, list(output_shapes.values()))
+
+        (received,) = self._session.get_inputs()
+        self._input_name = received.name
+        _check(path, "takes", {"input": tuple(received.shape)}, {"input": input_shape})
+
+        shapes = {output.name: tuple(output.shape) for output in self._session.get_outputs()}
+        _check(path, "gives", shapes, output_shapes)
 
     def __call__(self, values: Singles) -> list[Singles]:
         """Return the outputs for `values`, in the order of their names."""
         assert values.shape == self._input_shape
 
-        self._net.setInput(values)
-        outputs = self._net.forward(self._output_names)
+        outputs = self._session.run(self._output_names, {self._input_name: values})
         return [np.asarray(output, np.float32) for output in outputs]
 
-    def _load(self, path: Path) -> None:
-        if not path.is_file():
-            raise ConfigError(f"no weights {path}: train them with cogmap train")
-        try:
-            self._net = cv2.dnn.readNetFromONNX(str(path))
-        except cv2.error as error:
-            raise self._unreadable(path, error) from None
 
-    def _check(self, path: Path, expected: list[Shape]) -> None:
-        try:
-            channels = _input_channels(path)
-            outputs = self(np.zeros(self._input_shape, np.float32))
-        except cv2.error as error:
-            raise self._unreadable(path, error) from None
+def _session(path: Path) -> onnxruntime.InferenceSession:
+    if not path.is_file():
+        raise ConfigError(f"no weights {path}: train them with cogmap train")
 
-        if channels != self._input_shape[1]:
-            raise ConfigError(
-                f"{path} takes {channels} channels, where {self._input_shape[1]} are expected: "
-                "train it again with cogmap train"
-            )
-
-        shapes = [output.shape for output in outputs]
-        if shapes != expected:
-            raise ConfigError(
-                f"{path} gives {shapes}, where {expected} are expected: "
-                "train it again with cogmap train"
-            )
-
-    def _unreadable(self, path: Path, error: cv2.error) -> ConfigError:
-        lines = str(error).strip().splitlines()
-        reason = lines[0] if lines else "OpenCV cannot read it"
-        return ConfigError(
-            f"{path} does not hold a network that takes {self._input_shape} ({reason}): "
-            "train it again with cogmap train"
-        )
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1
+    options.inter_op_num_threads = 1
+    try:
+        return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+    except Exception as error:  # the library raises an exception of its own for each status
+        raise ConfigError(
+            f"{path} does not hold a network ({error}): train it again with cogmap train"
+        ) from error
 
 
-def _input_channels(path: Path) -> int:
-    """The number of channels of the first layer's weights, 0 if no layer has any.
-
-    OpenCV's new engine, which runs the network, accepts any number, so the classic one is asked.
-    """
-    net = cv2.dnn.readNetFromONNX(str(path), cv2.dnn.ENGINE_CLASSIC)
-    layers = len(net.getLayerNames())
-
-    for number in range(1, layers + 1):
-        blobs = net.getLayer(number).blobs
-        if blobs:
-            weights = blobs[0]
-            return int(weights.shape[1])
-    return 0
+def _check(
+    path: Path, verb: str, found: Mapping[str, Shape], expected: Mapping[str, Shape]
+) -> None:
+    """Raise ConfigError where the shapes of inputs or outputs differ from those expected."""
+    if found == dict(expected):
+        return
+    raise ConfigError(
+        f"{path} {verb} {found}, where {dict(expected)} is expected: "
+        "train it again with cogmap train"
+    )

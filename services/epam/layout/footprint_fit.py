@@ -24,7 +24,8 @@ from services.epam.layout.footprint_model import (
 )
 
 ORIENTATIONS = 10
-ITERATIONS = 9
+ITERATIONS = 8
+FIRST_DAMPING = 0.1 * 0.2
 # Errors of neighbouring columns are correlated: this many columns count as one.
 CORRELATED_COLUMNS = 5
 DISPARITY_SD_PX = 0.14
@@ -179,14 +180,15 @@ def _usual_centre(objects: FootprintProblem, slope: Floats) -> Floats:
 
 def _solve(parameters: Floats, problem: FootprintProblem) -> _Solution:
     """Levenberg-Marquardt with Huber's weights (1964), every start with a damping of its own."""
-    damping = np.full(len(parameters), 0.1)
-    best_cost = np.full(len(parameters), np.inf)
+    copies = problem.copies()
     best = parameters
-    candidate = parameters
-    residuals, jacobian = linearized(parameters, problem)
+    residuals, jacobian = linearized(best, copies)
+    best_cost = _huber_cost(residuals)
+    damping = np.full(len(best), FIRST_DAMPING)
 
     for _ in range(ITERATIONS):
-        new_residuals, new_jacobian = linearized(candidate, problem)
+        candidate = best - _damped_step(residuals, jacobian, damping)
+        new_residuals, new_jacobian = linearized(candidate, copies)
         cost = _huber_cost(new_residuals)
 
         better = cost < best_cost
@@ -198,8 +200,6 @@ def _solve(parameters: Floats, problem: FootprintProblem) -> _Solution:
         residuals = np.where(better_row, new_residuals, residuals)
         jacobian = np.where(better_matrix, new_jacobian, jacobian)
         damping = np.where(better, damping * 0.2, damping * 8)
-        step = _damped_step(residuals, jacobian, damping)
-        candidate = best - step
 
     return _solution(best, residuals, jacobian, problem)
 

@@ -47,6 +47,11 @@ class FootprintProblem:
             self.camera,
         )
 
+    def copies(self) -> FootprintProblem:
+        """The problem as `linearized` takes it: once as it is, and once for each derivative."""
+        every_row = np.arange(len(self.slope))
+        return self.take(np.tile(every_row, 1 + len(STEPS)))
+
 
 def _residuals(parameters: Floats, problem: FootprintProblem) -> Floats:
     """(s, COLUMNS + 2) residuals in standard deviations, of (s, 3) parameters."""
@@ -129,8 +134,10 @@ def _corner_columns(parameters: Floats, problem: FootprintProblem) -> Floats:
     return np.asarray(camera.cx_px + right_px)
 
 
-def linearized(parameters: Floats, problem: FootprintProblem) -> tuple[Floats, Floats]:
-    """Residuals (s, r) and their derivatives (s, r, 3), by forward differences."""
+def linearized(parameters: Floats, copies: FootprintProblem) -> tuple[Floats, Floats]:
+    """Residuals (s, r) and their derivatives (s, r, 3), by forward differences, of (s, 3)
+    `parameters` and the copies of their problem.
+    """
     evaluated = [parameters]
     for axis, step in enumerate(STEPS):
         shifted = parameters.copy()
@@ -138,9 +145,7 @@ def linearized(parameters: Floats, problem: FootprintProblem) -> tuple[Floats, F
         evaluated.append(shifted)
 
     # All at once: one call of numpy for four evaluations.
-    rows = np.tile(np.arange(len(parameters)), len(evaluated))
-    repeated = problem.take(rows)
-    values = _residuals(np.concatenate(evaluated), repeated)
+    values = _residuals(np.concatenate(evaluated), copies)
     residuals, *others = np.split(values, len(evaluated))
 
     derivatives = []
