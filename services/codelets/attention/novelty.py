@@ -32,6 +32,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         return Answer()
 
     nodes: list[AnyNode] = [graph.agent, *novel]
+
     found = coalition(CODELET.name, nodes, graph, config.attention_base_level)
     return Answer(coalitions=[found])
 

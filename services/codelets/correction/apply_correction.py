@@ -59,12 +59,14 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
 
     rows = correction.rows.numpy()
     path = _corrected_path(graph, rows)
-    operations: list[Operation] = [DropNode(id=CORRECTION_ID), *segments(path)]
 
+    operations: list[Operation] = [DropNode(id=CORRECTION_ID)]
+    operations += segments(path)
     if graph.agent is not None:
         operations += _move_self(graph, graph.agent, rows[-1:])
     operations += _move_objects(graph, rows, path)
     operations += move_road(graph, rows[:, OLD], rows[:, NEW])
+
     return Answer(operations)
 
 

@@ -52,10 +52,12 @@ class IncrementalSolver:
     def _relinearize(self, graph: PoseGraph, max_iterations: int = MAX_ITERATIONS) -> None:
         poses = optimize(graph, max_iterations)
         self.graph = replace(graph, poses=poses)
-        constraints = graph.constraints
 
+        constraints = graph.constraints
         self._normal = NormalEquations(len(poses), constraints)
-        self._factors = factor(self._normal.matrix(poses, constraints))
+        matrix = self._normal.matrix(poses, constraints)
+        self._factors = factor(matrix)
+
         self._cost = cost(poses, constraints)
         self._update_columns: list[Floats] = []
 
@@ -101,10 +103,14 @@ class IncrementalSolver:
         update_columns = np.linalg.solve(left, solved.T).T
 
         residual = residuals(self.graph.poses, closure)[0]
-        misfit = np.linalg.solve(left, root.T @ residual)
-        step = update_columns @ misfit
-        chi_square = float(misfit @ misfit)
-        return _Update(step, chi_square, update_columns)
+        whitened = root.T @ residual
+        misfit = np.linalg.solve(left, whitened)
+
+        return _Update(
+            step=update_columns @ misfit,
+            chi_square=float(misfit @ misfit),
+            columns=update_columns,
+        )
 
     def _columns(self, closure: Constraints, root: Floats) -> tuple[Floats, Indices]:
         """(u, 3): the closure's whitened Jacobian, transposed, and which of its rows are used."""

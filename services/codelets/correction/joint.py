@@ -67,16 +67,17 @@ def by_side(seen: Sightings, poses: Floats, sides: int) -> Sightings:
     keys, landmark = np.unique(key, return_inverse=True)
 
     numbers = keys // sides
-    labels = tuple(seen.labels[number] for number in numbers.tolist())
-    return seen._replace(labels=labels, landmark=landmark)
+    labels = [seen.labels[number] for number in numbers.tolist()]
+    return seen._replace(labels=tuple(labels), landmark=landmark)
 
 
 def _sides(seen: Sightings, poses: Floats, sides: int) -> Indices:
     """(m,): from which side each sighting is, 0 to `sides` - 1."""
+    heading_rad = poses[seen.place, 2]
     forward_m, left_m = seen.where_m.T
     bearing_rad = np.arctan2(left_m, forward_m)
-    direction_rad = poses[seen.place, 2] + bearing_rad
 
+    direction_rad = heading_rad + bearing_rad
     turns = direction_rad / FULL_TURN_RAD
     sector = np.rint(turns * sides).astype(np.int64)
     side: Indices = sector % sides

@@ -40,50 +40,24 @@ class NormalEquations:
     """
 
     def __init__(self, count: int, constraints: Constraints) -> None:
+        unknown_poses = count - 1
+        self.unknown_count = 3 * unknown_poses
         self._order = _elimination_order(count, constraints)
         self._position = np.full(count, -1)
-        self._position[self._order] = np.arange(count - 1)
-        self.unknown_count = 3 * (count - 1)
+        self._position[self._order] = np.arange(unknown_poses)
 
         i = self._position[constraints.i]
         j = self._position[constraints.j]
-        self._analyse_blocks(i, j, count - 1)
-        self._analyse_ends(i, j, count - 1)
+        self._pattern = _BlockPattern(i, j, unknown_poses)
 
-    def _analyse_blocks(self, i: Indices, j: Indices, unknown_poses: int) -> None:
-        """Where the four 3 x 3 blocks of each constraint go: by i and i, i and j, j and i, j and
-        j.
-        """
-        rows = np.concatenate([i, i, j, j])
-        columns = np.concatenate([i, j, i, j])
-        is_used = (rows >= 0) & (columns >= 0)
-        used = np.flatnonzero(is_used)
-
-        keys = columns[used] * unknown_poses + rows[used]
-        blocks, target = np.unique(keys, return_inverse=True)
-
-        self._sum_blocks = _summing(target, used, len(blocks), len(rows))
-        block_rows = blocks % unknown_poses
-        column_keys = np.arange(unknown_poses + 1) * unknown_poses
-        self._indices = block_rows.astype(np.int32)
-        self._starts = np.searchsorted(blocks, column_keys).astype(np.int32)
-
-    def _analyse_ends(self, i: Indices, j: Indices, unknown_poses: int) -> None:
-        """Where the gradient by i and by j of each constraint goes."""
         ends = np.concatenate([i, j])
         used = np.flatnonzero(ends >= 0)
-
         self._sum_ends = _summing(ends[used], used, unknown_poses, len(ends))
 
     def matrix(self, poses: Floats, constraints: Constraints) -> sparse.csc_matrix:
         """J' S^-1 J at `poses`."""
         blocks = _blocks(poses, constraints)
-        data = self._sum_blocks @ blocks.reshape(-1, 9)
-
-        shape = (self.unknown_count, self.unknown_count)
-        stored = (data.reshape(-1, 3, 3), self._indices, self._starts)
-        rows = sparse.bsr_matrix(stored, shape=shape).tocsr()
-        return sparse.csc_matrix((rows.data, rows.indices, rows.indptr), shape=shape)
+        return self._pattern.summed(blocks)
 
     def gradient(self, poses: Floats, constraints: Constraints) -> Floats:
         """J' S^-1 d at `poses`, (3 (n - 1),)."""
@@ -103,8 +77,10 @@ class NormalEquations:
     def unknowns(self, pose: Indices) -> tuple[Indices, Booleans]:
         """(k, 3): the unknowns of k poses, and (k,) which poses have any: the first has none."""
         position = self._position[pose]
-        unknowns = 3 * position[:, None] + np.arange(3)
-        return unknowns, position >= 0
+        is_free = position >= 0
+
+        first = 3 * position[:, None]
+        return first + np.arange(3), is_free
 
     def moved(self, poses: Floats, step: Floats) -> Floats:
         """`poses` after a step of the unknowns."""
@@ -113,10 +89,43 @@ class NormalEquations:
         return result
 
 
-def _blocks(poses: Floats, constraints: Constraints) -> Floats:
-    """(4 m, 3, 3): the blocks of J' S^-1 J by constraint, in the order of their analysis.
+class _BlockPattern:
+    """A sparse matrix that four 3 x 3 blocks of each constraint are summed up in: by the unknown
+    poses i and i, i and j, j and i, j and j. A pose that is known is -1.
+    """
 
-    Columns are stored, and blocks by rows: each is transposed.
+    def __init__(self, i: Indices, j: Indices, unknown_poses: int) -> None:
+        rows = np.concatenate([i, i, j, j])
+        columns = np.concatenate([i, j, i, j])
+        is_used = (rows >= 0) & (columns >= 0)
+        used = np.flatnonzero(is_used)
+
+        keys = columns[used] * unknown_poses + rows[used]
+        blocks, target = np.unique(keys, return_inverse=True)
+        self._sum = _summing(target, used, len(blocks), len(rows))
+
+        block_rows = blocks % unknown_poses
+        column_keys = np.arange(unknown_poses + 1) * unknown_poses
+        starts = np.searchsorted(blocks, column_keys)
+        self._indices = block_rows.astype(np.int32)
+        self._starts = starts.astype(np.int32)
+        self._shape = (3 * unknown_poses, 3 * unknown_poses)
+
+    def summed(self, blocks: Floats) -> sparse.csc_matrix:
+        """The matrix of (4 m, 3, 3) blocks, each transposed: columns are stored, and blocks by
+        rows.
+        """
+        data = self._sum @ blocks.reshape(-1, 9)
+        stored = (data.reshape(-1, 3, 3), self._indices, self._starts)
+        transposed = sparse.bsr_matrix(stored, shape=self._shape).tocsr()
+
+        columns = (transposed.data, transposed.indices, transposed.indptr)
+        return sparse.csc_matrix(columns, shape=self._shape)
+
+
+def _blocks(poses: Floats, constraints: Constraints) -> Floats:
+    """(4 m, 3, 3): the blocks of J' S^-1 J by constraint, each transposed, as a _BlockPattern sums
+    them up.
     """
     by_i, by_j = jacobians(poses, constraints)
     weighted_i = by_i.mT @ constraints.information
@@ -156,6 +165,7 @@ def _summing(target: Indices, source: Indices, targets: int, sources: int) -> sp
     """A matrix that adds row `source[k]` of what it is multiplied with to row `target[k]`."""
     ones = np.ones(len(target))
     shape = (targets, sources)
+
     return sparse.csr_matrix((ones, (target, source)), shape=shape)
 
 

@@ -83,8 +83,8 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     is_accepted[is_consistent] = holds
 
     operations = _judged(closures, is_consistent, is_accepted)
-    closed = set(_ids(closures, is_accepted))
     closed_before = {closure.id for closure in closures if closure.accepted}
+    closed = set(_ids(closures, is_accepted))
     if closed == closed_before:
         return Answer(operations)
 
@@ -131,15 +131,18 @@ def _start(poses: Floats, steps: Constraints) -> Floats:
     Beliefs of an agent that was lost for a while would mislead the optimization for good.
     """
     believed = residuals(poses, steps)
-    is_possible = mahalanobis2(believed, steps.information) <= IMPOSSIBLE_SD**2
+    squared = mahalanobis2(believed, steps.information)
+    is_possible = squared <= IMPOSSIBLE_SD**2
+
     deviation = np.where(is_possible[:, None], believed, 0.0)
     measured = steps.measurement + deviation
 
     heading_rad = poses[0, 2] + cumulative(measured[:, 2])
     turn = rotation_matrices(heading_rad[:-1])
     steps_m = np.einsum("mab,mb->ma", turn, measured[:, :2])
-    positions_m = poses[0, :2] + cumulative(steps_m)
+    moved_m = cumulative(steps_m)
 
+    positions_m = poses[0, :2] + moved_m
     return np.column_stack([positions_m, wrap_angle(heading_rad)])
 
 

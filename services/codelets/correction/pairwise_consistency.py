@@ -32,6 +32,11 @@ class Points(NamedTuple):
     place: Indices
     at_m: Floats
 
+    @property
+    def range_m(self) -> Floats:
+        """(m,): how far the points are from their places."""
+        return _lengths(self.at_m)
+
 
 class Views(NamedTuple):
     """m views from places `j` (m,) of the path, of what was seen from places `i` (m,) before.
@@ -81,8 +86,8 @@ def consistent(views: Views, steps: Constraints, false_closure: float) -> Boolea
     `steps` are those of the path; views that agree are taken for disagreeing with probability
     `false_closure`.
     """
-    path = _DeadReckoning(steps)
     one, other = _pairs(views)
+    path = _DeadReckoning(steps)
     agree = _agree(views.select(one), views.select(other), path, false_closure)
 
     adjacency = _adjacency(one[agree], other[agree], len(views.i))
@@ -140,7 +145,7 @@ class _DeadReckoning:
     def variance_m2(self, one: Points, other: Points) -> Floats:
         """(m,): the variance of `between_m`: of the steps, and of the turns at their lever arm."""
         length_m = _between(self._length_m, one.place, other.place)
-        lever_arm_m = np.maximum(_lengths(one.at_m), _lengths(other.at_m))
+        lever_arm_m = np.maximum(one.range_m, other.range_m)
         lever_m2 = length_m**2 / 3 + lever_arm_m**2
 
         by_steps_m2 = _between(self._variance_m2, one.place, other.place)

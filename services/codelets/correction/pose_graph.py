@@ -90,7 +90,11 @@ class PoseGraph:
 
         numbers = np.arange(len(constraints))
         closures = np.setdiff1d(numbers, steps)
-        return cls(poses, constraints.select(steps), constraints.select(closures))
+        return cls(
+            poses=poses,
+            steps=constraints.select(steps),
+            closures=constraints.select(closures),
+        )
 
     def with_closures(self, closures: Constraints) -> PoseGraph:
         """The same path with other closures."""
@@ -156,7 +160,8 @@ def cost(poses: Floats, constraints: Constraints) -> float:
 def jacobians(poses: Floats, constraints: Constraints) -> tuple[Floats, Floats]:
     """(m, 3, 3) each: the derivative of each residual by pose i, and by pose j."""
     origins = poses[constraints.i]
-    predicted = relative(origins, poses[constraints.j])
+    ends = poses[constraints.j]
+    predicted = relative(origins, ends)
 
     by_j = np.zeros((len(constraints), 3, 3))
     by_j[:, :2, :2] = rotation_matrices(-origins[:, 2])
@@ -172,5 +177,6 @@ def sqrt_information(information: Floats) -> Floats:
     """(m, 3, 3) matrices R with R R' = `information`, which may be singular."""
     values, vectors = np.linalg.eigh(information)
     scales = np.sqrt(values.clip(0.0))
+
     root: Floats = vectors * scales[:, None, :]
     return root

@@ -166,6 +166,7 @@ def close_loops(graph: PoseGraph, tolerance: float = 0.01, max_replays: int = 50
     while total > (1 + tolerance) * max(bound, 0.0) + 1e-12:
         if search.replays >= max_replays or search.gained <= 0:
             break
+
         search.replay()
         if search.replays % CHECK_EVERY == 0 or search.replays < CHECK_EVERY:
             total, bound = loops.costs(search.forces)
@@ -196,12 +197,13 @@ class _ConjugateGradients:
         rate = self.gained / _dot(self._direction, yielded_m)
         self.forces = self.forces + rate * self._direction
         self._left_m = self._left_m - rate * yielded_m
+        self.replays += 1
 
         correction = _times(self._loops.gain, self._left_m)
-        before = self.gained
-        self.gained = _dot(self._left_m, correction)
-        self._direction = correction + self.gained / before * self._direction
-        self.replays += 1
+        gained = _dot(self._left_m, correction)
+        taken_over = gained / self.gained
+        self._direction = correction + taken_over * self._direction
+        self.gained = gained
 
 
 def _dot(one: Floats, other: Floats) -> float:

@@ -34,7 +34,6 @@ def move_road(graph: Graph, old: Floats, new: Floats) -> list[Operation]:
     around = _neighbourhood(arrived)
     origins = _moved_cells(around, new, old, cell_m)
 
-    before = dict(zip(_keys(cells), shares.tolist(), strict=True))
     after = dict.fromkeys(before, 0.0)
     _fill_gaps(after, around, origins, before)
     _raise_shares(after, arrived, shares.tolist())
@@ -46,8 +45,10 @@ def _moved_cells(cells: Indices, old: Floats, new: Floats, cell_m: float) -> Ind
     points_m = cells.astype(np.float64) * cell_m
     tree = cKDTree(old[:, :2])
     _, nearest = tree.query(points_m)
+    before = old[nearest]
+    after = new[nearest]
 
-    moved_m = move_with(points_m, old[nearest], new[nearest])
+    moved_m = move_with(points_m, before, after)
     moved_cells = np.rint(moved_m / cell_m)
     return moved_cells.astype(np.int64)
 

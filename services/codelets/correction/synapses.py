@@ -77,8 +77,9 @@ def _pairs(fields_m: Floats, loops: Constraints, places: int, reach_m: float) ->
             crossings.append((cell, older))
 
     crossing = np.array(crossings, np.int64).reshape(-1, 2)
-    pairs: Indices = np.unique(np.vstack([neighbours, crossing]), axis=0)
-    return pairs
+    pairs = np.vstack([neighbours, crossing])
+    different: Indices = np.unique(pairs, axis=0)
+    return different
 
 
 def _same_place(fields_m: Floats, newer: int, older: int, reach_m: float) -> list[int]:

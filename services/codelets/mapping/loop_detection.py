@@ -43,8 +43,9 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     since, or along a known path.
     """
     percepts = context.percepts
-    again = _seen_again(percepts.objects, graph, context.stamp_ns, config)
-    matches = _places_again(percepts.matches, graph, context.stamp_ns, config)
+    now_ns = context.stamp_ns
+    again = _seen_again(percepts.objects, graph, now_ns, config)
+    matches = _places_again(percepts.matches, graph, now_ns, config)
     if not again and not matches:
         return []
 
@@ -66,12 +67,14 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     newest = newest_closures(graph)
     operations: list[Operation] = []
     for percept in _seen_again(task.percepts, graph, task.stamp_ns, config):
-        closure = _closure_by_landmark(percept, task, graph, newest.get(percept.label), config)
+        closure_before = newest.get(percept.label)
+        closure = _closure_by_landmark(percept, task, graph, closure_before, config)
         if closure is not None:
             operations.append(closure)
 
     for match in task.matches:
         operations.append(_closure_by_place(match, task, config))
+
     return Answer(operations)
 
 

@@ -25,11 +25,20 @@ FIRST_BASE_LEVEL = 0.2
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     """One task for each object in view that the map lacks."""
+    by_label = sorted(context.percepts.objects, key=lambda percept: percept.label)
+
     tasks = []
-    for percept in sorted(context.percepts.objects, key=lambda percept: percept.label):
-        if object_id(percept.label) not in graph.nodes:
-            task = context.task(CODELET.name, [SELF_ID], subject=percept.label, percepts=[percept])
-            tasks.append(task)
+    for percept in by_label:
+        if object_id(percept.label) in graph.nodes:
+            continue
+
+        task = context.task(
+            CODELET.name,
+            about=[SELF_ID],
+            subject=percept.label,
+            percepts=[percept],
+        )
+        tasks.append(task)
 
     return tasks
 

@@ -128,12 +128,14 @@ class Sightings(NamedTuple):
         Cauchy's weights.
         """
         turn = rotation_matrices(poses[self.place, 2])
-        offset_m = landmarks_m[self.landmark] - poses[self.place, :2]
+        position_m = poses[self.place, :2]
+        offset_m = landmarks_m[self.landmark] - position_m
         expected_m = np.einsum("mba,mb->ma", turn, offset_m)
 
         residual_m = expected_m - self.where_m
         squared = np.einsum("ma,mab,mb->m", residual_m, self.information, residual_m)
         doubt = squared / DOUBTED**2
+
         weights: Floats = 1 / (1 + doubt)
         return weights
 

@@ -93,7 +93,7 @@ def _road_cells(points_m: Array, pose: Floats, cell_m: float) -> tuple[Cell32, S
 
     on_map_m = transform_from(pose, seen_m[is_near])
     seen_cells = np.rint(on_map_m / cell_m).astype(np.int32)
-    cells, counts = np.unique(seen_cells, axis=0, return_counts=True)
 
+    cells, counts = np.unique(seen_cells, axis=0, return_counts=True)
     shares = np.minimum(1.0, counts / ENOUGH_POINTS)
     return cells, shares.astype(np.float32)

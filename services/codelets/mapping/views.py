@@ -69,7 +69,9 @@ def constraints_of(views: Views, poses: Floats) -> Constraints:
     A landmark determines the agent's position given its heading alone: with another heading the
     agent stands elsewhere around it.
     """
-    step = relative(poses[views.i], poses[views.j])
+    origins = poses[views.i]
+    step = relative(origins, poses[views.j])
+
     turn_rad = np.where(views.has_heading, 0.0, step[:, 2])
     turn = rotation_matrices(turn_rad)
     seen_m = np.einsum("mab,mb->ma", turn, views.here_m)
