@@ -30,6 +30,7 @@ def move_road(graph: Graph, old: Floats, new: Floats) -> list[Operation]:
         return []
 
     cell_m = graph.cell_m()
+    before = dict(zip(_keys(cells), shares.tolist(), strict=True))
     arrived = _moved_cells(cells, old, new, cell_m)
     around = _neighbourhood(arrived)
     origins = _moved_cells(around, new, old, cell_m)
