@@ -58,7 +58,8 @@ def _announce(sentence: str) -> None:
 
 def _report(name: str, thresholds: Thresholds, metrics: Metrics, json_path: Path | None) -> None:
     measured = {key: limit for key, limit in thresholds.items() if key in metrics}
-    report(suite.completed(name, measured, metrics), json_path)
+    outcome = suite.completed(name, measured, metrics)
+    report(outcome, json_path)
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -148,7 +149,8 @@ def map_size_command(json_path: Path | None) -> None:
     objects and 1,000 place nodes, once on one of 100,000 and 500,000. A worker of its own process
     then joins over Zenoh. Takes about two minutes.
     """
-    _report("map_size", map_size.THRESHOLDS, map_size.measure(_announce), json_path)
+    metrics = map_size.measure(_announce)
+    _report("map_size", map_size.THRESHOLDS, metrics, json_path)
 
 
 @benchmarks.command(name="bus")

@@ -42,7 +42,8 @@ class TimedStop(Stop):
     @property
     def asked(self) -> bool:
         """Whether to end."""
-        return super().asked or self._elapsed_s >= self._seconds
+        is_over = self._elapsed_s >= self._seconds
+        return is_over or super().asked
 
     @property
     def interrupted(self) -> bool:
@@ -74,8 +75,11 @@ def drive(folder: Path, laps: float = 1.0, seconds: float = TIMEOUT_S) -> tuple[
     """
     began_s = time.monotonic()
     choices = Choices(laps=laps)
-    sections = effective({}, choices, awaited(choices, observer=True))
-    stop = TimedStop(display_on(Console(stderr=True)), seconds)
+    members = awaited(choices, observer=True)
+    sections = effective({}, choices, members)
+
+    display = display_on(Console(stderr=True))
+    stop = TimedStop(display, seconds)
     run = Drive(folder, free_endpoint(), "agent", choices, sections, began_s)
 
     try:

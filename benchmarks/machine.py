@@ -36,8 +36,11 @@ def machine_unit_ms() -> float:
 
 def _pair() -> tuple[Image, Image]:
     """Smoothed noise, the same on every machine, and the same moved by SHIFT_PX."""
-    noise = np.random.default_rng(SEED).integers(0, 256, (HEIGHT_PX, WIDTH_PX), np.uint8)
-    left = np.asarray(cv2.GaussianBlur(noise, (5, 5), 0), np.uint8)
+    rng = np.random.default_rng(SEED)
+    noise = rng.integers(0, 256, (HEIGHT_PX, WIDTH_PX), np.uint8)
+    smooth = cv2.GaussianBlur(noise, (5, 5), 0)
+
+    left = np.asarray(smooth, np.uint8)
     right = np.roll(left, -SHIFT_PX, axis=1)
     return left, right
 
@@ -45,4 +48,5 @@ def _pair() -> tuple[Image, Image]:
 def _cpu_ms(matcher: cv2.StereoSGBM, left: Image, right: Image) -> float:
     began_s = time.process_time()
     matcher.compute(left, right)
-    return 1e3 * (time.process_time() - began_s)
+    took_s = time.process_time() - began_s
+    return 1e3 * took_s

@@ -36,5 +36,9 @@ def measure_city_maps(processes: int) -> Metrics:
         budget = city_maps.Budget(city_maps.TRAVERSALS, SEED, processes, progress)
         maps = city_maps.measure(places, city_maps.NOISE, budget)
 
-    measured = map_metrics(maps, city_maps.NOISE)
-    return {key: value for key, value in measured.items() if isinstance(value, float)}
+    metrics: Metrics = {}
+    for key, value in map_metrics(maps, city_maps.NOISE).items():
+        if isinstance(value, float):
+            metrics[key] = value
+
+    return metrics

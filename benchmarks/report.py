@@ -15,7 +15,6 @@ from rich.table import Table
 from benchmarks.threshold import Threshold
 
 Metrics = dict[str, float]
-HEADINGS = ("key", "measured", "threshold", "")
 
 
 @dataclass(frozen=True)
@@ -30,11 +29,13 @@ class Outcome:
     @property
     def missed(self) -> list[str]:
         """The keys whose threshold is missed, or that were not measured."""
-        return [
-            key
-            for key, threshold in self.thresholds.items()
-            if not threshold.is_met(self.metrics.get(key, math.nan))
-        ]
+        missed = []
+        for key, threshold in self.thresholds.items():
+            value = self.metrics.get(key, math.nan)
+            if not threshold.is_met(value):
+                missed.append(key)
+
+        return missed
 
 
 def report(outcome: Outcome, json_path: Path | None) -> None:
@@ -63,24 +64,26 @@ def summary(outcomes: list[Outcome]) -> Table:
 
 def write(path: Path, metrics: Mapping[str, float]) -> None:
     """Write `metrics` to `path` as one flat JSON object."""
-    path.write_text(json.dumps(dict(metrics), indent=2) + "\n")
+    text = json.dumps(dict(metrics), indent=2)
+    path.write_text(text + "\n")
 
 
 def _table(title: str) -> Table:
     table = Table(title=title)
-
-    for heading in HEADINGS:
-        table.add_column(heading, justify="left" if heading == "key" else "right")
+    table.add_column("key")
+    for heading in ("measured", "threshold", ""):
+        table.add_column(heading, justify="right")
 
     return table
 
 
 def _add_rows(table: Table, outcome: Outcome) -> None:
     """Keys with a threshold come first; those without one tell how the others came about."""
+    missed = outcome.missed
     for key, threshold in outcome.thresholds.items():
         value = outcome.metrics.get(key)
         measured = "" if value is None else f"{value:.4g}"
-        verdict = "[red]missed" if key in outcome.missed else "[green]met"
+        verdict = "[red]missed" if key in missed else "[green]met"
         table.add_row(key, measured, str(threshold), verdict)
 
     for key, value in outcome.metrics.items():

@@ -44,6 +44,12 @@ class Setting:
 
         return path
 
+    def subfolder(self, name: str) -> Path:
+        """A new folder of one benchmark in `folder`."""
+        path = self.folder / name
+        path.mkdir(parents=True, exist_ok=True)
+        return path
+
 
 @dataclass(frozen=True)
 class Benchmark:
@@ -55,11 +61,13 @@ class Benchmark:
 
 
 def _cycle(setting: Setting) -> Metrics:
-    return cycle.measure(_subfolder(setting, "cycle"), setting.processes, setting.announce)
+    folder = setting.subfolder("cycle")
+    return cycle.measure(folder, setting.processes, setting.announce)
 
 
 def _bus(setting: Setting) -> Metrics:
-    return bus.measure(_subfolder(setting, "bus"), setting.announce)
+    folder = setting.subfolder("bus")
+    return bus.measure(folder, setting.announce)
 
 
 def _perception(setting: Setting) -> Metrics:
@@ -68,19 +76,26 @@ def _perception(setting: Setting) -> Metrics:
 
 def _cones(setting: Setting) -> Metrics:
     folder = setting.set_of("stereo_cones")
-    return stereo.measure(folder / "im2.png", folder / "im6.png", folder / "disp2.png", CONES_SCALE)
+    left = folder / "im2.png"
+    right = folder / "im6.png"
+    disparity = folder / "disp2.png"
+    return stereo.measure(left, right, disparity, CONES_SCALE)
 
 
 def _camvid(setting: Setting) -> Metrics:
-    return photographs.measure(setting.set_of("camvid"), _subfolder(setting, "camvid"))
+    camvid = setting.set_of("camvid")
+    folder = setting.subfolder("camvid")
+    return photographs.measure(camvid, folder)
 
 
 def _spiking(setting: Setting) -> Metrics:
-    return spiking.metrics(spiking.measure(spiking.SEED, setting.processes))
+    scenes = spiking.measure(spiking.SEED, setting.processes)
+    return spiking.metrics(scenes)
 
 
 def _localization(setting: Setting) -> Metrics:
-    return localization.measure(setting.set_of("mrclam6"), setting.processes)
+    folder = setting.set_of("mrclam6")
+    return localization.measure(folder, setting.processes)
 
 
 def _map_correction(setting: Setting) -> Metrics:
@@ -141,8 +156,10 @@ def run(benchmark: Benchmark, setting: Setting) -> Outcome:
 
 def completed(name: str, thresholds: Thresholds, metrics: Metrics, failure: str = "") -> Outcome:
     """The outcome of a benchmark that has just run, with the unit of this machine's speed."""
-    unit = {} if failure else {MACHINE_UNIT: machine_unit_ms()}
-    return Outcome(name, thresholds, metrics | unit, failure)
+    if not failure:
+        metrics = metrics | {MACHINE_UNIT: machine_unit_ms()}
+
+    return Outcome(name, thresholds, metrics, failure)
 
 
 def merged(outcomes: Sequence[Outcome]) -> Metrics:
@@ -155,9 +172,3 @@ def merged(outcomes: Sequence[Outcome]) -> Metrics:
             found[unique] = value
 
     return found
-
-
-def _subfolder(setting: Setting, name: str) -> Path:
-    folder = setting.folder / name
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder

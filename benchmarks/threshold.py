@@ -23,10 +23,12 @@ class Threshold:
 
     def __str__(self) -> str:
         if math.isinf(self.minimum):
-            return f"{'<' if self.exclusive else '≤'} {self.maximum:g}"
+            below = "<" if self.exclusive else "≤"
+            return f"{below} {self.maximum:g}"
 
         if math.isinf(self.maximum):
-            return f"{'>' if self.exclusive else '≥'} {self.minimum:g}"
+            above = ">" if self.exclusive else "≥"
+            return f"{above} {self.minimum:g}"
 
         return f"{self.minimum:g}-{self.maximum:g}"
 

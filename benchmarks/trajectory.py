@@ -39,4 +39,5 @@ def trajectory_error_m(positions_m: Floats, truth_m: Floats) -> float:
 
 def _in_space(positions_m: Floats) -> Floats:
     """(n, 2) positions as (n, 3), on the ground."""
-    return np.column_stack([positions_m, np.zeros(len(positions_m))])
+    heights_m = np.zeros(len(positions_m))
+    return np.column_stack([positions_m, heights_m])

@@ -23,7 +23,7 @@ from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.array import Matrix
 from schemas.graph import Delta, Links, Operation, Phase
-from schemas.nodes import SELF_ID, Object, Self, object_id
+from schemas.nodes import SELF_ID, AnyNode, Object, Self, object_id
 from schemas.process import Clock
 from services.workspace.commit import Ledger
 
@@ -41,10 +41,16 @@ LINK_KIND = "near"
 def typical_operations() -> list[Operation]:
     """50 nodes, 200 links and one cloud of samples: 31 KB, in operations of the workspace."""
     rng = np.random.default_rng(SEED)
-    agent = Self(id=SELF_ID, samples=Matrix.of(rng.normal(size=(SAMPLES, 3))))
+    samples = rng.normal(size=(SAMPLES, 3))
+    agent = Self(id=SELF_ID, samples=Matrix.of(samples))
     objects = [_object(number) for number in range(1, NODES)]
-    weights = {node.id: _links(number) for number, node in enumerate([agent, *objects])}
-    return [agent, *objects, Links(kind=LINK_KIND, weights=weights)]
+    nodes: list[AnyNode] = [agent, *objects]
+
+    weights = {}
+    for number, node in enumerate(nodes):
+        weights[node.id] = _links(number)
+
+    return [*nodes, Links(kind=LINK_KIND, weights=weights)]
 
 
 def _object(number: int) -> Object:
@@ -61,7 +67,11 @@ def _object(number: int) -> Object:
 
 
 def _links(number: int) -> dict[str, float]:
-    return {f"place:{at}:{-at}": 0.5 for at in range(number, LINKS, NODES)}
+    links = {}
+    for at in range(number, LINKS, NODES):
+        links[f"place:{at}:{-at}"] = 0.5
+
+    return links
 
 
 def measure(endpoint: str, number: int, pairs: int, announce: Callable[[str], None]) -> Metrics:
@@ -69,14 +79,17 @@ def measure(endpoint: str, number: int, pairs: int, announce: Callable[[str], No
     router = open_router(endpoint)
     ours = []
     raw = []
+    ratios = []
 
     for pair in range(1, pairs + 1):
         announce(f"deltas and raw puts, pair {pair} of {pairs}")
-        raw.append(pace(endpoint, number, _put, _receive))
-        ours.append(pace(endpoint, number, _commit, _replicate))
+        peer = pace(endpoint, number, _put, _receive)
+        our = pace(endpoint, number, _commit, _replicate)
+        raw.append(peer)
+        ours.append(our)
+        ratios.append(our.rate_hz / peer.rate_hz)
 
     router.close()  # type: ignore[no-untyped-call]
-    ratios = [our.rate_hz / peer.rate_hz for our, peer in zip(ours, raw, strict=True)]
     rates = {
         "delta_rate_ratio": median(ratios),
         "delta_rate_hz": median(our.rate_hz for our in ours),
@@ -92,7 +105,8 @@ def costs() -> Metrics:
     ledger = Ledger({})
     replica = Graph()
     operations = typical_operations()
-    payload = encode(ledger.commit(0, 1, Phase.OBJECTS, operations))
+    committed = ledger.commit(0, 1, Phase.OBJECTS, operations)
+    payload = encode(committed)
     delta = decode(topics.DELTA, payload)
     assert isinstance(delta, Delta)
 
@@ -106,19 +120,21 @@ def costs() -> Metrics:
 
 
 def _cost_us(work: Callable[[], object]) -> float:
-    rounds = timeit.repeat(work, repeat=COST_REPEATS, number=COST_ROUNDS, timer=time.process_time)
-    return 1e6 * min(rounds) / COST_ROUNDS
+    repeats_s = timeit.repeat(
+        work, repeat=COST_REPEATS, number=COST_ROUNDS, timer=time.process_time
+    )
+    return 1e6 * min(repeats_s) / COST_ROUNDS
 
 
 def _commit(race: Race) -> None:
     """The workspace's part: commit, encode, publish."""
     ledger = Ledger({})
     operations = typical_operations()
-    publisher = Module("workspace").on(
-        topics.CLOCK,
-        lambda clock: ledger.commit(clock.stamp_ns, 1, Phase.OBJECTS, operations),
-        emits=[topics.DELTA],
-    )
+
+    def on_clock(clock: Clock) -> Delta:
+        return ledger.commit(clock.stamp_ns, 1, Phase.OBJECTS, operations)
+
+    publisher = Module("workspace").on(topics.CLOCK, on_clock, emits=[topics.DELTA])
     publisher.requires = {"replica": REPLICAS}
     shell = Shell(publisher, ZenohBus(race.endpoint, AGENT), health=False)
     shell.open()
@@ -129,7 +145,8 @@ def _commit(race: Race) -> None:
     with race.timed():
         race.go.wait()
         for number in range(race.number):
-            shell.publish(publisher.feed(Clock(stamp_ns=number)))
+            delta = publisher.feed(Clock(stamp_ns=number))
+            shell.publish(delta)
         race.end.wait()
 
     shell.close()
@@ -157,7 +174,8 @@ def _replicate(race: Race) -> None:
 
 def _put(race: Race) -> None:
     """The peer: the same bytes put on a plain publisher."""
-    payload = encode(Ledger({}).commit(0, 1, Phase.OBJECTS, typical_operations()))
+    delta = Ledger({}).commit(0, 1, Phase.OBJECTS, typical_operations())
+    payload = encode(delta)
     session = open_client(race.endpoint)
     publisher = session.declare_publisher(RAW_KEY, congestion_control=zenoh.CongestionControl.BLOCK)
     receivers = session.liveliness().declare_subscriber(f"{RAW_KEY}/*", history=True)

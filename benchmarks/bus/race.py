@@ -74,19 +74,19 @@ def pace(
     CogmapError where a process does not answer within TIMEOUT_S.
     """
     race = Race.at(endpoint, number)
-    receivers = [_spawn.Process(target=receive, args=(race,), daemon=True) for _ in range(REPLICAS)]
-    publisher = _spawn.Process(target=publish, args=(race,), daemon=True)
-    processes = [*receivers, publisher]
-
-    for process in processes:
+    processes = []
+    for work in [receive] * REPLICAS + [publish]:
+        process = _spawn.Process(target=work, args=(race,), daemon=True)
         process.start()
+        processes.append(process)
+
     for _ in processes:
         _wait(race.ready)
 
     began_s = time.monotonic()
     router_began_s = time.process_time()
     race.go.set()
-    for _ in receivers:
+    for _ in range(REPLICAS):
         _wait(race.done)
 
     took_s = time.monotonic() - began_s

@@ -11,22 +11,14 @@ from functools import partial
 import numpy as np
 
 from benchmarks.report import Metrics
-from cli.launch.observer import Observer
+from cli.launch.observer import OBSERVED, Observer
 from cli.launch.plan import OBSERVER, Choices, awaited, effective
 from cogmap.errors import CogmapError
 from cogmap.parallel import parallel_map
 from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
-from schemas import topics
 from services import registry
 
-FOLLOWED = (
-    topics.TRUE_TOWN,
-    topics.TRUE_POSE,
-    topics.ODOMETRY,
-    topics.SELF_MOTION,
-    topics.DELTA,
-)
 TOWNS = (1, 2, 3)
 LAPS = 3.0
 
@@ -43,15 +35,17 @@ class MeanErrors:
 def over_fused(processes: int) -> Metrics:
     """`error_over_fused`, the mean over the towns of each one's ratio, and the errors behind it."""
     drives = parallel_map(partial(mean_errors, laps=LAPS), TOWNS, processes)
-    ratios = [errors.estimate_m / errors.fused_m for errors in drives]
+    rows = [(errors.estimate_m, errors.fused_m, errors.wheels_m) for errors in drives]
+    estimate_m, fused_m, wheels_m = np.array(rows).T
+    ratios = estimate_m / fused_m
 
     metrics = {
-        "error_over_fused": float(np.mean(ratios)),
-        "estimate_error_m": float(np.mean([errors.estimate_m for errors in drives])),
-        "fused_self_motion_error_m": float(np.mean([errors.fused_m for errors in drives])),
-        "wheels_error_m": float(np.mean([errors.wheels_m for errors in drives])),
+        "error_over_fused": float(ratios.mean()),
+        "estimate_error_m": float(estimate_m.mean()),
+        "fused_self_motion_error_m": float(fused_m.mean()),
+        "wheels_error_m": float(wheels_m.mean()),
     }
-    for town, ratio in zip(TOWNS, ratios, strict=True):
+    for town, ratio in zip(TOWNS, ratios.tolist(), strict=True):
         metrics[f"error_over_fused_town_{town}"] = ratio
 
     return metrics
@@ -71,7 +65,8 @@ def mean_errors(town: int, laps: float) -> MeanErrors:
         runner.close()
 
     if observer.progress < 1.0:
-        raise CogmapError(f"the drive of town {town} ended at {observer.progress:.0%} of its route")
+        share = f"{observer.progress:.0%}"
+        raise CogmapError(f"the drive of town {town} ended at {share} of its route")
 
     errors = observer.errors()
     return MeanErrors(
@@ -84,6 +79,7 @@ def mean_errors(town: int, laps: float) -> MeanErrors:
 def _observing(observer: Observer) -> Module:
     """The module `observer`, whom the simulator waits for."""
     module = Module(OBSERVER)
-    for topic in FOLLOWED:
+    for topic in OBSERVED:
         module.on(topic, observer.update)
+
     return module

@@ -41,12 +41,14 @@ class Cycles:
     @property
     def mean_cpu_s(self) -> float:
         """The mean over the cycles after the first few."""
-        return float(np.mean(self.cpu_s[WARM_UP:]))
+        measured_s = self.cpu_s[WARM_UP:]
+        return float(np.mean(measured_s))
 
     @property
     def mean_delta_bytes(self) -> float:
         """The mean over the cycles after the first few."""
-        return float(np.mean(self.delta_bytes[WARM_UP:]))
+        measured = self.delta_bytes[WARM_UP:]
+        return float(np.mean(measured))
 
     @property
     def task_bytes_p99(self) -> float:
@@ -58,8 +60,14 @@ def sections() -> Sections:
     """Percept-level sensing along a street with buildings on both sides, in lockstep."""
     landmarks = []
     for number, x_m in enumerate(np.arange(0.0, LENGTH_M, APART_M).tolist()):
-        side = 1 if number % 2 else -1
-        landmarks.append({"name": f"house-{number:02d}", "x_m": x_m, "y_m": side * ASIDE_M})
+        is_left = number % 2
+        landmark = {
+            "name": f"house-{number:02d}",
+            "x_m": x_m,
+            "y_m": ASIDE_M if is_left else -ASIDE_M,
+        }
+        landmarks.append(landmark)
+
     trajectory = {
         "line_m": [[0.0, 0.0], [LENGTH_M, 0.0]],
         "landmarks": landmarks,
@@ -87,19 +95,36 @@ class _Meter:
         self._began_s = time.process_time()
         self._bytes = 0
 
-    def on_delta(self, arrival: Arrival) -> None:
+    def listen(self, bus: MemoryBus) -> None:
+        """Subscribe to the topics that it measures."""
+        bus.subscribe(topics.DELTA, self._on_delta, _ignore_gap)
+        bus.subscribe(topics.TASK, self._on_task, _ignore_gap)
+        bus.subscribe(topics.MOTOR_COMMAND, self._on_command, _ignore_gap)
+
+    def has_enough(self) -> bool:
+        """Whether CYCLES were measured after the first few."""
+        return len(self.cycles.cpu_s) >= WARM_UP + CYCLES
+
+    def _on_delta(self, arrival: Arrival) -> None:
         self._bytes += len(arrival.payload)
 
-    def on_task(self, arrival: Arrival) -> None:
-        self.cycles.task_bytes.append(len(arrival.payload))
+    def _on_task(self, arrival: Arrival) -> None:
+        size = len(arrival.payload)
+        self.cycles.task_bytes.append(size)
 
-    def on_command(self, arrival: Arrival) -> None:
+    def _on_command(self, arrival: Arrival) -> None:
         """The last message of a cycle in lockstep."""
         now_s = time.process_time()
-        self.cycles.cpu_s.append(now_s - self._began_s)
+        took_s = now_s - self._began_s
+        self.cycles.cpu_s.append(took_s)
         self.cycles.delta_bytes.append(self._bytes)
+
         self._began_s = now_s
         self._bytes = 0
+
+
+def _ignore_gap(source: str, count: int) -> None:
+    """The bus in memory loses nothing."""
 
 
 def drive(learned: Snapshot) -> Cycles:
@@ -110,23 +135,18 @@ def drive(learned: Snapshot) -> Cycles:
     workspace = registry.build("workspace", configured)
     if workspace.restore is not None:
         workspace.restore([learned])
-    others = [registry.build(name, configured) for name in MODULES if name != "workspace"]
 
+    others = [registry.build(name, configured) for name in MODULES if name != "workspace"]
     runner = InProcessRunner([workspace, *others])
     meter = _Meter()
-    bus = MemoryBus(runner.network)
-    handlers = {
-        topics.DELTA: meter.on_delta,
-        topics.TASK: meter.on_task,
-        topics.MOTOR_COMMAND: meter.on_command,
-    }
-    for topic, handler in handlers.items():
-        bus.subscribe(topic, handler, lambda name, number: None)
-
+    meter.listen(MemoryBus(runner.network))
     gc.collect()
-    runner.run(lambda: len(meter.cycles.cpu_s) >= WARM_UP + CYCLES)
+
+    runner.run(meter.has_enough)
     for shell in runner.shells:
-        if shell.intake.rejected:
-            raise CogmapError(f"{shell.module.name} rejected {dict(shell.intake.rejected)}")
+        rejected = dict(shell.intake.rejected)
+        if rejected:
+            raise CogmapError(f"{shell.module.name} rejected {rejected}")
+
     runner.close()
     return meter.cycles

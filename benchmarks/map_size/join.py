@@ -58,13 +58,14 @@ def replica_memory_mb(learned: Snapshot) -> float:
 def _hold(connection: Connection) -> None:
     """The process of the replica."""
     payload = connection.recv_bytes()
-    with_message = psutil.Process().memory_info().rss
-    size = len(payload)
+    before = _resident_bytes() - len(payload)
+
     graph = Graph()
     graph.load(_decoded(payload))
     del payload
+
     gc.collect()
-    grown = psutil.Process().memory_info().rss - (with_message - size)
+    grown = _resident_bytes() - before
     connection.send(grown / 1e6)
 
 
@@ -72,6 +73,12 @@ def _decoded(payload: bytes) -> Snapshot:
     snapshot = decode(topics.SNAPSHOT, payload)
     assert isinstance(snapshot, Snapshot)
     return snapshot
+
+
+def _resident_bytes() -> int:
+    """The memory of this process."""
+    memory = psutil.Process().memory_info()
+    return int(memory.rss)
 
 
 def join(learned: Snapshot) -> Joined:
@@ -91,23 +98,30 @@ def join(learned: Snapshot) -> Joined:
     ended = threading.Event()
     thread = threading.Thread(target=_serve, args=(shell, ended))
     thread.start()
+    try:
+        return _join_late(endpoint)
+    finally:
+        ended.set()
+        thread.join()
+        senses.close()
+        shell.close()
+        router.close()  # type: ignore[no-untyped-call]
+
+
+def _join_late(endpoint: str) -> Joined:
+    """Start the worker's process, and wait until it has answered."""
     context = get_context("spawn")
     ours, theirs = context.Pipe()
     worker = context.Process(target=_work, args=(endpoint, theirs))
     worker.start()
+    theirs.close()
     try:
-        theirs.close()
         if not ours.poll(TIMEOUT_S):
             raise CogmapError(f"the worker that joined answered nothing in {TIMEOUT_S:g} s")
         return Joined(*ours.recv())
     finally:
         worker.terminate()
         worker.join()
-        ended.set()
-        thread.join()
-        senses.close()
-        shell.close()
-        router.close()  # type: ignore[no-untyped-call]
 
 
 def _senses() -> Module:
@@ -119,12 +133,21 @@ def _senses() -> Module:
 def _first_view() -> list[SelfMotion | Percepts]:
     """A view of nothing, and the motion up to it."""
     stamp_ns = 1_000_000_000
-    road_m = Array.of(np.zeros((0, 2), np.float32))
-    motions = Array.of(np.array([[1.0, 0.0, 1.0, 0.1, 0.01]]))
-    return [
-        SelfMotion(stamp_ns=stamp_ns, frame=0, since_ns=0, motions=motions),
-        Percepts(stamp_ns=stamp_ns, frame=0, objects=[], road_m=road_m),
-    ]
+    motions = np.array([[1.0, 0.0, 1.0, 0.1, 0.01]])
+    motion = SelfMotion(
+        stamp_ns=stamp_ns,
+        frame=0,
+        since_ns=0,
+        motions=Array.of(motions),
+    )
+    no_road_m = np.zeros((0, 2), np.float32)
+    percepts = Percepts(
+        stamp_ns=stamp_ns,
+        frame=0,
+        objects=[],
+        road_m=Array.of(no_road_m),
+    )
+    return [motion, percepts]
 
 
 def _serve(shell: Shell, ended: threading.Event) -> None:
@@ -147,6 +170,7 @@ def _watch_answers(module: Module) -> threading.Event:
 
     for topic, handler in module.handlers.items():
         module.handlers[topic] = watched(handler)
+
     return answered
 
 
@@ -154,18 +178,17 @@ def _work(endpoint: str, connection: Connection) -> None:
     """The process of the worker."""
     module = registry.build("codelets", sections(), "codelets-late")
     answered = _watch_answers(module)
-    process = psutil.Process()
     gc.collect()
-    before = process.memory_info().rss
+    before = _resident_bytes()
 
     began_s = time.monotonic()
     shell = Shell(module, ZenohBus(endpoint, AGENT), health=False)
     shell.open()
     while not answered.is_set():
         shell.spin_once(PERIOD_S)
-    join_s = time.monotonic() - began_s
 
+    join_s = time.monotonic() - began_s
     gc.collect()
-    memory_mb = (process.memory_info().rss - before) / 1e6
-    connection.send((join_s, memory_mb))
+    grown = _resident_bytes() - before
+    connection.send((join_s, grown / 1e6))
     shell.close()

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from cogmap.geometry.arrays import Floats
 from schemas.array import Array, Matrix
 from schemas.graph import TILE_SIDE, Decay, Links, PlaceTile, Snapshot
 from schemas.nodes import (
@@ -45,7 +47,11 @@ def cognitive_map(size: Size, cycle: int = 1000) -> Snapshot:
     """
     rng = np.random.default_rng(SEED)
     objects = _objects(size.objects, cycle, rng)
-    weights = {node.id: {nearest_place(node.x_m, node.y_m, CELL_M): 1.0} for node in objects}
+    weights = {}
+    for node in objects:
+        place = nearest_place(node.x_m, node.y_m, CELL_M)
+        weights[node.id] = {place: 1.0}
+
     nodes: list[AnyNode] = [Map(id=ROOT_MAP, cell_m=CELL_M), *objects]
     return Snapshot(
         version=1,
@@ -61,45 +67,61 @@ def _objects(number: int, cycle: int, rng: np.random.Generator) -> list[Object]:
     samples = Config().landmark_samples
     radius_m = CLEAR_M + 2 * np.sqrt(number)
     positions_m = rng.uniform(-radius_m, radius_m, (number, 2))
-    positions_m[:, 1] += np.where(positions_m[:, 1] < 0, -CLEAR_M, CLEAR_M)
+    is_south = positions_m[:, 1] < 0
+    positions_m[:, 1] += np.where(is_south, -CLEAR_M, CLEAR_M)
 
     objects = []
     for index, (x_m, y_m) in enumerate(positions_m.tolist()):
-        label = f"building-{index:06d}"
         offsets_m = rng.normal(0.0, SPREAD_M, (samples, 2))
-        objects.append(
-            Object(
-                id=object_id(label),
-                activation=0.4,
-                base_level=0.9,
-                cycle=cycle,
-                label=label,
-                x_m=x_m,
-                y_m=y_m,
-                x_sd_m=SPREAD_M + index * 1e-9,
-                y_sd_m=SPREAD_M + index * 2e-9,
-                width_m=9.0 + index * 1e-9,
-                height_m=6.0 + index * 1e-9,
-                sightings=5,
-                last_seen_ns=10**12 + index,
-                created_ns=10**11 + index,
-                offsets_m=Matrix.of(offsets_m, "<f2"),
-            )
-        )
+        objects.append(_object(index, x_m, y_m, offsets_m, cycle))
+
     return objects
+
+
+def _object(index: int, x_m: float, y_m: float, offsets_m: Floats, cycle: int) -> Object:
+    """A building of that `index`; no number of one is quite that of another."""
+    label = f"building-{index:06d}"
+    return Object(
+        id=object_id(label),
+        activation=0.4,
+        base_level=0.9,
+        cycle=cycle,
+        label=label,
+        x_m=x_m,
+        y_m=y_m,
+        x_sd_m=SPREAD_M + index * 1e-9,
+        y_sd_m=SPREAD_M + index * 2e-9,
+        width_m=9.0 + index * 1e-9,
+        height_m=6.0 + index * 1e-9,
+        sightings=5,
+        last_seen_ns=10**12 + index,
+        created_ns=10**11 + index,
+        offsets_m=Matrix.of(offsets_m, "<f2"),
+    )
 
 
 def _tiles(places: int, rng: np.random.Generator) -> list[PlaceTile]:
     """Tiles in rows of a square, that the agent is in the middle of."""
-    number = -(-places // TILE_SIDE**2)
-    side = int(np.ceil(np.sqrt(number)))
     shape = (TILE_SIDE, TILE_SIDE)
+    number = math.ceil(places / math.prod(shape))
+    side = math.ceil(math.sqrt(number))
+    middle = side // 2
     cycles = Array.of(np.zeros(shape, np.int32))
 
     tiles = []
     for index in range(number):
-        columns = {name: Array.of(rng.random(shape, np.float32)) for name in PlaceColumn}
-        x = index // side - side // 2
-        y = index % side - side // 2
-        tiles.append(PlaceTile(x=x, y=y, columns=columns, activation_cycle=cycles))
+        columns = {}
+        for name in PlaceColumn:
+            values = rng.random(shape, np.float32)
+            columns[name] = Array.of(values)
+
+        row, column = divmod(index, side)
+        tile = PlaceTile(
+            x=row - middle,
+            y=column - middle,
+            columns=columns,
+            activation_cycle=cycles,
+        )
+        tiles.append(tile)
+
     return tiles

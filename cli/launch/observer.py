@@ -10,11 +10,19 @@ from cli.launch.track import PathIntegrator, Track
 from cogmap.errors import MessageError
 from cogmap.geometry import se2
 from cogmap.geometry.arrays import Floats, Indices
+from schemas import topics
 from schemas.base import Message
 from schemas.graph import Delta
 from schemas.nodes import Self
 from schemas.sensing import Odometry, Pose, SelfMotion, TruePose, TrueTown
 
+OBSERVED = (
+    topics.TRUE_TOWN,
+    topics.TRUE_POSE,
+    topics.ODOMETRY,
+    topics.SELF_MOTION,
+    topics.DELTA,
+)
 MOTION_COLUMNS = 5
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections import Counter, deque
 from collections.abc import Mapping
 
-from cli.launch.observer import Observer
+from cli.launch.observer import OBSERVED, Observer
 from cogmap.bus.codec import Envelope
 from cogmap.graph.replica import Replica
 from schemas import topics
@@ -21,11 +21,7 @@ from schemas.topics import Delivery
 
 MAX_REASONS = 8
 FOLLOWED = (
-    topics.TRUE_TOWN,
-    topics.TRUE_POSE,
-    topics.ODOMETRY,
-    topics.SELF_MOTION,
-    topics.DELTA,
+    *OBSERVED,
     topics.MOTOR_COMMAND,
     topics.BROADCAST,
     topics.HEALTH,
