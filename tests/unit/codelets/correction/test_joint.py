@@ -22,10 +22,12 @@ NEARER_M = 1.0
 
 def _steps(laps: int, turn_error_rad: float = 0.0) -> Constraints:
     """Metre by metre round a square, counter-clockwise."""
-    measurement = np.tile([1.0, 0.0, turn_error_rad], (laps * LAP, 1))
+    count = laps * LAP
+    measurement = np.tile([1.0, 0.0, turn_error_rad], (count, 1))
     measurement[SIDE - 1 :: SIDE, 2] += np.pi / 2
-    information = np.tile(np.diag(1 / STEP_VARIANCE), (len(measurement), 1, 1))
-    at = np.arange(len(measurement))
+    information = np.tile(np.diag(1 / STEP_VARIANCE), (count, 1, 1))
+
+    at = np.arange(count)
     return Constraints(at, at + 1, measurement, information)
 
 
@@ -52,25 +54,27 @@ def _graph(steps: Constraints) -> PoseGraph:
 
 
 def _error_m(poses: np.ndarray, truth: np.ndarray) -> float:
-    return float(np.hypot(*(poses - truth)[:, :2].T).mean())
+    off_m = poses[:, :2] - truth[:, :2]
+    return float(np.hypot(*off_m.T).mean())
 
 
 def test_a_landmark_has_a_label_for_each_side_that_it_is_seen_from() -> None:
     truth = _graph(_steps(1)).poses
     sides = by_side(_sightings(truth), truth, 4)
     of_tower = [label for label in sides.labels if label == "tower"]
+    here = sides.landmark[2]
+    opposite = sides.landmark[LAP // 2 + 2]
 
     assert len(of_tower) == 4
-
-    opposite = sides.landmark[[2, LAP // 2 + 2]]
-    assert opposite[0] != opposite[1]
+    assert here != opposite
 
 
 def test_with_one_side_a_landmark_stays_one() -> None:
     truth = _graph(_steps(1)).poses
     seen = _sightings(truth)
+    one_side = by_side(seen, truth, 1)
 
-    assert by_side(seen, truth, 1).landmark.tolist() == seen.landmark.tolist()
+    assert one_side.landmark.tolist() == seen.landmark.tolist()
 
 
 @pytest.mark.parametrize("sides", [1, 16])
@@ -79,7 +83,8 @@ def test_a_bias_by_side_bends_a_good_path_only_as_a_single_landmark(
 ) -> None:
     graph = _graph(_steps(1))
     seen = _sightings(graph.poses)
-    poses, _ = optimize_jointly(graph, seen, Config(landmark_sides=sides))
+    config = Config(landmark_sides=sides)
+    poses, _ = optimize_jointly(graph, seen, config)
     bent_m = _error_m(poses, graph.poses)
 
     assert bent_m > 0.2 if sides == 1 else bent_m < 0.1
@@ -104,9 +109,8 @@ def test_sides_bind_the_second_lap_to_the_first() -> None:
 
 def test_a_path_without_sightings_is_optimized_alone() -> None:
     graph = _graph(_steps(1))
-    nothing = Sightings(
-        (), np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2)), np.zeros((0, 2, 2))
-    )
+    none = np.zeros(0, int)
+    nothing = Sightings((), none, none, np.zeros((0, 2)), np.zeros((0, 2, 2)))
     poses, _ = optimize_jointly(graph, nothing, Config())
 
     assert poses == pytest.approx(optimize(graph))

@@ -10,7 +10,7 @@ import pytest
 
 from cogmap.geometry.arrays import Floats
 from schemas.cognition import Replay
-from schemas.graph import Phase
+from schemas.graph import Delta, Phase
 from schemas.nodes import (
     CORRECTION_ID,
     ROOT_MAP,
@@ -25,6 +25,7 @@ from schemas.nodes import (
 from services.codelets.correction.joint import ROUNDS
 from services.codelets.mapping.path import ODOMETRY, POSE, STAMP, rows_of
 from tests.support.loop_drive import LAP, QUIET, SLIP, LoopDrive
+from tests.support.messages import of_type
 from tests.support.scenes import Desk, stamp_ns
 
 TOWER = {"tower": (8.0, 5.0)}
@@ -57,23 +58,34 @@ def _accepted(desk: Desk) -> list[bool | None]:
     return [closure.accepted for closure in _closures(desk)]
 
 
+def _distances_m(one: Floats, other: Floats) -> Floats:
+    """(n,): from each of n positions to the nearest of m others."""
+    off_m = one[:, None, :] - other[None]
+    return np.hypot(off_m[..., 0], off_m[..., 1]).min(axis=1)
+
+
+def _positions_m(desk: Desk) -> Floats:
+    """(n, 2): where the places of the path are."""
+    return _rows(desk)[:, POSE][:, :2]
+
+
 def _path_error_m(drive: LoopDrive) -> float:
-    rows = _rows(drive.desk)
-    frames = np.rint(rows[:, STAMP] / (stamp_ns(0) * 1e-9) - 1).astype(int)
-    return float(np.hypot(*(rows[:, POSE][:, :2] - drive.poses[frames, :2]).T).mean())
+    stamps_ns = _rows(drive.desk)[:, STAMP] * 1e9
+    frames = np.rint(stamps_ns / stamp_ns(0) - 1).astype(int)
+    off_m = _positions_m(drive.desk) - drive.poses[frames, :2]
+    return float(np.hypot(*off_m.T).mean())
 
 
 def test_the_path_has_places_at_its_spacing_and_steps_by_path_integration() -> None:
     drive = LoopDrive()
     drive.go(70, {})
     path = list(drive.desk.graph.of_kind(PathSegment))
-
     assert [item.id for item in path] == ["path:0", "path:1"]
 
     rows = rows_of(path)
+    steps = np.diff(rows[:, ODOMETRY], axis=0)
+    steps_m = np.hypot(steps[:, 0], steps[:, 1])
     assert len(rows) == 70
-
-    steps_m = np.hypot(*np.diff(rows[:, ODOMETRY][:, :2], axis=0).T)
     assert steps_m[:19] == pytest.approx(2.0)
     assert steps_m[19:39] == pytest.approx(2.0 * (1 + SLIP))
 
@@ -90,54 +102,53 @@ def test_an_agent_that_stands_still_adds_nothing_to_its_path() -> None:
 @pytest.mark.parametrize("by", ["landmark", "view"])
 def test_a_closed_loop_corrects_the_path_the_agent_and_its_objects(by: str) -> None:
     drive = _round_once(LoopDrive())
+    desk = drive.desk
     before_m = drive.error_m()
-    path_m = _path_error_m(drive)
-    house = _object(drive.desk, "house")
+    path_before_m = _path_error_m(drive)
+    house_before = _object(desk, "house")
+
     drive.meet(3, TOWER if by == "landmark" else None)
     drive.go(5, {})
-
-    assert _accepted(drive.desk) == [True] * 3
+    assert _accepted(desk) == [True] * 3
     assert drive.error_m() < 0.6 * before_m
-    assert _path_error_m(drive) < path_m
+    assert _path_error_m(drive) < path_before_m
 
-    after = _object(drive.desk, "house")
-    moved_m = math.hypot(after.x_m - house.x_m, after.y_m - house.y_m)
+    house = _object(desk, "house")
+    moved_m = math.hypot(house.x_m - house_before.x_m, house.y_m - house_before.y_m)
+    place = nearest_place(house.x_m, house.y_m, 1.0)
     assert 0.5 < moved_m < before_m
+    assert desk.graph.links.targets(house.id, LinkKind.AT) == {place: 1.0}
 
-    place = nearest_place(after.x_m, after.y_m, 1.0)
-    assert drive.desk.graph.links.targets(after.id, LinkKind.AT) == {place: 1.0}
-
-    tower = _object(drive.desk, "tower")
+    tower = _object(desk, "tower")
     assert (tower.x_m, tower.y_m) == pytest.approx(TOWER["tower"], abs=0.5)
 
 
-def test_headings_are_corrected_only_where_configured() -> None:
-    errors = {}
-    for correct in ("positions", "heading"):
-        drive = _round_once(
-            LoopDrive(msgspec.structs.replace(QUIET, correct=correct), bias_rad=0.004)
-        )
-        drive.meet(3)
-        drive.go(5, {})
-        off = drive.poses[drive.frame - 1, 2] - drive.desk.agent.heading_rad
-        errors[correct] = abs(math.remainder(off, 2 * math.pi))
+def _heading_error_rad(correct: str) -> float:
+    """After a loop was closed on a path that turns too far, correcting positions or headings."""
+    config = msgspec.structs.replace(QUIET, correct=correct)
+    drive = _round_once(LoopDrive(config, bias_rad=0.004))
+    drive.meet(3)
+    drive.go(5, {})
+    error_rad = drive.poses[drive.frame - 1, 2] - drive.desk.agent.heading_rad
+    return abs(math.remainder(error_rad, 2 * math.pi))
 
-    assert errors["heading"] < 0.8 * errors["positions"]
+
+def test_headings_are_corrected_only_where_configured() -> None:
+    assert _heading_error_rad("heading") < 0.8 * _heading_error_rad("positions")
 
 
 def test_road_moves_with_the_path_that_it_lies_along() -> None:
     drive = _round_once(LoopDrive())
     drive.meet(3)
     drive.go(5, {})
-    path = _rows(drive.desk)[:, POSE][:, :2]
-    road, _ = drive.desk.graph.places.written_cells(ROOT_MAP, PlaceColumn.ROAD)
-    away = np.hypot(*(road[:, None, :] - path[None]).transpose(2, 0, 1)).min(axis=1)
+    path_m = _positions_m(drive.desk)
+    road_m, _ = drive.desk.graph.places.written_cells(ROOT_MAP, PlaceColumn.ROAD)
+    assert len(road_m) > 100
 
-    assert len(road) > 100
-    assert np.percentile(away, 95) < 2.0
-
-    on_road = np.hypot(*(path[:, None, :] - road[None]).transpose(2, 0, 1)).min(axis=1)
-    assert on_road.max() < 1.5
+    to_path_m = _distances_m(road_m, path_m)
+    to_road_m = _distances_m(path_m, road_m)
+    assert np.percentile(to_path_m, 95) < 2.0
+    assert to_road_m.max() < 1.5
 
 
 def test_what_the_agent_writes_during_a_correction_is_kept() -> None:
@@ -146,20 +157,17 @@ def test_what_the_agent_writes_during_a_correction_is_kept() -> None:
     drive.meet(3)
     drive.go(1, {})
     length = len(_rows(desk))
-    drive.go(4, {"inn": (60.0, -4.0)})
 
+    drive.go(4, {"inn": (60.0, -4.0)})
+    inn_m = _object(desk, "inn").y_m
     assert CORRECTION_ID in desk.graph.nodes
     assert len(_rows(desk)) == length + 4
 
-    inn_m = _object(desk, "inn").y_m
     drive.go(1, {})
+    steps_m = np.hypot(*np.diff(_positions_m(desk), axis=0).T)
     assert CORRECTION_ID not in desk.graph.nodes
-
-    rows = _rows(desk)
-    assert len(rows) == length + 5
-
-    steps = np.hypot(*np.diff(rows[:, POSE][:, :2], axis=0).T)
-    assert steps[length - 1 :] == pytest.approx(2.0)
+    assert len(_rows(desk)) == length + 5
+    assert steps_m[length - 1 :] == pytest.approx(2.0)
     assert abs(_object(desk, "inn").y_m - inn_m) > 1.0
     assert all(not delta.reasons for delta in desk.deltas)
 
@@ -171,15 +179,17 @@ def test_lockstep_commits_the_correction_at_its_cycle_and_not_before() -> None:
     drive.meet(3)
     drive.go(1, {})
     cycle = desk.graph.cycle
-    drive.go(2, {})
 
+    drive.go(2, {})
     assert desk.deltas[-1].phase is not Phase.END
     assert desk.graph.cycle == cycle + 2
     assert len(desk.withheld) == 1
 
     desk.release()
-    assert [delta.phase for delta in desk.deltas[-2:]] == [Phase.BACKGROUND, Phase.END]
-    assert desk.deltas[-1].cycle == cycle + 2
+    background, end = desk.deltas[-2:]
+    assert background.phase is Phase.BACKGROUND
+    assert end.phase is Phase.END
+    assert end.cycle == cycle + 2
 
 
 def test_real_time_continues_without_the_correction_by_other_workers() -> None:
@@ -210,23 +220,33 @@ def test_the_same_drive_gives_the_same_graph_with_any_number_of_workers() -> Non
     assert digests[0] == digests[1]
 
 
+def _believed(landmarks: dict[str, tuple[float, float]], match: int | None) -> LoopDrive:
+    """A drive round the block and on, with one view of landmarks or of another place."""
+    drive = _round_once(LoopDrive())
+    drive.go(20, {})
+    drive.go(1, landmarks, match=match)
+    drive.go(12, {})
+    assert not any(delta.phase is Phase.CORRECTION for delta in drive.desk.deltas)
+    return drive
+
+
 @pytest.mark.parametrize("by", ["landmark", "view"])
 def test_one_view_mistaken_for_another_place_never_moves_the_map(by: str) -> None:
-    believed = []
-    for mistaken in (False, True):
-        drive = _round_once(LoopDrive())
-        drive.go(20, {})
-        x_m, y_m, _ = drive.poses[drive.frame].tolist()
-        tower = {"tower": (x_m + 6.0, y_m + 8.0)} if mistaken and by == "landmark" else {}
-        drive.go(1, tower, match=40 if mistaken and by == "view" else None)
-        drive.go(12, {})
-        house = _object(drive.desk, "house")
-        believed.append([drive.error_m(), house.x_m, house.y_m])
+    plain = _believed({}, None)
+    x_m, y_m, _ = plain.poses[LAP + 20].tolist()
+    if by == "landmark":
+        mistaken = _believed({"tower": (x_m + 6.0, y_m + 8.0)}, None)
+    else:
+        mistaken = _believed({}, match=40)
 
-        assert len(_closures(drive.desk)) == mistaken
-        assert not any(delta.phase is Phase.CORRECTION for delta in drive.desk.deltas)
+    assert len(_closures(plain.desk)) == 0
+    assert len(_closures(mistaken.desk)) == 1
+    assert mistaken.error_m() == pytest.approx(plain.error_m(), abs=1e-6)
 
-    assert believed[1] == pytest.approx(believed[0], abs=1e-6)
+    house = _object(plain.desk, "house")
+    moved = _object(mistaken.desk, "house")
+    assert moved.x_m == pytest.approx(house.x_m, abs=1e-6)
+    assert moved.y_m == pytest.approx(house.y_m, abs=1e-6)
 
 
 def test_one_false_view_among_true_ones_is_rejected() -> None:
@@ -235,10 +255,11 @@ def test_one_false_view_among_true_ones_is_rejected() -> None:
     drive.go(1, {}, match=40)
     drive.meet(2)
     drive.go(8, {})
-    judged = {closure.cue: closure.accepted for closure in _closures(drive.desk)}
+    closures = _closures(drive.desk)
+    rejected = [closure.cue for closure in closures if not closure.accepted]
 
-    assert [name for name, holds in judged.items() if not holds] == ["view-40"]
-    assert len(judged) == 5
+    assert len(closures) == 5
+    assert rejected == ["view-40"]
 
 
 def test_two_views_are_too_few_to_close_a_loop() -> None:
@@ -258,9 +279,10 @@ def test_closures_that_agree_beyond_possible_drift_are_rejected() -> None:
     for view in (2, 3, 4):
         drive.go(1, {}, match=view)
     drive.go(7, {})
-    judged = [(closure.consistent, closure.accepted) for closure in _closures(drive.desk)]
+    consistent = [closure.consistent for closure in _closures(drive.desk)]
 
-    assert judged == [(True, False)] * 3
+    assert consistent == [True] * 3
+    assert _accepted(drive.desk) == [False] * 3
     assert drive.error_m() == pytest.approx(before_m, abs=1.0)
     assert CORRECTION_ID not in drive.desk.graph.nodes
 
@@ -285,7 +307,7 @@ def test_accepted_closures_are_undone_when_later_ones_contradict_them() -> None:
 def _replay(drive: LoopDrive) -> Replay:
     drive.meet(3)
     drive.go(4, {})
-    (replay,) = [item for item in drive.desk.published if isinstance(item, Replay)]
+    (replay,) = of_type(Replay, drive.desk.published)
     return replay
 
 
@@ -294,17 +316,19 @@ def test_a_replay_is_published_once_after_the_commit_of_its_correction() -> None
     replay = _replay(drive)
     published = drive.desk.published
     before = published[: published.index(replay)]
-    committed = [item for item in before if item in drive.desk.deltas]
+    last = of_type(Delta, before)[-1]
 
-    assert committed[-1].phase is Phase.BACKGROUND  # type: ignore[union-attr]
+    assert last.phase is Phase.BACKGROUND
     assert replay.source == "workspace"
 
 
 def test_a_replay_counts_the_replays_of_the_rule_that_was_applied() -> None:
-    assert _replay(_round_once(LoopDrive())).replays > 0
-
     with_headings = msgspec.structs.replace(QUIET, correct="heading")
-    assert _replay(_round_once(LoopDrive(with_headings))).replays == 1 + ROUNDS
+    of_positions = _replay(_round_once(LoopDrive()))
+    of_headings = _replay(_round_once(LoopDrive(with_headings)))
+
+    assert of_positions.replays > 0
+    assert of_headings.replays == 1 + ROUNDS
 
 
 def test_a_replay_runs_backwards_and_shifts_each_place_less_than_the_last() -> None:
@@ -313,27 +337,31 @@ def test_a_replay_runs_backwards_and_shifts_each_place_less_than_the_last() -> N
     assert (np.diff(stamps) < 0).all()
     assert stamps[0] > stamps[-1] == stamp_ns(0)
 
-    shifts_m = np.hypot(*np.asarray(replay.shifts_m.numpy(), np.float64).T)
+    shifts = np.asarray(replay.shifts_m.numpy(), np.float64)
+    shifts_m = np.hypot(shifts[:, 0], shifts[:, 1])
     assert (np.diff(shifts_m) <= 1e-9).all()
     assert shifts_m[-1] == pytest.approx(0.0)
     assert shifts_m[0] > 3.0
     assert (len(replay.closed), replay.undone) == (3, [])
 
 
+def _strength(replay: Replay, positions_m: Floats) -> Floats:
+    """The strength of the synapse of each pair of fields."""
+    first, second = replay.pairs.numpy().astype(int).T
+    apart_m = np.hypot(*(positions_m[first] - positions_m[second]).T)
+    return np.exp(-replay.decay_per_m * apart_m)
+
+
 def test_the_synapse_of_two_fields_grows_as_they_shift_together() -> None:
     replay = _replay(_round_once(LoopDrive()))
-    pairs = replay.pairs.numpy().astype(int)
     changes = np.asarray(replay.strength_changes.numpy(), np.float64)
-    positions = np.asarray(replay.positions_m.numpy(), np.float64)
-    moved = positions + np.asarray(replay.shifts_m.numpy(), np.float64)
-    apart = np.array(
-        [np.hypot(*(where[pairs[:, 0]] - where[pairs[:, 1]]).T) for where in (positions, moved)]
-    )
-    strength = np.exp(-replay.decay_per_m * apart)
-
-    assert changes == pytest.approx(strength[1] - strength[0])
+    before_m = np.asarray(replay.positions_m.numpy(), np.float64)
+    after_m = before_m + np.asarray(replay.shifts_m.numpy(), np.float64)
+    expected = _strength(replay, after_m) - _strength(replay, before_m)
+    assert changes == pytest.approx(expected)
 
     # The newest place is that of the third view, as was the third of all.
-    same_place = int(np.flatnonzero((pairs[:, 0] == 0) & (pairs[:, 1] == len(positions) - 3))[0])
+    first, second = replay.pairs.numpy().astype(int).T
+    (same_place,) = np.flatnonzero((first == 0) & (second == len(before_m) - 3))
     assert changes[same_place] > 0.3
     assert changes[same_place] == pytest.approx(changes.max(), rel=0.01)

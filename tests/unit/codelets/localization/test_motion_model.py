@@ -1,4 +1,4 @@
-"""What localization makes of one sense alone, of senses that are off, and of being carried away."""
+"""Localization by one sense alone, with biased motion, and after being carried elsewhere."""
 
 from __future__ import annotations
 
@@ -21,6 +21,10 @@ from tests.support.scenes import landmark as object_node
 PLACES = {"mill": (20.0, 0.0), "tower": (0.0, 25.0), "church": (-15.0, -10.0), "inn": (30.0, 30.0)}
 Pose = tuple[float, float, float]
 UNKNOWN_BEARING = {"bearing_sd_rad": 2 * math.pi}
+CONFIG = Config(correlated_views=1.0)
+A_METRE = np.array([[1.0, 0.0, 1.0, 0.1, 0.0]])
+THREE = ("mill", "tower", "church")
+UNKNOWN_RANGE = {"range_sd_m": 1e3}
 
 
 def _agent(
@@ -51,39 +55,43 @@ def _known(*labels: str) -> list[Object]:
 
 
 def _seen(pose: Pose, label: str, **facts: float) -> Percept:
-    off = np.array(PLACES[label]) - pose[:2]
-    bearing = math.remainder(math.atan2(off[1], off[0]) - pose[2], math.tau)
-    return percept(label, bearing, float(np.hypot(*off)), **facts)
+    x_m, y_m, heading_rad = pose
+    off_x_m = PLACES[label][0] - x_m
+    off_y_m = PLACES[label][1] - y_m
+    bearing_rad = math.remainder(math.atan2(off_y_m, off_x_m) - heading_rad, math.tau)
+    return percept(label, bearing_rad, math.hypot(off_x_m, off_y_m), **facts)
+
+
+def _ahead(pose: Pose, distance_m: float = 1.0) -> Pose:
+    x_m, y_m, heading_rad = pose
+    moved_x_m = distance_m * math.cos(heading_rad)
+    moved_y_m = distance_m * math.sin(heading_rad)
+    return x_m + moved_x_m, y_m + moved_y_m, heading_rad
 
 
 def _move(
     agent: Self, number: int, landmarks: list[Object], seen: Iterable[Percept], config: Config
 ) -> Self:
     """The agent after a step of a metre and a look."""
-    motions = Array.of(np.array([[1.0, 0.0, 1.0, 0.1, 0.0]]))
-    facts = {"motions": motions, "percepts": list(seen), "stamp_ns": number}
+    facts = {"motions": Array.of(A_METRE), "percepts": list(seen), "stamp_ns": number}
     asked = task("localization", f"{number}/l", **facts)
+
     found, _ = run(asked, graph_of(agent, *landmarks), config).operations
     assert isinstance(found, Self)
     return found
 
 
 def _off_m(agent: Self, true: Pose) -> float:
-    return math.hypot(agent.x_m - true[0], agent.y_m - true[1])
-
-
-CONFIG = Config(correlated_views=1.0)
+    return math.dist((agent.x_m, agent.y_m), true[:2])
 
 
 def test_a_kidnapped_agent_relocalizes_by_landmarks_in_view() -> None:
     agent = _agent()
-    labels = ("mill", "tower", "church")
     true = (60.0, -40.0, 2.0)
     for number in range(1, 30):
-        true = (true[0] + math.cos(true[2]), true[1] + math.sin(true[2]), true[2])
-        agent = _move(
-            agent, number, _known(*labels), [_seen(true, label) for label in labels[:2]], CONFIG
-        )
+        true = _ahead(true)
+        seen = [_seen(true, "mill"), _seen(true, "tower")]
+        agent = _move(agent, number, _known(*THREE), seen, CONFIG)
 
     assert _off_m(agent, true) < 1.0
     assert not agent.is_lost
@@ -94,9 +102,9 @@ def test_a_kidnapped_agent_relocalizes_by_landmarks_seen_one_at_a_time() -> None
     labels = tuple(PLACES)
     true = (60.0, -40.0, 2.0)
     for number in range(1, 30):
-        true = (true[0] + math.cos(true[2]), true[1] + math.sin(true[2]), true[2])
-        motions = np.array([[1.0, 0.0, 1.0, 0.1, 0.0]])
-        loop.live(Moment(float(number), motions, [_seen(true, labels[number % 4])], True))
+        true = _ahead(true)
+        seen = [_seen(true, labels[number % 4])]
+        loop.live(Moment(float(number), A_METRE, seen, True))
     loop.close()
 
     assert math.dist(loop.pose[:2], true[:2]) < 2.0
@@ -104,36 +112,31 @@ def test_a_kidnapped_agent_relocalizes_by_landmarks_seen_one_at_a_time() -> None
 
 def test_the_distance_that_an_agent_was_carried_is_a_step_of_its_path() -> None:
     agent = _agent()
-    labels = ("mill", "tower")
     true = (-20.0, 30.0, 2.0)
     for number in range(1, 12):
-        true = (true[0] + math.cos(true[2]), true[1] + math.sin(true[2]), true[2])
-        agent = _move(
-            agent, number, _known(*labels), [_seen(true, label) for label in labels], CONFIG
-        )
+        true = _ahead(true)
+        seen = [_seen(true, "mill"), _seen(true, "tower")]
+        agent = _move(agent, number, _known("mill", "tower"), seen, CONFIG)
 
     assert _off_m(agent, true) < 0.5
-
-    odometry_m = (agent.odometry_x_m, agent.odometry_y_m)
-    assert odometry_m == pytest.approx((agent.x_m, agent.y_m), abs=5.0)
+    assert agent.odometry_x_m == pytest.approx(agent.x_m, abs=5.0)
+    assert agent.odometry_y_m == pytest.approx(agent.y_m, abs=5.0)
 
 
 def test_ranges_alone_to_three_landmarks_give_the_position() -> None:
     true = (1.5, 0.8, 0.0)
-    labels = ("mill", "tower", "church")
     agent = _agent((0.0, 0.0, 0.0), (1.0, 1.0, 0.01))
-    seen = [_seen(true, label, **UNKNOWN_BEARING) for label in labels]
-    found = _move(agent, 1, _known(*labels), seen, CONFIG)
+    seen = [_seen(true, label, **UNKNOWN_BEARING) for label in THREE]
+    found = _move(agent, 1, _known(*THREE), seen, CONFIG)
 
     assert _off_m(found, true) < 0.4
 
 
 def test_bearings_alone_to_three_landmarks_give_the_position() -> None:
     true = (1.5, 0.8, 0.0)
-    labels = ("mill", "tower", "church")
     agent = _agent((0.0, 0.0, 0.0), (1.0, 1.0, 0.01))
-    seen = [_seen(true, label, range_sd_m=1e3) for label in labels]
-    found = _move(agent, 1, _known(*labels), seen, CONFIG)
+    seen = [_seen(true, label, **UNKNOWN_RANGE) for label in THREE]
+    found = _move(agent, 1, _known(*THREE), seen, CONFIG)
 
     assert _off_m(found, true) < 0.5
 
@@ -143,23 +146,22 @@ def test_range_or_bearing_alone_places_a_new_landmark_from_several_places(
     alone: dict[str, float],
 ) -> None:
     config = Config(correlated_views=1.0, landmark_samples=4000)
-    landmark: Object | None = None
-    for number, (x_m, y_m) in enumerate(
-        ((0.0, 0.0), (4.0, 3.0), (8.0, 2.0), (12.0, 6.0), (8.0, 9.0), (4.0, 12.0))
-    ):
+    places_m = ((0.0, 0.0), (4.0, 3.0), (8.0, 2.0), (12.0, 6.0), (8.0, 9.0), (4.0, 12.0))
+
+    known: list[Object] = []
+    for number, (x_m, y_m) in enumerate(places_m):
         pose = (x_m, y_m, 0.0)
         agent = _agent(pose, (0.01, 0.01, 0.002))
         seen = [_seen(pose, "mill", **alone)]
-        nodes = [agent] if landmark is None else [agent, landmark]
-        codelet = "object_place" if landmark is None else "landmark"
+        codelet = "landmark" if known else "object_place"
         asked = task(codelet, f"{number}/mill", percepts=seen, stamp_ns=number)
-        found, _ = run(asked, graph_of(*nodes), config).operations
+
+        found, _ = run(asked, graph_of(agent, *known), config).operations
         assert isinstance(found, Object)
+        known = [found]
 
-        landmark = found
-
-    assert landmark is not None
-    assert (landmark.x_m, landmark.y_m) == pytest.approx(PLACES["mill"], abs=1.5)
+    (mill,) = known
+    assert (mill.x_m, mill.y_m) == pytest.approx(PLACES["mill"], abs=1.5)
 
 
 def test_landmarks_calibrate_wheels_that_always_slip() -> None:
@@ -173,9 +175,11 @@ def test_landmarks_calibrate_wheels_that_always_slip() -> None:
         agent = _agent()
         true = (0.0, 0.0, 0.0)
         for number in range(1, 60):
-            true = (true[0] + 0.8, 0.0, 0.0)  # where self-motion says a metre
-            seen = [_seen(true, label) for label in ("mill", "tower")] if number <= 30 else []
+            true = _ahead(true, 0.8)  # where self-motion says a metre
+            in_view = ("mill", "tower") if number <= 30 else ()
+            seen = [_seen(true, label) for label in in_view]
             agent = _move(agent, number, _known("mill", "tower"), seen, config)
+
         return _off_m(agent, true)
 
     assert off_m(0.0) > 4.0
@@ -184,8 +188,8 @@ def test_landmarks_calibrate_wheels_that_always_slip() -> None:
 
 def test_what_is_not_seen_costs_nothing() -> None:
     agent = _agent()
-    true = (1.0, 0.0, 0.0)
-    few = _move(agent, 1, _known("mill"), [_seen(true, "mill")], CONFIG)
-    many = _move(agent, 1, _known("mill", "tower", "church", "inn"), [_seen(true, "mill")], CONFIG)
+    seen = [_seen((1.0, 0.0, 0.0), "mill")]
+    few = _move(agent, 1, _known("mill"), seen, CONFIG)
+    many = _move(agent, 1, _known("mill", "tower", "church", "inn"), seen, CONFIG)
 
     assert few == many

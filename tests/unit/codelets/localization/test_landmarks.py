@@ -1,0 +1,92 @@
+"""Where a landmark is, by seeing it again and again (eq. 4)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from schemas.nodes import Object
+from services.codelets.config import Config
+from tests.support.landmarks import house
+from tests.support.scenes import agent, graph_of, landmark, percept, run, task
+
+CONFIG = Config(misses=3, correlated_views=1.0)
+ASIDE_RAD = math.pi / 2
+
+
+def _seen(
+    known: Object, bearing_rad: float, range_m: float, number: int = 0, config: Config = CONFIG
+) -> Object:
+    """The landmark after it was seen from the origin."""
+    seen = percept("house", bearing_rad, range_m, bearing_sd_rad=0.02, range_sd_m=0.4)
+    asked = task("landmark", identifier=f"{number}/landmark/house", percepts=[seen])
+    found, _ = run(asked, graph_of(agent(), known), config).operations
+    assert isinstance(found, Object)
+    return found
+
+
+def test_seeing_a_landmark_again_shrinks_its_spread_around_where_it_is() -> None:
+    known = house(10.0, 0.0, 1.0, sightings=1)
+    spreads_m = []
+    for number in range(12):
+        known = _seen(known, 0.0, 10.5, number)
+        spreads_m.append(math.hypot(known.x_sd_m, known.y_sd_m))
+
+    assert spreads_m[0] < 0.6
+    assert spreads_m[-1] < 0.5 * spreads_m[0]
+    assert (known.x_m, known.y_m) == pytest.approx((10.5, 0.0), abs=0.25)
+    assert known.sightings == 13
+
+
+def test_a_landmarks_samples_become_the_exact_gaussian_posterior_of_eq_4() -> None:
+    samples_m = np.random.default_rng(6).normal((10.0, 0.0), (1.0, 0.01), (8000, 2))
+    known = landmark("house", samples_m)
+    config = Config(landmark_jitter_m=1e-6, correlated_views=1.0)
+    found = _seen(known, 0.0, 11.0, config=config)
+
+    prior = 1 / 1.0**2
+    sensed = 1 / 0.4**2
+    precision = prior + sensed
+    assert found.x_m == pytest.approx((prior * 10 + sensed * 11) / precision, abs=0.03)
+    assert found.x_sd_m == pytest.approx(precision**-0.5, rel=0.1)
+
+
+def test_the_number_of_a_landmarks_samples_stays() -> None:
+    found = _seen(house(10.0, 0.0, 0.5), 0.0, 10.0)
+
+    assert len(found.positions_m()) == 200
+
+
+def test_a_landmark_seen_elsewhere_starts_anew_after_the_configured_misses() -> None:
+    once = _seen(house(10.0, 0.0, 0.1), ASIDE_RAD, 6.0, number=0)
+    twice = _seen(once, ASIDE_RAD, 6.0, number=1)
+    assert (once.x_m, once.y_m) == pytest.approx((10.0, 0.0), abs=0.1)
+    assert (twice.x_m, twice.y_m) == (once.x_m, once.y_m)
+
+    anew = _seen(twice, ASIDE_RAD, 6.0, number=2)
+    assert (anew.x_m, anew.y_m) == pytest.approx((0.0, 6.0), abs=0.2)
+    assert anew.misses == 0
+
+
+def test_a_landmark_that_is_seen_in_its_place_again_is_forgiven_its_misses() -> None:
+    in_place = (0.0, 10.0)
+    elsewhere = (1.5, 6.0)
+    seen = [elsewhere, elsewhere, in_place, elsewhere, elsewhere]
+
+    known = house(10.0, 0.0, 0.1)
+    for number, (bearing_rad, range_m) in enumerate(seen):
+        known = _seen(known, bearing_rad, range_m, number)
+
+    assert known.misses == 2
+    assert known.x_m == pytest.approx(10.0, abs=0.2)
+
+
+def test_a_landmark_seen_once_and_then_twice_elsewhere_starts_anew_there() -> None:
+    known = house(300.0, 0.0, 0.5, sightings=1)
+    for number in range(2):
+        known = _seen(known, 0.0, 10.0, number)
+
+    assert known.x_m == pytest.approx(10.0, abs=0.5)
+    assert (known.sightings, known.misses) == (1, 0)
