@@ -1,0 +1,101 @@
+"""What attention codelets bring to the competition, and how active it is."""
+
+from __future__ import annotations
+
+import pytest
+
+from schemas.graph import Link
+from schemas.nodes import AnyNode, Node, Object, Self
+from services.codelets.attention.coalitions import coalition
+from services.codelets.attention.novelty import NOVEL_SIGHTINGS
+from services.codelets.config import Config
+from tests.support.scenes import agent, graph_of, landmark, percept, run, task
+
+CONFIG = Config()
+
+
+def _content(*activations: float, salience: float = 0.0) -> list[AnyNode]:
+    return [
+        landmark(f"house {index}", activation=activation, salience=salience)
+        for index, activation in enumerate(activations)
+    ]
+
+
+def _activation(content: list[AnyNode], base_level: float = 1.0) -> float:
+    return coalition("test", content, graph_of(), base_level).activation
+
+
+def test_a_coalitions_activation_is_lidas_formula() -> None:
+    neutral = _content(0.4, 0.8)
+    salient = _content(0.4, 0.8, salience=-0.6)
+
+    assert _activation(neutral) == pytest.approx((0.4 + 0.8) / 4)
+    assert _activation(neutral, base_level=0.5) == pytest.approx(0.5 * (0.4 + 0.8) / 4)
+    assert _activation(salient) == pytest.approx((0.4 + 0.8 + 1.2) / 4)
+
+
+def test_total_activation_is_base_level_plus_current_at_most_one() -> None:
+    node = Node(id="a", kind="thing", activation=0.7, base_level=0.6)
+
+    assert _activation([node]) == 0.5
+
+
+def test_activation_exceeds_a_half_only_where_content_is_salient() -> None:
+    neutral = _content(1.0, 1.0, 1.0)
+    salient = _content(1.0, 1.0, 1.0, salience=0.1)
+
+    assert _activation(neutral) == 0.5
+    assert _activation(salient) > 0.5
+
+
+def _found(codelet: str, *nodes: AnyNode) -> list[AnyNode]:
+    """The nodes of what an attention codelet finds while all objects are in view."""
+    seen = [percept(node.label) for node in nodes if isinstance(node, Object)]
+    answer = run(task(codelet, percepts=seen), graph_of(*nodes), CONFIG)
+
+    found: list[AnyNode] = []
+    for brought in answer.coalitions:
+        found += brought.nodes
+    return found
+
+
+def test_attention_brings_the_agents_whereabouts_and_what_is_new_to_it() -> None:
+    old = landmark("old", sightings=NOVEL_SIGHTINGS + 1)
+    new = landmark("new", sightings=1)
+    whereabouts = [node.id for node in _found("whereabouts", agent(), old, new)]
+    novelty = [node.id for node in _found("novelty", agent(), old, new)]
+
+    assert whereabouts == ["self", "object:new", "object:old"]
+    assert novelty == ["self", "object:new"]
+
+
+def test_without_anything_new_there_is_no_coalition_about_novelty() -> None:
+    old = landmark("old", sightings=99)
+
+    assert _found("novelty", agent(), old) == []
+
+
+def test_an_object_is_the_more_salient_the_less_it_has_been_seen() -> None:
+    saliences = []
+    for sightings in (1, 3, 5):
+        _, found = _found("novelty", agent(), landmark("new", sightings=sightings))
+        assert isinstance(found, Object)
+        saliences.append(found.salience)
+
+    assert saliences == sorted(saliences, reverse=True)
+    assert saliences[0] > saliences[-1] > 0
+
+
+def test_coalitions_leave_samples_behind_and_keep_links_and_maps() -> None:
+    at = Link(source="self", target="place:map:0:0:0")
+    graph = graph_of(agent(), landmark("house", sightings=1), at)
+    asked = task("whereabouts", percepts=[percept("house")])
+    (found,) = run(asked, graph, CONFIG).coalitions
+    own, house = found.nodes
+
+    assert isinstance(own, Self)
+    assert isinstance(house, Object)
+    assert own.samples.shape == (1, 3)
+    assert house.offsets_m is None
+    assert found.links == [at]
+    assert found.maps == ["map:0"]
