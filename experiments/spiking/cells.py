@@ -1,7 +1,7 @@
 """Grid, border and place cells as generators of spikes.
 
-Time goes in gamma cycles of 25 ms; a cell spikes at most once in a cycle, and spikes of one cycle
-coincide.
+Time is counted in gamma cycles of 25 ms; a cell spikes at most once in a cycle, and spikes of one
+cycle coincide.
 """
 
 from __future__ import annotations
@@ -30,7 +30,9 @@ def generate(share: npt.NDArray[np.float32], rng: np.random.Generator) -> Spikes
     """Spikes where a cell fires at `share` of its peak, (cells, cycles), as bits packed by eight
     cycles.
     """
-    return np.packbits(rng.random(share.shape, np.float32) < PEAK * share, axis=1)
+    drawn = rng.random(share.shape, np.float32)
+    fires = drawn < PEAK * share
+    return np.packbits(fires, axis=1)
 
 
 @dataclass(frozen=True)
@@ -42,41 +44,49 @@ class GridModule:
     @property
     def lattice_m(self) -> Values:
         """The two steps from a field to its neighbours, as columns."""
-        return self.spacing_m * np.array([[1.0, 0.5], [0.0, np.sqrt(3) / 2]])
+        row_height = np.sqrt(3) / 2
+        triangular = np.array([[1.0, 0.5], [0.0, row_height]])
+        return self.spacing_m * triangular
 
     def tuning(self, where_m: Values) -> npt.NDArray[np.float32]:
         """How much of its peak each cell fires at positions (n, 2): (cells, n), 1 in the middle of
         a field.
         """
-        waves = self._waves()
-        own = (self._centres_m() @ waves.T).astype(np.float32)
-        there = (where_m @ waves.T).astype(np.float32)
-        total = np.full((len(own), len(there)), -float(len(waves)), np.float32)
+        own_rad = self._phases_rad(self._centres_m())
+        there_rad = self._phases_rad(where_m)
 
-        for wave in range(len(waves)):
-            phase = there[None, :, wave] - own[:, None, wave]
-            total += np.cos(phase)
+        waves, cells = own_rad.shape
+        total = np.full((cells, len(where_m)), -waves, np.float32)
+        for own, there in zip(own_rad, there_rad, strict=True):
+            total += np.cos(there - own[:, None])
 
-        return np.asarray(np.exp(SHARPNESS * total), np.float32)
+        share = np.exp(SHARPNESS * total)
+        return np.asarray(share, np.float32)
+
+    def _phases_rad(self, where_m: Values) -> npt.NDArray[np.float32]:
+        """(3, n): the phase of each wave at positions (n, 2)."""
+        phases_rad = where_m @ self._waves().T
+        return phases_rad.astype(np.float32).T
 
     def _centres_m(self) -> Values:
         """(cells, 2): a field of each cell."""
-        phases = np.arange(PHASES)
-        steps = np.stack(np.meshgrid(phases, phases, indexing="ij"), axis=-1).reshape(-1, 2)
-        return steps / PHASES @ self.lattice_m.T
+        shares = np.arange(PHASES) / PHASES
+        return _pairs(shares) @ self.lattice_m.T
 
     def _waves(self) -> Values:
         """(3, 2): the wave vectors, in radians a metre, whose sum peaks in the fields."""
-        angles = np.radians([30, 90, 150])
-        directions = np.column_stack([np.cos(angles), np.sin(angles)])
-        per_metre = 4 * np.pi / (np.sqrt(3) * self.spacing_m)
-        return np.asarray(per_metre * directions)
+        angles_rad = np.radians([30, 90, 150])
+        directions = np.column_stack([np.cos(angles_rad), np.sin(angles_rad)])
+        rad_per_m = 4 * np.pi / (np.sqrt(3) * self.spacing_m)
+        return np.asarray(rad_per_m * directions)
 
     def nearest(self, centres_m: Values) -> Indices:
         """Of positions (n, 2), the cell that has a field there."""
-        fields = centres_m @ np.linalg.inv(self.lattice_m).T
-        steps = np.rint(fields * PHASES).astype(np.intp) % PHASES
-        return np.asarray(steps[:, 0] * PHASES + steps[:, 1])
+        per_field = np.linalg.inv(self.lattice_m)
+        fields = centres_m @ per_field.T
+        steps = np.rint(fields * PHASES).astype(np.intp)
+        along, across = steps.T % PHASES
+        return np.asarray(PHASES * along + across)
 
 
 @dataclass(frozen=True)
@@ -88,12 +98,14 @@ class BorderCells:
     @property
     def distances_m(self) -> Values:
         """What each cell prefers."""
-        return np.arange(0.0, self.farthest_m + BORDER_M / 2, BORDER_M)
+        end_m = self.farthest_m + BORDER_M / 2
+        return np.arange(0.0, end_m, BORDER_M)
 
     def tuning(self, sensed_m: float, sd_m: float) -> npt.NDArray[np.float32]:
         """How much of its peak each cell fires at a sensed distance of that precision: (cells,)."""
         deviations = (self.distances_m - sensed_m) / sd_m
-        return np.exp(-(deviations**2) / 2).astype(np.float32)
+        share = np.exp(-(deviations**2) / 2)
+        return share.astype(np.float32)
 
     def nearest(self, distances_m: Values) -> Indices:
         """Of distances (n,), the cell that prefers it."""
@@ -103,5 +115,11 @@ class BorderCells:
 
 def place_centres_m(side_m: float) -> Values:
     """Where place cells have their fields in a square room: (n, 2), PLACE_M apart."""
-    line = np.arange(PLACE_M / 2, side_m, PLACE_M)
-    return np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2)
+    line_m = np.arange(PLACE_M / 2, side_m, PLACE_M)
+    return _pairs(line_m)
+
+
+def _pairs(values: Values) -> Values:
+    """(n^2, 2): each of `values` (n,) with each."""
+    first, second = np.meshgrid(values, values, indexing="ij")
+    return np.column_stack([first.ravel(), second.ravel()])

@@ -1,14 +1,15 @@
 """A place cell fires when its grid cells and its border cells fire together: Bayes' rule, by
 coincidence.
 
-Path integration moves grid cells: in each cycle they stand for one position out of its
-distribution, the prior. Border cells fire as likely as the sensed distance to a wall is from where
+Path integration moves grid cells: in each cycle they represent one position out of its
+distribution, the prior. Border cells fire by the likelihood of the sensed distance to a wall where
 they prefer to be. A place cell that fires on the coincidence of all its inputs fires in proportion
 to the product: its spikes are samples of the posterior (paper eq. 2, figure 4).
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,7 +42,7 @@ class Border:
 
 @dataclass(frozen=True)
 class Cues:
-    """What path integration says, a normal distribution, and what is sensed of walls."""
+    """The estimate of path integration, a normal distribution, and what is sensed of walls."""
 
     mean_m: tuple[float, float]
     covariance_m2: tuple[tuple[float, float], tuple[float, float]]
@@ -58,12 +59,15 @@ class Posterior:
     @property
     def sd_m(self) -> Values:
         """Standard deviation along x and y."""
-        return np.sqrt(np.diag(self.covariance_m2))
+        variances_m2 = np.diag(self.covariance_m2)
+        return np.sqrt(variances_m2)
 
     def off(self, mean_m: Values) -> float:
         """How far another mean is from this one's, in its standard deviations (Mahalanobis)."""
-        difference = mean_m - self.mean_m
-        return float(np.sqrt(difference @ np.linalg.inv(self.covariance_m2) @ difference))
+        offset_m = mean_m - self.mean_m
+        precision = np.linalg.inv(self.covariance_m2)
+        mahalanobis2 = offset_m @ precision @ offset_m
+        return float(np.sqrt(mahalanobis2))
 
 
 def exact(cues: Cues) -> Posterior:
@@ -96,7 +100,8 @@ class Recording:
     @property
     def counts(self) -> Values:
         """How often each place cell fired."""
-        return np.asarray(np.bitwise_count(self.place).sum(axis=1), np.float64)
+        counts = np.bitwise_count(self.place).sum(axis=1)
+        return np.asarray(counts, np.float64)
 
     @property
     def posterior(self) -> Posterior:
@@ -108,8 +113,8 @@ class Recording:
             raise ValueError("place cells hardly fire: record for longer")
 
         mean_m = counts @ self.centres_m / counts.sum()
-        weights = counts.astype(np.int64)
-        covariance_m2 = np.cov(self.centres_m, rowvar=False, fweights=weights)
+        frequencies = counts.astype(np.int64)
+        covariance_m2 = np.cov(self.centres_m, rowvar=False, fweights=frequencies)
         return Posterior(mean_m, covariance_m2)
 
 
@@ -118,16 +123,28 @@ def record(cues: Cues, side_m: float, seconds: float, rng: np.random.Generator) 
     cycles = round(seconds / GAMMA_S)
     centres_m = place_centres_m(side_m)
     integrated_m = rng.multivariate_normal(cues.mean_m, cues.covariance_m2, cycles)
+
+    place = _in_every_cycle(len(centres_m), cycles)
     grid = []
     border = []
-    place: Spikes = np.full((len(centres_m), -(-cycles // 8)), 255, np.uint8)
+
     for spacing_m in SPACINGS_M:
         module = GridModule(spacing_m)
-        grid.append(generate(module.tuning(integrated_m), rng))
-        place &= grid[-1][module.nearest(centres_m)]
-    for sensed in cues.borders:
+        spikes = generate(module.tuning(integrated_m), rng)
+        place &= spikes[module.nearest(centres_m)]
+        grid.append(spikes)
+
+    for wall in cues.borders:
         cells = BorderCells(side_m)
-        share = np.repeat(cells.tuning(sensed.sensed_m, sensed.sd_m)[:, None], cycles, axis=1)
-        border.append(generate(share, rng))
-        place &= border[-1][cells.nearest(centres_m[:, sensed.axis])]
+        share = cells.tuning(wall.sensed_m, wall.sd_m)
+        spikes = generate(np.repeat(share[:, None], cycles, axis=1), rng)
+        place &= spikes[cells.nearest(centres_m[:, wall.axis])]
+        border.append(spikes)
+
     return Recording(tuple(grid), tuple(border), place, centres_m)
+
+
+def _in_every_cycle(cells: int, cycles: int) -> Spikes:
+    """Packed spikes of cells that fire in all of so many cycles."""
+    groups = math.ceil(cycles / 8)
+    return np.full((cells, groups), 0xFF, np.uint8)
