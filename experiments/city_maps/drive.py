@@ -15,6 +15,7 @@ from experiments import in_memory
 from experiments.city_maps.correction import settings
 from experiments.city_maps.environment import Environment
 from experiments.city_maps.observer import Observer, Traversal
+from experiments.city_maps.streets import Points
 from services import registry
 from services.sim.odometry import Noise
 
@@ -64,27 +65,34 @@ def sections(environment: Environment, tour: Tour, noise: Noise, method: str) ->
 
 def _trajectory(environment: Environment, tour: Tour) -> dict[str, object]:
     line_m = environment.line(tour.start, tour.backward, LEAD_M, OVERRUN_M)
-    landmarks = [
-        {"name": name, "x_m": x_m, "y_m": y_m}
-        for name, (x_m, y_m) in zip(
-            environment.names, environment.buildings_m.tolist(), strict=True
-        )
-    ]
+    places_m = environment.buildings_m.tolist()
+    landmarks = []
+
+    for name, (x_m, y_m) in zip(environment.names, places_m, strict=True):
+        landmarks.append({"name": name, "x_m": x_m, "y_m": y_m})
+
     return {"line_m": line_m.tolist(), "landmarks": landmarks, "speed_m_s": SPEED_M_S}
 
 
 def traverse(configured: Sections) -> Traversal:
     """Drive one tour to its end. Raises CogmapError where a message was lost or refused."""
-    return driven(configured, [registry.build(name, configured) for name in MODULES])
+    modules = [registry.build(name, configured) for name in MODULES]
+    return driven(configured, modules)
 
 
 def driven(configured: Sections, modules: Sequence[Module]) -> Traversal:
     """As `traverse`, with these modules."""
     trajectory = configured["sim"]["trajectory"]
-    (x_m, y_m), (ahead_x_m, ahead_y_m) = trajectory["line_m"][:2]
-    origin = np.array([x_m, y_m, math.atan2(ahead_y_m - y_m, ahead_x_m - x_m)])
+    origin = _first_pose(trajectory["line_m"])
     names = tuple(landmark["name"] for landmark in trajectory["landmarks"])
 
     observer = Observer(origin, names)
     in_memory.run([*modules, observer.module()])
     return observer.traversal()
+
+
+def _first_pose(line_m: Sequence[tuple[float, float]]) -> Points:
+    """(3,): the pose at the beginning of a line, towards its second point."""
+    (x_m, y_m), (ahead_x_m, ahead_y_m) = line_m[:2]
+    heading_rad = math.atan2(ahead_y_m - y_m, ahead_x_m - x_m)
+    return np.array([x_m, y_m, heading_rad])

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Indices
-from cogmap.geometry.polylines import distances_along
+from cogmap.geometry.polylines import distances_along, interpolate
 from experiments.city_maps.streets import Points, Streets, shortest_path
 from experiments.city_maps.tour import shortest_tour
 
@@ -48,13 +50,14 @@ class Environment:
     @property
     def area_km2(self) -> float:
         """Of the rectangle around the buildings."""
-        sides_m = np.ptp(self.buildings_m, axis=0)
-        return float(np.prod(sides_m)) / 1e6
+        width_m, height_m = np.ptp(self.buildings_m, axis=0).tolist()
+        return float(width_m * height_m) / 1e6
 
     @property
     def tour_m(self) -> float:
         """The length of the tour."""
-        return sum(_length_m(leg) for leg in self.legs_m)
+        lengths_m = [_length_m(leg) for leg in self.legs_m]
+        return sum(lengths_m)
 
     def line(self, start: int, backward: bool, lead_m: float, overrun_m: float) -> Points:
         """The tour past building `start`, all others and `start` again.
@@ -102,8 +105,10 @@ def _beside_streets(city: City, streets: Streets) -> Indices:
     _, feet_m = streets.nearest(city.buildings_m)
     offsets_m = city.buildings_m - feet_m
     distances_m = np.hypot(*offsets_m.T)
-    nearest_m, farthest_m = FROM_STREET_M
-    return np.flatnonzero((distances_m >= nearest_m) & (distances_m <= farthest_m))
+
+    min_m, max_m = FROM_STREET_M
+    is_beside = (distances_m >= min_m) & (distances_m <= max_m)
+    return np.flatnonzero(is_beside)
 
 
 def _choose(buildings_m: Points, usable: Indices, rng: np.random.Generator) -> list[int] | None:
@@ -114,25 +119,31 @@ def _choose(buildings_m: Points, usable: Indices, rng: np.random.Generator) -> l
     if len(usable) < BUILDINGS:
         return None
 
-    corner_m = buildings_m[usable].min(axis=0)
-    extent_m = np.ptp(buildings_m[usable], axis=0)
-    max_side_m = min(MAX_SIDE_M, max(MIN_SIDE_M, float(extent_m.max())))
+    usable_m = buildings_m[usable]
+    corner_m = usable_m.min(axis=0)
+    extent_m = np.ptp(usable_m, axis=0)
+    max_side_m = np.clip(extent_m.max(), MIN_SIDE_M, MAX_SIDE_M)
 
     for _ in range(MAX_TRIES):
         side_m = float(rng.uniform(MIN_SIDE_M, max_side_m))
         room_m = np.maximum(extent_m - side_m, 0)
         lower_m = corner_m + rng.uniform(0, 1, 2) * room_m
-        upper_m = lower_m + side_m
 
-        candidates_m = buildings_m[usable]
-        inside = ((candidates_m >= lower_m) & (candidates_m <= upper_m)).all(axis=1)
-        order = rng.permutation(usable[inside]).tolist()
-        chosen = _apart(buildings_m, order, MIN_APART * side_m)
+        inside = usable[_in_square(usable_m, lower_m, side_m)]
+        candidates = rng.permutation(inside).tolist()
+        chosen = _apart(buildings_m, candidates, MIN_APART * side_m)
 
         if len(chosen) == BUILDINGS:
             return chosen
 
     return None
+
+
+def _in_square(positions_m: Points, lower_m: Points, side_m: float) -> npt.NDArray[np.bool_]:
+    """Which of (n, 2) positions lie in a square, by its lower corner (2,)."""
+    upper_m = lower_m + side_m
+    is_within = (positions_m >= lower_m) & (positions_m <= upper_m)
+    return np.asarray(is_within.all(axis=1))
 
 
 def _apart(buildings_m: Points, candidates: Sequence[int], min_m: float) -> list[int]:
@@ -151,41 +162,55 @@ def _apart(buildings_m: Points, candidates: Sequence[int], min_m: float) -> list
 
 
 def _environment(name: str, city: City, streets: Streets, chosen: Sequence[int]) -> Environment:
-    joined, fronts = streets.with_points(city.buildings_m[chosen])
-    distances_m, before = joined.shortest_paths(fronts)
-    _, order = shortest_tour(distances_m[:, fronts])
-    legs = []
-
-    for start, end in zip(order, [*order[1:], order[0]], strict=True):
-        points = shortest_path(before[start], int(fronts[end]))
-        legs.append(joined.points_m[points])
-
+    order, legs_m = _tour(streets, city.buildings_m[chosen])
     in_order = [chosen[place] for place in order]
+    names = [city.names[building] for building in in_order]
+
     return Environment(
         name=name,
         streets=streets,
-        names=tuple(city.names[building] for building in in_order),
+        names=tuple(names),
         buildings_m=city.buildings_m[in_order],
-        legs_m=tuple(legs),
+        legs_m=tuple(legs_m),
     )
+
+
+def _tour(streets: Streets, buildings_m: Points) -> tuple[list[int], list[Points]]:
+    """The order of the shortest tour past (n, 2) buildings, and its line from each to the next."""
+    joined, fronts = streets.with_points(buildings_m)
+    distances_m, before = joined.shortest_paths(fronts)
+    _, order = shortest_tour(distances_m[:, fronts])
+    legs_m = []
+
+    for start, end in itertools.pairwise([*order, order[0]]):
+        points = shortest_path(before[start], int(fronts[end]))
+        legs_m.append(joined.points_m[points])
+
+    return order, legs_m
 
 
 def _joined(lines: Sequence[Points]) -> Points:
     """One line, without points that coincide with the one before."""
     points_m = np.vstack(lines)
-    steps_m = np.diff(points_m, axis=0)
-    is_new = np.hypot(*steps_m.T) > SAME_POINT_M
-    return np.asarray(points_m[np.concatenate([[True], is_new])])
+    is_new = np.ones(len(points_m), bool)
+    is_new[1:] = _step_lengths_m(points_m) > SAME_POINT_M
+    return np.asarray(points_m[is_new])
 
 
 def _beginning(line_m: Points, length_m: float) -> Points:
     """The first `length_m` of a line."""
     along_m = distances_along(line_m)
-    x_m = np.interp(length_m, along_m, line_m[:, 0])
-    y_m = np.interp(length_m, along_m, line_m[:, 1])
-    return np.vstack([line_m[along_m < length_m], [[x_m, y_m]]])
+    is_before = along_m < length_m
+    end_m = interpolate(along_m, line_m, np.array([length_m]))
+    return np.vstack([line_m[is_before], end_m])
 
 
 def _length_m(line_m: Points) -> float:
+    lengths_m = _step_lengths_m(line_m)
+    return float(lengths_m.sum())
+
+
+def _step_lengths_m(line_m: Points) -> Points:
+    """(n - 1,): the distance from each of the (n, 2) points of a line to the next."""
     steps_m = np.diff(line_m, axis=0)
-    return float(np.hypot(*steps_m.T).sum())
+    return np.asarray(np.hypot(*steps_m.T))

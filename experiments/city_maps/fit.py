@@ -19,7 +19,7 @@ from services.sim.odometry import Noise
 
 FIT_TRAVERSALS = 2
 FACTORS = (1.4, 1.15)
-MOST = 1.0
+MAX_NOISE = 1.0
 OTHERS = 500_000
 
 
@@ -30,22 +30,24 @@ def fitted(environments: Sequence[Environment], budget: Budget) -> Noise:
     One mean for two noises: others would fit as well. The traversals are others than those measured
     with the same seed.
     """
+    traversals = min(budget.traversals, FIT_TRAVERSALS)
+    seed = budget.seed + OTHERS
 
     @cache
     def cost(noise: Noise) -> float:
-        if max(noise.speed, noise.turn) > MOST:
+        if max(noise.speed, noise.turn) > MAX_NOISE:
             return float("inf")
-        tried = jobs(
-            environments, noise, min(budget.traversals, FIT_TRAVERSALS), budget.seed + OTHERS
-        )
+
+        tried = jobs(environments, noise, traversals, seed)
         errors_km2 = parallel_map(positions_error_km2, tried, budget.processes, budget.progress)
-        return float(np.mean(errors_km2) - published.HUMAN_MEAN_KM2) ** 2
+        difference_km2 = np.mean(errors_km2) - published.HUMAN_MEAN_KM2
+        return float(difference_km2) ** 2
 
     return coordinate_descent(cost, NOISE, FACTORS)
 
 
 def positions_error_km2(job: Job) -> float:
     """The error of the map of one traversal, positions corrected."""
-    return map_error_km2(
-        traverse(configurations(job)["positions"]).buildings_m, job.environment.buildings_m
-    )
+    configured = configurations(job)["positions"]
+    traversal = traverse(configured)
+    return map_error_km2(traversal.buildings_m, job.environment.buildings_m)

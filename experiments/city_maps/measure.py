@@ -101,7 +101,8 @@ def jobs(
 
     for place, environment in enumerate(environments):
         own_seed = seed * 1000 + place
-        found += [Job(environment, number, noise, own_seed) for number in range(traversals)]
+        for number in range(traversals):
+            found.append(Job(environment, number, noise, own_seed))
 
     return found
 
@@ -133,7 +134,12 @@ def configurations(job: Job) -> dict[str, Sections]:
         backward=bool(rng.integers(2)),
         seed=int(rng.integers(2**32)),
     )
-    return {method: sections(job.environment, tour, job.noise, method) for method in METHODS}
+    found = {}
+
+    for method in METHODS:
+        found[method] = sections(job.environment, tour, job.noise, method)
+
+    return found
 
 
 def map_error_km2(learned_m: Points, true_m: Points) -> float:
@@ -143,23 +149,30 @@ def map_error_km2(learned_m: Points, true_m: Points) -> float:
     """
     offsets_m = learned_m - true_m
     squared_m2 = (offsets_m**2).sum(axis=1)
-    known_m2 = squared_m2[~np.isnan(squared_m2)]
+    is_known = ~np.isnan(squared_m2)
 
-    if not len(known_m2):
+    if not is_known.any():
         return float("nan")
 
-    return float(known_m2.mean()) * len(squared_m2) / 1e6
+    mean_m2 = float(squared_m2[is_known].mean())
+    return mean_m2 * len(squared_m2) / 1e6
 
 
 def _learned(job: Job, maps: Mapping[str, Traversal]) -> Learned:
-    missing = [np.isnan(one.buildings_m[:, 0]).sum() for one in maps.values()]
-    return Learned(
+    learned = Learned(
         error_km2=_errors_km2(maps, job.environment.buildings_m),
-        missing=int(sum(missing)),
-        buildings_m={method: one.buildings_m for method, one in maps.items()},
-        path_m={method: one.path_m for method, one in maps.items()},
-        road_m={method: one.road_m for method, one in maps.items()},
+        missing=sum(one.missing for one in maps.values()),
+        buildings_m={},
+        path_m={},
+        road_m={},
     )
+
+    for method, one in maps.items():
+        learned.buildings_m[method] = one.buildings_m
+        learned.path_m[method] = one.path_m
+        learned.road_m[method] = one.road_m
+
+    return learned
 
 
 def _errors_km2(maps: Mapping[str, Traversal], true_m: Points) -> dict[str, float]:

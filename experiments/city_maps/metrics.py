@@ -39,16 +39,20 @@ def map_metrics(maps: Sequence[CityMap], noise: Noise) -> Metrics:
     for method, name in NAMES.items():
         errors[name] = np.array([city.error_km2(method) for city in maps])
 
-    metrics = _ratios(errors)
-    for name, values in errors.items():
-        metrics[f"error_{name}_km2"] = float(values.mean())
-        metrics[f"error_{name}_sd_km2"] = float(values.std())
-        metrics[f"growth_{name}_km2_per_km"] = growth(maps, values)
-
-    metrics |= _protocol(maps, noise)
+    metrics = _ratios(errors) | _errors(maps, errors) | _protocol(maps, noise)
     for number, city in enumerate(maps, start=1):
-        own = {name: float(values[number - 1]) for name, values in errors.items()}
-        metrics |= _of_map(f"map_{number:02d}", city, own)
+        metrics |= _of_map(f"map_{number:02d}", city)
+
+    return metrics
+
+
+def _errors(maps: Sequence[CityMap], errors: dict[str, Errors]) -> Metrics:
+    metrics: Metrics = {}
+
+    for name, values_km2 in errors.items():
+        metrics[f"error_{name}_km2"] = float(values_km2.mean())
+        metrics[f"error_{name}_sd_km2"] = float(values_km2.std())
+        metrics[f"growth_{name}_km2_per_km"] = growth(maps, values_km2)
 
     return metrics
 
@@ -83,15 +87,15 @@ def _protocol(maps: Sequence[CityMap], noise: Noise) -> Metrics:
     }
 
 
-def _of_map(prefix: str, city: CityMap, errors_km2: dict[str, float]) -> Metrics:
+def _of_map(prefix: str, city: CityMap) -> Metrics:
     metrics: Metrics = {
         f"{prefix}_name": city.environment.name,
         f"{prefix}_area_km2": city.environment.area_km2,
         f"{prefix}_tour_km": city.environment.tour_m / 1e3,
     }
 
-    for name, error_km2 in errors_km2.items():
-        metrics[f"{prefix}_error_{name}_km2"] = error_km2
+    for method, name in NAMES.items():
+        metrics[f"{prefix}_error_{name}_km2"] = city.error_km2(method)
 
     return metrics
 
@@ -102,14 +106,15 @@ def camera_metrics(seen: Learned, told: Learned) -> Metrics:
     With cameras self-motion is fused: `fused_alone` is path integration of that alone.
     """
     metrics: Metrics = {"cameras_traversals": 1.0}
+    errors_km2 = seen.error_km2
 
     for method, name in CAMERA_NAMES.items():
-        metrics[f"cameras_error_{name}_km2"] = seen.error_km2[method]
+        metrics[f"cameras_error_{name}_km2"] = errors_km2[method]
         if method in told.error_km2:
             metrics[f"cameras_same_traversal_by_percepts_error_{name}_km2"] = told.error_km2[method]
 
     for method in ("heading", "positions"):
-        ratio = seen.error_km2[method] / seen.error_km2["none"]
+        ratio = errors_km2[method] / errors_km2["none"]
         metrics[f"cameras_error_{NAMES[method]}_over_uncorrected"] = ratio
 
     metrics["cameras_buildings_missing"] = float(seen.missing)
@@ -120,9 +125,10 @@ def growth(maps: Sequence[CityMap], errors_km2: Errors) -> float:
     """By how many km^2 the error grows for a kilometre of tour: a line's slope, 0 for one map."""
     length_km = np.array([city.environment.tour_m / 1e3 for city in maps])
     centred_km = length_km - length_km.mean()
-    variance = float(centred_km @ centred_km)
+    variation = float(centred_km @ centred_km)
 
-    if variance == 0:
+    if variation == 0:
         return 0.0
 
-    return float(centred_km @ errors_km2 / variance)
+    covariation = centred_km @ errors_km2
+    return float(covariation / variation)

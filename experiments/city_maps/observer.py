@@ -38,6 +38,12 @@ class Traversal:
     road_m: Points
     alone_m: dict[str, Points]
 
+    @property
+    def missing(self) -> int:
+        """How many buildings are not on the map."""
+        is_missing = np.isnan(self.buildings_m[:, 0])
+        return int(is_missing.sum())
+
 
 class Observer:
     """Follows the graph, the truth and the odometry of one traversal.
@@ -64,17 +70,20 @@ class Observer:
 
     def traversal(self) -> Traversal:
         """All that was observed."""
+        believed = np.array(self._believed)
+        true = np.array(self._true)
         path = reading.path_rows(self._graph)
+        path_m = path[:, reading.POSE][:, :2]
         buildings_m = reading.object_positions_m(self._graph, self._names)
-        alone_m = {name: self._placed(own_m) for name, own_m in self._alone_m(path).items()}
+        road_m = reading.road_m(self._graph)
 
         return Traversal(
-            believed=self._placed_poses(np.array(self._believed)),
-            true=np.array(self._true)[: len(self._believed)],
-            path_m=self._placed(path[:, reading.POSE][:, :2]),
+            believed=self._placed_poses(believed),
+            true=true[: len(believed)],
+            path_m=self._placed(path_m),
             buildings_m=self._placed(buildings_m),
-            road_m=self._placed(reading.road_m(self._graph)),
-            alone_m=alone_m,
+            road_m=self._placed(road_m),
+            alone_m=self._alone_m(path),
         )
 
     def _on_delta(self, delta: Delta) -> None:
@@ -89,18 +98,21 @@ class Observer:
         self._true.append((pose.x_m, pose.y_m, pose.heading_rad))
 
     def _alone_m(self, path: Points) -> dict[str, Points]:
-        """The buildings (8, 2) by path integration alone.
+        """The buildings (8, 2) by path integration alone, in the true frame.
 
         Without images self-motion is that of the wheels.
         """
         fused = path[:, reading.ODOMETRY].copy()
-        fused[:, :2] -= fused[0, :2] - path[0, reading.POSE][:2]
+        start_m = path[0, reading.POSE][:2]
+        fused[:, :2] -= fused[0, :2] - start_m
+        fused_m = self._placed(self._seen_from(fused))
 
         if not self._wheels:
-            return {WHEELS: self._seen_from(fused)}
+            return {WHEELS: fused_m}
 
         wheels = self._wheels.poses(path[:, reading.STAMP])
-        return {WHEELS: self._seen_from(wheels), FUSED: self._seen_from(fused)}
+        wheels_m = self._placed(self._seen_from(wheels))
+        return {WHEELS: wheels_m, FUSED: fused_m}
 
     def _seen_from(self, poses: Points) -> Points:
         """(8, 2): the median of all observations of each building, from `poses` of the path."""
@@ -122,5 +134,6 @@ class Observer:
 
     def _placed_poses(self, own: Points) -> Points:
         """(n, 3) poses of the agent's own frame, in the true one."""
+        positions_m = self._placed(own[:, :2])
         heading_rad = own[:, 2] + self._origin[2]
-        return np.column_stack([self._placed(own[:, :2]), heading_rad])
+        return np.column_stack([positions_m, heading_rad])

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Hashable, Iterable, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -31,6 +33,7 @@ EVERY_M = 45.0
 CORNER_M = 15.0
 MIN_CORNERS = 3
 MANY_NAMED = 40
+Point = TypeVar("Point", bound=Hashable)
 
 
 def from_osm(path: Path) -> City:
@@ -46,24 +49,20 @@ def from_osm(path: Path) -> City:
         )
 
     middle = np.array(list(extract.nodes.values())).mean(axis=0)
-    names, where = _buildings(extract)
-    return City(_name(path), _streets(extract, ways, middle), names, plane_m(where, middle))
+    streets = _streets(extract, ways, middle)
+    names, lonlat = _buildings(extract)
+    return City(_name(path), streets, names, plane_m(lonlat, middle))
 
 
 def from_street_graph(graph: StreetGraph, seed: int) -> City:
     """A city of real streets, which has no buildings: houses are put along them, from a seed."""
     middle = np.array(graph.nodes_lonlat).mean(axis=0)
-    number: dict[tuple[float, float], int] = {}
-    pieces = []
+    lines = [graph.line(edge) for edge in graph.edges]
+    lonlat, pieces = _pieces(lines)
 
-    for edge in graph.edges:
-        line = [number.setdefault(point, len(number)) for point in graph.line(edge)]
-        pieces += [[a, b] for a, b in itertools.pairwise(line) if a != b]
-
-    points_m = plane_m(np.array(list(number)), middle)
-    streets = Streets(points_m, np.array(pieces, np.intp)).connected()
-    houses_m = _along(streets, np.random.default_rng([seed, 0xA10]))
-    return City(graph.city, streets, _house_names(houses_m), houses_m)
+    points_m = plane_m(np.array(lonlat), middle)
+    streets = Streets(points_m, pieces).connected()
+    return _with_houses(graph.city, streets, np.random.default_rng([seed, 0xA10]))
 
 
 def folder(path: Path, seed: int) -> list[City]:
@@ -96,84 +95,114 @@ def grown(seed: int) -> City:
     rng = np.random.default_rng([seed, 0xC17])
     points_m = _bent_grid_m(rng)
     pieces = _grid_pieces()
-    is_there = rng.random(len(pieces)) < STREETS_LEFT
-    streets = Streets(points_m, pieces[is_there]).connected()
-    houses_m = _along(streets, rng)
-    return City(f"city {seed}", streets, _house_names(houses_m), houses_m)
+    is_left = rng.random(len(pieces)) < STREETS_LEFT
+    streets = Streets(points_m, pieces[is_left]).connected()
+    return _with_houses(f"city {seed}", streets, rng)
 
 
 def grown_environments(number: int, seed: int) -> list[Environment]:
     """`number` environments, each of a city grown from a seed of its own."""
-    cities = [grown(1000 * seed + count) for count in range(number)]
-    return [environments(city, 1, seed)[0] for city in cities]
+    found = []
+
+    for count in range(number):
+        city = grown(1000 * seed + count)
+        found += environments(city, 1, seed)
+
+    return found
 
 
 def plane_m(lonlat: Points, middle: Points) -> Points:
     """Metres east and north of `middle`, (n, 2), from degrees: good to a thousandth within some
     kilometres.
     """
-    per_degree_m = np.radians(1.0) * EARTH_M
-    shrinking = np.array([np.cos(np.radians(middle[1])), 1.0])
+    degree_m = np.radians(1.0) * EARTH_M
+    parallels_share = np.cos(np.radians(middle[1]))
     offsets = lonlat.reshape(-1, 2) - middle
-    return np.asarray(offsets * shrinking * per_degree_m)
+    return np.asarray(offsets * np.array([parallels_share, 1.0]) * degree_m)
 
 
 def _bent_grid_m(rng: np.random.Generator) -> Points:
     """(GRID_SIDE^2, 2) crossings of blocks of many sizes, moved about, and all turned by chance."""
-    lines_m = [np.cumsum(rng.uniform(*BLOCK_M, GRID_SIDE)) for _ in range(2)]
-    x_m, y_m = np.meshgrid(*lines_m, indexing="ij")
+    blocks_m = rng.uniform(*BLOCK_M, (2, GRID_SIDE))
+    x_m, y_m = np.meshgrid(*np.cumsum(blocks_m, axis=1), indexing="ij")
     points_m = np.column_stack([x_m.ravel(), y_m.ravel()])
     points_m += rng.normal(0, JITTER * BLOCK_M[0], points_m.shape)
 
     turn_rad = float(rng.uniform(0, np.pi))
-    return rotate(points_m - points_m.mean(axis=0), turn_rad)
+    centred_m = points_m - points_m.mean(axis=0)
+    return rotate(centred_m, turn_rad)
 
 
 def _grid_pieces() -> Indices:
     """(m, 2): the neighbours along both axes of a grid."""
     number = np.arange(GRID_SIDE**2).reshape(GRID_SIDE, GRID_SIDE)
-    along = np.column_stack([number[:-1].ravel(), number[1:].ravel()])
-    across = np.column_stack([number[:, :-1].ravel(), number[:, 1:].ravel()])
+    along = _pairs(number[:-1], number[1:])
+    across = _pairs(number[:, :-1], number[:, 1:])
     return np.vstack([along, across])
 
 
-def _along(streets: Streets, rng: np.random.Generator) -> Points:
-    """(k, 2): houses on both sides of every street."""
-    found = []
+def _pairs(first: Indices, second: Indices) -> Indices:
+    """(m, 2): the elements of two arrays of one shape, side by side."""
+    return np.column_stack([first.ravel(), second.ravel()])
+
+
+def _with_houses(name: str, streets: Streets, rng: np.random.Generator) -> City:
+    """A city with houses on both sides of every street."""
+    houses_m = []
 
     for start_m, end_m in streets.points_m[streets.pieces]:
-        length_m = float(np.hypot(*(end_m - start_m)))
-        first_m = rng.uniform(CORNER_M, EVERY_M)
-        along_m = np.arange(first_m, length_m - CORNER_M, EVERY_M)
-        side_m = rng.choice([-1.0, 1.0], len(along_m)) * FRONT_M
+        houses_m.append(_along(start_m, end_m, rng))
 
-        ahead = (end_m - start_m) / length_m
-        left = np.array([-ahead[1], ahead[0]])
-        found.append(start_m + along_m[:, None] * ahead + side_m[:, None] * left)
-
-    return np.vstack(found)
+    buildings_m = np.vstack(houses_m)
+    names = [f"house {number}" for number, _ in enumerate(buildings_m, start=1)]
+    return City(name, streets, tuple(names), buildings_m)
 
 
-def _house_names(houses_m: Points) -> tuple[str, ...]:
-    return tuple(f"house {number}" for number in range(1, len(houses_m) + 1))
+def _along(start_m: Points, end_m: Points, rng: np.random.Generator) -> Points:
+    """(k, 2): houses along one street, each on a side by chance."""
+    street_m = end_m - start_m
+    length_m = float(np.hypot(*street_m))
+    ahead = street_m / length_m
+    left = np.array([-ahead[1], ahead[0]])
+
+    first_m = rng.uniform(CORNER_M, EVERY_M)
+    along_m = np.arange(first_m, length_m - CORNER_M, EVERY_M)
+    left_m = rng.choice([-1.0, 1.0], len(along_m)) * FRONT_M
+
+    on_street_m = start_m + along_m[:, None] * ahead
+    return np.asarray(on_street_m + left_m[:, None] * left)
 
 
 def _is_street(way: Way) -> bool:
-    return way.tags.get("highway") in STREETS and way.tags.get("area") != "yes"
+    is_area = way.tags.get("area") == "yes"
+    return way.tags.get("highway") in STREETS and not is_area
 
 
 def _streets(extract: Extract, ways: list[Way], middle: Points) -> Streets:
-    number: dict[int, int] = {}
-    pieces = []
+    lines = []
 
     for way in ways:
         inside = [node for node in way.nodes if node in extract.nodes]
-        for a, b in itertools.pairwise(inside):
-            if a != b:
-                pieces.append([number.setdefault(node, len(number)) for node in (a, b)])
+        lines.append(inside)
 
-    where = np.array([extract.nodes[node] for node in number])
-    return Streets(plane_m(where, middle), np.array(pieces, np.intp))
+    nodes, pieces = _pieces(lines)
+    lonlat = np.array([extract.nodes[node] for node in nodes])
+    return Streets(plane_m(lonlat, middle), pieces)
+
+
+def _pieces(lines: Iterable[Sequence[Point]]) -> tuple[list[Point], Indices]:
+    """The different points of all lines, and the pieces (m, 2) between them, by their numbers."""
+    number: dict[Point, int] = {}
+    pieces = []
+
+    for line in lines:
+        for start, end in itertools.pairwise(line):
+            if start != end:
+                first = number.setdefault(start, len(number))
+                second = number.setdefault(end, len(number))
+                pieces.append((first, second))
+
+    return list(number), np.array(pieces, np.intp)
 
 
 def _buildings(extract: Extract) -> tuple[tuple[str, ...], Points]:
@@ -189,8 +218,7 @@ def _buildings(extract: Extract) -> tuple[tuple[str, ...], Points]:
 
     for way in extract.ways:
         corners = [extract.nodes[node] for node in way.nodes[:-1] if node in extract.nodes]
-        is_building = "building" in way.tags or _is_known(way.tags)
-        if len(corners) < MIN_CORNERS or not is_building:
+        if len(corners) < MIN_CORNERS or not _is_building(way):
             continue
 
         lon, lat = np.mean(corners, axis=0).tolist()
@@ -200,11 +228,17 @@ def _buildings(extract: Extract) -> tuple[tuple[str, ...], Points]:
             unnamed[f"building {way.id}"] = (lon, lat)
 
     found = named if len(named) >= MANY_NAMED else named | unnamed
-    return tuple(found), np.array(list(found.values())).reshape(-1, 2)
+    lonlat = np.array(list(found.values()))
+    return tuple(found), lonlat.reshape(-1, 2)
+
+
+def _is_building(way: Way) -> bool:
+    return "building" in way.tags or _is_known(way.tags)
 
 
 def _is_known(tags: Tags) -> bool:
-    return "name" in tags and any(key in tags for key in KNOWN_BY)
+    is_of_use = not tags.keys().isdisjoint(KNOWN_BY)
+    return is_of_use and "name" in tags
 
 
 def _name(path: Path) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,10 +11,12 @@ import numpy.typing as npt
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
+from cogmap.geometry.polylines import nearest_on_pieces
+
 Points = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
 MIN_LENGTH_M = 1e-6
-MIN_SQUARED_M2 = 1e-9
+# A city has many pieces: their distances to many positions at once would not fit into memory.
 _CHUNK = 256
 
 
@@ -27,7 +30,8 @@ class Streets:
     @property
     def length_m(self) -> float:
         """Of all pieces together."""
-        return float(self._lengths_m().sum())
+        lengths_m = self._lengths_m()
+        return float(lengths_m.sum())
 
     def connected(self) -> Streets:
         """The largest part in which each point can be reached from every other."""
@@ -37,19 +41,21 @@ class Streets:
 
         number = np.full(len(self.points_m), -1)
         number[kept] = np.arange(len(kept))
+
         pieces = number[self.pieces]
         is_kept = (pieces >= 0).all(axis=1)
         return Streets(self.points_m[kept], pieces[is_kept])
 
     def nearest(self, positions_m: Points) -> tuple[Indices, Points]:
         """The piece nearest to each of (k, 2) positions, and the nearest point on it, (k, 2)."""
+        starts_m, ends_m = self._ends_m()
         pieces = []
         feet_m = []
 
         for chunk_m in np.array_split(positions_m, range(_CHUNK, len(positions_m), _CHUNK)):
-            found, foot_m = self._nearest(chunk_m)
-            pieces.append(found)
-            feet_m.append(foot_m)
+            found = nearest_on_pieces(starts_m, ends_m, chunk_m)
+            pieces.append(found.piece)
+            feet_m.append(found.foot_m)
 
         return np.concatenate(pieces), np.concatenate(feet_m)
 
@@ -59,18 +65,17 @@ class Streets:
         Returns those points' numbers too. The pieces that are cut are replaced.
         """
         cut, feet_m = self.nearest(positions_m)
-        numbers = len(self.points_m) + np.arange(len(feet_m))
         points_m = np.vstack([self.points_m, feet_m])
-        is_whole = ~np.isin(np.arange(len(self.pieces)), cut)
-        pieces = self.pieces[is_whole].tolist()
+        numbers = len(self.points_m) + np.arange(len(feet_m))
+
+        is_whole = np.ones(len(self.pieces), bool)
+        is_whole[cut] = False
+        pieces: list[Sequence[int]] = self.pieces[is_whole].tolist()
 
         for piece in np.unique(cut).tolist():
             start, end = self.pieces[piece].tolist()
-            on_it = numbers[cut == piece]
-            offsets_m = points_m[on_it] - points_m[start]
-            order = np.argsort(np.hypot(*offsets_m.T), kind="stable")
-            chain = [start, *on_it[order].tolist(), end]
-            pieces += [list(pair) for pair in itertools.pairwise(chain)]
+            between = _by_distance(points_m, start, numbers[cut == piece])
+            pieces += itertools.pairwise([start, *between, end])
 
         return Streets(points_m, np.array(pieces, np.intp)), numbers
 
@@ -83,40 +88,47 @@ class Streets:
         )
         return distances_m, before
 
-    def _nearest(self, positions_m: Points) -> tuple[Indices, Points]:
-        start_m = self.points_m[self.pieces[:, 0]]
-        along_m = self.points_m[self.pieces[:, 1]] - start_m
-        squared_m2 = np.maximum((along_m**2).sum(axis=1), MIN_SQUARED_M2)
-
-        offsets_m = positions_m[:, None] - start_m
-        share = (offsets_m * along_m).sum(axis=2) / squared_m2
-        feet_m = start_m + share.clip(0, 1)[..., None] * along_m
-
-        missing_m = positions_m[:, None] - feet_m
-        best = (missing_m**2).sum(axis=2).argmin(axis=1)
-        return best, feet_m[np.arange(len(positions_m)), best]
+    def _ends_m(self) -> tuple[Points, Points]:
+        """(m, 2) each: where the pieces start, and where they end."""
+        starts, ends = self.pieces.T
+        return self.points_m[starts], self.points_m[ends]
 
     def _lengths_m(self) -> Points:
-        start_m = self.points_m[self.pieces[:, 0]]
-        end_m = self.points_m[self.pieces[:, 1]]
-        along_m = end_m - start_m
-        return np.asarray(np.hypot(along_m[:, 0], along_m[:, 1]))
+        """(m,): of each piece."""
+        starts_m, ends_m = self._ends_m()
+        offsets_m = ends_m - starts_m
+        return np.asarray(np.hypot(*offsets_m.T))
 
     def _graph(self) -> csr_array:
         # An explicit zero would be no edge at all; of two pieces between the same points the sum
         # would be taken.
-        ends = np.sort(self.pieces, axis=1)
-        ends, first = np.unique(ends, axis=0, return_index=True)
-        weights = np.maximum(self._lengths_m()[first], MIN_LENGTH_M)
+        undirected = np.sort(self.pieces, axis=1)
+        ends, first = np.unique(undirected, axis=0, return_index=True)
+        lengths_m = self._lengths_m()[first]
+        weights = np.maximum(lengths_m, MIN_LENGTH_M)
+
         count = len(self.points_m)
-        return coo_array((weights, ends.T), shape=(count, count)).tocsr()
+        graph = coo_array((weights, ends.T), shape=(count, count))
+        return graph.tocsr()
+
+
+def _by_distance(points_m: Points, start: int, others: Indices) -> list[int]:
+    """The points `others`, the nearest to `start` first."""
+    offsets_m = points_m[others] - points_m[start]
+    distances_m = np.hypot(*offsets_m.T)
+    order = np.argsort(distances_m, kind="stable")
+
+    nearest_first: list[int] = others[order].tolist()
+    return nearest_first
 
 
 def shortest_path(before: Indices, end: int) -> list[int]:
     """The points of the shortest path to `end`, by a row of `Streets.shortest_paths`."""
-    path = [end]
+    path = []
+    point = end
 
-    while before[path[-1]] >= 0:
-        path.append(int(before[path[-1]]))
+    while point >= 0:
+        path.append(point)
+        point = int(before[point])
 
     return path[::-1]

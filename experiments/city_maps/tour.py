@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -21,37 +22,52 @@ def shortest_tour(distance: Matrix) -> tuple[float, list[int]]:
     Raises CogmapError where some cannot be reached.
     """
     count = len(distance)
-    if count < 3:
-        length = 2 * float(distance[0, -1]) if count == 2 else 0.0
-        return length, list(range(count))
+    if count < 2:
+        return 0.0, list(range(count))
 
     best = _best_paths(distance)
-    visited = (1 << count) - 2
-    closed = [(best[visited, k][0] + float(distance[k, 0]), k) for k in range(1, count)]
-    length, last = min(closed)
+    stops = range(1, count)
+    length, last = _extended(best, stops, distance[:, 0])
 
     if not np.isfinite(length):
         raise CogmapError("no tour: some of the buildings cannot be reached from the others")
 
-    return length, _order(best, visited, last)
+    return length, _order(best, _set_of(stops), last)
 
 
 def _best_paths(distance: Matrix) -> Paths:
     """The shortest path from 0 through each set of stops, for each that may be its last."""
-    count = len(distance)
-    best: Paths = {(1 << k, k): (float(distance[0, k]), 0) for k in range(1, count)}
+    stops = range(1, len(distance))
+    best: Paths = {}
 
-    for size in range(2, count):
-        for chosen in itertools.combinations(range(1, count), size):
-            visited = sum(1 << k for k in chosen)
+    for stop in stops:
+        best[_set_of([stop]), stop] = (float(distance[0, stop]), 0)
+
+    for size in range(2, len(distance)):
+        for chosen in itertools.combinations(stops, size):
             for last in chosen:
-                rest = visited & ~(1 << last)
-                longer = [
-                    (best[rest, k][0] + float(distance[k, last]), k) for k in chosen if k != last
-                ]
-                best[visited, last] = min(longer)
+                others = [stop for stop in chosen if stop != last]
+                best[_set_of(chosen), last] = _extended(best, others, distance[:, last])
 
     return best
+
+
+def _extended(best: Paths, visited: Sequence[int], onward: Matrix) -> tuple[float, int]:
+    """The shortest path through the stops `visited` and on to one more, `onward` (n,) from each:
+    its length, and the stop before the last.
+    """
+    paths = []
+
+    for before in visited:
+        length, _ = best[_set_of(visited), before]
+        paths.append((length + float(onward[before]), before))
+
+    return min(paths)
+
+
+def _set_of(stops: Iterable[int]) -> int:
+    """A set of stops, a bit each."""
+    return sum(1 << stop for stop in stops)
 
 
 def _order(best: Paths, visited: int, last: int) -> list[int]:
