@@ -1,4 +1,4 @@
-"""What responses say about how cues were combined (Nardini et al. 2008)."""
+"""What responses reveal of how cues were combined (Nardini et al. 2008)."""
 
 from __future__ import annotations
 
@@ -24,19 +24,26 @@ def errors(trials: Sequence[Trial], responses: Sequence[Response]) -> Points:
     either way, then fall together.
     """
     targets_m = np.array([trial.target for trial in trials])
-    turned_m = np.array([trial.turned_target for trial in trials])
-    sides = np.array([[trial.side] for trial in trials])
     placed_m = np.array([(response.x_m, response.y_m) for response in responses])
+    offsets_m = placed_m - targets_m
 
-    moved_m = turned_m - targets_m
-    along = moved_m / np.hypot(*moved_m.T)[:, None]
-    left = np.column_stack([-along[:, 1], along[:, 0]])
-    inward = left * sides
-
-    offset_m = placed_m - targets_m
-    along_m = (offset_m * along).sum(axis=1)
-    inward_m = (offset_m * inward).sum(axis=1)
+    along, inward = _directions(trials)
+    along_m = (offsets_m * along).sum(axis=1)
+    inward_m = (offsets_m * inward).sum(axis=1)
     return np.column_stack([along_m, inward_m])
+
+
+def _directions(trials: Sequence[Trial]) -> tuple[Points, Points]:
+    """Unit vectors (n, 2) along and inward, as `errors` has them."""
+    targets_m = np.array([trial.target for trial in trials])
+    turned_m = np.array([trial.turned_target for trial in trials])
+    shifts_m = turned_m - targets_m
+    distances_m = np.hypot(*shifts_m.T)
+    along = shifts_m / distances_m[:, None]
+
+    left = np.column_stack([-along[:, 1], along[:, 0]])
+    sides = np.array([[trial.side] for trial in trials])
+    return along, left * sides
 
 
 def turned_errors(errors_m: Points, shift: float) -> Points:
@@ -44,7 +51,9 @@ def turned_errors(errors_m: Points, shift: float) -> Points:
 
     All is turned by 15°.
     """
-    return np.asarray(rotate(errors_m, CONFLICT_RAD) + np.array([shift, 0.0]))
+    turned_m = rotate(errors_m, CONFLICT_RAD)
+    shift_m = np.array([shift, 0.0])
+    return np.asarray(turned_m + shift_m)
 
 
 def shift_m(trials: Sequence[Trial]) -> float:
@@ -71,19 +80,24 @@ def lost(errors_m: Points) -> int:
     """
     offsets_m = errors_m - np.median(errors_m, axis=0)
     distances_m = np.hypot(*offsets_m.T)
+
     is_lost = distances_m > FAR * np.median(distances_m)
     return int(is_lost.sum())
 
 
 def landmark_weight(self_motion_sd_m: float, landmarks_sd_m: float) -> float:
     """What landmarks weigh in the optimal combination."""
-    return self_motion_sd_m**2 / (landmarks_sd_m**2 + self_motion_sd_m**2)
+    self_motion_m2 = self_motion_sd_m**2
+    landmarks_m2 = landmarks_sd_m**2
+    return self_motion_m2 / (landmarks_m2 + self_motion_m2)
 
 
 def optimal_sd_m(self_motion_sd_m: float, landmarks_sd_m: float) -> float:
     """The standard deviation of the optimal combination of two independent cues."""
     weight = landmark_weight(self_motion_sd_m, landmarks_sd_m)
-    return float(np.hypot(weight * landmarks_sd_m, (1 - weight) * self_motion_sd_m))
+    by_landmarks_m = weight * landmarks_sd_m
+    by_self_motion_m = (1 - weight) * self_motion_sd_m
+    return float(np.hypot(by_landmarks_m, by_self_motion_m))
 
 
 @dataclass(frozen=True)
@@ -96,7 +110,9 @@ class Gaussian:
     @classmethod
     def of(cls, errors_m: Points) -> Gaussian:
         """As (n, 2) errors are distributed."""
-        return cls(errors_m.mean(axis=0), np.cov(errors_m, rowvar=False))
+        mean_m = errors_m.mean(axis=0)
+        covariance_m2 = np.cov(errors_m, rowvar=False)
+        return cls(mean_m, covariance_m2)
 
     def log_density(self, points_m: Points) -> Points:
         """The log of the density at (n, 2) points."""
@@ -104,8 +120,8 @@ class Gaussian:
         precision = np.linalg.inv(self.covariance_m2)
         mahalanobis2 = np.einsum("ni,ij,nj->n", offsets_m, precision, offsets_m)
 
-        log_determinant = np.log(np.linalg.det(self.covariance_m2))
-        log_norm = np.log(2 * np.pi) + log_determinant / 2
+        determinant = np.linalg.det(self.covariance_m2)
+        log_norm = np.log(2 * np.pi) + np.log(determinant) / 2
         return np.asarray(-mahalanobis2 / 2 - log_norm)
 
 
@@ -113,9 +129,12 @@ def combined(first: Gaussian, second: Gaussian) -> Gaussian:
     """The optimal combination, direction by direction: precisions add, means weigh by them."""
     first_precision = np.linalg.inv(first.covariance_m2)
     second_precision = np.linalg.inv(second.covariance_m2)
-    covariance = np.linalg.inv(first_precision + second_precision)
-    weighed = first_precision @ first.mean_m + second_precision @ second.mean_m
-    return Gaussian(covariance @ weighed, covariance)
+    covariance_m2 = np.linalg.inv(first_precision + second_precision)
+
+    first_weighed = first_precision @ first.mean_m
+    second_weighed = second_precision @ second.mean_m
+    mean_m = covariance_m2 @ (first_weighed + second_weighed)
+    return Gaussian(mean_m, covariance_m2)
 
 
 def alternation_log_densities(

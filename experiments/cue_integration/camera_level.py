@@ -3,8 +3,8 @@ EPAM as they are.
 
 Buildings are larger than the landmarks of Nardini's room, so the room that is drawn is SCALE times
 as large, and what is seen of it is made as much smaller. Nothing is lost by that: noise is a share
-of the distance, so the model has no scale. The participant looks all around, as it does where it is
-told percepts; posts are touched, not seen.
+of the distance, so the model has no scale. The participant looks all around, as it does where it
+receives percepts that are not drawn; posts are touched, not seen.
 """
 
 from __future__ import annotations
@@ -51,67 +51,96 @@ class PicturedRoom(Room):
 
     def _seen(self, picked: Mapping[str, Point]) -> list[Percept]:
         """The buildings around that are recognised, if it is light, and what is being picked up."""
+        recognised = self._around() if self._are_lit else []
         touched = senses.sightings(self._pose, picked, self._trial.noise, self._rng)
-        return [*(self._around() if self._are_lit else []), *touched]
+        return [*recognised, *touched]
 
     def _around(self) -> list[Percept]:
         """Each building once, as in the picture that shows it best: whole, and in the middle."""
         if self._drawn != self._landmarks:
-            self._world.close()
-            self._drawn = self._landmarks
-            self._world, self._camera = self._open()
-        best: dict[str, tuple[bool, float, Percept]] = {}
-        for turn_rad in (math.tau * look / LOOKS for look in range(LOOKS)):
+            self._redraw()
+
+        qualities: dict[str, tuple[bool, float]] = {}
+        best: dict[str, Percept] = {}
+
+        for look in range(LOOKS):
+            turn_rad = math.tau * look / LOOKS
             for percept in self._look(turn_rad):
-                quality = percept.whole, -abs(percept.bearing_rad), _turned(percept, turn_rad)
-                if percept.label not in best or quality[:2] > best[percept.label][:2]:
-                    best[percept.label] = quality
-        return [percept for _, _, percept in best.values()]
+                quality = (percept.whole, -abs(percept.bearing_rad))
+                if percept.label not in best or quality > qualities[percept.label]:
+                    qualities[percept.label] = quality
+                    best[percept.label] = _turned(percept, turn_rad)
+
+        return list(best.values())
 
     def _look(self, turn_rad: float) -> list[Percept]:
-        """What EPAM says of a view, the participant's head turned so far to the left."""
-        here = self._pose
-        self._looks = self._looks + 1
-        self._world.place_robot(
-            sensing.Pose(
-                x_m=SCALE * here.x_m, y_m=SCALE * here.y_m, heading_rad=here.heading_rad + turn_rad
-            )
-        )
+        """The percepts that EPAM publishes of a view, the participant's head turned to the left."""
+        self._looks += 1
         stamp_ns = self._looks * LOOK_NS
-        self._sensory.feed(
-            Odometry(stamp_ns=stamp_ns, speed_m_s=0.0, turn_rate_rad_s=0.0, dt_s=LOOK_NS / 1e9)
+        self._world.place_robot(self._drawn_pose(turn_rad))
+
+        standing = Odometry(
+            stamp_ns=stamp_ns, speed_m_s=0.0, turn_rate_rad_s=0.0, dt_s=LOOK_NS / 1e9
         )
-        felt = self._sensory.feed(self._camera.frame(stamp_ns, self._looks))
-        said = [each for view in felt if isinstance(view, View) for each in self._epam.feed(view)]
-        return [percept for each in said if isinstance(each, Percepts) for percept in each.objects]
+        self._sensory.feed(standing)
+        frame = self._camera.frame(stamp_ns, self._looks)
+        views = [message for message in self._sensory.feed(frame) if isinstance(message, View)]
+
+        percepts: list[Percept] = []
+        for view in views:
+            for message in self._epam.feed(view):
+                if isinstance(message, Percepts):
+                    percepts += message.objects
+        return percepts
+
+    def _drawn_pose(self, turn_rad: float) -> sensing.Pose:
+        """Where the participant stands in the room that is drawn, its head turned to the left."""
+        x_m, y_m = _scaled((self._pose.x_m, self._pose.y_m))
+        heading_rad = self._pose.heading_rad + turn_rad
+        return sensing.Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad)
+
+    def _redraw(self) -> None:
+        """Draw the landmarks where they are now."""
+        self._world.close()
+        self._drawn = self._landmarks
+        self._world, self._camera = self._open()
 
     def _open(self) -> tuple[World, StereoCamera]:
+        places = []
+        for landmark in self._drawn:
+            x_m, y_m = _scaled(landmark)
+            places.append({"x_m": x_m, "y_m": y_m})
+
         line_m = [_scaled(START), _scaled(POSTS[-1])]
-        places = [dict(zip(("x_m", "y_m"), _scaled(each), strict=True)) for each in self._drawn]
-        way = msgspec.convert(
+        trajectory = msgspec.convert(
             {"line_m": line_m, "landmarks": named(places), "sensing": "cameras"}, Trajectory
         )
-        world = World(roadside.along(way, self._trial.seed))
+        world = World(roadside.along(trajectory, self._trial.seed))
         return world, StereoCamera(world, calibration())
 
 
 def metrics(noise: Noise, seed: int, progress: Progress) -> dict[str, float]:
-    """How far off the response is in one trial of each condition with cameras, and in the same told
-    percepts.
+    """The error of the response in one trial of each condition with cameras, and in the same with
+    percepts that are not drawn.
     """
     found: dict[str, float] = {}
+
     for done, condition in enumerate(Condition, start=1):
         trial = Trial(condition, 0, noise, seed)
-        found[f"cameras_error_{condition.value}_m"] = _error_m(trial, _respond(trial))
-        found[f"cameras_same_trial_by_percepts_error_{condition.value}_m"] = _error_m(
-            trial, respond(trial)
-        )
+        name = condition.value
+        drawn_m = _error_m(trial, _respond(trial))
+        percepts_m = _error_m(trial, respond(trial))
+
+        found[f"cameras_error_{name}_m"] = drawn_m
+        found[f"cameras_same_trial_by_percepts_error_{name}_m"] = percepts_m
         progress(done / len(Condition))
+
     return found
 
 
 def _respond(trial: Trial) -> Response:
     session = Session(trial, PicturedRoom)
+
     try:
         return session.run()
     finally:
@@ -119,11 +148,13 @@ def _respond(trial: Trial) -> Response:
 
 
 def _error_m(trial: Trial, response: Response) -> float:
-    return math.dist((response.x_m, response.y_m), trial.target)
+    placed_m = (response.x_m, response.y_m)
+    return math.dist(placed_m, trial.target)
 
 
 def _scaled(point: Point) -> Point:
-    return SCALE * point[0], SCALE * point[1]
+    x_m, y_m = point
+    return SCALE * x_m, SCALE * y_m
 
 
 def _turned(percept: Percept, turn_rad: float) -> Percept:

@@ -22,16 +22,26 @@ def coordinate_descent(
     `cost` must be the same for the same noise.
     """
     lowest = cost(noise)
+
     for factor in factors:
         improved = True
         while improved:
             improved = False
             for name in ("speed", "turn"):
-                for step in (factor, 1 / factor):
-                    tried = msgspec.structs.replace(noise, **{name: getattr(noise, name) * step})
-                    if (found := cost(tried)) < lowest:
+                for tried in _steps(noise, name, factor):
+                    found = cost(tried)
+                    if found < lowest:
                         noise = tried
                         lowest = found
                         improved = True
                         break
+
     return noise
+
+
+def _steps(noise: Noise, name: str, factor: float) -> list[Noise]:
+    """`noise` with one of its values a step up, and a step down."""
+    value = getattr(noise, name)
+    up = msgspec.structs.replace(noise, **{name: value * factor})
+    down = msgspec.structs.replace(noise, **{name: value * (1 / factor)})
+    return [up, down]

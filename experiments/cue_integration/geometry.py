@@ -59,17 +59,19 @@ class Pose:
     def after(self, turn_rad: float, forward_m: float) -> Pose:
         """Turned on the spot, then walked straight on."""
         heading_rad = self.heading_rad + turn_rad
-        x_m = self.x_m + forward_m * math.cos(heading_rad)
-        y_m = self.y_m + forward_m * math.sin(heading_rad)
-        return Pose(x_m, y_m, heading_rad)
+        dx_m = forward_m * math.cos(heading_rad)
+        dy_m = forward_m * math.sin(heading_rad)
+        return Pose(self.x_m + dx_m, self.y_m + dy_m, heading_rad)
 
     def towards(self, goal: Point) -> tuple[float, float]:
         """Bearing, left positive, and distance of `goal`."""
         dx_m = goal[0] - self.x_m
         dy_m = goal[1] - self.y_m
+        distance_m = math.hypot(dx_m, dy_m)
+
         direction_rad = math.atan2(dy_m, dx_m)
         bearing_rad = math.remainder(direction_rad - self.heading_rad, math.tau)
-        return bearing_rad, math.hypot(dx_m, dy_m)
+        return bearing_rad, distance_m
 
 
 def step(bearing_rad: float, distance_m: float) -> tuple[float, float]:
@@ -78,7 +80,9 @@ def step(bearing_rad: float, distance_m: float) -> tuple[float, float]:
     The distance is short while the goal is not yet ahead.
     """
     turn_rad = max(-STEP_RAD, min(STEP_RAD, bearing_rad))
-    max_m = STEP_M if turn_rad == bearing_rad else WHILE_TURNING_M
+    is_ahead = turn_rad == bearing_rad
+    max_m = STEP_M if is_ahead else WHILE_TURNING_M
+
     forward_m = min(distance_m - REACH_M, max_m)
     return turn_rad, max(0.0, forward_m)
 

@@ -1,5 +1,5 @@
-"""The participant's will as a module: it goes where the map in its workspace says that the first
-post stood.
+"""The participant's will as a module: it goes where the first post stood by the map in its
+workspace.
 """
 
 from __future__ import annotations
@@ -17,10 +17,11 @@ from schemas.nodes import Object, Percept, Self, object_id
 
 POSTS_CARRIED = 3
 NEAR_M = 0.1
-MOST_MOVEMENTS = 24
+MAX_MOVEMENTS = 24
 LOST_RAD = 0.8
 LOOK_M = 0.25
-MOST_LOOKS = 3
+MAX_LOOKS = 3
+Choice = tuple[str, dict[str, Scalar]]
 
 
 class Participant:
@@ -36,7 +37,8 @@ class Participant:
         self._carried: dict[str, Point] = {}
         self._movements = 0
         self._looks = 0
-        self._has_waited = self._has_stopped = False
+        self._has_waited = False
+        self._has_stopped = False
 
     def on_delta(self, delta: Delta) -> Action | None:
         """An action for each cycle that has ended. Raises MessageError where a delta is missing."""
@@ -46,10 +48,12 @@ class Participant:
             )
         if delta.phase is not Phase.END or self._has_stopped:
             return None
+
         pose = self._pose()
         for node in self._graph.of_kind(Percept):
             if node.label.startswith("post-"):
                 self._pick_up(node, pose)
+
         scheme, parameters = self._choose(pose)
         return Action(
             stamp_ns=delta.stamp_ns,
@@ -72,32 +76,53 @@ class Participant:
     def _pick_up(self, post: Percept, pose: Pose) -> None:
         """Carry a post from now on, and keep in mind where it was, for the map may not have it."""
         there = pose.after(post.bearing_rad, post.range_m)
-        self._carried.setdefault(post.label, (there.x_m, there.y_m))
+        position = (there.x_m, there.y_m)
+        self._carried.setdefault(post.label, position)
 
-    def _choose(self, pose: Pose) -> tuple[str, dict[str, Scalar]]:
+    def _choose(self, pose: Pose) -> Choice:
+        """The scheme of the next action, and its parameters."""
         if len(self._carried) < POSTS_CARRIED:
             return FOLLOW, {}
+
         if not self._has_waited:
             self._has_waited = True
             return WAIT, {}
+
         label, in_mind = next(iter(self._carried.items()))
         node = self._graph.get(Object, object_id(label))
-        on_map = in_mind if node is None else (node.x_m, node.y_m)
-        return self._go_back(pose, on_map)
+        goal = in_mind if node is None else (node.x_m, node.y_m)
+        return self._go_back(pose, goal)
 
-    def _go_back(self, pose: Pose, goal: Point) -> tuple[str, dict[str, Scalar]]:
+    def _go_back(self, pose: Pose, goal: Point) -> Choice:
         bearing_rad, distance_m = pose.towards(goal)
-        heading_sd_rad = self._agent().heading_sd_rad
-        is_lost = heading_sd_rad > LOST_RAD and self._looks < MOST_LOOKS
-        if self._movements == MOST_MOVEMENTS or (distance_m < REACH_M + NEAR_M and not is_lost):
+        may_move = self._movements < MAX_MOVEMENTS
+        is_within_reach = distance_m < REACH_M + NEAR_M
+        is_lost = self._is_lost()
+
+        if not may_move or (is_within_reach and not is_lost):
             self._has_stopped = True
-            return STOP, {"turn_rad": bearing_rad, "forward_m": distance_m}
+            return STOP, _movement(bearing_rad, distance_m)
+
         self._movements += 1
-        self._looks += is_lost
-        turn_rad, forward_m = (0.0, LOOK_M) if is_lost else step(bearing_rad, distance_m)
-        return WALK, {"turn_rad": turn_rad, "forward_m": forward_m}
+        if is_lost:
+            self._looks += 1
+            return WALK, _movement(0.0, LOOK_M)
+
+        turn_rad, forward_m = step(bearing_rad, distance_m)
+        return WALK, _movement(turn_rad, forward_m)
+
+    def _is_lost(self) -> bool:
+        """Whether it does not know where it faces, and may look once more."""
+        heading_sd_rad = self._agent().heading_sd_rad
+        return heading_sd_rad > LOST_RAD and self._looks < MAX_LOOKS
+
+
+def _movement(turn_rad: float, forward_m: float) -> dict[str, Scalar]:
+    """The parameters of a turn on the spot and a step straight on."""
+    return {"turn_rad": turn_rad, "forward_m": forward_m}
 
 
 def build() -> Module:
     """The module `participant`."""
-    return Module("participant").on(topics.DELTA, Participant().on_delta, emits=[topics.ACTION])
+    participant = Participant()
+    return Module("participant").on(topics.DELTA, participant.on_delta, emits=[topics.ACTION])

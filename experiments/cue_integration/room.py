@@ -1,5 +1,5 @@
-"""The room as a module: it moves the participant as asked, and says what the participant senses of
-it.
+"""The room as a module: it moves the participant as asked, and publishes what the participant
+senses of it.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ AWAITS = {"workspace": 1, "codelets": 1, "participant": 1, transcript.NAME: 1}
 
 
 class Room:
-    """One trial's world. It knows where everything is, and tells the participant only what is
-    sensed, with noise.
+    """One trial's world. It knows where everything is, and publishes only what is sensed, with
+    noise.
     """
 
     def __init__(self, trial: Trial) -> None:
@@ -54,12 +54,14 @@ class Room:
         self._landmarks = LANDMARKS
         self._to_pick = list(trial.route)
         self._frame = 0
-        self._are_lit = self._knows_motion = True
+        self._are_lit = True
+        self._knows_motion = True
         self.response: Response | None = None
 
     def begin(self) -> list[Message]:
         """What is seen from the start."""
-        return self._say(senses.STANDING, self._seen(NOTHING))
+        percepts = self._seen(NOTHING)
+        return self._sensed(senses.STANDING, percepts)
 
     def act(self, action: Action) -> list[Message]:
         """Carry out the participant's action; nothing more is sensed after the last."""
@@ -67,10 +69,12 @@ class Room:
             return self._follow()
         if action.scheme == WAIT:
             return self._change()
+
         turn_rad = float(action.parameters["turn_rad"])
         forward_m = float(action.parameters["forward_m"])
         if action.scheme == WALK:
             return self._walk(turn_rad, forward_m)
+
         put = self._pose.after(turn_rad, forward_m)
         self.response = Response(put.x_m, put.y_m, self._frame)
         return []
@@ -79,68 +83,77 @@ class Room:
         """Leave whatever is open for the trial."""
 
     def _follow(self) -> list[Message]:
-        """The participant goes on to the post that is lit, and picks it up where it is within
+        """The participant walks to the post that is lit, and picks it up where it is within
         reach.
         """
-        post = self._to_pick[0]
-        turn_rad, forward_m = step(*self._pose.towards(POSTS[post]))
-        if self._pose.after(turn_rad, forward_m).towards(POSTS[post])[1] > REACH_M + TOLERANCE_M:
+        number = self._to_pick[0]
+        post = POSTS[number]
+        bearing_rad, distance_m = self._pose.towards(post)
+        turn_rad, forward_m = step(bearing_rad, distance_m)
+
+        _, left_m = self._pose.after(turn_rad, forward_m).towards(post)
+        if left_m > REACH_M + TOLERANCE_M:
             return self._walk(turn_rad, forward_m)
+
         self._to_pick.pop(0)
-        return self._walk(turn_rad, forward_m, {f"post-{post}": POSTS[post]})
+        return self._walk(turn_rad, forward_m, {f"post-{number}": post})
 
     def _change(self) -> list[Message]:
-        """What happens, eyes closed, before the way back."""
+        """What happens, eyes closed, before the participant walks back."""
         condition = self._trial.condition
         self._are_lit = condition is not Condition.SELF_MOTION
+
         if condition is Condition.CONFLICT:
             self._landmarks = turned(LANDMARKS, self._trial.side * CONFLICT_RAD)
+
         if condition is not Condition.LANDMARKS:
-            return self._say(senses.STANDING, [])
+            return self._sensed(senses.STANDING, [])
+
         self._knows_motion = False
-        self._pose = Pose(
-            self._pose.x_m, self._pose.y_m, float(self._rng.uniform(-math.pi, math.pi))
-        )
-        return self._say(senses.DISORIENTED, [])
+        heading_rad = float(self._rng.uniform(-math.pi, math.pi))
+        self._pose = Pose(self._pose.x_m, self._pose.y_m, heading_rad)
+        return self._sensed(senses.DISORIENTED, [])
 
     def _walk(
         self, turn_rad: float, forward_m: float, picked: Mapping[str, Point] = NOTHING
     ) -> list[Message]:
         self._pose = self._pose.after(turn_rad, forward_m)
-        moved = senses.self_motion(turn_rad, forward_m, self._trial.noise, self._rng)
-        return self._say(moved if self._knows_motion else senses.UNKNOWN, self._seen(picked))
+        felt = senses.self_motion(turn_rad, forward_m, self._trial.noise, self._rng)
+        motions = felt if self._knows_motion else senses.UNKNOWN
+
+        percepts = self._seen(picked)
+        return self._sensed(motions, percepts)
 
     def _seen(self, picked: Mapping[str, Point]) -> list[Percept]:
         """The landmarks that are lit, and what is being picked up."""
-        lit = (
-            {f"landmark-{number}": where for number, where in enumerate(self._landmarks)}
-            if self._are_lit
-            else {}
-        )
-        return senses.sightings(self._pose, {**lit, **picked}, self._trial.noise, self._rng)
+        things: dict[str, Point] = {}
 
-    def _say(self, rows: Rows, objects: list[Percept]) -> list[Message]:
-        since_ns = self._frame * PERIOD_NS
+        if self._are_lit:
+            for number, position in enumerate(self._landmarks):
+                things[f"landmark-{number}"] = position
+
+        things |= picked
+        return senses.sightings(self._pose, things, self._trial.noise, self._rng)
+
+    def _sensed(self, motions: Rows, objects: list[Percept]) -> list[Message]:
+        """The messages of the next frame."""
         frame = self._frame
         self._frame += 1
         stamp_ns = self._frame * PERIOD_NS
-        nothing = Array.of(np.zeros((0, 2), np.float32))
-        return [
-            SelfMotion(
-                stamp_ns=stamp_ns,
-                frame=frame,
-                since_ns=since_ns,
-                motions=Array.of(np.array(rows, np.float64)),
-            ),
-            Percepts(stamp_ns=stamp_ns, frame=frame, objects=objects, road_m=nothing),
-        ]
+
+        self_motion = SelfMotion(
+            stamp_ns=stamp_ns,
+            frame=frame,
+            since_ns=frame * PERIOD_NS,
+            motions=Array.of(np.array(motions, np.float64)),
+        )
+        no_road = Array.of(np.zeros((0, 2), np.float32))
+        percepts = Percepts(stamp_ns=stamp_ns, frame=frame, objects=objects, road_m=no_road)
+        return [self_motion, percepts]
 
 
 def build(room: Room) -> Module:
-    """The module `room`, which begins when everybody is there, and somebody listens."""
-    says = (topics.SELF_MOTION, topics.PERCEPTS)
-    return (
-        Module("room")
-        .on(topics.ACTION, room.act, emits=says)
-        .on_start(room.begin, AWAITS, emits=says)
-    )
+    """The module `room`, which begins when all whom it awaits are there."""
+    emits = (topics.SELF_MOTION, topics.PERCEPTS)
+    module = Module("room").on(topics.ACTION, room.act, emits=emits)
+    return module.on_start(room.begin, AWAITS, emits=emits)

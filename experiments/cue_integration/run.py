@@ -20,9 +20,9 @@ from experiments.cue_integration.trial import Condition, Noise, Response, Trial
 from experiments.transcript import Transcript
 from schemas import topics
 
-# What `fitted` gives with the seed and budget that the command has by default, rounded.
+# What `fitted` returns with the seed and budget that the command has by default, rounded.
 FITTED = Noise(speed=0.3, turn=0.173)
-SAID = (
+COMPARED = (
     topics.SELF_MOTION,
     topics.PERCEPTS,
     topics.TASK,
@@ -31,31 +31,37 @@ SAID = (
     topics.ACTION,
 )
 FIT_TRIALS = 64
+Metrics = dict[str, float]
 
 
 @dataclass
 class Session:
-    """One trial to be run: the world, the participant's will, and who listens to what all say."""
+    """One trial to be run: the world, the participant's will, and a transcript of all messages."""
 
     trial: Trial
     kind: type[room.Room] = room.Room
 
     def __post_init__(self) -> None:
         self.room = self.kind(self.trial)
-        self.transcript = Transcript(SAID)
+        self.transcript = Transcript(COMPARED)
 
     def bodies(self) -> list[Module]:
         """All that is not the mind. The room is the last, for it begins."""
-        return [self.transcript.module(), participant.build(), room.build(self.room)]
+        listener = self.transcript.module()
+        return [listener, participant.build(), room.build(self.room)]
 
     def run(self) -> Response:
         """Run it on the in-memory bus. Raises CogmapError where no response comes."""
-        runner = InProcessRunner([*agent.modules(self.trial.number), *self.bodies()])
+        mind = agent.modules(self.trial.number)
+        runner = InProcessRunner([*mind, *self.bodies()])
         runner.run()
         runner.close()
-        if self.room.response is None:
+
+        response = self.room.response
+        if response is None:
             raise CogmapError(f"no response in {self.trial}")
-        return self.room.response
+
+        return response
 
 
 def respond(trial: Trial) -> Response:
@@ -65,7 +71,7 @@ def respond(trial: Trial) -> Response:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Errors (n, 2) of every condition, along and inward, and what they say."""
+    """Errors (n, 2) of every condition, along and inward, and the metrics of them."""
 
     noise: Noise
     errors_m: dict[Condition, Points]
@@ -78,31 +84,40 @@ class Outcome:
     @property
     def optimal_sd_m(self) -> float:
         """That of both cues, were they combined optimally."""
-        return analysis.optimal_sd_m(
-            self.sd_m(Condition.SELF_MOTION), self.sd_m(Condition.LANDMARKS)
-        )
+        self_motion_m = self.sd_m(Condition.SELF_MOTION)
+        landmarks_m = self.sd_m(Condition.LANDMARKS)
+        return analysis.optimal_sd_m(self_motion_m, landmarks_m)
 
-    def metrics(self) -> dict[str, float]:
+    @property
+    def landmark_weight(self) -> float:
+        """What landmarks would weigh then."""
+        self_motion_m = self.sd_m(Condition.SELF_MOTION)
+        landmarks_m = self.sd_m(Condition.LANDMARKS)
+        return analysis.landmark_weight(self_motion_m, landmarks_m)
+
+    def metrics(self) -> Metrics:
         """Every metric, flat; lengths in metres."""
-        metrics: dict[str, float] = {}
-        for condition, errors_m in self.errors_m.items():
-            name = condition.value
-            metrics[f"sd_{name}_m"] = self.sd_m(condition)
-            metrics[f"rmse_{name}_m"] = analysis.rmse_m(errors_m)
-            metrics[f"lost_trials_{name}"] = float(analysis.lost(errors_m))
-            metrics[f"published_simulation_sd_{name}_m"] = published.SD_M[condition]
-            metrics[f"published_simulation_rmse_{name}_m"] = published.RMSE_M[condition]
+        metrics: Metrics = {}
+        for condition in self.errors_m:
+            metrics |= self._of(condition)
+
         metrics["sd_optimal_m"] = self.optimal_sd_m
         metrics["sd_both_over_optimal"] = metrics["sd_both_m"] / self.optimal_sd_m
-        metrics |= self._conflict()
-        return metrics | {
-            "sigma_v": self.noise.speed,
-            "sigma_w": self.noise.turn,
-            "distance_noise": self.noise.distance,
-            "trials_a_condition": float(len(self.errors_m[Condition.BOTH])),
+        return metrics | self._conflict() | self._protocol()
+
+    def _of(self, condition: Condition) -> Metrics:
+        """The metrics of one condition, beside those published."""
+        name = condition.value
+        errors_m = self.errors_m[condition]
+        return {
+            f"sd_{name}_m": self.sd_m(condition),
+            f"rmse_{name}_m": analysis.rmse_m(errors_m),
+            f"lost_trials_{name}": float(analysis.lost(errors_m)),
+            f"published_simulation_sd_{name}_m": published.SD_M[condition],
+            f"published_simulation_rmse_{name}_m": published.RMSE_M[condition],
         }
 
-    def _conflict(self) -> dict[str, float]:
+    def _conflict(self) -> Metrics:
         """How likely the conflict's responses are where cues are integrated, and where they
         alternate.
 
@@ -110,33 +125,48 @@ class Outcome:
         alternation has the share of landmarks that suits it most.
         """
         conflict_m = self.errors_m[Condition.CONFLICT]
-        own = Gaussian.of(self.errors_m[Condition.SELF_MOTION])
-        seen = Gaussian.of(analysis.turned_errors(self.errors_m[Condition.LANDMARKS], self.shift_m))
-        weight = analysis.landmark_weight(
-            self.sd_m(Condition.SELF_MOTION), self.sd_m(Condition.LANDMARKS)
-        )
+        own, seen = self._single_cues()
+
         integrated = analysis.combined(own, seen).log_density(conflict_m)
-        alternated = analysis.alternation_log_densities(conflict_m, own, seen, weight)
+        alternated = analysis.alternation_log_densities(conflict_m, own, seen, self.landmark_weight)
         best = analysis.best_alternation_log_likelihood(conflict_m, own, seen)
+
+        total = float(integrated.sum())
+        differences = integrated - alternated
+        is_likelier = integrated > alternated
         return {
-            "landmark_weight": weight,
+            "landmark_weight": self.landmark_weight,
             "conflict_shift_m": self.shift_m,
             "conflict_followed_m": float(conflict_m[:, 0].mean()),
-            "integration_log_likelihood": float(integrated.sum()),
+            "integration_log_likelihood": total,
             "alternation_log_likelihood": float(alternated.sum()),
-            "integration_over_alternation": float((integrated - alternated).sum()),
-            "integration_over_alternation_median_of_a_trial": float(
-                np.median(integrated - alternated)
-            ),
-            "integration_likelier_share": float((integrated > alternated).mean()),
-            "integration_over_best_alternation": float(integrated.sum()) - best,
+            "integration_over_alternation": float(differences.sum()),
+            "integration_over_alternation_median_of_a_trial": float(np.median(differences)),
+            "integration_likelier_share": float(is_likelier.mean()),
+            "integration_over_best_alternation": total - best,
+        }
+
+    def _single_cues(self) -> tuple[Gaussian, Gaussian]:
+        """The conflict's responses by self-motion alone, and by the turned landmarks alone."""
+        self_motion_m = self.errors_m[Condition.SELF_MOTION]
+        landmarks_m = self.errors_m[Condition.LANDMARKS]
+        turned_m = analysis.turned_errors(landmarks_m, self.shift_m)
+        return Gaussian.of(self_motion_m), Gaussian.of(turned_m)
+
+    def _protocol(self) -> Metrics:
+        trials = len(self.errors_m[Condition.BOTH])
+        return {
+            "sigma_v": self.noise.speed,
+            "sigma_w": self.noise.turn,
+            "distance_noise": self.noise.distance,
+            "trials_a_condition": float(trials),
         }
 
 
 @dataclass(frozen=True)
 class Budget:
-    """How many trials of each condition, with what seed, on how many processes, and who is told of
-    the progress.
+    """How many trials of each condition, with what seed, on how many processes, and where the
+    progress is reported.
     """
 
     trials: int
@@ -149,17 +179,18 @@ def measure(
     noise: Noise, budget: Budget, conditions: Sequence[Condition] = tuple(Condition)
 ) -> Outcome:
     """Trials of each condition. The same whatever the number of processes."""
-    trials = budget.trials
-    jobs = [
-        Trial(condition, number, noise, budget.seed)
-        for condition in conditions
-        for number in range(trials)
-    ]
+    jobs = []
+    for condition in conditions:
+        for number in range(budget.trials):
+            jobs.append(Trial(condition, number, noise, budget.seed))
+
     responses = parallel_map(respond, jobs, budget.processes, budget.progress)
     errors_m = {}
     for place, condition in enumerate(conditions):
-        mine = slice(place * trials, (place + 1) * trials)
-        errors_m[condition] = analysis.errors(jobs[mine], responses[mine])
+        first = place * budget.trials
+        own = slice(first, first + budget.trials)
+        errors_m[condition] = analysis.errors(jobs[own], responses[own])
+
     return Outcome(noise, errors_m, analysis.shift_m(jobs))
 
 
@@ -178,7 +209,9 @@ def fitted(distance: float, budget: Budget) -> Noise:
     @cache
     def cost(noise: Noise) -> float:
         errors_m = measure(noise, budget, (own,)).errors_m[own]
-        sd_off_m = analysis.sd_m(errors_m) - published.SD_M[own]
-        return sd_off_m**2 + (analysis.rmse_m(errors_m) - published.RMSE_M[own]) ** 2
+        sd_difference_m = analysis.sd_m(errors_m) - published.SD_M[own]
+        rmse_difference_m = analysis.rmse_m(errors_m) - published.RMSE_M[own]
+        return sd_difference_m**2 + rmse_difference_m**2
 
-    return coordinate_descent(cost, Noise(speed=0.1, turn=0.1, distance=distance))
+    start = Noise(speed=0.1, turn=0.1, distance=distance)
+    return coordinate_descent(cost, start)

@@ -23,38 +23,47 @@ UNKNOWN: Rows = [
 
 
 def self_motion(turn_rad: float, forward_m: float, noise: Noise, rng: np.random.Generator) -> Rows:
-    """A turn on the spot, then a way straight on, as rows of SelfMotion: multiplied by Gaussians of
-    mean one (§5.4).
+    """A turn on the spot, then a distance straight on, as rows of SelfMotion: multiplied by
+    Gaussians of mean one (§5.4).
 
-    How unsure they are follows from what is felt, the only thing that a participant has to go by.
+    Their standard deviations follow from what is felt, all that a participant knows of them.
     """
-    turn_rate = turn_rad / HALF_S * float(rng.normal(1.0, noise.turn))
-    speed = forward_m / HALF_S * float(rng.normal(1.0, noise.speed))
+    turn_factor = float(rng.normal(1.0, noise.turn))
+    speed_factor = float(rng.normal(1.0, noise.speed))
+    turn_rate_rad_s = turn_rad / HALF_S * turn_factor
+    speed_m_s = forward_m / HALF_S * speed_factor
+
+    turn_rate_sd_rad_s = _sd_of_true(turn_rate_rad_s, noise.turn)
+    speed_sd_m_s = _sd_of_true(speed_m_s, noise.speed)
     return [
-        (0.0, turn_rate, HALF_S, 0.0, unsure(turn_rate, noise.turn)),
-        (speed, 0.0, HALF_S, unsure(speed, noise.speed), 0.0),
+        (0.0, turn_rate_rad_s, HALF_S, 0.0, turn_rate_sd_rad_s),
+        (speed_m_s, 0.0, HALF_S, speed_sd_m_s, 0.0),
     ]
 
 
-def unsure(felt: float, noise: float) -> float:
-    """The standard deviation of what was, where that times a Gaussian of mean one was felt, to the
-    fourth order.
+def _sd_of_true(felt: float, noise: float) -> float:
+    """The standard deviation of the true value where that times a Gaussian of mean one was felt, to
+    the fourth order.
 
     It is more than that of the factor: who has felt little may have felt a fraction of much.
     """
-    return abs(felt) * noise * float(np.sqrt(1 + 8 * noise**2))
+    higher_orders = float(np.sqrt(1 + 8 * noise**2))
+    return abs(felt) * noise * higher_orders
 
 
 def sightings(
     pose: Pose, things: Mapping[str, Point], noise: Noise, rng: np.random.Generator
 ) -> list[Percept]:
     """All things, by label, wherever the participant faces: it looks around."""
+    sd = noise.distance
     seen = []
-    for label, where in things.items():
-        bearing_rad, distance_m = pose.towards(where)
-        range_m = distance_m * float(rng.normal(1.0, noise.distance))
-        bearing_rad += float(rng.normal(0.0, noise.distance))
-        seen.append(_percept(label, bearing_rad, range_m, noise.distance, noise.distance * range_m))
+
+    for label, position in things.items():
+        true_bearing_rad, distance_m = pose.towards(position)
+        range_m = distance_m * float(rng.normal(1.0, sd))
+        bearing_rad = true_bearing_rad + float(rng.normal(0.0, sd))
+        seen.append(_percept(label, bearing_rad, range_m, sd, sd * range_m))
+
     return seen
 
 

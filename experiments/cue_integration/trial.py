@@ -24,7 +24,7 @@ class Noise(msgspec.Struct, frozen=True):
     """Standard deviations as shares of what is sensed: of speed, of turn rate (fitted), and of
     distance.
 
-    Directions to landmarks are off by as much across as distances are along.
+    Directions to landmarks err by as much across as distances do along.
     """
 
     speed: float
@@ -44,18 +44,20 @@ class Trial:
     @property
     def route(self) -> tuple[int, int, int]:
         """The posts in the order in which they are picked up."""
-        return ROUTES[self.number % len(ROUTES)]
+        route = self.number % len(ROUTES)
+        return ROUTES[route]
 
     @property
     def side(self) -> int:
-        """Which way landmarks turn in a conflict: 1 counter-clockwise, -1 clockwise."""
-        return 1 if (self.number // len(ROUTES)) % 2 == 0 else -1
+        """In which direction landmarks turn in a conflict: 1 counter-clockwise, -1 clockwise."""
+        rounds = self.number // len(ROUTES)
+        is_even = rounds % 2 == 0
+        return 1 if is_even else -1
 
     def generator(self) -> np.random.Generator:
         """The world's own noise in this trial."""
-        return np.random.default_rng(
-            [self.seed, list(Condition).index(self.condition), self.number]
-        )
+        condition = list(Condition).index(self.condition)
+        return np.random.default_rng([self.seed, condition, self.number])
 
     @property
     def target(self) -> Point:
@@ -64,8 +66,9 @@ class Trial:
 
     @property
     def turned_target(self) -> Point:
-        """Where landmarks turned as in a conflict say that it stood."""
-        return turned((self.target,), self.side * CONFLICT_RAD)[0]
+        """Where it stood by landmarks turned as in a conflict."""
+        (position,) = turned((self.target,), self.side * CONFLICT_RAD)
+        return position
 
 
 @dataclass(frozen=True)
