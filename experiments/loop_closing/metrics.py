@@ -28,19 +28,33 @@ def loop_metrics(loops: Mapping[str, Loop]) -> Metrics:
     metrics: Metrics = {}
 
     for method, loop in loops.items():
-        maps = {"before": loop.before, "after": loop.after, "in_the_end": loop.end}
-        for error in ERRORS:
-            for when, drawn in maps.items():
-                metrics[f"{error}_{when}_m_{method}"] = getattr(drawn, f"{error}_m")
-
-        metrics[f"corrections_{method}"] = float(len(loop.replays))
-        metrics[f"replays_of_the_first_{method}"] = float(loop.replays[0].passes)
+        metrics |= _of_loop(loop, method)
 
     positions = loops["positions"]
-    true_path_m = positions.end.true_path_m
-    metrics["path_error_wheels_alone_m"] = rms_m(positions.wheels_path_m - true_path_m)
-    metrics["path_error_fused_alone_m"] = rms_m(positions.fused_path_m - true_path_m)
+    metrics |= _alone(positions)
     return metrics | _predicted(positions.replays[0])
+
+
+def _of_loop(loop: Loop, method: str) -> Metrics:
+    metrics: Metrics = {}
+    maps = {"before": loop.before, "after": loop.after, "in_the_end": loop.end}
+
+    for error in ERRORS:
+        for when, learned in maps.items():
+            metrics[f"{error}_{when}_m_{method}"] = getattr(learned, f"{error}_m")
+
+    metrics[f"corrections_{method}"] = float(len(loop.replays))
+    metrics[f"replays_of_the_first_{method}"] = float(loop.replays[0].passes)
+    return metrics
+
+
+def _alone(loop: Loop) -> Metrics:
+    """The errors of the path by path integration alone."""
+    true_path_m = loop.end.true_path_m
+    return {
+        "path_error_wheels_alone_m": rms_m(loop.wheels_path_m - true_path_m),
+        "path_error_fused_alone_m": rms_m(loop.fused_path_m - true_path_m),
+    }
 
 
 def _predicted(replay: Replayed) -> Metrics:
@@ -49,8 +63,9 @@ def _predicted(replay: Replayed) -> Metrics:
     It is k a metre, where they are close.
     """
     every = np.ones(len(replay.close), bool)
-    metrics = {"synapse_decay_per_m": replay.decay_per_m}
-    return metrics | _fit("close_pairs", replay, replay.close) | _fit("all_pairs", replay, every)
+    close_pairs = _fit("close_pairs", replay, replay.close)
+    all_pairs = _fit("all_pairs", replay, every)
+    return {"synapse_decay_per_m": replay.decay_per_m} | close_pairs | all_pairs
 
 
 def _fit(name: str, replay: Replayed, pairs: npt.NDArray[np.bool_]) -> Metrics:

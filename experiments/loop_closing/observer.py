@@ -36,17 +36,20 @@ class Map:
     @property
     def path_error_m(self) -> float:
         """Root mean square over the path."""
-        return rms_m(self.path_m - self.true_path_m)
+        offsets_m = self.path_m - self.true_path_m
+        return rms_m(offsets_m)
 
     @property
     def object_error_m(self) -> float:
         """Root mean square over the objects."""
-        return rms_m(self.objects_m - self.true_objects_m)
+        offsets_m = self.objects_m - self.true_objects_m
+        return rms_m(offsets_m)
 
     @property
     def end_error_m(self) -> float:
         """Distance of the agent's estimate from where it is."""
-        return float(np.hypot(*(self.path_m[-1] - self.true_path_m[-1])))
+        dx_m, dy_m = self.path_m[-1] - self.true_path_m[-1]
+        return float(np.hypot(dx_m, dy_m))
 
 
 @dataclass(frozen=True)
@@ -154,10 +157,12 @@ class Observer:
             self._after = self._map()
 
     def _on_pose(self, true: TruePose) -> None:
-        self._true[true.stamp_ns] = (true.pose.x_m, true.pose.y_m)
+        pose = true.pose
+        self._true[true.stamp_ns] = (pose.x_m, pose.y_m)
 
     def _on_replay(self, replay: Replay) -> None:
-        self._replays.append(Replayed.of(replay))
+        replayed = Replayed.of(replay)
+        self._replays.append(replayed)
 
     def _map(self) -> Map:
         """The map as it is now."""
@@ -177,10 +182,12 @@ class Observer:
 
     def _true_path_m(self, stamps_s: Floats) -> Floats:
         """(n, 2): where the agent truly was at the stamp known nearest to each."""
-        stamps_ns = np.rint(stamps_s * 1e9).astype(np.int64)
         known_ns = np.array(list(self._true))
         positions_m = np.array(list(self._true.values()))
-        nearest = np.abs(known_ns - stamps_ns[:, None]).argmin(axis=1)
+
+        stamps_ns = np.rint(stamps_s * 1e9).astype(np.int64)
+        apart_ns = np.abs(known_ns - stamps_ns[:, None])
+        nearest = apart_ns.argmin(axis=1)
         return np.asarray(positions_m[nearest].reshape(-1, 2), np.float64)
 
 
@@ -189,9 +196,12 @@ def rms_m(offsets_m: Floats) -> float:
     if not len(offsets_m):
         return 0.0
 
-    return float(np.sqrt(np.square(offsets_m).sum(axis=1).mean()))
+    squared_m2 = np.square(offsets_m).sum(axis=1)
+    return float(np.sqrt(squared_m2.mean()))
 
 
 def _distances_m(positions_m: Floats, pairs: npt.NDArray[np.int64]) -> Floats:
-    offsets_m = positions_m[pairs[:, 0]] - positions_m[pairs[:, 1]]
+    """(m,): between the two places of each of (m, 2) pairs."""
+    first, second = pairs.T
+    offsets_m = positions_m[first] - positions_m[second]
     return np.asarray(np.hypot(*offsets_m.T))

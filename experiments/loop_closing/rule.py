@@ -1,7 +1,7 @@
-"""What eq. 9 can do for a way whose headings err: many laps of path integration alone, each closed
+"""What eq. 9 can do for a path whose headings err: many laps of path integration alone, each closed
 exactly.
 
-Without landmarks or minds: the rule itself, its positions shifted by the share of the loop that
+Without landmarks or agents: the rule itself, its positions shifted by the share of the loop that
 lies before them.
 """
 
@@ -30,12 +30,15 @@ class Laps:
     @property
     def ratio(self) -> float:
         """The mean error after over that before."""
-        return float(self.after_m.mean() / self.before_m.mean())
+        before_m = self.before_m.mean()
+        after_m = self.after_m.mean()
+        return float(after_m / before_m)
 
     @property
     def helped(self) -> float:
         """The share of laps that came nearer to the truth."""
-        return float((self.after_m < self.before_m).mean())
+        is_nearer = self.after_m < self.before_m
+        return float(is_nearer.mean())
 
 
 def close_laps(
@@ -46,38 +49,54 @@ def close_laps(
     """
     distance_m, turn_rad, begins_rad = _legs(corners_m, step_m)
     heading_rad = begins_rad + _sum_before(turn_rad)
-    drift_sd_rad = noise.drift_rad_per_sqrt_m * np.sqrt(distance_m)
+    true_m = _displacements_m(distance_m, heading_rad)
 
     rng = np.random.default_rng(seed)
-    speed, drift, turn = rng.normal(0.0, 1.0, (3, laps, len(distance_m)))
-    drifted_rad = drift_sd_rad * drift
-    turn_error_rad = noise.turn * turn * turn_rad
-    measured_m = distance_m * (1 + noise.speed * speed)
-
-    # A leg's own drift counts half on the leg, its turn comes after it.
-    heading_error_rad = _sum_before(drifted_rad + turn_error_rad) + drifted_rad / 2
-    measured_rad = heading_rad + heading_error_rad
-    error_x_m = measured_m * np.cos(measured_rad) - distance_m * np.cos(heading_rad)
-    error_y_m = measured_m * np.sin(measured_rad) - distance_m * np.sin(heading_rad)
-    error_m = np.cumsum(np.stack([error_x_m, error_y_m], axis=-1), axis=1)
+    measured_distance_m, heading_error_rad = _measured(distance_m, turn_rad, noise, laps, rng)
+    measured_m = _displacements_m(measured_distance_m, heading_rad + heading_error_rad)
+    error_m = np.cumsum(measured_m - true_m, axis=1)
 
     along_m = np.cumsum(distance_m)
-    share = (along_m / along_m[-1])[:, None]
-    closed_m = error_m - share * error_m[:, -1:]
+    share = along_m / along_m[-1]
+    closed_m = error_m - share[:, None] * error_m[:, -1:]
     return Laps(_rms_m(error_m), _rms_m(closed_m))
 
 
 def _legs(corners_m: Sequence[tuple[float, float]], step_m: float) -> tuple[Floats, Floats, float]:
     """Distance and turn (n,) of each leg, first straight on and then on the spot; first heading."""
     line = Line(np.array(corners_m, float))
-    stops_m = [*np.arange(0.0, line.length_m, step_m).tolist(), line.length_m]
+    stops_m = np.arange(0.0, line.length_m, step_m).tolist()
     legs = []
 
-    for start_m, end_m in itertools.pairwise(stops_m):
+    for start_m, end_m in itertools.pairwise([*stops_m, line.length_m]):
         legs += line.legs(start_m, end_m)
 
     distance_m, turn_rad = np.array(legs).T
     return distance_m, turn_rad, float(line.heading_rad[0])
+
+
+def _measured(
+    distance_m: Floats, turn_rad: Floats, noise: Noise, laps: int, rng: np.random.Generator
+) -> tuple[Floats, Floats]:
+    """Distances and errors of headings, (laps, n) each, as the wheels measure the n legs."""
+    speed, drift, turn = rng.normal(0.0, 1.0, (3, laps, len(distance_m)))
+    measured_m = distance_m * (1 + noise.speed * speed)
+
+    drift_sd_rad = noise.drift_rad_per_sqrt_m * np.sqrt(distance_m)
+    drift_rad = drift_sd_rad * drift
+    turn_error_rad = noise.turn * turn * turn_rad
+
+    # A leg's own drift counts half on the leg, its turn comes after it.
+    before_rad = _sum_before(drift_rad + turn_error_rad)
+    heading_error_rad = before_rad + drift_rad / 2
+    return measured_m, heading_error_rad
+
+
+def _displacements_m(distance_m: Floats, heading_rad: Floats) -> Floats:
+    """(..., 2): along x and y, of distances at headings of the same shape."""
+    x_m = distance_m * np.cos(heading_rad)
+    y_m = distance_m * np.sin(heading_rad)
+    return np.stack([x_m, y_m], axis=-1)
 
 
 def _sum_before(values: Floats) -> Floats:
@@ -89,4 +108,5 @@ def _sum_before(values: Floats) -> Floats:
 def _rms_m(error_m: Floats) -> Floats:
     """Of (laps, n, 2) errors, one a lap."""
     squared_m2 = np.square(error_m).sum(axis=-1)
-    return np.asarray(np.sqrt(squared_m2.mean(axis=-1)))
+    mean_m2 = squared_m2.mean(axis=-1)
+    return np.asarray(np.sqrt(mean_m2))

@@ -48,15 +48,17 @@ def trajectory() -> dict[str, Any]:
     """A line round some blocks and a bit of it again, and landmarks on both sides in turn."""
     landmarks: list[dict[str, Any]] = []
 
-    for start, end in itertools.pairwise(np.array(CORNERS_M)):
-        length_m = float(np.hypot(*(end - start)))
-        ahead = (end - start) / length_m
+    for start_m, end_m in itertools.pairwise(np.array(CORNERS_M)):
+        street_m = end_m - start_m
+        length_m = float(np.hypot(*street_m))
+        ahead = street_m / length_m
         right = np.array([ahead[1], -ahead[0]])
 
         for along_m in np.arange(APART_M / 2, length_m, APART_M):
             number = len(landmarks)
-            side = 1 if number % 2 else -1
-            x_m, y_m = (start + along_m * ahead + side * ASIDE_M * right).tolist()
+            right_m = ASIDE_M if number % 2 else -ASIDE_M
+            position_m = start_m + along_m * ahead + right_m * right
+            x_m, y_m = position_m.tolist()
             landmarks.append({"name": f"building-{number:02d}", "x_m": x_m, "y_m": y_m})
 
     return {"line_m": [*CORNERS_M, AGAIN_M], "landmarks": landmarks, "speed_m_s": SPEED_M_S}
@@ -96,7 +98,8 @@ def sections(seed: int, method: str) -> Sections:
 def drive(seed: int, method: str) -> Loop:
     """Drive the loop once. Raises CogmapError where no loop is closed, or a message is refused."""
     configured = sections(seed, method)
-    return driven(configured, [registry.build(name, configured) for name in MODULES])
+    modules = [registry.build(name, configured) for name in MODULES]
+    return driven(configured, modules)
 
 
 def drive_by_cameras(seed: int, progress: Progress) -> dict[str, Loop]:
@@ -107,8 +110,10 @@ def drive_by_cameras(seed: int, progress: Progress) -> dict[str, Loop]:
 
 def driven(configured: Sections, modules: Sequence[Module]) -> Loop:
     """As `drive`, with these modules."""
-    landmarks = configured["sim"]["trajectory"]["landmarks"]
-    places_m = {landmark["name"]: (landmark["x_m"], landmark["y_m"]) for landmark in landmarks}
+    places_m = {}
+    for landmark in configured["sim"]["trajectory"]["landmarks"]:
+        places_m[landmark["name"]] = (landmark["x_m"], landmark["y_m"])
+
     observer = Observer(places_m)
     in_memory.run([*modules, observer.module()])
     return observer.loop()
