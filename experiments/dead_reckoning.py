@@ -1,4 +1,4 @@
-"""Where the wheels alone would have the agent: their odometry integrated, nothing else."""
+"""The path by the wheels alone: their odometry integrated, nothing else."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from cogmap.geometry.arrays import Floats
+from cogmap.geometry.polylines import interpolate
 from schemas.sensing import Odometry
 
 
@@ -14,26 +15,32 @@ class DeadReckoning:
     """Integrates odometry by midpoints, from the origin, heading along x."""
 
     def __init__(self) -> None:
-        self._rows: list[tuple[float, float, float, float]] = []
+        self._stamps_s: list[float] = []
+        self._poses: list[tuple[float, float, float]] = []
 
     def __bool__(self) -> bool:
-        return bool(self._rows)
+        return bool(self._poses)
 
     def on_odometry(self, odometry: Odometry) -> None:
         """Add one step."""
         stamp_s = odometry.stamp_ns * 1e-9
-        if not self._rows:
-            self._rows.append((stamp_s - odometry.dt_s, 0.0, 0.0, 0.0))
+        if not self._poses:
+            self._stamps_s.append(stamp_s - odometry.dt_s)
+            self._poses.append((0.0, 0.0, 0.0))
 
-        _, x_m, y_m, heading_rad = self._rows[-1]
-        turn_rad = odometry.turn_rate_rad_s * odometry.dt_s
-        middle_rad = heading_rad + turn_rad / 2
         distance_m = odometry.speed_m_s * odometry.dt_s
+        turn_rad = odometry.turn_rate_rad_s * odometry.dt_s
+
+        x_m, y_m, heading_rad = self._poses[-1]
+        middle_rad = heading_rad + turn_rad / 2
         x_m += distance_m * math.cos(middle_rad)
         y_m += distance_m * math.sin(middle_rad)
-        self._rows.append((stamp_s, x_m, y_m, heading_rad + turn_rad))
+
+        self._stamps_s.append(stamp_s)
+        self._poses.append((x_m, y_m, heading_rad + turn_rad))
 
     def poses(self, stamps_s: Floats) -> Floats:
         """(n, 3) at each of `stamps_s`, interpolated."""
-        stamp_s, *columns = np.array(self._rows).T
-        return np.column_stack([np.interp(stamps_s, stamp_s, column) for column in columns])
+        known_s = np.array(self._stamps_s)
+        poses = np.array(self._poses)
+        return interpolate(known_s, poses, stamps_s)

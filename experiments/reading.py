@@ -54,10 +54,12 @@ def object_positions_m(graph: Graph, labels: Sequence[str]) -> Floats:
 
 def observations(graph: Graph) -> Sightings:
     """All observations of landmarks, by the place of the path that they were made from."""
-    return Sightings.of(graph.of_kind(Observations), path_rows(graph)[:, STAMP])
+    stamps_s = path_rows(graph)[:, STAMP]
+    return Sightings.of(graph.of_kind(Observations), stamps_s)
 
 
 def road_m(graph: Graph) -> Floats:
     """(n, 2): the middles of the cells that are road."""
     cells, _ = graph.places.written_cells(ROOT_MAP, PlaceColumn.ROAD)
-    return cells.astype(np.float64) * graph.cell_m()
+    indices = cells.astype(np.float64)
+    return indices * graph.cell_m()

@@ -54,10 +54,11 @@ def named(landmarks: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
             f"cameras tell {len(CATALOGUE)} kinds of building apart, too few for {len(landmarks)}"
         )
 
-    return [
-        {"name": kind.name, "x_m": landmark["x_m"], "y_m": landmark["y_m"]}
-        for kind, landmark in zip(CATALOGUE, landmarks, strict=False)
-    ]
+    found = []
+    for kind, landmark in zip(CATALOGUE, landmarks, strict=False):
+        found.append({"name": kind.name, "x_m": landmark["x_m"], "y_m": landmark["y_m"]})
+
+    return found
 
 
 class SensorLog:
@@ -81,7 +82,8 @@ class SensorLog:
 
     def player(self) -> Module:
         """The module that publishes it all again, in the place of the senses."""
-        frames = iter([self._frames[stamp_ns] for stamp_ns in sorted(self._frames)])
+        in_order = [self._frames[stamp_ns] for stamp_ns in sorted(self._frames)]
+        frames = iter(in_order)
 
         def on_command(command: MotorCommand) -> list[Message]:
             return next(frames, [])
@@ -90,7 +92,8 @@ class SensorLog:
         return module.on_start(lambda: next(frames), {"action": 1}, _REPLAYED)
 
     def _keep(self, message: Message) -> None:
-        self._frames.setdefault(message.stamp_ns, []).append(message)
+        frame = self._frames.setdefault(message.stamp_ns, [])
+        frame.append(message)
 
     def _keep_pose(self, true: TruePose) -> None:
         self._keep(true)

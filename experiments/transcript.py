@@ -23,8 +23,8 @@ class Transcript:
     """Keeps the bytes of the messages on some topics, in the order in which they came on each."""
 
     def __init__(self, topics: Iterable[Topic]) -> None:
-        self.messages: dict[str, list[bytes]] = {topic.name: [] for topic in topics}
         self._topics = tuple(topics)
+        self.messages: dict[str, list[bytes]] = {topic.name: [] for topic in self._topics}
 
     def module(self) -> Module:
         """The module `listener`."""
@@ -41,7 +41,18 @@ class Transcript:
 
     def differs_from(self, other: Transcript) -> list[str]:
         """The topics on which the bytes are others."""
-        return [name for name, there in other.messages.items() if self.messages[name] != there]
+        differing = []
+
+        for name, there in other.messages.items():
+            if self.messages[name] != there:
+                differing.append(name)
+
+        return differing
 
     def _keep(self, topic: Topic) -> Callable[[Message], None]:
-        return lambda message: self.messages[topic.name].append(encode(message))
+        messages = self.messages[topic.name]
+
+        def keep(message: Message) -> None:
+            messages.append(encode(message))
+
+        return keep
