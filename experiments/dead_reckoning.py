@@ -8,6 +8,7 @@ import numpy as np
 
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.polylines import interpolate
+from experiments.reading import Pose
 from schemas.sensing import Odometry
 
 
@@ -16,7 +17,7 @@ class DeadReckoning:
 
     def __init__(self) -> None:
         self._stamps_s: list[float] = []
-        self._poses: list[tuple[float, float, float]] = []
+        self._poses: list[Pose] = []
 
     def __bool__(self) -> bool:
         return bool(self._poses)
@@ -35,9 +36,10 @@ class DeadReckoning:
         middle_rad = heading_rad + turn_rad / 2
         x_m += distance_m * math.cos(middle_rad)
         y_m += distance_m * math.sin(middle_rad)
+        heading_rad += turn_rad
 
         self._stamps_s.append(stamp_s)
-        self._poses.append((x_m, y_m, heading_rad + turn_rad))
+        self._poses.append((x_m, y_m, heading_rad))
 
     def poses(self, stamps_s: Floats) -> Floats:
         """(n, 3) at each of `stamps_s`, interpolated."""

@@ -23,9 +23,10 @@ from services.codelets.mapping.path import rows_of
 STAMP = 0
 POSE = slice(1, 4)
 ODOMETRY = slice(4, 7)
+Pose = tuple[float, float, float]
 
 
-def self_pose(graph: Graph) -> tuple[float, float, float]:
+def self_pose(graph: Graph) -> Pose:
     """Where the agent believes that it is: x_m, y_m, heading_rad. Raises CogmapError before the
     first cycle.
     """

@@ -69,7 +69,8 @@ def _trajectory(environment: Environment, tour: Tour) -> dict[str, object]:
     landmarks = []
 
     for name, (x_m, y_m) in zip(environment.names, places_m, strict=True):
-        landmarks.append({"name": name, "x_m": x_m, "y_m": y_m})
+        landmark = {"name": name, "x_m": x_m, "y_m": y_m}
+        landmarks.append(landmark)
 
     return {"line_m": line_m.tolist(), "landmarks": landmarks, "speed_m_s": SPEED_M_S}
 
@@ -83,8 +84,9 @@ def traverse(configured: Sections) -> Traversal:
 def driven(configured: Sections, modules: Sequence[Module]) -> Traversal:
     """As `traverse`, with these modules."""
     trajectory = configured["sim"]["trajectory"]
+    landmarks = trajectory["landmarks"]
+    names = tuple(landmark["name"] for landmark in landmarks)
     origin = _first_pose(trajectory["line_m"])
-    names = tuple(landmark["name"] for landmark in trajectory["landmarks"])
 
     observer = Observer(origin, names)
     in_memory.run([*modules, observer.module()])
@@ -93,6 +95,7 @@ def driven(configured: Sections, modules: Sequence[Module]) -> Traversal:
 
 def _first_pose(line_m: Sequence[tuple[float, float]]) -> Points:
     """(3,): the pose at the beginning of a line, towards its second point."""
-    (x_m, y_m), (ahead_x_m, ahead_y_m) = line_m[:2]
-    heading_rad = math.atan2(ahead_y_m - y_m, ahead_x_m - x_m)
-    return np.array([x_m, y_m, heading_rad])
+    start_m, next_m = np.array(line_m[:2])
+    dx_m, dy_m = next_m - start_m
+    heading_rad = math.atan2(dy_m, dx_m)
+    return np.append(start_m, heading_rad)

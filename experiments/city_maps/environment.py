@@ -67,12 +67,13 @@ class Environment:
         """
         legs = [*self.legs_m[start:], *self.legs_m[:start]]
         if backward:
-            legs = [leg[::-1] for leg in reversed(legs)]
+            legs.reverse()
+            legs = [leg[::-1] for leg in legs]
 
         whole = _joined(legs)
-        lead = _beginning(whole[::-1], lead_m)[::-1]
+        reverse_lead = _beginning(whole[::-1], lead_m)
         overrun = _beginning(whole, overrun_m)
-        return _joined([lead, whole, overrun])
+        return _joined([reverse_lead[::-1], whole, overrun])
 
 
 def environments(city: City, number: int, seed: int) -> list[Environment]:
@@ -107,8 +108,9 @@ def _beside_streets(city: City, streets: Streets) -> Indices:
     distances_m = np.hypot(*offsets_m.T)
 
     min_m, max_m = FROM_STREET_M
-    is_beside = (distances_m >= min_m) & (distances_m <= max_m)
-    return np.flatnonzero(is_beside)
+    is_off_street = distances_m >= min_m
+    is_near = distances_m <= max_m
+    return np.flatnonzero(is_off_street & is_near)
 
 
 def _choose(buildings_m: Points, usable: Indices, rng: np.random.Generator) -> list[int] | None:
@@ -142,7 +144,9 @@ def _choose(buildings_m: Points, usable: Indices, rng: np.random.Generator) -> l
 def _in_square(positions_m: Points, lower_m: Points, side_m: float) -> npt.NDArray[np.bool_]:
     """Which of (n, 2) positions lie in a square, by its lower corner (2,)."""
     upper_m = lower_m + side_m
-    is_within = (positions_m >= lower_m) & (positions_m <= upper_m)
+    is_above = positions_m >= lower_m
+    is_below = positions_m <= upper_m
+    is_within = is_above & is_below
     return np.asarray(is_within.all(axis=1))
 
 
@@ -179,10 +183,12 @@ def _tour(streets: Streets, buildings_m: Points) -> tuple[list[int], list[Points
     """The order of the shortest tour past (n, 2) buildings, and its line from each to the next."""
     joined, fronts = streets.with_points(buildings_m)
     distances_m, before = joined.shortest_paths(fronts)
+
     _, order = shortest_tour(distances_m[:, fronts])
+    closed = [*order, order[0]]
     legs_m = []
 
-    for start, end in itertools.pairwise([*order, order[0]]):
+    for start, end in itertools.pairwise(closed):
         points = shortest_path(before[start], int(fronts[end]))
         legs_m.append(joined.points_m[points])
 
@@ -192,17 +198,18 @@ def _tour(streets: Streets, buildings_m: Points) -> tuple[list[int], list[Points
 def _joined(lines: Sequence[Points]) -> Points:
     """One line, without points that coincide with the one before."""
     points_m = np.vstack(lines)
-    is_new = np.ones(len(points_m), bool)
-    is_new[1:] = _step_lengths_m(points_m) > SAME_POINT_M
+    lengths_m = _step_lengths_m(points_m)
+    is_step = lengths_m > SAME_POINT_M
+    is_new = np.insert(is_step, 0, True)
     return np.asarray(points_m[is_new])
 
 
 def _beginning(line_m: Points, length_m: float) -> Points:
     """The first `length_m` of a line."""
     along_m = distances_along(line_m)
-    is_before = along_m < length_m
+    before_m = line_m[along_m < length_m]
     end_m = interpolate(along_m, line_m, np.array([length_m]))
-    return np.vstack([line_m[is_before], end_m])
+    return np.vstack([before_m, end_m])
 
 
 def _length_m(line_m: Points) -> float:

@@ -40,8 +40,8 @@ def fitted(environments: Sequence[Environment], budget: Budget) -> Noise:
 
         tried = jobs(environments, noise, traversals, seed)
         errors_km2 = parallel_map(positions_error_km2, tried, budget.processes, budget.progress)
-        difference_km2 = np.mean(errors_km2) - published.HUMAN_MEAN_KM2
-        return float(difference_km2) ** 2
+        mean_km2 = float(np.mean(errors_km2))
+        return (mean_km2 - published.HUMAN_MEAN_KM2) ** 2
 
     return coordinate_descent(cost, NOISE, FACTORS)
 
@@ -49,5 +49,6 @@ def fitted(environments: Sequence[Environment], budget: Budget) -> Noise:
 def positions_error_km2(job: Job) -> float:
     """The error of the map of one traversal, positions corrected."""
     configured = configurations(job)["positions"]
-    traversal = traverse(configured)
-    return map_error_km2(traversal.buildings_m, job.environment.buildings_m)
+    learned_m = traverse(configured).buildings_m
+    true_m = job.environment.buildings_m
+    return map_error_km2(learned_m, true_m)

@@ -76,7 +76,8 @@ class CityMap:
         errors_km2 = [one.error_km2["heading"] for one in self.learned]
         order = np.argsort(errors_km2, kind="stable")
         middle = (len(order) - 1) // 2
-        return self.learned[int(order[middle])]
+        typical = int(order[middle])
+        return self.learned[typical]
 
 
 def measure(environments: Sequence[Environment], noise: Noise, budget: Budget) -> list[CityMap]:
@@ -122,7 +123,8 @@ def traversed(job: Job) -> Learned:
 
 def by_cameras(job: Job, progress: Progress) -> Learned:
     """As `traversed`, with buildings that are drawn and recognised."""
-    maps = rendered.by_cameras(configurations(job), COGNITION, driven, progress)
+    configured = configurations(job)
+    maps = rendered.by_cameras(configured, COGNITION, driven, progress)
     return _learned(job, maps)
 
 

@@ -37,11 +37,13 @@ def map_metrics(maps: Sequence[CityMap], noise: Noise) -> Metrics:
     """
     errors = {}
     for method, name in NAMES.items():
-        errors[name] = np.array([city.error_km2(method) for city in maps])
+        errors_km2 = [city.error_km2(method) for city in maps]
+        errors[name] = np.array(errors_km2)
 
     metrics = _ratios(errors) | _errors(maps, errors) | _protocol(maps, noise)
     for number, city in enumerate(maps, start=1):
-        metrics |= _of_map(f"map_{number:02d}", city)
+        prefix = f"map_{number:02d}"
+        metrics |= _of_map(prefix, city)
 
     return metrics
 

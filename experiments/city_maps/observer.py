@@ -13,6 +13,7 @@ from cogmap.runtime.module import Module
 from experiments import reading
 from experiments.city_maps.streets import Points
 from experiments.dead_reckoning import DeadReckoning
+from experiments.reading import Pose
 from schemas import topics
 from schemas.graph import Delta, Phase
 from schemas.sensing import TruePose
@@ -56,8 +57,8 @@ class Observer:
         self._names = names
         self._graph = Graph()
         self._wheels = DeadReckoning()
-        self._believed: list[tuple[float, float, float]] = []
-        self._true: list[tuple[float, float, float]] = []
+        self._believed: list[Pose] = []
+        self._true: list[Pose] = []
 
     def module(self) -> Module:
         """The module `observer`."""
@@ -91,7 +92,8 @@ class Observer:
             raise CogmapError(f"delta {delta.version} is not the next one")
 
         if delta.phase is Phase.LOCALIZATION:
-            self._believed.append(reading.self_pose(self._graph))
+            pose = reading.self_pose(self._graph)
+            self._believed.append(pose)
 
     def _on_pose(self, true: TruePose) -> None:
         pose = true.pose
@@ -104,18 +106,21 @@ class Observer:
         """
         fused = path[:, reading.ODOMETRY].copy()
         start_m = path[0, reading.POSE][:2]
-        fused[:, :2] -= fused[0, :2] - start_m
-        fused_m = self._placed(self._seen_from(fused))
+        shift_m = fused[0, :2] - start_m
+        fused[:, :2] -= shift_m
+        fused_m = self._seen_from(fused)
 
         if not self._wheels:
             return {WHEELS: fused_m}
 
         wheels = self._wheels.poses(path[:, reading.STAMP])
-        wheels_m = self._placed(self._seen_from(wheels))
+        wheels_m = self._seen_from(wheels)
         return {WHEELS: wheels_m, FUSED: fused_m}
 
     def _seen_from(self, poses: Points) -> Points:
-        """(8, 2): the median of all observations of each building, from `poses` of the path."""
+        """(8, 2): the median of all observations of each building, from `poses` of the path, in the
+        true frame.
+        """
         seen = reading.observations(self._graph)
         where_m = transform_from(poses[seen.place], seen.where_m)
         numbers = {label: number for number, label in enumerate(seen.labels)}
@@ -126,7 +131,7 @@ class Observer:
                 of_it = seen.landmark == numbers[name]
                 buildings_m[row] = np.median(where_m[of_it], axis=0)
 
-        return buildings_m
+        return self._placed(buildings_m)
 
     def _placed(self, own_m: Points) -> Points:
         """(n, 2) positions of the agent's own frame, in the true one."""

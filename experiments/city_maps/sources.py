@@ -33,6 +33,7 @@ EVERY_M = 45.0
 CORNER_M = 15.0
 MIN_CORNERS = 3
 MANY_NAMED = 40
+LonLat = tuple[float, float]
 Point = TypeVar("Point", bound=Hashable)
 
 
@@ -56,13 +57,16 @@ def from_osm(path: Path) -> City:
 
 def from_street_graph(graph: StreetGraph, seed: int) -> City:
     """A city of real streets, which has no buildings: houses are put along them, from a seed."""
-    middle = np.array(graph.nodes_lonlat).mean(axis=0)
+    nodes_lonlat = np.array(graph.nodes_lonlat)
+    middle = nodes_lonlat.mean(axis=0)
+
     lines = [graph.line(edge) for edge in graph.edges]
     lonlat, pieces = _pieces(lines)
-
     points_m = plane_m(np.array(lonlat), middle)
     streets = Streets(points_m, pieces).connected()
-    return _with_houses(graph.city, streets, np.random.default_rng([seed, 0xA10]))
+
+    rng = np.random.default_rng([seed, 0xA10])
+    return _with_houses(graph.city, streets, rng)
 
 
 def folder(path: Path, seed: int) -> list[City]:
@@ -95,6 +99,7 @@ def grown(seed: int) -> City:
     rng = np.random.default_rng([seed, 0xC17])
     points_m = _bent_grid_m(rng)
     pieces = _grid_pieces()
+
     is_left = rng.random(len(pieces)) < STREETS_LEFT
     streets = Streets(points_m, pieces[is_left]).connected()
     return _with_houses(f"city {seed}", streets, rng)
@@ -116,18 +121,22 @@ def plane_m(lonlat: Points, middle: Points) -> Points:
     kilometres.
     """
     degree_m = np.radians(1.0) * EARTH_M
-    parallels_share = np.cos(np.radians(middle[1]))
+    lat_rad = np.radians(middle[1])
+    shares = np.array([np.cos(lat_rad), 1.0])
+
     offsets = lonlat.reshape(-1, 2) - middle
-    return np.asarray(offsets * np.array([parallels_share, 1.0]) * degree_m)
+    return np.asarray(offsets * shares * degree_m)
 
 
 def _bent_grid_m(rng: np.random.Generator) -> Points:
     """(GRID_SIDE^2, 2) crossings of blocks of many sizes, moved about, and all turned by chance."""
     blocks_m = rng.uniform(*BLOCK_M, (2, GRID_SIDE))
-    x_m, y_m = np.meshgrid(*np.cumsum(blocks_m, axis=1), indexing="ij")
+    lines_m = np.cumsum(blocks_m, axis=1)
+    x_m, y_m = np.meshgrid(*lines_m, indexing="ij")
     points_m = np.column_stack([x_m.ravel(), y_m.ravel()])
-    points_m += rng.normal(0, JITTER * BLOCK_M[0], points_m.shape)
 
+    jitter_m = JITTER * BLOCK_M[0]
+    points_m += rng.normal(0, jitter_m, points_m.shape)
     turn_rad = float(rng.uniform(0, np.pi))
     centred_m = points_m - points_m.mean(axis=0)
     return rotate(centred_m, turn_rad)
@@ -135,9 +144,10 @@ def _bent_grid_m(rng: np.random.Generator) -> Points:
 
 def _grid_pieces() -> Indices:
     """(m, 2): the neighbours along both axes of a grid."""
-    number = np.arange(GRID_SIDE**2).reshape(GRID_SIDE, GRID_SIDE)
-    along = _pairs(number[:-1], number[1:])
-    across = _pairs(number[:, :-1], number[:, 1:])
+    numbers = np.arange(GRID_SIDE**2)
+    grid = numbers.reshape(GRID_SIDE, GRID_SIDE)
+    along = _pairs(grid[:-1], grid[1:])
+    across = _pairs(grid[:, :-1], grid[:, 1:])
     return np.vstack([along, across])
 
 
@@ -154,8 +164,9 @@ def _with_houses(name: str, streets: Streets, rng: np.random.Generator) -> City:
         houses_m.append(_along(start_m, end_m, rng))
 
     buildings_m = np.vstack(houses_m)
-    names = [f"house {number}" for number, _ in enumerate(buildings_m, start=1)]
-    return City(name, streets, tuple(names), buildings_m)
+    numbers = range(1, len(buildings_m) + 1)
+    names = tuple(f"house {number}" for number in numbers)
+    return City(name, streets, names, buildings_m)
 
 
 def _along(start_m: Points, end_m: Points, rng: np.random.Generator) -> Points:
@@ -167,27 +178,29 @@ def _along(start_m: Points, end_m: Points, rng: np.random.Generator) -> Points:
 
     first_m = rng.uniform(CORNER_M, EVERY_M)
     along_m = np.arange(first_m, length_m - CORNER_M, EVERY_M)
-    left_m = rng.choice([-1.0, 1.0], len(along_m)) * FRONT_M
+    sides = rng.choice([-1.0, 1.0], len(along_m))
 
     on_street_m = start_m + along_m[:, None] * ahead
-    return np.asarray(on_street_m + left_m[:, None] * left)
+    to_side_m = sides[:, None] * FRONT_M * left
+    return np.asarray(on_street_m + to_side_m)
 
 
 def _is_street(way: Way) -> bool:
+    kind = way.tags.get("highway")
     is_area = way.tags.get("area") == "yes"
-    return way.tags.get("highway") in STREETS and not is_area
+    return kind in STREETS and not is_area
 
 
 def _streets(extract: Extract, ways: list[Way], middle: Points) -> Streets:
-    lines = []
-
-    for way in ways:
-        inside = [node for node in way.nodes if node in extract.nodes]
-        lines.append(inside)
-
+    lines = [_known_nodes(extract, way) for way in ways]
     nodes, pieces = _pieces(lines)
     lonlat = np.array([extract.nodes[node] for node in nodes])
     return Streets(plane_m(lonlat, middle), pieces)
+
+
+def _known_nodes(extract: Extract, way: Way) -> list[int]:
+    """The nodes of a way whose positions the extract has."""
+    return [node for node in way.nodes if node in extract.nodes]
 
 
 def _pieces(lines: Iterable[Sequence[Point]]) -> tuple[list[Point], Indices]:
@@ -209,8 +222,8 @@ def _buildings(extract: Extract) -> tuple[tuple[str, ...], Points]:
     """What people would know by name first: named places and buildings; where these are few, any
     building.
     """
-    named: dict[str, tuple[float, float]] = {}
-    unnamed: dict[str, tuple[float, float]] = {}
+    named: dict[str, LonLat] = {}
+    unnamed: dict[str, LonLat] = {}
 
     for node, tags in extract.node_tags.items():
         if _is_known(tags):

@@ -37,14 +37,12 @@ class Streets:
         """The largest part in which each point can be reached from every other."""
         _, part = connected_components(self._graph(), directed=False)
         largest = np.bincount(part).argmax()
-        kept = np.flatnonzero(part == largest)
+        is_kept = part == largest
 
-        number = np.full(len(self.points_m), -1)
-        number[kept] = np.arange(len(kept))
-
-        pieces = number[self.pieces]
-        is_kept = (pieces >= 0).all(axis=1)
-        return Streets(self.points_m[kept], pieces[is_kept])
+        starts, _ = self.pieces.T
+        pieces = self.pieces[is_kept[starts]]
+        numbers = np.cumsum(is_kept) - 1
+        return Streets(self.points_m[is_kept], numbers[pieces])
 
     def nearest(self, positions_m: Points) -> tuple[Indices, Points]:
         """The piece nearest to each of (k, 2) positions, and the nearest point on it, (k, 2)."""
@@ -74,8 +72,9 @@ class Streets:
 
         for piece in np.unique(cut).tolist():
             start, end = self.pieces[piece].tolist()
-            between = _by_distance(points_m, start, numbers[cut == piece])
-            pieces += itertools.pairwise([start, *between, end])
+            on_it = numbers[cut == piece]
+            chain = [start, *_by_distance(points_m, start, on_it), end]
+            pieces += itertools.pairwise(chain)
 
         return Streets(points_m, np.array(pieces, np.intp)), numbers
 

@@ -41,7 +41,8 @@ def _best_paths(distance: Matrix) -> Paths:
     best: Paths = {}
 
     for stop in stops:
-        best[_set_of([stop]), stop] = (float(distance[0, stop]), 0)
+        length = float(distance[0, stop])
+        best[_set_of([stop]), stop] = (length, 0)
 
     for size in range(2, len(distance)):
         for chosen in itertools.combinations(stops, size):

@@ -24,7 +24,7 @@ def errors(trials: Sequence[Trial], responses: Sequence[Response]) -> Points:
     either way, then fall together.
     """
     targets_m = np.array([trial.target for trial in trials])
-    placed_m = np.array([(response.x_m, response.y_m) for response in responses])
+    placed_m = np.array([response.position for response in responses])
     offsets_m = placed_m - targets_m
 
     along, inward = _directions(trials)
@@ -52,26 +52,30 @@ def turned_errors(errors_m: Points, shift: float) -> Points:
     All is turned by 15°.
     """
     turned_m = rotate(errors_m, CONFLICT_RAD)
-    shift_m = np.array([shift, 0.0])
-    return np.asarray(turned_m + shift_m)
+    return np.asarray(turned_m + np.array([shift, 0.0]))
 
 
 def shift_m(trials: Sequence[Trial]) -> float:
     """How far turned landmarks move the target."""
-    distances_m = [math.dist(trial.turned_target, trial.target) for trial in trials]
+    distances_m = []
+    for trial in trials:
+        distances_m.append(math.dist(trial.turned_target, trial.target))
+
     return float(np.mean(distances_m))
 
 
 def sd_m(errors_m: Points) -> float:
     """The standard deviation in the plane about the mean of (n, 2) errors."""
     variances_m2 = errors_m.var(axis=0, ddof=1)
-    return float(np.sqrt(variances_m2.sum()))
+    variance_m2 = variances_m2.sum()
+    return float(np.sqrt(variance_m2))
 
 
 def rmse_m(errors_m: Points) -> float:
     """The root mean squared distance from where the post stood."""
     squared_m2 = (errors_m**2).sum(axis=1)
-    return float(np.sqrt(squared_m2.mean()))
+    mean_m2 = squared_m2.mean()
+    return float(np.sqrt(mean_m2))
 
 
 def lost(errors_m: Points) -> int:
@@ -81,7 +85,8 @@ def lost(errors_m: Points) -> int:
     offsets_m = errors_m - np.median(errors_m, axis=0)
     distances_m = np.hypot(*offsets_m.T)
 
-    is_lost = distances_m > FAR * np.median(distances_m)
+    far_m = FAR * np.median(distances_m)
+    is_lost = distances_m > far_m
     return int(is_lost.sum())
 
 
@@ -120,8 +125,8 @@ class Gaussian:
         precision = np.linalg.inv(self.covariance_m2)
         mahalanobis2 = np.einsum("ni,ij,nj->n", offsets_m, precision, offsets_m)
 
-        determinant = np.linalg.det(self.covariance_m2)
-        log_norm = np.log(2 * np.pi) + np.log(determinant) / 2
+        determinant_m4 = np.linalg.det(self.covariance_m2)
+        log_norm = np.log(2 * np.pi) + np.log(determinant_m4) / 2
         return np.asarray(-mahalanobis2 / 2 - log_norm)
 
 
@@ -133,8 +138,8 @@ def combined(first: Gaussian, second: Gaussian) -> Gaussian:
 
     first_weighed = first_precision @ first.mean_m
     second_weighed = second_precision @ second.mean_m
-    mean_m = covariance_m2 @ (first_weighed + second_weighed)
-    return Gaussian(mean_m, covariance_m2)
+    weighed = first_weighed + second_weighed
+    return Gaussian(covariance_m2 @ weighed, covariance_m2)
 
 
 def alternation_log_densities(
@@ -143,12 +148,14 @@ def alternation_log_densities(
     """The log densities (n,) of conflict errors where each response follows one cue alone:
     landmarks in that share.
     """
+    shares = [landmarks_share, 1 - landmarks_share]
     with np.errstate(divide="ignore"):
-        log_share, log_rest = np.log([landmarks_share, 1 - landmarks_share])
+        landmarks_log_share, self_motion_log_share = np.log(shares)
 
-    by_landmarks = log_share + landmarks.log_density(conflict_m)
-    by_self_motion = log_rest + self_motion.log_density(conflict_m)
-    return np.asarray(np.logaddexp(by_landmarks, by_self_motion))
+    by_landmarks = landmarks_log_share + landmarks.log_density(conflict_m)
+    by_self_motion = self_motion_log_share + self_motion.log_density(conflict_m)
+    either = np.logaddexp(by_landmarks, by_self_motion)
+    return np.asarray(either)
 
 
 def best_alternation_log_likelihood(

@@ -20,7 +20,7 @@ from experiments.cue_integration.geometry import POSTS, START, Point
 from experiments.cue_integration.room import Room
 from experiments.cue_integration.run import Session, respond
 from experiments.cue_integration.trial import Condition, Noise, Response, Trial
-from experiments.rendered import SENSES, named
+from experiments.rendered import named
 from schemas import sensing
 from schemas.sensing import Odometry, Percept, Percepts, View
 from services import registry
@@ -40,7 +40,8 @@ class PicturedRoom(Room):
 
     def __init__(self, trial: Trial) -> None:
         super().__init__(trial)
-        self._sensory, self._epam = (registry.build(name, {}) for name in SENSES)
+        self._sensory = registry.build("sensory", {})
+        self._epam = registry.build("epam", {})
         self._drawn = self._landmarks
         self._world, self._camera = self._open()
         self._looks = 0
@@ -66,10 +67,11 @@ class PicturedRoom(Room):
         for look in range(LOOKS):
             turn_rad = math.tau * look / LOOKS
             for percept in self._look(turn_rad):
+                label = percept.label
                 quality = (percept.whole, -abs(percept.bearing_rad))
-                if percept.label not in best or quality > qualities[percept.label]:
-                    qualities[percept.label] = quality
-                    best[percept.label] = _turned(percept, turn_rad)
+                if label not in best or quality > qualities[label]:
+                    qualities[label] = quality
+                    best[label] = _turned(percept, turn_rad)
 
         return list(best.values())
 
@@ -95,7 +97,7 @@ class PicturedRoom(Room):
 
     def _drawn_pose(self, turn_rad: float) -> sensing.Pose:
         """Where the participant stands in the room that is drawn, its head turned to the left."""
-        x_m, y_m = _scaled((self._pose.x_m, self._pose.y_m))
+        x_m, y_m = _scaled(self._pose.position)
         heading_rad = self._pose.heading_rad + turn_rad
         return sensing.Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad)
 
@@ -148,8 +150,7 @@ def _respond(trial: Trial) -> Response:
 
 
 def _error_m(trial: Trial, response: Response) -> float:
-    placed_m = (response.x_m, response.y_m)
-    return math.dist(placed_m, trial.target)
+    return math.dist(response.position, trial.target)
 
 
 def _scaled(point: Point) -> Point:

@@ -42,6 +42,10 @@ def coordinate_descent(
 def _steps(noise: Noise, name: str, factor: float) -> list[Noise]:
     """`noise` with one of its values a step up, and a step down."""
     value = getattr(noise, name)
-    up = msgspec.structs.replace(noise, **{name: value * factor})
-    down = msgspec.structs.replace(noise, **{name: value * (1 / factor)})
-    return [up, down]
+    steps = []
+
+    for step in (factor, 1 / factor):
+        changed = {name: value * step}
+        steps.append(msgspec.structs.replace(noise, **changed))
+
+    return steps

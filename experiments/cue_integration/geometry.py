@@ -56,17 +56,23 @@ class Pose:
     y_m: float
     heading_rad: float
 
+    @property
+    def position(self) -> Point:
+        """Without the heading."""
+        return self.x_m, self.y_m
+
     def after(self, turn_rad: float, forward_m: float) -> Pose:
         """Turned on the spot, then walked straight on."""
         heading_rad = self.heading_rad + turn_rad
-        dx_m = forward_m * math.cos(heading_rad)
-        dy_m = forward_m * math.sin(heading_rad)
-        return Pose(self.x_m + dx_m, self.y_m + dy_m, heading_rad)
+        x_m = self.x_m + forward_m * math.cos(heading_rad)
+        y_m = self.y_m + forward_m * math.sin(heading_rad)
+        return Pose(x_m, y_m, heading_rad)
 
     def towards(self, goal: Point) -> tuple[float, float]:
         """Bearing, left positive, and distance of `goal`."""
-        dx_m = goal[0] - self.x_m
-        dy_m = goal[1] - self.y_m
+        x_m, y_m = goal
+        dx_m = x_m - self.x_m
+        dy_m = y_m - self.y_m
         distance_m = math.hypot(dx_m, dy_m)
 
         direction_rad = math.atan2(dy_m, dx_m)
@@ -95,13 +101,14 @@ def turned(
     """
     cos = math.cos(angle_rad)
     sin = math.sin(angle_rad)
+    about_x_m, about_y_m = about
     found = []
 
     for x_m, y_m in points:
-        dx_m = x_m - about[0]
-        dy_m = y_m - about[1]
-        turned_x_m = about[0] + cos * dx_m - sin * dy_m
-        turned_y_m = about[1] + sin * dx_m + cos * dy_m
+        dx_m = x_m - about_x_m
+        dy_m = y_m - about_y_m
+        turned_x_m = about_x_m + cos * dx_m - sin * dy_m
+        turned_y_m = about_y_m + sin * dx_m + cos * dy_m
         found.append((turned_x_m, turned_y_m))
 
     return tuple(found)

@@ -76,8 +76,7 @@ class Participant:
     def _pick_up(self, post: Percept, pose: Pose) -> None:
         """Carry a post from now on, and keep in mind where it was, for the map may not have it."""
         there = pose.after(post.bearing_rad, post.range_m)
-        position = (there.x_m, there.y_m)
-        self._carried.setdefault(post.label, position)
+        self._carried.setdefault(post.label, there.position)
 
     def _choose(self, pose: Pose) -> Choice:
         """The scheme of the next action, and its parameters."""
@@ -113,8 +112,9 @@ class Participant:
 
     def _is_lost(self) -> bool:
         """Whether it does not know where it faces, and may look once more."""
-        heading_sd_rad = self._agent().heading_sd_rad
-        return heading_sd_rad > LOST_RAD and self._looks < MAX_LOOKS
+        agent = self._agent()
+        may_look = self._looks < MAX_LOOKS
+        return may_look and agent.heading_sd_rad > LOST_RAD
 
 
 def _movement(turn_rad: float, forward_m: float) -> dict[str, Scalar]:

@@ -91,7 +91,8 @@ class Room:
         bearing_rad, distance_m = self._pose.towards(post)
         turn_rad, forward_m = step(bearing_rad, distance_m)
 
-        _, left_m = self._pose.after(turn_rad, forward_m).towards(post)
+        there = self._pose.after(turn_rad, forward_m)
+        _, left_m = there.towards(post)
         if left_m > REACH_M + TOLERANCE_M:
             return self._walk(turn_rad, forward_m)
 
@@ -104,7 +105,8 @@ class Room:
         self._are_lit = condition is not Condition.SELF_MOTION
 
         if condition is Condition.CONFLICT:
-            self._landmarks = turned(LANDMARKS, self._trial.side * CONFLICT_RAD)
+            angle_rad = self._trial.side * CONFLICT_RAD
+            self._landmarks = turned(LANDMARKS, angle_rad)
 
         if condition is not Condition.LANDMARKS:
             return self._sensed(senses.STANDING, [])
@@ -155,5 +157,7 @@ class Room:
 def build(room: Room) -> Module:
     """The module `room`, which begins when all whom it awaits are there."""
     emits = (topics.SELF_MOTION, topics.PERCEPTS)
-    module = Module("room").on(topics.ACTION, room.act, emits=emits)
-    return module.on_start(room.begin, AWAITS, emits=emits)
+    module = Module("room")
+    module.on(topics.ACTION, room.act, emits=emits)
+    module.on_start(room.begin, AWAITS, emits=emits)
+    return module

@@ -48,7 +48,9 @@ class Session:
     def bodies(self) -> list[Module]:
         """All that is not the mind. The room is the last, for it begins."""
         listener = self.transcript.module()
-        return [listener, participant.build(), room.build(self.room)]
+        subject = participant.build()
+        world = room.build(self.room)
+        return [listener, subject, world]
 
     def run(self) -> Response:
         """Run it on the in-memory bus. Raises CogmapError where no response comes."""
@@ -81,6 +83,10 @@ class Outcome:
         """The standard deviation of a condition's responses."""
         return analysis.sd_m(self.errors_m[condition])
 
+    def rmse_m(self, condition: Condition) -> float:
+        """The root mean squared distance of a condition's responses from where the post stood."""
+        return analysis.rmse_m(self.errors_m[condition])
+
     @property
     def optimal_sd_m(self) -> float:
         """That of both cues, were they combined optimally."""
@@ -108,11 +114,11 @@ class Outcome:
     def _of(self, condition: Condition) -> Metrics:
         """The metrics of one condition, beside those published."""
         name = condition.value
-        errors_m = self.errors_m[condition]
+        lost = analysis.lost(self.errors_m[condition])
         return {
             f"sd_{name}_m": self.sd_m(condition),
-            f"rmse_{name}_m": analysis.rmse_m(errors_m),
-            f"lost_trials_{name}": float(analysis.lost(errors_m)),
+            f"rmse_{name}_m": self.rmse_m(condition),
+            f"lost_trials_{name}": float(lost),
             f"published_simulation_sd_{name}_m": published.SD_M[condition],
             f"published_simulation_rmse_{name}_m": published.RMSE_M[condition],
         }
@@ -149,9 +155,12 @@ class Outcome:
     def _single_cues(self) -> tuple[Gaussian, Gaussian]:
         """The conflict's responses by self-motion alone, and by the turned landmarks alone."""
         self_motion_m = self.errors_m[Condition.SELF_MOTION]
+        self_motion = Gaussian.of(self_motion_m)
+
         landmarks_m = self.errors_m[Condition.LANDMARKS]
         turned_m = analysis.turned_errors(landmarks_m, self.shift_m)
-        return Gaussian.of(self_motion_m), Gaussian.of(turned_m)
+        landmarks = Gaussian.of(turned_m)
+        return self_motion, landmarks
 
     def _protocol(self) -> Metrics:
         trials = len(self.errors_m[Condition.BOTH])
@@ -182,10 +191,12 @@ def measure(
     jobs = []
     for condition in conditions:
         for number in range(budget.trials):
-            jobs.append(Trial(condition, number, noise, budget.seed))
+            trial = Trial(condition, number, noise, budget.seed)
+            jobs.append(trial)
 
     responses = parallel_map(respond, jobs, budget.processes, budget.progress)
     errors_m = {}
+
     for place, condition in enumerate(conditions):
         first = place * budget.trials
         own = slice(first, first + budget.trials)
@@ -203,14 +214,14 @@ def fitted(distance: float, budget: Budget) -> Noise:
     not have. The other conditions are predictions then. The trials are others than those that
     `measure` runs with the same seed.
     """
-    budget = replace(budget, seed=budget.seed + 1)
+    others = replace(budget, seed=budget.seed + 1)
     own = Condition.SELF_MOTION
 
     @cache
     def cost(noise: Noise) -> float:
-        errors_m = measure(noise, budget, (own,)).errors_m[own]
-        sd_difference_m = analysis.sd_m(errors_m) - published.SD_M[own]
-        rmse_difference_m = analysis.rmse_m(errors_m) - published.RMSE_M[own]
+        outcome = measure(noise, others, (own,))
+        sd_difference_m = outcome.sd_m(own) - published.SD_M[own]
+        rmse_difference_m = outcome.rmse_m(own) - published.RMSE_M[own]
         return sd_difference_m**2 + rmse_difference_m**2
 
     start = Noise(speed=0.1, turn=0.1, distance=distance)

@@ -44,8 +44,7 @@ class Trial:
     @property
     def route(self) -> tuple[int, int, int]:
         """The posts in the order in which they are picked up."""
-        route = self.number % len(ROUTES)
-        return ROUTES[route]
+        return ROUTES[self.number % len(ROUTES)]
 
     @property
     def side(self) -> int:
@@ -62,7 +61,8 @@ class Trial:
     @property
     def target(self) -> Point:
         """Where the first post stood."""
-        return POSTS[self.route[0]]
+        first, _, _ = self.route
+        return POSTS[first]
 
     @property
     def turned_target(self) -> Point:
@@ -78,3 +78,8 @@ class Response:
     x_m: float
     y_m: float
     movements: int
+
+    @property
+    def position(self) -> Point:
+        """In the room."""
+        return self.x_m, self.y_m

@@ -43,8 +43,9 @@ def _of_loop(loop: Loop, method: str) -> Metrics:
         for when, learned in maps.items():
             metrics[f"{error}_{when}_m_{method}"] = getattr(learned, f"{error}_m")
 
+    first = loop.replays[0]
     metrics[f"corrections_{method}"] = float(len(loop.replays))
-    metrics[f"replays_of_the_first_{method}"] = float(loop.replays[0].passes)
+    metrics[f"replays_of_the_first_{method}"] = float(first.passes)
     return metrics
 
 
@@ -62,7 +63,7 @@ def _predicted(replay: Replayed) -> Metrics:
 
     It is k a metre, where they are close.
     """
-    every = np.ones(len(replay.close), bool)
+    every = np.ones_like(replay.close)
     close_pairs = _fit("close_pairs", replay, replay.close)
     all_pairs = _fit("all_pairs", replay, every)
     return {"synapse_decay_per_m": replay.decay_per_m} | close_pairs | all_pairs
@@ -90,8 +91,9 @@ def rule_metrics(seed: int) -> Metrics:
     exact_headings = Noise(speed=NOISE.speed, turn=0.0, drift_rad_per_sqrt_m=0.0)
     metrics: Metrics = {}
 
+    step_m = SPEED_M_S / FRAME_HZ
     for name, noise in (("", NOISE), ("_exact_headings", exact_headings)):
-        laps = close_laps(CORNERS_M, SPEED_M_S / FRAME_HZ, noise, LAPS, seed)
+        laps = close_laps(CORNERS_M, step_m, noise, LAPS, seed)
         metrics[f"rule_over_uncorrected{name}"] = laps.ratio
         metrics[f"rule_helps_share{name}"] = laps.helped
 

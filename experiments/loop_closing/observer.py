@@ -167,14 +167,17 @@ class Observer:
     def _map(self) -> Map:
         """The map as it is now."""
         rows = reading.path_rows(self._graph)
+        stamps_s = rows[:, reading.STAMP]
+        path_m = rows[:, reading.POSE][:, :2]
+
         labels = sorted(self._landmarks)
         objects_m = reading.object_positions_m(self._graph, labels)
         true_objects_m = np.array([self._landmarks[label] for label in labels])
         is_known = ~np.isnan(objects_m[:, 0])
 
         return Map(
-            path_m=rows[:, reading.POSE][:, :2],
-            true_path_m=self._true_path_m(rows[:, reading.STAMP]),
+            path_m=path_m,
+            true_path_m=self._true_path_m(stamps_s),
             objects_m=objects_m[is_known],
             true_objects_m=true_objects_m[is_known],
             road_m=reading.road_m(self._graph),
@@ -183,12 +186,14 @@ class Observer:
     def _true_path_m(self, stamps_s: Floats) -> Floats:
         """(n, 2): where the agent truly was at the stamp known nearest to each."""
         known_ns = np.array(list(self._true))
-        positions_m = np.array(list(self._true.values()))
+        known_m = np.array(list(self._true.values()))
 
         stamps_ns = np.rint(stamps_s * 1e9).astype(np.int64)
         apart_ns = np.abs(known_ns - stamps_ns[:, None])
         nearest = apart_ns.argmin(axis=1)
-        return np.asarray(positions_m[nearest].reshape(-1, 2), np.float64)
+
+        positions_m = known_m[nearest].reshape(-1, 2)
+        return np.asarray(positions_m, np.float64)
 
 
 def rms_m(offsets_m: Floats) -> float:

@@ -53,7 +53,8 @@ def close_laps(
 
     rng = np.random.default_rng(seed)
     measured_distance_m, heading_error_rad = _measured(distance_m, turn_rad, noise, laps, rng)
-    measured_m = _displacements_m(measured_distance_m, heading_rad + heading_error_rad)
+    measured_heading_rad = heading_rad + heading_error_rad
+    measured_m = _displacements_m(measured_distance_m, measured_heading_rad)
     error_m = np.cumsum(measured_m - true_m, axis=1)
 
     along_m = np.cumsum(distance_m)
@@ -66,20 +67,23 @@ def _legs(corners_m: Sequence[tuple[float, float]], step_m: float) -> tuple[Floa
     """Distance and turn (n,) of each leg, first straight on and then on the spot; first heading."""
     line = Line(np.array(corners_m, float))
     stops_m = np.arange(0.0, line.length_m, step_m).tolist()
+    stops_m.append(line.length_m)
     legs = []
 
-    for start_m, end_m in itertools.pairwise([*stops_m, line.length_m]):
+    for start_m, end_m in itertools.pairwise(stops_m):
         legs += line.legs(start_m, end_m)
 
     distance_m, turn_rad = np.array(legs).T
-    return distance_m, turn_rad, float(line.heading_rad[0])
+    begins_rad = float(line.heading_rad[0])
+    return distance_m, turn_rad, begins_rad
 
 
 def _measured(
     distance_m: Floats, turn_rad: Floats, noise: Noise, laps: int, rng: np.random.Generator
 ) -> tuple[Floats, Floats]:
     """Distances and errors of headings, (laps, n) each, as the wheels measure the n legs."""
-    speed, drift, turn = rng.normal(0.0, 1.0, (3, laps, len(distance_m)))
+    legs = len(distance_m)
+    speed, drift, turn = rng.normal(0.0, 1.0, (3, laps, legs))
     measured_m = distance_m * (1 + noise.speed * speed)
 
     drift_sd_rad = noise.drift_rad_per_sqrt_m * np.sqrt(distance_m)

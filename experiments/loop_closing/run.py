@@ -45,8 +45,20 @@ NOISE = Noise(speed=Noise().speed / READINGS**0.5, turn=Noise().turn / READINGS*
 
 
 def trajectory() -> dict[str, Any]:
-    """A line round some blocks and a bit of it again, and landmarks on both sides in turn."""
-    landmarks: list[dict[str, Any]] = []
+    """A line round some blocks and a bit of it again, and landmarks along it."""
+    line_m = [*CORNERS_M, AGAIN_M]
+    landmarks = []
+
+    for number, (x_m, y_m) in enumerate(_landmarks_m()):
+        landmark = {"name": f"building-{number:02d}", "x_m": x_m, "y_m": y_m}
+        landmarks.append(landmark)
+
+    return {"line_m": line_m, "landmarks": landmarks, "speed_m_s": SPEED_M_S}
+
+
+def _landmarks_m() -> list[list[float]]:
+    """(k, 2): along the blocks, left and right in turn."""
+    found: list[list[float]] = []
 
     for start_m, end_m in itertools.pairwise(np.array(CORNERS_M)):
         street_m = end_m - start_m
@@ -55,13 +67,12 @@ def trajectory() -> dict[str, Any]:
         right = np.array([ahead[1], -ahead[0]])
 
         for along_m in np.arange(APART_M / 2, length_m, APART_M):
-            number = len(landmarks)
-            right_m = ASIDE_M if number % 2 else -ASIDE_M
+            is_right = len(found) % 2
+            right_m = ASIDE_M if is_right else -ASIDE_M
             position_m = start_m + along_m * ahead + right_m * right
-            x_m, y_m = position_m.tolist()
-            landmarks.append({"name": f"building-{number:02d}", "x_m": x_m, "y_m": y_m})
+            found.append(position_m.tolist())
 
-    return {"line_m": [*CORNERS_M, AGAIN_M], "landmarks": landmarks, "speed_m_s": SPEED_M_S}
+    return found
 
 
 def sections(seed: int, method: str) -> Sections:
@@ -110,8 +121,10 @@ def drive_by_cameras(seed: int, progress: Progress) -> dict[str, Loop]:
 
 def driven(configured: Sections, modules: Sequence[Module]) -> Loop:
     """As `drive`, with these modules."""
+    trajectory = configured["sim"]["trajectory"]
     places_m = {}
-    for landmark in configured["sim"]["trajectory"]["landmarks"]:
+
+    for landmark in trajectory["landmarks"]:
         places_m[landmark["name"]] = (landmark["x_m"], landmark["y_m"])
 
     observer = Observer(places_m)

@@ -54,11 +54,12 @@ class GridModule:
         """
         own_rad = self._phases_rad(self._centres_m())
         there_rad = self._phases_rad(where_m)
-
         waves, cells = own_rad.shape
         total = np.full((cells, len(where_m)), -waves, np.float32)
+
         for own, there in zip(own_rad, there_rad, strict=True):
-            total += np.cos(there - own[:, None])
+            apart_rad = there - own[:, None]
+            total += np.cos(apart_rad)
 
         share = np.exp(SHARPNESS * total)
         return np.asarray(share, np.float32)
@@ -76,7 +77,10 @@ class GridModule:
     def _waves(self) -> Values:
         """(3, 2): the wave vectors, in radians a metre, whose sum peaks in the fields."""
         angles_rad = np.radians([30, 90, 150])
-        directions = np.column_stack([np.cos(angles_rad), np.sin(angles_rad)])
+        x = np.cos(angles_rad)
+        y = np.sin(angles_rad)
+        directions = np.column_stack([x, y])
+
         rad_per_m = 4 * np.pi / (np.sqrt(3) * self.spacing_m)
         return np.asarray(rad_per_m * directions)
 
@@ -85,6 +89,7 @@ class GridModule:
         per_field = np.linalg.inv(self.lattice_m)
         fields = centres_m @ per_field.T
         steps = np.rint(fields * PHASES).astype(np.intp)
+
         along, across = steps.T % PHASES
         return np.asarray(PHASES * along + across)
 

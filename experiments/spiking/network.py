@@ -76,12 +76,13 @@ def exact(cues: Cues) -> Posterior:
     weighed = precision @ np.array(cues.mean_m)
 
     for border in cues.borders:
-        own_precision = border.sd_m**-2
-        precision[border.axis, border.axis] += own_precision
-        weighed[border.axis] += border.sensed_m * own_precision
+        axis = border.axis
+        border_precision = border.sd_m**-2
+        precision[axis, axis] += border_precision
+        weighed[axis] += border.sensed_m * border_precision
 
-    covariance = np.linalg.inv(precision)
-    return Posterior(covariance @ weighed, covariance)
+    covariance_m2 = np.linalg.inv(precision)
+    return Posterior(covariance_m2 @ weighed, covariance_m2)
 
 
 @dataclass(frozen=True)
