@@ -7,13 +7,8 @@ from collections.abc import Mapping
 from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
 from schemas.codelets import Offer, Proposal
-from schemas.graph import (
-    Decay,
-    Delta,
-    Operation,
-    Phase,
-    Snapshot,
-)
+from schemas.graph import Delta, Operation, Phase, Snapshot
+from schemas.nodes import GraphNode
 from services.workspace.rules import Writer, check_operation, written_by
 
 MAX_REASONS = 8
@@ -127,9 +122,12 @@ class Ledger:
             raise MessageError(f"{name} is late: {what} has changed since {base_version}")
 
     def _note(self, delta: Delta) -> None:
+        written = self._written
+        version = delta.version
         for operation in delta.operations:
-            if isinstance(operation, Decay):
+            if isinstance(operation, GraphNode):
+                written[operation.id] = version
                 continue
 
             for key in written_by(operation):
-                self._written[key] = delta.version
+                written[key] = version
