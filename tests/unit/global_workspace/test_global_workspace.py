@@ -13,7 +13,11 @@ LIDA = {"ticks_per_decay": 1}
 
 def _with_fate(competition: Competition, fate: Fate) -> dict[str, float]:
     """The activations of the contenders of one fate, by codelet."""
-    return {each.codelet: each.activation for each in competition.contenders if each.fate is fate}
+    activations = {}
+    for each in competition.contenders:
+        if each.fate is fate:
+            activations[each.codelet] = each.activation
+    return activations
 
 
 class Arena:
@@ -174,12 +178,16 @@ def test_a_codelet_that_brings_its_coalition_again_renews_it() -> None:
 
 def test_a_coalition_keeps_its_id_until_its_codelet_brings_a_newer_one() -> None:
     arena = Arena()
-    (first,) = arena.compete(10, a=0.4)[0].contenders
-    (again,) = arena.compete(11)[0].contenders
-    displaced, newer = arena.compete(12, a=0.3)[0].contenders
+    begun, _ = arena.compete(10, a=0.4)
+    continued, _ = arena.compete(11)
+    renewed, _ = arena.compete(12, a=0.3)
+    (first,) = begun.contenders
+    (again,) = continued.contenders
+    displaced, newer = renewed.contenders
 
     assert first.id == again.id == displaced.id != newer.id
-    assert (displaced.fate, newer.fate) == (Fate.DISPLACED, Fate.WAITING)
+    assert displaced.fate is Fate.DISPLACED
+    assert newer.fate is Fate.WAITING
 
 
 def test_every_cycle_has_its_competition_even_where_nothing_competes() -> None:
@@ -219,4 +227,5 @@ def test_a_contender_goes_by_the_id_that_the_workspace_gave_its_coalition() -> N
     *_, competition = module.feed(Coalitions(stamp_ns=5, cycle=7, coalitions=[coalition]))
 
     assert isinstance(competition, Competition)
-    assert [each.id for each in competition.contenders] == ["7:attention"]
+    (contender,) = competition.contenders
+    assert contender.id == "7:attention"

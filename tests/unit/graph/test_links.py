@@ -22,14 +22,12 @@ def _link(source: str, target: str, weight: float = 1.0, kind: str = NEAR) -> Li
 
 
 def test_links_in_bulk_are_the_links_that_they_list() -> None:
-    links = Links(kind=NEAR, weights={"b": {"c": 0.5}, "a": {"c": 0.25, "b": 1.0}})
-    graph = _graph(links)
+    graph = _graph(Links(kind=NEAR, weights={"b": {"c": 0.5}, "a": {"c": 0.25, "b": 1.0}}))
+    in_order = Links(kind=NEAR, weights={"a": {"b": 1.0, "c": 0.25}, "b": {"c": 0.5}})
 
     assert graph.links.targets("a", NEAR) == {"c": 0.25, "b": 1.0}
     assert graph.links.sources("c", NEAR) == ("b", "a")
-    assert graph.snapshot().links == [
-        Links(kind=NEAR, weights={"a": {"b": 1.0, "c": 0.25}, "b": {"c": 0.5}})
-    ]
+    assert graph.snapshot().links == [in_order]
 
 
 def test_links_in_bulk_leave_other_links_of_their_source() -> None:
@@ -46,8 +44,10 @@ def test_links_in_bulk_leave_other_links_of_their_source() -> None:
 def test_links_applied_twice_are_links_applied_once() -> None:
     links = Links(kind=NEAR, weights={"a": {"b": 0.5}})
     at = _link("a", "place:map:0:1:2", kind=LinkKind.AT)
+    once = _graph(links, at)
+    twice = _graph(links, at, links, at)
 
-    assert _graph(links, at, links, at).digest() == _graph(links, at).digest()
+    assert twice.digest() == once.digest()
 
 
 def test_a_node_has_one_link_of_an_exclusive_kind() -> None:
@@ -66,22 +66,21 @@ def test_a_node_has_one_link_of_an_exclusive_kind() -> None:
 def test_dropping_a_link_that_is_not_there_changes_nothing() -> None:
     graph = _graph(_link("a", "b"), _link("a", "here", kind=LinkKind.AT))
     before = graph.digest()
-    graph.change(
-        [
-            DropLink(source="a", target="c", kind=NEAR),
-            DropLink(source="a", target="there", kind=LinkKind.AT),
-            DropLink(source="x", target="y", kind="other"),
-        ]
-    )
+
+    other_target = DropLink(source="a", target="c", kind=NEAR)
+    other_place = DropLink(source="a", target="there", kind=LinkKind.AT)
+    other_kind = DropLink(source="x", target="y", kind="other")
+    graph.change([other_target, other_place, other_kind])
 
     assert graph.digest() == before
 
 
 def test_a_forgotten_node_takes_links_to_it_and_from_it_along() -> None:
     weights = {"a": {"b": 0.5, "c": 0.25}, "b": {"a": 0.5}, "d": {"b": 1.0}}
-    links = Links(kind=NEAR, weights=weights)
-    at = [_link("b", "here", kind=LinkKind.AT), _link("e", "b", kind=LinkKind.INSTANCE)]
-    graph = _graph(thing("a"), thing("b"), links, *at, DropNode(id="b"))
+    near = Links(kind=NEAR, weights=weights)
+    at = _link("b", "here", kind=LinkKind.AT)
+    instance = _link("e", "b", kind=LinkKind.INSTANCE)
+    graph = _graph(thing("a"), thing("b"), near, at, instance, DropNode(id="b"))
 
     assert graph.snapshot().links == [Links(kind=NEAR, weights={"a": {"c": 0.25}})]
     assert graph.links.sources("here", LinkKind.AT) == ()
@@ -89,7 +88,8 @@ def test_a_forgotten_node_takes_links_to_it_and_from_it_along() -> None:
 
 def test_a_message_in_the_graph_is_not_changed_by_the_next_one() -> None:
     first = Links(kind=NEAR, weights={"a": {"b": 0.5}})
+    second = Links(kind=NEAR, weights={"a": {"b": 1.0, "c": 1.0}})
     before = encode(first)
-    _graph(first, Links(kind=NEAR, weights={"a": {"b": 1.0, "c": 1.0}}), _link("a", "d"))
+    _graph(first, second, _link("a", "d"))
 
     assert encode(first) == before

@@ -13,12 +13,12 @@ from schemas.nodes import ROOT_MAP, Map, PlaceColumn
 
 
 def _cells(
-    column: PlaceColumn, cells: list[tuple[int, int]], values: list[float], map_id: str = ROOT_MAP
+    column: PlaceColumn, written: dict[tuple[int, int], float], map_id: str = ROOT_MAP
 ) -> Cells:
-    where = Array.of(np.array(cells, np.int32))
-    return Cells(
-        map=map_id, column=column, cells=where, values=Array.of(np.array(values, np.float32))
-    )
+    """Values of a column by cell."""
+    cells = np.array(list(written), np.int32)
+    values = np.array(list(written.values()), np.float32)
+    return Cells(map=map_id, column=column, cells=Array.of(cells), values=Array.of(values))
 
 
 def _graph(*operations: Operation) -> Graph:
@@ -27,20 +27,26 @@ def _graph(*operations: Operation) -> Graph:
     return graph
 
 
+def _weights(graph: Graph, i: int, j: int) -> dict[str, float]:
+    """The links of a place node, by target."""
+    return {link.target: link.weight for link in graph.place_links(i, j)}
+
+
 def test_a_tile_comes_into_being_with_its_first_cell() -> None:
-    graph = _graph(_cells(PlaceColumn.ROAD, [(-1, TILE_SIDE)], [0.5]))
+    graph = _graph(_cells(PlaceColumn.ROAD, {(-1, TILE_SIDE): 0.5}))
     assert list(graph.places.tiles) == [(ROOT_MAP, -1, 1)]
     assert graph.place(0, 0) is None
 
-    road = {cell: graph.place(*cell) for cell in ((-1, TILE_SIDE), (-2, TILE_SIDE))}
-    assert [place.road for place in road.values() if place is not None] == [0.5, 0.0]
+    written = graph.place(-1, TILE_SIDE)
+    beside = graph.place(-2, TILE_SIDE)
+    assert written is not None
+    assert beside is not None
+    assert (written.road, beside.road) == (0.5, 0.0)
 
 
 def test_maps_have_place_nodes_of_their_own() -> None:
-    graph = _graph(
-        Map(id="map:1", cell_m=4.0, parent=ROOT_MAP),
-        _cells(PlaceColumn.ROAD, [(2, 3)], [1.0], "map:1"),
-    )
+    coarse = Map(id="map:1", cell_m=4.0, parent=ROOT_MAP)
+    graph = _graph(coarse, _cells(PlaceColumn.ROAD, {(2, 3): 1.0}, "map:1"))
     place = graph.place(2, 3, "map:1")
 
     assert place is not None
@@ -49,53 +55,55 @@ def test_maps_have_place_nodes_of_their_own() -> None:
 
 
 def test_each_of_the_eight_links_of_a_place_node_is_kept_once() -> None:
-    weights = {
-        PlaceColumn.WEIGHT_E: 0.1,
-        PlaceColumn.WEIGHT_NE: 0.2,
-        PlaceColumn.WEIGHT_N: 0.3,
-        PlaceColumn.WEIGHT_NW: 0.4,
-    }
-    graph = _graph(*[_cells(column, [(5, 5)], [value]) for column, value in weights.items()])
-    links = {link.target: link.weight for link in graph.place_links(5, 5)}
+    graph = _graph(
+        _cells(PlaceColumn.WEIGHT_E, {(5, 5): 0.1}),
+        _cells(PlaceColumn.WEIGHT_NE, {(5, 5): 0.2}),
+        _cells(PlaceColumn.WEIGHT_N, {(5, 5): 0.3}),
+        _cells(PlaceColumn.WEIGHT_NW, {(5, 5): 0.4}),
+    )
+    weights = _weights(graph, 5, 5)
 
-    assert len(links) == 8
-    assert links["place:map:0:6:5"] == pytest.approx(0.1)
-    assert links["place:map:0:6:6"] == pytest.approx(0.2)
-    assert links["place:map:0:5:6"] == pytest.approx(0.3)
-    assert links["place:map:0:4:6"] == pytest.approx(0.4)
-    assert links["place:map:0:4:5"] == 1.0
+    assert len(weights) == 8
+    assert weights["place:map:0:6:5"] == pytest.approx(0.1)
+    assert weights["place:map:0:6:6"] == pytest.approx(0.2)
+    assert weights["place:map:0:5:6"] == pytest.approx(0.3)
+    assert weights["place:map:0:4:6"] == pytest.approx(0.4)
+    assert weights["place:map:0:4:5"] == 1.0
 
-    back = {link.target: link.weight for link in graph.place_links(6, 6)}
+    back = _weights(graph, 6, 6)
     assert back["place:map:0:5:5"] == pytest.approx(0.2)
 
 
 def test_links_lead_to_place_nodes_that_exist_alone() -> None:
-    graph = _graph(_cells(PlaceColumn.ROAD, [(0, 0)], [1.0]))
-    targets = {link.target for link in graph.place_links(0, 0)}
+    graph = _graph(_cells(PlaceColumn.ROAD, {(0, 0): 1.0}))
+    targets = set(_weights(graph, 0, 0))
 
     assert targets == {"place:map:0:1:0", "place:map:0:1:1", "place:map:0:0:1"}
 
 
 def test_written_cells_are_those_whose_value_is_not_zero() -> None:
-    graph = _graph(_cells(PlaceColumn.ROAD, [(40, -3), (1, 1), (2, 2)], [0.5, 1.0, 0.0]))
+    graph = _graph(_cells(PlaceColumn.ROAD, {(40, -3): 0.5, (1, 1): 1.0, (2, 2): 0.0}))
     cells, values = graph.places.written_cells(ROOT_MAP, PlaceColumn.ROAD)
-    found = dict(zip(map(tuple, cells.tolist()), values.tolist(), strict=True))
+    where = [tuple(cell) for cell in cells.tolist()]
+    found = dict(zip(where, values.tolist(), strict=True))
 
     assert found == {(40, -3): 0.5, (1, 1): 1.0}
 
 
 def test_a_snapshot_has_the_columns_that_were_written() -> None:
-    graph = _graph(_cells(PlaceColumn.ROAD, [(0, 0)], [1.0]))
-    (tile,) = graph.snapshot().tiles
+    graph = _graph(_cells(PlaceColumn.ROAD, {(0, 0): 1.0}))
+    snapshot = graph.snapshot()
+    (tile,) = snapshot.tiles
     assert list(tile.columns) == [PlaceColumn.ROAD]
 
     again = Graph()
-    again.load(graph.snapshot())
+    again.load(snapshot)
     assert again.digest() == graph.digest()
 
 
 def test_a_tile_of_another_side_is_rejected() -> None:
     column = Array.of(np.zeros((TILE_SIDE, TILE_SIDE + 1), np.float32))
+    tile = PlaceTile(x=0, y=0, columns={PlaceColumn.ROAD: column})
 
     with pytest.raises(MessageError, match="road of shape"):
-        _graph(PlaceTile(x=0, y=0, columns={PlaceColumn.ROAD: column}))
+        _graph(tile)

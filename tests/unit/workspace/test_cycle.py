@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import msgspec
 import numpy as np
 import pytest
@@ -8,11 +10,11 @@ from cogmap.bus.codec import encode
 from cogmap.errors import MessageError
 from schemas import topics
 from schemas.array import Array
-from schemas.base import Message
-from schemas.codelets import Leases, Offer, Task
+from schemas.codelets import Leases, Task
 from schemas.cognition import Coalitions
-from schemas.graph import Delta, Phase, SnapshotRequest
-from schemas.nodes import LinkKind, Node, Self, object_id, percept_id
+from schemas.graph import Delta, SnapshotRequest
+from schemas.nodes import LinkKind, Self, object_id, percept_id
+from tests.support.messages import of_type
 from tests.support.scenes import (
     Desk,
     agent,
@@ -22,7 +24,6 @@ from tests.support.scenes import (
     percept,
     percepts,
     stamp_ns,
-    thing,
 )
 
 
@@ -30,54 +31,61 @@ def _moved_self(frame: int, x_m: float = 1.0) -> Self:
     return agent(x_m=x_m, stamp_ns=stamp_ns(frame))
 
 
-def _phases(desk: Desk) -> list[str]:
-    return [delta.phase for delta in desk.deltas]
+def _names(tasks: Iterable[Task]) -> list[str]:
+    return [asked.task_id for asked in tasks]
+
+
+def _localized(desk: Desk) -> list[Task]:
+    """The tasks that follow the answer to the localization of the cycle."""
+    (localization,) = desk.take()
+    desk.feed(answer(localization))
+    return desk.take()
 
 
 def test_percepts_wait_for_the_self_motion_up_to_them() -> None:
     desk = Desk("w1")
-
     assert desk.feed(percepts(1)) == []
     assert desk.feed(motion(0)) == []
-    assert [type(said) for said in desk.feed(motion(1))] == [Delta, Task, Leases]
+
+    published = desk.feed(motion(1))
+    assert [type(message) for message in published] == [Delta, Task, Leases]
 
 
 def test_self_motion_alone_begins_no_cycle() -> None:
     desk = Desk("w1")
 
-    assert [desk.feed(motion(frame)) for frame in range(3)] == [[], [], []]
+    for frame in range(3):
+        assert desk.feed(motion(frame)) == []
 
 
 def test_a_cycle_commits_percepts_then_the_pose_then_objects_and_an_end() -> None:
     desk = Desk("w1")
     desk.drive(range(2), percept("house"))
+    phases = [delta.phase for delta in desk.deltas]
+    cycles = [delta.cycle for delta in desk.deltas]
 
-    assert _phases(desk) == ["percepts", "localization", "objects", "end"] * 2
-    assert [delta.cycle for delta in desk.deltas] == [1] * 4 + [2] * 4
+    assert phases == ["percepts", "localization", "objects", "end"] * 2
+    assert cycles == [1] * 4 + [2] * 4
 
 
 def test_a_phase_begins_when_every_task_of_the_one_before_is_answered() -> None:
     desk = Desk("w1")
     desk.see(0, percept("a"), percept("b"))
-    (localization,) = desk.take()
-    desk.feed(answer(localization))
-    first, second, road, path = desk.take()
-
-    assert [asked.task_id for asked in (first, second, road, path)] == [
+    first, *others = _localized(desk)
+    assert _names([first, *others]) == [
         "1/object_place/a",
         "1/object_place/b",
         "1/road_place",
         "1/path",
     ]
 
-    desk.feed(answer(second))
-    desk.feed(answer(road))
-    desk.feed(answer(path))
-
+    for asked in others:
+        desk.feed(answer(asked))
     assert desk.take() == []
 
     desk.feed(answer(first))
-    assert [asked.codelet for asked in desk.take()] == ["whereabouts"]
+    (whereabouts,) = desk.take()
+    assert whereabouts.codelet == "whereabouts"
 
 
 def test_a_percept_below_the_threshold_is_no_object_of_the_map() -> None:
@@ -85,39 +93,42 @@ def test_a_percept_below_the_threshold_is_no_object_of_the_map() -> None:
     desk.see(0, percept("a"), percept("b", activation=0.7))
     (localization,) = desk.take()
     desk.feed(answer(localization))
+    seen = [item.label for item in localization.percepts]
 
-    assert [seen.label for seen in localization.percepts] == ["a"]
-    assert [asked.task_id for asked in desk.take()] == [
-        "1/object_place/a",
-        "1/road_place",
-        "1/path",
-    ]
+    assert seen == ["a"]
+    assert _names(desk.take()) == ["1/object_place/a", "1/road_place", "1/path"]
 
 
 def test_deltas_are_numbered_without_a_gap() -> None:
     desk = Desk("w1", "w2")
     desk.drive(range(6), percept("a"), percept("b", 0.4))
+    count = len(desk.deltas)
+    versions = [delta.version for delta in desk.deltas]
+    numbers = [delta.seq for delta in desk.deltas]
 
-    assert [delta.version for delta in desk.deltas] == list(range(1, len(desk.deltas) + 1))
-    assert [delta.seq for delta in desk.deltas] == list(range(len(desk.deltas)))
+    assert versions == list(range(1, count + 1))
+    assert numbers == list(range(count))
+
+
+def _committed(order: tuple[int, ...]) -> list[bytes]:
+    """The deltas of a cycle whose tasks about objects are answered in that order."""
+    desk = Desk("w1")
+    desk.see(0, percept("a"), percept("b"))
+    tasks = _localized(desk)
+    for index in order:
+        asked = tasks[index]
+        written = [landmark(asked.task_id)] if asked.codelet == "object_place" else []
+        desk.feed(answer(asked, written))
+
+    assert desk.deltas[-1].tasks == _names(tasks)
+    return [encode(delta) for delta in desk.deltas]
 
 
 def test_answers_are_committed_in_the_order_of_their_tasks_not_of_arrival() -> None:
-    said = []
-    for order in ((0, 1, 2, 3), (2, 0, 3, 1)):
-        desk = Desk("w1")
-        desk.see(0, percept("a"), percept("b"))
-        desk.feed(answer(desk.take()[0]))
-        tasks = desk.take()
-        for index in order:
-            asked = tasks[index]
-            written = [landmark(asked.task_id)] if asked.codelet == "object_place" else []
-            desk.feed(answer(asked, written))
-        said.append([encode(delta) for delta in desk.deltas])
+    in_order = _committed((0, 1, 2, 3))
+    mixed = _committed((2, 0, 3, 1))
 
-        assert desk.deltas[-1].tasks == [asked.task_id for asked in tasks]
-
-    assert said[0] == said[1]
+    assert mixed == in_order
 
 
 def test_a_task_that_is_answered_twice_is_committed_once() -> None:
@@ -127,7 +138,9 @@ def test_a_task_that_is_answered_twice_is_committed_once() -> None:
 
     assert desk.feed(answer(asked, [_moved_self(0)]))
     assert desk.feed(answer(asked, [_moved_self(0, 5.0)])) == []
-    assert sum(asked.task_id in delta.tasks for delta in desk.deltas) == 1
+
+    commits = [delta for delta in desk.deltas if asked.task_id in delta.tasks]
+    assert len(commits) == 1
     assert desk.agent.x_m == 1.0
 
 
@@ -146,13 +159,12 @@ def test_the_newest_view_is_next_and_its_motion_covers_those_skipped() -> None:
     desk.see(1)
     desk.see(2)
     desk.see(3)
-
-    assert [asked.cycle for asked in desk.tasks] == [2]
+    (asked,) = desk.tasks
+    assert asked.cycle == 2
 
     desk.work()
-    assert [delta.stamp_ns for delta in desk.deltas if delta.phase == "percepts"] == [
-        stamp_ns(n) for n in (0, 1, 3)
-    ]
+    begun_ns = [delta.stamp_ns for delta in desk.deltas if delta.phase == "percepts"]
+    assert begun_ns == [stamp_ns(0), stamp_ns(1), stamp_ns(3)]
     assert desk.agent.x_m == pytest.approx(4 * 0.4, abs=0.1)
 
 
@@ -168,9 +180,8 @@ def test_a_known_object_is_located_and_an_unknown_one_is_placed() -> None:
     desk = Desk("w1")
     desk.drive(range(1), percept("a"))
     desk.see(1, percept("a"), percept("b"))
-    desk.feed(answer(desk.take()[0]))
 
-    assert [asked.task_id for asked in desk.take()] == [
+    assert _names(_localized(desk)) == [
         "2/object_place/b",
         "2/landmark/a",
         "2/road_place",
@@ -184,8 +195,9 @@ def test_a_percept_becomes_a_node_linked_to_the_object_it_is_of() -> None:
     assert desk.graph.links.target(percept_id("a"), LinkKind.INSTANCE) is None
 
     desk.drive(range(1, 2), percept("a"))
-    assert desk.graph.links.target(percept_id("a"), LinkKind.INSTANCE) == object_id("a")
-    assert desk.graph.links.sources(object_id("a"), LinkKind.INSTANCE) == (percept_id("a"),)
+    links = desk.graph.links
+    assert links.target(percept_id("a"), LinkKind.INSTANCE) == object_id("a")
+    assert links.sources(object_id("a"), LinkKind.INSTANCE) == (percept_id("a"),)
 
 
 def test_a_task_names_what_it_is_about_and_the_version_to_read() -> None:
@@ -195,9 +207,10 @@ def test_a_task_names_what_it_is_about_and_the_version_to_read() -> None:
     (asked,) = desk.take()
 
     assert asked.about == ["self", "object:a"]
-    assert (desk.graph.cell_m(), asked.version) == (2.0, desk.deltas[-1].version)
+    assert asked.version == desk.deltas[-1].version
     assert asked.motions is not None
     assert asked.motions.shape == (1, 5)
+    assert desk.graph.cell_m() == 2.0
 
 
 @pytest.mark.parametrize("shape", [(3,), (2, 4), (0, 3)])
@@ -222,44 +235,6 @@ def test_road_points_of_a_wrong_shape_are_refused() -> None:
         desk.feed(bad)
 
 
-def _restored(past: list[Message]) -> Desk:
-    desk = Desk("w1")
-    assert desk.module.restore is not None
-    desk.module.restore(past)
-    return desk
-
-
-def test_a_restored_workspace_has_the_same_graph_and_continues_its_numbers() -> None:
-    desk = Desk("w1")
-    desk.drive(range(4), percept("a"), percept("b", 0.5))
-    assert desk.module.compact is not None
-
-    snapshot = desk.module.compact()
-    restored = [
-        _restored([*desk.deltas]),
-        _restored([snapshot]),
-        _restored([snapshot, desk.deltas[-1]]),
-    ]
-
-    assert {each.digest for each in restored} == {desk.digest}
-
-    for each in restored:
-        each.drive(range(4, 5), percept("a"))
-        assert each.deltas[0].version == desk.deltas[-1].version + 1
-        assert each.deltas[0].cycle == desk.deltas[-1].cycle + 1
-
-    assert len({each.digest for each in restored}) == 1
-
-
-def test_a_restored_workspace_passes_over_views_that_it_had_before() -> None:
-    desk = Desk("w1")
-    desk.drive(range(3))
-    again = _restored([*desk.deltas])
-    again.see(2)
-
-    assert again.deltas == []
-
-
 def test_replicas_that_apply_the_deltas_equal_the_workspace() -> None:
     desk = Desk("w1", "w2")
     desk.drive(range(8), percept("a"), percept("b", -0.5, 15.0))
@@ -281,92 +256,14 @@ def test_a_snapshot_of_a_version_that_is_not_committed_yet_is_refused() -> None:
 def test_coalitions_are_published_once_after_the_phase_with_an_id_each() -> None:
     desk = Desk("w1")
     desk.drive(range(2), percept("a"))
-    published = [item for item in desk.published if isinstance(item, Coalitions)]
+    first, second = of_type(Coalitions, desk.published)
+    whereabouts, novelty = second.coalitions
+    nodes = [node.id for node in whereabouts.nodes]
+    sources = {link.source for link in whereabouts.links}
 
-    assert [item.cycle for item in published] == [1, 2]
-    assert [coalition.id for coalition in published[1].coalitions] == [
-        "2/whereabouts/0",
-        "2/novelty/0",
-    ]
-
-    whereabouts = published[1].coalitions[0]
-    assert [node.id for node in whereabouts.nodes] == ["self", "object:a"]
-    assert {link.source for link in whereabouts.links} == {"self", "object:a"}
+    assert (first.cycle, second.cycle) == (1, 2)
+    assert whereabouts.id == "2/whereabouts/0"
+    assert novelty.id == "2/novelty/0"
+    assert nodes == ["self", "object:a"]
+    assert sources == {"self", "object:a"}
     assert whereabouts.maps == ["map:0"]
-
-
-def test_offers_are_committed_at_the_next_cycle_by_source_and_number() -> None:
-    desk = Desk("w1")
-    for source, seq, name in (("b", 0, "x"), ("a", 1, "y"), ("a", 0, "z")):
-        offer = Offer(cycle=0, operations=[thing(name)], source=source, seq=seq)
-        assert desk.feed(offer) == []
-    desk.see(0)
-    first = desk.deltas[0]
-
-    assert first.phase is Phase.PERCEPTS
-    assert [item.id for item in first.operations if isinstance(item, Node)] == ["z", "y", "x"]
-
-
-def test_an_offer_of_what_only_codelets_write_is_rejected_and_counted() -> None:
-    desk = Desk("w1")
-    desk.feed(Offer(cycle=0, operations=[_moved_self(0)], source="goal"))
-    desk.drive(range(1))
-
-    assert [delta.rejected for delta in desk.deltas if delta.rejected] == [1]
-    assert "may not write nodes of kind self" in "".join(
-        reason for delta in desk.deltas for reason in delta.reasons
-    )
-
-
-def test_in_lockstep_a_cycle_waits_for_the_offers_that_are_declared() -> None:
-    desk = Desk("w1", offering=("memory",))
-    desk.drive(range(1))
-    ended = desk.deltas[-1].cycle
-    desk.see(1)
-
-    assert desk.deltas[-1].cycle == ended
-
-    desk.feed(Offer(cycle=ended, operations=[thing("recalled")], source="memory"))
-    assert desk.deltas[-1].cycle == ended + 1
-    assert "recalled" in desk.graph.nodes
-
-
-@pytest.mark.parametrize("committed", range(1, 4))
-def test_an_interrupted_cycle_goes_on_from_its_last_commit(committed: int) -> None:
-    whole = Desk("w1")
-    whole.drive(range(3), percept("a"))
-    interrupted = Desk("w1")
-    interrupted.drive(range(2), percept("a"))
-    past = whole.deltas[: len(interrupted.deltas) + committed]
-
-    again = _restored([*past])
-    again.drive(range(2, 3), percept("a"))
-
-    assert again.digest == whole.digest
-    assert [delta.version for delta in again.deltas] == [
-        delta.version for delta in whole.deltas[len(past) :]
-    ]
-
-
-def test_an_offer_made_before_a_restart_is_not_committed_again() -> None:
-    desk = Desk("w1")
-    desk.drive(range(3))
-    again = _restored([*desk.deltas])
-    again.feed(Offer(cycle=1, operations=[thing("old")], source="goal"))
-    again.feed(Offer(cycle=3, operations=[thing("new")], source="goal"))
-    again.drive(range(3, 4))
-    names = {
-        item.id for delta in again.deltas for item in delta.operations if isinstance(item, Node)
-    }
-
-    assert names == {"new"}
-
-
-def test_an_offered_node_is_as_active_as_it_states_when_it_enters() -> None:
-    desk = Desk("w1")
-    desk.drive(range(5))
-    desk.feed(Offer(cycle=5, operations=[thing("goal")], source="goal"))
-    desk.drive(range(5, 6))
-    graph = desk.graph
-
-    assert graph.activation(graph.nodes["goal"]) == 1.0

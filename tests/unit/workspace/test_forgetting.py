@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import numpy as np
 import pytest
 
 from cogmap.graph import decay
 from cogmap.graph.graph import Graph
+from cogmap.graph.places import Place
 from schemas.array import Array
 from schemas.graph import Cells, Decay, Delta, DropNode, Link, Phase
-from schemas.nodes import KINDS, Node, PlaceColumn
+from schemas.nodes import KINDS, AnyNode, Node, PlaceColumn
 from services.workspace.forgetting import Forgetting
+from tests.support.messages import of_type
 from tests.support.scenes import Desk, agent, percept
 
 RATES = Decay(activation=0.1, base_level=0.0005, place_activation=0.02, forget_below=0.05)
+HERE = (-3, 70)
 
 
 def _node(name: str, activation: float, base_level: float = 0.0) -> Node:
@@ -66,16 +71,25 @@ def test_activation_never_falls_below_zero() -> None:
     assert run.graph.activation(run.graph.nodes["a"]) == 0.0
 
 
+def _cells(column: PlaceColumn, value: float) -> Cells:
+    """A value of the place node HERE."""
+    where = Array.of(np.array([HERE], np.int32))
+    values = Array.of(np.full(1, value, np.float32))
+    return Cells(column=column, cells=where, values=values)
+
+
 def test_persistent_kinds_do_not_decay() -> None:
     run = _Run(agent())
     assert run.end_cycles(100) == []
 
     node = run.graph.nodes["self"]
-    assert (run.graph.activation(node), run.graph.base_level(node)) == (1.0, 1.0)
+    assert run.graph.activation(node) == 1.0
+    assert run.graph.base_level(node) == 1.0
 
 
 def test_what_falls_below_threshold_is_forgotten_with_its_links() -> None:
-    run = _Run(_node("a", 0.3), _node("b", 1.0, 0.5), Link(source="b", target="a", kind="near"))
+    near = Link(source="b", target="a", kind="near")
+    run = _Run(_node("a", 0.3), _node("b", 1.0, 0.5), near)
 
     assert run.end_cycles(2) == []
     assert run.end_cycles() == ["a"]
@@ -84,7 +98,9 @@ def test_what_falls_below_threshold_is_forgotten_with_its_links() -> None:
 
 
 def test_base_level_keeps_a_node_that_activation_alone_would_not() -> None:
-    run = _Run(_node("seen once", 1.0, 0.0), _node("learned", 0.0, 0.2))
+    seen_once = _node("seen once", 1.0, 0.0)
+    learned = _node("learned", 0.0, 0.2)
+    run = _Run(seen_once, learned)
     run.end_cycles(20)
 
     assert list(run.graph.nodes) == ["learned"]
@@ -108,7 +124,10 @@ def test_a_restored_graph_forgets_what_the_one_before_would_have() -> None:
     after.graph.load(before.graph.snapshot())
     after.forgetting.restore(after.graph)
 
-    assert [after.end_cycles() for _ in range(8)] == [before.end_cycles() for _ in range(8)]
+    expected = [before.end_cycles() for _ in range(8)]
+    found = [after.end_cycles() for _ in range(8)]
+    assert any(expected)
+    assert found == expected
 
 
 @pytest.mark.parametrize("base_level", [0.0, 0.03, 0.2])
@@ -125,44 +144,43 @@ def test_the_cycle_of_forgetting_is_the_last_above_threshold(
 
 
 def test_without_decay_nothing_is_forgotten() -> None:
-    assert decay.cycle_of_forgetting(_node("a", 0.5), Decay(forget_below=0.1)) == decay.NEVER
-    assert decay.cycle_of_forgetting(_node("a", 0.5), Decay(activation=0.1)) == decay.NEVER
+    node = _node("a", 0.5)
+    threshold_alone = Decay(forget_below=0.1)
+    decay_alone = Decay(activation=0.1)
+
+    assert decay.cycle_of_forgetting(node, threshold_alone) == decay.NEVER
+    assert decay.cycle_of_forgetting(node, decay_alone) == decay.NEVER
 
 
-def _activation(graph: Graph) -> float:
-    place = graph.place(-3, 70)
+def _place(graph: Graph) -> Place:
+    place = graph.place(*HERE)
     assert place is not None
-    return place.activation
+    return place
 
 
 def test_the_activation_of_place_nodes_decays_to_zero() -> None:
-    here = Array.of(np.array([[-3, 70]], np.int32))
-    value = Array.of(np.full(1, 0.05, np.float32))
-    run = _Run(Cells(column=PlaceColumn.ACTIVATION, cells=here, values=value))
+    run = _Run(_cells(PlaceColumn.ACTIVATION, 0.05))
     trace = []
     for _ in range(4):
-        trace.append(_activation(run.graph))
+        trace.append(_place(run.graph).activation)
         run.end_cycles()
 
     assert trace == pytest.approx([0.05, 0.03, 0.01, 0.0], abs=1e-6)
 
 
 def test_road_does_not_decay() -> None:
-    here = Array.of(np.array([[-3, 70]], np.int32))
-    value = Array.of(np.ones(1, np.float32))
-    run = _Run(Cells(column=PlaceColumn.ROAD, cells=here, values=value))
+    run = _Run(_cells(PlaceColumn.ROAD, 1.0))
     run.end_cycles(10)
-    place = run.graph.place(-3, 70)
 
-    assert place is not None
-    assert place.road == 1.0
+    assert _place(run.graph).road == 1.0
 
 
 def test_a_cycle_in_which_nothing_is_forgotten_writes_nothing_at_its_end() -> None:
     desk = Desk("w1")
     desk.drive(range(3), percept("a"))
+    written = [delta.operations for delta in desk.deltas if delta.phase is Phase.END]
 
-    assert [delta.operations for delta in desk.deltas if delta.phase is Phase.END] == [[], [], []]
+    assert written == [[], [], []]
 
 
 def test_an_object_that_is_no_longer_seen_stays_and_its_percept_is_forgotten() -> None:
@@ -170,11 +188,12 @@ def test_an_object_that_is_no_longer_seen_stays_and_its_percept_is_forgotten() -
     desk.drive(range(3), percept("a"))
     desk.drive(range(3, 15))
     expected = {"self", "map:0", "path:0", "observations:0:a", "object:a"}
-
     assert set(desk.graph.nodes) == expected
 
-    dropped = [item for delta in desk.deltas for item in delta.operations]
-    assert [item.id for item in dropped if isinstance(item, DropNode)] == ["percept:a"]
+    dropped = []
+    for delta in desk.deltas:
+        dropped += [drop.id for drop in of_type(DropNode, delta.operations)]
+    assert dropped == ["percept:a"]
 
 
 def test_a_replica_decays_as_the_workspace_does() -> None:
@@ -188,4 +207,7 @@ def test_a_replica_decays_as_the_workspace_does() -> None:
 
 
 def test_every_kind_has_rules() -> None:
-    assert all(KINDS[type(node)] for node in (agent(), _node("a", 1.0)))
+    kinds = set(get_args(AnyNode))
+
+    assert kinds
+    assert kinds <= set(KINDS)
