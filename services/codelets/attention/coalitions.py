@@ -10,6 +10,7 @@ from schemas.cognition import Coalition
 from schemas.graph import Link
 from schemas.nodes import AnyNode, LinkKind, Object, Self, object_id
 from schemas.sensing import Percept
+from services.codelets.nodes import nodes_of
 
 
 def coalition(codelet: str, nodes: list[AnyNode], graph: Graph, base_level: float) -> Coalition:
@@ -53,13 +54,9 @@ def _maps_of(nodes: list[AnyNode]) -> list[str]:
 
 def objects_in_view(percepts: list[Percept], graph: Graph) -> list[Object]:
     """The objects of the map that are in view, by label."""
-    found = []
-    for label in sorted(percept.label for percept in percepts):
-        node = graph.get(Object, object_id(label))
-        if node is not None:
-            found.append(node)
-
-    return found
+    labels = sorted(percept.label for percept in percepts)
+    names = [object_id(label) for label in labels]
+    return nodes_of(graph, Object, names)
 
 
 def _salience(node: AnyNode) -> float:

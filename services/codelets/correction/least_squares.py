@@ -103,13 +103,17 @@ class _BlockPattern:
         keys = columns[used] * unknown_poses + rows[used]
         blocks, target = np.unique(keys, return_inverse=True)
         self._sum = _summing(target, used, len(blocks), len(rows))
+        self._compress(blocks, unknown_poses)
 
-        block_rows = blocks % unknown_poses
-        column_keys = np.arange(unknown_poses + 1) * unknown_poses
-        starts = np.searchsorted(blocks, column_keys)
-        self._indices = block_rows.astype(np.int32)
-        self._starts = starts.astype(np.int32)
-        self._shape = (3 * unknown_poses, 3 * unknown_poses)
+    def _compress(self, keys: Indices, unknown_poses: int) -> None:
+        """Where blocks are stored: by column, and by row within it, as `keys` count them."""
+        self._indices = (keys % unknown_poses).astype(np.int32)
+
+        first_keys = np.arange(unknown_poses + 1) * unknown_poses
+        self._starts = np.searchsorted(keys, first_keys).astype(np.int32)
+
+        side = 3 * unknown_poses
+        self._shape = (side, side)
 
     def summed(self, blocks: Floats) -> sparse.csc_matrix:
         """The matrix of (4 m, 3, 3) blocks, each transposed: columns are stored, and blocks by
@@ -197,14 +201,14 @@ def optimize(graph: PoseGraph, max_iterations: int = MAX_ITERATIONS) -> Floats:
                 break
             continue
 
-        predicted = before - predicted_decrease
+        # What the linear model did not predict is about what another step would gain.
+        unpredicted = after - (before - predicted_decrease)
         decrease = before - after
         poses = moved
         before = after
 
-        # What the linear model did not predict is about what another step would gain.
         least_decrease = RELATIVE_DECREASE * after
-        is_linear = not damping and after - predicted <= least_decrease
+        is_linear = not damping and unpredicted <= least_decrease
         if decrease <= least_decrease or is_linear:
             break
         damping = _less(damping)

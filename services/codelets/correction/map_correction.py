@@ -8,6 +8,7 @@ Correction node for the apply-correction codelet.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -53,8 +54,7 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
 
     closures = list(graph.of_kind(LoopClosure))
     fresh = [closure.id for closure in closures if closure.accepted is None]
-    late_ns = context.stamp_ns - config.revisit_s * 1e9
-    late = [closure for closure in closures if closure.to_ns > late_ns]
+    late = _late(closures, context.stamp_ns, config)
     if not fresh or len(late) < MIN_AGREEING:
         return []
 
@@ -72,28 +72,20 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     if not closures or len(rows) < 2:
         return Answer()
 
-    steps = steps_of(rows, config)
-    views = views_of(closures, rows)
-    is_consistent = consistent(views, steps, config.false_closure)
-    is_consistent &= views.j - views.i >= MIN_ROWS
-
-    start = _start(rows[:, POSE], steps)
-    path, holds = _accepted(start, steps, views.select(is_consistent), config)
-    is_accepted = np.zeros(len(closures), bool)
-    is_accepted[is_consistent] = holds
-
-    operations = _judged(closures, is_consistent, is_accepted)
+    judgement = _judge(closures, rows, config)
+    operations = _judged(closures, judgement)
     closed_before = {closure.id for closure in closures if closure.accepted}
-    closed = set(_ids(closures, is_accepted))
+    closed = set(_ids(closures, judgement.is_accepted))
     if closed == closed_before:
         return Answer(operations)
 
     seen = Sightings.of(graph.of_kind(Observations), rows[:, STAMP])
-    poses, replays = corrected(path, seen, config)
+    poses, replays = corrected(judgement.path, seen, config)
     operations.append(_correction(rows, poses))
 
+    loops = judgement.path.closures
     replay = msgspec.structs.replace(
-        replay_of(rows, poses, path.closures, config.synapse_decay_per_m),
+        replay_of(rows, poses, loops, config.synapse_decay_per_m),
         stamp_ns=task.stamp_ns,
         cycle=task.cycle,
         replays=replays,
@@ -115,6 +107,12 @@ CODELET = Codelet(
 )
 
 
+def _late(closures: list[LoopClosure], now_ns: int, config: Config) -> list[LoopClosure]:
+    """The closures of the present pass."""
+    since_ns = now_ns - config.revisit_s * 1e9
+    return [closure for closure in closures if closure.to_ns > since_ns]
+
+
 def _next_judgement_ns(closures: list[LoopClosure], config: Config) -> float:
     """When closures may be judged again, by those judged so far; 0 where none was."""
     judged_ns = [closure.to_ns for closure in closures if closure.accepted is not None]
@@ -124,26 +122,57 @@ def _next_judgement_ns(closures: list[LoopClosure], config: Config) -> float:
     return max(judged_ns) + config.closure_spacing_s * 1e9
 
 
+class _Judgement(NamedTuple):
+    """Which closures are consistent with one another (m,) and which are accepted (m,), and the path
+    with those.
+    """
+
+    is_consistent: Booleans
+    is_accepted: Booleans
+    path: PoseGraph
+
+
+def _judge(closures: list[LoopClosure], rows: Floats, config: Config) -> _Judgement:
+    """Which of the closures of path `rows` are consistent, and of these accepted."""
+    steps = steps_of(rows, config)
+    views = views_of(closures, rows)
+    is_consistent = consistent(views, steps, config.false_closure)
+    is_consistent &= views.j - views.i >= MIN_ROWS
+
+    start = _start(rows[:, POSE], steps)
+    path, holds = _accepted(start, steps, views.select(is_consistent), config)
+
+    is_accepted = np.zeros(len(closures), bool)
+    is_accepted[is_consistent] = holds
+    return _Judgement(is_consistent, is_accepted, path)
+
+
 def _start(poses: Floats, steps: Constraints) -> Floats:
     """(n, 3) poses to correct from: those believed, and where no step can have led from one to the
     next, those by path integration.
 
     Beliefs of an agent that was lost for a while would mislead the optimization for good.
     """
+    measured = _possible_steps(poses, steps)
+    heading_rad = poses[0, 2] + cumulative(measured[:, 2])
+
+    turn = rotation_matrices(heading_rad[:-1])
+    steps_m = np.einsum("mab,mb->ma", turn, measured[:, :2])
+    positions_m = poses[0, :2] + cumulative(steps_m)
+    return np.column_stack([positions_m, wrap_angle(heading_rad)])
+
+
+def _possible_steps(poses: Floats, steps: Constraints) -> Floats:
+    """(n - 1, 3): the steps between (n, 3) poses, where path integration makes them possible, and
+    its own elsewhere.
+    """
     believed = residuals(poses, steps)
     squared = mahalanobis2(believed, steps.information)
     is_possible = squared <= IMPOSSIBLE_SD**2
 
     deviation = np.where(is_possible[:, None], believed, 0.0)
-    measured = steps.measurement + deviation
-
-    heading_rad = poses[0, 2] + cumulative(measured[:, 2])
-    turn = rotation_matrices(heading_rad[:-1])
-    steps_m = np.einsum("mab,mb->ma", turn, measured[:, :2])
-    moved_m = cumulative(steps_m)
-
-    positions_m = poses[0, :2] + moved_m
-    return np.column_stack([positions_m, wrap_angle(heading_rad)])
+    possible: Floats = steps.measurement + deviation
+    return possible
 
 
 def _accepted(
@@ -241,12 +270,13 @@ def _between_ends(loops: Constraints, values: Floats) -> Floats:
     return np.asarray(np.abs(change))
 
 
-def _judged(
-    closures: list[LoopClosure], is_consistent: Booleans, is_accepted: Booleans
-) -> list[Operation]:
+def _judged(closures: list[LoopClosure], judgement: _Judgement) -> list[Operation]:
     """The closures whose judgement differs from before."""
+    is_consistent = judgement.is_consistent.tolist()
+    is_accepted = judgement.is_accepted.tolist()
+
     changed: list[Operation] = []
-    judgements = zip(closures, is_consistent.tolist(), is_accepted.tolist(), strict=True)
+    judgements = zip(closures, is_consistent, is_accepted, strict=True)
     for closure, consistent_now, accepted_now in judgements:
         judged = msgspec.structs.replace(
             closure,

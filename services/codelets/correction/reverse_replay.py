@@ -50,12 +50,7 @@ class Displacements:
 def displacements(poses: Floats, constraints: Constraints) -> Displacements:
     """What `constraints` measure of positions where the headings are those of `poses`."""
     covariance = _inverse(constraints.information[:, :2, :2])
-    heading_error_rad = residuals(poses, constraints)[:, 2]
-
-    # Where position and heading are measured together, the position that is expected changes with
-    # the error of the heading.
-    coupling = constraints.information[:, :2, 2] * heading_error_rad[:, None]
-    expected_m = constraints.measurement[:, :2] - _times(covariance, coupling)
+    expected_m = _expected_m(poses, constraints, covariance)
 
     heading_rad = poses[constraints.i, 2]
     turn = rotation_matrices(heading_rad)
@@ -63,6 +58,19 @@ def displacements(poses: Floats, constraints: Constraints) -> Displacements:
         rotate(expected_m, heading_rad),
         turn @ covariance @ turn.mT,
     )
+
+
+def _expected_m(poses: Floats, constraints: Constraints, covariance: Floats) -> Floats:
+    """(m, 2): the offsets that are expected where headings are those of `poses`.
+
+    Where position and heading are measured together, the position that is expected changes with the
+    error of the heading.
+    """
+    heading_error_rad = residuals(poses, constraints)[:, 2]
+    coupling = constraints.information[:, :2, 2] * heading_error_rad[:, None]
+
+    expected_m: Floats = constraints.measurement[:, :2] - _times(covariance, coupling)
+    return expected_m
 
 
 def position_cost(positions_m: Floats, constraints: Constraints, known: Displacements) -> float:
@@ -78,23 +86,30 @@ class Loops:
     """The loops of one path, and the forces by which they hold it together."""
 
     def __init__(self, graph: PoseGraph) -> None:
-        closures = graph.closures
+        self._orient(graph.poses, graph.closures)
+        self._integrate(graph.poses, graph.steps)
+
+        along_m2 = self._across(cumulative(self._step_m2))
+        self.gain = _inverse(along_m2 + self._closing_m2)
+
+    def _orient(self, poses: Floats, closures: Constraints) -> None:
+        """Turn each loop so that it starts before it ends."""
         backwards = closures.i > closures.j
         self._start = np.where(backwards, closures.j, closures.i)
         self._end = np.where(backwards, closures.i, closures.j)
 
-        closing = displacements(graph.poses, closures)
+        closing = displacements(poses, closures)
         offset_m = closing.offset_m
         self._closing_m = np.where(backwards[:, None], -offset_m, offset_m)
         self._closing_m2 = closing.covariance_m2
 
-        step = displacements(graph.poses, graph.steps)
+    def _integrate(self, poses: Floats, steps: Constraints) -> None:
+        """Path integration alone, from the first of `poses`."""
+        step = displacements(poses, steps)
         moved_m = cumulative(step.offset_m)
-        self._step_m2 = step.covariance_m2
-        self._integrated_m = graph.poses[0, :2] + moved_m
 
-        along_m2 = self._across(cumulative(step.covariance_m2))
-        self.gain = _inverse(along_m2 + self._closing_m2)
+        self._integrated_m = poses[0, :2] + moved_m
+        self._step_m2 = step.covariance_m2
 
     @property
     def discrepancy_m(self) -> Floats:

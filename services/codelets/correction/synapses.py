@@ -24,8 +24,8 @@ def replay_of(rows: Floats, poses: Floats, loops: Constraints, decay_per_m: floa
 
     stamps_ns = np.rint(before[:, STAMP] * 1e9)
     pairs = _pairs(after_m, loops, len(rows), 1 / decay_per_m)
-    strength_before = _strengths(before_m, pairs, decay_per_m)
-    strength_after = _strengths(after_m, pairs, decay_per_m)
+    strengths_before = _strengths(before_m, pairs, decay_per_m)
+    strengths_after = _strengths(after_m, pairs, decay_per_m)
     return Replay(
         cycle=0,
         replays=0,
@@ -35,7 +35,7 @@ def replay_of(rows: Floats, poses: Floats, loops: Constraints, decay_per_m: floa
         positions_m=Array.of(before_m),
         shifts_m=Array.of(after_m - before_m),
         pairs=Array.of(pairs.astype(np.int32)),
-        strength_changes=Array.of(strength_after - strength_before),
+        strength_changes=Array.of(strengths_after - strengths_before),
         decay_per_m=decay_per_m,
     )
 
@@ -51,13 +51,18 @@ def _first_place(loops: Constraints) -> int:
 
 def _strengths(positions_m: Floats, pairs: Indices, decay_per_m: float) -> Floats:
     """(m,): the synaptic strengths of pairs of place cells."""
-    first_m = positions_m[pairs[:, 0]]
-    second_m = positions_m[pairs[:, 1]]
-    apart_m = first_m - second_m
-
-    distance_m = np.hypot(apart_m[:, 0], apart_m[:, 1])
+    distance_m = _distances_m(positions_m, pairs)
     strengths: Floats = np.exp(-decay_per_m * distance_m)
     return strengths
+
+
+def _distances_m(positions_m: Floats, pairs: Indices) -> Floats:
+    """(m,): how far the two of each pair are from one another."""
+    first_m = positions_m[pairs[:, 0]]
+    second_m = positions_m[pairs[:, 1]]
+
+    apart_m = first_m - second_m
+    return np.asarray(np.hypot(*apart_m.T))
 
 
 def _pairs(fields_m: Floats, loops: Constraints, places: int, reach_m: float) -> Indices:
@@ -66,20 +71,24 @@ def _pairs(fields_m: Floats, loops: Constraints, places: int, reach_m: float) ->
 
     Cells are numbered from the newest of the path's `places` on.
     """
-    cells = np.arange(len(fields_m))
-    neighbours = np.column_stack([cells[:-1], cells[1:]])
-
     newest = places - 1
     ends = np.column_stack([newest - loops.j, newest - loops.i])
+
     crossings = []
     for newer, older in ends.tolist():
         for cell in _same_place(fields_m, newer, older, reach_m):
             crossings.append((cell, older))
 
     crossing = np.array(crossings, np.int64).reshape(-1, 2)
-    pairs = np.vstack([neighbours, crossing])
+    pairs = np.vstack([_neighbours(len(fields_m)), crossing])
     different: Indices = np.unique(pairs, axis=0)
     return different
+
+
+def _neighbours(count: int) -> Indices:
+    """(count - 1, 2): each cell and the next."""
+    cells = np.arange(count)
+    return np.column_stack([cells[:-1], cells[1:]])
 
 
 def _same_place(fields_m: Floats, newer: int, older: int, reach_m: float) -> list[int]:

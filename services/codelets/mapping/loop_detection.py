@@ -11,7 +11,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from cogmap.errors import MessageError
-from cogmap.geometry.arrays import Floats, Indices
+from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.geometry.se2 import rotation_matrices
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
@@ -33,6 +33,7 @@ from services.codelets.correction.pairwise_consistency import MIN_AGREEING
 from services.codelets.localization.measurement_model import has_bearing, has_range
 from services.codelets.mapping.observations import Sightings
 from services.codelets.mapping.path import ODOMETRY, STAMP, path_grows, rows_of
+from services.codelets.nodes import nodes_of
 
 SAME_M = 6.0
 PLACE_CUE = ""
@@ -253,18 +254,12 @@ def _closure_id(task: Task, cue: str) -> str:
 
 def _observed(landmark: Object, graph: Graph) -> tuple[list[Observations], Floats]:
     """All observations of a landmark, and the rows of the path segments they were made along."""
-    observations = []
-    for name in graph.links.sources(landmark.id, LinkKind.OBSERVES):
-        node = graph.get(Observations, name)
-        if node is not None:
-            observations.append(node)
+    names = graph.links.sources(landmark.id, LinkKind.OBSERVES)
+    observations = nodes_of(graph, Observations, names)
 
-    path = []
-    for number in sorted({node.number for node in observations}):
-        segment = graph.get(PathSegment, segment_id(number))
-        if segment is not None:
-            path.append(segment)
-
+    numbers = sorted({node.number for node in observations})
+    segments = [segment_id(number) for number in numbers]
+    path = nodes_of(graph, PathSegment, segments)
     return observations, rows_of(path)
 
 
@@ -281,9 +276,7 @@ def _clearest(seen: Sightings, rows: Floats, before_ns: int) -> Indices:
         return known
 
     where_m = _where_by_odometry_m(seen, rows, known)
-    is_same = _apart_m(where_m) <= SAME_M
-    agreeing = is_same.sum(axis=1)
-    chosen = known[is_same[agreeing.argmax()]]
+    chosen = known[_most_agreeing(where_m)]
 
     distance_m = np.hypot(*seen.where_m[chosen].T)
     nearest_first = np.argsort(distance_m, kind="stable")
@@ -300,6 +293,15 @@ def _where_by_odometry_m(seen: Sightings, rows: Floats, known: Indices) -> Float
     offset_m = np.einsum("mab,mb->ma", turn, seen.where_m[known])
     where_m: Floats = poses[:, :2] + offset_m
     return where_m
+
+
+def _most_agreeing(points_m: Floats) -> Booleans:
+    """(k,): which of (k, 2) points are near the one that most of them are near."""
+    is_near = _apart_m(points_m) <= SAME_M
+    near_count = is_near.sum(axis=1)
+
+    chosen: Booleans = is_near[near_count.argmax()]
+    return chosen
 
 
 def _apart_m(points_m: Floats) -> Floats:

@@ -127,17 +127,21 @@ class Sightings(NamedTuple):
         """(m,) how much each counts, the path being at (n, 3) `poses` and landmarks at (k, 2):
         Cauchy's weights.
         """
-        turn = rotation_matrices(poses[self.place, 2])
-        position_m = poses[self.place, :2]
-        offset_m = landmarks_m[self.landmark] - position_m
-        expected_m = np.einsum("mba,mb->ma", turn, offset_m)
-
-        residual_m = expected_m - self.where_m
+        residual_m = self._expected_m(poses, landmarks_m) - self.where_m
         squared = np.einsum("ma,mab,mb->m", residual_m, self.information, residual_m)
         doubt = squared / DOUBTED**2
 
         weights: Floats = 1 / (1 + doubt)
         return weights
+
+    def _expected_m(self, poses: Floats, landmarks_m: Floats) -> Floats:
+        """(m, 2): where each sighting should be, in the frame of its place."""
+        position_m = poses[self.place, :2]
+        offset_m = landmarks_m[self.landmark] - position_m
+
+        turn = rotation_matrices(poses[self.place, 2])
+        expected_m: Floats = np.einsum("mba,mb->ma", turn, offset_m)
+        return expected_m
 
     def landmarks_m(self, poses: Floats) -> Floats:
         """(k, 2): where the landmarks are most likely, the path being at (n, 3) `poses`."""
@@ -166,16 +170,19 @@ class Sightings(NamedTuple):
 
     def _means_m(self, seen_m: Floats, information: Floats) -> Floats:
         """(k, 2): the mean of where each landmark was seen, (m, 2), by (m, 2, 2) information."""
-        count = len(self.labels)
-        total = np.zeros((count, 2, 2))
-        np.add.at(total, self.landmark, information)
-
         weighed_m = np.einsum("mab,mb->ma", information, seen_m)
-        pull = np.zeros((count, 2))
-        np.add.at(pull, self.landmark, weighed_m)
+        total = self._sums(information)
+        pull = self._sums(weighed_m)
 
         means_m = np.linalg.solve(total, pull[..., None])
         return np.asarray(means_m[..., 0], np.float64)
+
+    def _sums(self, values: Floats) -> Floats:
+        """(k, ...): the sum of the (m, ...) values of each landmark's sightings."""
+        _, *shape = values.shape
+        sums = np.zeros((len(self.labels), *shape))
+        np.add.at(sums, self.landmark, values)
+        return sums
 
     def constraints(self, first_landmark: int, weights: Floats) -> Constraints:
         """Between places of the path and landmarks, the latter as poses from number

@@ -35,6 +35,7 @@ from services.codelets.config import SECTION, Config
 from services.codelets.correction.pose_graph import Constraints, diagonal_information
 from services.codelets.localization.measurement_model import has_bearing, has_range
 from services.codelets.mapping.observations import Viewpoint, extended, is_observed_from
+from services.codelets.nodes import nodes_of
 
 ROWS = 64
 COLUMNS = len(PathColumn)
@@ -72,11 +73,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     operations: list[Operation] = []
     if _is_apart(rows, agent, config.path_spacing_m) or _is_lost_since(rows, agent):
         row = _row(task.stamp_ns, agent)
-        if len(rows) >= ROWS:
-            number += 1
-            rows = row
-        else:
-            rows = np.vstack([rows, row])
+        number, rows = _appended(number, rows, row)
         operations += segments(rows, number)
 
     viewpoint = _viewpoint(agent, number, rows[-1])
@@ -168,16 +165,25 @@ def steps_of(rows: Floats, config: Config) -> Constraints:
     odometry = rows[:, ODOMETRY]
     steps = relative(odometry[:-1], odometry[1:])
 
-    stated_m2, stated_rad2 = np.diff(rows[:, VARIANCES], axis=0).T
+    variances = rows[:, VARIANCES]
+    stated = np.diff(variances, axis=0)
+    information = _step_information(steps, stated, config)
+    return Constraints(places, places + 1, steps, information)
+
+
+def _step_information(steps: Floats, stated: Floats, config: Config) -> Floats:
+    """(m, 3, 3): the information of (m, 3) steps, by the variances that are `stated` of position
+    and heading, (m, 2), or the least ones.
+    """
+    stated_m2, stated_rad2 = stated.T
     least_m2, least_rad2 = _least_variances(steps, config)
+
     variance_m2 = np.maximum(least_m2, stated_m2)
     variance_rad2 = np.maximum(least_rad2, stated_rad2)
-
-    information = diagonal_information(
+    return diagonal_information(
         position=1 / variance_m2,
         heading=1 / variance_rad2,
     )
-    return Constraints(places, places + 1, steps, information)
 
 
 def _least_variances(steps: Floats, config: Config) -> tuple[Floats, Floats]:
@@ -199,6 +205,14 @@ def _last_rows(graph: Graph) -> tuple[int, Floats]:
         return 0, np.zeros((0, COLUMNS))
 
     return last.number, last.rows.numpy()
+
+
+def _appended(number: int, rows: Floats, row: Floats) -> tuple[int, Floats]:
+    """The last segment, `number` with `rows`, after one more row: the next where it was full."""
+    if len(rows) >= ROWS:
+        return number + 1, row
+
+    return number, np.vstack([rows, row])
 
 
 def _viewpoint(agent: Self, number: int, row: Floats) -> Viewpoint:
@@ -276,23 +290,26 @@ def _observe(percept: Percept, viewpoint: Viewpoint, graph: Graph) -> list[Opera
     if before is not None:
         return [after]
 
-    landmark = object_id(percept.label)
-    segment = segment_id(viewpoint.number)
+    return [after, *_links_of(after)]
+
+
+def _links_of(observations: Observations) -> list[Link]:
+    """From new observations to the landmark and to the path segment."""
+    landmark = object_id(observations.landmark)
+    segment = segment_id(observations.number)
+
     return [
-        after,
-        Link(source=after.id, target=landmark, kind=LinkKind.OBSERVES),
-        Link(source=after.id, target=segment, kind=LinkKind.ALONG),
+        Link(source=observations.id, target=landmark, kind=LinkKind.OBSERVES),
+        Link(source=observations.id, target=segment, kind=LinkKind.ALONG),
     ]
 
 
 def objects_along(graph: Graph, segment: PathSegment) -> list[tuple[Observations, Object]]:
     """The observations along a path segment, by landmark, of objects that the map has."""
-    found = []
-    for name in sorted(graph.links.sources(segment.id, LinkKind.ALONG)):
-        observations = graph.get(Observations, name)
-        if observations is None:
-            continue
+    names = sorted(graph.links.sources(segment.id, LinkKind.ALONG))
 
+    found = []
+    for observations in nodes_of(graph, Observations, names):
         landmark = graph.get(Object, object_id(observations.landmark))
         if landmark is not None:
             found.append((observations, landmark))

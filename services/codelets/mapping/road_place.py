@@ -81,17 +81,21 @@ def _activated(map_id: str, pose: Floats, cell_m: float, cycle: int) -> Cells:
     )
 
 
-def _road_cells(points_m: Array, pose: Floats, cell_m: float) -> tuple[Cell32, Share32]:
-    """(k, 2) cells that are seen as road by (n, 2) points in the robot's frame, and how much, (k,),
-    0 to 1.
-    """
+def _near_m(points_m: Array) -> Floats:
+    """(k, 2): the points within reach, of (n, 2) in the robot's frame."""
     points = np.asarray(points_m.numpy(), np.float64)
     seen_m = points.reshape(-1, 2)
 
     range_m = np.hypot(seen_m[:, 0], seen_m[:, 1])
-    is_near = range_m < ROAD_REACH_M
+    near_m: Floats = seen_m[range_m < ROAD_REACH_M]
+    return near_m
 
-    on_map_m = transform_from(pose, seen_m[is_near])
+
+def _road_cells(points_m: Array, pose: Floats, cell_m: float) -> tuple[Cell32, Share32]:
+    """(k, 2) cells that are seen as road by (n, 2) points in the robot's frame, and how much, (k,),
+    0 to 1.
+    """
+    on_map_m = transform_from(pose, _near_m(points_m))
     seen_cells = np.rint(on_map_m / cell_m).astype(np.int32)
 
     cells, counts = np.unique(seen_cells, axis=0, return_counts=True)

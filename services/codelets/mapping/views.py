@@ -71,8 +71,8 @@ def constraints_of(views: Views, poses: Floats) -> Constraints:
     """
     origins = poses[views.i]
     step = relative(origins, poses[views.j])
-
     turn_rad = np.where(views.has_heading, 0.0, step[:, 2])
+
     turn = rotation_matrices(turn_rad)
     seen_m = np.einsum("mab,mb->ma", turn, views.here_m)
 
@@ -84,12 +84,7 @@ def constraints_of(views: Views, poses: Floats) -> Constraints:
 
 def _information(views: Views, seen_m: Floats) -> Floats:
     """(m, 3, 3): the information of the views of (m, 2) points, about the place of view."""
-    jacobian = np.zeros((len(seen_m), 2, 3))
-    jacobian[:, 0, 0] = 1.0
-    jacobian[:, 1, 1] = 1.0
-    jacobian[:, 0, 2] = -seen_m[:, 1]
-    jacobian[:, 1, 2] = seen_m[:, 0]
-
+    jacobian = _jacobian(seen_m)
     variance_m2 = views.sd_m[:, None, None] ** 2
     information: Floats = jacobian.mT @ jacobian / variance_m2
 
@@ -97,3 +92,15 @@ def _information(views: Views, seen_m: Floats) -> Floats:
     known_sd_rad = views.sd_rad[has_heading]
     information[has_heading, 2, 2] += known_sd_rad**-2
     return information
+
+
+def _jacobian(seen_m: Floats) -> Floats:
+    """(m, 2, 3): how (m, 2) points move with the pose of who sees them there."""
+    jacobian = np.zeros((len(seen_m), 2, 3))
+    jacobian[:, 0, 0] = 1.0
+    jacobian[:, 1, 1] = 1.0
+
+    x_m, y_m = seen_m.T
+    jacobian[:, 0, 2] = -y_m
+    jacobian[:, 1, 2] = x_m
+    return jacobian
