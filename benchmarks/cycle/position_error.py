@@ -5,6 +5,7 @@ The drives run in lockstep in one process each, so the errors do not depend on t
 
 from __future__ import annotations
 
+import gc
 from dataclasses import dataclass
 from functools import partial
 
@@ -53,6 +54,20 @@ def over_fused(processes: int) -> Metrics:
 
 def mean_errors(town: int, laps: float) -> MeanErrors:
     """Drive `laps` of the town of that seed. Raises CogmapError where it does not end its route."""
+    observer = _drive(town, laps)
+    # A process has one renderer at a time, which goes with its module: now, before the next town.
+    gc.collect()
+
+    errors = observer.errors()
+    return MeanErrors(
+        estimate_m=float(errors.estimate_m.mean()),
+        fused_m=float(errors.fused_m.mean()),
+        wheels_m=float(errors.wheels_m.mean()),
+    )
+
+
+def _drive(town: int, laps: float) -> Observer:
+    """Run all modules in this process until the route is complete."""
     choices = Choices(seed=town, laps=laps, lockstep=True, record=False)
     sections = effective({}, choices, awaited(choices, observer=True))
     observer = Observer()
@@ -68,12 +83,7 @@ def mean_errors(town: int, laps: float) -> MeanErrors:
         share = f"{observer.progress:.0%}"
         raise CogmapError(f"the drive of town {town} ended at {share} of its route")
 
-    errors = observer.errors()
-    return MeanErrors(
-        estimate_m=float(errors.estimate_m.mean()),
-        fused_m=float(errors.fused_m.mean()),
-        wheels_m=float(errors.wheels_m.mean()),
-    )
+    return observer
 
 
 def _observing(observer: Observer) -> Module:
