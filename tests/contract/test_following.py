@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 import pytest
 
-from cogmap.bus.codec import decode
+from cogmap.bus.interface import Member
 from cogmap.graph.graph import Graph
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
@@ -15,9 +16,19 @@ from schemas import topics
 from schemas.base import Message
 from schemas.graph import Delta, DropNode, Link, Operation, Phase, SnapshotRequest
 from schemas.nodes import Node
-from schemas.process import Health
-from schemas.sensing import MotorCommand, Odometry
-from tests.support.networks import Network, Peer, meet, publish, spin_until, working
+from schemas.sensing import MotorCommand
+from tests.support.logs import odometry
+from tests.support.networks import (
+    TIMEOUT_S,
+    Network,
+    Peer,
+    await_members,
+    meet,
+    next_health,
+    publish,
+    spin_until,
+    working,
+)
 
 
 class Workspace:
@@ -25,6 +36,9 @@ class Workspace:
 
     def __init__(self, network: Network, graph: Graph | None = None, answers: bool = True) -> None:
         self.graph = Graph() if graph is None else graph
+        self._observer = network.join()
+        # In memory a query is answered on the thread of whoever asks.
+        self._changing = threading.Lock()
         module = Module("workspace", emits={topics.DELTA})
         if answers:
             module.serve(topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, self._snapshot)
@@ -35,34 +49,49 @@ class Workspace:
         for _ in range(number):
             self.shell.inbox.call(lambda: self._commit(lost))
 
+    def settle(self) -> None:
+        """Wait until every commit so far is published: who joins then receives none of them."""
+        settled = threading.Event()
+        self.shell.inbox.call(settled.set)
+        assert settled.wait(TIMEOUT_S), "the commits take too long"
+
+    @contextmanager
+    def running(self, *others: Shell) -> Iterator[None]:
+        """Run it; it answers, and what it publishes reaches the others, from now on."""
+        with working(self.shell):
+            await_members(self._observer, Member("workspace", "workspace"))
+            meet(self.shell.bus, *(other.bus for other in others))
+            yield
+
     def _commit(self, lost: bool) -> None:
         version = self.graph.version + 1
-        delta = Delta(
-            version=version, cycle=version, phase=Phase.OBJECTS, operations=changes(version)
-        )
-        self.graph.apply(delta)
+        operations = changes(version)
+        delta = Delta(version=version, cycle=version, phase=Phase.OBJECTS, operations=operations)
+        with self._changing:
+            self.graph.apply(delta)
+
         numbered = self.shell.module.stamp(delta)
         if not lost:
             self.shell.publish(numbered)
 
     def _snapshot(self, request: SnapshotRequest) -> Message:
-        return self.graph.snapshot()
-
-    @contextmanager
-    def running(self, *others: Shell) -> Iterator[None]:
-        """Run it; what it publishes from now on reaches the others."""
-        with working(self.shell):
-            meet(self.shell.bus, *(other.bus for other in others))
-            yield
+        with self._changing:
+            return self.graph.snapshot()
 
 
 def changes(version: int) -> list[Operation]:
     """Another node at every version, and every third forgotten again."""
     node = Node(id=f"building-{version}", kind="thing", activation=0.5)
-    operations: list[Operation] = [node, Link(source=node.id, target="self", kind="near")]
-    if version % 3 == 0:
-        operations.append(DropNode(id=f"building-{version - 2}"))
-    return operations
+    link = Link(source=node.id, target="self", kind="near")
+    if version % 3:
+        return [node, link]
+
+    forgotten = DropNode(id=f"building-{version - 2}")
+    return [node, link, forgotten]
+
+
+def stopped(stamp_ns: int) -> MotorCommand:
+    return MotorCommand(left_wheel_rad_s=0.0, right_wheel_rad_s=0.0, stamp_ns=stamp_ns)
 
 
 class Followed:
@@ -77,21 +106,24 @@ class Followed:
         )
         self.shell = Shell(module, network.join(), health=health)
 
-    def _on_delta(self, delta: Delta) -> MotorCommand:
-        assert self.graph.version >= delta.version
-        self.versions.append(delta.version)
-        return MotorCommand(left_wheel_rad_s=0.0, right_wheel_rad_s=0.0, stamp_ns=delta.version)
-
-    def _on_load(self) -> None:
-        self.loads.append(self.graph.version)
-
     def catch_up(self, workspace: Workspace, version: int) -> None:
-        """Work until both are at `version`."""
+        """Spin until both are at `version`."""
         spin_until(lambda: workspace.graph.version == version, self.shell)
         spin_until(lambda: self.graph.version == version, self.shell)
 
     def agrees_with(self, workspace: Workspace) -> bool:
-        return self.graph.digest() == workspace.graph.digest()
+        here = self.graph.digest()
+        there = workspace.graph.digest()
+        return here == there
+
+    def _on_delta(self, delta: Delta) -> MotorCommand:
+        assert self.graph.version >= delta.version
+        self.versions.append(delta.version)
+        return stopped(delta.version)
+
+    def _on_load(self) -> None:
+        version = self.graph.version
+        self.loads.append(version)
 
 
 @pytest.fixture
@@ -121,9 +153,10 @@ def test_a_follower_that_joins_late_begins_with_a_snapshot(
 
     with workspace.running():
         workspace.commit(10)
-        spin_until(lambda: workspace.graph.version == 10)
+        workspace.settle()
         follower.shell.open()
         assert follower.graph.version == 10
+
         meet(workspace.shell.bus, follower.shell.bus)
         workspace.commit(5)
         follower.catch_up(workspace, 15)
@@ -181,7 +214,8 @@ def test_a_follower_that_restarts_has_the_graph_again(network: Network) -> None:
         first.catch_up(workspace, 6)
         first.shell.close()
         workspace.commit(6)
-        spin_until(lambda: workspace.graph.version == 12)
+        workspace.settle()
+
         second = Followed(network)
         second.shell.open()
         meet(workspace.shell.bus, second.shell.bus)
@@ -190,6 +224,14 @@ def test_a_follower_that_restarts_has_the_graph_again(network: Network) -> None:
 
     assert second.agrees_with(workspace)
     second.shell.close()
+
+
+def graph_at(version: int) -> Graph:
+    """A graph of so many commits that changed nothing."""
+    graph = Graph()
+    for number in range(1, version + 1):
+        graph.apply(Delta(version=number, cycle=number, phase=Phase.END, operations=[]))
+    return graph
 
 
 @pytest.mark.parametrize("kept", [5, 8, 0], ids=["all kept", "one more kept", "nothing kept"])
@@ -201,11 +243,8 @@ def test_a_workspace_that_restarts_is_followed(
     with before.running(follower.shell):
         before.commit(5)
         follower.catch_up(before, 5)
-    graph = Graph()
-    for version in range(1, kept + 1):
-        graph.apply(Delta(version=version, cycle=version, phase=Phase.END, operations=[]))
 
-    after = Workspace(network, graph)
+    after = Workspace(network, graph_at(kept))
     with after.running(follower.shell):
         after.commit(3)
         follower.catch_up(after, kept + 3)
@@ -230,10 +269,7 @@ def test_a_delta_is_applied_before_any_later_message_is_received(network: Networ
         for version in range(1, 6):
             workspace.commit()
             spin_until(lambda: graph.version == version, follower)  # noqa: B023
-            odometry = Odometry(
-                speed_m_s=0.0, turn_rate_rad_s=0.0, dt_s=0.1, seq=version - 1, source="sim"
-            )
-            publish(sim, odometry)
+            publish(sim, odometry(version - 1))
             spin_until(lambda: len(seen) == version, follower)  # noqa: B023
 
     assert seen == [1, 2, 3, 4, 5]
@@ -246,7 +282,7 @@ def test_a_snapshot_is_named_among_the_causes(network: Network, follower: Follow
 
     with workspace.running():
         workspace.commit(4)
-        spin_until(lambda: workspace.graph.version == 4)
+        workspace.settle()
         follower.shell.open()
         meet(workspace.shell.bus, follower.shell.bus)
         meet(follower.shell.bus, peer.bus)
@@ -273,12 +309,8 @@ def test_health_reports_a_graph_that_is_behind(network: Network) -> None:
         silent.commit(1, lost=True)
         silent.commit(1)
         spin_until(lambda: bool(follower.shell.notes), follower.shell)
-        reports = peer.arrived
-        spin_until(lambda: peer.arrived > reports, follower.shell)
+        health = next_health(peer, follower.shell)
 
-    (arrival,) = peer.take(1)
-    health = decode(topics.HEALTH, arrival.payload)
-    assert isinstance(health, Health)
     assert health.notes == [
         "the graph stays at version 1: deltas are missing "
         "and no snapshot is to be had from the workspace"

@@ -11,7 +11,7 @@ from typing import Protocol
 
 import zenoh
 
-from cogmap.bus.codec import Envelope, decode_envelope, encode
+from cogmap.bus.codec import Envelope, decode, decode_envelope, encode
 from cogmap.bus.interface import Arrival, Bus, Member
 from cogmap.bus.memory import MemoryBus, MemoryNetwork
 from cogmap.bus.session import free_endpoint, open_client, open_router
@@ -21,6 +21,7 @@ from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.base import Message
+from schemas.process import Health
 from schemas.topics import Topic
 
 TIMEOUT_S = 20.0
@@ -177,6 +178,21 @@ def spin_until(condition: Callable[[], bool], *shells: Shell) -> None:
         assert time.monotonic() < deadline_s, "the condition never held"
         for shell in shells:
             shell.spin_once(0.01)
+
+
+def next_health(peer: Peer, shell: Shell) -> Health:
+    """Spin `shell` until `peer` has a report that it made from now on.
+
+    Earlier ones may still be under way.
+    """
+    now_ns = time.time_ns()
+    while True:
+        spin_until(lambda: len(peer.inbox) > 0, shell)
+        (arrival,) = peer.take(1)
+        health = decode(topics.HEALTH, arrival.payload)
+        assert isinstance(health, Health)
+        if health.stamp_ns >= now_ns:
+            return health
 
 
 @contextmanager
