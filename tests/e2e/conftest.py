@@ -16,10 +16,10 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Run]]:
     runs: list[Run] = []
 
     def start(*arguments: str, file_limit_bytes: int | None = None) -> Run:
-        runs.append(
-            Run(tmp_path / f"run-{len(runs)}", *arguments, file_limit_bytes=file_limit_bytes)
-        )
-        return runs[-1]
+        folder = tmp_path / f"run-{len(runs)}"
+        run = Run(folder, *arguments, file_limit_bytes=file_limit_bytes)
+        runs.append(run)
+        return run
 
     yield start
     for run in runs:

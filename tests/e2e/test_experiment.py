@@ -13,6 +13,7 @@ from services import registry
 
 COGMAP = [sys.executable, "-m", "cli.main", "experiment"]
 TIMEOUT_S = 110.0
+LOOP_M = [(0.0, 0.0), (60.0, 0.0), (60.0, 40.0), (0.0, 40.0), (0.0, 0.0), (60.0, 0.0)]
 
 
 def _run(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -26,44 +27,35 @@ def test_cue_integration_gives_the_same_bytes_through_real_processes(
 ) -> None:
     out = tmp_path / "out"
     chosen = tmp_path / "cue.json"
-    done = _run(
-        "cue-integration",
-        "--trials",
-        "8",
-        "--live",
-        "--seed",
-        "3",
-        "--out",
-        str(out),
-        "--json",
-        str(chosen),
-    )
+    options = ("--trials", "8", "--live", "--seed", "3")
+
+    done = _run("cue-integration", *options, "--out", str(out), "--json", str(chosen))
     assert done.returncode == 0, done.stdout + done.stderr
-    figures = json.loads(chosen.read_text())
-    assert figures["live_same"] == 1.0
-    assert figures["seed"] == 3 and "cue-integration --trials 8" in figures["command"]
-    assert figures["sd_both_m"] < figures["sd_self_motion_m"]
-    assert figures == json.loads((out / "cue-integration.json").read_text())
+
+    metrics = json.loads(chosen.read_text())
+    assert metrics["live_same"] == 1.0
+    assert metrics["seed"] == 3
+    assert "cue-integration --trials 8" in metrics["command"]
+    assert metrics["sd_both_m"] < metrics["sd_self_motion_m"]
+    assert metrics == json.loads((out / "cue-integration.json").read_text())
     assert (out / "cue-integration.png").read_bytes().startswith(b"\x89PNG")
     assert (out / "cue-integration.pdf").read_bytes().startswith(b"%PDF")
 
 
 def test_a_json_file_in_no_folder_is_one_sentence_and_code_2(tmp_path: Path) -> None:
-    done = _run("cue-integration", "--json", str(tmp_path / "nowhere" / "cue.json"))
+    path = tmp_path / "nowhere" / "cue.json"
+
+    done = _run("cue-integration", "--json", str(path))
+
     assert done.returncode == 2
-    assert "there is no folder" in done.stderr and len(done.stderr.splitlines()) == 1
+    assert "there is no folder" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
 
 
 def test_a_loop_is_closed_with_the_same_bytes_through_real_processes() -> None:
     configured = sections(1, "heading")
-    configured["sim"]["trajectory"]["line_m"] = [
-        (0.0, 0.0),
-        (60.0, 0.0),
-        (60.0, 40.0),
-        (0.0, 40.0),
-        (0.0, 0.0),
-        (60.0, 0.0),
-    ]
-    modules = MODULES
-    assert driven(configured, [registry.build(name, configured) for name in modules]).replays
-    assert live.differing(configured, modules) == []
+    configured["sim"]["trajectory"]["line_m"] = LOOP_M
+    modules = [registry.build(name, configured) for name in MODULES]
+
+    assert driven(configured, modules).replays
+    assert live.differing(configured, MODULES) == []

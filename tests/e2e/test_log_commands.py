@@ -9,8 +9,9 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -29,6 +30,7 @@ from tests.support.networks import routed
 
 COUNT = 5
 TIMEOUT_S = 30.0
+AGENT = "replayed"
 REPLAY = [sys.executable, "-m", "cli.main", "log", "replay"]
 PLAYED = {"odometry": COUNT, "sensory/scan": COUNT}
 
@@ -38,10 +40,11 @@ def write(path: Path, speed_m_s: float = 1.0, without: int | None = None) -> Pat
     values = Array.of(np.arange(4, dtype=np.float32))
     rows: list[tuple[int, Message]] = []
     for seq in range(COUNT):
+        if seq == without:
+            continue
         at_ns = SECOND_NS * (seq + 1)
-        if seq != without:
-            rows.append((at_ns, odometry(seq, stamp_ns=at_ns, speed_m_s=speed_m_s)))
-            rows.append((at_ns, scan(seq, stamp_ns=at_ns, values=values)))
+        rows.append((at_ns, odometry(seq, stamp_ns=at_ns, speed_m_s=speed_m_s)))
+        rows.append((at_ns, scan(seq, stamp_ns=at_ns, values=values)))
     return write_log(path, rows, incarnation=5)
 
 
@@ -50,80 +53,106 @@ def path(tmp_path: Path) -> Path:
     return write(tmp_path / "log.mcap")
 
 
-@pytest.fixture
-def run() -> Callable[..., Result]:
-    def invoke(*arguments: str | Path) -> Result:
-        result = CliRunner().invoke(cogmap, ["log", *map(str, arguments)], standalone_mode=False)
-        if result.exception is not None and not isinstance(result.exception, SystemExit):
-            raise result.exception
-        return result
+def run(*arguments: str | Path) -> Result:
+    """Run `cogmap log` in this process. Raises what it raises."""
+    given = ["log", *map(str, arguments)]
+    result = CliRunner().invoke(cogmap, given, standalone_mode=False)
+    error = result.exception
+    if error is not None and not isinstance(error, SystemExit):
+        raise error
+    return result
 
-    return invoke
+
+def run_json(*arguments: str | Path) -> dict[str, Any]:
+    """What `cogmap log` prints as JSON."""
+    result = run(*arguments, "--json")
+    printed: dict[str, Any] = json.loads(result.stdout)
+    return printed
 
 
-def test_info_counts_the_messages_of_each_topic_by_source(
-    run: Callable[..., Result], path: Path
-) -> None:
-    found = json.loads(run("info", path, "--json").stdout)
-    assert (found["agent"], found["messages"], found["duration_s"]) == ("a", 2 * COUNT, 4.0)
-    assert found["gaps"] == []
-    rows = {topic["topic"]: topic for topic in found["topics"]}
-    wheels = rows["odometry"]
-    assert (wheels["count"], wheels["rate_hz"]) == (COUNT, 1.25)
-    assert wheels["sources"] == {"sim": COUNT}
+def cat(path: Path, *arguments: str) -> list[dict[str, Any]]:
+    """What `cogmap log cat` prints as JSON, message by message."""
+    result = run("cat", path, *arguments, "--json")
+    return [json.loads(line) for line in result.stdout.splitlines()]
+
+
+def test_info_counts_the_messages_of_each_topic_by_source(path: Path) -> None:
+    found = run_json("info", path)
     text = run("info", path).stdout
+
+    assert found["agent"] == "a"
+    assert found["messages"] == 2 * COUNT
+    assert found["duration_s"] == 4.0
+    assert found["gaps"] == []
+
+    (wheels,) = (topic for topic in found["topics"] if topic["topic"] == "odometry")
+    assert wheels["count"] == COUNT
+    assert wheels["rate_hz"] == 1.25
+    assert wheels["sources"] == {"sim": COUNT}
+
     assert "sim:5" in text
     assert "its recorder did not end it" in text.lower()
 
 
-def test_info_names_a_gap(run: Callable[..., Result], tmp_path: Path) -> None:
+def test_info_names_a_gap(tmp_path: Path) -> None:
     thin = write(tmp_path / "thin.mcap", without=2)
-    assert "gap: odometry (never drop): 1 of sim missing, number 2" in run("info", thin).stdout
+
+    text = run("info", thin).stdout
+
+    assert "gap: odometry (never drop): 1 of sim missing, number 2" in text
 
 
-def test_cat_prints_the_messages_of_the_topics_named_and_no_more_than_asked(
-    run: Callable[..., Result], path: Path
-) -> None:
-    printed = run("cat", path, "odometry", "-n", "3", "--json").stdout
-    lines = [json.loads(line) for line in printed.splitlines()]
+def test_cat_prints_the_messages_of_the_topics_named_and_no_more_than_asked(path: Path) -> None:
+    lines = cat(path, "odometry", "-n", "3")
+
     assert [line["message"]["seq"] for line in lines] == [0, 1, 2]
     assert {line["topic"] for line in lines} == {"odometry"}
     assert lines[0]["envelope"]["source"] == "sim"
-    text = run("cat", path, "sensory/scan", "-n", "1").stdout
-    assert text.startswith("--- sensory/scan at 0.000 s\nstamp_ns: 1000000000\n")
-    assert "range_m: <f4 4, 0.0 to 3.0" in text
-    assert "[0.0, 1.0, 2.0, 3.0]" in run("cat", path, "sensory/scan", "-n", "1", "--full").stdout
 
 
-def test_cat_begins_at_the_offset(run: Callable[..., Result], path: Path) -> None:
-    lines = run("cat", path, "odometry", "--json", "--start-offset", "3").stdout.splitlines()
-    assert [json.loads(line)["message"]["seq"] for line in lines] == [3, 4]
+def test_cat_prints_the_values_of_an_array_where_asked(path: Path) -> None:
+    brief = run("cat", path, "sensory/scan", "-n", "1").stdout
+    full = run("cat", path, "sensory/scan", "-n", "1", "--full").stdout
+
+    assert brief.startswith("--- sensory/scan at 0.000 s\nstamp_ns: 1000000000\n")
+    assert "range_m: <f4 4, 0.0 to 3.0" in brief
+    assert "[0.0, 1.0, 2.0, 3.0]" in full
+
+
+def test_cat_begins_at_the_offset(path: Path) -> None:
+    lines = cat(path, "odometry", "--start-offset", "3")
+
+    assert [line["message"]["seq"] for line in lines] == [3, 4]
 
 
 def test_diff_ends_with_0_for_the_same_and_1_with_words_for_a_difference(
-    run: Callable[..., Result], path: Path, tmp_path: Path
+    path: Path, tmp_path: Path
 ) -> None:
     same = write(tmp_path / "same.mcap")
     other = write(tmp_path / "other.mcap", speed_m_s=2.0)
-    assert run("diff", path, same).exit_code == 0
+
     result = run("diff", path, other)
-    assert result.exit_code == 1
+
     first = "odometry number 0 of sim (stamp 1.000 s): speed_m_s is 1.0 in log.mcap"
+    assert result.exit_code == 1
     assert f"First difference: {first}" in result.stdout
+    assert run_json("diff", path, other)["same"] is False
+    assert run("diff", path, same).exit_code == 0
     assert run("diff", path, other, "sensory/scan").exit_code == 0
-    assert json.loads(run("diff", path, other, "--json").stdout)["same"] is False
 
 
-def test_recover_prints_what_it_saved_and_what_is_lost(
-    run: Callable[..., Result], path: Path, tmp_path: Path
-) -> None:
+def test_recover_prints_what_it_saved_and_what_is_lost(path: Path, tmp_path: Path) -> None:
+    whole = path.read_bytes()
     cut = tmp_path / "cut.mcap"
-    cut.write_bytes(path.read_bytes()[:-1500])
-    result = run("recover", cut, tmp_path / "saved.mcap", "--json")
-    assert json.loads(result.stdout)["messages"] == 2 * COUNT
-    found = json.loads(run("info", tmp_path / "saved.mcap", "--json").stdout)
-    assert found["messages"] == 2 * COUNT
-    assert "messages saved from" in run("recover", cut, tmp_path / "again.mcap").stdout
+    saved = tmp_path / "saved.mcap"
+    cut.write_bytes(whole[:-1500])
+
+    recovery = run_json("recover", cut, saved)
+    text = run("recover", cut, tmp_path / "again.mcap").stdout
+
+    assert recovery["messages"] == 2 * COUNT
+    assert run_json("info", saved)["messages"] == 2 * COUNT
+    assert "messages saved from" in text
 
 
 @pytest.mark.parametrize(
@@ -142,12 +171,16 @@ def test_recover_prints_what_it_saved_and_what_is_lost(
     ],
 )
 def test_what_the_user_can_mend_is_one_sentence(
-    run: Callable[..., Result], path: Path, arguments: list[str], sentence: str
+    path: Path, arguments: list[str], sentence: str
 ) -> None:
+    given = [path if argument == "LOG" else argument for argument in arguments]
+
     with pytest.raises(UsageError) as caught:
-        run(*(path if argument == "LOG" else argument for argument in arguments))
-    assert sentence in str(caught.value)
-    assert "\n" not in str(caught.value)
+        run(*given)
+
+    printed = str(caught.value)
+    assert sentence in printed
+    assert "\n" not in printed
 
 
 @pytest.fixture
@@ -156,47 +189,58 @@ def endpoint() -> Iterator[str]:
         yield address
 
 
+@pytest.fixture
+def somebody(endpoint: str) -> Iterator[threading.Event]:
+    """Is set once the first process of AGENT is ready."""
+    here = threading.Event()
+    observer = ZenohBus(endpoint, AGENT)
+    observer.watch(lambda member, alive: here.set())
+    yield here
+    observer.close()
+
+
+def played(player: subprocess.Popen[str]) -> dict[str, int]:
+    """How many messages a player says it has played, by topic, when it ends."""
+    assert player.stdout is not None
+    counts: dict[str, int] = json.loads(player.stdout.read())["messages"]
+    return counts
+
+
+def replay(endpoint: str, path: Path, *options: str) -> list[str]:
+    """The command that plays `path` onto AGENT's topics, a thousand times as fast."""
+    return [*REPLAY, str(path), "-r", "1000", "--connect", endpoint, "--agent", AGENT, *options]
+
+
 def test_what_is_played_onto_zenoh_and_recorded_again_is_the_same(
-    endpoint: str, path: Path, tmp_path: Path
+    endpoint: str, somebody: threading.Event, path: Path, tmp_path: Path
 ) -> None:
     again = tmp_path / "again.mcap"
-    recorder = Recorder(ZenohBus(endpoint, "played"), again, topics_to_record(), {})
+    recorder = Recorder(ZenohBus(endpoint, AGENT), again, topics_to_record(), {})
     recorder.open()
-    observer = ZenohBus(endpoint, "played")
-    here = threading.Event()
-    observer.watch(lambda member, alive: here.set())
-    assert here.wait(TIMEOUT_S)
-    observer.close()
-    command = [*REPLAY, str(path), "-r", "1000", "--json"]
-    with subprocess.Popen(
-        [*command, "--connect", endpoint, "--agent", "played"], stdout=subprocess.PIPE, text=True
-    ) as player:
+    assert somebody.wait(TIMEOUT_S)
+
+    command = replay(endpoint, path, "--json")
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as player:
         deadline_s = time.monotonic() + TIMEOUT_S
-        while sum(recorder.received.values()) < 2 * COUNT and time.monotonic() < deadline_s:
+        while recorder.received.total() < 2 * COUNT and time.monotonic() < deadline_s:
             recorder.pump(0.1)
-        assert player.stdout is not None
-        assert json.loads(player.stdout.read())["messages"] == PLAYED
+        assert played(player) == PLAYED
+
     assert recorder.close().never_drop_whole
     assert diff(path, again).same
 
 
-def test_the_space_bar_continues_a_replay_that_began_paused(endpoint: str, path: Path) -> None:
-    observer = ZenohBus(endpoint, "paused")
-    here = threading.Event()
-    observer.watch(lambda member, alive: here.set())
+def test_the_space_bar_continues_a_replay_that_began_paused(
+    endpoint: str, somebody: threading.Event, path: Path
+) -> None:
     terminal, other = pty.openpty()
-    command = [*REPLAY, str(path), "-r", "1000", "--start-paused", "--json"]
-    with subprocess.Popen(
-        [*command, "--connect", endpoint, "--agent", "paused"],
-        stdin=other,
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as player:
-        assert here.wait(TIMEOUT_S)
+
+    command = replay(endpoint, path, "--start-paused", "--json")
+    with subprocess.Popen(command, stdin=other, stdout=subprocess.PIPE, text=True) as player:
+        assert somebody.wait(TIMEOUT_S)
         assert player.poll() is None
         os.write(terminal, b" ")
-        assert player.stdout is not None
-        assert json.loads(player.stdout.read())["messages"] == PLAYED
-    observer.close()
+        assert played(player) == PLAYED
+
     os.close(terminal)
     os.close(other)

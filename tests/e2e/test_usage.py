@@ -28,9 +28,12 @@ def start(*arguments: str) -> subprocess.Popen[str]:
 
 
 def sentence_of(process: subprocess.Popen[str]) -> str:
-    """What a command that ends with code 2 says, in one line and nothing else."""
+    """What a command that ends with code 2 prints, in one line and nothing else."""
     output, errors = process.communicate(timeout=TIMEOUT_S)
-    assert (process.returncode, output, errors.count("\n")) == (2, "", 1), output + errors
+
+    assert process.returncode == 2, output + errors
+    assert output == ""
+    assert errors.count("\n") == 1, errors
     assert errors.startswith("cogmap: ")
     return errors
 
@@ -107,27 +110,30 @@ def endpoint() -> Iterator[str]:
 def test_what_is_wrong_is_named_with_the_remedy(
     endpoint: str, arguments: list[str], named: str, remedy: str
 ) -> None:
-    said = sentence_of(start(*(argument.replace("ROUTER", endpoint) for argument in arguments)))
-    assert named.replace("ROUTER", endpoint) in said
-    assert remedy in said
+    given = [argument.replace("ROUTER", endpoint) for argument in arguments]
+
+    sentence = sentence_of(start(*given))
+
+    assert named.replace("ROUTER", endpoint) in sentence
+    assert remedy in sentence
 
 
-def test_whoever_finds_no_router_within_five_seconds_names_it(
-    tmp_path: Path,
-) -> None:
+def test_whoever_finds_no_router_within_five_seconds_names_it(tmp_path: Path) -> None:
+    log = tmp_path / "log.mcap"
     commands = (
         ["module", "workspace"],
         ["module", "codelets"],
-        ["log", "record", "-o", str(tmp_path / "log.mcap")],
+        ["log", "record", "-o", str(log)],
         ["topic", "hz", "clock"],
         ["graph"],
     )
-    for process in [start(*command, "--connect", NO_ROUTER) for command in commands]:
-        said = sentence_of(process)
-        assert said.startswith(
-            f"cogmap: no router at {NO_ROUTER} within 5 s: start one with `cogmap run`"
-        )
-    assert not (tmp_path / "log.mcap").exists()
+    expected = f"cogmap: no router at {NO_ROUTER} within 5 s: start one with `cogmap run`"
+
+    processes = [start(*command, "--connect", NO_ROUTER) for command in commands]
+
+    for process in processes:
+        assert sentence_of(process).startswith(expected)
+    assert not log.exists()
 
 
 def wait_for_processes(session: zenoh.Session, names: set[str]) -> None:
@@ -135,7 +141,8 @@ def wait_for_processes(session: zenoh.Session, names: set[str]) -> None:
     deadline_s = time.monotonic() + TIMEOUT_S
     seen: set[str] = set()
     while not names <= seen and time.monotonic() < deadline_s:
-        seen = {process.name for process in discover(session, "agent").processes}
+        system = discover(session, "agent")
+        seen = {process.name for process in system.processes}
     assert names <= seen
 
 
@@ -143,16 +150,16 @@ def test_a_router_that_ends_is_named_by_whoever_watches_a_topic() -> None:
     endpoint = free_endpoint()
     router = start("router", "--connect", endpoint)
     session = open_client(endpoint, TIMEOUT_S)
-    commands = ("echo", "hz")
-    watching = [start("topic", name, "clock", "--connect", endpoint) for name in commands]
+    echo = start("topic", "echo", "clock", "--connect", endpoint)
+    hz = start("topic", "hz", "clock", "--connect", endpoint)
     try:
-        wait_for_processes(session, {f"cli-topic-{name}" for name in commands})
+        wait_for_processes(session, {"cli-topic-echo", "cli-topic-hz"})
     finally:
         session.close()  # type: ignore[no-untyped-call]
         router.terminate()
         router.communicate(timeout=TIMEOUT_S)
 
-    for process in watching:
+    for process in (echo, hz):
         _, errors = process.communicate(timeout=TIMEOUT_S)
         assert process.returncode == 2
         assert errors.startswith(f"cogmap: no router at {endpoint} for 5 s: start one with")
