@@ -15,20 +15,16 @@ from cogmap.errors import NoAnswerError, UsageError
 from schemas import topics
 from schemas.examples import example_messages
 from schemas.process import Clock
-from schemas.sensing import Odometry
 from schemas.topics import Delivery
+from tests.support.logs import odometry
 from tests.support.networks import TIMEOUT_S, Network, OverZenoh, Peer, meet, publish
 
 MESSAGES = {topics.of(message): message for message in example_messages()}
 TRAVELLING = [topic for topic in topics.ALL if topic.delivery is not Delivery.ON_REQUEST]
 SNAPSHOTS = (topics.SNAPSHOT_REQUEST, topics.SNAPSHOT)
 ENVELOPE = Envelope("workspace", 0, 7, 2, 1)
-
-
-def odometry(seq: int, source: str = "sim") -> Odometry:
-    return Odometry(
-        speed_m_s=1.0, turn_rate_rad_s=0.0, dt_s=0.05, seq=seq, source=source, stamp_ns=seq
-    )
+# How long nothing arrives where nothing should.
+SILENCE_S = 0.3
 
 
 def clock(seq: int) -> Clock:
@@ -37,21 +33,20 @@ def clock(seq: int) -> Clock:
 
 @pytest.mark.parametrize("topic", TRAVELLING, ids=lambda topic: topic.name)
 def test_a_message_of_every_topic_arrives_whole(network: Network, topic: topics.Topic) -> None:
+    message = MESSAGES[topic]
     publisher = network.join()
     subscriber = network.join()
     publisher.declare(topic)
     peer = Peer(subscriber, topic)
     meet(publisher, subscriber)
 
-    publish(publisher, MESSAGES[topic])
-
+    publish(publisher, message)
     (arrival,) = peer.take(1)
-    assert decode(topic, arrival.payload) == MESSAGES[topic]
+
+    assert decode(topic, arrival.payload) == message
     assert arrival.envelope is not None
-    assert (arrival.envelope.source, arrival.envelope.seq) == (
-        MESSAGES[topic].source,
-        MESSAGES[topic].seq,
-    )
+    assert arrival.envelope.source == message.source
+    assert arrival.envelope.seq == message.seq
 
 
 def test_2000_never_drop_messages_arrive_in_order_at_every_subscriber(
@@ -92,13 +87,14 @@ def test_the_newest_of_one_source_does_not_replace_that_of_another(network: Netw
     peer = Peer(subscriber, topics.CLOCK)
     meet(publisher, subscriber)
 
-    publish(publisher, Clock(source="left"), Clock(source="right"), Clock(source="left", seq=1))
+    first_left = Clock(source="left")
+    second_left = Clock(source="left", seq=1)
+    right = Clock(source="right")
+    publish(publisher, first_left, right, second_left)
     peer.wait_for(3)
 
-    assert [(a.envelope.source, a.envelope.seq) for a in peer.take(2) if a.envelope] == [
-        ("left", 1),
-        ("right", 0),
-    ]
+    clocks = [decode(topics.CLOCK, arrival.payload) for arrival in peer.take(2)]
+    assert clocks == [second_left, right]
 
 
 def test_a_publisher_does_not_wait_for_an_idle_subscriber(network: Network) -> None:
@@ -126,32 +122,33 @@ def test_a_late_subscriber_receives_nothing_of_the_past(network: Network) -> Non
 
     late = Peer(network.join(), topics.ODOMETRY)
     meet(publisher, late.bus)
-    assert late.inbox.take(0.3) is None
+    assert late.inbox.take(SILENCE_S) is None
+
     publish(publisher, odometry(50))
 
     assert late.take_seqs(1) == [50]
 
 
 def test_a_subscriber_with_history_receives_the_last_messages_first(network: Network) -> None:
-    publishers = [network.join(), network.join()]
-    early = network.join()
-    peer = Peer(early, topics.ODOMETRY)
-    for publisher in publishers:
+    publishers = {"left": network.join(), "right": network.join()}
+    early = Peer(network.join(), topics.ODOMETRY)
+    for source, publisher in publishers.items():
         publisher.declare(topics.ODOMETRY)
-    meet(publishers[0], early)
-    meet(publishers[1], early)
-    for source, publisher in zip(("left", "right"), publishers, strict=True):
-        publish(publisher, *(odometry(seq, source) for seq in range(50)))
-    peer.wait_for(100)
+        meet(publisher, early.bus)
+        publish(publisher, *(odometry(seq, source=source) for seq in range(50)))
+    early.wait_for(100)
 
     late = Peer(network.join(), topics.ODOMETRY, history=30)
     late.wait_for(60)
-    meet(publishers[0], late.bus)
-    publish(publishers[0], odometry(50, "left"))
+    meet(publishers["left"], late.bus)
+    publish(publishers["left"], odometry(50, source="left"))
 
-    heard = [arrival.envelope for arrival in late.take(61) if arrival.envelope]
-    assert [envelope.seq for envelope in heard if envelope.source == "left"] == list(range(20, 51))
-    assert [envelope.seq for envelope in heard if envelope.source == "right"] == list(range(20, 50))
+    seqs: dict[str, list[int]] = {"left": [], "right": []}
+    for arrival in late.take(61):
+        assert arrival.envelope is not None
+        seqs[arrival.envelope.source].append(arrival.envelope.seq)
+    assert seqs["left"] == list(range(20, 51))
+    assert seqs["right"] == list(range(20, 50))
     assert len(late.inbox) == 0
 
 
@@ -165,7 +162,8 @@ def test_the_history_of_a_publisher_that_left_is_gone(network: Network) -> None:
     peer.wait_for(1)
     gone.close()
 
-    assert Peer(network.join(), topics.ODOMETRY, history=30).inbox.take(0.3) is None
+    late = Peer(network.join(), topics.ODOMETRY, history=30)
+    assert late.inbox.take(SILENCE_S) is None
 
 
 def work(job: Job) -> None:
@@ -208,6 +206,7 @@ def test_a_query_to_an_answerer_that_left_raises(network: Network) -> None:
     gone: SimpleQueue[tuple[Member, bool]] = SimpleQueue()
     meet(asker, answerer)
     asker.watch(lambda member, alive: None if alive else gone.put((member, alive)))
+
     answerer.close()
     gone.get(timeout=TIMEOUT_S)
 
@@ -222,12 +221,14 @@ def test_watchers_learn_who_is_there_comes_and_goes(network: Network) -> None:
     changes: SimpleQueue[tuple[Member, bool]] = SimpleQueue()
     first = Member("codelets", "codelets-1")
     second = Member("codelets", "codelets-2")
-
     early.announce(first)
+
     watcher.watch(lambda member, alive: changes.put((member, alive)))
     assert changes.get(timeout=TIMEOUT_S) == (first, True)
+
     late.announce(second)
     assert changes.get(timeout=TIMEOUT_S) == (second, True)
+
     early.close()
     assert changes.get(timeout=TIMEOUT_S) == (first, False)
     assert changes.empty()
@@ -266,10 +267,14 @@ def test_a_plain_client_reads_what_queries_and_answers_hold(over_zenoh: OverZeno
 
 @pytest.mark.parametrize("name", ["a/b", "", "*", "a b", "robot?", "$x"])
 def test_an_agent_that_cannot_be_in_a_key_names_itself(endpoint: str, name: str) -> None:
-    with pytest.raises(UsageError, match=f"--agent {re.escape(repr(name))}: use letters, digits"):
+    quoted = re.escape(repr(name))
+
+    with pytest.raises(UsageError, match=f"--agent {quoted}: use letters, digits"):
         ZenohBus(endpoint, name)
 
 
 def test_an_instance_that_cannot_be_in_a_key_names_itself(over_zenoh: OverZenoh) -> None:
+    bus = over_zenoh.join()
+
     with pytest.raises(UsageError, match=r"--instance 'a/b': use letters, digits"):
-        over_zenoh.join().announce(Member("codelets", "a/b"))
+        bus.announce(Member("codelets", "a/b"))

@@ -72,23 +72,28 @@ def distance_m(graph: Graph) -> float:
     return float(trip.attributes["distance_m"])
 
 
+def moved_m(motion: SelfMotion) -> float:
+    """The distance that a self-motion states: its speeds times their durations."""
+    rows = motion.motions.numpy()
+    speed_m_s = rows[:, 0].astype(np.float64)
+    duration_s = rows[:, 2].astype(np.float64)
+    steps_m = np.abs(speed_m_s * duration_s)
+    return float(steps_m.sum())
+
+
 @pytest.mark.usefixtures("installed")
 def test_the_codelet_sums_the_self_motion_in_one_process() -> None:
     graph = Graph()
-    moved_m: list[float] = []
-
-    def on_motion(message: SelfMotion) -> None:
-        motions = np.asarray(message.motions.numpy(), np.float64)
-        moved_m.append(float(np.abs(motions[:, 0] * motions[:, 2]).sum()))
-
-    observer = Module("observer").following(graph).on(topics.SELF_MOTION, on_motion)
+    motions: list[SelfMotion] = []
+    observer = Module("observer").following(graph).on(topics.SELF_MOTION, motions.append)
     modules = [registry.build(name, SECTIONS) for name in registry.MODULES]
-    runner = InProcessRunner([*modules, observer])
-    runner.run()
-    runner.close()
 
-    assert sum(moved_m) > 15
-    assert distance_m(graph) == pytest.approx(sum(moved_m))
+    with InProcessRunner([*modules, observer]) as runner:
+        runner.run()
+
+    driven_m = sum(map(moved_m, motions))
+    assert driven_m > 15
+    assert distance_m(graph) == pytest.approx(driven_m)
 
 
 @pytest.mark.usefixtures("installed")
@@ -103,16 +108,16 @@ def test_without_the_package_there_is_no_such_section() -> None:
 
 
 def test_the_codelet_runs_in_processes(site: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
     config = tmp_path / "trajectory.toml"
     config.write_text(CONFIG)
     command = [sys.executable, "-m", "cli.main", "run", "--lockstep", "--config", config]
-    folder = tmp_path / "run"
     options = ["--out", folder, "--connect", free_endpoint(), "--time-limit", "60"]
-    path = os.pathsep.join([str(site), str(ROOT)])
+
     run = subprocess.run(
         [*command, *options],
         check=False,
-        env=os.environ | {"PYTHONPATH": path},
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(site), str(ROOT)])},
         capture_output=True,
         text=True,
         timeout=TIMEOUT_S,

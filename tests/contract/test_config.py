@@ -18,7 +18,8 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
 
 
 def typed(*settings: str) -> Config:
-    return config.typed(config.load(None, settings), "action", Config)
+    sections = config.load(None, settings)
+    return config.typed(sections, "action", Config)
 
 
 def test_defaults_hold_where_nothing_is_set() -> None:
@@ -75,9 +76,10 @@ def test_a_wrong_setting_names_itself_and_what_would_be_right(setting: str, sent
 )
 def test_a_wrong_section_names_itself(tmp_path: Path, text: str, sentence: str) -> None:
     (tmp_path / "c.toml").write_text(text)
+    sections = config.load(tmp_path / "c.toml")
 
     with pytest.raises(ConfigError, match=sentence):
-        config.check_sections(config.load(tmp_path / "c.toml"), ["sim", "action"])
+        config.check_sections(sections, ["sim", "action"])
 
 
 def test_a_setting_of_a_section_that_is_none_names_the_section(tmp_path: Path) -> None:
@@ -96,9 +98,9 @@ def test_a_file_that_is_no_toml_names_itself(tmp_path: Path, content: bytes) -> 
 
 
 def test_a_missing_file_names_itself_and_the_remedy(tmp_path: Path) -> None:
-    with pytest.raises(
-        ConfigError, match=r"no configuration file .*none\.toml: name one that exists"
-    ):
+    sentence = r"no configuration file .*none\.toml: name one that exists"
+
+    with pytest.raises(ConfigError, match=sentence):
         config.load(tmp_path / "none.toml")
 
 

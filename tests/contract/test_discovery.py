@@ -17,6 +17,8 @@ from schemas.topics import Scope
 from services import registry
 from tests.support.networks import TIMEOUT_S, OverZenoh, Peer, meet
 
+TRUTH = [topic for topic in topics.ALL if topic.scope is Scope.TRUTH]
+
 
 def discovered(network: OverZenoh) -> System:
     session = open_client(network.endpoint)
@@ -26,20 +28,25 @@ def discovered(network: OverZenoh) -> System:
 
 
 def names(system: System, role: Role, topic: topics.Topic) -> list[str]:
-    return [process.name for process in system.doing(role, topic)]
+    processes = system.doing(role, topic)
+    return [process.name for process in processes]
 
 
 def test_every_process_is_found_by_name_with_all_that_it_does(over_zenoh: OverZenoh) -> None:
-    sim, first, second = (over_zenoh.join() for _ in range(3))
+    sim = over_zenoh.join()
     sim.declare(topics.ODOMETRY)
     sim.declare(topics.VIEW)
-    for bus in (first, second):
-        Peer(bus, topics.ODOMETRY)
-    first.serve(topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, Answer, lambda job: job())
     sim.announce(Member("sim", "sim"))
-    first.announce(Member("workspace", "workspace"))
-    second.announce(Member("codelets", "codelets-2"))
-    meet(over_zenoh.join(), sim, first, second)
+
+    workspace = over_zenoh.join()
+    Peer(workspace, topics.ODOMETRY)
+    workspace.serve(topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, Answer, lambda job: job())
+    workspace.announce(Member("workspace", "workspace"))
+
+    worker = over_zenoh.join()
+    Peer(worker, topics.ODOMETRY)
+    worker.announce(Member("codelets", "codelets-2"))
+    meet(over_zenoh.join(), sim, workspace, worker)
 
     system = discovered(over_zenoh)
 
@@ -53,23 +60,19 @@ def test_every_process_is_found_by_name_with_all_that_it_does(over_zenoh: OverZe
 
 
 def test_no_module_subscribes_to_the_truth(over_zenoh: OverZenoh) -> None:
-    shells = [
-        Shell(registry.build(name, {"sim": {"egl": False}}), over_zenoh.join())
-        for name in registry.MODULES
-    ]
-    for shell in shells:
-        shell.open()
-    meet(over_zenoh.join(), *(shell.bus for shell in shells))
+    buses = [over_zenoh.join() for _ in registry.MODULES]
+    for name, bus in zip(registry.MODULES, buses, strict=True):
+        module = registry.build(name, {"sim": {"egl": False}})
+        Shell(module, bus).open()
+    meet(over_zenoh.join(), *buses)
 
     system = discovered(over_zenoh)
 
-    assert {process.member.module for process in system.processes if process.member} >= set(
-        registry.MODULES
-    )
+    found = {process.member.module for process in system.processes if process.member}
+    assert found >= set(registry.MODULES)
     assert names(system, Role.PUBLISHES, topics.TRUE_POSE) == ["sim"]
-    for topic in topics.ALL:
-        if topic.scope is Scope.TRUTH:
-            assert names(system, Role.SUBSCRIBES, topic) == []
+    for topic in TRUTH:
+        assert names(system, Role.SUBSCRIBES, topic) == []
 
 
 ZIDS = {"aa": Member("sim", "sim"), "bb": Member("recorder", "recorder")}
@@ -79,9 +82,9 @@ TOKENS = [
 
 
 def fact(router: str, role: str, key: str, *zids: str) -> tuple[str, bytes]:
-    return f"@/{router}/router/{role}/{key}", json.dumps(
-        {"routers": [], "peers": [], "clients": zids}
-    ).encode()
+    """What a router's admin space answers of the clients `zids`."""
+    sessions = {"routers": [], "peers": [], "clients": zids}
+    return f"@/{router}/router/{role}/{key}", json.dumps(sessions).encode()
 
 
 FACTS = [
@@ -104,13 +107,13 @@ def system() -> System:
 def test_the_facts_of_several_routers_are_merged_and_unnamed_keep_their_id(
     system: System,
 ) -> None:
+    unnamed, _ = system.doing(Role.PUBLISHES, topics.ODOMETRY)
+
     assert names(system, Role.PUBLISHES, topics.ODOMETRY) == ["?cc", "sim"]
-    assert system.doing(Role.PUBLISHES, topics.ODOMETRY)[0] == Process("cc")
+    assert unnamed == Process("cc")
 
 
-def test_a_wildcard_counts_for_each_topic_and_the_asker_for_none(
-    system: System,
-) -> None:
+def test_a_wildcard_counts_for_each_topic_and_the_asker_for_none(system: System) -> None:
     assert names(system, Role.SUBSCRIBES, topics.TRUE_POSE) == ["recorder"]
     assert names(system, Role.SUBSCRIBES, topics.TRUE_TOWN) == ["recorder"]
     assert names(system, Role.SUBSCRIBES, topics.ODOMETRY) == []
@@ -130,7 +133,9 @@ def test_the_graph_shows_every_process_and_what_it_does(
 
 
 def test_an_empty_graph_is_a_sentence() -> None:
-    assert to_tree(read("agent", [], [])) == "no process of 'agent' is on the bus"
+    empty = read("agent", [], [])
+
+    assert to_tree(empty) == "no process of 'agent' is on the bus"
 
 
 def test_a_process_that_left_is_not_found(over_zenoh: OverZenoh) -> None:

@@ -41,14 +41,12 @@ def test_a_page_shows_the_files_that_it_includes(page: Path) -> None:
 
 
 def test_every_example_is_shown_on_the_page() -> None:
-    shown = set(included_paths(PAGE.read_text()))
-    written = {
-        str(path.relative_to(ROOT))
-        for path in (ROOT / "examples").glob("*.*")
-        if path.suffix in LANGUAGES
-    }
+    shown = included_paths(PAGE.read_text())
+    paths = (ROOT / "examples").glob("*.*")
+    written = {str(path.relative_to(ROOT)) for path in paths if path.suffix in LANGUAGES}
 
-    assert written <= shown
+    assert written
+    assert written <= set(shown)
 
 
 def _scan(range_m: float, seq: int = 0) -> RangeScan:
@@ -80,7 +78,8 @@ def test_the_module_turns_left_where_something_is_in_its_way(
 
 
 def test_the_module_rejects_a_scan_that_makes_no_sense() -> None:
-    bad = msgspec.structs.replace(_scan(1.0), range_m=Array.of(np.ones(2, np.float32)))
+    too_few = Array.of(np.ones(2, np.float32))
+    bad = msgspec.structs.replace(_scan(1.0), range_m=too_few)
 
     with pytest.raises(MessageError, match=r"5,\) bearings, \(2"):
         _module().feed(bad)
@@ -96,8 +95,10 @@ def test_msgpack_alone_computes_the_same_commands() -> None:
     module = _module()
     for seq, range_m in enumerate((20.0, 2.0)):
         scan = _scan(range_m, seq)
-        command = wanderer_msgpack.command(msgpack.unpackb(encode(scan)), seq)
+        plain = msgpack.unpackb(encode(scan))
         (expected,) = module.feed(scan)
+
+        command = wanderer_msgpack.command(plain, seq)
 
         assert decode(topics.MOTOR_COMMAND, msgpack.packb(command)) == expected
 
@@ -128,8 +129,9 @@ class Stage:
             assert command.left_wheel_rad_s == (0.0 if seq else 10.0)
             assert (command.source, command.seq) == ("action", seq)
 
-            assert arrival.envelope is not None
-            assert (arrival.envelope.source, arrival.envelope.seq) == ("action", seq)
+            envelope = arrival.envelope
+            assert envelope is not None
+            assert (envelope.source, envelope.seq) == ("action", seq)
 
 
 def test_a_module_of_msgpack_and_zenoh_alone_answers_scans(over_zenoh: OverZenoh) -> None:
@@ -146,7 +148,8 @@ def test_a_module_of_msgpack_and_zenoh_alone_answers_scans(over_zenoh: OverZenoh
 
 
 def test_the_module_in_rust_answers_scans(over_zenoh: OverZenoh) -> None:
-    built = Path(os.environ.get("CARGO_TARGET_DIR", RUST / "target")) / "debug" / "wanderer"
+    target = Path(os.environ.get("CARGO_TARGET_DIR", RUST / "target"))
+    built = target / "debug" / "wanderer"
     if not built.exists():
         pytest.skip("`cargo build --manifest-path examples/rust/Cargo.toml` builds it")
 
@@ -177,9 +180,11 @@ def test_javascript_decodes_every_golden_message() -> None:
 
     paths = sorted(GOLDEN.glob("*.msgpack"))
     command = [node, JAVASCRIPT / "golden.mjs", *paths]
+
     run = subprocess.run(command, capture_output=True, check=True, timeout=TIMEOUT_S)
 
     decoded = json.loads(run.stdout)
     assert len(decoded) == len(topics.ALL)
     for path in paths:
-        assert decoded[path.name] == _base64(msgpack.unpackb(path.read_bytes()))
+        plain = msgpack.unpackb(path.read_bytes())
+        assert decoded[path.name] == _base64(plain)

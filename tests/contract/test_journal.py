@@ -20,17 +20,32 @@ from tests.support.disks import full_after
 
 
 def delta(version: int) -> Delta:
-    operations = [Link(source="self", target=f"place:{version}:0", weight=0.5)]
-    return Delta(version=version, cycle=version, phase=Phase.OBJECTS, operations=list(operations))
+    link = Link(source="self", target=f"place:{version}:0", weight=0.5)
+    return Delta(version=version, cycle=version, phase=Phase.OBJECTS, operations=[link])
+
+
+def snapshot(version: int) -> Snapshot:
+    """Of an empty graph."""
+    return Snapshot(version=version, cycle=version, decay=Decay(), nodes=[], links=[], tiles=[])
+
+
+def opened(path: Path) -> Journal:
+    """A new journal, ready to be written."""
+    journal = Journal(path)
+    assert list(journal.messages()) == []
+    return journal
+
+
+def append(journal: Journal, message: Message) -> None:
+    journal.append(message, encode(message))
 
 
 def written(path: Path, *messages: Message) -> list[int]:
     """Write `messages`; the size of the file after each."""
-    journal = Journal(path)
+    journal = opened(path)
     sizes = []
-    assert list(journal.messages()) == []
     for message in messages:
-        journal.append(message, encode(message))
+        append(journal, message)
         sizes.append(path.stat().st_size)
     journal.close()
     return sizes
@@ -45,59 +60,64 @@ def restored(path: Path) -> list[Message]:
 
 def test_what_was_written_is_read_in_order(tmp_path: Path) -> None:
     deltas = [delta(version) for version in range(1, 6)]
+
     written(tmp_path / "j", *deltas)
 
     assert restored(tmp_path / "j") == deltas
 
 
 def test_a_tail_torn_at_any_byte_costs_only_the_record_it_is_in(tmp_path: Path) -> None:
+    path = tmp_path / "whole"
+    torn = tmp_path / "torn"
     deltas = [delta(version) for version in range(1, 4)]
-    sizes = written(tmp_path / "whole", *deltas)
-    whole = (tmp_path / "whole").read_bytes()
+    sizes = written(path, *deltas)
+    whole = path.read_bytes()
 
     for offset in range(len(whole) + 1):
-        torn = tmp_path / "torn"
         torn.write_bytes(whole[:offset])
-        complete = sum(size <= offset for size in sizes)
-        assert restored(torn) == deltas[:complete]
-        assert torn.stat().st_size == ([0, *sizes])[complete]
+        kept = [size for size in sizes if size <= offset]
+
+        assert restored(torn) == deltas[: len(kept)]
+        assert torn.stat().st_size == max(kept, default=0)
 
 
 def test_a_tail_whose_bytes_never_reached_the_disk_is_cut_off(tmp_path: Path) -> None:
+    path = tmp_path / "j"
     deltas = [delta(version) for version in range(1, 4)]
-    sizes = written(tmp_path / "j", *deltas)
-    content = (tmp_path / "j").read_bytes()
+    _, second, _ = written(path, *deltas)
+    content = path.read_bytes()
 
-    (tmp_path / "j").write_bytes(content[: sizes[1] + 20] + bytes(sizes[2] - sizes[1] - 20))
+    reached = content[: second + 20]
+    zeros = bytes(len(content) - len(reached))
+    path.write_bytes(reached + zeros)
 
-    assert restored(tmp_path / "j") == deltas[:2]
+    assert restored(path) == deltas[:2]
 
 
 def test_writing_continues_behind_the_last_whole_record(tmp_path: Path) -> None:
-    sizes = written(tmp_path / "j", delta(1), delta(2))
-    content = (tmp_path / "j").read_bytes()
-    (tmp_path / "j").write_bytes(content[: sizes[1] - 1])
+    path = tmp_path / "j"
+    written(path, delta(1), delta(2))
+    content = path.read_bytes()
+    path.write_bytes(content[:-1])
 
-    journal = Journal(tmp_path / "j")
+    journal = Journal(path)
     assert list(journal.messages()) == [delta(1)]
-    journal.append(delta(2), encode(delta(2)))
+    append(journal, delta(2))
     journal.close()
 
-    assert restored(tmp_path / "j") == [delta(1), delta(2)]
+    assert restored(path) == [delta(1), delta(2)]
 
 
 def test_one_message_replaces_all_when_compacted(tmp_path: Path) -> None:
-    journal = Journal(tmp_path / "j")
-    assert list(journal.messages()) == []
+    journal = opened(tmp_path / "j")
     for version in range(1, 50):
-        journal.append(delta(version), encode(delta(version)))
-    snapshot = Snapshot(version=49, cycle=49, decay=Decay(), nodes=[], links=[], tiles=[])
+        append(journal, delta(version))
 
-    journal.compact(snapshot)
-    journal.append(delta(50), encode(delta(50)))
+    journal.compact(snapshot(49))
+    append(journal, delta(50))
     journal.close()
 
-    assert restored(tmp_path / "j") == [snapshot, delta(50)]
+    assert restored(tmp_path / "j") == [snapshot(49), delta(50)]
     assert [path.name for path in tmp_path.iterdir()] == ["j"]
 
 
@@ -108,36 +128,33 @@ def test_a_kill_during_compaction_leaves_the_old_journal(tmp_path: Path) -> None
     assert restored(tmp_path / "j") == [delta(1), delta(2)]
 
     journal = Journal(tmp_path / "j")
-    snapshot = Snapshot(version=2, cycle=2, decay=Decay(), nodes=[], links=[], tiles=[])
-    journal.compact(snapshot)
+    journal.compact(snapshot(2))
     journal.close()
-    assert restored(tmp_path / "j") == [snapshot]
+    assert restored(tmp_path / "j") == [snapshot(2)]
 
 
 def test_a_whole_record_that_cannot_be_read_is_refused_and_kept(tmp_path: Path) -> None:
-    stranger = Delta(version=2, cycle=2, phase=Phase.OBJECTS, operations=[])
-    journal = Journal(tmp_path / "j")
-    journal.append(delta(1), encode(delta(1)))
-    journal.append(stranger, b"\x80")
+    path = tmp_path / "j"
+    journal = Journal(path)
+    append(journal, delta(1))
+    journal.append(delta(2), b"\x80")
     journal.close()
-    size = (tmp_path / "j").stat().st_size
+    before = path.read_bytes()
 
     with pytest.raises(UsageError, match=r"j: a record .* move the file away"):
-        restored(tmp_path / "j")
-    assert (tmp_path / "j").stat().st_size == size
+        restored(path)
+    assert path.read_bytes() == before
 
 
 def test_a_full_disk_is_one_sentence_and_costs_only_what_was_not_written(tmp_path: Path) -> None:
-    sizes = written(tmp_path / "whole", *(delta(version) for version in range(1, 4)))
-    journal = Journal(tmp_path / "j")
-    assert list(journal.messages()) == []
+    deltas = [delta(version) for version in range(1, 4)]
+    _, second, _ = written(tmp_path / "whole", *deltas)
+    journal = opened(tmp_path / "j")
+    sentence = r"cannot write .*/j \(.*\): make room on its disk"
 
-    with (
-        full_after(sizes[1] + 20),
-        pytest.raises(StorageError, match=r"cannot write .*/j \(.*\): make room on its disk"),
-    ):
-        for version in range(1, 4):
-            journal.append(delta(version), encode(delta(version)))
+    with full_after(second + 20), pytest.raises(StorageError, match=sentence):
+        for message in deltas:
+            append(journal, message)
     journal.close()
 
     assert restored(tmp_path / "j") == [delta(1), delta(2)]
@@ -154,9 +171,10 @@ def test_a_module_whose_journal_cannot_be_written_publishes_nothing_of_it(tmp_pa
     network = MemoryNetwork()
     published: list[Arrival] = []
     MemoryBus(network).subscribe(topics.DELTA, published.append, lambda topic, number: None)
-    module = Module("workspace", emits={topics.DELTA}).journaling(topics.DELTA, list, Snapshot)
-    journal = Journal(tmp_path / "j")
-    shell = Shell(module, MemoryBus(network), journal, health=False)
+
+    module = Module("workspace", emits={topics.DELTA})
+    module.journaling(topics.DELTA, list, Snapshot)
+    shell = Shell(module, MemoryBus(network), Journal(tmp_path / "j"), health=False)
     shell.open()
 
     with full_after(10), pytest.raises(StorageError, match="cannot write"):

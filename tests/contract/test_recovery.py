@@ -6,10 +6,9 @@ import subprocess
 import sys
 from collections.abc import Iterator
 
-import msgspec
 import pytest
 
-from cogmap.bus.interface import CACHED_MESSAGES
+from cogmap.bus.interface import CACHED_MESSAGES, Bus
 from cogmap.bus.session import free_endpoint
 from cogmap.graph.graph import Graph
 from cogmap.runtime.module import Module
@@ -17,7 +16,7 @@ from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.graph import Delta, Phase
 from schemas.nodes import Node
-from schemas.sensing import Odometry
+from tests.support.logs import odometry
 from tests.support.networks import OverZenoh, Peer, meet, publish, spin_until, working
 
 
@@ -48,10 +47,8 @@ def router() -> Iterator[Router]:
     router.kill()
 
 
-def odometry(seq: int) -> Odometry:
-    return Odometry(
-        speed_m_s=1.0, turn_rate_rad_s=0.0, dt_s=0.05, seq=seq, source="sim", stamp_ns=seq
-    )
+def publish_odometry(bus: Bus, numbers: range) -> None:
+    publish(bus, *map(odometry, numbers))
 
 
 @pytest.mark.parametrize("afterwards", [0, 20], ids=["nothing said since", "more said since"])
@@ -59,58 +56,76 @@ def test_what_is_published_while_the_router_is_dead_arrives_afterwards(
     router: Router, afterwards: int
 ) -> None:
     network = OverZenoh(router.endpoint)
-    publisher, *subscribers = (network.join() for _ in range(3))
+    publisher = network.join()
     publisher.declare(topics.ODOMETRY)
-    peers = [Peer(subscriber, topics.ODOMETRY) for subscriber in subscribers]
-    meet(publisher, *subscribers)
-
-    publish(publisher, *(odometry(seq) for seq in range(20)))
+    peers = [Peer(network.join(), topics.ODOMETRY) for _ in range(2)]
+    meet(publisher, *(peer.bus for peer in peers))
+    publish_odometry(publisher, range(20))
     for peer in peers:
         peer.wait_for(20)
+
     router.kill()
-    publish(publisher, *(odometry(seq) for seq in range(20, 40)))
+    publish_odometry(publisher, range(20, 40))
     router.start()
-    publish(publisher, *(odometry(seq) for seq in range(40, 40 + afterwards)))
+    count = 40 + afterwards
+    publish_odometry(publisher, range(40, count))
 
     for peer in peers:
-        assert peer.take_seqs(40 + afterwards) == list(range(40 + afterwards))
+        assert peer.take_seqs(count) == list(range(count))
     network.close()
+
+
+class Keeper:
+    """Answers for a graph, and publishes what changes in it."""
+
+    def __init__(self, network: OverZenoh) -> None:
+        self.graph = Graph()
+        self.publisher = network.join()
+        self.publisher.declare(topics.DELTA)
+        module = Module("workspace").serve(
+            topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, lambda request: self.graph.snapshot()
+        )
+        self.shell = Shell(module, network.join(), health=False)
+
+    def commit(self, number: int) -> None:
+        """Add so many nodes, each in a delta of its own."""
+        for _ in range(number):
+            version = self.graph.version + 1
+            node = Node(id=f"building-{version}", kind="thing", activation=0.5)
+            delta = Delta(
+                version=version,
+                cycle=1,
+                phase=Phase.OBJECTS,
+                operations=[node],
+                source="workspace",
+                seq=version,
+            )
+            self.graph.apply(delta)
+            publish(self.publisher, delta)
 
 
 def test_a_loss_beyond_the_cache_is_counted_and_a_snapshot_mends_the_graph(
     router: Router,
 ) -> None:
-    graph = Graph()
-    network = OverZenoh(router.endpoint)
     lost = 50
-    keeper = Module("workspace").serve(
-        topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, lambda request: graph.snapshot()
-    )
-    publisher = network.join()
-    reader = network.join()
-    publisher.declare(topics.DELTA)
+    network = OverZenoh(router.endpoint)
+    keeper = Keeper(network)
     replica = Graph()
-    follower = Shell(Module("follower").following(replica), reader, health=False)
+    follower = Shell(Module("follower").following(replica), network.join(), health=False)
     follower.open()
 
-    def commit() -> None:
-        node = Node(id=f"building-{graph.version}", kind="thing", activation=0.5)
-        delta = Delta(version=graph.version + 1, cycle=1, phase=Phase.OBJECTS, operations=[node])
-        graph.apply(delta)
-        numbered = msgspec.structs.replace(delta, source="workspace", seq=delta.version)
-        publish(publisher, numbered)
-
-    with working(Shell(keeper, network.join(), health=False)):
-        meet(publisher, reader)
-        commit()
+    with working(keeper.shell):
+        meet(keeper.publisher, follower.bus)
+        keeper.commit(1)
         spin_until(lambda: replica.version == 1, follower)
-        router.kill()
-        for _ in range(CACHED_MESSAGES + lost):
-            commit()
-        router.start()
-        spin_until(lambda: replica.version == graph.version, follower)
 
-    assert replica.digest() == graph.digest()
+        router.kill()
+        keeper.commit(CACHED_MESSAGES + lost)
+        router.start()
+        spin_until(lambda: replica.version == keeper.graph.version, follower)
+
+    assert replica.digest() == keeper.graph.digest()
     assert follower.notes == ["snapshots that replaced the graph after a gap: 1"]
     assert dict(follower.intake.gaps) == {topics.DELTA.name: lost}
     follower.close()
+    network.close()

@@ -14,7 +14,7 @@ import pytest
 from msgspec.inspect import FloatType
 
 from cogmap.bus.codec import Envelope, decode, encode
-from schemas import topics
+from schemas import sensing, topics
 from schemas.base import Message
 from schemas.examples import example_messages
 from schemas.export import GOLDEN, export_golden, export_schemas, file_name, json_schema
@@ -54,18 +54,23 @@ def test_the_reference_library_of_msgpack_decodes_the_golden_bytes(topic: Topic)
 
 @each_topic
 def test_the_reference_library_of_msgpack_decodes_an_envelope(topic: Topic) -> None:
-    envelope = Envelope("sim", 7, 1, 2, 3, [("sensory", 4, 5)], [(topic.name, "sim", 6)], 8)
+    stage = ("sensory", 4, 5)
+    cause = (topic.name, "sim", 6)
+    envelope = Envelope("sim", 7, 1, 2, 3, [stage], [cause], 8)
 
     decoded = msgpack.unpackb(encode(envelope))
 
-    assert decoded == ["sim", 7, 1, 2, 3, [["sensory", 4, 5]], [[topic.name, "sim", 6]], 8]
+    assert decoded == ["sim", 7, 1, 2, 3, [list(stage)], [list(cause)], 8]
 
 
 @each_topic
 def test_a_field_of_tomorrow_does_not_trouble_todays_reader(topic: Topic) -> None:
-    plain = msgspec.msgpack.decode(golden(topic)) | {"field_of_tomorrow": [1, {"two": 3.0}]}
+    plain = msgspec.msgpack.decode(golden(topic))
+    plain["field_of_tomorrow"] = [1, {"two": 3.0}]
 
-    assert decode(topic, msgspec.msgpack.encode(plain)) == BY_TOPIC[topic]
+    payload = msgspec.msgpack.encode(plain)
+
+    assert decode(topic, payload) == BY_TOPIC[topic]
 
 
 @each_topic
@@ -84,10 +89,13 @@ def test_every_golden_file_belongs_to_a_topic() -> None:
 
 
 def test_golden_bytes_are_written_the_same_every_time(tmp_path: Path) -> None:
-    for path in export_golden(tmp_path):
-        assert path.read_bytes() == (GOLDEN / path.name).read_bytes(), (
-            f"{path.name} differs: export it on purpose"
-        )
+    paths = export_golden(tmp_path)
+
+    assert len(paths) == len(topics.ALL)
+    for path in paths:
+        committed = GOLDEN / path.name
+        differs = f"{path.name} differs: export it on purpose"
+        assert path.read_bytes() == committed.read_bytes(), differs
 
 
 def test_every_export_is_one_command(tmp_path: Path) -> None:
@@ -131,9 +139,19 @@ def _floats(kind: object) -> Iterator[FloatType]:
 
 @each_topic
 def test_every_float_is_bounded_which_keeps_nan_and_infinity_out(topic: Topic) -> None:
-    for kind in _floats(msgspec.inspect.type_info(topic.type)):
+    definition = msgspec.inspect.type_info(topic.type)
+
+    for kind in _floats(definition):
         assert kind.ge is not None or kind.gt is not None
         assert kind.le is not None or kind.lt is not None
+
+
+def test_the_floats_of_a_type_are_found_at_any_depth() -> None:
+    wheels = msgspec.inspect.type_info(sensing.Odometry)
+    view = msgspec.inspect.type_info(sensing.Percepts)
+
+    assert len(list(_floats(wheels))) == 3
+    assert len(list(_floats(view))) > 3
 
 
 @each_topic
@@ -141,10 +159,9 @@ def test_every_field_of_a_sample_differs_from_its_default(topic: Topic) -> None:
     sample = BY_TOPIC[topic]
     defaults = sample.__struct_defaults__
     optional = sample.__struct_fields__[-len(defaults) :]
-    same = [
-        name
-        for name, default in zip(optional, defaults, strict=True)
-        if getattr(sample, name) == default
-    ]
+    same = []
+    for name, default in zip(optional, defaults, strict=True):
+        if getattr(sample, name) == default:
+            same.append(name)
 
     assert same in ([], ["seq"])
