@@ -18,15 +18,8 @@ from cogmap.runtime.client import Client
 from cogmap.runtime.module import Module
 from schemas import topics
 from schemas.sensing import MotorCommand
-from tests.support.runs import (
-    COGMAP,
-    DRIVING,
-    TIMEOUT_S,
-    Run,
-    processes_at,
-    shared_memory,
-    wait_until,
-)
+from tests.support.processes import shared_memory
+from tests.support.runs import COGMAP, DRIVING, TIMEOUT_S, Run, processes_at, wait_until
 
 LOG_LIMIT_BYTES = 4_000_000
 MCAP_END = b"\x89MCAP0\r\n"
@@ -118,7 +111,7 @@ def test_nothing_is_left_of_a_launcher_that_is_killed(start: Callable[..., Run])
 
     run.process.kill()
     run.end()
-    wait_until(lambda: processes_at(run.endpoint) == [])
+    wait_until(lambda: processes_at(run.endpoint) == [], "all processes end")
 
     assert is_finished(run.folder / "log.mcap")
 
@@ -141,7 +134,7 @@ class Drive:
     def await_more(self, commands: int) -> None:
         """Wait until so many more have come."""
         enough = self.moving + commands
-        wait_until(lambda: self.moving >= enough)
+        wait_until(lambda: self.moving >= enough, f"{commands} commands more move the robot")
 
     def _on_command(self, command: MotorCommand) -> None:
         if not command.halted_by:

@@ -1,8 +1,8 @@
-"""The committed log of a small drive, held against what each module says today.
+"""The committed log of a small drive, compared with what each module publishes today.
 
 Sines, sums and image filters may round differently on another processor, so there most modules are
-held against a log that is recorded on the spot. Two compute with nothing but additions, comparisons
-and minima of single numbers, which are the same everywhere.
+compared with a log that is recorded on the spot. Two compute with nothing but additions,
+comparisons and minima of single numbers, which are the same everywhere.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from services import registry
 from tests.support.reference import FRAMES, REFERENCE, compared, drive, in_words, other_arithmetic
 
 SAME_EVERYWHERE = ("workspace", "global_workspace")
+MAX_BYTES = 1_500_000
 ON_PURPOSE = "where this is meant to change: python -m tests.support.reference --update"
 
 
@@ -31,7 +32,8 @@ def _replayed(log: Path, module: str) -> Outcome:
 
 
 def _needs_the_same_arithmetic() -> None:
-    if other := other_arithmetic():
+    other = other_arithmetic()
+    if other:
         pytest.skip(
             f"this machine may round differently than the one that recorded the reference: {other}"
         )
@@ -46,24 +48,30 @@ def fresh(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("module", registry.MODULES)
-def test_a_module_says_the_bytes_of_the_reference(module: str) -> None:
+def test_a_module_publishes_the_bytes_of_the_reference(module: str) -> None:
     if module not in SAME_EVERYWHERE:
         _needs_the_same_arithmetic()
+
     outcome = _replayed(REFERENCE, module)
+
     assert outcome.same >= FRAMES - 1
-    assert (outcome.missing_inputs, outcome.extra_outputs, outcome.notes) == ({}, 0, [])
+    assert outcome.missing_inputs == {}
+    assert outcome.extra_outputs == 0
+    assert outcome.notes == []
 
 
 @pytest.mark.parametrize("module", registry.MODULES)
-def test_a_module_says_the_bytes_of_a_drive_recorded_on_this_machine(
-    fresh: Path, module: str
-) -> None:
-    assert _replayed(fresh, module).same >= FRAMES - 1
+def test_a_module_publishes_the_bytes_of_a_drive_on_this_machine(fresh: Path, module: str) -> None:
+    outcome = _replayed(fresh, module)
+
+    assert outcome.same >= FRAMES - 1
 
 
 def test_a_drive_of_today_is_the_reference_on_every_topic(fresh: Path) -> None:
     _needs_the_same_arithmetic()
+
     changed = compared(REFERENCE, fresh)
+
     assert changed.same, f"{in_words(changed)}\n{ON_PURPOSE}"
 
 
@@ -71,26 +79,33 @@ def test_two_drives_on_this_machine_are_the_same_on_every_topic(
     fresh: Path, tmp_path: Path
 ) -> None:
     again = tmp_path / "again.mcap"
+
     drive(log=again)
+
     assert compared(fresh, again).same
 
 
 def test_the_reference_is_small_and_holds_a_whole_drive() -> None:
-    assert REFERENCE.stat().st_size < 1_500_000
     reader = LogReader(REFERENCE)
-    commands = [reader.message(record) for record in reader.records({topics.MOTOR_COMMAND})]
+    commands = []
+    for record in reader.records({topics.MOTOR_COMMAND}):
+        command = reader.message(record)
+        assert isinstance(command, MotorCommand)
+        commands.append(command)
+
+    assert REFERENCE.stat().st_size < MAX_BYTES
     assert len(commands) == FRAMES
-    assert any(isinstance(command, MotorCommand) and not command.halted_by for command in commands)
+    assert any(not command.halted_by for command in commands)
 
 
-def test_a_change_is_told_topic_by_topic_with_the_first_difference_of_each(
+def test_a_change_is_printed_by_topic_with_the_first_difference_of_each(
     fresh: Path, tmp_path: Path
 ) -> None:
     shorter = tmp_path / "shorter.mcap"
     drive(3, log=shorter)
-    told = in_words(compared(fresh, shorter))
-    assert f"motor/command: 3 the same, 0 changed, {FRAMES - 3} gone, 0 new" in told
-    assert (
-        "motor/command number 3 of action (stamp 0.800 s) is in fresh.mcap and not in shorter.mcap"
-        in told
-    )
+
+    printed = in_words(compared(fresh, shorter))
+
+    first = "motor/command number 3 of action (stamp 0.800 s)"
+    assert f"motor/command: 3 the same, 0 changed, {FRAMES - 3} gone, 0 new" in printed
+    assert f"{first} is in fresh.mcap and not in shorter.mcap" in printed

@@ -25,6 +25,9 @@ CAMERA = Calibration(
 SKY = (120, 170, 226)
 GRASS = (104, 138, 66)
 ASPHALT = (88, 88, 94)
+MIN_SPEED = 1e-12
+MAX_DEPTH_M = 150
+NOISE_SD = 3
 Colour = tuple[int, int, int]
 Floats = npt.NDArray[np.float64]
 
@@ -44,20 +47,28 @@ class Block:
         """Depth at which the level ray `slope` (right over forward) enters it, infinite where it
         passes by.
         """
-        cos = np.cos(self.turn_rad)
-        sin = np.sin(self.turn_rad)
-        enter = np.full(slope.shape, -np.inf)
-        leave = np.full(slope.shape, np.inf)
-        for (axis_x, axis_y), side in zip(((cos, sin), (-sin, cos)), self.sides_m, strict=True):
-            centre = (self.x_m - CAMERA.mount_forward_m) * axis_x + self.y_m * axis_y
-            speed = axis_x - slope * axis_y
-            speed = np.where(np.abs(speed) < 1e-12, 1e-12, speed)
-            ends = np.sort(
-                np.stack([(centre - side / 2) / speed, (centre + side / 2) / speed]), axis=0
-            )
-            enter = np.maximum(enter, ends[0])
-            leave = np.minimum(leave, ends[1])
-        return np.where((enter < leave) & (enter > 0), enter, np.inf)
+        cos = float(np.cos(self.turn_rad))
+        sin = float(np.sin(self.turn_rad))
+        length_m, width_m = self.sides_m
+        first = self._between(slope, (cos, sin), length_m)
+        second = self._between(slope, (-sin, cos), width_m)
+
+        enter = np.maximum(first[0], second[0])
+        leave = np.minimum(first[1], second[1])
+        hits = (enter < leave) & (enter > 0)
+        return np.where(hits, enter, np.inf)
+
+    def _between(self, slope: Floats, axis: tuple[float, float], side_m: float) -> Floats:
+        """(2, ...): depths at which the ray enters and leaves the slab between two sides."""
+        axis_x, axis_y = axis
+        forward_m = self.x_m - CAMERA.mount_forward_m
+        centre_m = forward_m * axis_x + self.y_m * axis_y
+        speed = axis_x - slope * axis_y
+        speed = np.where(np.abs(speed) < MIN_SPEED, MIN_SPEED, speed)
+
+        near = (centre_m - side_m / 2) / speed
+        far = (centre_m + side_m / 2) / speed
+        return np.sort(np.stack([near, far]), axis=0)
 
 
 def painted(
@@ -69,15 +80,33 @@ def painted(
     rows, columns = np.indices((CAMERA.height_px, CAMERA.width_px))
     down = (rows - CAMERA.cy_px) / CAMERA.fy_px
     slope = (columns - CAMERA.cx_px) / CAMERA.fx_px
-    depth = np.where(down > 0, CAMERA.mount_height_m / np.maximum(down, 1e-6), np.inf)
-    on_road = np.abs(slope * np.where(down > 0, depth, 1e6)) < road_half_m
-    image = np.where((down > 0)[..., None], np.where(on_road[..., None], ASPHALT, GRASS), SKY)
+    image, depth = _ground(down, slope, road_half_m)
     label = np.zeros(depth.shape, np.uint8)
-    for number, block in enumerate(blocks):
+
+    for number, block in enumerate(blocks, 1):
         reach = block.depth_m(slope)
         height = CAMERA.mount_height_m - down * reach
-        hit = np.isfinite(reach) & (reach < depth) & (height >= 0) & (height <= block.height_m)
-        depth[hit], image[hit], label[hit] = reach[hit], block.colour, number + 1
-    depth[depth > 150] = 0
-    noisy = image + np.random.default_rng(seed).normal(0, 3, image.shape)
-    return np.clip(noisy, 0, 255).astype(np.uint8), depth.astype(np.float32), label
+        is_nearer = np.isfinite(reach) & (reach < depth)
+        hit = is_nearer & (height >= 0) & (height <= block.height_m)
+        depth[hit] = reach[hit]
+        image[hit] = block.colour
+        label[hit] = number
+
+    depth[depth > MAX_DEPTH_M] = 0
+    noise = np.random.default_rng(seed).normal(0, NOISE_SD, image.shape)
+    noisy = np.clip(image + noise, 0, 255).astype(np.uint8)
+    return noisy, depth.astype(np.float32), label
+
+
+def _ground(
+    down: Floats, slope: Floats, road_half_m: float
+) -> tuple[npt.NDArray[np.int64], Floats]:
+    """Image and depth of a road in grass under the sky; the depth of the sky is infinite."""
+    is_ground = down > 0
+    depth = np.where(is_ground, CAMERA.mount_height_m / np.maximum(down, 1e-6), np.inf)
+    side_m = np.abs(slope * np.where(is_ground, depth, 1e6))
+    is_road = side_m < road_half_m
+
+    surface = np.where(is_road[..., None], ASPHALT, GRASS)
+    image = np.where(is_ground[..., None], surface, SKY)
+    return image, depth

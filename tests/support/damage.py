@@ -15,7 +15,8 @@ from schemas.topics import Topic
 
 
 def golden(topic: Topic) -> bytes:
-    return (GOLDEN / file_name(topic, ".msgpack")).read_bytes()
+    path = GOLDEN / file_name(topic, ".msgpack")
+    return path.read_bytes()
 
 
 def poisoned(value: Any, poison: float) -> Any:
@@ -33,26 +34,28 @@ def _poison(value: Any, poison: float, done: list[bool]) -> Any:
         return poison
     if isinstance(value, list):
         return [_poison(item, poison, done) for item in value]
-    if isinstance(value, dict) and str(value.get("dtype")).startswith("<f"):
-        done[0] = True
-        values = np.frombuffer(value["data"], value["dtype"]).copy()
-        values[-1] = poison
-        return {**value, "data": values.tobytes()}
-    if isinstance(value, dict):
+    if not isinstance(value, dict):
+        return value
+
+    if not str(value.get("dtype")).startswith("<f"):
         return {key: _poison(item, poison, done) for key, item in value.items()}
-    return value
+    done[0] = True
+    numbers = np.frombuffer(value["data"], value["dtype"]).copy()
+    numbers[-1] = poison
+    return {**value, "data": numbers.tobytes()}
 
 
 def stretched(value: Any) -> Any:
     """`value` with every array claiming to be far larger than it is."""
     if isinstance(value, list):
         return [stretched(item) for item in value]
-    if isinstance(value, dict):
-        return {
-            key: [2**62, 2**62] if key == "shape" else stretched(item)
-            for key, item in value.items()
-        }
-    return value
+    if not isinstance(value, dict):
+        return value
+
+    changed = {key: stretched(item) for key, item in value.items()}
+    if "shape" in changed:
+        changed["shape"] = [2**62, 2**62]
+    return changed
 
 
 def damaged(topic: Topic) -> dict[str, bytes]:
@@ -60,12 +63,14 @@ def damaged(topic: Topic) -> dict[str, bytes]:
     whole = golden(topic)
     plain = msgspec.msgpack.decode(whole)
     encode = msgspec.msgpack.encode
-    other = topics.MOTOR_COMMAND if topic is not topics.MOTOR_COMMAND else topics.CLOCK
+    is_command = topic is topics.MOTOR_COMMAND
+    of_another = encode([1, 2, 3]) if is_command else golden(topics.MOTOR_COMMAND)
+
     payloads = {
         "random": random.Random(topic.name).randbytes(200),
         "empty": b"",
         "truncated": whole[:-3],
-        "wrong type": golden(other) if other is not topics.CLOCK else encode([1, 2, 3]),
+        "wrong type": of_another,
         "a number": encode(7),
         "NaN": encode(poisoned(plain, math.nan)),
         "infinity": encode(poisoned(plain, -math.inf)),

@@ -22,24 +22,27 @@ _INCLUDE = re.compile(
 
 def included(text: str) -> str:
     """`text` with each file that it includes as it is now."""
+    return _INCLUDE.sub(_block, text)
 
-    def block(match: re.Match[str]) -> str:
-        path = ROOT / match["path"]
-        code = path.read_text()
-        return f"{match['begin']}```{LANGUAGES[path.suffix]}\n{code}```\n{match['end']}"
 
-    return _INCLUDE.sub(block, text)
+def _block(match: re.Match[str]) -> str:
+    path = ROOT / match["path"]
+    language = LANGUAGES[path.suffix]
+    code = path.read_text()
+    return f"{match['begin']}```{language}\n{code}```\n{match['end']}"
 
 
 def included_paths(text: str) -> list[str]:
     """The files that `text` includes, from the root."""
-    return [match["path"] for match in _INCLUDE.finditer(text)]
+    matches = _INCLUDE.finditer(text)
+    return [match["path"] for match in matches]
 
 
 def main() -> None:
     """Write every page anew."""
     for page in PAGES:
-        page.write_text(included(page.read_text()))
+        text = page.read_text()
+        page.write_text(included(text))
 
 
 if __name__ == "__main__":

@@ -28,8 +28,9 @@ def _road() -> Array:
     """Ground points on a road straight ahead."""
     ahead_m = np.arange(2.0, 12.0)
     left_m = np.arange(-2.0, 3.0)
-    points = np.stack(np.meshgrid(ahead_m, left_m), -1)
-    return Array.of(points.reshape(-1, 2), "<f4")
+    grid_m = np.meshgrid(ahead_m, left_m)
+    points_m = np.stack(grid_m, -1).reshape(-1, 2)
+    return Array.of(points_m, "<f4")
 
 
 class Feeder:
@@ -53,8 +54,12 @@ class Feeder:
 
     def driven_m(self, stamp_ns: int | None = None) -> float:
         """The distance driven so far, or at the view of `stamp_ns`."""
-        views = self.views if stamp_ns is None else self.stamps.index(stamp_ns) + 1
-        return views * PERIOD_NS / 1e9 * SPEED_M_S
+        views = self.views
+        if stamp_ns is not None:
+            views = self.stamps.index(stamp_ns) + 1
+
+        driven_s = views * PERIOD_NS / 1e9
+        return driven_s * SPEED_M_S
 
     def pause(self) -> None:
         """Let the clock continue and nothing move."""
@@ -95,7 +100,8 @@ class Feeder:
 
 def _motions() -> Array:
     """One period straight on: speed, turn rate, duration, standard deviations of both speeds."""
-    return Array.of([[SPEED_M_S, 0.0, PERIOD_NS / 1e9, 1e-3, 1e-3]], "<f8")
+    row = [SPEED_M_S, 0.0, PERIOD_NS / 1e9, 1e-3, 1e-3]
+    return Array.of([row], "<f8")
 
 
 class Witness:
@@ -122,7 +128,8 @@ class Witness:
         began = len(self.deltas)
 
         def are_enough() -> bool:
-            ended = {delta.cycle for delta in self.deltas[began:] if delta.tasks}
+            later = self.deltas[began:]
+            ended = {delta.cycle for delta in later if delta.tasks}
             return len(ended) >= cycles
 
         wait_until(are_enough, f"{cycles} cycles more")
@@ -131,7 +138,8 @@ class Witness:
         """Wait until the graph here is the workspace's. What feeds it must have paused."""
 
         def is_same() -> bool:
-            return self._workspace_digest() == self.graph.digest()
+            here = self.graph.digest()
+            return self._workspace_digest() == here
 
         wait_until(is_same, "the replica is the workspace's graph")
 

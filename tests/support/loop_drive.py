@@ -7,9 +7,9 @@ import math
 import msgspec
 import numpy as np
 
-from schemas.sensing import Percept, PlaceMatch
+from schemas.sensing import Percept, Percepts, PlaceMatch
 from services.codelets.module import Config as WorkerConfig
-from tests.support.scenes import Desk, motion, percept, percepts, stamp_ns
+from tests.support.scenes import Desk, Rows, motion, percept, percepts, stamp_ns
 
 STEP_M = 2.0
 SIDE_STEPS = 20
@@ -27,25 +27,32 @@ QUIET = WorkerConfig(
     closure_spacing_s=0.2,
 )
 SLIP = 0.1
+ROW_S = 0.1
+ROAD_M = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
+Position = tuple[float, float]
+Landmarks = dict[str, Position]
 
 
 def true_poses(frames: int) -> np.ndarray:
     """(frames, 3): where the robot is at each view, counter-clockwise round a square."""
-    poses = [np.zeros(3)]
+    poses = np.zeros((frames, 3))
     for number in range(1, frames):
-        x_m, y_m, heading = poses[-1]
-        heading += math.pi / 2 if number % SIDE_STEPS == 0 else 0.0
-        poses.append(
-            np.array([x_m + STEP_M * math.cos(heading), y_m + STEP_M * math.sin(heading), heading])
-        )
-    return np.array(poses)
+        x_m, y_m, heading = poses[number - 1]
+        if number % SIDE_STEPS == 0:
+            heading += math.pi / 2
+        x_m += STEP_M * math.cos(heading)
+        y_m += STEP_M * math.sin(heading)
+        poses[number] = x_m, y_m, heading
+    return poses
 
 
-def seen(pose: np.ndarray, label: str, where: tuple[float, float]) -> Percept:
+def seen(pose: np.ndarray, label: str, position_m: Position) -> Percept:
     """A landmark as seen without error."""
-    off = np.array(where) - pose[:2]
-    bearing = math.remainder(math.atan2(off[1], off[0]) - pose[2], 2 * math.pi)
-    return percept(label, bearing, float(np.hypot(*off)), bearing_sd_rad=0.01, range_sd_m=0.2)
+    x_m, y_m = np.array(position_m) - pose[:2]
+    direction = math.atan2(y_m, x_m)
+    bearing = math.remainder(direction - pose[2], 2 * math.pi)
+    range_m = float(np.hypot(x_m, y_m))
+    return percept(label, bearing, range_m, bearing_sd_rad=0.01, range_sd_m=0.2)
 
 
 class LoopDrive:
@@ -65,46 +72,53 @@ class LoopDrive:
         self.poses = true_poses(3 * LAP)
         self.frame = 0
 
-    def go(
-        self, frames: int, landmarks: dict[str, tuple[float, float]], match: int | None = None
-    ) -> None:
+    def go(self, frames: int, landmarks: Landmarks, match: int | None = None) -> None:
         """Drive on, seeing `landmarks`; the last view matches that of frame `match`."""
         for left in range(frames, 0, -1):
-            turned = (
-                0.0
-                if self.frame == 0
-                else float(self.poses[self.frame, 2] - self.poses[self.frame - 1, 2])
-            )
-            # Turning first, then straight on: two rows.
-            turn_row = (0.0, (turned + self.bias_rad) / 0.1, 0.1, 0.0, 0.0)
-            slip = SLIP if self.frame // SIDE_STEPS % 4 == 1 else 0.0
-            step_m = STEP_M * (1 + slip) if self.frame else 0.0
-            rows = (turn_row, (step_m / 0.1, 0.0, 0.1, 0.0, 0.0))
-            self.desk.feed(motion(self.frame, rows))
-            objects = [
-                seen(self.poses[self.frame], label, where) for label, where in landmarks.items()
-            ]
-            view = percepts(self.frame, *objects, road_m=((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
+            view = self._view(landmarks)
             if match is not None and left == 1:
                 seen_again = PlaceMatch(frame=match, view_ns=stamp_ns(match), score=0.99)
                 view = msgspec.structs.replace(view, matches=[seen_again])
+
+            self.desk.feed(motion(self.frame, self._rows()))
             self.desk.feed(view)
             self.desk.work()
             self.frame += 1
 
-    def meet(
-        self, frames: int, landmarks: dict[str, tuple[float, float]] | None = None, late: int = 0
-    ) -> None:
+    def meet(self, frames: int, landmarks: Landmarks | None = None, late: int = 0) -> None:
         """Drive on where the robot has been a lap ago, and see `landmarks` again, or else match the
         views of then.
 
         Those that match are `late` views later than they should be.
         """
         for _ in range(frames):
-            self.go(1, landmarks or {}, match=None if landmarks else self.frame - LAP + late)
+            if landmarks:
+                self.go(1, landmarks)
+            else:
+                self.go(1, {}, match=self.frame - LAP + late)
 
     def error_m(self) -> float:
-        """How far the agent takes itself to be from where it is."""
+        """The distance between the agent's estimate and where it is."""
         agent = self.desk.agent
-        where = self.poses[self.frame - 1]
-        return math.hypot(agent.x_m - where[0], agent.y_m - where[1])
+        x_m, y_m, _ = self.poses[self.frame - 1]
+        return math.hypot(agent.x_m - x_m, agent.y_m - y_m)
+
+    def _rows(self) -> Rows:
+        """The motion as the wheels state it: turning first, then straight on."""
+        if self.frame == 0:
+            return (self._turn_row(0.0), (0.0, 0.0, ROW_S, 0.0, 0.0))
+
+        before, now = self.poses[self.frame - 1 : self.frame + 1, 2]
+        side = self.frame // SIDE_STEPS % 4
+        slip = SLIP if side == 1 else 0.0
+        step_m = STEP_M * (1 + slip)
+        return (self._turn_row(float(now - before)), (step_m / ROW_S, 0.0, ROW_S, 0.0, 0.0))
+
+    def _turn_row(self, turned_rad: float) -> tuple[float, ...]:
+        return (0.0, (turned_rad + self.bias_rad) / ROW_S, ROW_S, 0.0, 0.0)
+
+    def _view(self, landmarks: Landmarks) -> Percepts:
+        """The landmarks and the road, seen without error."""
+        pose = self.poses[self.frame]
+        objects = [seen(pose, label, position_m) for label, position_m in landmarks.items()]
+        return percepts(self.frame, *objects, road_m=ROAD_M)

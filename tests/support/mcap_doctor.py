@@ -23,7 +23,8 @@ class Doctor:
 
     def examine(self, path: Path) -> list[str]:
         with path.open("rb") as file:
-            for record in StreamReader(file, emit_chunks=True, validate_crcs=True).records:
+            reader = StreamReader(file, emit_chunks=True, validate_crcs=True)
+            for record in reader.records:
                 self._examine(record)
         self._compare_statistics()
         return self.warnings
@@ -31,44 +32,60 @@ class Doctor:
     def _examine(self, record: McapRecord) -> None:
         match record:
             case Header():
-                if record.profile not in PROFILES:
-                    self.warnings.append(f"profile {record.profile!r} is not well known")
-                if not record.library:
-                    self.warnings.append("no library")
+                self._examine_header(record)
             case Chunk():
                 self._examine_chunk(record)
             case Statistics():
                 self._statistics = record
 
+    def _examine_header(self, header: Header) -> None:
+        if header.profile not in PROFILES:
+            self.warnings.append(f"profile {header.profile!r} is not well known")
+        if not header.library:
+            self.warnings.append("no library")
+
     def _examine_chunk(self, chunk: Chunk) -> None:
         times_ns = []
         for record in breakup_chunk(chunk, validate_crc=True):
             match record:
-                case Schema() | Channel():
-                    self._examine_declaration(record)
+                case Schema():
+                    self._examine_schema(record)
+                case Channel():
+                    self._examine_channel(record)
                 case Message():
                     self._examine_message(record)
                     times_ns.append(record.log_time)
-        if (min(times_ns), max(times_ns)) != (chunk.message_start_time, chunk.message_end_time):
+
+        stated_ns = chunk.message_start_time, chunk.message_end_time
+        if (min(times_ns), max(times_ns)) != stated_ns:
             self.warnings.append("a chunk's times are not those of its messages")
 
-    def _examine_declaration(self, record: Schema | Channel) -> None:
-        key = type(record), record.id
+    def _examine_schema(self, schema: Schema) -> None:
+        self._declare(Schema, schema.id)
+        if not (schema.id and schema.encoding and schema.data):
+            self.warnings.append(f"schema {schema.name} lacks number, encoding or data")
+
+    def _examine_channel(self, channel: Channel) -> None:
+        self._declare(Channel, channel.id)
+        if (Schema, channel.schema_id) not in self._declared:
+            self.warnings.append(f"the schema of {channel.topic} is declared nowhere")
+
+    def _declare(self, kind: type, number: int) -> None:
+        key = kind, number
         self._declared[key] += 1
         if self._declared[key] > 1:
             self.warnings.append(f"{key} is declared twice")
-        if isinstance(record, Schema) and not (record.id and record.encoding and record.data):
-            self.warnings.append(f"schema {record.name} lacks number, encoding or data")
-        if isinstance(record, Channel) and (Schema, record.schema_id) not in self._declared:
-            self.warnings.append(f"the schema of {record.topic} is declared nowhere")
 
     def _examine_message(self, message: Message) -> None:
-        if (Channel, message.channel_id) not in self._declared:
-            self.warnings.append(f"a message comes before its channel {message.channel_id}")
-        if self._times_ns and message.log_time < self._times_ns[-1]:
-            self.warnings.append(f"log time {message.log_time} is less than the one before")
-        self._messages[message.channel_id] += 1
-        self._times_ns.append(message.log_time)
+        channel = message.channel_id
+        time_ns = message.log_time
+        if (Channel, channel) not in self._declared:
+            self.warnings.append(f"a message comes before its channel {channel}")
+        if self._times_ns and time_ns < self._times_ns[-1]:
+            self.warnings.append(f"log time {time_ns} is less than the one before")
+
+        self._messages[channel] += 1
+        self._times_ns.append(time_ns)
 
     def _compare_statistics(self) -> None:
         found = self._statistics

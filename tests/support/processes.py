@@ -21,9 +21,9 @@ POOLS = ("sem.mp-", "sem.loky-", "joblib_")
 AGENT = "fault"
 
 
-def wait_until(condition: Callable[[], bool], what: str) -> None:
+def wait_until(condition: Callable[[], bool], what: str, timeout_s: float = TIMEOUT_S) -> None:
     """Poll until `condition` holds."""
-    deadline_s = time.monotonic() + TIMEOUT_S
+    deadline_s = time.monotonic() + timeout_s
     pause = threading.Event()
     while not condition():
         assert time.monotonic() < deadline_s, f"it never happened: {what}"
@@ -32,7 +32,8 @@ def wait_until(condition: Callable[[], bool], what: str) -> None:
 
 def shared_memory() -> set[Path]:
     """Files in shared memory, but for those of pools of processes, which no module uses."""
-    return {path for path in Path("/dev/shm").iterdir() if not path.name.startswith(POOLS)}
+    paths = Path("/dev/shm").iterdir()
+    return {path for path in paths if not path.name.startswith(POOLS)}
 
 
 class Process:
@@ -62,7 +63,8 @@ class Process:
     @property
     def memory_mb(self) -> float:
         """Its resident memory."""
-        return psutil.Process(self.pid).memory_info().rss / 1e6
+        memory = psutil.Process(self.pid).memory_info()
+        return memory.rss / 1e6
 
     def lines(self) -> list[str]:
         """The lines of its log, also those of processes of the same name before it."""
@@ -113,9 +115,11 @@ class System:
     def start(self, name: str, *arguments: str) -> int:
         """Start `cogmap` with these arguments. Returns how many lines its log has already."""
         log = self.folder / f"{name}.log"
-        earlier = len(log.read_text().splitlines()) if log.exists() else 0
-        self.processes[name] = Process(name, log, *arguments, "--tied", "--connect", self.endpoint)
-        return earlier
+        log.touch()
+        earlier = log.read_text().splitlines()
+        options = ("--tied", "--connect", self.endpoint)
+        self.processes[name] = Process(name, log, *arguments, *options)
+        return len(earlier)
 
     def close(self) -> None:
         """End everything, modules first."""
@@ -129,8 +133,9 @@ class System:
         process = self.processes[name]
 
         def is_ready() -> bool:
-            assert process.is_alive, process.lines()
-            return any(sentence in line for line in process.lines()[earlier:])
+            lines = process.lines()
+            assert process.is_alive, lines
+            return any(sentence in line for line in lines[earlier:])
 
         wait_until(is_ready, f"{name} logs {sentence!r}")
         return process

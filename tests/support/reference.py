@@ -1,8 +1,8 @@
-"""The reference: a small drive in lockstep, its log committed, against which every later version is
-held.
+"""The reference: a small drive in lockstep, its log committed, with which every later version is
+compared.
 
 `python -m tests.support.reference --update` records it anew, which is how behaviour is changed on
-purpose, and says what has changed.
+purpose, and prints what has changed.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from cogmap.recording.storage import format as layout
 from cogmap.recording.storage.reader import LogReader
 from cogmap.runtime.config import Sections
 from cogmap.runtime.in_process import InProcessRunner
+from cogmap.runtime.module import Module
 from schemas import topics
 from schemas.graph import Delta
 from schemas.topics import Scope
@@ -45,7 +46,8 @@ SMALL: Sections = {
     "workspace": {"first_samples": 40},
     "codelets": {"samples": 100, "kept_samples": 40, "landmark_samples": 40},
 }
-Said = dict[str, list[bytes]]
+COMPARED = [topic for topic in topics.ALL if topic.scope is not Scope.PROCESS]
+Published = dict[str, list[bytes]]
 
 
 def sections(seed: int = 1) -> Sections:
@@ -53,35 +55,51 @@ def sections(seed: int = 1) -> Sections:
     return effective(SMALL, Choices(seed=seed, lockstep=True), {"sim": 1})
 
 
-def drive(frames: int = FRAMES, seed: int = 1, workers: int = 1, log: Path | None = None) -> Said:
-    """Drive with every module in this process, until so many motor commands were said; log it where
-    `log` is given.
+def drive(
+    frames: int = FRAMES, seed: int = 1, workers: int = 1, log: Path | None = None
+) -> Published:
+    """Drive with every module in this process, until so many motor commands were published; log it
+    where `log` is given.
 
     Returns the bytes of every message of the model and of the truth, by topic.
     """
     configured = sections(seed)
-    names = [f"codelets-{number}" for number in range(1, workers + 1)]
-    instances = [(name, name) for name in registry.MODULES if name != "codelets"] + [
-        ("codelets", name) for name in names
-    ]
-    runner = InProcessRunner(
-        [registry.build(name, configured, instance) for name, instance in instances]
-    )
-    said: Said = defaultdict(list)
-    bus = MemoryBus(runner.network)
-    for topic in topics.ALL:
-        if topic.scope is not Scope.PROCESS:
-            bus.subscribe(topic, lambda arrival: _keep(said, arrival), lambda name, number: None)
-    recorder = None if log is None else _recorder(MemoryBus(runner.network), log, configured)
-    runner.run(lambda: len(said[topics.MOTOR_COMMAND.name]) >= frames)
+    runner = InProcessRunner(_modules(configured, workers))
+    published: Published = defaultdict(list)
+    _subscribe(MemoryBus(runner.network), published)
+
+    recorder = None
+    if log is not None:
+        recorder = _recorder(MemoryBus(runner.network), log, configured)
+
+    commands = published[topics.MOTOR_COMMAND.name]
+    runner.run(lambda: len(commands) >= frames)
     runner.close()
     if recorder is not None:
         recorder.close()
-    return dict(said)
+    return dict(published)
 
 
-def _keep(said: Said, arrival: Arrival) -> None:
-    said[arrival.topic.name].append(bytes(arrival.payload))
+def _modules(configured: Sections, workers: int) -> list[Module]:
+    """Every module, and so many workers last."""
+    modules = []
+    for name in registry.MODULES:
+        if name != "codelets":
+            modules.append(registry.build(name, configured, name))
+    for number in range(1, workers + 1):
+        modules.append(registry.build("codelets", configured, f"codelets-{number}"))
+    return modules
+
+
+def _subscribe(bus: MemoryBus, published: Published) -> None:
+    """Keep the bytes of every message of the model and of the truth."""
+
+    def keep(arrival: Arrival) -> None:
+        payload = bytes(arrival.payload)
+        published[arrival.topic.name].append(payload)
+
+    for topic in COMPARED:
+        bus.subscribe(topic, keep, lambda name, number: None)
 
 
 def _recorder(bus: MemoryBus, log: Path, configured: Sections) -> Recorder:
@@ -108,15 +126,18 @@ def arithmetic() -> dict[str, str]:
     numpy, OpenCV and BLAS each have variants of a function for each generation of processors; sines
     and exponentials come from the C library, which has variants too.
     """
-    found = np.show_config(mode="dicts")["SIMD Extensions"]
-    return {
+    simd = np.show_config(mode="dicts")["SIMD Extensions"]
+    extensions = [*simd["baseline"], *simd.get("found", [])]
+    facts = {
         "machine": platform.machine(),
         "processor": _processor(),
         "code of opencv": cv2.getCPUFeaturesLine(),
-        "code of numpy": " ".join([*found["baseline"], *found.get("found", [])]),
+        "code of numpy": " ".join(extensions),
         "libc": " ".join(platform.libc_ver()),
-        **{name: version(name) for name in ("numpy", "opencv-python-headless", "pybullet")},
     }
+    for name in ("numpy", "opencv-python-headless", "pybullet"):
+        facts[name] = version(name)
+    return facts
 
 
 def _processor() -> str:
@@ -125,27 +146,33 @@ def _processor() -> str:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:
         return platform.processor()
-    facts = dict(line.replace("\t", "").split(":", 1) for line in lines if ":" in line)
-    return " ".join(facts.get(name, "").strip() for name in ("vendor_id", "cpu family", "model"))
+
+    facts = dict.fromkeys(("vendor_id", "cpu family", "model"), "")
+    for line in lines:
+        name, _, value = line.partition(":")
+        name = name.strip()
+        if name in facts:
+            facts[name] = value.strip()
+    return " ".join(facts.values())
 
 
 def other_arithmetic(log: Path = REFERENCE) -> str:
     """What this machine rounds differently with than the one that recorded `log`; empty where
     nothing.
     """
-    recorded = json.loads(LogReader(log).about(layout.RECORDING)["arithmetic"])
+    about = LogReader(log).about(layout.RECORDING)
+    there = json.loads(about["arithmetic"])
     here = arithmetic()
-    differing = [
-        f"{name} {here.get(name)!r}, there {recorded.get(name)!r}"
-        for name in here | recorded
-        if here.get(name) != recorded.get(name)
-    ]
+    differing = []
+    for name in here | there:
+        if here.get(name) != there.get(name):
+            differing.append(f"{name} {here.get(name)!r}, there {there.get(name)!r}")
     return "; ".join(differing)
 
 
 def compared(left: Path, right: Path) -> Diff:
     """How two drives compare, the truth included."""
-    return diff(left, right, [topic for topic in topics.ALL if topic.scope is not Scope.PROCESS])
+    return diff(left, right, COMPARED)
 
 
 def _compared_with_reference(fresh: Path) -> Diff | None:
@@ -177,12 +204,14 @@ def in_words(changed: Diff | None) -> str:
         return f"{REFERENCE.name} is new"
     if changed.same:
         return f"every message in {REFERENCE.name} is as it was"
-    lines = [
-        f"{topic.topic}: {topic.same} the same, {topic.different} changed, {topic.left_only} gone, "
-        f"{topic.right_only} new\n  {topic.first}"
-        for topic in changed.topics
-        if topic.first
-    ]
+    lines = []
+    for topic in changed.topics:
+        if topic.first:
+            counts = (
+                f"{topic.same} the same, {topic.different} changed, "
+                f"{topic.left_only} gone, {topic.right_only} new"
+            )
+            lines.append(f"{topic.topic}: {counts}\n  {topic.first}")
     return "\n".join(lines)
 
 
@@ -190,7 +219,7 @@ def main() -> None:
     """The command."""
     parser = argparse.ArgumentParser(prog="python -m tests.support.reference", description=__doc__)
     parser.add_argument(
-        "--update", action="store_true", required=True, help="record it anew and say what changed"
+        "--update", action="store_true", required=True, help="record it anew and print what changed"
     )
     parser.parse_args()
     sys.stdout.write(f"{in_words(update())}\n")

@@ -19,16 +19,18 @@ def seen(views: Views) -> list[View]:
     calibration = msgspec.json.decode(views["calibration"].tobytes(), type=Calibration)
     rectified = rectification(calibration)
     matcher = DepthFromStereo(rectified.calibration, 2.5)
+    lefts = np.asarray(views["left"], np.uint8)
+    rights = np.asarray(views["right"], np.uint8)
+
     result = []
-    for number, pair in enumerate(zip(views["left"], views["right"], strict=True)):
-        left, right = rectified.apply(*(np.asarray(image, np.uint8) for image in pair))
-        result.append(
-            View(
-                stamp_ns=(number + 1) * PERIOD_NS,
-                frame=number,
-                image=Array.of(left),
-                depth_m=Array.of(matcher.depth_m(left, right)),
-                calibration=rectified.calibration,
-            )
+    for number, images in enumerate(zip(lefts, rights, strict=True)):
+        left, right = rectified.apply(*images)
+        view = View(
+            stamp_ns=(number + 1) * PERIOD_NS,
+            frame=number,
+            image=Array.of(left),
+            depth_m=Array.of(matcher.depth_m(left, right)),
+            calibration=rectified.calibration,
         )
+        result.append(view)
     return result

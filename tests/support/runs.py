@@ -5,48 +5,46 @@ from __future__ import annotations
 import json
 import os
 import resource
-import select
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from cogmap.bus.session import free_endpoint
+from tests.support import processes
 
 COGMAP = [sys.executable, "-m", "cli.main"]
-POOLS = ("sem.mp-", "sem.loky-", "joblib_")
 TIMEOUT_S = 90.0
 DRIVING = "path integration alone"
+# What the command lines of those that are no modules have in them.
+WORDS = {"router": "\0router\0", "recorder": "\0log\0record\0"}
 
 
 def processes_at(endpoint: str, words: str = "") -> list[int]:
     """Every process with `endpoint`, and `words`, in its command line."""
     found = []
     for entry in Path("/proc").iterdir():
-        try:
-            command = (entry / "cmdline").read_bytes().decode(errors="replace")
-            state = (entry / "stat").read_text().rpartition(")")[2].split()[0]
-        except (OSError, IndexError):
+        if not entry.name.isdigit():
             continue
-        if entry.name.isdigit() and endpoint in command and words in command and state != "Z":
+        command = _command(entry)
+        if endpoint in command and words in command:
             found.append(int(entry.name))
     return found
 
 
-def shared_memory() -> set[Path]:
-    """Files in shared memory, but for those of pools of processes, which no module uses."""
-    return {path for path in Path("/dev/shm").iterdir() if not path.name.startswith(POOLS)}
+def _command(entry: Path) -> str:
+    """The command line of a process, its words ended by NUL; empty where it has ended."""
+    try:
+        return (entry / "cmdline").read_bytes().decode(errors="replace")
+    except OSError:
+        return ""
 
 
-def wait_until(condition: Callable[[], bool]) -> None:
-    """Look every 20 ms whether `condition` holds."""
-    deadline_s = time.monotonic() + TIMEOUT_S
-    while not condition():
-        assert time.monotonic() < deadline_s, "it never happened"
-        select.select([], [], [], 0.02)
+def wait_until(condition: Callable[[], bool], what: str) -> None:
+    """Poll until `condition` holds, as long as a drive may take to start."""
+    processes.wait_until(condition, what, TIMEOUT_S)
 
 
 class Run:
@@ -55,9 +53,11 @@ class Run:
     def __init__(self, folder: Path, *arguments: str, file_limit_bytes: int | None) -> None:
         self.folder = folder
         self.endpoint = free_endpoint()
-        command = [*COGMAP, "run", "--out", str(folder), "--connect", self.endpoint, *arguments]
+        options = ["--out", str(folder), "--connect", self.endpoint, *arguments]
         self._output = folder.with_suffix(".txt").open("w+")
-        self.process = subprocess.Popen(command, stdout=self._output, stderr=subprocess.STDOUT)
+        self.process = subprocess.Popen(
+            [*COGMAP, "run", *options], stdout=self._output, stderr=subprocess.STDOUT
+        )
         if file_limit_bytes is not None:
             limits = (file_limit_bytes, file_limit_bytes)
             resource.prlimit(self.process.pid, resource.RLIMIT_FSIZE, limits)
@@ -68,7 +68,8 @@ class Run:
 
     def summary(self) -> dict[str, Any]:
         """What it left in summary.json."""
-        summary: dict[str, Any] = json.loads((self.folder / "summary.json").read_text())
+        text = (self.folder / "summary.json").read_text()
+        summary: dict[str, Any] = json.loads(text)
         return summary
 
     def end(self) -> int:
@@ -79,28 +80,29 @@ class Run:
         """Wait until it has printed `sentence`."""
 
         def printed() -> bool:
-            assert self.process.poll() is None, self.output()
-            return sentence in self.output()
+            output = self.output()
+            assert self.process.poll() is None, output
+            return sentence in output
 
-        wait_until(printed)
+        wait_until(printed, f"it prints {sentence!r}")
 
     def pid_of(self, instance: str) -> int | None:
         """The process of a module's instance, or of the router or the recorder; None where it does
         not run.
         """
-        words = {"router": "\0router\0", "recorder": "\0log\0record\0"}.get(
-            instance, f"\0--instance\0{instance}\0"
-        )
-        return next(iter(processes_at(self.endpoint, words)), None)
+        words = WORDS.get(instance, f"\0--instance\0{instance}\0")
+        pids = processes_at(self.endpoint, words)
+        return pids[0] if pids else None
 
     def kill(self, *instances: str) -> None:
         """Kill these processes together, and wait until each runs again."""
         pids = {instance: self.pid_of(instance) for instance in instances}
-        for pid in pids.values():
-            assert pid is not None
+        for instance, pid in pids.items():
+            assert pid is not None, f"{instance} does not run"
             os.kill(pid, signal.SIGKILL)
 
-        wait_until(lambda: all(self.pid_of(name) not in (pid, None) for name, pid in pids.items()))
+        for instance, pid in pids.items():
+            self._await_another(instance, pid)
 
     def close(self) -> None:
         """End it, if it has not ended."""
@@ -108,3 +110,11 @@ class Run:
             self.process.terminate()
             self.end()
         self._output.close()
+
+    def _await_another(self, instance: str, killed: int | None) -> None:
+        """Wait until another process of an instance runs than the one that was killed."""
+
+        def runs() -> bool:
+            return self.pid_of(instance) not in (killed, None)
+
+        wait_until(runs, f"{instance} is restarted")

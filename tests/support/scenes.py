@@ -17,7 +17,7 @@ from schemas import topics
 from schemas.array import Array, Matrix
 from schemas.base import Message
 from schemas.codelets import Assignment, Leases, Proposal, Task
-from schemas.graph import Delta, Operation, Phase, SnapshotRequest
+from schemas.graph import Delta, Operation, Phase, Snapshot, SnapshotRequest
 from schemas.nodes import ROOT_MAP, SELF_ID, Map, Node, Object, Self, object_id
 from schemas.process import Clock, Presence
 from schemas.sensing import Percept, Percepts, SelfMotion
@@ -38,9 +38,12 @@ def stamp_ns(frame: int) -> int:
 
 def motion(frame: int, rows: Rows = STRAIGHT) -> SelfMotion:
     """The self-motion from the view before to view `frame`."""
-    motions = Array.of(np.array(rows, np.float64).reshape(-1, 5))
+    motions = np.array(rows, np.float64).reshape(-1, 5)
     return SelfMotion(
-        stamp_ns=stamp_ns(frame), frame=frame, since_ns=stamp_ns(frame - 1), motions=motions
+        stamp_ns=stamp_ns(frame),
+        frame=frame,
+        since_ns=stamp_ns(frame - 1),
+        motions=Array.of(motions),
     )
 
 
@@ -54,23 +57,28 @@ def percept(
         "range_sd_m": 0.3,
         "width_m": 8.0,
         "height_m": 6.0,
+        "whole": True,
+        "box_px": (0, 0, 10, 10),
     }
-    more = {"whole": True, "box_px": (0, 0, 10, 10)}
-    return Percept(
-        label=label, bearing_rad=bearing_rad, range_m=range_m, **{**usual, **more, **facts}
-    )  # type: ignore[arg-type]
+    return Percept(label=label, bearing_rad=bearing_rad, range_m=range_m, **(usual | facts))  # type: ignore[arg-type]
 
 
 def percepts(frame: int, *objects: Percept, road_m: Rows = ()) -> Percepts:
     """What was recognised in view `frame`."""
-    road = Array.of(np.array(road_m, np.float32).reshape(-1, 2))
-    return Percepts(stamp_ns=stamp_ns(frame), frame=frame, objects=list(objects), road_m=road)
+    points_m = np.array(road_m, np.float32).reshape(-1, 2)
+    return Percepts(
+        stamp_ns=stamp_ns(frame),
+        frame=frame,
+        objects=list(objects),
+        road_m=Array.of(points_m),
+    )
 
 
 def agent(samples: npt.ArrayLike | None = None, **facts: Any) -> Self:
     """The self node, fully active, at the origin unless `facts` have another pose."""
     values = np.zeros((200, 3)) if samples is None else samples
-    return Self(id=SELF_ID, activation=1.0, base_level=1.0, samples=Matrix.of(values), **facts)
+    matrix = Matrix.of(values)
+    return Self(id=SELF_ID, activation=1.0, base_level=1.0, samples=matrix, **facts)
 
 
 def landmark(
@@ -79,13 +87,9 @@ def landmark(
     """An object with those samples of its position, fully active."""
     values = np.asarray(samples_m, np.float64)
     mean_m = values.mean(axis=0)
+    offsets_m = Matrix.of(values - mean_m, "<f2")
     usual = {"activation": 1.0, "x_m": float(mean_m[0]), "y_m": float(mean_m[1])}
-    return Object(
-        id=object_id(label),
-        label=label,
-        offsets_m=Matrix.of(values - mean_m, "<f2"),
-        **{**usual, **facts},
-    )
+    return Object(id=object_id(label), label=label, offsets_m=offsets_m, **(usual | facts))
 
 
 def thing(name: str) -> Node:
@@ -96,8 +100,9 @@ def thing(name: str) -> Node:
 def graph_of(*operations: Operation, cell_m: float = 1.0) -> Graph:
     """A graph at version 1, in cycle 1, of a root map and what `operations` make."""
     graph = Graph()
-    written = [Map(id=ROOT_MAP, cell_m=cell_m), *operations]
-    assert graph.apply(Delta(version=1, cycle=1, phase=Phase.PERCEPTS, operations=written))
+    root = Map(id=ROOT_MAP, cell_m=cell_m)
+    delta = Delta(version=1, cycle=1, phase=Phase.PERCEPTS, operations=[root, *operations])
+    assert graph.apply(delta)
     return graph
 
 
@@ -109,18 +114,19 @@ def task(codelet: str, identifier: str = "", **facts: Any) -> Task:
         "motions": Array.of(np.zeros((0, 5))),
         "road_m": Array.of(np.zeros((0, 2), np.float32)),
     }
-    name = identifier or f"1/{codelet}"
-    return Task(task_id=name, codelet=codelet, **{**usual, **facts})
+    task_id = identifier or f"1/{codelet}"
+    return Task(task_id=task_id, codelet=codelet, **(usual | facts))
 
 
 def configured(config: WorkerConfig | None = None) -> list[ConfiguredCodelet]:
     """All our codelets, with these settings."""
-    return [ConfiguredCodelet(codelet, config or WorkerConfig()) for codelet in CODELETS]
+    settings = config or WorkerConfig()
+    return [ConfiguredCodelet(codelet, settings) for codelet in CODELETS]
 
 
 def run(asked: Task, graph: Graph, config: WorkerConfig) -> Answer:
     """What the codelet of `asked` answers."""
-    (codelet,) = [codelet for codelet in CODELETS if codelet.name == asked.codelet]
+    (codelet,) = (codelet for codelet in CODELETS if codelet.name == asked.codelet)
     return codelet.run(asked, graph, config)
 
 
@@ -134,6 +140,11 @@ def answer(asked: Task, operations: Iterable[Operation] = (), failure: str = "")
         operations=list(operations),
         failure=failure,
     )
+
+
+def received(message: Message) -> Message:
+    """`message` as it comes off a bus."""
+    return decode(topics.of(message), encode(message))
 
 
 class Desk:
@@ -165,17 +176,21 @@ class Desk:
 
     def feed(self, message: Message) -> list[Message]:
         """Let the workspace receive `message`, as it would come off a bus."""
-        published = self.module.feed(decode(topics.of(message), encode(message)))
+        published = self.module.feed(received(message))
         self.published += published
         self._unread += published
         for item in published:
-            if isinstance(item, Delta):
-                self.deltas.append(item)
-            elif isinstance(item, Task):
-                self.tasks.append(item)
-            elif isinstance(item, Leases):
-                self._leases |= {lease.task_id: lease for lease in item.assignments}
+            self._keep(item)
         return published
+
+    def _keep(self, message: Message) -> None:
+        match message:
+            case Delta():
+                self.deltas.append(message)
+            case Task():
+                self.tasks.append(message)
+            case Leases():
+                self._leases |= {lease.task_id: lease for lease in message.assignments}
 
     def lease(self, asked: Task) -> Assignment:
         """Which worker holds `asked`, as was published last."""
@@ -183,9 +198,8 @@ class Desk:
 
     def presence(self, worker: str, alive: bool = True) -> list[Message]:
         """A worker comes or goes."""
-        return self.feed(
-            Presence(module="codelets", instance=worker, alive=alive, observer="workspace")
-        )
+        presence = Presence(module="codelets", instance=worker, alive=alive, observer="workspace")
+        return self.feed(presence)
 
     def clock(self, now_ns: int) -> list[Message]:
         """The time is `now_ns`."""
@@ -211,8 +225,7 @@ class Desk:
                 for lease in message.assignments:
                     self._employ(lease.worker)
                     self.busy.append(lease.worker)
-            for worker in list(self._workers.values()):
-                self._show(worker, message)
+            self._show_all(message)
         self.tasks = []
 
     def drive(
@@ -242,16 +255,20 @@ class Desk:
     def digest(self) -> str:
         """The digest of the workspace's own graph."""
         graph = Graph()
-        reply, handler = self.module.served[topics.SNAPSHOT_REQUEST]
-        graph.load(decode(reply, encode(handler(SnapshotRequest()))))  # type: ignore[arg-type]
+        graph.load(self._snapshot())
         return graph.digest()
 
     def release(self) -> None:
         """Let the workers do what was withheld: the tasks of codelet `withhold`."""
         leases = Leases(assignments=self.withheld)
         self.withheld = []
-        for worker in list(self._workers.values()):
-            self._show(worker, leases)
+        self._show_all(leases)
+
+    def _snapshot(self) -> Snapshot:
+        _, handler = self.module.served[topics.SNAPSHOT_REQUEST]
+        snapshot = received(handler(SnapshotRequest()))
+        assert isinstance(snapshot, Snapshot)
+        return snapshot
 
     def _kept_back(self, leases: Leases) -> Leases:
         shown = []
@@ -268,15 +285,18 @@ class Desk:
             return
         worker = build_worker(name, self._configured)
         assert worker.graph is not None
-        _, handler = self.module.served[topics.SNAPSHOT_REQUEST]
-        worker.graph.load(decode(topics.SNAPSHOT, encode(handler(SnapshotRequest()))))  # type: ignore[arg-type]
+        worker.graph.load(self._snapshot())
         self._workers[name] = worker
         for message in self.published:
             if isinstance(message, Task):
                 self._show(worker, message)
 
+    def _show_all(self, message: Message) -> None:
+        for worker in list(self._workers.values()):
+            self._show(worker, message)
+
     def _show(self, worker: Module, message: Message) -> None:
         if topics.of(message) not in worker.handlers:
             return
-        for said in worker.feed(decode(topics.of(message), encode(message))):
-            self.feed(said)
+        for published in worker.feed(received(message)):
+            self.feed(published)
