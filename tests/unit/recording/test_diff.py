@@ -19,6 +19,7 @@ from schemas.graph import Delta, DropNode, Link, Phase
 from schemas.nodes import Node
 from schemas.sensing import Odometry, RangeScan
 from tests.support.logs import odometry, scan, write_log
+from tests.support.messages import of_type
 
 Change = Callable[[list[Message]], object]
 
@@ -28,24 +29,33 @@ def messages() -> list[Message]:
     found: list[Message] = []
     for seq in range(10):
         stamp_ns = seq * 10**8
-        values = Array.of(np.arange(6, dtype=np.float32).reshape(2, 3) + seq)
         found.append(odometry(seq, stamp_ns=stamp_ns, speed_m_s=2.0))
-        found.append(scan(seq, stamp_ns=stamp_ns, values=values))
+        found.append(scan(seq, stamp_ns=stamp_ns, values=Array.of(_values() + seq)))
+
     return found
+
+
+def _values() -> np.ndarray:
+    return np.arange(6, dtype=np.float32).reshape(2, 3)
 
 
 def record(
     path: Path, recorded: Iterable[Message], delay_ns: int = 0, incarnation: int = 1
 ) -> Path:
-    rows = [(1000 * n + delay_ns, message) for n, message in enumerate(recorded)]
+    rows = []
+    for number, message in enumerate(recorded):
+        rows.append((1000 * number + delay_ns, message))
+
     return write_log(path, rows, incarnation=incarnation)
 
 
 def compared(folder: Path, change: Change, delay_ns: int = 0, incarnation: int = 1) -> Diff:
-    other = messages()
-    change(other)
+    """Messages and what `change` makes of them, each in a log of its own."""
+    changed = messages()
+    change(changed)
+
     left = record(folder / "a.mcap", messages())
-    right = record(folder / "b.mcap", other, delay_ns, incarnation)
+    right = record(folder / "b.mcap", changed, delay_ns, incarnation)
     return diff(left, right)
 
 
@@ -54,8 +64,11 @@ def test_logs_of_the_same_messages_are_the_same_however_they_travelled(tmp_path:
         other.sort(key=lambda message: message.source)
 
     found = compared(tmp_path, reorder, delay_ns=77, incarnation=9)
-    assert (found.same, found.first) == (True, "")
-    assert [(t.topic, t.same) for t in found.topics] == [("odometry", 10), ("sensory/scan", 10)]
+    same = {compared.topic: compared.same for compared in found.topics}
+
+    assert found.same
+    assert found.first == ""
+    assert same == {"odometry": 10, "sensory/scan": 10}
 
 
 def test_a_changed_value_is_found_and_named(tmp_path: Path) -> None:
@@ -64,10 +77,12 @@ def test_a_changed_value_is_found_and_named(tmp_path: Path) -> None:
         other[12] = msgspec.structs.replace(other[12], speed_m_s=9.0)
 
     found = compared(tmp_path, change)
+    different = {compared.topic: compared.different for compared in found.topics}
+
     assert found.first == (
         "odometry number 4 of sim (stamp 0.400 s): speed_m_s is 2.0 in a.mcap, 2.5 in b.mcap"
     )
-    assert [(t.topic, t.different) for t in found.topics] == [("odometry", 2), ("sensory/scan", 0)]
+    assert different == {"odometry": 2, "sensory/scan": 0}
 
 
 def test_a_changed_value_in_an_array_is_named_with_its_index(tmp_path: Path) -> None:
@@ -87,12 +102,14 @@ def test_a_message_in_one_log_only_is_named(tmp_path: Path) -> None:
     assert found.first == "odometry number 9 of sim (stamp 0.900 s) is in a.mcap and not in b.mcap"
 
     first = found.topics[0]
-    assert (first.left, first.right, first.left_only) == (10, 9, 1)
+    assert first.left == 10
+    assert first.right == 9
+    assert first.left_only == 1
 
 
 def test_only_the_chosen_topics_are_compared(tmp_path: Path) -> None:
     left = record(tmp_path / "a.mcap", messages())
-    scans = [message for message in messages() if isinstance(message, RangeScan)]
+    scans = of_type(RangeScan, messages())
     right = record(tmp_path / "b.mcap", scans)
 
     assert not diff(left, right).same

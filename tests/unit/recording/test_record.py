@@ -51,17 +51,18 @@ def path(tmp_path: Path) -> Path:
 
 def test_a_log_gives_back_bytes_times_and_envelopes_in_order_of_arrival(path: Path) -> None:
     recorded = Recorded(path)
-    messages = [odometry(0), scan(0), odometry(1), scan(1)]
-    published = [recorded.publish(message, 100 + n) for n, message in enumerate(messages)]
+    payloads = []
+    for at_ns, message in enumerate((odometry(0), scan(0), odometry(1), scan(1)), start=100):
+        payloads.append(recorded.publish(message, at_ns))
+
+    last = encode(odometry(2))
     envelope = Envelope("sim", 2, 1, 105, 90, [("sim", 3, 4)], [("motor/command", "action", 7)])
-    published.append(encode(odometry(2)))
-    recorded.publish_bytes(topics.ODOMETRY, published[-1], envelope)
+    recorded.publish_bytes(topics.ODOMETRY, last, envelope)
     recorded.end()
 
     reader = LogReader(path)
     records = list(reader.records())
-
-    assert [reader.payload(record) for record in records] == published
+    assert [reader.payload(record) for record in records] == [*payloads, last]
     assert [record.log_time_ns for record in records] == [100, 101, 102, 103, 105]
     assert [record.sequence for record in records] == [0, 0, 1, 1, 2]
     assert records[-1].envelope == envelope
@@ -78,7 +79,9 @@ def test_a_summary_counts_messages_by_topic_and_that_none_is_missing(
 
     assert summary.messages == {"odometry": 1, "sensory/scan": 1}
     assert summary.never_drop_whole
-    assert (summary.gaps, summary.rejected, summary.size_bytes) == ([], {}, path.stat().st_size)
+    assert summary.gaps == []
+    assert summary.rejected == {}
+    assert summary.size_bytes == path.stat().st_size
 
 
 def test_a_gap_is_named_with_its_source_and_its_numbers(path: Path) -> None:
@@ -124,12 +127,19 @@ def test_a_restarted_source_begins_anew_and_that_is_no_gap(path: Path) -> None:
     assert recorded.end().gaps == []
 
 
-def test_what_a_source_published_before_its_restart_and_is_missing_is_a_gap(path: Path) -> None:
+def _restarted(path: Path, ended_at: int) -> Recorded:
+    """A recording of two messages of a source, its restart, and one more; the new incarnation
+    states that the old one published so many in all.
+    """
     recorded = Recorded(path)
-    for seq, incarnation, earlier in ((0, 1, 10), (1, 1, 10), (0, 2, 15)):
-        message = odometry(seq)
+    for seq, incarnation, earlier in ((0, 1, 10), (1, 1, 10), (0, 2, ended_at)):
         envelope = Envelope("sim", seq, incarnation, seq, seq, earlier=earlier)
-        recorded.publish_bytes(topics.ODOMETRY, encode(message), envelope)
+        recorded.publish_bytes(topics.ODOMETRY, encode(odometry(seq)), envelope)
+    return recorded
+
+
+def test_what_a_source_published_before_its_restart_and_is_missing_is_a_gap(path: Path) -> None:
+    recorded = _restarted(path, ended_at=15)
     summary = recorded.end()
 
     assert summary.gaps == ["odometry (never drop): 3 of sim missing, number 2 to 4"]
@@ -137,10 +147,7 @@ def test_what_a_source_published_before_its_restart_and_is_missing_is_a_gap(path
 
 
 def test_a_restart_after_which_nothing_is_missing_is_no_gap(path: Path) -> None:
-    recorded = Recorded(path)
-    for seq, incarnation, earlier in ((0, 1, 10), (1, 1, 10), (0, 2, 12)):
-        envelope = Envelope("sim", seq, incarnation, seq, seq, earlier=earlier)
-        recorded.publish_bytes(topics.ODOMETRY, encode(odometry(seq)), envelope)
+    recorded = _restarted(path, ended_at=12)
 
     assert recorded.end().gaps == []
 
@@ -149,24 +156,27 @@ def test_what_is_no_message_is_counted_and_not_written(path: Path) -> None:
     recorded = Recorded(path)
     recorded.publish(odometry(0), 1)
     recorded.publish_bytes(topics.ODOMETRY, b"\xc1", Envelope("sim", 1, 1, 2, 2))
-    recorded.publish_bytes(topics.ODOMETRY, encode(odometry(1)), Envelope("mallory", 1, 1, 3, 3))
+    of_another = Envelope("mallory", 1, 1, 3, 3)
+    recorded.publish_bytes(topics.ODOMETRY, encode(odometry(1)), of_another)
     summary = recorded.end()
 
+    records = list(LogReader(path).records())
     assert summary.rejected == {"odometry": 2}
-    assert len(list(LogReader(path).records())) == 1
+    assert len(records) == 1
 
 
 def test_numbers_that_mcap_has_no_room_for_are_kept_in_the_envelope(path: Path) -> None:
+    seq = 2**40 + 3
+    far = msgspec.structs.replace(scan(0), seq=seq)
     recorded = Recorded(path)
-    far = scan(0)
-    far = msgspec.structs.replace(far, seq=2**40 + 3)
-    recorded.publish_bytes(topics.SCAN, encode(far), Envelope("sensory", far.seq, 1, -5, -5))
+    recorded.publish_bytes(topics.SCAN, encode(far), Envelope("sensory", seq, 1, -5, -5))
     recorded.end()
-    (record,) = LogReader(path).records()
 
+    (record,) = LogReader(path).records()
     assert (record.sequence, record.publish_ns, record.log_time_ns) == (3, 0, 0)
     assert record.envelope is not None
-    assert (record.envelope.seq, record.envelope.sent_ns) == (2**40 + 3, -5)
+    assert record.envelope.seq == seq
+    assert record.envelope.sent_ns == -5
 
 
 def test_what_finds_no_room_is_counted_and_never_drop_topics_have_more(
@@ -201,8 +211,11 @@ def test_others_can_wait_for_the_recorder_and_it_notes_who_is_there(path: Path) 
 
     recorded.bus.announce(Member("codelets", "codelets-1"))
     recorded.end()
-    members = [facts["instance"] for name, facts in LogReader(path).metadata if name == "member"]
 
+    members = []
+    for name, facts in LogReader(path).metadata:
+        if name == "member":
+            members.append(facts["instance"])
     assert members[:2] == ["recorder", "codelets-1"]
 
 

@@ -24,6 +24,7 @@ from tests.support.logs import odometry
 
 CHUNKS = 6
 EACH = 5
+ALL = range(CHUNKS * EACH)
 
 
 def _message(seq: int) -> bytes:
@@ -35,27 +36,35 @@ def _message(seq: int) -> bytes:
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("log") / "whole.mcap"
     writer = LogWriter(path, [topics.ODOMETRY, topics.SCAN], {"agent": "a", "began_ns": "17"})
-    for seq in range(CHUNKS * EACH):
-        writer.write(topics.ODOMETRY, _message(seq), Envelope("sim", seq, 1, seq, seq), seq)
+    for seq in ALL:
+        envelope = Envelope("sim", seq, 1, seq, seq)
+        writer.write(topics.ODOMETRY, _message(seq), envelope, seq)
         if seq % EACH == EACH - 1:
             writer.flush()
+
     writer.close()
     return path
 
 
 def _chunks(path: Path) -> list[tuple[int, int]]:
-    spans = LogBytes(path).records_from(len(MCAP0_MAGIC))
-    return [(span.offset, span.end) for span in spans if span.opcode == Opcode.CHUNK]
+    chunks = []
+    for span in LogBytes(path).records_from(len(MCAP0_MAGIC)):
+        if span.opcode == Opcode.CHUNK:
+            chunks.append((span.offset, span.end))
+    return chunks
 
 
 def _numbers(path: Path) -> list[int]:
+    """The numbers of the messages of a log, each of which is as it was written."""
     reader = LogReader(path)
-    records = list(reader.records())
-    assert all(reader.payload(record) == _message(record.sequence) for record in records)
-    assert all(
-        record.envelope is not None and record.envelope.seq == record.sequence for record in records
-    )
-    return [record.sequence for record in records]
+    numbers = []
+    for record in reader.records():
+        assert reader.payload(record) == _message(record.sequence)
+        assert record.envelope is not None
+        assert record.envelope.seq == record.sequence
+        numbers.append(record.sequence)
+
+    return numbers
 
 
 def _altered(whole: Path, folder: Path, content: bytes) -> Path:
@@ -91,12 +100,13 @@ def test_a_file_cut_at_any_byte_keeps_every_chunk_that_was_finished(
 
 def test_a_cut_file_says_how_many_bytes_at_its_end_are_lost(whole: Path, tmp_path: Path) -> None:
     start, end = _chunks(whole)[3]
-    path = _altered(whole, tmp_path, whole.read_bytes()[: end - 10])
-    assert LogReader(path).cut_bytes == end - 10 - start
+    cut = end - 10
+    path = _altered(whole, tmp_path, whole.read_bytes()[:cut])
+    assert LogReader(path).cut_bytes == cut - start
 
     recovery = recover(path, tmp_path / "out.mcap")
-    assert recovery.lost_bytes == end - 10 - start
-    assert recovery.damaged == [f"bytes {start} to {end - 10}: the file is cut off here"]
+    assert recovery.lost_bytes == cut - start
+    assert recovery.damaged == [f"bytes {start} to {cut}: the file is cut off here"]
 
 
 @pytest.mark.parametrize("number", range(CHUNKS))
@@ -107,18 +117,17 @@ def test_a_damaged_chunk_is_left_out_and_its_messages_are_counted(
     content = bytearray(whole.read_bytes())
     content[end - 20] ^= 0xFF
     path = _altered(whole, tmp_path, bytes(content))
-
     with pytest.raises(LogError, match="cogmap log recover"):
         list(LogReader(path).records())
 
     recovery = recover(path, tmp_path / "out.mcap")
-    lost = range(number * EACH, (number + 1) * EACH)
-
-    assert (recovery.lost_bytes, recovery.messages) == (end - start, (CHUNKS - 1) * EACH)
+    assert recovery.lost_bytes == end - start
+    assert recovery.messages == (CHUNKS - 1) * EACH
     assert recovery.lost_messages == EACH
-    assert _numbers(tmp_path / "out.mcap") == [
-        seq for seq in range(CHUNKS * EACH) if seq not in lost
-    ]
+
+    lost = range(number * EACH, (number + 1) * EACH)
+    kept = [seq for seq in ALL if seq not in lost]
+    assert _numbers(tmp_path / "out.mcap") == kept
 
 
 @pytest.mark.parametrize("length", [0, 7, 3000, 2**50])
@@ -128,21 +137,23 @@ def test_a_record_with_a_wrong_length_costs_only_its_own_chunk(
     start, _ = _chunks(whole)[2]
     content = bytearray(whole.read_bytes())
     struct.pack_into("<Q", content, start + 1, length)
-    recover(_altered(whole, tmp_path, bytes(content)), tmp_path / "out.mcap")
+    path = _altered(whole, tmp_path, bytes(content))
+    recover(path, tmp_path / "out.mcap")
 
-    assert set(_numbers(tmp_path / "out.mcap")) >= set(range(CHUNKS * EACH)) - set(
-        range(2 * EACH, 3 * EACH)
-    )
+    of_the_chunk = set(range(2 * EACH, 3 * EACH))
+    recovered = set(_numbers(tmp_path / "out.mcap"))
+    assert recovered >= set(ALL) - of_the_chunk
 
 
 def test_a_whole_file_is_copied_as_it_is(whole: Path, tmp_path: Path) -> None:
-    recovery = recover(whole, tmp_path / "out.mcap")
+    copy = tmp_path / "out.mcap"
+    recovery = recover(whole, copy)
+    about = LogReader(whole).about("recording")
 
-    assert (recovery.whole, recovery.lost_bytes) == (True, 0)
-    assert _numbers(tmp_path / "out.mcap") == list(range(CHUNKS * EACH))
-    assert LogReader(tmp_path / "out.mcap").about("recording") == LogReader(whole).about(
-        "recording"
-    )
+    assert recovery.whole
+    assert recovery.lost_bytes == 0
+    assert _numbers(copy) == list(ALL)
+    assert LogReader(copy).about("recording") == about
 
 
 def test_random_bytes_after_the_first_record_never_break_recovery(
@@ -154,8 +165,10 @@ def test_random_bytes_after_the_first_record_never_break_recovery(
         altered = bytearray(content)
         at = int(generator.integers(8, len(content) - 64))
         altered[at : at + 64] = generator.bytes(64)
+        path = _altered(whole, tmp_path, bytes(altered))
+
         target = tmp_path / f"{trial}.mcap"
-        recovery = recover(_altered(whole, tmp_path, bytes(altered)), target)
+        recovery = recover(path, target)
 
         assert recovery.messages >= (CHUNKS - 2) * EACH
         assert len(_numbers(target)) == recovery.messages
@@ -171,14 +184,18 @@ def _read_all(path: Path) -> None:
 
 def test_a_damaged_log_is_read_or_is_one_sentence(whole: Path, tmp_path: Path) -> None:
     content = whole.read_bytes()
+    end = len(content)
+    parts = [(8, 400), (end - 4000, end), (8, end)]
     generator = np.random.default_rng(4)
+
     refused = 0
     for trial in range(60):
+        at = int(generator.integers(*parts[trial % 3]))
         altered = bytearray(content)
-        start, end = [(8, 400), (len(content) - 4000, len(content)), (8, len(content))][trial % 3]
-        altered[int(generator.integers(start, end))] ^= int(generator.integers(1, 256))
+        altered[at] ^= int(generator.integers(1, 256))
+        path = _altered(whole, tmp_path, bytes(altered))
         try:
-            _read_all(_altered(whole, tmp_path, bytes(altered)))
+            _read_all(path)
         except LogError as error:
             refused += 1
             assert "altered.mcap" in str(error)

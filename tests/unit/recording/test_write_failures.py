@@ -69,13 +69,16 @@ def test_a_full_disk_ends_the_recorder_with_one_sentence(tmp_path: Path) -> None
 
 def test_what_was_flushed_before_the_disk_was_full_can_be_recovered(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
+    saved = tmp_path / "saved.mcap"
     disk = Disk(path)
     with full_after(FULL_BYTES), pytest.raises(LogError):
         run(disk.recorder, disk.stop)
 
-    recovery = recover(path, tmp_path / "saved.mcap")
+    recovery = recover(path, saved)
+    records = list(LogReader(saved).records())
+
     assert recovery.messages * MESSAGE_BYTES >= CHUNK_BYTES
-    assert len(list(LogReader(tmp_path / "saved.mcap").records())) == recovery.messages
+    assert len(records) == recovery.messages
 
 
 def test_a_recovery_onto_a_full_disk_is_one_sentence(tmp_path: Path) -> None:
