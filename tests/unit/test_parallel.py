@@ -40,9 +40,11 @@ def _alive(pid: int) -> bool:
 
 def test_results_come_in_the_order_of_the_jobs_and_progress_reaches_one() -> None:
     shares: list[float] = []
+    results = parallel_map(abs, [-3, 2, -1], 2, shares.append)
 
-    assert parallel_map(abs, [-3, 2, -1], 2, shares.append) == [3, 2, 1]
-    assert shares[-1] == 1.0 and shares == sorted(shares)
+    assert results == [3, 2, 1]
+    assert shares[-1] == 1.0
+    assert shares == sorted(shares)
 
 
 def test_nothing_is_left_of_the_processes_of_one_that_is_killed(tmp_path: Path) -> None:

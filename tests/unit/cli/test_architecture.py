@@ -18,15 +18,17 @@ PAGE = Path(__file__).parents[3] / "docs" / "architecture.md"
 
 def _modules() -> list[Module]:
     camera = Module("camera", emits={topics.STEREO, topics.ODOMETRY})
-    memory = (
-        Module("memory", emits={topics.VIEW}).on(topics.STEREO, print).on(topics.ODOMETRY, print)
-    )
+    memory = Module("memory", emits={topics.VIEW})
+    memory.on(topics.STEREO, print)
+    memory.on(topics.ODOMETRY, print)
     memory.serve(topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, print)  # type: ignore[arg-type]
     return [camera, memory]
 
 
 def test_the_page_is_what_the_code_generates() -> None:
-    assert renewed(PAGE.read_text()) == PAGE.read_text(), "write it anew with `cogmap architecture`"
+    page = PAGE.read_text()
+
+    assert renewed(page) == page, "write it anew with `cogmap architecture`"
 
 
 def test_modules_are_boxes_and_topics_are_arrows_by_their_delivery() -> None:
@@ -65,11 +67,12 @@ def test_a_page_that_is_out_of_date_fails_the_check(
 ) -> None:
     page = tmp_path / "page.md"
     page.write_text(PAGE.read_text().replace("sensory/view", "sensory/sight"))
-    run = CliRunner().invoke(architecture, ["--check", str(page)])
+    check = CliRunner().invoke(architecture, ["--check", str(page)])
+    assert isinstance(check.exception, CogmapError)
+    assert "cogmap architecture" in str(check.exception)
 
-    assert isinstance(run.exception, CogmapError)
-    assert "cogmap architecture" in str(run.exception)
-    assert CliRunner().invoke(architecture, [str(page)]).exit_code == 0
+    write = CliRunner().invoke(architecture, [str(page)])
+    assert write.exit_code == 0
     assert page.read_text() == PAGE.read_text()
 
 
@@ -80,7 +83,8 @@ def test_a_page_without_a_place_for_a_part_is_named(text: str) -> None:
 
 
 def test_a_page_that_is_not_there_is_named_with_the_remedy(tmp_path: Path) -> None:
-    run = CliRunner().invoke(architecture, [str(tmp_path / "none.md")])
+    absent = tmp_path / "none.md"
+    run = CliRunner().invoke(architecture, [str(absent)])
 
     assert isinstance(run.exception, UsageError)
     assert "run this in the sources" in str(run.exception)

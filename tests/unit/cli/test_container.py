@@ -13,9 +13,8 @@ ROOT = Path(__file__).parents[3]
 
 
 def services() -> dict[str, dict[str, str]]:
-    compose: dict[str, dict[str, dict[str, str]]] = yaml.safe_load(
-        (ROOT / "compose.yaml").read_text()
-    )
+    written = (ROOT / "compose.yaml").read_text()
+    compose: dict[str, dict[str, dict[str, str]]] = yaml.safe_load(written)
     return compose["services"]
 
 
@@ -23,15 +22,21 @@ def test_the_image_gets_every_package() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())
     found = project["tool"]["setuptools"]["packages"]["find"]["include"]
     packages = {pattern.rstrip("*") for pattern in found}
-    copied = (ROOT / ".dockerignore").read_text().splitlines()
 
-    assert packages <= {line.removeprefix("!") for line in copied}
+    ignored = (ROOT / ".dockerignore").read_text().splitlines()
+    copied = {line.removeprefix("!") for line in ignored}
+    assert packages
+    assert packages <= copied
 
 
 def test_every_module_is_a_service() -> None:
-    assert set(registry.MODULES) <= set(services())
+    modules = set(registry.MODULES)
+
+    assert modules <= set(services())
 
 
 def test_every_module_keeps_its_state_where_a_restart_finds_it() -> None:
+    configured = services()
+
     for name in registry.MODULES:
-        assert "--state runs/latest/state" in str(services()[name])
+        assert "--state runs/latest/state" in str(configured[name])

@@ -40,7 +40,8 @@ def health(at_s: float, **changes: object) -> Health:
 
 def system(role: Role = Role.PUBLISHES, topic: Topic = topics.SCAN) -> System:
     process = Process("1", SENSORY)
-    return System("agent", (process,), (Use(topic.key("agent"), role, process),))
+    use = Use(topic.key("agent"), role, process)
+    return System("agent", (process,), (use,))
 
 
 def findings(observed: Observed, on: System | None = None) -> list[str]:
@@ -48,11 +49,14 @@ def findings(observed: Observed, on: System | None = None) -> list[str]:
 
 
 def observed(*reports: Health, clock_rate: float | None = 1.0) -> Observed:
-    return Observed({SENSORY}, {"sensory": list(reports)} if reports else {}, clock_rate)
+    by_instance = {"sensory": list(reports)} if reports else {}
+    return Observed({SENSORY}, by_instance, clock_rate)
 
 
 def test_a_system_that_is_well_has_no_findings() -> None:
-    assert findings(observed(health(10), health(11), health(12))) == []
+    well = observed(health(10), health(11), health(12))
+
+    assert findings(well) == []
 
 
 def test_a_module_that_is_not_there_is_named() -> None:
@@ -87,14 +91,16 @@ def test_what_a_module_complains_of_is_a_finding(changes: dict[str, object], sen
     assert finding.startswith(sentence)
 
 
+def queued(*numbers: int) -> Observed:
+    """A module that reports so many messages in its queue, second by second."""
+    return observed(*[health(10 + second, queued=number) for second, number in enumerate(numbers)])
+
+
 def test_a_queue_that_grows_is_named_and_one_that_shrinks_is_not() -> None:
-    growing = [health(10 + i, queued=queued) for i, queued in enumerate((5, 20, 40))]
-    falling = [health(10 + i, queued=queued) for i, queued in enumerate((5, 40, 20))]
+    (finding,) = findings(queued(5, 20, 40))
 
-    assert findings(observed(*falling)) == []
-
-    (finding,) = findings(observed(*growing))
     assert finding.startswith("sensory: its queue grows, to 40 messages")
+    assert findings(queued(5, 40, 20)) == []
 
 
 @pytest.mark.parametrize(
@@ -113,32 +119,46 @@ def test_a_topic_with_a_rate_far_from_the_tables_is_named(number: int, is_off: b
 
 
 def test_rates_mean_nothing_in_lockstep_and_follow_the_clock_otherwise() -> None:
-    slow = [health(10, emitted={"sensory/scan": 0}), health(12, emitted={"sensory/scan": 5})]
+    before = health(10, emitted={"sensory/scan": 0})
+    after = health(12, emitted={"sensory/scan": 5})
+    in_lockstep = observed(before, after, clock_rate=0.0)
+    at_half_speed = observed(before, after, clock_rate=0.5)
+    in_real_time = observed(before, after, clock_rate=1.0)
 
-    assert findings(observed(*slow, clock_rate=0.0)) == []
-    assert findings(observed(*slow, clock_rate=0.5)) == []
-    assert len(findings(observed(*slow, clock_rate=1.0))) == 1
+    assert findings(in_lockstep) == []
+    assert findings(at_half_speed) == []
+    assert len(findings(in_real_time)) == 1
 
 
 def test_a_module_that_subscribes_to_the_truth_is_named() -> None:
-    found = findings(observed(health(10), health(12)), system(Role.SUBSCRIBES, topics.TRUE_POSE))
+    cheating = system(Role.SUBSCRIBES, topics.TRUE_POSE)
+    found = findings(observed(health(10), health(12)), cheating)
 
     assert found == ["sensory: it subscribes to truth/pose: no module may see the ground truth"]
 
 
 def test_an_old_python_is_named() -> None:
-    assert [str(finding) for finding in installation.python_version((3, 10))] == [
-        "Python: this is 3.10: install Python 3.11 or newer and run `make setup`"
-    ]
+    (old,) = installation.python_version((3, 10))
+    assert str(old) == "Python: this is 3.10: install Python 3.11 or newer and run `make setup`"
+
     assert list(installation.python_version((3, 12))) == []
 
 
-def test_a_python_or_platform_without_the_simulator_is_named() -> None:
+def test_the_simulator_is_at_home_on_its_python_and_platform() -> None:
     assert list(installation.simulator((3, 11), "linux", "x86_64")) == []
 
-    for elsewhere in (((3, 12), "linux", "x86_64"), ((3, 11), "darwin", "arm64")):
-        (finding,) = installation.simulator(*elsewhere)
-        assert "needs Python 3.11 on Linux x86-64" in finding.wrong
+
+@pytest.mark.parametrize(
+    ("version", "platform", "machine"),
+    [((3, 12), "linux", "x86_64"), ((3, 11), "darwin", "arm64")],
+    ids=["newer Python", "another platform"],
+)
+def test_a_python_or_platform_without_the_simulator_is_named(
+    version: tuple[int, int], platform: str, machine: str
+) -> None:
+    (finding,) = installation.simulator(version, platform, machine)
+
+    assert "needs Python 3.11 on Linux x86-64" in finding.wrong
 
 
 def test_a_dependency_that_is_missing_or_of_another_version_is_named() -> None:

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
 
-from cli.main import cogmap
 from cogmap.errors import LogError, UsageError
 from schemas.base import Message
 from schemas.sensing import Odometry, Pose, TruePose
+from tests.support.commands import log_command, log_facts
 from tests.support.logs import SECOND_NS, odometry, write_log
 
 STEPS = 5
@@ -43,77 +41,69 @@ def drive(tmp_path: Path) -> Path:
     """A robot that drives straight for five seconds, with wheels that measure it so."""
     messages: list[Message] = []
     for seq in range(STEPS + 1):
-        messages += [true_pose(seq), turn_of_wheels(seq)]
+        messages.append(true_pose(seq))
+        messages.append(turn_of_wheels(seq))
+
     config = json.dumps({"sim": {"seed": 7, "laps": 0.5, "mode": "lockstep"}})
     return write(tmp_path / "drive.mcap", messages, config)
 
 
-@pytest.fixture
-def run() -> Callable[..., Result]:
-    def invoke(*arguments: str | Path) -> Result:
-        result = CliRunner().invoke(cogmap, ["log", *map(str, arguments)], standalone_mode=False)
-        if result.exception is not None:
-            raise result.exception
-        return result
+def test_a_summary_has_the_drive_and_its_settings(drive: Path) -> None:
+    found = log_facts("summary", drive)
 
-    return invoke
-
-
-def test_a_summary_has_the_drive_and_its_settings(run: Callable[..., Result], drive: Path) -> None:
-    found = json.loads(run("summary", drive, "--json").stdout)
-
-    assert (found["seed"], found["laps"], found["mode"]) == (7, 0.5, "lockstep")
-    assert (found["drive_s"], found["distance_m"]) == (5.0, 5.0)
+    assert found["seed"] == 7
+    assert found["laps"] == 0.5
+    assert found["mode"] == "lockstep"
+    assert found["drive_s"] == 5.0
+    assert found["distance_m"] == 5.0
     assert found["completed"]
     assert found["gaps_total"] == 0
     assert found["log"] is None
 
 
-def test_a_summary_is_a_table_for_people(run: Callable[..., Result], drive: Path) -> None:
-    shown = run("summary", drive).stdout
+def test_a_summary_is_a_table_for_people(drive: Path) -> None:
+    shown = log_command("summary", drive).stdout
 
     assert "5.0 m in 5.0 s" in shown
     assert "path integration alone, wheels" in shown
     assert "the recording was not finished" in shown
 
 
-def test_settings_that_a_log_lacks_are_the_defaults(
-    run: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_settings_that_a_log_lacks_are_the_defaults(tmp_path: Path) -> None:
     log = write(tmp_path / "bare.mcap", [true_pose(0)])
-    found = json.loads(run("summary", log, "--json").stdout)
+    found = log_facts("summary", log)
 
-    assert (found["seed"], found["laps"]) == (1, 1.0)
+    assert found["seed"] == 1
+    assert found["laps"] == 1.0
 
 
-def test_a_log_without_true_poses_is_said_to_have_none(
-    run: Callable[..., Result], tmp_path: Path
-) -> None:
-    result = run("summary", write(tmp_path / "blind.mcap", [turn_of_wheels(0)]), "--json")
+def test_a_log_without_true_poses_is_said_to_have_none(tmp_path: Path) -> None:
+    blind = write(tmp_path / "blind.mcap", [turn_of_wheels(0)])
+    result = log_command("summary", blind, "--json")
 
     assert "holds no truth/pose: distances and errors are 0" in result.stderr
     assert json.loads(result.stdout)["distance_m"] == 0.0
 
 
 def test_a_map_is_drawn_as_an_image_named_by_its_log(
-    run: Callable[..., Result], drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
 
-    assert "drive-map.png: 5 m of driving" in run("map", drive).stdout
+    assert "drive-map.png: 5 m of driving" in log_command("map", drive).stdout
     assert (tmp_path / "drive-map.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_map_can_be_a_pdf(run: Callable[..., Result], drive: Path, tmp_path: Path) -> None:
-    run("map", drive, "-o", tmp_path / "town.pdf")
+def test_a_map_can_be_a_pdf(drive: Path, tmp_path: Path) -> None:
+    log_command("map", drive, "-o", tmp_path / "town.pdf")
 
     assert (tmp_path / "town.pdf").read_bytes().startswith(b"%PDF")
 
 
-def test_a_map_that_cannot_be_written_is_one_sentence(
-    run: Callable[..., Result], drive: Path, tmp_path: Path
-) -> None:
+def test_a_map_that_cannot_be_written_is_one_sentence(drive: Path, tmp_path: Path) -> None:
+    absent = tmp_path / "absent"
+
     with pytest.raises(UsageError, match=r"name a file that ends in \.png or \.pdf"):
-        run("map", drive, "-o", "town.txt")
+        log_command("map", drive, "-o", "town.txt")
     with pytest.raises(LogError, match="name a file in a folder that can be written to"):
-        run("map", drive, "-o", tmp_path / "absent" / "town.png")
+        log_command("map", drive, "-o", absent / "town.png")

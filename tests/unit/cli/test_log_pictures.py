@@ -4,8 +4,7 @@ figure of it all.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
+import itertools
 from pathlib import Path
 
 import cv2
@@ -14,14 +13,12 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from click import UsageError as ClickUsageError
-from click.testing import CliRunner, Result
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
-from cli.main import cogmap
 from cli.plots import draw, ground
 from cli.plots.labels import Label, place
 from cli.plots.palette import KERB, SEVERAL
@@ -30,6 +27,7 @@ from schemas.array import Array
 from schemas.base import Message
 from schemas.sensing import Percept, Percepts, StereoFrame, View
 from tests.support.blocks import ASPHALT, CAMERA, GRASS, Block, painted
+from tests.support.commands import log_command, log_facts
 from tests.support.logs import SECOND_NS, write_log
 
 FRAMES = 5
@@ -42,11 +40,13 @@ HOUSE = Block(
 SCENE, DEPTH_M, _ = painted([HOUSE])
 OUTLINE = [(40, 60), (120, 70), (120, 150), (40, 160)]
 Pixels = npt.NDArray[np.uint8]
+SCALE = 3
 
 
 def shade(frame: int) -> Pixels:
     """The image of a frame: no two are the same."""
-    return np.asarray(SCENE.astype(int) * (10 + frame) // 20, np.uint8)
+    brightened = SCENE.astype(int) * (10 + frame) // 20
+    return np.asarray(brightened, np.uint8)
 
 
 def percept(number: int) -> Percept:
@@ -66,24 +66,25 @@ def percept(number: int) -> Percept:
 
 
 def view(frame: int, image: Pixels | None = None) -> View:
-    pixels = Array.of(shade(frame) if image is None else image)
+    pixels = shade(frame) if image is None else image
     return View(
-        stamp_ns=frame, frame=frame, image=pixels, depth_m=Array.of(DEPTH_M), calibration=CAMERA
+        stamp_ns=frame,
+        frame=frame,
+        image=Array.of(pixels),
+        depth_m=Array.of(DEPTH_M),
+        calibration=CAMERA,
     )
 
 
 def answer(frame: int) -> Percepts:
-    road_m = np.array(
-        [(x, y) for x in np.arange(3.2, 14, 0.5) for y in np.arange(-3.7, 4, 0.5)], np.float32
-    )
-    objects = [percept(number) for number in range(RECOGNISED[frame])]
-    ends_m = np.array([(x, side * 4.0) for x in range(5, 14) for side in (-1, 1)], np.float32)
+    road_m = itertools.product(np.arange(3.2, 14, 0.5), np.arange(-3.7, 4, 0.5))
+    ends_m = itertools.product(range(5, 14), (-4.0, 4.0))
     return Percepts(
         stamp_ns=frame,
         frame=frame,
-        objects=objects,
-        road_m=Array.of(road_m),
-        road_boundary_m=Array.of(ends_m),
+        objects=[percept(number) for number in range(RECOGNISED[frame])],
+        road_m=Array.of(np.array(list(road_m), np.float32)),
+        road_boundary_m=Array.of(np.array(list(ends_m), np.float32)),
     )
 
 
@@ -111,17 +112,10 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write(tmp_path_factory.mktemp("pictures") / "drive.mcap", messages)
 
 
-@pytest.fixture
-def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Images go into a folder of their own."""
     monkeypatch.chdir(tmp_path)
-
-    def invoke(*arguments: str | Path) -> Result:
-        result = CliRunner().invoke(cogmap, ["log", *map(str, arguments)], standalone_mode=False)
-        if result.exception is not None:
-            raise result.exception
-        return result
-
-    return invoke
 
 
 def read(path: str | Path) -> Pixels:
@@ -130,134 +124,152 @@ def read(path: str | Path) -> Pixels:
     return np.asarray(image[..., ::-1], np.uint8)
 
 
-def test_an_image_has_the_pixels_of_the_view_one_for_one(
-    run: Callable[..., Result], drive: Path
-) -> None:
-    printed = run("image", drive, "--frame", "4").stdout
+def test_an_image_has_the_pixels_of_the_view_one_for_one(drive: Path) -> None:
+    printed = log_command("image", drive, "--frame", "4").stdout
 
     assert printed == f"drive-frame-4-view.png: sensory/view, frame 4 at 2.000 s of {drive}\n"
     assert np.array_equal(read("drive-frame-4-view.png"), shade(4))
 
 
-def test_it_is_the_view_in_the_middle_or_the_nearest_to_a_time(
-    run: Callable[..., Result], drive: Path
-) -> None:
-    middle = json.loads(run("image", drive, "--json").stdout)
-    assert (middle["frame"], middle["topic"], middle["objects"]) == (5, "sensory/view", None)
+def levels(colour: str) -> npt.NDArray[np.float64]:
+    """Red, green and blue of a colour, from 0 to 255."""
+    return np.array(to_rgb(colour)) * 255
 
-    near = json.loads(run("image", drive, "--json", "--at", "3.2").stdout)
-    assert (near["frame"], near["at_s"], near["stamp_ns"]) == (4, 2.0, 4)
+
+def enlarged(path: str | Path) -> npt.NDArray[np.int64]:
+    """The middle of each enlarged pixel of the view in an image."""
+    shown = read(path)[1 : SCALE * 240 : SCALE, 1 : SCALE * 320 : SCALE]
+    return shown.astype(int)
+
+
+def test_it_is_the_view_in_the_middle_or_the_nearest_to_a_time(drive: Path) -> None:
+    middle = log_facts("image", drive)
+    assert middle["frame"] == 5
+    assert middle["topic"] == "sensory/view"
+    assert middle["objects"] is None
+
+    near = log_facts("image", drive, "--at", "3.2")
+    assert near["frame"] == 4
+    assert near["at_s"] == 2.0
+    assert near["stamp_ns"] == 4
     assert np.array_equal(read(near["path"]), shade(4))
 
 
-def test_a_camera_is_shown_as_it_gave_its_image(run: Callable[..., Result], drive: Path) -> None:
-    run("image", drive, "--frame", "6", "--camera", "right", "-o", "right.png")
-    assert np.array_equal(read("right.png"), 255 - shade(6))
+def test_a_camera_is_shown_as_it_gave_its_image(drive: Path) -> None:
+    log_command("image", drive, "--frame", "6", "--camera", "right", "-o", "right.png")
+    log_command("image", drive, "--frame", "6", "--camera", "left", "-o", "left.JPG")
+    left = read("left.JPG").astype(int)
+    right = read("right.png")
 
-    run("image", drive, "--frame", "6", "--camera", "left", "-o", "left.JPG")
-    assert np.abs(read("left.JPG").astype(int) - shade(6)).mean() < 6
-
-
-def test_depth_is_coloured_by_distance_grey_where_unknown_and_has_a_scale(
-    run: Callable[..., Result], drive: Path
-) -> None:
-    run("image", drive, "--frame", "6", "--depth", "-o", "depth.png")
-    shown = read("depth.png")
-    assert shown.shape == (3 * 240, 3 * 320 + draw.SCALE_PX, 3)
-
-    pixels = shown[1 : 3 * 240 : 3, 1 : 3 * 320 : 3].astype(int)
-    grey = np.round(np.array(to_rgb(KERB)) * 255)
-    assert np.array_equal(np.abs(pixels - grey).max(-1) <= 1, DEPTH_M == 0)
-
-    rows = pixels[130:, 310]
-    assert len(np.unique(rows, axis=0)) > 50
-    assert (np.diff(rows[:, 1]) >= 0).all()
-    assert np.ptp(shown[:, 3 * 320 :].astype(int)) > 100
+    assert np.array_equal(right, 255 - shade(6))
+    assert np.abs(left - shade(6)).mean() < 6
 
 
-def test_percepts_are_outlined_where_they_are_and_leave_the_rest_of_the_view(
-    run: Callable[..., Result], drive: Path
-) -> None:
-    facts = json.loads(run("image", drive, "--frame", "5", "--percepts", "--json").stdout)
+def test_depth_is_coloured_by_distance_grey_where_unknown_and_has_a_scale(drive: Path) -> None:
+    log_command("image", drive, "--frame", "6", "--depth", "-o", "depth.png")
+    shown = read("depth.png").astype(int)
+    assert shown.shape == (SCALE * 240, SCALE * 320 + draw.SCALE_PX, 3)
+
+    pixels = enlarged("depth.png")
+    grey = np.round(levels(KERB))
+    is_grey = np.abs(pixels - grey).max(axis=-1) <= 1
+    assert np.array_equal(is_grey, DEPTH_M == 0)
+
+    nearer_and_nearer = pixels[130:, 310]
+    green = nearer_and_nearer[:, 1]
+    assert len(np.unique(nearer_and_nearer, axis=0)) > 50
+    assert (np.diff(green) >= 0).all()
+
+    scale = shown[:, SCALE * 320 :]
+    assert np.ptp(scale) > 100
+
+
+def test_percepts_are_outlined_where_they_are_and_leave_the_rest_of_the_view(drive: Path) -> None:
+    facts = log_facts("image", drive, "--frame", "5", "--percepts")
     assert facts["objects"] == ["town_hall_0", "town_hall_1"]
 
-    shown = read(facts["path"])[1::3, 1::3].astype(int)
-    assert shown.shape == (240, 320, 3)
-    for (column, row), colour in (((40, 110), SEVERAL[0]), ((219, 110), SEVERAL[1])):
-        assert np.abs(shown[row, column] - np.array(to_rgb(colour)) * 255).max() < 12
+    shown = enlarged(facts["path"])
+    first = shown[110, 40]
+    second = shown[110, 219]
+    assert read(facts["path"]).shape == (SCALE * 240, SCALE * 320, 3)
+    assert np.abs(first - levels(SEVERAL[0])).max() < 12
+    assert np.abs(second - levels(SEVERAL[1])).max() < 12
 
-    changed = np.abs(shown - shade(5)).max(-1) > 1
+    changed = np.abs(shown - shade(5)).max(axis=-1) > 1
     assert changed[75:145, 45:115].all()
     assert not changed[:, :20].any()
     assert not changed[165:].any()
 
 
-def test_with_percepts_only_views_that_were_answered_are_chosen(
-    run: Callable[..., Result], drive: Path
-) -> None:
-    facts = json.loads(run("image", drive, "--percepts", "--json", "--at", "7.4").stdout)
+def test_with_percepts_only_views_that_were_answered_are_chosen(drive: Path) -> None:
+    facts = log_facts("image", drive, "--percepts", "--at", "7.4")
 
     assert facts["frame"] == 5
     with pytest.raises(
         UsageError, match=r"no frame 6 in .*: there are 3, from 4 to 7, and 5 is the nearest"
     ):
-        run("image", drive, "--percepts", "--frame", "6")
+        log_command("image", drive, "--percepts", "--frame", "6")
 
 
-def test_the_plot_has_the_most_percepts_and_the_same_bytes_each_time(
-    run: Callable[..., Result], drive: Path
-) -> None:
-    facts = json.loads(run("perception", drive, "--json").stdout)
-    assert (facts["path"], facts["frame"]) == ("drive-frame-5-perception.png", 5)
+def test_the_plot_has_the_most_percepts(drive: Path) -> None:
+    facts = log_facts("perception", drive)
+
+    assert facts["path"] == "drive-frame-5-perception.png"
+    assert facts["frame"] == 5
     assert facts["objects"] == ["town_hall_0", "town_hall_1"]
     assert read(facts["path"]).shape == (949, 1690, 3)
 
-    for name in ("first.pdf", "second.pdf"):
-        run("perception", drive, "--frame", "4", "-o", name)
-    assert Path("first.pdf").read_bytes().startswith(b"%PDF")
-    assert Path("first.pdf").read_bytes() == Path("second.pdf").read_bytes()
+
+def test_the_plot_has_the_same_bytes_each_time(drive: Path) -> None:
+    log_command("perception", drive, "--frame", "4", "-o", "first.pdf")
+    log_command("perception", drive, "--frame", "4", "-o", "second.pdf")
+    first = Path("first.pdf").read_bytes()
+    second = Path("second.pdf").read_bytes()
+
+    assert first.startswith(b"%PDF")
+    assert first == second
 
 
-def test_a_view_in_which_nothing_was_recognised_has_a_plot_too(
-    run: Callable[..., Result], tmp_path: Path
-) -> None:
-    empty = Array.of(np.empty((0, 2), np.float32))
-    nothing = Array.of(np.zeros((240, 320), np.float32))
-    unknown = msgspec.structs.replace(view(0), depth_m=nothing)
-    log = write(tmp_path / "empty.mcap", [unknown, Percepts(frame=0, objects=[], road_m=empty)])
-    run("perception", log, "-o", "figure.png")
+def test_a_view_in_which_nothing_was_recognised_has_a_plot_too(tmp_path: Path) -> None:
+    unknown = Array.of(np.zeros((240, 320), np.float32))
+    nothing = Array.of(np.empty((0, 2), np.float32))
+    blind = msgspec.structs.replace(view(0), depth_m=unknown)
+    log = write(tmp_path / "empty.mcap", [blind, Percepts(frame=0, objects=[], road_m=nothing)])
+
+    log_command("perception", log, "-o", "figure.png")
+    printed = log_command("image", log, "--percepts", "--depth").stdout
 
     assert read("figure.png").shape == (949, 1690, 3)
-    assert "with nothing recognised" in run("image", log, "--percepts", "--depth").stdout
+    assert "with nothing recognised" in printed
 
 
-def test_the_reference_drive_has_its_plot(run: Callable[..., Result]) -> None:
-    facts = json.loads(run("perception", REFERENCE, "-o", "reference.png", "--json").stdout)
+def test_the_reference_drive_has_its_plot() -> None:
+    facts = log_facts("perception", REFERENCE, "-o", "reference.png")
 
     assert facts["objects"]
 
 
-def test_ground_is_laid_into_the_image_where_the_camera_sees_it() -> None:
+@pytest.mark.parametrize(
+    ("left_m", "colour"),
+    [(0.0, ASPHALT), (3.8, ASPHALT), (-3.8, ASPHALT), (4.2, GRASS), (-4.2, GRASS)],
+)
+def test_ground_is_laid_into_the_image_where_the_camera_sees_it(
+    left_m: float, colour: tuple[int, int, int]
+) -> None:
     image = painted([])[0].astype(int)
-    ahead = np.arange(4.0, 15.0, 0.5)
-    for y_m, colour in (
-        (0.0, ASPHALT),
-        (3.8, ASPHALT),
-        (-3.8, ASPHALT),
-        (4.2, GRASS),
-        (-4.2, GRASS),
-    ):
-        pixels = np.rint(
-            ground.to_image(np.stack([ahead, np.full_like(ahead, y_m)], axis=1), CAMERA)
-        ).astype(int)
-        column, row = pixels[((pixels >= 0) & (pixels < (320, 240))).all(axis=1)].T
+    ahead_m = np.arange(4.0, 15.0, 0.5)
+    points_m = np.stack([ahead_m, np.full_like(ahead_m, left_m)], axis=1)
+    pixels = np.rint(ground.to_image(points_m, CAMERA)).astype(int)
+    inside = (pixels >= 0) & (pixels < (320, 240))
+    column, row = pixels[inside.all(axis=1)].T
 
-        assert len(row) > 10
-        assert np.abs(image[row, column] - colour).max() < 20
+    assert len(row) > 10
+    assert np.abs(image[row, column] - colour).max() < 20
 
 
 def test_labels_stay_inside_and_hide_none_of_the_others() -> None:
-    axes, boxes = placed([Label(f"number {n}", 9.7, 0.1 * n, "#000000") for n in range(6)])
+    labels = [Label(f"number {n}", 9.7, 0.1 * n, "#000000") for n in range(6)]
+    axes, boxes = placed(labels)
     inside = axes.get_window_extent()
 
     for number, box in enumerate(boxes):
@@ -271,8 +283,10 @@ def placed(labels: list[Label]) -> tuple[Axes, list[Bbox]]:
     axes = figure.add_axes((0, 0, 1, 1))
     axes.set(xlim=(0, 10), ylim=(0, 10))
     place(axes, labels, size=9)
-    canvas = FigureCanvasAgg(figure)
-    return axes, [text.get_window_extent(canvas.get_renderer()) for text in axes.texts]
+
+    renderer = FigureCanvasAgg(figure).get_renderer()
+    boxes = [text.get_window_extent(renderer) for text in axes.texts]
+    return axes, boxes
 
 
 @pytest.mark.parametrize(
@@ -301,39 +315,35 @@ def placed(labels: list[Label]) -> tuple[Axes, list[Bbox]]:
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
 def test_what_is_wrong_is_named_with_the_remedy(
-    run: Callable[..., Result], drive: Path, arguments: list[str], words: str
+    drive: Path, arguments: list[str], words: str
 ) -> None:
     with pytest.raises((UsageError, ClickUsageError), match=words):
-        run(arguments[0], drive, *arguments[1:])
+        log_command(arguments[0], drive, *arguments[1:])
     assert not list(Path().iterdir())
 
 
-def test_a_picture_that_cannot_be_written_is_one_sentence(
-    run: Callable[..., Result], drive: Path
-) -> None:
+def test_a_picture_that_cannot_be_written_is_one_sentence(drive: Path) -> None:
     Path("taken.png").mkdir()
 
     for command in ("image", "perception"):
         with pytest.raises(LogError, match=r"cannot write taken\.png \(Is a directory\)"):
-            run(command, drive, "-o", "taken.png")
+            log_command(command, drive, "-o", "taken.png")
 
 
-def test_a_log_without_views_or_percepts_names_the_command_that_helps(
-    run: Callable[..., Result], tmp_path: Path
-) -> None:
+def test_a_log_without_views_or_percepts_names_the_command_that_helps(tmp_path: Path) -> None:
     with pytest.raises(
         LogError, match=r"holds no sensory/view: `cogmap log info .*` shows what it holds"
     ):
-        run("image", write(tmp_path / "none.mcap", [answer(4)]))
+        log_command("image", write(tmp_path / "none.mcap", [answer(4)]))
     with pytest.raises(LogError, match=r"holds no epam/percepts of any of its 1 frames"):
-        run("perception", write(tmp_path / "views.mcap", [view(4)]))
+        log_command("perception", write(tmp_path / "views.mcap", [view(4)]))
 
 
-def test_a_view_whose_image_is_none_is_named(run: Callable[..., Result], tmp_path: Path) -> None:
+def test_a_view_whose_image_is_none_is_named(tmp_path: Path) -> None:
     log = write(tmp_path / "grey.mcap", [view(4, SCENE[..., 0]), answer(4)])
 
     for command in ("image", "perception"):
         with pytest.raises(
             LogError, match=r"grey.mcap, frame 4: expected a uint8 image \(height, width, 3\), got"
         ):
-            run(command, log)
+            log_command(command, log)

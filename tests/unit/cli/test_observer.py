@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from cli.launch.observer import Observer
+from cli.launch.observer import Errors, Observer
 from cli.launch.track import Track
 from cogmap.errors import MessageError
 from schemas.array import Array
@@ -17,6 +17,7 @@ from schemas.sensing import Odometry, Pose, SelfMotion, TruePose
 from tests.support.scenes import agent, thing
 
 TICK_NS = 50_000_000
+TICK_S = 0.05
 
 
 def true_pose(tick: int, x_m: float, y_m: float, heading_rad: float = 0.0) -> TruePose:
@@ -26,7 +27,7 @@ def true_pose(tick: int, x_m: float, y_m: float, heading_rad: float = 0.0) -> Tr
 
 def odometry(tick: int, speed_m_s: float, turn_rate_rad_s: float = 0.0) -> Odometry:
     return Odometry(
-        stamp_ns=tick * TICK_NS, speed_m_s=speed_m_s, turn_rate_rad_s=turn_rate_rad_s, dt_s=0.05
+        stamp_ns=tick * TICK_NS, speed_m_s=speed_m_s, turn_rate_rad_s=turn_rate_rad_s, dt_s=TICK_S
     )
 
 
@@ -61,16 +62,30 @@ def straight_drive(
     for tick in range(1, ticks + 1):
         observer.update(odometry(tick, wheel_speed_m_s))
         observer.update(self_motion(tick, fused_speed_m_s))
-        observer.update(true_pose(tick, 0.05 * tick, 0.0))
+        observer.update(true_pose(tick, TICK_S * tick, 0.0))
 
 
-def test_errors_are_distances_from_the_truth_of_the_same_stamp() -> None:
+def driven(ticks: int) -> Observer:
+    """An observer of a straight drive that the wheels measure without error."""
+    observer = Observer()
+    straight_drive(observer, ticks, wheel_speed_m_s=1.0)
+    return observer
+
+
+def errors_of_a_second() -> Errors:
+    """Of a second at 1 m/s: wheels that measure a fifth more, fused self-motion that measures a
+    tenth less, and two estimates.
+    """
     observer = Observer()
     straight_drive(observer, 20, wheel_speed_m_s=1.2, fused_speed_m_s=0.9)
     observer.update(estimate(10, 0.5, 0.03))
     observer.update(estimate(20, 1.0, -0.05))
+    return observer.errors()
 
-    errors = observer.errors()
+
+def test_errors_are_distances_from_the_truth_of_the_same_stamp() -> None:
+    errors = errors_of_a_second()
+
     assert errors.stamps_ns.tolist() == [10 * TICK_NS, 20 * TICK_NS]
     assert errors.estimate_m == pytest.approx([0.03, 0.05])
     assert errors.wheels_m == pytest.approx([0.1, 0.2])
@@ -78,20 +93,16 @@ def test_errors_are_distances_from_the_truth_of_the_same_stamp() -> None:
 
 
 def test_the_estimate_is_compared_with_wheels_and_with_fused_self_motion() -> None:
-    observer = Observer()
-    straight_drive(observer, 20, wheel_speed_m_s=1.2, fused_speed_m_s=0.9)
-    observer.update(estimate(10, 0.5, 0.03))
-    observer.update(estimate(20, 1.0, -0.05))
+    errors = errors_of_a_second()
 
-    errors = observer.errors()
     assert errors.over_wheels == pytest.approx(0.04 / 0.15)
     assert errors.over_fused == pytest.approx(0.04 / 0.075)
 
 
 def test_truth_between_two_poses_is_interpolated() -> None:
     observer = Observer()
-    for tick in (0, 4):
-        observer.update(true_pose(tick, float(tick), 2.0 * tick))
+    observer.update(true_pose(0, 0.0, 0.0))
+    observer.update(true_pose(4, 4.0, 8.0))
     for tick in (1, 4):
         observer.update(odometry(tick, 0.0))
         observer.update(self_motion(tick, 0.0))
@@ -101,17 +112,17 @@ def test_truth_between_two_poses_is_interpolated() -> None:
 
 
 def test_an_estimate_that_no_truth_surrounds_does_not_count() -> None:
-    observer = Observer()
-    straight_drive(observer, 4, wheel_speed_m_s=1.0)
+    observer = driven(4)
     observer.update(estimate(5, 0.25, 0.0))
+    errors = observer.errors()
 
-    assert observer.errors().stamps_ns.size == 0
-    assert (observer.errors().over_wheels, observer.errors().over_fused) == (1.0, 1.0)
+    assert errors.stamps_ns.size == 0
+    assert errors.over_wheels == 1.0
+    assert errors.over_fused == 1.0
 
 
 def test_the_last_of_several_estimates_of_one_stamp_counts() -> None:
-    observer = Observer()
-    straight_drive(observer, 4, wheel_speed_m_s=1.0)
+    observer = driven(4)
     observer.update(estimate(4, 9.0, 9.0, version=1))
     observer.update(estimate(4, 0.2, 0.0, version=2))
 
@@ -122,25 +133,26 @@ def test_the_agents_frame_starts_in_the_first_true_pose() -> None:
     observer = Observer()
     observer.update(true_pose(0, 5.0, -2.0, math.pi / 2))
     observer.update(true_pose(1, 5.0, -1.0, math.pi / 2))
+    ahead, left = observer.to_world(np.array([[1.0, 0.0], [0.0, 2.0]]))
 
-    assert observer.to_world(np.array([[1.0, 0.0], [0.0, 2.0]])) == pytest.approx(
-        np.array([[5.0, -1.0], [3.0, -2.0]])
-    )
+    assert ahead == pytest.approx([5.0, -1.0])
+    assert left == pytest.approx([3.0, -2.0])
 
 
 def test_path_integration_of_a_circle_by_midpoints_closes_it() -> None:
+    steps = 200
+    circumference_m = steps * TICK_S
+    turn_rate_rad_s = math.tau / circumference_m
     observer = Observer()
     observer.update(true_pose(0, 0.0, 0.0))
-    steps = 200
-    turn_rate_rad_s = math.tau / (steps * 0.05)
     for tick in range(1, steps + 1):
         observer.update(odometry(tick, 1.0, turn_rate_rad_s))
         observer.update(self_motion(tick, 1.0, turn_rate_rad_s))
 
-    radius_m = steps * 0.05 / math.tau
+    diameter_m = circumference_m / math.pi
     for path_m in (observer.wheels_path_m, observer.fused_path_m):
         assert path_m[-1] == pytest.approx([0.0, 0.0], abs=1e-9)
-        assert path_m[:, 1].max() == pytest.approx(2 * radius_m, rel=1e-3)
+        assert path_m[:, 1].max() == pytest.approx(diameter_m, rel=1e-3)
 
 
 def test_a_repeated_motion_moves_nothing() -> None:
@@ -157,7 +169,8 @@ def test_a_repeated_motion_moves_nothing() -> None:
 
 
 def test_self_motion_without_its_five_columns_is_refused() -> None:
-    motion = SelfMotion(frame=1, since_ns=0, motions=Array.of([[1.0, 0.0, 0.05]], "<f8"))
+    three_columns = Array.of([[1.0, 0.0, 0.05]], "<f8")
+    motion = SelfMotion(frame=1, since_ns=0, motions=three_columns)
 
     with pytest.raises(MessageError, match=r"it needs \(n, 5\)"):
         Observer().update(motion)
@@ -171,8 +184,7 @@ def test_distance_progress_and_time_are_those_of_the_newest_pose() -> None:
 
 
 def test_other_messages_and_nodes_change_nothing() -> None:
-    observer = Observer()
-    straight_drive(observer, 4, wheel_speed_m_s=1.0)
+    observer = driven(4)
     observer.update(Competition(stamp_ns=4, cycle=1, contenders=[]))
     observer.update(Delta(version=1, cycle=1, phase=Phase.OBJECTS, operations=[thing("x")]))
 
@@ -183,6 +195,7 @@ def test_a_track_keeps_its_order_when_an_old_position_comes_late() -> None:
     track = Track()
     for stamp_ns in (1, 3, 2):
         track.add(stamp_ns, float(stamp_ns), 0.0)
+    covered = track.covers(np.arange(5))
 
     assert track.stamps_ns.tolist() == [1, 3]
-    assert track.covers(np.array([0, 1, 2, 3, 4])).tolist() == [False, True, True, True, False]
+    assert covered.tolist() == [False, True, True, True, False]

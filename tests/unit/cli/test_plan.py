@@ -31,27 +31,30 @@ def configured(choices: Choices, **sections: dict[str, object]) -> dict[str, dic
 
 def test_the_configuration_reads_back_from_toml_to_the_same() -> None:
     sections = configured(Choices(seed=7), epam={}, workspace={"cell_m": 0.5})
+    read = tomllib.loads(to_toml(sections))
 
-    assert tomllib.loads(to_toml(sections)) == sections
+    assert read == sections
     assert sections["workspace"]["cell_m"] == 0.5
 
 
 def test_every_module_gets_its_whole_configuration() -> None:
     sections = configured(Choices())
-
     assert list(sections) == list(registry.MODULES)
 
-    for name in registry.MODULES:
-        of_type = registry.config_type(name)
-        unset = {field for field in of_type.__struct_fields__ if getattr(of_type(), field) is None}
-        assert set(sections[name]) == set(of_type.__struct_fields__) - unset
+    for name, section in sections.items():
+        config = registry.config_type(name)()
+        keys = set(config.__struct_fields__)
+        unset = {key for key in keys if getattr(config, key) is None}
+        assert set(section) == keys - unset
 
 
 def test_the_route_is_that_of_the_town_and_the_laps() -> None:
     sections = configured(Choices(seed=3, laps=1.5))
+    route = generate(3).route(1.5)
 
-    assert sections["action"]["route"] == [list(leg) for leg in generate(3).route(1.5)]
-    assert (sections["sim"]["seed"], sections["sim"]["laps"]) == (3, 1.5)
+    assert sections["action"]["route"] == [list(leg) for leg in route]
+    assert sections["sim"]["seed"] == 3
+    assert sections["sim"]["laps"] == 1.5
 
 
 def test_a_route_of_ones_own_stays() -> None:
@@ -63,7 +66,8 @@ def test_a_route_of_ones_own_stays() -> None:
 def test_lockstep_is_the_mode_of_all_that_have_one() -> None:
     sections = configured(Choices(lockstep=True))
 
-    assert {sections[name]["mode"] for name in ("sim", "workspace", "action")} == {"lockstep"}
+    for name in ("sim", "workspace", "action"):
+        assert sections[name]["mode"] == "lockstep"
 
 
 def test_the_drive_waits_for_every_module_every_worker_and_whoever_watches() -> None:
@@ -97,36 +101,43 @@ def instances(folder: Path, choices: Choices) -> set[str]:
 
 
 def test_each_module_is_a_process_and_each_worker_one_more(tmp_path: Path) -> None:
-    names = [program.instance for program in started(tmp_path, Choices(codelets=2))]
+    router, *names = [program.instance for program in started(tmp_path, Choices(codelets=2))]
+    modules = set(registry.MODULES) - {"codelets"}
+    workers = {"codelets-1", "codelets-2"}
 
-    assert names[0] == ROUTER
-    assert sorted(names[1:]) == sorted(
-        {*registry.MODULES, "codelets-1", "codelets-2", RECORDER} - {"codelets"}
-    )
+    assert router == ROUTER
+    assert sorted(names) == sorted(modules | workers | {RECORDER})
 
 
 def test_modules_of_ones_own_are_not_started_and_waited_for(tmp_path: Path) -> None:
     choices = Choices(without=["epam", "codelets"], codelets=2)
     every = {*registry.MODULES, RECORDER, ROUTER}
+    awaits = awaited(choices, observer=True)
 
     assert instances(tmp_path, choices) == every - {"epam", "codelets"}
-    assert awaited(choices, observer=True)["epam"] == 1
-    assert awaited(choices, observer=True)["codelets"] == 2
+    assert awaits["epam"] == 1
+    assert awaits["codelets"] == 2
 
 
 def test_an_existing_router_is_used_and_none_started(tmp_path: Path) -> None:
-    assert ROUTER not in instances(tmp_path, Choices(own_router=False))
+    choices = Choices(own_router=False)
+
+    assert ROUTER not in instances(tmp_path, choices)
 
 
 def test_a_recorder_that_is_started_again_writes_another_log(tmp_path: Path) -> None:
     every = started(tmp_path, Choices())
     (recorder,) = [program for program in every if program.instance == RECORDER]
+    first = str(tmp_path / "log.mcap")
+    second = str(tmp_path / "log-2.mcap")
 
-    assert str(tmp_path / "log.mcap") in recorder.command(0)
-    assert str(tmp_path / "log-2.mcap") in recorder.command(1)
+    assert first in recorder.command(0)
+    assert second in recorder.command(1)
 
 
 def test_toml_keeps_every_character_and_infinity() -> None:
-    sections = {"sim": {"town": '\U0001f3e0 "\\ \x7f é', "limit": math.inf, "list": [-math.inf]}}
+    town = '\U0001f3e0 "\\ \x7f é'
+    sections = {"sim": {"town": town, "limit": math.inf, "list": [-math.inf]}}
+    read = tomllib.loads(to_toml(sections))
 
-    assert tomllib.loads(to_toml(sections)) == sections
+    assert read == sections

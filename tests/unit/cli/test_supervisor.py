@@ -134,10 +134,17 @@ sys.stdin.read()
 
 
 def free_ports() -> list[str]:
+    ports = []
     with socket.socket() as one, socket.socket() as two:
-        one.bind(("127.0.0.1", 0))
-        two.bind(("127.0.0.1", 0))
-        return [str(each.getsockname()[1]) for each in (one, two)]
+        for each in (one, two):
+            each.bind(("127.0.0.1", 0))
+            _, port = each.getsockname()
+            ports.append(str(port))
+    return ports
+
+
+def is_up(folder: Path, instance: str) -> bool:
+    return any("listens" in line for line in said(folder, instance))
 
 
 def test_no_child_outlives_a_launcher_that_is_killed(tmp_path: Path) -> None:
@@ -146,14 +153,11 @@ def test_no_child_outlives_a_launcher_that_is_killed(tmp_path: Path) -> None:
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as launcher:
         assert launcher.stdout is not None
-
-        pids = [int(word) for word in launcher.stdout.readline().split()]
-        wait_until(
-            lambda: all("listens" in " ".join(said(tmp_path, name)) for name in ("one", "two"))
-        )
-
-        assert len(pids) == 2 and all(is_running(pid) for pid in pids)
+        one, two = [int(word) for word in launcher.stdout.readline().split()]
+        wait_until(lambda: is_up(tmp_path, "one") and is_up(tmp_path, "two"))
+        assert is_running(one)
+        assert is_running(two)
 
         launcher.kill()
         launcher.wait()
-        wait_until(lambda: not any(is_running(pid) for pid in pids))
+        wait_until(lambda: not is_running(one) and not is_running(two))

@@ -27,9 +27,10 @@ def test_a_message_is_read_from_json() -> None:
 
 @pytest.mark.parametrize("topic", topics.ALL, ids=lambda topic: topic.name)
 def test_what_echo_prints_in_full_can_be_published_again(topic: Topic) -> None:
-    printed = formatter(None, True, False, "json")(BY_TOPIC[topic])
+    example = BY_TOPIC[topic]
+    printed = formatter(None, True, False, "json")(example)
 
-    assert parse(topic, printed) == BY_TOPIC[topic]
+    assert parse(topic, printed) == example
 
 
 @pytest.mark.parametrize(
@@ -74,7 +75,9 @@ def test_an_array_whose_data_do_not_fit_its_shape_is_refused() -> None:
 
 
 def test_a_topic_may_begin_with_a_slash_and_a_wrong_one_names_the_nearest() -> None:
-    assert topic_named("/odometry") is topic_named("odometry") is topics.ODOMETRY
+    assert topic_named("/odometry") is topics.ODOMETRY
+    assert topic_named("odometry") is topics.ODOMETRY
+
     with pytest.raises(UsageError, match=r"no topic 'odometri': did you mean 'odometry'\?"):
         topic_named("odometri")
 
@@ -85,13 +88,18 @@ def test_what_is_answered_on_request_cannot_be_watched() -> None:
 
 
 def test_echo_shows_one_field_or_says_which_there_are() -> None:
-    assert formatter("speed_m_s", False, False, "text")(ODOMETRY) == "1.5\n---"
+    speed = formatter("speed_m_s", False, False, "text")
+    assert speed(ODOMETRY) == "1.5\n---"
+
+    unknown = formatter("speed", False, False, "text")
     with pytest.raises(UsageError, match=r"--field speed: no 'speed' .*speed_m_s"):
-        formatter("speed", False, False, "text")(ODOMETRY)
+        unknown(ODOMETRY)
 
 
 def test_echo_prints_a_line_of_csv_a_message() -> None:
-    assert formatter(None, False, False, "csv")(ODOMETRY) == "7,3,sim,1.5,0.0,0.05"
+    as_csv = formatter(None, False, False, "csv")
+
+    assert as_csv(ODOMETRY) == "7,3,sim,1.5,0.0,0.05"
 
 
 def test_echo_leaves_the_numbers_of_arrays_out_where_asked() -> None:

@@ -166,15 +166,20 @@ def test_errors_of_the_estimate_the_wheels_and_fused_self_motion_are_apart(
     assert metrics.error_over_fused == pytest.approx(0.1 / 0.3)
 
 
-def test_a_cycle_is_timed_from_the_frame_to_the_command(watch: Watch, publisher: Publisher) -> None:
-    command = MotorCommand(
-        left_wheel_rad_s=0.0, right_wheel_rad_s=0.0, halted_by=SpeedLimit.OBSTACLE
+def command(seq: int = 0, speed_rad_s: float = 0.0, **limits: SpeedLimit) -> MotorCommand:
+    return MotorCommand(
+        seq=seq, left_wheel_rad_s=speed_rad_s, right_wheel_rad_s=speed_rad_s, **limits
     )
+
+
+def test_a_cycle_is_timed_from_the_frame_to_the_command(watch: Watch, publisher: Publisher) -> None:
+    halt = command(halted_by=SpeedLimit.OBSTACLE)
     stages = [("sensory", 20 * MS, 5 * MS), ("action", 10 * MS, 5 * MS)]
-    publisher.publish(command, sent_ns=40 * MS, stages=stages)
+    publisher.publish(halt, sent_ns=40 * MS, stages=stages)
     metrics = metrics_of(watch)
 
-    assert (metrics.commands, metrics.halted) == (1, {"obstacle": 1})
+    assert metrics.commands == 1
+    assert metrics.halted == {"obstacle": 1}
     assert metrics.cycle_p50_ms == pytest.approx(40.0)
     assert metrics.bus_share == pytest.approx(0.25)
 
@@ -182,23 +187,23 @@ def test_a_cycle_is_timed_from_the_frame_to_the_command(watch: Watch, publisher:
 def test_what_slowed_or_halted_the_robot_is_counted_by_reason(
     watch: Watch, publisher: Publisher
 ) -> None:
-    for seq, slowed_by in enumerate((SpeedLimit.POSE_AGE, SpeedLimit.NONE, SpeedLimit.BEND)):
-        command = MotorCommand(
-            seq=seq, left_wheel_rad_s=1.0, right_wheel_rad_s=1.0, slowed_by=slowed_by
-        )
-        publisher.publish(command)
+    publisher.publish(command(0, 1.0, slowed_by=SpeedLimit.POSE_AGE))
+    publisher.publish(command(1, 1.0, slowed_by=SpeedLimit.NONE))
+    publisher.publish(command(2, 1.0, slowed_by=SpeedLimit.BEND))
+    slow_share = watch.tally.share_limited_by(SpeedLimit.POSE_AGE)
 
     assert metrics_of(watch).slowed == {"pose age": 1, "bend": 1}
-    assert watch.tally.share_limited_by(SpeedLimit.POSE_AGE) == pytest.approx(1 / 3)
+    assert slow_share == pytest.approx(1 / 3)
 
 
 def test_gaps_are_those_of_whoever_missed_most(watch: Watch, publisher: Publisher) -> None:
     publisher.publish(health("epam", {"odometry": 3}, busy=0.2))
     publisher.publish(health("sensory", {"odometry": 5, "camera/stereo": 9}))
     publisher.publish(health("epam", {"odometry": 3}, busy=0.4))
+    gaps = watch.gaps()
 
-    assert watch.gaps()["odometry"] == 5
-    assert "camera/stereo" not in watch.gaps()
+    assert gaps["odometry"] == 5
+    assert "camera/stereo" not in gaps
     assert watch.rejected() == {"odometry": 4}
     assert watch.tally.busy == {"epam": pytest.approx(0.3), "sensory": 0.5}
 
@@ -228,18 +233,23 @@ def test_dropped_answers_are_counted_and_the_last_reasons_kept(
 
 def test_an_object_that_left_the_map_is_named(watch: Watch, publisher: Publisher) -> None:
     inn = landmark("inn")
-    for seq, operation in enumerate((inn, DropNode(id=inn.id), DropNode(id="object:nowhere"))):
-        version = seq + 1
-        delta = Delta(seq=seq, version=version, cycle=1, phase=Phase.END, operations=[operation])
-        publisher.publish(delta)
+    unknown = DropNode(id="object:nowhere")
+    for seq, operation in enumerate((inn, DropNode(id=inn.id), unknown)):
+        publisher.publish(
+            Delta(seq=seq, version=seq + 1, cycle=1, phase=Phase.END, operations=[operation])
+        )
     metrics = metrics_of(watch)
 
-    assert (metrics.objects, metrics.forgotten) == (0, ["inn"])
+    assert metrics.objects == 0
+    assert metrics.forgotten == ["inn"]
 
 
 def test_it_is_quiet_when_only_health_arrives(watch: Watch, publisher: Publisher) -> None:
-    assert publisher.publish(generate(1).message())
-    assert not publisher.publish(health("epam", {}))
+    town = generate(1).message()
+    report = health("epam", {})
+
+    assert publisher.publish(town)
+    assert not publisher.publish(report)
     assert not watch.pump(0.0)
 
 

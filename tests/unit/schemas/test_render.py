@@ -32,9 +32,11 @@ DELTA = Delta(
 
 
 def test_json_abbreviates_arrays_and_names_the_kind_of_each_operation() -> None:
-    node, drop = json.loads(json.dumps(to_jsonable(DELTA)))["operations"]
+    shown = json.loads(json.dumps(to_jsonable(DELTA)))
+    node, drop = shown["operations"]
 
-    assert (node["type"], node["attributes"]) == ("node", {"x_m": 1.5})
+    assert node["type"] == "node"
+    assert node["attributes"] == {"x_m": 1.5}
     assert node["samples"] == {"dtype": "<f8", "shape": [3, 2], "min": 0.0, "max": 5.0}
     assert drop == {"type": "drop_node", "id": "tree"}
 
@@ -48,7 +50,9 @@ def test_full_json_has_every_value() -> None:
 
 
 def test_an_empty_array_has_no_least_value() -> None:
-    assert to_jsonable(Array.of(np.zeros((0, 2))))["min"] is None
+    empty = Array.of(np.zeros((0, 2)))
+
+    assert to_jsonable(empty)["min"] is None
 
 
 def test_text_is_yaml_with_a_line_a_field() -> None:
