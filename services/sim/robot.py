@@ -45,6 +45,7 @@ class Robot:
         """The middle of the axle, and the robot's heading."""
         (x_m, y_m, _), quaternion = self.position_and_orientation()
         _, _, heading_rad = pybullet.getEulerFromQuaternion(quaternion)
+
         return Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad)
 
     def position_and_orientation(
@@ -59,8 +60,7 @@ class Robot:
     def place(self, pose: Pose) -> None:
         """Put the robot there, at rest."""
         client = self._client
-        half_rad = pose.heading_rad / 2
-        rotation = (0.0, 0.0, math.sin(half_rad), math.cos(half_rad))
+        rotation = upright_quaternion(pose.heading_rad)
         position_m = (pose.x_m, pose.y_m, WHEEL_RADIUS_M)
         pybullet.resetBasePositionAndOrientation(
             self.body, position_m, rotation, physicsClientId=client
@@ -125,6 +125,12 @@ class Robot:
                 physicsClientId=self._client,
             )
         )
+
+
+def upright_quaternion(heading_rad: float) -> tuple[float, float, float, float]:
+    """The orientation (x, y, z, w) of what stands upright and heads there."""
+    half_rad = heading_rad / 2
+    return 0.0, 0.0, math.sin(half_rad), math.cos(half_rad)
 
 
 def _within_limits(speed_rad_s: float) -> float:

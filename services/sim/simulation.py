@@ -111,4 +111,5 @@ class Simulation:
 
     def town(self) -> TrueTown:
         """The town."""
-        return msgspec.structs.replace(self.world.town.message(), stamp_ns=self.now_ns)
+        town = self.world.town.message()
+        return msgspec.structs.replace(town, stamp_ns=self.now_ns)

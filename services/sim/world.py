@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import math
 import tempfile
 import weakref
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 
 from cogmap.geometry.arrays import Singles
 from schemas.sensing import Pose
+from services.sim.layout.furniture import Prop
 from services.sim.layout.plan import Plot, Point
 from services.sim.layout.town import Place
 from services.sim.rendering import mesh, prop_shapes, scenery
@@ -20,7 +20,7 @@ from services.sim.rendering.egl import Egl
 from services.sim.rendering.egl import works as egl_works
 from services.sim.rendering.light import relief
 from services.sim.rendering.wall import Image
-from services.sim.robot import Robot
+from services.sim.robot import Robot, upright_quaternion
 from services.sim.stdio import pybullet, quiet
 
 STEP_S = 1 / 240
@@ -80,7 +80,10 @@ class World:
     def _move(self, body: int, x_m: float, y_m: float) -> None:
         upright = (0, 0, 0, 1)
         pybullet.resetBasePositionAndOrientation(
-            body, (x_m, y_m, 0), upright, physicsClientId=self.client
+            body,
+            (x_m, y_m, 0),
+            upright,
+            physicsClientId=self.client,
         )
 
     def _build(self) -> None:
@@ -89,26 +92,21 @@ class World:
         pybullet.setTimeStep(STEP_S, physicsClientId=client)
 
         self._add_ground()
-        sky, picture = scenery.sky()
-        self.sky = self._add(sky, picture)
+        self.sky = self._add(*scenery.sky())
         for plot in self.town.plots:
             self._add_building(plot)
 
         for prop in self.town.props:
-            surface, picture = prop_shapes.shape(prop)
-            at_m = (prop.x_m, prop.y_m)
-            body = self._add(surface, picture, at_m=at_m, heading_rad=prop.heading_rad)
-            self.props.append(body)
+            self._add_prop(prop)
 
     def _add_ground(self) -> None:
-        (grass, grass_picture), (pavement, pavement_picture), *streets = scenery.ground(
-            self.town.roads
-        )
+        grass, pavement, *streets = scenery.ground(self.town.roads)
         floor = self._solid_box(scenery.GROUND_M, scenery.GROUND_M, 1.0, middle_m=-1.0)
-        self._soil = self._add(grass, grass_picture, floor)
+        self._soil = self._add(*grass, floor)
         pybullet.changeDynamics(self._soil, -1, lateralFriction=1.0, physicsClientId=self.client)
-        self._add(pavement, pavement_picture)
-        self.streets = [self._add(surface, picture) for surface, picture in streets]
+
+        self._add(*pavement)
+        self.streets = [self._add(*street) for street in streets]
 
     def _add_building(self, plot: Plot) -> None:
         kind = plot.kind
@@ -123,6 +121,13 @@ class World:
         surface, picture = mesh.building(kind)
         body = self._add(surface, picture, solid, (plot.x_m, plot.y_m), plot.heading_rad)
         self.building_of_body[body] = kind.name
+
+    def _add_prop(self, prop: Prop) -> None:
+        surface, picture = prop_shapes.shape(prop)
+        at_m = (prop.x_m, prop.y_m)
+
+        body = self._add(surface, picture, at_m=at_m, heading_rad=prop.heading_rad)
+        self.props.append(body)
 
     def _solid_box(self, half_x_m: float, half_y_m: float, half_z_m: float, middle_m: float) -> int:
         """A box that nothing passes, its middle at height `middle_m`."""
@@ -148,26 +153,37 @@ class World:
         """
         client = self.client
         with tempfile.TemporaryDirectory(prefix="cogmap-") as folder:
-            form = Path(folder) / "surface.obj"
-            paint = Path(folder) / "texture.bmp"
-            form.write_text(surface.obj())
-            bgr = np.ascontiguousarray(picture[..., ::-1])
-            cv2.imwrite(str(paint), bgr)
+            form, paint = _written(surface, picture, Path(folder))
             shape = pybullet.createVisualShape(
                 pybullet.GEOM_MESH,
-                fileName=str(form),
+                fileName=form,
                 specularColor=[0, 0, 0],
                 physicsClientId=client,
             )
-            rotation = (0.0, 0.0, math.sin(heading_rad / 2), math.cos(heading_rad / 2))
             body = pybullet.createMultiBody(
-                0, solid, shape, (*at_m, 0.0), rotation, physicsClientId=client
+                0,
+                solid,
+                shape,
+                (*at_m, 0.0),
+                upright_quaternion(heading_rad),
+                physicsClientId=client,
             )
-            texture = pybullet.loadTexture(str(paint), physicsClientId=client)
+            texture = pybullet.loadTexture(paint, physicsClientId=client)
 
         pybullet.changeVisualShape(body, -1, textureUniqueId=texture, physicsClientId=client)
 
         return int(body)
+
+
+def _written(surface: mesh.Mesh, picture: Image, folder: Path) -> tuple[str, str]:
+    """The files of a shape and of the picture on it."""
+    form = folder / "surface.obj"
+    form.write_text(surface.obj())
+
+    paint = folder / "texture.bmp"
+    bgr = np.ascontiguousarray(picture[..., ::-1])
+    cv2.imwrite(str(paint), bgr)
+    return str(form), str(paint)
 
 
 def _relief(town: Place) -> Singles:

@@ -191,8 +191,13 @@ def invented(seed: int, count: int) -> tuple[BuildingType, ...]:
     trained on.
     """
     rng = np.random.default_rng([seed, 0x1D])
-    names = [f"invented-{seed}-{number}" for number in range(count)]
-    return tuple(_invent(name, rng) for name in names)
+
+    kinds = []
+    for number in range(count):
+        name = f"invented-{seed}-{number}"
+        kinds.append(_invent(name, rng))
+
+    return tuple(kinds)
 
 
 def _invent(name: str, rng: np.random.Generator) -> BuildingType:
@@ -228,7 +233,8 @@ def _invent(name: str, rng: np.random.Generator) -> BuildingType:
 
 def _difference(a: Colour, b: Colour) -> int:
     """The greatest difference of red, green or blue."""
-    return max(abs(x - y) for x, y in zip(a, b, strict=True))
+    differences = [abs(x - y) for x, y in zip(a, b, strict=True)]
+    return max(differences)
 
 
 def _paint(rng: np.random.Generator) -> Colour:

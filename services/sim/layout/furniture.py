@@ -132,10 +132,11 @@ def _beside(rng: np.random.Generator, road: Road, along_m: float, side: float) -
     """A prop on the pavement, or as near to it as its size allows."""
     prop = _prop(rng, 0.0, 0.0, road.heading_rad)
     _, width_m, _ = prop.size_m
-    least_m = STREET_WIDTH_M / 2 + _KERB_M + width_m / 2
-    most_m = max(least_m, STREET_WIDTH_M / 2 + PAVEMENT_WIDTH_M)
 
+    kerb_m = STREET_WIDTH_M / 2
+    least_m = kerb_m + _KERB_M + width_m / 2
+    most_m = max(least_m, kerb_m + PAVEMENT_WIDTH_M)
     left_m = side * float(rng.uniform(least_m, most_m))
-    x_m, y_m = road.point(along_m, left_m)
 
+    x_m, y_m = road.point(along_m, left_m)
     return replace(prop, x_m=round(x_m, 3), y_m=round(y_m, 3))

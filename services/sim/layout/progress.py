@@ -32,10 +32,11 @@ class Progress:
     def advance(self, x_m: float, y_m: float) -> float:
         """The share of the route that lies behind the robot at this place."""
         end = self._index + round(WINDOW_M / STEP_M)
-        away_m = self._points_m[self._index : end] - (x_m, y_m)
+        ahead_m = self._points_m[self._index : end]
+
+        away_m = ahead_m - (x_m, y_m)
         nearest = np.argmin(np.hypot(*away_m.T))
         self._index += int(nearest)
-
         return self._index / self._last
 
     @property

@@ -38,7 +38,9 @@ def _roads(line: Line) -> tuple[Road, ...]:
     """A road for each piece of the line, once where the line repeats it."""
     points: list[Point] = [(x, y) for x, y in line.points.tolist()]
     pieces = dict.fromkeys(pairwise(points))
-    return tuple(Road("way", start, end) for start, end in pieces)
+
+    roads = [Road("way", start, end) for start, end in pieces]
+    return tuple(roads)
 
 
 def _plots(landmarks: list[Landmark], line: Line) -> tuple[Plot, ...]:
@@ -46,10 +48,11 @@ def _plots(landmarks: list[Landmark], line: Line) -> tuple[Plot, ...]:
     places_m = np.array(places, float).reshape(-1, 2)
     to_line_m = line.nearest(places_m) - places_m
 
-    return tuple(
-        _plot(landmark, x_m, y_m)
-        for landmark, (x_m, y_m) in zip(landmarks, to_line_m.tolist(), strict=True)
-    )
+    plots = []
+    for landmark, (x_m, y_m) in zip(landmarks, to_line_m.tolist(), strict=True):
+        plots.append(_plot(landmark, x_m, y_m))
+
+    return tuple(plots)
 
 
 def _plot(landmark: Landmark, to_line_x_m: float, to_line_y_m: float) -> Plot:

@@ -73,12 +73,13 @@ class Town(Place):
         roads = [Road("", a, b) for a, b in pairwise(self.line(laps))]
         lengths_m = [road.length_m for road in roads]
 
-        turns_rad = [
-            math.remainder(after.heading_rad - before.heading_rad, math.tau)
-            for before, after in pairwise(roads)
-        ]
+        turns_rad = []
+        for before, after in pairwise(roads):
+            turn_rad = after.heading_rad - before.heading_rad
+            turns_rad.append(math.remainder(turn_rad, math.tau))
 
-        return list(zip(lengths_m, [*turns_rad, 0.0], strict=True))
+        turns_rad.append(0.0)
+        return list(zip(lengths_m, turns_rad, strict=True))
 
     def line(self, laps: float = 1.0) -> list[Point]:
         """The points between the route's legs: the start, the corners passed, the end."""
@@ -154,6 +155,7 @@ class _Settlement:
 
     def __post_init__(self) -> None:
         order = self.rng.permutation(len(self.choice))
+
         self.kinds: list[BuildingType] = [self.choice[i] for i in order]
 
     def line(self, road: Road, left: bool) -> None:
@@ -188,8 +190,9 @@ class _Settlement:
         garden_m = float(self.rng.uniform(0.3, 2.0))
         back_m = _REACH_M + garden_m + kind.depth_m / 2
         left_m = back_m if left else -back_m
-        x_m, y_m = road.point(along_m + kind.width_m / 2, left_m)
 
+        middle_m = along_m + kind.width_m / 2
+        x_m, y_m = road.point(middle_m, left_m)
         return Plot(kind, round(x_m, 3), round(y_m, 3), heading_rad)
 
     def _is_free(self, area: Rectangle) -> bool:

@@ -105,27 +105,37 @@ class StereoCamera:
         """As `capture`, with true depth and bodies, for training and tests; in `light`, with noise
         from `rng`.
         """
-        stations = self._stations()
-        left, right = (self._render(station, True, light) for station in stations)
+        left_station, right_station = self._stations()
+        left = self._render(left_station, True, light)
+        right = self._render(right_station, True, light)
         if light is None:
             return left, right
 
         rng = rng or np.random.default_rng(0)
         top_m = shadow_top(self._world.relief, light)
+        return (
+            self._lit(left, left_station, top_m, light, rng),
+            self._lit(right, right_station, top_m, light, rng),
+        )
 
-        lit = []
-        for exposure, station in zip((left, right), stations, strict=True):
-            bright = self._brightness(exposure, station, top_m, light)
-            image = expose(exposure.image, bright, light, rng)
-
-            lit.append(replace(exposure, image=image))
-
-        return lit[0], lit[1]
+    def _lit(
+        self,
+        exposure: Exposure,
+        station: Station,
+        top_m: Singles,
+        light: Light,
+        rng: np.random.Generator,
+    ) -> Exposure:
+        """The exposure in `light`, shadows up to `top_m`."""
+        bright = self._brightness(exposure, station, top_m, light)
+        image = expose(exposure.image, bright, light, rng)
+        return replace(exposure, image=image)
 
     def _brightness(
         self, exposure: Exposure, station: Station, top_m: Singles, light: Light
     ) -> Singles:
-        rays = self._rays @ station.axes.T.astype(np.float32)
+        to_world = station.axes.T.astype(np.float32)
+        rays = self._rays @ to_world
         return brightness(exposure.depth_m, rays, station.at_m, top_m, light)
 
     def _stations(self) -> tuple[Station, Station]:
@@ -177,10 +187,9 @@ class StereoCamera:
             return Exposure(image)
 
         body = np.asarray(mask, np.int32)
-        depth_m = _metres(np.asarray(depth))
         is_sky = body == world.sky
-
-        return Exposure(image, np.where(is_sky, np.float32(0), depth_m), body)
+        depth_m = np.where(is_sky, np.float32(0), _metres(np.asarray(depth)))
+        return Exposure(image, depth_m, body)
 
 
 def _rays(calibration: Calibration) -> Singles:
@@ -215,7 +224,8 @@ def _view(station: Station) -> list[float]:
 def _metres(depth: Singles) -> Singles:
     """Depth along the axis from OpenGL's depth buffer."""
     share = depth.astype(np.float64)
-    depth_m = FAR_M * NEAR_M / (FAR_M - (FAR_M - NEAR_M) * share)
+    nearer_m = (FAR_M - NEAR_M) * share
+    depth_m = FAR_M * NEAR_M / (FAR_M - nearer_m)
     return depth_m.astype(np.float32)
 
 
@@ -224,6 +234,7 @@ def _projection(mount: Calibration) -> list[float]:
     range_m = NEAR_M - FAR_M
     a = (FAR_M + NEAR_M) / range_m
     b = 2 * FAR_M * NEAR_M / range_m
+
     wide = 2 * mount.fx_px / mount.width_px
     high = 2 * mount.fy_px / mount.height_px
 

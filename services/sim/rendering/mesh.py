@@ -48,29 +48,28 @@ class Mesh:
         `tile_m`.
         """
         west, south, east, north = area
-        xs = pairwise(_cuts(west, east, cell_m))
-        ys = pairwise(_cuts(south, north, cell_m))
-        for (x0, x1), (y0, y1) in itertools.product(xs, ys):
+        columns = pairwise(_cuts(west, east, cell_m))
+        rows = pairwise(_cuts(south, north, cell_m))
+
+        for (x0, x1), (y0, y1) in itertools.product(columns, rows):
             corners = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
             self.floor(corners, z_m, tile_m)
 
     def floor(self, corners: list[Point], z_m: float, tile_m: float) -> None:
         """Add a level polygon at `z_m`, its picture repeated every `tile_m`."""
-        vertices = [(x, y, z_m) for x, y in corners]
-        uvs = [(x / tile_m, -y / tile_m) for x, y in corners]
+        vertices: list[Vertex] = []
+        uvs: list[UV] = []
+        for x, y in corners:
+            vertices.append((x, y, z_m))
+            uvs.append((x / tile_m, -y / tile_m))
+
         self.polygon(vertices, uvs)
 
     def obj(self) -> str:
         """The text of a Wavefront OBJ file."""
-        lines = []
-        for x, y, z in self.vertices:
-            lines.append(f"v {x:.4f} {y:.4f} {z:.4f}")
-
-        for u, v in self.uvs:
-            lines.append(f"vt {u:.6f} {1 - v:.6f}")
-
-        for x, y, z in self.normals:
-            lines.append(f"vn {x:.4f} {y:.4f} {z:.4f}")
+        lines = [f"v {x:.4f} {y:.4f} {z:.4f}" for x, y, z in self.vertices]
+        lines += [f"vt {u:.6f} {1 - v:.6f}" for u, v in self.uvs]
+        lines += [f"vn {x:.4f} {y:.4f} {z:.4f}" for x, y, z in self.normals]
 
         for corners in self.triangles:
             numbers = [corner + 1 for corner in corners]
@@ -107,41 +106,55 @@ class _Shell:
         w = self._half_width_m
         d = self._half_depth_m
         self._corners: list[Point] = [(-w, -d), (w, -d), (w, d), (-w, d), (-w, -d)]
-        pictures = [
-            facade.side(kind, math.dist(a, b), number)
-            for number, (a, b) in enumerate(pairwise(self._corners))
-        ]
-        self.atlas, self._lefts = _side_by_side([*pictures, facade.roof(kind)])
+        self.atlas, self._lefts = _side_by_side(self._pictures(kind))
+
+    def _pictures(self, kind: BuildingType) -> list[Image]:
+        """The pictures of the walls, and that of the roof."""
+        pictures = []
+        for number, (start, end) in enumerate(pairwise(self._corners)):
+            length_m = math.dist(start, end)
+            pictures.append(facade.side(kind, length_m, number))
+
+        return [*pictures, facade.roof(kind)]
 
     def add_side(self, number: int) -> None:
         """Wall `number`; with a gable, those at the sides have one."""
-        (ax, ay), (bx, by) = self._corners[number : number + 2]
-        length_m = math.dist((ax, ay), (bx, by))
-        along_x = (bx - ax) / length_m
-        along_y = (by - ay) / length_m
+        start = self._corners[number]
+        end = self._corners[number + 1]
+        length_m = math.dist(start, end)
 
-        vertices = []
+        vertices: list[Vertex] = []
         uvs = []
-        for s, z in self._outline(number, length_m):
-            vertices.append((ax + s * along_x, ay + s * along_y, z))
-            uvs.append(self._uv(number, s, self._height_m - z))
+        for along_m, up_m in self._outline(number, length_m):
+            x_m, y_m = _along(start, end, along_m)
+            vertices.append((x_m, y_m, up_m))
+            uvs.append(self._uv(number, along_m, self._height_m - up_m))
 
         self.mesh.polygon(vertices, uvs)
 
     def add_roof(self) -> None:
         """A flat roof, or the two halves of a gabled one."""
-        w = self._half_width_m
-        d = self._half_depth_m
-        eaves_m = self._eaves_m
-        ridge_m = self._height_m
-        ridge_y = 0.0 if self._is_gabled else d
-
-        front = [(-w, -d, eaves_m), (w, -d, eaves_m), (w, ridge_y, ridge_m), (-w, ridge_y, ridge_m)]
+        half_width_m = self._half_width_m
+        half_depth_m = self._half_depth_m
+        ridge_y = 0.0 if self._is_gabled else half_depth_m
         uvs = self._roof_uvs(ridge_y)
+
+        front = self._slope((-half_width_m, -half_depth_m), (half_width_m, ridge_y))
         self.mesh.polygon(front, uvs)
         if self._is_gabled:
-            back = [(w, d, eaves_m), (-w, d, eaves_m), (-w, 0, ridge_m), (w, 0, ridge_m)]
+            back = self._slope((half_width_m, half_depth_m), (-half_width_m, 0))
             self.mesh.polygon(back, uvs)
+
+    def _slope(self, eaves: Point, ridge: Point) -> list[Vertex]:
+        """A rectangle of the roof, between opposite corners at the eaves and at the ridge."""
+        eaves_x, eaves_y = eaves
+        ridge_x, ridge_y = ridge
+        return [
+            (eaves_x, eaves_y, self._eaves_m),
+            (ridge_x, eaves_y, self._eaves_m),
+            (ridge_x, ridge_y, self._height_m),
+            (eaves_x, ridge_y, self._height_m),
+        ]
 
     def _outline(self, number: int, length_m: float) -> list[Point]:
         """The corners of a wall: along it, and up."""
@@ -161,8 +174,8 @@ class _Shell:
         width_m = 2 * self._half_width_m
         eaves_m = 2 * self._half_depth_m
         ridge_m = self._half_depth_m - ridge_y
-        corners = ((0, eaves_m), (width_m, eaves_m), (width_m, ridge_m), (0, ridge_m))
 
+        corners = ((0, eaves_m), (width_m, eaves_m), (width_m, ridge_m), (0, ridge_m))
         return [self._uv(_ROOF, along_m, down_m) for along_m, down_m in corners]
 
     def _uv(self, number: int, along_m: float, down_m: float) -> UV:
@@ -177,14 +190,27 @@ class _Shell:
 
 def _cuts(start: float, end: float, cell_m: float) -> list[float]:
     """Where a stretch is cut to cells of `cell_m` at most."""
-    cells = math.ceil((end - start) / cell_m)
+    length = end - start
+    cells = math.ceil(length / cell_m)
     cuts: list[float] = np.linspace(start, end, cells + 1).tolist()
     return cuts
+
+
+def _along(start: Point, end: Point, along_m: float) -> Point:
+    """The point `along_m` from `start` towards `end`."""
+    start_x, start_y = start
+    end_x, end_y = end
+    length_m = math.dist(start, end)
+
+    x_m = start_x + along_m * ((end_x - start_x) / length_m)
+    y_m = start_y + along_m * ((end_y - start_y) / length_m)
+    return x_m, y_m
 
 
 def _normal(corners: list[Vertex]) -> Vertex:
     a, b, c = np.asarray(corners[:3])
     across = np.cross(b - a, c - a)
+
     length = np.linalg.norm(across)
     x, y, z = (across / length).tolist()
 

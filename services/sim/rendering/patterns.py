@@ -16,7 +16,8 @@ STOREY_M = 3.0
 def bands(wall: Wall) -> None:
     """A band above each storey."""
     lowest_m = STOREY_M - 0.35
-    for z_m in np.arange(lowest_m, wall.height_m, STOREY_M).tolist():
+    bands_m = np.arange(lowest_m, wall.height_m, STOREY_M)
+    for z_m in bands_m.tolist():
         wall.box(0, z_m, wall.width_m, 0.8, wall.kind.accent)
 
 
@@ -42,17 +43,20 @@ def columns(wall: Wall) -> None:
 
 def checker(wall: Wall) -> None:
     """Squares of a metre."""
+    accent = wall.kind.accent
     width = int(wall.width_m) + 1
     height = int(wall.height_m) + 1
+
     for x_m in range(width):
         for z_m in range(x_m % 2, height, 2):
-            wall.box(x_m, z_m, 1, 1, wall.kind.accent)
+            wall.box(x_m, z_m, 1, 1, accent)
 
 
 def planks(wall: Wall) -> None:
     """Level planks."""
     accent = wall.kind.accent
-    for z_m in np.arange(0.5, wall.height_m, 1.2).tolist():
+    planks_m = np.arange(0.5, wall.height_m, 1.2)
+    for z_m in planks_m.tolist():
         wall.box(0, z_m, wall.width_m, 0.45, accent)
 
 
@@ -61,9 +65,11 @@ def timber(wall: Wall) -> None:
     accent = wall.kind.accent
     bays = max(2, round(wall.width_m / 2.5))
     bay_m = wall.width_m / bays
+
     for x_m in np.arange(0, wall.width_m + 0.1, bay_m).tolist():
         post_top = (x_m, wall.height_m)
         wall.line((x_m, 0), post_top, 0.4, accent)
+
         brace_foot = (x_m + bay_m, 0.4)
         wall.line((x_m, STOREY_M), brace_foot, 0.3, accent)
 

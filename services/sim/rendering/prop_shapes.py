@@ -18,6 +18,7 @@ from services.sim.rendering.wall import Image, roughen
 Colours = tuple[Colour, Colour]
 
 _SIDES = 9
+_ANGLES_RAD: list[float] = np.linspace(0, math.tau, _SIDES + 1).tolist()
 _GRAIN = 0.25
 _DARK: Colour = (40, 42, 46)
 _BARK: Colour = (92, 66, 44)
@@ -56,16 +57,20 @@ def _tree(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
     trunk = [(0.16, 0.0), (0.14, 0.5 * tall_m)]
     _rotate(mesh, trunk, _FIRST)
 
-    crown = []
+    _rotate(mesh, _crown(reach_m, tall_m), _SECOND)
+
+    return _BARK, _tinted((58, 112, 44), rng)
+
+
+def _crown(reach_m: float, tall_m: float) -> list[tuple[float, float]]:
+    """The profile of a tree's crown: an ellipse."""
+    profile = []
     for angle_rad in np.linspace(0, math.pi, 6).tolist():
         radius_m = reach_m * math.sin(angle_rad)
         z_m = 0.66 * tall_m + 0.34 * tall_m * -math.cos(angle_rad)
+        profile.append((radius_m, z_m))
 
-        crown.append((radius_m, z_m))
-
-    _rotate(mesh, crown, _SECOND)
-
-    return _BARK, _tinted((58, 112, 44), rng)
+    return profile
 
 
 def _lamp(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
@@ -150,15 +155,19 @@ def _any_colour(rng: np.random.Generator, least: int, most: int) -> Colour:
 
 def _tinted(colour: Colour, rng: np.random.Generator) -> Colour:
     """`colour`, its hue and brightness varied a little."""
-    pixel = np.array([[colour]], np.uint8)
-    hue, saturation, value = cv2.cvtColor(pixel, cv2.COLOR_RGB2HSV)[0, 0].tolist()
+    hue, saturation, value = _converted(colour, cv2.COLOR_RGB2HSV)
     new_hue = (hue + int(rng.integers(-8, 9))) % 180
-    new_value = int(np.clip(value * rng.uniform(0.75, 1.3), 0, 255))
 
-    varied = np.array([[(new_hue, saturation, new_value)]], np.uint8)
-    red, green, blue = cv2.cvtColor(varied, cv2.COLOR_HSV2RGB)[0, 0].tolist()
+    brighter = value * rng.uniform(0.75, 1.3)
+    new_value = int(np.clip(brighter, 0, 255))
+    return _converted((new_hue, saturation, new_value), cv2.COLOR_HSV2RGB)
 
-    return red, green, blue
+
+def _converted(colour: Colour, conversion: int) -> Colour:
+    """`colour` in another colour space, by one of OpenCV's conversions."""
+    pixel = np.array([[colour]], np.uint8)
+    first, second, third = cv2.cvtColor(pixel, conversion)[0, 0].tolist()
+    return first, second, third
 
 
 def _rotate(mesh: Mesh, profile: Sequence[tuple[float, float]], half: float) -> None:
@@ -167,19 +176,34 @@ def _rotate(mesh: Mesh, profile: Sequence[tuple[float, float]], half: float) -> 
     """
     heights = np.linspace(1, 0, len(profile)).tolist()
     rings = [Ring(radius, z, v) for (radius, z), v in zip(profile, heights, strict=True)]
-    angles_rad = np.linspace(0, math.tau, _SIDES + 1).tolist()
+
     for lower, upper in pairwise(rings):
-        for number, (start_rad, end_rad) in enumerate(pairwise(angles_rad)):
-            corners = [
-                _on_ring(lower, start_rad),
-                _on_ring(lower, end_rad),
-                _on_ring(upper, end_rad),
-                _on_ring(upper, start_rad),
-            ]
-            left = half + _MARGIN + _HALF_WIDTH * number / _SIDES
-            right = half + _MARGIN + _HALF_WIDTH * (number + 1) / _SIDES
-            uvs = [(left, lower.v), (right, lower.v), (right, upper.v), (left, upper.v)]
-            mesh.polygon(corners, uvs, _outwards((start_rad + end_rad) / 2))
+        for number in range(_SIDES):
+            _add_facet(mesh, lower, upper, number, half)
+
+
+def _add_facet(mesh: Mesh, lower: Ring, upper: Ring, number: int, half: float) -> None:
+    """Add side `number` of those between two rings."""
+    start_rad = _ANGLES_RAD[number]
+    end_rad = _ANGLES_RAD[number + 1]
+    corners = [
+        _on_ring(lower, start_rad),
+        _on_ring(lower, end_rad),
+        _on_ring(upper, end_rad),
+        _on_ring(upper, start_rad),
+    ]
+
+    left = half + _MARGIN + _HALF_WIDTH * number / _SIDES
+    right = half + _MARGIN + _HALF_WIDTH * (number + 1) / _SIDES
+    uvs = [
+        (left, lower.v),
+        (right, lower.v),
+        (right, upper.v),
+        (left, upper.v),
+    ]
+
+    middle_rad = (start_rad + end_rad) / 2
+    mesh.polygon(corners, uvs, _outwards(middle_rad))
 
 
 def _on_ring(ring: Ring, angle_rad: float) -> Vertex:
@@ -190,21 +214,28 @@ def _on_ring(ring: Ring, angle_rad: float) -> Vertex:
 
 def _outwards(angle_rad: float) -> Vertex:
     """A normal that points outwards and a little upwards."""
-    return math.cos(angle_rad), math.sin(angle_rad), 0.3
+    x = math.cos(angle_rad)
+    y = math.sin(angle_rad)
+    return x, y, 0.3
 
 
 def _box(mesh: Mesh, low: Vertex, high: Vertex, half: float) -> None:
     """Add a box without a floor, painted with one half of the picture."""
-    x0, y0, z0 = low
-    x1, y1, z1 = high
+    west, south, bottom_m = low
+    east, north, top_m = high
+    ground = [(west, south), (east, south), (east, north), (west, north)]
+
+    uvs = _uvs_of_half(half)
+    for start, end in pairwise([*ground, ground[0]]):
+        wall = [(*start, bottom_m), (*end, bottom_m), (*end, top_m), (*start, top_m)]
+        mesh.polygon(wall, uvs)
+
+    lid = [(x, y, top_m) for x, y in ground]
+    mesh.polygon(lid, uvs)
+
+
+def _uvs_of_half(half: float) -> list[UV]:
+    """The corners of one half of the picture, from its lower left counter-clockwise."""
     left = half + _MARGIN
-    right = half + _MARGIN + _HALF_WIDTH
-    uvs: list[UV] = [(left, 1.0), (right, 1.0), (right, 0.0), (left, 0.0)]
-
-    ground = [(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)]
-    for (ax, ay), (bx, by) in pairwise(ground):
-        side = [(ax, ay, z0), (bx, by, z0), (bx, by, z1), (ax, ay, z1)]
-        mesh.polygon(side, uvs)
-
-    top = [(x, y, z1) for x, y in ground[:4]]
-    mesh.polygon(top, uvs)
+    right = left + _HALF_WIDTH
+    return [(left, 1.0), (right, 1.0), (right, 0.0), (left, 0.0)]

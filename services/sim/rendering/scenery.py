@@ -8,7 +8,7 @@ from itertools import pairwise
 import cv2
 import numpy as np
 
-from cogmap.geometry.arrays import Floats
+from cogmap.geometry.arrays import Floats, Singles
 from services.sim.layout.plan import PAVEMENT_WIDTH_M, STREET_WIDTH_M, Point, Road
 from services.sim.rendering.mesh import Mesh, Vertex
 from services.sim.rendering.wall import Image, plain, roughen
@@ -30,13 +30,17 @@ def ground(roads: tuple[Road, ...]) -> list[tuple[Mesh, Image]]:
     none that is empty.
     """
     rng = np.random.default_rng(11)
-    surfaces = [
-        (_grass(), roughen(plain(512, (104, 138, 66)), rng, 0.2)),
-        (_pavements(roads), roughen(_slabs(), rng, 0.1)),
-        (_asphalt(roads), roughen(plain(512, (92, 92, 98)), rng, 0.15)),
-        (_lines(roads), roughen(plain(64, (232, 230, 220)), rng, 0.06)),
-    ]
+    grass = roughen(plain(512, (104, 138, 66)), rng, 0.2)
+    slabs = roughen(_slabs(), rng, 0.1)
+    asphalt = roughen(plain(512, (92, 92, 98)), rng, 0.15)
+    paint = roughen(plain(64, (232, 230, 220)), rng, 0.06)
 
+    surfaces = [
+        (_grass(), grass),
+        (_pavements(roads), slabs),
+        (_asphalt(roads), asphalt),
+        (_lines(roads), paint),
+    ]
     return [(mesh, picture) for mesh, picture in surfaces if mesh.triangles]
 
 
@@ -98,11 +102,7 @@ def _pave(mesh: Mesh, road: Road, reach_m: float, z_m: float, grain_m: tuple[flo
         mesh.level(road.area(reach_m), z_m, tile_m, cell_m)
         return
 
-    end_m = road.length_m + reach_m
-    length_m = road.length_m + 2 * reach_m
-    cells = math.ceil(length_m / cell_m)
-    cuts_m = np.linspace(-reach_m, end_m, cells + 1).tolist()
-    for start_m, stop_m in pairwise(cuts_m):
+    for start_m, stop_m in pairwise(_cuts_m(road, reach_m, cell_m)):
         corners: list[Point] = [
             road.point(start_m, -reach_m),
             road.point(stop_m, -reach_m),
@@ -112,15 +112,34 @@ def _pave(mesh: Mesh, road: Road, reach_m: float, z_m: float, grain_m: tuple[flo
         mesh.floor(corners, z_m, tile_m)
 
 
+def _cuts_m(road: Road, reach_m: float, cell_m: float) -> list[float]:
+    """Where a road, with `reach_m` at either end, is cut to cells of `cell_m` at most."""
+    end_m = road.length_m + reach_m
+    length_m = road.length_m + 2 * reach_m
+    cells = math.ceil(length_m / cell_m)
+
+    cuts_m: list[float] = np.linspace(-reach_m, end_m, cells + 1).tolist()
+    return cuts_m
+
+
 def sky() -> tuple[Mesh, Image]:
     """A ring of distant hills under clouds, with a lid, seen from inside."""
     mesh = Mesh()
-    angles_rad = np.linspace(0, math.tau, _SEGMENTS + 1).tolist()
-    rim = [(_SKY_M * math.cos(angle), _SKY_M * math.sin(angle)) for angle in angles_rad]
-    for number, (start, end) in enumerate(pairwise(rim)):
+    for number, (start, end) in enumerate(pairwise(_rim())):
         _add_segment(mesh, number, start, end)
 
     return mesh, _panorama()
+
+
+def _rim() -> list[Point]:
+    """The corners of the ring, the first again at its end."""
+    rim = []
+    for angle_rad in np.linspace(0, math.tau, _SEGMENTS + 1).tolist():
+        x_m = _SKY_M * math.cos(angle_rad)
+        y_m = _SKY_M * math.sin(angle_rad)
+        rim.append((x_m, y_m))
+
+    return rim
 
 
 def _add_segment(mesh: Mesh, number: int, start: Point, end: Point) -> None:
@@ -160,19 +179,28 @@ def _panorama() -> Image:
     return roughen(pixels, rng, 0.02)
 
 
-def _air(
-    rng: np.random.Generator, tall: int, wide: int
-) -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
+def _air(rng: np.random.Generator, tall: int, wide: int) -> Singles:
     """Blue, paler towards the horizon, with clouds, float32 (tall, wide, 3)."""
     height = np.linspace(1, 0, tall)[:, None]
-    clouds = _clouds(rng, height, wide)
-    is_high = np.clip(height[..., None] * 6 - 0.6, 0, 1)
-    mist = 0.75 * np.clip(clouds - 0.9, 0, 1)[..., None] * is_high
+    mist = _mist(rng, height, wide)
 
     blueness = height[..., None] ** 0.5
-    clear = np.asarray(_ZENITH) * blueness + np.asarray(_HORIZON) * (1 - blueness)
+    blue = np.asarray(_ZENITH) * blueness
+    pale = np.asarray(_HORIZON) * (1 - blueness)
+    clear = blue + pale
 
-    return (clear * (1 - mist) + 250 * mist).astype(np.float32)
+    air = clear * (1 - mist) + 250 * mist
+    return air.astype(np.float32)
+
+
+def _mist(rng: np.random.Generator, height: Floats, wide: int) -> Floats:
+    """(tall, wide, 1): how much of the clear air clouds hide, none low down."""
+    clouds = _clouds(rng, height, wide)
+    is_high = np.clip(height[..., None] * 6 - 0.6, 0, 1)
+
+    density = np.clip(clouds - 0.9, 0, 1)
+    mist: Floats = 0.75 * density[..., None] * is_high
+    return mist
 
 
 def _clouds(rng: np.random.Generator, height: Floats, wide: int) -> Floats:
@@ -194,10 +222,11 @@ def _crest(base: float, rng: np.random.Generator) -> Floats:
     """The height of hills around the horizon, as a share of the picture's."""
     angle_rad = np.linspace(0, math.tau, _PANORAMA_PX[1], endpoint=False)
     k = np.arange(2, 30)[:, None]
+
     amplitude = rng.uniform(0.2, 1, k.shape) * 0.03 / k**0.8
     phase_rad = rng.uniform(0, math.tau, k.shape)
-
     waves = amplitude * np.sin(k * angle_rad + phase_rad)
+
     crest: Floats = base + waves.sum(axis=0)
 
     return crest

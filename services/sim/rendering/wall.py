@@ -27,13 +27,17 @@ class Wall:
     def __post_init__(self) -> None:
         height_px = _pixels(self.height_m)
         width_px = _pixels(self.width_m)
-        self.image: Image = np.full((height_px, width_px, 3), self.kind.wall, np.uint8)
+
+        shape = (height_px, width_px, 3)
+        self.image: Image = np.full(shape, self.kind.wall, np.uint8)
 
     def box(self, x_m: float, z_m: float, width_m: float, height_m: float, colour: Colour) -> None:
         """Paint a rectangle whose lower left corner is (`x_m`, `z_m`)."""
         left = _pixels(x_m)
         right = left + _pixels(width_m)
-        top = _pixels(self.height_m - z_m - height_m)
+
+        top_m = self.height_m - z_m - height_m
+        top = _pixels(top_m)
         bottom = top + _pixels(height_m)
 
         rows = slice(max(top, 0), max(bottom, 0))
@@ -60,6 +64,7 @@ def _pixels(length_m: float) -> int:
 def shaded(colour: Colour, factor: float) -> Colour:
     """`colour`, darker or lighter."""
     levels = [round(factor * level) for level in colour]
+
     red, green, blue = (min(255, level) for level in levels)
     return red, green, blue
 

@@ -27,9 +27,13 @@ class CameraLevelSim(LineFollower):
 
     def __init__(self, config: Config, trajectory: Trajectory) -> None:
         tick_ns = 1_000_000_000 // config.odometry_hz
-        super().__init__(trajectory, tick_ns, config.odometry_hz // config.frame_hz)
-        self.world = World(roadside.along(trajectory, config.seed), config.egl)
-        self.camera = StereoCamera(self.world, calibration(config.width_px, config.height_px))
+        ticks_per_frame = config.odometry_hz // config.frame_hz
+        super().__init__(trajectory, tick_ns, ticks_per_frame)
+
+        place = roadside.along(trajectory, config.seed)
+        mount = calibration(config.width_px, config.height_px)
+        self.world = World(place, config.egl)
+        self.camera = StereoCamera(self.world, mount)
         self._odometry = WheelOdometry(config.noise, config.seed)
 
     def step(self) -> list[Message]:
@@ -41,6 +45,10 @@ class CameraLevelSim(LineFollower):
             return [self._at_rest()]
 
         rows = self._measure(legs)
+        return self._stamped(rows, since_ns)
+
+    def _stamped(self, rows: list[Odometry], since_ns: int) -> list[Message]:
+        """The odometry of a tick, each row with the time of its end; the last one's is now."""
         passed_s = 0.0
         stamped: list[Message] = []
         for row in rows:
@@ -55,11 +63,14 @@ class CameraLevelSim(LineFollower):
     def view(self) -> list[Message]:
         """The next stereo frame."""
         self.world.place_robot(self._pose())
-        return [self.camera.frame(self.now_ns, self._next_frame())]
+
+        number = self._next_frame()
+        return [self.camera.frame(self.now_ns, number)]
 
     def town(self) -> TrueTown:
         """The line and the buildings along it."""
-        return msgspec.structs.replace(self.world.town.message(), stamp_ns=self.now_ns)
+        town = self.world.town.message()
+        return msgspec.structs.replace(town, stamp_ns=self.now_ns)
 
     def _at_rest(self) -> Odometry:
         return Odometry(

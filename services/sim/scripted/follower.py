@@ -56,7 +56,8 @@ class LineFollower:
     def _pace_s(self, legs: list[Leg]) -> float:
         """The time that a metre takes, where the legs together take a tick."""
         lengths_m = [length_m + TURN_AS_M * abs(turn_rad) for length_m, turn_rad in legs]
-        return self.tick_ns / 1e9 / sum(lengths_m)
+        tick_s = self.tick_ns / 1e9
+        return tick_s / sum(lengths_m)
 
     def _pose(self) -> Pose:
         return self.line.at(self._travelled_m)

@@ -47,7 +47,9 @@ class PerceptLevelSim(LineFollower):
         frame_hz: int,
         seed: int,
     ) -> None:
-        super().__init__(trajectory, 1_000_000_000 // frame_hz, ticks_per_frame=1)
+        tick_ns = 1_000_000_000 // frame_hz
+        super().__init__(trajectory, tick_ns, ticks_per_frame=1)
+
         self._noise = noise
         self._seed = seed
         self._percepts = PerceptSim(errors, trajectory.landmarks, seed)
@@ -132,11 +134,13 @@ class PerceptLevelSim(LineFollower):
         )
 
     def _turn(self, felt_rad: float, duration_s: float) -> Row:
+        turn_rate = felt_rad / duration_s
         turn_rate_sd = self._noise.turn * abs(felt_rad) / duration_s
-        return 0.0, felt_rad / duration_s, duration_s, 0.0, turn_rate_sd
+        return 0.0, turn_rate, duration_s, 0.0, turn_rate_sd
 
     def _at_rest(self) -> Floats:
-        return np.array([[0.0, 0.0, self.tick_ns / 1e9, 0.0, 0.0]])
+        duration_s = self.tick_ns / 1e9
+        return np.array([[0.0, 0.0, duration_s, 0.0, 0.0]])
 
     def _road(self, pose: Pose) -> Floats:
         """(4, 2): points of the street ahead, in the robot's frame."""
@@ -160,16 +164,24 @@ class PerceptLevelSim(LineFollower):
         behind them.
         """
         landmark = self._trajectory.landmarks[number]
+        centre_m = np.array([[landmark.x_m, landmark.y_m]])
+        front_m = self.line.nearest(centre_m)[0]
+
         eye_m = np.array([pose.x_m, pose.y_m])
-        front_m = self.line.nearest(np.array([[landmark.x_m, landmark.y_m]]))[0]
-
-        steps = max(2, math.ceil(math.dist(eye_m, front_m) / SIGHT_STEP_M))
-        share = np.linspace(0, 1, steps)[:, None]
-        sight_m = eye_m + share * (front_m - eye_m)
-
+        sight_m = _line_of_sight(eye_m, front_m)
         off_m = sight_m - self.line.nearest(sight_m)
+        distance_m = np.hypot(off_m[:, 0], off_m[:, 1])
+        return bool((distance_m > STREET_HALF_WIDTH_M).any())
 
-        return bool((np.hypot(off_m[:, 0], off_m[:, 1]) > STREET_HALF_WIDTH_M).any())
+
+def _line_of_sight(eye_m: Floats, front_m: Floats) -> Floats:
+    """(n, 2): points from (2,) to (2,), SIGHT_STEP_M from one another at most."""
+    distance_m = math.dist(eye_m, front_m)
+    steps = max(2, math.ceil(distance_m / SIGHT_STEP_M))
+
+    share = np.linspace(0, 1, steps)[:, None]
+    sight_m: Floats = eye_m + share * (front_m - eye_m)
+    return sight_m
 
 
 def _array(pose: Pose) -> Floats:

@@ -15,6 +15,7 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
+from cogmap.geometry.arrays import Floats
 from schemas.base import Name, PositiveMetres, PositiveRadians, PositiveShare, Share
 from schemas.sensing import Percept, Pose
 
@@ -112,23 +113,30 @@ class PerceptSim:
     def __init__(self, errors: PerceptErrors, landmarks: Sequence[Landmark], seed: int) -> None:
         self._errors = errors
         self._landmarks = landmarks
+        self._rng = np.random.default_rng([seed, 0x9E])
+
         places = [(each.x_m, each.y_m) for each in landmarks]
         self._places_m = np.array(places, float).reshape(-1, 2)
-        self._rng = np.random.default_rng([seed, 0x9E])
 
     def in_view(self, pose: Pose) -> list[int]:
         """The landmarks in the field of view and within range, whatever else may hide them."""
         errors = self._errors
-        x_m, y_m = (self._places_m - (pose.x_m, pose.y_m)).T
-        range_m = np.hypot(x_m, y_m)
-        direction_rad = np.arctan2(y_m, x_m) - pose.heading_rad
-        bearing_rad = np.remainder(direction_rad + np.pi, 2 * np.pi) - np.pi
+        range_m, bearing_rad = self._as_seen_from(pose)
 
         is_near = (range_m >= errors.nearest_m) & (range_m <= errors.farthest_m)
         is_ahead = np.abs(bearing_rad) <= errors.field_of_view_rad / 2
         numbers: list[int] = np.flatnonzero(is_near & is_ahead).tolist()
-
         return numbers
+
+    def _as_seen_from(self, pose: Pose) -> tuple[Floats, Floats]:
+        """Range and bearing of all landmarks, (n,) each."""
+        position_m = (pose.x_m, pose.y_m)
+        x_m, y_m = (self._places_m - position_m).T
+
+        range_m = np.hypot(x_m, y_m)
+        direction_rad = np.arctan2(y_m, x_m) - pose.heading_rad
+        bearing_rad = np.remainder(direction_rad + np.pi, 2 * np.pi) - np.pi
+        return range_m, bearing_rad
 
     def perceive(self, pose: Pose, visible: Sequence[int]) -> list[Percept]:
         """Percepts of the landmarks that are `visible` from `pose`; of percepts with one name, the
@@ -136,11 +144,13 @@ class PerceptSim:
         """
         errors = self._errors
         phantoms_per_object = (1 / errors.precision - 1) * errors.named_phantoms
+
         percepts: dict[str, Percept] = {}
         for number in visible:
             if self._rng.random() < errors.detected:
                 found = self._detection(pose, number)
                 percepts.setdefault(found.label, found)
+
             if self._rng.random() < phantoms_per_object:
                 phantom = self._phantom()
                 percepts.setdefault(phantom.label, phantom)
@@ -148,21 +158,26 @@ class PerceptSim:
         return list(percepts.values())
 
     def _detection(self, pose: Pose, number: int) -> Percept:
+        """A percept of a landmark that is there, perhaps by another name."""
         x_m, y_m = self._places_m[number] - (pose.x_m, pose.y_m)
-        bearing_rad = math.remainder(math.atan2(y_m, x_m) - pose.heading_rad, math.tau)
-        label = self._name(number)
+        range_m = math.hypot(x_m, y_m)
+        direction_rad = math.atan2(y_m, x_m)
+        bearing_rad = math.remainder(direction_rad - pose.heading_rad, math.tau)
 
-        return self._percept(label, number, math.hypot(x_m, y_m), bearing_rad)
+        label = self._name(number)
+        return self._percept(label, number, range_m, bearing_rad)
 
     def _phantom(self) -> Percept:
         """A percept of a landmark that is not there."""
         errors = self._errors
-        half_rad = errors.field_of_view_rad / 2
         number = int(self._rng.integers(len(self._landmarks)))
         range_m = float(self._rng.uniform(errors.nearest_m, errors.farthest_m))
+
+        half_rad = errors.field_of_view_rad / 2
         bearing_rad = float(self._rng.uniform(-half_rad, half_rad))
 
-        return self._percept(self._landmarks[number].name, number, range_m, bearing_rad)
+        name = self._landmarks[number].name
+        return self._percept(name, number, range_m, bearing_rad)
 
     def _name(self, number: int) -> str:
         """The landmark's name or, by mistake, that of any other."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cogmap.geometry.arrays import Floats
 from schemas.sensing import PlaceMatch, Pose
 from services.sim.scripted.percepts import PerceptErrors
 
@@ -21,6 +22,7 @@ class PlaceSim:
     def __init__(self, errors: PerceptErrors, seed: int) -> None:
         self._errors = errors
         self._rng = np.random.default_rng([seed, 0x9F])
+
         self._views: list[tuple[int, int]] = []
         self._poses: list[tuple[float, float, float]] = []
         self._similar_frames = 0
@@ -48,8 +50,8 @@ class PlaceSim:
         precision = self._errors.place_precision
         is_right = self._rng.random() < precision
         number = similar if is_right else int(self._rng.integers(len(self._views)))
-        frame, view_ns = self._views[number]
 
+        frame, view_ns = self._views[number]
         return PlaceMatch(frame=frame, view_ns=view_ns, score=precision)
 
     def _similar(self, frame: int, pose: Pose) -> int | None:
@@ -59,12 +61,18 @@ class PlaceSim:
 
         poses = np.array(self._poses)
         apart_m = np.hypot(poses[:, 0] - pose.x_m, poses[:, 1] - pose.y_m)
-        difference_rad = poses[:, 2] - pose.heading_rad
-        turn_rad = np.abs(np.remainder(difference_rad + np.pi, 2 * np.pi) - np.pi)
+        is_turned = _turns_rad(poses, pose) > MAX_TURN_RAD
+
         frames = np.array([number for number, _ in self._views])
+        is_recent = frames > frame - RECENT_FRAMES
 
-        is_excluded = (turn_rad > MAX_TURN_RAD) | (frames > frame - RECENT_FRAMES)
-        apart_m[is_excluded] = np.inf
+        apart_m[is_turned | is_recent] = np.inf
         nearest = int(apart_m.argmin())
-
         return nearest if apart_m[nearest] <= MAX_APART_M else None
+
+
+def _turns_rad(poses: Floats, pose: Pose) -> Floats:
+    """(n,): the angles between the headings of (n, 3) poses and that of `pose`, 0 to pi."""
+    difference_rad = poses[:, 2] - pose.heading_rad
+    turn_rad = np.remainder(difference_rad + np.pi, 2 * np.pi) - np.pi
+    return np.asarray(np.abs(turn_rad))

@@ -49,7 +49,9 @@ class Line:
     def __init__(self, points_m: Floats) -> None:
         lengths_m = np.hypot(*np.diff(points_m, axis=0).T)
         is_new = lengths_m > SAME_POINT_M
-        self.points = np.vstack([points_m[:1], points_m[1:][is_new]])
+        others_m = points_m[1:][is_new]
+
+        self.points = np.vstack([points_m[:1], others_m])
         self.along_m = distances_along(self.points)
 
         pieces_m = np.diff(self.points, axis=0)
@@ -63,26 +65,40 @@ class Line:
     def at(self, along_m: float) -> Pose:
         """The pose there, heading as the line does; at a corner as it does after the corner."""
         corners_passed = int(np.searchsorted(self.along_m, along_m, "right"))
-        piece = min(corners_passed - 1, len(self.heading_rad) - 1)
-        x_m, y_m = (np.interp(along_m, self.along_m, column) for column in self.points.T)
+        last = len(self.heading_rad) - 1
+        heading_rad = self.heading_rad[min(corners_passed - 1, last)]
 
-        return Pose(x_m=float(x_m), y_m=float(y_m), heading_rad=float(self.heading_rad[piece]))
+        x_m = np.interp(along_m, self.along_m, self.points[:, 0])
+        y_m = np.interp(along_m, self.along_m, self.points[:, 1])
+
+        return Pose(
+            x_m=float(x_m),
+            y_m=float(y_m),
+            heading_rad=float(heading_rad),
+        )
 
     def legs(self, from_m: float, to_m: float) -> list[Leg]:
         """The line between two distances as (length_m, turn_rad): straight, then a turn on the
         spot.
         """
+        legs = []
+        for start_m, end_m in pairwise(self._stops_m(from_m, to_m)):
+            before_rad = self.at(start_m).heading_rad
+            after_rad = self.at(end_m).heading_rad
+
+            turn_rad = math.remainder(after_rad - before_rad, math.tau)
+            legs.append((end_m - start_m, turn_rad))
+
+        return legs
+
+    def _stops_m(self, from_m: float, to_m: float) -> list[float]:
+        """The two distances, and those of the points between them."""
         is_between = (self.along_m > from_m) & (self.along_m <= to_m)
         stops_m = [from_m, *self.along_m[is_between].tolist()]
         if stops_m[-1] != to_m or len(stops_m) == 1:
             stops_m.append(to_m)
 
-        legs = []
-        for start_m, end_m in pairwise(stops_m):
-            turn_rad = self.at(end_m).heading_rad - self.at(start_m).heading_rad
-            legs.append((end_m - start_m, math.remainder(turn_rad, math.tau)))
-
-        return legs
+        return stops_m
 
     def nearest(self, points_m: Floats) -> Floats:
         """(n, 2): the points of the line nearest to each of (n, 2) points."""
