@@ -69,7 +69,10 @@ class StereoMatcher:
         """The matcher's fixed-point disparities. It leaves out a strip as wide as its search at the
         left border, so both images are padded there.
         """
-        padded = self._matcher.compute(self._padded(left), self._padded(right))
+        padded_left = self._padded(left)
+        padded_right = self._padded(right)
+
+        padded = self._matcher.compute(padded_left, padded_right)
         return padded[:, self._disparities :]
 
     def _padded(self, grey: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -106,32 +109,39 @@ def refined(disparity_px: Singles, left: Singles, right: Singles) -> Singles:
     Brightness is compared without its local mean, since two cameras seldom agree on it.
     """
     height_px, width_px = disparity_px.shape
-    columns, rows = np.meshgrid(
-        np.arange(width_px, dtype=np.float32), np.arange(height_px, dtype=np.float32)
-    )
+    first_column = np.arange(width_px, dtype=np.float32)
+    first_row = np.arange(height_px, dtype=np.float32)
+    columns, rows = np.meshgrid(first_column, first_row)
+
     left_slope = _slope(left)
     right_slope = _slope(right)
+    least_px = disparity_px - MAX_STEP_PX
+    most_px = disparity_px + MAX_STEP_PX
 
     result_px = disparity_px
     for _ in range(REFINEMENTS):
         matched = columns - result_px
         matched_slope = cv2.remap(right_slope, matched, rows, cv2.INTER_LINEAR)
-        slope = 0.5 * (left_slope + matched_slope)
-
         error = cv2.remap(right, matched, rows, cv2.INTER_LINEAR) - left
-        error -= _local_mean(error)
 
-        curvature = _local_mean(slope * slope) + NOISE_GRADIENT
-        step_px = _local_mean(slope * error) / curvature
-        least_px = disparity_px - MAX_STEP_PX
-        result_px = np.clip(result_px + step_px, least_px, disparity_px + MAX_STEP_PX)
+        step_px = _step_px(0.5 * (left_slope + matched_slope), error)
+        result_px = np.clip(result_px + step_px, least_px, most_px)
 
     return result_px
 
 
+def _step_px(slope: Singles, error: Singles) -> Singles:
+    """The Gauss-Newton step of each pixel, by the error around it beyond its local mean."""
+    error -= _local_mean(error)
+
+    curvature = _local_mean(slope * slope) + NOISE_GRADIENT
+    return _local_mean(slope * error) / curvature
+
+
 def _slope(grey: Singles) -> Singles:
     """The change of brightness by column."""
-    return _singles(cv2.Sobel(grey, cv2.CV_32F, 1, 0, ksize=3, scale=1 / 8))
+    slope = cv2.Sobel(grey, cv2.CV_32F, 1, 0, ksize=3, scale=1 / 8)
+    return _singles(slope)
 
 
 def _local_mean(values: Singles) -> Singles:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from cogmap.geometry.arrays import Floats
 from cogmap.runtime.module import Module
 from schemas import topics
 from schemas.array import Array
@@ -91,17 +92,21 @@ class SensoryMemory:
         since_ns = self._last_ns
         self._last_ns = frame.stamp_ns
 
-        image = view.image.numpy().astype(np.uint8, copy=False)
-        depth_m = view.depth_m.numpy().astype(np.float32)
-        wheels = self._noise.total(rows)
-        motion = self._visual_odometry.update(image, depth_m, view.calibration, wheels)
-
         return SelfMotion(
             stamp_ns=frame.stamp_ns,
             frame=frame.frame,
             since_ns=since_ns,
-            motions=Array.of(fuse(rows, motion, wheels)),
+            motions=Array.of(self._motions(rows, view)),
         )
+
+    def _motions(self, rows: Floats, view: View) -> Floats:
+        """(n, 5): the rows of odometry up to `view`, fused with what is seen of the motion."""
+        image = view.image.numpy().astype(np.uint8, copy=False)
+        depth_m = view.depth_m.numpy().astype(np.float32)
+
+        wheels = self._noise.total(rows)
+        motion = self._visual_odometry.update(image, depth_m, view.calibration, wheels)
+        return fuse(rows, motion, wheels)
 
     def _views(self, frame: StereoFrame) -> tuple[RangeScan, View]:
         rectified = rectification(frame.calibration)

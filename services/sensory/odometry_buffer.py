@@ -60,10 +60,17 @@ class OdometryBuffer:
         taken = [row for row in self._rows if row.stamp_ns <= until_ns]
         self._rows = self._rows[len(taken) :]
 
-        rows = [(row.speed_m_s, row.turn_rate_rad_s, row.dt_s) for row in taken]
         began_ns = _began_ns(taken[0]) if taken else None
+        return began_ns, _rows(taken)
 
-        return began_ns, np.array(rows, np.float64).reshape(-1, 3)
+
+def _rows(measured: list[Odometry]) -> Floats:
+    """(n, 3): speed, turn rate and duration."""
+    rows = []
+    for row in measured:
+        rows.append((row.speed_m_s, row.turn_rate_rad_s, row.dt_s))
+
+    return np.array(rows, np.float64).reshape(-1, 3)
 
 
 def _began_ns(row: Odometry) -> int:

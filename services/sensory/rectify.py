@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 
 from cogmap.errors import MessageError
-from cogmap.geometry.arrays import Bytes, Singles
+from cogmap.geometry.arrays import Bytes, Floats, Singles
 from schemas.sensing import Calibration
 
 Maps = tuple[Singles, Singles]
@@ -37,7 +37,9 @@ class Rectification:
 
     def apply(self, left: Bytes, right: Bytes) -> tuple[Bytes, Bytes]:
         """The rectified images, uint8 of the same shapes, black where no camera saw anything."""
-        return _remap(left, self.left_maps), _remap(right, self.right_maps)
+        rectified_left = _remap(left, self.left_maps)
+        rectified_right = _remap(right, self.right_maps)
+        return rectified_left, rectified_right
 
 
 def rectification(calibration: Calibration) -> Rectification:
@@ -76,22 +78,31 @@ def _maps(
     if distortion == _UNDISTORTED and rotation_rad == _STRAIGHT:
         return None
 
-    camera = np.array(
+    camera = _camera_matrix(calibration)
+    to_left, _ = cv2.Rodrigues(np.array(rotation_rad))
+    columns, rows = cv2.initUndistortRectifyMap(
+        camera,
+        np.array(distortion),
+        to_left,
+        camera,
+        (calibration.width_px, calibration.height_px),
+        cv2.CV_32FC1,
+    )
+    if not (np.isfinite(columns).all() and np.isfinite(rows).all()):
+        raise MessageError("calibration: its distortion maps pixels to infinity")
+
+    return columns.astype(np.float32, copy=False), rows.astype(np.float32, copy=False)
+
+
+def _camera_matrix(calibration: Calibration) -> Floats:
+    """(3, 3): what takes the camera's axes to its pixels."""
+    return np.array(
         [
             [calibration.fx_px, 0.0, calibration.cx_px],
             [0.0, calibration.fy_px, calibration.cy_px],
             [0.0, 0.0, 1.0],
         ]
     )
-    to_left, _ = cv2.Rodrigues(np.array(rotation_rad))
-    size = (calibration.width_px, calibration.height_px)
-    columns, rows = cv2.initUndistortRectifyMap(
-        camera, np.array(distortion), to_left, camera, size, cv2.CV_32FC1
-    )
-    if not (np.isfinite(columns).all() and np.isfinite(rows).all()):
-        raise MessageError("calibration: its distortion maps pixels to infinity")
-
-    return columns.astype(np.float32, copy=False), rows.astype(np.float32, copy=False)
 
 
 def _remap(image: Bytes, maps: Maps | None) -> Bytes:

@@ -25,10 +25,11 @@ class Points(NamedTuple):
 
 def points_at(pixels: Singles, depth_m: Singles, calibration: Calibration) -> Points:
     """The (n,) points at (n, 2) pixels of an image whose depth is `depth_m` (h, w)."""
-    column, row = np.rint(pixels).astype(int).T
-    ahead_m = depth_m[row, column].astype(np.float64)
+    nearest_column, nearest_row = np.rint(pixels).astype(int).T
+    ahead_m = depth_m[nearest_row, nearest_column]
 
-    return _points(pixels[:, 0], pixels[:, 1], ahead_m, calibration)
+    column, row = pixels.T
+    return _points(column, row, ahead_m.astype(np.float64), calibration)
 
 
 def surface(depth_m: Singles, calibration: Calibration) -> Points:
@@ -41,10 +42,14 @@ def surface(depth_m: Singles, calibration: Calibration) -> Points:
 
 
 def _points(column: Singles, row: Singles, ahead_m: Floats, calibration: Calibration) -> Points:
-    left_m = -(column - calibration.cx_px) / calibration.fx_px * ahead_m
-    up_m = -(row - calibration.cy_px) / calibration.fy_px * ahead_m
+    left = -(column - calibration.cx_px) / calibration.fx_px
+    up = -(row - calibration.cy_px) / calibration.fy_px
 
-    return Points(ahead_m + calibration.mount_forward_m, left_m, up_m)
+    return Points(
+        ahead_m=ahead_m + calibration.mount_forward_m,
+        left_m=left * ahead_m,
+        up_m=up * ahead_m,
+    )
 
 
 def project_back(
@@ -56,13 +61,11 @@ def project_back(
     The motion is an arc: it leads in the direction half-way through the turn.
     """
     distance_m, sideways_m, turn_rad, pitch_rad, roll_rad = motion
-    cos = np.cos(turn_rad)
-    sin = np.sin(turn_rad)
-    ahead_m = cos * points.ahead_m - sin * points.left_m
-    left_m = sin * points.ahead_m + cos * points.left_m
+    ahead_m, left_m = _turned(points.ahead_m, points.left_m, turn_rad)
 
-    cos = np.cos(turn_rad / 2)
-    sin = np.sin(turn_rad / 2)
+    half_turn_rad = turn_rad / 2
+    cos = np.cos(half_turn_rad)
+    sin = np.sin(half_turn_rad)
     ahead_m = ahead_m + cos * distance_m - sin * sideways_m
     left_m = left_m + sin * distance_m + cos * sideways_m
 
@@ -75,3 +78,13 @@ def project_back(
     column_px = tilted_x * calibration.fx_px + calibration.cx_px
     row_px = tilted_y * calibration.fy_px + calibration.cy_px
     return column_px, row_px
+
+
+def _turned(ahead_m: Floats, left_m: Floats, turn_rad: Floats) -> tuple[Floats, Floats]:
+    """What is ahead and to the left, turned counter-clockwise."""
+    cos = np.cos(turn_rad)
+    sin = np.sin(turn_rad)
+
+    turned_ahead_m = cos * ahead_m - sin * left_m
+    turned_left_m = sin * ahead_m + cos * left_m
+    return turned_ahead_m, turned_left_m

@@ -22,33 +22,44 @@ def scan(depth_m: Singles, calibration: Calibration, sectors: int) -> tuple[Sing
     pixel counts, so that one or two wrong matches stop no robot. Bearing and range are from the
     robot's origin.
     """
-    nearest_m = _nearest_by_column(depth_m, calibration)
-    is_seen = np.isfinite(nearest_m)
-    columns = np.arange(calibration.width_px)[is_seen]
-    forward_m = nearest_m[is_seen] + calibration.mount_forward_m
-    left_m = (calibration.cx_px - columns) / calibration.fx_px * nearest_m[is_seen]
+    bearing_rad, range_m = _obstacles(depth_m, calibration)
 
     half_rad = _half_field_of_view_rad(calibration)
     sector_rad = 2 * half_rad / sectors
-    sector = _sector(half_rad - np.arctan2(left_m, forward_m), sector_rad, sectors)
-    range_m = np.full(sectors, np.inf)
-    np.minimum.at(range_m, sector, np.hypot(forward_m, left_m))
-    range_m[np.isinf(range_m)] = 0.0
+    sector = _sector(half_rad - bearing_rad, sector_rad, sectors)
 
-    bearing_rad = half_rad - (np.arange(sectors) + 0.5) * sector_rad
+    nearest_m = np.full(sectors, np.inf)
+    np.minimum.at(nearest_m, sector, range_m)
+    nearest_m[np.isinf(nearest_m)] = 0.0
 
-    return bearing_rad.astype(np.float32), range_m.astype(np.float32)
+    middles = np.arange(sectors) + 0.5
+    middle_rad = half_rad - middles * sector_rad
+    return middle_rad.astype(np.float32), nearest_m.astype(np.float32)
+
+
+def _obstacles(depth_m: Singles, calibration: Calibration) -> tuple[Floats, Floats]:
+    """Bearing and range of the nearest obstacle in each image column that has one, (k,) each."""
+    by_column_m = _nearest_by_column(depth_m, calibration)
+    is_seen = np.isfinite(by_column_m)
+    nearest_m = by_column_m[is_seen]
+    columns = np.arange(calibration.width_px)[is_seen]
+
+    forward_m = nearest_m + calibration.mount_forward_m
+    left_m = (calibration.cx_px - columns) / calibration.fx_px * nearest_m
+    return np.arctan2(left_m, forward_m), np.hypot(forward_m, left_m)
 
 
 def _half_field_of_view_rad(calibration: Calibration) -> float:
-    half_px = max(calibration.cx_px, calibration.width_px - calibration.cx_px)
+    right_px = calibration.width_px - calibration.cx_px
+    half_px = max(calibration.cx_px, right_px)
     return math.atan(half_px / calibration.fx_px)
 
 
 def _sector(from_left_rad: Floats, sector_rad: float, sectors: int) -> Indices:
     """The sector of each direction, counted from the left."""
-    sector = np.floor(from_left_rad / sector_rad).astype(np.int64)
-    return sector.clip(0, sectors - 1)
+    sector = np.floor(from_left_rad / sector_rad)
+    last = sectors - 1
+    return sector.astype(np.int64).clip(0, last)
 
 
 def _nearest_by_column(depth_m: Singles, calibration: Calibration) -> Floats:
@@ -67,6 +78,7 @@ def _nearest_by_column(depth_m: Singles, calibration: Calibration) -> Floats:
 
     candidates_m = np.where(is_obstacle, depth_m, np.inf).astype(np.float64)
     number = SURE_PIXELS - 1
-    nearest_m: Floats = np.partition(candidates_m, number, axis=0)[number]
+    ordered_m = np.partition(candidates_m, number, axis=0)
 
+    nearest_m: Floats = ordered_m[number]
     return nearest_m

@@ -75,6 +75,7 @@ class Scale:
     def _update(self, seen_m: float, wheels: Motion) -> None:
         information = (seen_m / wheels.distance_sd_m) ** 2
         self._information += information
+
         innovation = wheels.distance_m / seen_m - self._mean
         self._mean += innovation * information / self._information
 
@@ -145,7 +146,8 @@ def _estimate(pair: _Pair, corners_px: Singles, guess: Floats, wheels: Motion) -
     if tracks.is_found.sum() < MIN_TRACKED:
         return None
 
-    points = points_at(corners_px[tracks.is_found], pair.depth_m, pair.calibration)
+    found_px = corners_px[tracks.is_found]
+    points = points_at(found_px, pair.depth_m, pair.calibration)
     before_px = tracks.before_px[tracks.is_found]
 
     return _solve(points, before_px, guess, wheels, pair.calibration)
@@ -170,7 +172,12 @@ def _track_back(pair: _Pair, corners_px: Singles, guess: Floats) -> _Tracks:
 
     anywhere = np.zeros_like(corners_px)
     tracked_px, is_tracked, _ = cv2.calcOpticalFlowPyrLK(
-        pair.new, redrawn, corners_px, anywhere, winSize=(11, 11), maxLevel=3
+        pair.new,
+        redrawn,
+        corners_px,
+        anywhere,
+        winSize=(11, 11),
+        maxLevel=3,
     )
 
     at = tracked_px.reshape(1, -1, 2)
@@ -182,11 +189,18 @@ def _track_back(pair: _Pair, corners_px: Singles, guess: Floats) -> _Tracks:
         borderMode=cv2.BORDER_REPLICATE,
     )[0]
 
-    height_px, width_px = pair.new.shape
-    in_image = (before_px >= 0) & (before_px <= (width_px - 1, height_px - 1))
-    is_found = np.asarray(is_tracked[:, 0], bool) & np.all(in_image, axis=1)
-
+    is_inside = _is_inside(np.asarray(before_px, np.float32), pair.new.shape)
+    is_found = np.asarray(is_tracked[:, 0], bool) & is_inside
     return _Tracks(np.asarray(before_px, np.float64), is_found)
+
+
+def _is_inside(pixels: Singles, shape: tuple[int, ...]) -> Booleans:
+    """(n,): which of (n, 2) pixels, column and row, lie in an image of that shape (h, w)."""
+    height_px, width_px = shape
+    last = (width_px - 1, height_px - 1)
+
+    is_inside = (pixels >= 0) & (pixels <= last)
+    return np.asarray(is_inside.all(axis=1))
 
 
 def _redraw(pair: _Pair, guess: Floats) -> tuple[Bytes, Singles]:
@@ -219,19 +233,7 @@ def _solve(
     """The motion that best explains where the points were, from `guess`; None where too few agree
     on it.
     """
-    prior = _prior(wheels)
-    expected = np.array([wheels.distance_m, 0.0, wheels.turn_rad, 0.0, 0.0])
-    motion = guess.copy()
-    information = prior
-    for _ in range(ITERATIONS):
-        fit = _linearize(points, before_px, motion, calibration)
-        information = prior + np.einsum("nik,n,nil->kl", fit.jacobian, fit.weight, fit.jacobian)
-        pull = np.einsum("nik,n,ni->k", fit.jacobian, fit.weight, fit.residual_px)
-        gradient = pull - prior @ (motion - expected)
-        step = np.linalg.solve(information, gradient)
-        motion = motion + step
-        if np.abs(step).max() < CONVERGED:
-            break
+    motion, information = _most_likely(points, before_px, guess, wheels, calibration)
 
     residual_px = before_px - np.column_stack(project_back(points, motion, calibration))
     distance_px = np.hypot(*residual_px.T)
@@ -239,9 +241,42 @@ def _solve(
         return None
 
     inflation = max(1.0, float(np.median(distance_px)) / TRACK_SD_PX)
-    deviation = inflation * np.sqrt(np.diag(np.linalg.inv(information)))
+    variances = np.diag(np.linalg.inv(information))
+    deviation = inflation * np.sqrt(variances)
 
-    return Motion(float(motion[0]), float(motion[2]), float(deviation[0]), float(deviation[2]))
+    return Motion(
+        distance_m=float(motion[0]),
+        turn_rad=float(motion[2]),
+        distance_sd_m=float(deviation[0]),
+        turn_sd_rad=float(deviation[2]),
+    )
+
+
+def _most_likely(
+    points: Points,
+    before_px: Floats,
+    guess: Floats,
+    wheels: Motion,
+    calibration: Calibration,
+) -> tuple[Floats, Floats]:
+    """The motion (5,) by Gauss-Newton from `guess`, and its information (5, 5)."""
+    prior = _prior(wheels)
+    expected = np.array([wheels.distance_m, 0.0, wheels.turn_rad, 0.0, 0.0])
+
+    motion = guess.copy()
+    information = prior
+    for _ in range(ITERATIONS):
+        fit = _linearize(points, before_px, motion, calibration)
+        information = prior + np.einsum("nik,n,nil->kl", fit.jacobian, fit.weight, fit.jacobian)
+        pull = np.einsum("nik,n,ni->k", fit.jacobian, fit.weight, fit.residual_px)
+
+        gradient = pull - prior @ (motion - expected)
+        step = np.linalg.solve(information, gradient)
+        motion = motion + step
+        if np.abs(step).max() < CONVERGED:
+            break
+
+    return motion, information
 
 
 def _prior(wheels: Motion) -> Floats:
@@ -257,18 +292,25 @@ def _prior(wheels: Motion) -> Floats:
 
 
 def _linearize(points: Points, before_px: Floats, motion: Floats, calibration: Calibration) -> _Fit:
-    """Residuals at `motion`, their Jacobian by differences, and Geman-McClure weights."""
-    differences = np.vstack([np.zeros(5), np.diag(np.full(5, DIFFERENCE))])
+    """Residuals at `motion`, their Jacobian by differences, and their weights."""
+    at_rest = np.zeros(5)
+    differences = np.vstack([at_rest, np.diag(np.full(5, DIFFERENCE))])
     motions = motion + differences
     column_px, row_px = project_back(points, motions.T[..., None], calibration)
     projected_px = np.stack([column_px, row_px], axis=2)
 
     predicted_px = projected_px[0]
-    residual_px = before_px - predicted_px
     changes = (projected_px[1:] - predicted_px) / DIFFERENCE
     jacobian = np.ascontiguousarray(np.moveaxis(changes, 0, 2))
 
-    distance_px = np.hypot(residual_px[:, 0], residual_px[:, 1])
-    weight = 1 / (1 + (distance_px / OUTLIER_PX) ** 2) ** 2 / TRACK_SD_PX**2
+    residual_px = before_px - predicted_px
+    return _Fit(residual_px, jacobian, _robust_weight(residual_px))
 
-    return _Fit(residual_px, jacobian, weight)
+
+def _robust_weight(residual_px: Floats) -> Floats:
+    """Geman-McClure weights (n,) of (n, 2) residuals, over the variance of a track."""
+    distance_px = np.hypot(residual_px[:, 0], residual_px[:, 1])
+    squared = (distance_px / OUTLIER_PX) ** 2
+
+    weight: Floats = 1 / (1 + squared) ** 2 / TRACK_SD_PX**2
+    return weight
