@@ -17,8 +17,11 @@ def errors(depth_m: Singles, true_m: Singles) -> tuple[Singles, float]:
     """
     is_within = (true_m >= NEAREST_M) & (true_m <= FARTHEST_M)
     is_known = is_within & (depth_m > 0)
-    known_m = true_m[is_known]
-    relative = np.abs(depth_m[is_known] - known_m) / known_m
 
-    share = is_known.sum() / max(1, is_within.sum())
+    known_m = true_m[is_known]
+    error_m = np.abs(depth_m[is_known] - known_m)
+    relative = error_m / known_m
+
+    within = max(1, is_within.sum())
+    share = is_known.sum() / within
     return relative.astype(np.float32, copy=False), float(share)

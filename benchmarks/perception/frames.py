@@ -14,15 +14,20 @@ WARM_UP = 20
 
 def times_ms(seed: int, frames: int) -> list[float]:
     """Of so many `frames` of a drive through the town of `seed`, after a few to warm up."""
-    path = drive((WARM_UP + frames) * STEP_M, STEP_M)
+    length_m = (WARM_UP + frames) * STEP_M
+    path = drive(length_m, STEP_M)
 
     with drawn(seed, 0, path) as (_, camera, scenes):
         pairs = [(scene.left, scene.right) for scene in scenes]
 
     pipeline = PerceptionPipeline(camera)
     speed_m_s = STEP_M / PERIOD_S
-    results = [pipeline.process(left, right, speed_m_s) for left, right in pairs]
-    return [result.took_ms for result in results[WARM_UP:]]
+    took_ms = []
+    for left, right in pairs:
+        result = pipeline.process(left, right, speed_m_s)
+        took_ms.append(result.took_ms)
+
+    return took_ms[WARM_UP:]
 
 
 def metrics(took_ms: list[float]) -> Metrics:

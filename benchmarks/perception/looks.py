@@ -11,7 +11,15 @@ from benchmarks.perception import depth, road, streets
 from benchmarks.perception.novel import Meeting, Memory, remembered
 from benchmarks.perception.objects import Claim, Sight, claims, right_or_not, sight
 from benchmarks.perception.pipeline import CandidateProbe, PerceptionPipeline, Result
-from benchmarks.perception.scenes import Scene, anywhere, drawn, encounter, later, side_and_range
+from benchmarks.perception.scenes import (
+    Poses,
+    Scene,
+    anywhere,
+    drawn,
+    encounter,
+    later,
+    side_and_range,
+)
 from cogmap.geometry.arrays import Bytes, Floats, Singles
 from schemas.sensing import Calibration, Pose
 from services.epam.layout.road import load
@@ -71,40 +79,51 @@ class _Tally:
     def __post_init__(self) -> None:
         self._roads = load()
         self._probe = CandidateProbe()
-        areas = [street.area(STREET_WIDTH_M / 2) for street in self.place.roads]
+
+        half_width_m = STREET_WIDTH_M / 2
+        areas = [street.area(half_width_m) for street in self.place.roads]
         self._edges = streets.edges(areas)
 
     def add(self, scene: Scene, result: Result) -> None:
         """One view, and what was made of it."""
         percepts = claims(result.percepts.objects, scene.label.shape)
+        candidates = self._probe.candidates(result)
         self.sights.append(_sight(percepts, self.place, scene))
-        self.candidates.append(_sight(self._probe.candidates(result), self.place, scene))
-        self._add_road(scene, result)
+        self.candidates.append(_sight(candidates, self.place, scene))
+        self._add_road_mask(scene, result)
+        self._add_road_edges(scene, result)
         self._add_depth(scene, result)
 
-    def _add_road(self, scene: Scene, result: Result) -> None:
+    def _add_road_mask(self, scene: Scene, result: Result) -> None:
         image = result.view.image.numpy().astype(np.uint8, copy=False)
-        self.masks.append(self._roads.mask(image))
+        mask = self._roads.mask(image)
+        self.masks.append(mask)
         self.surfaces.append(scene.surface)
 
+    def _add_road_edges(self, scene: Scene, result: Result) -> None:
         boundary_m = result.percepts.road_boundary_m.numpy()
         in_town_m = streets.in_town(boundary_m, scene.pose)
+        errors_m = streets.distances_m(in_town_m, self._edges)
         missed_m = road.road_edges_missed_m(boundary_m, scene.surface, scene.depth_m, self.camera)
-        self.edge_errors_m.append(streets.distances_m(in_town_m, self._edges))
+        self.edge_errors_m.append(errors_m)
         self.edges_missed_m.append(missed_m)
 
     def _add_depth(self, scene: Scene, result: Result) -> None:
-        depth_m = result.view.depth_m.numpy().astype(np.float32, copy=False)
+        found_m = result.view.depth_m.numpy()
+        depth_m = found_m.astype(np.float32, copy=False)
         relative, known = depth.errors(depth_m, scene.depth_m)
         self.depth_errors.append(relative[::EVERY])
         self.depth_known.append(known)
 
     def look(self) -> Look:
         """All views together."""
+        masks = np.asarray(self.masks)
+        surfaces = np.asarray(self.surfaces)
+
         return Look(
             sights=self.sights,
             judged=right_or_not(self.candidates, self.sights, TRAINED),
-            road_iou=road.road_iou(np.asarray(self.masks), np.asarray(self.surfaces)),
+            road_iou=road.road_iou(masks, surfaces),
             edge_errors_m=np.concatenate(self.edge_errors_m),
             edges_missed_m=np.concatenate(self.edges_missed_m),
             depth_errors=np.concatenate(self.depth_errors),
@@ -114,18 +133,7 @@ class _Tally:
 
 def novel_look(seed: int, sightings: int) -> Memory:
     """Meet NOVEL invented buildings of a town, then see each up to `sightings` times."""
-
-    def poses(place: Town, rng: np.random.Generator) -> list[Pose]:
-        first = [encounter(place, target, rng) for target in range(NOVEL)]
-        targets = np.repeat(np.arange(NOVEL), sightings)
-        again = []
-
-        for target in rng.permutation(targets).tolist():
-            pose = later(place, target, first[target], rng)
-            if pose is not None:
-                again.append(pose)
-
-        return first + again
+    poses = _first_and_again(sightings)
 
     with drawn(seed, KINDS, poses, NOVEL) as (place, camera, scenes):
         pipeline = PerceptionPipeline(camera)
@@ -135,12 +143,32 @@ def novel_look(seed: int, sightings: int) -> Memory:
             result = pipeline.process(scene.left, scene.right)
             percepts = claims(result.percepts.objects, scene.label.shape)
             seen = _sight(percepts, place, scene)
-            meetings.append(Meeting(seen, side_and_range(place, scene.pose)))
+            from_where = side_and_range(place, scene.pose)
+            meetings.append(Meeting(seen, from_where))
 
     return remembered(meetings[:NOVEL], meetings[NOVEL:], TRAINED)
 
 
+def _first_and_again(sightings: int) -> Poses:
+    """One pose that meets each of NOVEL buildings, and then up to `sightings` others of each."""
+
+    def poses(place: Town, rng: np.random.Generator) -> list[Pose]:
+        first = [encounter(place, target, rng) for target in range(NOVEL)]
+        targets = np.repeat(np.arange(NOVEL), sightings)
+        order = rng.permutation(targets)
+        again = []
+
+        for target in order.tolist():
+            pose = later(place, target, first[target], rng)
+            if pose is not None:
+                again.append(pose)
+
+        return first + again
+
+    return poses
+
+
 def _sight(made: Sequence[Claim], place: Town, scene: Scene) -> Sight:
     kinds = [plot.kind.name for plot in place.plots]
-    ranges_m = side_and_range(place, scene.pose)[:, 1].tolist()
-    return sight(made, scene.label, kinds, ranges_m)
+    _, range_m = side_and_range(place, scene.pose).T
+    return sight(made, scene.label, kinds, range_m.tolist())

@@ -47,18 +47,9 @@ def measure() -> Metrics:
     """The metrics of THRESHOLDS, and others that explain them."""
     # Each process is on a core of its own: no library should start threads.
     os.environ.update(OMP_NUM_THREADS="1", LP_NUM_THREADS="1")
-    first_novel = FIRST_SEED + len(TOWNS)
-    novel_seeds = range(first_novel, first_novel + NOVEL_TOWNS)
-    novel = [partial(novel_look, seed, SIGHTINGS) for seed in novel_seeds]
-    towns = [
-        partial(town_look, seed, invented, VIEWS)
-        for seed, invented in enumerate(TOWNS, start=FIRST_SEED)
-    ]
-    # The longest come first.
-    jobs: list[Callable[[], Any]] = [sequence.measure, *novel, *towns]
 
     with bar("held-out towns") as progress:
-        found = parallel_map(_run, jobs, PROCESSES, progress)
+        found = parallel_map(_run, _jobs(), PROCESSES, progress)
 
     places: Metrics = found[0]
     memories = found[1 : 1 + NOVEL_TOWNS]
@@ -67,35 +58,69 @@ def measure() -> Metrics:
     return places | seen(looks) | recognised_again(memories) | frames.metrics(times_ms)
 
 
+def _jobs() -> list[Callable[[], Any]]:
+    """Places by sequence, the towns of novel buildings, and TOWNS: the longest come first."""
+    jobs: list[Callable[[], Any]] = [sequence.measure]
+
+    first_novel = FIRST_SEED + len(TOWNS)
+    for number in range(NOVEL_TOWNS):
+        jobs.append(partial(novel_look, first_novel + number, SIGHTINGS))
+
+    for seed, invented in enumerate(TOWNS, start=FIRST_SEED):
+        jobs.append(partial(town_look, seed, invented, VIEWS))
+
+    return jobs
+
+
 def _run(job: Callable[[], Any]) -> Any:
     return job()
 
 
 def seen(looks: Sequence[Look]) -> Metrics:
     """What was seen in all towns together."""
-    sights = [sight for look in looks for sight in look.sights]
-    judged = [pair for look in looks for pair in look.judged]
-    edge_errors_m = [look.edge_errors_m for look in looks]
-    edges_missed_m = [look.edges_missed_m for look in looks]
-    depth_errors = np.concatenate([look.depth_errors for look in looks])
+    sights: list[Sight] = []
+    judged: list[tuple[float, bool]] = []
+    for look in looks:
+        sights += look.sights
+        judged += look.judged
 
     metrics = _named(sights) | {"ece": calibration_error(judged)} | _detected(sights)
-    return metrics | {
-        "road_iou": float(np.mean([look.road_iou for look in looks])),
+    return metrics | _road(looks) | _depth(looks)
+
+
+def _road(looks: Sequence[Look]) -> Metrics:
+    iou = [look.road_iou for look in looks]
+    edge_errors_m = [look.edge_errors_m for look in looks]
+    edges_missed_m = [look.edges_missed_m for look in looks]
+
+    return {
+        "road_iou": float(np.mean(iou)),
         "road_edge_error_m": road_edge_error_m(edge_errors_m),
         "road_edge_missed_m": road_edge_error_m(edges_missed_m),
-        "depth_error": float(np.median(depth_errors)),
-        "depth_known": float(np.mean([look.depth_known for look in looks])),
+    }
+
+
+def _depth(looks: Sequence[Look]) -> Metrics:
+    errors = np.concatenate([look.depth_errors for look in looks])
+    known = [look.depth_known for look in looks]
+
+    return {
+        "depth_error": float(np.median(errors)),
+        "depth_known": float(np.mean(known)),
     }
 
 
 def _named(sights: Sequence[Sight]) -> Metrics:
     """The share of segments of trained kinds whose name is right, in all and by distance."""
     right = named(sights, TRAINED, NEAREST_M, FARTHEST_M)
-    metrics = {"top1": _share(right), "top1_segments": float(len(right))}
+    metrics = {
+        "top1": _share(right),
+        "top1_segments": float(len(right)),
+    }
 
     for min_m, max_m in RANGES_M:
-        metrics[f"top1_{min_m:g}_{max_m:g}m"] = _share(named(sights, TRAINED, min_m, max_m))
+        right_there = named(sights, TRAINED, min_m, max_m)
+        metrics[f"top1_{min_m:g}_{max_m:g}m"] = _share(right_there)
 
     return metrics
 
@@ -115,18 +140,18 @@ def _detected(sights: Sequence[Sight]) -> Metrics:
 
 def recognised_again(memories: Sequence[Memory]) -> Metrics:
     """What became of the buildings that were met once, in all towns together."""
-    sightings = sum(memory.later for memory in memories)
-    right = sum(memory.right for memory in memories)
+    together = sum(memories, Memory())
 
     return {
-        "novel_top1": right / max(1, sightings),
-        "novel_buildings": float(sum(memory.met for memory in memories)),
-        "novel_sightings": float(sightings),
-        "novel_wrong_merges": float(sum(memory.merges for memory in memories)),
-        "novel_splits": float(sum(memory.splits for memory in memories)),
-        "novel_as_trained": float(sum(memory.mistaken for memory in memories)),
+        "novel_top1": together.right / max(1, together.later),
+        "novel_buildings": float(together.met),
+        "novel_sightings": float(together.later),
+        "novel_wrong_merges": float(together.merges),
+        "novel_splits": float(together.splits),
+        "novel_as_trained": float(together.mistaken),
     }
 
 
 def _share(right: Sequence[bool]) -> float:
-    return sum(right) / max(1, len(right))
+    count = max(1, len(right))
+    return sum(right) / count

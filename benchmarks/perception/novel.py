@@ -34,12 +34,23 @@ class Memory:
     `mistaken` ones by a trained class's.
     """
 
-    met: int
-    later: int
-    right: int
-    merges: int
-    splits: int
-    mistaken: int
+    met: int = 0
+    later: int = 0
+    right: int = 0
+    merges: int = 0
+    splits: int = 0
+    mistaken: int = 0
+
+    def __add__(self, other: Memory) -> Memory:
+        """What became of the buildings of two towns."""
+        return Memory(
+            met=self.met + other.met,
+            later=self.later + other.later,
+            right=self.right + other.right,
+            merges=self.merges + other.merges,
+            splits=self.splits + other.splits,
+            mistaken=self.mistaken + other.mistaken,
+        )
 
 
 def remembered(
@@ -87,24 +98,30 @@ class _Tally:
                 continue
 
             is_taken = label in self.names.values()
+            is_own = not is_taken and label not in self.trained
             self.merges += is_taken
-            self.names[number] = "" if is_taken or label in self.trained else label
+            self.names[number] = label if is_own else ""
 
     def see_again(self, meeting: Meeting) -> None:
         """Count the sightings of one later view."""
         for number, label, _ in _sightings(meeting):
             here = meeting.from_where[number]
-            if not all(_is_elsewhere(here, there) for there in self.places[number]):
+            if self._was_there(number, here):
                 continue
 
             is_known = label in self.names.values()
             is_right = label == self.names.get(number)
             is_trained = label in self.trained
+
             self.later += 1
             self.right += is_right
             self.mistaken += is_trained
             self.merges += is_known and not is_right
             self.splits += not is_trained and not is_known
+
+    def _was_there(self, number: int, here: Floats) -> bool:
+        """Whether a building was met from about there."""
+        return not all(_is_elsewhere(here, there) for there in self.places[number])
 
     def memory(self) -> Memory:
         """All counts."""
@@ -117,13 +134,16 @@ def _sightings(meeting: Meeting) -> list[tuple[int, str, float]]:
     found = []
 
     for segment in meeting.sight.segments:
-        if segment.building:
-            found.append((segment.building.number, segment.label, segment.activation))
+        building = segment.building
+        if building is not None:
+            found.append((building.number, segment.label, segment.activation))
 
     return found
 
 
 def _is_elsewhere(here: Floats, there: Floats) -> bool:
     """Whether `here` is at another side and distance of a building than `there`."""
-    turn_rad = abs(math.remainder(float(here[0] - there[0]), math.tau))
-    return turn_rad >= MIN_TURN_RAD and other_distance(float(here[1]), float(there[1]))
+    here_rad, here_m = here.tolist()
+    there_rad, there_m = there.tolist()
+    turn_rad = math.remainder(here_rad - there_rad, math.tau)
+    return abs(turn_rad) >= MIN_TURN_RAD and other_distance(here_m, there_m)

@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
 from benchmarks.spiking.measure import SIDE_M, Scene, recording
+from benchmarks.spiking.raster import draw_raster
 from cli.plots.draw import STYLE
-from cli.plots.palette import ESTIMATE, FAINT, INK, KERB, OBJECT, PAPER, TRUE
+from cli.plots.palette import ESTIMATE, FAINT, INK, KERB, PAPER, TRUE
 from experiments.spiking.cells import (
-    GAMMA_S,
     PLACE_M,
     SPACINGS_M,
     BorderCells,
@@ -22,9 +22,11 @@ from experiments.spiking.cells import (
     Spikes,
     Values,
 )
-from experiments.spiking.network import Posterior, Recording
+from experiments.spiking.network import Cues, Posterior, Recording
 
-SHOWN_S = 2.0
+ALL_BITS = 255
+DASHES = (0, (3, 2))
+LineStyle = str | tuple[int, tuple[int, int]]
 MOSAIC: Any = [["grid", "border", "place"], ["raster", "raster", "agreement"]]
 
 
@@ -35,15 +37,14 @@ def figure(scenes: list[Scene], seeds: list[int]) -> Figure:
     chosen = next(number for number, scene in enumerate(scenes) if len(scene.cues.borders) == 2)
     scene = scenes[chosen]
     spikes = recording(seeds[chosen])
+
     with mpl.rc_context(STYLE):
         sheet = Figure(figsize=(13, 8), dpi=130, facecolor=PAPER, layout="constrained")
         panels = sheet.subplot_mosaic(MOSAIC, height_ratios=[1.25, 1])
-        _draw_inputs(panels, scene, spikes)
-        _show(panels["place"], spikes.counts, "c   place cells: coincidences")
-        _draw_ellipse(panels["place"], scene.exact, TRUE, "-", "exact posterior, 2 SD")
-        _draw_ellipse(panels["place"], scene.spiking, ESTIMATE, (0, (3, 2)), "the spikes', 2 SD")
-        panels["place"].legend(frameon=False, fontsize=8, loc="lower left")
-        _draw_raster(panels["raster"], spikes)
+        _draw_prior(panels["grid"], scene.cues, spikes)
+        _draw_likelihood(panels["border"], scene.cues, spikes)
+        _draw_posterior(panels["place"], scene, spikes)
+        draw_raster(panels["raster"], spikes)
         _draw_agreement(panels["agreement"], scenes)
         sheet.suptitle(
             f"Cue integration by coincidence: {scene.spikes} spikes of place cells, "
@@ -55,46 +56,59 @@ def figure(scenes: list[Scene], seeds: list[int]) -> Figure:
             fontweight="bold",
         )
         sheet.draw_without_rendering()
+
     return sheet
 
 
-def _inputs(spikes: Recording) -> tuple[Values, Values]:
-    """How often the grid cells of each place cell fired together, and how often its border cells
-    did.
-    """
-    grid = np.full_like(spikes.place, 255)
+def _draw_prior(axes: Axes, cues: Cues, spikes: Recording) -> None:
+    """How often the grid cells of each place cell fired together."""
+    together = np.full_like(spikes.place, ALL_BITS)
     for spacing_m, fired in zip(SPACINGS_M, spikes.grid, strict=True):
-        grid &= fired[GridModule(spacing_m).nearest(spikes.centres_m)]
-    border = np.full_like(spikes.place, 255)
+        nearest = GridModule(spacing_m).nearest(spikes.centres_m)
+        together &= fired[nearest]
+
+    prior = Posterior(np.array(cues.mean_m), np.array(cues.covariance_m2))
+    _show(axes, _counts(together), "a   grid cells: path integration, the prior")
+    _draw_ellipse(axes, prior, TRUE, "-", "prior, 2 SD")
+    _add_legend(axes)
+
+
+def _draw_likelihood(axes: Axes, cues: Cues, spikes: Recording) -> None:
+    """How often the border cells of each place cell fired together."""
+    cells = BorderCells(SIDE_M)
+    together = np.full_like(spikes.place, ALL_BITS)
     for axis, fired in enumerate(spikes.border):
-        border &= fired[BorderCells(SIDE_M).nearest(spikes.centres_m[:, axis])]
-    return _counts(grid), _counts(border)
+        nearest = cells.nearest(spikes.centres_m[:, axis])
+        together &= fired[nearest]
+
+    sensed_m = np.array([border.sensed_m for border in cues.borders])
+    sds_m = np.array([border.sd_m for border in cues.borders])
+    walls = Posterior(sensed_m, np.diag(sds_m**2))
+    title = "b   border cells: distances to two walls, the likelihood"
+    _show(axes, _counts(together), title)
+    _draw_ellipse(axes, walls, TRUE, "-", "likelihood, 2 SD")
+    _add_legend(axes)
+
+
+def _draw_posterior(axes: Axes, scene: Scene, spikes: Recording) -> None:
+    """How often each place cell fired."""
+    _show(axes, spikes.counts, "c   place cells: coincidences")
+    _draw_ellipse(axes, scene.exact, TRUE, "-", "exact posterior, 2 SD")
+    _draw_ellipse(axes, scene.spiking, ESTIMATE, DASHES, "the spikes', 2 SD")
+    _add_legend(axes)
 
 
 def _counts(spikes: Spikes) -> Values:
-    return np.asarray(np.bitwise_count(spikes).sum(axis=1), np.float64)
-
-
-def _draw_inputs(panels: dict[str, Axes], scene: Scene, spikes: Recording) -> None:
-    grid, border = _inputs(spikes)
-    _show(panels["grid"], grid, "a   grid cells: path integration, the prior")
-    _show(panels["border"], border, "b   border cells: distances to two walls, the likelihood")
-    prior = Posterior(np.array(scene.cues.mean_m), np.array(scene.cues.covariance_m2))
-    sensed = scene.cues.borders
-    walls = Posterior(
-        np.array([each.sensed_m for each in sensed]), np.diag([each.sd_m**2 for each in sensed])
-    )
-    _draw_ellipse(panels["grid"], prior, TRUE, "-", "prior, 2 SD")
-    _draw_ellipse(panels["border"], walls, TRUE, "-", "likelihood, 2 SD")
-    for name in ("grid", "border"):
-        panels[name].legend(frameon=False, fontsize=8, loc="lower left")
+    counts = np.bitwise_count(spikes).sum(axis=1)
+    return np.asarray(counts, np.float64)
 
 
 def _show(axes: Axes, counts: Values, title: str) -> None:
     """Spikes by place, the room from above."""
     number = round(SIDE_M / PLACE_M)
+    room = counts.reshape(number, number)
     axes.imshow(
-        counts.reshape(number, number).T,
+        room.T,
         origin="lower",
         extent=(0, SIDE_M, 0, SIDE_M),
         cmap="YlGnBu",
@@ -104,66 +118,46 @@ def _show(axes: Axes, counts: Values, title: str) -> None:
     axes.set_xlabel("metres from the west wall", color=FAINT)
 
 
-def _draw_ellipse(
-    axes: Axes, of: Posterior, colour: str, style: str | tuple[int, tuple[int, int]], label: str
-) -> None:
+def _draw_ellipse(axes: Axes, of: Posterior, colour: str, style: LineStyle, label: str) -> None:
+    """The ellipse of two standard deviations."""
     values, vectors = np.linalg.eigh(of.covariance_m2)
-    width, height = 4 * np.sqrt(values[::-1])
-    angle = float(np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1])))
-    where = (float(of.mean_m[0]), float(of.mean_m[1]))
-    axes.add_patch(
-        Ellipse(
-            where, width, height, angle=angle, fill=False, ec=colour, lw=1.6, ls=style, label=label
-        )
+    height, width = 4 * np.sqrt(values)
+    along_x, along_y = vectors[:, 1]
+    angle_rad = np.arctan2(along_y, along_x)
+    x_m, y_m = of.mean_m.tolist()
+
+    ellipse = Ellipse(
+        (x_m, y_m),
+        width,
+        height,
+        angle=float(np.degrees(angle_rad)),
+        fill=False,
+        ec=colour,
+        lw=1.6,
+        ls=style,
+        label=label,
     )
+    axes.add_patch(ellipse)
 
 
-def _draw_raster(axes: Axes, spikes: Recording) -> None:
-    """The inputs of the place cell that fires most, and its own spikes where all coincide."""
-    most = int(np.argmax(spikes.counts))
-    cell = spikes.centres_m[most : most + 1]
-    rows = [("place cell", spikes.place[most], ESTIMATE)]
-    rows += [
-        (f"border cell, {'west' if axis == 0 else 'south'} wall", fired[int(nearest[0])], OBJECT)
-        for axis, fired in enumerate(spikes.border)
-        for nearest in (BorderCells(SIDE_M).nearest(cell[:, axis]),)
-    ]
-    rows += [
-        (f"grid cell, {spacing_m:g} m", fired[int(GridModule(spacing_m).nearest(cell)[0])], TRUE)
-        for spacing_m, fired in zip(SPACINGS_M, spikes.grid, strict=True)
-    ]
-    first = int(np.flatnonzero(np.unpackbits(rows[0][1]))[0])
-    shown = round(SHOWN_S / GAMMA_S)
-    from_cycle = max(0, first - shown // 2)
-    for height, (_, packed, colour) in enumerate(rows):
-        fired = np.flatnonzero(np.unpackbits(packed)[from_cycle : from_cycle + shown]) * GAMMA_S
-        axes.vlines(fired, height - 0.4, height + 0.4, color=colour, lw=1.4)
-    for coincidence in (
-        np.flatnonzero(np.unpackbits(rows[0][1])[from_cycle : from_cycle + shown]) * GAMMA_S
-    ):
-        axes.axvline(coincidence, color=ESTIMATE, lw=6, alpha=0.15, zorder=0)
-    axes.set_yticks(range(len(rows)), [name for name, _, _ in rows])
-    axes.set_xlim(0, SHOWN_S)
-    axes.set_xlabel("seconds", color=FAINT)
-    axes.set_title(
-        "d   a place cell and its inputs: it fires where all fire together",
-        loc="left",
-        color=INK,
-        fontsize=10,
-    )
-    axes.set_facecolor(PAPER)
+def _add_legend(axes: Axes) -> None:
+    axes.legend(frameon=False, fontsize=8, loc="lower left")
 
 
 def _draw_agreement(axes: Axes, scenes: list[Scene]) -> None:
+    """Standard deviations of the spikes over those of the exact posterior, along x and y."""
     exact = np.array([scene.exact.sd_m for scene in scenes]).ravel()
     spiking = np.array([scene.spiking.sd_m for scene in scenes]).ravel()
-    limits = (0.9 * min(exact.min(), spiking.min()), 1.1 * max(exact.max(), spiking.max()))
+    least = min(exact.min(), spiking.min())
+    most = max(exact.max(), spiking.max())
+    limits = (0.9 * least, 1.1 * most)
+
     axes.plot(limits, limits, color=KERB, lw=1.2)
     axes.plot(exact, spiking, "o", ms=4.5, mfc=ESTIMATE, mec="white", mew=0.5)
     axes.set(xlim=limits, ylim=limits, aspect="equal")
-    axes.set_title(
-        f"e   SD along x and y, {len(scenes)} scenes", loc="left", color=INK, fontsize=10
-    )
+
+    title = f"e   SD along x and y, {len(scenes)} scenes"
+    axes.set_title(title, loc="left", color=INK, fontsize=10)
     axes.set_xlabel("exact, metres", color=FAINT)
     axes.set_ylabel("of the spikes, metres", color=FAINT)
     axes.tick_params(colors=FAINT, length=3)

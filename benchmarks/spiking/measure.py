@@ -17,8 +17,12 @@ SIDE_M = 5.0
 RECORDED_S = 600.0
 SCENES = 40
 SEED = 1
+MIDDLE_M = (1.6, 3.4)
 PRIOR_SD_M = (0.25, 0.5)
+MAX_CORRELATION = 0.6
 BORDER_SD_M = (0.15, 0.4)
+SENSED_AXES = ((0,), (1,), (0, 1))
+SAMPLES = 20_000
 THRESHOLDS = {
     "posterior_sd_ratio": within(0.9, 1.1),
     "posterior_mean_error": at_most(0.1),
@@ -43,24 +47,28 @@ def cues(seed: int) -> Cues:
     sensed.
     """
     rng = np.random.default_rng([seed, 0])
-    mean = rng.uniform(1.6, 3.4, 2)
-    sds = rng.uniform(*PRIOR_SD_M, 2)
-    correlation = rng.uniform(-0.6, 0.6)
-    across = float(correlation * sds[0] * sds[1])
-    covariance = ((float(sds[0] ** 2), across), (across, float(sds[1] ** 2)))
-    true_m = rng.multivariate_normal(mean, covariance)
-    axes = ((0,), (1,), (0, 1))[seed % 3]
-    sd_m = rng.uniform(*BORDER_SD_M, 2)
-    borders = tuple(
-        Border(axis, float(rng.normal(true_m[axis], sd_m[axis])), float(sd_m[axis]))
-        for axis in axes
-    )
-    return Cues((float(mean[0]), float(mean[1])), covariance, borders)
+    x_m, y_m = rng.uniform(*MIDDLE_M, 2).tolist()
+    x_sd_m, y_sd_m = rng.uniform(*PRIOR_SD_M, 2)
+    correlation = rng.uniform(-MAX_CORRELATION, MAX_CORRELATION)
+    across_m2 = float(correlation * x_sd_m * y_sd_m)
+    along_x = (float(x_sd_m**2), across_m2)
+    along_y = (across_m2, float(y_sd_m**2))
+    covariance_m2 = (along_x, along_y)
+
+    true_m = rng.multivariate_normal((x_m, y_m), covariance_m2)
+    sds_m = rng.uniform(*BORDER_SD_M, 2).tolist()
+    borders = []
+    for axis in SENSED_AXES[seed % len(SENSED_AXES)]:
+        sensed_m = float(rng.normal(true_m[axis], sds_m[axis]))
+        borders.append(Border(axis, sensed_m, sds_m[axis]))
+
+    return Cues((x_m, y_m), covariance_m2, tuple(borders))
 
 
 def recording(seed: int) -> Recording:
     """The spikes of the scene of that seed."""
-    return record(cues(seed), SIDE_M, RECORDED_S, np.random.default_rng([seed, 1]))
+    rng = np.random.default_rng([seed, 1])
+    return record(cues(seed), SIDE_M, RECORDED_S, rng)
 
 
 def scene(seed: int) -> Scene:
@@ -68,22 +76,33 @@ def scene(seed: int) -> Scene:
     given = cues(seed)
     spikes = recording(seed)
     return Scene(
-        given, exact(given), spikes.posterior, _rejection(given, seed), int(spikes.counts.sum())
+        cues=given,
+        exact=exact(given),
+        spiking=spikes.posterior,
+        rejection=_rejection(given, seed),
+        spikes=int(spikes.counts.sum()),
     )
 
 
 def _rejection(given: Cues, seed: int) -> Posterior:
     """The posterior by the localization codelet's own rejection of samples."""
     rng = np.random.default_rng([seed, 2])
-    samples = rng.multivariate_normal(given.mean_m, given.covariance_m2, 20_000)
-    squared = [((samples[:, each.axis] - each.sensed_m) / each.sd_m) ** 2 for each in given.borders]
-    kept = samples[rejection_mask(-np.sum(squared, axis=0) / 2, rng)]
+    samples = rng.multivariate_normal(given.mean_m, given.covariance_m2, SAMPLES)
+    squared = []
+    for border in given.borders:
+        residual = (samples[:, border.axis] - border.sensed_m) / border.sd_m
+        squared.append(residual**2)
+
+    log_likelihood = -np.sum(squared, axis=0) / 2
+    is_kept = rejection_mask(log_likelihood, rng)
+    kept = samples[is_kept]
     return Posterior(kept.mean(axis=0), np.cov(kept, rowvar=False))
 
 
 def seeds(seed: int) -> list[int]:
     """Those of the SCENES scenes."""
-    return [seed * SCENES + number for number in range(SCENES)]
+    first = seed * SCENES
+    return list(range(first, first + SCENES))
 
 
 def measure(seed: int, processes: int, progress: Progress = lambda share: None) -> list[Scene]:
@@ -109,12 +128,12 @@ def metrics(scenes: list[Scene]) -> Metrics:
 def _compared(name: str, pairs: list[tuple[Posterior, Posterior]]) -> Metrics:
     """Of pairs of the exact posterior and another."""
     ratios: Values = np.array([other.sd_m / exact.sd_m for exact, other in pairs])
-    errors = [exact.off(other.mean_m) for exact, other in pairs]
+    errors = np.array([exact.off(other.mean_m) for exact, other in pairs])
 
     return {
         f"{name}_sd_ratio": float(ratios.mean()),
         f"{name}_sd_ratio_least": float(ratios.min()),
         f"{name}_sd_ratio_most": float(ratios.max()),
-        f"{name}_mean_error": float(np.mean(errors)),
-        f"{name}_mean_error_most": float(np.max(errors)),
+        f"{name}_mean_error": float(errors.mean()),
+        f"{name}_mean_error_most": float(errors.max()),
     }
