@@ -28,7 +28,8 @@ def build(name: str, sections: dict[str, Any], instance: str) -> Module:
     graph = Graph()
 
     def command() -> MotorCommand:
-        content = int(graph.digest()[:4], 16) % 1000
+        digest = graph.digest()
+        content = int(digest[:4], 16) % 1000
         return MotorCommand(left_wheel_rad_s=content, right_wheel_rad_s=graph.version)
 
     return Module(name, instance).following(
@@ -91,11 +92,6 @@ class Session:
 
 def replay(path: Path) -> Report:
     return replay_into(path, ["follower"], build)
-
-
-@pytest.fixture
-def path(tmp_path: Path) -> Path:
-    return tmp_path / "log.mcap"
 
 
 def test_followers_replay_alike_whenever_they_joined(path: Path) -> None:
