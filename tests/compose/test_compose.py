@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import socket
 import subprocess
 import time
 from collections.abc import Callable, Iterator
@@ -16,6 +15,7 @@ import pytest
 from cli.launch.metrics import Recording
 from cli.launch.watch import Watch
 from cogmap.bus.interface import Member
+from cogmap.bus.session import free_endpoint
 from cogmap.bus.zenoh_bus import ZenohBus
 from services import registry
 
@@ -33,19 +33,20 @@ class Compose:
     """
 
     def __init__(self, name: str, laps: str) -> None:
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.port = probe.getsockname()[1]
+        self.endpoint = free_endpoint()
+        _, _, port = self.endpoint.rpartition(":")
         self._environment = os.environ | {
             "COGMAP_LAPS": laps,
-            "COGMAP_PORT": str(self.port),
+            "COGMAP_PORT": port,
             "COMPOSE_PROJECT_NAME": f"cogmap-{name}-{os.getpid()}",
         }
 
     def __call__(self, *arguments: str) -> str:
+        """Run it, which must succeed, and return what it prints."""
         done = self.attempt(*arguments)
-        words = " ".join(done.args)
-        assert done.returncode == 0, f"{words}:\n{(done.stdout + done.stderr)[-3000:]}"
+        command = " ".join(done.args)
+        output = done.stdout + done.stderr
+        assert done.returncode == 0, f"{command}:\n{output[-3000:]}"
         return done.stdout
 
     def attempt(self, *arguments: str) -> subprocess.CompletedProcess[str]:
@@ -60,26 +61,29 @@ class Compose:
         )
 
     def containers(self, service: str) -> list[str]:
-        return self("ps", "--quiet", service).split()
+        """The ids of the containers of a service."""
+        ids = self("ps", "--quiet", service)
+        return ids.split()
 
-    def cogmap(self, service: str, command: str) -> subprocess.CompletedProcess[str]:
-        return self.attempt("exec", "-T", service, "sh", "-c", f"cogmap {command}")
+    def cogmap(self, service: str, command: str) -> str:
+        """What `cogmap` prints in a container of `service`, whatever its exit code."""
+        done = self.attempt("exec", "-T", service, "sh", "-c", f"cogmap {command}")
+        return done.stdout
 
 
 def docker(*arguments: str) -> str:
-    return subprocess.run(
-        ["docker", *arguments], capture_output=True, text=True, check=True
-    ).stdout.strip()
+    """What `docker` prints. Raises CalledProcessError."""
+    done = subprocess.run(["docker", *arguments], capture_output=True, text=True, check=True)
+    return done.stdout.strip()
 
 
 def there_is_docker() -> bool:
+    """Whether the engine answers and compose is version 2."""
     if shutil.which("docker") is None:
         return False
-    asked = [["docker", "info"], ["docker", "compose", "version"]]
-    return all(
-        subprocess.run(command, capture_output=True, check=False).returncode == 0
-        for command in asked
-    )
+    engine = subprocess.run(["docker", "info"], capture_output=True, check=False)
+    compose = subprocess.run(["docker", "compose", "version"], capture_output=True, check=False)
+    return engine.returncode == 0 and compose.returncode == 0
 
 
 @pytest.fixture(scope="module")
@@ -108,12 +112,13 @@ def compose(image: None) -> Iterator[Compose]:
 @pytest.fixture(scope="module")
 def watch(compose: Compose) -> Iterator[Watch]:
     """An observer from outside the containers, through the published port."""
-    watch = Watch(ZenohBus(f"tcp/127.0.0.1:{compose.port}", "agent"))
+    watch = Watch(ZenohBus(compose.endpoint, "agent"))
     yield watch
     watch.close()
 
 
 def wait_until(watch: Watch, condition: Callable[[], bool]) -> None:
+    """Let `watch` receive until `condition` holds."""
     deadline_s = time.monotonic() + TIMEOUT_S
     while not condition():
         assert time.monotonic() < deadline_s, f"it never happened; present: {sorted(watch.present)}"
@@ -121,24 +126,26 @@ def wait_until(watch: Watch, condition: Callable[[], bool]) -> None:
 
 
 def test_frames_lead_to_commands_that_move_the_robot(watch: Watch) -> None:
-    wait_until(
-        watch, lambda: watch.tally.observer.travelled_m > 3.0 and len(watch.tally.cycle_ms) > 5
-    )
+    wait_until(watch, lambda: watch.tally.observer.travelled_m > 3.0)
+    wait_until(watch, lambda: len(watch.tally.cycle_ms) > 5)
 
 
 def test_each_worker_has_a_name_of_its_own(watch: Watch, compose: Compose) -> None:
-    named = {
-        Member("codelets", f"codelets-{container[:12]}")
-        for container in compose.containers("codelets")
-    }
-    assert len(named) == 2
-    wait_until(watch, lambda: named <= watch.present)
+    containers = compose.containers("codelets")
+    workers = {Member("codelets", f"codelets-{container[:12]}") for container in containers}
+
+    assert len(workers) == 2
+    wait_until(watch, lambda: workers <= watch.present)
 
 
 @pytest.mark.parametrize("service", SERVICES)
 def test_no_process_in_a_container_is_roots(compose: Compose, service: str) -> None:
-    for container in compose.containers(service):
-        users = docker("top", container, "-o", "pid,uid").split()[3::2]
+    containers = compose.containers(service)
+
+    assert containers
+    for container in containers:
+        _, *processes = docker("top", container, "-o", "pid,uid").splitlines()
+        users = [process.split()[1] for process in processes]
         assert users
         assert "0" not in users
 
@@ -146,15 +153,17 @@ def test_no_process_in_a_container_is_roots(compose: Compose, service: str) -> N
 def test_the_output_names_the_module_of_each_line(compose: Compose) -> None:
     lines = compose("logs", "--no-color").splitlines()
     for service in ("sensory", "workspace", "action"):
-        said = [line for line in lines if line.startswith(f"{service}-1 ")]
-        assert any(f"{service} is ready" in line for line in said)
+        own = [line for line in lines if line.startswith(f"{service}-1 ")]
+        assert any(f"{service} is ready" in line for line in own)
 
 
 def test_the_log_has_what_the_workspace_publishes_from_its_first_message_on(
     compose: Compose,
 ) -> None:
-    first = compose.cogmap("drive", f"log cat {RUN}/log.mcap presence -n 1 --json").stdout
-    assert json.loads(first.splitlines()[0])["message"]["seq"] == 0
+    output = compose.cogmap("drive", f"log cat {RUN}/log.mcap presence -n 1 --json")
+
+    first = json.loads(output.splitlines()[0])
+    assert first["message"]["seq"] == 0
 
 
 @pytest.mark.parametrize("service", ["epam", "workspace", "sim", "action"])
@@ -164,13 +173,15 @@ def test_a_container_that_is_killed_restarts_and_the_robot_drives_again(
     member = Member(service, service)
     wait_until(watch, lambda: member in watch.present)
     (container,) = compose.containers(service)
+
     kill(container)
     wait_until(watch, lambda: member not in watch.present)
     wait_until(watch, lambda: member in watch.present)
 
-    commands = len(watch.tally.cycle_ms)
-    wait_until(watch, lambda: len(watch.tally.cycle_ms) > commands + 5)
-    assert docker("inspect", "--format", "{{.RestartCount}}", container) == "1"
+    enough = len(watch.tally.cycle_ms) + 6
+    wait_until(watch, lambda: len(watch.tally.cycle_ms) >= enough)
+    restarts = docker("inspect", "--format", "{{.RestartCount}}", container)
+    assert restarts == "1"
 
 
 def kill(container: str) -> None:
@@ -183,8 +194,11 @@ def kill(container: str) -> None:
 def test_when_recording_has_ended_the_doctor_misses_nobody(watch: Watch, compose: Compose) -> None:
     wait_until(watch, lambda: watch.tally.observer.travelled_m > 0.0)
     compose("stop", "drive")
-    findings = json.loads(compose.cogmap("sim", "doctor --json").stdout)
-    missed = {finding["about"] for finding in findings} & {"recorder", "observer", *SERVICES}
+
+    findings = json.loads(compose.cogmap("sim", "doctor --json"))
+
+    about = {finding["about"] for finding in findings}
+    missed = about & {"recorder", "observer", *SERVICES}
     assert not missed, findings
 
 
@@ -197,12 +211,16 @@ def test_a_drive_ends_every_container_and_leaves_its_files(image: None, tmp_path
     finally:
         project("down", "--volumes", "--timeout", "5")
 
+    summary = json.loads((tmp_path / "summary.json").read_text())
     assert "route complete" in output
-    assert json.loads((tmp_path / "summary.json").read_text())["completed"]
+    assert summary["completed"]
     assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
     assert Recording.read(tmp_path / "log.mcap") is not None
 
 
 def test_the_image_has_the_experiments(image: None) -> None:
     command = ["experiment", "cue-integration", "--trials", "8", "--processes", "1"]
-    assert "runs/cue-integration" in docker("run", "--rm", "cogmap", *command)
+
+    output = docker("run", "--rm", "cogmap", *command)
+
+    assert "runs/cue-integration" in output

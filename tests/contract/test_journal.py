@@ -32,7 +32,8 @@ def snapshot(version: int) -> Snapshot:
 def opened(path: Path) -> Journal:
     """A new journal, ready to be written."""
     journal = Journal(path)
-    assert list(journal.messages()) == []
+    earlier = list(journal.messages())
+    assert earlier == []
     return journal
 
 

@@ -31,8 +31,9 @@ def agent(
     """The workspace and two workers, with the settings in the fixture's parameter, fed and
     followed.
     """
+    settings = getattr(request, "param", ())
     system.router()
-    system.modules("workspace", "codelets-1", "codelets-2", settings=getattr(request, "param", ()))
+    system.modules("workspace", "codelets-1", "codelets-2", settings=settings)
     feeder = Feeder(system.bus())
     witness = Witness(system.bus())
     with working(witness.shell), working(feeder.shell):

@@ -17,16 +17,19 @@ from schemas import topics
 from schemas.array import Array
 from schemas.base import Message
 from schemas.graph import Delta, Phase
-from schemas.sensing import Percept, Percepts, SelfMotion
+from schemas.sensing import Percepts, SelfMotion
 from schemas.topics import Delivery
 from tests.support.damage import damaged
 from tests.support.live import Witness
 from tests.support.networks import working
 from tests.support.processes import AGENT, System, wait_until
+from tests.support.scenes import percept
 
 TRAVELLING = [topic for topic in topics.ALL if topic.delivery is not Delivery.ON_REQUEST]
 VIEWS = len(TRAVELLING)
 PERIOD_NS = 200_000_000
+MOTIONS = Array.of(np.array([[2.0, 0.0, 0.2, 0.1, 0.01]]))
+ROAD_M = Array.of(np.array([[3.0, 0.0], [4.0, 1.0]], np.float32))
 
 
 class Turns:
@@ -37,41 +40,27 @@ class Turns:
     def __init__(self, before: Callable[[int], None]) -> None:
         self._views = 0
         self._before = before
-        says = (topics.SELF_MOTION, topics.PERCEPTS)
-        awaits = {"workspace": 1, "codelets": 2, "witness": 1}
-        self.module = (
-            Module("turns")
-            .on(topics.DELTA, self._on_delta, says)
-            .on_start(self._view, awaits, says)
-        )
+        emits = (topics.SELF_MOTION, topics.PERCEPTS)
+        requires = {"workspace": 1, "codelets": 2, "witness": 1}
+        self.module = Module("turns")
+        self.module.on(topics.DELTA, self._on_delta, emits)
+        self.module.on_start(self._view, requires, emits)
 
     def _on_delta(self, delta: Delta) -> list[Message]:
-        return self._view() if delta.phase is Phase.END and self._views < VIEWS else []
+        has_ended = delta.phase is Phase.END
+        return self._view() if has_ended and self._views < VIEWS else []
 
     def _view(self) -> list[Message]:
         self._before(self._views)
+        since_ns = self._views * PERIOD_NS
         self._views += 1
-        stamp_ns = self._views * PERIOD_NS
-        motion = Array.of(np.array([[2.0, 0.0, 0.2, 0.1, 0.01]]))
-        house = Percept(
-            label="building-01",
-            activation=0.9,
-            bearing_rad=0.3,
-            range_m=40.0 - 0.4 * self._views,
-            bearing_sd_rad=0.05,
-            range_sd_m=1.0,
-            width_m=9.0,
-            height_m=6.0,
-            whole=True,
-            box_px=(10, 10, 50, 50),
-        )
-        road_m = Array.of(np.array([[3.0, 0.0], [4.0, 1.0]], np.float32))
-        return [
-            SelfMotion(
-                stamp_ns=stamp_ns, frame=self._views, since_ns=stamp_ns - PERIOD_NS, motions=motion
-            ),
-            Percepts(stamp_ns=stamp_ns, frame=self._views, objects=[house], road_m=road_m),
-        ]
+
+        frame = self._views
+        stamp_ns = frame * PERIOD_NS
+        house = percept("building-01", 0.3, 40.0 - 0.4 * frame)
+        motion = SelfMotion(stamp_ns=stamp_ns, frame=frame, since_ns=since_ns, motions=MOTIONS)
+        percepts = Percepts(stamp_ns=stamp_ns, frame=frame, objects=[house], road_m=ROAD_M)
+        return [motion, percepts]
 
 
 @pytest.fixture
@@ -88,16 +77,18 @@ def drive(system: System, before: Callable[[int], None] = lambda view: None) -> 
     system.modules("workspace", "codelets-1", "codelets-2", settings=("workspace.mode=lockstep",))
     witness = Witness(system.bus())
     turns = Turns(before)
+
+    def all_have_ended() -> bool:
+        return witness.graph.cycle == VIEWS and witness.deltas[-1].phase is Phase.END
+
     with working(witness.shell), working(Shell(turns.module, system.bus())):
-        wait_until(
-            lambda: witness.graph.cycle == VIEWS and witness.deltas[-1].phase is Phase.END,
-            "all views",
-        )
+        wait_until(all_have_ended, "the cycles of all views end")
     return witness
 
 
 def test_what_is_no_message_changes_no_byte_of_the_graph(system: System, other: System) -> None:
-    system.router(), other.router()
+    system.router()
+    other.router()
     stranger = open_client(other.endpoint)
 
     def molest(view: int) -> None:

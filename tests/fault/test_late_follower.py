@@ -13,10 +13,11 @@ def test_a_late_follower_has_the_graph_though_the_workspace_dies_as_it_joins(
     agent: tuple[System, Feeder, Witness],
 ) -> None:
     system, feeder, witness = agent
+    workspace = system.processes["workspace"]
     late = Witness(system.bus())
 
-    system.processes["workspace"].send(signal.SIGSTOP)
-    system.processes["workspace"].end(signal.SIGKILL)
+    workspace.send(signal.SIGSTOP)
+    workspace.end(signal.SIGKILL)
     with working(late.shell):
         assert late.graph.version == 0
         system.modules("workspace")
@@ -26,8 +27,9 @@ def test_a_late_follower_has_the_graph_though_the_workspace_dies_as_it_joins(
         late.await_same_graph()
 
     first = late.versions[0]
+    end = first + len(late.versions)
     assert first > 1
-    assert late.versions == list(range(first, first + len(late.versions)))
+    assert late.versions == list(range(first, end))
     assert not late.shell.intake.gaps
 
 

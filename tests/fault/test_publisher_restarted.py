@@ -17,7 +17,8 @@ WITHOUT_IMAGES = ("sim.egl=false", "sim.frame_hz=1")
 
 def published(system: System) -> int:
     """How many odometry messages the simulator has published, as its file counts them."""
-    counts = PublishedCounts(system.folder / "state" / "sim.published")
+    path = system.folder / "state" / "sim.published"
+    counts = PublishedCounts(path)
     number = counts.earlier(topics.ODOMETRY)
     counts.close()
     return number
@@ -31,16 +32,17 @@ def test_what_a_publisher_lost_before_its_restart_is_counted_as_a_gap(system: Sy
     with working(listener):
         system.modules("sim", settings=WITHOUT_IMAGES)
         wait_until(lambda: len(received) > 20, "odometry arrives")
+
         system.processes["router"].end(signal.SIGKILL)
         before = published(system)
-        wait_until(lambda: published(system) > before + 20, "odometry is published unheard")
+        wait_until(lambda: published(system) > before + 20, "odometry is published and lost")
         system.processes["sim"].end(signal.SIGKILL)
-        lost = published(system) - len(received)
+        arrived = len(received)
+        lost = published(system) - arrived
 
         system.router()
         system.modules("sim", settings=WITHOUT_IMAGES)
-        heard = len(received)
-        wait_until(lambda: len(received) > heard + 20, "odometry arrives again")
+        wait_until(lambda: len(received) > arrived + 20, "odometry arrives again")
 
     assert lost > 20
     assert dict(listener.intake.gaps) == {"odometry": lost}

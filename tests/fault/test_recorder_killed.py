@@ -18,7 +18,7 @@ import pytest
 from cogmap.bus.codec import Envelope, encode
 from cogmap.bus.interface import Member
 from cogmap.bus.zenoh_bus import ZenohBus
-from cogmap.recording.storage.reader import LogReader
+from cogmap.recording.storage.reader import LogReader, Record
 from cogmap.recording.storage.recover import recover
 from schemas import topics
 from tests.support.disks import full_after
@@ -65,7 +65,7 @@ class Publisher:
         self._pause.wait(0.002)
 
     def publish_until_it_grows(self, path: Path, times: int) -> None:
-        """Go on until the file has grown so often."""
+        """Publish until the file has grown so often."""
         size = path.stat().st_size
         deadline_s = time.monotonic() + TIMEOUT_S
         while times:
@@ -84,6 +84,7 @@ def publisher(endpoint: str) -> Iterator[Publisher]:
 
 
 def start(endpoint: str, path: Path, *options: str) -> subprocess.Popen[str]:
+    """A recorder of what is published at `endpoint`."""
     program = [sys.executable, "-m", "cli.main", "log", "record"]
     target = ["-o", str(path), "--connect", endpoint, "--agent", AGENT]
     return subprocess.Popen(
@@ -95,27 +96,46 @@ def start(endpoint: str, path: Path, *options: str) -> subprocess.Popen[str]:
     )
 
 
-def numbers(path: Path) -> list[int]:
-    return [record.sequence for record in LogReader(path).records({topics.ODOMETRY})]
+def recorded(path: Path) -> list[Record]:
+    """The records of odometry in a log."""
+    reader = LogReader(path)
+    return list(reader.records({topics.ODOMETRY}))
+
+
+def seqs(records: list[Record]) -> list[int]:
+    return [record.sequence for record in records]
+
+
+def end_of_errors(recorder: subprocess.Popen[str]) -> str:
+    """The last line of what a recorder that ends with code 2 prints as errors."""
+    _, errors = recorder.communicate(timeout=TIMEOUT_S)
+    assert recorder.returncode == 2
+    assert "Traceback" not in errors
+    return errors.strip().splitlines()[-1]
 
 
 def test_a_killed_recorder_loses_only_what_came_since_its_last_flush(
     endpoint: str, publisher: Publisher, tmp_path: Path
 ) -> None:
     path = tmp_path / "log.mcap"
+    saved = tmp_path / "saved.mcap"
     recorder = start(endpoint, path)
     publisher.await_recorder()
     publisher.publish_until_it_grows(path, 4)
     publisher.publish()
+
     recorder.kill()
     killed_ns = time.time_ns()
     recorder.wait()
-    found = list(LogReader(path).records({topics.ODOMETRY}))
-    assert [record.sequence for record in found] == list(range(len(found)))
-    assert killed_ns - found[-1].log_time_ns < (FLUSH_S + SLACK_S) * 1e9
-    recovery = recover(path, tmp_path / "saved.mcap")
+
+    found = recorded(path)
+    lost_s = (killed_ns - found[-1].log_time_ns) / 1e9
+    assert seqs(found) == list(range(len(found)))
+    assert lost_s < FLUSH_S + SLACK_S
+
+    recovery = recover(path, saved)
     assert recovery.messages == len(found)
-    assert numbers(tmp_path / "saved.mcap") == numbers(path)
+    assert seqs(recorded(saved)) == seqs(found)
 
 
 @pytest.mark.parametrize("how", ["SIGTERM", "SIGINT", "end of input"])
@@ -124,19 +144,22 @@ def test_a_recorder_that_is_asked_to_end_has_every_message(
 ) -> None:
     path = tmp_path / "log.mcap"
     recorder = start(endpoint, path, "--json", "--tied")
+    assert recorder.stdin is not None
+    assert recorder.stdout is not None
     publisher.await_recorder()
     publisher.publish_until_it_grows(path, 2)
+
     if how == "end of input":
-        assert recorder.stdin is not None
         recorder.stdin.close()
     else:
         recorder.send_signal(getattr(signal, how))
-    assert recorder.stdout is not None
     summary = json.loads(recorder.stdout.read())
+
+    count = summary["messages"]["odometry"]
     assert recorder.wait() == 0
     assert summary["never_drop_whole"]
-    assert summary["messages"]["odometry"] == len(numbers(path))
-    assert summary["messages"]["odometry"] > 0
+    assert count == len(recorded(path))
+    assert count > 0
     assert LogReader(path).about("summary")
 
 
@@ -147,14 +170,13 @@ def test_a_recorder_on_a_full_disk_ends_with_one_sentence(
     with full_after(FULL_BYTES):
         recorder = start(endpoint, path)
     publisher.await_recorder()
+
     deadline_s = time.monotonic() + TIMEOUT_S
     while recorder.poll() is None:
         assert time.monotonic() < deadline_s, "the recorder does not end"
         publisher.publish()
-    _, errors = recorder.communicate()
-    assert recorder.returncode == 2
-    assert "Traceback" not in errors
-    last = errors.strip().splitlines()[-1]
+
+    last = end_of_errors(recorder)
     assert last.startswith(f"cogmap: cannot write {path} (")
     assert last.endswith("free some space, or write to another disk")
 
@@ -162,9 +184,10 @@ def test_a_recorder_on_a_full_disk_ends_with_one_sentence(
 def test_a_recorder_that_cannot_write_its_file_ends_with_one_sentence(
     endpoint: str, tmp_path: Path
 ) -> None:
-    (tmp_path / "file").write_text("no folder")
-    recorder = start(endpoint, tmp_path / "file" / "log.mcap")
-    _, errors = recorder.communicate(timeout=TIMEOUT_S)
-    assert recorder.returncode == 2
-    assert "Traceback" not in errors
-    assert errors.strip().endswith("name a file in a folder that can be written to")
+    file = tmp_path / "file"
+    file.write_text("no folder")
+
+    recorder = start(endpoint, file / "log.mcap")
+
+    last = end_of_errors(recorder)
+    assert last.endswith("name a file in a folder that can be written to")

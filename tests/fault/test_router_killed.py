@@ -13,10 +13,10 @@ def test_deltas_arrive_in_order_and_cycles_continue_after_a_router_is_killed(
 ) -> None:
     system, feeder, witness = agent
     last = witness.versions[-1]
-    views = feeder.views
+    enough = feeder.views + 5
 
     system.processes["router"].end(signal.SIGKILL)
-    wait_until(lambda: feeder.views >= views + 5, "views continue without a router")
+    wait_until(lambda: feeder.views >= enough, "views continue without a router")
     system.router()
     wait_until(lambda: witness.versions[-1] > last, "deltas arrive again")
     witness.await_cycles(5)
@@ -24,8 +24,8 @@ def test_deltas_arrive_in_order_and_cycles_continue_after_a_router_is_killed(
     witness.await_same_graph()
 
     first = witness.versions[0]
-    count = len(witness.versions)
-    assert witness.versions == list(range(first, first + count))
+    end = first + len(witness.versions)
+    assert witness.versions == list(range(first, end))
     assert not witness.shell.notes
     assert not witness.shell.intake.gaps
     assert all(process.is_alive for process in system.processes.values())

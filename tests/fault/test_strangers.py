@@ -32,10 +32,10 @@ CARRIED = tuple(
     if topic.delivery is not Delivery.ON_REQUEST and topic is not topics.PRESENCE
 )
 # Every field of a request has a default, so that an object of another type is one too.
-NO_REQUESTS = [
-    bad for what, bad in damaged(topics.SNAPSHOT_REQUEST).items() if what != "wrong type"
-]
+NO_REQUESTS = damaged(topics.SNAPSHOT_REQUEST)
+del NO_REQUESTS["wrong type"]
 BLOCK = zenoh.CongestionControl.BLOCK
+Rejections = dict[str, dict[str, int]]
 
 
 class Stranger:
@@ -52,7 +52,8 @@ class Stranger:
         """Put everything on `topic` that is no message of it."""
         for payload in damaged(topic).values():
             source = f"stranger-{self.put[topic.name]}"
-            self._put(topic, payload, encode(Envelope(source, 0, 1, 1, 1)))
+            envelope = Envelope(source, 0, 1, 1, 1)
+            self._put(topic, payload, encode(envelope))
         self._put(topic, golden(topic), b"\xc1 no envelope")
 
     def _put(self, topic: Topic, payload: bytes, attachment: bytes) -> None:
@@ -62,7 +63,7 @@ class Stranger:
 
 
 def auditor() -> Module:
-    """Subscribes to every topic, those that no module handles among them."""
+    """Subscribes to every topic, also to those that no module handles."""
     module = Module("auditor")
     for topic in CARRIED:
         module.on(topic, _ignore)
@@ -75,15 +76,35 @@ def _ignore(message: Message) -> None:
 
 def handled(instance: str) -> set[str]:
     """The topics that an instance subscribes to."""
-    module, _, _ = instance.partition("-")
-    handlers = registry.build(module, {}).handlers
-    return {topic.name for topic in handlers if topic is not topics.PRESENCE}
+    name, _, _ = instance.partition("-")
+    module = registry.build(name, {})
+    carried = set(module.handlers) - {topics.PRESENCE}
+    return {topic.name for topic in carried}
 
 
 def logged(process: Process) -> Counter[str]:
     """How often a process logged that it rejected a message, by topic."""
     lines = "\n".join(process.lines())
     return Counter(re.findall(r"rejected ([\w/]+): ", lines))
+
+
+def rejections(stranger: Stranger) -> Rejections:
+    """What each instance must have rejected of what the stranger has put and asked."""
+    expected: Rejections = {}
+    for instance in (*MODULES, "workspace", "codelets-1", "codelets-2"):
+        expected[instance] = {name: stranger.put[name] for name in handled(instance)}
+    expected["workspace"][topics.SNAPSHOT_REQUEST.name] = len(NO_REQUESTS)
+    return expected
+
+
+def await_rejected(witness: Witness, expected: Rejections) -> None:
+    """Wait until every instance reports that it has rejected just that."""
+
+    def are_counted() -> bool:
+        reported = {name: health.rejected for name, health in witness.health.items()}
+        return all(reported.get(name) == counts for name, counts in expected.items())
+
+    wait_until(are_counted, f"{expected} are counted")
 
 
 def test_bytes_that_are_no_message_are_counted_and_logged_and_change_nothing(
@@ -98,20 +119,12 @@ def test_bytes_that_are_no_message_are_counted_and_logged_and_change_nothing(
     with working(auditing):
         for topic in CARRIED:
             stranger.damage(topic)
-        for payload in NO_REQUESTS:
+        for payload in NO_REQUESTS.values():
             with pytest.raises(NoAnswerError):
                 auditing.bus.query(topics.SNAPSHOT_REQUEST, payload, 10.0)
 
-        expected: dict[str, dict[str, int]] = {}
-        for instance in (*MODULES, "workspace", "codelets-1", "codelets-2"):
-            expected[instance] = {name: stranger.put[name] for name in handled(instance)}
-        expected["workspace"][topics.SNAPSHOT_REQUEST.name] = len(NO_REQUESTS)
-
-        def are_counted() -> bool:
-            reported = {name: health.rejected for name, health in witness.health.items()}
-            return all(reported.get(name) == counts for name, counts in expected.items())
-
-        wait_until(are_counted, f"{expected} are counted")
+        expected = rejections(stranger)
+        await_rejected(witness, expected)
         wait_until(lambda: auditing.intake.rejected == stranger.put, f"{stranger.put} are counted")
         lasted_s = time.monotonic() - began_s
         witness.await_cycles(5)
@@ -121,9 +134,10 @@ def test_bytes_that_are_no_message_are_counted_and_logged_and_change_nothing(
     stranger.session.close()  # type: ignore[no-untyped-call]
     for instance, counts in expected.items():
         process = system.processes[instance]
+        health = witness.health[instance]
         times = logged(process)
         assert process.is_alive
-        assert not witness.health[instance].notes
-        assert not witness.health[instance].gaps
+        assert not health.notes
+        assert not health.gaps
         assert set(times) == set(counts)
         assert max(times.values()) <= lasted_s + 1

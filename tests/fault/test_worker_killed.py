@@ -43,21 +43,23 @@ def test_the_task_of_a_killed_worker_is_done_by_another_and_committed_once(
         )
         system.processes[STOPPED].send(signal.SIGSTOP)
         held = _held(leases, answers)
+        cycle = _cycle(held.task_id)
+
         system.processes[STOPPED].end(signal.SIGKILL)
-        wait_until(
-            lambda: _latest_cycle(witness) > _cycle(held.task_id),
-            f"the cycle of {held.task_id} ends",
-        )
+        wait_until(lambda: _latest_cycle(witness) > cycle, f"cycle {cycle} ends")
         witness.await_cycles(5)
         feeder.pause()
         witness.await_same_graph()
 
-    again = [lease for lease in leases if lease.task_id == held.task_id]
-    assert [(lease.worker, lease.attempt) for lease in again] == [(STOPPED, 0), (OTHER, 1)]
+    first, second = (lease for lease in leases if lease.task_id == held.task_id)
+    assert (first.worker, first.attempt) == (STOPPED, 0)
+    assert (second.worker, second.attempt) == (OTHER, 1)
+
     # What attention finds is not written into the graph, so no delta names its task.
     _, codelet, *_ = held.task_id.split("/")
-    assert codelet in ATTENTION or held.task_id in witness.tasks_done
-    assert max(Counter(witness.tasks_done).values()) == 1
+    times = Counter(witness.tasks_done)
+    assert codelet in ATTENTION or held.task_id in times
+    assert max(times.values()) == 1
 
 
 def _held(leases: list[Assignment], answers: list[Proposal]) -> Assignment:

@@ -26,21 +26,22 @@ def test_a_restarted_workspace_resumes_its_graph_and_the_missed_self_motion(
     began_m, began_ns = believed(witness)
 
     system.processes["workspace"].end(signal.SIGKILL)
-    views = feeder.views
-    wait_until(lambda: feeder.views >= views + 10, "views continue without a workspace")
-    seen = len(witness.deltas)
+    enough = feeder.views + 10
+    wait_until(lambda: feeder.views >= enough, "views continue without a workspace")
+    deltas_before = len(witness.deltas)
     version = witness.graph.version
     cycle = witness.graph.cycle
+
     system.modules("workspace")
     witness.await_cycles(5)
     feeder.pause()
     witness.await_same_graph()
 
-    first = witness.deltas[seen]
+    first = witness.deltas[deltas_before]
+    versions = witness.versions[deltas_before:]
     assert first.version > version
     assert first.cycle > cycle
-    versions = witness.versions[seen:]
-    assert versions == list(range(versions[0], versions[0] + len(versions)))
+    assert versions == list(range(first.version, first.version + len(versions)))
 
     ended_m, ended_ns = believed(witness)
     driven_m = feeder.driven_m(ended_ns) - feeder.driven_m(began_ns)

@@ -60,8 +60,9 @@ class InMemory:
         self.buses: list[MemoryBus] = []
 
     def join(self) -> MemoryBus:
-        self.buses.append(MemoryBus(self.network))
-        return self.buses[-1]
+        bus = MemoryBus(self.network)
+        self.buses.append(bus)
+        return bus
 
     def put(self, topic: Topic, payload: bytes, attachment: bytes | None) -> None:
         try:
@@ -85,8 +86,9 @@ class OverZenoh:
         self.stranger: zenoh.Session | None = None
 
     def join(self) -> ZenohBus:
-        self.buses.append(ZenohBus(self.endpoint, self.agent))
-        return self.buses[-1]
+        bus = ZenohBus(self.endpoint, self.agent)
+        self.buses.append(bus)
+        return bus
 
     def put(self, topic: Topic, payload: bytes, attachment: bytes | None) -> None:
         if self.stranger is None:
@@ -167,8 +169,10 @@ def await_members(here: Bus, *members: Member, then: Callable[[], None] = lambda
 
     here.watch(on_change)
     then()
+    missing = set(members)
     with changed:
-        assert changed.wait_for(lambda: set(members) <= seen, TIMEOUT_S), f"only {seen} are ready"
+        are_ready = changed.wait_for(lambda: missing <= seen, TIMEOUT_S)
+    assert are_ready, f"only {seen} are ready"
 
 
 def spin_until(condition: Callable[[], bool], *shells: Shell) -> None:
@@ -223,4 +227,5 @@ def envelope_of(message: Message, incarnation: int = INCARNATION) -> Envelope:
 def publish(bus: Bus, *messages: Message, incarnation: int = INCARNATION) -> None:
     """Publish messages that are numbered already."""
     for message in messages:
-        bus.publish(topics.of(message), encode(message), envelope_of(message, incarnation))
+        envelope = envelope_of(message, incarnation)
+        bus.publish(topics.of(message), encode(message), envelope)

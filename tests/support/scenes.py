@@ -48,10 +48,10 @@ def motion(frame: int, rows: Rows = STRAIGHT) -> SelfMotion:
 
 
 def percept(
-    label: str = "house", bearing_rad: float = 0.0, range_m: float = 10.0, **facts: object
+    label: str = "house", bearing_rad: float = 0.0, range_m: float = 10.0, **facts: Any
 ) -> Percept:
     """One building, seen well."""
-    usual = {
+    usual: dict[str, Any] = {
         "activation": 0.9,
         "bearing_sd_rad": 0.02,
         "range_sd_m": 0.3,
@@ -60,7 +60,7 @@ def percept(
         "whole": True,
         "box_px": (0, 0, 10, 10),
     }
-    return Percept(label=label, bearing_rad=bearing_rad, range_m=range_m, **(usual | facts))  # type: ignore[arg-type]
+    return Percept(label=label, bearing_rad=bearing_rad, range_m=range_m, **(usual | facts))
 
 
 def percepts(frame: int, *objects: Percept, road_m: Rows = ()) -> Percepts:

@@ -37,7 +37,8 @@ class Acting:
 
     def move(self, count: int) -> None:
         """Publish odometry with the numbers and stamps 0, 1, and so on."""
-        publish(self.peer.bus, *(odometry(seq, stamp_ns=seq) for seq in range(count)))
+        for seq in range(count):
+            publish(self.peer.bus, odometry(seq, stamp_ns=seq))
 
     def await_commands(self, count: int) -> None:
         spin_until(lambda: self.peer.arrived == count, self.shell)
