@@ -63,14 +63,18 @@ def sight(
     buildings = _buildings(label, kinds, range_m)
     masks = [mask for _, _, mask in claims]
     numbers = [building.number + 1 for building in buildings]
-    matched = match(overlaps(masks, label, numbers))
+    iou = overlaps(masks, label, numbers)
     segments = []
 
-    for (name, activation, mask), place in zip(claims, matched, strict=True):
-        matching = None if place is None else buildings[place]
-        share = float(mask.mean())
-        shown = _shown(mask, label, buildings)
-        segments.append(Segment(name, activation, share, matching, shown))
+    for (name, activation, mask), place in zip(claims, match(iou), strict=True):
+        segment = Segment(
+            label=name,
+            activation=activation,
+            share=float(mask.mean()),
+            building=None if place is None else buildings[place],
+            shows=_shown(mask, label, buildings),
+        )
+        segments.append(segment)
 
     return Sight(buildings, tuple(segments))
 
@@ -78,13 +82,19 @@ def sight(
 def _buildings(
     label: Bytes, kinds: Sequence[str], range_m: Sequence[float]
 ) -> tuple[Building, ...]:
-    numbers, counts = np.unique(label[label > 0], return_counts=True)
+    of_buildings = label[label > 0]
+    numbers, counts = np.unique(of_buildings, return_counts=True)
     buildings = []
 
     for number, count in zip(numbers.tolist(), counts.tolist(), strict=True):
         place = number - 1
-        share = count / label.size
-        buildings.append(Building(place, kinds[place], share, range_m[place]))
+        building = Building(
+            number=place,
+            kind=kinds[place],
+            share=count / label.size,
+            range_m=range_m[place],
+        )
+        buildings.append(building)
 
     return tuple(buildings)
 
@@ -92,24 +102,32 @@ def _buildings(
 def _shown(mask: Bools, label: Bytes, buildings: Sequence[Building]) -> Building | None:
     """The building that at least half of the mask's pixels are of."""
     counts = np.bincount(label[mask], minlength=MAX_LABELS)
+    half = mask.sum() / 2
 
     for building in buildings:
-        if 2 * counts[building.number + 1] >= mask.sum():
+        if counts[building.number + 1] >= half:
             return building
 
     return None
 
 
 def claims(percepts: Sequence[Percept], shape: tuple[int, ...]) -> list[Claim]:
-    """What `percepts` of a view of that shape say: label, activation, pixels."""
-    return [(percept.label, percept.activation, filled(percept, shape)) for percept in percepts]
+    """What `percepts` of a view of that shape claim."""
+    found = []
+    for percept in percepts:
+        pixels = filled(percept, shape)
+        found.append((percept.label, percept.activation, pixels))
+
+    return found
 
 
 def filled(percept: Percept, shape: tuple[int, ...]) -> Bools:
     """The pixels that the percept's outline holds, (h, w)."""
     mask = np.zeros(shape, np.uint8)
-    if len(percept.outline_px) >= 3:
-        cv2.fillPoly(mask, [np.array(percept.outline_px, np.int32)], 1)
+    outline_px = np.array(percept.outline_px, np.int32)
+    if len(outline_px) >= 3:
+        cv2.fillPoly(mask, [outline_px], 1)
+
     return mask > 0
 
 
@@ -119,7 +137,8 @@ def overlaps(
     """Intersection over union of each mask with the pixels of each number in `label`, (masks,
     numbers).
     """
-    iou = np.zeros((len(found), len(numbers)))
+    shape = (len(found), len(numbers))
+    iou = np.zeros(shape)
 
     for column, number in enumerate(numbers):
         true = label == number
@@ -135,12 +154,14 @@ def match(iou: npt.NDArray[np.float64]) -> list[int | None]:
     """For each row the column that it matches at MATCH_IOU or better, the best pairs first, none
     twice.
     """
-    matched: list[int | None] = [None] * iou.shape[0]
+    matched: list[int | None] = [None] * len(iou)
     left = iou.copy()
 
     while left.size and left.max() >= MATCH_IOU:
-        row, column = np.unravel_index(left.argmax(), left.shape)
-        matched[int(row)] = int(column)
+        best = int(left.argmax())
+        row, column = divmod(best, left.shape[1])
+        matched[row] = column
+
         left[row] = -1.0
         left[:, column] = -1.0
 
@@ -176,13 +197,16 @@ def detection(sights: Iterable[Sight], min_share: float = LARGE_SHARE) -> tuple[
 
     for view in sights:
         matched = {segment.building.number for segment in view.segments if segment.building}
-        buildings = [building for building in view.buildings if building.share >= min_share]
-        there += len(buildings)
-        found += sum(building.number in matched for building in buildings)
 
-        segments = [segment for segment in view.segments if segment.share >= min_share]
-        claimed += len(segments)
-        right += sum(segment.building is not None for segment in segments)
+        for building in view.buildings:
+            if building.share >= min_share:
+                there += 1
+                found += building.number in matched
+
+        for segment in view.segments:
+            if segment.share >= min_share:
+                claimed += 1
+                right += segment.building is not None
 
     return found, there, right, claimed
 
@@ -202,7 +226,8 @@ def right_or_not(
 
     for before, after in zip(candidates, percepts, strict=True):
         for segment in before.segments:
-            judged.append((segment.activation, _is_right(segment, owner, trained)))
+            is_right = _is_right(segment, owner, trained)
+            judged.append((segment.activation, is_right))
 
         for segment in after.segments:
             if segment.label not in trained:
@@ -233,6 +258,9 @@ def calibration_error(judged: Sequence[tuple[float, bool]]) -> float:
         return float("nan")
 
     activation, right = np.array(judged, np.float64).T
-    bins = np.minimum((activation * BINS).astype(int), BINS - 1)
+    scaled = (activation * BINS).astype(int)
+    bins = np.minimum(scaled, BINS - 1)
+
     gaps = np.bincount(bins, right - activation, minlength=BINS)
-    return float(np.abs(gaps).sum()) / len(activation)
+    total = np.abs(gaps).sum()
+    return float(total) / len(activation)

@@ -50,7 +50,10 @@ class PerceptionPipeline:
         """What sensory memory and then EPAM make of the next frame, PERIOD_S after the last."""
         frame = self._stereo(left, right)
         odometry = Odometry(
-            stamp_ns=frame.stamp_ns, speed_m_s=speed_m_s, turn_rate_rad_s=0.0, dt_s=PERIOD_S
+            stamp_ns=frame.stamp_ns,
+            speed_m_s=speed_m_s,
+            turn_rate_rad_s=0.0,
+            dt_s=PERIOD_S,
         )
         self._sensory.feed(odometry)
 
@@ -87,7 +90,12 @@ class CandidateProbe:
     """
 
     def __init__(self) -> None:
-        self._pam = ExtendedPam(epam.Config(), segments.load(), objects.load(), road.load())
+        self._pam = ExtendedPam(
+            epam.Config(),
+            segments.load(),
+            objects.load(),
+            road.load(),
+        )
 
     def candidates(self, result: Result) -> list[tuple[str, float, Booleans]]:
         """Label, empty for none that it knows, activation, and pixels (h, w) of each.

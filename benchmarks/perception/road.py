@@ -25,7 +25,8 @@ def road_iou(found: Booleans, surface: Bytes) -> float:
     if not union:
         return float("nan")
 
-    return float(np.count_nonzero(found & road) / union)
+    common = np.count_nonzero(found & road)
+    return float(common / union)
 
 
 def road_edge_errors_m(
@@ -73,32 +74,38 @@ def true_boundary_m(
     points_m = []
 
     for here, there in (beside, below):
-        ends = _is_boundary(surface[here], surface[there])
-        between_m = (ground_m[here][ends] + ground_m[there][ends]) / 2
-        points_m.append(between_m)
+        is_boundary = _is_boundary(surface[here], surface[there])
+        here_m = ground_m[here][is_boundary]
+        there_m = ground_m[there][is_boundary]
+        points_m.append((here_m + there_m) / 2)
 
     every_m = np.concatenate(points_m)
     distance_m = np.hypot(every_m[:, 0], every_m[:, 1])
-    return np.asarray(every_m[distance_m <= within_m])
+    is_near = distance_m <= within_m
+    return np.asarray(every_m[is_near])
 
 
 def _is_boundary(one: Bytes, other: Bytes) -> Booleans:
     """Where one of two surfaces is road and the other is other ground."""
-    leaves = (one == ROAD) & (other == GROUND)
-    enters = (one == GROUND) & (other == ROAD)
-    return np.asarray(leaves | enters)
+    is_left = (one == ROAD) & (other == GROUND)
+    is_entered = (one == GROUND) & (other == ROAD)
+    return np.asarray(is_left | is_entered)
 
 
 def _ground_m(depth_m: Singles, camera: Calibration) -> Floats:
     """Forward and left of the robot, (h, w, 2), what each pixel shows."""
-    columns = np.arange(depth_m.shape[1])
+    _, width_px = depth_m.shape
+    left_px = camera.cx_px - np.arange(width_px)
+    left_m = left_px / camera.fx_px * depth_m
     forward_m = depth_m + camera.mount_forward_m
-    left_m = (camera.cx_px - columns) / camera.fx_px * depth_m
-    return np.stack([forward_m, left_m], axis=-1).astype(np.float64)
+
+    ground_m = np.stack([forward_m, left_m], axis=-1)
+    return ground_m.astype(np.float64)
 
 
 def _points_m(boundary_m: npt.ArrayLike) -> Floats:
-    return np.asarray(boundary_m, np.float64).reshape(-1, 2)
+    points_m = np.asarray(boundary_m, np.float64)
+    return points_m.reshape(-1, 2)
 
 
 def _nearest_m(points_m: Floats, others_m: Floats) -> Floats:
@@ -106,6 +113,6 @@ def _nearest_m(points_m: Floats, others_m: Floats) -> Floats:
     if not len(others_m):
         return np.full(len(points_m), np.inf)
 
-    offsets_m = points_m[:, None] - others_m[None]
+    offsets_m = points_m[:, None] - others_m
     distances_m = np.hypot(offsets_m[..., 0], offsets_m[..., 1])
     return np.asarray(distances_m.min(axis=1))

@@ -29,6 +29,7 @@ MIN_RATIO = 1.3
 ENCOUNTER_M = (11.0, 22.0)
 HALF_VIEW_RAD = math.radians(37.5)
 RAYS = 96
+MIN_WHOLE_RAYS = RAYS // 8
 MARGIN_RAYS = 4
 TRIES = 40
 LOOKING_SD_RAD = 0.3
@@ -65,14 +66,16 @@ def drawn(
 
     Its scenes are each drawn when asked for, in a light of its own.
     """
-    place = town.generate(seed, towns.kinds(seed, invented))
-    place = replace(place, plots=place.plots[:buildings])
+    whole = town.generate(seed, towns.kinds(seed, invented))
+    place = replace(whole, plots=whole.plots[:buildings])
     world = World(place)
+
     try:
         camera = StereoCamera(world, calibration())
         rng = np.random.default_rng([seed, 0xBE])
         places = poses(place, rng)
-        yield place, camera.calibration, (_scene(world, camera, pose, rng) for pose in places)
+        scenes = (_scene(world, camera, pose, rng) for pose in places)
+        yield place, camera.calibration, scenes
     finally:
         world.close()
 
@@ -97,8 +100,13 @@ def anywhere(count: int) -> Poses:
     def poses(place: town.Town, rng: np.random.Generator) -> list[Pose]:
         made = []
         for number in range(count):
-            target = number // 2 % len(place.plots)
-            made.append(_on_a_street(place, rng) if number % 2 else _towards(place, target, rng))
+            turn, is_on_street = divmod(number, 2)
+            if is_on_street:
+                made.append(_on_a_street(place, rng))
+            else:
+                target = turn % len(place.plots)
+                made.append(_towards(place, target, rng))
+
         return made
 
     return poses
@@ -109,12 +117,13 @@ def drive(metres: float, step_m: float) -> Poses:
 
     def poses(place: town.Town, rng: np.random.Generator) -> list[Pose]:
         corners_m = np.asarray(place.line(1.0)).tolist()
+        count = round(metres / step_m)
         made: list[Pose] = []
 
         for start_m, end_m in itertools.pairwise(corners_m):
             made += _straight(start_m, end_m, step_m)
 
-        return made[: round(metres / step_m)]
+        return made[:count]
 
     return poses
 
@@ -122,22 +131,28 @@ def drive(metres: float, step_m: float) -> Poses:
 def _straight(start_m: Sequence[float], end_m: Sequence[float], step_m: float) -> list[Pose]:
     """Poses every `step_m` from one point towards another."""
     x_m, y_m = start_m
-    ahead_x_m = end_m[0] - x_m
-    ahead_y_m = end_m[1] - y_m
+    end_x_m, end_y_m = end_m
+    ahead_x_m = end_x_m - x_m
+    ahead_y_m = end_y_m - y_m
     heading_rad = math.atan2(ahead_y_m, ahead_x_m)
     length_m = math.hypot(ahead_x_m, ahead_y_m)
+    shares = np.arange(0.0, length_m, step_m) / length_m
     made = []
 
-    for share in (np.arange(0.0, length_m, step_m) / length_m).tolist():
-        here_x_m = x_m + share * ahead_x_m
-        here_y_m = y_m + share * ahead_y_m
-        made.append(Pose(x_m=here_x_m, y_m=here_y_m, heading_rad=heading_rad))
+    for share in shares.tolist():
+        pose = Pose(
+            x_m=x_m + share * ahead_x_m,
+            y_m=y_m + share * ahead_y_m,
+            heading_rad=heading_rad,
+        )
+        made.append(pose)
 
     return made
 
 
 def _turned(pose: Pose, turn_rad: float) -> Pose:
-    return msgspec.structs.replace(pose, heading_rad=pose.heading_rad + turn_rad)
+    heading_rad = pose.heading_rad + turn_rad
+    return msgspec.structs.replace(pose, heading_rad=heading_rad)
 
 
 def _towards(place: town.Town, target: int, rng: np.random.Generator) -> Pose:
@@ -148,15 +163,19 @@ def _towards(place: town.Town, target: int, rng: np.random.Generator) -> Pose:
         pose = facing(place, target, range_m, side_rad)
 
         if towns.is_free(place, pose.x_m, pose.y_m):
-            return _turned(pose, float(rng.normal(0, LOOKING_SD_RAD)))
+            turn_rad = float(rng.normal(0, LOOKING_SD_RAD))
+            return _turned(pose, turn_rad)
 
 
 def _on_a_street(place: town.Town, rng: np.random.Generator) -> Pose:
-    road = place.roads[int(rng.integers(len(place.roads)))]
+    number = int(rng.integers(len(place.roads)))
+    road = place.roads[number]
     along_m = float(rng.uniform(0, road.length_m))
     aside_m = float(rng.uniform(-LANE_M, LANE_M))
+
     x_m, y_m = road.point(along_m, aside_m)
-    return Pose(x_m=x_m, y_m=y_m, heading_rad=float(rng.uniform(-math.pi, math.pi)))
+    heading_rad = float(rng.uniform(-math.pi, math.pi))
+    return Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad)
 
 
 def facing(place: town.Town, target: int, range_m: float, side_rad: float) -> Pose:
@@ -164,17 +183,20 @@ def facing(place: town.Town, target: int, range_m: float, side_rad: float) -> Po
     `side_rad` of it.
     """
     plot = place.plots[target]
-    x_m = plot.x_m + range_m * math.cos(side_rad)
-    y_m = plot.y_m + range_m * math.sin(side_rad)
-    return Pose(x_m=x_m, y_m=y_m, heading_rad=math.remainder(side_rad + math.pi, math.tau))
+    back_rad = side_rad + math.pi
+    return Pose(
+        x_m=plot.x_m + range_m * math.cos(side_rad),
+        y_m=plot.y_m + range_m * math.sin(side_rad),
+        heading_rad=math.remainder(back_rad, math.tau),
+    )
 
 
 def side_and_range(place: town.Town, pose: Pose) -> Floats:
     """In which direction of each plot's middle the robot is, and how far away, (plots, 2)."""
     middles_m = np.array([(plot.x_m, plot.y_m) for plot in place.plots])
-    offsets_m = np.array([pose.x_m, pose.y_m]) - middles_m
-    side_rad = np.arctan2(offsets_m[:, 1], offsets_m[:, 0])
-    range_m = np.hypot(offsets_m[:, 0], offsets_m[:, 1])
+    x_m, y_m = (np.array([pose.x_m, pose.y_m]) - middles_m).T
+    side_rad = np.arctan2(y_m, x_m)
+    range_m = np.hypot(x_m, y_m)
     return np.stack([side_rad, range_m], axis=1)
 
 
@@ -182,19 +204,29 @@ def skyline(place: town.Town, pose: Pose) -> npt.NDArray[np.intp]:
     """The nearest plot in each of RAYS directions across the view, from left to right, -1 where
     there is none.
     """
-    bearing_rad = pose.heading_rad + np.linspace(HALF_VIEW_RAD, -HALF_VIEW_RAD, RAYS)
-    ray = np.stack([np.cos(bearing_rad), np.sin(bearing_rad)], axis=1)[:, None]
-    areas_m = np.array([plot.footprint for plot in place.plots]).reshape(1, -1, 2, 2)
-
-    with np.errstate(divide="ignore"):
-        hits_m = (areas_m - (pose.x_m, pose.y_m)) / ray[:, :, None]
-
-    enter_m = hits_m.min(axis=2).max(axis=2)
-    leave_m = hits_m.max(axis=2).min(axis=2)
-    is_hit = (enter_m <= leave_m) & (enter_m > 0)
-    range_m = np.where(is_hit, enter_m, np.inf)
+    bearings_rad = np.linspace(HALF_VIEW_RAD, -HALF_VIEW_RAD, RAYS)
+    range_m = _ray_ranges_m(place, pose, pose.heading_rad + bearings_rad)
     nearest = range_m.argmin(axis=1)
-    return np.where(is_hit.any(axis=1), nearest, -1)
+    is_hit = np.isfinite(range_m.min(axis=1))
+    return np.where(is_hit, nearest, -1)
+
+
+def _ray_ranges_m(place: town.Town, pose: Pose, direction_rad: Floats) -> Floats:
+    """How far the robot is from each plot in each direction, (rays, plots); infinite where the ray
+    misses it.
+    """
+    rays = np.stack([np.cos(direction_rad), np.sin(direction_rad)], axis=1)
+    footprints_m = np.array([plot.footprint for plot in place.plots])
+    corners_m = footprints_m.reshape(-1, 2, 2) - (pose.x_m, pose.y_m)
+
+    # Where each ray crosses the lines of a footprint's sides: (rays, plots, corners, axes).
+    with np.errstate(divide="ignore"):
+        crossings_m = corners_m / rays[:, None, None]
+
+    enter_m = crossings_m.min(axis=2).max(axis=2)
+    leave_m = crossings_m.max(axis=2).min(axis=2)
+    is_hit = (enter_m <= leave_m) & (enter_m > 0)
+    return np.where(is_hit, enter_m, np.inf)
 
 
 def encounter(place: town.Town, target: int, rng: np.random.Generator) -> Pose:
@@ -208,7 +240,8 @@ def encounter(place: town.Town, target: int, rng: np.random.Generator) -> Pose:
         range_m = float(rng.uniform(*ENCOUNTER_M))
         side_rad = float(rng.uniform(-math.pi, math.pi))
         pose = facing(place, target, range_m, side_rad)
-        cost = _encounter_cost(skyline(place, pose), target)
+        seen = skyline(place, pose)
+        cost = _encounter_cost(seen, target)
 
         if cost < min_cost and towns.is_free(place, pose.x_m, pose.y_m):
             best = pose
@@ -220,30 +253,41 @@ def encounter(place: town.Town, target: int, rng: np.random.Generator) -> Pose:
 def _encounter_cost(seen: npt.NDArray[np.intp], target: int) -> int:
     """How much more of others is seen than of the target; RAYS more where it is not seen whole."""
     own = np.count_nonzero(seen == target)
-    others = np.count_nonzero((seen >= 0) & (seen != target))
-    is_whole = seen[0] != target != seen[-1] and own >= RAYS // 8
-    return int(others - own) + (0 if is_whole else RAYS)
+    others = np.count_nonzero(seen >= 0) - own
+    cost = int(others - own)
+
+    is_cut_off = target in (seen[0], seen[-1])
+    if is_cut_off or own < MIN_WHOLE_RAYS:
+        return cost + RAYS
+
+    return cost
 
 
 def later(place: town.Town, target: int, first: Pose, rng: np.random.Generator) -> Pose | None:
     """Looking at plot `target` from another side and distance than `first` did, about towards it,
     None if hidden.
     """
-    side_rad, range_m = side_and_range(place, first)[target].tolist()
+    side_rad, first_m = side_and_range(place, first)[target].tolist()
 
     for _ in range(TRIES):
-        turn_rad = float(rng.uniform(MIN_TURN_RAD, math.tau - MIN_TURN_RAD))
+        around_rad = float(rng.uniform(MIN_TURN_RAD, math.tau - MIN_TURN_RAD))
         distance_m = float(rng.uniform(NEAREST_M, FARTHEST_M))
-        pose = facing(place, target, distance_m, side_rad + turn_rad)
-        pose = _turned(pose, float(rng.normal(0, LATER_SD_RAD)))
+        towards = facing(place, target, distance_m, side_rad + around_rad)
+        turn_rad = float(rng.normal(0, LATER_SD_RAD))
+        pose = _turned(towards, turn_rad)
 
-        there_m = side_and_range(place, pose)[target, 1]
-        visible = np.count_nonzero(skyline(place, pose) == target)
-        is_clear = visible >= MARGIN_RAYS and towns.is_free(place, pose.x_m, pose.y_m)
-        if is_clear and other_distance(there_m, range_m):
+        _, range_m = side_and_range(place, pose)[target].tolist()
+        if other_distance(range_m, first_m) and _is_clear(place, target, pose):
             return pose
 
     return None
+
+
+def _is_clear(place: town.Town, target: int, pose: Pose) -> bool:
+    """Whether the robot can be there, and sees enough of plot `target`."""
+    seen = skyline(place, pose)
+    rays = int(np.count_nonzero(seen == target))
+    return rays >= MARGIN_RAYS and towns.is_free(place, pose.x_m, pose.y_m)
 
 
 def other_distance(range_m: float, first_m: float) -> bool:

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.report import Metrics
+from cogmap.geometry.arrays import Bytes, Floats, Singles
 from cogmap.geometry.polylines import distances_along
 from schemas.sensing import PlaceMatch, Pose
 from services.epam.places.recognizer import PlaceRecognizer
@@ -28,12 +29,12 @@ from services.sim.rendering.light import Light, some_light
 from services.sim.world import World
 from training.rendering import towns
 
-Floats = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
 # The last town is built of kinds that nobody was taught alone: no landmark in any view.
 TOWNS = ((3201, 0), (3202, 0), (3203, 28))
 FIRST_LAP, SIDE_STREET, SECOND_LAP = range(3)
+SIDE_ROAD = 4
 STEP_M = (0.8, 0.8)
 STEPS_M = (0.6, 1.1)
 OFFSET_M = 0.5
@@ -77,13 +78,25 @@ def measure() -> Metrics:
     answers = list[Answer]()
 
     for seed, invented in TOWNS:
-        answers += drive(recognizer, len(answers), _town(seed, invented))
+        place = _town(seed, invented)
+        answers += drive(recognizer, len(answers), place)
 
     return metrics(answers)
 
 
 def drive(recognizer: PlaceRecognizer, first_frame: int, place: town.Town) -> Iterator[Answer]:
     """Drive through a town and ask `recognizer` at each view; frames count from `first_frame`."""
+    frame = first_frame
+
+    for stretch, pose, left, depth_m in _views(place):
+        matches, _ = recognizer.observe(frame, frame * FRAME_NS, left, depth_m)
+        best = matches[0] if matches else None
+        yield Answer(place.seed, stretch.part, pose, best)
+        frame += 1
+
+
+def _views(place: town.Town) -> Iterator[tuple[Stretch, Pose, Bytes, Singles]]:
+    """From every pose of the course the left image (h, w, 3), rectified, and its depth (h, w)."""
     world = World(place)
 
     try:
@@ -91,19 +104,13 @@ def drive(recognizer: PlaceRecognizer, first_frame: int, place: town.Town) -> It
         straight = rectification(camera.calibration)
         stereo = DepthFromStereo(straight.calibration, NEAREST_M)
         rng = np.random.default_rng([place.seed, 0x5F])
-        frame = first_frame
 
         for stretch in course(place):
             for pose in stretch.poses:
                 world.robot.place(pose)
-                eyes = camera.capture_labelled(stretch.light, rng)
-                left, right = straight.apply(*(eye.image for eye in eyes))
-
-                depth_m = stereo.depth_m(left, right)
-                matches, _ = recognizer.observe(frame, frame * FRAME_NS, left, depth_m)
-                best = matches[0] if matches else None
-                yield Answer(place.seed, stretch.part, pose, best)
-                frame += 1
+                left_eye, right_eye = camera.capture_labelled(stretch.light, rng)
+                left, right = straight.apply(left_eye.image, right_eye.image)
+                yield stretch, pose, left, stereo.depth_m(left, right)
     finally:
         world.close()
 
@@ -112,12 +119,17 @@ def course(place: town.Town) -> list[Stretch]:
     """A lap, a side street, and the lap again in another light."""
     rng = np.random.default_rng([place.seed, 0x5E])
     light = some_light(rng)
-    other = some_light(rng)
-    side = place.roads[4]
+    other_light = some_light(rng)
+    loop = place.line()
+    side = place.roads[SIDE_ROAD]
+
+    first = poses(loop, rng, STEP_M)
+    aside = poses([side.start, side.end], rng, STEP_M)
+    second = poses(loop, rng, STEPS_M, OFFSET_M, TURN_RAD)
     return [
-        Stretch(FIRST_LAP, light, poses(place.line(), rng, STEP_M)),
-        Stretch(SIDE_STREET, light, poses([side.start, side.end], rng, STEP_M)),
-        Stretch(SECOND_LAP, other, poses(place.line(), rng, STEPS_M, OFFSET_M, TURN_RAD)),
+        Stretch(FIRST_LAP, light, first),
+        Stretch(SIDE_STREET, light, aside),
+        Stretch(SECOND_LAP, other_light, second),
     ]
 
 
@@ -138,12 +150,11 @@ def poses(
     step = _slowly(rng, at_m, SPEED_CHANGES_M, 1.0)
     offset = _slowly(rng, at_m, OFFSET_CHANGES_M, offset_m)
     turn = _slowly(rng, at_m, TURN_CHANGES_M, turn_rad)
-    x_ahead, y_ahead = np.gradient(points_m, axis=0).T
-    heading_rad = np.unwrap(np.arctan2(y_ahead, x_ahead))
-    columns = np.column_stack([points_m, heading_rad, offset, turn, step])
+    columns = np.column_stack([points_m, _headings_rad(points_m), offset, turn, step])
 
-    mean_step_m = sum(steps_m) / 2
-    half_range_m = (steps_m[1] - steps_m[0]) / 2
+    min_step_m, max_step_m = steps_m
+    mean_step_m = (min_step_m + max_step_m) / 2
+    half_range_m = (max_step_m - min_step_m) / 2
     found = []
     here_m = 0.0
 
@@ -161,6 +172,13 @@ def poses(
     return found
 
 
+def _headings_rad(points_m: Floats) -> Floats:
+    """The direction (n,) of the line through (n, 2) points at each of them, without jumps."""
+    x_ahead, y_ahead = np.gradient(points_m, axis=0).T
+    headings_rad: Floats = np.arctan2(y_ahead, x_ahead)
+    return np.unwrap(headings_rad)
+
+
 def _rounded(line: Sequence[Point]) -> tuple[Floats, Floats]:
     """How far along `line` each of (n,) points close to each other is, and the points (n, 2).
 
@@ -168,37 +186,43 @@ def _rounded(line: Sequence[Point]) -> tuple[Floats, Floats]:
     """
     corners_m = np.asarray(line, np.float64)
     along_m = distances_along(corners_m)
-    count = math.ceil(along_m[-1] / SPACING_M)
-    even_m = np.linspace(0, along_m[-1], count)
+    length_m = along_m[-1]
+    count = math.ceil(length_m / SPACING_M)
+    even_m = np.linspace(0, length_m, count)
 
-    half = round(CORNER_M / SPACING_M / 2)
-    width = 2 * half + 1
-    window = np.full(width, 1 / width)
     columns = []
-
     for values in corners_m.T:
         column = np.interp(even_m, along_m, values)
-        padded = np.pad(column, half, mode="edge")
-        columns.append(np.convolve(padded, window, mode="valid"))
+        columns.append(_smoothed(column))
 
     points_m = np.stack(columns, axis=1)
     return distances_along(points_m), points_m
 
 
+def _smoothed(column: Floats) -> Floats:
+    """The mean of (n,) values over CORNER_M around each."""
+    half = round(CORNER_M / SPACING_M / 2)
+    width = 2 * half + 1
+    window = np.full(width, 1 / width)
+    padded = np.pad(column, half, mode="edge")
+    return np.convolve(padded, window, mode="valid")
+
+
 def _slowly(rng: np.random.Generator, at_m: Floats, every_m: float, limit: float) -> Floats:
     """Values up to `limit` to both sides, between ones drawn at every so many metres."""
-    knots_m = np.arange(0.0, at_m[-1] + 2 * every_m, every_m)
+    beyond_m = at_m[-1] + 2 * every_m
+    knots_m = np.arange(0.0, beyond_m, every_m)
     values = rng.uniform(-limit, limit, len(knots_m))
     return np.asarray(np.interp(at_m, knots_m, values))
 
 
 def metrics(answers: Sequence[Answer]) -> Metrics:
     """Recall at 99 % precision, and that of the answers as they were given."""
-    score = np.array([answer.match.score if answer.match else 0.0 for answer in answers])
+    score = np.array([_score(answer) for answer in answers])
     right = np.array([_is_right(answer, answers) for answer in answers])
     again = np.array([answer.part == SECOND_LAP for answer in answers])
     first = [answer for answer in answers if answer.part == FIRST_LAP]
-    was_seen = np.array([any(same(answer, other) for other in first) for answer in answers])
+    was_seen = np.array([_was_seen(answer, first) for answer in answers])
 
     wanted = again & was_seen
     matched = score > 0
@@ -212,13 +236,28 @@ def metrics(answers: Sequence[Answer]) -> Metrics:
     }
 
 
+def _score(answer: Answer) -> float:
+    """The score of its match, 0 where it has none."""
+    return 0.0 if answer.match is None else answer.match.score
+
+
 def _is_right(answer: Answer, answers: Sequence[Answer]) -> bool:
     """Whether it matches a view of the same place."""
-    return answer.match is not None and same(answer, answers[answer.match.frame])
+    if answer.match is None:
+        return False
+
+    matched = answers[answer.match.frame]
+    return same(answer, matched)
+
+
+def _was_seen(answer: Answer, before: Sequence[Answer]) -> bool:
+    """Whether one of those before it was at the same place."""
+    return any(same(answer, other) for other in before)
 
 
 def _ratio(some: Flags, of_all: Flags) -> float:
-    return float(some.sum() / max(1, of_all.sum()))
+    count = max(1, of_all.sum())
+    return float(some.sum() / count)
 
 
 def recall(score: Floats, right: Flags, wanted: Flags, precision: float) -> float:
@@ -227,7 +266,8 @@ def recall(score: Floats, right: Flags, wanted: Flags, precision: float) -> floa
 
     0 where no score does; a view of score 0 is not matched.
     """
-    for min_score in np.unique(score[score > 0]):
+    scores = score[score > 0]
+    for min_score in np.unique(scores):
         matched = score >= min_score
         if right[matched].mean() >= precision:
             return _ratio(matched & right & wanted, wanted)
@@ -237,10 +277,15 @@ def recall(score: Floats, right: Flags, wanted: Flags, precision: float) -> floa
 
 def same(one: Answer, other: Answer) -> bool:
     """Whether both were at the same place and looked in about the same direction."""
-    apart_m = math.hypot(one.pose.x_m - other.pose.x_m, one.pose.y_m - other.pose.y_m)
-    turned = math.remainder(one.pose.heading_rad - other.pose.heading_rad, math.tau)
-    return one.seed == other.seed and apart_m < SAME_M and abs(turned) < SAME_RAD
+    if one.seed != other.seed:
+        return False
+
+    x_m = one.pose.x_m - other.pose.x_m
+    y_m = one.pose.y_m - other.pose.y_m
+    turn_rad = math.remainder(one.pose.heading_rad - other.pose.heading_rad, math.tau)
+    return math.hypot(x_m, y_m) < SAME_M and abs(turn_rad) < SAME_RAD
 
 
 def _town(seed: int, invented: int) -> town.Town:
-    return town.generate(seed, towns.kinds(seed, invented))
+    kinds = towns.kinds(seed, invented)
+    return town.generate(seed, kinds)

@@ -21,6 +21,7 @@ SMALLEST_SHARE = 1e-9
 THRESHOLDS = {f"stereo_off_{px}px_over_plain": at_most(1.0) for px in OFF_PX}
 Bytes = npt.NDArray[np.uint8]
 Floats32 = npt.NDArray[np.float32]
+Image = npt.NDArray[Any]
 
 
 def measure(left: Path, right: Path, disparity: Path, scale: float) -> Metrics:
@@ -30,17 +31,19 @@ def measure(left: Path, right: Path, disparity: Path, scale: float) -> Metrics:
     `*_together_*` is of the pixels only that both match. Raises UsageError where a file is missing,
     no image, or of another size.
     """
-    pair = (_read(left, cv2.IMREAD_COLOR), _read(right, cv2.IMREAD_COLOR))
+    left_rgb = _read_rgb(left)
+    right_rgb = _read_rgb(right)
     true_px = _truth(disparity, scale)
-    _check_sizes(left, pair[0].shape[:2], {right: pair[1].shape[:2], disparity: true_px.shape})
-    left_rgb, right_rgb = (_rgb(image) for image in pair)
+    _check_size(right, right_rgb, left, left_rgb)
+    _check_size(disparity, true_px, left, left_rgb)
 
     most_px = float(true_px.max())
     matcher = StereoMatcher(most_px)
     ours = matcher.disparity_px(left_rgb, right_rgb)
     unrefined = matcher.disparity_px(left_rgb, right_rgb, refine=False)
     plain = plain_sgbm(left_rgb, right_rgb, most_px)
-    in_both = np.where((ours > 0) & (plain > 0), true_px, 0.0).astype(np.float32)
+    is_matched = (ours > 0) & (plain > 0)
+    in_both = np.where(is_matched, true_px, np.float32(0))
 
     metrics = _off("stereo", ours, true_px) | _off("plain", plain, true_px)
     metrics |= _off("unrefined", unrefined, true_px)
@@ -49,22 +52,24 @@ def measure(left: Path, right: Path, disparity: Path, scale: float) -> Metrics:
     metrics["plain_unmatched"] = unmatched(plain, true_px)
 
     for px in OFF_PX:
+        key = f"stereo_off_{px}px"
         plain_share = max(metrics[f"plain_off_{px}px"], SMALLEST_SHARE)
-        metrics[f"stereo_off_{px}px_over_plain"] = metrics[f"stereo_off_{px}px"] / plain_share
+        metrics[f"{key}_over_plain"] = metrics[key] / plain_share
 
     return metrics
 
 
-def _check_sizes(left: Path, shape: tuple[int, ...], others: dict[Path, tuple[int, ...]]) -> None:
-    for path, other in others.items():
-        if other != shape:
-            raise UsageError(
-                f"{path} is {_size(other)}, but {left} {_size(shape)}: they must be of one size"
-            )
+def _check_size(path: Path, image: Image, left: Path, left_image: Image) -> None:
+    """Raise UsageError where an image is of another size than the left one."""
+    size = _size(image)
+    left_size = _size(left_image)
+    if size != left_size:
+        raise UsageError(f"{path} is {size}, but {left} {left_size}: they must be of one size")
 
 
-def _rgb(image: npt.NDArray[Any]) -> Bytes:
-    return cv2.cvtColor(image, cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)
+def _size(image: Image) -> str:
+    height_px, width_px, *_ = image.shape
+    return f"{width_px} x {height_px}"
 
 
 def _off(name: str, found_px: Floats32, true_px: Floats32) -> Metrics:
@@ -72,12 +77,16 @@ def _off(name: str, found_px: Floats32, true_px: Floats32) -> Metrics:
 
 
 def off_share(found_px: Floats32, true_px: Floats32, most_px: float) -> float:
-    """Of the pixels with a true disparity, over 0, the share that is off by more than `most_px`, or
-    not found, 0.
+    """Of the pixels with a true disparity, over 0, the share that errs by more than `most_px`, or
+    is not found, 0. NaN where no pixel has one.
     """
-    known = true_px > 0
-    wrong = (found_px <= 0) | (np.abs(found_px - true_px) > most_px)
-    return float(wrong[known].mean()) if known.any() else math.nan
+    is_known = true_px > 0
+    if not is_known.any():
+        return math.nan
+
+    error_px = np.abs(found_px - true_px)
+    is_wrong = (found_px <= 0) | (error_px > most_px)
+    return float(is_wrong[is_known].mean())
 
 
 def unmatched(found_px: Floats32, true_px: Floats32) -> float:
@@ -101,19 +110,30 @@ def plain_sgbm(left: Bytes, right: Bytes, most_px: float) -> Floats32:
         speckleWindowSize=100,
         speckleRange=32,
     )
-    steps = matcher.compute(*(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY) for image in (left, right)))
-    return np.maximum(steps, 0).astype(np.float32) / np.float32(STEPS_PER_PIXEL)
+    left_grey = cv2.cvtColor(left, cv2.COLOR_RGB2GRAY)
+    right_grey = cv2.cvtColor(right, cv2.COLOR_RGB2GRAY)
+    steps = matcher.compute(left_grey, right_grey)
+
+    matched = np.maximum(steps, 0).astype(np.float32)
+    return matched / np.float32(STEPS_PER_PIXEL)
 
 
-def _read(path: Path, flags: int) -> npt.NDArray[Any]:
+def _read_rgb(path: Path) -> Bytes:
+    image = cv2.cvtColor(_read(path, cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
+    return image.astype(np.uint8, copy=False)
+
+
+def _read(path: Path, flags: int) -> Image:
     if not path.is_file():
         raise UsageError(f"there is no file {path}: name the image")
+
     data = np.frombuffer(path.read_bytes(), np.uint8)
     image = cv2.imdecode(data, flags) if data.size else None
     if image is None:
         raise UsageError(
             f"{path} is no image that can be read: give a PNG or another common format"
         )
+
     return image
 
 
@@ -123,17 +143,17 @@ def _truth(path: Path, scale: float) -> Floats32:
         raise UsageError(
             f"{path} is a colour image: give the disparities as one channel, 0 where unknown"
         )
+
     true_px = values.astype(np.float32) / np.float32(scale)
     if not np.isfinite(true_px).all() or not (true_px > 0).any():
         raise UsageError(
             f"{path} holds no disparity over 0: give --scale times the left image's disparities"
         )
-    if true_px.max() >= values.shape[1]:
+
+    _, width_px = values.shape
+    if true_px.max() >= width_px:
         raise UsageError(
             f"{path} holds disparities wider than the image: give the --scale of its writing"
         )
+
     return true_px
-
-
-def _size(shape: tuple[int, ...]) -> str:
-    return f"{shape[1]} x {shape[0]}"

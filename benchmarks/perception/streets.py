@@ -23,15 +23,18 @@ def edges(areas: Sequence[Rectangle]) -> Floats:
 
     None runs inside another area.
     """
-    xs = sorted({x for west, _, east, _ in areas for x in (west, east)})
-    ys = sorted({y for _, south, _, north in areas for y in (south, north)})
+    corners = np.asarray(areas, np.float64).reshape(-1, 2, 2)
+    xs = np.unique(corners[..., 0]).tolist()
+    ys = np.unique(corners[..., 1]).tolist()
     outer = []
 
     for area in areas:
-        sides = _sides(area, xs, ys)
-        outer += [piece for piece in sides if not _is_inside(_middle(piece), areas)]
+        for piece in _sides(area, xs, ys):
+            if not _is_inside(_middle(piece), areas):
+                outer.append(piece)
 
-    return np.asarray(outer, np.float64).reshape(-1, 2, 2)
+    pieces = np.asarray(outer, np.float64)
+    return pieces.reshape(-1, 2, 2)
 
 
 def _sides(area: Rectangle, xs: Sequence[float], ys: Sequence[float]) -> Iterator[Piece]:
@@ -51,7 +54,9 @@ def _sides(area: Rectangle, xs: Sequence[float], ys: Sequence[float]) -> Iterato
 
 def _middle(piece: Piece) -> Point:
     (start_x, start_y), (end_x, end_y) = piece
-    return (start_x + end_x) / 2, (start_y + end_y) / 2
+    middle_x = (start_x + end_x) / 2
+    middle_y = (start_y + end_y) / 2
+    return middle_x, middle_y
 
 
 def _is_inside(point: Point, areas: Sequence[Rectangle]) -> bool:
@@ -64,17 +69,20 @@ def distances_m(points_m: npt.ArrayLike, pieces: Floats) -> Floats:
     points = np.asarray(points_m, np.float64).reshape(-1, 1, 2)
     start = pieces[:, 0]
     along = pieces[:, 1] - start
-    squared = (along**2).sum(axis=1)
+    length2 = (along**2).sum(axis=1)
 
-    share = ((points - start) * along).sum(axis=2) / squared
-    foot = start + share.clip(0.0, 1.0)[..., None] * along
+    projection = ((points - start) * along).sum(axis=2)
+    share = (projection / length2).clip(0.0, 1.0)
+    foot = start + share[..., None] * along
+
     offset = points - foot
     distance = np.hypot(offset[..., 0], offset[..., 1])
-    return np.asarray(distance.min(axis=1, initial=math.inf))
+    nearest = distance.min(axis=1, initial=math.inf)
+    return np.asarray(nearest)
 
 
 def in_town(points_m: npt.ArrayLike, pose: Pose) -> Floats:
     """Points (n, 2) in the robot's frame, x forward and y left, in the town's."""
-    points = np.asarray(points_m, np.float64).reshape(-1, 2)
     robot = np.array([pose.x_m, pose.y_m, pose.heading_rad])
-    return transform_from(robot, points)
+    points = np.asarray(points_m, np.float64)
+    return transform_from(robot, points.reshape(-1, 2))
