@@ -52,7 +52,11 @@ def augmented(
     matrix = _affine(original_size, how, rng)
     size = (WIDTH_PX, HEIGHT_PX)
     image = cv2.warpAffine(
-        labelled.image, matrix, size, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+        labelled.image,
+        matrix,
+        size,
+        flags=cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
     )
     road = cv2.warpAffine(labelled.road, matrix, size, flags=cv2.INTER_LINEAR)
     known = cv2.warpAffine(labelled.known, matrix, size, flags=cv2.INTER_LINEAR)
@@ -75,7 +79,8 @@ def resized(labelled: LabelledImage) -> LabelledImage:
 
 
 def _resized(image: Bytes) -> Bytes:
-    small = cv2.resize(image, (WIDTH_PX, HEIGHT_PX), interpolation=cv2.INTER_AREA)
+    size = (WIDTH_PX, HEIGHT_PX)
+    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
     return small.astype(np.uint8, copy=False)
 
 
@@ -98,15 +103,16 @@ def _affine(size: tuple[int, ...], how: Augmentation, rng: np.random.Generator) 
 
 def _linear(size: tuple[int, ...], how: Augmentation, rng: np.random.Generator) -> Floats:
     """The linear part (2, 2) of that map: zoom, turn and mirror."""
-    height, width = size
     log_zoom = rng.uniform(*np.log(how.zoom))
     zoom = np.exp(log_zoom)
     turn_deg = rng.uniform(-how.turn_deg, how.turn_deg)
     turn_rad = np.radians(turn_deg)
     mirror = rng.choice((-1.0, 1.0))
 
+    height, width = size
     across = zoom * WIDTH_PX / width
     down = zoom * HEIGHT_PX / height
+
     cos = np.cos(turn_rad)
     sin = np.sin(turn_rad)
     top_row = [mirror * across * cos, -down * sin]
@@ -125,6 +131,7 @@ def _relit(image: Singles, how: Augmentation, rng: np.random.Generator) -> Bytes
     if rng.random() < how.blur_share:
         blurred = cv2.GaussianBlur(image, (3, 3), rng.uniform(0.4, 1.0))
         image = blurred.astype(np.float32, copy=False)
+
     if rng.random() < how.shadow_share:
         image *= _shadow(rng)
 
@@ -135,7 +142,9 @@ def _relit(image: Singles, how: Augmentation, rng: np.random.Generator) -> Bytes
     noise = rng.standard_normal(image.shape, np.float32)
     noise_sd = np.float32(rng.uniform(0, how.noise))
     image += noise * noise_sd
-    return np.clip(image, 0, 255).astype(np.uint8)
+
+    limited = np.clip(image, 0, 255)
+    return limited.astype(np.uint8)
 
 
 def _response(how: Augmentation, rng: np.random.Generator) -> Singles:
@@ -143,6 +152,7 @@ def _response(how: Augmentation, rng: np.random.Generator) -> Singles:
     contrast = rng.uniform(-how.contrast, how.contrast)
     cast = rng.uniform(-how.cast, how.cast, 3)
     gain = np.exp(contrast + cast)
+
     log_gamma = rng.uniform(-how.gamma, how.gamma)
     gamma = np.exp(log_gamma)
     offset = rng.uniform(-how.brightness, how.brightness)
@@ -155,22 +165,27 @@ def _response(how: Augmentation, rng: np.random.Generator) -> Singles:
 
 def _shadow(rng: np.random.Generator) -> Singles:
     """The share of light that is left, (HEIGHT_PX, WIDTH_PX, 1), by a shadow in a straight band."""
-    rows, columns = np.indices((HEIGHT_PX, WIDTH_PX), dtype=np.float32, sparse=True)
-    right_px = columns - WIDTH_PX / 2
-    down_px = rows - HEIGHT_PX / 2
-
-    direction_rad = rng.uniform(0, np.pi)
-    cos = np.cos(direction_rad)
-    sin = np.sin(direction_rad)
-    across_px = cos * right_px + sin * down_px
-
+    across_px = _across_px(rng.uniform(0, np.pi))
     middle_px = rng.uniform(-80, 80)
     half_px = rng.uniform(5, 60)
+    edge_px = rng.uniform(0.5, 4.0)
+
     from_middle_px = np.abs(across_px - middle_px)
     inside_px = half_px - from_middle_px
-    edge_px = rng.uniform(0.5, 4.0)
     shade = np.clip(inside_px / edge_px + 0.5, 0, 1)
 
     darkness = rng.uniform(0.2, 0.65)
     light = 1 - darkness * shade
     return np.asarray(light, np.float32)[..., None]
+
+
+def _across_px(direction_rad: float) -> Floats:
+    """How far each pixel (HEIGHT_PX, WIDTH_PX) lies from the middle in that direction."""
+    rows, columns = np.indices((HEIGHT_PX, WIDTH_PX), dtype=np.float32, sparse=True)
+    right_px = columns - WIDTH_PX / 2
+    down_px = rows - HEIGHT_PX / 2
+
+    cos = np.cos(direction_rad)
+    sin = np.sin(direction_rad)
+    across_px: Floats = cos * right_px + sin * down_px
+    return across_px

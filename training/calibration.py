@@ -46,12 +46,14 @@ class Trial:
     def posteriors(self, prototypes: Prototypes) -> Floats:
         """The posteriors (n, k + m + 2)."""
         building = np.ones(len(self.wanted))
+
         return posteriors(self.taught, self.novel, building, prototypes)
 
     def cost(self, prototypes: Prototypes) -> float:
         """The negative log likelihood of the right answers."""
-        rows = np.arange(len(self.wanted))
         posterior = self.posteriors(prototypes)
+        rows = np.arange(len(self.wanted))
+
         likelihood = posterior[rows, self.wanted]
         return _surprise(likelihood)
 
@@ -83,25 +85,24 @@ def calibrate(
     directions = np.asarray(prototypes.directions, np.float32)
     cosines = embeddings @ directions.T
     column = _columns(of, prototypes)
-
     rows = np.flatnonzero(building)
-    none_learned = np.empty((len(rows), 0), np.float32)
-    taught = Trial(cosines[rows], none_learned, column[rows])
+    taught = Trial(cosines[rows], _none_learned(len(rows)), column[rows])
     prototypes = _likeliest(prototypes, [taught], "sharpness", "unknown")
 
     encounters = _encounters(embeddings, cosines, of)
     trials = [*encounters.known, *encounters.unknown]
     prototypes = _likeliest(prototypes, trials, "novel_sharpness", "novel_unknown")
 
-    posterior = posteriors(
-        cosines,
-        np.empty((len(embeddings), 0), np.float32),
-        probability(log_odds, prototypes)[:, 0],
-        prototypes,
-    )
+    shows_building = probability(log_odds, prototypes)[:, 0]
+    posterior = posteriors(cosines, _none_learned(len(cosines)), shows_building, prototypes)
     metrics = _metrics(posterior, of, column)
     metrics |= _novel_metrics(prototypes, encounters)
     return Calibrated(prototypes, metrics)
+
+
+def _none_learned(count: int) -> Singles:
+    """(count, 0): the cosines of so many segments with what was learned, where that is nothing."""
+    return np.empty((count, 0), np.float32)
 
 
 def _with_evidence(prototypes: Prototypes, log_odds: Singles, shown: Booleans) -> Prototypes:
@@ -145,9 +146,7 @@ def _columns(of: Crops, prototypes: Prototypes) -> Rows:
 def _metrics(posterior: Floats, of: Crops, column: Rows) -> dict[str, float]:
     """Of segments with these posteriors (n, k + 2) and the columns that are right (n,)."""
     taught = posterior.shape[1] - 2
-    of_labels = posterior[:, :taught]
-    unlabelled = posterior[:, taught:].sum(1, keepdims=True)
-    claims = np.concatenate([of_labels, unlabelled], axis=1)
+    claims = _claims(posterior, taught)
     claimed = claims.argmax(1)
     correct = claimed == column
 
@@ -165,6 +164,13 @@ def _metrics(posterior: Floats, of: Crops, column: Rows) -> dict[str, float]:
         "building_recall": _share(claimed_building[building]),
         "ece": calibration_error(claims.max(1), correct),
     }
+
+
+def _claims(posterior: Floats, taught: int) -> Floats:
+    """The posteriors (n, taught + 1) of each label taught, and of any other thing."""
+    of_labels = posterior[:, :taught]
+    unlabelled = posterior[:, taught:].sum(1, keepdims=True)
+    return np.concatenate([of_labels, unlabelled], axis=1)
 
 
 def _share(of: Booleans) -> float:
@@ -209,18 +215,24 @@ def _encounter(
     rows = np.setdiff1d(here, first)
     column = np.searchsorted(names, of.name[rows])
 
+    of_taught = cosines[rows]
+    _, taught = cosines.shape
     novel = embeddings[rows] @ embeddings[first].T
-    never = novel.copy()
-    never[np.arange(len(rows)), column] = IMPOSSIBLE_COSINE
+    known_trial = Trial(of_taught, novel, taught + column)
+    encounters.known.append(known_trial)
 
-    taught = cosines.shape[1]
     after_all = taught + len(names)
     unknown = np.full(len(rows), after_all)
-    of_taught = cosines[rows]
-    known_trial = Trial(of_taught, novel, taught + column)
-    unknown_trial = Trial(of_taught, never, unknown)
-    encounters.known.append(known_trial)
+    unknown_trial = Trial(of_taught, _without(novel, column), unknown)
     encounters.unknown.append(unknown_trial)
+
+
+def _without(novel: Singles, column: Rows) -> Singles:
+    """The cosines (n, m) of segments whose own building, in `column` (n,), was not encountered."""
+    rows = np.arange(len(novel))
+    never = novel.copy()
+    never[rows, column] = IMPOSSIBLE_COSINE
+    return never
 
 
 def _first_encounters(here: Rows, names: list[str], of: Crops) -> list[int]:
@@ -255,5 +267,6 @@ def calibration_error(activation: Floats, correct: Booleans) -> float:
     excess = activation - correct
     gap = np.bincount(number, excess, minlength=BINS)
     total_gap = np.abs(gap).sum()
+
     total = max(count.sum(), 1)
     return float(total_gap / total)

@@ -41,8 +41,14 @@ def train_on_photographs(
     read = photographs(folder / "train", folder / "trainannot")
     known = [_labelled(photograph) for photograph in read]
 
-    schedule = Schedule(epochs or EPOCHS, images, seed, STRONG)
-    write(train(known, schedule), out)
+    schedule = Schedule(
+        epochs=epochs or EPOCHS,
+        images=images,
+        seed=seed,
+        augmentation=STRONG,
+    )
+    net = train(known, schedule)
+    write(net, out)
 
 
 def _labelled(photograph: Photograph) -> LabelledImage:

@@ -117,9 +117,9 @@ def _relight(values: Singles, rng: np.random.Generator) -> None:
     overall_gain = rng.normal(0, 0.15, (count, 1, 1, 1))
     gain = np.exp(channel_gain + overall_gain).astype(np.float32)
     offset = rng.normal(0, 0.06, (count, 1, 1, 1)).astype(np.float32)
-
     _relight_segments(values, gain, offset)
     _relight_surroundings(values, gain, offset)
+
     log_size = rng.normal(0, 0.04, (count, 1, 1))
     values[:, 5] += log_size.astype(np.float32)
 
@@ -153,6 +153,7 @@ def _hide_parts(values: Singles, rng: np.random.Generator) -> None:
     for number in np.flatnonzero(is_hidden):
         left, top = rng.integers(0, SIDE_PX, 2)
         width, height = rng.integers(4, SIDE_PX // 2, 2)
+
         rows = slice(top, top + height)
         columns = slice(left, left + width)
         values[number, :4, rows, columns] = 0.0
@@ -218,9 +219,7 @@ def _uncalibrated(folder: Path, fitted: Fitted) -> Prototypes:
 
 def _fit(known: Crops, rng: np.random.Generator, epochs: int, progress: Progress) -> Fitted:
     names = sorted(set(known.name.tolist()) - {""})
-    rows = np.searchsorted(names, known.name)
-    is_nameless = known.name == ""
-    number = np.where(is_nameless, -1, rows)
+    number = _numbers(known, names)
 
     net = EmbeddingNet().to(memory_format=torch.channels_last)
     # Short ones turn fast at first: each of thousands of kinds is seldom seen.
@@ -232,7 +231,8 @@ def _fit(known: Crops, rng: np.random.Generator, epochs: int, progress: Progress
     optimizer = Optimizer(parameters, steps, MAX_RATE, WEIGHT_DECAY)
     task = progress.add_task("training", total=steps)
 
-    for values, wanted, whole in prefetch(partial(_batches, known, number, steps, rng)):
+    batches = partial(_batches, known, number, steps, rng)
+    for values, wanted, whole in prefetch(batches):
         batch = values.contiguous(memory_format=torch.channels_last)
         with torch.autocast("cpu", torch.bfloat16):
             embedding, log_odds = net(batch)
@@ -241,7 +241,15 @@ def _fit(known: Crops, rng: np.random.Generator, epochs: int, progress: Progress
         lost = loss(embedding.float(), log_odds.float(), unit, wanted, whole)
         value = optimizer.step(lost)
         progress.update(task, advance=1, description=f"training, loss {value:.3f}")
+
     return Fitted(net.eval(), directions, names)
+
+
+def _numbers(known: Crops, names: list[str]) -> npt.NDArray[np.intp]:
+    """The row (n,) in sorted `names` of what each crop shows, -1 for no building."""
+    rows = np.searchsorted(names, known.name)
+    is_nameless = known.name == ""
+    return np.where(is_nameless, -1, rows)
 
 
 def loss(
@@ -251,8 +259,9 @@ def loss(
     of what each shows, -1 for no building, and whether it shows most of it.
     """
     building = wanted >= 0
-    labels = wanted[building]
     cosines = embedding[building] @ directions.T
+
+    labels = wanted[building]
     is_wanted = functional.one_hot(labels, len(directions))
     margin = MARGIN * is_wanted
     scores = SHARPNESS * (cosines - margin)
@@ -286,6 +295,7 @@ def embed(net: EmbeddingNet, of: Crops) -> tuple[Singles, Singles]:
             embedding, odds = net(values)
             embeddings.append(embedding)
             log_odds.append(odds)
+
     return _array(embeddings), _array(log_odds)
 
 

@@ -66,10 +66,13 @@ def _photograph(path: Path, label_path: Path) -> Photograph:
             "image: make it anew from the labels of that image"
         )
 
-    rgb = cv2.cvtColor(image, cv2.COLOR_BGR2RGB).astype(np.uint8, copy=False)
-    is_road = label == ROAD
-    is_known = label != UNLABELLED
-    return Photograph(path.stem, rgb, road=is_road, known=is_known)
+    rgb = cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
+    return Photograph(
+        name=path.stem,
+        image=rgb.astype(np.uint8, copy=False),
+        road=label == ROAD,
+        known=label != UNLABELLED,
+    )
 
 
 def camvid_iou(weights: Path, images: Path, labels: Path) -> float:

@@ -59,19 +59,28 @@ def train_on_renderings(
     Raises UsageError if there are no renderings.
     """
     held_out = files(folder, "val")
-    images: list[LabelledImage] = []
-    for path in track(files(folder, "train"), "reading"):
-        town = read(path)
-        views = zip(town.left, town.surface, strict=True)
-        for image, surface in views:
-            images.append(_labelled(image, surface))
+    images = _images(folder)
 
     schedule = Schedule(
-        epochs=epochs or EPOCHS, images=len(images), seed=seed, augmentation=Augmentation()
+        epochs=epochs or EPOCHS,
+        images=len(images),
+        seed=seed,
+        augmentation=Augmentation(),
     )
     net = train(images, schedule)
     write(net, out)
     return {"road_iou": _iou(folder, out, len(held_out))}
+
+
+def _images(folder: Path) -> list[LabelledImage]:
+    """All views of the towns in `folder`/train, with their road."""
+    images = []
+    for path in track(files(folder, "train"), "reading"):
+        town = read(path)
+        for image, surface in zip(town.left, town.surface, strict=True):
+            images.append(_labelled(image, surface))
+
+    return images
 
 
 def train(images: Sequence[LabelledImage], schedule: Schedule) -> UNet:
@@ -86,8 +95,10 @@ def train(images: Sequence[LabelledImage], schedule: Schedule) -> UNet:
     with Progress() as progress:
         task = progress.add_task("training", total=steps)
         for values, road, known in prefetch(batches):
-            value = optimizer.step(loss(net, values, road, known))
+            lost = loss(net, values, road, known)
+            value = optimizer.step(lost)
             progress.update(task, advance=1, description=f"training, loss {value:.3f}")
+
     return net.eval()
 
 
@@ -116,14 +127,14 @@ def _batches(
 ) -> Iterator[tuple[Singles, Singles, Singles]]:
     rng = np.random.default_rng([schedule.seed, 0x60AD])
     order = _order(len(images), steps * BATCH, rng)
+
     for chosen in order.reshape(steps, BATCH):
         batch = [augmented(images[number], schedule.augmentation, rng) for number in chosen]
         pixels = np.stack([each.image for each in batch])
-        values = network_input(pixels)
-
         road = _shares([each.road for each in batch])
         known = _shares([each.known for each in batch])
-        yield values, road, known
+
+        yield network_input(pixels), road, known
 
 
 def _order(count: int, wanted: int, rng: np.random.Generator) -> npt.NDArray[np.intp]:
@@ -144,7 +155,9 @@ def _labelled(image: Bytes, surface: Bytes) -> LabelledImage:
     is_road = surface == ROAD
     road = is_road.astype(np.uint8) * 255
     known = np.full_like(road, 255)
-    return resized(LabelledImage(image, road, known))
+
+    labelled = LabelledImage(image, road, known)
+    return resized(labelled)
 
 
 def _iou(folder: Path, weights: Path, count: int) -> float:
@@ -157,9 +170,7 @@ def _iou(folder: Path, weights: Path, count: int) -> float:
         for image, surface in views:
             found = segmenter.mask(image)
             road = surface == ROAD
-            both = found & road
-            either = found | road
-            both_px += int(np.count_nonzero(both))
-            either_px += int(np.count_nonzero(either))
+            both_px += int(np.count_nonzero(found & road))
+            either_px += int(np.count_nonzero(found | road))
 
     return both_px / max(either_px, 1)

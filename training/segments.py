@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -25,6 +26,7 @@ from services.epam.recognition.segments import (
     OUTPUT_SHAPES,
     PADDING_PX,
     WIDTH_PX,
+    Segment,
     load,
     network_input,
     padded,
@@ -104,31 +106,65 @@ def target(label: Bytes) -> Singles:
     """Return what the network should predict for labels (h, w), float32 (5, h, w): building,
     centre, offset to the right and downwards, and the weight of the offset.
     """
-    wanted = np.zeros((5, *label.shape), np.float32)
-    wanted[0] = label > 0
-
     rows, columns = np.nonzero(label)
     number = label[rows, columns]
-    area_px = np.bincount(number, minlength=1)
-    divisor = np.maximum(area_px, 1)
-    centre_row = np.bincount(number, rows, minlength=1) / divisor
-    centre_column = np.bincount(number, columns, minlength=1) / divisor
+    areas = _areas(number, rows, columns)
 
-    large = area_px >= MIN_AREA_PX
-    for one in np.flatnonzero(large):
-        sd_px = np.clip(0.12 * np.sqrt(area_px[one]), 1.5, 5.0)
-        bump = _bump(label.shape, centre_row[one], centre_column[one], sd_px)
-        np.maximum(wanted[1], bump, out=wanted[1])
+    wanted = np.zeros((5, *label.shape), np.float32)
+    wanted[0] = label > 0
+    _draw_centres(wanted[1], areas)
 
-    right_px = centre_column[number] - columns
-    down_px = centre_row[number] - rows
+    right_px = areas.centre_column[number] - columns
+    down_px = areas.centre_row[number] - rows
     wanted[2, rows, columns] = right_px / OFFSET_PX
     wanted[3, rows, columns] = down_px / OFFSET_PX
-
-    weight = large[number] / np.sqrt(divisor[number])
-    scale = len(rows) / max(float(weight.sum()), 1e-9)
-    wanted[4, rows, columns] = weight * scale
+    wanted[4, rows, columns] = _weight(number, areas.size_px)
     return wanted
+
+
+class _Areas(NamedTuple):
+    """Of each number of a label, (k,): how many pixels show it, and the middle of these."""
+
+    size_px: npt.NDArray[np.intp]
+    centre_row: Floats
+    centre_column: Floats
+
+
+def _areas(number: Bytes, rows: npt.NDArray[np.intp], columns: npt.NDArray[np.intp]) -> _Areas:
+    """What the pixels of `rows` and `columns` show, by number (n,) each."""
+    size_px = np.bincount(number, minlength=1)
+    divisor = np.maximum(size_px, 1)
+
+    row_sum = np.bincount(number, rows, minlength=1)
+    column_sum = np.bincount(number, columns, minlength=1)
+    return _Areas(
+        size_px=size_px,
+        centre_row=row_sum / divisor,
+        centre_column=column_sum / divisor,
+    )
+
+
+def _draw_centres(image: Singles, areas: _Areas) -> None:
+    """Raise `image` (h, w) to a bump at the centre of each large area, larger for a larger one."""
+    is_large = areas.size_px >= MIN_AREA_PX
+    for number in np.flatnonzero(is_large):
+        sd_px = np.clip(0.12 * np.sqrt(areas.size_px[number]), 1.5, 5.0)
+        row = areas.centre_row[number]
+        column = areas.centre_column[number]
+
+        bump = _bump(image.shape, row, column, sd_px)
+        np.maximum(image, bump, out=image)
+
+
+def _weight(number: Bytes, size_px: npt.NDArray[np.intp]) -> Floats:
+    """(n,): the weight of each pixel, 1 on the mean: of a large area the less the larger it is."""
+    is_large = size_px >= MIN_AREA_PX
+    divisor = np.maximum(size_px, 1)
+    weight = is_large[number] / np.sqrt(divisor[number])
+
+    scale = len(number) / max(float(weight.sum()), 1e-9)
+    weighted: Floats = weight * scale
+    return weighted
 
 
 def _bump(size: tuple[int, ...], row: float, column: float, sd_px: float) -> Floats:
@@ -152,18 +188,18 @@ def loss(output: Tensor, wanted: Tensor) -> Tensor:
     """Return the loss of the network's output (n, 4, h, w); small buildings have more weight than
     their pixels.
     """
-    wanted_centre = wanted[:, 1]
-    weight = wanted[:, 4]
     building = functional.binary_cross_entropy_with_logits(output[:, 0], wanted[:, 0])
 
+    wanted_centre = wanted[:, 1]
     squared = (output[:, 1] - wanted_centre).square()
     emphasis = 1 + 8 * wanted_centre
     centre = (squared * emphasis).mean()
 
-    wanted_offset = wanted[:, 2:4]
-    error = (output[:, 2:4] - wanted_offset).abs()
+    weight = wanted[:, 4]
+    error = (output[:, 2:4] - wanted[:, 2:4]).abs()
     weighted = error.sum(1) * weight
     offset = weighted.sum() / (weight.sum() + 1)
+
     return building + 20 * centre + 2 * offset
 
 
@@ -176,20 +212,31 @@ def augmented(
         varied[:7] = varied[:7, :, ::-1]
         label = label[:, ::-1]
 
+    _relight(varied[:3], rng)
+    if rng.random() < 0.3:
+        _lose_depth(varied[3:6], rng)
+
+    return varied, label
+
+
+def _relight(colours: Singles, rng: np.random.Generator) -> None:
+    """Change the light on colours (3, h, w), in place."""
     channel_gain = rng.normal(0, 0.08, (3, 1, 1))
     overall_gain = rng.normal(0, 0.12)
     gain = np.exp(channel_gain + overall_gain).astype(np.float32)
     offset = rng.normal(0, 0.05)
-    colours = varied[:3]
+
     light = colours + 2
     colours[:] = light * gain - 2 + offset
 
-    if rng.random() < 0.3:
-        coarse = rng.random((15, 20), np.float32)
-        field = cv2.resize(coarse, (WIDTH_PX, HEIGHT_PX))
-        lost = field < rng.uniform(0, 0.4)
-        varied[3:6, lost] = 0.0
-    return varied, label
+
+def _lose_depth(channels: Singles, rng: np.random.Generator) -> None:
+    """Set what follows from depth (3, h, w) to 0 in some patches, in place."""
+    coarse = rng.random((15, 20), np.float32)
+    field = cv2.resize(coarse, (WIDTH_PX, HEIGHT_PX))
+
+    is_lost = field < rng.uniform(0, 0.4)
+    channels[:, is_lost] = 0.0
 
 
 def train_on_renderings(
@@ -217,8 +264,8 @@ def _fit(
     net = SegmentationNet().to(memory_format=torch.channels_last)
     steps = max(1, epochs * len(known.label) // BATCH)
     optimizer = Optimizer(net.parameters(), steps, MAX_RATE, WEIGHT_DECAY)
-    task = progress.add_task("training", total=steps)
 
+    task = progress.add_task("training", total=steps)
     batches = partial(_batches, known, steps, rng)
     for values, wanted in prefetch(batches):
         batch = values.contiguous(memory_format=torch.channels_last)
@@ -241,6 +288,7 @@ def _batches(
             values, label = augmented(known.values[number], known.label[number], rng)
             inputs.append(values)
             targets.append(target(label))
+
         yield padded(np.stack(inputs)), np.stack(targets)
 
 
@@ -249,26 +297,44 @@ def metrics(folder: Path, weights: Path) -> dict[str, float]:
     the precision of segments at least as large.
     """
     segmenter = load(weights)
-    buildings = 0
-    found = 0
-    segments = 0
-    correct = 0
-
+    count = _Count()
     for town in towns(folder, "val"):
         for image, depth_m, label in zip(town.left, town.stereo_m, town.label, strict=True):
-            min_area_px = LARGE_SHARE * label.size
-            large = np.flatnonzero(np.bincount(label.ravel())[1:] >= min_area_px) + 1
-            buildings += len(large)
+            segments = segmenter.segments(image, depth_m, town.calibration)
+            count.add(segments, label)
 
-            matched = set()
-            for segment in segmenter.segments(image, depth_m, town.calibration):
-                building, share = overlap(segment, label)
-                is_match = share >= MIN_OVERLAP
-                is_large = segment.area_px >= min_area_px
-                segments += is_large
-                correct += is_large and is_match
-                if is_match:
-                    matched.add(building)
-            found += len(matched & set(large.tolist()))
+    return {
+        "recall": count.found / max(count.buildings, 1),
+        "precision": count.correct / max(count.segments, 1),
+    }
 
-    return {"recall": found / max(buildings, 1), "precision": correct / max(segments, 1)}
+
+@dataclass
+class _Count:
+    """Of all views: the large buildings and how many of them were found, and the large segments and
+    how many of them are right.
+    """
+
+    buildings: int = 0
+    found: int = 0
+    segments: int = 0
+    correct: int = 0
+
+    def add(self, segments: list[Segment], label: Bytes) -> None:
+        """Add a view with that `label` (h, w), in which `segments` were found."""
+        min_area_px = LARGE_SHARE * label.size
+        area_px = np.bincount(label.ravel())[1:]
+        large = np.flatnonzero(area_px >= min_area_px) + 1
+        self.buildings += len(large)
+
+        matched = set()
+        for segment in segments:
+            building, share = overlap(segment, label)
+            is_match = share >= MIN_OVERLAP
+            is_large = segment.area_px >= min_area_px
+            self.segments += is_large
+            self.correct += is_large and is_match
+            if is_match:
+                matched.add(building)
+
+        self.found += len(matched & set(large.tolist()))

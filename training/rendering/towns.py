@@ -70,7 +70,7 @@ def _facing_a_building(place: town.Town, rng: np.random.Generator) -> Pose:
             break
 
     heading_rad = bearing_rad + rng.normal(0, 0.35)
-    return Pose(x_m=x_m, y_m=y_m, heading_rad=math.remainder(heading_rad, math.tau))
+    return _pose(x_m, y_m, heading_rad)
 
 
 def _on_a_street(place: town.Town, rng: np.random.Generator) -> Pose:
@@ -83,14 +83,25 @@ def _on_a_street(place: town.Town, rng: np.random.Generator) -> Pose:
     half_turns = int(rng.integers(2))
     direction_rad = road.heading_rad + math.pi * half_turns
     heading_rad = direction_rad + rng.normal(0, 0.5)
-    return Pose(x_m=x_m, y_m=y_m, heading_rad=math.remainder(heading_rad, math.tau))
+    return _pose(x_m, y_m, heading_rad)
+
+
+def _pose(x_m: float, y_m: float, heading_rad: float) -> Pose:
+    """The pose with its heading wrapped."""
+    return Pose(
+        x_m=x_m,
+        y_m=y_m,
+        heading_rad=math.remainder(heading_rad, math.tau),
+    )
 
 
 def is_free(place: town.Town, x_m: float, y_m: float) -> bool:
     """Return whether the robot can stand there, away from buildings and outside of props."""
     here = (x_m, y_m, x_m, y_m)
-    if any(plan.overlap(here, plot.footprint, BUILDING_MARGIN_M) for plot in place.plots):
-        return False
+    for plot in place.plots:
+        if plan.overlap(here, plot.footprint, BUILDING_MARGIN_M):
+            return False
+
     return not any(plan.overlap(here, prop.area, PROP_MARGIN_M) for prop in place.props)
 
 
@@ -150,6 +161,7 @@ def labels(world: World, exposure: Exposure) -> Bytes:
     for number, body in enumerate(world.building_of_body):
         is_shown = exposure.body == body
         label[is_shown] = 1 + number
+
     return label
 
 
@@ -163,6 +175,8 @@ def surfaces(world: World, exposure: Exposure) -> Bytes:
     }
     surface = np.full(exposure.body.shape, SURFACES.index("ground"), np.uint8)
     for name, bodies in bodies_of.items():
-        surface[np.isin(exposure.body, list(bodies))] = SURFACES.index(name)
+        is_shown = np.isin(exposure.body, list(bodies))
+        surface[is_shown] = SURFACES.index(name)
+
     surface[exposure.body < 0] = SURFACES.index("sky")
     return surface
