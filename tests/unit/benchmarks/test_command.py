@@ -16,7 +16,7 @@ from benchmarks.commands import benchmarks
 from benchmarks.cycle import measure as cycle
 from benchmarks.report import Metrics, Outcome, report
 from benchmarks.suite import Benchmark, Setting
-from benchmarks.threshold import at_least, at_most, more_than, within
+from benchmarks.threshold import Threshold, at_least, at_most, more_than, within
 from cogmap.bus.codec import encode
 from cogmap.errors import UsageError
 from schemas.graph import Links
@@ -39,12 +39,22 @@ def test_the_thresholds_are_those_of_the_keys_promised() -> None:
     }
 
 
-def test_a_threshold_is_met_up_to_its_limits_and_by_no_nan() -> None:
-    assert at_most(2).is_met(2.0) and not at_most(2).is_met(2.1)
-    assert at_least(2).is_met(2.0) and not at_least(2).is_met(1.9)
-    assert more_than(0).is_met(0.1) and not more_than(0).is_met(0.0)
-    assert within(0.9, 1.1).is_met(0.9) and not within(0.9, 1.1).is_met(1.2)
-    assert not at_most(2).is_met(float("nan"))
+@pytest.mark.parametrize(
+    ("threshold", "met", "missed"),
+    [
+        (at_most(2), 2.0, 2.1),
+        (at_least(2), 2.0, 1.9),
+        (more_than(0), 0.1, 0.0),
+        (within(0.9, 1.1), 0.9, 1.2),
+        (at_most(2), 0.0, float("nan")),
+    ],
+    ids=["at most", "at least", "more than", "within", "not a number"],
+)
+def test_a_threshold_is_met_up_to_its_limits_and_by_no_nan(
+    threshold: Threshold, met: float, missed: float
+) -> None:
+    assert threshold.is_met(met)
+    assert not threshold.is_met(missed)
 
 
 def test_a_report_shows_what_is_met_and_missed_and_writes_flat_json(
@@ -105,9 +115,11 @@ def test_all_ends_with_0_where_every_threshold_chosen_is_met(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     _suite(monkeypatch)
+    one = CliRunner().invoke(benchmarks, ["all", "--only", "bus"])
+    all_but_one = CliRunner().invoke(benchmarks, ["all", "--skip", "cycle"])
 
-    assert CliRunner().invoke(benchmarks, ["all", "--only", "bus"]).exit_code == 0
-    assert CliRunner().invoke(benchmarks, ["all", "--skip", "cycle"]).exit_code == 0
+    assert one.exit_code == 0
+    assert all_but_one.exit_code == 0
 
 
 def test_a_benchmark_that_fails_is_a_row_with_its_reason_and_others_run(
@@ -145,13 +157,17 @@ def test_a_benchmark_of_a_set_that_is_not_there_names_its_folder(tmp_path: Path)
 
 
 def test_no_two_benchmarks_have_a_threshold_of_the_same_key() -> None:
-    keys = [key for each in suite.SUITE for key in each.thresholds]
+    keys: list[str] = []
+    for benchmark in suite.SUITE:
+        keys += benchmark.thresholds
 
+    assert keys
     assert len(keys) == len(set(keys))
 
 
 def test_the_unit_of_a_machine_is_repeatable() -> None:
-    first, second = machine.machine_unit_ms(), machine.machine_unit_ms()
+    first = machine.machine_unit_ms()
+    second = machine.machine_unit_ms()
 
     assert 0 < first < 1000
     assert second == pytest.approx(first, rel=0.5)

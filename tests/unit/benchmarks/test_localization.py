@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from benchmarks.localization.delay import Delay
@@ -19,97 +20,126 @@ LANDMARKS = {6: (0.0, 4.0), 7: (5.0, 5.0), 8: (6.0, -1.0), 9: (-2.0, -2.0), 10: 
 RATE_HZ = 10
 LASTS_S = 200.0
 SEES_M = 6.0
+START = (0.0, 0.0, 0.0)
+RADIUS_M = 3.0
+TURN_RATE_RAD_S = 0.1
+SPEED_M_S = RADIUS_M * TURN_RATE_RAD_S
 
 
 @pytest.fixture(scope="module")
 def robot() -> Robot:
-    """Round a circle of 3 m with wheels that slip by 5 % and drift, and an eye that is 3 % and 1°
-    off.
+    """Round a circle of 3 m with wheels that slip by 5 % and drift, and an eye that is wrong by 3 %
+    and 1°.
     """
     rng = np.random.default_rng(8)
-    stamps = np.arange(0.0, LASTS_S, 1 / RATE_HZ)
-    heading = 0.1 * stamps
-    truth = np.column_stack([stamps, 3 * np.sin(heading), 3 - 3 * np.cos(heading), heading])
-    felt = np.column_stack([stamps, np.full(len(stamps), 0.3 * 1.05), np.full(len(stamps), 0.1)])
-    felt[:, 2] += rng.normal(0.0, 0.02, len(stamps))
-    rows = [row for pose in truth[5::7] for row in _seen(pose, rng)]
-    return Robot(1, felt, np.array(rows), truth, 0)
+    stamps_s = np.arange(0.0, LASTS_S, 1 / RATE_HZ)
+    heading = TURN_RATE_RAD_S * stamps_s
+    x_m = RADIUS_M * np.sin(heading)
+    y_m = RADIUS_M - RADIUS_M * np.cos(heading)
+    truth = np.column_stack([stamps_s, x_m, y_m, heading])
+
+    odometry = np.empty((len(stamps_s), 3))
+    odometry[:, 0] = stamps_s
+    odometry[:, 1] = SPEED_M_S * 1.05
+    odometry[:, 2] = TURN_RATE_RAD_S + rng.normal(0.0, 0.02, len(stamps_s))
+
+    observations = []
+    for pose in truth[5::7]:
+        observations += _seen(pose, rng)
+    return Robot(1, odometry, np.array(observations), truth, 0)
 
 
 def _seen(pose: Floats, rng: np.random.Generator) -> list[tuple[float, int, float, float]]:
+    """The landmarks ahead from a row of the truth: stamp, subject, depth and bearing."""
+    stamp_s, x_m, y_m, heading_rad = pose.tolist()
     rows = []
-    for subject, (x, y) in LANDMARKS.items():
-        off = x - pose[1], y - pose[2]
-        bearing = math.remainder(math.atan2(off[1], off[0]) - pose[3], math.tau)
-        if math.hypot(*off) < SEES_M and abs(bearing) < 0.6:
-            depth_m = math.hypot(*off) * math.cos(bearing) * (1 + rng.normal(0.0, 0.03))
-            rows.append((float(pose[0]), subject, depth_m, bearing + rng.normal(0.0, 0.017)))
+    for subject, (landmark_x_m, landmark_y_m) in LANDMARKS.items():
+        ahead_m = math.hypot(landmark_x_m - x_m, landmark_y_m - y_m)
+        direction = math.atan2(landmark_y_m - y_m, landmark_x_m - x_m)
+        bearing = math.remainder(direction - heading_rad, math.tau)
+        if ahead_m < SEES_M and abs(bearing) < 0.6:
+            depth_m = ahead_m * math.cos(bearing) * (1 + rng.normal(0.0, 0.03))
+            rows.append((stamp_s, subject, depth_m, bearing + rng.normal(0.0, 0.017)))
+
     return rows
 
 
 def _truth(robot: Robot, stamps_s: Floats) -> Floats:
-    return np.column_stack(
-        [np.interp(stamps_s, robot.truth[:, 0], robot.truth[:, k]) for k in (1, 2, 3)]
-    )
+    at_s = robot.truth[:, 0]
+    columns = [np.interp(stamps_s, at_s, robot.truth[:, k]) for k in (1, 2, 3)]
+    return np.column_stack(columns)
 
 
 def _error_m(path: Floats, truth: Floats) -> Floats:
-    return np.asarray(np.hypot(*(path[:, :2] - truth[:, :2]).T))
+    off_m = path[:, :2] - truth[:, :2]
+    return np.asarray(np.hypot(off_m[:, 0], off_m[:, 1]))
 
 
 def _rms(values: Floats) -> float:
     return float(np.sqrt(np.square(values).mean()))
 
 
+def _centred(path: Floats) -> npt.NDArray[np.complex128]:
+    """Positions about their mean, as complex numbers."""
+    positions = path[:, 0] + 1j * path[:, 1]
+    return positions - positions.mean()
+
+
 def _aligned_rms(path: Floats, truth: Floats) -> float:
     """Of the distances that are left once the path is moved and turned to fit the truth best."""
-    found = path[:, :2] - path[:, :2].mean(axis=0)
-    true = truth[:, :2] - truth[:, :2].mean(axis=0)
-    found_z = found[:, 0] + 1j * found[:, 1]
-    true_z = true[:, 0] + 1j * true[:, 1]
-    turn = (true_z * found_z.conj()).sum()
-    return _rms(np.abs(true_z - found_z * turn / abs(turn)))
+    found = _centred(path)
+    true = _centred(truth)
+    turn = (true * found.conj()).sum()
+    aligned = found * turn / abs(turn)
+    return _rms(np.abs(true - aligned))
 
 
 def test_on_a_known_map_the_robot_is_localized_all_the_time(robot: Robot) -> None:
     log = list(moments(robot))
-    path = follow(log, LANDMARKS, (0.0, 0.0, 0.0), 0).online
+    path = follow(log, LANDMARKS, START, 0).online
 
-    error_m = _error_m(path, _truth(robot, np.array([moment.stamp_s for moment in log])))
-
+    stamps_s = np.array([moment.stamp_s for moment in log])
+    error_m = _error_m(path, _truth(robot, stamps_s))
     assert _rms(error_m) < 0.25
     assert error_m.max() < 1.0
 
 
 def test_on_its_own_map_the_corrected_path_beats_belief_and_odometry(robot: Robot) -> None:
     log = list(moments(robot))
-    drive = follow(log, {}, (0.0, 0.0, 0.0), 0)
+    drive = follow(log, {}, START, 0)
     stamps_s = np.array([moment.stamp_s for moment in log])
     truth = _truth(robot, stamps_s)
 
     corrected = _aligned_rms(drive.corrected(stamps_s), truth)
+    believed = _aligned_rms(drive.online, truth)
+    by_odometry = _aligned_rms(drive.odometry, truth)
 
     assert corrected < 0.15
-    assert corrected < _aligned_rms(drive.online, truth)
-    assert corrected < _aligned_rms(drive.odometry, truth)
+    assert corrected < believed
+    assert corrected < by_odometry
+
+
+def _followed(robot: Robot, seed: int = 0, steps: int = 50) -> Floats:
+    """The beginning of the path that is believed without a known map."""
+    log = list(moments(robot))[:steps]
+    return follow(log, {}, START, seed).online
 
 
 def test_the_truth_does_not_reach_the_codelets(robot: Robot) -> None:
-    blind = Robot(1, robot.odometry, robot.observations, robot.truth * np.nan, 0)
-    seeing_log = list(moments(robot))[:300]
-    blind_log = list(moments(blind))[:300]
+    nowhere = robot.truth * np.nan
+    blind = Robot(1, robot.odometry, robot.observations, nowhere, 0)
 
-    seeing = follow(seeing_log, {}, (0.0, 0.0, 0.0), 0).online
+    seeing_path = _followed(robot, steps=300)
+    blind_path = _followed(blind, steps=300)
 
-    assert (follow(blind_log, {}, (0.0, 0.0, 0.0), 0).online == seeing).all()
+    assert (blind_path == seeing_path).all()
 
 
 def test_another_seed_is_other_noise_of_the_codelets(robot: Robot) -> None:
-    log = list(moments(robot))[:50]
+    first = _followed(robot, seed=0)
+    other = _followed(robot, seed=1)
 
-    first = follow(log, {}, (0.0, 0.0, 0.0), 0).online
-
-    assert (follow(log, {}, (0.0, 0.0, 0.0), 1).online != first).any()
+    assert (other != first).any()
 
 
 def test_the_workers_time_for_each_task_is_known(robot: Robot) -> None:
@@ -129,10 +159,12 @@ def test_a_trajectory_error_depends_on_its_scale_but_not_on_its_frame() -> None:
     pytest.importorskip("evo")
     truth = np.random.default_rng(0).normal(0.0, 10.0, (50, 2))
     turned = truth @ np.array([[0.6, 0.8], [-0.8, 0.6]]) + (3.0, -5.0)
+    mirrored = truth * (-1, 1)
+    larger = 1.1 * truth
 
     assert trajectory_error_m(turned, truth) == pytest.approx(0.0, abs=1e-9)
-    assert trajectory_error_m(truth * (-1, 1), truth) > 5.0
-    assert trajectory_error_m(1.1 * truth, truth) > 0.5
+    assert trajectory_error_m(mirrored, truth) > 5.0
+    assert trajectory_error_m(larger, truth) > 0.5
 
 
 def test_the_wheels_delay_is_found_by_how_landmarks_turn() -> None:

@@ -15,25 +15,30 @@ TINY = Size(objects=5, places=2_000)
 def test_a_made_up_map_has_the_objects_and_places_it_should() -> None:
     graph = Graph()
     graph.load(cognitive_map(TINY))
-    assert graph.count(Object) == 5
-    assert len(graph.places.tiles) * TILE_SIDE**2 >= 2_000
+    objects = list(graph.of_kind(Object))
+    tiles = list(graph.places.tiles.values())
 
-    (tile, *_) = graph.places.tiles.values()
-    assert set(tile.columns) == set(PlaceColumn)
-    assert all(graph.links.target(node.id, LinkKind.AT) for node in graph.of_kind(Object))
+    assert len(objects) == graph.count(Object) == 5
+    assert all(graph.links.target(node.id, LinkKind.AT) for node in objects)
+    assert len(tiles) * TILE_SIDE**2 >= 2_000
+    assert set(tiles[0].columns) == set(PlaceColumn)
 
 
 def test_every_cycle_is_measured_and_the_learned_map_stays() -> None:
     measured = cycles.drive(cognitive_map(TINY))
+    count = cycles.WARM_UP + cycles.CYCLES
 
-    assert len(measured.cpu_s) == len(measured.delta_bytes) == cycles.WARM_UP + cycles.CYCLES
+    assert len(measured.cpu_s) == count
+    assert len(measured.delta_bytes) == count
     assert measured.mean_cpu_s > 0
     assert measured.mean_delta_bytes > 0
     assert 0 < measured.task_bytes_p99 < 65536
 
 
 def test_a_worker_that_joins_is_timed_until_its_first_proposal() -> None:
-    assert join(cognitive_map(TINY)).join_s > 0
+    joined = join(cognitive_map(TINY))
+
+    assert joined.join_s > 0
 
 
 def test_the_memory_of_a_replica_grows_with_its_map() -> None:
