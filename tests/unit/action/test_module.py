@@ -21,9 +21,11 @@ from schemas.process import Clock
 from schemas.sensing import MotorCommand, RangeScan, SelfMotion, SpeedLimit
 from services.action.module import Config, build
 from services.action.selection import FOLLOW_ROUTE, HALT
+from tests.support.messages import of_type
 from tests.support.scenes import agent
 
 PERIOD_NS = 200_000_000
+Legs = tuple[tuple[float, float], ...]
 
 
 def _scan(*obstacles: tuple[float, float], cycle: int = 1) -> RangeScan:
@@ -36,10 +38,9 @@ def _scan(*obstacles: tuple[float, float], cycle: int = 1) -> RangeScan:
     )
 
 
-def _module(
-    mode: str = "real_time", route: tuple[tuple[float, float], ...] = ((20.0, 0.0),)
-) -> Module:
-    return build(Config(mode=mode, route=[*route]), "action")  # type: ignore[arg-type]
+def _module(mode: str = "real_time", route: Legs = ((20.0, 0.0),)) -> Module:
+    config = Config(mode=mode, route=[*route])  # type: ignore[arg-type]
+    return build(config, "action")
 
 
 def _delta(cycle: int = 1, x_m: float = 0.0, phase: Phase = Phase.LOCALIZATION) -> Delta:
@@ -74,14 +75,28 @@ def _motion(cycle: int = 1, speed_m_s: float = 2.0) -> SelfMotion:
     )
 
 
+def _driving() -> Module:
+    """A module that follows its route."""
+    module = _module()
+    module.feed(_broadcast())
+    return module
+
+
 def _commands(messages: list[Message]) -> list[MotorCommand]:
-    return [message for message in messages if isinstance(message, MotorCommand)]
+    return of_type(MotorCommand, messages)
+
+
+def _command(module: Module, message: Message) -> MotorCommand:
+    """The only command that follows a message."""
+    (command,) = _commands(module.feed(message))
+    return command
 
 
 def test_before_any_broadcast_the_robot_stands() -> None:
-    (command,) = _commands(_module().feed(_delta()))
+    command = _command(_module(), _delta())
 
-    assert (command.left_wheel_rad_s, command.halted_by) == (0.0, "no action")
+    assert command.left_wheel_rad_s == 0.0
+    assert command.halted_by is SpeedLimit.NO_ACTION
 
 
 def test_a_broadcast_selects_an_action_and_the_next_pose_moves_the_robot() -> None:
@@ -121,29 +136,35 @@ def test_at_the_end_of_the_route_a_broadcast_halts_the_robot() -> None:
 def test_without_a_route_the_robot_is_halted_for_want_of_one() -> None:
     module = _module(route=())
     module.feed(_broadcast())
+    command = _command(module, _delta())
 
-    assert [command.halted_by for command in _commands(module.feed(_delta()))] == ["no route"]
+    assert command.halted_by is SpeedLimit.NO_ROUTE
 
 
 def test_an_obstacle_in_the_scan_halts_the_robot_until_it_has_gone() -> None:
-    module = _module()
-    module.feed(_broadcast())
+    module = _driving()
     module.feed(_scan((0.0, 1.2), (0.05, 1.2)))
-
-    assert [command.halted_by for command in _commands(module.feed(_delta(1)))] == ["obstacle"]
+    before_it = _command(module, _delta(1))
 
     module.feed(_scan(cycle=2))
+    afterwards = _command(module, _delta(2))
 
-    assert [command.halted_by for command in _commands(module.feed(_delta(2)))] == [""]
+    assert before_it.halted_by is SpeedLimit.OBSTACLE
+    assert afterwards.halted_by is SpeedLimit.NONE
 
 
 @pytest.mark.parametrize("phase", [Phase.PERCEPTS, Phase.OBJECTS, Phase.END])
 def test_deltas_without_a_new_pose_lead_to_no_command(phase: str) -> None:
-    assert _module().feed(_delta(phase=phase)) == []
+    delta = _delta(phase=phase)
+
+    assert _module().feed(delta) == []
 
 
 def test_a_pose_that_is_committed_late_leads_to_a_command_too() -> None:
-    assert len(_commands(_module().feed(_delta(phase=Phase.LATE)))) == 1
+    late = _delta(phase=Phase.LATE)
+    published = _module().feed(late)
+
+    assert len(_commands(published)) == 1
 
 
 def test_in_lockstep_the_command_waits_for_the_senses_and_the_cycle_before() -> None:
@@ -242,9 +263,9 @@ def test_in_lockstep_a_restarted_action_without_a_pose_halts_for_a_frame() -> No
     assert module.feed(_scan(cycle=6)) == []
 
     module.feed(_motion(6))
-    (command,) = _commands(module.feed(_scan(cycle=6)))
-
-    assert (command.stamp_ns, command.halted_by) == (6 * PERIOD_NS, SpeedLimit.NO_POSE)
+    command = _command(module, _scan(cycle=6))
+    assert command.stamp_ns == 6 * PERIOD_NS
+    assert command.halted_by is SpeedLimit.NO_POSE
 
 
 def test_in_lockstep_a_restarted_action_waits_for_no_past_competition() -> None:
@@ -264,59 +285,55 @@ def _clock(at_s: float) -> Clock:
 
 
 def test_a_pose_that_is_old_by_the_clock_moves_the_robot_more_slowly() -> None:
-    fresh = _module()
-    slow = _module()
-    for module in (fresh, slow):
-        module.feed(_broadcast())
-
+    fresh = _driving()
+    slow = _driving()
     slow.feed(_clock(0.2 + 1.0))
-    (fast_command,) = _commands(fresh.feed(_delta(1)))
-    (slow_command,) = _commands(slow.feed(_delta(1)))
+    fast_command = _command(fresh, _delta(1))
+    slow_command = _command(slow, _delta(1))
 
     assert 0 < slow_command.left_wheel_rad_s < fast_command.left_wheel_rad_s
-    assert (slow_command.slowed_by, slow_command.pose_age_ns) == (SpeedLimit.POSE_AGE, 10**9)
+    assert slow_command.slowed_by is SpeedLimit.POSE_AGE
+    assert slow_command.pose_age_ns == 10**9
 
 
 def test_a_moving_robot_that_gets_no_new_pose_is_halted_once() -> None:
-    module = _module()
-    module.feed(_broadcast())
+    module = _driving()
     module.feed(_delta(1))
-    halts = [_commands(module.feed(_clock(0.2 + age_s))) for age_s in (1.0, 2.1, 2.2)]
+    assert module.feed(_clock(0.2 + 1.0)) == []
 
-    assert [len(commands) for commands in halts] == [0, 1, 0]
-    assert halts[1][0].halted_by is SpeedLimit.POSE_AGE
+    halt = _command(module, _clock(0.2 + 2.1))
+    assert halt.halted_by is SpeedLimit.POSE_AGE
+    assert module.feed(_clock(0.2 + 2.2)) == []
 
 
 def test_a_robot_that_is_commanded_to_move_and_stands_is_stuck() -> None:
-    module = _module()
-    module.feed(_broadcast())
-    reasons = []
+    module = _driving()
+    halts = {}
     for cycle in range(1, 40):
         module.feed(_motion(cycle, speed_m_s=0.02))
-        reasons += [command.halted_by for command in _commands(module.feed(_delta(cycle)))]
+        command = _command(module, _delta(cycle))
+        if command.halted_by:
+            halts[cycle] = command.halted_by
 
-    halts = [cycle for cycle, reason in enumerate(reasons, start=1) if reason]
-
-    assert {reasons[cycle - 1] for cycle in halts} == {SpeedLimit.STUCK}
-    assert halts[0] == pytest.approx(Config().stuck_after_s * 1e9 / PERIOD_NS + 1, abs=1)
+    stuck_cycles = Config().stuck_after_s * 1e9 / PERIOD_NS
+    assert set(halts.values()) == {SpeedLimit.STUCK}
+    assert min(halts) == pytest.approx(stuck_cycles + 1, abs=1)
 
 
 def test_a_robot_that_moves_or_is_not_commanded_to_is_not_stuck() -> None:
-    moving = _module()
-    moving.feed(_broadcast())
+    moving = _driving()
     idle = _module()
     for cycle in range(1, 40):
         moving.feed(_motion(cycle))
         idle.feed(_motion(cycle, speed_m_s=0.0))
-        (moved,) = _commands(moving.feed(_delta(cycle)))
-        (stood,) = _commands(idle.feed(_delta(cycle)))
 
-        assert moved.halted_by is SpeedLimit.NONE
-        assert stood.halted_by is SpeedLimit.NO_ACTION
+        assert _command(moving, _delta(cycle)).halted_by is SpeedLimit.NONE
+        assert _command(idle, _delta(cycle)).halted_by is SpeedLimit.NO_ACTION
 
 
 def test_a_self_motion_of_another_shape_is_refused_by_name() -> None:
-    motion = msgspec.structs.replace(_motion(), motions=Array.of(np.zeros((2, 3))))
+    three_columns = Array.of(np.zeros((2, 3)))
+    motion = msgspec.structs.replace(_motion(), motions=three_columns)
 
     with pytest.raises(MessageError, match="rows of 5 columns"):
         _module().feed(motion)

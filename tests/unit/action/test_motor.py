@@ -31,14 +31,14 @@ def _command(
     legs: tuple[tuple[float, float], ...] = ((50.0, 0.0),),
     age_s: float = 0.0,
 ) -> MotorCommand:
+    """The command on a straight drive so far along the route."""
     config = Config()
     route = Route([*legs], config.corner_radius_m, config.overrun_m)
     for x_m in np.arange(0.0, pose.x_m, 1.0):
         route.advance(x_m, 0.0)
-
     route.advance(pose.x_m, pose.y_m)
-    motor = SensoryMotorMemory(config, route)
 
+    motor = SensoryMotorMemory(config, route)
     return motor.command(7, pose, clear_m, round(age_s * 1e9))
 
 
@@ -76,9 +76,8 @@ def test_right_of_the_line_or_headed_right_the_robot_turns_left(pose: Pose) -> N
 
 def test_a_robot_that_looks_backwards_turns_slowly() -> None:
     command = _command(_at(5.0, 0.0, 3.0))
-    mean_m_s = (command.left_wheel_rad_s + command.right_wheel_rad_s) / 2 * Config().wheel_radius_m
 
-    assert mean_m_s == pytest.approx(0.5)
+    assert _driven(command) == pytest.approx(0.5)
     assert command.left_wheel_rad_s > command.right_wheel_rad_s
 
 
@@ -101,14 +100,18 @@ def test_the_arc_of_pure_pursuit_passes_through_the_point_ahead() -> None:
 
 def test_the_robot_slows_down_before_a_bend() -> None:
     legs = ((50.0, QUARTER), (50.0, 0.0))
-    speeds = [_driven(_command(_at(x_m), legs=legs)) for x_m in (10.0, 49.0)]
+    far_m_s = _driven(_command(_at(10.0), legs=legs))
+    near_m_s = _driven(_command(_at(49.0), legs=legs))
+    in_bend_m_s = math.sqrt(Config().lateral_m_s2 * 3.5)
 
-    assert speeds[0] == Config().cruise_m_s
-    assert speeds[1] < math.sqrt(Config().lateral_m_s2 * 3.5) + 0.1
+    assert far_m_s == Config().cruise_m_s
+    assert near_m_s < in_bend_m_s + 0.1
 
 
 def _driven(command: MotorCommand) -> float:
-    return (command.left_wheel_rad_s + command.right_wheel_rad_s) / 2 * Config().wheel_radius_m
+    """The speed of the robot by a command, in m/s."""
+    mean_rad_s = (command.left_wheel_rad_s + command.right_wheel_rad_s) / 2
+    return mean_rad_s * Config().wheel_radius_m
 
 
 def test_the_robot_slows_down_before_an_obstacle_and_stops_at_its_clearance() -> None:
@@ -127,34 +130,55 @@ def test_the_robot_slows_down_before_an_obstacle_and_stops_at_its_clearance() ->
     )
 
 
-def test_the_older_its_pose_the_slower_the_robot_until_it_stops() -> None:
-    config = Config()
-    commands = [_command(_at(5.0), age_s=age_s) for age_s in (0.0, 0.2, 0.5, 1.0, 2.1)]
-    speeds = [_driven(command) for command in commands]
+@pytest.mark.parametrize("age_s", [0.0, 0.2])
+def test_with_a_fresh_pose_the_robot_drives_at_full_speed(age_s: float) -> None:
+    command = _command(_at(5.0), age_s=age_s)
 
-    assert speeds[:2] == [config.cruise_m_s] * 2
-    assert speeds[2:] == pytest.approx([config.blind_m / 0.5, config.blind_m, 0.0])
-    assert [command.slowed_by for command in commands[:4]] == [
-        SpeedLimit.NONE,
-        SpeedLimit.NONE,
-        SpeedLimit.POSE_AGE,
-        SpeedLimit.POSE_AGE,
-    ]
-    assert commands[4].halted_by is SpeedLimit.POSE_AGE
-    assert commands[3].pose_age_ns == 10**9
+    assert _driven(command) == Config().cruise_m_s
+    assert command.slowed_by is SpeedLimit.NONE
 
 
-def test_what_stands_aside_behind_or_alone_is_no_obstacle() -> None:
-    assert obstacle_ahead_m(_scan((0.0, 8.0), (0.05, 8.2)), 0.7) == pytest.approx(8.2, abs=0.05)
-    assert obstacle_ahead_m(_scan((0.0, 8.0)), 0.7) == math.inf
-    assert obstacle_ahead_m(_scan((0.5, 8.0), (0.55, 8.0)), 0.7) == math.inf
-    assert obstacle_ahead_m(_scan((3.1, 8.0), (3.14, 8.0)), 0.7) == math.inf
-    assert obstacle_ahead_m(_scan((0.0, 0.0), (0.05, 0.0)), 0.7) == math.inf
+@pytest.mark.parametrize("age_s", [0.5, 1.0])
+def test_the_older_its_pose_the_slower_the_robot(age_s: float) -> None:
+    command = _command(_at(5.0), age_s=age_s)
+
+    assert _driven(command) == pytest.approx(Config().blind_m / age_s)
+    assert command.slowed_by is SpeedLimit.POSE_AGE
+    assert command.pose_age_ns == round(age_s * 1e9)
+
+
+def test_a_pose_older_than_the_limit_halts_the_robot() -> None:
+    command = _command(_at(5.0), age_s=2.1)
+
+    assert _driven(command) == 0.0
+    assert command.halted_by is SpeedLimit.POSE_AGE
+
+
+def test_the_second_nearest_point_ahead_is_the_obstacle() -> None:
+    ahead = _scan((0.0, 8.0), (0.05, 8.2))
+
+    assert obstacle_ahead_m(ahead, 0.7) == pytest.approx(8.2, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        [(0.0, 8.0)],
+        [(0.5, 8.0), (0.55, 8.0)],
+        [(3.1, 8.0), (3.14, 8.0)],
+        [(0.0, 0.0), (0.05, 0.0)],
+    ],
+    ids=["alone", "aside", "behind", "unknown range"],
+)
+def test_what_stands_aside_behind_or_alone_is_no_obstacle(
+    points: list[tuple[float, float]],
+) -> None:
+    assert obstacle_ahead_m(_scan(*points), 0.7) == math.inf
 
 
 def test_a_scan_whose_bearings_and_ranges_do_not_pair_is_refused() -> None:
-    scan = _scan((0.0, 8.0), (0.1, 8.0))
-    scan = msgspec.structs.replace(scan, range_m=Array.of(np.ones(3, np.float32)))
+    three_ranges = Array.of(np.ones(3, np.float32))
+    scan = msgspec.structs.replace(_scan((0.0, 8.0), (0.1, 8.0)), range_m=three_ranges)
 
     with pytest.raises(MessageError, match="2,\\) bearings and \\(3"):
         obstacle_ahead_m(scan, 0.7)

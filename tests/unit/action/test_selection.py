@@ -17,13 +17,17 @@ def _nodes(**activations: float) -> list[Node]:
 
 def test_a_schemes_activation_is_mean_context_plus_mean_salience() -> None:
     scheme = Scheme("s", context=("a", "b"), adding={"c": 0.2, "d": -0.4})
+    partly_active = {"a": 0.3, "b": 0.1}
+    fully_active = {"a": 1.0, "b": 1.0}
 
-    assert scheme.activation({"a": 0.3, "b": 0.1}) == pytest.approx(0.2 + 0.3)
-    assert scheme.activation({"a": 1.0, "b": 1.0}) == 1.0
+    assert scheme.activation(partly_active) == pytest.approx(0.2 + 0.3)
+    assert scheme.activation(fully_active) == 1.0
 
 
 def test_a_scheme_lacking_part_of_its_context_is_not_active() -> None:
-    assert Scheme("s", context=("a", "b"), adding={"c": 1.0}).activation({"a": 1.0}) == 0.0
+    scheme = Scheme("s", context=("a", "b"), adding={"c": 1.0})
+
+    assert scheme.activation({"a": 1.0}) == 0.0
 
 
 def test_the_threshold_falls_with_each_attempt_until_one_selects() -> None:

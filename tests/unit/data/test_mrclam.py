@@ -32,21 +32,25 @@ def test_a_set_is_read_with_barcodes_as_subjects_and_by_time(
     tmp_path: Path,
 ) -> None:
     recording = read(_folder(tmp_path))
-    assert recording.landmarks == {6: (1.0, -2.0), 7: (0.5, 4.0)}
-
     (robot,) = recording.robots
-    assert robot.observations[:, 1].tolist() == [7, 6, 1]
-    assert robot.landmark_observations[:, 1].tolist() == [7, 6]
+    subjects = robot.observations[:, 1].tolist()
+    landmarks = robot.landmark_observations[:, 1].tolist()
+
+    assert recording.landmarks == {6: (1.0, -2.0), 7: (0.5, 4.0)}
+    assert subjects == [7, 6, 1]
+    assert landmarks == [7, 6]
     assert robot.unread == 1
 
 
 def test_files_packed_with_xz_are_read_as_they_are(tmp_path: Path) -> None:
-    plain = read(_folder(tmp_path)).robots[0].odometry
+    (plain,) = read(_folder(tmp_path)).robots
     for path in list(tmp_path.glob("*.dat")):
-        path.with_suffix(".dat.xz").write_bytes(lzma.compress(path.read_bytes()))
+        packed = lzma.compress(path.read_bytes())
+        path.with_suffix(".dat.xz").write_bytes(packed)
         path.unlink()
 
-    assert (read(tmp_path).robots[0].odometry == plain).all()
+    (robot,) = read(tmp_path).robots
+    assert (robot.odometry == plain.odometry).all()
 
 
 @pytest.mark.parametrize(
@@ -70,17 +74,23 @@ def test_files_packed_with_xz_are_read_as_they_are(tmp_path: Path) -> None:
 def test_a_wrong_line_is_named_with_its_number_and_what_was_expected(
     tmp_path: Path, name: str, text: str, told: str
 ) -> None:
+    folder = _folder(tmp_path, **{name: text})
+
     with pytest.raises(UsageError, match=told.replace(".", r"\.")):
-        read(_folder(tmp_path, **{name: text}))
+        read(folder)
 
 
 def test_a_file_that_is_missing_is_named(tmp_path: Path) -> None:
+    folder = _folder(tmp_path, Robot1_Measurement=None)
+
     with pytest.raises(UsageError, match=r"has no Robot1_Measurement\.dat"):
-        read(_folder(tmp_path, Robot1_Measurement=None))
+        read(folder)
 
 
 def test_a_folder_without_robots_or_that_is_none_is_refused(tmp_path: Path) -> None:
+    without_robots = _folder(tmp_path, Robot1_Odometry=None)
+
     with pytest.raises(UsageError, match="there is no folder"):
         read(tmp_path / "nowhere")
     with pytest.raises(UsageError, match="has no Robot1_Odometry"):
-        read(_folder(tmp_path, Robot1_Odometry=None))
+        read(without_robots)

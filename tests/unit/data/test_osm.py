@@ -27,32 +27,40 @@ def _write(path: Path, text: str) -> Path:
 
 def test_nodes_ways_and_their_tags_are_read(tmp_path: Path) -> None:
     extract = osm.read(_write(tmp_path / "a.osm", EXTRACT))
+    (way,) = extract.ways
 
     assert extract.nodes == {1: (15.6, 48.4), 2: (15.7, 48.5)}
     assert extract.node_tags == {1: {"name": "Café", "amenity": "cafe"}}
-    assert [(way.id, way.nodes, way.tags) for way in extract.ways] == [
-        (7, [1, 2, 3], {"highway": "residential"})
-    ]
+    assert way.id == 7
+    assert way.nodes == [1, 2, 3]
+    assert way.tags == {"highway": "residential"}
 
 
 @pytest.mark.parametrize(
     ("suffix", "opener"), [(".xz", lzma.open), (".gz", gzip.open), (".bz2", bz2.open)]
 )
 def test_a_packed_extract_reads_as_a_plain_one(tmp_path: Path, suffix: str, opener) -> None:
-    path = tmp_path / f"a.osm{suffix}"
-    with opener(path, "wt", encoding="utf-8") as file:
+    plain = _write(tmp_path / "a.osm", EXTRACT)
+    packed = tmp_path / f"a.osm{suffix}"
+    with opener(packed, "wt", encoding="utf-8") as file:
         file.write(EXTRACT)
 
-    assert osm.read(path) == osm.read(_write(tmp_path / "a.osm", EXTRACT))
+    assert osm.read(packed) == osm.read(plain)
+
+
+def _converted(xml: Path, path: Path) -> Path:
+    """The extract in the format that the name of the new file has."""
+    with osmium.SimpleWriter(path) as writer:
+        for element in osmium.FileProcessor(xml):
+            writer.add(element)
+    return path
 
 
 def test_a_pbf_extract_reads_as_an_xml_one(tmp_path: Path) -> None:
     xml = _write(tmp_path / "a.osm", EXTRACT)
-    with osmium.SimpleWriter(tmp_path / "a.osm.pbf") as writer:
-        for element in osmium.FileProcessor(xml):
-            writer.add(element)
+    pbf = _converted(xml, tmp_path / "a.osm.pbf")
 
-    assert osm.read(tmp_path / "a.osm.pbf") == osm.read(xml)
+    assert osm.read(pbf) == osm.read(xml)
 
 
 @pytest.mark.parametrize(
@@ -75,12 +83,14 @@ def test_what_is_wrong_in_an_extract_is_named(
 
     with pytest.raises(UsageError) as caught:
         osm.read(path)
-    assert str(caught.value).startswith(f"{path}")
-    assert expected in str(caught.value)
+    sentence = str(caught.value)
+    assert sentence.startswith(f"{path}")
+    assert expected in sentence
 
 
 def test_an_extract_that_stops_in_the_middle_names_its_last_line(tmp_path: Path) -> None:
-    path = _write(tmp_path / "a.osm", "\n".join(EXTRACT.splitlines()[:4]))
+    first_lines = EXTRACT.splitlines()[:4]
+    path = _write(tmp_path / "a.osm", "\n".join(first_lines))
 
     with pytest.raises(UsageError, match="error at line 4"):
         osm.read(path)
@@ -108,14 +118,12 @@ def test_what_is_no_extract_is_one_sentence(
 
 @pytest.mark.parametrize("name", ["a.osm.gz", "a.osm.pbf"])
 def test_an_extract_that_was_cut_off_is_one_sentence(tmp_path: Path, name: str) -> None:
-    with osmium.SimpleWriter(tmp_path / name) as writer:
-        for element in osmium.FileProcessor(_write(tmp_path / "a.osm", EXTRACT)):
-            writer.add(element)
-    content = (tmp_path / name).read_bytes()
-    (tmp_path / name).write_bytes(content[: len(content) // 2])
+    path = _converted(_write(tmp_path / "a.osm", EXTRACT), tmp_path / name)
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) // 2])
 
     with pytest.raises(UsageError, match="cannot be read"):
-        osm.read(tmp_path / name)
+        osm.read(path)
 
 
 GRAPH = (
@@ -124,10 +132,12 @@ GRAPH = (
 
 
 def test_street_graphs_are_read_a_city_a_line(tmp_path: Path) -> None:
-    graphs = street_graphs.read(_write(tmp_path / "a.jsonl", GRAPH + GRAPH.replace('"A"', '"B"')))
+    of_b = GRAPH.replace('"A"', '"B"')
+    first, second = street_graphs.read(_write(tmp_path / "a.jsonl", GRAPH + of_b))
 
-    assert [graph.city for graph in graphs] == ["A", "B"]
-    assert graphs[0].line(graphs[0].edges[0]) == [(1.0, 2.0), (1.1, 2.0)]
+    assert first.city == "A"
+    assert second.city == "B"
+    assert first.line(first.edges[0]) == [(1.0, 2.0), (1.1, 2.0)]
 
 
 @pytest.mark.parametrize(
@@ -137,5 +147,8 @@ def test_street_graphs_are_read_a_city_a_line(tmp_path: Path) -> None:
 def test_a_wrong_street_graph_is_named_by_its_line(
     tmp_path: Path, wrong: str, right: str, expected: str
 ) -> None:
+    second = GRAPH.replace(wrong, right)
+    path = _write(tmp_path / "a.jsonl", GRAPH + second)
+
     with pytest.raises(UsageError, match=f"line 2: expected {expected}"):
-        street_graphs.read(_write(tmp_path / "a.jsonl", GRAPH + GRAPH.replace(wrong, right)))
+        street_graphs.read(path)

@@ -24,16 +24,13 @@ def test_edges_lead_from_node_to_node_whichever_way_their_polyline_goes(
     tmp_path: Path, name: str
 ) -> None:
     bend = [[1.001, 2.001], [1.0005, 2.0007], [1.0, 2.0]]
-    (graph,) = read(
-        _file(
-            tmp_path,
-            **{name: [[0, 1, 100.0, "residential", None, None], [0, 2, 150.0, "", None, bend]]},
-        )
-    )
-    nodes = [tuple(node) for node in NODES]
+    straight_edge = [0, 1, 100.0, "residential", None, None]
+    bent_edge = [0, 2, 150.0, "", None, bend]
+    (graph,) = read(_file(tmp_path, **{name: [straight_edge, bent_edge]}))
+    first, second, third = [tuple(node) for node in NODES]
 
-    assert graph.line(graph.edges[0]) == nodes[:2]
-    assert graph.line(graph.edges[1]) == [nodes[0], (1.0005, 2.0007), nodes[2]]
+    assert graph.line(graph.edges[0]) == [first, second]
+    assert graph.line(graph.edges[1]) == [first, (1.0005, 2.0007), third]
 
 
 @pytest.mark.parametrize(
@@ -43,5 +40,7 @@ def test_edges_lead_from_node_to_node_whichever_way_their_polyline_goes(
 def test_a_wrong_line_is_named_with_what_was_expected_there(
     tmp_path: Path, facts: dict[str, object], expected: str
 ) -> None:
+    path = _file(tmp_path, **facts)
+
     with pytest.raises(UsageError, match=f"cities.jsonl, line 1: expected .*{expected}"):
-        read(_file(tmp_path, **facts))
+        read(path)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from itertools import pairwise
 
 import msgspec
 import numpy as np
@@ -16,6 +15,7 @@ from schemas.array import Array
 from schemas.base import Message
 from schemas.sensing import Calibration, Odometry, RangeScan, SelfMotion, StereoFrame, View
 from services.sensory.module import Config, build
+from tests.support.messages import of_type
 
 STEP_NS = 50_000_000
 CALIBRATION = Calibration(
@@ -49,48 +49,55 @@ def _frame(number: int, step: int, calibration: Calibration = CALIBRATION) -> St
 
 def _published(messages: Iterable[Message]) -> list[Message]:
     module = build(Config(), "sensory")
-    return [answer for message in messages for answer in module.feed(message)]
+    published = []
+    for message in messages:
+        published += module.feed(message)
+    return published
+
+
+def _rows(first: int, last: int) -> list[Odometry]:
+    """The odometry from one step to another, both included."""
+    return [_odometry(step) for step in range(first, last + 1)]
 
 
 def test_a_frame_waits_for_the_odometry_up_to_its_stamp() -> None:
     module = build(Config(), "sensory")
-
     assert module.feed(_frame(0, 2)) == []
     assert module.feed(_odometry(1)) == []
 
     messages = module.feed(_odometry(2))
-
-    assert [type(message) for message in messages] == [SelfMotion, RangeScan, View]
-    assert {message.stamp_ns for message in messages} == {2 * STEP_NS}
+    types = [type(message) for message in messages]
+    stamps_ns = {message.stamp_ns for message in messages}
+    assert types == [SelfMotion, RangeScan, View]
+    assert stamps_ns == {2 * STEP_NS}
 
 
 def test_any_interleaving_of_frames_with_their_odometry_gives_the_same_bytes() -> None:
-    rows = [_odometry(step) for step in range(1, 9)]
+    rows = _rows(1, 8)
     first = _frame(0, 4)
     second = _frame(1, 8)
-    orders = (
-        [*rows[:4], first, *rows[4:], second],
-        [first, *rows[:4], second, *rows[4:]],
-        [rows[0], first, *rows[1:5], second, *rows[5:]],
-        [first, *rows[:7], second, rows[7]],
-    )
-    outputs = [[codec.encode(message) for message in _published(order)] for order in orders]
+    in_order = _plain(_published([*rows[:4], first, *rows[4:], second]))
+    frames_first = _plain(_published([first, *rows[:4], second, *rows[4:]]))
+    mixed = _plain(_published([rows[0], first, *rows[1:5], second, *rows[5:]]))
+    late = _plain(_published([first, *rows[:7], second, rows[7]]))
 
-    assert len(outputs[0]) == 6
-    assert all(output == outputs[0] for output in outputs)
+    assert len(in_order) == 6
+    assert frames_first == in_order
+    assert mixed == in_order
+    assert late == in_order
 
 
 def test_motions_cover_exactly_what_came_since_the_last_view() -> None:
-    messages = _published([*(_odometry(step) for step in range(1, 10)), _frame(0, 3), _frame(1, 8)])
-    first, second = [message for message in messages if isinstance(message, SelfMotion)]
+    messages = _published([*_rows(1, 9), _frame(0, 3), _frame(1, 8)])
+    first, second = of_type(SelfMotion, messages)
+    assert first.since_ns == 0
+    assert first.motions.shape == (3, 5)
+    assert second.since_ns == 3 * STEP_NS
+    assert second.stamp_ns == 8 * STEP_NS
 
-    assert (first.since_ns, first.motions.shape) == (0, (3, 5))
-    assert (second.since_ns, second.stamp_ns) == (3 * STEP_NS, 8 * STEP_NS)
-
-    turn_rates = [float(row[1]) for row in second.motions.numpy()]
-    steps = [round(after - before, 9) for before, after in pairwise(turn_rates)]
-
-    assert steps == [0.1] * 4  # odometry's own steps; what is seen moves them all alike
+    # Odometry's own steps; what is seen moves them all alike.
+    turn_rates = second.motions.numpy()[:, 1]
+    assert np.diff(turn_rates) == pytest.approx([0.1] * 4, abs=1e-9)
 
 
 def test_a_newer_frame_replaces_a_waiting_one_and_no_motion_is_lost() -> None:
@@ -110,16 +117,18 @@ def test_a_newer_frame_replaces_a_waiting_one_and_no_motion_is_lost() -> None:
 
 
 def test_the_first_frame_without_earlier_odometry_has_no_motion() -> None:
-    motion = _published([_frame(0, 4), _odometry(5)])[0]
+    motion, *_ = _published([_frame(0, 4), _odometry(5)])
 
     assert isinstance(motion, SelfMotion)
-    assert (motion.since_ns, motion.motions.shape) == (4 * STEP_NS, (0, 5))
+    assert motion.since_ns == 4 * STEP_NS
+    assert motion.motions.shape == (0, 5)
 
 
 def test_older_frames_and_odometry_are_ignored() -> None:
-    messages = [_odometry(1), _odometry(2), _frame(0, 2)]
+    messages = [*_rows(1, 2), _frame(0, 2)]
+    older = [_frame(7, 1), _odometry(2), _odometry(1)]
 
-    assert len(_published([*messages, _frame(7, 1), _odometry(2), _odometry(1)])) == 3
+    assert len(_published([*messages, *older])) == 3
 
 
 def _plain(messages: Iterable[Message]) -> list[bytes]:
@@ -128,35 +137,34 @@ def _plain(messages: Iterable[Message]) -> list[bytes]:
 
 
 def test_the_last_frame_published_again_gets_the_same_answer_again() -> None:
-    rows = [_odometry(step) for step in range(1, 9)]
     module = build(Config(), "sensory")
-    for message in (*rows[:4], _frame(0, 4), *rows[4:]):
+    before = [*_rows(1, 4), _frame(0, 4), *_rows(5, 8)]
+    for message in before:
         module.feed(message)
-
     answer = module.feed(_frame(1, 8))
 
-    for row in rows[4:]:
+    for row in _rows(5, 8):
         assert module.feed(row) == []
     assert _plain(module.feed(_frame(1, 8))) == _plain(answer)
 
 
 def test_a_frame_published_again_is_integrated_only_once() -> None:
-    rows = [_odometry(step) for step in range(1, 13)]
-    frames = [_frame(0, 4), _frame(1, 8), _frame(2, 12)]
-    once = [*rows[:4], frames[0], *rows[4:8], frames[1], *rows[8:], frames[2]]
-    twice = [*rows[:4], frames[0], *rows[4:8], frames[1], frames[1], *rows[8:], frames[2]]
+    first = [*_rows(1, 4), _frame(0, 4), *_rows(5, 8), _frame(1, 8)]
+    rest = [*_rows(9, 12), _frame(2, 12)]
+    once = _published([*first, *rest])
+    twice = _published([*first, _frame(1, 8), *rest])
 
-    assert _plain(_published(twice)[-3:]) == _plain(_published(once)[-3:])
+    assert _plain(twice[-3:]) == _plain(once[-3:])
 
 
 def test_a_rectified_frame_keeps_its_image_and_calibration() -> None:
     frame = _frame(0, 1)
-    view = _published([_odometry(1), frame])[2]
+    (view,) = of_type(View, _published([_odometry(1), frame]))
 
-    assert isinstance(view, View)
     assert view.image == frame.left
     assert view.calibration == CALIBRATION
-    assert (view.depth_m.dtype, view.depth_m.shape) == ("<f4", (64, 96))
+    assert view.depth_m.dtype == "<f4"
+    assert view.depth_m.shape == (64, 96)
 
 
 def _resized(frame: StereoFrame, name: str, values: np.ndarray) -> StereoFrame:
@@ -199,6 +207,7 @@ def test_odometry_that_makes_no_sense_is_refused_and_changes_nothing(row: Odomet
 
 def test_it_receives_and_publishes_what_the_table_of_topics_names() -> None:
     module = build(Config(), "sensory")
+    received = set(module.handlers)
 
-    assert set(module.handlers) == {topics.STEREO, topics.ODOMETRY}
+    assert received == {topics.STEREO, topics.ODOMETRY}
     assert module.emits == {topics.SELF_MOTION, topics.SCAN, topics.VIEW}

@@ -21,33 +21,41 @@ CAMERA = Calibration(
     mount_height_m=1.5,
 )
 WALL_M = 12.0
+PX_PER_M = 50
+STILL = Motion(0.0, 0.0, 1e-3, 1e-3)
 
 
 def _view(distance_m: float, turn_rad: float) -> tuple[np.ndarray, np.ndarray]:
     """A wall at WALL_M seen after a distance ahead and a turn to the left, and its depth."""
-    texture = cv2.GaussianBlur(
-        np.random.default_rng(7).integers(0, 255, (2000, 2000), np.uint8), (0, 0), 6
-    )
-    texture = cv2.normalize(texture, None, 0, 255, cv2.NORM_MINMAX)
     column, row = np.meshgrid(np.arange(320.0), np.arange(240.0))
     right = (column - CAMERA.cx_px) / CAMERA.fx_px
     down = (row - CAMERA.cy_px) / CAMERA.fy_px
-    ahead = np.cos(turn_rad) + right * np.sin(turn_rad)
-    depth = (WALL_M - distance_m) / ahead
-    across = (right * np.cos(turn_rad) - np.sin(turn_rad)) * depth
-    at = [(1000 + 50 * across).astype(np.float32), (1000 + 50 * down * depth).astype(np.float32)]
-    grey = cv2.remap(texture, at[0], at[1], cv2.INTER_LINEAR)
 
-    return cv2.cvtColor(grey, cv2.COLOR_GRAY2RGB), depth.astype(np.float32)
+    cos = np.cos(turn_rad)
+    sin = np.sin(turn_rad)
+    depth_m = (WALL_M - distance_m) / (cos + right * sin)
+    across_m = (right * cos - sin) * depth_m
+    down_m = down * depth_m
+
+    x_px = (1000 + PX_PER_M * across_m).astype(np.float32)
+    y_px = (1000 + PX_PER_M * down_m).astype(np.float32)
+    grey = cv2.remap(_texture(), x_px, y_px, cv2.INTER_LINEAR)
+    return cv2.cvtColor(grey, cv2.COLOR_GRAY2RGB), depth_m.astype(np.float32)
+
+
+def _texture() -> np.ndarray:
+    noise = np.random.default_rng(7).integers(0, 255, (2000, 2000), np.uint8)
+    smooth = cv2.GaussianBlur(noise, (0, 0), 6)
+    return cv2.normalize(smooth, None, 0, 255, cv2.NORM_MINMAX)
 
 
 @pytest.mark.parametrize(
     ("distance_m", "turn_rad"), [(0.6, 0.0), (0.5, 0.1), (0.0, -0.15), (0.8, 0.02)]
 )
 def test_views_measure_distance_and_turn_far_better_than_noisy_wheels(distance_m, turn_rad):
-    odometry = VisualOdometry()
     wheels = Motion(distance_m * 1.1, turn_rad + 0.03, 0.1 * distance_m + 1e-3, 0.03)
-    odometry.update(*_view(0.0, 0.0), CAMERA, Motion(0.0, 0.0, 1e-3, 1e-3))
+    odometry = VisualOdometry()
+    odometry.update(*_view(0.0, 0.0), CAMERA, STILL)
     motion = odometry.update(*_view(distance_m, turn_rad), CAMERA, wheels)
 
     assert motion.turn_rad == pytest.approx(turn_rad, abs=0.004)
@@ -56,25 +64,30 @@ def test_views_measure_distance_and_turn_far_better_than_noisy_wheels(distance_m
 
 
 def test_without_texture_the_motion_is_that_of_the_wheels():
-    odometry = VisualOdometry()
     wheels = Motion(0.5, 0.1, 0.05, 0.02)
-    blank = np.full((240, 320, 3), 90, np.uint8), np.full((240, 320), 9.0, np.float32)
-    odometry.update(*blank, CAMERA, wheels)
+    blank = np.full((240, 320, 3), 90, np.uint8)
+    depth_m = np.full((240, 320), 9.0, np.float32)
+    odometry = VisualOdometry()
+    odometry.update(blank, depth_m, CAMERA, wheels)
 
-    assert odometry.update(*blank, CAMERA, wheels) == wheels
+    assert odometry.update(blank, depth_m, CAMERA, wheels) == wheels
 
 
 def test_fused_rows_add_up_to_the_fused_motion_and_its_spread():
     rows = np.array([[2.0, 0.1, 0.05], [2.2, 0.3, 0.05], [2.4, 0.2, 0.05]])
     wheels = WheelNoise(0.1, 0.1, 0.02).total(rows)
     fused = fuse(rows, Motion(0.3, 0.05, 0.01, 0.002), wheels)
+    speed_m_s, turn_rate_rad_s, duration_s, _, turn_rate_sd_rad_s = fused.T
+    turn_variance_rad2 = ((turn_rate_sd_rad_s * duration_s) ** 2).sum()
 
-    assert (fused[:, 0] * fused[:, 2]).sum() == pytest.approx(0.3)
-    assert (fused[:, 1] * fused[:, 2]).sum() == pytest.approx(0.05)
-    assert np.sqrt(((fused[:, 4] * fused[:, 2]) ** 2).sum()) == pytest.approx(0.002)
+    assert (speed_m_s * duration_s).sum() == pytest.approx(0.3)
+    assert (turn_rate_rad_s * duration_s).sum() == pytest.approx(0.05)
+    assert np.sqrt(turn_variance_rad2) == pytest.approx(0.002)
 
 
 def test_wheels_that_stand_still_have_no_noise():
-    still = WheelNoise(0.1, 0.1, 0.02).total(np.array([[0.0, 0.0, 0.05]] * 4))
+    still_rows = np.array([[0.0, 0.0, 0.05]] * 4)
+    still = WheelNoise(0.1, 0.1, 0.02).total(still_rows)
 
-    assert (still.distance_sd_m, still.turn_sd_rad) == (0.0, 0.0)
+    assert still.distance_sd_m == 0.0
+    assert still.turn_sd_rad == 0.0

@@ -56,11 +56,15 @@ def test_clear_embeddings_are_recognized_taught_novel_and_unknown() -> None:
 
 @pytest.mark.parametrize("noise", [0.05, 0.25, 0.4])
 def test_the_activation_is_a_probability_with_any_noise(noise: float) -> None:
-    assert _calibrated(noise).metrics["ece"] < 0.06
+    calibrated = _calibrated(noise)
+
+    assert calibrated.metrics["ece"] < 0.06
 
 
 def test_overconfident_log_odds_are_scaled_down() -> None:
-    assert _calibrated(noise=0.05).prototypes.evidence < 0.6
+    calibrated = _calibrated(noise=0.05)
+
+    assert calibrated.prototypes.evidence < 0.6
 
 
 def test_noisier_embeddings_get_a_lower_sharpness() -> None:
@@ -73,7 +77,10 @@ def test_noisier_embeddings_get_a_lower_sharpness() -> None:
 
 def test_calibration_error_is_the_gap_between_activation_and_accuracy() -> None:
     correct = np.arange(1000) % 2 == 0
+    guessing = np.full(1000, 0.5)
+    too_sure = np.full(1000, 0.9)
+    knowing = np.where(correct, 0.99, 0.01)
 
-    assert calibration_error(np.full(1000, 0.5), correct) == pytest.approx(0.0)
-    assert calibration_error(np.full(1000, 0.9), correct) == pytest.approx(0.4)
-    assert calibration_error(np.where(correct, 0.99, 0.01), correct) == pytest.approx(0.01)
+    assert calibration_error(guessing, correct) == pytest.approx(0.0)
+    assert calibration_error(too_sure, correct) == pytest.approx(0.4)
+    assert calibration_error(knowing, correct) == pytest.approx(0.01)

@@ -19,12 +19,10 @@ from training.rendering.reader import INVENTED, files, read
 def test_no_town_is_in_two_splits_and_each_has_untaught_buildings() -> None:
     wanted = list(jobs(Path("out"), 1.0))
     seeds = [job.seed for job in wanted]
-
     assert len(seeds) == len(set(seeds)) == sum(split.towns for split in SPLITS)
 
     for split in SPLITS:
         here = [job for job in wanted if job.target.parent.name == split.name]
-
         assert len(here) == split.towns
         assert {job.invented for job in here} == set(split.invented)
         assert max(split.invented) >= 20
@@ -33,21 +31,24 @@ def test_no_town_is_in_two_splits_and_each_has_untaught_buildings() -> None:
 def test_a_trial_is_a_part_of_each_split() -> None:
     small = set(jobs(Path("out"), 0.1))
     whole = set(jobs(Path("out"), 1.0))
+    splits = {job.target.parent.name for job in small}
 
     assert small < whole
-    assert {job.target.parent.name for job in small} == {split.name for split in SPLITS}
+    assert splits == {split.name for split in SPLITS}
 
 
 def test_a_town_is_the_same_file_every_time_with_depth_by_stereo(tmp_path: Path) -> None:
     first = Job(4006, 3, 14, tmp_path / "first" / "town-4006.npz")
     again = Job(4006, 3, 14, tmp_path / "again" / "town-4006.npz")
     render_all([first, again], processes=2)
-    town = read(first.target)
-
+    files = [path.name for path in first.target.parent.iterdir()]
+    assert files == ["town-4006.npz"]
     assert again.target.read_bytes() == first.target.read_bytes()
-    assert [path.name for path in first.target.parent.iterdir()] == ["town-4006.npz"]
-    assert town.left.shape[0] == len(town.stereo_m) == len(town.label) == 3
-    assert sum(name.startswith(INVENTED) for name in town.names) > 3
+
+    town = read(first.target)
+    invented = [name for name in town.names if name.startswith(INVENTED)]
+    assert len(town.left) == len(town.stereo_m) == len(town.label) == 3
+    assert len(invented) > 3
 
     known = (town.stereo_m > 3) & (town.depth_m > 3) & (town.depth_m < 30)
     error = np.abs(town.stereo_m[known] / town.depth_m[known] - 1)
@@ -64,8 +65,10 @@ def test_a_file_that_exists_is_kept(tmp_path: Path) -> None:
 
 
 def test_a_failure_names_the_town_and_leaves_no_file(tmp_path: Path) -> None:
+    impossible = Job(-1, 1, 0, tmp_path / "town.npz")
+
     with pytest.raises(CogmapError, match=r"cannot render the town of seed -1: .*negative"):
-        render(Job(-1, 1, 0, tmp_path / "town.npz"))
+        render(impossible)
     assert list(tmp_path.iterdir()) == []
 
 

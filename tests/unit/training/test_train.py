@@ -52,6 +52,9 @@ assert (torch.random.get_rng_state() == before).all()
 assert [len(whole) for _, whole in found] == list(range(7))
 assert all((values == number).all() for number, (values, _) in enumerate(found))
 """
+ROAD = 3
+OTHER = 0
+VOID = 11
 
 
 def _python(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -64,15 +67,19 @@ def _python(*arguments: str) -> subprocess.CompletedProcess[str]:
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """Four small street photographs, in CamVid's folders."""
-    for name in ("train", "trainannot"):
-        (tmp_path / name).mkdir()
+    images = tmp_path / "train"
+    labels = tmp_path / "trainannot"
+    images.mkdir()
+    labels.mkdir()
 
     for number in range(4):
         image, depth_m, _ = painted([], road_half_m=3.0 + number, seed=number)
-        grey = (np.ptp(image.astype(int), axis=2) < 40) & (depth_m > 0)
-        label = np.where(grey, 3, 11 * (number == 0)).astype(np.uint8)
-        cv2.imwrite(str(tmp_path / "train" / f"{number}.png"), image[..., ::-1])
-        cv2.imwrite(str(tmp_path / "trainannot" / f"{number}.png"), label)
+        is_grey = np.ptp(image.astype(int), axis=2) < 40
+        elsewhere = VOID if number == 0 else OTHER
+        label = np.where(is_grey & (depth_m > 0), ROAD, elsewhere)
+        cv2.imwrite(str(images / f"{number}.png"), image[..., ::-1])
+        cv2.imwrite(str(labels / f"{number}.png"), label.astype(np.uint8))
+
     return tmp_path
 
 
@@ -83,13 +90,15 @@ def test_one_seed_gives_the_same_weights_and_another_seed_others(
     done = _python("-c", TRAINING, str(folder), str(tmp_path))
     assert done.returncode == 0, done.stderr
 
-    first, again, other = ((tmp_path / f"{name}.onnx").read_bytes() for name in "abc")
-
+    first = (tmp_path / "a.onnx").read_bytes()
+    again = (tmp_path / "b.onnx").read_bytes()
+    other = (tmp_path / "c.onnx").read_bytes()
     assert again == first
     assert other != first
 
-    image = painted([])[0]
-    assert load(tmp_path / "a.onnx").mask(image).shape == image.shape[:2]
+    image, _, _ = painted([])
+    segmenter = load(tmp_path / "a.onnx")
+    assert segmenter.mask(image).shape == image.shape[:2]
 
 
 @needs_torch
@@ -111,11 +120,14 @@ def test_train_is_a_command_of_cogmap() -> None:
 def test_without_torch_the_remedy_is_named(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    with_torch = ("training.networks", "training.camvid", f"training.{name}")
     for module in [*sys.modules]:
-        if module.startswith(("training.networks", "training.camvid", f"training.{name}")):
+        if module.startswith(with_torch):
             monkeypatch.delitem(sys.modules, module)
     monkeypatch.setitem(sys.modules, "torch", None)
-    run = CliRunner().invoke(train, [name, str(tmp_path), "--out", str(tmp_path / "a.onnx")])
+
+    out = tmp_path / "a.onnx"
+    run = CliRunner().invoke(train, [name, str(tmp_path), "--out", str(out)])
 
     assert isinstance(run.exception, UsageError)
     assert "pip install 'cogmap[train]'" in str(run.exception)
@@ -133,31 +145,33 @@ def test_roads_are_learned_from_one_kind_of_folder(arguments: list[str]) -> None
 def test_segments_and_objects_are_learned_from_renderings_the_same_each_time(
     tmp_path: Path,
 ) -> None:
-    towns = (("train", 4007, 0), ("unlabelled", 4008, 30), ("val", 4009, 20))
-    wanted = [
-        Job(seed, 8, invented, tmp_path / split / f"town-{seed}.npz")
-        for split, seed, invented in towns
-    ]
+    wanted = []
+    for split, seed, invented in (("train", 4007, 0), ("unlabelled", 4008, 30), ("val", 4009, 20)):
+        target = tmp_path / split / f"town-{seed}.npz"
+        wanted.append(Job(seed, 8, invented, target))
     render_all(wanted, processes=2)
 
+    first = tmp_path / "a"
+    again = tmp_path / "b"
     for name in ("segments", "objects"):
-        printed = [_trained(name, tmp_path, out) for out in ("a", "b")]
-        assert printed[0] == printed[1]
+        printed = _trained(name, tmp_path, first)
+        assert _trained(name, tmp_path, again) == printed
 
     for name in ("segments.onnx", "objects.onnx", "objects.json"):
-        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+        assert (first / name).read_bytes() == (again / name).read_bytes()
 
-    recognizer = objects.load(tmp_path / "a" / "objects.onnx")
-    assert recognizer.sizes_m.keys() <= {kind.name for kind in CATALOGUE}
+    recognizer = objects.load(first / "objects.onnx")
+    known = {kind.name for kind in CATALOGUE}
+    assert recognizer.sizes_m.keys() <= known
 
     image, depth_m, _ = painted([])
-    found = segments.load(tmp_path / "a" / "segments.onnx").segments(image, depth_m, CAMERA)
+    found = segments.load(first / "segments.onnx").segments(image, depth_m, CAMERA)
     assert all(segment.mask.shape == depth_m.shape for segment in found)
 
 
-def _trained(name: str, folder: Path, out: str) -> str:
+def _trained(name: str, folder: Path, out: Path) -> str:
     """Train for one epoch, and return what is printed, without the file's name."""
-    weights = str(folder / out / f"{name}.onnx")
+    weights = str(out / f"{name}.onnx")
     options = ["--out", weights, "--epochs", "1", "--seed", "3"]
     done = _python("-m", "training", name, str(folder), *options)
     assert done.returncode == 0, done.stderr
