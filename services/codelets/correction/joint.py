@@ -55,7 +55,7 @@ def with_landmarks(
     weights = seen.weights(graph.poses, landmarks_m) / correlated
     sightings = seen.constraints(len(graph.poses), weights)
     closures = graph.closures + sightings
-    return PoseGraph(poses, graph.steps, closures)
+    return replace(graph, poses=poses, closures=closures)
 
 
 def by_side(seen: Sightings, poses: Floats, sides: int) -> Sightings:

@@ -12,8 +12,10 @@ from cogmap.geometry.arrays import Booleans, Floats, Indices
 from services.codelets.correction.pose_graph import (
     Constraints,
     PoseGraph,
+    adjacency,
     cost,
     jacobians,
+    matvec,
     residuals,
 )
 
@@ -62,7 +64,7 @@ class NormalEquations:
     def gradient(self, poses: Floats, constraints: Constraints) -> Floats:
         """J' S^-1 d at `poses`, (3 (n - 1),)."""
         residual = residuals(poses, constraints)
-        weighted = np.einsum("mab,mb->ma", constraints.information, residual)
+        weighted = matvec(constraints.information, residual)
 
         by_i, by_j = jacobians(poses, constraints)
         at_i = np.einsum("mba,mb->ma", by_i, weighted)
@@ -102,6 +104,7 @@ class _BlockPattern:
 
         keys = columns[used] * unknown_poses + rows[used]
         blocks, target = np.unique(keys, return_inverse=True)
+
         self._sum = _summing(target, used, len(blocks), len(rows))
         self._compress(blocks, unknown_poses)
 
@@ -119,8 +122,10 @@ class _BlockPattern:
         """The matrix of (4 m, 3, 3) blocks, each transposed: columns are stored, and blocks by
         rows.
         """
-        data = self._sum @ blocks.reshape(-1, 9)
-        stored = (data.reshape(-1, 3, 3), self._indices, self._starts)
+        summed = self._sum @ blocks.reshape(-1, 9)
+        data = summed.reshape(-1, 3, 3)
+
+        stored = (data, self._indices, self._starts)
         transposed = sparse.bsr_matrix(stored, shape=self._shape).tocsr()
 
         columns = (transposed.data, transposed.indices, transposed.indptr)
@@ -143,7 +148,8 @@ def _blocks(poses: Floats, constraints: Constraints) -> Floats:
 
 def _elimination_order(count: int, constraints: Constraints) -> Indices:
     """The poses but the first, in an order of little fill (minimum degree)."""
-    pattern = _adjacency(count, constraints)[1:, 1:]
+    joined = adjacency(constraints.i, constraints.j, count)
+    pattern = joined[1:, 1:]
     pattern.data[:] = 1.0
 
     # A dominant diagonal, so that the order is decided by the pattern alone.
@@ -154,15 +160,6 @@ def _elimination_order(count: int, constraints: Constraints) -> Indices:
     factors = splu(dominant, **by_degree)
     order: Indices = np.argsort(factors.perm_c) + 1
     return order
-
-
-def _adjacency(count: int, constraints: Constraints) -> sparse.csc_matrix:
-    """Which of `count` poses are joined, in either direction, and by how many constraints."""
-    rows = np.concatenate([constraints.i, constraints.j])
-    columns = np.concatenate([constraints.j, constraints.i])
-
-    ones = np.ones(len(rows))
-    return sparse.csc_matrix((ones, (rows, columns)), shape=(count, count))
 
 
 def _summing(target: Indices, source: Indices, targets: int, sources: int) -> sparse.csr_matrix:

@@ -31,6 +31,7 @@ from services.codelets.correction.pose_graph import (
     PoseGraph,
     diagonal_information,
     mahalanobis2,
+    matvec,
     residuals,
 )
 from services.codelets.correction.reverse_replay import close_loops
@@ -157,8 +158,10 @@ def _start(poses: Floats, steps: Constraints) -> Floats:
     heading_rad = poses[0, 2] + cumulative(measured[:, 2])
 
     turn = rotation_matrices(heading_rad[:-1])
-    steps_m = np.einsum("mab,mb->ma", turn, measured[:, :2])
-    positions_m = poses[0, :2] + cumulative(steps_m)
+    steps_m = matvec(turn, measured[:, :2])
+    moved_m = cumulative(steps_m)
+
+    positions_m = poses[0, :2] + moved_m
     return np.column_stack([positions_m, wrap_angle(heading_rad)])
 
 
@@ -232,7 +235,8 @@ def _positions_only(graph: PoseGraph) -> PoseGraph:
 
     steps = _weakened_steps(graph.steps, graph.closures)
     weights = _weights(graph.steps, graph.closures)
-    return PoseGraph(graph.poses, steps, graph.closures.weighted(weights))
+    closures = graph.closures.weighted(weights)
+    return replace(graph, steps=steps, closures=closures)
 
 
 def _weakened_steps(steps: Constraints, loops: Constraints) -> Constraints:

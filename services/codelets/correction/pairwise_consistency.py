@@ -12,12 +12,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import sparse
 from scipy.special import chdtri
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.geometry.se2 import cumulative, integrate, transform_from, wrap_angle
-from services.codelets.correction.pose_graph import Constraints
+from services.codelets.correction.pose_graph import Constraints, adjacency
 
 MIN_AGREEING = 3
 # With more uncertainty between them than this, any two views would agree.
@@ -90,19 +89,11 @@ def consistent(views: Views, steps: Constraints, false_closure: float) -> Boolea
     path = _DeadReckoning(steps)
     agree = _agree(views.select(one), views.select(other), path, false_closure)
 
-    adjacency = _adjacency(one[agree], other[agree], len(views.i))
-    joined_twice = adjacency @ adjacency
-    triangles = joined_twice.multiply(adjacency).sum(axis=1)
+    joined = adjacency(one[agree], other[agree], len(views.i))
+    joined_by_one = joined @ joined
+
+    triangles = joined_by_one.multiply(joined).sum(axis=1)
     return np.asarray(triangles).ravel() > 0
-
-
-def _adjacency(one: Indices, other: Indices, count: int) -> sparse.csr_array:
-    """(count, count): which views are joined, by the numbers of either of a pair."""
-    rows = np.concatenate([one, other])
-    columns = np.concatenate([other, one])
-
-    ones = np.ones(len(rows))
-    return sparse.csr_array((ones, (rows, columns)), shape=(count, count))
 
 
 def _pairs(views: Views) -> tuple[Indices, Indices]:

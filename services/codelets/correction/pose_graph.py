@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import sparse
 
 from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Booleans, Floats, Indices
@@ -44,10 +45,10 @@ class Constraints:
     def select(self, chosen: Booleans | Indices | slice) -> Constraints:
         """The chosen ones, by mask, indices or slice."""
         return Constraints(
-            self.i[chosen],
-            self.j[chosen],
-            self.measurement[chosen],
-            self.information[chosen],
+            i=self.i[chosen],
+            j=self.j[chosen],
+            measurement=self.measurement[chosen],
+            information=self.information[chosen],
         )
 
     def weighted(self, weights: Floats) -> Constraints:
@@ -57,10 +58,10 @@ class Constraints:
 
     def __add__(self, other: Constraints) -> Constraints:
         return Constraints(
-            np.concatenate([self.i, other.i]),
-            np.concatenate([self.j, other.j]),
-            np.concatenate([self.measurement, other.measurement]),
-            np.concatenate([self.information, other.information]),
+            i=np.concatenate([self.i, other.i]),
+            j=np.concatenate([self.j, other.j]),
+            measurement=np.concatenate([self.measurement, other.measurement]),
+            information=np.concatenate([self.information, other.information]),
         )
 
 
@@ -132,6 +133,15 @@ def diagonal_information(position: Floats, heading: Floats) -> Floats:
     return information
 
 
+def adjacency(one: Indices, other: Indices, count: int) -> sparse.csc_matrix:
+    """(count, count): by how many of (m,) pairs of numbers each two are joined, either way round."""
+    rows = np.concatenate([one, other])
+    columns = np.concatenate([other, one])
+
+    ones = np.ones(len(rows))
+    return sparse.csc_matrix((ones, (rows, columns)), shape=(count, count))
+
+
 def residuals(poses: Floats, constraints: Constraints) -> Floats:
     """(m, 3): what the poses make of each constraint less what it measures, in the frame of pose
     i.
@@ -142,6 +152,12 @@ def residuals(poses: Floats, constraints: Constraints) -> Floats:
     residual = relative(origins, ends) - constraints.measurement
     residual[:, 2] = wrap_angle(residual[:, 2])
     return residual
+
+
+def matvec(matrices: Floats, vectors: Floats) -> Floats:
+    """(m, a): each of (m, a, b) matrices times its vector of (m, b)."""
+    product: Floats = np.einsum("mab,mb->ma", matrices, vectors)
+    return product
 
 
 def mahalanobis2(residual: Floats, information: Floats) -> Floats:

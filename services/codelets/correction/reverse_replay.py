@@ -19,7 +19,7 @@ import numpy as np
 
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import cumulative, rotate, rotation_matrices
-from services.codelets.correction.pose_graph import Constraints, PoseGraph, residuals
+from services.codelets.correction.pose_graph import Constraints, PoseGraph, matvec, residuals
 
 CHECK_EVERY = 10
 
@@ -68,8 +68,9 @@ def _expected_m(poses: Floats, constraints: Constraints, covariance: Floats) -> 
     """
     heading_error_rad = residuals(poses, constraints)[:, 2]
     coupling = constraints.information[:, :2, 2] * heading_error_rad[:, None]
+    by_heading_m = matvec(covariance, coupling)
 
-    expected_m: Floats = constraints.measurement[:, :2] - _times(covariance, coupling)
+    expected_m: Floats = constraints.measurement[:, :2] - by_heading_m
     return expected_m
 
 
@@ -126,13 +127,13 @@ class Loops:
         change = entering - leaving
 
         pull = np.cumsum(change[::-1], axis=0)[::-1]
-        stretched_m = _times(self._step_m2, pull[1:])
+        stretched_m = matvec(self._step_m2, pull[1:])
         return cumulative(stretched_m)
 
     def yielded(self, forces: Floats) -> Floats:
         """(m, 2): how far `forces` close each loop: the path yields, and so does the closure."""
         by_path_m = self._across(self.shifts(forces))
-        by_closure_m = _times(self._closing_m2, forces)
+        by_closure_m = matvec(self._closing_m2, forces)
         return by_path_m + by_closure_m
 
     def positions_m(self, forces: Floats) -> Floats:
@@ -143,7 +144,7 @@ class Loops:
     def costs(self, forces: Floats) -> tuple[float, float]:
         """Eq. 7 of the path under `forces`, and a lower bound for any forces (its dual)."""
         yielded_m = self.yielded(forces)
-        by_closure_m = _times(self._closing_m2, forces)
+        by_closure_m = matvec(self._closing_m2, forces)
         work = _dot(forces, yielded_m)
         in_steps = work - _dot(forces, by_closure_m)
 
@@ -187,8 +188,12 @@ def close_loops(graph: PoseGraph, tolerance: float = 0.01, max_replays: int = 50
             total, bound = loops.costs(search.forces)
 
     total, bound = loops.costs(search.forces)
-    positions_m = loops.positions_m(search.forces)
-    return Correction(positions_m, search.replays, total, bound)
+    return Correction(
+        positions_m=loops.positions_m(search.forces),
+        replays=search.replays,
+        cost=total,
+        least_cost=bound,
+    )
 
 
 class _ConjugateGradients:
@@ -200,7 +205,7 @@ class _ConjugateGradients:
     def __init__(self, loops: Loops) -> None:
         self._loops = loops
         self._left_m = loops.discrepancy_m
-        self._direction = _times(loops.gain, self._left_m)
+        self._direction = matvec(loops.gain, self._left_m)
 
         self.forces = np.zeros_like(self._left_m)
         self.gained = _dot(self._left_m, self._direction)
@@ -214,8 +219,9 @@ class _ConjugateGradients:
         self._left_m = self._left_m - rate * yielded_m
         self.replays += 1
 
-        correction = _times(self._loops.gain, self._left_m)
+        correction = matvec(self._loops.gain, self._left_m)
         gained = _dot(self._left_m, correction)
+
         taken_over = gained / self.gained
         self._direction = correction + taken_over * self._direction
         self.gained = gained
@@ -227,12 +233,6 @@ def _dot(one: Floats, other: Floats) -> float:
 
 def _inverse(matrices: Floats) -> Floats:
     return np.asarray(np.linalg.inv(matrices), np.float64)
-
-
-def _times(matrices: Floats, vectors: Floats) -> Floats:
-    """(m, 2): each of (m, 2, 2) matrices times its vector."""
-    product: Floats = np.einsum("mab,mb->ma", matrices, vectors)
-    return product
 
 
 def _weighted_squares(errors_m: Floats, covariance_m2: Floats) -> float:

@@ -30,6 +30,7 @@ from schemas.nodes import (
 from schemas.sensing import Percept, PlaceMatch
 from services.codelets.config import SECTION, Config
 from services.codelets.correction.pairwise_consistency import MIN_AGREEING
+from services.codelets.correction.pose_graph import matvec
 from services.codelets.localization.measurement_model import has_bearing, has_range
 from services.codelets.mapping.observations import Sightings
 from services.codelets.mapping.path import ODOMETRY, STAMP, path_grows, rows_of
@@ -290,7 +291,7 @@ def _where_by_odometry_m(seen: Sightings, rows: Floats, known: Indices) -> Float
     poses = rows[places, ODOMETRY]
 
     turn = rotation_matrices(poses[:, 2])
-    offset_m = np.einsum("mab,mb->ma", turn, seen.where_m[known])
+    offset_m = matvec(turn, seen.where_m[known])
     where_m: Floats = poses[:, :2] + offset_m
     return where_m
 

@@ -17,7 +17,7 @@ from cogmap.geometry.se2 import rotation_matrices
 from schemas.array import Matrix
 from schemas.nodes import ObservationColumn, Observations, observations_id
 from schemas.sensing import Percept
-from services.codelets.correction.pose_graph import Constraints
+from services.codelets.correction.pose_graph import Constraints, matvec
 
 COLUMNS = len(ObservationColumn)
 STAMP = ObservationColumn.STAMP_S
@@ -146,7 +146,7 @@ class Sightings(NamedTuple):
     def landmarks_m(self, poses: Floats) -> Floats:
         """(k, 2): where the landmarks are most likely, the path being at (n, 3) `poses`."""
         turn = rotation_matrices(poses[self.place, 2])
-        offset_m = np.einsum("mab,mb->ma", turn, self.where_m)
+        offset_m = matvec(turn, self.where_m)
         seen_m = poses[self.place, :2] + offset_m
         information = turn @ self.information @ turn.mT
 
@@ -170,7 +170,7 @@ class Sightings(NamedTuple):
 
     def _means_m(self, seen_m: Floats, information: Floats) -> Floats:
         """(k, 2): the mean of where each landmark was seen, (m, 2), by (m, 2, 2) information."""
-        weighed_m = np.einsum("mab,mb->ma", information, seen_m)
+        weighed_m = matvec(information, seen_m)
         total = self._sums(information)
         pull = self._sums(weighed_m)
 

@@ -167,8 +167,12 @@ def steps_of(rows: Floats, config: Config) -> Constraints:
 
     variances = rows[:, VARIANCES]
     stated = np.diff(variances, axis=0)
-    information = _step_information(steps, stated, config)
-    return Constraints(places, places + 1, steps, information)
+    return Constraints(
+        i=places,
+        j=places + 1,
+        measurement=steps,
+        information=_step_information(steps, stated, config),
+    )
 
 
 def _step_information(steps: Floats, stated: Floats, config: Config) -> Floats:

@@ -8,7 +8,7 @@ from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import relative, rotation_matrices
 from schemas.nodes import LoopClosure
 from services.codelets.correction.pairwise_consistency import Views
-from services.codelets.correction.pose_graph import Constraints
+from services.codelets.correction.pose_graph import Constraints, matvec
 from services.codelets.mapping.path import STAMP
 
 MIN_SD_M = 1e-3
@@ -34,7 +34,6 @@ def _places_of(closures: list[LoopClosure], rows: Floats) -> Indices:
     """(m, 2): the rows nearest in time to where each closure leads from, and to."""
     from_to_ns = [[closure.from_ns, closure.to_ns] for closure in closures]
     stamps_ns = np.array(from_to_ns).reshape(-1, 2)
-
     stamps_s = stamps_ns[..., None] * 1e-9
 
     away_s = np.abs(rows[:, STAMP] - stamps_s)
@@ -74,12 +73,16 @@ def constraints_of(views: Views, poses: Floats) -> Constraints:
     turn_rad = np.where(views.has_heading, 0.0, step[:, 2])
 
     turn = rotation_matrices(turn_rad)
-    seen_m = np.einsum("mab,mb->ma", turn, views.here_m)
+    seen_m = matvec(turn, views.here_m)
 
     moved_m = views.there_m - seen_m
     measured = np.column_stack([moved_m, turn_rad])
-    information = _information(views, seen_m)
-    return Constraints(views.i, views.j, measured, information)
+    return Constraints(
+        i=views.i,
+        j=views.j,
+        measurement=measured,
+        information=_information(views, seen_m),
+    )
 
 
 def _information(views: Views, seen_m: Floats) -> Floats:
