@@ -87,29 +87,33 @@ def evaluate(robot: Robot, landmarks: dict[int, tuple[float, float]]) -> Metrics
     it. `*_even_m` is of the moments at even times alone.
     """
     log = list(moments(robot))
-    stamps_s = _stamps_s(log)
-    truth = Truth.at(robot, stamps_s)
+    truth = Truth.at(robot, _stamps_s(log))
     is_tick = np.array([moment.tick for moment in log])
     even = truth.only(is_tick)
     start = _start(robot)
 
-    known = [follow(log, landmarks, start, seed) for seed in SEEDS]
-    slam = [follow(log, {}, ORIGIN, seed) for seed in SEEDS]
+    known = [follow(log, landmarks, start, seed).online for seed in SEEDS]
+    metrics = {
+        "known_map_rmse_m": float(np.mean([truth.rmse_m(path) for path in known])),
+        "known_map_rmse_even_m": float(np.mean([even.rmse_m(path) for path in known])),
+    }
+    metrics |= _mapping_errors(log, truth)
+    return metrics | {"recovery_s": recovery_s(robot, landmarks)}
 
-    known_m = [truth.rmse_m(drive.online) for drive in known]
-    known_even_m = [even.rmse_m(drive.online) for drive in known]
-    slam_m = [truth.aligned_error_m(drive.corrected(stamps_s)) for drive in slam]
-    slam_online_m = [truth.aligned_error_m(drive.online) for drive in slam]
+
+def _mapping_errors(log: Sequence[Moment], truth: Truth) -> Metrics:
+    """The errors of paths on a map of the robot's own, and of path integration and the smoother."""
+    stamps_s = _stamps_s(log)
+    drives = [follow(log, {}, ORIGIN, seed) for seed in SEEDS]
+    in_the_end_m = [truth.aligned_error_m(drive.corrected(stamps_s)) for drive in drives]
+    online_m = [truth.aligned_error_m(drive.online) for drive in drives]
     smoothed = smoother.smooth(log)
 
     return {
-        "known_map_rmse_m": float(np.mean(known_m)),
-        "known_map_rmse_even_m": float(np.mean(known_even_m)),
-        "slam_rmse_m": float(np.mean(slam_m)),
-        "slam_online_rmse_m": float(np.mean(slam_online_m)),
-        "path_integration_rmse_m": truth.aligned_error_m(slam[0].odometry),
+        "slam_rmse_m": float(np.mean(in_the_end_m)),
+        "slam_online_rmse_m": float(np.mean(online_m)),
+        "path_integration_rmse_m": truth.aligned_error_m(drives[0].odometry),
         "smoother_rmse_m": truth.aligned_error_m(smoothed),
-        "recovery_s": recovery_s(robot, landmarks),
     }
 
 
@@ -129,24 +133,21 @@ def recovery_s(robot: Robot, landmarks: dict[int, tuple[float, float]]) -> float
 
     is_after = stamps_s > begin_s + released_s
     observes = np.array([bool(moment.percepts) for moment in log])
-    after = np.flatnonzero(observes & truth.is_known & is_after)
-    if not len(after):
+    after = truth.only(is_after & observes)
+    return _lost_s(stamps_s[after.is_known], after.errors_m(online))
+
+
+def _lost_s(stamps_s: Floats, errors_m: Floats) -> float:
+    """How long after the first of (n,) stamps no error is over FOUND_M any more.
+
+    Up to the last one where there is no such time; 0 where there are no stamps.
+    """
+    lost = np.flatnonzero(errors_m > FOUND_M)
+    if not len(lost):
         return 0.0
 
-    offset_m = online[after, :2] - truth.poses[after, :2]
-    error_m = np.hypot(offset_m[:, 0], offset_m[:, 1])
-    observed_s = stamps_s[after]
-    found_s = observed_s[_first_found(error_m)]
-    return float(found_s - observed_s[0])
-
-
-def _first_found(error_m: Floats) -> int:
-    """The index from which on no error is over FOUND_M; the last one where there is none."""
-    lost = np.flatnonzero(error_m > FOUND_M)
-    if not len(lost):
-        return 0
-
-    return min(int(lost[-1]) + 1, len(error_m) - 1)
+    found = min(int(lost[-1]) + 1, len(stamps_s) - 1)
+    return float(stamps_s[found] - stamps_s[0])
 
 
 def _stamps_s(log: Sequence[Moment]) -> Floats:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from benchmarks.localization.senses import Moment
 from cogmap.errors import CogmapError
 from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
+from cogmap.runtime.config import Sections
 from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module, Reply
 from schemas import topics
@@ -36,7 +36,7 @@ LOCALIZATION = "localization"
 Landmarks = dict[str, tuple[float, float]]
 
 
-def sections(surveyed: bool) -> dict[str, dict[str, Any]]:
+def sections(surveyed: bool) -> Sections:
     """The configuration of both modules; no loop is closed on a map that was surveyed."""
     workspace = {"mode": "lockstep", "base_level_decay": 0.0}
 
@@ -85,20 +85,18 @@ class LocalizationLoop:
         self._frame = 0
         self._until_ns = 0
 
-        configured = sections(surveyed)
-        workspace = registry.build("workspace", configured)
-        if workspace.restore is not None:
-            first_cycle = seed * CYCLES_A_SEED
-            initial = nodes.initial_map(start, landmarks or {}, surveyed, SAMPLES, first_cycle)
-            workspace.restore([initial])
-
-        worker = registry.build("codelets", configured)
-        on_leases = worker.handlers[topics.LEASES]
-        worker.handlers[topics.LEASES] = self._timed(on_leases)
-
-        observer = Module("observer").following(self._graph, self._on_delta)
         self._senses = Module("senses")
         self._senses.emits.update((topics.SELF_MOTION, topics.PERCEPTS))
+
+        configured = sections(surveyed)
+        first_cycle = seed * CYCLES_A_SEED
+        initial = nodes.initial_map(start, landmarks or {}, surveyed, SAMPLES, first_cycle)
+        workspace = registry.build("workspace", configured)
+        if workspace.restore is not None:
+            workspace.restore([initial])
+
+        worker = self._worker(configured)
+        observer = Module("observer").following(self._graph, self._on_delta)
         self._runner = InProcessRunner([workspace, worker, observer, self._senses])
 
     def live(self, moment: Moment) -> None:
@@ -132,6 +130,13 @@ class LocalizationLoop:
     def path(self) -> Floats:
         """(n, 7) rows of the path on the map now: stamp_s, pose, and path integration's."""
         return nodes.path(self._graph)
+
+    def _worker(self, configured: Sections) -> Module:
+        """The codelets' module, whose tasks are timed."""
+        worker = registry.build("codelets", configured)
+        on_leases = worker.handlers[topics.LEASES]
+        worker.handlers[topics.LEASES] = self._timed(on_leases)
+        return worker
 
     def _messages(self, moment: Moment) -> list[SelfMotion | Percepts]:
         """The next frame's self-motion and percepts."""

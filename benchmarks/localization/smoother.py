@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ SIDEWAYS_SHARE = 0.2
 CAUCHY = 2.0
 
 
-def smooth(moments: list[Moment]) -> Floats:
+def smooth(moments: Sequence[Moment]) -> Floats:
     """(n, 3) poses at the moments that fit all percepts and motions best; the start is at 0.
 
     Levenberg-Marquardt on the same percepts, motions and noise that the codelets get; landmarks are

@@ -26,6 +26,7 @@ MIN_RANGE_M = 0.1
 NEAR_M = 25.0
 FAR_M = (100.0, 5000.0)
 SEED = 11
+Times = tuple[float, float]
 
 
 class Circle:
@@ -45,7 +46,7 @@ class Circle:
         self._time_s = 0.0
         self._loop = LocalizationLoop(start, places)
 
-    def update_s(self) -> tuple[float, float]:
+    def update_s(self) -> Times:
         """Drive a step and look: CPU time of localization, and of all tasks of the cycle."""
         self._loop.live(self._next())
 
@@ -97,6 +98,12 @@ class Circle:
         return seen(label_of(number), float(wrapped_rad), max(MIN_RANGE_M, range_m))
 
 
+def _drive_both(small: Circle, large: Circle) -> tuple[list[Times], Times]:
+    """LARGE_EVERY updates on the small map, and one on the large."""
+    small_s = [small.update_s() for _ in range(LARGE_EVERY)]
+    return small_s, large.update_s()
+
+
 def measure() -> Metrics:
     """CPU times of the worker on both maps in turn; the ratio is of medians.
 
@@ -104,22 +111,24 @@ def measure() -> Metrics:
     """
     small = Circle(SMALL)
     large = Circle(LARGE)
-    small_s = []
-    large_s = []
-    warm_up = WARM_UP * LARGE_EVERY
     gc.collect()
     gc.freeze()  # a worker holds no map for the collector to look through
 
-    for number in range(warm_up + UPDATES):
-        small_s.append(small.update_s())
-        if number % LARGE_EVERY == 0:
-            large_s.append(large.update_s())
+    for _ in range(WARM_UP):
+        _drive_both(small, large)
+
+    small_s: list[Times] = []
+    large_s: list[Times] = []
+    for _ in range(UPDATES // LARGE_EVERY):
+        of_small_s, of_large_s = _drive_both(small, large)
+        small_s += of_small_s
+        large_s.append(of_large_s)
 
     gc.unfreeze()
     small.close()
     large.close()
-    localization_ms, small_ms = 1e3 * np.array(small_s[warm_up:]).T
-    _, large_ms = 1e3 * np.array(large_s[WARM_UP:]).T
+    localization_ms, small_ms = 1e3 * np.array(small_s).T
+    _, large_ms = 1e3 * np.array(large_s).T
 
     return {
         "update_ms_p50": float(np.median(localization_ms)),

@@ -39,9 +39,15 @@ class Truth:
         """The truth as known at the (n,) `chosen` times alone."""
         return replace(self, is_known=self.is_known & chosen)
 
+    def errors_m(self, path: Floats) -> Floats:
+        """Distances of a (n, 3) `path` from the truth where that is known, (known,)."""
+        offset_m = self._offset_m(path)
+        distances_m: Floats = np.hypot(offset_m[:, 0], offset_m[:, 1])
+        return distances_m
+
     def rmse_m(self, path: Floats) -> float:
         """Root mean square distance of a (n, 3) `path` from the truth where that is known."""
-        offset_m = path[self.is_known, :2] - self._positions_m
+        offset_m = self._offset_m(path)
         squared_m2 = np.square(offset_m).sum(axis=1)
         return float(np.sqrt(squared_m2.mean()))
 
@@ -49,6 +55,9 @@ class Truth:
         """The same once the path is aligned with the truth, as one in a frame of its own."""
         positions_m = path[self.is_known, :2]
         return trajectory_error_m(positions_m, self._positions_m)
+
+    def _offset_m(self, path: Floats) -> Floats:
+        return path[self.is_known, :2] - self._positions_m
 
     @property
     def _positions_m(self) -> Floats:

@@ -23,6 +23,7 @@ MAX_CORRELATION = 0.6
 BORDER_SD_M = (0.15, 0.4)
 SENSED_AXES = ((0,), (1,), (0, 1))
 SAMPLES = 20_000
+Covariance = tuple[tuple[float, float], tuple[float, float]]
 THRESHOLDS = {
     "posterior_sd_ratio": within(0.9, 1.1),
     "posterior_mean_error": at_most(0.1),
@@ -48,21 +49,28 @@ def cues(seed: int) -> Cues:
     """
     rng = np.random.default_rng([seed, 0])
     x_m, y_m = rng.uniform(*MIDDLE_M, 2).tolist()
-    x_sd_m, y_sd_m = rng.uniform(*PRIOR_SD_M, 2)
-    correlation = rng.uniform(-MAX_CORRELATION, MAX_CORRELATION)
-    across_m2 = float(correlation * x_sd_m * y_sd_m)
-    along_x = (float(x_sd_m**2), across_m2)
-    along_y = (across_m2, float(y_sd_m**2))
-    covariance_m2 = (along_x, along_y)
-
+    covariance_m2 = _covariance(rng)
     true_m = rng.multivariate_normal((x_m, y_m), covariance_m2)
+
+    axes = SENSED_AXES[seed % len(SENSED_AXES)]
     sds_m = rng.uniform(*BORDER_SD_M, 2).tolist()
     borders = []
-    for axis in SENSED_AXES[seed % len(SENSED_AXES)]:
+    for axis in axes:
         sensed_m = float(rng.normal(true_m[axis], sds_m[axis]))
         borders.append(Border(axis, sensed_m, sds_m[axis]))
 
     return Cues((x_m, y_m), covariance_m2, tuple(borders))
+
+
+def _covariance(rng: np.random.Generator) -> Covariance:
+    """That of path integration: standard deviations in PRIOR_SD_M, correlated."""
+    x_sd_m, y_sd_m = rng.uniform(*PRIOR_SD_M, 2)
+    correlation = rng.uniform(-MAX_CORRELATION, MAX_CORRELATION)
+
+    across_m2 = float(correlation * x_sd_m * y_sd_m)
+    along_x = (float(x_sd_m**2), across_m2)
+    along_y = (across_m2, float(y_sd_m**2))
+    return along_x, along_y
 
 
 def recording(seed: int) -> Recording:

@@ -62,7 +62,10 @@ def draw_raster(axes: Axes, spikes: Recording) -> None:
     for coincidence_s in place.times_s(first_cycle):
         axes.axvline(coincidence_s, color=ESTIMATE, lw=6, alpha=0.15, zorder=0)
 
-    names = [train.name for train in trains]
+    _label(axes, [train.name for train in trains])
+
+
+def _label(axes: Axes, names: list[str]) -> None:
     axes.set_yticks(range(len(names)), names)
     axes.set_xlim(0, SHOWN_S)
     axes.set_xlabel("seconds", color=FAINT)
@@ -82,11 +85,11 @@ def _inputs(spikes: Recording, place: int) -> list[Train]:
 
     for axis, fired in enumerate(spikes.border):
         wall = "west" if axis == WEST else "south"
-        nearest = BorderCells(SIDE_M).nearest(centre_m[:, axis])
-        trains.append(Train(f"border cell, {wall} wall", fired[int(nearest[0])], OBJECT))
+        (cell,) = BorderCells(SIDE_M).nearest(centre_m[:, axis])
+        trains.append(Train(f"border cell, {wall} wall", fired[cell], OBJECT))
 
     for spacing_m, fired in zip(SPACINGS_M, spikes.grid, strict=True):
-        nearest = GridModule(spacing_m).nearest(centre_m)
-        trains.append(Train(f"grid cell, {spacing_m:g} m", fired[int(nearest[0])], TRUE))
+        (cell,) = GridModule(spacing_m).nearest(centre_m)
+        trains.append(Train(f"grid cell, {spacing_m:g} m", fired[cell], TRUE))
 
     return trains
