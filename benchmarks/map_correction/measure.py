@@ -128,6 +128,23 @@ def _headings(graph: PoseGraph, peer: Gtsam) -> tuple[Floats, Floats, Metrics]:
     by_qr = peer.gives_up()
     poses = optimize(graph)
     peers_poses = peer.poses(peer.solve())
+    ours_s, peers_s = _in_turn(graph, peer)
+
+    heading_cost = cost(poses, graph.constraints)
+    peers_cost = cost(peers_poses, graph.constraints)
+    metrics = {
+        "heading_ms": 1e3 * ours_s,
+        "gtsam_ms": 1e3 * peers_s,
+        "gtsam_by_qr": float(by_qr),
+        "time_vs_gtsam": ours_s / peers_s,
+        "heading_cost": heading_cost,
+        "cost_vs_gtsam": heading_cost / peers_cost,
+    }
+    return poses, peers_poses, metrics
+
+
+def _in_turn(graph: PoseGraph, peer: Gtsam) -> tuple[float, float]:
+    """The median seconds of PAIRS runs of ours and of gtsam's."""
     ours_s = []
     peers_s = []
 
@@ -139,19 +156,7 @@ def _headings(graph: PoseGraph, peer: Gtsam) -> tuple[Floats, Floats, Metrics]:
             peers_s.append(peer_s)
             progress(pair / PAIRS)
 
-    ours_median_s = float(np.median(ours_s))
-    peers_median_s = float(np.median(peers_s))
-    heading_cost = cost(poses, graph.constraints)
-    peers_cost = cost(peers_poses, graph.constraints)
-    metrics = {
-        "heading_ms": 1e3 * ours_median_s,
-        "gtsam_ms": 1e3 * peers_median_s,
-        "gtsam_by_qr": float(by_qr),
-        "time_vs_gtsam": ours_median_s / peers_median_s,
-        "heading_cost": heading_cost,
-        "cost_vs_gtsam": heading_cost / peers_cost,
-    }
-    return poses, peers_poses, metrics
+    return float(np.median(ours_s)), float(np.median(peers_s))
 
 
 def _incremental(graph: PoseGraph, batch_cost: float) -> Metrics:

@@ -110,16 +110,11 @@ def _tiles(places: int, rng: np.random.Generator) -> list[PlaceTile]:
 
     tiles = []
     for index in range(number):
-        columns = {}
-        for name in PlaceColumn:
-            values = rng.random(shape, np.float32)
-            columns[name] = Array.of(values)
-
         row, column = divmod(index, side)
         tile = PlaceTile(
             x=row - middle,
             y=column - middle,
-            columns=columns,
+            columns={name: Array.of(rng.random(shape, np.float32)) for name in PlaceColumn},
             activation_cycle=cycles,
         )
         tiles.append(tile)

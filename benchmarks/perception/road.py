@@ -69,20 +69,22 @@ def true_boundary_m(
     Where something upright hides the ground, or the image ends, nobody can see the road end.
     """
     ground_m = _ground_m(depth_m, camera)
-    beside = (np.s_[:, :-1], np.s_[:, 1:])
-    below = (np.s_[:-1], np.s_[1:])
-    points_m = []
+    beside_m = _between_m(surface[:, :-1], surface[:, 1:], ground_m[:, :-1], ground_m[:, 1:])
+    below_m = _between_m(surface[:-1], surface[1:], ground_m[:-1], ground_m[1:])
 
-    for here, there in (beside, below):
-        is_boundary = _is_boundary(surface[here], surface[there])
-        here_m = ground_m[here][is_boundary]
-        there_m = ground_m[there][is_boundary]
-        points_m.append((here_m + there_m) / 2)
-
-    every_m = np.concatenate(points_m)
+    every_m = np.concatenate([beside_m, below_m])
     distance_m = np.hypot(every_m[:, 0], every_m[:, 1])
     is_near = distance_m <= within_m
     return np.asarray(every_m[is_near])
+
+
+def _between_m(one: Bytes, other: Bytes, one_m: Floats, other_m: Floats) -> Floats:
+    """Points (n, 2) half way between neighbouring pixels where road ends.
+
+    `one` and `other` are their surfaces (h, w), `one_m` and `other_m` what ground they show.
+    """
+    is_boundary = _is_boundary(one, other)
+    return (one_m[is_boundary] + other_m[is_boundary]) / 2
 
 
 def _is_boundary(one: Bytes, other: Bytes) -> Booleans:

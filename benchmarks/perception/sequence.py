@@ -160,16 +160,22 @@ def poses(
 
     while here_m <= at_m[-1]:
         here = [float(np.interp(here_m, at_m, column)) for column in columns.T]
-        x_m, y_m, along_rad, left_m, turned_rad, speed = here
-        pose = Pose(
-            x_m=x_m - left_m * math.sin(along_rad),
-            y_m=y_m + left_m * math.cos(along_rad),
-            heading_rad=along_rad + turned_rad,
-        )
-        found.append(pose)
+        *beside, speed = here
+        found.append(_pose_beside(*beside))
         here_m += mean_step_m + half_range_m * speed
 
     return found
+
+
+def _pose_beside(
+    x_m: float, y_m: float, along_rad: float, left_m: float, turned_rad: float
+) -> Pose:
+    """The pose `left_m` of a point of the line, `turned_rad` from its direction `along_rad`."""
+    return Pose(
+        x_m=x_m - left_m * math.sin(along_rad),
+        y_m=y_m + left_m * math.cos(along_rad),
+        heading_rad=along_rad + turned_rad,
+    )
 
 
 def _headings_rad(points_m: Floats) -> Floats:

@@ -36,12 +36,16 @@ def measure(left: Path, right: Path, disparity: Path, scale: float) -> Metrics:
     true_px = _truth(disparity, scale)
     _check_size(right, right_rgb, left, left_rgb)
     _check_size(disparity, true_px, left, left_rgb)
+    return compared(left_rgb, right_rgb, true_px)
 
+
+def compared(left: Bytes, right: Bytes, true_px: Floats32) -> Metrics:
+    """The metrics of `measure`, of a pair's images (h, w, 3) and true disparities (h, w)."""
     most_px = float(true_px.max())
     matcher = StereoMatcher(most_px)
-    ours = matcher.disparity_px(left_rgb, right_rgb)
-    unrefined = matcher.disparity_px(left_rgb, right_rgb, refine=False)
-    plain = plain_sgbm(left_rgb, right_rgb, most_px)
+    ours = matcher.disparity_px(left, right)
+    unrefined = matcher.disparity_px(left, right, refine=False)
+    plain = plain_sgbm(left, right, most_px)
     is_matched = (ours > 0) & (plain > 0)
     in_both = np.where(is_matched, true_px, np.float32(0))
 

@@ -71,7 +71,8 @@ def distances_m(points_m: npt.ArrayLike, pieces: Floats) -> Floats:
     along = pieces[:, 1] - start
     length2 = (along**2).sum(axis=1)
 
-    projection = ((points - start) * along).sum(axis=2)
+    from_start = points - start
+    projection = (from_start * along).sum(axis=2)
     share = (projection / length2).clip(0.0, 1.0)
     foot = start + share[..., None] * along
 
