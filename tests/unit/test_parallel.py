@@ -58,10 +58,12 @@ def test_nothing_is_left_of_the_processes_of_one_that_is_killed(tmp_path: Path) 
 
     while process.stdout.readline() != "waiting\n":
         assert process.poll() is None
+
     deadline_s = time.monotonic() + 30
     while len(_children(process.pid)) < 3:  # two at work, and Python's own tracker
         assert time.monotonic() < deadline_s
     children = _children(process.pid)
+
     process.send_signal(signal.SIGKILL)
     process.wait()
     while any(_alive(child) for child in children):

@@ -33,6 +33,7 @@ def test_a_scheme_lacking_part_of_its_context_is_not_active() -> None:
 def test_the_threshold_falls_with_each_attempt_until_one_selects() -> None:
     selection = ActionSelection(Config())
     route = {"route_ahead": 0.5}
+
     attempts = [selection.select(_nodes(self=0.4), route) for _ in range(10)]
     chosen = [number for number, attempt in enumerate(attempts) if attempt is not None]
 

@@ -121,6 +121,7 @@ def test_a_topic_with_a_rate_far_from_the_tables_is_named(number: int, is_off: b
 def test_rates_mean_nothing_in_lockstep_and_follow_the_clock_otherwise() -> None:
     before = health(10, emitted={"sensory/scan": 0})
     after = health(12, emitted={"sensory/scan": 5})
+
     in_lockstep = observed(before, after, clock_rate=0.0)
     at_half_speed = observed(before, after, clock_rate=0.5)
     in_real_time = observed(before, after, clock_rate=1.0)

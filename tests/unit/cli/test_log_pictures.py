@@ -158,6 +158,7 @@ def test_it_is_the_view_in_the_middle_or_the_nearest_to_a_time(drive: Path) -> N
 def test_a_camera_is_shown_as_it_gave_its_image(drive: Path) -> None:
     log_command("image", drive, "--frame", "6", "--camera", "right", "-o", "right.png")
     log_command("image", drive, "--frame", "6", "--camera", "left", "-o", "left.JPG")
+
     left = read("left.JPG").astype(int)
     right = read("right.png")
 

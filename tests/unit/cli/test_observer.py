@@ -106,6 +106,7 @@ def test_truth_between_two_poses_is_interpolated() -> None:
     for tick in (1, 4):
         observer.update(odometry(tick, 0.0))
         observer.update(self_motion(tick, 0.0))
+
     observer.update(estimate(3, 3.0, 6.0))
 
     assert observer.errors().estimate_m == pytest.approx([0.0])
@@ -195,6 +196,7 @@ def test_a_track_keeps_its_order_when_an_old_position_comes_late() -> None:
     track = Track()
     for stamp_ns in (1, 3, 2):
         track.add(stamp_ns, float(stamp_ns), 0.0)
+
     covered = track.covers(np.arange(5))
 
     assert track.stamps_ns.tolist() == [1, 3]

@@ -112,6 +112,7 @@ def test_each_module_is_a_process_and_each_worker_one_more(tmp_path: Path) -> No
 def test_modules_of_ones_own_are_not_started_and_waited_for(tmp_path: Path) -> None:
     choices = Choices(without=["epam", "codelets"], codelets=2)
     every = {*registry.MODULES, RECORDER, ROUTER}
+
     awaits = awaited(choices, observer=True)
 
     assert instances(tmp_path, choices) == every - {"epam", "codelets"}
@@ -128,6 +129,7 @@ def test_an_existing_router_is_used_and_none_started(tmp_path: Path) -> None:
 def test_a_recorder_that_is_started_again_writes_another_log(tmp_path: Path) -> None:
     every = started(tmp_path, Choices())
     (recorder,) = [program for program in every if program.instance == RECORDER]
+
     first = str(tmp_path / "log.mcap")
     second = str(tmp_path / "log-2.mcap")
 

@@ -115,6 +115,7 @@ def test_a_stopped_child_is_ended_all_the_same(supervisor: Supervisor, tmp_path:
     supervisor.start(python("mind", "print('here', flush=True); import sys; sys.stdin.read()"))
     wait_until(lambda: said(tmp_path, "mind") == ["here"])
     pid = supervisor.children["mind"].pid
+
     os.kill(pid, signal.SIGSTOP)
     supervisor.end(["mind"], grace_s=0.1)
 

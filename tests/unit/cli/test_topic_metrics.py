@@ -39,6 +39,7 @@ def test_bandwidth_is_what_came_over_the_time_since_the_first_of_it() -> None:
     bandwidth = Bandwidth(3)
     for at_s, size in ((0, 9999), (1, 100), (2, 200), (3, 300)):
         bandwidth.add(at_s * S, size)
+
     sizes = bandwidth.sizes_bytes()
 
     assert bandwidth.bytes_per_s(5 * S) == pytest.approx(150.0)

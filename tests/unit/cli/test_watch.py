@@ -200,6 +200,7 @@ def test_gaps_are_those_of_whoever_missed_most(watch: Watch, publisher: Publishe
     publisher.publish(health("epam", {"odometry": 3}, busy=0.2))
     publisher.publish(health("sensory", {"odometry": 5, "camera/stereo": 9}))
     publisher.publish(health("epam", {"odometry": 3}, busy=0.4))
+
     gaps = watch.gaps()
 
     assert gaps["odometry"] == 5

@@ -256,6 +256,7 @@ def test_whatever_a_codelet_raises_is_a_failure_of_its_task() -> None:
 def test_a_task_on_a_graph_that_lacks_what_it_reads_is_a_failure(codelet: str) -> None:
     worker = build("w", configured(CONFIG))
     asked = task(codelet, version=0, percepts=[percept("house")])
+
     proposal = _proposal(_answers(worker, asked))
 
     assert proposal.failure.startswith(f"{codelet}: ")

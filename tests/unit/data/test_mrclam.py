@@ -33,6 +33,7 @@ def test_a_set_is_read_with_barcodes_as_subjects_and_by_time(
 ) -> None:
     recording = read(_folder(tmp_path))
     (robot,) = recording.robots
+
     subjects = robot.observations[:, 1].tolist()
     landmarks = robot.landmark_observations[:, 1].tolist()
 

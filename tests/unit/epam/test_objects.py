@@ -69,6 +69,7 @@ def test_an_unknown_object_has_no_label_until_it_is_learned(
 ) -> None:
     unknown = _appearance(5)
     before = recognizer.recognize(unknown)
+
     recognizer.learn("new-building-1", unknown.embedding)
     after = recognizer.recognize(_appearance(5, 6, 0.25))
 
@@ -104,6 +105,7 @@ def test_an_objects_cosine_is_that_of_its_most_similar_appearance(
 ) -> None:
     recognizer.learn("new-building-1", _direction(5))
     before = recognizer.recognize(_appearance(6))
+
     recognizer.learn("new-building-1", _direction(6))
     after = recognizer.recognize(_appearance(6))
     first_side = recognizer.recognize(_appearance(5))

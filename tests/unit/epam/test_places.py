@@ -96,6 +96,7 @@ def test_a_route_is_recognized_in_other_light_at_other_speed_and_heading() -> No
 def test_on_a_new_route_nothing_matches_and_every_view_is_remembered() -> None:
     recognizer = _recognizer_after(Route(1))
     new_route = Route(2)
+
     matches, remembered = _drive(recognizer, _lap(new_route), LENGTH)
     frames = [view.frame for view in remembered]
 
@@ -123,6 +124,7 @@ def test_the_most_recent_views_do_not_match() -> None:
 def test_a_recognized_place_is_not_remembered_again() -> None:
     route = Route(1)
     recognizer = _recognizer_after(route)
+
     matches, remembered = _drive(
         recognizer, [route.view(place, evening=True) for place in range(30)], LENGTH
     )
@@ -168,6 +170,7 @@ def test_a_view_that_shows_no_place_is_neither_remembered_nor_matched(
 ) -> None:
     route = Route(1)
     recognizer = _recognizer_after(route)
+
     matches, _ = _drive(recognizer, _along(route, range(10)), LENGTH)
     assert matches[-1] is not None
 

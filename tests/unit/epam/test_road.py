@@ -150,6 +150,7 @@ def test_no_boundary_is_claimed_behind_something_upright() -> None:
 def test_no_boundary_is_claimed_where_the_image_ends() -> None:
     everywhere = np.ones(SIZE, np.float32)
     everywhere[:HORIZON] = 0.0
+
     road_m, boundary_m = project(everywhere, _street().depth_m, CAMERA)
 
     assert len(road_m) > 100
@@ -167,6 +168,7 @@ def test_no_boundary_is_claimed_at_the_outermost_pixels() -> None:
 def test_left_is_positive() -> None:
     street = _street()
     left_half = street.mask & (np.arange(320) < 160)
+
     road_m, _ = project(left_half.astype(np.float32), street.depth_m, CAMERA)
     left_m = road_m[:, 1]
 

@@ -48,6 +48,7 @@ def test_every_route_ends_at_post_8_and_15_degrees_move_its_target_46_cm() -> No
 def test_steps_lead_to_a_goal_behind_one_until_it_is_within_reach() -> None:
     pose = Pose(1.0, 2.0, 0.0)
     goal = (-2.0, 2.5)
+
     for _ in range(12):
         towards = pose.towards(goal)
         pose = pose.after(*step(*towards))

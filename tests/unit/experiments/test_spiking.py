@@ -32,6 +32,7 @@ def test_a_grid_cells_field_repeats_on_a_hexagonal_lattice() -> None:
 def test_every_place_has_a_grid_cell_that_fires_there(spacing_m: float) -> None:
     centres_m = place_centres_m(5.0)
     module = GridModule(spacing_m)
+
     chosen = module.nearest(centres_m)
     tuning = module.tuning(centres_m)[chosen, np.arange(len(centres_m))]
 
@@ -41,6 +42,7 @@ def test_every_place_has_a_grid_cell_that_fires_there(spacing_m: float) -> None:
 def test_every_place_has_a_border_cell_that_fires_there() -> None:
     centres_m = place_centres_m(5.0)
     cells = BorderCells(5.0)
+
     chosen = cells.nearest(centres_m[:, 0])
 
     assert cells.distances_m[chosen] == pytest.approx(centres_m[:, 0])

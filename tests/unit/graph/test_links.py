@@ -44,6 +44,7 @@ def test_links_in_bulk_leave_other_links_of_their_source() -> None:
 def test_links_applied_twice_are_links_applied_once() -> None:
     links = Links(kind=NEAR, weights={"a": {"b": 0.5}})
     at = _link("a", "place:map:0:1:2", kind=LinkKind.AT)
+
     once = _graph(links, at)
     twice = _graph(links, at, links, at)
 
@@ -89,6 +90,7 @@ def test_a_forgotten_node_takes_links_to_it_and_from_it_along() -> None:
 def test_a_message_in_the_graph_is_not_changed_by_the_next_one() -> None:
     first = Links(kind=NEAR, weights={"a": {"b": 0.5}})
     second = Links(kind=NEAR, weights={"a": {"b": 1.0, "c": 1.0}})
+
     before = encode(first)
     _graph(first, second, _link("a", "d"))
 

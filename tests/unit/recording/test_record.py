@@ -158,6 +158,7 @@ def test_what_is_no_message_is_counted_and_not_written(path: Path) -> None:
     recorded.publish_bytes(topics.ODOMETRY, b"\xc1", Envelope("sim", 1, 1, 2, 2))
     of_another = Envelope("mallory", 1, 1, 3, 3)
     recorded.publish_bytes(topics.ODOMETRY, encode(odometry(1)), of_another)
+
     summary = recorded.end()
 
     records = list(LogReader(path).records())

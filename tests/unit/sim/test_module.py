@@ -95,6 +95,7 @@ def _stamps_ns(kind: type[Message], messages: list[Message]) -> list[int]:
 def test_lockstep_ignores_commands_that_answer_another_frame() -> None:
     module = build(Config(mode="lockstep", **SMALL))
     stamp_ns = _start(module)[-1].stamp_ns
+
     other = _command(stamp_ns + 1)
     asked = _command(stamp_ns)
 

@@ -139,6 +139,7 @@ def test_a_known_building_stands_in_both_pictures_where_geometry_puts_it(world: 
 def test_the_same_view_gives_the_same_pictures(world: World) -> None:
     camera = StereoCamera(world, calibration())
     world.robot.place(world.town.start)
+
     first = [picture.tobytes() for picture in camera.capture()]
     again = [picture.tobytes() for picture in camera.capture()]
     left, right = first

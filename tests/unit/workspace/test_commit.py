@@ -237,6 +237,7 @@ def test_a_refused_answer_lets_the_cycle_go_on() -> None:
     (localization,) = desk.take()
     desk.feed(answer(localization, [DropNode(id="self")]))
     desk.work()
+
     phases = [delta.phase for delta in desk.deltas]
     rejected = [delta.rejected for delta in desk.deltas]
 
@@ -260,6 +261,7 @@ def test_what_a_snapshot_holds_counts_as_written_at_its_version() -> None:
     snapshot = _ledger().graph.snapshot()
     again = Ledger({"dreaming": _may_write})
     again.restore(snapshot)
+
     again.check(_proposal(thing("a"), base_version=3))
 
     with pytest.raises(MessageError, match="a has changed since 2"):
@@ -294,6 +296,7 @@ def test_a_forgotten_node_takes_its_links_with_it() -> None:
 def test_the_ledger_keeps_the_nodes_of_a_commit_as_they_were_said() -> None:
     said = Node(id="a", kind="thing", activation=0.25, attributes={"x_m": 1.0})
     ledger = Ledger({})
+
     delta = ledger.commit(5, 2, Phase.OBJECTS, [said], ["2/object_place/a"])
 
     assert delta.stamp_ns == 5

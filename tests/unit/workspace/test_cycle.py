@@ -93,6 +93,7 @@ def test_a_percept_below_the_threshold_is_no_object_of_the_map() -> None:
     desk.see(0, percept("a"), percept("b", activation=0.7))
     (localization,) = desk.take()
     desk.feed(answer(localization))
+
     seen = [item.label for item in localization.percepts]
 
     assert seen == ["a"]
@@ -256,6 +257,7 @@ def test_a_snapshot_of_a_version_that_is_not_committed_yet_is_refused() -> None:
 def test_coalitions_are_published_once_after_the_phase_with_an_id_each() -> None:
     desk = Desk("w1")
     desk.drive(range(2), percept("a"))
+
     first, second = of_type(Coalitions, desk.published)
     whereabouts, novelty = second.coalitions
     nodes = [node.id for node in whereabouts.nodes]

@@ -200,6 +200,7 @@ def test_a_replica_decays_as_the_workspace_does() -> None:
     desk = Desk("w1", decay=0.3, base_level_decay=0.1)
     desk.drive(range(2), percept("a"), percept("b", 0.7))
     desk.drive(range(2, 12))
+
     expected = {"self", "map:0", "path:0", "observations:0:a", "observations:0:b"}
 
     assert set(desk.graph.nodes) == expected

@@ -83,6 +83,7 @@ def test_a_lost_workers_task_is_given_to_another_and_committed_once() -> None:
     desk.see(0)
     (asked,) = desk.take()
     first = _holder(desk, asked)
+
     desk.presence(first, alive=False)
     (again,) = desk.take()
     second, attempt = _held(desk, again)
@@ -191,6 +192,7 @@ def test_in_lockstep_a_task_that_kills_every_worker_is_given_up_and_told_of() ->
         assert not any(delta.phase == "end" for delta in desk.deltas)
         desk.presence(f"w{number}")
         desk.presence(f"w{number}", alive=False)
+
     desk.presence("steady")
     desk.work()
 
@@ -278,6 +280,7 @@ def test_a_late_answer_about_a_changed_node_is_dropped_and_counted() -> None:
     desk.see(1)
     (newer,) = desk.take()
     desk.feed(answer(newer, [_moved_self(1, 3.0)]))
+
     before = len(desk.deltas)
     assert desk.feed(answer(asked, [_moved_self(0)])) == []
     assert _committed(desk, asked) == 0
@@ -310,6 +313,7 @@ def test_workers_that_never_answer_leave_the_deltas_without_a_gap() -> None:
     for frame in range(5):
         desk.see(frame, percept("a"))
         desk.clock(stamp_ns(frame) + PERIOD_NS)
+
     versions = [delta.version for delta in desk.deltas]
 
     assert versions == list(range(1, 11))

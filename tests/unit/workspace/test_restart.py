@@ -82,6 +82,7 @@ def test_an_offer_made_before_a_restart_is_not_committed_again() -> None:
     desk = Desk("w1")
     desk.drive(range(3))
     again = _restored(desk.deltas)
+
     again.feed(Offer(cycle=1, operations=[thing("old")], source="goal"))
     again.feed(Offer(cycle=3, operations=[thing("new")], source="goal"))
     again.drive(range(3, 4))

@@ -90,6 +90,7 @@ def test_coalitions_leave_samples_behind_and_keep_links_and_maps() -> None:
     at = Link(source="self", target="place:map:0:0:0")
     graph = graph_of(agent(), landmark("house", sightings=1), at)
     asked = task("whereabouts", percepts=[percept("house")])
+
     (found,) = run(asked, graph, CONFIG).coalitions
     own, house = found.nodes
 

@@ -36,6 +36,7 @@ def test_a_closure_that_turns_the_path_far_is_optimized_anew() -> None:
     measured = laps(2)
     solver = IncrementalSolver(measured.without_closures())
     poses = solver.add(FAR)
+
     together = optimize(measured.with_closures(FAR))
     least = cost(together, solver.graph.constraints)
 

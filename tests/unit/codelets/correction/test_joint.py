@@ -61,6 +61,7 @@ def _error_m(poses: np.ndarray, truth: np.ndarray) -> float:
 def test_a_landmark_has_a_label_for_each_side_that_it_is_seen_from() -> None:
     truth = _graph(_steps(1)).poses
     sides = by_side(_sightings(truth), truth, 4)
+
     of_tower = [label for label in sides.labels if label == "tower"]
     here = sides.landmark[2]
     opposite = sides.landmark[LAP // 2 + 2]
@@ -84,6 +85,7 @@ def test_a_bias_by_side_bends_a_good_path_only_as_a_single_landmark(
     graph = _graph(_steps(1))
     seen = _sightings(graph.poses)
     config = Config(landmark_sides=sides)
+
     poses, _ = optimize_jointly(graph, seen, config)
     bent_m = _error_m(poses, graph.poses)
 

@@ -226,6 +226,7 @@ def _believed(landmarks: dict[str, tuple[float, float]], match: int | None) -> L
     drive.go(20, {})
     drive.go(1, landmarks, match=match)
     drive.go(12, {})
+
     assert not any(delta.phase is Phase.CORRECTION for delta in drive.desk.deltas)
     return drive
 
@@ -276,6 +277,7 @@ def test_closures_that_agree_beyond_possible_drift_are_rejected() -> None:
     drive = LoopDrive()
     drive.go(LAP // 2, {})
     before_m = drive.error_m()
+
     for view in (2, 3, 4):
         drive.go(1, {}, match=view)
     drive.go(7, {})
@@ -324,6 +326,7 @@ def test_a_replay_is_published_once_after_the_commit_of_its_correction() -> None
 
 def test_a_replay_counts_the_replays_of_the_rule_that_was_applied() -> None:
     with_headings = msgspec.structs.replace(QUIET, correct="heading")
+
     of_positions = _replay(_round_once(LoopDrive()))
     of_headings = _replay(_round_once(LoopDrive(with_headings)))
 

@@ -80,6 +80,7 @@ def test_the_variance_when_a_landmark_was_placed_is_that_of_the_path() -> None:
 
 def test_a_landmark_of_no_weight_leaves_all_samples_as_likely() -> None:
     density = compare(_agent(), _seen()).density
+
     weighted = log_likelihood(density, CONFIG.outlier_share)
     weightless = log_likelihood(density, CONFIG.outlier_share, np.zeros(1))
 

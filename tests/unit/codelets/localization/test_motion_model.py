@@ -189,6 +189,7 @@ def test_landmarks_calibrate_wheels_that_always_slip() -> None:
 def test_what_is_not_seen_costs_nothing() -> None:
     agent = _agent()
     seen = [_seen((1.0, 0.0, 0.0), "mill")]
+
     few = _move(agent, 1, _known("mill"), seen, CONFIG)
     many = _move(agent, 1, _known("mill", "tower", "church", "inn"), seen, CONFIG)
 
