@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from services.action.route import STEP_M, Route
+from tests.support.paths import steps_m
 
 QUARTER = math.pi / 2
 
@@ -71,11 +72,10 @@ def test_between_short_legs_a_corner_is_as_wide_as_they_allow() -> None:
 
 
 def test_points_lie_a_step_apart() -> None:
-    route = _route((20.0, QUARTER), (10.0, -QUARTER), (15.0, 0.3), (8.0, 0.0))
-    steps = np.diff(route.points_m, axis=0)
-    apart_m = np.hypot(steps[:, 0], steps[:, 1])
+    legs = ((20.0, QUARTER), (10.0, -QUARTER), (15.0, 0.3), (8.0, 0.0))
+    route = _route(*legs)
 
-    assert apart_m == pytest.approx(STEP_M, abs=0.02)
+    assert steps_m(route.points_m) == pytest.approx(STEP_M, abs=0.02)
 
 
 def test_the_agent_advances_along_the_line_and_never_back() -> None:

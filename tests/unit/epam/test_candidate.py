@@ -54,7 +54,9 @@ def test_the_outline_follows_a_gable() -> None:
 
 @pytest.mark.parametrize("gap_px", [6, 20, 40])
 def test_a_lamp_or_a_tree_before_a_building_does_not_divide_it(gap_px: int) -> None:
-    segment, held = _filled((50, 60, 60, 40), (110 + gap_px, 60, 60, 40))
+    left_part = (50, 60, 60, 40)
+    right_part = (110 + gap_px, 60, 60, 40)
+    segment, held = _filled(left_part, right_part)
 
     assert held[segment.mask].all()
     assert held.sum() == segment.area_px + gap_px * 40
@@ -98,7 +100,8 @@ def test_adjacent_pieces_at_the_same_distance_are_one() -> None:
 
     assert whole.segment.area_px == sum(areas_px)
     assert whole.segment.box_px == (50, 60, 120, 40)
-    assert (whole.walls.left, whole.walls.right) == (49.5, 169.5)
+    assert whole.walls.left == 49.5
+    assert whole.walls.right == 169.5
     assert whole.recognition == pieces[0].recognition
 
 

@@ -23,6 +23,8 @@ WIDTH = 320
 LENGTH = 60
 NEAR = np.full((HEIGHT, WIDTH), 10.0, np.float32)
 PERIOD_NS = 200_000_000
+SIDEWAYS_PX = 20
+DUSK = np.array([1.1, 1.0, 0.85])
 
 
 class Route:
@@ -31,17 +33,25 @@ class Route:
     def __init__(self, seed: int) -> None:
         rng = np.random.default_rng(seed)
         coarse = rng.uniform(30, 220, (LENGTH // 2 + 2, 9, 12, 3)).astype(np.float32)
-        self._pictures = [cv2.resize(picture, (WIDTH + 40, HEIGHT)) for picture in coarse]
+        size = (WIDTH + 2 * SIDEWAYS_PX, HEIGHT)
+        self._pictures = [cv2.resize(picture, size) for picture in coarse]
 
     def view(self, place: float, aside_px: int = 0, evening: bool = False) -> Image:
         """The view at `place`, of a robot that is turned a little."""
         before, share = divmod(place / 2, 1.0)
-        both = self._pictures[int(before)] * (1 - share) + self._pictures[int(before) + 1] * share
-        picture = both[:, 20 + aside_px : 20 + aside_px + WIDTH] / 255
+        last = self._pictures[int(before)]
+        following = self._pictures[int(before) + 1]
+        blended = last * (1 - share) + following * share
+
+        left = SIDEWAYS_PX + aside_px
+        picture = blended[:, left : left + WIDTH] / 255
         if evening:
-            picture = 0.6 * picture**1.2 * np.array([1.1, 1.0, 0.85])
-        noise = np.random.default_rng(int(1000 * place)).normal(0, 0.01, picture.shape)
-        return np.asarray(np.clip(255 * (picture + noise), 0, 255), np.uint8)
+            picture = 0.6 * picture**1.2 * DUSK
+
+        rng = np.random.default_rng(int(1000 * place))
+        noise = rng.normal(0, 0.01, picture.shape)
+        levels = np.clip(255 * (picture + noise), 0, 255)
+        return np.asarray(levels, np.uint8)
 
 
 def _drive(
@@ -106,9 +116,11 @@ def test_on_a_new_route_nothing_matches_and_every_view_is_remembered() -> None:
 
 def test_a_single_view_is_no_match() -> None:
     route = Route(1)
+    other = Route(2)
     recognizer = _recognizer_after(route)
-    before = _along(Route(2), range(10))
-    after = _along(Route(2), range(10, 20))
+    before = _along(other, range(10))
+    after = _along(other, range(10, 20))
+
     matches, _ = _drive(recognizer, [*before, route.view(15), *after], LENGTH)
 
     assert not any(matches)
@@ -149,6 +161,7 @@ def test_at_rest_the_last_match_is_returned_again() -> None:
     route = Route(1)
     recognizer = _recognizer_after(route)
     until_rest = _along(route, (5, 6, 7, 8, 9, 10, 10, 10))
+
     matches, _ = _drive(recognizer, until_rest, LENGTH)
 
     assert matches[-1] is not None
@@ -222,7 +235,10 @@ def test_the_same_views_give_the_same_answers() -> None:
     again = [route.view(place, 6, evening=True) for place in range(20)]
     views = [*_lap(route), *again]
 
-    assert _drive(PlaceRecognizer(), views) == _drive(PlaceRecognizer(), views)
+    first_answers = _drive(PlaceRecognizer(), views)
+    second_answers = _drive(PlaceRecognizer(), views)
+
+    assert second_answers == first_answers
 
 
 @pytest.mark.parametrize(

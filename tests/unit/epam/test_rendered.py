@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from cogmap.geometry.se2 import rotate
 from schemas import topics
 from schemas.base import Message
 from schemas.sensing import Building, Learned, Percept, Percepts
@@ -124,11 +125,12 @@ def _offset(percept: Percept, building: Building, pose: np.ndarray) -> tuple[flo
     it.
     """
     direction = pose[2] + percept.bearing_rad
-    cos = math.cos(direction)
-    sin = math.sin(direction)
-    x_m = pose[0] + percept.range_m * cos - building.pose.x_m
-    y_m = pose[1] + percept.range_m * sin - building.pose.y_m
-    return cos * x_m + sin * y_m, -sin * x_m + cos * y_m
+    ahead_m = np.array([percept.range_m, 0.0])
+    centre_m = (building.pose.x_m, building.pose.y_m)
+    off_m = pose[:2] + rotate(ahead_m, direction) - centre_m
+
+    along_m, left_m = rotate(off_m, -direction).tolist()
+    return along_m, left_m
 
 
 def test_unlabelled_buildings_get_nodes_and_are_recognized_again() -> None:
@@ -173,4 +175,6 @@ def _shown(percept: Percept, label: np.ndarray, names: list[str]) -> str:
 
 
 def test_perception_declares_the_topics_that_it_publishes() -> None:
-    assert build(Config(), "epam").emits == {topics.PERCEPTS, topics.LEARNED}
+    module = build(Config(), "epam")
+
+    assert module.emits == {topics.PERCEPTS, topics.LEARNED}

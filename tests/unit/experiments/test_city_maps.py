@@ -18,6 +18,7 @@ from experiments.city_maps.sources import from_osm, grown, plane_m
 from experiments.city_maps.streets import Streets, shortest_path
 from experiments.city_maps.tour import shortest_tour
 from services.sim.odometry import Noise
+from tests.support.paths import steps_m
 
 CROSS = Streets(
     np.array([(0.0, 0.0), (100.0, 0.0), (-100.0, 0.0), (0.0, 100.0)]),
@@ -59,14 +60,14 @@ def test_a_tour_past_what_cannot_be_reached_is_refused() -> None:
 
 
 def test_ways_follow_the_streets_between_points_put_on_them() -> None:
-    points_m = np.array([(60.0, 9.0), (-5.0, 80.0)])
-    streets, (east, north) = CROSS.with_points(points_m)
+    beside_streets_m = np.array([(60.0, 9.0), (-5.0, 80.0)])
+    streets, (east, north) = CROSS.with_points(beside_streets_m)
     distance, before = streets.shortest_paths(np.array([east, north]))
     assert distance[0, north] == pytest.approx(140.0)
 
     path = shortest_path(before[0], int(north))
-    path_m = streets.points_m[path]
-    assert path_m.tolist() == [[60.0, 0.0], [0.0, 0.0], [0.0, 80.0]]
+    path_m = streets.points_m[path].tolist()
+    assert path_m == [[60.0, 0.0], [0.0, 0.0], [0.0, 80.0]]
 
 
 def test_two_points_on_one_piece_stand_in_order() -> None:
@@ -110,10 +111,13 @@ def test_the_line_of_a_tour_comes_up_to_its_start_and_goes_on_beyond_its_end(
     backward: bool,
 ) -> None:
     environment = _environment(3)
-    line = environment.line(2, backward, 70.0, 100.0)
-    steps_m = np.hypot(*np.diff(line, axis=0).T)
+    before_m = 70.0
+    after_m = 100.0
 
-    assert steps_m.sum() == pytest.approx(environment.tour_m + 170.0, abs=0.1)
+    line = environment.line(2, backward, before_m, after_m)
+
+    expected_m = before_m + environment.tour_m + after_m
+    assert steps_m(line).sum() == pytest.approx(expected_m, abs=0.1)
 
 
 def test_the_same_seed_grows_the_same_city() -> None:

@@ -132,9 +132,15 @@ def _restarted(path: Path, ended_at: int) -> Recorded:
     states that the old one published so many in all.
     """
     recorded = Recorded(path)
-    for seq, incarnation, earlier in ((0, 1, 10), (1, 1, 10), (0, 2, ended_at)):
-        envelope = Envelope("sim", seq, incarnation, seq, seq, earlier=earlier)
-        recorded.publish_bytes(topics.ODOMETRY, encode(odometry(seq)), envelope)
+    published = (
+        Envelope("sim", 0, 1, 0, 0, earlier=10),
+        Envelope("sim", 1, 1, 1, 1, earlier=10),
+        Envelope("sim", 0, 2, 0, 0, earlier=ended_at),
+    )
+    for envelope in published:
+        message = encode(odometry(envelope.seq))
+        recorded.publish_bytes(topics.ODOMETRY, message, envelope)
+
     return recorded
 
 

@@ -76,15 +76,16 @@ def test_any_interleaving_of_frames_with_their_odometry_gives_the_same_bytes() -
     rows = _rows(1, 8)
     first = _frame(0, 4)
     second = _frame(1, 8)
-    in_order = _plain(_published([*rows[:4], first, *rows[4:], second]))
-    frames_first = _plain(_published([first, *rows[:4], second, *rows[4:]]))
-    mixed = _plain(_published([rows[0], first, *rows[1:5], second, *rows[5:]]))
-    late = _plain(_published([first, *rows[:7], second, rows[7]]))
+    in_order = [*rows[:4], first, *rows[4:], second]
+    frames_first = [first, *rows[:4], second, *rows[4:]]
+    mixed = [rows[0], first, *rows[1:5], second, *rows[5:]]
+    late = [first, *rows[:7], second, rows[7]]
 
-    assert len(in_order) == 6
-    assert frames_first == in_order
-    assert mixed == in_order
-    assert late == in_order
+    expected = _plain(_published(in_order))
+
+    assert len(expected) == 6
+    for order in (frames_first, mixed, late):
+        assert _plain(_published(order)) == expected
 
 
 def test_motions_cover_exactly_what_came_since_the_last_view() -> None:

@@ -44,7 +44,8 @@ def _view(distance_m: float, turn_rad: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _texture() -> np.ndarray:
-    noise = np.random.default_rng(7).integers(0, 255, (2000, 2000), np.uint8)
+    rng = np.random.default_rng(7)
+    noise = rng.integers(0, 255, (2000, 2000), np.uint8)
     smooth = cv2.GaussianBlur(noise, (0, 0), 6)
     return cv2.normalize(smooth, None, 0, 255, cv2.NORM_MINMAX)
 
@@ -54,9 +55,12 @@ def _texture() -> np.ndarray:
 )
 def test_views_measure_distance_and_turn_far_better_than_noisy_wheels(distance_m, turn_rad):
     wheels = Motion(distance_m * 1.1, turn_rad + 0.03, 0.1 * distance_m + 1e-3, 0.03)
+    before = _view(0.0, 0.0)
+    after = _view(distance_m, turn_rad)
+
     odometry = VisualOdometry()
-    odometry.update(*_view(0.0, 0.0), CAMERA, STILL)
-    motion = odometry.update(*_view(distance_m, turn_rad), CAMERA, wheels)
+    odometry.update(*before, CAMERA, STILL)
+    motion = odometry.update(*after, CAMERA, wheels)
 
     assert motion.turn_rad == pytest.approx(turn_rad, abs=0.004)
     assert motion.distance_m == pytest.approx(distance_m, abs=0.04)

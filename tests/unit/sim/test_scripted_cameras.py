@@ -102,13 +102,15 @@ def _percepts(ride: list[list[Message]]) -> list[Percepts]:
 
 
 def test_epam_recognizes_a_landmark_in_the_images_along_a_trajectory() -> None:
-    ride = _ride(_module(_trajectory(line=[(0.0, 0.0), (6.0, 0.0)])))
-    seen = _percepts(ride)
+    straight = _trajectory(line=[(0.0, 0.0), (6.0, 0.0)])
+    seen = _percepts(_ride(_module(straight)))
     assert len(seen) == 3
 
     (percept,) = [each for each in seen[-1].objects if each.label == "bakery"]
-    assert percept.range_m == pytest.approx(math.hypot(34.0, 14.0), rel=0.15)
-    assert percept.bearing_rad == pytest.approx(math.atan2(14.0, 34.0), abs=0.1)
+    range_m = math.hypot(34.0, 14.0)
+    bearing_rad = math.atan2(14.0, 34.0)
+    assert percept.range_m == pytest.approx(range_m, rel=0.15)
+    assert percept.bearing_rad == pytest.approx(bearing_rad, abs=0.1)
 
 
 def test_wheels_without_noise_add_up_to_the_line_with_its_corners(

@@ -11,6 +11,7 @@ from services.codelets.correction.joint import by_side, optimize_jointly
 from services.codelets.correction.least_squares import optimize
 from services.codelets.correction.pose_graph import Constraints, PoseGraph
 from services.codelets.mapping.observations import Sightings
+from tests.support.paths import mean_distance_m
 
 SIDE = 20
 LAP = 4 * SIDE
@@ -53,11 +54,6 @@ def _graph(steps: Constraints) -> PoseGraph:
     return PoseGraph(poses, steps, steps.select(slice(0, 0)))
 
 
-def _error_m(poses: np.ndarray, truth: np.ndarray) -> float:
-    off_m = poses[:, :2] - truth[:, :2]
-    return float(np.hypot(*off_m.T).mean())
-
-
 def test_a_landmark_has_a_label_for_each_side_that_it_is_seen_from() -> None:
     truth = _graph(_steps(1)).poses
     sides = by_side(_sightings(truth), truth, 4)
@@ -87,7 +83,7 @@ def test_a_bias_by_side_bends_a_good_path_only_as_a_single_landmark(
     config = Config(landmark_sides=sides)
 
     poses, _ = optimize_jointly(graph, seen, config)
-    bent_m = _error_m(poses, graph.poses)
+    bent_m = mean_distance_m(poses, graph.poses)
 
     assert bent_m > 0.2 if sides == 1 else bent_m < 0.1
 
@@ -96,16 +92,12 @@ def test_sides_bind_the_second_lap_to_the_first() -> None:
     truth = _graph(_steps(2)).poses
     drifted = _graph(_steps(2, turn_error_rad=0.0005))
     seen = _sightings(truth)
-    first = slice(0, LAP)
-    second = slice(LAP, 2 * LAP)
 
-    def gap_m(poses: np.ndarray) -> float:
-        return _error_m(poses[second], poses[first])
-
-    alone_m = gap_m(optimize(drifted))
+    alone = optimize(drifted)
     joint, _ = optimize_jointly(drifted, seen, Config())
-    joint_m = gap_m(joint)
 
+    alone_m = mean_distance_m(alone[LAP : 2 * LAP], alone[:LAP])
+    joint_m = mean_distance_m(joint[LAP : 2 * LAP], joint[:LAP])
     assert joint_m < 0.5 * alone_m
 
 
@@ -113,6 +105,6 @@ def test_a_path_without_sightings_is_optimized_alone() -> None:
     graph = _graph(_steps(1))
     none = np.zeros(0, int)
     nothing = Sightings((), none, none, np.zeros((0, 2)), np.zeros((0, 2, 2)))
-    poses, _ = optimize_jointly(graph, nothing, Config())
 
+    poses, _ = optimize_jointly(graph, nothing, Config())
     assert poses == pytest.approx(optimize(graph))

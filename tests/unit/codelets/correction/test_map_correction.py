@@ -26,6 +26,7 @@ from services.codelets.correction.joint import ROUNDS
 from services.codelets.mapping.path import ODOMETRY, POSE, STAMP, rows_of
 from tests.support.loop_drive import LAP, QUIET, SLIP, LoopDrive
 from tests.support.messages import of_type
+from tests.support.paths import mean_distance_m, steps_m
 from tests.support.scenes import Desk, stamp_ns
 
 TOWER = {"tower": (8.0, 5.0)}
@@ -72,8 +73,7 @@ def _positions_m(desk: Desk) -> Floats:
 def _path_error_m(drive: LoopDrive) -> float:
     stamps_ns = _rows(drive.desk)[:, STAMP] * 1e9
     frames = np.rint(stamps_ns / stamp_ns(0) - 1).astype(int)
-    off_m = _positions_m(drive.desk) - drive.poses[frames, :2]
-    return float(np.hypot(*off_m.T).mean())
+    return mean_distance_m(_positions_m(drive.desk), drive.poses[frames])
 
 
 def test_the_path_has_places_at_its_spacing_and_steps_by_path_integration() -> None:
@@ -83,11 +83,10 @@ def test_the_path_has_places_at_its_spacing_and_steps_by_path_integration() -> N
     assert [item.id for item in path] == ["path:0", "path:1"]
 
     rows = rows_of(path)
-    steps = np.diff(rows[:, ODOMETRY], axis=0)
-    steps_m = np.hypot(steps[:, 0], steps[:, 1])
+    lengths_m = steps_m(rows[:, ODOMETRY])
     assert len(rows) == 70
-    assert steps_m[:19] == pytest.approx(2.0)
-    assert steps_m[19:39] == pytest.approx(2.0 * (1 + SLIP))
+    assert lengths_m[:19] == pytest.approx(2.0)
+    assert lengths_m[19:39] == pytest.approx(2.0 * (1 + SLIP))
 
 
 def test_an_agent_that_stands_still_adds_nothing_to_its_path() -> None:
@@ -164,10 +163,10 @@ def test_what_the_agent_writes_during_a_correction_is_kept() -> None:
     assert len(_rows(desk)) == length + 4
 
     drive.go(1, {})
-    steps_m = np.hypot(*np.diff(_positions_m(desk), axis=0).T)
+    lengths_m = steps_m(_positions_m(desk))
     assert CORRECTION_ID not in desk.graph.nodes
     assert len(_rows(desk)) == length + 5
-    assert steps_m[length - 1 :] == pytest.approx(2.0)
+    assert lengths_m[length - 1 :] == pytest.approx(2.0)
     assert abs(_object(desk, "inn").y_m - inn_m) > 1.0
     assert all(not delta.reasons for delta in desk.deltas)
 

@@ -60,7 +60,8 @@ def test_the_number_of_a_landmarks_samples_stays() -> None:
 
 
 def test_a_landmark_seen_elsewhere_starts_anew_after_the_configured_misses() -> None:
-    once = _seen(house(10.0, 0.0, 0.1), ASIDE_RAD, 6.0, number=0)
+    known = house(10.0, 0.0, 0.1)
+    once = _seen(known, ASIDE_RAD, 6.0, number=0)
     twice = _seen(once, ASIDE_RAD, 6.0, number=1)
     assert (once.x_m, once.y_m) == pytest.approx((10.0, 0.0), abs=0.1)
     assert (twice.x_m, twice.y_m) == (once.x_m, once.y_m)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -16,23 +17,32 @@ from tests.support.landmarks import house, localized, motions, normal_samples, p
 from tests.support.scenes import agent, graph_of, percept, run, task
 
 
-def _posterior(prior: tuple[float, float], measured: tuple[float, float]) -> tuple[float, float]:
-    """Mean and standard deviation of the product of two Gaussians, each by mean and deviation."""
-    means = np.array([prior[0], measured[0]])
-    precisions = np.array([prior[1], measured[1]]) ** -2.0
-    total = precisions.sum()
-    return float(precisions @ means / total), float(total**-0.5)
+@dataclass(frozen=True)
+class Gaussian:
+    """A mean and its standard deviation."""
+
+    mean: float
+    sd: float
+
+
+def _posterior(prior: Gaussian, measured: Gaussian) -> Gaussian:
+    """Their product."""
+    of_prior = prior.sd**-2
+    of_measured = measured.sd**-2
+    precision = of_prior + of_measured
+    weighted = of_prior * prior.mean + of_measured * measured.mean
+    return Gaussian(weighted / precision, precision**-0.5)
 
 
 def test_without_landmarks_the_samples_move_by_the_motion() -> None:
-    ahead = (2.0, 0.0, 1.0, 0.0, 0.0)
+    two_metres = (2.0, 0.0, 1.0, 0.0, 0.0)
     quarter_turn = (0.0, math.pi / 2, 1.0, 0.0, 0.0)
-    found = localized(agent(), motions=motions(ahead, quarter_turn))
+    found = localized(agent(), motions=motions(two_metres, quarter_turn))
     assert pose_of(found) == pytest.approx((2.0, 0.0, math.pi / 2))
 
     there = agent(samples_of(found))
-    ahead = (3.0, 0.0, 1.0, 0.0, 0.0)
-    again = localized(there, motions=motions(ahead), identifier="2/localization")
+    three_metres = (3.0, 0.0, 1.0, 0.0, 0.0)
+    again = localized(there, motions=motions(three_metres), identifier="2/localization")
     assert pose_of(again) == pytest.approx((2.0, 3.0, math.pi / 2))
 
 
@@ -53,34 +63,38 @@ def test_the_samples_spread_as_the_motions_noise_says() -> None:
 
 
 def test_a_landmark_ahead_corrects_the_distance_to_the_exact_gaussian_posterior() -> None:
-    distance_m, distance_sd_m = 5.5, 0.5
-    range_m, range_sd_m = 14.0, 0.4
+    driven = Gaussian(5.5, 0.5)
+    range_m = 14.0
+    by_landmark = Gaussian(20.0 - range_m, 0.4)
+    exact = _posterior(driven, by_landmark)
+
     found = localized(
         agent(),
         house(20.0, 0.0),
-        motions=motions((distance_m, 0.0, 1.0, distance_sd_m, 0.0)),
-        percepts=[percept("house", 0.0, range_m, range_sd_m=range_sd_m)],
+        motions=motions((driven.mean, 0.0, 1.0, driven.sd, 0.0)),
+        percepts=[percept("house", 0.0, range_m, range_sd_m=by_landmark.sd)],
     )
-    mean_m, sd_m = _posterior((distance_m, distance_sd_m), (20.0 - range_m, range_sd_m))
 
-    assert found.x_m == pytest.approx(mean_m, abs=0.03)
-    assert found.x_sd_m == pytest.approx(sd_m, rel=0.1)
+    assert found.x_m == pytest.approx(exact.mean, abs=0.03)
+    assert found.x_sd_m == pytest.approx(exact.sd, rel=0.1)
 
 
 def test_a_bearing_corrects_the_heading_to_the_exact_gaussian_posterior() -> None:
-    turn_sd_rad = 0.1
-    bearing_rad, bearing_sd_rad = -0.08, 0.05
-    seen = percept("house", bearing_rad, 50.0, bearing_sd_rad=bearing_sd_rad, range_sd_m=5.0)
+    turned = Gaussian(0.0, 0.1)
+    bearing_rad = -0.08
+    by_landmark = Gaussian(-bearing_rad, 0.05)
+    exact = _posterior(turned, by_landmark)
+
+    seen = percept("house", bearing_rad, 50.0, bearing_sd_rad=by_landmark.sd, range_sd_m=5.0)
     found = localized(
         agent(),
         house(50.0, 0.0, 1e-3),
-        motions=motions((1e-3, 0.0, 1.0, 0.0, turn_sd_rad)),
+        motions=motions((1e-3, 0.0, 1.0, 0.0, turned.sd)),
         percepts=[seen],
     )
-    mean_rad, sd_rad = _posterior((0.0, turn_sd_rad), (-bearing_rad, bearing_sd_rad))
 
-    assert found.heading_rad == pytest.approx(mean_rad, abs=0.006)
-    assert found.heading_sd_rad == pytest.approx(sd_rad, rel=0.1)
+    assert found.heading_rad == pytest.approx(exact.mean, abs=0.006)
+    assert found.heading_sd_rad == pytest.approx(exact.sd, rel=0.1)
 
 
 def test_two_landmarks_weigh_as_much_as_their_noise_allows() -> None:

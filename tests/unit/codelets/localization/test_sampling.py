@@ -26,9 +26,11 @@ def test_rejection_keeps_the_likeliest_where_all_are_unlikely() -> None:
 
 
 def test_means_and_spreads_of_headings_are_taken_on_the_circle() -> None:
-    poses = np.array([[0.0, 0.0, math.pi - 0.1], [2.0, 0.0, -math.pi + 0.1]])
-    mean = mean_pose(poses)
+    left_of_west = math.pi - 0.1
+    right_of_west = -math.pi + 0.1
+    poses = np.array([[0.0, 0.0, left_of_west], [2.0, 0.0, right_of_west]])
 
+    mean = mean_pose(poses)
     assert abs(mean[2]) == pytest.approx(math.pi)
     assert spread(poses, mean) == pytest.approx([1.0, 0.0, 0.1])
 

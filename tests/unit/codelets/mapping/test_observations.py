@@ -14,6 +14,7 @@ from services.codelets.correction.joint import with_landmarks
 from services.codelets.correction.least_squares import optimize
 from services.codelets.correction.pose_graph import Constraints, PoseGraph
 from services.codelets.mapping.observations import Sightings, Viewpoint, extended
+from tests.support.paths import mean_distance_m
 from tests.support.scenes import Desk, percept
 
 STILL = np.zeros(3)
@@ -49,9 +50,12 @@ def _sightings(poses: np.ndarray, wrong: tuple[int, ...] = ()) -> list[Observati
     node: Observations | None = None
     for number, pose in enumerate(poses):
         off_m = ELSEWHERE_M if number in wrong else TOWER_M - pose[:2]
+        range_m = math.hypot(*off_m)
         bearing_rad = math.atan2(off_m[1], off_m[0]) - pose[2]
-        seen = _tower(bearing_rad, math.hypot(*off_m), bearing_sd_rad=0.01, range_sd_m=0.1)
-        node = extended(node, Viewpoint(0, float(number), STILL, 0.0), seen)
+
+        viewpoint = Viewpoint(0, float(number), STILL, 0.0)
+        seen = _tower(bearing_rad, range_m, bearing_sd_rad=0.01, range_sd_m=0.1)
+        node = extended(node, viewpoint, seen)
 
     return [node] if node else []
 
@@ -70,11 +74,6 @@ def _turning_excess(poses: np.ndarray) -> PoseGraph:
     return PoseGraph(np.array(bent), steps, steps.select(slice(0, 0)))
 
 
-def _error_m(poses: np.ndarray, truth: np.ndarray) -> float:
-    off_m = poses[:, :2] - truth[:, :2]
-    return float(np.hypot(*off_m.T).mean())
-
-
 def test_a_landmark_is_remembered_once_from_each_place_of_the_path() -> None:
     desk = Desk("w1")
     desk.drive(range(3), percept("a"))
@@ -89,17 +88,19 @@ def test_a_landmark_is_remembered_once_from_each_place_of_the_path() -> None:
 
 def test_what_is_seen_some_way_from_a_place_is_told_as_seen_from_the_place() -> None:
     since_place = np.array([2.0, 1.0, math.pi / 2])
-    node = extended(None, Viewpoint(0, 1.0, since_place, 0.0), _tower())
-    seen = Sightings.of([node], np.array([1.0]))
+    viewpoint = Viewpoint(0, 1.0, since_place, 0.0)
+    node = extended(None, viewpoint, _tower())
 
+    seen = Sightings.of([node], np.array([1.0]))
     assert seen.where_m[0] == pytest.approx((2.0, 11.0))
 
 
 def test_an_eye_that_sees_too_far_is_known_to() -> None:
     too_far = 0.25
-    node = extended(None, Viewpoint(0, 1.0, STILL, too_far), _tower())
-    seen = Sightings.of([node], np.array([1.0]))
+    viewpoint = Viewpoint(0, 1.0, STILL, too_far)
+    node = extended(None, viewpoint, _tower())
 
+    seen = Sightings.of([node], np.array([1.0]))
     assert seen.where_m[0] == pytest.approx((8.0, 0.0))
 
 
@@ -126,12 +127,12 @@ def test_observations_along_a_path_correct_its_excess_of_turning() -> None:
     seen = Sightings.of(_sightings(truth), stamps)
 
     graph = _turning_excess(truth)
-    before_m = _error_m(graph.poses, truth)
+    before_m = mean_distance_m(graph.poses, truth)
     for _ in range(5):
         landmarks_m = seen.landmarks_m(graph.poses)
         joint = optimize(with_landmarks(graph, seen, landmarks_m))
         graph = PoseGraph(joint[: len(truth)], graph.steps, graph.closures)
-    after_m = _error_m(graph.poses, truth)
+    after_m = mean_distance_m(graph.poses, truth)
 
     assert before_m > 2.0
     assert after_m < 0.3 * before_m

@@ -15,6 +15,7 @@ from services.codelets.mapping.road_place import ROAD_REACH_M
 from tests.support.scenes import agent, graph_of, run, task
 
 CONFIG = Config()
+AHEAD = (4.0, 0.0)
 
 
 def _self(x_m: float, y_m: float, heading_rad: float) -> Self:
@@ -39,19 +40,23 @@ def _road(
 
 def test_road_is_marked_on_the_place_nodes_where_it_is_seen_from_the_pose() -> None:
     facing_north = _self(10.0, 20.0, math.pi / 2)
-    road = _road(facing_north, (4.0, 0.0), (4.0, 0.0), (4.0, 0.0), (4.0, 2.0))
+    aside = (4.0, 2.0)
+    road = _road(facing_north, AHEAD, AHEAD, AHEAD, aside)
 
     assert road == {(10, 24): 1.0, (8, 24): pytest.approx(1 / 3)}
 
 
 def test_a_coarser_grid_gets_the_same_road_on_fewer_nodes() -> None:
-    road = _road(_self(0.0, 0.0, 0.0), (4.0, 0.0), (4.6, 0.4), (8.0, 0.0), cell_m=4.0)
+    at_origin = _self(0.0, 0.0, 0.0)
+    road = _road(at_origin, AHEAD, (4.6, 0.4), (8.0, 0.0), cell_m=4.0)
 
     assert sorted(road) == [(1, 0), (2, 0)]
 
 
 def test_road_seen_from_afar_is_not_believed() -> None:
-    road = _road(_self(0.0, 0.0, 0.0), (2.0, 0.0), (ROAD_REACH_M + 1, 0.0))
+    at_origin = _self(0.0, 0.0, 0.0)
+    too_far = (ROAD_REACH_M + 1, 0.0)
+    road = _road(at_origin, (2.0, 0.0), too_far)
 
     assert list(road) == [(2, 0)]
 
