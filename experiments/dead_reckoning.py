@@ -26,7 +26,8 @@ class DeadReckoning:
         """Add one step."""
         stamp_s = odometry.stamp_ns * 1e-9
         if not self._poses:
-            self._stamps_s.append(stamp_s - odometry.dt_s)
+            start_s = stamp_s - odometry.dt_s
+            self._stamps_s.append(start_s)
             self._poses.append((0.0, 0.0, 0.0))
 
         distance_m = odometry.speed_m_s * odometry.dt_s

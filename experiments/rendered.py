@@ -85,11 +85,16 @@ class SensorLog:
         in_order = [self._frames[stamp_ns] for stamp_ns in sorted(self._frames)]
         frames = iter(in_order)
 
+        def on_start() -> list[Message]:
+            return next(frames)
+
         def on_command(command: MotorCommand) -> list[Message]:
             return next(frames, [])
 
-        module = Module("sim").on(topics.MOTOR_COMMAND, on_command, _REPLAYED)
-        return module.on_start(lambda: next(frames), {"action": 1}, _REPLAYED)
+        module = Module("sim")
+        module.on_start(on_start, {"action": 1}, _REPLAYED)
+        module.on(topics.MOTOR_COMMAND, on_command, _REPLAYED)
+        return module
 
     def _keep(self, message: Message) -> None:
         frame = self._frames.setdefault(message.stamp_ns, [])

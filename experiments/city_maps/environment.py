@@ -189,7 +189,8 @@ def _tour(streets: Streets, buildings_m: Points) -> tuple[list[int], list[Points
     legs_m = []
 
     for start, end in itertools.pairwise(closed):
-        points = shortest_path(before[start], int(fronts[end]))
+        front = int(fronts[end])
+        points = shortest_path(before[start], front)
         legs_m.append(joined.points_m[points])
 
     return order, legs_m

@@ -40,6 +40,7 @@ def fitted(environments: Sequence[Environment], budget: Budget) -> Noise:
 
         tried = jobs(environments, noise, traversals, seed)
         errors_km2 = parallel_map(positions_error_km2, tried, budget.processes, budget.progress)
+
         mean_km2 = float(np.mean(errors_km2))
         return (mean_km2 - published.HUMAN_MEAN_KM2) ** 2
 

@@ -89,7 +89,8 @@ def measure(environments: Sequence[Environment], noise: Noise, budget: Budget) -
     for place, environment in enumerate(environments):
         first = place * budget.traversals
         own = learned[first : first + budget.traversals]
-        maps.append(CityMap(environment, tuple(own)))
+        city = CityMap(environment, tuple(own))
+        maps.append(city)
 
     return maps
 

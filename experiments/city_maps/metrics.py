@@ -102,24 +102,25 @@ def _of_map(prefix: str, city: CityMap) -> Metrics:
     return metrics
 
 
-def camera_metrics(seen: Learned, told: Learned) -> Metrics:
+def camera_metrics(drawn: Learned, percepts: Learned) -> Metrics:
     """Those of one traversal with cameras, and of the same one at percept level.
 
     With cameras self-motion is fused: `fused_alone` is path integration of that alone.
     """
     metrics: Metrics = {"cameras_traversals": 1.0}
-    errors_km2 = seen.error_km2
+    errors_km2 = drawn.error_km2
 
     for method, name in CAMERA_NAMES.items():
         metrics[f"cameras_error_{name}_km2"] = errors_km2[method]
-        if method in told.error_km2:
-            metrics[f"cameras_same_traversal_by_percepts_error_{name}_km2"] = told.error_km2[method]
+        percepts_km2 = percepts.error_km2.get(method)
+        if percepts_km2 is not None:
+            metrics[f"cameras_same_traversal_by_percepts_error_{name}_km2"] = percepts_km2
 
     for method in ("heading", "positions"):
         ratio = errors_km2[method] / errors_km2["none"]
         metrics[f"cameras_error_{NAMES[method]}_over_uncorrected"] = ratio
 
-    metrics["cameras_buildings_missing"] = float(seen.missing)
+    metrics["cameras_buildings_missing"] = float(drawn.missing)
     return metrics
 
 

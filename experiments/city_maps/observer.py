@@ -113,7 +113,8 @@ class Observer:
         if not self._wheels:
             return {WHEELS: fused_m}
 
-        wheels = self._wheels.poses(path[:, reading.STAMP])
+        stamps_s = path[:, reading.STAMP]
+        wheels = self._wheels.poses(stamps_s)
         wheels_m = self._seen_from(wheels)
         return {WHEELS: wheels_m, FUSED: fused_m}
 

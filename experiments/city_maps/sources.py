@@ -177,7 +177,8 @@ def _along(start_m: Points, end_m: Points, rng: np.random.Generator) -> Points:
     left = np.array([-ahead[1], ahead[0]])
 
     first_m = rng.uniform(CORNER_M, EVERY_M)
-    along_m = np.arange(first_m, length_m - CORNER_M, EVERY_M)
+    last_m = length_m - CORNER_M
+    along_m = np.arange(first_m, last_m, EVERY_M)
     sides = rng.choice([-1.0, 1.0], len(along_m))
 
     on_street_m = start_m + along_m[:, None] * ahead
@@ -230,19 +231,28 @@ def _buildings(extract: Extract) -> tuple[tuple[str, ...], Points]:
             named.setdefault(tags["name"], extract.nodes[node])
 
     for way in extract.ways:
-        corners = [extract.nodes[node] for node in way.nodes[:-1] if node in extract.nodes]
-        if len(corners) < MIN_CORNERS or not _is_building(way):
+        centre = _centre(extract, way)
+        if centre is None or not _is_building(way):
             continue
 
-        lon, lat = np.mean(corners, axis=0).tolist()
         if "name" in way.tags:
-            named.setdefault(way.tags["name"], (lon, lat))
+            named.setdefault(way.tags["name"], centre)
         else:
-            unnamed[f"building {way.id}"] = (lon, lat)
+            unnamed[f"building {way.id}"] = centre
 
     found = named if len(named) >= MANY_NAMED else named | unnamed
     lonlat = np.array(list(found.values()))
     return tuple(found), lonlat.reshape(-1, 2)
+
+
+def _centre(extract: Extract, way: Way) -> LonLat | None:
+    """The mean of a closed way's corners; None where it has too few."""
+    corners = [extract.nodes[node] for node in way.nodes[:-1] if node in extract.nodes]
+    if len(corners) < MIN_CORNERS:
+        return None
+
+    lon, lat = np.mean(corners, axis=0).tolist()
+    return lon, lat
 
 
 def _is_building(way: Way) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,8 +73,7 @@ class Streets:
         for piece in np.unique(cut).tolist():
             start, end = self.pieces[piece].tolist()
             on_it = numbers[cut == piece]
-            chain = [start, *_by_distance(points_m, start, on_it), end]
-            pieces += itertools.pairwise(chain)
+            pieces += _cut(points_m, start, end, on_it)
 
         return Streets(points_m, np.array(pieces, np.intp)), numbers
 
@@ -103,22 +102,23 @@ class Streets:
         # would be taken.
         undirected = np.sort(self.pieces, axis=1)
         ends, first = np.unique(undirected, axis=0, return_index=True)
-        lengths_m = self._lengths_m()[first]
-        weights = np.maximum(lengths_m, MIN_LENGTH_M)
+        lengths_m = self._lengths_m()
+        weights = np.maximum(lengths_m[first], MIN_LENGTH_M)
 
         count = len(self.points_m)
-        graph = coo_array((weights, ends.T), shape=(count, count))
+        shape = (count, count)
+        graph = coo_array((weights, ends.T), shape=shape)
         return graph.tocsr()
 
 
-def _by_distance(points_m: Points, start: int, others: Indices) -> list[int]:
-    """The points `others`, the nearest to `start` first."""
-    offsets_m = points_m[others] - points_m[start]
+def _cut(points_m: Points, start: int, end: int, on_it: Indices) -> Iterable[tuple[int, int]]:
+    """The pieces into which points `on_it` cut the piece from `start` to `end`."""
+    offsets_m = points_m[on_it] - points_m[start]
     distances_m = np.hypot(*offsets_m.T)
     order = np.argsort(distances_m, kind="stable")
 
-    nearest_first: list[int] = others[order].tolist()
-    return nearest_first
+    between = on_it[order].tolist()
+    return itertools.pairwise([start, *between, end])
 
 
 def shortest_path(before: Indices, end: int) -> list[int]:

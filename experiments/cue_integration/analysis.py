@@ -21,7 +21,7 @@ def errors(trials: Sequence[Trial], responses: Sequence[Response]) -> Points:
 
     Along is the direction in which turned landmarks move the target, whether or not they did,
     inward is across it, on the side of post 8: trials of every route, and of landmarks turned
-    either way, then fall together.
+    in either direction, then fall together.
     """
     targets_m = np.array([trial.target for trial in trials])
     placed_m = np.array([response.position for response in responses])
@@ -134,12 +134,13 @@ def combined(first: Gaussian, second: Gaussian) -> Gaussian:
     """The optimal combination, direction by direction: precisions add, means weigh by them."""
     first_precision = np.linalg.inv(first.covariance_m2)
     second_precision = np.linalg.inv(second.covariance_m2)
-    covariance_m2 = np.linalg.inv(first_precision + second_precision)
+    precision = first_precision + second_precision
+    covariance_m2 = np.linalg.inv(precision)
 
     first_weighed = first_precision @ first.mean_m
     second_weighed = second_precision @ second.mean_m
-    weighed = first_weighed + second_weighed
-    return Gaussian(covariance_m2 @ weighed, covariance_m2)
+    mean_m = covariance_m2 @ (first_weighed + second_weighed)
+    return Gaussian(mean_m, covariance_m2)
 
 
 def alternation_log_densities(
@@ -150,12 +151,13 @@ def alternation_log_densities(
     """
     shares = [landmarks_share, 1 - landmarks_share]
     with np.errstate(divide="ignore"):
-        landmarks_log_share, self_motion_log_share = np.log(shares)
+        log_share, log_rest = np.log(shares)
 
-    by_landmarks = landmarks_log_share + landmarks.log_density(conflict_m)
-    by_self_motion = self_motion_log_share + self_motion.log_density(conflict_m)
-    either = np.logaddexp(by_landmarks, by_self_motion)
-    return np.asarray(either)
+    by_landmarks = log_share + landmarks.log_density(conflict_m)
+    by_self_motion = log_rest + self_motion.log_density(conflict_m)
+
+    densities = np.logaddexp(by_landmarks, by_self_motion)
+    return np.asarray(densities)
 
 
 def best_alternation_log_likelihood(

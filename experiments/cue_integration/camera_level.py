@@ -22,7 +22,7 @@ from experiments.cue_integration.run import Session, respond
 from experiments.cue_integration.trial import Condition, Noise, Response, Trial
 from experiments.rendered import named
 from schemas import sensing
-from schemas.sensing import Odometry, Percept, Percepts, View
+from schemas.sensing import Odometry, Percept, Percepts, StereoFrame, View
 from services import registry
 from services.sim.layout import roadside
 from services.sim.rendering.camera import StereoCamera, calibration
@@ -69,14 +69,15 @@ class PicturedRoom(Room):
             for percept in self._look(turn_rad):
                 label = percept.label
                 quality = (percept.whole, -abs(percept.bearing_rad))
-                if label not in best or quality > qualities[label]:
+                is_better = label not in best or quality > qualities[label]
+                if is_better:
                     qualities[label] = quality
                     best[label] = _turned(percept, turn_rad)
 
         return list(best.values())
 
     def _look(self, turn_rad: float) -> list[Percept]:
-        """The percepts that EPAM publishes of a view, the participant's head turned to the left."""
+        """What is recognised with the participant's head turned to the left."""
         self._looks += 1
         stamp_ns = self._looks * LOOK_NS
         self._world.place_robot(self._drawn_pose(turn_rad))
@@ -86,13 +87,19 @@ class PicturedRoom(Room):
         )
         self._sensory.feed(standing)
         frame = self._camera.frame(stamp_ns, self._looks)
-        views = [message for message in self._sensory.feed(frame) if isinstance(message, View)]
+        return self._recognised(frame)
 
+    def _recognised(self, frame: StereoFrame) -> list[Percept]:
+        """What sensory memory and EPAM make of a frame."""
         percepts: list[Percept] = []
-        for view in views:
+
+        for view in self._sensory.feed(frame):
+            if not isinstance(view, View):
+                continue
             for message in self._epam.feed(view):
                 if isinstance(message, Percepts):
                     percepts += message.objects
+
         return percepts
 
     def _drawn_pose(self, turn_rad: float) -> sensing.Pose:
@@ -117,7 +124,8 @@ class PicturedRoom(Room):
         trajectory = msgspec.convert(
             {"line_m": line_m, "landmarks": named(places), "sensing": "cameras"}, Trajectory
         )
-        world = World(roadside.along(trajectory, self._trial.seed))
+        layout = roadside.along(trajectory, self._trial.seed)
+        world = World(layout)
         return world, StereoCamera(world, calibration())
 
 

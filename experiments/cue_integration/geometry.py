@@ -89,8 +89,9 @@ def step(bearing_rad: float, distance_m: float) -> tuple[float, float]:
     is_ahead = turn_rad == bearing_rad
     max_m = STEP_M if is_ahead else WHILE_TURNING_M
 
-    forward_m = min(distance_m - REACH_M, max_m)
-    return turn_rad, max(0.0, forward_m)
+    missing_m = distance_m - REACH_M
+    forward_m = max(0.0, min(missing_m, max_m))
+    return turn_rad, forward_m
 
 
 def turned(

@@ -1,4 +1,4 @@
-"""Figures that others published of this experiment. They are a simulation's, not people's.
+"""Metrics that others published of this experiment. They are a simulation's, not people's.
 
 Kessler, Frankenstein and Rothkopf (2024) simulated the experiment of Nardini et al. (2008) with a
 model of their own, its noise fitted to human responses. The human values themselves are in no

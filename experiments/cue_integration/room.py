@@ -97,7 +97,8 @@ class Room:
             return self._walk(turn_rad, forward_m)
 
         self._to_pick.pop(0)
-        return self._walk(turn_rad, forward_m, {f"post-{number}": post})
+        picked = {f"post-{number}": post}
+        return self._walk(turn_rad, forward_m, picked)
 
     def _change(self) -> list[Message]:
         """What happens, eyes closed, before the participant walks back."""
@@ -119,8 +120,9 @@ class Room:
     def _walk(
         self, turn_rad: float, forward_m: float, picked: Mapping[str, Point] = NOTHING
     ) -> list[Message]:
+        noise = self._trial.noise
         self._pose = self._pose.after(turn_rad, forward_m)
-        felt = senses.self_motion(turn_rad, forward_m, self._trial.noise, self._rng)
+        felt = senses.self_motion(turn_rad, forward_m, noise, self._rng)
         motions = felt if self._knows_motion else senses.UNKNOWN
 
         percepts = self._seen(picked)

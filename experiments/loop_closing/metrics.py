@@ -36,12 +36,14 @@ def loop_metrics(loops: Mapping[str, Loop]) -> Metrics:
 
 
 def _of_loop(loop: Loop, method: str) -> Metrics:
+    """Errors and corrections of one loop, by its method."""
     metrics: Metrics = {}
     maps = {"before": loop.before, "after": loop.after, "in_the_end": loop.end}
 
     for error in ERRORS:
         for when, learned in maps.items():
-            metrics[f"{error}_{when}_m_{method}"] = getattr(learned, f"{error}_m")
+            error_m = getattr(learned, f"{error}_m")
+            metrics[f"{error}_{when}_m_{method}"] = error_m
 
     first = loop.replays[0]
     metrics[f"corrections_{method}"] = float(len(loop.replays))

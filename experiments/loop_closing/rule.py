@@ -55,11 +55,9 @@ def close_laps(
     measured_distance_m, heading_error_rad = _measured(distance_m, turn_rad, noise, laps, rng)
     measured_heading_rad = heading_rad + heading_error_rad
     measured_m = _displacements_m(measured_distance_m, measured_heading_rad)
-    error_m = np.cumsum(measured_m - true_m, axis=1)
 
-    along_m = np.cumsum(distance_m)
-    share = along_m / along_m[-1]
-    closed_m = error_m - share[:, None] * error_m[:, -1:]
+    error_m = np.cumsum(measured_m - true_m, axis=1)
+    closed_m = _closed_m(error_m, distance_m)
     return Laps(_rms_m(error_m), _rms_m(closed_m))
 
 
@@ -101,6 +99,16 @@ def _displacements_m(distance_m: Floats, heading_rad: Floats) -> Floats:
     x_m = distance_m * np.cos(heading_rad)
     y_m = distance_m * np.sin(heading_rad)
     return np.stack([x_m, y_m], axis=-1)
+
+
+def _closed_m(error_m: Floats, distance_m: Floats) -> Floats:
+    """Errors (laps, n, 2) after eq. 9: that of the end is taken from each position by the share of
+    the loop that lies before it.
+    """
+    along_m = np.cumsum(distance_m)
+    share = along_m / along_m[-1]
+    end_m = error_m[:, -1:]
+    return np.asarray(error_m - share[:, None] * end_m)
 
 
 def _sum_before(values: Floats) -> Floats:

@@ -81,7 +81,8 @@ class GridModule:
         y = np.sin(angles_rad)
         directions = np.column_stack([x, y])
 
-        rad_per_m = 4 * np.pi / (np.sqrt(3) * self.spacing_m)
+        two_rows_m = np.sqrt(3) * self.spacing_m
+        rad_per_m = 4 * np.pi / two_rows_m
         return np.asarray(rad_per_m * directions)
 
     def nearest(self, centres_m: Values) -> Indices:

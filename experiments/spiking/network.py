@@ -72,7 +72,8 @@ class Posterior:
 
 def exact(cues: Cues) -> Posterior:
     """Bayes' rule for normal distributions: precisions add, means weigh by them."""
-    precision = np.linalg.inv(np.array(cues.covariance_m2))
+    prior_m2 = np.array(cues.covariance_m2)
+    precision = np.linalg.inv(prior_m2)
     weighed = precision @ np.array(cues.mean_m)
 
     for border in cues.borders:
@@ -131,7 +132,8 @@ def record(cues: Cues, side_m: float, seconds: float, rng: np.random.Generator) 
 
     for spacing_m in SPACINGS_M:
         module = GridModule(spacing_m)
-        spikes = generate(module.tuning(integrated_m), rng)
+        share = module.tuning(integrated_m)
+        spikes = generate(share, rng)
         place &= spikes[module.nearest(centres_m)]
         grid.append(spikes)
 
