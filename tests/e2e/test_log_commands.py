@@ -15,9 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
 
-from cli.main import cogmap
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.errors import UsageError
 from cogmap.recording.diff import diff
@@ -25,6 +23,7 @@ from cogmap.recording.recorder import Recorder
 from cogmap.recording.storage.format import topics_to_record
 from schemas.array import Array
 from schemas.base import Message
+from tests.support.commands import log_command, log_facts
 from tests.support.logs import SECOND_NS, odometry, scan, write_log
 from tests.support.networks import routed
 
@@ -53,32 +52,15 @@ def path(tmp_path: Path) -> Path:
     return write(tmp_path / "log.mcap")
 
 
-def run(*arguments: str | Path) -> Result:
-    """Run `cogmap log` in this process. Raises what it raises."""
-    given = ["log", *map(str, arguments)]
-    result = CliRunner().invoke(cogmap, given, standalone_mode=False)
-    error = result.exception
-    if error is not None and not isinstance(error, SystemExit):
-        raise error
-    return result
-
-
-def run_json(*arguments: str | Path) -> dict[str, Any]:
-    """What `cogmap log` prints as JSON."""
-    result = run(*arguments, "--json")
-    printed: dict[str, Any] = json.loads(result.stdout)
-    return printed
-
-
 def cat(path: Path, *arguments: str) -> list[dict[str, Any]]:
     """What `cogmap log cat` prints as JSON, message by message."""
-    result = run("cat", path, *arguments, "--json")
+    result = log_command("cat", path, *arguments, "--json")
     return [json.loads(line) for line in result.stdout.splitlines()]
 
 
 def test_info_counts_the_messages_of_each_topic_by_source(path: Path) -> None:
-    found = run_json("info", path)
-    text = run("info", path).stdout
+    found = log_facts("info", path)
+    text = log_command("info", path).stdout
 
     assert found["agent"] == "a"
     assert found["messages"] == 2 * COUNT
@@ -97,7 +79,7 @@ def test_info_counts_the_messages_of_each_topic_by_source(path: Path) -> None:
 def test_info_names_a_gap(tmp_path: Path) -> None:
     thin = write(tmp_path / "thin.mcap", without=2)
 
-    text = run("info", thin).stdout
+    text = log_command("info", thin).stdout
 
     assert "gap: odometry (never drop): 1 of sim missing, number 2" in text
 
@@ -111,8 +93,8 @@ def test_cat_prints_the_messages_of_the_topics_named_and_no_more_than_asked(path
 
 
 def test_cat_prints_the_values_of_an_array_where_asked(path: Path) -> None:
-    brief = run("cat", path, "sensory/scan", "-n", "1").stdout
-    full = run("cat", path, "sensory/scan", "-n", "1", "--full").stdout
+    brief = log_command("cat", path, "sensory/scan", "-n", "1").stdout
+    full = log_command("cat", path, "sensory/scan", "-n", "1", "--full").stdout
 
     assert brief.startswith("--- sensory/scan at 0.000 s\nstamp_ns: 1000000000\n")
     assert "range_m: <f4 4, 0.0 to 3.0" in brief
@@ -131,14 +113,14 @@ def test_diff_ends_with_0_for_the_same_and_1_with_words_for_a_difference(
     same = write(tmp_path / "same.mcap")
     other = write(tmp_path / "other.mcap", speed_m_s=2.0)
 
-    result = run("diff", path, other)
+    log_command("diff", path, same, code=0)
+    log_command("diff", path, other, "sensory/scan", code=0)
+    text = log_command("diff", path, other, code=1).stdout
+    facts = log_facts("diff", path, other, code=1)
 
     first = "odometry number 0 of sim (stamp 1.000 s): speed_m_s is 1.0 in log.mcap"
-    assert result.exit_code == 1
-    assert f"First difference: {first}" in result.stdout
-    assert run_json("diff", path, other)["same"] is False
-    assert run("diff", path, same).exit_code == 0
-    assert run("diff", path, other, "sensory/scan").exit_code == 0
+    assert f"First difference: {first}" in text
+    assert facts["same"] is False
 
 
 def test_recover_prints_what_it_saved_and_what_is_lost(path: Path, tmp_path: Path) -> None:
@@ -147,11 +129,11 @@ def test_recover_prints_what_it_saved_and_what_is_lost(path: Path, tmp_path: Pat
     saved = tmp_path / "saved.mcap"
     cut.write_bytes(whole[:-1500])
 
-    recovery = run_json("recover", cut, saved)
-    text = run("recover", cut, tmp_path / "again.mcap").stdout
+    recovery = log_facts("recover", cut, saved)
+    text = log_command("recover", cut, tmp_path / "again.mcap").stdout
 
     assert recovery["messages"] == 2 * COUNT
-    assert run_json("info", saved)["messages"] == 2 * COUNT
+    assert log_facts("info", saved)["messages"] == 2 * COUNT
     assert "messages saved from" in text
 
 
@@ -176,7 +158,7 @@ def test_what_the_user_can_mend_is_one_sentence(
     given = [path if argument == "LOG" else argument for argument in arguments]
 
     with pytest.raises(UsageError) as caught:
-        run(*given)
+        log_command(*given)
 
     printed = str(caught.value)
     assert sentence in printed

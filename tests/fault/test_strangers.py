@@ -74,12 +74,11 @@ def _ignore(message: Message) -> None:
     """Only what is rejected matters here."""
 
 
-def handled(instance: str) -> set[str]:
+def handled(instance: str) -> list[str]:
     """The topics that an instance subscribes to."""
-    name, _, _ = instance.partition("-")
-    module = registry.build(name, {})
-    carried = set(module.handlers) - {topics.PRESENCE}
-    return {topic.name for topic in carried}
+    module, _, _ = instance.partition("-")
+    handlers = registry.build(module, {}).handlers
+    return [topic.name for topic in CARRIED if topic in handlers]
 
 
 def logged(process: Process) -> Counter[str]:
@@ -101,9 +100,10 @@ def await_rejected(witness: Witness, expected: Rejections) -> None:
     """Wait until every instance reports that it has rejected just that."""
 
     def are_counted() -> bool:
-        reported = {name: health.rejected for name, health in witness.health.items()}
-        return all(reported.get(name) == counts for name, counts in expected.items())
+        reported = {name: witness.health[name].rejected for name in expected}
+        return reported == expected
 
+    wait_until(lambda: expected.keys() <= witness.health.keys(), "all report their health")
     wait_until(are_counted, f"{expected} are counted")
 
 

@@ -145,10 +145,12 @@ def test_wellformed_bytes_of_wrong_content_are_refused_or_finite_messages(topic:
     assert False in accepted
 
 
-def test_every_byte_string_up_to_two_bytes_is_refused_or_an_envelope() -> None:
-    for number in range(2**16):
+@pytest.mark.parametrize("length", [0, 1, 2])
+def test_no_byte_string_of_up_to_two_bytes_is_an_envelope(length: int) -> None:
+    for number in range(256**length):
+        payload = number.to_bytes(length, "big")
         with pytest.raises(MessageError):
-            decode_envelope(number.to_bytes(2, "big"))
+            decode_envelope(payload)
 
 
 def test_mutated_envelopes_are_refused_or_encode_to_the_same() -> None:

@@ -105,11 +105,13 @@ class Session:
         shell.open()
         return shell
 
-    def publish(self, message: Message, sent_ns: int, incarnation: int = 1) -> None:
+    def publish(self, message: Message, since_ns: int, incarnation: int = 1) -> None:
         """Publish `message` as the simulator's, so many ns after the session began."""
+        topic = topics.of(message)
         of_sim = replace(message, source="sim")
-        envelope = Envelope("sim", message.seq, incarnation, self.now_ns + sent_ns, 0)
-        self.bus.publish(topics.of(message), encode(of_sim), envelope)
+        sent_ns = self.now_ns + since_ns
+        envelope = Envelope("sim", message.seq, incarnation, sent_ns, 0)
+        self.bus.publish(topic, encode(of_sim), envelope)
 
     def settle(self) -> None:
         for shell in self.shells.values():
@@ -125,7 +127,7 @@ def odometry(seq: int) -> Odometry:
     return Odometry(stamp_ns=seq * 10**9, seq=seq, speed_m_s=1.0, turn_rate_rad_s=0.0, dt_s=0.05)
 
 
-def clock(seq: int) -> Message:
+def clock(seq: int) -> Clock:
     return Clock(stamp_ns=seq * 10**9, seq=seq)
 
 

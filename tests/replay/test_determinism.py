@@ -16,6 +16,7 @@ from schemas import topics
 from schemas.base import Message
 from schemas.graph import Delta
 from schemas.topics import Delivery, Topic
+from tests.support.messages import of_type
 from tests.support.reference import COMPARED, Published, drive, graph
 
 FRAMES = 8
@@ -36,7 +37,8 @@ def _messages(published: Published, topic: Topic) -> list[Message]:
 def _graph(published: Published) -> Graph:
     """What the deltas of a drive make."""
     messages = _messages(published, topics.DELTA)
-    return graph(message for message in messages if isinstance(message, Delta))
+    deltas = of_type(Delta, messages)
+    return graph(deltas)
 
 
 def _check_that_all_is_the_same(

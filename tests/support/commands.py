@@ -11,16 +11,20 @@ from click.testing import CliRunner, Result
 from cli.main import cogmap
 
 
-def log_command(*arguments: str | Path) -> Result:
-    """`cogmap log` with these arguments; what it raises is raised."""
+def log_command(*arguments: str | Path, code: int = 0) -> Result:
+    """`cogmap log` with these arguments, which must end with `code`. Raises what it raises."""
     words = ["log", *map(str, arguments)]
     result = CliRunner().invoke(cogmap, words, standalone_mode=False)
-    if result.exception is not None:
-        raise result.exception
+    error = result.exception
+    if error is not None and not isinstance(error, SystemExit):
+        raise error
+
+    assert result.exit_code == code, result.output
     return result
 
 
-def log_facts(*arguments: str | Path) -> dict[str, Any]:
+def log_facts(*arguments: str | Path, code: int = 0) -> dict[str, Any]:
     """What `cogmap log` prints as JSON."""
-    facts: dict[str, Any] = json.loads(log_command(*arguments, "--json").stdout)
+    result = log_command(*arguments, "--json", code=code)
+    facts: dict[str, Any] = json.loads(result.stdout)
     return facts

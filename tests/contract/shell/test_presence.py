@@ -77,7 +77,7 @@ def test_a_module_that_observes_presence_learns_who_comes_and_goes(network: Netw
     worker.close()
     spin_until(lambda: any(not presence.alive for presence in observed), shell)
 
-    of_workers = [presence for presence in observed if presence.module == "codelets"]
-    assert [presence.instance for presence in of_workers] == ["codelets-1", "codelets-1"]
-    assert [presence.alive for presence in of_workers] == [True, False]
+    came, went = (presence for presence in observed if presence.module == "codelets")
+    assert (came.instance, came.alive) == ("codelets-1", True)
+    assert (went.instance, went.alive) == ("codelets-1", False)
     shell.close()
