@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.support.networks import InMemory, Network, OverZenoh, routed
+from tests.support.system.networks import InMemory, Network, OverZenoh, routed
 
 
 @pytest.fixture(scope="session")

@@ -17,7 +17,7 @@ from schemas.examples import example_messages
 from schemas.process import Clock
 from schemas.topics import Delivery
 from tests.support.logs import odometry
-from tests.support.networks import TIMEOUT_S, Network, OverZenoh, Peer, meet, publish
+from tests.support.system.networks import TIMEOUT_S, Network, OverZenoh, Peer, meet, publish
 
 MESSAGES = {topics.of(message): message for message in example_messages()}
 TRAVELLING = [topic for topic in topics.ALL if topic.delivery is not Delivery.ON_REQUEST]

@@ -15,7 +15,7 @@ from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.topics import Scope
 from services import registry
-from tests.support.networks import TIMEOUT_S, OverZenoh, Peer, meet
+from tests.support.system.networks import TIMEOUT_S, OverZenoh, Peer, meet
 
 TRUTH = [topic for topic in topics.ALL if topic.scope is Scope.TRUTH]
 

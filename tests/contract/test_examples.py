@@ -26,7 +26,7 @@ from schemas.array import Array
 from schemas.export import GOLDEN
 from schemas.sensing import MotorCommand, RangeScan
 from tests.support.includes import LANGUAGES, PAGES, ROOT, included, included_paths
-from tests.support.networks import TIMEOUT_S, OverZenoh, Peer, publish
+from tests.support.system.networks import TIMEOUT_S, OverZenoh, Peer, publish
 
 PAGE = ROOT / "docs" / "modules.md"
 RUST = ROOT / "examples" / "rust"

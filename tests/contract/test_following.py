@@ -18,7 +18,7 @@ from schemas.graph import Delta, DropNode, Link, Operation, Phase, SnapshotReque
 from schemas.nodes import Node
 from schemas.sensing import MotorCommand
 from tests.support.logs import odometry
-from tests.support.networks import (
+from tests.support.system.networks import (
     TIMEOUT_S,
     Network,
     Peer,

@@ -16,7 +16,7 @@ from cogmap.runtime.state.journal import Journal
 from schemas import topics
 from schemas.base import Message
 from schemas.graph import Decay, Delta, Link, Phase, Snapshot
-from tests.support.disks import full_after
+from tests.support.system.disks import full_after
 
 
 def delta(version: int) -> Delta:

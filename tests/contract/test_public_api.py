@@ -19,8 +19,8 @@ from schemas.nodes import Node
 from schemas.sensing import MotorCommand, Odometry
 from tests.support.includes import ROOT
 from tests.support.logs import odometry
-from tests.support.networks import OverZenoh, Peer, await_members, publish
 from tests.support.reference import REFERENCE
+from tests.support.system.networks import OverZenoh, Peer, await_members, publish
 
 OURS = {"benchmarks", "cli", "cogmap", "experiments", "services", "tests", "training"}
 PUBLIC = {"cogmap", "services.registry"}

@@ -17,7 +17,7 @@ from schemas import topics
 from schemas.graph import Delta, Phase
 from schemas.nodes import Node
 from tests.support.logs import odometry
-from tests.support.networks import OverZenoh, Peer, meet, publish, spin_until, working
+from tests.support.system.networks import OverZenoh, Peer, meet, publish, spin_until, working
 
 
 class Router:

@@ -9,7 +9,7 @@ from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.graph import Delta, Link, Phase
 from schemas.nodes import Node
-from tests.support.networks import Network, meet, working
+from tests.support.system.networks import Network, meet, working
 
 
 def delta(version: int) -> Delta:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.runs import Run
+from tests.support.system.runs import Run
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from cogmap.recording.diff import diff
-from tests.support.runs import DRIVING, Run
+from tests.support.system.runs import DRIVING, Run
 
 SHORT = ("--lockstep", "--laps", "0.04", "--seed", "6", "--codelets", "2")
 

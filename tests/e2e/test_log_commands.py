@@ -23,9 +23,9 @@ from cogmap.recording.recorder import Recorder
 from cogmap.recording.storage.format import topics_to_record
 from schemas.array import Array
 from schemas.base import Message
-from tests.support.commands import log_command, log_facts
 from tests.support.logs import SECOND_NS, odometry, scan, write_log
-from tests.support.networks import routed
+from tests.support.system.commands import log_command, log_facts
+from tests.support.system.networks import routed
 
 COUNT = 5
 TIMEOUT_S = 30.0

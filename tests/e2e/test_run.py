@@ -18,8 +18,8 @@ from cogmap.runtime.client import Client
 from cogmap.runtime.module import Module
 from schemas import topics
 from schemas.sensing import MotorCommand
-from tests.support.processes import shared_memory
-from tests.support.runs import COGMAP, DRIVING, TIMEOUT_S, Run, processes_at, wait_until
+from tests.support.system.processes import shared_memory
+from tests.support.system.runs import COGMAP, DRIVING, TIMEOUT_S, Run, processes_at, wait_until
 
 LOG_LIMIT_BYTES = 4_000_000
 MCAP_END = b"\x89MCAP0\r\n"

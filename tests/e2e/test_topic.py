@@ -16,7 +16,7 @@ from cogmap import Client, Module, topics
 from schemas.base import Message
 from schemas.examples import example_messages
 from schemas.sensing import MotorCommand, Odometry
-from tests.support.networks import routed
+from tests.support.system.networks import routed
 
 TIMEOUT_S = 30.0
 PERIOD_NS = 20_000_000

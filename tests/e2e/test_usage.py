@@ -15,7 +15,7 @@ import zenoh
 
 from cogmap.bus.discovery import discover
 from cogmap.bus.session import free_endpoint, open_client
-from tests.support.networks import routed
+from tests.support.system.networks import routed
 
 TIMEOUT_S = 30.0
 NO_ROUTER = "tcp/127.0.0.1:1"

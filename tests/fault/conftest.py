@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from cogmap.bus.session import check_free
-from tests.support.live import Feeder, Witness
-from tests.support.networks import working
-from tests.support.processes import System, shared_memory
+from tests.support.system.live import Feeder, Witness
+from tests.support.system.networks import working
+from tests.support.system.processes import System, shared_memory
 
 
 @pytest.fixture

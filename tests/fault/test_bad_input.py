@@ -20,10 +20,10 @@ from schemas.graph import Delta, Phase
 from schemas.sensing import Percepts, SelfMotion
 from schemas.topics import Delivery
 from tests.support.damage import damaged
-from tests.support.live import Witness
-from tests.support.networks import working
-from tests.support.processes import AGENT, System, wait_until
-from tests.support.scenes import percept
+from tests.support.system.live import Witness
+from tests.support.system.networks import working
+from tests.support.system.processes import AGENT, System, wait_until
+from tests.support.world.scenes import percept
 
 TRAVELLING = [topic for topic in topics.ALL if topic.delivery is not Delivery.ON_REQUEST]
 VIEWS = len(TRAVELLING)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from tests.support.disks import full_after
-from tests.support.live import Feeder
-from tests.support.networks import working
-from tests.support.processes import System, wait_until
+from tests.support.system.disks import full_after
+from tests.support.system.live import Feeder
+from tests.support.system.networks import working
+from tests.support.system.processes import System, wait_until
 
 FULL_BYTES = 20_000
 USAGE_EXIT = 2

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import signal
 
-from tests.support.live import Feeder, Witness
-from tests.support.networks import working
-from tests.support.processes import System, wait_until
+from tests.support.system.live import Feeder, Witness
+from tests.support.system.networks import working
+from tests.support.system.processes import System, wait_until
 
 
 def test_a_late_follower_has_the_graph_though_the_workspace_dies_as_it_joins(

@@ -9,8 +9,8 @@ from cogmap.runtime.shell import Shell
 from cogmap.runtime.state.published import PublishedCounts
 from schemas import topics
 from schemas.sensing import Odometry
-from tests.support.networks import working
-from tests.support.processes import System, wait_until
+from tests.support.system.networks import working
+from tests.support.system.processes import System, wait_until
 
 WITHOUT_IMAGES = ("sim.egl=false", "sim.frame_hz=1")
 

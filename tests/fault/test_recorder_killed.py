@@ -21,9 +21,9 @@ from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.recording.storage.reader import LogReader, Record
 from cogmap.recording.storage.recover import recover
 from schemas import topics
-from tests.support.disks import full_after
 from tests.support.logs import odometry
-from tests.support.networks import routed
+from tests.support.system.disks import full_after
+from tests.support.system.networks import routed
 
 TIMEOUT_S = 30.0
 AGENT = "recorded"

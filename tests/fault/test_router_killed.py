@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import signal
 
-from tests.support.live import Feeder, Witness
-from tests.support.processes import System, wait_until
+from tests.support.system.live import Feeder, Witness
+from tests.support.system.processes import System, wait_until
 
 
 def test_deltas_arrive_in_order_and_cycles_continue_after_a_router_is_killed(

@@ -21,9 +21,9 @@ from schemas.base import Message
 from schemas.topics import Delivery, Topic
 from services import registry
 from tests.support.damage import damaged, golden
-from tests.support.live import Feeder, Witness
-from tests.support.networks import working
-from tests.support.processes import AGENT, Process, System, wait_until
+from tests.support.system.live import Feeder, Witness
+from tests.support.system.networks import working
+from tests.support.system.processes import AGENT, Process, System, wait_until
 
 MODULES = ("sensory", "epam", "global_workspace", "action")
 CARRIED = tuple(

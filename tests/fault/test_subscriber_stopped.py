@@ -22,9 +22,9 @@ from schemas.base import Message
 from schemas.examples import example_messages
 from schemas.sensing import StereoFrame
 from schemas.topics import Topic
-from tests.support.live import Feeder, Witness
-from tests.support.networks import working
-from tests.support.processes import AGENT, Process, System, wait_until
+from tests.support.system.live import Feeder, Witness
+from tests.support.system.networks import working
+from tests.support.system.processes import AGENT, Process, System, wait_until
 
 STOPPED_S = 5.0
 MAX_GAP_S = 0.5

@@ -11,9 +11,9 @@ from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.codelets import Assignment, Leases, Proposal
-from tests.support.live import Feeder, Witness
-from tests.support.networks import working
-from tests.support.processes import System, wait_until
+from tests.support.system.live import Feeder, Witness
+from tests.support.system.networks import working
+from tests.support.system.processes import System, wait_until
 
 PATIENT = ("workspace.deadline_ms=20000", "workspace.lease_ms=20000")
 STOPPED = "codelets-1"

@@ -6,8 +6,8 @@ import signal
 
 import pytest
 
-from tests.support.live import Feeder, Witness
-from tests.support.processes import System, wait_until
+from tests.support.system.live import Feeder, Witness
+from tests.support.system.processes import System, wait_until
 
 TOLERANCE_M = 0.3
 

@@ -10,7 +10,7 @@ from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.sensing import MotorCommand, Odometry
 from tests.support.logs import odometry
-from tests.support.networks import Network, Peer, meet, next_health, publish, spin_until
+from tests.support.system.networks import Network, Peer, meet, next_health, publish, spin_until
 
 
 def command(odometry: Odometry) -> MotorCommand:

@@ -19,7 +19,7 @@ from schemas.process import Clock
 from schemas.topics import Delivery, Topic
 from tests.support.damage import damaged, golden
 from tests.support.logs import odometry
-from tests.support.networks import Network, Peer, envelope_of, meet, publish, spin_until
+from tests.support.system.networks import Network, Peer, envelope_of, meet, publish, spin_until
 
 RECEIVED = [
     topic

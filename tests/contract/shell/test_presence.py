@@ -9,7 +9,7 @@ from schemas import topics
 from schemas.process import Presence
 from schemas.sensing import Odometry
 from tests.support.logs import odometry
-from tests.support.networks import Network, spin_until
+from tests.support.system.networks import Network, spin_until
 
 COUNT = 20
 

@@ -14,7 +14,15 @@ from schemas import topics
 from schemas.graph import Decay, Snapshot, SnapshotRequest
 from schemas.sensing import MotorCommand, Odometry
 from tests.support.logs import odometry
-from tests.support.networks import TIMEOUT_S, Network, Peer, meet, publish, spin_until, working
+from tests.support.system.networks import (
+    TIMEOUT_S,
+    Network,
+    Peer,
+    meet,
+    publish,
+    spin_until,
+    working,
+)
 
 Handler = Callable[[Odometry], MotorCommand | None]
 EMPTY = Snapshot(version=0, cycle=0, decay=Decay(), nodes=[], links=[], tiles=[])

@@ -22,7 +22,7 @@ from schemas.sensing import MotorCommand, RangeScan, SelfMotion, SpeedLimit
 from services.action.module import Config, build
 from services.action.selection import FOLLOW_ROUTE, HALT
 from tests.support.messages import of_type
-from tests.support.scenes import agent
+from tests.support.world.scenes import agent
 
 PERIOD_NS = 200_000_000
 Legs = tuple[tuple[float, float], ...]

@@ -17,7 +17,7 @@ from schemas.nodes import Node
 from schemas.process import Clock
 from schemas.sensing import MotorCommand, SpeedLimit
 from services.action.module import Config, build
-from tests.support.scenes import agent
+from tests.support.world.scenes import agent
 
 TICK_S = 0.05
 CYCLE_TICKS = 8

@@ -10,8 +10,8 @@ import pytest
 from cogmap.errors import LogError, UsageError
 from schemas.base import Message
 from schemas.sensing import Odometry, Pose, TruePose
-from tests.support.commands import log_command, log_facts
 from tests.support.logs import SECOND_NS, odometry, write_log
+from tests.support.system.commands import log_command, log_facts
 
 STEPS = 5
 

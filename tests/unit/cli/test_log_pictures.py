@@ -26,9 +26,9 @@ from cogmap.errors import LogError, UsageError
 from schemas.array import Array
 from schemas.base import Message
 from schemas.sensing import Percept, Percepts, StereoFrame, View
-from tests.support.blocks import ASPHALT, CAMERA, GRASS, Block, painted
-from tests.support.commands import log_command, log_facts
 from tests.support.logs import SECOND_NS, write_log
+from tests.support.system.commands import log_command, log_facts
+from tests.support.world.blocks import ASPHALT, CAMERA, GRASS, Block, painted
 
 FRAMES = 5
 FIRST = 3

@@ -14,7 +14,7 @@ from schemas.array import Array
 from schemas.cognition import Competition
 from schemas.graph import Delta, DropNode, Phase
 from schemas.sensing import Odometry, Pose, SelfMotion, TruePose
-from tests.support.scenes import agent, thing
+from tests.support.world.scenes import agent, thing
 
 TICK_NS = 50_000_000
 TICK_S = 0.05

@@ -21,7 +21,7 @@ from schemas.nodes import PlaceColumn
 from schemas.process import Health
 from schemas.sensing import MotorCommand, Odometry, Pose, SelfMotion, SpeedLimit, TruePose
 from services.sim.layout.town import generate
-from tests.support.scenes import agent, landmark
+from tests.support.world.scenes import agent, landmark
 
 MS = 1_000_000
 

@@ -26,7 +26,7 @@ from services.codelets.config import Config
 from services.codelets.module import build
 from services.codelets.table import CODELETS
 from tests.support.messages import of_type
-from tests.support.scenes import (
+from tests.support.world.scenes import (
     agent,
     configured,
     graph_of,

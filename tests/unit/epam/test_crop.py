@@ -8,7 +8,7 @@ import pytest
 
 from services.epam.recognition.crop import CHANNELS, SIDE_PX, colours, crop, surroundings
 from services.epam.recognition.segments import Segment
-from tests.support.blocks import CAMERA, painted
+from tests.support.world.blocks import CAMERA, painted
 
 SIZE = (240, 320)
 MIDDLE = SIDE_PX // 2

@@ -20,9 +20,9 @@ from schemas.array import Array
 from schemas.base import Message
 from schemas.sensing import Learned, Percepts, View
 from services.epam.module import Config, build
-from tests.support.blocks import CAMERA
 from tests.support.messages import of_type
-from tests.support.rendered import seen
+from tests.support.world.blocks import CAMERA
+from tests.support.world.rendered import seen
 from training.rendering.towns import render_town
 
 UNLABELLED = 4005

@@ -14,7 +14,7 @@ from schemas.sensing import Building, Learned, Percept, Percepts
 from services.epam.module import Config, build
 from services.sim.layout import town
 from tests.support.messages import of_type
-from tests.support.rendered import seen
+from tests.support.world.rendered import seen
 from training.rendering.towns import Views, render_town
 
 SEED = 4003

@@ -24,7 +24,7 @@ from services.epam.layout.road import DEFAULT_PATH, INPUT_SHAPE, OUTPUT_SHAPES, 
 from services.epam.network import Network
 from services.sensory.disparity import DepthFromStereo
 from services.sensory.rectify import rectification
-from tests.support.blocks import CAMERA, Block, painted
+from tests.support.world.blocks import CAMERA, Block, painted
 from training.photographs import camvid_iou
 from training.rendering.towns import render_town
 

@@ -17,7 +17,7 @@ from services.epam.recognition.segments import (
     load,
     network_input,
 )
-from tests.support.blocks import CAMERA
+from tests.support.world.blocks import CAMERA
 
 SIZE = (240, 320)
 WALL_PX = 8.0

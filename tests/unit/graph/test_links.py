@@ -6,7 +6,7 @@ from cogmap.bus.codec import encode
 from cogmap.graph.graph import Graph
 from schemas.graph import DropLink, DropNode, Link, Links, Operation
 from schemas.nodes import LinkKind
-from tests.support.scenes import thing
+from tests.support.world.scenes import thing
 
 NEAR = "near"
 

@@ -19,7 +19,7 @@ from cogmap.recording.storage.writer import CHUNK_BYTES
 from schemas import topics
 from schemas.array import Array
 from schemas.sensing import RangeScan
-from tests.support.disks import full_after
+from tests.support.system.disks import full_after
 
 FULL_BYTES = 6_000_000
 MESSAGE_BYTES = 200_000

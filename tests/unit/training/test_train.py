@@ -18,7 +18,7 @@ from cogmap.errors import UsageError
 from services.epam.layout.road import load
 from services.epam.recognition import objects, segments
 from services.sim.layout.catalogue import CATALOGUE
-from tests.support.blocks import CAMERA, painted
+from tests.support.world.blocks import CAMERA, painted
 from training.command import train
 from training.rendering.dataset import Job, render_all
 

@@ -22,7 +22,7 @@ from schemas.graph import (
 )
 from schemas.nodes import Node, PlaceColumn, object_id
 from services.workspace.commit import Ledger
-from tests.support.scenes import Desk, agent, answer, landmark, percept, task, thing
+from tests.support.world.scenes import Desk, agent, answer, landmark, percept, task, thing
 
 WRITABLE = frozenset({Node, *PlaceColumn})
 

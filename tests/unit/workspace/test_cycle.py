@@ -15,7 +15,7 @@ from schemas.cognition import Coalitions
 from schemas.graph import Delta, SnapshotRequest
 from schemas.nodes import LinkKind, Self, object_id, percept_id
 from tests.support.messages import of_type
-from tests.support.scenes import (
+from tests.support.world.scenes import (
     Desk,
     agent,
     answer,

@@ -15,7 +15,7 @@ from schemas.graph import Cells, Decay, Delta, DropNode, Link, Phase
 from schemas.nodes import KINDS, AnyNode, Node, PlaceColumn
 from services.workspace.forgetting import Forgetting
 from tests.support.messages import of_type
-from tests.support.scenes import Desk, agent, percept
+from tests.support.world.scenes import Desk, agent, percept
 
 RATES = Decay(activation=0.1, base_level=0.0005, place_activation=0.02, forget_below=0.05)
 HERE = (-3, 70)

@@ -10,7 +10,7 @@ from schemas.codelets import Task
 from schemas.nodes import Self
 from schemas.process import Presence
 from tests.support.messages import of_type
-from tests.support.scenes import (
+from tests.support.world.scenes import (
     PERIOD_NS,
     Desk,
     agent,

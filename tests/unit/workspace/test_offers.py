@@ -6,7 +6,7 @@ from schemas.codelets import Offer
 from schemas.graph import Phase
 from schemas.nodes import Node
 from tests.support.messages import of_type
-from tests.support.scenes import Desk, agent, thing
+from tests.support.world.scenes import Desk, agent, thing
 
 
 def _offer(name: str, cycle: int = 0, source: str = "goal", seq: int = 0) -> Offer:

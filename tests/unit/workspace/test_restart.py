@@ -10,7 +10,7 @@ from schemas.base import Message
 from schemas.codelets import Offer
 from schemas.nodes import Node
 from tests.support.messages import of_type
-from tests.support.scenes import Desk, percept, thing
+from tests.support.world.scenes import Desk, percept, thing
 
 
 def _restored(past: Sequence[Message]) -> Desk:

@@ -9,7 +9,7 @@ from schemas.nodes import AnyNode, Node, Object, Self
 from services.codelets.attention.coalitions import coalition
 from services.codelets.attention.novelty import NOVEL_SIGHTINGS
 from services.codelets.config import Config
-from tests.support.scenes import agent, graph_of, landmark, percept, run, task
+from tests.support.world.scenes import agent, graph_of, landmark, percept, run, task
 
 CONFIG = Config()
 

@@ -6,7 +6,7 @@ import pytest
 
 from services.codelets.correction.gnc import inliers
 from services.codelets.correction.least_squares import optimize
-from tests.support.laps import CLOSURE_SD, error_m, laps, one_between
+from tests.support.world.laps import CLOSURE_SD, error_m, laps, one_between
 
 FALSE_CLOSURE = 1e-3
 

@@ -16,7 +16,7 @@ from services.codelets.correction.pose_graph import (
     residuals,
     sqrt_information,
 )
-from tests.support.laps import error_m, laps, one_between
+from tests.support.world.laps import error_m, laps, one_between
 
 NUDGE = 1e-6
 

@@ -24,10 +24,10 @@ from schemas.nodes import (
 )
 from services.codelets.correction.joint import ROUNDS
 from services.codelets.mapping.path import ODOMETRY, POSE, STAMP, rows_of
-from tests.support.loop_drive import LAP, QUIET, SLIP, LoopDrive
 from tests.support.messages import of_type
 from tests.support.paths import mean_distance_m, steps_m
-from tests.support.scenes import Desk, stamp_ns
+from tests.support.world.loop_drive import LAP, QUIET, SLIP, LoopDrive
+from tests.support.world.scenes import Desk, stamp_ns
 
 TOWER = {"tower": (8.0, 5.0)}
 HOUSE = {"house": (40.0, 50.0)}

@@ -14,7 +14,7 @@ from services.codelets.correction.reverse_replay import (
     displacements,
     position_cost,
 )
-from tests.support.laps import START, laps, one_between, steps_along
+from tests.support.world.laps import START, laps, one_between, steps_along
 
 UNIT_SD = np.ones(3)
 

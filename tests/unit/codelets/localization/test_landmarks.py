@@ -9,8 +9,8 @@ import pytest
 
 from schemas.nodes import Object
 from services.codelets.config import Config
-from tests.support.landmarks import house
-from tests.support.scenes import agent, graph_of, landmark, percept, run, task
+from tests.support.world.landmarks import house
+from tests.support.world.scenes import agent, graph_of, landmark, percept, run, task
 
 CONFIG = Config(misses=3, correlated_views=1.0)
 ASIDE_RAD = math.pi / 2

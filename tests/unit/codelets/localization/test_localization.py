@@ -13,8 +13,15 @@ from cogmap.graph.graph import Graph
 from schemas.graph import Link
 from schemas.nodes import LinkKind, Self
 from services.codelets.config import Config
-from tests.support.landmarks import house, localized, motions, normal_samples, pose_of, samples_of
-from tests.support.scenes import agent, graph_of, percept, run, task
+from tests.support.world.landmarks import (
+    house,
+    localized,
+    motions,
+    normal_samples,
+    pose_of,
+    samples_of,
+)
+from tests.support.world.scenes import agent, graph_of, percept, run, task
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from services.codelets.localization.measurement_model import (
 )
 from services.codelets.localization.novelty import novelty, variances_at
 from services.codelets.mapping.path import segments
-from tests.support.scenes import graph_of, landmark, percept
+from tests.support.world.scenes import graph_of, landmark, percept
 
 CONFIG = Config()
 RANGE_M = 10.0

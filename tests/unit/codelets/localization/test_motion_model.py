@@ -14,9 +14,9 @@ from schemas.array import Array
 from schemas.nodes import Object, Self
 from schemas.sensing import Percept
 from services.codelets.config import Config
-from tests.support.scenes import agent as self_node
-from tests.support.scenes import graph_of, percept, run, task
-from tests.support.scenes import landmark as object_node
+from tests.support.world.scenes import agent as self_node
+from tests.support.world.scenes import graph_of, percept, run, task
+from tests.support.world.scenes import landmark as object_node
 
 PLACES = {"mill": (20.0, 0.0), "tower": (0.0, 25.0), "church": (-15.0, -10.0), "inn": (30.0, 30.0)}
 Pose = tuple[float, float, float]

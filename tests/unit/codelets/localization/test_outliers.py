@@ -8,8 +8,15 @@ import numpy as np
 import pytest
 
 from services.codelets.config import Config
-from tests.support.landmarks import house, localized, motions, normal_samples, pose_of, samples_of
-from tests.support.scenes import agent, percept
+from tests.support.world.landmarks import (
+    house,
+    localized,
+    motions,
+    normal_samples,
+    pose_of,
+    samples_of,
+)
+from tests.support.world.scenes import agent, percept
 
 FIVE_METRES = (5.0, 0.0, 1.0, 0.5, 0.0)
 

@@ -10,7 +10,7 @@ import pytest
 from schemas.graph import Link
 from schemas.nodes import Object
 from services.codelets.config import Config
-from tests.support.scenes import agent, graph_of, percept, run, task
+from tests.support.world.scenes import agent, graph_of, percept, run, task
 
 CONFIG = Config(landmark_samples=40)
 

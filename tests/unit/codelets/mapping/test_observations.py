@@ -15,7 +15,7 @@ from services.codelets.correction.least_squares import optimize
 from services.codelets.correction.pose_graph import Constraints, PoseGraph
 from services.codelets.mapping.observations import Sightings, Viewpoint, extended
 from tests.support.paths import mean_distance_m
-from tests.support.scenes import Desk, percept
+from tests.support.world.scenes import Desk, percept
 
 STILL = np.zeros(3)
 TOWER_M = np.array([6.0, 8.0])

@@ -12,7 +12,7 @@ from schemas.graph import Cells
 from schemas.nodes import PlaceColumn, Self
 from services.codelets.config import Config
 from services.codelets.mapping.road_place import ROAD_REACH_M
-from tests.support.scenes import agent, graph_of, run, task
+from tests.support.world.scenes import agent, graph_of, run, task
 
 CONFIG = Config()
 AHEAD = (4.0, 0.0)

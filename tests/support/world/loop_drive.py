@@ -9,7 +9,7 @@ import numpy as np
 
 from schemas.sensing import Percept, Percepts, PlaceMatch
 from services.codelets.module import Config as WorkerConfig
-from tests.support.scenes import Desk, Rows, motion, percept, percepts, stamp_ns
+from tests.support.world.scenes import Desk, Rows, motion, percept, percepts, stamp_ns
 
 STEP_M = 2.0
 SIDE_STEPS = 20

@@ -16,7 +16,7 @@ from schemas.base import Message
 from schemas.graph import Delta, Snapshot, SnapshotRequest
 from schemas.process import Clock, Health
 from schemas.sensing import MotorCommand, Percept, Percepts, SelfMotion
-from tests.support.processes import wait_until
+from tests.support.system.processes import wait_until
 
 PERIOD_NS = 100_000_000
 SPEED_M_S = 1.0

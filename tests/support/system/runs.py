@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from cogmap.bus.session import free_endpoint
-from tests.support import processes
+from tests.support.system import processes
 
 COGMAP = [sys.executable, "-m", "cli.main"]
 TIMEOUT_S = 90.0

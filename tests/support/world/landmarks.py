@@ -11,7 +11,7 @@ from schemas.array import Array
 from schemas.graph import Operation
 from schemas.nodes import Object, Self
 from services.codelets.config import Config
-from tests.support.scenes import graph_of, landmark, run, task
+from tests.support.world.scenes import graph_of, landmark, run, task
 
 EXACT = Config(samples=4000, kept_samples=2000, outlier_share=1e-9, correlated_views=1.0)
 Row = tuple[float, float, float, float, float]
