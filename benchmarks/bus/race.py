@@ -93,7 +93,7 @@ def pace(
 
 
 def _run(race: Race) -> tuple[float, float]:
-    """Let the publisher go: seconds until all receivers are done, and the CPU time of the router."""
+    """Let the publisher go: seconds until the receivers are done, the CPU time of the router."""
     began_s = time.monotonic()
     router_began_s = time.process_time()
     race.go.set()

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from cogmap.geometry.arrays import Floats
+from cogmap.geometry.se2 import wrap_angle
 
 LAGS_S = np.arange(0.0, 0.525, 0.025)
 MAX_GAP_S = 0.6
@@ -48,6 +49,5 @@ class Delay:
             headings_rad = heading_rad(stamp_s - LAGS_S)
             turned_rad = headings_rad - heading_rad(before_s - LAGS_S)
             error_rad = bearing_rad - before_rad + turned_rad
-            wrapped_rad = np.remainder(error_rad + np.pi, 2 * np.pi) - np.pi
-            self._errors_rad += np.abs(wrapped_rad)
+            self._errors_rad += np.abs(wrap_angle(error_rad))
             self._pairs += 1

@@ -21,6 +21,7 @@ from schemas.nodes import (
     Self,
     object_id,
 )
+from services.codelets.mapping.path import rows_of
 
 CERTAIN_M = 1e-3
 LANDMARK_SAMPLES = 50
@@ -96,8 +97,8 @@ def odometry(graph: Graph) -> Floats:
 
 def path(graph: Graph) -> Floats:
     """(n, 9) rows of the path as it is on the map now, see PathColumn."""
-    segments = sorted(graph.of_kind(PathSegment), key=lambda segment: segment.number)
-    return np.vstack([segment.rows.numpy() for segment in segments])
+    segments = graph.of_kind(PathSegment)
+    return rows_of(segments)
 
 
 def _agent(graph: Graph) -> Self:

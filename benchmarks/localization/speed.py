@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import math
 
 import numpy as np
 
@@ -81,21 +82,26 @@ class Circle:
     def _percepts(self) -> list[Percept]:
         """Some of the nearest landmarks, as many as are drawn, up to IN_VIEW."""
         offsets_m = self._near_m - self._pose[:2]
-        distances_m = np.hypot(offsets_m[:, 0], offsets_m[:, 1])
-        nearest = np.argsort(distances_m)
+        x_m, y_m = offsets_m.T
+        nearest = np.argsort(np.hypot(x_m, y_m))
         count = self._rng.integers(1, IN_VIEW + 1)
-        in_view = nearest[:count].tolist()
-        return [self._percept(number, offsets_m[number]) for number in in_view]
+
+        percepts = []
+        for number in nearest[:count].tolist():
+            percept = self._percept(number, offsets_m[number])
+            percepts.append(percept)
+
+        return percepts
 
     def _percept(self, number: int, offset_m: Floats) -> Percept:
-        x_m, y_m = offset_m
-        direction_rad = np.arctan2(y_m, x_m) - self._pose[2]
+        x_m, y_m = offset_m.tolist()
+        direction_rad = math.atan2(y_m, x_m) - self._pose[2]
         bearing_rad = direction_rad + self._rng.normal(0.0, BEARING_SD_RAD)
-        wrapped_rad = np.remainder(bearing_rad + np.pi, 2 * np.pi) - np.pi
+        wrapped_rad = math.remainder(bearing_rad, math.tau)
 
-        distance_m = float(np.hypot(x_m, y_m))
-        range_m = float(self._rng.normal(distance_m, RANGE_NOISE * distance_m))
-        return seen(label_of(number), float(wrapped_rad), max(MIN_RANGE_M, range_m))
+        distance_m = math.hypot(x_m, y_m)
+        range_m = self._rng.normal(distance_m, RANGE_NOISE * distance_m)
+        return seen(label_of(number), wrapped_rad, max(MIN_RANGE_M, range_m))
 
 
 def _drive_both(small: Circle, large: Circle) -> tuple[list[Times], Times]:

@@ -72,8 +72,12 @@ def measure(graph_path: Path, truth_path: Path | None) -> Metrics:
 
 def _trajectory_errors(paths_m: Mapping[str, Floats], truth_m: Floats) -> Metrics:
     """Each path's absolute trajectory error by its key, and ours over gtsam's."""
-    errors_m = {key: trajectory_error_m(path_m, truth_m) for key, path_m in paths_m.items()}
-    return errors_m | {"ate_vs_gtsam": errors_m["ate_m"] / errors_m["ate_gtsam_m"]}
+    errors_m = {}
+    for key, path_m in paths_m.items():
+        errors_m[key] = trajectory_error_m(path_m, truth_m)
+
+    ratio = errors_m["ate_m"] / errors_m["ate_gtsam_m"]
+    return errors_m | {"ate_vs_gtsam": ratio}
 
 
 def read_graph(path: Path) -> PoseGraph:

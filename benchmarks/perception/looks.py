@@ -95,8 +95,9 @@ class _Tally:
         self._add_depth(scene, result)
 
     def _add_road_mask(self, scene: Scene, result: Result) -> None:
-        image = result.view.image.numpy().astype(np.uint8, copy=False)
-        mask = self._roads.mask(image)
+        image = result.view.image.numpy()
+        mask = self._roads.mask(image.astype(np.uint8, copy=False))
+
         self.masks.append(mask)
         self.surfaces.append(scene.surface)
 
@@ -104,7 +105,12 @@ class _Tally:
         boundary_m = result.percepts.road_boundary_m.numpy()
         in_town_m = streets.in_town(boundary_m, scene.pose)
         errors_m = streets.distances_m(in_town_m, self._edges)
-        missed_m = road.road_edges_missed_m(boundary_m, scene.surface, scene.depth_m, self.camera)
+        missed_m = road.road_edges_missed_m(
+            boundary_m,
+            scene.surface,
+            scene.depth_m,
+            self.camera,
+        )
         self.edge_errors_m.append(errors_m)
         self.edges_missed_m.append(missed_m)
 
@@ -112,6 +118,7 @@ class _Tally:
         found_m = result.view.depth_m.numpy()
         depth_m = found_m.astype(np.float32, copy=False)
         relative, known = depth.errors(depth_m, scene.depth_m)
+
         self.depth_errors.append(relative[::EVERY])
         self.depth_known.append(known)
 

@@ -126,7 +126,14 @@ class _Tally:
     def memory(self) -> Memory:
         """All counts."""
         met = sum(bool(name) for name in self.names.values())
-        return Memory(met, self.later, self.right, self.merges, self.splits, self.mistaken)
+        return Memory(
+            met=met,
+            later=self.later,
+            right=self.right,
+            merges=self.merges,
+            splits=self.splits,
+            mistaken=self.mistaken,
+        )
 
 
 def _sightings(meeting: Meeting) -> list[tuple[int, str, float]]:

@@ -194,7 +194,9 @@ def facing(place: town.Town, target: int, range_m: float, side_rad: float) -> Po
 def side_and_range(place: town.Town, pose: Pose) -> Floats:
     """In which direction of each plot's middle the robot is, and how far away, (plots, 2)."""
     middles_m = np.array([(plot.x_m, plot.y_m) for plot in place.plots])
-    x_m, y_m = (np.array([pose.x_m, pose.y_m]) - middles_m).T
+    robot_m = np.array([pose.x_m, pose.y_m])
+    x_m, y_m = (robot_m - middles_m).T
+
     side_rad = np.arctan2(y_m, x_m)
     range_m = np.hypot(x_m, y_m)
     return np.stack([side_rad, range_m], axis=1)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from cogmap.geometry.arrays import Floats
+from cogmap.geometry.polylines import nearest_on_pieces
 from cogmap.geometry.se2 import transform_from
 from schemas.sensing import Pose
 from services.sim.layout.plan import Rectangle
@@ -66,20 +66,10 @@ def _is_inside(point: Point, areas: Sequence[Rectangle]) -> bool:
 
 def distances_m(points_m: npt.ArrayLike, pieces: Floats) -> Floats:
     """From each of `points_m` (n, 2) to the nearest point of any of `pieces` (m, 2, 2)."""
-    points = np.asarray(points_m, np.float64).reshape(-1, 1, 2)
-    start = pieces[:, 0]
-    along = pieces[:, 1] - start
-    length2 = (along**2).sum(axis=1)
-
-    from_start = points - start
-    projection = (from_start * along).sum(axis=2)
-    share = (projection / length2).clip(0.0, 1.0)
-    foot = start + share[..., None] * along
-
-    offset = points - foot
-    distance = np.hypot(offset[..., 0], offset[..., 1])
-    nearest = distance.min(axis=1, initial=math.inf)
-    return np.asarray(nearest)
+    points = np.asarray(points_m, np.float64)
+    nearest = nearest_on_pieces(pieces[:, 0], pieces[:, 1], points)
+    offset_m = points - nearest.foot_m
+    return np.asarray(np.hypot(offset_m[:, 0], offset_m[:, 1]))
 
 
 def in_town(points_m: npt.ArrayLike, pose: Pose) -> Floats:
