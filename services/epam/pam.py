@@ -18,7 +18,7 @@ from services.epam.config import Config
 from services.epam.layout.footprint_fit import ObjectPose, Silhouette, locate
 from services.epam.layout.ground import project
 from services.epam.layout.road import RoadSegmenter
-from services.epam.layout.walls import walls
+from services.epam.layout.walls import Walls, walls
 from services.epam.recognition.candidate import (
     Candidate,
     height_m,
@@ -27,7 +27,7 @@ from services.epam.recognition.candidate import (
     outline_px,
 )
 from services.epam.recognition.objects import Appearance, ObjectRecognizer, Recognition
-from services.epam.recognition.segments import Segmenter
+from services.epam.recognition.segments import Segment, Segmenter
 from services.epam.view import ViewArrays
 
 NEW_LABEL = "new-building-{}"
@@ -65,12 +65,7 @@ class ExtendedPam:
         """Return what is recognized in `view`; with `learning`, new buildings get nodes."""
         candidates = self.candidates(view, camera)
         found, learned = self._labelled(candidates, view, learning)
-
-        poses = self._poses(found, camera)
-        objects = [
-            self._percept(candidate, pose, camera)
-            for candidate, pose in zip(found, poses, strict=True)
-        ]
+        objects = self._percepts(found, camera)
 
         likelihood = self._road_segmenter.likelihood(view.image)
         road_m, road_boundary_m = project(likelihood, view.depth_m, camera)
@@ -80,6 +75,18 @@ class ExtendedPam:
         """Return every segment that is wide enough and has known depth, whatever its activation,
         from left to right.
         """
+        segments, standing = self._standing(view, camera)
+        appearances = self._recognizer.appearances(view.image, view.depth_m, segments, camera)
+
+        candidates = []
+        for segment, of_segment, appearance in zip(segments, standing, appearances, strict=True):
+            recognition = self._recognizer.recognize(appearance)
+            candidates.append(Candidate(segment, of_segment, recognition))
+
+        return candidates
+
+    def _standing(self, view: ViewArrays, camera: Calibration) -> tuple[list[Segment], list[Walls]]:
+        """The segments that are wide enough and have known depth, and their walls."""
         segments = []
         standing = []
         narrowest_px = self._config.narrowest_px
@@ -91,11 +98,7 @@ class ExtendedPam:
                 segments.append(segment)
                 standing.append(of_segment)
 
-        appearances = self._recognizer.appearances(view.image, view.depth_m, segments, camera)
-        return [
-            Candidate(segment, of_segment, self._recognizer.recognize(appearance))
-            for segment, of_segment, appearance in zip(segments, standing, appearances, strict=True)
-        ]
+        return segments, standing
 
     def restore(self, objects: Iterable[LearnedObject]) -> None:
         """Recognize these nodes again."""
@@ -109,6 +112,7 @@ class ExtendedPam:
         nodes = []
         for label, embedding in self._recognizer.learned:
             nodes.append(_learned(label, embedding))
+
         return nodes
 
     def _labelled(
@@ -137,7 +141,8 @@ class ExtendedPam:
             pieces.setdefault(candidate.recognition.label, []).append(candidate)
 
         found = [joined(parts, view.disparity_px) for parts in pieces.values()]
-        return sorted(found, key=lambda candidate: candidate.walls.left), learned
+        found.sort(key=lambda candidate: candidate.walls.left)
+        return found, learned
 
     def _recognized(self, candidate: Candidate, excluded: Container[str] = ()) -> Candidate:
         """`candidate` recognized by all that is known by now, except by labels `excluded`."""
@@ -153,6 +158,7 @@ class ExtendedPam:
         same = pieces.get(candidate.recognition.label)
         if same is None or is_beside(same[0], candidate):
             return candidate
+
         return self._recognized(candidate, excluded=pieces)
 
     def _is_new(self, candidate: Candidate) -> bool:
@@ -185,6 +191,15 @@ class ExtendedPam:
         self._recognizer.learn(label, appearance.embedding)
         return _learned(label, appearance.embedding)
 
+    def _percepts(self, found: list[Candidate], camera: Calibration) -> list[Percept]:
+        poses = self._poses(found, camera)
+
+        percepts = []
+        for candidate, pose in zip(found, poses, strict=True):
+            percepts.append(self._percept(candidate, pose, camera))
+
+        return percepts
+
     def _poses(self, found: list[Candidate], camera: Calibration) -> list[ObjectPose]:
         """The pose of each: by its known footprint if that fits what is seen, else as a building of
         the usual size.
@@ -210,12 +225,7 @@ class ExtendedPam:
 
     def _percept(self, candidate: Candidate, pose: ObjectPose, camera: Calibration) -> Percept:
         recognition = candidate.recognition
-        if recognition.size_m is None:
-            width_m = candidate.walls.width_m(camera)
-            top_m = height_m(candidate, camera)
-        else:
-            longer_m, shorter_m, top_m = recognition.size_m
-            width_m = (longer_m + shorter_m) / 2
+        width_m, top_m = _width_and_height_m(candidate, camera)
 
         return Percept(
             label=recognition.label,
@@ -230,6 +240,16 @@ class ExtendedPam:
             box_px=candidate.segment.box_px,
             outline_px=outline_px(candidate.segment),
         )
+
+
+def _width_and_height_m(candidate: Candidate, camera: Calibration) -> tuple[float, float]:
+    """By the known size, the width being the mean of both sides; else by what is seen."""
+    size_m = candidate.recognition.size_m
+    if size_m is None:
+        return candidate.walls.width_m(camera), height_m(candidate, camera)
+
+    longer_m, shorter_m, top_m = size_m
+    return (longer_m + shorter_m) / 2, top_m
 
 
 def _activation(candidate: Candidate) -> float:

@@ -63,6 +63,8 @@ def _check_layout(view: View) -> None:
 def _disparity_px(depth_m: Singles, camera: Calibration) -> Singles:
     """Disparities beyond the image's width cannot be matched and count as unknown."""
     focal_baseline = np.float32(camera.fx_px * camera.baseline_m)
-    known = depth_m > focal_baseline / camera.width_px
+    nearest_m = focal_baseline / camera.width_px
+
+    known = depth_m > nearest_m
     unknown = np.zeros(depth_m.shape, np.float32)
     return np.divide(focal_baseline, depth_m, out=unknown, where=known)

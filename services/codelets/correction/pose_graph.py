@@ -134,7 +134,7 @@ def diagonal_information(position: Floats, heading: Floats) -> Floats:
 
 
 def adjacency(one: Indices, other: Indices, count: int) -> sparse.csc_matrix:
-    """(count, count): by how many of (m,) pairs of numbers each two are joined, either way round."""
+    """(count, count): by how many of (m,) pairs of numbers each two are joined, both directions."""
     rows = np.concatenate([one, other])
     columns = np.concatenate([other, one])
 

@@ -105,13 +105,7 @@ def locate(silhouettes: list[Silhouette], camera: Calibration) -> list[ObjectPos
 
 
 def _stack(silhouettes: list[Silhouette], camera: Calibration) -> FootprintProblem:
-    columns = np.empty((len(silhouettes), COLUMNS))
-    disparity_px = np.empty((len(silhouettes), COLUMNS))
-    for row, silhouette in enumerate(silhouettes):
-        picked = _evenly_spaced(len(silhouette.columns))
-        columns[row] = silhouette.columns[picked]
-        disparity_px[row] = silhouette.disparity_px[picked]
-
+    columns, disparity_px = _sampled(silhouettes)
     width_px = np.array([len(each.columns) for each in silhouettes], float)
     edges_px = [(each.left, each.right) for each in silhouettes]
     true_ends = [(each.left_true, each.right_true) for each in silhouettes]
@@ -128,6 +122,18 @@ def _stack(silhouettes: list[Silhouette], camera: Calibration) -> FootprintProbl
         bias_sd_px=DISPARITY_BIAS_SD_PX + NARROW_BIAS_PX / width_px,
         camera=camera,
     )
+
+
+def _sampled(silhouettes: list[Silhouette]) -> tuple[Floats, Floats]:
+    """COLUMNS columns of each silhouette and their disparities in pixels, (s, COLUMNS) each."""
+    columns = np.empty((len(silhouettes), COLUMNS))
+    disparity_px = np.empty((len(silhouettes), COLUMNS))
+    for row, silhouette in enumerate(silhouettes):
+        picked = _evenly_spaced(len(silhouette.columns))
+        columns[row] = silhouette.columns[picked]
+        disparity_px[row] = silhouette.disparity_px[picked]
+
+    return columns, disparity_px
 
 
 def _evenly_spaced(count: int) -> npt.NDArray[np.intp]:
@@ -194,7 +200,6 @@ def _solve(parameters: Floats, problem: FootprintProblem) -> _Solution:
         better = cost < best_cost
         better_row = better[:, None]
         better_matrix = better_row[..., None]
-
         best_cost = np.where(better, cost, best_cost)
         best = np.where(better_row, candidate, best)
         residuals = np.where(better_row, new_residuals, residuals)
@@ -226,14 +231,21 @@ def _damped_step(residuals: Floats, jacobian: Floats, damping: Floats) -> Floats
     weighted, normal = _weighted_normal(jacobian, weight)
     gradient = np.einsum("sri,sr->si", weighted, residuals)
 
-    diagonal = np.einsum("sii->si", normal)
-    added = diagonal * damping[:, None] + 1e-9
-    damped = normal + added[:, :, None] * np.eye(3)
-
+    damped = _damped(normal, damping)
     solved = np.linalg.solve(damped, gradient[..., None])
     step = solved[..., 0]
+
     largest = np.array(MAX_STEP)
     return np.asarray(step.clip(-largest, largest))
+
+
+def _damped(normal: Floats, damping: Floats) -> Floats:
+    """The normal matrices (s, 3, 3) with their diagonals raised by the damping (s,)."""
+    diagonal = np.einsum("sii->si", normal)
+    added = diagonal * damping[:, None] + 1e-9
+
+    damped: Floats = normal + added[:, :, None] * np.eye(3)
+    return damped
 
 
 def _weighted_normal(jacobian: Floats, weight: Floats) -> tuple[Floats, Floats]:
@@ -266,6 +278,7 @@ def _covariances(solution: _Solution, problem: FootprintProblem) -> Floats:
     """
     prior = np.diag([1e-4, 1e-4, 1e-2])
     independent = np.linalg.inv(solution.normal + prior)
+
     common = np.einsum("sij,sj->si", independent, solution.bias_gradient)
     covariances = np.asarray(independent + _outer(common))
 
@@ -302,11 +315,7 @@ def _pose(
     the robot.
     """
     weight = _likelihood_weight(costs)
-    centres = parameters[:, :2]
-    mean = weight @ centres
-    scatter = _outer(centres - mean)
-    spread = covariances[:, :2, :2] + scatter
-    covariance = np.einsum("s,sij->ij", weight, spread)
+    mean, covariance = _moments(weight, parameters[:, :2], covariances[:, :2, :2])
 
     forward_m = mean[1] + camera.mount_forward_m
     left_m = -mean[0]
@@ -325,6 +334,16 @@ def _pose(
         range_sd_m=float(np.hypot(range_sd_m, MIN_RANGE_SD_M)),
         misfit=float(misfit),
     )
+
+
+def _moments(weight: Floats, centres: Floats, covariances: Floats) -> tuple[Floats, Floats]:
+    """Mean (2,) and covariance (2, 2) of a mixture of centres (s, 2) with covariances (s, 2, 2)."""
+    mean: Floats = weight @ centres
+    scatter = _outer(centres - mean)
+    spread = covariances + scatter
+
+    covariance: Floats = np.einsum("s,sij->ij", weight, spread)
+    return mean, covariance
 
 
 def _likelihood_weight(costs: Floats) -> Floats:

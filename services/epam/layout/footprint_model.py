@@ -72,8 +72,8 @@ def _inverse_depths(parameters: Floats, problem: FootprintProblem) -> Floats:
     x, z, orientation = parameters.T
     cos = np.cos(orientation)
     sin = np.sin(orientation)
-    inverse = np.full(problem.slope.shape, np.inf)
 
+    inverse = np.full(problem.slope.shape, np.inf)
     axes = ((cos, sin), (-sin, cos))
     for (axis_x, axis_z), half in zip(axes, problem.half_m.T, strict=True):
         along = x * axis_x + z * axis_z
@@ -94,6 +94,7 @@ def _inverse_depths_of_side(towards: Floats, gap_m: Floats) -> Floats:
     """
     facing = gap_m > 1e-3
     safe_gap_m = np.where(facing, gap_m, 1.0)
+
     inverse = towards / safe_gap_m[:, None]
     return np.where(facing[:, None], inverse, np.inf)
 
@@ -119,19 +120,24 @@ def _edge_residuals(parameters: Floats, problem: FootprintProblem) -> Floats:
 def _corner_columns(parameters: Floats, problem: FootprintProblem) -> Floats:
     """The columns (s, 4) of the rectangle's corners."""
     camera = problem.camera
-    x, z, orientation = parameters.T[:, :, None]
-    cos = np.cos(orientation)
-    sin = np.sin(orientation)
-    a_signs = np.array([1, 1, -1, -1])
-    b_signs = np.array([1, -1, 1, -1])
-    a = problem.half_m[:, :1] * a_signs
-    b = problem.half_m[:, 1:] * b_signs
+    corner_x, corner_z = _corners(parameters, problem.half_m)
 
-    corner_x = x + a * cos - b * sin
-    corner_z = z + a * sin + b * cos
     depth_m = np.maximum(corner_z, MIN_RANGE_M)
     right_px = camera.fx_px * corner_x / depth_m
     return np.asarray(camera.cx_px + right_px)
+
+
+def _corners(parameters: Floats, half_m: Floats) -> tuple[Floats, Floats]:
+    """x and z (s, 4) of the corners of rectangles with half sides (s, 2)."""
+    x, z, orientation = parameters.T[:, :, None]
+    a = half_m[:, :1] * np.array([1, 1, -1, -1])
+    b = half_m[:, 1:] * np.array([1, -1, 1, -1])
+
+    cos = np.cos(orientation)
+    sin = np.sin(orientation)
+    corner_x = x + a * cos - b * sin
+    corner_z = z + a * sin + b * cos
+    return corner_x, corner_z
 
 
 def linearized(parameters: Floats, copies: FootprintProblem) -> tuple[Floats, Floats]:

@@ -42,20 +42,15 @@ def project(likelihood: Singles, depth_m: Singles, camera: Calibration) -> tuple
 
     upright = _upright(disparity_px, ground_px)
     near = ground_px > min_disparity_px(camera)
-    is_flat = ~upright
-    near_road = mask & is_flat & near
-    road_rows, road_columns = np.nonzero(near_road)
+    road_rows, road_columns = np.nonzero(mask & ~upright & near)
     road_m = _on_ground(road_rows, road_columns, plane, camera)
 
     upright_px = np.where(upright, disparity_px, 0.0).astype(np.float32)
     visible_ground = _visible_ground(upright_px, ground_px)
-
     end_rows, end_columns = _boundary_pixels(likelihood, mask, visible_ground)
     boundary_m = _on_ground(end_rows, end_columns, plane, camera)
 
-    thinned_road_m = thin(road_m)
-    thinned_boundary_m = thin(boundary_m)
-    return thinned_road_m, thinned_boundary_m
+    return thin(road_m), thin(boundary_m)
 
 
 def min_disparity_px(camera: Calibration) -> float:
@@ -67,6 +62,7 @@ def _disparity_px(depth_m: Singles, camera: Calibration) -> Floats:
     """Of each pixel (h, w), 0 where depth is unknown."""
     known = depth_m > 0
     unknown_px = np.zeros(depth_m.shape)
+
     return np.divide(focal_baseline(camera), depth_m, out=unknown_px, where=known)
 
 
@@ -105,10 +101,9 @@ def _boundary_pixels(
 
     rows = np.concatenate([across_rows, down_rows])
     columns = np.concatenate([across_columns, down_columns])
+
     height, width = mask.shape
-    inside_rows = _inside(rows, height)
-    inside_columns = _inside(columns, width)
-    inside = inside_rows & inside_columns
+    inside = _inside(rows, height) & _inside(columns, width)
     return rows[inside], columns[inside]
 
 
@@ -127,24 +122,16 @@ def _crossings(
     """
     left = slice(None, -1)
     right = slice(1, None)
-    left_visible = visible_ground[:, left]
-    right_visible = visible_ground[:, right]
-    visible = left_visible & right_visible
-
-    left_road = mask[:, left]
-    right_road = mask[:, right]
-    changes = left_road != right_road
-    rows, columns = np.nonzero(visible & changes)
+    is_visible = visible_ground[:, left] & visible_ground[:, right]
+    changes = mask[:, left] != mask[:, right]
+    rows, columns = np.nonzero(is_visible & changes)
 
     first = likelihood[rows, columns]
     second = likelihood[rows, columns + 1]
-    rise = second - first
-    missing = 0.5 - first
-    share = missing / rise
+    share = (0.5 - first) / (second - first)
 
-    crossed_rows = rows.astype(np.float64)
     crossed_columns = np.asarray(columns + share, np.float64)
-    return crossed_rows, crossed_columns
+    return rows.astype(np.float64), crossed_columns
 
 
 def _on_ground(
@@ -153,8 +140,7 @@ def _on_ground(
     """The ground points (n, 2) that these pixels show; those beyond MAX_RANGE_M are left out."""
     disparity_px = plane.disparity_px(rows, columns, camera)
     near = disparity_px > min_disparity_px(camera)
-    near_px = disparity_px[near]
-    depth_m = focal_baseline(camera) / near_px
+    depth_m = focal_baseline(camera) / disparity_px[near]
     forward_m = depth_m + camera.mount_forward_m
 
     right, _ = ray_slopes(rows, columns, camera)
@@ -167,9 +153,13 @@ def thin(points_m: Floats) -> Singles:
     """Return the mean of the points (n, 2) in each cell, in the order of the cells."""
     ranges_m = np.hypot(points_m[:, 0], points_m[:, 1])
     near_m = points_m[ranges_m <= MAX_RANGE_M]
-    cell = _cell_numbers(near_m)
+    means_m = _means_m(near_m, _cell_numbers(near_m))
+    return np.asarray(means_m, np.float32)
 
-    x_m, y_m = near_m.T
+
+def _means_m(points_m: Floats, cell: npt.NDArray[np.intp]) -> Floats:
+    """The mean (k, 2) of the points (n, 2) in each of the cells that they are in, (n,)."""
+    x_m, y_m = points_m.T
     sum_x_m = np.bincount(cell, x_m, minlength=1)
     sum_y_m = np.bincount(cell, y_m, minlength=1)
     sums_m = np.stack([sum_x_m, sum_y_m], axis=1)
@@ -177,8 +167,8 @@ def thin(points_m: Floats) -> Singles:
     count = np.bincount(cell, minlength=1)
     occupied = np.flatnonzero(count)
     divisor = count[occupied, None]
-    means_m = sums_m[occupied] / divisor
-    return np.asarray(means_m, np.float32)
+    means_m: Floats = sums_m[occupied] / divisor
+    return means_m
 
 
 def _cell_numbers(points_m: Floats) -> npt.NDArray[np.intp]:

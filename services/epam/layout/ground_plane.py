@@ -64,6 +64,7 @@ def fit(mask: Booleans, disparity_px: Floats, camera: Calibration) -> GroundPlan
     prior, information = _prior(camera)
     predicted_px = slopes @ prior
     observed_px = disparity_px[rows, columns] - predicted_px
+
     correction = _correction(slopes, observed_px, information)
 
     across, down, level = (prior + correction).tolist()
@@ -98,6 +99,7 @@ def _correction(slopes: Floats, observed_px: Floats, information: Floats) -> Flo
         normal = weighted @ slopes + information
         solved = np.linalg.solve(normal, weighted @ observed_px)
         correction = np.asarray(solved)
+
     return correction
 
 

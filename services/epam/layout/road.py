@@ -50,11 +50,12 @@ class RoadSegmenter:
         if small.std() < MIN_CONTRAST:
             return np.zeros((height, width), np.float32)
 
-        values = network_input(small[None])
-        (output,) = self._network(values)
+        (output,) = self._network(network_input(small[None]))
         unpadded = output[0, 0, PADDING_PX:-PADDING_PX]
         log_odds = cv2.resize(unpadded, (width, height), interpolation=cv2.INTER_LINEAR)
-        return _denoised(_probability(np.asarray(log_odds, np.float32)))
+
+        likelihood = _probability(np.asarray(log_odds, np.float32))
+        return _denoised(likelihood)
 
     def mask(self, image: Bytes) -> Booleans:
         """Return which pixels of an RGB image (h, w, 3) show road, (h, w)."""
@@ -79,9 +80,8 @@ def network_input(small: Bytes) -> Singles:
     _, _, height, width = INPUT_SHAPE
     values = np.empty((count, CHANNELS, height, width), np.float32)
 
-    rows = (PADDING_PX, PADDING_PX)
-    padded = np.pad(small, ((0, 0), rows, (0, 0), (0, 0)), mode="edge")
     scale = _gain(small) / 64
+    padded = _padded(small)
     colours = values[:, :3]
     colours[:] = padded.transpose(0, 3, 1, 2)
     colours[:] = colours * scale - 2
@@ -91,6 +91,13 @@ def network_input(small: Bytes) -> Singles:
     values[:, 3] = across
     values[:, 4] = down[:, None]
     return values
+
+
+def _padded(small: Bytes) -> Bytes:
+    """Images (n, h, w, 3) with rows above and below."""
+    rows = (PADDING_PX, PADDING_PX)
+    unpadded = (0, 0)
+    return np.pad(small, (unpadded, rows, unpadded, unpadded), mode="edge")
 
 
 def _probability(log_odds: Singles) -> Singles:

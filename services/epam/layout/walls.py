@@ -79,15 +79,7 @@ class Walls:
 
     def usual_pose(self, camera: Calibration) -> ObjectPose:
         """Return the pose of a building of the usual size, behind the middle of what is seen."""
-        median_px = float(np.median(self.disparity_px))
-        safe_px = max(median_px, MIN_DISPARITY_PX)
-        depth_m = camera.fx_px * camera.baseline_m / safe_px
-
-        middle_px = (self.left + self.right) / 2
-        slope = (camera.cx_px - middle_px) / camera.fx_px
-        forward_m = depth_m + camera.mount_forward_m
-        left_m = slope * depth_m
-
+        forward_m, left_m = self._middle_m(camera)
         wall_m = float(np.hypot(forward_m, left_m))
         range_m = min(wall_m + USUAL_HALF_M, MAX_RANGE_M)
         hidden_m = 0.0 if self.whole else USUAL_HALF_M / 2
@@ -101,17 +93,27 @@ class Walls:
             misfit=0.0,
         )
 
+    def _middle_m(self, camera: Calibration) -> tuple[float, float]:
+        """The middle of what is seen, forward and left of the robot."""
+        median_px = float(np.median(self.disparity_px))
+        safe_px = max(median_px, MIN_DISPARITY_PX)
+        depth_m = camera.fx_px * camera.baseline_m / safe_px
+
+        middle_px = (self.left + self.right) / 2
+        slope = (camera.cx_px - middle_px) / camera.fx_px
+        forward_m = depth_m + camera.mount_forward_m
+        return forward_m, slope * depth_m
+
     def width_m(self, camera: Calibration) -> float:
         """Return the distance between the first and the last column."""
         ends_px = self.disparity_px[[0, -1]].clip(MIN_DISPARITY_PX)
         forward_m = camera.fx_px * camera.baseline_m / ends_px
+
         columns_px = np.array([self.left, self.right])
         slopes = (columns_px - camera.cx_px) / camera.fx_px
         right_m = slopes * forward_m
 
-        across_m = np.ptp(right_m)
-        deep_m = np.ptp(forward_m)
-        width_m = np.hypot(across_m, deep_m)
+        width_m = np.hypot(np.ptp(right_m), np.ptp(forward_m))
         return float(min(width_m, MAX_RANGE_M))
 
 
@@ -176,11 +178,15 @@ def _truly_ends(segment: Segment, disparity_px: Singles, medians_px: Singles, ou
         return False
 
     rows = segment.mask[:, left + inside]
-    beside_px = disparity_px[rows, beyond]
+    return not _is_nearer(disparity_px[rows, beyond], own_px)
+
+
+def _is_nearer(beside_px: Singles, own_px: float) -> bool:
+    """Whether what is beside a wall, with disparities 0 where unknown, is nearer than the wall."""
     known_px = beside_px[beside_px > 0]
     if len(known_px) < MIN_PIXELS:
-        return True
+        return False
 
     neighbour_px = np.median(known_px)
     nearer_px = own_px + NEARER_PX
-    return bool(neighbour_px <= nearer_px)
+    return bool(neighbour_px > nearer_px)

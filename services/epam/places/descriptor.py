@@ -42,10 +42,7 @@ def descriptors(image: Bytes) -> Bytes | None:
     uint8 (len(SHIFTS), DESCRIPTOR_BYTES); the largest turn is 24 columns of 320. None if there is
     too little contrast.
     """
-    windows = _cells(image)[:, _COLUMNS].transpose(1, 3, 0, 2)
-    patches_across = len(_ORIGINS) // PATCH
-    patches = windows.reshape(len(SHIFTS), 3, -1, PATCH, patches_across, PATCH)
-
+    patches = _patches(image)
     contrast = patches.std(axis=(3, 5), keepdims=True)
     of_brightness = contrast[UNSHIFTED, 0]
     if np.count_nonzero(of_brightness > MIN_CONTRAST) < MIN_PATCHES:
@@ -54,8 +51,20 @@ def descriptors(image: Bytes) -> Bytes | None:
     mean = patches.mean(axis=(3, 5), keepdims=True)
     divisor = contrast + np.float32(FLAT_CONTRAST)
     normalized = (patches - mean) / divisor
+
     codes = _quantized(normalized)
     return codes.reshape(len(SHIFTS), DESCRIPTOR_BYTES)
+
+
+def _patches(image: Bytes) -> Singles:
+    """The cells of `image` for each of SHIFTS and each channel, in patches of PATCH by PATCH cells:
+    (shift, channel, row of patches, PATCH, column of patches, PATCH).
+    """
+    windows = _cells(image)[:, _COLUMNS]
+    by_shift = windows.transpose(1, 3, 0, 2)
+
+    patches_across = len(_ORIGINS) // PATCH
+    return by_shift.reshape(len(SHIFTS), 3, -1, PATCH, patches_across, PATCH)
 
 
 def _quantized(normalized: npt.NDArray[np.floating]) -> Bytes:
@@ -72,16 +81,27 @@ def _cells(image: Bytes) -> Singles:
     thumbnail = cv2.resize(image, (COLUMNS, ROWS), interpolation=cv2.INTER_AREA)
     above = thumbnail[:ROWS_ABOVE_HORIZON].astype(np.float32)
     light = np.log(above + np.float32(DARK_LEVEL))
-    red, green, blue = np.moveaxis(light, 2, 0)
+    channels = _opponents(light)
 
+    means = cv2.boxFilter(
+        channels,
+        -1,
+        (CELL, CELL),
+        anchor=(0, 0),
+        borderType=cv2.BORDER_REPLICATE,
+    )
+    return np.asarray(means[::CELL], np.float32)
+
+
+def _opponents(light: Singles) -> Singles:
+    """The mean and two differences of the logarithms of red, green and blue, (h, w, 3)."""
+    red, green, blue = np.moveaxis(light, 2, 0)
     brightness = (red + green + blue) / 3
     red_green = red - green
     blue_green = blue - green
-    channels = cv2.merge([brightness, red_green, blue_green])
 
-    cell = (CELL, CELL)
-    means = cv2.boxFilter(channels, -1, cell, anchor=(0, 0), borderType=cv2.BORDER_REPLICATE)
-    return np.asarray(means[::CELL], np.float32)
+    merged = cv2.merge([brightness, red_green, blue_green])
+    return np.asarray(merged, np.float32)
 
 
 def has_near_structure(depth_m: Singles) -> bool:

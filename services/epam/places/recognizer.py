@@ -80,8 +80,10 @@ class PlaceRecognizer:
         self._views: list[RememberedView] = []
         self._vectors: Singles = np.empty((INITIAL_CAPACITY, DESCRIPTOR_BYTES), np.float32)
         self._step_of_view = np.empty(0, np.int64)
+
         self._belief = np.empty(0)
         self._p_new = 1.0
+
         self._step = 0
         self._last_vector: Singles | None = None
         self._matches: list[PlaceMatch] = []
@@ -174,6 +176,7 @@ class PlaceRecognizer:
         similarities = known @ vectors.T
         most_similar = similarities.max(axis=1)
         highest = most_similar.astype(np.float64)
+
         log_odds = LOG_ODDS_SLOPE * (highest - EVEN_SIMILARITY)
         limited = log_odds.clip(-MAX_LOG_ODDS, MAX_LOG_ODDS)
         ratios = np.exp(limited)
@@ -240,6 +243,7 @@ class PlaceRecognizer:
         count = len(self._views)
         kept = self._vectors[oldest:count]
         self._vectors[: len(kept)] = kept
+
         self._views = self._views[oldest:]
         self._step_of_view = self._step_of_view[oldest:]
         self._belief = self._belief[oldest:]

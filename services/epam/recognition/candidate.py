@@ -46,6 +46,7 @@ def joined(pieces: Sequence[Candidate], disparity_px: Singles) -> Candidate:
         segment = Segment.of(mask)
         joined_walls = walls(segment, disparity_px) or whole.walls
         whole = replace(whole, segment=segment, walls=joined_walls)
+
     return whole
 
 
@@ -82,12 +83,14 @@ def outline_px(segment: Segment) -> list[tuple[int, int]]:
     rows = slice(top, top + height)
     columns = slice(left, left + width)
     boxed = segment.mask[rows, columns]
+
     piece = _main_piece(boxed.astype(np.uint8))
     polygon = _polygon(piece.astype(np.uint8))
 
     corners = []
     for column, row in polygon:
         corners.append((left + column, top + row))
+
     return corners
 
 
@@ -96,6 +99,7 @@ def _polygon(piece: Bytes) -> list[list[int]]:
     contours, _ = cv2.findContours(piece, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     longest = max(contours, key=len)
     polygon = cv2.approxPolyDP(longest, OUTLINE_TOLERANCE_PX, True)
+
     corners: list[list[int]] = polygon[:, 0].tolist()
     return corners
 
@@ -104,10 +108,12 @@ def _main_piece(shown: Bytes) -> Booleans:
     """The piece of `shown` (h, w) to outline, with the smallest gaps bridged that make it nearly
     the whole, else with small gaps bridged.
     """
+    required_px = MIN_OUTLINED_SHARE * shown.sum()
     for bridged_px in BRIDGED_PX:
         piece = _largest_piece(shown, bridged_px)
-        if shown[piece].sum() >= MIN_OUTLINED_SHARE * shown.sum():
+        if shown[piece].sum() >= required_px:
             return piece
+
     return _largest_piece(shown, BRIDGED_PX[0])
 
 

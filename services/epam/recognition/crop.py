@@ -32,16 +32,13 @@ def surroundings(image: Bytes, depth_m: Singles, camera: Calibration) -> Singles
     """
     image = image[::STRIDE_PX, ::STRIDE_PX]
     depth_m = depth_m[::STRIDE_PX, ::STRIDE_PX]
-    known = depth_m > 0
     down = _downward_slopes(len(depth_m), camera)
-    below_camera_m = down * depth_m
-    height_m = camera.mount_height_m - below_camera_m
-    is_below_horizon = down > 0
-
-    is_above_horizon = down < 0
+    height_m = camera.mount_height_m - down * depth_m
+    is_known = depth_m > 0
     is_low = height_m < GROUND_M
-    ground = known & is_below_horizon & is_low
-    sky = ~known & is_above_horizon
+
+    ground = is_known & (down > 0) & is_low
+    sky = ~is_known & (down < 0)
 
     of_ground = _median_colour(image[ground])
     of_sky = _median_colour(image[sky])
@@ -89,14 +86,18 @@ def crop(
     relief = np.zeros((side, side), np.float32)
     relief[target] = _relief(depth_m[source], distance_m)
 
-    side_m = side * distance_m / focal_px
-    log_side = np.log(max(side_m, 1.0))
     values = np.empty((CHANNELS, SIDE_PX, SIDE_PX), np.float32)
     values[:4] = _resized(shown).transpose(2, 0, 1)
     values[4] = _resized(relief)
-    values[5] = log_side / 2.0 - 1.0
+    values[5] = _size_level(side * distance_m / focal_px)
     values[6:] = around[:, None, None]
     return values
+
+
+def _size_level(side_m: float) -> float:
+    """The length of a square's side, as the network receives it."""
+    log_side = np.log(max(side_m, 1.0))
+    return float(log_side / 2.0 - 1.0)
 
 
 def _square(segment: Segment) -> tuple[int, int, int]:
@@ -117,7 +118,9 @@ def _resized(square: Singles) -> Singles:
     """To SIDE_PX."""
     is_larger = len(square) > SIDE_PX
     interpolation = cv2.INTER_AREA if is_larger else cv2.INTER_LINEAR
-    resized = cv2.resize(square, (SIDE_PX, SIDE_PX), interpolation=interpolation)
+    size = (SIDE_PX, SIDE_PX)
+
+    resized = cv2.resize(square, size, interpolation=interpolation)
     return resized.astype(np.float32, copy=False)
 
 
@@ -135,6 +138,7 @@ def _relief(depth_m: Singles, distance_m: float) -> Singles:
     known = depth_m > 0
     filled_m = np.where(known, depth_m, distance_m)
     ratio = np.log(filled_m / distance_m)
+
     scaled = RELIEF * ratio
     return np.asarray(scaled.clip(-1, 1))
 

@@ -98,6 +98,7 @@ class ObjectRecognizer:
         self._network = network
         self._prototypes = prototypes
         self._directions = np.asarray(prototypes.directions, np.float32)
+
         self._labels: list[str] = []
         self._embeddings = np.empty((0, DIMENSIONS), np.float32)
 
@@ -129,6 +130,7 @@ class ObjectRecognizer:
         for row in range(count):
             building, whole = probabilities[row].tolist()
             appearances.append(Appearance(embeddings[row], building, whole))
+
         return appearances
 
     def recognize(self, appearance: Appearance, excluded: Container[str] = ()) -> Recognition:
@@ -151,7 +153,15 @@ class ObjectRecognizer:
         size_m = None
         if activation > unknown + background and best < len(taught):
             size_m = self._prototypes.size_m[best]
-        return Recognition(labels[best], activation, unknown, background, appearance, size_m)
+
+        return Recognition(
+            label=labels[best],
+            activation=activation,
+            unknown=unknown,
+            background=background,
+            appearance=appearance,
+            size_m=size_m,
+        )
 
     def _novel_cosines(self, appearance: Appearance, novel: list[str]) -> Singles:
         """The cosine with each of the labels `novel`: that of its most similar embedding."""
@@ -211,13 +221,18 @@ def load(path: Path = DEFAULT_PATH) -> ObjectRecognizer:
             "train both again with cogmap train objects"
         ) from None
 
-    dimensions = {len(direction) for direction in prototypes.directions}
-    counts = {len(prototypes.names), len(prototypes.directions), len(prototypes.size_m)}
-    if dimensions != {DIMENSIONS} or len(counts) != 1:
+    if not _is_complete(prototypes):
         raise ConfigError(
             f"{beside} belongs to other weights: train both again with cogmap train objects"
         )
     return ObjectRecognizer(network, prototypes)
+
+
+def _is_complete(prototypes: Prototypes) -> bool:
+    """Whether each name has a direction of DIMENSIONS and a size."""
+    dimensions = {len(direction) for direction in prototypes.directions}
+    counts = {len(prototypes.names), len(prototypes.directions), len(prototypes.size_m)}
+    return dimensions == {DIMENSIONS} and len(counts) == 1
 
 
 def posteriors(
@@ -233,9 +248,7 @@ def posteriors(
     `taught` (..., n) and `novel` (..., m) are cosines with their directions, `building` (...) the
     probability of a building; labels `excluded` (n + m,) have a posterior of 0.
     """
-    taught_odds = prototypes.sharpness * (taught - prototypes.unknown)
-    novel_odds = prototypes.novel_sharpness * (novel - prototypes.novel_unknown)
-    log_odds = np.concatenate([taught_odds, novel_odds], axis=-1, dtype=np.float64)
+    log_odds = _log_odds(taught, novel, prototypes)
     possible = np.where(excluded, -np.inf, log_odds)
 
     *leading, _ = taught.shape
@@ -249,6 +262,13 @@ def posteriors(
     background = 1 - of_building
     labels = of_building * weights / total
     return np.concatenate([labels, background], axis=-1)
+
+
+def _log_odds(taught: Singles, novel: Singles, prototypes: Prototypes) -> Floats:
+    """The log odds (..., n + m) of each label, taught or learned, over an unknown building."""
+    taught_odds = prototypes.sharpness * (taught - prototypes.unknown)
+    novel_odds = prototypes.novel_sharpness * (novel - prototypes.novel_unknown)
+    return np.concatenate([taught_odds, novel_odds], axis=-1, dtype=np.float64)
 
 
 def _scaled_weights(log_weights: Floats) -> Floats:

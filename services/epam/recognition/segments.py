@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from cogmap.geometry.arrays import Booleans, Bytes, Singles
+from cogmap.geometry.arrays import Booleans, Bytes, Floats, Singles
 from schemas.sensing import Calibration
 from services.epam.network import WEIGHTS, Network
 
@@ -47,6 +47,7 @@ class Segment:
     def of(cls, mask: Booleans) -> Segment:
         """Return the segment of `mask`, in which at least one pixel is set."""
         left, top, width, height = cv2.boundingRect(mask.astype(np.uint8))
+
         return cls(mask, (left, top, width, height))
 
     @property
@@ -76,6 +77,7 @@ class Segmenter:
         resized_m = cv2.resize(depth_m, size, interpolation=cv2.INTER_NEAREST)
         small_depth_m = np.asarray(resized_m, np.float32)
         values = padded(network_input(small, small_depth_m, camera))
+
         (output,) = self._network(values[None])
         unpadded = output[0, :, PADDING_PX:-PADDING_PX]
         return divided(unpadded, depth_m.shape)
@@ -160,8 +162,7 @@ def _instances(output: Singles) -> npt.NDArray[np.intp]:
     log_odds, centre, right, down = output
     numbers = np.full(log_odds.shape, -1, np.intp)
     min_odds = MIN_BUILDING / (1 - MIN_BUILDING)
-    min_log_odds = np.log(min_odds)
-    building = log_odds > min_log_odds
+    building = log_odds > np.log(min_odds)
     rows, columns = np.nonzero(building)
 
     centres = _centres(centre)
@@ -172,12 +173,18 @@ def _instances(output: Singles) -> npt.NDArray[np.intp]:
     pointed_column = columns + OFFSET_PX * right[building]
     pointed_at = np.stack([pointed_row, pointed_column], 1)
 
-    away_px = pointed_at[:, None] - centres[None]
-    squared_away_px2 = away_px**2
-    squared_px2 = squared_away_px2.sum(2)
-
-    numbers[building] = squared_px2.argmin(1)
+    numbers[building] = _nearest(pointed_at, centres)
     return numbers
+
+
+def _nearest(points_px: Floats, centres_px: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
+    """The number of the centre (k, 2) nearest to each point (n, 2)."""
+    away_px = points_px[:, None] - centres_px[None]
+    squared_px2 = away_px**2
+
+    distance_px2 = squared_px2.sum(2)
+    nearest: npt.NDArray[np.intp] = distance_px2.argmin(1)
+    return nearest
 
 
 def _centres(probability: Singles) -> npt.NDArray[np.intp]:
