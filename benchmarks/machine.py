@@ -6,7 +6,8 @@ import time
 
 import cv2
 import numpy as np
-import numpy.typing as npt
+
+from cogmap.geometry.arrays import Bytes
 
 ROUNDS = 50
 HEIGHT_PX = 240
@@ -15,7 +16,6 @@ DISPARITIES_PX = 64
 BLOCK_PX = 5
 SHIFT_PX = 12
 SEED = 320
-Image = npt.NDArray[np.uint8]
 
 
 def machine_unit_ms() -> float:
@@ -34,7 +34,7 @@ def machine_unit_ms() -> float:
         cv2.setNumThreads(threads)
 
 
-def _pair() -> tuple[Image, Image]:
+def _pair() -> tuple[Bytes, Bytes]:
     """Smoothed noise, the same on every machine, and the same moved by SHIFT_PX."""
     rng = np.random.default_rng(SEED)
     noise = rng.integers(0, 256, (HEIGHT_PX, WIDTH_PX), np.uint8)
@@ -45,7 +45,7 @@ def _pair() -> tuple[Image, Image]:
     return left, right
 
 
-def _cpu_ms(matcher: cv2.StereoSGBM, left: Image, right: Image) -> float:
+def _cpu_ms(matcher: cv2.StereoSGBM, left: Bytes, right: Bytes) -> float:
     began_s = time.process_time()
     matcher.compute(left, right)
     took_s = time.process_time() - began_s

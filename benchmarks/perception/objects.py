@@ -7,18 +7,16 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
+from cogmap.geometry.arrays import Booleans, Bytes, Floats
 from schemas.sensing import Percept
 
 MATCH_IOU = 0.5
 LARGE_SHARE = 0.01
 BINS = 15
 MAX_LABELS = 256
-Bools = npt.NDArray[np.bool_]
-Bytes = npt.NDArray[np.uint8]
 # Label, activation and pixels (h, w) of what is taken for a building.
-Claim = tuple[str, float, Bools]
+Claim = tuple[str, float, Booleans]
 
 
 @dataclass(frozen=True)
@@ -99,7 +97,7 @@ def _buildings(
     return tuple(buildings)
 
 
-def _shown(mask: Bools, label: Bytes, buildings: Sequence[Building]) -> Building | None:
+def _shown(mask: Booleans, label: Bytes, buildings: Sequence[Building]) -> Building | None:
     """The building that at least half of the mask's pixels are of."""
     counts = np.bincount(label[mask], minlength=MAX_LABELS)
     half = mask.sum() / 2
@@ -121,7 +119,7 @@ def claims(percepts: Sequence[Percept], shape: tuple[int, ...]) -> list[Claim]:
     return found
 
 
-def filled(percept: Percept, shape: tuple[int, ...]) -> Bools:
+def filled(percept: Percept, shape: tuple[int, ...]) -> Booleans:
     """The pixels that the percept's outline holds, (h, w)."""
     mask = np.zeros(shape, np.uint8)
     outline_px = np.array(percept.outline_px, np.int32)
@@ -131,9 +129,7 @@ def filled(percept: Percept, shape: tuple[int, ...]) -> Bools:
     return mask > 0
 
 
-def overlaps(
-    found: Sequence[Bools], label: Bytes, numbers: Sequence[int]
-) -> npt.NDArray[np.float64]:
+def overlaps(found: Sequence[Booleans], label: Bytes, numbers: Sequence[int]) -> Floats:
     """Intersection over union of each mask with the pixels of each number in `label`, (masks,
     numbers).
     """
@@ -150,7 +146,7 @@ def overlaps(
     return iou
 
 
-def match(iou: npt.NDArray[np.float64]) -> list[int | None]:
+def match(iou: Floats) -> list[int | None]:
     """For each row the column that it matches at MATCH_IOU or better, the best pairs first, none
     twice.
     """

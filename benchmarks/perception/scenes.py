@@ -14,6 +14,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from cogmap.geometry.arrays import Bytes, Floats, Singles
 from schemas.sensing import Calibration, Pose
 from services.sim.layout import town
 from services.sim.rendering.camera import StereoCamera, calibration
@@ -35,9 +36,6 @@ TRIES = 40
 LOOKING_SD_RAD = 0.3
 LATER_SD_RAD = 0.2
 LANE_M = 3.5
-Bytes = npt.NDArray[np.uint8]
-Floats32 = npt.NDArray[np.float32]
-Floats = npt.NDArray[np.float64]
 Poses = Callable[[town.Town, np.random.Generator], Sequence[Pose]]
 
 
@@ -51,7 +49,7 @@ class Scene:
 
     left: Bytes
     right: Bytes
-    depth_m: Floats32
+    depth_m: Singles
     label: Bytes
     surface: Bytes
     pose: Pose

@@ -13,10 +13,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from benchmarks.report import Metrics
-from cogmap.geometry.arrays import Bytes, Floats, Singles
+from cogmap.geometry.arrays import Booleans, Bytes, Floats, Singles
 from cogmap.geometry.polylines import distances_along
 from schemas.sensing import PlaceMatch, Pose
 from services.epam.places.recognizer import PlaceRecognizer
@@ -28,8 +27,6 @@ from services.sim.rendering.camera import StereoCamera, calibration
 from services.sim.rendering.light import Light, some_light
 from services.sim.world import World
 from training.rendering import towns
-
-Flags = npt.NDArray[np.bool_]
 
 # The last town is built of kinds that nobody was taught alone: no landmark in any view.
 TOWNS = ((3201, 0), (3202, 0), (3203, 28))
@@ -261,12 +258,12 @@ def _was_seen(answer: Answer, before: Sequence[Answer]) -> bool:
     return any(same(answer, other) for other in before)
 
 
-def _ratio(some: Flags, of_all: Flags) -> float:
+def _ratio(some: Booleans, of_all: Booleans) -> float:
     count = max(1, of_all.sum())
     return float(some.sum() / count)
 
 
-def recall(score: Floats, right: Flags, wanted: Flags, precision: float) -> float:
+def recall(score: Floats, right: Booleans, wanted: Booleans, precision: float) -> float:
     """The share of `wanted` views that are matched rightly, at the lowest score that gives at least
     `precision`.
 

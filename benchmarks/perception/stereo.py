@@ -13,14 +13,13 @@ import numpy.typing as npt
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_most
 from cogmap.errors import UsageError
+from cogmap.geometry.arrays import Bytes, Singles
 from services.sensory.disparity import STEPS_PER_PIXEL, StereoMatcher
 
 OFF_PX = (1, 3)
 PLAIN_BLOCK_PX = 3
 SMALLEST_SHARE = 1e-9
 THRESHOLDS = {f"stereo_off_{px}px_over_plain": at_most(1.0) for px in OFF_PX}
-Bytes = npt.NDArray[np.uint8]
-Floats32 = npt.NDArray[np.float32]
 Image = npt.NDArray[Any]
 
 
@@ -39,7 +38,7 @@ def measure(left: Path, right: Path, disparity: Path, scale: float) -> Metrics:
     return compared(left_rgb, right_rgb, true_px)
 
 
-def compared(left: Bytes, right: Bytes, true_px: Floats32) -> Metrics:
+def compared(left: Bytes, right: Bytes, true_px: Singles) -> Metrics:
     """The metrics of `measure`, of a pair's images (h, w, 3) and true disparities (h, w)."""
     most_px = float(true_px.max())
     matcher = StereoMatcher(most_px)
@@ -76,11 +75,11 @@ def _size(image: Image) -> str:
     return f"{width_px} x {height_px}"
 
 
-def _off(name: str, found_px: Floats32, true_px: Floats32) -> Metrics:
+def _off(name: str, found_px: Singles, true_px: Singles) -> Metrics:
     return {f"{name}_off_{px}px": off_share(found_px, true_px, px) for px in OFF_PX}
 
 
-def off_share(found_px: Floats32, true_px: Floats32, most_px: float) -> float:
+def off_share(found_px: Singles, true_px: Singles, most_px: float) -> float:
     """Of the pixels with a true disparity, over 0, the share that errs by more than `most_px`, or
     is not found, 0. NaN where no pixel has one.
     """
@@ -93,12 +92,12 @@ def off_share(found_px: Floats32, true_px: Floats32, most_px: float) -> float:
     return float(is_wrong[is_known].mean())
 
 
-def unmatched(found_px: Floats32, true_px: Floats32) -> float:
+def unmatched(found_px: Singles, true_px: Singles) -> float:
     """Of the pixels with a true disparity the share for which none was found."""
     return off_share(found_px, true_px, math.inf)
 
 
-def plain_sgbm(left: Bytes, right: Bytes, most_px: float) -> Floats32:
+def plain_sgbm(left: Bytes, right: Bytes, most_px: float) -> Singles:
     """StereoSGBM as OpenCV's documentation sets it up, on grey images: disparities, float32 (h, w),
     0 unmatched.
     """
@@ -141,7 +140,7 @@ def _read(path: Path, flags: int) -> Image:
     return image
 
 
-def _truth(path: Path, scale: float) -> Floats32:
+def _truth(path: Path, scale: float) -> Singles:
     values = _read(path, cv2.IMREAD_UNCHANGED)
     if values.ndim != 2:
         raise UsageError(
