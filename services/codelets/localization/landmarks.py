@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
 from cogmap.errors import MessageError
-from cogmap.geometry.se2 import mean_pose, wrap_angle
+from cogmap.geometry.se2 import wrap_angle
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.array import Matrix
@@ -34,9 +35,12 @@ from services.codelets.localization.measurement_model import (
 from services.codelets.localization.motion_model import with_gains
 from services.codelets.localization.sampling import (
     Samples,
+    centred,
     generator,
+    jittered,
     rejection_mask,
     resample,
+    select,
     spread,
 )
 
@@ -87,19 +91,20 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     if agent is None or landmark is None:
         raise MessageError(f"task {task.task_id}: the graph lacks the self or the landmark")
 
-    before = landmark.positions_m()
+    before = np.asfortranarray(landmark.positions_m())
     record = Record(landmark.sightings, landmark.misses)
     if _stays(agent, landmark):
         return _kept_answer(task, graph, landmark, record)
 
     rng = generator(task.task_id)
     selves = nearby_selves(with_gains(agent.samples.numpy(), config, rng), config)
-    selves = rng.permutation(resample(selves, len(before), 0.0, rng))
+    selves = resample(selves, len(before))
+    selves = select(selves, rng.permutation(len(selves)))
     mahalanobis2 = _mahalanobis2(before, selves, percept)
     if mahalanobis2.min() < config.gate**2:
         log_likelihood = -mahalanobis2 / 2 / config.correlated_views
-        kept = before[rejection_mask(log_likelihood, rng)]
-        after = resample(kept, len(before), _jitter_m(kept, config), rng)
+        kept = select(before, rejection_mask(log_likelihood, rng).nonzero()[0])
+        after = jittered(resample(kept, len(before)), _jitter_m(kept, config), rng)
         record = Record(record.sightings + 1, 0)
         return object_answer(task, graph, landmark, after, record)
 
@@ -133,18 +138,16 @@ def nearby_selves(selves: Samples, config: Config) -> Samples:
     as the last step was. Here the self's samples keep all that is uncertain since the start; drawn
     together about their mean, they state the same.
     """
-    mean = mean_pose(selves)
-    sd = spread(selves[:, :POSE_COLUMNS], mean)
-
-    position_sd_m = max(float(np.hypot(sd[0], sd[1])), 1e-9)
+    mean, offset = centred(selves[:, :POSE_COLUMNS])
+    sd = spread(offset[:, :2])
+    position_sd_m = max(math.hypot(*sd.tolist()), 1e-9)
     share = min(1.0, LOCAL_SHARE * config.largest_landmark_sd_m / position_sd_m)
     if share == 1.0:
         return selves
 
-    offset = selves[:, :POSE_COLUMNS] - mean
-    offset[:, 2] = wrap_angle(offset[:, 2])
-    poses = mean + share * offset
-    return np.hstack([poses, selves[:, POSE_COLUMNS:]])
+    nearby = selves.copy(order="F")
+    nearby[:, :POSE_COLUMNS] = mean + share * offset
+    return nearby
 
 
 def first_positions(
@@ -180,15 +183,15 @@ def object_answer(
     """An object with new samples, refreshed by the percept of `task`, and its link to the place of
     their mean.
     """
-    mean = positions_m.mean(axis=0)
-    sd = spread(positions_m, mean)
+    mean, offsets_m = centred(positions_m)
+    sd = spread(offsets_m)
     located = msgspec.structs.replace(
         node,
         x_m=float(mean[0]),
         y_m=float(mean[1]),
         x_sd_m=float(sd[0]),
         y_sd_m=float(sd[1]),
-        offsets_m=Matrix.of(positions_m - mean, "<f2"),
+        offsets_m=Matrix.of(offsets_m, "<f2"),
     )
     return _kept_answer(task, graph, located, record)
 
@@ -221,7 +224,8 @@ def _jitter_m(kept: Samples, config: Config) -> Samples:
     Few samples represent all positions between them: of a ring or a ray, the next view must find
     some again.
     """
-    sd_m = spread(kept, kept.mean(axis=0))
+    _, offsets_m = centred(kept)
+    sd_m = spread(offsets_m)
     gaps_m = GAP * sd_m / len(kept)
     jitter_m: Samples = np.maximum(config.landmark_jitter_m, gaps_m)
     return jitter_m

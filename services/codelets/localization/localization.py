@@ -7,7 +7,7 @@ view, not with the map.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -46,10 +46,12 @@ from services.codelets.localization.recovery import relocalize, relocalize_headi
 from services.codelets.localization.sampling import (
     Samples,
     centred,
+    equal_weights,
     generator,
     inflate,
     rejection_resample,
     resample,
+    spread,
     tempering_exponent,
 )
 from services.codelets.mapping.path import odometry_of, variances_of
@@ -65,8 +67,7 @@ ALIKE = 0.6
 FORGOTTEN_NS = 20_000_000_000
 
 
-@dataclass(frozen=True)
-class Estimate:
+class Estimate(NamedTuple):
     """The samples that were kept, the share of those tried that they are, and for how many views
     nothing has fitted.
 
@@ -111,7 +112,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     rng = generator(task.task_id)
     motions = np.asarray(task.motions.numpy(), np.float64)
     before = with_gains(agent.samples.numpy(), config, rng)
-    moved = move(resample(before, config.samples, 0.0, rng), motions, config, rng)
+    moved = move(resample(before, config.samples), motions, config, rng)
 
     stationary_since_ns = _stationary_since(agent, bool(motions[:, :2].any()))
     seen = sightings(task.percepts, graph, config.largest_landmark_sd_m, stationary_since_ns)
@@ -124,7 +125,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         weights = novelty(moved, seen, since) / config.correlated_views
         found = _correct(found, seen, weights, config, rng)
 
-    gains = found.samples[:, POSE_COLUMNS:].mean(axis=0)
+    gains = equal_weights(len(found.samples)) @ found.samples[:, POSE_COLUMNS:]
     odometry = dead_reckon(odometry_of(agent), motions, gains)
     if seen is not None and found.is_lost:
         percepts = _all_seen(task.percepts, seen_before(graph, odometry))
@@ -136,7 +137,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         step = relative(mean_pose(moved), mean_pose(found.samples))
         odometry = compose(odometry, step)
         _, offsets = centred(found.samples)
-        found_variances = np.square(offsets).mean(axis=0)
+        found_variances = np.square(spread(offsets))
         variances += found_variances[1:POSE_COLUMNS]
 
     estimate = _self_node(task, agent, found)
@@ -226,7 +227,7 @@ def _correct(
         if exponent_left <= 0:
             break
 
-        samples = resample(kept, len(samples), 0.0, rng)
+        samples = resample(kept, len(samples))
         compared = compare(samples, seen)
 
     return Estimate(kept, share)
@@ -309,8 +310,7 @@ def _relocalize(
 def _self_node(task: Task, agent: Self, found: Estimate) -> Self:
     """The self node after localization; what path integration measured is as before."""
     mean, offsets = centred(found.samples)
-    variance = np.einsum("nd,nd->d", offsets, offsets) / len(offsets)
-    sd = np.sqrt(variance)
+    sd = spread(offsets)
     has_gains = bool(sd[POSE_COLUMNS:].any())
     samples = found.samples if has_gains else found.samples[:, :POSE_COLUMNS]
 

@@ -29,8 +29,8 @@ def novelty(samples: Samples, seen: Sighting, since: Samples) -> Samples:
     landmark was placed: `since` (k, 2), by path integration's variances in m^2 and rad^2.
     """
     _, deviations = centred(samples[:, :2])
-    variances_m2 = np.square(deviations).mean(axis=0)
-    position_m2 = max(float(variances_m2.sum()), 1e-9)
+    squared_m2 = float(np.einsum("nd,nd->", deviations, deviations))
+    position_m2 = max(squared_m2 / len(deviations), 1e-9)
 
     since_m2, since_rad2 = since.T
     by_turns_m2 = since_rad2 * seen.range_m**2

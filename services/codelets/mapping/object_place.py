@@ -57,7 +57,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     rng = generator(task.task_id)
     samples = with_gains(agent.samples.numpy(), config, rng)
     nearby = nearby_selves(samples, config)
-    selves = resample(nearby, config.landmark_samples, 0.0, rng)
+    selves = resample(nearby, config.landmark_samples)
 
     node = _new(percept.label, agent, task)
     positions_m = first_positions(selves, percept, config, rng)
