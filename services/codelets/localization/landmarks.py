@@ -91,20 +91,17 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     if agent is None or landmark is None:
         raise MessageError(f"task {task.task_id}: the graph lacks the self or the landmark")
 
-    before = np.asfortranarray(landmark.positions_m())
     record = Record(landmark.sightings, landmark.misses)
     if _stays(agent, landmark):
         return _kept_answer(task, graph, landmark, record)
 
     rng = generator(task.task_id)
-    selves = nearby_selves(with_gains(agent.samples.numpy(), config, rng), config)
-    selves = resample(selves, len(before))
-    selves = select(selves, rng.permutation(len(selves)))
+    before = np.asfortranarray(landmark.positions_m())
+    selves = _drawn_selves(agent, len(before), config, rng)
     mahalanobis2 = _mahalanobis2(before, selves, percept)
+
     if mahalanobis2.min() < config.gate**2:
-        log_likelihood = -mahalanobis2 / 2 / config.correlated_views
-        kept = select(before, rejection_mask(log_likelihood, rng).nonzero()[0])
-        after = jittered(resample(kept, len(before)), _jitter_m(kept, config), rng)
+        after = _corrected(before, mahalanobis2, config, rng)
         record = Record(record.sightings + 1, 0)
         return object_answer(task, graph, landmark, after, record)
 
@@ -128,6 +125,26 @@ CODELET = Codelet(
     config=Config,
     section=SECTION,
 )
+
+
+def _drawn_selves(agent: Self, count: int, config: Config, rng: np.random.Generator) -> Samples:
+    """`count` samples of the self in random order, one for each sample of a landmark."""
+    samples = with_gains(agent.samples.numpy(), config, rng)
+    nearby = nearby_selves(samples, config)
+    drawn = resample(nearby, count)
+    return select(drawn, rng.permutation(count))
+
+
+def _corrected(
+    positions_m: Samples, mahalanobis2: Samples, config: Config, rng: np.random.Generator
+) -> Samples:
+    """As many samples of a landmark as before, of those that agree with what is seen."""
+    log_likelihood = -mahalanobis2 / 2 / config.correlated_views
+    is_kept = rejection_mask(log_likelihood, rng)
+    kept = select(positions_m, np.flatnonzero(is_kept))
+
+    drawn = resample(kept, len(positions_m))
+    return jittered(drawn, _jitter_m(kept, config), rng)
 
 
 def nearby_selves(selves: Samples, config: Config) -> Samples:
@@ -158,23 +175,37 @@ def first_positions(
 
     Seen by range alone it is on a ring, by bearing alone on a ray as long as `config.farthest_m`.
     """
-    number = len(selves)
+    direction_rad = _first_directions(selves, percept, rng)
+    distance_m = _first_distances(selves, percept, config, rng)
+    east_m = distance_m * np.cos(direction_rad)
+    north_m = distance_m * np.sin(direction_rad)
 
-    if has_bearing(percept):
-        seen_rad = rng.normal(percept.bearing_rad, percept.bearing_sd_rad, number)
-        direction_rad = selves[:, SelfColumn.HEADING_RAD] + seen_rad
-    else:
-        direction_rad = rng.uniform(-np.pi, np.pi, number)
-
-    if has_range(percept):
-        seen_m = rng.normal(percept.range_m, percept.range_sd_m, number).clip(MIN_RANGE_M)
-        distance_m = seen_m / (1 + selves[:, SelfColumn.RANGE_GAIN])
-    else:
-        distance_m = rng.uniform(0.0, config.farthest_m, number)
-
-    direction = np.column_stack([np.cos(direction_rad), np.sin(direction_rad)])
-    positions_m: Samples = selves[:, :2] + distance_m[:, None] * direction
+    offsets_m = np.column_stack([east_m, north_m])
+    positions_m: Samples = selves[:, :2] + offsets_m
     return positions_m
+
+
+def _first_directions(selves: Samples, percept: Percept, rng: np.random.Generator) -> Samples:
+    """(n,): the directions, from samples of the self, in which an object may be."""
+    number = len(selves)
+    if not has_bearing(percept):
+        return rng.uniform(-np.pi, np.pi, number)
+
+    bearing_rad = rng.normal(percept.bearing_rad, percept.bearing_sd_rad, number)
+    return selves[:, SelfColumn.HEADING_RAD] + bearing_rad
+
+
+def _first_distances(
+    selves: Samples, percept: Percept, config: Config, rng: np.random.Generator
+) -> Samples:
+    """(n,): the distances, from samples of the self, at which an object may be."""
+    number = len(selves)
+    if not has_range(percept):
+        return rng.uniform(0.0, config.farthest_m, number)
+
+    range_m = rng.normal(percept.range_m, percept.range_sd_m, number)
+    distance_m: Samples = range_m.clip(MIN_RANGE_M) / (1 + selves[:, SelfColumn.RANGE_GAIN])
+    return distance_m
 
 
 def object_answer(
@@ -240,19 +271,20 @@ def _stays(agent: Self, landmark: Object) -> bool:
 
 def _mahalanobis2(positions_m: Samples, selves: Samples, percept: Percept) -> Samples:
     """(n,): squared deviations of the percept from what each pair of landmark and self predicts."""
-    offset_m = positions_m - selves[:, :2]
-    mahalanobis2 = np.zeros(len(offset_m))
+    mahalanobis2 = np.zeros(len(positions_m))
+    east_m = positions_m[:, 0] - selves[:, SelfColumn.X_M]
+    north_m = positions_m[:, 1] - selves[:, SelfColumn.Y_M]
 
     if has_bearing(percept):
-        direction_rad = np.arctan2(offset_m[:, 1], offset_m[:, 0])
+        direction_rad = np.arctan2(north_m, east_m)
         bearing_rad = direction_rad - selves[:, SelfColumn.HEADING_RAD]
         residual_rad = wrap_angle(bearing_rad - percept.bearing_rad)
         mahalanobis2 += (residual_rad / percept.bearing_sd_rad) ** 2
 
     if has_range(percept):
-        distance_m = np.hypot(offset_m[:, 0], offset_m[:, 1])
-        expected_m = distance_m * (1 + selves[:, SelfColumn.RANGE_GAIN])
-        residual_m = expected_m - percept.range_m
+        distance_m = np.hypot(east_m, north_m)
+        range_m = distance_m * (1 + selves[:, SelfColumn.RANGE_GAIN])
+        residual_m = range_m - percept.range_m
         mahalanobis2 += (residual_m / percept.range_sd_m) ** 2
 
     return mahalanobis2

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cogmap.geometry.se2 import FULL_TURN_RAD
 from schemas.nodes import POSE_COLUMNS, SelfColumn
 from services.codelets.config import Config
 from services.codelets.localization.sampling import Samples, standard_normal
@@ -55,8 +56,10 @@ def with_gains(samples: Samples, config: Config, rng: np.random.Generator) -> Sa
     if samples.shape[1] == COLUMNS:
         return np.asfortranarray(samples)
 
-    gains = rng.normal(0.0, 1.0, (len(samples), GAINS)) * bias(config).sds
-    return np.hstack([samples[:, :POSE_COLUMNS], gains])
+    drawn = rng.normal(0.0, 1.0, (len(samples), GAINS))
+    gains = drawn * bias(config).sds
+    poses = samples[:, :POSE_COLUMNS]
+    return np.hstack([poses, gains])
 
 
 def propagate_bias(
@@ -86,12 +89,15 @@ def move(start: Samples, motions: Samples, config: Config, rng: np.random.Genera
     standard deviations of the two rates.
     """
     samples = start.copy(order="F")
-    propagate_bias(samples, float(motions[:, 2].sum()), config, rng)
-
     speed, turn_rate, duration_s, speed_sd, turn_rate_sd = motions.T[:, :, None]
+    propagate_bias(samples, float(duration_s.sum()), config, rng)
+
     shape = (len(samples), len(motions))
-    noisy_speed = speed + speed_sd * standard_normal(rng, *shape).T
-    noisy_turn_rate = turn_rate + turn_rate_sd * standard_normal(rng, *shape).T
+    speed_noise = standard_normal(rng, *shape).T
+    turn_rate_noise = standard_normal(rng, *shape).T
+    noisy_speed = speed + speed_sd * speed_noise
+    noisy_turn_rate = turn_rate + turn_rate_sd * turn_rate_noise
+
     _advance(samples, noisy_speed, noisy_turn_rate, duration_s)
     return samples
 
@@ -106,18 +112,21 @@ def dead_reckon(pose: Samples, motions: Samples, gains: Samples) -> Samples:
 
     for speed, turn_rate, duration_s, *_ in motions.tolist():
         distance_m = speed * duration_s * (1 + speed_gain)
-        turn_rad = turn_rate * duration_s * (1 + turn_gain) + distance_m * drift_rad_per_m
+        turn_rad = turn_rate * duration_s * (1 + turn_gain)
+        turn_rad += distance_m * drift_rad_per_m
+
         middle_rad = heading_rad + turn_rad / 2
         x_m += distance_m * math.cos(middle_rad)
         y_m += distance_m * math.sin(middle_rad)
         heading_rad += turn_rad
 
-    return np.array([x_m, y_m, math.remainder(heading_rad, 2 * math.pi)])
+    heading_rad = math.remainder(heading_rad, FULL_TURN_RAD)
+    return np.array([x_m, y_m, heading_rad])
 
 
 def _advance(samples: Samples, speed: Samples, turn_rate: Samples, duration_s: Samples) -> None:
-    """Move (n, 7) samples in place, by speeds and turn rates (m, n) or (m, 1) that last (m, 1)
-    seconds, each along the heading half-way through its turn.
+    """Move (n, 7) samples in place, by speeds and turn rates (m, n) that last (m, 1) seconds, each
+    along the heading half-way through its turn.
     """
     if not len(duration_s):
         return
@@ -131,8 +140,11 @@ def _advance(samples: Samples, speed: Samples, turn_rate: Samples, duration_s: S
     heading = samples[:, 2] + turn
     for row in range(1, len(turn)):
         heading[row] = heading[row - 1] + turn[row]
+
     turn /= 2
     middle = np.subtract(heading, turn, out=turn)
-    samples[:, 0] += (distance * np.cos(middle)).sum(axis=0)
-    samples[:, 1] += (distance * np.sin(middle)).sum(axis=0)
+    east = distance * np.cos(middle)
+    north = distance * np.sin(middle)
+    samples[:, 0] += east.sum(axis=0)
+    samples[:, 1] += north.sum(axis=0)
     samples[:, 2] = heading[-1]

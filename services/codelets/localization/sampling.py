@@ -47,12 +47,14 @@ def generator(identifier: str) -> np.random.Generator:
 def standard_normal(rng: np.random.Generator, count: int, columns: int) -> Samples:
     """(count, columns) standard normal numbers of single precision: noise needs no more."""
     numbers = rng.standard_normal((columns, count), np.float32)
-    return numbers.astype(np.float64).T
+    double = numbers.astype(np.float64)
+    return double.T
 
 
 def select(samples: Samples, chosen: Indices) -> Samples:
     """The rows `chosen` of (n, d) samples."""
-    return samples.T.take(chosen, axis=1).T
+    columns = samples.T.take(chosen, axis=1)
+    return columns.T
 
 
 @lru_cache(maxsize=256)
@@ -76,15 +78,20 @@ def centred(samples: Samples) -> tuple[Samples, Samples]:
         return mean, samples - mean
 
     headings_rad = np.ascontiguousarray(samples[:, 2])
-    mean[2] = np.arctan2(weights @ np.sin(headings_rad), weights @ np.cos(headings_rad))
+    sin = weights @ np.sin(headings_rad)
+    cos = weights @ np.cos(headings_rad)
+    mean[2] = np.arctan2(sin, cos)
+
     deviations = samples - mean
-    deviations[:, 2] -= FULL_TURN_RAD * np.rint(deviations[:, 2] / FULL_TURN_RAD)
+    turns = np.rint(deviations[:, 2] / FULL_TURN_RAD)
+    deviations[:, 2] -= FULL_TURN_RAD * turns
     return mean, deviations
 
 
 def spread(deviations: Samples) -> Samples:
     """(d,): the standard deviations of samples that deviate by (n, d) from their mean."""
-    variances = np.einsum("nd,nd->d", deviations, deviations) / len(deviations)
+    squares = np.einsum("nd,nd->d", deviations, deviations)
+    variances = squares / len(deviations)
     return np.asarray(np.sqrt(variances))
 
 
@@ -93,10 +100,18 @@ def rejection_mask(log_likelihood: Samples, rng: np.random.Generator) -> Boolean
 
     The likeliest is always kept, so that one is even where all are unlikely.
     """
-    probability = np.exp(log_likelihood - log_likelihood.max())
+    probability = _relative(log_likelihood)
+    likeliest = int(probability.argmax())
+
     kept: Booleans = rng.random(len(probability)) < probability
-    kept[int(np.argmax(probability))] = True
+    kept[likeliest] = True
     return kept
+
+
+def _relative(log_likelihood: Samples) -> Samples:
+    """Likelihoods relative to the largest, any shape."""
+    below = log_likelihood - log_likelihood.max()
+    return np.asarray(np.exp(below))
 
 
 def inflate(poses: Samples, factor: float, rng: np.random.Generator) -> Samples:
@@ -106,10 +121,10 @@ def inflate(poses: Samples, factor: float, rng: np.random.Generator) -> Samples:
     mean = mean_pose(poses)
     deviations = poses[:, :3] - mean
     deviations[:, 2] = wrap_angle(deviations[:, 2])
-    noise = rng.normal(0.0, 1.0, deviations.shape) * INFLATION_SD
 
+    noise = rng.normal(0.0, 1.0, deviations.shape)
     result = poses.copy()
-    result[:, :3] = mean + factor * deviations + noise
+    result[:, :3] = mean + factor * deviations + INFLATION_SD * noise
     return result
 
 
@@ -121,17 +136,26 @@ def kernel_smooth(drawn: Samples, effective: float, rng: np.random.Generator) ->
     """
     count, columns = drawn.shape
     mean, deviations = centred(drawn)
-    width = (4 / ((columns + 2) * max(1.0, effective))) ** (1 / (columns + 4))
-    variance = min(MAX_KERNEL_VARIANCE, width**2)
+    variance = _kernel_variance(effective, columns)
 
-    values, vectors = np.linalg.eigh(deviations.T @ deviations / count)
-    root = vectors * np.sqrt(values.clip(0.0) * variance)
-    noise = (root @ standard_normal(rng, count, columns).T).T
+    covariance = deviations.T @ deviations / count
+    values, vectors = np.linalg.eigh(covariance)
+    sds = np.sqrt(values.clip(0.0) * variance)
+    root = vectors * sds
 
-    deviations *= np.sqrt(1 - variance)
+    normal = standard_normal(rng, count, columns)
+    noise = (root @ normal.T).T
+    deviations *= math.sqrt(1 - variance)
     deviations += noise
     deviations += mean - equal_weights(count) @ noise
     return deviations
+
+
+def _kernel_variance(effective: float, columns: int) -> float:
+    """The variance of a Gaussian kernel of Silverman's width, as a share of the samples'."""
+    weight = (columns + 2) * max(1.0, effective)
+    width = math.pow(4 / weight, 1 / (columns + 4))
+    return min(MAX_KERNEL_VARIANCE, width**2)
 
 
 def tempering_exponent(log_likelihood: Samples, share: float) -> float:
@@ -141,15 +165,19 @@ def tempering_exponent(log_likelihood: Samples, share: float) -> float:
     The logarithm of what is kept falls with the power, ever more slowly: a straight line from the
     start leads to a power that is a little too large, and from there on ever nearer.
     """
-    relative = (log_likelihood - log_likelihood.max()).astype(np.float32)
-    count = len(relative)
+    count = len(log_likelihood)
+    below = log_likelihood - log_likelihood.max()
+    below = below.astype(np.float32)
     target = math.log(share)
+
     power = 1.0
     for _ in range(SECANT_STEPS):
-        kept = math.log(np.exp(power * relative).sum() / count)
-        if kept >= target:
+        kept = np.exp(power * below).sum() / count
+        log_kept = math.log(kept)
+        if log_kept >= target:
             break
-        power *= target / kept
+        power *= target / log_kept
+
     return power
 
 
@@ -164,20 +192,31 @@ def rejection_resample(
     the same probabilities, some repeatedly.
     """
     order = np.argsort(samples[:, -1], kind="stable")
-    probability = np.exp(log_likelihood - log_likelihood.max())[order]
+    probability = _relative(log_likelihood)[order]
     total = float(probability.sum())
     share = total / len(probability)
     effective = total**2 / float(probability @ probability)
 
-    expected = np.cumsum(probability * max(1.0, min_kept / total))
-    drawn = np.zeros(len(samples) + 1)
-    np.floor(expected + rng.random(), out=drawn[1:])
-    copies = (drawn[1:] - drawn[:-1]).astype(np.int64)
+    expected = probability * max(1.0, min_kept / total)
+    copies = _systematic(expected, rng)
     kept = select(samples, order.repeat(copies))
     if not len(kept):
         likeliest = np.array([log_likelihood.argmax()])
         kept = select(samples, likeliest)
+
     return kernel_smooth(kept, effective, rng), share
+
+
+def _systematic(expected: Samples, rng: np.random.Generator) -> Indices:
+    """(n,): how often each sample is drawn, as often as `expected` (n,) on the mean: of each run of
+    samples as often as their sum, but for one.
+    """
+    through = np.zeros(len(expected) + 1)
+    offset = rng.random()
+    np.floor(np.cumsum(expected) + offset, out=through[1:])
+
+    copies = through[1:] - through[:-1]
+    return copies.astype(np.int64)
 
 
 def resample(kept: Samples, count: int) -> Samples:
@@ -193,4 +232,5 @@ def resample(kept: Samples, count: int) -> Samples:
 
 def jittered(samples: Samples, sd: Samples, rng: np.random.Generator) -> Samples:
     """(n, d) samples with normal noise of standard deviations `sd` (d,)."""
-    return samples + standard_normal(rng, *samples.shape) * sd
+    noise = standard_normal(rng, *samples.shape)
+    return samples + noise * sd
