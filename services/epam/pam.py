@@ -69,7 +69,12 @@ class ExtendedPam:
 
         likelihood = self._road_segmenter.likelihood(view.image)
         road_m, road_boundary_m = project(likelihood, view.depth_m, camera)
-        return Perceived(objects, road_m, road_boundary_m, learned)
+        return Perceived(
+            objects=objects,
+            road_m=road_m,
+            road_boundary_m=road_boundary_m,
+            learned=learned,
+        )
 
     def candidates(self, view: ViewArrays, camera: Calibration) -> list[Candidate]:
         """Return every segment that is wide enough and has known depth, whatever its activation,
@@ -127,7 +132,8 @@ class ExtendedPam:
         learned: list[LearnedObject] = []
 
         for first in sorted(candidates, key=_activation, reverse=True):
-            candidate = self._in_one_place(self._recognized(first), pieces)
+            recognized = self._recognized(first)
+            candidate = self._in_one_place(recognized, pieces)
             recognition = candidate.recognition
             if 1 - recognition.background <= self._config.percept_threshold:
                 continue
@@ -184,6 +190,7 @@ class ExtendedPam:
     def _next_label(self) -> str:
         learned = self._recognizer.learned
         labels = {label for label, _ in learned}
+
         number = 1 + len(labels)
         return NEW_LABEL.format(number)
 

@@ -161,6 +161,7 @@ def _starts(objects: FootprintProblem) -> Floats:
 def _middle_slope(objects: FootprintProblem) -> Floats:
     """The slope (s,) of the ray through the middle of what is seen of each object."""
     camera = objects.camera
+
     middle_px = objects.edge_px.mean(1)
     right_px = middle_px - camera.cx_px
     return np.asarray(right_px / camera.fx_px)
@@ -258,6 +259,7 @@ def _weighted_normal(jacobian: Floats, weight: Floats) -> tuple[Floats, Floats]:
 def _huber_weight(residuals: Floats) -> Floats:
     size = np.abs(residuals)
     safe_size = np.maximum(size, 1e-12)
+
     weight = np.minimum(1.0, HUBER / safe_size)
     return np.asarray(weight)
 
@@ -282,10 +284,17 @@ def _covariances(solution: _Solution, problem: FootprintProblem) -> Floats:
     common = np.einsum("sij,sj->si", independent, solution.bias_gradient)
     covariances = np.asarray(independent + _outer(common))
 
+    of_centre = covariances[:, :2, :2]
+    of_centre += _of_hidden_edges(problem)
+    return covariances
+
+
+def _of_hidden_edges(problem: FootprintProblem) -> Floats:
+    """The covariance (s, 2, 2) of a centre that a hidden edge leaves open; 0 where none is."""
     is_hidden = problem.hidden.any(1)
     hidden_m2 = np.where(is_hidden, HIDDEN_SD_M**2, 0.0)
-    of_centre = covariances[:, :2, :2]
-    of_centre += hidden_m2[:, None, None] * np.eye(2)
+
+    covariances: Floats = hidden_m2[:, None, None] * np.eye(2)
     return covariances
 
 

@@ -18,6 +18,10 @@ MIN_RANGE_M = 0.5
 # Of differences: x and z in metres, orientation in radians.
 STEPS = (1e-3, 1e-3, 1e-4)
 
+# Of the corners of a rectangle, along its two axes.
+_SIGNS_A = np.array([1, 1, -1, -1])
+_SIGNS_B = np.array([1, -1, 1, -1])
+
 
 @dataclass(frozen=True, eq=False)
 class FootprintProblem:
@@ -75,12 +79,12 @@ def _inverse_depths(parameters: Floats, problem: FootprintProblem) -> Floats:
 
     inverse = np.full(problem.slope.shape, np.inf)
     axes = ((cos, sin), (-sin, cos))
-    for (axis_x, axis_z), half in zip(axes, problem.half_m.T, strict=True):
-        along = x * axis_x + z * axis_z
-        across = problem.slope * axis_x[:, None] + axis_z[:, None]
-        towards = across * np.sign(along)[:, None]
+    for (axis_x, axis_z), half_m in zip(axes, problem.half_m.T, strict=True):
+        along_m = x * axis_x + z * axis_z
+        gap_m = np.abs(along_m) - half_m
 
-        gap_m = np.abs(along) - half
+        across = problem.slope * axis_x[:, None] + axis_z[:, None]
+        towards = across * np.sign(along_m)[:, None]
         of_side = _inverse_depths_of_side(towards, gap_m)
         inverse = np.minimum(inverse, of_side)
 
@@ -130,11 +134,12 @@ def _corner_columns(parameters: Floats, problem: FootprintProblem) -> Floats:
 def _corners(parameters: Floats, half_m: Floats) -> tuple[Floats, Floats]:
     """x and z (s, 4) of the corners of rectangles with half sides (s, 2)."""
     x, z, orientation = parameters.T[:, :, None]
-    a = half_m[:, :1] * np.array([1, 1, -1, -1])
-    b = half_m[:, 1:] * np.array([1, -1, 1, -1])
+    a = half_m[:, :1] * _SIGNS_A
+    b = half_m[:, 1:] * _SIGNS_B
 
     cos = np.cos(orientation)
     sin = np.sin(orientation)
+
     corner_x = x + a * cos - b * sin
     corner_z = z + a * sin + b * cos
     return corner_x, corner_z

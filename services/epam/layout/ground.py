@@ -36,6 +36,7 @@ def project(likelihood: Singles, depth_m: Singles, camera: Calibration) -> tuple
     """
     likelihood = likelihood.astype(np.float32, copy=False)
     mask = likelihood >= 0.5
+
     disparity_px = _disparity_px(depth_m, camera)
     plane = fit(mask, disparity_px, camera)
     ground_px = plane.disparity_image_px(mask.shape, camera)
@@ -47,6 +48,7 @@ def project(likelihood: Singles, depth_m: Singles, camera: Calibration) -> tuple
 
     upright_px = np.where(upright, disparity_px, 0.0).astype(np.float32)
     visible_ground = _visible_ground(upright_px, ground_px)
+
     end_rows, end_columns = _boundary_pixels(likelihood, mask, visible_ground)
     boundary_m = _on_ground(end_rows, end_columns, plane, camera)
 
@@ -84,10 +86,11 @@ def _visible_ground(upright_px: Singles, ground_px: Floats) -> Booleans:
     height = ABOVE_PX + 1 + BELOW_PX
     width = 2 * BESIDE_PX + 1
     kernel = np.ones((height, width), np.uint8)
-    nearest_px = cv2.dilate(upright_px, kernel, anchor=(BESIDE_PX, ABOVE_PX))
 
+    nearest_px = cv2.dilate(upright_px, kernel, anchor=(BESIDE_PX, ABOVE_PX))
     limit_px = HIDING_SHARE * ground_px - HIDING_PX
     is_hidden = nearest_px >= limit_px
+
     is_ground = ground_px > 0
     return np.asarray(is_ground & ~is_hidden)
 
@@ -128,7 +131,8 @@ def _crossings(
 
     first = likelihood[rows, columns]
     second = likelihood[rows, columns + 1]
-    share = (0.5 - first) / (second - first)
+    rise = second - first
+    share = (0.5 - first) / rise
 
     crossed_columns = np.asarray(columns + share, np.float64)
     return rows.astype(np.float64), crossed_columns
@@ -153,7 +157,9 @@ def thin(points_m: Floats) -> Singles:
     """Return the mean of the points (n, 2) in each cell, in the order of the cells."""
     ranges_m = np.hypot(points_m[:, 0], points_m[:, 1])
     near_m = points_m[ranges_m <= MAX_RANGE_M]
-    means_m = _means_m(near_m, _cell_numbers(near_m))
+
+    cell = _cell_numbers(near_m)
+    means_m = _means_m(near_m, cell)
     return np.asarray(means_m, np.float32)
 
 

@@ -43,6 +43,7 @@ class GroundPlane:
     ) -> Floats:
         """The disparity at each of these pixels; at most 0 at and over the horizon."""
         right, below = ray_slopes(rows, columns, camera)
+
         across_px = self.across * right
         down_px = self.down * below
         return across_px + down_px + self.level
@@ -52,6 +53,7 @@ class GroundPlane:
         height, width = size
         rows = np.arange(height)[:, None]
         columns = np.arange(width)
+
         return self.disparity_px(rows, columns, camera)
 
 
@@ -66,7 +68,6 @@ def fit(mask: Booleans, disparity_px: Floats, camera: Calibration) -> GroundPlan
     observed_px = disparity_px[rows, columns] - predicted_px
 
     correction = _correction(slopes, observed_px, information)
-
     across, down, level = (prior + correction).tolist()
     return GroundPlane(across, down, level)
 
@@ -134,6 +135,7 @@ def _sampled_pixels(
     """
     first = STRIDE_PX // 2
     every = slice(first, None, STRIDE_PX)
+
     wanted = mask[every, every]
     known = disparity_px[every, every] > 0
 

@@ -45,7 +45,8 @@ class RoadSegmenter:
         A pixel is road if it is at least 0.5. An image without any contrast has none.
         """
         height, width, _ = image.shape
-        resized = cv2.resize(image, (WIDTH_PX, HEIGHT_PX), interpolation=cv2.INTER_AREA)
+        small_size = (WIDTH_PX, HEIGHT_PX)
+        resized = cv2.resize(image, small_size, interpolation=cv2.INTER_AREA)
         small = resized.astype(np.uint8, copy=False)
         if small.std() < MIN_CONTRAST:
             return np.zeros((height, width), np.float32)
@@ -110,6 +111,7 @@ def _gain(small: Bytes) -> Singles:
     """The factor (n, 1, 1, 1) by which each image's mean becomes MEAN_GREY."""
     brightness = small.mean((1, 2, 3), dtype=np.float32)
     safe_brightness = np.maximum(brightness, MIN_GREY)
+
     gain = MEAN_GREY / safe_brightness
     return np.asarray(gain[:, None, None, None])
 
@@ -132,8 +134,10 @@ def _large_components(mask: Booleans, min_share: float) -> Booleans:
     """The connected components of `mask` that cover at least `min_share` of the image, (h, w)."""
     found = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
     _, component, stats, _ = found
+
     area_px = stats[:, cv2.CC_STAT_AREA]
 
-    kept = area_px >= min_share * mask.size
+    min_area_px = min_share * mask.size
+    kept = area_px >= min_area_px
     kept[0] = False
     return np.asarray(kept[component])

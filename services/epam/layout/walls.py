@@ -98,10 +98,10 @@ class Walls:
         median_px = float(np.median(self.disparity_px))
         safe_px = max(median_px, MIN_DISPARITY_PX)
         depth_m = camera.fx_px * camera.baseline_m / safe_px
+        forward_m = depth_m + camera.mount_forward_m
 
         middle_px = (self.left + self.right) / 2
         slope = (camera.cx_px - middle_px) / camera.fx_px
-        forward_m = depth_m + camera.mount_forward_m
         return forward_m, slope * depth_m
 
     def width_m(self, camera: Calibration) -> float:
@@ -167,6 +167,7 @@ def _truly_ends(segment: Segment, disparity_px: Singles, medians_px: Singles, ou
     """
     left, _, width, _ = segment.box_px
     last = width - 1
+
     within = min(WITHIN_PX, last)
     inside = last - within if outward > 0 else within
     edge = left + last if outward > 0 else left

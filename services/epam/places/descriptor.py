@@ -96,6 +96,7 @@ def _cells(image: Bytes) -> Singles:
 def _opponents(light: Singles) -> Singles:
     """The mean and two differences of the logarithms of red, green and blue, (h, w, 3)."""
     red, green, blue = np.moveaxis(light, 2, 0)
+
     brightness = (red + green + blue) / 3
     red_green = red - green
     blue_green = blue - green
@@ -123,8 +124,9 @@ def unit_vectors(codes: Bytes) -> Singles:
     """
     middle = np.float32(128)
     values = codes.astype(np.float32) - middle
-    length = np.linalg.norm(values, axis=1, keepdims=True)
 
+    length = np.linalg.norm(values, axis=1, keepdims=True)
     divisor = np.maximum(length, np.float32(1))
+
     vectors = values / divisor
     return np.asarray(vectors, np.float32)
