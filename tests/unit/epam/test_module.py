@@ -278,8 +278,10 @@ def test_a_view_of_noise_gives_valid_messages() -> None:
         depth_m = (10.0**exponent).astype(np.float32)
         view = msgspec.structs.replace(_view(image, depth_m), frame=seed)
 
-        for answer in module.feed(view):
-            codec.decode(topics.of(answer), codec.encode(answer))
+        answers = module.feed(view)
+        assert answers
+        for answer in answers:
+            assert codec.decode(topics.of(answer), codec.encode(answer)) == answer
 
 
 @pytest.mark.parametrize("weights", ["segments_weights", "object_weights", "road_weights"])

@@ -50,13 +50,14 @@ class Street:
 
 def _street(*blocks: Block, height_m: float = CAMERA.mount_height_m) -> Street:
     _, painted_m, label = painted(list(blocks))
+    on_ground = label == 0
     lower = np.float32(height_m / CAMERA.mount_height_m)
-    depth_m = np.where(label > 0, painted_m, painted_m * lower)
+    depth_m = np.where(on_ground, painted_m * lower, painted_m)
 
-    rows, columns = np.indices(SIZE)
-    left_m = (CAMERA.cx_px - columns) / CAMERA.fx_px * depth_m
-    ground = (rows > CAMERA.cy_px) & (label == 0) & (depth_m > 0)
-    return Street((np.abs(left_m) < HALF_M) & ground, depth_m)
+    rows, _ = np.indices(SIZE)
+    below_horizon = (rows > CAMERA.cy_px) & (depth_m > 0)
+    in_street = np.abs(_left_m(depth_m)) < HALF_M
+    return Street(in_street & on_ground & below_horizon, depth_m)
 
 
 def _projected(street: Street, depth_m: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -77,8 +78,9 @@ def _edge_errors_m(boundary_m: np.ndarray) -> np.ndarray:
 
 def test_a_straight_street_ends_at_its_two_sides_and_nowhere_else() -> None:
     road_m, boundary_m = _projected(_street())
+    errors_m = _edge_errors_m(boundary_m)
     assert len(boundary_m) > 30
-    assert np.quantile(_edge_errors_m(boundary_m), 0.9) < 0.1
+    assert np.quantile(errors_m, 0.9) < 0.1
 
     ahead_m, left_m = road_m.T
     assert (np.abs(left_m) < HALF_M).all()
@@ -168,20 +170,27 @@ def test_no_boundary_is_claimed_at_the_outermost_pixels() -> None:
 def test_left_is_positive() -> None:
     street = _street()
     left_half = street.mask & (np.arange(320) < 160)
+    likelihood = left_half.astype(np.float32)
 
-    road_m, _ = project(left_half.astype(np.float32), street.depth_m, CAMERA)
+    road_m, _ = project(likelihood, street.depth_m, CAMERA)
     left_m = road_m[:, 1]
 
     assert (left_m > -0.1).all()
     assert left_m.max() > 3.0
 
 
+def _left_m(depth_m: np.ndarray) -> np.ndarray:
+    """How far to the left of the camera each pixel of a depth image is."""
+    _, columns = np.indices(SIZE)
+    return (CAMERA.cx_px - columns) / CAMERA.fx_px * depth_m
+
+
 def test_what_stands_on_the_road_is_no_road_though_it_is_in_the_mask() -> None:
     block = Block(8.0, 0.0, 0.0, (2.0, 3.0), 1.2, (90, 90, 90))
     street = _street(block)
-    rows, columns = np.indices(SIZE)
-    across_m = (CAMERA.cx_px - columns) / CAMERA.fx_px * street.depth_m
-    everything = (rows > CAMERA.cy_px) & (np.abs(across_m) < HALF_M)
+    rows, _ = np.indices(SIZE)
+    in_street = np.abs(_left_m(street.depth_m)) < HALF_M
+    everything = (rows > CAMERA.cy_px) & in_street
 
     road_m, _ = project(everything.astype(np.float32), street.depth_m, CAMERA)
 
@@ -202,12 +211,14 @@ def test_no_road_in_the_image_is_no_road_on_the_ground() -> None:
 @pytest.mark.parametrize("level", [0, 3, 90, 255])
 def test_an_image_without_contrast_shows_no_road(segmenter: RoadSegmenter, level: int) -> None:
     flat = np.full((*SIZE, 3), level, np.uint8)
+    mask = segmenter.mask(flat)
 
-    assert not segmenter.mask(flat).any()
+    assert not mask.any()
 
 
 def test_a_black_image_with_the_noise_of_a_camera_shows_no_road(segmenter: RoadSegmenter) -> None:
-    noise = np.random.default_rng(0).normal(0, 3, (*SIZE, 3))
+    rng = np.random.default_rng(0)
+    noise = rng.normal(0, 3, (*SIZE, 3))
     black = np.clip(noise, 0, 255).astype(np.uint8)
 
     assert not segmenter.mask(black).any()

@@ -12,14 +12,16 @@ from experiments.loop_closing.run import CORNERS_M, METHODS, trajectory
 from schemas.array import Array
 from schemas.cognition import Replay
 from services.sim.odometry import Noise
+from tests.support.paths import distances_m
 
 DECAY = 0.2
 
 
 def _strength(positions_m: np.ndarray, pairs: np.ndarray) -> np.ndarray:
     """The strength of the synapse of each pair of places."""
-    between_m = positions_m[pairs[:, 0]] - positions_m[pairs[:, 1]]
-    return np.exp(-DECAY * np.hypot(*between_m.T))
+    first, second = pairs.T
+    apart_m = distances_m(positions_m[first], positions_m[second])
+    return np.exp(-DECAY * apart_m)
 
 
 def _replayed(before: np.ndarray, after: np.ndarray, pairs: np.ndarray) -> Replayed:
@@ -67,15 +69,22 @@ def _loop(error_m: float) -> Loop:
     return Loop(off, exact, off, there, wheels_m, [_squeezed()])
 
 
+def _metrics(error_m: float) -> dict[str, float]:
+    """Of a loop that errs so much, by whichever method."""
+    loops = {method: _loop(error_m) for method in METHODS}
+    return loop_metrics(loops)
+
+
 def test_pairs_are_close_where_their_fields_are_before_and_after() -> None:
     replayed = _squeezed()
+    expected = [True] * 38 + [False, False]
 
-    assert replayed.close.tolist() == [True] * 38 + [False, False]
+    assert replayed.close.tolist() == expected
     assert replayed.nearer_m[-1] == pytest.approx(97.5)
 
 
 def test_synapses_of_close_places_change_by_the_decay_times_the_shift() -> None:
-    metrics = loop_metrics({method: _loop(3.0) for method in METHODS})
+    metrics = _metrics(3.0)
     expected = DECAY * np.exp(-DECAY * 2.375)
 
     assert metrics["strength_change_per_m_close_pairs"] == pytest.approx(expected, rel=0.05)

@@ -49,8 +49,8 @@ def test_every_place_has_a_border_cell_that_fires_there() -> None:
 
 
 def test_cells_fire_as_often_as_their_tuning_says() -> None:
-    tuning = np.array([[0.0], [0.5], [1.0]], np.float32)
-    share = np.repeat(tuning, 20_000, axis=1)
+    never, half, always = np.float32([0.0, 0.5, 1.0])
+    share = np.repeat([[never], [half], [always]], 20_000, axis=1)
     spikes = generate(share, np.random.default_rng(1))
     fired = np.unpackbits(spikes, axis=1)
 
@@ -65,9 +65,12 @@ def test_place_cells_fire_only_where_all_their_inputs_do() -> None:
     border_cells = BorderCells(5.0).nearest(centres_m[:, 0])
 
     fired = spikes.place[busiest]
+    grid_fired = spikes.grid[0][grid_cells]
+    border_fired = spikes.border[0][border_cells]
+
     assert fired.any()
-    assert not (fired & ~spikes.grid[0][grid_cells]).any()
-    assert not (fired & ~spikes.border[0][border_cells]).any()
+    assert not (fired & ~grid_fired).any()
+    assert not (fired & ~border_fired).any()
 
 
 def test_the_exact_posterior_lies_between_the_cues_by_their_precision() -> None:

@@ -51,17 +51,18 @@ def _ride(simulation: PerceptLevelSim) -> list[tuple[TruePose, SelfMotion, Perce
 
 
 def test_self_motion_without_noise_adds_up_to_the_true_path() -> None:
-    x = y = heading = 0.0
+    x_m = y_m = heading = 0.0
     for truth, motion, _ in _ride(_simulation()):
         for speed, turn_rate, dt, *_ in motion.motions.numpy():
+            distance_m = speed * dt
             middle = heading + turn_rate * dt / 2
-            x += speed * dt * math.cos(middle)
-            y += speed * dt * math.sin(middle)
+            x_m += distance_m * math.cos(middle)
+            y_m += distance_m * math.sin(middle)
             heading += turn_rate * dt
 
         turned_rad = math.remainder(heading - truth.pose.heading_rad, math.tau)
-        assert x == pytest.approx(truth.pose.x_m, abs=1e-9)
-        assert y == pytest.approx(truth.pose.y_m, abs=1e-9)
+        assert x_m == pytest.approx(truth.pose.x_m, abs=1e-9)
+        assert y_m == pytest.approx(truth.pose.y_m, abs=1e-9)
         assert turned_rad == pytest.approx(0.0, abs=1e-9)
 
 
@@ -73,28 +74,26 @@ def test_the_rows_of_a_view_take_as_long_as_the_view() -> None:
 
 
 def test_a_landmark_is_seen_where_it_stands() -> None:
-    seen = [
-        (truth.pose, each)
-        for truth, _, percepts in _ride(_simulation())
-        for each in percepts.objects
-    ]
-
+    seen = []
+    for truth, _, percepts in _ride(_simulation()):
+        for percept in percepts.objects:
+            seen.append((truth.pose, percept))
     assert seen
 
     for pose, percept in seen:
-        bearing = pose.heading_rad + percept.bearing_rad
-        where = (
-            pose.x_m + percept.range_m * math.cos(bearing),
-            pose.y_m + percept.range_m * math.sin(bearing),
-        )
-        assert where == pytest.approx((HOUSE.x_m, HOUSE.y_m), abs=0.01)
+        direction = pose.heading_rad + percept.bearing_rad
+        x_m = pose.x_m + percept.range_m * math.cos(direction)
+        y_m = pose.y_m + percept.range_m * math.sin(direction)
+        assert x_m == pytest.approx(HOUSE.x_m, abs=0.01)
+        assert y_m == pytest.approx(HOUSE.y_m, abs=0.01)
 
 
 def test_houses_hide_what_is_not_along_the_street() -> None:
     around = [(0.0, 0.0), (40.0, 0.0), (40.0, 40.0), (0.0, 40.0)]
-    seen_from = [
-        truth.pose for truth, _, percepts in _ride(_simulation(around)) if percepts.objects
-    ]
+    seen_from = []
+    for truth, _, percepts in _ride(_simulation(around)):
+        if percepts.objects:
+            seen_from.append(truth.pose)
 
     assert seen_from
     assert all(pose.y_m < 1.0 for pose in seen_from)
@@ -103,8 +102,10 @@ def test_houses_hide_what_is_not_along_the_street() -> None:
 def _sensed(seed: int) -> list[tuple[bytes, list[Percept]]]:
     """The motions and percepts of a drive with noise and errors."""
     simulation = _simulation(noise=Noise(), errors=PerceptErrors(), seed=seed)
-    ride = _ride(simulation)
-    return [(motion.motions.data, percepts.objects) for _, motion, percepts in ride]
+    sensed = []
+    for _, motion, percepts in _ride(simulation):
+        sensed.append((motion.motions.data, percepts.objects))
+    return sensed
 
 
 def test_the_same_seed_gives_the_same_messages() -> None:
@@ -130,11 +131,12 @@ def test_misses_confusions_and_noise_are_as_frequent_as_measured() -> None:
 
 
 def test_a_name_is_perceived_once_a_view() -> None:
-    sense = PerceptSim(PerceptErrors(right_name=0.2, detected=1.0), _landmarks(3), seed=3)
+    confusing = PerceptErrors(right_name=0.2, detected=1.0)
+    sense = PerceptSim(confusing, _landmarks(3), seed=3)
+
     for _ in range(50):
         percepts = sense.perceive(AT_ORIGIN, [0, 1, 2])
         labels = [percept.label for percept in percepts]
-
         assert len(labels) == len(set(labels))
 
 
@@ -178,6 +180,7 @@ def test_each_command_leads_to_a_frame_until_the_line_ends() -> None:
 
 def test_a_trajectory_in_real_time_is_refused() -> None:
     trajectory = Trajectory(line_m=[(0.0, 0.0), (9.0, 0.0)], landmarks=[])
+    config = Config(mode="real_time", trajectory=trajectory)
 
     with pytest.raises(ConfigError, match="lockstep"):
-        build(Config(mode="real_time", trajectory=trajectory))
+        build(config)

@@ -79,9 +79,10 @@ def test_invented_kinds_are_the_same_for_a_seed_and_of_no_catalogue() -> None:
 
 
 def test_every_front_looks_at_a_street_of_the_loop() -> None:
+    to_middle_m = 2.0 + PAVEMENT_WIDTH_M + STREET_WIDTH_M / 2
     for place in TOWNS:
         for plot in place.plots:
-            ahead_m = plot.kind.depth_m / 2 + 2.0 + PAVEMENT_WIDTH_M + STREET_WIDTH_M / 2
+            ahead_m = plot.kind.depth_m / 2 + to_middle_m
             x_m = plot.x_m + ahead_m * math.sin(plot.heading_rad)
             y_m = plot.y_m - ahead_m * math.cos(plot.heading_rad)
 

@@ -42,7 +42,9 @@ def _drive(world: World, left_rad_s: float, right_rad_s: float) -> tuple[Pose, P
 
 
 def _distance_m(one: Pose, other: Pose) -> float:
-    return math.hypot(other.x_m - one.x_m, other.y_m - one.y_m)
+    x_m = other.x_m - one.x_m
+    y_m = other.y_m - one.y_m
+    return math.hypot(x_m, y_m)
 
 
 def _before(plot: Plot, distance_m: float) -> Pose:
@@ -113,6 +115,14 @@ def _columns_of(world: World, plot: Plot, exposure: Exposure, row: int) -> np.nd
     return np.flatnonzero(shown[row])
 
 
+def _projected(eye: Calibration, points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The columns and the rows of points (right, down, ahead) in a picture."""
+    right, down, ahead = points_m.T
+    columns = eye.fx_px * right / ahead + eye.cx_px
+    rows = eye.fy_px * down / ahead + eye.cy_px
+    return columns, rows
+
+
 def test_a_known_building_stands_in_both_pictures_where_geometry_puts_it(world: World) -> None:
     camera = StereoCamera(world, calibration())
     eye = camera.calibration
@@ -122,8 +132,7 @@ def test_a_known_building_stands_in_both_pictures_where_geometry_puts_it(world: 
 
     middles_px = []
     for exposure, corners_m in zip(exposures, _lower_corners_m(plot, eye), strict=True):
-        left_px, right_px = eye.fx_px * corners_m[:, 0] / corners_m[:, 2] + eye.cx_px
-        rows = eye.fy_px * corners_m[:, 1] / corners_m[:, 2] + eye.cy_px
+        (left_px, right_px), rows = _projected(eye, corners_m)
         shown = _columns_of(world, plot, exposure, round(rows.mean()) - 4)
 
         assert shown.min() == pytest.approx(left_px, abs=1.5)
