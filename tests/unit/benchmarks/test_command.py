@@ -106,8 +106,10 @@ def test_all_ends_with_1_where_a_threshold_is_missed_and_writes_every_key(
     assert "missed" in result.output
 
     metrics = json.loads(path.read_text())
-    assert metrics["slow_ms"] == 3.0 and metrics["fast_ms"] == 1.0
-    assert metrics["runs"] == 2.0 and metrics["bus_runs"] == 5.0
+    assert metrics["slow_ms"] == 3.0
+    assert metrics["fast_ms"] == 1.0
+    assert metrics["runs"] == 2.0
+    assert metrics["bus_runs"] == 5.0
     assert metrics["machine_unit_ms"] > 0
 
 

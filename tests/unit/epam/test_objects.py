@@ -69,15 +69,17 @@ def test_an_unknown_object_has_no_label_until_it_is_learned(
 ) -> None:
     unknown = _appearance(5)
     before = recognizer.recognize(unknown)
+    assert not before.known
+    assert before.size_m is None
+    assert before.unknown > 0.9
 
     recognizer.learn("new-building-1", unknown.embedding)
     after = recognizer.recognize(_appearance(5, 6, 0.25))
-
-    assert (before.known, before.size_m) == (False, None)
-    assert before.unknown > 0.9
-    assert (after.label, after.size_m) == ("new-building-1", None)
+    other = recognizer.recognize(_appearance(9))
+    assert after.label == "new-building-1"
+    assert after.size_m is None
     assert after.activation > 0.9
-    assert not recognizer.recognize(_appearance(9)).known
+    assert not other.known
 
 
 def test_an_excluded_label_is_not_considered(recognizer: ObjectRecognizer) -> None:

@@ -251,6 +251,7 @@ def test_a_restarted_world_continues_where_it_was_with_the_robot_at_rest(
     else:
         messages += _real_time(before, 90)
     poses = of_type(TruePose, messages)
+    last_frame = of_type(StereoFrame, messages)[-1]
 
     after = build(config)
     assert after.restore is not None
@@ -258,13 +259,12 @@ def test_a_restarted_world_continues_where_it_was_with_the_robot_at_rest(
     again = _start(after)
     if mode == "real_time":
         again += _real_time(after, 4)
-
-    assert of_type(Odometry, again)[0].stamp_ns == poses[-1].stamp_ns + TICK_NS
-
-    last = of_type(StereoFrame, messages)[-1]
-    assert of_type(StereoFrame, again)[0].frame == last.frame + 1
-
+    odometry = of_type(Odometry, again)[0]
+    frame = of_type(StereoFrame, again)[0]
     start = of_type(TruePose, again)[0]
+
+    assert odometry.stamp_ns == poses[-1].stamp_ns + TICK_NS
+    assert frame.frame == last_frame.frame + 1
     assert start.pose.x_m == pytest.approx(poses[-1].pose.x_m, abs=0.1)
     assert start.travelled_m == pytest.approx(poses[-1].travelled_m, abs=0.1)
     assert start.progress == pytest.approx(poses[-1].progress, abs=0.005)

@@ -30,14 +30,16 @@ ORIGIN = Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)
 
 
 def test_noise_multiplies_speed_and_turn_rate_by_something_of_mean_one() -> None:
-    wheels = WheelOdometry(Noise(speed=0.1, turn=0.2, drift_rad_per_sqrt_m=0.0), seed=3)
+    noise = Noise(speed=0.1, turn=0.2, drift_rad_per_sqrt_m=0.0)
+    wheels = WheelOdometry(noise, seed=3)
     after = _moved(4.0, 0.5)
     rows = [wheels.measure(ORIGIN, after, DT_S) for _ in range(4000)]
-    speeds = np.array([row.speed_m_s for row in rows])
-    turns = np.array([row.turn_rate_rad_s for row in rows])
 
+    speeds = np.array([row.speed_m_s for row in rows])
     assert speeds.mean() == pytest.approx(4.0, rel=0.01)
     assert speeds.std() == pytest.approx(0.4, rel=0.1)
+
+    turns = np.array([row.turn_rate_rad_s for row in rows])
     assert turns.mean() == pytest.approx(0.5, rel=0.02)
     assert turns.std() == pytest.approx(0.1, rel=0.1)
 
