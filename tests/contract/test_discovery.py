@@ -32,7 +32,8 @@ def names(system: System, role: Role, topic: topics.Topic) -> list[str]:
     return [process.name for process in processes]
 
 
-def test_every_process_is_found_by_name_with_all_that_it_does(over_zenoh: OverZenoh) -> None:
+def start_three(over_zenoh: OverZenoh) -> None:
+    """A simulator, a workspace and a worker, each with its topics, as the router knows them."""
     sim = over_zenoh.join()
     sim.declare(topics.ODOMETRY)
     sim.declare(topics.VIEW)
@@ -47,6 +48,10 @@ def test_every_process_is_found_by_name_with_all_that_it_does(over_zenoh: OverZe
     Peer(worker, topics.ODOMETRY)
     worker.announce(Member("codelets", "codelets-2"))
     meet(over_zenoh.join(), sim, workspace, worker)
+
+
+def test_every_process_is_found_by_name_with_all_that_it_does(over_zenoh: OverZenoh) -> None:
+    start_three(over_zenoh)
 
     system = discovered(over_zenoh)
 
@@ -75,9 +80,9 @@ def test_no_module_subscribes_to_the_truth(over_zenoh: OverZenoh) -> None:
         assert names(system, Role.SUBSCRIBES, topic) == []
 
 
-ZIDS = {"aa": Member("sim", "sim"), "bb": Member("recorder", "recorder")}
 TOKENS = [
-    f"cogmap/agent/@session/{zid}/{member.module}/{member.instance}" for zid, member in ZIDS.items()
+    "cogmap/agent/@session/aa/sim/sim",
+    "cogmap/agent/@session/bb/recorder/recorder",
 ]
 
 

@@ -7,10 +7,12 @@ from __future__ import annotations
 import json
 import signal
 import time
+from dataclasses import dataclass
 from typing import Any
 
 import msgspec
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from cogmap.recording.storage.reader import LogReader
@@ -68,12 +70,25 @@ class Listener:
         received_s.append(time.monotonic())
 
 
-def stop_for(process: Process, stopped_s: float) -> float:
-    """Stop a process, wait, and return when it was stopped; it stays stopped."""
-    process.send(signal.SIGSTOP)
+@dataclass(frozen=True)
+class Observed:
+    """What others did while a process was stopped: how they grew, and when they were silent."""
+
+    grown_mb: npt.NDArray[np.float64]
+    gaps_s: list[float]
+
+
+def observe_stopped(stopped: Process, watched: list[Process], listener: Listener) -> Observed:
+    """Stop a process for STOPPED_S, and then let it continue."""
+    before_mb = [process.memory_mb for process in watched]
+    stopped.send(signal.SIGSTOP)
     began_s = time.monotonic()
-    wait_until(lambda: time.monotonic() > began_s + stopped_s, f"{stopped_s} seconds pass")
-    return began_s
+    wait_until(lambda: time.monotonic() > began_s + STOPPED_S, f"{STOPPED_S} seconds pass")
+
+    after_mb = [process.memory_mb for process in watched]
+    gaps_s = [listener.max_gap_s(topic, began_s) for topic in listener.received_s]
+    stopped.send(signal.SIGCONT)
+    return Observed(np.subtract(after_mb, before_mb), gaps_s)
 
 
 def summary_of(recorder: Process) -> dict[str, Any]:
@@ -105,20 +120,15 @@ def test_a_stopped_subscriber_delays_nobody_and_loses_nothing(
 
     with working(Shell(listener.module, system.bus())), working(Shell(camera(), system.bus())):
         wait_until(lambda: len(listener.received_s[topics.STEREO]) > 10, "frames arrive")
-        before_mb = [process.memory_mb for process in watched]
-        stopped_s = stop_for(recorder, STOPPED_S)
-        after_mb = [process.memory_mb for process in watched]
-        gaps_s = [listener.max_gap_s(topic, stopped_s) for topic in listener.received_s]
-        recorder.send(signal.SIGCONT)
+        observed = observe_stopped(recorder, watched, listener)
         witness.await_cycles(20)
 
     feeder.pause()
     witness.await_same_graph()
     assert recorder.end(signal.SIGTERM) == 0
 
-    grown_mb = np.subtract(after_mb, before_mb)
-    assert grown_mb.max() < MAX_GROWTH_MB, grown_mb
-    assert max(gaps_s) < MAX_GAP_S, gaps_s
+    assert observed.grown_mb.max() < MAX_GROWTH_MB, observed
+    assert max(observed.gaps_s) < MAX_GAP_S, observed
     assert not witness.shell.intake.gaps
 
     summary = summary_of(recorder)

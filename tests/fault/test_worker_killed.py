@@ -16,9 +16,50 @@ from tests.support.system.networks import working
 from tests.support.system.processes import System, wait_until
 
 PATIENT = ("workspace.deadline_ms=20000", "workspace.lease_ms=20000")
+VIEWS_UNDER_WAY = 5
 STOPPED = "codelets-1"
 OTHER = "codelets-2"
 ATTENTION = {"whereabouts", "novelty"}
+
+
+class Observer:
+    """Keeps which worker was given which task, and what was answered."""
+
+    def __init__(self) -> None:
+        self.leases: list[Assignment] = []
+        self.answers: list[Proposal] = []
+        self.module = Module("observer")
+        self.module.on(topics.LEASES, self._on_leases)
+        self.module.on(topics.PROPOSAL, self.answers.append)
+
+    def await_lease(self, worker: str) -> None:
+        """Wait until `worker` has been given a task."""
+
+        def is_given() -> bool:
+            return any(lease.worker == worker for lease in self.leases)
+
+        wait_until(is_given, f"{worker} is given tasks")
+
+    def held_by(self, worker: str, feeder: Feeder) -> Assignment:
+        """A task that a stopped worker has not answered.
+
+        It stays unanswered for some views, as an answer may be under way when it is stopped.
+        """
+        held: set[str] = set()
+        while not held:
+            before = self._unanswered(worker)
+            enough = feeder.views + VIEWS_UNDER_WAY
+            wait_until(lambda: feeder.views >= enough, "views continue")  # noqa: B023
+            held = before & self._unanswered(worker)
+        return next(lease for lease in reversed(self.leases) if lease.task_id in held)
+
+    def _unanswered(self, worker: str) -> set[str]:
+        given = {lease.task_id for lease in self.leases if lease.worker == worker}
+        answered = {answer.task_id for answer in self.answers}
+        return given - answered
+
+    def _on_leases(self, message: Leases) -> None:
+        self.leases.extend(message.assignments)
 
 
 @pytest.mark.parametrize(
@@ -28,21 +69,12 @@ def test_the_task_of_a_killed_worker_is_done_by_another_and_committed_once(
     agent: tuple[System, Feeder, Witness],
 ) -> None:
     system, feeder, witness = agent
-    leases: list[Assignment] = []
-    answers: list[Proposal] = []
+    observer = Observer()
 
-    def keep(message: Leases) -> None:
-        leases.extend(message.assignments)
-
-    observer = Module("observer").on(topics.LEASES, keep)
-    observer.on(topics.PROPOSAL, answers.append)
-
-    with working(Shell(observer, system.bus())):
-        wait_until(
-            lambda: any(lease.worker == STOPPED for lease in leases), f"{STOPPED} is given tasks"
-        )
+    with working(Shell(observer.module, system.bus())):
+        observer.await_lease(STOPPED)
         system.processes[STOPPED].send(signal.SIGSTOP)
-        held = _held(leases, answers)
+        held = observer.held_by(STOPPED, feeder)
         cycle = _cycle(held.task_id)
 
         system.processes[STOPPED].end(signal.SIGKILL)
@@ -51,7 +83,7 @@ def test_the_task_of_a_killed_worker_is_done_by_another_and_committed_once(
         feeder.pause()
         witness.await_same_graph()
 
-    first, second = (lease for lease in leases if lease.task_id == held.task_id)
+    first, second = (lease for lease in observer.leases if lease.task_id == held.task_id)
     assert (first.worker, first.attempt) == (STOPPED, 0)
     assert (second.worker, second.attempt) == (OTHER, 1)
 
@@ -60,26 +92,6 @@ def test_the_task_of_a_killed_worker_is_done_by_another_and_committed_once(
     times = Counter(witness.tasks_done)
     assert codelet in ATTENTION or held.task_id in times
     assert max(times.values()) == 1
-
-
-def _held(leases: list[Assignment], answers: list[Proposal]) -> Assignment:
-    """The task that the stopped worker has not answered.
-
-    It is looked for twice, as an answer may be under way.
-    """
-    open_before: set[str] = set()
-
-    def holds() -> bool:
-        nonlocal open_before
-        given = {lease.task_id for lease in leases if lease.worker == STOPPED}
-        answered = {answer.task_id for answer in answers}
-        still_open = given - answered
-        both = open_before & still_open
-        open_before = still_open
-        return bool(both)
-
-    wait_until(holds, f"{STOPPED} holds a task")
-    return next(lease for lease in reversed(leases) if lease.task_id in open_before)
 
 
 def _latest_cycle(witness: Witness) -> int:

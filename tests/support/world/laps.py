@@ -12,6 +12,8 @@ from services.codelets.correction.pose_graph import Constraints, PoseGraph
 
 SIDE = 20
 LAP = 4 * SIDE
+EVERY = 9
+MIN_APART_M = 5
 STEP_SD = np.array([0.05, 0.05, 0.01])
 CLOSURE_SD = np.array([0.3, 0.3, 0.05])
 START = np.zeros(3)
@@ -33,7 +35,8 @@ class Laps:
 
     def without_closures(self) -> PoseGraph:
         """The path alone."""
-        return self.with_closures(self.graph.closures.select(slice(0, 0)))
+        none = self.graph.closures.select(slice(0, 0))
+        return self.with_closures(none)
 
 
 def between(
@@ -41,7 +44,8 @@ def between(
 ) -> Constraints:
     """Constraints of equal standard deviations (x, y, heading)."""
     information = np.diag(sd**-2.0)
-    return Constraints(first, second, measured, np.tile(information, (len(first), 1, 1)))
+    each = np.tile(information, (len(first), 1, 1))
+    return Constraints(first, second, measured, each)
 
 
 def one_between(
@@ -65,22 +69,31 @@ def laps(count: int = 3, seed: int = 0, false: int = 0) -> Laps:
     truth = integrate(START, exact)
     noisy = exact + rng.normal(0.0, 1.0, exact.shape) * STEP_SD
 
-    ends = [(first, first + LAP) for first in range(0, len(truth) - LAP, 9)]
-    while false:
-        first, second = np.sort(rng.integers(0, len(truth), 2)).tolist()
-        apart_m = np.hypot(*(truth[first] - truth[second])[:2])
-        if second - first > SIDE and apart_m > 5:
-            ends.append((first, second))
-            false -= 1
-
+    ends = [(first, first + LAP) for first in range(0, len(truth) - LAP, EVERY)]
+    ends += _false_ends(rng, truth, false)
     i, j = np.array(ends).T
     measured = rng.normal(0.0, 1.0, (len(ends), 3)) * CLOSURE_SD
     closures = between(i, j, measured, CLOSURE_SD)
-    graph = PoseGraph(integrate(START, noisy), steps_along(noisy, STEP_SD), closures)
-    return Laps(truth, graph, (j - i) % LAP == 0)
+
+    steps = steps_along(noisy, STEP_SD)
+    graph = PoseGraph(integrate(START, noisy), steps, closures)
+    is_true = (j - i) % LAP == 0
+    return Laps(truth, graph, is_true)
+
+
+def _false_ends(rng: np.random.Generator, truth: Floats, number: int) -> list[tuple[int, int]]:
+    """So many pairs of poses at different places, as loop detection may mistake them."""
+    ends: list[tuple[int, int]] = []
+    while len(ends) < number:
+        first, second = np.sort(rng.integers(0, len(truth), 2)).tolist()
+        offset_m = (truth[first] - truth[second])[:2]
+        if second - first > SIDE and np.hypot(*offset_m) > MIN_APART_M:
+            ends.append((first, second))
+    return ends
 
 
 def error_m(poses: Floats, truth: Floats) -> float:
     """The root mean square distance of the positions; both paths begin at one pose."""
-    squared_m2 = ((poses - truth)[:, :2] ** 2).sum(axis=1)
+    offsets_m = (poses - truth)[:, :2]
+    squared_m2 = (offsets_m**2).sum(axis=1)
     return float(np.sqrt(squared_m2.mean()))
