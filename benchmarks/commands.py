@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -18,7 +19,7 @@ from benchmarks.map_correction import measure as map_correction
 from benchmarks.map_size import measure as map_size
 from benchmarks.perception import measure as perception
 from benchmarks.perception import photographs, stereo
-from benchmarks.report import Metrics, report, summary, write
+from benchmarks.report import Metrics, Outcome, report, summary, write
 from benchmarks.spiking import measure as spiking
 from benchmarks.threshold import Thresholds
 from cli.experiment.outcome import save_figure
@@ -106,22 +107,30 @@ def all_command(
     and counts as missed. Takes about an hour on two cores.
     """
     chosen = suite.selected(only, skip)
-    outcomes = []
-
     with tempfile.TemporaryDirectory() as folder:
         setting = suite.Setting(Path(folder), processes, data, _announce)
-
-        for number, benchmark in enumerate(chosen, start=1):
-            _announce(f"[{number}/{len(chosen)}] {benchmark.name}")
-            outcomes.append(suite.run(benchmark, setting))
-
-            if json_path is not None:
-                write(json_path, suite.merged(outcomes))
+        outcomes = _run_all(chosen, setting, json_path)
 
     Console().print(summary(outcomes))
 
     if any(outcome.failure or outcome.missed for outcome in outcomes):
         sys.exit(1)
+
+
+def _run_all(
+    chosen: Sequence[suite.Benchmark], setting: suite.Setting, json_path: Path | None
+) -> list[Outcome]:
+    """Run one benchmark after the other; what is measured is written after each."""
+    outcomes = []
+    for number, benchmark in enumerate(chosen, start=1):
+        setting.announce(f"[{number}/{len(chosen)}] {benchmark.name}")
+        outcome = suite.run(benchmark, setting)
+        outcomes.append(outcome)
+
+        if json_path is not None:
+            write(json_path, suite.merged(outcomes))
+
+    return outcomes
 
 
 @benchmarks.command(name="cycle")

@@ -78,7 +78,7 @@ def _table(title: str) -> Table:
 
 
 def _add_rows(table: Table, outcome: Outcome) -> None:
-    """Keys with a threshold come first; those without one tell how the others came about."""
+    """Keys with a threshold come first; those without one explain the others."""
     missed = outcome.missed
     for key, threshold in outcome.thresholds.items():
         value = outcome.metrics.get(key)

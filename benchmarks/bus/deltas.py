@@ -5,13 +5,13 @@ from __future__ import annotations
 import threading
 import time
 import timeit
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from statistics import median
 
 import numpy as np
 import zenoh
 
-from benchmarks.bus.race import REPLICAS, Race, pace
+from benchmarks.bus.race import REPLICAS, Pace, Race, pace
 from benchmarks.report import Metrics
 from cogmap.bus.codec import decode, encode
 from cogmap.bus.session import open_client, open_router
@@ -77,27 +77,26 @@ def _links(number: int) -> dict[str, float]:
 def measure(endpoint: str, number: int, pairs: int, announce: Callable[[str], None]) -> Metrics:
     """The rates of both, in turn, through one router at `endpoint`; the ratio is the median."""
     router = open_router(endpoint)
-    ours = []
-    raw = []
-    ratios = []
-
+    runs = []
     for pair in range(1, pairs + 1):
         announce(f"deltas and raw puts, pair {pair} of {pairs}")
         peer = pace(endpoint, number, _put, _receive)
-        our = pace(endpoint, number, _commit, _replicate)
-        raw.append(peer)
-        ours.append(our)
-        ratios.append(our.rate_hz / peer.rate_hz)
+        ours = pace(endpoint, number, _commit, _replicate)
+        runs.append((ours, peer))
 
     router.close()  # type: ignore[no-untyped-call]
-    rates = {
-        "delta_rate_ratio": median(ratios),
-        "delta_rate_hz": median(our.rate_hz for our in ours),
-        "raw_put_rate_hz": median(peer.rate_hz for peer in raw),
-        "delta_cpu_us": median(our.cpu_us for our in ours),
-        "raw_put_cpu_us": median(peer.cpu_us for peer in raw),
+    return _rates(runs) | costs()
+
+
+def _rates(runs: Sequence[tuple[Pace, Pace]]) -> Metrics:
+    """The medians of pairs of runs, ours and the peer's."""
+    return {
+        "delta_rate_ratio": median(ours.rate_hz / peer.rate_hz for ours, peer in runs),
+        "delta_rate_hz": median(ours.rate_hz for ours, _ in runs),
+        "raw_put_rate_hz": median(peer.rate_hz for _, peer in runs),
+        "delta_cpu_us": median(ours.cpu_us for ours, _ in runs),
+        "raw_put_cpu_us": median(peer.cpu_us for _, peer in runs),
     }
-    return rates | costs()
 
 
 def costs() -> Metrics:

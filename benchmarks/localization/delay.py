@@ -15,7 +15,7 @@ MIN_PAIRS = 30
 
 
 class Delay:
-    """Compares how a landmark's bearing changes with how the wheels were told to turn.
+    """Compares how a landmark's bearing changes with the turns that the wheels were commanded.
 
     Of LAGS_S, `lag_s` is the one at which the two agree best so far.
     """

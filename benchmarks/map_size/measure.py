@@ -8,6 +8,7 @@ from benchmarks.map_size import cycles, join
 from benchmarks.map_size.maps import LARGE, SMALL, cognitive_map
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_most
+from schemas.graph import Snapshot
 
 THRESHOLDS = {
     "cycle_ratio": at_most(1.3),
@@ -31,8 +32,16 @@ def measure(announce: Callable[[str], None]) -> Metrics:
 
     announce("a worker joins")
     joined = min(join.join(large_map) for _ in range(REPEATS))
-    memory_mb = join.replica_memory_mb(large_map)
+    joining = {
+        "join_s": joined.join_s,
+        "memory_mb": join.replica_memory_mb(large_map),
+        "worker_memory_mb": joined.worker_memory_mb,
+    }
+    return _cycles(small_map, large_map, announce) | joining
 
+
+def _cycles(small_map: Snapshot, large_map: Snapshot, announce: Callable[[str], None]) -> Metrics:
+    """The cycle's metrics on the large map, and over those on the small one."""
     small = []
     large = []
     for number in range(1, REPEATS + 1):
@@ -50,9 +59,6 @@ def measure(announce: Callable[[str], None]) -> Metrics:
         "cycle_ratio": large_s / small_s,
         "delta_bytes_ratio": large_bytes / small_bytes,
         "task_bytes_p99": large[0].task_bytes_p99,
-        "join_s": joined.join_s,
-        "memory_mb": memory_mb,
-        "worker_memory_mb": joined.worker_memory_mb,
         "cycle_cpu_ms": 1e3 * large_s,
         "cycle_cpu_small_ms": 1e3 * small_s,
         "delta_bytes": large_bytes,

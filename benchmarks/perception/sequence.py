@@ -59,8 +59,8 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Answer:
-    """Where a view was taken, in which town and on which part of the drive, and what it was said to
-    match.
+    """Where a view was taken, in which town and on which part of the drive, and the place that it
+    was matched with.
     """
 
     seed: int
@@ -137,11 +137,10 @@ def poses(
     offset_m: float = 0.0,
     turn_rad: float = 0.0,
 ) -> list[Pose]:
-    """Poses along `line`, its corners rounded, at steps between `steps_m`, off the line and off its
-    direction.
+    """Poses along `line`, its corners rounded, at steps between `steps_m`.
 
-    How long a step is and how far off the robot is, up to `offset_m` and `turn_rad`, changes slowly
-    along the way.
+    Each is beside the line by up to `offset_m`, and turned from its direction by up to `turn_rad`:
+    these and the length of a step change slowly along the line.
     """
     at_m, points_m = _rounded(line)
     step = _slowly(rng, at_m, SPEED_CHANGES_M, 1.0)
@@ -230,6 +229,7 @@ def metrics(answers: Sequence[Answer]) -> Metrics:
     wanted = again & was_seen
     matched = score > 0
     false_elsewhere = matched & ~right & ~again
+
     return {
         "sequence_recall_at_99p": recall(score, right, wanted, PRECISION),
         "sequence_recall": _ratio(right & wanted, wanted),

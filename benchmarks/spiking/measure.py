@@ -32,8 +32,8 @@ THRESHOLDS = {
 
 @dataclass(frozen=True)
 class Scene:
-    """Cues, what the exact posterior is, what place cells' spikes say, and what rejection of
-    samples says.
+    """Cues, and the posterior by Bayes' rule, by place cells' spikes, which are counted in
+    `spikes`, and by rejection of samples.
     """
 
     cues: Cues
