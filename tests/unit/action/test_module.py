@@ -1,3 +1,5 @@
+"""Action as a module: what broadcasts, poses, scans and clocks make of the wheels."""
+
 from __future__ import annotations
 
 import msgspec

@@ -1,3 +1,5 @@
+"""Wheel speeds that follow a route, and the obstacles that stop them."""
+
 from __future__ import annotations
 
 import math

@@ -1,3 +1,5 @@
+"""Routes of legs and turns as lines with rounded corners."""
+
 from __future__ import annotations
 
 import math

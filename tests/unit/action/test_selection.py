@@ -1,3 +1,5 @@
+"""Behaviours compete by activation until one is above threshold."""
+
 from __future__ import annotations
 
 import pytest

@@ -1,3 +1,5 @@
+"""The map correction benchmark on a square of four edges and two closures."""
+
 from __future__ import annotations
 
 import sys

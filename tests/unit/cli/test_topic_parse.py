@@ -87,7 +87,7 @@ def test_what_is_answered_on_request_cannot_be_watched() -> None:
         streamed_topic("workspace/snapshot")
 
 
-def test_echo_shows_one_field_or_says_which_there_are() -> None:
+def test_echo_shows_one_field_or_names_those_that_there_are() -> None:
     speed = formatter("speed_m_s", False, False, "text")
     assert speed(ODOMETRY) == "1.5\n---"
 

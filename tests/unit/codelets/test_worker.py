@@ -1,3 +1,5 @@
+"""A worker does the tasks that it holds, each once the graph has the version it reads."""
+
 from __future__ import annotations
 
 import msgspec

@@ -1,3 +1,5 @@
+"""OpenStreetMap extracts and street graphs, right and wrong."""
+
 from __future__ import annotations
 
 import bz2

@@ -1,3 +1,5 @@
+"""Pose graphs in g2o and TORO files, right and wrong."""
+
 from __future__ import annotations
 
 import lzma

@@ -1,3 +1,5 @@
+"""Maps of cities: tours, environments, and errors of the buildings learned."""
+
 from __future__ import annotations
 
 import itertools
@@ -59,7 +61,7 @@ def test_a_tour_past_what_cannot_be_reached_is_refused() -> None:
         shortest_tour(distance)
 
 
-def test_ways_follow_the_streets_between_points_put_on_them() -> None:
+def test_shortest_paths_follow_the_streets_between_points_put_on_them() -> None:
     beside_streets_m = np.array([(60.0, 9.0), (-5.0, 80.0)])
     streets, (east, north) = CROSS.with_points(beside_streets_m)
     distance, before = streets.shortest_paths(np.array([east, north]))
@@ -107,7 +109,7 @@ def test_an_environment_has_eight_buildings_in_4_km2_and_a_tour_past_them(
 
 
 @pytest.mark.parametrize("backward", [False, True])
-def test_the_line_of_a_tour_comes_up_to_its_start_and_goes_on_beyond_its_end(
+def test_the_line_of_a_tour_begins_before_its_start_and_ends_after_its_end(
     backward: bool,
 ) -> None:
     environment = _environment(3)

@@ -1,3 +1,5 @@
+"""Homing by self-motion and landmarks: trials, senses, errors and models of the responses."""
+
 from __future__ import annotations
 
 import math
@@ -130,7 +132,7 @@ def test_after_disorientation_landmarks_lead_back() -> None:
     assert math.dist(put_m, trial.target) < 0.5
 
 
-def test_landmarks_that_are_turned_lead_to_where_they_say() -> None:
+def test_landmarks_that_are_turned_turn_the_response_with_them() -> None:
     trial = _trial(Condition.CONFLICT, 9)
     put_m = _response(trial)
     to_turned_m = math.dist(put_m, trial.turned_target)
@@ -146,7 +148,7 @@ def _run(number: int) -> tuple[Response, Mapping[str, Sequence[bytes]]]:
     return response, session.transcript.messages
 
 
-def test_a_trial_says_the_same_bytes_each_time_and_others_in_another() -> None:
+def test_a_trial_publishes_the_same_bytes_each_time_and_another_others() -> None:
     response, messages = _run(4)
     same_response, same_messages = _run(4)
     _, others = _run(12)
@@ -170,7 +172,7 @@ def test_the_metrics_do_not_depend_on_the_number_of_processes() -> None:
     assert np.array_equal(in_two.errors_m[condition], errors_m)
 
 
-def test_errors_lie_along_the_way_that_turned_landmarks_move_the_target() -> None:
+def test_errors_lie_along_the_shift_of_the_target_by_turned_landmarks() -> None:
     trials = _trials(Condition.CONFLICT)
     assert {trial.side for trial in trials} == {1, -1}
 

@@ -131,7 +131,7 @@ def test_without_noise_nothing_errs() -> None:
     assert laps.after_m == pytest.approx(0.0, abs=1e-9)
 
 
-def test_the_way_ends_on_the_street_where_it_began() -> None:
+def test_the_trajectory_ends_on_the_street_where_it_began() -> None:
     line = trajectory()["line_m"]
     start, corner = line[:2]
     back, end = line[-2:]

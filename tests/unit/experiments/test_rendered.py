@@ -1,3 +1,5 @@
+"""Experiments with rendered cameras instead of made-up percepts."""
+
 from __future__ import annotations
 
 import math

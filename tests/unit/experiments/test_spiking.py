@@ -1,3 +1,5 @@
+"""Grid, border and place cells whose spikes are samples of a posterior."""
+
 from __future__ import annotations
 
 import numpy as np
@@ -48,7 +50,7 @@ def test_every_place_has_a_border_cell_that_fires_there() -> None:
     assert cells.distances_m[chosen] == pytest.approx(centres_m[:, 0])
 
 
-def test_cells_fire_as_often_as_their_tuning_says() -> None:
+def test_cells_fire_in_proportion_to_their_tuning() -> None:
     never, half, always = np.float32([0.0, 0.5, 1.0])
     share = np.repeat([[never], [half], [always]], 20_000, axis=1)
     spikes = generate(share, np.random.default_rng(1))

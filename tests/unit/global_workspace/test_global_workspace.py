@@ -1,3 +1,5 @@
+"""Coalitions compete until a trigger fires and the winner is broadcast."""
+
 from __future__ import annotations
 
 import pytest
@@ -65,7 +67,7 @@ class Arena:
         return self.compete(at_tick, **activations)[0].trigger
 
 
-def test_the_defaults_are_lidas_with_decay_told_per_cycle_of_forty_ticks() -> None:
+def test_the_defaults_are_lidas_with_decay_per_cycle_of_forty_ticks() -> None:
     config = Config()
 
     assert (config.no_broadcast_ticks, config.no_new_coalition_ticks, config.refractory_ticks) == (

@@ -160,7 +160,7 @@ def test_a_difference_deep_in_a_message_is_put_in_words(
     assert found.in_words(("A", "B")) == words
 
 
-def test_the_same_values_in_other_bytes_are_told_by_the_first_byte() -> None:
+def test_the_same_values_in_other_bytes_are_named_by_the_first_byte() -> None:
     row = Odometry(speed_m_s=2.0, turn_rate_rad_s=0.0, dt_s=0.05)
     left = encode(row)
     right = left.replace(b"\xcb\x40\x00\x00\x00\x00\x00\x00\x00", b"\x02")

@@ -98,7 +98,7 @@ def test_a_file_cut_at_any_byte_keeps_every_chunk_that_was_finished(
         assert _numbers(target) == list(range(finished * EACH))
 
 
-def test_a_cut_file_says_how_many_bytes_at_its_end_are_lost(whole: Path, tmp_path: Path) -> None:
+def test_the_bytes_lost_at_the_end_of_a_cut_file_are_counted(whole: Path, tmp_path: Path) -> None:
     start, end = _chunks(whole)[3]
     cut = end - 10
     path = _altered(whole, tmp_path, whole.read_bytes()[:cut])

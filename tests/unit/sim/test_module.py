@@ -1,3 +1,5 @@
+"""The simulation as a module, in lockstep and in real time."""
+
 from __future__ import annotations
 
 from typing import TypeVar

@@ -1,3 +1,5 @@
+"""Wheel odometry with noise and drift."""
+
 from __future__ import annotations
 
 import cmath

@@ -1,3 +1,5 @@
+"""Simulations at the level of percepts, along a scripted trajectory."""
+
 from __future__ import annotations
 
 import math

@@ -1,3 +1,5 @@
+"""Simulations with cameras, along a scripted trajectory."""
+
 from __future__ import annotations
 
 import math

@@ -1,3 +1,5 @@
+"""Generated towns: streets, buildings, props, and routes through them."""
+
 from __future__ import annotations
 
 import itertools
@@ -150,7 +152,7 @@ def test_each_kind_of_building_has_colours_of_its_own() -> None:
         assert np.minimum(one, other).sum() < 0.8
 
 
-def test_a_building_is_as_large_as_its_type_says_and_its_picture_lies_within() -> None:
+def test_a_building_has_the_size_of_its_kind_and_its_picture_lies_within() -> None:
     for kind in CATALOGUE:
         surface, picture = mesh.building(kind)
         sides_m = np.ptp(surface.vertices, axis=0)

@@ -1,3 +1,5 @@
+"""The physical world: wheels, buildings that stop the robot, and its pictures."""
+
 from __future__ import annotations
 
 import math

@@ -1,3 +1,5 @@
+"""The ledger checks proposals and commits them as deltas."""
+
 from __future__ import annotations
 
 import msgspec
@@ -231,7 +233,7 @@ def test_one_proposal_that_is_refused_keeps_no_other_from_being_committed() -> N
     assert ledger.validate([bad, good]) == [good]
 
 
-def test_a_refused_answer_lets_the_cycle_go_on() -> None:
+def test_a_refused_answer_lets_the_cycle_continue() -> None:
     desk = Desk("w1")
     desk.see(0, percept("a"))
     (localization,) = desk.take()
@@ -294,7 +296,7 @@ def test_a_forgotten_node_takes_its_links_with_it() -> None:
     assert kept == Links(kind="near", weights={"b": {"here": 1.0}})
 
 
-def test_the_ledger_keeps_the_nodes_of_a_commit_as_they_were_said() -> None:
+def test_the_ledger_keeps_the_nodes_of_a_commit_as_they_were_written() -> None:
     said = Node(id="a", kind="thing", activation=0.25, attributes={"x_m": 1.0})
     ledger = Ledger({})
 

@@ -1,3 +1,5 @@
+"""The phases of a cognitive cycle, from percepts to coalitions."""
+
 from __future__ import annotations
 
 from collections.abc import Iterable
@@ -168,7 +170,7 @@ def test_the_newest_view_is_next_and_its_motion_covers_those_skipped() -> None:
     assert desk.agent.x_m == pytest.approx(4 * 0.4, abs=0.1)
 
 
-def test_a_view_no_newer_than_the_last_cycles_is_passed_over() -> None:
+def test_a_view_no_newer_than_the_last_cycles_is_ignored() -> None:
     desk = Desk("w1")
     desk.drive(range(3))
 

@@ -185,7 +185,7 @@ def test_a_task_lost_at_every_attempt_is_given_up_and_the_cycle_continues() -> N
     assert attempt == 0
 
 
-def test_in_lockstep_a_task_that_kills_every_worker_is_given_up_and_told_of() -> None:
+def test_in_lockstep_a_task_that_kills_every_worker_is_given_up_and_named() -> None:
     desk = Desk(attempts=3)
     desk.see(0)
     for number in range(3):

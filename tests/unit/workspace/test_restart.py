@@ -53,7 +53,7 @@ def test_a_restored_workspace_continues_the_numbers() -> None:
     assert len({each.digest for each in restored}) == 1
 
 
-def test_a_restored_workspace_passes_over_views_that_it_had_before() -> None:
+def test_a_restored_workspace_ignores_views_that_it_had_before() -> None:
     desk = Desk("w1")
     desk.drive(range(3))
     again = _restored(desk.deltas)
@@ -63,7 +63,7 @@ def test_a_restored_workspace_passes_over_views_that_it_had_before() -> None:
 
 
 @pytest.mark.parametrize("committed", range(1, 4))
-def test_an_interrupted_cycle_goes_on_from_its_last_commit(committed: int) -> None:
+def test_an_interrupted_cycle_continues_from_its_last_commit(committed: int) -> None:
     whole = Desk("w1")
     whole.drive(range(3), percept("a"))
     interrupted = Desk("w1")

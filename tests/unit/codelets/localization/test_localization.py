@@ -60,7 +60,7 @@ def test_a_quarter_circle_ends_where_its_chord_does() -> None:
     assert pose_of(found) == pytest.approx((1.0, 1.0, math.pi / 2), abs=1e-3)
 
 
-def test_the_samples_spread_as_the_motions_noise_says() -> None:
+def test_the_samples_spread_by_the_noise_of_the_motion() -> None:
     driven = localized(agent(), motions=motions((4.0, 0.0, 1.0, 0.5, 0.0)))
     turned = localized(agent(), motions=motions((0.0, 1.0, 1.0, 0.0, 0.2)))
 

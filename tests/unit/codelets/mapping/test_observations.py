@@ -86,7 +86,7 @@ def test_a_landmark_is_remembered_once_from_each_place_of_the_path() -> None:
     assert _seen(desk) == {"a": places, "b": 1}
 
 
-def test_what_is_seen_some_way_from_a_place_is_told_as_seen_from_the_place() -> None:
+def test_what_is_seen_at_a_distance_from_a_place_is_kept_as_seen_from_it() -> None:
     since_place = np.array([2.0, 1.0, math.pi / 2])
     viewpoint = Viewpoint(0, 1.0, since_place, 0.0)
     node = extended(None, viewpoint, _tower())
