@@ -115,6 +115,7 @@ def _linear(size: tuple[int, ...], how: Augmentation, rng: np.random.Generator) 
 
     cos = np.cos(turn_rad)
     sin = np.sin(turn_rad)
+
     top_row = [mirror * across * cos, -down * sin]
     bottom_row = [mirror * across * sin, down * cos]
     return np.array([top_row, bottom_row])
@@ -159,6 +160,7 @@ def _response(how: Augmentation, rng: np.random.Generator) -> Singles:
 
     share = np.arange(256) / 255
     curve = 255 * share**gamma
+
     response = curve[:, None] * gain + offset
     return np.asarray(response, np.float32)
 
@@ -187,5 +189,6 @@ def _across_px(direction_rad: float) -> Floats:
 
     cos = np.cos(direction_rad)
     sin = np.sin(direction_rad)
+
     across_px: Floats = cos * right_px + sin * down_px
     return across_px

@@ -85,6 +85,7 @@ def calibrate(
     directions = np.asarray(prototypes.directions, np.float32)
     cosines = embeddings @ directions.T
     column = _columns(of, prototypes)
+
     rows = np.flatnonzero(building)
     taught = Trial(cosines[rows], _none_learned(len(rows)), column[rows])
     prototypes = _likeliest(prototypes, [taught], "sharpness", "unknown")
@@ -95,6 +96,7 @@ def calibrate(
 
     shows_building = probability(log_odds, prototypes)[:, 0]
     posterior = posteriors(cosines, _none_learned(len(cosines)), shows_building, prototypes)
+
     metrics = _metrics(posterior, of, column)
     metrics |= _novel_metrics(prototypes, encounters)
     return Calibrated(prototypes, metrics)
@@ -217,6 +219,7 @@ def _encounter(
 
     of_taught = cosines[rows]
     _, taught = cosines.shape
+
     novel = embeddings[rows] @ embeddings[first].T
     known_trial = Trial(of_taught, novel, taught + column)
     encounters.known.append(known_trial)
@@ -260,8 +263,8 @@ def calibration_error(activation: Floats, correct: Booleans) -> float:
     """Return the expected calibration error, by BINS of equal width (Naeini, Cooper & Hauskrecht
     2015).
     """
-    scaled = (activation * BINS).astype(np.intp)
-    number = np.minimum(scaled, BINS - 1)
+    scaled = activation * BINS
+    number = np.minimum(scaled.astype(np.intp), BINS - 1)
     count = np.bincount(number, minlength=BINS)
 
     excess = activation - correct

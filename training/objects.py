@@ -58,10 +58,12 @@ class EmbeddingNet(nn.Module):
     def __init__(self) -> None:
         super().__init__()
         self.stem = convolution(CHANNELS, WIDTHS[0], 2)
+
         self.scales = nn.ModuleList()
         for fine, coarse in itertools.pairwise(WIDTHS):
             halved = convolution(fine, coarse, 2)
-            self.scales.append(nn.Sequential(halved, convolution(coarse, coarse, 1)))
+            mixed = convolution(coarse, coarse, 1)
+            self.scales.append(nn.Sequential(halved, mixed))
 
         features = 2 * sum(WIDTHS[1:])
         self.head = nn.Linear(features, DIMENSIONS)
@@ -112,16 +114,22 @@ def augmented(values: npt.NDArray[np.float16], rng: np.random.Generator) -> Sing
 
 def _relight(values: Singles, rng: np.random.Generator) -> None:
     """Change the colours of segment, ground and sky alike, and the size a little, in place."""
-    count = len(values)
-    channel_gain = rng.normal(0, 0.06, (count, 3, 1, 1))
-    overall_gain = rng.normal(0, 0.15, (count, 1, 1, 1))
-    gain = np.exp(channel_gain + overall_gain).astype(np.float32)
-    offset = rng.normal(0, 0.06, (count, 1, 1, 1)).astype(np.float32)
+    gain, offset = _lights(len(values), rng)
     _relight_segments(values, gain, offset)
     _relight_surroundings(values, gain, offset)
 
-    log_size = rng.normal(0, 0.04, (count, 1, 1))
+    log_size = rng.normal(0, 0.04, (len(values), 1, 1))
     values[:, 5] += log_size.astype(np.float32)
+
+
+def _lights(count: int, rng: np.random.Generator) -> tuple[Singles, Singles]:
+    """The factor (count, 3, 1, 1) on colours, and what is added to them (count, 1, 1, 1)."""
+    channel_gain = rng.normal(0, 0.06, (count, 3, 1, 1))
+    overall_gain = rng.normal(0, 0.15, (count, 1, 1, 1))
+    gain = np.exp(channel_gain + overall_gain)
+
+    offset = rng.normal(0, 0.06, (count, 1, 1, 1))
+    return gain.astype(np.float32), offset.astype(np.float32)
 
 
 def _relight_segments(values: Singles, gain: Singles, offset: Singles) -> None:
@@ -143,13 +151,15 @@ def _relight_surroundings(values: Singles, gain: Singles, offset: Singles) -> No
     visible = brightest > 0
 
     light = around + 2
-    relit = light * gain[:, None] - 2 + offset[:, None]
+    brighter = light * gain[:, None]
+    relit = brighter - 2 + offset[:, None]
     around[:] = np.where(visible, relit, 0)
 
 
 def _hide_parts(values: Singles, rng: np.random.Generator) -> None:
     """Remove a rectangle from some of the segments, in place."""
     is_hidden = rng.random(len(values)) < HIDDEN_SHARE
+
     for number in np.flatnonzero(is_hidden):
         left, top = rng.integers(0, SIDE_PX, 2)
         width, height = rng.integers(4, SIDE_PX // 2, 2)
@@ -280,6 +290,7 @@ def _batches(
         values = augmented(known.values[chosen], rng)
         wanted = number[chosen]
         whole = known.whole[chosen]
+
         yield values, wanted, whole
 
 

@@ -87,6 +87,7 @@ def train(images: Sequence[LabelledImage], schedule: Schedule) -> UNet:
     """Return a road network trained on augmented `images`."""
     seed_torch(schedule.seed)
     net = UNet(CHANNELS, 1, WIDTHS).to(memory_format=torch.channels_last)
+
     steps = max(1, schedule.epochs * schedule.images // BATCH)
     optimizer = Optimizer(net.parameters(), steps, MAX_RATE, WEIGHT_DECAY, WARM_UP)
     net.train()
@@ -141,6 +142,7 @@ def _order(count: int, wanted: int, rng: np.random.Generator) -> npt.NDArray[np.
     """Which image comes when, (wanted,): each once, in any order, then each once more."""
     rounds = math.ceil(wanted / count)
     orders = [rng.permutation(count) for _ in range(rounds)]
+
     order = np.concatenate(orders)
     return order[:wanted]
 

@@ -98,6 +98,7 @@ def _example(image: Bytes, depth_m: Singles, camera: Calibration) -> npt.NDArray
 
     resized_m = cv2.resize(depth_m, size, interpolation=cv2.INTER_NEAREST)
     small_m = resized_m.astype(np.float32, copy=False)
+
     values = network_input(small, small_m, camera)
     return values.astype(np.float16)
 
@@ -147,6 +148,7 @@ def _areas(number: Bytes, rows: npt.NDArray[np.intp], columns: npt.NDArray[np.in
 def _draw_centres(image: Singles, areas: _Areas) -> None:
     """Raise `image` (h, w) to a bump at the centre of each large area, larger for a larger one."""
     is_large = areas.size_px >= MIN_AREA_PX
+
     for number in np.flatnonzero(is_large):
         sd_px = np.clip(0.12 * np.sqrt(areas.size_px[number]), 1.5, 5.0)
         row = areas.centre_row[number]
@@ -172,6 +174,7 @@ def _bump(size: tuple[int, ...], row: float, column: float, sd_px: float) -> Flo
     height, width = size
     down = _gaussian(height, row, sd_px)
     across = _gaussian(width, column, sd_px)
+
     return np.outer(down, across)
 
 
@@ -180,6 +183,7 @@ def _gaussian(count: int, middle: float, sd: float) -> Floats:
     away = np.arange(count) - middle
     squared = away**2
     variance = sd**2
+
     exponent = -squared / (2 * variance)
     return np.asarray(np.exp(exponent))
 
@@ -275,6 +279,7 @@ def _fit(
         output = padded_output[:, :, PADDING_PX:-PADDING_PX].float()
         value = optimizer.step(loss(output, wanted))
         progress.update(task, advance=1, description=f"training, loss {value:.3f}")
+
     return net
 
 

@@ -106,6 +106,7 @@ class SensoryMemory:
 
         wheels = self._noise.total(rows)
         motion = self._visual_odometry.update(image, depth_m, view.calibration, wheels)
+
         return fuse(rows, motion, wheels)
 
     def _views(self, frame: StereoFrame) -> tuple[RangeScan, View]:

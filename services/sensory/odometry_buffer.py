@@ -59,9 +59,10 @@ class OdometryBuffer:
         """
         taken = [row for row in self._rows if row.stamp_ns <= until_ns]
         self._rows = self._rows[len(taken) :]
+        if not taken:
+            return None, _rows(taken)
 
-        began_ns = _began_ns(taken[0]) if taken else None
-        return began_ns, _rows(taken)
+        return _began_ns(taken[0]), _rows(taken)
 
 
 def _rows(measured: list[Odometry]) -> Floats:

@@ -41,11 +41,13 @@ def _obstacles(depth_m: Singles, calibration: Calibration) -> tuple[Floats, Floa
     """Bearing and range of the nearest obstacle in each image column that has one, (k,) each."""
     by_column_m = _nearest_by_column(depth_m, calibration)
     is_seen = np.isfinite(by_column_m)
+
     nearest_m = by_column_m[is_seen]
     columns = np.arange(calibration.width_px)[is_seen]
 
     forward_m = nearest_m + calibration.mount_forward_m
     left_m = (calibration.cx_px - columns) / calibration.fx_px * nearest_m
+
     return np.arctan2(left_m, forward_m), np.hypot(forward_m, left_m)
 
 

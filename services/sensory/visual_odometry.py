@@ -296,6 +296,7 @@ def _linearize(points: Points, before_px: Floats, motion: Floats, calibration: C
     at_rest = np.zeros(5)
     differences = np.vstack([at_rest, np.diag(np.full(5, DIFFERENCE))])
     motions = motion + differences
+
     column_px, row_px = project_back(points, motions.T[..., None], calibration)
     projected_px = np.stack([column_px, row_px], axis=2)
 

@@ -23,10 +23,12 @@ class UNet(nn.Module):
         coarser = widths[1:]
 
         self.stem = convolution(channels_in, widths[0])
+
         self.down = nn.ModuleList()
         for fine, coarse in zip(finer, coarser, strict=True):
             halved = convolution(fine, coarse, stride=2)
-            self.down.append(nn.Sequential(halved, convolution(coarse, coarse)))
+            mixed = convolution(coarse, coarse)
+            self.down.append(nn.Sequential(halved, mixed))
 
         self.up = nn.ModuleList()
         for fine, coarse in zip(reversed(finer), reversed(coarser), strict=True):

@@ -76,6 +76,7 @@ def _facing_a_building(place: town.Town, rng: np.random.Generator) -> Pose:
 def _on_a_street(place: town.Town, rng: np.random.Generator) -> Pose:
     number = int(rng.integers(len(place.roads)))
     road = place.roads[number]
+
     along_m = rng.uniform(0, road.length_m)
     across_m = rng.uniform(-3, 3)
     x_m, y_m = road.point(along_m, across_m)
@@ -144,12 +145,15 @@ def _known(world: World, camera: StereoCamera) -> Views:
     """What all views of a town have in common."""
     plots = world.town.plots
     kinds_of_plots = [plot.kind for plot in plots]
+    places_m = [(plot.x_m, plot.y_m) for plot in plots]
     sizes_m = [(kind.width_m, kind.depth_m, kind.height_m) for kind in kinds_of_plots]
+    encoded = msgspec.json.encode(camera.calibration)
+
     return {
         "names": np.asarray([kind.name for kind in kinds_of_plots]),
-        "place_m": np.asarray([(plot.x_m, plot.y_m) for plot in plots]),
+        "place_m": np.asarray(places_m),
         "size_m": np.asarray(sizes_m),
-        "calibration": np.frombuffer(msgspec.json.encode(camera.calibration), np.uint8),
+        "calibration": np.frombuffer(encoded, np.uint8),
     }
 
 
