@@ -27,6 +27,8 @@ QUIET = WorkerConfig(
     closure_spacing_s=0.2,
 )
 SLIP = 0.1
+TOWER = {"tower": (8.0, 5.0)}
+HOUSE = {"house": (40.0, 50.0)}
 ROW_S = 0.1
 ROAD_M = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
 Position = tuple[float, float]
@@ -122,3 +124,12 @@ class LoopDrive:
         pose = self.poses[self.frame]
         objects = [seen(pose, label, position_m) for label, position_m in landmarks.items()]
         return percepts(self.frame, *objects, road_m=ROAD_M)
+
+
+def round_once(drive: LoopDrive) -> LoopDrive:
+    """Drive round the block, past a tower at its start and a house on its far side."""
+    drive.go(3, TOWER)
+    drive.go(30, {})
+    drive.go(5, HOUSE)
+    drive.go(LAP - 38, {})
+    return drive

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from cogmap.geometry.arrays import Floats
-from schemas.cognition import Replay
-from schemas.graph import Delta, Phase
+from schemas.graph import Phase
 from schemas.nodes import (
     CORRECTION_ID,
     ROOT_MAP,
@@ -22,23 +21,10 @@ from schemas.nodes import (
     nearest_place,
     object_id,
 )
-from services.codelets.correction.joint import ROUNDS
 from services.codelets.mapping.path import ODOMETRY, POSE, STAMP, rows_of
-from tests.support.messages import of_type
 from tests.support.paths import mean_distance_m, steps_m
-from tests.support.world.loop_drive import LAP, QUIET, SLIP, LoopDrive
+from tests.support.world.loop_drive import LAP, QUIET, SLIP, TOWER, LoopDrive, round_once
 from tests.support.world.scenes import Desk, stamp_ns
-
-TOWER = {"tower": (8.0, 5.0)}
-HOUSE = {"house": (40.0, 50.0)}
-
-
-def _round_once(drive: LoopDrive) -> LoopDrive:
-    drive.go(3, TOWER)
-    drive.go(30, {})
-    drive.go(5, HOUSE)
-    drive.go(LAP - 38, {})
-    return drive
 
 
 def _closures(desk: Desk) -> list[LoopClosure]:
@@ -100,7 +86,7 @@ def test_an_agent_that_stands_still_adds_nothing_to_its_path() -> None:
 
 @pytest.mark.parametrize("by", ["landmark", "view"])
 def test_a_closed_loop_corrects_the_path_the_agent_and_its_objects(by: str) -> None:
-    drive = _round_once(LoopDrive())
+    drive = round_once(LoopDrive())
     desk = drive.desk
     before_m = drive.error_m()
     path_before_m = _path_error_m(drive)
@@ -125,7 +111,7 @@ def test_a_closed_loop_corrects_the_path_the_agent_and_its_objects(by: str) -> N
 def _heading_error_rad(correct: str) -> float:
     """After a loop was closed on a path that turns too far, correcting positions or headings."""
     config = msgspec.structs.replace(QUIET, correct=correct)
-    drive = _round_once(LoopDrive(config, bias_rad=0.004))
+    drive = round_once(LoopDrive(config, bias_rad=0.004))
     drive.meet(3)
     drive.go(5, {})
     error_rad = drive.poses[drive.frame - 1, 2] - drive.desk.agent.heading_rad
@@ -137,7 +123,7 @@ def test_headings_are_corrected_only_where_configured() -> None:
 
 
 def test_road_moves_with_the_path_that_it_lies_along() -> None:
-    drive = _round_once(LoopDrive())
+    drive = round_once(LoopDrive())
     drive.meet(3)
     drive.go(5, {})
     path_m = _positions_m(drive.desk)
@@ -151,7 +137,7 @@ def test_road_moves_with_the_path_that_it_lies_along() -> None:
 
 
 def test_what_the_agent_writes_during_a_correction_is_kept() -> None:
-    drive = _round_once(LoopDrive(background_cycles=4))
+    drive = round_once(LoopDrive(background_cycles=4))
     desk = drive.desk
     drive.meet(3)
     drive.go(1, {})
@@ -172,7 +158,7 @@ def test_what_the_agent_writes_during_a_correction_is_kept() -> None:
 
 
 def test_lockstep_commits_the_correction_at_its_cycle_and_not_before() -> None:
-    drive = _round_once(LoopDrive(background_cycles=2))
+    drive = round_once(LoopDrive(background_cycles=2))
     desk = drive.desk
     desk.withhold = "map_correction"
     drive.meet(3)
@@ -192,7 +178,7 @@ def test_lockstep_commits_the_correction_at_its_cycle_and_not_before() -> None:
 
 
 def test_real_time_continues_without_the_correction_by_other_workers() -> None:
-    drive = _round_once(LoopDrive(mode="real_time", workers=2))
+    drive = round_once(LoopDrive(mode="real_time", workers=2))
     desk = drive.desk
     desk.withhold = "map_correction"
     drive.meet(3)
@@ -211,7 +197,7 @@ def test_real_time_continues_without_the_correction_by_other_workers() -> None:
 def test_the_same_drive_gives_the_same_graph_with_any_number_of_workers() -> None:
     digests = []
     for workers in (1, 3):
-        drive = _round_once(LoopDrive(workers=workers))
+        drive = round_once(LoopDrive(workers=workers))
         drive.meet(3, TOWER)
         drive.go(6, {})
         digests.append(drive.desk.graph.digest())
@@ -221,7 +207,7 @@ def test_the_same_drive_gives_the_same_graph_with_any_number_of_workers() -> Non
 
 def _believed(landmarks: dict[str, tuple[float, float]], match: int | None) -> LoopDrive:
     """A drive round the block and on, with one view of landmarks or of another place."""
-    drive = _round_once(LoopDrive())
+    drive = round_once(LoopDrive())
     drive.go(20, {})
     drive.go(1, landmarks, match=match)
     drive.go(12, {})
@@ -250,7 +236,7 @@ def test_one_view_mistaken_for_another_place_never_moves_the_map(by: str) -> Non
 
 
 def test_one_false_view_among_true_ones_is_rejected() -> None:
-    drive = _round_once(LoopDrive())
+    drive = round_once(LoopDrive())
     drive.meet(2)
     drive.go(1, {}, match=40)
     drive.meet(2)
@@ -263,7 +249,7 @@ def test_one_false_view_among_true_ones_is_rejected() -> None:
 
 
 def test_two_views_are_too_few_to_close_a_loop() -> None:
-    drive = _round_once(LoopDrive())
+    drive = round_once(LoopDrive())
     before_m = drive.error_m()
     drive.meet(2)
     drive.go(10, {})
@@ -289,7 +275,7 @@ def test_closures_that_agree_beyond_possible_drift_are_rejected() -> None:
 
 
 def test_accepted_closures_are_undone_when_later_ones_contradict_them() -> None:
-    drive = _round_once(LoopDrive())
+    drive = round_once(LoopDrive())
     # Sixteen metres off: not more than path integration may have been wrong by.
     drive.meet(3, late=8)
     drive.go(5, {})
@@ -303,67 +289,3 @@ def test_accepted_closures_are_undone_when_later_ones_contradict_them() -> None:
 
     assert [closure.accepted for closure in closures] == [False] * 3 + [True] * 10
     assert drive.error_m() < 0.5 * wrong_m
-
-
-def _replay(drive: LoopDrive) -> Replay:
-    drive.meet(3)
-    drive.go(4, {})
-    (replay,) = of_type(Replay, drive.desk.published)
-    return replay
-
-
-def test_a_replay_is_published_once_after_the_commit_of_its_correction() -> None:
-    drive = _round_once(LoopDrive(workers=3))
-    replay = _replay(drive)
-    published = drive.desk.published
-    before = published[: published.index(replay)]
-    last = of_type(Delta, before)[-1]
-
-    assert last.phase is Phase.BACKGROUND
-    assert replay.source == "workspace"
-
-
-def test_a_replay_counts_the_replays_of_the_rule_that_was_applied() -> None:
-    with_headings = msgspec.structs.replace(QUIET, correct="heading")
-
-    of_positions = _replay(_round_once(LoopDrive()))
-    of_headings = _replay(_round_once(LoopDrive(with_headings)))
-
-    assert of_positions.replays > 0
-    assert of_headings.replays == 1 + ROUNDS
-
-
-def test_a_replay_runs_backwards_and_shifts_each_place_less_than_the_last() -> None:
-    replay = _replay(_round_once(LoopDrive()))
-    stamps = replay.stamps_ns.numpy().astype(np.int64)
-    assert (np.diff(stamps) < 0).all()
-    assert stamps[0] > stamps[-1] == stamp_ns(0)
-
-    shifts = np.asarray(replay.shifts_m.numpy(), np.float64)
-    shifts_m = np.hypot(shifts[:, 0], shifts[:, 1])
-    assert (np.diff(shifts_m) <= 1e-9).all()
-    assert shifts_m[-1] == pytest.approx(0.0)
-    assert shifts_m[0] > 3.0
-    assert (len(replay.closed), replay.undone) == (3, [])
-
-
-def _strength(replay: Replay, positions_m: Floats) -> Floats:
-    """The strength of the synapse of each pair of fields."""
-    first, second = replay.pairs.numpy().astype(int).T
-    apart_m = np.hypot(*(positions_m[first] - positions_m[second]).T)
-    return np.exp(-replay.decay_per_m * apart_m)
-
-
-def test_the_synapse_of_two_fields_grows_as_they_shift_together() -> None:
-    replay = _replay(_round_once(LoopDrive()))
-    changes = np.asarray(replay.strength_changes.numpy(), np.float64)
-    before_m = np.asarray(replay.positions_m.numpy(), np.float64)
-    after_m = before_m + np.asarray(replay.shifts_m.numpy(), np.float64)
-    expected = _strength(replay, after_m) - _strength(replay, before_m)
-    assert changes == pytest.approx(expected)
-
-    # The newest place is that of the third view, as was the third of all.
-    first, second = replay.pairs.numpy().astype(int).T
-    (same_place,) = np.flatnonzero((first == 0) & (second == len(before_m) - 3))
-    assert changes[same_place] > 0.3
-    assert changes[same_place] == pytest.approx(changes.max(), rel=0.01)

@@ -69,7 +69,7 @@ def test_the_samples_spread_by_the_noise_of_the_motion() -> None:
     assert turned.heading_sd_rad == pytest.approx(0.2, rel=0.1)
 
 
-def test_a_landmark_ahead_corrects_the_distance_to_the_exact_gaussian_posterior() -> None:
+def test_a_landmark_ahead_corrects_the_distance_to_the_exact_posterior() -> None:
     driven = Gaussian(5.5, 0.5)
     range_m = 14.0
     by_landmark = Gaussian(20.0 - range_m, 0.4)
