@@ -1,4 +1,4 @@
-"""Who publishes and subscribes what, as the router tells it."""
+"""Who publishes and subscribes what, as the router reports it."""
 
 from __future__ import annotations
 

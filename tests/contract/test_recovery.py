@@ -51,7 +51,7 @@ def publish_odometry(bus: Bus, numbers: range) -> None:
     publish(bus, *map(odometry, numbers))
 
 
-@pytest.mark.parametrize("afterwards", [0, 20], ids=["nothing said since", "more said since"])
+@pytest.mark.parametrize("afterwards", [0, 20], ids=["nothing since", "more since"])
 def test_what_is_published_while_the_router_is_dead_arrives_afterwards(
     router: Router, afterwards: int
 ) -> None:

@@ -182,7 +182,7 @@ def somebody(endpoint: str) -> Iterator[threading.Event]:
 
 
 def played(player: subprocess.Popen[str]) -> dict[str, int]:
-    """How many messages a player says it has played, by topic, when it ends."""
+    """How many messages a player reports that it has played, by topic, when it ends."""
     assert player.stdout is not None
     counts: dict[str, int] = json.loads(player.stdout.read())["messages"]
     return counts

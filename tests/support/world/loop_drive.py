@@ -51,10 +51,10 @@ def true_poses(frames: int) -> np.ndarray:
 def seen(pose: np.ndarray, label: str, position_m: Position) -> Percept:
     """A landmark as seen without error."""
     x_m, y_m = np.array(position_m) - pose[:2]
-    direction = math.atan2(y_m, x_m)
-    bearing = math.remainder(direction - pose[2], 2 * math.pi)
     range_m = float(np.hypot(x_m, y_m))
-    return percept(label, bearing, range_m, bearing_sd_rad=0.01, range_sd_m=0.2)
+    direction_rad = math.atan2(y_m, x_m)
+    bearing_rad = math.remainder(direction_rad - pose[2], 2 * math.pi)
+    return percept(label, bearing_rad, range_m, bearing_sd_rad=0.01, range_sd_m=0.2)
 
 
 class LoopDrive:
@@ -111,10 +111,12 @@ class LoopDrive:
             return (self._turn_row(0.0), (0.0, 0.0, ROW_S, 0.0, 0.0))
 
         before, now = self.poses[self.frame - 1 : self.frame + 1, 2]
+        turn_row = self._turn_row(float(now - before))
+
         side = self.frame // SIDE_STEPS % 4
         slip = SLIP if side == 1 else 0.0
         step_m = STEP_M * (1 + slip)
-        return (self._turn_row(float(now - before)), (step_m / ROW_S, 0.0, ROW_S, 0.0, 0.0))
+        return (turn_row, (step_m / ROW_S, 0.0, ROW_S, 0.0, 0.0))
 
     def _turn_row(self, turned_rad: float) -> tuple[float, ...]:
         return (0.0, (turned_rad + self.bias_rad) / ROW_S, ROW_S, 0.0, 0.0)
