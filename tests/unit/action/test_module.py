@@ -328,9 +328,11 @@ def test_a_robot_that_moves_or_is_not_commanded_to_is_not_stuck() -> None:
     for cycle in range(1, 40):
         moving.feed(_motion(cycle))
         idle.feed(_motion(cycle, speed_m_s=0.0))
+        drive = _command(moving, _delta(cycle))
+        halt = _command(idle, _delta(cycle))
 
-        assert _command(moving, _delta(cycle)).halted_by is SpeedLimit.NONE
-        assert _command(idle, _delta(cycle)).halted_by is SpeedLimit.NO_ACTION
+        assert drive.halted_by is SpeedLimit.NONE
+        assert halt.halted_by is SpeedLimit.NO_ACTION
 
 
 def test_a_self_motion_of_another_shape_is_refused_by_name() -> None:

@@ -10,9 +10,13 @@ from cli.run.command import LAP_LIMIT_S, default_limit_s
 
 
 def test_the_time_limit_grows_with_the_laps_and_is_one_laps_at_least() -> None:
-    assert default_limit_s(1.0) == LAP_LIMIT_S
-    assert default_limit_s(2.0) == 2 * LAP_LIMIT_S
-    assert default_limit_s(0.05) == LAP_LIMIT_S
+    of_one_lap = default_limit_s(1.0)
+    of_two_laps = default_limit_s(2.0)
+    of_a_short_drive = default_limit_s(0.05)
+
+    assert of_one_lap == LAP_LIMIT_S
+    assert of_two_laps == 2 * LAP_LIMIT_S
+    assert of_a_short_drive == LAP_LIMIT_S
 
 
 @pytest.mark.parametrize("number", ["nan", "inf", "-1"])

@@ -125,7 +125,8 @@ def test_a_wall_before_something_farther_has_true_ends() -> None:
 
     assert wall is not None
     assert wall.whole
-    assert (wall.left, wall.right) == (99.5, 159.5)
+    assert wall.left == 99.5
+    assert wall.right == 159.5
     assert set(wall.disparity_px.tolist()) == {WALL_PX}
 
 

@@ -135,7 +135,8 @@ def test_the_trajectory_ends_on_the_street_where_it_began() -> None:
     line = trajectory()["line_m"]
     start, corner = line[:2]
     back, end = line[-2:]
+    end_x_m, end_y_m = end
 
     assert back == start
-    assert end[1] == start[1]
-    assert 0 < end[0] < corner[0]
+    assert end_y_m == start[1]
+    assert 0 < end_x_m < corner[0]

@@ -214,12 +214,14 @@ def test_coalitions_of_an_earlier_time_turn_no_clock_back() -> None:
 def test_the_coalitions_of_a_cycle_compete_once_whoever_sends_them() -> None:
     module = build(Config(), "global_workspace")
     first = Coalitions(stamp_ns=5, cycle=7, coalitions=[])
+    second = Coalitions(stamp_ns=6, cycle=8, coalitions=[])
+    after_restart = Coalitions(stamp_ns=1000, cycle=7, coalitions=[])
 
     assert module.feed(first)
-    assert module.feed(Coalitions(stamp_ns=6, cycle=8, coalitions=[]))
+    assert module.feed(second)
     with pytest.raises(MessageError, match="cycle 7 came twice"):
         module.feed(first)
-    assert module.feed(Coalitions(stamp_ns=1000, cycle=7, coalitions=[]))
+    assert module.feed(after_restart)
 
 
 def test_a_contender_goes_by_the_id_that_the_workspace_gave_its_coalition() -> None:

@@ -54,16 +54,15 @@ def test_links_applied_twice_are_links_applied_once() -> None:
 
 
 def test_a_node_has_one_link_of_an_exclusive_kind() -> None:
-    graph = _graph(
-        _link("a", "here", kind=LinkKind.AT),
-        _link("b", "here", kind=LinkKind.AT),
-        _link("a", "there", 0.5, kind=LinkKind.AT),
-    )
+    a_here = _link("a", "here", kind=LinkKind.AT)
+    b_here = _link("b", "here", kind=LinkKind.AT)
+    a_there = _link("a", "there", 0.5, kind=LinkKind.AT)
+    links = _graph(a_here, b_here, a_there).links
 
-    assert graph.links.targets("a", LinkKind.AT) == {"there": 0.5}
-    assert graph.links.target("a", LinkKind.AT) == "there"
-    assert graph.links.sources("here", LinkKind.AT) == ("b",)
-    assert graph.links.sources("there", LinkKind.AT) == ("a",)
+    assert links.targets("a", LinkKind.AT) == {"there": 0.5}
+    assert links.target("a", LinkKind.AT) == "there"
+    assert links.sources("here", LinkKind.AT) == ("b",)
+    assert links.sources("there", LinkKind.AT) == ("a",)
 
 
 def test_dropping_a_link_that_is_not_there_changes_nothing() -> None:

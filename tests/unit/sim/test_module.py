@@ -170,12 +170,13 @@ def test_an_older_command_that_arrives_late_is_ignored() -> None:
     module = build(Config(**SMALL))
     _start(module)
     messages = _real_time(module, 20)
-
     old_ns = messages[-1].stamp_ns - 4 * TICK_NS
-    module.feed(_command(old_ns, -15.0, -15.0))
-    after = _real_time(module, 10, first_tick=20, answer=False)
 
-    assert of_type(Odometry, after)[-1].speed_m_s > 1.0
+    module.feed(_command(old_ns, -15.0, -15.0))
+
+    after = _real_time(module, 10, first_tick=20, answer=False)
+    last = of_type(Odometry, after)[-1]
+    assert last.speed_m_s > 1.0
 
 
 def test_a_command_older_than_the_limit_is_refused_and_moves_no_wheel() -> None:
@@ -229,8 +230,9 @@ def test_in_lockstep_a_frame_published_again_is_answered_only_once() -> None:
     _wait_for_command(module, 6)
 
     messages = module.feed(asked)
+    (frame,) = of_type(StereoFrame, messages)
 
-    assert of_type(StereoFrame, messages)[0].frame == 1
+    assert frame.frame == 1
     assert module.feed(asked) == []
     assert _tick(module, 7 * 10**9) == []
 

@@ -137,9 +137,11 @@ def test_a_task_that_is_answered_twice_is_committed_once() -> None:
     desk = Desk("w1", "w2")
     desk.see(0)
     (asked,) = desk.take()
+    first = answer(asked, [_moved_self(0)])
+    second = answer(asked, [_moved_self(0, 5.0)])
 
-    assert desk.feed(answer(asked, [_moved_self(0)]))
-    assert desk.feed(answer(asked, [_moved_self(0, 5.0)])) == []
+    assert desk.feed(first)
+    assert desk.feed(second) == []
 
     commits = [delta for delta in desk.deltas if asked.task_id in delta.tasks]
     assert len(commits) == 1
@@ -158,9 +160,8 @@ def test_an_answer_to_what_was_never_asked_changes_nothing() -> None:
 def test_the_newest_view_is_next_and_its_motion_covers_those_skipped() -> None:
     desk = Desk("w1")
     desk.drive(range(1))
-    desk.see(1)
-    desk.see(2)
-    desk.see(3)
+    for frame in (1, 2, 3):
+        desk.see(frame)
     (asked,) = desk.tasks
     assert asked.cycle == 2
 
@@ -221,7 +222,8 @@ def test_self_motion_of_a_wrong_shape_is_refused_and_changes_nothing(
 ) -> None:
     desk = Desk("w1")
     desk.feed(percepts(0))
-    bad = msgspec.structs.replace(motion(0), motions=Array.of(np.zeros(shape)))
+    rows = Array.of(np.zeros(shape))
+    bad = msgspec.structs.replace(motion(0), motions=rows)
 
     with pytest.raises(MessageError, match="self-motion of shape"):
         desk.feed(bad)

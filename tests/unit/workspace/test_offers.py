@@ -32,10 +32,11 @@ def test_offers_are_committed_at_the_next_cycle_by_source_and_number() -> None:
 
 def test_an_offer_of_what_only_codelets_write_is_rejected_and_counted() -> None:
     desk = Desk("w1")
-    desk.feed(Offer(cycle=0, operations=[agent()], source="goal"))
+    offer = Offer(cycle=0, operations=[agent()], source="goal")
+    desk.feed(offer)
     desk.drive(range(1))
-    (rejecting,) = [delta for delta in desk.deltas if delta.rejected]
 
+    (rejecting,) = [delta for delta in desk.deltas if delta.rejected]
     assert rejecting.rejected == 1
     assert "may not write nodes of kind self" in "".join(rejecting.reasons)
 
