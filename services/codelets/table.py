@@ -41,9 +41,7 @@ def all_codelets() -> tuple[Codelet, ...]:
     points = sorted(entry_points(group=ENTRY_POINTS), key=lambda point: point.name)
 
     for point in points:
-        codelet = _loaded(point)
-        if not isinstance(codelet, Codelet):
-            raise ConfigError(f"entry point {point.name} = {point.value} is no Codelet")
+        codelet = _declared(point)
         if codelet.name in names:
             raise ConfigError(f"entry point {point.name}: there is a codelet {codelet.name!r}")
 
@@ -51,6 +49,15 @@ def all_codelets() -> tuple[Codelet, ...]:
         codelets.append(codelet)
 
     return tuple(codelets)
+
+
+def _declared(point: EntryPoint) -> Codelet:
+    """The codelet that an entry point names. Raises ConfigError where it names none."""
+    loaded = _loaded(point)
+    if not isinstance(loaded, Codelet):
+        raise ConfigError(f"entry point {point.name} = {point.value} is no Codelet")
+
+    return loaded
 
 
 def _loaded(point: EntryPoint) -> object:

@@ -35,7 +35,6 @@ def optimize_jointly(graph: PoseGraph, seen: Sightings, config: Config) -> tuple
         path = replace(graph, poses=poses)
         joint = with_landmarks(path, sides, landmarks_m, config.correlated_sightings)
         optimized = optimize(joint)
-
         poses = optimized[: len(poses)]
         landmarks_m = optimized[len(poses) :, :2]
 
@@ -50,12 +49,15 @@ def with_landmarks(
     """
     headings_rad = np.zeros(len(landmarks_m))
     landmarks = np.column_stack([landmarks_m, headings_rad])
-    poses = np.vstack([graph.poses, landmarks])
 
     weights = seen.weights(graph.poses, landmarks_m) / correlated
     sightings = seen.constraints(len(graph.poses), weights)
-    closures = graph.closures + sightings
-    return replace(graph, poses=poses, closures=closures)
+
+    return replace(
+        graph,
+        poses=np.vstack([graph.poses, landmarks]),
+        closures=graph.closures + sightings,
+    )
 
 
 def by_side(seen: Sightings, poses: Floats, sides: int) -> Sightings:

@@ -74,21 +74,26 @@ def _pairs(fields_m: Floats, loops: Constraints, places: int, reach_m: float) ->
     newest = places - 1
     ends = np.column_stack([newest - loops.j, newest - loops.i])
 
-    crossings = []
-    for newer, older in ends.tolist():
-        for cell in _same_place(fields_m, newer, older, reach_m):
-            crossings.append((cell, older))
-
-    crossing = np.array(crossings, np.int64).reshape(-1, 2)
-    pairs = np.vstack([_neighbours(len(fields_m)), crossing])
-    different: Indices = np.unique(pairs, axis=0)
-    return different
+    neighbours = _neighbours(len(fields_m))
+    crossings = _crossings(fields_m, ends, reach_m)
+    pairs: Indices = np.unique(np.vstack([neighbours, crossings]), axis=0)
+    return pairs
 
 
 def _neighbours(count: int) -> Indices:
     """(count - 1, 2): each cell and the next."""
     cells = np.arange(count)
     return np.column_stack([cells[:-1], cells[1:]])
+
+
+def _crossings(fields_m: Floats, ends: Indices, reach_m: float) -> Indices:
+    """(k, 2): cells of one place on different passes, by the (m, 2) cells that loops join."""
+    crossings = []
+    for newer, older in ends.tolist():
+        for cell in _same_place(fields_m, newer, older, reach_m):
+            crossings.append((cell, older))
+
+    return np.array(crossings, np.int64).reshape(-1, 2)
 
 
 def _same_place(fields_m: Floats, newer: int, older: int, reach_m: float) -> list[int]:

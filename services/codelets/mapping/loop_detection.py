@@ -110,8 +110,7 @@ def _seen_again(
     """The percepts of landmarks that come again: last seen, or closing a loop, long ago; or closing
     one on this pass, where the path has grown since.
     """
-    known = [percept for percept in percepts if percept.whole]
-    known = [percept for percept in known if object_id(percept.label) in graph.nodes]
+    known = _known(percepts, graph)
     if not known:
         return []
 
@@ -130,6 +129,16 @@ def _seen_again(
             again.append(percept)
 
     return again
+
+
+def _known(percepts: Iterable[Percept], graph: Graph) -> list[Percept]:
+    """The percepts of whole objects that the graph has."""
+    known = []
+    for percept in percepts:
+        if percept.whole and object_id(percept.label) in graph.nodes:
+            known.append(percept)
+
+    return known
 
 
 def _is_last_seen_by(stamp_ns: float, label: str, graph: Graph) -> bool:

@@ -45,13 +45,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     if not len(cells):
         return Answer([active])
 
-    road = Cells(
-        map=agent.map,
-        column=PlaceColumn.ROAD,
-        cells=Array.of(cells, "<i4"),
-        values=Array.of(shares),
-    )
-    return Answer([active, road])
+    return Answer([active, _road(agent.map, cells, shares)])
 
 
 CODELET = Codelet(
@@ -78,6 +72,16 @@ def _activated(map_id: str, pose: Floats, cell_m: float, cycle: int) -> Cells:
         cells=Array.of(here),
         values=Array.of(full),
         cycle=cycle,
+    )
+
+
+def _road(map_id: str, cells: Cell32, shares: Share32) -> Cells:
+    """The place nodes at (k, 2) cells as road, by (k,) shares."""
+    return Cells(
+        map=map_id,
+        column=PlaceColumn.ROAD,
+        cells=Array.of(cells, "<i4"),
+        values=Array.of(shares),
     )
 
 
