@@ -33,7 +33,7 @@ from tests.support.world.blocks import ASPHALT, CAMERA, GRASS, Block, painted
 FRAMES = 5
 FIRST = 3
 RECOGNISED = {4: 1, 5: 2, 7: 1}
-REFERENCE = Path(__file__).parents[2] / "replay" / "reference.mcap"
+REFERENCE = Path(__file__).parents[3] / "replay" / "reference.mcap"
 HOUSE = Block(
     x_m=12.0, y_m=5.0, turn_rad=0.0, sides_m=(6.0, 6.0), height_m=6.0, colour=(180, 60, 40)
 )
