@@ -129,10 +129,13 @@ CODELET = Codelet(
 
 def _drawn_selves(agent: Self, count: int, config: Config, rng: np.random.Generator) -> Samples:
     """`count` samples of the self in random order, one for each sample of a landmark."""
-    samples = with_gains(agent.samples.numpy(), config, rng)
-    nearby = nearby_selves(samples, config)
+    samples = agent.samples.numpy()
+    selves = with_gains(samples, config, rng)
+    nearby = nearby_selves(selves, config)
+
     drawn = resample(nearby, count)
-    return select(drawn, rng.permutation(count))
+    order = rng.permutation(count)
+    return select(drawn, order)
 
 
 def _corrected(
@@ -143,8 +146,9 @@ def _corrected(
     is_kept = rejection_mask(log_likelihood, rng)
     kept = select(positions_m, np.flatnonzero(is_kept))
 
+    jitter_m = _jitter_m(kept, config)
     drawn = resample(kept, len(positions_m))
-    return jittered(drawn, _jitter_m(kept, config), rng)
+    return jittered(drawn, jitter_m, rng)
 
 
 def nearby_selves(selves: Samples, config: Config) -> Samples:

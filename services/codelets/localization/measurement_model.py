@@ -146,20 +146,24 @@ def _range_residuals(
 
 def _noise(seen: Sighting, offset_m: Floats) -> Noise:
     """The noise of views of landmarks at (k, 2) offsets from the agent."""
-    squared_m2 = np.maximum(np.square(offset_m).sum(axis=1), 1e-6)
-    radial = np.einsum("ka,kab,kb->k", offset_m, seen.covariance_m2, offset_m) / squared_m2
-    total = seen.covariance_m2[:, 0, 0] + seen.covariance_m2[:, 1, 1]
-    tangential = np.maximum(total - radial, 0.0)
+    covariance_m2 = seen.covariance_m2
+    squared_m2 = np.square(offset_m).sum(axis=1)
+    squared_m2 = np.maximum(squared_m2, 1e-6)
+
+    along_m4 = np.einsum("ka,kab,kb->k", offset_m, covariance_m2, offset_m)
+    radial_m2 = along_m4 / squared_m2
+    total_m2 = covariance_m2[:, 0, 0] + covariance_m2[:, 1, 1]
+    tangential_m2 = np.maximum(total_m2 - radial_m2, 0.0)
 
     has_bearing = seen.has_bearing
     sensed = np.square(seen.bearing_sd_rad)
-    variance = sensed + tangential / squared_m2
+    variance = sensed + tangential_m2 / squared_m2
     bearing_information = has_bearing / variance
     peak = np.where(has_bearing, sensed / variance, 1.0)
 
     has_range = seen.has_range
     sensed = np.square(seen.range_sd_m)
-    variance = sensed + radial
+    variance = sensed + radial_m2
     range_information = has_range / variance
     peak *= np.where(has_range, sensed / variance, 1.0)
 
@@ -236,9 +240,16 @@ def _sighting(percepts: list[Percept], landmarks: list[Object]) -> Sighting:
 
 def _select(seen: Sighting, chosen: Booleans) -> Sighting:
     """The landmarks in view that are chosen (k,)."""
-    labels = tuple(itertools.compress(seen.labels, chosen.tolist()))
-    arrays = [values[chosen] for values in seen[1:]]
-    return Sighting(labels, *arrays)
+    labels = itertools.compress(seen.labels, chosen.tolist())
+    return Sighting(
+        labels=tuple(labels),
+        mean_m=seen.mean_m[chosen],
+        covariance_m2=seen.covariance_m2[chosen],
+        bearing_rad=seen.bearing_rad[chosen],
+        range_m=seen.range_m[chosen],
+        bearing_sd_rad=seen.bearing_sd_rad[chosen],
+        range_sd_m=seen.range_sd_m[chosen],
+    )
 
 
 def _covariances(landmarks: list[Object]) -> Floats:
@@ -256,16 +267,21 @@ def _covariances(landmarks: list[Object]) -> Floats:
 
 def _is_sharp(seen: Sighting, largest_sd_m: float) -> Booleans:
     """(k,): of which landmarks in view the position is known well enough."""
-    share_m = np.where(seen.has_range, MAX_SD_SHARE * seen.range_m, np.inf)
-    limit_m = np.minimum(largest_sd_m, share_m)
-    variance_m2 = seen.covariance_m2[:, 0, 0] + seen.covariance_m2[:, 1, 1]
-    return variance_m2 <= 2 * limit_m**2
+    share_m = MAX_SD_SHARE * seen.range_m
+    limit_m = np.where(seen.has_range, share_m, np.inf)
+    limit_m = np.minimum(largest_sd_m, limit_m)
+
+    variances_m2 = np.einsum("kaa->k", seen.covariance_m2)
+    is_sharp: Booleans = variances_m2 <= 2 * limit_m**2
+    return is_sharp
 
 
 def _informs(node: Object, stationary_since_ns: int) -> bool:
     """Whether another view of the landmark is evidence of where the agent is."""
-    is_confirmed = node.surveyed or node.sightings >= MIN_SIGHTINGS
-    return is_confirmed and not is_seen_from_here(node, stationary_since_ns)
+    if is_seen_from_here(node, stationary_since_ns):
+        return False
+
+    return node.surveyed or node.sightings >= MIN_SIGHTINGS
 
 
 def is_seen_from_here(node: Object, stationary_since_ns: int) -> bool:

@@ -110,13 +110,16 @@ def relocalize(gains: Samples, seen: Sighting, config: Config, rng: np.random.Ge
     """
     candidates = np.tile(gains, (CANDIDATES, 1))
     number = len(candidates)
-    which = rng.integers(len(seen.labels), size=number)
+    landmarks = len(seen.labels)
+    which = rng.integers(landmarks, size=number)
     direction_rad = rng.uniform(-np.pi, np.pi, number)
 
     landmark_m = _drawn_positions(seen, which, rng)
     distance_m = _drawn_distances(seen, which, candidates[:, RANGE], config, rng)
-    candidates[:, 0] = landmark_m[:, 0] + distance_m * np.cos(direction_rad)
-    candidates[:, 1] = landmark_m[:, 1] + distance_m * np.sin(direction_rad)
+    east_m = distance_m * np.cos(direction_rad)
+    north_m = distance_m * np.sin(direction_rad)
+    candidates[:, 0] = landmark_m[:, 0] + east_m
+    candidates[:, 1] = landmark_m[:, 1] + north_m
 
     bearing_rad = _drawn_bearings(seen, which, rng)
     candidates[:, 2] = direction_rad + np.pi - bearing_rad
@@ -181,17 +184,19 @@ def relocalize_heading(
     with_bearing = np.flatnonzero(seen.has_bearing)
     which = rng.choice(with_bearing, size=number)
 
-    east_m = seen.mean_m[which, 0] - candidates[:, 0]
-    north_m = seen.mean_m[which, 1] - candidates[:, 1]
+    landmark_m = seen.mean_m[which]
+    east_m = landmark_m[:, 0] - candidates[:, 0]
+    north_m = landmark_m[:, 1] - candidates[:, 1]
     direction_rad = np.arctan2(north_m, east_m)
     drawn = rng.normal(0.0, 1.0, number)
     bearing_rad = seen.bearing_rad[which] + drawn * seen.bearing_sd_rad[which]
     candidates[:, 2] = direction_rad - bearing_rad
 
-    density = compare(candidates, seen).density
     # Each was turned by that one's bearing.
+    density = compare(candidates, seen).density
     by_bearing = np.exp(drawn**2 / 2)
-    density[which, np.arange(number)] *= by_bearing
+    each = np.arange(number)
+    density[which, each] *= by_bearing
     return _drawn(candidates, density, len(samples), config, rng)
 
 
@@ -200,7 +205,8 @@ def _drawn(
 ) -> Samples:
     """`count` of (n, 7) candidates, drawn by the (k, n) densities of the landmarks in view."""
     scores = log_likelihood(density, config.outlier_share)
-    weights = np.exp(scores - scores.max())
+    relative_scores = scores - scores.max()
+    weights = np.exp(relative_scores)
     probabilities = weights / weights.sum()
     chosen = rng.choice(len(candidates), size=count, p=probabilities)
     return candidates[chosen]

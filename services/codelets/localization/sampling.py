@@ -30,7 +30,8 @@ class _Digest(ISeedSequence):
     """
 
     def __init__(self, identifier: str) -> None:
-        self._bytes = hashlib.blake2b(identifier.encode()).digest()
+        content = identifier.encode()
+        self._bytes = hashlib.blake2b(content).digest()
 
     def generate_state(
         self, n_words: int, dtype: npt.DTypeLike = np.uint32
@@ -90,8 +91,9 @@ def centred(samples: Samples) -> tuple[Samples, Samples]:
 
 def spread(deviations: Samples) -> Samples:
     """(d,): the standard deviations of samples that deviate by (n, d) from their mean."""
+    count = len(deviations)
     squares = np.einsum("nd,nd->d", deviations, deviations)
-    variances = squares / len(deviations)
+    variances = squares / count
     return np.asarray(np.sqrt(variances))
 
 
@@ -154,7 +156,8 @@ def kernel_smooth(drawn: Samples, effective: float, rng: np.random.Generator) ->
 def _kernel_variance(effective: float, columns: int) -> float:
     """The variance of a Gaussian kernel of Silverman's width, as a share of the samples'."""
     weight = (columns + 2) * max(1.0, effective)
-    width = math.pow(4 / weight, 1 / (columns + 4))
+    exponent = 1 / (columns + 4)
+    width = math.pow(4 / weight, exponent)
     return min(MAX_KERNEL_VARIANCE, width**2)
 
 
@@ -211,9 +214,10 @@ def _systematic(expected: Samples, rng: np.random.Generator) -> Indices:
     """(n,): how often each sample is drawn, as often as `expected` (n,) on the mean: of each run of
     samples as often as their sum, but for one.
     """
-    through = np.zeros(len(expected) + 1)
     offset = rng.random()
-    np.floor(np.cumsum(expected) + offset, out=through[1:])
+    summed = np.cumsum(expected)
+    through = np.zeros(len(expected) + 1)
+    np.floor(summed + offset, out=through[1:])
 
     copies = through[1:] - through[:-1]
     return copies.astype(np.int64)
