@@ -64,8 +64,9 @@ class TimedStop(Stop):
         self._display.driving(observer, errors)
 
     def close(self) -> None:
-        """Leave the screen as it should stay."""
+        """Leave the screen as it should stay, and signals to whoever had them before."""
         self._display.close()
+        self.release()
 
 
 def drive(folder: Path, laps: float = 1.0, seconds: float = TIMEOUT_S) -> tuple[RunMetrics, Watch]:

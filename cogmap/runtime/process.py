@@ -30,8 +30,10 @@ class Stop:
 
     def __init__(self, tied: bool = False) -> None:
         self._asked = threading.Event()
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, self._on_signal)
+        self._handlers_before = {
+            number: signal.signal(number, self._on_signal)
+            for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+        }
         if tied:
             threading.Thread(target=self._watch_parent, daemon=True).start()
 
@@ -43,6 +45,12 @@ class Stop:
     def wait(self, timeout_s: float | None = None) -> bool:
         """Wait until asked; False after `timeout_s`."""
         return self._asked.wait(timeout_s)
+
+    def release(self) -> None:
+        """Leave signals to whoever had them before."""
+        for number, handler in self._handlers_before.items():
+            if handler is not None:
+                signal.signal(number, handler)
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
         self._asked.set()
