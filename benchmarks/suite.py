@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import os
 from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +23,7 @@ from benchmarks.report import Metrics, Outcome
 from benchmarks.spiking import measure as spiking
 from benchmarks.threshold import Thresholds
 from cogmap.errors import CogmapError, UsageError
+from cogmap.parallel import exit_with
 
 MACHINE_UNIT = "machine_unit_ms"
 CONES_SCALE = 4.0
@@ -140,18 +145,32 @@ def selected(only: Sequence[str], skip: Sequence[str]) -> list[Benchmark]:
 
 
 def run(benchmark: Benchmark, setting: Setting) -> Outcome:
-    """Measure one benchmark. A failure of any kind is its outcome, so that others still run."""
-    metrics: Metrics = {}
-    failure = ""
+    """Measure one benchmark in a process of its own. A failure of any kind is its outcome, so that
+    others still run.
 
-    try:
-        metrics = benchmark.measure(setting)
-    except CogmapError as error:
-        failure = str(error)
-    except Exception as error:
-        failure = f"{type(error).__name__}: {error}"
+    Libraries that benchmarks load may not go together in one process: the renderer and torch bring
+    compilers of one name.
+    """
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(1, spawn, exit_with, (os.getpid(),)) as process:
+        measured = process.submit(_measured, benchmark.measure, setting)
+        try:
+            metrics, failure = measured.result()
+        except BrokenProcessPool:
+            metrics = {}
+            failure = f"its process died: see what `--only {benchmark.name}` prints"
 
     return completed(benchmark.name, benchmark.thresholds, metrics, failure)
+
+
+def _measured(measure: Callable[[Setting], Metrics], setting: Setting) -> tuple[Metrics, str]:
+    """The metrics, and why there are none."""
+    try:
+        return measure(setting), ""
+    except CogmapError as error:
+        return {}, str(error)
+    except Exception as error:
+        return {}, f"{type(error).__name__}: {error}"
 
 
 def completed(name: str, thresholds: Thresholds, metrics: Metrics, failure: str = "") -> Outcome:

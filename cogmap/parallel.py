@@ -46,10 +46,15 @@ def parallel_map(
     return results
 
 
-def _end_with(parent: int) -> None:
-    """Leave Ctrl-C to the parent process, and exit when it exits, even amid a job."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+def exit_with(parent: int) -> None:
+    """Exit this process when `parent` exits, even amid a job."""
     threading.Thread(target=_watch, args=(parent,), daemon=True).start()
+
+
+def _end_with(parent: int) -> None:
+    """Leave Ctrl-C to the parent process, and exit when it exits."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    exit_with(parent)
 
 
 def _watch(parent: int) -> None:

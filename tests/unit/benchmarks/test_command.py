@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import socket
 from pathlib import Path
 
@@ -77,18 +79,36 @@ def test_a_report_shows_what_is_met_and_missed_and_writes_flat_json(
     assert json.loads(path.read_text()) == {"low": 1.0, "high": 3.0, "why": 7.0}
 
 
+def _slow(setting: Setting) -> Metrics:
+    return {"slow_ms": 3.0, "runs": 2.0}
+
+
+def _fast(setting: Setting) -> Metrics:
+    return {"fast_ms": 1.0, "runs": 5.0}
+
+
+def _refused(setting: Setting) -> Metrics:
+    raise UsageError("gtsam is not installed")
+
+
+def _failing(setting: Setting) -> Metrics:
+    raise ZeroDivisionError("nothing was measured")
+
+
+def _crashing(setting: Setting) -> Metrics:
+    os.kill(os.getpid(), signal.SIGSEGV)
+    return {}
+
+
+def _silent(sentence: str) -> None:
+    """Announces nothing."""
+
+
 def _suite(monkeypatch: pytest.MonkeyPatch, *more: Benchmark) -> None:
     """Replace the minutes of the real suite by benchmarks that return at once."""
-
-    def slow(setting: Setting) -> Metrics:
-        return {"slow_ms": 3.0, "runs": 2.0}
-
-    def fast(setting: Setting) -> Metrics:
-        return {"fast_ms": 1.0, "runs": 5.0}
-
     benchmarks_there = (
-        Benchmark("cycle", {"slow_ms": at_most(2)}, slow),
-        Benchmark("bus", {"fast_ms": at_most(2)}, fast),
+        Benchmark("cycle", {"slow_ms": at_most(2)}, _slow),
+        Benchmark("bus", {"fast_ms": at_most(2)}, _fast),
         *more,
     )
     monkeypatch.setattr(suite, "SUITE", benchmarks_there)
@@ -127,16 +147,11 @@ def test_all_ends_with_0_where_every_threshold_chosen_is_met(
 def test_a_benchmark_that_fails_is_a_row_with_its_reason_and_others_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fails(setting: Setting) -> Metrics:
-        raise UsageError("gtsam is not installed")
-
-    def crashes(setting: Setting) -> Metrics:
-        raise ZeroDivisionError("nothing was measured")
-
     _suite(
         monkeypatch,
-        Benchmark("localization", {"rmse_m": at_most(1)}, fails),
-        Benchmark("spiking", {}, crashes),
+        Benchmark("localization", {"rmse_m": at_most(1)}, _refused),
+        Benchmark("spiking", {}, _failing),
+        Benchmark("camvid", {}, _crashing),
     )
     path = tmp_path / "all.json"
     arguments = ["all", "--skip", "cycle", "--json", str(path)]
@@ -146,13 +161,14 @@ def test_a_benchmark_that_fails_is_a_row_with_its_reason_and_others_run(
     assert result.exit_code == 1
     assert "gtsam is not installed" in result.output
     assert "ZeroDivisionError: nothing was measured" in result.output
+    assert "its process died" in result.output
     assert json.loads(path.read_text())["fast_ms"] == 1.0
 
 
 def test_a_benchmark_of_a_set_that_is_not_there_names_its_folder(tmp_path: Path) -> None:
     outcome = suite.run(
         next(each for each in suite.SUITE if each.name == "cones"),
-        Setting(tmp_path, 1, tmp_path, lambda sentence: None),
+        Setting(tmp_path, 1, tmp_path, _silent),
     )
 
     assert f"there is no folder {tmp_path / 'stereo_cones'}" in outcome.failure
