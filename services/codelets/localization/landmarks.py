@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
 from cogmap.errors import MessageError
-from cogmap.geometry.se2 import wrap_angle
+from cogmap.geometry.se2 import mean_pose, wrap_angle
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.array import Matrix
@@ -35,12 +34,9 @@ from services.codelets.localization.measurement_model import (
 from services.codelets.localization.motion_model import with_gains
 from services.codelets.localization.sampling import (
     Samples,
-    centred,
     generator,
-    jittered,
     rejection_mask,
     resample,
-    select,
     spread,
 )
 
@@ -91,17 +87,19 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     if agent is None or landmark is None:
         raise MessageError(f"task {task.task_id}: the graph lacks the self or the landmark")
 
+    before = landmark.positions_m()
     record = Record(landmark.sightings, landmark.misses)
     if _stays(agent, landmark):
         return _kept_answer(task, graph, landmark, record)
 
     rng = generator(task.task_id)
-    before = np.asfortranarray(landmark.positions_m())
-    selves = _drawn_selves(agent, len(before), config, rng)
+    selves = nearby_selves(with_gains(agent.samples.numpy(), config, rng), config)
+    selves = rng.permutation(resample(selves, len(before), 0.0, rng))
     mahalanobis2 = _mahalanobis2(before, selves, percept)
-
     if mahalanobis2.min() < config.gate**2:
-        after = _corrected(before, mahalanobis2, config, rng)
+        log_likelihood = -mahalanobis2 / 2 / config.correlated_views
+        kept = before[rejection_mask(log_likelihood, rng)]
+        after = resample(kept, len(before), _jitter_m(kept, config), rng)
         record = Record(record.sightings + 1, 0)
         return object_answer(task, graph, landmark, after, record)
 
@@ -127,30 +125,6 @@ CODELET = Codelet(
 )
 
 
-def _drawn_selves(agent: Self, count: int, config: Config, rng: np.random.Generator) -> Samples:
-    """`count` samples of the self in random order, one for each sample of a landmark."""
-    samples = agent.samples.numpy()
-    selves = with_gains(samples, config, rng)
-    nearby = nearby_selves(selves, config)
-
-    drawn = resample(nearby, count)
-    order = rng.permutation(count)
-    return select(drawn, order)
-
-
-def _corrected(
-    positions_m: Samples, mahalanobis2: Samples, config: Config, rng: np.random.Generator
-) -> Samples:
-    """As many samples of a landmark as before, of those that agree with what is seen."""
-    log_likelihood = -mahalanobis2 / 2 / config.correlated_views
-    is_kept = rejection_mask(log_likelihood, rng)
-    kept = select(positions_m, np.flatnonzero(is_kept))
-
-    jitter_m = _jitter_m(kept, config)
-    drawn = resample(kept, len(positions_m))
-    return jittered(drawn, jitter_m, rng)
-
-
 def nearby_selves(selves: Samples, config: Config) -> Samples:
     """(n, 7) samples of the self for placing landmarks relative to it, which is known however lost
     the agent is.
@@ -159,16 +133,18 @@ def nearby_selves(selves: Samples, config: Config) -> Samples:
     as the last step was. Here the self's samples keep all that is uncertain since the start; drawn
     together about their mean, they state the same.
     """
-    mean, offset = centred(selves[:, :POSE_COLUMNS])
-    sd = spread(offset[:, :2])
-    position_sd_m = max(math.hypot(*sd.tolist()), 1e-9)
+    mean = mean_pose(selves)
+    sd = spread(selves[:, :POSE_COLUMNS], mean)
+
+    position_sd_m = max(float(np.hypot(sd[0], sd[1])), 1e-9)
     share = min(1.0, LOCAL_SHARE * config.largest_landmark_sd_m / position_sd_m)
     if share == 1.0:
         return selves
 
-    nearby = selves.copy(order="F")
-    nearby[:, :POSE_COLUMNS] = mean + share * offset
-    return nearby
+    offset = selves[:, :POSE_COLUMNS] - mean
+    offset[:, 2] = wrap_angle(offset[:, 2])
+    poses = mean + share * offset
+    return np.hstack([poses, selves[:, POSE_COLUMNS:]])
 
 
 def first_positions(
@@ -179,37 +155,23 @@ def first_positions(
 
     Seen by range alone it is on a ring, by bearing alone on a ray as long as `config.farthest_m`.
     """
-    direction_rad = _first_directions(selves, percept, rng)
-    distance_m = _first_distances(selves, percept, config, rng)
-    east_m = distance_m * np.cos(direction_rad)
-    north_m = distance_m * np.sin(direction_rad)
+    number = len(selves)
 
-    offsets_m = np.column_stack([east_m, north_m])
-    positions_m: Samples = selves[:, :2] + offsets_m
+    if has_bearing(percept):
+        seen_rad = rng.normal(percept.bearing_rad, percept.bearing_sd_rad, number)
+        direction_rad = selves[:, SelfColumn.HEADING_RAD] + seen_rad
+    else:
+        direction_rad = rng.uniform(-np.pi, np.pi, number)
+
+    if has_range(percept):
+        seen_m = rng.normal(percept.range_m, percept.range_sd_m, number).clip(MIN_RANGE_M)
+        distance_m = seen_m / (1 + selves[:, SelfColumn.RANGE_GAIN])
+    else:
+        distance_m = rng.uniform(0.0, config.farthest_m, number)
+
+    direction = np.column_stack([np.cos(direction_rad), np.sin(direction_rad)])
+    positions_m: Samples = selves[:, :2] + distance_m[:, None] * direction
     return positions_m
-
-
-def _first_directions(selves: Samples, percept: Percept, rng: np.random.Generator) -> Samples:
-    """(n,): the directions, from samples of the self, in which an object may be."""
-    number = len(selves)
-    if not has_bearing(percept):
-        return rng.uniform(-np.pi, np.pi, number)
-
-    bearing_rad = rng.normal(percept.bearing_rad, percept.bearing_sd_rad, number)
-    return selves[:, SelfColumn.HEADING_RAD] + bearing_rad
-
-
-def _first_distances(
-    selves: Samples, percept: Percept, config: Config, rng: np.random.Generator
-) -> Samples:
-    """(n,): the distances, from samples of the self, at which an object may be."""
-    number = len(selves)
-    if not has_range(percept):
-        return rng.uniform(0.0, config.farthest_m, number)
-
-    range_m = rng.normal(percept.range_m, percept.range_sd_m, number)
-    distance_m: Samples = range_m.clip(MIN_RANGE_M) / (1 + selves[:, SelfColumn.RANGE_GAIN])
-    return distance_m
 
 
 def object_answer(
@@ -218,15 +180,15 @@ def object_answer(
     """An object with new samples, refreshed by the percept of `task`, and its link to the place of
     their mean.
     """
-    mean, offsets_m = centred(positions_m)
-    sd = spread(offsets_m)
+    mean = positions_m.mean(axis=0)
+    sd = spread(positions_m, mean)
     located = msgspec.structs.replace(
         node,
         x_m=float(mean[0]),
         y_m=float(mean[1]),
         x_sd_m=float(sd[0]),
         y_sd_m=float(sd[1]),
-        offsets_m=Matrix.of(offsets_m, "<f2"),
+        offsets_m=Matrix.of(positions_m - mean, "<f2"),
     )
     return _kept_answer(task, graph, located, record)
 
@@ -259,8 +221,7 @@ def _jitter_m(kept: Samples, config: Config) -> Samples:
     Few samples represent all positions between them: of a ring or a ray, the next view must find
     some again.
     """
-    _, offsets_m = centred(kept)
-    sd_m = spread(offsets_m)
+    sd_m = spread(kept, kept.mean(axis=0))
     gaps_m = GAP * sd_m / len(kept)
     jitter_m: Samples = np.maximum(config.landmark_jitter_m, gaps_m)
     return jitter_m
@@ -275,20 +236,19 @@ def _stays(agent: Self, landmark: Object) -> bool:
 
 def _mahalanobis2(positions_m: Samples, selves: Samples, percept: Percept) -> Samples:
     """(n,): squared deviations of the percept from what each pair of landmark and self predicts."""
-    mahalanobis2 = np.zeros(len(positions_m))
-    east_m = positions_m[:, 0] - selves[:, SelfColumn.X_M]
-    north_m = positions_m[:, 1] - selves[:, SelfColumn.Y_M]
+    offset_m = positions_m - selves[:, :2]
+    mahalanobis2 = np.zeros(len(offset_m))
 
     if has_bearing(percept):
-        direction_rad = np.arctan2(north_m, east_m)
+        direction_rad = np.arctan2(offset_m[:, 1], offset_m[:, 0])
         bearing_rad = direction_rad - selves[:, SelfColumn.HEADING_RAD]
         residual_rad = wrap_angle(bearing_rad - percept.bearing_rad)
         mahalanobis2 += (residual_rad / percept.bearing_sd_rad) ** 2
 
     if has_range(percept):
-        distance_m = np.hypot(east_m, north_m)
-        range_m = distance_m * (1 + selves[:, SelfColumn.RANGE_GAIN])
-        residual_m = range_m - percept.range_m
+        distance_m = np.hypot(offset_m[:, 0], offset_m[:, 1])
+        expected_m = distance_m * (1 + selves[:, SelfColumn.RANGE_GAIN])
+        residual_m = expected_m - percept.range_m
         mahalanobis2 += (residual_m / percept.range_sd_m) ** 2
 
     return mahalanobis2

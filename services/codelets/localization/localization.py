@@ -7,7 +7,7 @@ view, not with the map.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import msgspec
 import numpy as np
@@ -28,6 +28,7 @@ from schemas.nodes import (
     Observations,
     PathSegment,
     Self,
+    SelfColumn,
     nearest_place,
     object_id,
 )
@@ -45,12 +46,10 @@ from services.codelets.localization.recovery import relocalize, relocalize_headi
 from services.codelets.localization.sampling import (
     Samples,
     centred,
-    equal_weights,
     generator,
     inflate,
     rejection_resample,
     resample,
-    spread,
     tempering_exponent,
 )
 from services.codelets.mapping.path import odometry_of, variances_of
@@ -66,7 +65,8 @@ ALIKE = 0.6
 FORGOTTEN_NS = 20_000_000_000
 
 
-class Estimate(NamedTuple):
+@dataclass(frozen=True)
+class Estimate:
     """The samples that were kept, the share of those tried that they are, and for how many views
     nothing has fitted.
 
@@ -110,18 +110,21 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
 
     rng = generator(task.task_id)
     motions = np.asarray(task.motions.numpy(), np.float64)
-    moved = _moved(agent, motions, config, rng)
-    variances = variances_of(agent) + _added_variances(motions)
+    before = with_gains(agent.samples.numpy(), config, rng)
+    moved = move(resample(before, config.samples, 0.0, rng), motions, config, rng)
 
-    stationary_since_ns = _stationary_since(agent, motions)
+    stationary_since_ns = _stationary_since(agent, bool(motions[:, :2].any()))
     seen = sightings(task.percepts, graph, config.largest_landmark_sd_m, stationary_since_ns)
+    moved_sd = motions[:, 3:5] * motions[:, 2:3]
+    variances = variances_of(agent) + np.square(moved_sd).sum(axis=0)
+
     found = _past(agent, moved, task.stamp_ns)
     if seen is not None:
         since = variances - variances_when_placed(graph, seen)
         weights = novelty(moved, seen, since) / config.correlated_views
         found = _correct(found, seen, weights, config, rng)
 
-    gains = equal_weights(len(found.samples)) @ found.samples[:, POSE_COLUMNS:]
+    gains = found.samples[:, POSE_COLUMNS:].mean(axis=0)
     odometry = dead_reckon(odometry_of(agent), motions, gains)
     if seen is not None and found.is_lost:
         percepts = _all_seen(task.percepts, seen_before(graph, odometry))
@@ -132,10 +135,20 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         # as certain as the pose that was found.
         step = relative(mean_pose(moved), mean_pose(found.samples))
         odometry = compose(odometry, step)
-        variances += _pose_variances(found.samples)
+        _, offsets = centred(found.samples)
+        found_variances = np.square(offsets).mean(axis=0)
+        variances += found_variances[1:POSE_COLUMNS]
 
     estimate = _self_node(task, agent, found)
-    after = _with_odometry(estimate, odometry, variances, stationary_since_ns)
+    after = msgspec.structs.replace(
+        estimate,
+        stationary_since_ns=stationary_since_ns,
+        odometry_x_m=float(odometry[0]),
+        odometry_y_m=float(odometry[1]),
+        odometry_heading_rad=float(odometry[2]),
+        odometry_variance_m2=float(variances[0]),
+        odometry_variance_rad2=float(variances[1]),
+    )
     return Answer(_operations(after, graph))
 
 
@@ -151,34 +164,9 @@ CODELET = Codelet(
 )
 
 
-def _moved(agent: Self, motions: Samples, config: Config, rng: np.random.Generator) -> Samples:
-    """(n, 7) samples of the agent after (m, 5) rows of motion."""
-    samples = agent.samples.numpy()
-    before = with_gains(samples, config, rng)
-    start = resample(before, config.samples)
-    return move(start, motions, config, rng)
-
-
-def _added_variances(motions: Samples) -> Samples:
-    """(2,): what (m, 5) rows of motion add to path integration's variances."""
-    durations_s = motions[:, 2:3]
-    rate_sds = motions[:, 3:5]
-    sds = rate_sds * durations_s
-    added: Samples = np.square(sds).sum(axis=0)
-    return added
-
-
-def _pose_variances(samples: Samples) -> Samples:
-    """(2,): how uncertain a pose is, in terms of path integration's variances."""
-    _, offsets = centred(samples)
-    variances = np.square(spread(offsets))
-    return variances[1:POSE_COLUMNS]
-
-
-def _stationary_since(agent: Self, motions: Samples) -> int:
+def _stationary_since(agent: Self, moves: bool) -> int:
     """The stamp at which the agent stopped; NEVER_NS where it moves."""
-    speeds = motions[:, :2]
-    if speeds.any():
+    if moves:
         return NEVER_NS
 
     if agent.stationary_since_ns == NEVER_NS:
@@ -238,7 +226,7 @@ def _correct(
         if exponent_left <= 0:
             break
 
-        samples = resample(kept, len(samples))
+        samples = resample(kept, len(samples), 0.0, rng)
         compared = compare(samples, seen)
 
     return Estimate(kept, share)
@@ -321,62 +309,39 @@ def _relocalize(
 def _self_node(task: Task, agent: Self, found: Estimate) -> Self:
     """The self node after localization; what path integration measured is as before."""
     mean, offsets = centred(found.samples)
-    sd = spread(offsets)
+    variance = np.einsum("nd,nd->d", offsets, offsets) / len(offsets)
+    sd = np.sqrt(variance)
     has_gains = bool(sd[POSE_COLUMNS:].any())
     samples = found.samples if has_gains else found.samples[:, :POSE_COLUMNS]
 
     is_misfit = found.misfit_count > agent.misfit_count
-    is_fit = not found.misfit_count
-    x_m, y_m, heading_rad, *gains = mean.tolist()
-    x_sd_m, y_sd_m, heading_sd_rad = sd[:POSE_COLUMNS].tolist()
-    speed_gain, turn_gain, _, range_gain = gains
-
     return msgspec.structs.replace(
         agent,
         activation=1.0,
         base_level=1.0,
         cycle=task.cycle,
         stamp_ns=task.stamp_ns,
-        x_m=x_m,
-        y_m=y_m,
-        heading_rad=heading_rad,
-        x_sd_m=x_sd_m,
-        y_sd_m=y_sd_m,
-        heading_sd_rad=heading_sd_rad,
+        x_m=float(mean[0]),
+        y_m=float(mean[1]),
+        heading_rad=float(mean[2]),
+        x_sd_m=float(sd[0]),
+        y_sd_m=float(sd[1]),
+        heading_sd_rad=float(sd[2]),
         kept_share=found.share,
         misfit_count=found.misfit_count,
         first_misfit=found.first_misfit,
         is_lost=found.is_lost,
         last_misfit_ns=task.stamp_ns if is_misfit else agent.last_misfit_ns,
-        last_fit_ns=task.stamp_ns if is_fit else agent.last_fit_ns,
-        speed_gain=speed_gain,
-        turn_gain=turn_gain,
-        range_gain=range_gain,
+        last_fit_ns=agent.last_fit_ns if found.misfit_count else task.stamp_ns,
+        speed_gain=float(mean[SelfColumn.SPEED_GAIN]),
+        turn_gain=float(mean[SelfColumn.TURN_GAIN]),
+        range_gain=float(mean[SelfColumn.RANGE_GAIN]),
         samples=Matrix.of(samples),
     )
 
 
-def _with_odometry(
-    agent: Self, pose: Samples, variances: Samples, stationary_since_ns: int
-) -> Self:
-    """The self node with what path integration measured: a pose (3,) and its variances (2,)."""
-    x_m, y_m, heading_rad = pose.tolist()
-    variance_m2, variance_rad2 = variances.tolist()
-    return msgspec.structs.replace(
-        agent,
-        stationary_since_ns=stationary_since_ns,
-        odometry_x_m=x_m,
-        odometry_y_m=y_m,
-        odometry_heading_rad=heading_rad,
-        odometry_variance_m2=variance_m2,
-        odometry_variance_rad2=variance_rad2,
-    )
-
-
 def _operations(agent: Self, graph: Graph) -> list[Operation]:
-    """The self node, and its link to the place nearest to it."""
     cell_m = graph.cell_m(agent.map)
     place = nearest_place(agent.x_m, agent.y_m, cell_m, agent.map)
-
     link = Link(source=agent.id, target=place, kind=LinkKind.AT)
     return [agent, link]

@@ -29,8 +29,8 @@ def novelty(samples: Samples, seen: Sighting, since: Samples) -> Samples:
     landmark was placed: `since` (k, 2), by path integration's variances in m^2 and rad^2.
     """
     _, deviations = centred(samples[:, :2])
-    squared_m2 = float(np.einsum("nd,nd->", deviations, deviations))
-    position_m2 = max(squared_m2 / len(deviations), 1e-9)
+    variances_m2 = np.square(deviations).mean(axis=0)
+    position_m2 = max(float(variances_m2.sum()), 1e-9)
 
     since_m2, since_rad2 = since.T
     by_turns_m2 = since_rad2 * seen.range_m**2
@@ -54,25 +54,16 @@ def variances_at(graph: Graph, stamp_ns: int) -> tuple[float, float]:
     next before it; -inf each before the path begins.
     """
     stamp_s = stamp_ns * 1e-9
-    segment = _segment_at(graph, stamp_s)
+    numbers = range(graph.count(PathSegment))
+    number = bisect_right(numbers, stamp_s, key=partial(_begin_s, graph)) - 1
+    segment = graph.get(PathSegment, segment_id(number))
     if segment is None:
         return -math.inf, -math.inf
 
     rows = segment.rows.numpy()
-    stamps_s = rows[:, PathColumn.STAMP_S]
-    following = int(stamps_s.searchsorted(stamp_s, side="right"))
-    row = rows[following - 1]
-    variance_m2, variance_rad2 = row[VARIANCES].tolist()
+    following = int(rows[:, PathColumn.STAMP_S].searchsorted(stamp_s, side="right"))
+    variance_m2, variance_rad2 = rows[following - 1, VARIANCES].tolist()
     return variance_m2, variance_rad2
-
-
-def _segment_at(graph: Graph, stamp_s: float) -> PathSegment | None:
-    """The last segment that begins at `stamp_s` or before; None where none does."""
-    numbers = range(graph.count(PathSegment))
-    begin_s = partial(_begin_s, graph)
-    following = bisect_right(numbers, stamp_s, key=begin_s)
-    name = segment_id(following - 1)
-    return graph.get(PathSegment, name)
 
 
 def _begin_s(graph: Graph, number: int) -> float:

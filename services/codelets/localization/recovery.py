@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
-from cogmap.geometry.arrays import Indices, Singles
+from cogmap.geometry.arrays import Singles
 from cogmap.geometry.se2 import compose, relative
 from cogmap.graph.graph import Graph
 from schemas.sensing import Percept
 from services.codelets.config import Config
 from services.codelets.localization.measurement_model import Sighting, compare, log_likelihood
-from services.codelets.localization.motion_model import RANGE
+from services.codelets.localization.motion_model import COLUMNS, RANGE
 from services.codelets.localization.sampling import Samples
 from services.codelets.mapping.observations import Sightings
 from services.codelets.mapping.path import ODOMETRY, STAMP, objects_along
@@ -39,39 +39,20 @@ def seen_before(graph: Graph, odometry: Samples) -> list[Percept]:
     observations = [each for each, _ in objects_along(graph, last)]
     seen = Sightings.of(observations, rows[:, STAMP])
 
-    percepts = []
-    for label, index in _latest(seen).items():
-        then = rows[seen.place[index], ODOMETRY]
-        where_m = seen.where_m[index]
-        information = seen.information[index]
-        percepts.append(_as_seen_now(label, where_m, information, then, odometry))
-
-    return percepts
-
-
-def _latest(seen: Sightings) -> dict[str, int]:
-    """The index of the latest sighting of each landmark, by its label."""
     latest = {}
     for index, landmark in enumerate(seen.landmark.tolist()):
-        label = seen.labels[landmark]
-        latest[label] = index
+        latest[seen.labels[landmark]] = index
 
-    return latest
+    percepts = []
+    for label, index in latest.items():
+        then = rows[seen.place[index], ODOMETRY]
+        step = np.append(seen.where_m[index], 0.0)
+        forwards_m, left_m, _ = relative(odometry, compose(then, step)).tolist()
 
-
-def _as_seen_now(
-    label: str, where_m: Samples, information: Samples, then: Samples, now: Samples
-) -> Percept:
-    """A landmark that was seen `where_m` (2,), with (2, 2) information, from the pose `then` (3,),
-    as it would be in view from `now` (3,).
-    """
-    step = np.append(where_m, 0.0)
-    landmark = compose(then, step)
-    forwards_m, left_m, _ = relative(now, landmark).tolist()
-
-    moved_m = float(np.hypot(*(then - now)[:2]))
-    sd_m = _remembered_sd_m(information, moved_m)
-    return _percept(label, forwards_m, left_m, sd_m)
+        moved_m = float(np.hypot(*(then - odometry)[:2]))
+        sd_m = _remembered_sd_m(seen.information[index], moved_m)
+        percepts.append(_percept(label, forwards_m, left_m, sd_m))
+    return percepts
 
 
 def _remembered_sd_m(information: Samples, moved_m: float) -> float:
@@ -79,9 +60,9 @@ def _remembered_sd_m(information: Samples, moved_m: float) -> float:
     information.
     """
     covariance_m2 = np.linalg.inv(information)
-    largest_m2 = np.linalg.eigvalsh(covariance_m2).max()
+    variance_m2 = float(np.linalg.eigvalsh(covariance_m2).max())
     drift_m = DRIFT_SHARE * moved_m
-    return math.sqrt(largest_m2 + drift_m**2)
+    return math.sqrt(variance_m2 + drift_m**2)
 
 
 def _percept(label: str, forwards_m: float, left_m: float, sd_m: float) -> Percept:
@@ -108,66 +89,31 @@ def relocalize(gains: Samples, seen: Sighting, config: Config, rng: np.random.Ge
     and is drawn with the likelihood of all others in view. One landmark gives a ring, of which the
     next ones leave parts.
     """
-    candidates = np.tile(gains, (CANDIDATES, 1))
-    number = len(candidates)
-    landmarks = len(seen.labels)
-    which = rng.integers(landmarks, size=number)
+    number = len(gains) * CANDIDATES
+    candidates = np.empty((number, COLUMNS))
+    candidates[:] = np.tile(gains, (CANDIDATES, 1))
+    which = rng.integers(len(seen.labels), size=number)
     direction_rad = rng.uniform(-np.pi, np.pi, number)
 
-    landmark_m = _drawn_positions(seen, which, rng)
-    distance_m = _drawn_distances(seen, which, candidates[:, RANGE], config, rng)
-    east_m = distance_m * np.cos(direction_rad)
-    north_m = distance_m * np.sin(direction_rad)
-    candidates[:, 0] = landmark_m[:, 0] + east_m
-    candidates[:, 1] = landmark_m[:, 1] + north_m
+    root_m = _roots(seen.covariance_m2)[which]
+    drawn = rng.normal(0.0, 1.0, (number, 2))
+    landmark_m = seen.mean_m[which] + np.einsum("nij,nj->ni", root_m, drawn)
 
-    bearing_rad = _drawn_bearings(seen, which, rng)
+    measured_m = rng.normal(seen.range_m[which], seen.range_sd_m[which])
+    near_m = measured_m / (1 + candidates[:, RANGE])
+    any_m = rng.uniform(0.0, config.farthest_m, number)
+    distance_m = np.where(seen.has_range[which], near_m, any_m).clip(0.0)
+    candidates[:, 0] = landmark_m[:, 0] + distance_m * np.cos(direction_rad)
+    candidates[:, 1] = landmark_m[:, 1] + distance_m * np.sin(direction_rad)
+
+    measured_rad = rng.normal(seen.bearing_rad[which], seen.bearing_sd_rad[which])
+    any_rad = rng.uniform(-np.pi, np.pi, number)
+    bearing_rad = np.where(seen.has_bearing[which], measured_rad, any_rad)
     candidates[:, 2] = direction_rad + np.pi - bearing_rad
 
     density = compare(candidates, seen).density
-    # Each was drawn by that one.
-    density[which, np.arange(number)] = 1.0
+    density[which, np.arange(number)] = 1.0  # it was drawn by that one
     return _drawn(candidates, density, len(gains), config, rng)
-
-
-def _drawn_positions(seen: Sighting, which: Indices, rng: np.random.Generator) -> Samples:
-    """(n, 2): where the landmarks `which` (n,) may stand."""
-    number = len(which)
-    mean_m = seen.mean_m[which]
-    root_m = _roots(seen.covariance_m2)[which]
-
-    drawn = rng.normal(0.0, 1.0, (number, 2))
-    offset_m = np.einsum("nij,nj->ni", root_m, drawn)
-    position_m: Samples = mean_m + offset_m
-    return position_m
-
-
-def _drawn_distances(
-    seen: Sighting, which: Indices, gains: Samples, config: Config, rng: np.random.Generator
-) -> Samples:
-    """(n,): how far the landmarks `which` (n,) may be, for (n,) gains of range."""
-    number = len(which)
-    mean_m = seen.range_m[which]
-    sd_m = seen.range_sd_m[which]
-    has_range = seen.has_range[which]
-
-    measured_m = rng.normal(mean_m, sd_m)
-    near_m = measured_m / (1 + gains)
-    any_m = rng.uniform(0.0, config.farthest_m, number)
-    distance_m = np.where(has_range, near_m, any_m)
-    return np.maximum(distance_m, 0.0)
-
-
-def _drawn_bearings(seen: Sighting, which: Indices, rng: np.random.Generator) -> Samples:
-    """(n,): at what bearings the landmarks `which` (n,) may be."""
-    number = len(which)
-    mean_rad = seen.bearing_rad[which]
-    sd_rad = seen.bearing_sd_rad[which]
-    has_bearing = seen.has_bearing[which]
-
-    measured_rad = rng.normal(mean_rad, sd_rad)
-    any_rad = rng.uniform(-np.pi, np.pi, number)
-    return np.where(has_bearing, measured_rad, any_rad)
 
 
 def relocalize_heading(
@@ -184,19 +130,14 @@ def relocalize_heading(
     with_bearing = np.flatnonzero(seen.has_bearing)
     which = rng.choice(with_bearing, size=number)
 
-    landmark_m = seen.mean_m[which]
-    east_m = landmark_m[:, 0] - candidates[:, 0]
-    north_m = landmark_m[:, 1] - candidates[:, 1]
-    direction_rad = np.arctan2(north_m, east_m)
+    offset_m = seen.mean_m[which] - candidates[:, :2]
+    direction_rad = np.arctan2(offset_m[:, 1], offset_m[:, 0])
     drawn = rng.normal(0.0, 1.0, number)
     bearing_rad = seen.bearing_rad[which] + drawn * seen.bearing_sd_rad[which]
     candidates[:, 2] = direction_rad - bearing_rad
 
-    # Each was turned by that one's bearing.
     density = compare(candidates, seen).density
-    by_bearing = np.exp(drawn**2 / 2)
-    each = np.arange(number)
-    density[which, each] *= by_bearing
+    density[which, np.arange(number)] *= np.exp(drawn**2 / 2)  # it was turned by that one's bearing
     return _drawn(candidates, density, len(samples), config, rng)
 
 
@@ -205,8 +146,7 @@ def _drawn(
 ) -> Samples:
     """`count` of (n, 7) candidates, drawn by the (k, n) densities of the landmarks in view."""
     scores = log_likelihood(density, config.outlier_share)
-    relative_scores = scores - scores.max()
-    weights = np.exp(relative_scores)
+    weights = np.exp(scores - scores.max())
     probabilities = weights / weights.sum()
     chosen = rng.choice(len(candidates), size=count, p=probabilities)
     return candidates[chosen]

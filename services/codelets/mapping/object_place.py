@@ -4,16 +4,12 @@ position, and a place (paper §5.2).
 
 from __future__ import annotations
 
-import numpy as np
-
 from cogmap.errors import MessageError
-from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.codelets import Task
 from schemas.graph import Phase
 from schemas.nodes import SELF_ID, LinkKind, Object, Self, object_id
-from schemas.sensing import Percept
 from services.codelets.config import SECTION, Config
 from services.codelets.localization.landmarks import (
     FIRST,
@@ -58,8 +54,13 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         return Answer()
 
     (percept,) = task.percepts
+    rng = generator(task.task_id)
+    samples = with_gains(agent.samples.numpy(), config, rng)
+    nearby = nearby_selves(samples, config)
+    selves = resample(nearby, config.landmark_samples, 0.0, rng)
+
     node = _new(percept.label, agent, task)
-    positions_m = _positions_m(percept, agent, config, generator(task.task_id))
+    positions_m = first_positions(selves, percept, config, rng)
     return object_answer(task, graph, node, positions_m, FIRST)
 
 
@@ -73,15 +74,6 @@ CODELET = Codelet(
     config=Config,
     section=SECTION,
 )
-
-
-def _positions_m(percept: Percept, agent: Self, config: Config, rng: np.random.Generator) -> Floats:
-    """(n, 2): samples of where the percept's object is, by the agent's samples."""
-    samples = with_gains(agent.samples.numpy(), config, rng)
-    nearby = nearby_selves(samples, config)
-    selves = resample(nearby, config.landmark_samples)
-
-    return first_positions(selves, percept, config, rng)
 
 
 def _new(label: str, agent: Self, task: Task) -> Object:
