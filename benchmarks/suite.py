@@ -23,7 +23,7 @@ from benchmarks.report import Metrics, Outcome
 from benchmarks.spiking import measure as spiking
 from benchmarks.threshold import Thresholds
 from cogmap.errors import CogmapError, UsageError
-from cogmap.parallel import exit_with
+from cogmap.parallel import end_workers, exit_with
 
 MACHINE_UNIT = "machine_unit_ms"
 CONES_SCALE = 4.0
@@ -171,6 +171,8 @@ def _measured(measure: Callable[[Setting], Metrics], setting: Setting) -> tuple[
         return {}, str(error)
     except Exception as error:
         return {}, f"{type(error).__name__}: {error}"
+    finally:
+        end_workers()
 
 
 def completed(name: str, thresholds: Thresholds, metrics: Metrics, failure: str = "") -> Outcome:

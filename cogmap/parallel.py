@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from joblib import Parallel, delayed
+from joblib.externals.loky import get_reusable_executor
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -44,6 +45,14 @@ def parallel_map(
         progress(len(results) / len(jobs))
 
     return results
+
+
+def end_workers() -> None:
+    """End the processes that wait for another `parallel_map`; by themselves they do in 5 minutes.
+
+    A process that a pool has started cannot exit before.
+    """
+    get_reusable_executor(reuse=True).shutdown(wait=True)
 
 
 def exit_with(parent: int) -> None:

@@ -21,6 +21,7 @@ from benchmarks.suite import Benchmark, Setting
 from benchmarks.threshold import Threshold, at_least, at_most, more_than, within
 from cogmap.bus.codec import encode
 from cogmap.errors import UsageError
+from cogmap.parallel import parallel_map
 from schemas.graph import Links
 from schemas.nodes import GraphNode
 from services.workspace.commit import Ledger
@@ -100,6 +101,10 @@ def _crashing(setting: Setting) -> Metrics:
     return {}
 
 
+def _parallel(setting: Setting) -> Metrics:
+    return {"total": float(sum(parallel_map(abs, [-1, 2], 2)))}
+
+
 def _silent(sentence: str) -> None:
     """Announces nothing."""
 
@@ -163,6 +168,15 @@ def test_a_benchmark_that_fails_is_a_row_with_its_reason_and_others_run(
     assert "ZeroDivisionError: nothing was measured" in result.output
     assert "its process died" in result.output
     assert json.loads(path.read_text())["fast_ms"] == 1.0
+
+
+def test_a_benchmark_ends_with_the_processes_that_it_used(tmp_path: Path) -> None:
+    outcome = suite.run(
+        Benchmark("spiking", {}, _parallel),
+        Setting(tmp_path, 2, None, _silent),
+    )
+
+    assert outcome.metrics["total"] == 3.0
 
 
 def test_a_benchmark_of_a_set_that_is_not_there_names_its_folder(tmp_path: Path) -> None:
