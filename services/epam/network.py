@@ -27,9 +27,9 @@ class Network:
         self._input_shape = input_shape
         self._output_names = list(output_shapes)
 
-        (received,) = self._session.get_inputs()
-        self._input_name = received.name
-        _check(path, "takes", {"input": tuple(received.shape)}, {"input": input_shape})
+        inputs = {received.name: tuple(received.shape) for received in self._session.get_inputs()}
+        self._input_name = next(iter(inputs), "input")
+        _check(path, "takes", inputs, {self._input_name: input_shape})
 
         shapes = {output.name: tuple(output.shape) for output in self._session.get_outputs()}
         _check(path, "gives", shapes, output_shapes)
