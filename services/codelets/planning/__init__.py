@@ -1,0 +1,1 @@
+"""Route planning by activation that spreads over place networks (paper §5.5)."""

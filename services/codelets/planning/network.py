@@ -1,0 +1,66 @@
+"""Place networks: place nodes on a regular grid, linked to eight neighbours (paper §5.2)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cogmap.geometry.arrays import Booleans, Indices, Singles
+
+LINK_OFFSETS: Indices = np.array([(1, 0), (1, 1), (0, 1), (-1, 1)])
+NEIGHBOUR_OFFSETS: Indices = np.concatenate([LINK_OFFSETS, -LINK_OFFSETS])
+Cell = tuple[int, int]
+
+
+class PlaceNetwork(NamedTuple):
+    """Place nodes of one map, and how well each link between two of them can be traversed.
+
+    `origin`: the cell of index [0, 0]; cell (i, j) stands at (i * cell_m, j * cell_m) in the map's
+    frame. `weights`: (4, width, height), of the links to the neighbours at LINK_OFFSETS, that is
+    E, NE, N and NW; 0 is not traversable, 1 is free. Links have no direction.
+    """
+
+    origin: Cell
+    cell_m: float
+    weights: Singles
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """How many cells wide and high."""
+        _, width, height = self.weights.shape
+        return width, height
+
+    def contains(self, cell: Cell) -> bool:
+        """Whether a cell of the map lies in the network."""
+        i, j = self.index_of(cell)
+        width, height = self.shape
+        return 0 <= i < width and 0 <= j < height
+
+    def index_of(self, cell: Cell) -> Cell:
+        """The index in arrays of this network of a cell of the map."""
+        return cell[0] - self.origin[0], cell[1] - self.origin[1]
+
+
+def grid_network(free: Booleans, cell_m: float = 1.0, origin: Cell = (0, 0)) -> PlaceNetwork:
+    """The network of a grid whose cells are `free`, (width, height), or blocked.
+
+    A diagonal link exists only where both cells beside it are free too: no corner is cut.
+    """
+    width, height = free.shape
+    padded = np.zeros((width + 2, height + 2), bool)
+    padded[1:-1, 1:-1] = free
+
+    weights = np.empty((len(LINK_OFFSETS), width, height), np.float32)
+    for link, (di, dj) in enumerate(LINK_OFFSETS.tolist()):
+        beside_i = _shifted(padded, di, 0)
+        beside_j = _shifted(padded, 0, dj)
+        weights[link] = free & beside_i & beside_j & _shifted(padded, di, dj)
+
+    return PlaceNetwork(origin, cell_m, weights)
+
+
+def _shifted(padded: Booleans, di: int, dj: int) -> Booleans:
+    """The neighbours at an offset, of a grid that is padded by one cell on each side."""
+    width, height = padded.shape
+    return padded[1 + di : width - 1 + di, 1 + dj : height - 1 + dj]
