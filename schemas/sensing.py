@@ -205,34 +205,67 @@ class Pose(Part, kw_only=True, frozen=True):
 
 
 class TruePose(Message, kw_only=True, frozen=True):
-    """Where the robot really is. Observers only."""
+    """Where the robot really is, and how often it has run into something. Observers only."""
 
     pose: Pose
     travelled_m: Metres
     progress: Unit
+    collisions: Count = 0
 
 
 class Street(Part, kw_only=True, frozen=True):
-    """A street's centre line, (x, y) in metres, and its width."""
+    """A street's centre line, (x, y) in metres, its width between the kerbs, and whether a barrier
+    closes it.
+    """
 
     name: Name
     line_m: list[tuple[Finite, Finite]]
     width_m: Metres
+    closed: bool = False
 
 
 class Building(Part, kw_only=True, frozen=True):
-    """A building's footprint: centre, width along its heading, depth across it, height."""
+    """A building's footprint: centre, width along its heading, depth across it, height.
+
+    `outline_m` are the corners, (x, y) in metres, counter-clockwise, of one that is no rectangle.
+    `function` is what it is used for, `district` the part of the town that it is in.
+    """
 
     name: Name
     pose: Pose
     width_m: Metres
     depth_m: Metres
     height_m: Metres
+    district: str = ""
+    function: str = ""
+    outline_m: list[tuple[Finite, Finite]] = []
+
+
+class Obstacle(Part, kw_only=True, frozen=True):
+    """What stands on a pavement or a street: centre, length along its heading, width, height."""
+
+    kind: Name
+    pose: Pose
+    length_m: Metres
+    width_m: Metres
+    height_m: Metres
+
+
+def _no_segments() -> Array:
+    segments_m = np.empty((0, 4), np.float32)
+    return Array.of(segments_m)
 
 
 class TrueTown(Message, kw_only=True, frozen=True):
-    """The town as it was built. Observers only."""
+    """The town as it was built, published again when a street is closed or opened. Observers only.
+
+    `kerbs_m`, where the surface of the streets ends, and `walls_m`, the buildings' outer walls, are
+    segments, float32 (n, 4): x and y of one end, then of the other.
+    """
 
     seed: Count
     streets: list[Street]
     buildings: list[Building]
+    obstacles: list[Obstacle] = []
+    kerbs_m: Array = msgspec.field(default_factory=_no_segments)
+    walls_m: Array = msgspec.field(default_factory=_no_segments)

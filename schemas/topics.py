@@ -83,7 +83,15 @@ BROADCAST = Topic("global_workspace/broadcast", cognition.Broadcast, 0, _NEVER)
 ACTION = Topic("action/selected", cognition.Action, 0, _NEVER)
 MOTOR_COMMAND = Topic("motor/command", sensing.MotorCommand, 5, _NEVER)
 TRUE_POSE = Topic("truth/pose", sensing.TruePose, 20, _LATEST, Scope.TRUTH, sensed=True)
-TRUE_TOWN = Topic("truth/town", sensing.TrueTown, 0.2, _NEVER, Scope.TRUTH, sensed=True)
+TRUE_TOWN = Topic(
+    "truth/town",
+    sensing.TrueTown,
+    0.2,
+    _NEVER,
+    Scope.TRUTH,
+    max_bytes=16 * MIB,
+    sensed=True,
+)
 PRESENCE = Topic("presence", process.Presence, 0, _NEVER, Scope.PROCESS)
 HEALTH = Topic("health", process.Health, 0, _LATEST, Scope.PROCESS)
 

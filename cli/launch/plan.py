@@ -15,6 +15,7 @@ from cogmap.runtime import config
 from cogmap.runtime.config import Sections
 from services import registry
 from services.sim.layout.town import generate
+from services.sim.layout.towns import LOOP
 
 OBSERVER = "observer"
 RECORDER = "recorder"
@@ -51,7 +52,7 @@ def effective(base: Sections, choices: Choices, awaits: dict[str, int]) -> Secti
 
     sim = complete["sim"]
     action = complete["action"]
-    if not action["route"]:
+    if not action["route"] and sim["town"] == LOOP:
         action["route"] = _route(sim["seed"], sim["laps"])
     return complete
 

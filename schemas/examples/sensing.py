@@ -10,6 +10,7 @@ from schemas.sensing import (
     Learned,
     LearnedObject,
     MotorCommand,
+    Obstacle,
     Odometry,
     Percept,
     Percepts,
@@ -39,7 +40,7 @@ def messages() -> list[Message]:
         RangeScan(frame=6, bearing_rad=ramp(5, dtype="<f4"), range_m=ramp(5, dtype="<f4")),
         _percepts(),
         _motor_command(),
-        TruePose(pose=_pose(), travelled_m=12.5, progress=0.25),
+        TruePose(pose=_pose(), travelled_m=12.5, progress=0.25, collisions=2),
         _town(),
     ]
 
@@ -121,6 +122,7 @@ def _town() -> TrueTown:
         name="ring",
         line_m=[(0.0, 0.0), (60.0, 0.5)],
         width_m=8.0,
+        closed=True,
     )
     house = Building(
         name="building-07",
@@ -128,5 +130,22 @@ def _town() -> TrueTown:
         width_m=9.0,
         depth_m=8.0,
         height_m=6.5,
+        district="Old Town",
+        function="shop",
+        outline_m=[(0.0, 0.0), (9.0, 0.0), (9.0, 8.0)],
     )
-    return TrueTown(seed=7, streets=[street], buildings=[house])
+    kiosk = Obstacle(
+        kind="kiosk",
+        pose=_pose(),
+        length_m=2.0,
+        width_m=1.75,
+        height_m=2.5,
+    )
+    return TrueTown(
+        seed=7,
+        streets=[street],
+        buildings=[house],
+        obstacles=[kiosk],
+        kerbs_m=ramp(3, 4, dtype="<f4"),
+        walls_m=ramp(2, 4, dtype="<f4"),
+    )

@@ -9,6 +9,7 @@ import msgspec
 from cogmap.errors import ConfigError
 from schemas.base import PositiveSeconds
 from services.sim.layout.catalogue import CATALOGUE
+from services.sim.layout.closures import Closure
 from services.sim.odometry import Noise
 from services.sim.scripted.percepts import PerceptErrors
 from services.sim.scripted.trajectory import Trajectory
@@ -57,8 +58,39 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     noise: Annotated[Noise, msgspec.Meta(description="Noise of the wheels' odometry.")] = Noise()
     percepts: Annotated[
         PerceptErrors,
-        msgspec.Meta(description="Errors of percepts along a trajectory without cameras."),
+        msgspec.Meta(description="Errors of percepts without cameras."),
     ] = PerceptErrors()
+    town: Annotated[
+        str,
+        msgspec.Meta(
+            pattern="^(loop|blocks)$",
+            description="loop: a loop of streets with a route around it. blocks: several blocks, "
+            "with districts, and no route.",
+        ),
+    ] = "loop"
+    town_size_m: Annotated[
+        float,
+        msgspec.Meta(ge=120, le=1000, description="Side of a town of blocks, in m, 120 to 1000."),
+    ] = 200.0
+    sensing: Annotated[
+        Literal["cameras", "percepts"],
+        msgspec.Meta(
+            description="cameras: rendered images and odometry are published, and perception runs. "
+            "percepts: published, in lockstep, with the errors that perception was measured to "
+            "make."
+        ),
+    ] = "cameras"
+    duration_s: Annotated[
+        float,
+        msgspec.Meta(
+            gt=0,
+            le=1e6,
+            description="Simulated time of a drive without a route, in s, above 0 to 1e6.",
+        ),
+    ] = 900.0
+    closures: Annotated[
+        list[Closure], msgspec.Meta(description="Streets that are closed for some time.")
+    ] = []
     trajectory: Annotated[
         Trajectory | None,
         msgspec.Meta(description="Line that the robot follows in lockstep, instead of a town."),
@@ -104,6 +136,11 @@ def check(config: Config) -> None:
     if steps_hz % config.odometry_hz:
         raise ConfigError(
             f"[sim] odometry_hz is {config.odometry_hz}: choose one that divides {steps_hz}"
+        )
+
+    if config.sensing == "percepts" and config.mode != "lockstep":
+        raise ConfigError(
+            '[sim] a town is sensed by percepts in lockstep only: set mode to "lockstep"'
         )
 
     if config.trajectory is not None:

@@ -36,6 +36,9 @@ class SteppedSim(Protocol):
     def town(self) -> TrueTown:
         """The place that is simulated."""
 
+    def changed_town(self) -> TrueTown | None:
+        """The place, where it has changed since the last call."""
+
 
 class Lockstep:
     """Advances `simulation` by one frame for each command that answers the last one, until the
@@ -92,9 +95,11 @@ class Lockstep:
 
         clock = simulation.clock(0.0)
         truth = simulation.truth()
+        changed = simulation.changed_town()
+        town = [] if changed is None else [changed]
         view = simulation.view()
 
         self._frame_ns = simulation.now_ns
         self._senses = [*odometry, *view]
 
-        return [*odometry, clock, truth, *view]
+        return [*odometry, clock, truth, *town, *view]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from cogmap.runtime.module import Module
 from schemas import topics
 from services.sim.config import Config, check
+from services.sim.driven.percept_level import DrivenPerceptLevelSim
 from services.sim.lockstep import REPEAT_CHECK_NS, Lockstep, SteppedSim
 from services.sim.real_time import RealTime
 from services.sim.scripted.camera_level import CameraLevelSim
@@ -25,6 +26,9 @@ def build(config: Config, instance: str = "sim") -> Module:
     module = Module("sim", instance)
     if config.trajectory is not None:
         return _scripted(module, config, config.trajectory)
+
+    if config.sensing == "percepts":
+        return _in_lockstep(module, config, DrivenPerceptLevelSim(config), _PERCEPT_LEVEL)
 
     simulation = Simulation(config)
     module.journaling(topics.TRUE_POSE, simulation.resume, simulation.truth)

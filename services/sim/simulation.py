@@ -109,6 +109,10 @@ class Simulation:
             progress=self.progress,
         )
 
+    def changed_town(self) -> TrueTown | None:
+        """None: the town does not change."""
+        return None
+
     def town(self) -> TrueTown:
         """The town."""
         town = self.world.town.message()

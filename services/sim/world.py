@@ -13,8 +13,8 @@ import numpy as np
 from cogmap.geometry.arrays import Singles
 from schemas.sensing import Pose
 from services.sim.layout.furniture import Prop
+from services.sim.layout.place import Place
 from services.sim.layout.plan import Plot, Point
-from services.sim.layout.town import Place
 from services.sim.rendering import mesh, prop_shapes, scenery
 from services.sim.rendering.egl import Egl
 from services.sim.rendering.egl import works as egl_works

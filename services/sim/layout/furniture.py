@@ -10,10 +10,11 @@ import numpy as np
 
 from services.sim.layout.plan import (
     PAVEMENT_WIDTH_M,
-    STREET_WIDTH_M,
     Plot,
+    Point,
     Rectangle,
     Road,
+    corners,
     overlap,
 )
 
@@ -58,7 +59,18 @@ class Prop:
             self.y_m + reach_y_m,
         )
 
+    @property
+    def solid(self) -> tuple[Point, ...]:
+        """The corners of what stands in the way of a robot, counter-clockwise: of a tree or a lamp
+        its trunk.
+        """
+        length_m, width_m, _ = self.size_m
+        trunk_m = _TRUNKS_M.get(self.kind)
+        size_m = (length_m, width_m) if trunk_m is None else (trunk_m, trunk_m)
+        return corners((self.x_m, self.y_m), self.heading_rad, size_m)
 
+
+_TRUNKS_M = {"tree": 0.4, "lamp": 0.2}
 _SIZES: dict[str, tuple[Size, Size]] = {
     "tree": ((1.4, 1.4, 3.0), (2.6, 2.6, 6.0)),
     "lamp": ((0.6, 0.6, 4.5), (0.7, 0.7, 5.5)),
@@ -73,9 +85,25 @@ _PROBABILITIES = (0.38, 0.14, 0.18, 0.14, 0.08, 0.08)
 def furnish(seed: int, roads: Sequence[Road], plots: Sequence[Plot]) -> tuple[Prop, ...]:
     """Props along `roads` and some farther away, clear of every street and every building."""
     rng = np.random.default_rng([seed, 0xF0])
-    occupied = [road.area(STREET_WIDTH_M / 2) for road in roads]
+    candidates = [*_along(rng, roads, _SPACING_M), *_scattered(rng)]
+
+    return _clear(candidates, roads, plots)
+
+
+def line_pavements(
+    rng: np.random.Generator, roads: Sequence[Road], plots: Sequence[Plot], spacing_m: float
+) -> tuple[Prop, ...]:
+    """Props along `roads`, clear of every street and every building."""
+    candidates = _along(rng, roads, spacing_m)
+    return _clear(candidates, roads, plots)
+
+
+def _clear(
+    candidates: Sequence[Prop], roads: Sequence[Road], plots: Sequence[Plot]
+) -> tuple[Prop, ...]:
+    """The candidates that stand on no street, in no building and in no candidate before them."""
+    occupied = [road.kerbs for road in roads]
     occupied += [plot.footprint for plot in plots]
-    candidates = [*_along(rng, roads), *_scattered(rng)]
 
     props: list[Prop] = []
     for prop in candidates:
@@ -88,15 +116,15 @@ def furnish(seed: int, roads: Sequence[Road], plots: Sequence[Plot]) -> tuple[Pr
     return tuple(props)
 
 
-def _along(rng: np.random.Generator, roads: Sequence[Road]) -> list[Prop]:
+def _along(rng: np.random.Generator, roads: Sequence[Road], spacing_m: float) -> list[Prop]:
     """Candidates on both pavements of each road."""
     props = []
     for road in roads:
         for side in (-1.0, 1.0):
-            along_m = float(rng.uniform(0, _SPACING_M))
+            along_m = float(rng.uniform(0, spacing_m))
             while along_m < road.length_m:
                 props.append(_beside(rng, road, along_m, side))
-                along_m += float(rng.uniform(0.6, 2.0)) * _SPACING_M
+                along_m += float(rng.uniform(0.6, 2.0)) * spacing_m
 
     return props
 
@@ -108,13 +136,19 @@ def _scattered(rng: np.random.Generator) -> list[Prop]:
         x_m, y_m = rng.uniform(-_AROUND_M, _AROUND_M, 2).tolist()
         heading_rad = float(rng.uniform(-math.pi, math.pi))
 
-        props.append(_prop(rng, x_m, y_m, heading_rad))
+        props.append(_some_prop(rng, x_m, y_m, heading_rad))
 
     return props
 
 
-def _prop(rng: np.random.Generator, x_m: float, y_m: float, heading_rad: float) -> Prop:
+def _some_prop(rng: np.random.Generator, x_m: float, y_m: float, heading_rad: float) -> Prop:
     kind = str(rng.choice(list(_SIZES), p=_PROBABILITIES))
+    return prop_of_kind(rng, kind, (x_m, y_m), heading_rad)
+
+
+def prop_of_kind(rng: np.random.Generator, kind: str, at_m: Point, heading_rad: float) -> Prop:
+    """A prop of one kind, its size drawn from what is usual."""
+    x_m, y_m = at_m
     least_m, most_m = _SIZES[kind]
     length_m, width_m, height_m = rng.uniform(least_m, most_m).round(2).tolist()
 
@@ -130,10 +164,10 @@ def _prop(rng: np.random.Generator, x_m: float, y_m: float, heading_rad: float) 
 
 def _beside(rng: np.random.Generator, road: Road, along_m: float, side: float) -> Prop:
     """A prop on the pavement, or as near to it as its size allows."""
-    prop = _prop(rng, 0.0, 0.0, road.heading_rad)
+    prop = _some_prop(rng, 0.0, 0.0, road.heading_rad)
     _, width_m, _ = prop.size_m
 
-    kerb_m = STREET_WIDTH_M / 2
+    kerb_m = road.width_m / 2
     least_m = kerb_m + _KERB_M + width_m / 2
     most_m = max(least_m, kerb_m + PAVEMENT_WIDTH_M)
     left_m = side * float(rng.uniform(least_m, most_m))

@@ -17,11 +17,12 @@ Rectangle = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class Road:
-    """A straight street: its centre line from `start` to `end`."""
+    """A straight street: its centre line from `start` to `end`, and the width between its kerbs."""
 
     name: str
     start: Point
     end: Point
+    width_m: float = STREET_WIDTH_M
 
     @property
     def length_m(self) -> float:
@@ -44,6 +45,16 @@ class Road:
         dx_m, dy_m = self.extent_m
 
         return math.atan2(dy_m, dx_m)
+
+    @property
+    def middle(self) -> Point:
+        """The middle of the centre line."""
+        return self.point(self.length_m / 2)
+
+    @property
+    def kerbs(self) -> Rectangle:
+        """West, south, east, north of the road's surface, where it runs along x or y."""
+        return self.area(self.width_m / 2)
 
     @property
     def is_along_an_axis(self) -> bool:
@@ -81,13 +92,15 @@ class Road:
 @dataclass(frozen=True)
 class Plot:
     """A building where it stands. Its front looks to the right of `heading_rad`; that heading runs
-    along its width.
+    along its width. `function` is what it is used for.
     """
 
     kind: BuildingType
     x_m: float
     y_m: float
     heading_rad: float
+    district: str = ""
+    function: str = ""
 
     @property
     def footprint(self) -> Rectangle:
@@ -104,6 +117,32 @@ class Plot:
         north = self.y_m + half_y_m
 
         return west, south, east, north
+
+    @property
+    def corners(self) -> tuple[Point, ...]:
+        """The corners of its walls, counter-clockwise from the front's left."""
+        size_m = (self.kind.width_m, self.kind.depth_m)
+        return corners((self.x_m, self.y_m), self.heading_rad, size_m)
+
+
+def corners(middle: Point, heading_rad: float, size_m: Point) -> tuple[Point, Point, Point, Point]:
+    """The corners of a rectangle, counter-clockwise; `size_m`: along its heading, and across it."""
+    middle_x, middle_y = middle
+    length_m, width_m = size_m
+    cos = math.cos(heading_rad)
+    sin = math.sin(heading_rad)
+
+    forward_x = cos * length_m / 2
+    forward_y = sin * length_m / 2
+    left_x = -sin * width_m / 2
+    left_y = cos * width_m / 2
+
+    return (
+        (middle_x - forward_x - left_x, middle_y - forward_y - left_y),
+        (middle_x + forward_x - left_x, middle_y + forward_y - left_y),
+        (middle_x + forward_x + left_x, middle_y + forward_y + left_y),
+        (middle_x - forward_x + left_x, middle_y - forward_y + left_y),
+    )
 
 
 def overlap(a: Rectangle, b: Rectangle, gap_m: float = 0.0) -> bool:

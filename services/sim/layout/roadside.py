@@ -11,8 +11,8 @@ import numpy as np
 
 from cogmap.errors import ConfigError
 from services.sim.layout.catalogue import CATALOGUE
+from services.sim.layout.place import Place
 from services.sim.layout.plan import Plot, Point, Road
-from services.sim.layout.town import Place
 from services.sim.scripted.percepts import Landmark
 from services.sim.scripted.trajectory import Line, Trajectory
 

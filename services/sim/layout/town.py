@@ -8,9 +8,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from schemas.sensing import Building, Pose, Street, TrueTown
+from schemas.sensing import Pose
 from services.sim.layout.catalogue import CATALOGUE, BuildingType
-from services.sim.layout.furniture import Prop, furnish
+from services.sim.layout.furniture import furnish
+from services.sim.layout.place import Place
 from services.sim.layout.plan import (
     PAVEMENT_WIDTH_M,
     STREET_WIDTH_M,
@@ -28,25 +29,6 @@ BUILDING_GAP_M = 1.0
 _REACH_M = STREET_WIDTH_M / 2 + PAVEMENT_WIDTH_M
 
 Leg = tuple[float, float]
-
-
-@dataclass(frozen=True)
-class Place:
-    """Streets, buildings, and props such as trees, and where the robot begins."""
-
-    seed: int
-    roads: tuple[Road, ...]
-    plots: tuple[Plot, ...]
-    props: tuple[Prop, ...]
-    start: Pose
-
-    def message(self) -> TrueTown:
-        """The place as it travels."""
-        return TrueTown(
-            seed=self.seed,
-            streets=[_street(road) for road in self.roads],
-            buildings=[_building(plot) for plot in self.plots],
-        )
 
 
 @dataclass(frozen=True)
@@ -237,17 +219,3 @@ def _between(a: Point, b: Point, share: float) -> Point:
     y = a_y + share * (b_y - a_y)
 
     return x, y
-
-
-def _street(road: Road) -> Street:
-    return Street(name=road.name, line_m=[road.start, road.end], width_m=STREET_WIDTH_M)
-
-
-def _building(plot: Plot) -> Building:
-    return Building(
-        name=plot.kind.name,
-        pose=Pose(x_m=plot.x_m, y_m=plot.y_m, heading_rad=plot.heading_rad),
-        width_m=plot.kind.width_m,
-        depth_m=plot.kind.depth_m,
-        height_m=plot.kind.height_m,
-    )

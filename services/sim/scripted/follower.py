@@ -32,6 +32,9 @@ class LineFollower:
         """The simulated time, which passes at `rate` times the wall's."""
         return Clock(stamp_ns=self.now_ns, rate=rate)
 
+    def changed_town(self) -> None:
+        """None: the place does not change."""
+
     def truth(self) -> TruePose:
         """The robot's true pose."""
         self.progress = self._travelled_m / self.line.length_m

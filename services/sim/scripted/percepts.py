@@ -9,7 +9,7 @@ each setting names the benchmark's metric.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Annotated
 
 import msgspec
@@ -93,6 +93,13 @@ class PerceptErrors(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fi
             "precision at which that recall was measured)."
         ),
     ] = 0.99
+    road_edge_sd_m: Annotated[
+        Share,
+        msgspec.Meta(
+            description="Standard deviation of the road's boundary, in m, 0 to 1 "
+            "(road_edge_error_m, a median, / 0.6745)."
+        ),
+    ] = 0.058 / NORMAL_MEDIAN
     nearest_m: Annotated[
         PositiveMetres,
         msgspec.Meta(description="Least range of a percept, in m, above 0 to 10000."),
@@ -138,9 +145,11 @@ class PerceptSim:
         bearing_rad = np.remainder(direction_rad + np.pi, 2 * np.pi) - np.pi
         return range_m, bearing_rad
 
-    def perceive(self, pose: Pose, visible: Sequence[int]) -> list[Percept]:
-        """Percepts of the landmarks that are `visible` from `pose`; of percepts with one name, the
-        first.
+    def perceive(
+        self, pose: Pose, visible: Sequence[int], cut: Collection[int] = ()
+    ) -> list[Percept]:
+        """Percepts of the landmarks that are `visible` from `pose`, not whole of those in `cut`; of
+        percepts with one name, the first.
         """
         errors = self._errors
         phantoms_per_object = (1 / errors.precision - 1) * errors.named_phantoms
@@ -148,7 +157,7 @@ class PerceptSim:
         percepts: dict[str, Percept] = {}
         for number in visible:
             if self._rng.random() < errors.detected:
-                found = self._detection(pose, number)
+                found = self._detection(pose, number, number not in cut)
                 percepts.setdefault(found.label, found)
 
             if self._rng.random() < phantoms_per_object:
@@ -157,7 +166,7 @@ class PerceptSim:
 
         return list(percepts.values())
 
-    def _detection(self, pose: Pose, number: int) -> Percept:
+    def _detection(self, pose: Pose, number: int, whole: bool) -> Percept:
         """A percept of a landmark that is there, perhaps by another name."""
         x_m, y_m = self._places_m[number] - (pose.x_m, pose.y_m)
         range_m = math.hypot(x_m, y_m)
@@ -165,7 +174,7 @@ class PerceptSim:
         bearing_rad = math.remainder(direction_rad - pose.heading_rad, math.tau)
 
         label = self._name(number)
-        return self._percept(label, number, range_m, bearing_rad)
+        return self._percept(label, number, range_m, bearing_rad, whole)
 
     def _phantom(self) -> Percept:
         """A percept of a landmark that is not there."""
@@ -188,7 +197,9 @@ class PerceptSim:
 
         return self._landmarks[number].name
 
-    def _percept(self, label: str, number: int, range_m: float, bearing_rad: float) -> Percept:
+    def _percept(
+        self, label: str, number: int, range_m: float, bearing_rad: float, whole: bool = True
+    ) -> Percept:
         """A percept of landmark `number` at `range_m` and `bearing_rad`, with noise on both."""
         errors = self._errors
         landmark = self._landmarks[number]
@@ -205,6 +216,6 @@ class PerceptSim:
             range_sd_m=range_sd_m,
             width_m=landmark.width_m,
             height_m=landmark.height_m,
-            whole=True,
+            whole=whole,
             box_px=(0, 0, 0, 0),
         )

@@ -24,7 +24,8 @@ class PlaceSim:
         self._rng = np.random.default_rng([seed, 0x9F])
 
         self._views: list[tuple[int, int]] = []
-        self._poses: list[tuple[float, float, float]] = []
+        # Columns x, y, heading and frame; the first rows are those of `_views`.
+        self._rows = np.zeros((256, 4))
         self._similar_frames = 0
 
     def recognize(self, frame: int, stamp_ns: int, pose: Pose) -> list[PlaceMatch]:
@@ -32,8 +33,7 @@ class PlaceSim:
         similar = self._similar(frame, pose)
         if similar is None:
             self._similar_frames = 0
-            self._views.append((frame, stamp_ns))
-            self._poses.append((pose.x_m, pose.y_m, pose.heading_rad))
+            self._remember(frame, stamp_ns, pose)
             return []
 
         self._similar_frames += 1
@@ -44,6 +44,14 @@ class PlaceSim:
             return []
 
         return [self._match(similar)]
+
+    def _remember(self, frame: int, stamp_ns: int, pose: Pose) -> None:
+        count = len(self._views)
+        if count == len(self._rows):
+            self._rows = np.vstack([self._rows, np.zeros_like(self._rows)])
+
+        self._rows[count] = (pose.x_m, pose.y_m, pose.heading_rad, frame)
+        self._views.append((frame, stamp_ns))
 
     def _match(self, similar: int) -> PlaceMatch:
         """The right view or, by mistake, any other."""
@@ -59,12 +67,10 @@ class PlaceSim:
         if not self._views:
             return None
 
-        poses = np.array(self._poses)
-        apart_m = np.hypot(poses[:, 0] - pose.x_m, poses[:, 1] - pose.y_m)
-        is_turned = _turns_rad(poses, pose) > MAX_TURN_RAD
-
-        frames = np.array([number for number, _ in self._views])
-        is_recent = frames > frame - RECENT_FRAMES
+        rows = self._rows[: len(self._views)]
+        apart_m = np.hypot(rows[:, 0] - pose.x_m, rows[:, 1] - pose.y_m)
+        is_turned = _turns_rad(rows, pose) > MAX_TURN_RAD
+        is_recent = rows[:, 3] > frame - RECENT_FRAMES
 
         apart_m[is_turned | is_recent] = np.inf
         nearest = int(apart_m.argmin())
@@ -72,7 +78,7 @@ class PlaceSim:
 
 
 def _turns_rad(poses: Floats, pose: Pose) -> Floats:
-    """(n,): the angles between the headings of (n, 3) poses and that of `pose`, 0 to pi."""
+    """(n,): the angles between the headings of n poses, one a row, and that of `pose`, 0 to pi."""
     difference_rad = poses[:, 2] - pose.heading_rad
     turn_rad = np.remainder(difference_rad + np.pi, 2 * np.pi) - np.pi
     return np.asarray(np.abs(turn_rad))

@@ -1,0 +1,149 @@
+"""What sensory memory and EPAM would publish of a place, from a true pose: computed from the ground
+plan, with the errors that they were measured to make. Pure.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cogmap.geometry.arrays import Floats, Singles
+from schemas.sensing import Calibration, Percept, Pose
+from services.sim.driven.camera import NEAR_M, NOTHING, Buffer, ColumnCamera, depths_m
+from services.sim.driven.ground import Lattice, boundary_points_m, road_points_m, thin
+from services.sim.driven.surroundings import Near
+from services.sim.layout.place import Place
+from services.sim.layout.plan import Plot
+from services.sim.scripted.percepts import Landmark, PerceptErrors, PerceptSim
+
+SECTORS = 32
+# Stereo matching finds no depth that is less; what is farther is not simulated.
+NEAREST_M = 2.2
+FARTHEST_M = 60.0
+# A building is seen where so many columns show it, and whole where so large a part of it is seen.
+MIN_COLUMNS = 8
+WHOLE_SHARE = 0.9
+# How much of the error of the road's boundary is the same all over one view.
+COMMON_SHARE = 0.5
+
+
+class View(NamedTuple):
+    """What is seen: a range scan, (SECTORS,) each; points of the road and its boundary, (n, 2), in
+    the robot's frame; and objects.
+    """
+
+    bearing_rad: Singles
+    range_m: Singles
+    road_m: Singles
+    boundary_m: Singles
+    objects: list[Percept]
+
+
+class Sensors:
+    """Range scan, road and objects of a place, the same from the same seed."""
+
+    def __init__(self, place: Place, errors: PerceptErrors, mount: Calibration, seed: int) -> None:
+        self._errors = errors
+        self._camera = ColumnCamera(mount)
+        self._lattice = Lattice(self._camera)
+        self._rng = np.random.default_rng([seed, 0x5C])
+
+        self._corners_m = [np.array(plot.corners) for plot in place.plots]
+        landmarks = [_landmark(plot) for plot in place.plots]
+        self._percepts = PerceptSim(errors, landmarks, seed)
+
+    def look(self, pose: Pose, near: Near) -> View:
+        """All that is seen from a pose, of what is near it."""
+        at = np.array([pose.x_m, pose.y_m, pose.heading_rad])
+        walls = self._camera.nearest(at, near.walls_m)
+        obstacles = self._camera.nearest(at, near.obstacles_m)
+        depth_m = depths_m(np.maximum(walls.inverse_m, obstacles.inverse_m))
+
+        bearing_rad, range_m = self._scan(depth_m)
+        road_m, boundary_m = self._ground(at, depth_m, near)
+
+        return View(
+            bearing_rad=bearing_rad,
+            range_m=range_m,
+            road_m=road_m,
+            boundary_m=boundary_m,
+            objects=self._objects(pose, at, walls, near),
+        )
+
+    def _scan(self, depth_m: Floats) -> tuple[Singles, Singles]:
+        """Bearing and range of the nearest in each sector, range 0 where there is nothing."""
+        middle_rad, nearest_m = scan(self._camera, depth_m)
+        factor = self._rng.normal(1.0, self._errors.range_sd_share, SECTORS)
+        return middle_rad.astype(np.float32), (nearest_m * factor).astype(np.float32)
+
+    def _ground(self, at: Floats, depth_m: Floats, near: Near) -> tuple[Singles, Singles]:
+        """Points of the road and of its boundary. Both are seen beside their place by one error;
+        each point of the boundary has one of its own.
+        """
+        variance_m2 = self._errors.road_edge_sd_m**2
+        common_m = self._rng.normal(0.0, np.sqrt(COMMON_SHARE * variance_m2), 2)
+        road_m = road_points_m(self._lattice, at, depth_m, near.streets, common_m)
+
+        exact_m = boundary_points_m(self._camera, at, depth_m, near.kerbs_m, common_m)
+        thinned_m = thin(exact_m)
+        own_sd_m = np.sqrt((1 - COMMON_SHARE) * variance_m2)
+        own_m = self._rng.normal(0.0, own_sd_m, thinned_m.shape)
+        return road_m, (thinned_m + own_m).astype(np.float32)
+
+    def _objects(self, pose: Pose, at: Floats, walls: Buffer, near: Near) -> list[Percept]:
+        """Percepts of the buildings that no other hides."""
+        segment = walls.segment[walls.segment != NOTHING]
+        columns = np.bincount(near.plot[segment], minlength=len(self._corners_m))
+
+        in_view = self._percepts.in_view(pose)
+        visible = [number for number in in_view if columns[number] >= MIN_COLUMNS]
+        cut = [number for number in visible if self._is_cut(at, number, int(columns[number]))]
+        return self._percepts.perceive(pose, visible, cut)
+
+    def _is_cut(self, at: Floats, number: int, columns: int) -> bool:
+        """Whether the image's border or another building cuts a building that `columns` show."""
+        corners_m = self._camera.seen_from(at, self._corners_m[number])
+        forward_m, left_m = corners_m.T
+        if forward_m.min() < NEAR_M:
+            return True
+
+        column = self._camera.column(forward_m, left_m)
+        is_inside = column.min() >= 1 and column.max() <= self._camera.width - 2
+        return not is_inside or columns < WHOLE_SHARE * np.ptp(column)
+
+
+def scan(camera: ColumnCamera, depth_m: Floats) -> tuple[Floats, Floats]:
+    """(SECTORS,) each: the middle bearing of each sector, from the left, and the range of the
+    nearest in it, 0 where there is nothing; both from the robot's origin. `depth_m` (width,) is
+    that of each image column.
+    """
+    is_measured = (depth_m >= NEAREST_M) & (depth_m <= FARTHEST_M)
+    seen_m = depth_m[is_measured]
+    forward_m = seen_m + camera.mount.mount_forward_m
+    left_m = camera.left_slope[is_measured] * seen_m
+    bearing_rad = np.arctan2(left_m, forward_m)
+
+    half_rad = camera.half_field_of_view_rad
+    sector_rad = 2 * half_rad / SECTORS
+    from_left = np.floor((half_rad - bearing_rad) / sector_rad).astype(np.int64)
+    sector = from_left.clip(0, SECTORS - 1)
+
+    nearest_m = np.full(SECTORS, np.inf)
+    np.minimum.at(nearest_m, sector, np.hypot(forward_m, left_m))
+    nearest_m[np.isinf(nearest_m)] = 0.0
+
+    middle_rad = half_rad - (np.arange(SECTORS) + 0.5) * sector_rad
+    return middle_rad, nearest_m
+
+
+def _landmark(plot: Plot) -> Landmark:
+    """A building as a landmark: it seems about as wide as its front is."""
+    kind = plot.kind
+    return Landmark(
+        name=kind.name,
+        x_m=plot.x_m,
+        y_m=plot.y_m,
+        width_m=kind.width_m,
+        height_m=kind.height_m,
+    )

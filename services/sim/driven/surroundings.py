@@ -1,0 +1,115 @@
+"""What is near the robot: walls, obstacles, barriers, kerbs and the surface of streets. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import NamedTuple
+
+import numpy as np
+
+from cogmap.geometry.arrays import Booleans, Floats, Indices
+from services.sim.layout.barriers import barrier
+from services.sim.layout.boundaries import Surfaces, outlines, surfaces
+from services.sim.layout.place import Place
+
+REACH_M = 60.0
+GROUND_REACH_M = 16.0
+BODY_REACH_M = 2.0
+# How far the robot moves before what is near it is chosen again.
+MOVED_M = 8.0
+KERB_STEP_M = 0.1
+WALLS_A_PLOT = 4
+
+
+class Near(NamedTuple):
+    """What is within reach of the robot.
+
+    `walls_m` (n, 4) with `plot` (n,), the building of each; `obstacles_m` (m, 4); `solid_m`, those
+    of both that it may touch; `kerbs_m`, points along the kerbs, (k, 2); the streets.
+    """
+
+    walls_m: Floats
+    plot: Indices
+    obstacles_m: Floats
+    solid_m: Floats
+    kerbs_m: Floats
+    streets: Surfaces
+
+
+class Surroundings:
+    """A place, searched by where the robot is."""
+
+    def __init__(self, place: Place) -> None:
+        self._walls_m = place.walls_m
+        self._plots = np.arange(len(self._walls_m)) // WALLS_A_PLOT
+        self._props_m = outlines([prop.solid for prop in place.props])
+        self._kerbs_m = _points_along(place.kerbs_m)
+        self._streets = surfaces(place.roads)
+        self._roads = {road.name: road for road in place.roads}
+
+        self._obstacles_m = self._props_m
+        self._middle_m: tuple[float, float] | None = None
+        self._near = self._search(place.start.x_m, place.start.y_m)
+
+    def close(self, names: Collection[str]) -> None:
+        """Let barriers close these streets, and no others."""
+        barriers = [barrier(self._roads[name]).solid for name in sorted(names)]
+        self._obstacles_m = np.vstack([self._props_m, outlines(barriers)])
+        self._middle_m = None
+
+    def near(self, x_m: float, y_m: float) -> Near:
+        """What is within REACH_M of a place, and of the ground within GROUND_REACH_M."""
+        middle_m = self._middle_m
+        if middle_m is None or np.hypot(middle_m[0] - x_m, middle_m[1] - y_m) > MOVED_M:
+            self._middle_m = (x_m, y_m)
+            self._near = self._search(x_m, y_m)
+
+        return self._near
+
+    def _search(self, x_m: float, y_m: float) -> Near:
+        is_near = _within(self._walls_m, x_m, y_m, REACH_M + MOVED_M)
+        is_obstacle = _within(self._obstacles_m, x_m, y_m, REACH_M + MOVED_M)
+        solid_m = np.vstack([self._walls_m, self._obstacles_m])
+        is_solid = _within(solid_m, x_m, y_m, BODY_REACH_M + MOVED_M)
+
+        ground_m = GROUND_REACH_M + MOVED_M
+        kerb_m = np.hypot(self._kerbs_m[:, 0] - x_m, self._kerbs_m[:, 1] - y_m)
+        half_m = self._streets.half_length_m + self._streets.half_width_m
+        street_m = np.hypot(*(self._streets.middle_m - (x_m, y_m)).T)
+
+        return Near(
+            walls_m=self._walls_m[is_near],
+            plot=self._plots[is_near],
+            obstacles_m=self._obstacles_m[is_obstacle],
+            solid_m=solid_m[is_solid],
+            kerbs_m=self._kerbs_m[kerb_m <= ground_m],
+            streets=self._streets.chosen(street_m <= ground_m + half_m),
+        )
+
+
+def _within(segments_m: Floats, x_m: float, y_m: float, reach_m: float) -> Booleans:
+    """(n,): which of (n, 4) segments have a bounding box that comes within reach, along both
+    axes.
+    """
+    west_m = np.minimum(segments_m[:, 0], segments_m[:, 2])
+    east_m = np.maximum(segments_m[:, 0], segments_m[:, 2])
+    south_m = np.minimum(segments_m[:, 1], segments_m[:, 3])
+    north_m = np.maximum(segments_m[:, 1], segments_m[:, 3])
+
+    is_near_x = (west_m <= x_m + reach_m) & (east_m >= x_m - reach_m)
+    is_near_y = (south_m <= y_m + reach_m) & (north_m >= y_m - reach_m)
+    return np.asarray(is_near_x & is_near_y)
+
+
+def _points_along(segments_m: Floats) -> Floats:
+    """(k, 2): points along (n, 4) segments, KERB_STEP_M apart at most."""
+    starts_m = segments_m[:, :2]
+    along_m = segments_m[:, 2:] - starts_m
+    counts = np.ceil(np.hypot(*along_m.T) / KERB_STEP_M).astype(int).clip(1)
+
+    number = np.repeat(np.arange(len(segments_m)), counts)
+    first = np.repeat(np.cumsum(counts) - counts, counts)
+    share = (np.arange(len(number)) - first + 0.5) / counts[number]
+
+    points_m: Floats = starts_m[number] + share[:, None] * along_m[number]
+    return points_m

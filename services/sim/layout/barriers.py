@@ -1,0 +1,27 @@
+"""Barriers that close streets. Pure."""
+
+from __future__ import annotations
+
+import math
+
+from services.sim.layout.furniture import Prop
+from services.sim.layout.plan import PAVEMENT_WIDTH_M, Road
+
+THICKNESS_M = 0.4
+HEIGHT_M = 1.2
+
+
+def barrier(road: Road) -> Prop:
+    """A barrier across the middle of a road and its pavements."""
+    x_m, y_m = road.middle
+    across_rad = math.remainder(road.heading_rad + math.pi / 2, math.tau)
+    length_m = road.width_m + 2 * PAVEMENT_WIDTH_M
+
+    return Prop(
+        kind="barrier",
+        x_m=x_m,
+        y_m=y_m,
+        heading_rad=across_rad,
+        size_m=(length_m, THICKNESS_M, HEIGHT_M),
+        look=0,
+    )

@@ -1,0 +1,302 @@
+"""The streets of a town of several blocks: an uneven grid with some stretches missing, dead ends
+and a square. Pure.
+
+A road is a stretch between two neighbouring crossings, so that closing one leaves every other
+reachable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from services.sim.layout.plan import Point, Road
+
+Crossing = tuple[int, int]
+Stretch = tuple[Crossing, Crossing]
+
+EDGE_M = 20.0
+BLOCK_M = 48.0
+UNEVEN = (0.86, 1.18)
+WIDTHS_M = {"Avenue": 11.0, "Street": 8.0, "Lane": 6.0}
+ALLEY_M = 5.0
+MISSING_SHARE = 0.22
+DEAD_END_SHARE = (0.4, 0.6)
+OUTWARD_M = (14.0, 18.0)
+SQUARE_M = (26.0, 32.0)
+SQUARE_NAME = "Market Square"
+_NAMES = (
+    "Oak",
+    "Elm",
+    "Ash",
+    "Birch",
+    "Cedar",
+    "Maple",
+    "Willow",
+    "Linden",
+    "Poplar",
+    "Hazel",
+    "Alder",
+    "Rowan",
+    "Cherry",
+    "Pine",
+    "Larch",
+    "Beech",
+    "Chestnut",
+    "Walnut",
+    "Plum",
+    "Pear",
+    "Apple",
+    "Juniper",
+    "Cypress",
+    "Laurel",
+    "Olive",
+    "Hawthorn",
+    "Sorrel",
+    "Thistle",
+    "Heather",
+    "Clover",
+)
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The lines of a grid of streets: where those along y and along x lie, and their widths."""
+
+    x_m: tuple[float, ...]
+    y_m: tuple[float, ...]
+    width_x_m: tuple[float, ...]
+    width_y_m: tuple[float, ...]
+
+    @property
+    def crossings(self) -> list[Crossing]:
+        """All of them, column by column."""
+        columns = range(len(self.x_m))
+        rows = range(len(self.y_m))
+        return [(column, row) for column in columns for row in rows]
+
+    def at(self, crossing: Crossing) -> Point:
+        """Where a crossing is."""
+        column, row = crossing
+        return self.x_m[column], self.y_m[row]
+
+    def stretches(self) -> list[Stretch]:
+        """All stretches between neighbouring crossings."""
+        found: list[Stretch] = []
+        for column, row in self.crossings:
+            if column + 1 < len(self.x_m):
+                found.append(((column, row), (column + 1, row)))
+            if row + 1 < len(self.y_m):
+                found.append(((column, row), (column, row + 1)))
+
+        return found
+
+    def line(self, stretch: Stretch) -> int:
+        """The number of the line that a stretch is part of: those along y first."""
+        (column, row), (other_column, _) = stretch
+        is_along_y = column == other_column
+        return column if is_along_y else len(self.x_m) + row
+
+    def width_m(self, stretch: Stretch) -> float:
+        """The width of a stretch."""
+        widths_m = (*self.width_x_m, *self.width_y_m)
+        return widths_m[self.line(stretch)]
+
+
+@dataclass(frozen=True)
+class Streets:
+    """The grid, its roads, the dead ends among them, and the square, which is the last road."""
+
+    grid: Grid
+    roads: tuple[Road, ...]
+    dead_ends: tuple[Road, ...]
+    square: Road
+
+
+def plan(rng: np.random.Generator, size_m: float) -> Streets:
+    """The streets of a town of `size_m` to the side."""
+    grid = _grid(rng, size_m)
+    names = _Names(rng, grid)
+
+    missing = _missing(rng, grid.stretches())
+    kept = [stretch for stretch in grid.stretches() if stretch not in missing]
+
+    through = [_road(grid, stretch, names) for stretch in kept]
+    dead_ends = _dead_ends(rng, grid, missing, names)
+    square = _square(rng, grid)
+
+    roads = (*through, *dead_ends, square)
+    return Streets(grid, roads, tuple(dead_ends), square)
+
+
+def _grid(rng: np.random.Generator, size_m: float) -> Grid:
+    x_m = _lines_m(rng, size_m)
+    y_m = _lines_m(rng, size_m)
+    widths_m = _widths_m(rng, len(x_m) + len(y_m))
+
+    return Grid(x_m, y_m, widths_m[: len(x_m)], widths_m[len(x_m) :])
+
+
+def _lines_m(rng: np.random.Generator, size_m: float) -> tuple[float, ...]:
+    """Where the lines of one direction lie, about BLOCK_M apart."""
+    span_m = size_m - 2 * EDGE_M
+    blocks = max(2, round(span_m / BLOCK_M))
+
+    gaps = rng.uniform(*UNEVEN, blocks)
+    lines = np.concatenate([[0.0], np.cumsum(gaps)])
+    lines_m = span_m * (lines / lines[-1] - 0.5)
+
+    return tuple(lines_m.round(1).tolist())
+
+
+def _widths_m(rng: np.random.Generator, count: int) -> tuple[float, ...]:
+    """A width for each line: at least one of each kind."""
+    kinds = list(WIDTHS_M.values())
+    others = rng.choice(kinds, count - len(kinds), p=(0.25, 0.45, 0.3))
+    widths_m = [*kinds, *others.tolist()]
+
+    return tuple(rng.permutation(widths_m).tolist())
+
+
+class _Names:
+    """Names a line of the grid, and numbers the stretches of it."""
+
+    def __init__(self, rng: np.random.Generator, grid: Grid) -> None:
+        self._grid = grid
+        self._words = [str(word) for word in rng.permutation(_NAMES)]
+        self._used: dict[str, int] = {}
+
+    def of(self, stretch: Stretch) -> str:
+        """The name of a stretch, such as "Elm Street 2"."""
+        kind = _kind(self._grid.width_m(stretch))
+        return self._numbered(self._grid.line(stretch), kind)
+
+    def dead_end(self, number: int) -> str:
+        """The name of a dead end, such as "Rowan Alley 1"."""
+        lines = len(self._grid.x_m) + len(self._grid.y_m)
+        return self._numbered(lines + number, "Alley")
+
+    def _numbered(self, number: int, kind: str) -> str:
+        word = self._words[number % len(self._words)]
+        more = number // len(self._words)
+        line = f"{word} {kind}" if not more else f"{word} {kind} {'I' * (more + 1)}"
+
+        count = self._used.get(line, 0) + 1
+        self._used[line] = count
+        return f"{line} {count}"
+
+
+def _kind(width_m: float) -> str:
+    """What a street of this width is called."""
+    return min(WIDTHS_M, key=lambda kind: abs(WIDTHS_M[kind] - width_m))
+
+
+def _road(grid: Grid, stretch: Stretch, names: _Names) -> Road:
+    first, second = stretch
+    return Road(names.of(stretch), grid.at(first), grid.at(second), grid.width_m(stretch))
+
+
+def _missing(rng: np.random.Generator, stretches: list[Stretch]) -> list[Stretch]:
+    """Stretches that are not built. Of those that are, any may be closed and all crossings stay
+    reachable.
+    """
+    most = round(MISSING_SHARE * len(stretches))
+    kept = list(stretches)
+
+    missing: list[Stretch] = []
+    for number in rng.permutation(len(stretches)).tolist():
+        if len(missing) == most:
+            break
+
+        stretch = stretches[number]
+        others = [other for other in kept if other != stretch]
+        if _is_robust(others):
+            kept = others
+            missing.append(stretch)
+
+    return missing
+
+
+def _is_robust(stretches: list[Stretch]) -> bool:
+    """Whether every crossing is reached from every other with any one stretch closed."""
+    crossings = {crossing for stretch in stretches for crossing in stretch}
+    for closed in stretches:
+        others = [other for other in stretches if other != closed]
+        if len(reachable(others)) < len(crossings):
+            return False
+
+    return True
+
+
+def reachable(stretches: Iterable[Stretch]) -> set[Crossing]:
+    """The crossings that are reached from the first one."""
+    neighbours: dict[Crossing, list[Crossing]] = {}
+    for first, second in stretches:
+        neighbours.setdefault(first, []).append(second)
+        neighbours.setdefault(second, []).append(first)
+
+    start = next(iter(neighbours))
+    found = {start}
+    waiting = [start]
+    while waiting:
+        for crossing in neighbours[waiting.pop()]:
+            if crossing not in found:
+                found.add(crossing)
+                waiting.append(crossing)
+
+    return found
+
+
+def _dead_ends(
+    rng: np.random.Generator, grid: Grid, missing: list[Stretch], names: _Names
+) -> list[Road]:
+    """Alleys into every other of the missing stretches, and two that lead out of the town."""
+    roads = []
+    for stretch in missing[::2]:
+        share = float(rng.uniform(*DEAD_END_SHARE))
+        first, second = stretch if rng.random() < 0.5 else stretch[::-1]
+
+        end = _between(grid.at(first), grid.at(second), share)
+        name = names.dead_end(len(roads))
+        roads.append(Road(name, grid.at(first), end, ALLEY_M))
+
+    for sign in (-1.0, 1.0):
+        start, end = _outward(rng, grid, sign)
+        name = names.dead_end(len(roads))
+        roads.append(Road(name, start, end, ALLEY_M))
+
+    return roads
+
+
+def _outward(rng: np.random.Generator, grid: Grid, sign: float) -> tuple[Point, Point]:
+    """A stretch from the western (-1) or eastern (1) border out of the town."""
+    x_m = grid.x_m[0] if sign < 0 else grid.x_m[-1]
+    y_m = grid.y_m[int(rng.integers(len(grid.y_m)))]
+    length_m = float(rng.uniform(*OUTWARD_M))
+
+    return (x_m, y_m), (round(x_m + sign * length_m, 1), y_m)
+
+
+def _square(rng: np.random.Generator, grid: Grid) -> Road:
+    """A square around one of the inner crossings: a road that is short and as wide as long."""
+    column = int(rng.integers(1, len(grid.x_m) - 1))
+    row = int(rng.integers(1, len(grid.y_m) - 1))
+    x_m, y_m = grid.at((column, row))
+
+    width_m = round(float(rng.uniform(*SQUARE_M)), 1)
+    half_line_m = 2.0
+    west = (x_m - half_line_m, y_m)
+    east = (x_m + half_line_m, y_m)
+
+    return Road(SQUARE_NAME, west, east, width_m)
+
+
+def _between(start: Point, end: Point, share: float) -> Point:
+    start_x, start_y = start
+    end_x, end_y = end
+    x_m = start_x + share * (end_x - start_x)
+    y_m = start_y + share * (end_y - start_y)
+
+    return round(x_m, 1), round(y_m, 1)

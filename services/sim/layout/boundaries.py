@@ -1,0 +1,177 @@
+"""Where streets and buildings end, as straight segments (n, 4): x and y of one end, then of the
+other. Pure.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from cogmap.geometry.arrays import Floats
+from services.sim.layout.plan import Point, Road, corners
+
+CHUNK = 256
+SHORTEST_M = 1e-3
+_SAME_M = 1e-6
+_LEVEL_M = 1e-9
+
+
+class Surfaces(NamedTuple):
+    """The surfaces of n streets: rectangles whose ends reach half a width further than their centre
+    lines.
+    """
+
+    middle_m: Floats
+    ahead: Floats
+    half_length_m: Floats
+    half_width_m: Floats
+
+    def local(self, points_m: Floats) -> tuple[Floats, Floats]:
+        """(k, n) each: how far (k, 2) points are from each middle, along the street and to its
+        left.
+        """
+        x_m = points_m[:, :1] - self.middle_m[:, 0]
+        y_m = points_m[:, 1:] - self.middle_m[:, 1]
+
+        along_m = x_m * self.ahead[:, 0] + y_m * self.ahead[:, 1]
+        left_m = y_m * self.ahead[:, 0] - x_m * self.ahead[:, 1]
+        return along_m, left_m
+
+    def chosen(self, numbers: Floats) -> Surfaces:
+        """Those of a mask or of numbers."""
+        return Surfaces(*(column[numbers] for column in self))
+
+
+def surfaces(roads: Sequence[Road]) -> Surfaces:
+    """The surfaces of `roads`."""
+    middles = [road.middle for road in roads]
+    headings_rad = np.array([road.heading_rad for road in roads])
+    lengths_m = np.array([road.length_m for road in roads])
+    widths_m = np.array([road.width_m for road in roads])
+
+    return Surfaces(
+        middle_m=np.array(middles, float).reshape(-1, 2),
+        ahead=np.column_stack([np.cos(headings_rad), np.sin(headings_rad)]),
+        half_length_m=(lengths_m + widths_m) / 2,
+        half_width_m=widths_m / 2,
+    )
+
+
+def outlines(shapes: Sequence[Sequence[Point]]) -> Floats:
+    """(n, 4): the sides of polygons, in order."""
+    sides = []
+    for shape in shapes:
+        following = [*shape[1:], shape[0]]
+        for start, end in zip(shape, following, strict=True):
+            sides.append((*start, *end))
+
+    return np.array(sides, float).reshape(-1, 4)
+
+
+def walls(footprints: Sequence[Sequence[Point]]) -> Floats:
+    """(n, 4): the sides of buildings' footprints, in order."""
+    return outlines(footprints)
+
+
+def kerbs(roads: Sequence[Road]) -> Floats:
+    """(n, 4): the outline of all that is the surface of a street: the sides of each street without
+    what lies on another.
+    """
+    if not roads:
+        return np.zeros((0, 4))
+
+    sides = outlines([_surface(road) for road in roads])
+    streets = surfaces(roads)
+
+    pieces = []
+    for first in range(0, len(sides), CHUNK):
+        chunk = sides[first : first + CHUNK]
+        owners = np.arange(first, first + len(chunk)) // 4
+        pieces += _uncovered(chunk, owners, streets)
+
+    return np.array(pieces, float).reshape(-1, 4)
+
+
+def _surface(road: Road) -> tuple[Point, ...]:
+    size_m = (road.length_m + road.width_m, road.width_m)
+    return corners(road.middle, road.heading_rad, size_m)
+
+
+def _uncovered(sides: Floats, owners: Floats, streets: Surfaces) -> list[list[float]]:
+    """The parts of (k, 4) sides, each of the street `owners`, that lie on no other street.
+
+    Of two sides at the same place, the first street's is kept.
+    """
+    begins, ends = _covered(sides, owners, streets)
+
+    pieces = []
+    for side, starts, stops in zip(sides, begins, ends, strict=True):
+        is_covered = stops > starts
+        start_m = side[:2]
+        along_m = side[2:] - start_m
+        shortest = SHORTEST_M / np.hypot(*along_m)
+
+        for begin, end in _gaps(starts[is_covered], stops[is_covered], shortest):
+            first_m = start_m + begin * along_m
+            last_m = start_m + end * along_m
+            pieces.append([*first_m.tolist(), *last_m.tolist()])
+
+    return pieces
+
+
+def _covered(sides: Floats, owners: Floats, streets: Surfaces) -> tuple[Floats, Floats]:
+    """(k, n) each: from which to which share of its length each side lies on each street."""
+    numbers = np.arange(len(streets.half_width_m))
+    is_before = numbers < owners[:, None]
+    wider_m = np.where(is_before, _SAME_M, -_SAME_M)
+
+    start_along_m, start_left_m = streets.local(sides[:, :2])
+    end_along_m, end_left_m = streets.local(sides[:, 2:])
+
+    along = _crossing(start_along_m, end_along_m, streets.half_length_m + wider_m)
+    across = _crossing(start_left_m, end_left_m, streets.half_width_m + wider_m)
+
+    begins = np.maximum(along[0], across[0]).clip(0.0, 1.0)
+    ends = np.minimum(along[1], across[1]).clip(0.0, 1.0)
+
+    is_own = numbers == owners[:, None]
+    ends[is_own] = 0.0
+    return begins, ends
+
+
+def _crossing(start_m: Floats, end_m: Floats, half_m: Floats) -> tuple[Floats, Floats]:
+    """From which to which share of the way from `start_m` to `end_m` the distance is `half_m` at
+    most, to either side; the second is lower where it never is.
+    """
+    change_m = end_m - start_m
+    is_level = np.abs(change_m) < _LEVEL_M
+    divisor_m = np.where(is_level, 1.0, change_m)
+
+    at_low = (-half_m - start_m) / divisor_m
+    at_high = (half_m - start_m) / divisor_m
+    begin = np.minimum(at_low, at_high)
+    end = np.maximum(at_low, at_high)
+
+    is_inside = np.abs(start_m) <= half_m
+    begin = np.where(is_level, np.where(is_inside, -math.inf, math.inf), begin)
+    end = np.where(is_level, np.where(is_inside, math.inf, -math.inf), end)
+    return begin, end
+
+
+def _gaps(starts: Floats, stops: Floats, shortest: float) -> list[tuple[float, float]]:
+    """The stretches of 0 to 1, longer than `shortest`, that none of the intervals covers."""
+    gaps = []
+    reached = 0.0
+    for number in np.argsort(starts).tolist():
+        start = float(starts[number])
+        if start > reached + shortest:
+            gaps.append((reached, start))
+        reached = max(reached, float(stops[number]))
+
+    if reached < 1.0 - shortest:
+        gaps.append((reached, 1.0))
+
+    return gaps

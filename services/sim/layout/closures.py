@@ -1,0 +1,86 @@
+"""When streets are closed and opened again. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Annotated
+
+import msgspec
+
+from cogmap.errors import ConfigError, MessageError
+from schemas.base import Name
+from services.sim.layout.plan import Road
+
+Seconds = Annotated[float, msgspec.Meta(ge=0, le=1e9)]
+
+
+class Closure(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """A street that a barrier closes for some time."""
+
+    street: Annotated[Name, msgspec.Meta(description="Name of the street, 1 to 200 characters.")]
+    from_s: Annotated[
+        Seconds,
+        msgspec.Meta(description="Simulated time at which it is closed, in s, 0 to 1e9."),
+    ]
+    to_s: Annotated[
+        Seconds,
+        msgspec.Meta(description="Simulated time at which it is opened again, in s, 0 to 1e9."),
+    ] = 1e9
+
+
+class ClosedStreets:
+    """Which streets are closed: as the schedule says, unless a command has changed it since."""
+
+    def __init__(self, roads: Sequence[Road], schedule: Sequence[Closure]) -> None:
+        self._names = frozenset(road.name for road in roads)
+        for closure in schedule:
+            if closure.street not in self._names:
+                raise ConfigError(
+                    f"[sim] closures: {self._unknown(closure.street)}: name one of this town's"
+                )
+
+        self._changes = _changes(schedule)
+        self._closed: set[str] = set()
+
+    @property
+    def names(self) -> frozenset[str]:
+        """The streets that are closed now."""
+        return frozenset(self._closed)
+
+    def advance(self, now_ns: int) -> bool:
+        """Follow the schedule up to a time; whether that closed or opened a street."""
+        before = self.names
+        while self._changes and self._changes[0][0] * 1e9 <= now_ns:
+            _, street, is_closed = self._changes.pop(0)
+            self._set(street, is_closed)
+
+        return self.names != before
+
+    def command(self, street: str, is_closed: bool) -> None:
+        """Close or open a street now. Raises MessageError where there is none of that name."""
+        if street not in self._names:
+            raise MessageError(self._unknown(street))
+        self._set(street, is_closed)
+
+    def _set(self, street: str, is_closed: bool) -> None:
+        if is_closed:
+            self._closed.add(street)
+        else:
+            self._closed.discard(street)
+
+    def _unknown(self, street: str) -> str:
+        return (
+            f"there is no street {street!r} in the town, which has {', '.join(sorted(self._names))}"
+        )
+
+
+def _changes(schedule: Iterable[Closure]) -> list[tuple[float, str, bool]]:
+    """Time in s, street, and whether it is closed then, in order; at one time streets are opened
+    first.
+    """
+    changes = []
+    for closure in schedule:
+        changes.append((closure.from_s, closure.street, True))
+        changes.append((closure.to_s, closure.street, False))
+
+    return sorted(changes, key=lambda change: (change[0], change[2], change[1]))

@@ -1,0 +1,77 @@
+"""A place to drive in: streets, buildings and props, and where the robot begins. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from cogmap.geometry.arrays import Floats
+from schemas.array import Array
+from schemas.sensing import Building, Obstacle, Pose, Street, TrueTown
+from services.sim.layout.boundaries import kerbs, walls
+from services.sim.layout.furniture import Prop
+from services.sim.layout.plan import Plot, Road
+
+
+@dataclass(frozen=True)
+class Place:
+    """Streets, buildings, and props such as trees, and where the robot begins."""
+
+    seed: int
+    roads: tuple[Road, ...]
+    plots: tuple[Plot, ...]
+    props: tuple[Prop, ...]
+    start: Pose
+
+    @property
+    def kerbs_m(self) -> Floats:
+        """(n, 4): where the streets' surface ends, x and y of both ends of each segment."""
+        return kerbs(self.roads)
+
+    @property
+    def walls_m(self) -> Floats:
+        """(n, 4): the outer walls of the buildings, in the order of `plots`."""
+        return walls([plot.corners for plot in self.plots])
+
+    def message(self, closed: Collection[str] = ()) -> TrueTown:
+        """The place as it travels, with the streets named in `closed` closed."""
+        streets = []
+        for road in self.roads:
+            streets.append(_street(road, road.name in closed))
+
+        return TrueTown(
+            seed=self.seed,
+            streets=streets,
+            buildings=[_building(plot) for plot in self.plots],
+            obstacles=[_obstacle(prop) for prop in self.props],
+            kerbs_m=Array.of(self.kerbs_m, "<f4"),
+            walls_m=Array.of(self.walls_m, "<f4"),
+        )
+
+
+def _street(road: Road, is_closed: bool) -> Street:
+    line_m = [road.start, road.end]
+    return Street(name=road.name, line_m=line_m, width_m=road.width_m, closed=is_closed)
+
+
+def _building(plot: Plot) -> Building:
+    return Building(
+        name=plot.kind.name,
+        pose=Pose(x_m=plot.x_m, y_m=plot.y_m, heading_rad=plot.heading_rad),
+        width_m=plot.kind.width_m,
+        depth_m=plot.kind.depth_m,
+        height_m=plot.kind.height_m,
+        district=plot.district,
+        function=plot.function,
+    )
+
+
+def _obstacle(prop: Prop) -> Obstacle:
+    length_m, width_m, height_m = prop.size_m
+    return Obstacle(
+        kind=prop.kind,
+        pose=Pose(x_m=prop.x_m, y_m=prop.y_m, heading_rad=prop.heading_rad),
+        length_m=length_m,
+        width_m=width_m,
+        height_m=height_m,
+    )
