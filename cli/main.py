@@ -77,6 +77,13 @@ def _run() -> click.Command:
     return run
 
 
+def _street() -> click.Command:
+    """Close streets of the simulated town, and open them."""
+    from cli.street import street
+
+    return street
+
+
 def _topic() -> click.Command:
     """Watch topics of a running system, or publish on them."""
     from cli.topic.command import topic
@@ -101,6 +108,7 @@ COMMANDS: dict[str, Loader] = {
     "module": _module,
     "router": _router,
     "run": _run,
+    "street": _street,
     "topic": _topic,
     "train": _train,
 }

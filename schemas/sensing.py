@@ -204,6 +204,13 @@ class Pose(Part, kw_only=True, frozen=True):
     heading_rad: Finite
 
 
+class StreetClosure(Message, kw_only=True, frozen=True):
+    """Closes a street of the simulated town by a barrier, or opens it. People publish it."""
+
+    street: Name
+    closed: bool
+
+
 class TruePose(Message, kw_only=True, frozen=True):
     """Where the robot really is, and how often it has run into something. Observers only."""
 

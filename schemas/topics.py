@@ -82,6 +82,7 @@ COMPETITION = Topic("global_workspace/competition", cognition.Competition, 5, _N
 BROADCAST = Topic("global_workspace/broadcast", cognition.Broadcast, 0, _NEVER)
 ACTION = Topic("action/selected", cognition.Action, 0, _NEVER)
 MOTOR_COMMAND = Topic("motor/command", sensing.MotorCommand, 5, _NEVER)
+STREET_CLOSURE = Topic("sim/street", sensing.StreetClosure, 0, _NEVER)
 TRUE_POSE = Topic("truth/pose", sensing.TruePose, 20, _LATEST, Scope.TRUTH, sensed=True)
 TRUE_TOWN = Topic(
     "truth/town",

@@ -24,6 +24,7 @@ def example_messages() -> list[Message]:
         *process.messages(),
         sensing.learned(),
         cognition.replay(),
+        sensing.street_closure(),
     ]
     stamped: list[Message] = []
     for seq, message in enumerate(messages):

@@ -22,6 +22,7 @@ from schemas.sensing import (
     SpeedLimit,
     StereoFrame,
     Street,
+    StreetClosure,
     TruePose,
     TrueTown,
     View,
@@ -69,6 +70,11 @@ def percept() -> Percept:
         box_px=(12, 34, 56, 78),
         outline_px=[(12, 34), (68, 34), (68, 112)],
     )
+
+
+def street_closure() -> StreetClosure:
+    """A street that a person closes."""
+    return StreetClosure(street="ring", closed=True)
 
 
 def place_match() -> PlaceMatch:

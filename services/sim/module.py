@@ -28,9 +28,12 @@ def build(config: Config, instance: str = "sim") -> Module:
         return _scripted(module, config, config.trajectory)
 
     if config.sensing == "percepts":
-        return _in_lockstep(module, config, DrivenPerceptLevelSim(config), _PERCEPT_LEVEL)
+        percepts = DrivenPerceptLevelSim(config)
+        module.on(topics.STREET_CLOSURE, percepts.closed_streets.on_closure)
+        return _in_lockstep(module, config, percepts, _PERCEPT_LEVEL)
 
     simulation = Simulation(config)
+    module.on(topics.STREET_CLOSURE, simulation.closed_streets.on_closure)
     module.journaling(topics.TRUE_POSE, simulation.resume, simulation.truth)
     if config.mode == "lockstep":
         return _in_lockstep(module, config, simulation, _CAMERA_LEVEL)

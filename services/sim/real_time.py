@@ -71,11 +71,17 @@ class RealTime:
         if messages:
             rate = self._rate(wall_ns)
             messages += [self._simulation.clock(rate), self._simulation.truth()]
+            messages += self._changed_town()
 
         if is_frame_due:
             messages.append(self._simulation.frame())
 
         return messages
+
+    def _changed_town(self) -> list[Message]:
+        """The town, where it has changed since the last call."""
+        changed = self._simulation.changed_town()
+        return [] if changed is None else [changed]
 
     def _fall_behind(self, wall_ns: int) -> None:
         """Add the wall's time since the last call to what is behind; the first call adds a tick."""

@@ -11,8 +11,11 @@ from schemas.base import Message
 from schemas.process import Clock
 from schemas.sensing import MotorCommand, Odometry, StereoFrame, TruePose, TrueTown
 from services.sim.config import Config
-from services.sim.layout import town
-from services.sim.layout.progress import Progress
+from services.sim.layout import towns
+from services.sim.layout.closures import ClosedStreets
+from services.sim.layout.place import Place
+from services.sim.layout.progress import Elapsed, Progress
+from services.sim.layout.town import Town
 from services.sim.odometry import WheelOdometry
 from services.sim.rendering.camera import StereoCamera, calibration
 from services.sim.world import World
@@ -28,13 +31,14 @@ class Simulation:
         self.now_ns = 0
         self.progress = 0.0
 
-        place = town.generate(config.seed)
+        place = towns.place(config.town, config.seed, config.town_size_m)
+        self.closed_streets = ClosedStreets(place.roads, config.closures)
         self.world = World(place, config.egl)
         mount = calibration(config.width_px, config.height_px)
         self.camera = StereoCamera(self.world, mount)
 
         self._odometry = WheelOdometry(config.noise, config.seed)
-        self._progress = Progress(place.line(config.laps))
+        self._progress = _progress(place, config)
         self._pose = self.world.pose()
         self._travelled_m = 0.0
         self._frames = 0
@@ -100,20 +104,33 @@ class Simulation:
     def truth(self) -> TruePose:
         """The robot's true pose."""
         pose = self._pose
-        self.progress = self._progress.advance(pose.x_m, pose.y_m)
+        self.progress = self._progress.advance(pose.x_m, pose.y_m, self.now_ns)
 
         return TruePose(
             stamp_ns=self.now_ns,
             pose=pose,
             travelled_m=self._travelled_m,
             progress=self.progress,
+            collisions=self.world.collisions,
         )
 
     def changed_town(self) -> TrueTown | None:
-        """None: the town does not change."""
-        return None
+        """The town, where a street was closed or opened since the last call."""
+        if not self.closed_streets.advance(self.now_ns):
+            return None
+
+        self.world.close_streets(self.closed_streets.names)
+        return self.town()
 
     def town(self) -> TrueTown:
-        """The town."""
-        town = self.world.town.message()
+        """The town as it is now."""
+        town = self.world.town.message(self.closed_streets.names)
         return msgspec.structs.replace(town, stamp_ns=self.now_ns)
+
+
+def _progress(place: Place, config: Config) -> Progress | Elapsed:
+    """How much of the route is completed or, where the place has none, of the time."""
+    if isinstance(place, Town):
+        return Progress(place.line(config.laps))
+
+    return Elapsed(round(config.duration_s * 1e9))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import tempfile
 import weakref
+from collections.abc import Collection
 from pathlib import Path
 
 import cv2
@@ -12,6 +13,7 @@ import numpy as np
 
 from cogmap.geometry.arrays import Singles
 from schemas.sensing import Pose
+from services.sim.layout.barriers import barrier
 from services.sim.layout.furniture import Prop
 from services.sim.layout.place import Place
 from services.sim.layout.plan import Plot, Point
@@ -26,6 +28,7 @@ from services.sim.stdio import pybullet, quiet
 STEP_S = 1 / 240
 _GRAVITY_M_S2 = -9.81
 _NOT_SOLID = -1
+_CONTACT_BODY = 2
 _ORIGIN = (0.0, 0.0)
 _log = logging.getLogger(__name__)
 
@@ -50,6 +53,10 @@ class World:
         self.relief = _relief(town)
         self.building_of_body: dict[int, str] = {}
         self.props: list[int] = []
+        self.collisions = 0
+        self._barriers: dict[str, int] = {}
+        self._solid: set[int] = set()
+        self._is_touching = False
         self.streets: list[int] = []
         self._build()
         self.robot = Robot(self.client, town.start)
@@ -60,6 +67,19 @@ class World:
 
         for _ in range(steps):
             pybullet.stepSimulation(physicsClientId=self.client)
+
+        self._count_collisions()
+
+    def close_streets(self, names: Collection[str]) -> None:
+        """Let barriers close these streets, and no others."""
+        for name in sorted(self._barriers.keys() - names):
+            body = self._barriers.pop(name)
+            self._solid.discard(body)
+            pybullet.removeBody(body, physicsClientId=self.client)
+
+        for road in self.town.roads:
+            if road.name in names and road.name not in self._barriers:
+                self._barriers[road.name] = self._add_obstacle(barrier(road))
 
     def pose(self) -> Pose:
         """The robot's pose."""
@@ -76,6 +96,16 @@ class World:
     def close(self) -> None:
         """Leave pybullet; nothing of it stays."""
         self._leave()
+
+    def _count_collisions(self) -> None:
+        """Count when the robot begins to touch something that stands on the ground."""
+        contacts = pybullet.getContactPoints(self.robot.body, physicsClientId=self.client)
+        touched = {contact[_CONTACT_BODY] for contact in contacts or ()}
+        is_touching = not self._solid.isdisjoint(touched)
+        if is_touching and not self._is_touching:
+            self.collisions += 1
+
+        self._is_touching = is_touching
 
     def _move(self, body: int, x_m: float, y_m: float) -> None:
         upright = (0, 0, 0, 1)
@@ -121,6 +151,7 @@ class World:
         surface, picture = mesh.building(kind)
         body = self._add(surface, picture, solid, (plot.x_m, plot.y_m), plot.heading_rad)
         self.building_of_body[body] = kind.name
+        self._solid.add(body)
 
     def _add_prop(self, prop: Prop) -> None:
         surface, picture = prop_shapes.shape(prop)
@@ -128,6 +159,19 @@ class World:
 
         body = self._add(surface, picture, at_m=at_m, heading_rad=prop.heading_rad)
         self.props.append(body)
+
+    def _add_obstacle(self, prop: Prop) -> int:
+        """Add a prop that nothing passes."""
+        length_m, width_m, height_m = prop.size_m
+        half_m = (length_m / 2, width_m / 2, height_m / 2)
+        solid = self._solid_box(*half_m, middle_m=height_m / 2)
+
+        surface, picture = prop_shapes.shape(prop)
+        at_m = (prop.x_m, prop.y_m)
+        body = self._add(surface, picture, solid, at_m, prop.heading_rad)
+        self._solid.add(body)
+
+        return body
 
     def _solid_box(self, half_x_m: float, half_y_m: float, half_z_m: float, middle_m: float) -> int:
         """A box that nothing passes, its middle at height `middle_m`."""

@@ -29,6 +29,7 @@ from services.sim.driven.sensors import Sensors
 from services.sim.driven.surroundings import Surroundings
 from services.sim.layout import towns
 from services.sim.layout.closures import ClosedStreets
+from services.sim.layout.progress import Elapsed
 from services.sim.odometry import Noise, WheelOdometry
 from services.sim.rendering.camera import calibration
 from services.sim.scripted.places import PlaceSim
@@ -50,7 +51,7 @@ class DrivenPerceptLevelSim:
         self.progress = 0.0
 
         self._place = towns.place(config.town, config.seed, config.town_size_m)
-        self._closed = ClosedStreets(self._place.roads, config.closures)
+        self.closed_streets = ClosedStreets(self._place.roads, config.closures)
         self._surroundings = Surroundings(self._place)
         self._robot = KinematicRobot(self._place.start, self._surroundings)
 
@@ -60,7 +61,7 @@ class DrivenPerceptLevelSim:
         self._odometry = WheelOdometry(config.noise, config.seed)
         self._noise = config.noise
 
-        self._duration_ns = round(config.duration_s * 1e9)
+        self._elapsed = Elapsed(round(config.duration_s * 1e9))
         self._motions: list[Row] = []
         self._frames = 0
 
@@ -118,11 +119,12 @@ class DrivenPerceptLevelSim:
 
     def truth(self) -> TruePose:
         """The robot's true pose."""
-        self.progress = min(1.0, self.now_ns / self._duration_ns)
+        pose = self._robot.pose
+        self.progress = self._elapsed.advance(pose.x_m, pose.y_m, self.now_ns)
 
         return TruePose(
             stamp_ns=self.now_ns,
-            pose=self._robot.pose,
+            pose=pose,
             travelled_m=self._robot.travelled_m,
             progress=self.progress,
             collisions=self._robot.collisions,
@@ -130,15 +132,15 @@ class DrivenPerceptLevelSim:
 
     def town(self) -> TrueTown:
         """The town as it is now."""
-        message = self._place.message(self._closed.names)
+        message = self._place.message(self.closed_streets.names)
         return msgspec.structs.replace(message, stamp_ns=self.now_ns)
 
     def changed_town(self) -> TrueTown | None:
         """The town, where a street was closed or opened since the last call."""
-        if not self._closed.advance(self.now_ns):
+        if not self.closed_streets.advance(self.now_ns):
             return None
 
-        self._surroundings.close(self._closed.names)
+        self._surroundings.close(self.closed_streets.names)
         return self.town()
 
     def _moved(self) -> Floats:

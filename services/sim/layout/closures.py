@@ -9,6 +9,7 @@ import msgspec
 
 from cogmap.errors import ConfigError, MessageError
 from schemas.base import Name
+from schemas.sensing import StreetClosure
 from services.sim.layout.plan import Road
 
 Seconds = Annotated[float, msgspec.Meta(ge=0, le=1e9)]
@@ -41,6 +42,7 @@ class ClosedStreets:
 
         self._changes = _changes(schedule)
         self._closed: set[str] = set()
+        self._is_changed = False
 
     @property
     def names(self) -> frozenset[str]:
@@ -48,30 +50,36 @@ class ClosedStreets:
         return frozenset(self._closed)
 
     def advance(self, now_ns: int) -> bool:
-        """Follow the schedule up to a time; whether that closed or opened a street."""
-        before = self.names
+        """Follow the schedule up to a time; whether a street was closed or opened since the last
+        call.
+        """
         while self._changes and self._changes[0][0] * 1e9 <= now_ns:
             _, street, is_closed = self._changes.pop(0)
             self._set(street, is_closed)
 
-        return self.names != before
+        is_changed = self._is_changed
+        self._is_changed = False
+        return is_changed
 
-    def command(self, street: str, is_closed: bool) -> None:
-        """Close or open a street now. Raises MessageError where there is none of that name."""
-        if street not in self._names:
-            raise MessageError(self._unknown(street))
-        self._set(street, is_closed)
+    def on_closure(self, closure: StreetClosure) -> None:
+        """Close or open a street now, whatever the schedule did before. Raises MessageError where
+        there is none of that name.
+        """
+        if closure.street not in self._names:
+            raise MessageError(self._unknown(closure.street))
+
+        self._set(closure.street, closure.closed)
 
     def _set(self, street: str, is_closed: bool) -> None:
+        self._is_changed = True
         if is_closed:
             self._closed.add(street)
         else:
             self._closed.discard(street)
 
     def _unknown(self, street: str) -> str:
-        return (
-            f"there is no street {street!r} in the town, which has {', '.join(sorted(self._names))}"
-        )
+        names = ", ".join(sorted(self._names))
+        return f"there is no street {street!r} in the town, which has {names}"
 
 
 def _changes(schedule: Iterable[Closure]) -> list[tuple[float, str, bool]]:

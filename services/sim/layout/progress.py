@@ -1,4 +1,4 @@
-"""How much of its route the robot has completed. Pure."""
+"""How much of its route, or of its time, the robot has completed. Pure."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class Progress:
         """Continue from a share of the route."""
         self._index = round(share * self._last)
 
-    def advance(self, x_m: float, y_m: float) -> float:
-        """The share of the route that lies behind the robot at this place."""
+    def advance(self, x_m: float, y_m: float, now_ns: int) -> float:
+        """The share of the route that lies behind the robot at this place, at any time."""
         end = self._index + round(WINDOW_M / STEP_M)
         ahead_m = self._points_m[self._index : end]
 
@@ -42,3 +42,17 @@ class Progress:
     @property
     def _last(self) -> int:
         return len(self._points_m) - 1
+
+
+class Elapsed:
+    """The time of a drive that has no route."""
+
+    def __init__(self, duration_ns: int) -> None:
+        self._duration_ns = duration_ns
+
+    def resume(self, share: float) -> None:
+        """Nothing to remember: the time is known."""
+
+    def advance(self, x_m: float, y_m: float, now_ns: int) -> float:
+        """The share of the time that has passed, at any place."""
+        return min(1.0, now_ns / self._duration_ns)

@@ -21,6 +21,9 @@ _SIDES = 9
 _ANGLES_RAD: list[float] = np.linspace(0, math.tau, _SIDES + 1).tolist()
 _GRAIN = 0.25
 _DARK: Colour = (40, 42, 46)
+_RED: Colour = (206, 34, 30)
+_WHITE: Colour = (240, 238, 232)
+_BOARD_M = 1.0
 _BARK: Colour = (92, 66, 44)
 # The two halves of the picture, each with one of the two colours.
 _FIRST = 0.0
@@ -138,6 +141,20 @@ def _bin(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
     return _DARK, _tinted((70, 84, 90), rng)
 
 
+def _barrier(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
+    """Boards across the street, red and white by turns."""
+    long_m, wide_m, tall_m = size_m
+    count = max(2, round(long_m / _BOARD_M))
+    edges_m = np.linspace(-long_m / 2, long_m / 2, count + 1).tolist()
+
+    for number, (start_m, end_m) in enumerate(pairwise(edges_m)):
+        low = (start_m, -wide_m / 2, 0.0)
+        high = (end_m, wide_m / 2, tall_m)
+        _box(mesh, low, high, _SECOND if number % 2 else _FIRST)
+
+    return _RED, _WHITE
+
+
 _BUILD: dict[str, Callable[[Mesh, Size, np.random.Generator], Colours]] = {
     "tree": _tree,
     "lamp": _lamp,
@@ -145,6 +162,7 @@ _BUILD: dict[str, Callable[[Mesh, Size, np.random.Generator], Colours]] = {
     "hedge": _hedge,
     "kiosk": _kiosk,
     "bin": _bin,
+    "barrier": _barrier,
 }
 
 
