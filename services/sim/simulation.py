@@ -33,7 +33,7 @@ class Simulation:
 
         place = towns.place(config.town, config.seed, config.town_size_m)
         self.closed_streets = ClosedStreets(place.roads, config.closures)
-        self.world = World(place, config.egl)
+        self.world = World(place, config.egl, whole=isinstance(place, Town))
         mount = calibration(config.width_px, config.height_px)
         self.camera = StereoCamera(self.world, mount)
 

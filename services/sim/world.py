@@ -3,33 +3,33 @@
 from __future__ import annotations
 
 import logging
-import tempfile
+import math
 import weakref
-from collections.abc import Collection
-from pathlib import Path
+from collections.abc import Collection, Sequence
+from functools import partial
 
-import cv2
 import numpy as np
 
 from cogmap.geometry.arrays import Singles
 from schemas.sensing import Pose
+from services.sim.bodies import Bodies
+from services.sim.builder import Builder
 from services.sim.layout.barriers import barrier
 from services.sim.layout.furniture import Prop
 from services.sim.layout.place import Place
-from services.sim.layout.plan import Plot, Point
-from services.sim.rendering import mesh, prop_shapes, scenery
+from services.sim.layout.plan import Plot, Road
+from services.sim.nearby import Nearby, Piece
+from services.sim.rendering import scenery
 from services.sim.rendering.egl import Egl
 from services.sim.rendering.egl import works as egl_works
 from services.sim.rendering.light import relief
-from services.sim.rendering.wall import Image
-from services.sim.robot import Robot, upright_quaternion
+from services.sim.robot import Robot
 from services.sim.stdio import pybullet, quiet
 
 STEP_S = 1 / 240
 _GRAVITY_M_S2 = -9.81
-_NOT_SOLID = -1
 _CONTACT_BODY = 2
-_ORIGIN = (0.0, 0.0)
+_TILE_M = 64.0
 _log = logging.getLogger(__name__)
 
 
@@ -37,10 +37,11 @@ class World:
     """A place with a robot in it. Positions in metres, x east, y north, z up; close it when done.
 
     With `want_egl` it is rendered by EGL where that works, and only in one world at a time in a
-    process (otherwise CogmapError).
+    process (otherwise CogmapError). A place that is not `whole` consists of what is near the robot,
+    and its obstacles stop the robot as its buildings do.
     """
 
-    def __init__(self, town: Place, want_egl: bool = True) -> None:
+    def __init__(self, town: Place, want_egl: bool = True, whole: bool = True) -> None:
         self.town = town
         with quiet():
             self.client: int = pybullet.connect(pybullet.DIRECT)
@@ -53,12 +54,16 @@ class World:
         self.relief = _relief(town)
         self.building_of_body: dict[int, str] = {}
         self.props: list[int] = []
+        self.streets: list[int] = []
         self.collisions = 0
         self._barriers: dict[str, int] = {}
         self._solid: set[int] = set()
         self._is_touching = False
-        self.streets: list[int] = []
-        self._build()
+
+        self._bodies = Bodies(self.client)
+        self._builder = Builder(self._bodies)
+        self._nearby: Nearby | None = None
+        self._build(whole)
         self.robot = Robot(self.client, town.start)
 
     def step(self, dt_s: float) -> None:
@@ -69,17 +74,9 @@ class World:
             pybullet.stepSimulation(physicsClientId=self.client)
 
         self._count_collisions()
-
-    def close_streets(self, names: Collection[str]) -> None:
-        """Let barriers close these streets, and no others."""
-        for name in sorted(self._barriers.keys() - names):
-            body = self._barriers.pop(name)
-            self._solid.discard(body)
-            pybullet.removeBody(body, physicsClientId=self.client)
-
-        for road in self.town.roads:
-            if road.name in names and road.name not in self._barriers:
-                self._barriers[road.name] = self._add_obstacle(barrier(road))
+        if self._nearby is not None:
+            pose = self.robot.pose()
+            self._follow(pose.x_m, pose.y_m)
 
     def pose(self) -> Pose:
         """The robot's pose."""
@@ -90,8 +87,18 @@ class World:
         distance.
         """
         self.robot.place(pose)
-        self._move(self._soil, _on_tile(pose.x_m), _on_tile(pose.y_m))
-        self._move(self.sky, pose.x_m, pose.y_m)
+        self._follow(pose.x_m, pose.y_m)
+
+    def close_streets(self, names: Collection[str]) -> None:
+        """Let barriers close these streets, and no others."""
+        for name in sorted(self._barriers.keys() - names):
+            self._remove(self._barriers.pop(name))
+
+        for road in self.town.roads:
+            if road.name in names and road.name not in self._barriers:
+                body = self._builder.prop(barrier(road), is_solid=True)
+                self._solid.add(body)
+                self._barriers[road.name] = body
 
     def close(self) -> None:
         """Leave pybullet; nothing of it stays."""
@@ -107,127 +114,84 @@ class World:
 
         self._is_touching = is_touching
 
-    def _move(self, body: int, x_m: float, y_m: float) -> None:
-        upright = (0, 0, 0, 1)
-        pybullet.resetBasePositionAndOrientation(
-            body,
-            (x_m, y_m, 0),
-            upright,
-            physicsClientId=self.client,
-        )
+    def _follow(self, x_m: float, y_m: float) -> None:
+        """Let the ground, the sky and what is near follow the robot."""
+        self._bodies.move(self._soil, _on_tile(x_m), _on_tile(y_m))
+        self._bodies.move(self.sky, x_m, y_m)
+        if self._nearby is not None:
+            self._nearby.update(x_m, y_m)
 
-    def _build(self) -> None:
+    def _build(self, whole: bool) -> None:
         client = self.client
         pybullet.setGravity(0, 0, _GRAVITY_M_S2, physicsClientId=client)
         pybullet.setTimeStep(STEP_S, physicsClientId=client)
 
-        self._add_ground()
-        self.sky = self._add(*scenery.sky())
+        self._soil = self._builder.soil()
+        pybullet.changeDynamics(self._soil, -1, lateralFriction=1.0, physicsClientId=client)
+        if not whole:
+            self.sky = self._builder.sky()
+            self._nearby = Nearby(self._pieces(), self._remove)
+            self._follow(self.town.start.x_m, self.town.start.y_m)
+            return
+
+        self.streets = self._builder.streets(self.town.roads)[1:]
+        self.sky = self._builder.sky()
         for plot in self.town.plots:
             self._add_building(plot)
 
         for prop in self.town.props:
-            self._add_prop(prop)
+            self.props.append(self._builder.prop(prop, is_solid=False))
 
-    def _add_ground(self) -> None:
-        grass, pavement, *streets = scenery.ground(self.town.roads)
-        floor = self._solid_box(scenery.GROUND_M, scenery.GROUND_M, 1.0, middle_m=-1.0)
-        self._soil = self._add(*grass, floor)
-        pybullet.changeDynamics(self._soil, -1, lateralFriction=1.0, physicsClientId=self.client)
+    def _pieces(self) -> list[Piece]:
+        """The streets tile by tile, the buildings and the props."""
+        pieces = [_tile(self._builder, roads) for roads in _tiles(self.town.roads)]
+        for plot in self.town.plots:
+            reach_m = math.hypot(plot.kind.width_m, plot.kind.depth_m) / 2
+            pieces.append(Piece((plot.x_m, plot.y_m), reach_m, partial(self._add_building, plot)))
 
-        self._add(*pavement)
-        self.streets = [self._add(*street) for street in streets]
+        for prop in self.town.props:
+            pieces.append(Piece((prop.x_m, prop.y_m), 0.0, partial(self._add_obstacle, prop)))
 
-    def _add_building(self, plot: Plot) -> None:
-        kind = plot.kind
-        half_height_m = kind.height_m / 2
-        solid = self._solid_box(
-            kind.width_m / 2,
-            kind.depth_m / 2,
-            half_height_m,
-            middle_m=half_height_m,
-        )
+        return pieces
 
-        surface, picture = mesh.building(kind)
-        body = self._add(surface, picture, solid, (plot.x_m, plot.y_m), plot.heading_rad)
-        self.building_of_body[body] = kind.name
+    def _add_building(self, plot: Plot) -> list[int]:
+        body = self._builder.building(plot)
+        self.building_of_body[body] = plot.kind.name
         self._solid.add(body)
+        return [body]
 
-    def _add_prop(self, prop: Prop) -> None:
-        surface, picture = prop_shapes.shape(prop)
-        at_m = (prop.x_m, prop.y_m)
-
-        body = self._add(surface, picture, at_m=at_m, heading_rad=prop.heading_rad)
-        self.props.append(body)
-
-    def _add_obstacle(self, prop: Prop) -> int:
-        """Add a prop that nothing passes."""
-        length_m, width_m, height_m = prop.size_m
-        half_m = (length_m / 2, width_m / 2, height_m / 2)
-        solid = self._solid_box(*half_m, middle_m=height_m / 2)
-
-        surface, picture = prop_shapes.shape(prop)
-        at_m = (prop.x_m, prop.y_m)
-        body = self._add(surface, picture, solid, at_m, prop.heading_rad)
+    def _add_obstacle(self, prop: Prop) -> list[int]:
+        body = self._builder.prop(prop, is_solid=True)
         self._solid.add(body)
+        return [body]
 
-        return body
-
-    def _solid_box(self, half_x_m: float, half_y_m: float, half_z_m: float, middle_m: float) -> int:
-        """A box that nothing passes, its middle at height `middle_m`."""
-        return int(
-            pybullet.createCollisionShape(
-                pybullet.GEOM_BOX,
-                halfExtents=[half_x_m, half_y_m, half_z_m],
-                collisionFramePosition=[0, 0, middle_m],
-                physicsClientId=self.client,
-            )
-        )
-
-    def _add(
-        self,
-        surface: mesh.Mesh,
-        picture: Image,
-        solid: int = _NOT_SOLID,
-        at_m: Point = _ORIGIN,
-        heading_rad: float = 0.0,
-    ) -> int:
-        """Add a body. Its shape and picture go through files, as all renderers of pybullet load
-        nothing else.
-        """
-        client = self.client
-        with tempfile.TemporaryDirectory(prefix="cogmap-") as folder:
-            form, paint = _written(surface, picture, Path(folder))
-            shape = pybullet.createVisualShape(
-                pybullet.GEOM_MESH,
-                fileName=form,
-                specularColor=[0, 0, 0],
-                physicsClientId=client,
-            )
-            body = pybullet.createMultiBody(
-                0,
-                solid,
-                shape,
-                (*at_m, 0.0),
-                upright_quaternion(heading_rad),
-                physicsClientId=client,
-            )
-            texture = pybullet.loadTexture(paint, physicsClientId=client)
-
-        pybullet.changeVisualShape(body, -1, textureUniqueId=texture, physicsClientId=client)
-
-        return int(body)
+    def _remove(self, body: int) -> None:
+        self._solid.discard(body)
+        self.building_of_body.pop(body, None)
+        self._bodies.remove(body)
 
 
-def _written(surface: mesh.Mesh, picture: Image, folder: Path) -> tuple[str, str]:
-    """The files of a shape and of the picture on it."""
-    form = folder / "surface.obj"
-    form.write_text(surface.obj())
+def _tiles(roads: Sequence[Road]) -> list[tuple[Road, ...]]:
+    """The roads by the tile of the plane that the middle of each is in."""
+    tiles: dict[tuple[int, int], list[Road]] = {}
+    for road in roads:
+        x_m, y_m = road.middle
+        key = (math.floor(x_m / _TILE_M), math.floor(y_m / _TILE_M))
+        tiles.setdefault(key, []).append(road)
 
-    paint = folder / "texture.bmp"
-    bgr = np.ascontiguousarray(picture[..., ::-1])
-    cv2.imwrite(str(paint), bgr)
-    return str(form), str(paint)
+    return [tuple(tiles[key]) for key in sorted(tiles)]
+
+
+def _tile(builder: Builder, roads: tuple[Road, ...]) -> Piece:
+    """The streets of a tile."""
+    ends_m = np.array([point for road in roads for point in (road.start, road.end)])
+    widest_m = max(road.width_m for road in roads)
+    low_m = ends_m.min(axis=0)
+    high_m = ends_m.max(axis=0)
+
+    middle_x_m, middle_y_m = ((low_m + high_m) / 2).tolist()
+    reach_m = float(np.hypot(*(high_m - low_m))) / 2 + widest_m
+    return Piece((middle_x_m, middle_y_m), reach_m, partial(builder.streets, roads))
 
 
 def _relief(town: Place) -> Singles:

@@ -60,14 +60,22 @@ class Prop:
         )
 
     @property
-    def solid(self) -> tuple[Point, ...]:
-        """The corners of what stands in the way of a robot, counter-clockwise: of a tree or a lamp
+    def solid_size_m(self) -> Size:
+        """The length, width and height of what stands in the way of a robot: of a tree or a lamp
         its trunk.
         """
-        length_m, width_m, _ = self.size_m
+        length_m, width_m, height_m = self.size_m
         trunk_m = _TRUNKS_M.get(self.kind)
-        size_m = (length_m, width_m) if trunk_m is None else (trunk_m, trunk_m)
-        return corners((self.x_m, self.y_m), self.heading_rad, size_m)
+        if trunk_m is None:
+            return length_m, width_m, height_m
+
+        return trunk_m, trunk_m, height_m
+
+    @property
+    def solid(self) -> tuple[Point, ...]:
+        """The corners of what stands in the way of a robot, counter-clockwise."""
+        length_m, width_m, _ = self.solid_size_m
+        return corners((self.x_m, self.y_m), self.heading_rad, (length_m, width_m))
 
 
 _TRUNKS_M = {"tree": 0.4, "lamp": 0.2}

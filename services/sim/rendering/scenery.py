@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 
 import cv2
 import numpy as np
 
 from cogmap.geometry.arrays import Floats, Singles
-from services.sim.layout.plan import PAVEMENT_WIDTH_M, STREET_WIDTH_M, Point, Road
+from services.sim.layout.plan import PAVEMENT_WIDTH_M, Point, Road
 from services.sim.rendering.mesh import Mesh, Vertex
 from services.sim.rendering.wall import Image, plain, roughen
 
@@ -25,26 +26,24 @@ _HORIZON = (214, 228, 238)
 _HILLS = ((0.105, (140, 164, 170)), (0.07, (104, 138, 112)))
 
 
-def ground(roads: tuple[Road, ...]) -> list[tuple[Mesh, Image]]:
-    """Grass, pavements, asphalt and the lines on it, from below upwards, each with its picture;
-    none that is empty.
-    """
+def pictures() -> tuple[Image, Image, Image, Image]:
+    """The pictures of grass, pavements, asphalt and the lines on it."""
     rng = np.random.default_rng(11)
-    grass = roughen(plain(512, (104, 138, 66)), rng, 0.2)
+    soil = roughen(plain(512, (104, 138, 66)), rng, 0.2)
     slabs = roughen(_slabs(), rng, 0.1)
     asphalt = roughen(plain(512, (92, 92, 98)), rng, 0.15)
     paint = roughen(plain(64, (232, 230, 220)), rng, 0.06)
 
-    surfaces = [
-        (_grass(), grass),
-        (_pavements(roads), slabs),
-        (_asphalt(roads), asphalt),
-        (_lines(roads), paint),
-    ]
-    return [(mesh, picture) for mesh, picture in surfaces if mesh.triangles]
+    return soil, slabs, asphalt, paint
 
 
-def _grass() -> Mesh:
+def streets(roads: Sequence[Road]) -> tuple[Mesh, Mesh, Mesh]:
+    """Pavements, asphalt and the lines on it, from below upwards."""
+    return _pavements(roads), _asphalt(roads), _lines(roads)
+
+
+def grass() -> Mesh:
+    """The ground around and between the streets."""
     mesh = Mesh()
     area = (-GROUND_M, -GROUND_M, GROUND_M, GROUND_M)
     mesh.level(area, 0.0, GRASS_TILE_M, 20.0)
@@ -52,29 +51,29 @@ def _grass() -> Mesh:
     return mesh
 
 
-def _pavements(roads: tuple[Road, ...]) -> Mesh:
+def _pavements(roads: Sequence[Road]) -> Mesh:
     mesh = Mesh()
-    reach_m = STREET_WIDTH_M / 2 + PAVEMENT_WIDTH_M
     for road in roads:
+        reach_m = road.width_m / 2 + PAVEMENT_WIDTH_M
         _pave(mesh, road, reach_m, 0.015, (4.0, 8.0))
 
     return mesh
 
 
-def _asphalt(roads: tuple[Road, ...]) -> Mesh:
+def _asphalt(roads: Sequence[Road]) -> Mesh:
     mesh = Mesh()
     for road in roads:
-        _pave(mesh, road, STREET_WIDTH_M / 2, 0.03, (8.0, 8.0))
+        _pave(mesh, road, road.width_m / 2, 0.03, (8.0, 8.0))
 
     return mesh
 
 
-def _lines(roads: tuple[Road, ...]) -> Mesh:
+def _lines(roads: Sequence[Road]) -> Mesh:
     """Dashes along the middle of each road."""
     mesh = Mesh()
     for road in roads:
-        end_m = road.length_m - STREET_WIDTH_M
-        starts_m = np.arange(STREET_WIDTH_M, end_m, 2 * _DASH_M)
+        end_m = road.length_m - road.width_m
+        starts_m = np.arange(road.width_m, end_m, 2 * _DASH_M)
 
         for along_m in starts_m.tolist():
             dash = Road(road.name, road.point(along_m), road.point(along_m + _DASH_M))

@@ -1,0 +1,128 @@
+"""Bodies in pybullet: shapes with pictures on them, and boxes that nothing passes."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from services.sim.layout.plan import Point
+from services.sim.rendering.mesh import Mesh
+from services.sim.rendering.wall import Image
+from services.sim.robot import upright_quaternion
+from services.sim.stdio import pybullet
+
+NOT_SOLID = -1
+_ORIGIN = (0.0, 0.0)
+_UPRIGHT = (0, 0, 0, 1)
+
+
+class Model(NamedTuple):
+    """A shape as the text of an OBJ file, its number, and the texture on it."""
+
+    number: int
+    obj: str
+    texture: int
+
+
+class Bodies:
+    """Adds bodies to a pybullet client, and removes them.
+
+    Shapes and pictures go through files, as all renderers of pybullet load nothing else; none is
+    left. pybullet remembers both by the names of their files: each has a name of its own, so that
+    adding it again is quick.
+    """
+
+    def __init__(self, client: int) -> None:
+        self._client = client
+        self._models = 0
+        self._textures = 0
+        self._folder = Path(tempfile.mkdtemp(prefix="cogmap-"))
+        self._folder.rmdir()
+
+    def model(self, surface: Mesh, picture: Image) -> Model:
+        """A shape with a picture on it, to be added as often as there is need."""
+        return self.painted(surface, self.texture(picture))
+
+    def painted(self, surface: Mesh, texture: int) -> Model:
+        """A shape with a texture on it."""
+        self._models += 1
+        return Model(self._models, surface.obj(), texture)
+
+    def texture(self, picture: Image) -> int:
+        """A picture, loaded."""
+        bgr = np.ascontiguousarray(picture[..., ::-1])
+        path = self._folder / f"{self._textures}.bmp"
+        self._textures += 1
+        self._folder.mkdir()
+        try:
+            cv2.imwrite(str(path), bgr)
+            return int(pybullet.loadTexture(str(path), physicsClientId=self._client))
+        finally:
+            shutil.rmtree(self._folder)
+
+    def box(self, half_m: tuple[float, float, float], middle_m: float) -> int:
+        """A box that nothing passes, its middle at height `middle_m`, for `add`."""
+        return int(
+            pybullet.createCollisionShape(
+                pybullet.GEOM_BOX,
+                halfExtents=list(half_m),
+                collisionFramePosition=[0, 0, middle_m],
+                physicsClientId=self._client,
+            )
+        )
+
+    def add(
+        self,
+        model: Model,
+        solid: int = NOT_SOLID,
+        at_m: Point = _ORIGIN,
+        heading_rad: float = 0.0,
+    ) -> int:
+        """Add a body; `solid` is what nothing passes."""
+        shape = self._visual(model)
+        body = pybullet.createMultiBody(
+            0,
+            solid,
+            shape,
+            (*at_m, 0.0),
+            upright_quaternion(heading_rad),
+            physicsClientId=self._client,
+        )
+        pybullet.changeVisualShape(
+            body, -1, textureUniqueId=model.texture, physicsClientId=self._client
+        )
+        return int(body)
+
+    def _visual(self, model: Model) -> int:
+        path = self._folder / f"{model.number}.obj"
+        self._folder.mkdir()
+        try:
+            path.write_text(model.obj)
+            return int(
+                pybullet.createVisualShape(
+                    pybullet.GEOM_MESH,
+                    fileName=str(path),
+                    specularColor=[0, 0, 0],
+                    physicsClientId=self._client,
+                )
+            )
+        finally:
+            shutil.rmtree(self._folder)
+
+    def move(self, body: int, x_m: float, y_m: float) -> None:
+        """Put a body there, upright."""
+        pybullet.resetBasePositionAndOrientation(
+            body,
+            (x_m, y_m, 0),
+            _UPRIGHT,
+            physicsClientId=self._client,
+        )
+
+    def remove(self, body: int) -> None:
+        """Take a body away."""
+        pybullet.removeBody(body, physicsClientId=self._client)

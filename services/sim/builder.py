@@ -1,0 +1,79 @@
+"""Builds the parts of a place in pybullet: its ground, streets, buildings and props."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from services.sim.bodies import NOT_SOLID, Bodies, Model
+from services.sim.layout.furniture import Prop
+from services.sim.layout.plan import Plot, Road
+from services.sim.rendering import mesh, prop_shapes, scenery
+from services.sim.rendering.mesh import Mesh
+from services.sim.rendering.wall import Image
+
+Key = Plot | Prop | tuple[Road, ...]
+
+
+class Builder:
+    """Adds parts of a place to `bodies`. A part that is added again looks as before, and is not
+    drawn again.
+    """
+
+    def __init__(self, bodies: Bodies) -> None:
+        self._bodies = bodies
+        self._models: dict[Key, list[Model]] = {}
+        grass, *layers = scenery.pictures()
+        self._grass = bodies.texture(grass)
+        self._layers = [bodies.texture(picture) for picture in layers]
+
+    def soil(self) -> int:
+        """The ground around and between the streets, which carries the robot."""
+        half_m = (scenery.GROUND_M, scenery.GROUND_M, 1.0)
+        floor = self._bodies.box(half_m, middle_m=-1.0)
+        return self._bodies.add(self._bodies.painted(scenery.grass(), self._grass), floor)
+
+    def sky(self) -> int:
+        """The ring of hills and clouds."""
+        return self._bodies.add(self._bodies.model(*scenery.sky()))
+
+    def streets(self, roads: Sequence[Road]) -> list[int]:
+        """Pavements, asphalt, and the lines on it, where there are any."""
+        key = tuple(roads)
+        if key not in self._models:
+            self._models[key] = self._paving(key)
+
+        return [self._bodies.add(model) for model in self._models[key]]
+
+    def building(self, plot: Plot) -> int:
+        """A building that nothing passes."""
+        kind = plot.kind
+        size_m = (kind.width_m, kind.depth_m, kind.height_m)
+        (model,) = self._kept(plot, lambda: mesh.building(kind))
+        at_m = (plot.x_m, plot.y_m)
+        return self._bodies.add(model, self._box(size_m), at_m, plot.heading_rad)
+
+    def prop(self, prop: Prop, is_solid: bool) -> int:
+        """A prop, which nothing passes where it is solid."""
+        (model,) = self._kept(prop, lambda: prop_shapes.shape(prop))
+        solid = self._box(prop.solid_size_m) if is_solid else NOT_SOLID
+        return self._bodies.add(model, solid, (prop.x_m, prop.y_m), prop.heading_rad)
+
+    def _box(self, size_m: tuple[float, float, float]) -> int:
+        length_m, width_m, height_m = size_m
+        half_m = (length_m / 2, width_m / 2, height_m / 2)
+        return self._bodies.box(half_m, middle_m=height_m / 2)
+
+    def _paving(self, roads: tuple[Road, ...]) -> list[Model]:
+        models = []
+        for surface, texture in zip(scenery.streets(roads), self._layers, strict=True):
+            if surface.triangles:
+                models.append(self._bodies.painted(surface, texture))
+
+        return models
+
+    def _kept(self, key: Key, draw: Callable[[], tuple[Mesh, Image]]) -> list[Model]:
+        """The model that was drawn for `key` before, or that `draw` draws now."""
+        if key not in self._models:
+            self._models[key] = [self._bodies.model(*draw())]
+
+        return self._models[key]

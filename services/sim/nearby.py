@@ -1,0 +1,81 @@
+"""Which parts of a large place there are: those near the robot, so that neither rendering nor
+physics grows with the place. Pure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cogmap.geometry.arrays import Floats
+from services.sim.layout.plan import Point
+
+ADDED_M = 80.0
+REMOVED_M = 95.0
+# How far the robot moves before the parts near it are chosen again, and how many are added then.
+MOVED_M = 2.0
+MOST_ADDED = 6
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A part of a place: its middle, how far it reaches from there, and what adds its bodies."""
+
+    middle_m: Point
+    reach_m: float
+    add: Callable[[], list[int]]
+
+
+@dataclass
+class Nearby:
+    """Adds and removes `pieces` as the robot moves; `remove` takes a body away."""
+
+    pieces: list[Piece]
+    remove: Callable[[int], None]
+    _shown: dict[int, list[int]] = field(default_factory=dict)
+    _last_m: Point | None = None
+
+    def __post_init__(self) -> None:
+        middles = [piece.middle_m for piece in self.pieces]
+        reaches = [piece.reach_m for piece in self.pieces]
+        self._middles_m = np.array(middles, float).reshape(-1, 2)
+        self._reaches_m = np.array(reaches, float)
+
+    def update(self, x_m: float, y_m: float) -> None:
+        """Follow the robot: where it moved on a little, add the nearest few that are missing; where
+        it was put somewhere else, all that are near.
+        """
+        moved_m = self._moved_m(x_m, y_m)
+        if moved_m < MOVED_M:
+            return
+
+        self._last_m = (x_m, y_m)
+        apart_m = np.hypot(*(self._middles_m - (x_m, y_m)).T) - self._reaches_m
+        self._remove_far(apart_m)
+
+        missing = self._missing(apart_m)
+        is_moved_on = moved_m <= REMOVED_M - ADDED_M
+        for number in missing[:MOST_ADDED] if is_moved_on else missing:
+            self._shown[number] = self.pieces[number].add()
+
+    def _moved_m(self, x_m: float, y_m: float) -> float:
+        if self._last_m is None:
+            return float("inf")
+
+        last_x_m, last_y_m = self._last_m
+        return float(np.hypot(x_m - last_x_m, y_m - last_y_m))
+
+    def _remove_far(self, apart_m: Floats) -> None:
+        for number in list(self._shown):
+            if apart_m[number] > REMOVED_M:
+                for body in self._shown.pop(number):
+                    self.remove(body)
+
+    def _missing(self, apart_m: Floats) -> list[int]:
+        """The pieces near enough that are not there yet, from the nearest on."""
+        order = np.argsort(apart_m, kind="stable").tolist()
+        return [
+            number for number in order if apart_m[number] <= ADDED_M and number not in self._shown
+        ]
