@@ -9,12 +9,11 @@ import msgspec
 
 from schemas.base import Message
 from schemas.process import Clock
-from schemas.sensing import MotorCommand, Odometry, StereoFrame, TruePose, TrueTown
+from schemas.sensing import MotorCommand, Odometry, Pose, StereoFrame, TruePose, TrueTown
 from services.sim.config import Config
 from services.sim.layout import towns
 from services.sim.layout.closures import ClosedStreets
-from services.sim.layout.place import Place
-from services.sim.layout.progress import Elapsed, Progress
+from services.sim.layout.progress import Progress, elapsed
 from services.sim.layout.town import Town
 from services.sim.odometry import WheelOdometry
 from services.sim.rendering.camera import StereoCamera, calibration
@@ -38,7 +37,10 @@ class Simulation:
         self.camera = StereoCamera(self.world, mount)
 
         self._odometry = WheelOdometry(config.noise, config.seed)
-        self._progress = _progress(place, config)
+        self._progress: Progress | None = None
+        if isinstance(place, Town):
+            self._progress = Progress(place.line(config.laps))
+
         self._pose = self.world.pose()
         self._travelled_m = 0.0
         self._frames = 0
@@ -55,7 +57,8 @@ class Simulation:
         self.world.robot.place(last.pose)
         self._pose = self.world.pose()
         self._travelled_m = last.travelled_m
-        self._progress.resume(last.progress)
+        if self._progress is not None:
+            self._progress.resume(last.progress)
         self.now_ns = last.stamp_ns
         self._frames = self.now_ns // self.tick_ns // self.ticks_per_frame
 
@@ -104,7 +107,7 @@ class Simulation:
     def truth(self) -> TruePose:
         """The robot's true pose."""
         pose = self._pose
-        self.progress = self._progress.advance(pose.x_m, pose.y_m, self.now_ns)
+        self.progress = self._completed(pose)
 
         return TruePose(
             stamp_ns=self.now_ns,
@@ -122,15 +125,14 @@ class Simulation:
         self.world.close_streets(self.closed_streets.names)
         return self.town()
 
+    def _completed(self, pose: Pose) -> float:
+        """The share of the route or, in a town without one, of the time."""
+        if self._progress is None:
+            return elapsed(self.now_ns, self.config.duration_s)
+
+        return self._progress.advance(pose.x_m, pose.y_m)
+
     def town(self) -> TrueTown:
         """The town as it is now."""
         town = self.world.town.message(self.closed_streets.names)
         return msgspec.structs.replace(town, stamp_ns=self.now_ns)
-
-
-def _progress(place: Place, config: Config) -> Progress | Elapsed:
-    """How much of the route is completed or, where the place has none, of the time."""
-    if isinstance(place, Town):
-        return Progress(place.line(config.laps))
-
-    return Elapsed(round(config.duration_s * 1e9))

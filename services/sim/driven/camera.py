@@ -44,7 +44,8 @@ class ColumnCamera:
         self.mount = mount
         self.width = mount.width_px
         columns = np.arange(mount.width_px)
-        self.left_slope: Floats = (mount.cx_px - columns) / mount.fx_px
+        left_px = mount.cx_px - columns
+        self.left_slope: Floats = np.asarray(left_px / mount.fx_px, float)
 
     @property
     def half_field_of_view_rad(self) -> float:

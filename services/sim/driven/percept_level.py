@@ -29,7 +29,7 @@ from services.sim.driven.sensors import Sensors
 from services.sim.driven.surroundings import Surroundings
 from services.sim.layout import towns
 from services.sim.layout.closures import ClosedStreets
-from services.sim.layout.progress import Elapsed
+from services.sim.layout.progress import elapsed
 from services.sim.odometry import Noise, WheelOdometry
 from services.sim.rendering.camera import calibration
 from services.sim.scripted.places import PlaceSim
@@ -61,7 +61,7 @@ class DrivenPerceptLevelSim:
         self._odometry = WheelOdometry(config.noise, config.seed)
         self._noise = config.noise
 
-        self._elapsed = Elapsed(round(config.duration_s * 1e9))
+        self._duration_s = config.duration_s
         self._motions: list[Row] = []
         self._frames = 0
 
@@ -119,12 +119,11 @@ class DrivenPerceptLevelSim:
 
     def truth(self) -> TruePose:
         """The robot's true pose."""
-        pose = self._robot.pose
-        self.progress = self._elapsed.advance(pose.x_m, pose.y_m, self.now_ns)
+        self.progress = elapsed(self.now_ns, self._duration_s)
 
         return TruePose(
             stamp_ns=self.now_ns,
-            pose=pose,
+            pose=self._robot.pose,
             travelled_m=self._robot.travelled_m,
             progress=self.progress,
             collisions=self._robot.collisions,

@@ -110,7 +110,7 @@ class Sensors:
 
         column = self._camera.column(forward_m, left_m)
         is_inside = column.min() >= 1 and column.max() <= self._camera.width - 2
-        return not is_inside or columns < WHOLE_SHARE * np.ptp(column)
+        return bool(not is_inside or columns < WHOLE_SHARE * np.ptp(column))
 
 
 def scan(camera: ColumnCamera, depth_m: Floats) -> tuple[Floats, Floats]:
@@ -129,12 +129,12 @@ def scan(camera: ColumnCamera, depth_m: Floats) -> tuple[Floats, Floats]:
     from_left = np.floor((half_rad - bearing_rad) / sector_rad).astype(np.int64)
     sector = from_left.clip(0, SECTORS - 1)
 
-    nearest_m = np.full(SECTORS, np.inf)
+    nearest_m: Floats = np.full(SECTORS, np.inf)
     np.minimum.at(nearest_m, sector, np.hypot(forward_m, left_m))
     nearest_m[np.isinf(nearest_m)] = 0.0
 
-    middle_rad = half_rad - (np.arange(SECTORS) + 0.5) * sector_rad
-    return middle_rad, nearest_m
+    middles = np.arange(SECTORS, dtype=float) + 0.5
+    return half_rad - middles * sector_rad, nearest_m
 
 
 def _landmark(plot: Plot) -> Landmark:

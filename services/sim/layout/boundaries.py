@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cogmap.geometry.arrays import Floats
+from cogmap.geometry.arrays import Booleans, Floats, Indices
 from services.sim.layout.plan import Point, Road, corners
 
 CHUNK = 256
@@ -40,8 +40,8 @@ class Surfaces(NamedTuple):
         left_m = y_m * self.ahead[:, 0] - x_m * self.ahead[:, 1]
         return along_m, left_m
 
-    def chosen(self, numbers: Floats) -> Surfaces:
-        """Those of a mask or of numbers."""
+    def chosen(self, numbers: Booleans) -> Surfaces:
+        """Those of a mask, (n,)."""
         return Surfaces(*(column[numbers] for column in self))
 
 
@@ -100,7 +100,7 @@ def _surface(road: Road) -> tuple[Point, ...]:
     return corners(road.middle, road.heading_rad, size_m)
 
 
-def _uncovered(sides: Floats, owners: Floats, streets: Surfaces) -> list[list[float]]:
+def _uncovered(sides: Floats, owners: Indices, streets: Surfaces) -> list[list[float]]:
     """The parts of (k, 4) sides, each of the street `owners`, that lie on no other street.
 
     Of two sides at the same place, the first street's is kept.
@@ -122,7 +122,7 @@ def _uncovered(sides: Floats, owners: Floats, streets: Surfaces) -> list[list[fl
     return pieces
 
 
-def _covered(sides: Floats, owners: Floats, streets: Surfaces) -> tuple[Floats, Floats]:
+def _covered(sides: Floats, owners: Indices, streets: Surfaces) -> tuple[Floats, Floats]:
     """(k, n) each: from which to which share of its length each side lies on each street."""
     numbers = np.arange(len(streets.half_width_m))
     is_before = numbers < owners[:, None]

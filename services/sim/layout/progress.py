@@ -29,8 +29,8 @@ class Progress:
         """Continue from a share of the route."""
         self._index = round(share * self._last)
 
-    def advance(self, x_m: float, y_m: float, now_ns: int) -> float:
-        """The share of the route that lies behind the robot at this place, at any time."""
+    def advance(self, x_m: float, y_m: float) -> float:
+        """The share of the route that lies behind the robot at this place."""
         end = self._index + round(WINDOW_M / STEP_M)
         ahead_m = self._points_m[self._index : end]
 
@@ -44,15 +44,6 @@ class Progress:
         return len(self._points_m) - 1
 
 
-class Elapsed:
-    """The time of a drive that has no route."""
-
-    def __init__(self, duration_ns: int) -> None:
-        self._duration_ns = duration_ns
-
-    def resume(self, share: float) -> None:
-        """Nothing to remember: the time is known."""
-
-    def advance(self, x_m: float, y_m: float, now_ns: int) -> float:
-        """The share of the time that has passed, at any place."""
-        return min(1.0, now_ns / self._duration_ns)
+def elapsed(now_ns: int, duration_s: float) -> float:
+    """The share of its time that a drive without a route has taken."""
+    return min(1.0, now_ns / (duration_s * 1e9))

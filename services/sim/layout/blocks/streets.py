@@ -253,7 +253,7 @@ def _dead_ends(
     rng: np.random.Generator, grid: Grid, missing: list[Stretch], names: _Names
 ) -> list[Road]:
     """Alleys into every other of the missing stretches, and two that lead out of the town."""
-    roads = []
+    roads: list[Road] = []
     for stretch in missing[::2]:
         share = float(rng.uniform(*DEAD_END_SHARE))
         first, second = stretch if rng.random() < 0.5 else stretch[::-1]
