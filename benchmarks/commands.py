@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -17,50 +16,17 @@ from benchmarks.cycle import measure as cycle
 from benchmarks.localization import measure as localization
 from benchmarks.map_correction import measure as map_correction
 from benchmarks.map_size import measure as map_size
+from benchmarks.options import announce, json_option, processes_option, report_metrics
 from benchmarks.perception import measure as perception
 from benchmarks.perception import photographs, stereo
-from benchmarks.report import Metrics, Outcome, report, summary, write
+from benchmarks.planning.command import planning_command
+from benchmarks.report import Metrics, Outcome, summary, write
 from benchmarks.spiking import measure as spiking
-from benchmarks.threshold import Thresholds
 from cli.experiment.outcome import save_figure
 from cli.log.progress import bar
 from cli.options import FiniteRange
 from services.epam.layout.road import DEFAULT_PATH as ROAD_WEIGHTS
 from training.photographs import camvid_iou
-
-
-def _writable(context: click.Context, parameter: click.Parameter, path: Path | None) -> Path | None:
-    """Refuse a file that cannot be written before minutes of measuring."""
-    if path is not None and not path.parent.is_dir():
-        raise click.BadParameter(f"there is no folder {path.parent}: make it first")
-
-    return path
-
-
-json_option = click.option(
-    "--json",
-    "json_path",
-    type=click.Path(dir_okay=False, writable=True, path_type=Path),
-    callback=_writable,
-    metavar="FILE",
-    help="Write the metrics there too, as one flat object.",
-)
-processes_option = click.option(
-    "--processes",
-    type=click.IntRange(1, 256),
-    default=os.cpu_count() or 1,
-    help="How many run at once.  [default: one a core]",
-)
-
-
-def _announce(sentence: str) -> None:
-    click.echo(sentence, err=True)
-
-
-def _report(name: str, thresholds: Thresholds, metrics: Metrics, json_path: Path | None) -> None:
-    measured = {key: limit for key, limit in thresholds.items() if key in metrics}
-    outcome = suite.completed(name, measured, metrics)
-    report(outcome, json_path)
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -84,7 +50,8 @@ def benchmarks() -> None:
     "--data",
     type=click.Path(exists=True, file_okay=False, path_type=Path),
     metavar="DIR",
-    help="Sets that others published, a folder each: mrclam6, pose_graphs, stereo_cones, camvid.",
+    help="Sets that others published, a folder each: mrclam6, pose_graphs, stereo_cones, camvid, "
+    "street_grids.",
 )
 @click.option(
     "--only", type=click.Choice(suite.NAMES), multiple=True, help="Just this one; repeatable."
@@ -108,7 +75,7 @@ def all_command(
     """
     chosen = suite.selected(only, skip)
     with tempfile.TemporaryDirectory() as folder:
-        setting = suite.Setting(Path(folder), processes, data, _announce)
+        setting = suite.Setting(Path(folder), processes, data, announce)
         outcomes = _run_all(chosen, setting, json_path)
 
     Console().print(summary(outcomes))
@@ -144,9 +111,9 @@ def cycle_command(processes: int, json_path: Path | None) -> None:
     in lockstep, to compare the estimate with fused self-motion alone. Takes about six minutes.
     """
     with tempfile.TemporaryDirectory() as folder:
-        metrics = cycle.measure(Path(folder), processes, _announce)
+        metrics = cycle.measure(Path(folder), processes, announce)
 
-    _report("cycle", cycle.THRESHOLDS, metrics, json_path)
+    report_metrics("cycle", cycle.THRESHOLDS, metrics, json_path)
 
 
 @benchmarks.command(name="map_size")
@@ -158,8 +125,8 @@ def map_size_command(json_path: Path | None) -> None:
     objects and 1,000 place nodes, once on one of 100,000 and 500,000. A worker of its own process
     then joins over Zenoh. Takes about two minutes.
     """
-    metrics = map_size.measure(_announce)
-    _report("map_size", map_size.THRESHOLDS, metrics, json_path)
+    metrics = map_size.measure(announce)
+    report_metrics("map_size", map_size.THRESHOLDS, metrics, json_path)
 
 
 @benchmarks.command(name="bus")
@@ -187,9 +154,9 @@ def bus_command(pairs: int, number: int, json_path: Path | None) -> None:
     for 60 s, recorded. Takes about two minutes.
     """
     with tempfile.TemporaryDirectory() as folder:
-        metrics = bus.measure(Path(folder), _announce, number, pairs)
+        metrics = bus.measure(Path(folder), announce, number, pairs)
 
-    _report("bus", bus.THRESHOLDS, metrics, json_path)
+    report_metrics("bus", bus.THRESHOLDS, metrics, json_path)
 
 
 @benchmarks.command(name="perception")
@@ -253,7 +220,7 @@ def perception_command(
         metrics = perception.measure()
 
     thresholds = perception.THRESHOLDS | stereo.THRESHOLDS | photographs.THRESHOLDS
-    _report("perception", thresholds, metrics, json_path)
+    report_metrics("perception", thresholds, metrics, json_path)
 
 
 @benchmarks.command(name="localization")
@@ -275,7 +242,7 @@ def localization_command(folder: Path, processes: int, json_path: Path | None) -
     batch smoother, which `make bench-setup` installs. Takes some minutes.
     """
     metrics = localization.measure(folder, processes)
-    _report("localization", localization.THRESHOLDS, metrics, json_path)
+    report_metrics("localization", localization.THRESHOLDS, metrics, json_path)
 
 
 @benchmarks.command(name="map_correction")
@@ -304,7 +271,7 @@ def map_correction_command(
     gtsam, which `make bench-setup` installs; and one closure at a time. Takes up to half a minute.
     """
     metrics = map_correction.measure(graph_path, truth_path)
-    _report("map correction", map_correction.THRESHOLDS, metrics, json_path)
+    report_metrics("map correction", map_correction.THRESHOLDS, metrics, json_path)
 
 
 @benchmarks.command(name="spiking")
@@ -335,11 +302,14 @@ def spiking_command(seed: int, processes: int, folder: Path | None, json_path: P
     with bar("recording") as progress:
         scenes = spiking.measure(seed, processes, progress)
 
-    _report("spiking", spiking.THRESHOLDS, spiking.metrics(scenes), json_path)
+    report_metrics("spiking", spiking.THRESHOLDS, spiking.metrics(scenes), json_path)
     if folder is None:
         return
 
     from benchmarks.spiking.figure import figure  # matplotlib takes long to import
 
     for path in save_figure(folder, "spiking", figure(scenes, spiking.seeds(seed))):
-        _announce(str(path))
+        announce(str(path))
+
+
+benchmarks.add_command(planning_command)

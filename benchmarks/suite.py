@@ -19,6 +19,7 @@ from benchmarks.map_correction import measure as map_correction
 from benchmarks.map_size import measure as map_size
 from benchmarks.perception import measure as perception
 from benchmarks.perception import photographs, stereo
+from benchmarks.planning import grid
 from benchmarks.report import Metrics, Outcome
 from benchmarks.spiking import measure as spiking
 from benchmarks.threshold import Thresholds
@@ -110,6 +111,13 @@ def _map_correction(setting: Setting) -> Metrics:
     return map_correction.measure(graph, truth)
 
 
+def _planning(setting: Setting) -> Metrics:
+    grids = setting.set_of("street_grids")
+    map_path = grids / "Berlin_0_256.map.xz"
+    scenario_path = grids / "Berlin_0_256.map.scen.xz"
+    return grid.measure(map_path, scenario_path)
+
+
 def _map_size(setting: Setting) -> Metrics:
     return map_size.measure(setting.announce)
 
@@ -132,6 +140,7 @@ SUITE = (
     Benchmark("localization", localization.THRESHOLDS, _localization),
     Benchmark("map_correction", map_correction.THRESHOLDS, _map_correction),
     Benchmark("map_size", map_size.THRESHOLDS, _map_size),
+    Benchmark("planning", grid.THRESHOLDS, _planning),
     Benchmark("cue-integration", paper.CUE_INTEGRATION_THRESHOLDS, _cue_integration),
     Benchmark("city-maps", paper.CITY_MAPS_THRESHOLDS, _city_maps),
 )

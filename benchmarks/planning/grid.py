@@ -1,0 +1,198 @@
+"""Routes over a grid map that others made, for the problems that came with it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import dijkstra
+
+from benchmarks.report import Metrics
+from benchmarks.threshold import at_least, at_most
+from cli.log.progress import bar
+from cogmap.data.moving_ai import Problem, read_map, read_problems
+from cogmap.geometry.arrays import Booleans, Floats
+from services.codelets.planning.flat import FlatPlanner
+from services.codelets.planning.hierarchy import HierarchicalPlanner
+from services.codelets.planning.links import Links
+from services.codelets.planning.network import PlaceNetwork, grid_network
+from services.codelets.planning.route import NoRoute, NoRouteReason, Route
+
+THRESHOLDS = {
+    "solved_share": at_least(1.0),
+    "flat_over_optimal": at_most(1.001),
+    "hierarchical_over_optimal": at_most(1.05),
+    "hierarchical_speedup": at_least(5.0),
+    "time_vs_dijkstra": at_most(1.0),
+}
+# The least of so many times counts, for other jobs of the machine only add to it.
+REPEATS = 3
+# How many cells wide and high the part of the map is that is closed, and opened again.
+CLOSED_CELLS = 5
+T = TypeVar("T")
+
+
+class Answers(NamedTuple):
+    """What the planners answered to one problem, and how long they took, and Dijkstra's method."""
+
+    flat: Route | NoRoute
+    hierarchical: Route | NoRoute
+    took_s: Floats
+
+
+class Subject(NamedTuple):
+    """A map, the planners for it, and the same graph for scipy, all of them made before."""
+
+    is_passable: Booleans
+    flat: FlatPlanner
+    hierarchical: HierarchicalPlanner
+    peer: sparse.csr_matrix
+    links: Links
+
+
+def measure(map_path: Path, scenario_path: Path) -> Metrics:
+    """The metrics of THRESHOLDS, and the times that the ratios are of.
+
+    Raises UsageError where a file cannot be read.
+    """
+    is_passable = read_map(map_path)
+    problems = read_problems(scenario_path, is_passable)
+    network = grid_network(is_passable)
+
+    flat_s, flat = _timed(lambda: FlatPlanner(network))
+    hierarchical_s, hierarchical = _timed(lambda: HierarchicalPlanner(network))
+    links = Links(network)
+    subject = Subject(is_passable, flat, hierarchical, _graph(links), links)
+
+    answers = _answer_all(subject, problems)
+    building = {
+        "flat_build_ms": 1e3 * flat_s,
+        "hierarchy_build_ms": 1e3 * hierarchical_s,
+        "hierarchy_update_ms": 1e3 * _update_s(network),
+    }
+    return _quality(subject, problems, answers) | _speed(answers) | building
+
+
+def _answer_all(subject: Subject, problems: Sequence[Problem]) -> list[Answers]:
+    """All answers, one problem after the other, each of them by both planners and by scipy."""
+    _answer(subject, problems[0])
+
+    answers = []
+    with bar("planning routes") as progress:
+        for number, problem in enumerate(problems, start=1):
+            answers.append(_answer(subject, problem))
+            progress(number / len(problems))
+
+    return answers
+
+
+def _answer(subject: Subject, problem: Problem) -> Answers:
+    start, goal, _ = problem
+    goal_node = subject.links.node(goal)
+
+    took_s = []
+    for _ in range(REPEATS):
+        flat_s, flat = _timed(lambda: subject.flat.find_route(start, goal))
+        rough_s, rough = _timed(lambda: subject.hierarchical.find_route(start, goal))
+        peer_s, _ = _timed(lambda: dijkstra(subject.peer, indices=goal_node))
+        took_s.append((flat_s, rough_s, peer_s))
+
+    return Answers(flat, rough, np.min(took_s, axis=0))
+
+
+def _quality(subject: Subject, problems: Sequence[Problem], answers: Sequence[Answers]) -> Metrics:
+    """How many problems both planners solved, and how long their routes are."""
+    flat = []
+    hierarchical = []
+    solved = 0
+
+    for problem, answer in zip(problems, answers, strict=True):
+        flat_length = _length(answer.flat, problem, subject.is_passable)
+        rough_length = _length(answer.hierarchical, problem, subject.is_passable)
+        if flat_length is None or rough_length is None:
+            continue
+
+        solved += 1
+        if problem.optimal > 0:
+            flat.append(flat_length / problem.optimal)
+            hierarchical.append(rough_length / problem.optimal)
+
+    return {
+        "problems": float(len(problems)),
+        "solved_share": solved / len(problems),
+        "flat_over_optimal": float(np.mean(flat or [1.0])),
+        "hierarchical_over_optimal": float(np.mean(hierarchical or [1.0])),
+        "hierarchical_over_optimal_max": max(hierarchical, default=1.0),
+    }
+
+
+def _speed(answers: Sequence[Answers]) -> Metrics:
+    """The mean times, and their ratios."""
+    took_s = np.array([answer.took_s for answer in answers])
+    flat_s, hierarchical_s, dijkstra_s = took_s.mean(axis=0).tolist()
+    return {
+        "hierarchical_speedup": flat_s / hierarchical_s,
+        "time_vs_dijkstra": flat_s / dijkstra_s,
+        "flat_ms": 1e3 * flat_s,
+        "hierarchical_ms": 1e3 * hierarchical_s,
+        "dijkstra_ms": 1e3 * dijkstra_s,
+    }
+
+
+def _length(answer: Route | NoRoute, problem: Problem, is_passable: Booleans) -> float | None:
+    """The length in cells of a route that can be driven, None where it cannot or there is none."""
+    if isinstance(answer, NoRoute):
+        return 0.0 if answer.reason is NoRouteReason.AT_GOAL else None
+
+    cells = answer.cells
+    steps = np.diff(cells, axis=0)
+    ends = cells[[0, -1]].tolist()
+    if ends != [list(problem.start), list(problem.goal)] or np.abs(steps).max() > 1:
+        return None
+
+    # A step across needs both cells beside it: no corner is cut.
+    i, j = cells[:-1].T
+    di, dj = steps.T
+    beside = is_passable[i + di, j] & is_passable[i, j + dj]
+    is_free = is_passable[i, j] & is_passable[i + di, j + dj] & beside
+    if not is_free.all():
+        return None
+
+    return float(np.hypot(di, dj).sum())
+
+
+def _graph(links: Links) -> sparse.csr_matrix:
+    """The links that are not cut, as scipy takes a graph."""
+    graph = links.matrix().copy()
+    graph.data[np.isinf(graph.data)] = 0
+    graph.eliminate_zeros()
+    return graph
+
+
+def _update_s(network: PlaceNetwork) -> float:
+    """The time to take a change of the map: its middle is closed, and opened again."""
+    planner = HierarchicalPlanner(network)
+    width, height = network.shape
+    i = slice(width // 2, width // 2 + CLOSED_CELLS)
+    j = slice(height // 2, height // 2 + CLOSED_CELLS)
+    closed = network._replace(weights=network.weights.copy())
+    closed.weights[:, i, j] = 0
+
+    took_s = []
+    for changed in (closed, network) * REPEATS:
+        update_s, _ = _timed(partial(planner.update, changed))
+        took_s.append(update_s)
+
+    return max(took_s[-2:])
+
+
+def _timed(work: Callable[[], T]) -> tuple[float, T]:
+    """The seconds that `work` took, and what it returned."""
+    began_s = time.perf_counter()
+    result = work()
+    return time.perf_counter() - began_s, result

@@ -1,0 +1,118 @@
+"""Routes planned on a coarse level first, then refined on finer ones (paper §5.5, figure 5).
+
+Three levels, each three times as fine as the one above it. Activation spreads from the goal over the
+coarsest, over the next level only within what the coarse route and its neighbours hold, and over the
+places only within the route of that.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cogmap.geometry.arrays import Booleans, Floats, Indices
+from services.codelets.planning.corridor import Corridor, CorridorField
+from services.codelets.planning.links import BLOCK, Links
+from services.codelets.planning.network import NEIGHBOUR_OFFSETS, Cell, PlaceNetwork
+from services.codelets.planning.regions import Regions, Rows, Traits
+from services.codelets.planning.route import NoRoute, NoRouteReason, Route, refusal, route_along
+
+FACTOR = 3
+
+
+class Places:
+    """The places of a network as the finest level."""
+
+    def __init__(self, links: Links) -> None:
+        self._links = links
+        self._lengths_m = links.cell_m * np.hypot(*NEIGHBOUR_OFFSETS.T)
+
+    def exist(self, nodes: Indices) -> Booleans:
+        """Which places have a link that is not cut."""
+        return self._links.is_linked[nodes]
+
+    def rows(self, nodes: Indices) -> Rows:
+        """The links of places that are not cut."""
+        costs_m = self._links.costs_m[nodes]
+        is_open = np.isfinite(costs_m)
+        columns = self._links.neighbours[nodes][is_open]
+        return Rows(is_open.sum(axis=1), columns.astype(np.int64), costs_m[is_open])
+
+    def traits(self, nodes: Indices) -> Traits:
+        """Where places are, and how slowly their links can be traversed."""
+        centre = np.stack(np.divmod(nodes, self._links.height), axis=-1)
+        return Traits(centre.astype(np.float64), np.ones(len(nodes)), self._slowness(nodes))
+
+    def _slowness(self, nodes: Indices) -> Floats:
+        over_length = self._links.costs_m[nodes] / self._lengths_m
+        is_open = np.isfinite(over_length)
+        total: Floats = np.where(is_open, over_length, 0).sum(axis=1)
+        return total / is_open.sum(axis=1)
+
+
+class Hierarchy:
+    """The coarser levels above the links of a network, updated as links change."""
+
+    def __init__(self, links: Links) -> None:
+        grid = (links.width, links.height)
+        self._corridor = Corridor(links)
+        self._middle = Regions(Places(links), grid, FACTOR, links.cell_m)
+        self._coarse = Regions(self._middle, grid, BLOCK, links.cell_m)
+        self._top = self._coarse.graph(self._coarse.all())
+
+    def update(self, nodes: Indices) -> None:
+        """Take changes of the links of `nodes`."""
+        changed = self._middle.update(nodes)
+        self._coarse.update(changed)
+        self._top = self._coarse.graph(self._coarse.all())
+
+    def field(self, start: int, goal: int) -> CorridorField | None:
+        """Activation from `goal` within a corridor of places that holds a route from `start`, both
+        of them linked; None where they are not connected.
+        """
+        middle_start, middle_goal = self._middle.region[[start, goal]].tolist()
+        coarse_start, coarse_goal = self._coarse.region[[middle_start, middle_goal]].tolist()
+
+        coarse = self._top.route(coarse_start, coarse_goal)
+        if coarse is None:
+            return None
+
+        beside = self._coarse.members(self._coarse.beside(coarse))
+        middle = self._middle.graph(beside).route(middle_start, middle_goal)
+        if middle is None:
+            return None
+
+        return self._corridor.spread(self._middle.members(middle), goal)
+
+
+class HierarchicalPlanner:
+    """Finds routes over one network, which may change: nearly the cheapest, and fast."""
+
+    def __init__(self, network: PlaceNetwork) -> None:
+        self._take(network)
+
+    def update(self, network: PlaceNetwork) -> None:
+        """Plan over `network` from now on."""
+        if not self._links.fits(network):
+            self._take(network)
+            return
+
+        changed = self._links.update(network)
+        if len(changed):
+            self._hierarchy.update(changed)
+
+    def find_route(self, start: Cell, goal: Cell) -> Route | NoRoute:
+        """A route between two cells of the map, or the reason why there is none."""
+        refused = refusal(self._links, start, goal)
+        if refused is not None:
+            return refused
+
+        start_node = self._links.node(start)
+        field = self._hierarchy.field(start_node, self._links.node(goal))
+        if field is None:
+            return NoRoute(NoRouteReason.NOT_CONNECTED)
+
+        return route_along(self._links, field.climb(start_node), field.distance_to(start_node))
+
+    def _take(self, network: PlaceNetwork) -> None:
+        self._links = Links(network)
+        self._hierarchy = Hierarchy(self._links)
