@@ -111,7 +111,9 @@ class HierarchicalPlanner:
         if field is None:
             return NoRoute(NoRouteReason.NOT_CONNECTED)
 
-        return route_along(self._links, field.climb(start_node), field.distance_to(start_node))
+        return route_along(
+            self._links, field.climb_short(start_node), field.distance_to(start_node)
+        )
 
     def _take(self, network: PlaceNetwork) -> None:
         self._links = Links(network)

@@ -26,6 +26,8 @@ COST_UNIT_M = 2.0**-20
 MAX_COST_M = float(np.finfo(np.float64).max)
 # The edge of a block of the coarsest level of the hierarchy, in cells.
 BLOCK = 9
+# The row of a node that does not belong to a part of the network: larger than any.
+OUTSIDE = np.iinfo(np.int32).max
 SLOTS = len(NEIGHBOUR_OFFSETS)
 _LINKS = len(LINK_OFFSETS)
 

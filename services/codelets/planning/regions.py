@@ -7,6 +7,7 @@ by its first place node, so that a level does not depend on the order of changes
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -14,7 +15,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from services.codelets.planning.links import COST_UNIT_M, MAX_COST_M, octile
+from services.codelets.planning.links import COST_UNIT_M, MAX_COST_M, OUTSIDE, octile
 
 
 class Rows(NamedTuple):
@@ -56,7 +57,11 @@ class Level(Protocol):
 
 
 class RegionGraph(NamedTuple):
-    """Some regions, ascending, and `matrix`, the costs of the links from row to column."""
+    """Some n regions, ascending.
+
+    `matrix`: (n + 1, n + 1), the costs of the links from row to column; the last row is of all
+    regions outside.
+    """
 
     regions: Indices
     matrix: sparse.csr_matrix
@@ -65,20 +70,20 @@ class RegionGraph(NamedTuple):
         """The regions from one to another up the activation that spreads from `goal`; None where
         none arrives at `start`.
         """
-        row, goal_row = np.searchsorted(self.regions, (start, goal)).tolist()
+        row = int(self.regions.searchsorted(start))
+        goal_row = int(self.regions.searchsorted(goal))
         distance_m, upward = dijkstra(
             self.matrix, indices=goal_row, limit=MAX_COST_M, return_predecessors=True
         )
-        if not np.isfinite(distance_m[row]):
+        if not math.isfinite(distance_m[row]):
             return None
 
-        following = upward.tolist()
         route = [row]
         while row != goal_row:
-            row = following[row]
+            row = int(upward[row])
             route.append(row)
 
-        return self.regions[route]
+        return self.regions.take(route)
 
 
 class Regions:
@@ -104,10 +109,10 @@ class Regions:
 
         # Links in order of (region, region it leads to), each as region * count + region.
         self._keys: Indices = np.zeros(0, np.int64)
-        self._columns: Indices = np.zeros(0, np.int64)
+        self._columns = np.zeros(0, np.int32)
         self._costs_m = np.zeros(0)
-        self._starts: Indices = np.zeros(self._count + 1, np.int64)
-        self._row_of = np.full(self._count, -1, np.int32)
+        self._starts = np.zeros(self._count + 1, np.int32)
+        self._row_of = np.full(self._count, OUTSIDE, np.int32)
         self.update(np.arange(self._count))
 
     def update(self, nodes: Indices) -> Indices:
@@ -139,8 +144,9 @@ class Regions:
         """The links of regions."""
         starts = self._starts.take(nodes)
         counts = self._starts.take(nodes + 1) - starts
-        before = np.cumsum(counts) - counts
-        links = np.arange(counts.sum()) + np.repeat(starts - before, counts)
+        ends = np.cumsum(counts)
+        links = np.repeat(starts + counts - ends, counts)
+        links += np.arange(len(links))
         return Rows(counts, self._columns.take(links), self._costs_m.take(links))
 
     def members(self, regions: Indices) -> Indices:
@@ -166,14 +172,16 @@ class Regions:
         links = self.rows(within)
         self._row_of[within] = np.arange(count, dtype=np.int32)
         columns = self._row_of.take(links.columns)
-        self._row_of[within] = -1
+        self._row_of[within] = OUTSIDE
 
-        is_outside = columns < 0
-        links.costs_m[is_outside] = np.inf
-        columns[is_outside] = 0
-        starts = np.zeros(count + 1, np.int32)
-        np.cumsum(links.counts, out=starts[1:])
-        matrix = sparse.csr_matrix((links.costs_m, columns, starts), shape=(count, count))
+        # All regions outside are one row, from which nothing spreads.
+        np.minimum(columns, count, out=columns)
+        starts = np.empty(count + 2, np.int32)
+        starts[0] = 0
+        np.cumsum(links.counts, out=starts[1:-1])
+        starts[-1] = starts[-2]
+        parts = (links.costs_m, columns, starts)
+        matrix = sparse.csr_matrix(parts, shape=(count + 1, count + 1))
         return RegionGraph(within, matrix)
 
     def _block_of(self, nodes: Indices) -> Indices:
@@ -236,7 +244,8 @@ class Regions:
         costs_m = self._link_costs_m(added)
         self._keys = np.insert(kept, positions, added)
         self._costs_m = np.insert(self._costs_m[is_kept], positions, costs_m)
-        owners, self._columns = np.divmod(self._keys, self._count)
+        owners, columns = np.divmod(self._keys, self._count)
+        self._columns = columns.astype(np.int32)
         self._starts[1:] = np.cumsum(np.bincount(owners, minlength=self._count))
 
     def _link_costs_m(self, keys: Indices) -> Floats:

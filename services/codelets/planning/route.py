@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,10 +62,11 @@ def refusal(links: Links, start: Cell, goal: Cell) -> NoRoute | None:
 
 def route_along(links: Links, nodes: Indices, cost_m: float) -> Route:
     """The route along (n,) nodes, each linked to the next."""
-    cells = links.cells(nodes)
-    steps = np.count_nonzero(np.diff(cells, axis=0), axis=1)
-    length_m = links.cell_m * float(np.sqrt(steps).sum())
-    return Route(cells, length_m, cost_m)
+    steps = np.abs(np.diff(nodes))
+    straight = np.count_nonzero((steps == 1) | (steps == links.height))
+    diagonal = len(steps) - straight
+    length_m = links.cell_m * (straight + math.sqrt(2) * diagonal)
+    return Route(links.cells(nodes), length_m, cost_m)
 
 
 def _is_inside(links: Links, cell: Cell) -> bool:
