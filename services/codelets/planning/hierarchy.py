@@ -43,10 +43,10 @@ class Places:
         return Traits(centre.astype(np.float64), np.ones(len(nodes)), self._slowness(nodes))
 
     def _slowness(self, nodes: Indices) -> Floats:
-        over_length = self._links.costs_m[nodes] / self._lengths_m
-        is_open = np.isfinite(over_length)
-        total: Floats = np.where(is_open, over_length, 0).sum(axis=1)
-        return total / is_open.sum(axis=1)
+        weights = self._lengths_m / self._links.costs_m[nodes]
+        open_links = np.count_nonzero(weights, axis=1)
+        slowness: Floats = open_links / weights.sum(axis=1)
+        return slowness
 
 
 class Hierarchy:

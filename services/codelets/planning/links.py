@@ -65,7 +65,7 @@ class Links:
             costs_m[(*there, link + _LINKS)] = of_link
 
         self.costs_m: Floats = costs_m.reshape(self.count, SLOTS)
-        self.is_linked: Booleans = np.isfinite(self.costs_m).any(axis=1)
+        self.is_linked: Booleans = np.any(np.isfinite(self.costs_m), axis=1)
 
     def fits(self, network: PlaceNetwork) -> bool:
         """Whether a network has the same cells, so that this can be updated to it."""

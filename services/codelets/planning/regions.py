@@ -8,14 +8,17 @@ by its first place node, so that a level does not depend on the order of changes
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+import numpy.typing as npt
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from services.codelets.planning.links import COST_UNIT_M, MAX_COST_M, OUTSIDE, octile
+
+Integers = npt.NDArray[np.integer[Any]]
 
 
 class Rows(NamedTuple):
@@ -24,8 +27,8 @@ class Rows(NamedTuple):
     `counts`: how many links each node has. `columns`: the nodes that they lead to.
     """
 
-    counts: Indices
-    columns: Indices
+    counts: Integers
+    columns: Integers
     costs_m: Floats
 
     def owners(self) -> Indices:
@@ -34,8 +37,8 @@ class Rows(NamedTuple):
 
 
 class Traits(NamedTuple):
-    """What is known of nodes: `centre` (n, 2) in cells, `size` in places, and `slowness`, the mean
-    of their links' cost over length.
+    """What is known of nodes: `centre` (n, 2) in cells, `size` in places, and `slowness`, one
+    over the mean weight of their links.
     """
 
     centre: Floats
@@ -184,7 +187,7 @@ class Regions:
         matrix = sparse.csr_matrix(parts, shape=(count + 1, count + 1))
         return RegionGraph(within, matrix)
 
-    def _block_of(self, nodes: Indices) -> Indices:
+    def _block_of(self, nodes: Integers) -> Indices:
         i, j = np.divmod(nodes, self._height)
         blocks: Indices = i // self._edge * self._blocks_high + j // self._edge
         return blocks
@@ -193,7 +196,8 @@ class Regions:
         """The numbers of the places in blocks."""
         i, j = np.divmod(blocks, self._blocks_high)
         corners = self._edge * (i * self._height + j)
-        return (corners[:, None] + self._inside).ravel()
+        places: Indices = corners[:, None] + self._inside
+        return places.ravel()
 
     def _label(self, members: Indices, links: Rows) -> None:
         """Find the regions of finer nodes: what is connected inside a block."""
