@@ -19,6 +19,7 @@ from benchmarks.map_correction import measure as map_correction
 from benchmarks.map_size import measure as map_size
 from benchmarks.perception import measure as perception
 from benchmarks.perception import photographs, stereo
+from benchmarks.place_grid import measure as place_grid
 from benchmarks.planning import grid
 from benchmarks.report import Metrics, Outcome
 from benchmarks.spiking import measure as spiking
@@ -122,6 +123,10 @@ def _map_size(setting: Setting) -> Metrics:
     return map_size.measure(setting.announce)
 
 
+def _place_grid(setting: Setting) -> Metrics:
+    return place_grid.measure(setting.announce)
+
+
 def _cue_integration(setting: Setting) -> Metrics:
     return paper.measure_cue_integration(setting.processes)
 
@@ -140,6 +145,7 @@ SUITE = (
     Benchmark("localization", localization.THRESHOLDS, _localization),
     Benchmark("map_correction", map_correction.THRESHOLDS, _map_correction),
     Benchmark("map_size", map_size.THRESHOLDS, _map_size),
+    Benchmark("place_grid", place_grid.THRESHOLDS, _place_grid),
     Benchmark("planning", grid.THRESHOLDS, _planning),
     Benchmark("cue-integration", paper.CUE_INTEGRATION_THRESHOLDS, _cue_integration),
     Benchmark("city-maps", paper.CITY_MAPS_THRESHOLDS, _city_maps),

@@ -13,7 +13,8 @@ class Task(Message, kw_only=True, frozen=True):
     """Work for one codelet: what it is about, and what was sensed. All else is in the graph.
 
     It reads the graph at `version`, or newer. `about` are ids of nodes. `motions` is as in
-    SelfMotion; `road_m` as in Percepts.
+    SelfMotion; `road_m` and `road_boundary_m` as in Percepts. `scan`, float32 (n, 2), has bearing
+    and range of each ray of the view's RangeScan; range 0 is nothing seen.
     """
 
     task_id: Name
@@ -25,6 +26,8 @@ class Task(Message, kw_only=True, frozen=True):
     matches: list[PlaceMatch] = []
     motions: Array | None = None
     road_m: Array | None = None
+    road_boundary_m: Array | None = None
+    scan: Array | None = None
 
 
 class Assignment(Part, kw_only=True, frozen=True):

@@ -23,7 +23,7 @@ from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.array import Array
 from schemas.graph import Snapshot
-from schemas.sensing import Percepts, SelfMotion
+from schemas.sensing import Percepts, RangeScan, SelfMotion
 from services import registry
 
 AGENT = "benchmark"
@@ -126,11 +126,11 @@ def _join_late(endpoint: str) -> Joined:
 
 def _senses() -> Module:
     module = Module("senses")
-    module.emits.update((topics.SELF_MOTION, topics.PERCEPTS))
+    module.emits.update((topics.SELF_MOTION, topics.SCAN, topics.PERCEPTS))
     return module
 
 
-def _first_view() -> list[SelfMotion | Percepts]:
+def _first_view() -> list[SelfMotion | RangeScan | Percepts]:
     """A view of nothing, and the motion up to it."""
     stamp_ns = 1_000_000_000
     motions = np.array([[1.0, 0.0, 1.0, 0.1, 0.01]])
@@ -147,7 +147,9 @@ def _first_view() -> list[SelfMotion | Percepts]:
         objects=[],
         road_m=Array.of(no_road_m),
     )
-    return [motion, percepts]
+    nothing = Array.of(np.zeros(0, np.float32))
+    scan = RangeScan(stamp_ns=stamp_ns, frame=0, bearing_rad=nothing, range_m=nothing)
+    return [motion, scan, percepts]
 
 
 def _serve(shell: Shell, ended: threading.Event) -> None:

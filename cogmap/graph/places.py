@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -10,12 +10,15 @@ import numpy.typing as npt
 
 from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Floats, Indices
+from cogmap.graph.tiles import by_tile, overlap, positions_in
+from cogmap.graph.window import Extent, Window
 from schemas.array import Array
 from schemas.graph import TILE_SIDE, Cells, Link, PlaceTile
 from schemas.nodes import LinkKind, PlaceColumn, place_id
 
 Column = npt.NDArray[np.float32]
 TileKey = tuple[str, int, int]
+MAX_WINDOW_CELLS = 2**25
 _SHAPE = (TILE_SIDE, TILE_SIDE)
 
 LINK_COLUMNS: dict[tuple[int, int], PlaceColumn] = {
@@ -99,15 +102,15 @@ class PlaceGrid:
         if where.ndim != 2 or where.shape != (values.size, 2):
             raise MessageError(f"{where.shape} cells of {cells.column} with {values.shape} values")
 
-        tiles, inside = np.divmod(where, TILE_SIDE)
-        for x, y in np.unique(tiles, axis=0).tolist():
-            is_in_tile = (tiles[:, 0] == x) & (tiles[:, 1] == y)
-            rows = inside[is_in_tile, 0]
-            columns = inside[is_in_tile, 1]
+        for (x, y), chosen in by_tile(where):
+            rows, columns = where[chosen].T % TILE_SIDE
+            key = (cells.map, x, y)
+            tile = self.tiles.get(key)
+            if tile is None:
+                tile = self.tiles[key] = Tile()
 
-            tile = self.tiles.setdefault((cells.map, x, y), Tile())
             column = tile.column(cells.column)
-            column[rows, columns] = values[is_in_tile]
+            column[rows, columns] = values[chosen]
             if cells.column is PlaceColumn.ACTIVATION:
                 tile.set_activation((rows, columns), cells.cycle)
 
@@ -168,6 +171,52 @@ class PlaceGrid:
             values.append(written[i, j].astype(np.float64))
 
         return np.vstack(cells), np.concatenate(values)
+
+    def extent(self, map_id: str) -> Extent:
+        """The smallest rectangle with all tiles of a map; an empty one where it has none."""
+        tiles = [(x, y) for name, x, y in self.tiles if name == map_id]
+        if not tiles:
+            return Extent((0, 0), (0, 0))
+
+        corners = np.array(tiles) * TILE_SIDE
+        first_i, first_j = corners.min(axis=0).tolist()
+        last_i, last_j = corners.max(axis=0).tolist()
+        return Extent((first_i, first_j), (last_i + TILE_SIDE, last_j + TILE_SIDE))
+
+    def window(
+        self, map_id: str, columns: Iterable[PlaceColumn], extent: Extent | None = None
+    ) -> Window:
+        """Some columns of a map's cells in `extent`, of all its tiles where that is not given.
+
+        Raises MessageError where those are more than MAX_WINDOW_CELLS cells.
+        """
+        names = tuple(columns)
+        wanted = self.extent(map_id) if extent is None else extent
+        width, height = wanted.shape
+        if width * height > MAX_WINDOW_CELLS:
+            raise MessageError(
+                f"{width} x {height} cells of {map_id} at once: ask for a part of the map"
+            )
+
+        values = np.empty((len(names), width, height), np.float32)
+        for column, name in zip(values, names, strict=True):
+            column.fill(DEFAULTS[name])
+
+        for (x, y), tile in self._tiles_in(map_id, wanted):
+            inside, within = overlap(x, y, wanted)
+            for column, name in zip(values, names, strict=True):
+                known = tile.columns.get(name)
+                if known is not None:
+                    column[within] = known[inside]
+
+        return Window(wanted.lower, names, values)
+
+    def _tiles_in(self, map_id: str, extent: Extent) -> Iterator[tuple[tuple[int, int], Tile]]:
+        """The tiles of a map that have cells in `extent`, by position."""
+        for position in positions_in(extent):
+            tile = self.tiles.get((map_id, *position))
+            if tile is not None:
+                yield position, tile
 
     def value(self, map_id: str, i: int, j: int, column: PlaceColumn) -> float | None:
         """One cell's value in a column; None where its tile does not exist."""

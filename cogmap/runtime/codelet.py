@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import msgspec
+import numpy as np
 
 from cogmap.graph.graph import Graph
 from schemas.array import Array
@@ -14,7 +15,7 @@ from schemas.codelets import Task
 from schemas.cognition import Coalition, Replay
 from schemas.graph import Operation, Phase
 from schemas.nodes import GraphNode, LinkKind, PlaceColumn
-from schemas.sensing import Percept, Percepts, PlaceMatch
+from schemas.sensing import Percept, Percepts, PlaceMatch, RangeScan
 
 ENTRY_POINTS = "cogmap.codelets"
 """The group of entry points by which codelets of other packages are found."""
@@ -24,14 +25,15 @@ Written = type[GraphNode] | LinkKind | PlaceColumn
 
 @dataclass(frozen=True)
 class CycleContext:
-    """What a cognitive cycle is about: a view's percepts, and the self-motion since the self node
-    was last moved, as in SelfMotion.
+    """What a cognitive cycle is about: a view's percepts, the self-motion since the self node was
+    last moved, as in SelfMotion, and the range scan of the view, where there is one.
     """
 
     cycle: int
     percepts: Percepts
     motions: Array
     version: int = 0
+    scan: RangeScan | None = None
 
     @property
     def stamp_ns(self) -> int:
@@ -48,10 +50,13 @@ class CycleContext:
         matches: Iterable[PlaceMatch] = (),
         with_motions: bool = False,
         with_road: bool = False,
+        with_boundary: bool = False,
+        with_scan: bool = False,
     ) -> Task:
         """A task for `codelet` about nodes `about`, by id.
 
-        `subject` distinguishes the tasks of one codelet in one cycle.
+        `subject` distinguishes the tasks of one codelet in one cycle. It carries what was sensed as
+        far as it is asked for: `with_boundary` is where the road ends.
         """
         task_id = f"{self.cycle}/{codelet}"
         if subject:
@@ -68,7 +73,18 @@ class CycleContext:
             matches=list(matches),
             motions=self.motions if with_motions else None,
             road_m=self.percepts.road_m if with_road else None,
+            road_boundary_m=self.percepts.road_boundary_m if with_boundary else None,
+            scan=_rays(self.scan) if with_scan else None,
         )
+
+
+def _rays(scan: RangeScan | None) -> Array | None:
+    """float32 (n, 2): bearing and range of each ray; None without a scan."""
+    if scan is None:
+        return None
+
+    rays = np.column_stack([scan.bearing_rad.numpy(), scan.range_m.numpy()])
+    return Array.of(rays, "<f4")
 
 
 @dataclass(frozen=True)

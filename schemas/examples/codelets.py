@@ -47,4 +47,6 @@ def _task() -> Task:
         matches=[sensing.place_match()],
         motions=ramp(4, 3, dtype="<f8"),
         road_m=ramp(3, 2, dtype="<f4"),
+        road_boundary_m=ramp(2, 2, dtype="<f4"),
+        scan=ramp(4, 2, dtype="<f4"),
     )

@@ -137,6 +137,22 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         Metres,
         Meta(description="distance between places of the path, in m, above 0, at most 10000"),
     ] = 1.0
+    boundary_reach_m: Annotated[
+        float,
+        Meta(
+            description="distance up to which links are cut or freed by what is seen, in m, above "
+            "0, at most 100",
+            gt=0,
+            le=100,
+        ),
+    ] = 15.0
+    range_sd_share: Annotated[
+        Gain,
+        Meta(
+            description="standard deviation of a distance seen over the distance, by which road, "
+            "boundaries and obstacles far away count less, 0 to 1"
+        ),
+    ] = 0.03
     revisit_s: Annotated[
         Seconds,
         Meta(

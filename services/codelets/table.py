@@ -15,7 +15,7 @@ from cogmap.runtime.codelet import ENTRY_POINTS, Codelet, ConfiguredCodelet
 from services.codelets.attention import novelty, whereabouts
 from services.codelets.correction import apply_correction, map_correction
 from services.codelets.localization import landmarks, localization
-from services.codelets.mapping import loop_detection, object_place, path, road_place
+from services.codelets.mapping import boundary, loop_detection, object_place, path, road_place
 
 CODELETS: tuple[Codelet, ...] = (
     apply_correction.CODELET,
@@ -23,6 +23,7 @@ CODELETS: tuple[Codelet, ...] = (
     object_place.CODELET,
     landmarks.CODELET,
     road_place.CODELET,
+    boundary.CODELET,
     path.CODELET,
     loop_detection.CODELET,
     map_correction.CODELET,

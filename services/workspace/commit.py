@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
 from schemas.codelets import Offer, Proposal
-from schemas.graph import Delta, Operation, Phase, Snapshot
+from schemas.graph import Cells, Delta, Operation, Phase, Snapshot
 from schemas.nodes import GraphNode
-from services.workspace.rules import Writer, check_operation, written_by
+from services.workspace.rules import Key, Writer, check_operation, written_by
 
 MAX_REASONS = 8
 MAX_REASON_CHARACTERS = 200
@@ -28,7 +28,7 @@ class Ledger:
         self._rejected = 0
         self._reasons: list[str] = []
 
-        self._written: dict[object, int] = {}
+        self._written: dict[Key, int] = {}
         self._written_before = 0
 
     def restore(self, past: Snapshot | Delta) -> None:
@@ -70,15 +70,24 @@ class Ledger:
         return delta
 
     def validate(self, proposals: list[Proposal]) -> list[Proposal]:
-        """The proposals that are valid, in order; the next delta counts the others."""
+        """The proposals that are valid, in order; the next delta counts the others.
+
+        Of those that write the same column of a tile the first is: the others were computed without
+        what it adds.
+        """
         valid = []
+        written: set[Key] = set()
         for proposal in proposals:
             try:
                 self.check(proposal)
+                columns = _tile_columns(proposal.operations)
+                _check_apart(proposal, columns & written)
             except MessageError as error:
                 self.reject(str(error))
             else:
                 valid.append(proposal)
+                written |= columns
+
         return valid
 
     def reject(self, reason: str) -> None:
@@ -118,8 +127,7 @@ class Ledger:
             if version <= base_version:
                 continue
 
-            what = key if isinstance(key, str) else " ".join(map(str, key))
-            raise MessageError(f"{name} is late: {what} has changed since {base_version}")
+            raise MessageError(f"{name} is late: {_in_words(key)} has changed since {base_version}")
 
     def _note(self, delta: Delta) -> None:
         written = self._written
@@ -131,3 +139,28 @@ class Ledger:
 
             for key in written_by(operation):
                 written[key] = version
+
+
+def _tile_columns(operations: list[Operation]) -> set[Key]:
+    """The columns of tiles that `operations` write."""
+    columns: set[Key] = set()
+    for operation in operations:
+        if isinstance(operation, Cells):
+            columns.update(written_by(operation))
+
+    return columns
+
+
+def _check_apart(proposal: Proposal, shared: set[Key]) -> None:
+    """Raise MessageError where a proposal writes columns of tiles that another one writes too."""
+    if shared:
+        first = min(shared, key=str)
+        raise MessageError(
+            f"proposal {proposal.task_id}: {_in_words(first)} is written by another in this phase"
+        )
+
+
+def _in_words(key: Key) -> str:
+    if isinstance(key, str):
+        return key
+    return " ".join(map(str, key))

@@ -31,6 +31,20 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         Milliseconds,
         msgspec.Meta(description="In real time, the age of the view at which a cycle ends, ms"),
     ] = 180.0
+    awaits_scan: Annotated[
+        bool,
+        msgspec.Meta(
+            description="In lockstep, whether a cycle waits for the range scan of its view; false"
+            " where nothing publishes scans"
+        ),
+    ] = True
+    max_scan_age_ms: Annotated[
+        Milliseconds,
+        msgspec.Meta(
+            description="In real time, how much older than its view a range scan may be, ms; an"
+            " older one is not used"
+        ),
+    ] = 100.0
     lease_ms: Annotated[
         Milliseconds,
         msgspec.Meta(

@@ -6,17 +6,15 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import msgspec
-import numpy as np
 
 from cogmap.errors import MessageError
 from cogmap.runtime.codelet import ConfiguredCodelet, CycleContext
-from schemas.array import Array
 from schemas.base import Message
 from schemas.codelets import Offer, Proposal
 from schemas.cognition import Coalitions
 from schemas.graph import Delta, Operation, Phase, Snapshot, SnapshotRequest
 from schemas.process import Clock, Presence
-from schemas.sensing import Percepts, SelfMotion
+from schemas.sensing import Percepts, RangeScan, SelfMotion
 from services.workspace.commit import Ledger
 from services.workspace.config import Config
 from services.workspace.dispatch import Dispatch
@@ -24,12 +22,12 @@ from services.workspace.entrance import first_operations, percept_operations, re
 from services.workspace.forgetting import Forgetting
 from services.workspace.lane import Lane
 from services.workspace.offers import Offers
+from services.workspace.senses import Scans, SelfMotions
 
 WORKERS = "codelets"
 MAX_LATE_TASKS = 256
 PHASES = (Phase.CORRECTION, Phase.LOCALIZATION, Phase.OBJECTS, Phase.ATTENTION)
 LANES_BEGIN = Phase.OBJECTS
-SELF_MOTION_COLUMNS = 5
 
 
 class Workspace:
@@ -54,7 +52,8 @@ class Workspace:
         self._forgetting = Forgetting()
         self._offers = Offers(config.offering if self._is_lockstep else ())
 
-        self._motions: list[SelfMotion] = []
+        self._motions = SelfMotions()
+        self._scans = Scans(config)
         self._waiting: Percepts | None = None
         self._context: CycleContext | None = None
         self._phase = 0
@@ -89,15 +88,12 @@ class Workspace:
 
     def on_motion(self, motion: SelfMotion) -> list[Message]:
         """Keep what moved until a cycle moves the self node by it."""
-        shape = motion.motions.shape
-        dtype = motion.motions.dtype
-        has_columns = len(shape) == 2 and shape[1] == SELF_MOTION_COLUMNS
-        if dtype != "<f8" or not has_columns:
-            raise MessageError(f"self-motion of shape {shape} and dtype {dtype}")
+        self._motions.put(motion, self._moved_until_ns)
+        return self._begin()
 
-        is_new = motion.stamp_ns > self._moved_until_ns
-        if is_new and not self._is_known(motion):
-            self._motions.append(motion)
+    def on_scan(self, scan: RangeScan) -> list[Message]:
+        """Keep a range scan for the cycle of its view."""
+        self._scans.put(scan)
         return self._begin()
 
     def on_percepts(self, percepts: Percepts) -> list[Message]:
@@ -195,10 +191,6 @@ class Workspace:
     def _background(self) -> list[Dispatch]:
         return [lane.dispatch for lane in self._lanes]
 
-    def _is_known(self, motion: SelfMotion) -> bool:
-        stamps_ns = [known.stamp_ns for known in self._motions]
-        return motion.stamp_ns in stamps_ns
-
     def _is_interrupted(self, percepts: Percepts) -> bool:
         """Whether those are the percepts of a cycle that ended before its last phase."""
         if self._context is not None or percepts.stamp_ns != self._begun_ns:
@@ -206,11 +198,13 @@ class Workspace:
         return self._ledger.graph.phase is not Phase.END
 
     def _begin(self) -> list[Message]:
-        """Begin a cycle if none runs, a view waits, and the self-motion up to it has come."""
+        """Begin a cycle if none runs, a view waits, and all that was sensed for it has come."""
         percepts = self._waiting
         if self._context is not None or percepts is None:
             return []
-        if not self._has_motion_until(percepts.stamp_ns):
+
+        stamp_ns = percepts.stamp_ns
+        if not self._has_motion_until(stamp_ns) or not self._scans.has(stamp_ns):
             return []
 
         if self._is_interrupted(percepts):
@@ -220,24 +214,22 @@ class Workspace:
         return self._begin_cycle(percepts)
 
     def _has_motion_until(self, stamp_ns: int) -> bool:
-        newest_ns = self._motions[-1].stamp_ns if self._motions else -1
+        newest_ns = self._motions.newest_ns()
         return max(newest_ns, self._moved_until_ns) >= stamp_ns
 
     def _continue_interrupted(self, percepts: Percepts) -> list[Message]:
         graph = self._ledger.graph
-        motions = self._motions_until(percepts.stamp_ns)
         self._waiting = None
-        self._context = CycleContext(graph.cycle, percepts, motions, graph.version)
+        self._context = self._sensed(percepts, graph.cycle)
 
         self._phase = PHASES.index(graph.phase) if graph.phase in PHASES else -1
         return self._next_phase()
 
     def _begin_cycle(self, percepts: Percepts) -> list[Message]:
         graph = self._ledger.graph
-        motions = self._motions_until(percepts.stamp_ns)
         self._waiting = None
         self._begun_ns = percepts.stamp_ns
-        self._context = CycleContext(graph.cycle + 1, percepts, motions, graph.version)
+        self._context = self._sensed(percepts, graph.cycle + 1)
         self._phase = -1
 
         entering = first_operations(graph, self._config)
@@ -245,17 +237,18 @@ class Workspace:
         entering += self._offers.take(self._ledger, self._context.cycle)
         return [self._commit(Phase.PERCEPTS, entering), *self._next_phase()]
 
-    def _motions_until(self, stamp_ns: int) -> Array:
-        """Rows of self-motion since the self node was moved last, up to `stamp_ns`."""
-        moved_ns = self._moved_until_ns
-        rows = [np.zeros((0, SELF_MOTION_COLUMNS))]
-        for motion in self._motions:
-            is_due = motion.since_ns >= moved_ns and motion.stamp_ns <= stamp_ns
-            if is_due:
-                values = motion.motions.numpy()
-                rows.append(np.asarray(values, np.float64))
-
-        return Array.of(np.vstack(rows), "<f8")
+    def _sensed(self, percepts: Percepts, cycle: int) -> CycleContext:
+        """All that was sensed for the view of `percepts`: motion since the self node was moved
+        last, and the scan.
+        """
+        stamp_ns = percepts.stamp_ns
+        return CycleContext(
+            cycle,
+            percepts,
+            self._motions.rows(self._moved_until_ns, stamp_ns),
+            self._ledger.graph.version,
+            self._scans.take(stamp_ns),
+        )
 
     def _commit(
         self, phase: Phase, operations: list[Operation], tasks: list[str] | None = None
@@ -369,14 +362,9 @@ class Workspace:
 
         forgotten: list[Operation] = [*self._forgetting.due(self._ledger.graph)]
         published.append(self._commit(Phase.END, forgotten))
-        self._discard_motions()
+        self._motions.discard(self._moved_until_ns)
         self._context = None
         return [*published, *self._begin()]
-
-    def _discard_motions(self) -> None:
-        """Discard the self-motion that has moved the self node."""
-        moved_ns = self._moved_until_ns
-        self._motions = [motion for motion in self._motions if motion.stamp_ns > moved_ns]
 
     def _reject_failed(self, tasks: list[str]) -> None:
         for name in tasks:

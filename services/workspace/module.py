@@ -21,6 +21,7 @@ def build(config: Config, instance: str, codelets: Sequence[ConfiguredCodelet]) 
     return (
         Module("workspace", instance, emits={topics.PRESENCE})
         .on(topics.SELF_MOTION, workspace.on_motion, emits=published)
+        .on(topics.SCAN, workspace.on_scan, emits=published)
         .on(topics.PERCEPTS, workspace.on_percepts, emits=published)
         .on(topics.PROPOSAL, workspace.on_proposal, emits=published)
         .on(topics.OFFER, workspace.on_offer, emits=published)

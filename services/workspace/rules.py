@@ -8,9 +8,9 @@ import numpy as np
 
 from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
+from cogmap.graph.tiles import tiles_of
 from schemas.array import Array
 from schemas.graph import (
-    TILE_SIDE,
     Cells,
     Decay,
     DropLink,
@@ -33,6 +33,9 @@ from schemas.nodes import (
     place_cell,
 )
 
+Key = str | tuple[str, int, int, str]
+"""A node's id, or a column of a tile: its map, x, y and name."""
+
 Writer = Callable[[object], bool]
 """Whether a writer may write a kind of nodes (a type), a kind of links, or a place column."""
 
@@ -49,14 +52,13 @@ def may_offer(written: object) -> bool:
     return KINDS[written].offered
 
 
-def written_by(operation: Operation) -> Iterable[str | tuple[str, int, int, str]]:
+def written_by(operation: Operation) -> Iterable[Key]:
     """What an operation rewrites: a node's id, or tiles' columns; nothing for links, which many may
     write.
     """
     if isinstance(operation, Cells):
-        tile_of = operation.cells.numpy() // TILE_SIDE
-        tiles = np.unique(tile_of, axis=0)
-        for x, y in tiles.tolist():
+        cells = np.asarray(operation.cells.numpy(), np.int64)
+        for x, y in tiles_of(cells):
             yield operation.map, x, y, operation.column
     elif isinstance(operation, (GraphNode, DropNode)):
         yield operation.id
@@ -168,6 +170,6 @@ def _check_extent(name: str, cells: np.ndarray[tuple[int, ...], np.dtype[np.int6
     if farthest > FARTHEST_CELL:
         raise MessageError(f"{name}: a cell {farthest} cells away, at most {FARTHEST_CELL}")
 
-    tiles = len(np.unique(cells // TILE_SIDE, axis=0))
+    tiles = len(tiles_of(cells))
     if tiles > MAX_TILES:
         raise MessageError(f"{name}: cells in {tiles} tiles, at most {MAX_TILES} are taken at once")

@@ -1,6 +1,6 @@
 """The apply-correction codelet: it applies a correction of the path to the map (paper §5.6).
 
-Each object and each road node moves with the place of the path that is nearest to it. What was
+Each object and each place node moves with the place of the path that is nearest to it. What was
 written since the correction was computed is kept: places that the path has gained move with its
 last.
 """
@@ -27,12 +27,11 @@ from schemas.nodes import (
     Object,
     Observations,
     PathSegment,
-    PlaceColumn,
     Self,
     nearest_place,
 )
 from services.codelets.config import SECTION, Config
-from services.codelets.correction.road import move_road
+from services.codelets.correction.place_columns import MOVED_COLUMNS, move_places
 from services.codelets.mapping.observations import Sightings
 from services.codelets.mapping.path import POSE, STAMP, rows_of, segments
 
@@ -65,7 +64,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     if graph.agent is not None:
         operations += _move_self(graph, graph.agent, rows[-1:])
     operations += _move_objects(graph, rows, path)
-    operations += move_road(graph, rows[:, OLD], rows[:, NEW])
+    operations += move_places(graph, rows[:, OLD], rows[:, NEW])
 
     return Answer(operations)
 
@@ -75,8 +74,8 @@ CODELET = Codelet(
     phase=Phase.CORRECTION,
     due=due,
     run=run,
-    reads=frozenset({Correction, PathSegment, Observations, Self, Object, PlaceColumn.ROAD}),
-    writes=frozenset({Correction, PathSegment, Self, Object, LinkKind.AT, PlaceColumn.ROAD}),
+    reads=frozenset({Correction, PathSegment, Observations, Self, Object, *MOVED_COLUMNS}),
+    writes=frozenset({Correction, PathSegment, Self, Object, LinkKind.AT, *MOVED_COLUMNS}),
     config=Config,
     section=SECTION,
 )

@@ -1,51 +1,51 @@
 """The road-place codelet: place nodes that are seen as road, and the one that the agent is at
 (paper §5.2).
+
+How much a place node is road follows from the last few views of it. What was taken for road is
+withdrawn where later views show other ground there.
 """
 
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Floats
-from cogmap.geometry.se2 import mean_pose, transform_from
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.array import Array
 from schemas.codelets import Task
-from schemas.graph import Cells, Phase
+from schemas.graph import Cells, Operation, Phase
 from schemas.nodes import SELF_ID, PlaceColumn, Self
 from services.codelets.config import SECTION, Config
+from services.codelets.mapping.evidence import blended
+from services.codelets.mapping.local_grid import LocalGrid
+from services.codelets.mapping.rays import clear_cells, rays_of
 
 ROAD_REACH_M = 12.0
 ENOUGH_POINTS = 3
-
-Cell32 = npt.NDArray[np.int32]
-Share32 = npt.NDArray[np.float32]
+# Nearer ground is below the image, and of farther ground too few points are seen to miss any.
+NOT_ROAD_M = (3.0, 8.0)
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     """One task in each cycle."""
-    task = context.task(CODELET.name, about=[SELF_ID], with_road=True)
+    task = context.task(CODELET.name, about=[SELF_ID], with_road=True, with_scan=True)
     return [task]
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
-    """Mark the place nodes near the agent that it sees as road, and activate the one it is at."""
+    """Activate the place node that the agent is at, and mark those near it that it sees as road."""
     agent = graph.agent
     if agent is None or task.road_m is None:
         raise MessageError(f"task {task.task_id}: no self node, or no road points")
 
-    pose = mean_pose(agent.samples.numpy())
-    cell_m = graph.cell_m(agent.map)
-    active = _activated(agent.map, pose, cell_m, task.cycle)
+    grid = LocalGrid.around(agent, graph.cell_m(agent.map), ROAD_REACH_M)
+    operations: list[Operation] = [_activated(grid, task.cycle)]
+    if not agent.is_lost and task.road_m.shape[0]:
+        operations += _road(task.road_m, task.scan, grid, graph, config)
 
-    cells, shares = _road_cells(task.road_m, pose, cell_m)
-    if not len(cells):
-        return Answer([active])
-
-    return Answer([active, _road(agent.map, cells, shares)])
+    return Answer(operations)
 
 
 CODELET = Codelet(
@@ -53,21 +53,21 @@ CODELET = Codelet(
     phase=Phase.OBJECTS,
     due=due,
     run=run,
-    reads=frozenset({Self}),
+    reads=frozenset({Self, PlaceColumn.ROAD}),
     writes=frozenset({PlaceColumn.ACTIVATION, PlaceColumn.ROAD}),
     config=Config,
     section=SECTION,
 )
 
 
-def _activated(map_id: str, pose: Floats, cell_m: float, cycle: int) -> Cells:
-    """The activation of the place node at `pose`."""
-    position_m = pose[None, :2]
-    here = np.rint(position_m / cell_m).astype(np.int32)
+def _activated(grid: LocalGrid, cycle: int) -> Cells:
+    """The activation of the place node that the agent is at."""
+    position_m = grid.pose[None, :2]
+    here = np.rint(position_m / grid.cell_m).astype(np.int32)
     full = np.ones(1, np.float32)
 
     return Cells(
-        map=map_id,
+        map=grid.map_id,
         column=PlaceColumn.ACTIVATION,
         cells=Array.of(here),
         values=Array.of(full),
@@ -75,14 +75,25 @@ def _activated(map_id: str, pose: Floats, cell_m: float, cycle: int) -> Cells:
     )
 
 
-def _road(map_id: str, cells: Cell32, shares: Share32) -> Cells:
-    """The place nodes at (k, 2) cells as road, by (k,) shares."""
-    return Cells(
-        map=map_id,
-        column=PlaceColumn.ROAD,
-        cells=Array.of(cells, "<i4"),
-        values=Array.of(shares),
-    )
+def _road(
+    road_m: Array, scan: Array | None, grid: LocalGrid, graph: Graph, config: Config
+) -> list[Operation]:
+    """The operation that writes how much the place nodes in view are road, if that changes."""
+    near_m = _near_m(road_m)
+    points = grid.counts(grid.positions(near_m))
+    shares = np.minimum(1.0, points / ENOUGH_POINTS)
+
+    rays = rays_of(scan, grid, ROAD_REACH_M, config.range_sd_share)
+    range_m = grid.range_m()
+    nearest_m, farthest_m = NOT_ROAD_M
+    is_missed = clear_cells(rays, grid) & (range_m >= nearest_m) & (range_m <= farthest_m)
+
+    is_in_view = (points > 0) | is_missed
+    certainty = grid.certainty(range_m, config.range_sd_share)
+    window = graph.places.window(grid.map_id, [PlaceColumn.ROAD], grid.extent)
+    before = window.column(PlaceColumn.ROAD)
+    after = blended(before, shares, np.where(is_in_view, certainty, 0.0))
+    return grid.changed(PlaceColumn.ROAD, before, after)
 
 
 def _near_m(points_m: Array) -> Floats:
@@ -93,15 +104,3 @@ def _near_m(points_m: Array) -> Floats:
     range_m = np.hypot(seen_m[:, 0], seen_m[:, 1])
     near_m: Floats = seen_m[range_m < ROAD_REACH_M]
     return near_m
-
-
-def _road_cells(points_m: Array, pose: Floats, cell_m: float) -> tuple[Cell32, Share32]:
-    """(k, 2) cells that are seen as road by (n, 2) points in the robot's frame, and how much, (k,),
-    0 to 1.
-    """
-    on_map_m = transform_from(pose, _near_m(points_m))
-    seen_cells = np.rint(on_map_m / cell_m).astype(np.int32)
-
-    cells, counts = np.unique(seen_cells, axis=0, return_counts=True)
-    shares = np.minimum(1.0, counts / ENOUGH_POINTS)
-    return cells, shares.astype(np.float32)

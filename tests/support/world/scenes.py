@@ -160,7 +160,8 @@ class Desk:
         **settings: Any,
     ) -> None:
         self._configured = configured(codelets)
-        config = Config(mode=mode, **settings)  # type: ignore[arg-type]
+        facts = {"awaits_scan": False} | settings
+        config = Config(mode=mode, **facts)  # type: ignore[arg-type]
         self.module: Module = build(config, "workspace", self._configured)
         self.withheld: list[Assignment] = []
         self.withhold = ""

@@ -92,6 +92,10 @@ def _graph() -> Graph:
     return graph_of(_self(), _house(), _path(), _closure(), _correction())
 
 
+_KERB_M = Array.of(np.array([[4.0, 1.6], [4.6, 1.6]], np.float32))
+_RAYS = Array.of(np.array([[0.1, 6.0], [0.0, 6.0]], np.float32))
+
+
 def _every_task() -> list[Task]:
     motions = Array.of(np.array([[2.0, 0.0, 1.0, 0.2, 0.05]]))
     road_m = Array.of(np.array([[2.0, 0.0], [3.0, 1.0]], np.float32))
@@ -102,6 +106,7 @@ def _every_task() -> list[Task]:
         task("object_place", percepts=[percept("tower")]),
         task("landmark", percepts=house),
         task("road_place", road_m=road_m),
+        task("boundary", road_m=road_m, road_boundary_m=_KERB_M, scan=_RAYS),
         task("path", percepts=house),
         task("loop_detection", matches=[PlaceMatch(frame=0, view_ns=0, score=0.9)]),
         task("map_correction"),

@@ -22,7 +22,7 @@ from schemas.graph import (
     Phase,
     PlaceTile,
 )
-from schemas.nodes import Node, PlaceColumn, object_id
+from schemas.nodes import ROOT_MAP, Map, Node, PlaceColumn, object_id
 from services.workspace.commit import Ledger
 from tests.support.world.scenes import Desk, agent, answer, landmark, percept, task, thing
 
@@ -223,6 +223,30 @@ def test_cells_are_late_where_their_tiles_column_has_changed_since() -> None:
     ledger.check(_proposal(other_column, base_version=3))
     with pytest.raises(MessageError, match="late: map:0 0 0 road has changed since 3"):
         ledger.check(_proposal(same_tile, base_version=3))
+
+
+def test_of_two_answers_about_one_column_of_a_tile_the_first_is_committed() -> None:
+    ledger = _ledger()
+    first = _proposal(_cells())
+    same_tile = _proposal(thing("new"), _cells(where=((1, 1),)))
+    elsewhere = _proposal(_cells(where=((TILE_SIDE, 0),)))
+
+    assert ledger.validate([first, same_tile, elsewhere]) == [first, elsewhere]
+    counted = ledger.commit(0, 2, Phase.END, [])
+    assert counted.rejected == 1
+    assert "map:0 0 0 road is written by another in this phase" in counted.reasons[0]
+
+
+def test_cells_of_another_map_are_never_late() -> None:
+    ledger = _ledger()
+    hall = Map(id="map:hall", cell_m=0.5, parent=ROOT_MAP)
+    ledger.commit(0, 1, Phase.OBJECTS, [hall])
+    ledger.commit(0, 1, Phase.OBJECTS, [_cells()])
+
+    ledger.check(_proposal(_cells(map="map:hall"), base_version=4))
+    ledger.commit(0, 1, Phase.OBJECTS, [_cells(map="map:hall")])
+    with pytest.raises(MessageError, match="late: map:hall 0 0 road"):
+        ledger.check(_proposal(_cells(map="map:hall"), base_version=5))
 
 
 def test_one_proposal_that_is_refused_keeps_no_other_from_being_committed() -> None:

@@ -1,0 +1,128 @@
+"""The metrics of place_grid: a map of half a million place nodes, and a change of one tile."""
+
+from __future__ import annotations
+
+import statistics
+import time
+import tracemalloc
+from collections.abc import Callable
+
+import numpy as np
+
+from benchmarks.map_size.maps import Size, cognitive_map
+from benchmarks.report import Metrics
+from benchmarks.threshold import at_most
+from cogmap.bus.codec import decode, encode
+from cogmap.graph.graph import Graph
+from schemas import topics
+from schemas.array import Array
+from schemas.codelets import Proposal
+from schemas.graph import TILE_SIDE, Cells, Delta, Operation, Phase, Snapshot
+from schemas.nodes import PlaceColumn
+from services.workspace.commit import Ledger
+
+THRESHOLDS = {
+    "nodes_500k_commit_ms": at_most(5.0),
+    "bytes_per_node": at_most(64.0),
+}
+SIZE = Size(objects=0, places=500_000)
+CHANGES = 200
+CODELET = "boundary"
+TILE = (3, -4)
+
+
+def measure(announce: Callable[[str], None]) -> Metrics:
+    """Every metric of THRESHOLDS, and the parts and the bytes of a change.
+
+    A change writes all columns of all cells of one tile. Its time is the median over CHANGES, of
+    the workspace's and of one replica's together.
+    """
+    announce(f"making a map of {SIZE.places} place nodes")
+    snapshot = decode(topics.SNAPSHOT, encode(cognitive_map(SIZE)))
+    assert isinstance(snapshot, Snapshot)
+    bytes_per_node = _bytes_per_node(snapshot)
+
+    ledger = Ledger({CODELET: lambda written: True})
+    ledger.restore(snapshot)
+    replica = Graph()
+    replica.load(snapshot)
+
+    announce(f"committing {CHANGES} changes of a tile")
+    rng = np.random.default_rng(SIZE.places)
+    commit_ms = []
+    apply_ms = []
+    delta_bytes = 0
+    for number in range(CHANGES):
+        proposal = _proposal(number, ledger.graph.version, rng)
+        began_s = time.perf_counter()
+        payload = _committed(ledger, proposal)
+        committed_s = time.perf_counter()
+        _follow(replica, payload)
+        applied_s = time.perf_counter()
+
+        commit_ms.append(1e3 * (committed_s - began_s))
+        apply_ms.append(1e3 * (applied_s - committed_s))
+        delta_bytes = len(payload)
+
+    both_ms = np.add(commit_ms, apply_ms)
+    return {
+        "nodes_500k_commit_ms": float(np.median(both_ms)),
+        "bytes_per_node": bytes_per_node,
+        "workspace_ms": statistics.median(commit_ms),
+        "replica_ms": statistics.median(apply_ms),
+        "commit_ms_p99": float(np.percentile(both_ms, 99)),
+        "tile_delta_bytes": float(delta_bytes),
+    }
+
+
+def _proposal(number: int, base_version: int, rng: np.random.Generator) -> Proposal:
+    """New values of every column of every cell of a tile."""
+    inside = np.argwhere(np.ones((TILE_SIDE, TILE_SIDE), bool))
+    cells = inside + np.array(TILE) * TILE_SIDE
+
+    operations: list[Operation] = []
+    for column in PlaceColumn:
+        values = rng.random(len(cells), np.float32)
+        operation = Cells(
+            column=column,
+            cells=Array.of(cells, "<i4"),
+            values=Array.of(values),
+            cycle=number,
+        )
+        operations.append(operation)
+
+    return Proposal(
+        task_id=f"{number}/{CODELET}",
+        codelet=CODELET,
+        base_version=base_version,
+        operations=operations,
+    )
+
+
+def _committed(ledger: Ledger, proposal: Proposal) -> bytes:
+    """Validate a proposal, commit it and encode the delta, as the workspace does."""
+    (valid,) = ledger.validate([proposal])
+    delta = ledger.commit(0, 1, Phase.OBJECTS, valid.operations, [valid.task_id])
+    return encode(delta)
+
+
+def _follow(replica: Graph, payload: bytes) -> None:
+    """Decode and apply a delta, as each replica does."""
+    delta = decode(topics.DELTA, payload)
+    assert isinstance(delta, Delta)
+    replica.apply(delta)
+
+
+def _bytes_per_node(snapshot: Snapshot) -> float:
+    """The memory of a replica's place nodes, as allocated, over their number."""
+    tracemalloc.start()
+    try:
+        before, _ = tracemalloc.get_traced_memory()
+        replica = Graph()
+        replica.load(snapshot)
+        after, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+
+    nodes = len(replica.places.tiles) * TILE_SIDE**2
+    return (after - before) / nodes

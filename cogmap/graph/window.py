@@ -1,0 +1,80 @@
+"""A rectangle of place nodes as dense arrays, for what computes on many of them at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cogmap.geometry.arrays import Singles
+from schemas.nodes import PlaceColumn
+
+WEIGHT_COLUMNS = (
+    PlaceColumn.WEIGHT_E,
+    PlaceColumn.WEIGHT_NE,
+    PlaceColumn.WEIGHT_N,
+    PlaceColumn.WEIGHT_NW,
+)
+EVIDENCE_COLUMNS = (
+    PlaceColumn.EVIDENCE_E,
+    PlaceColumn.EVIDENCE_NE,
+    PlaceColumn.EVIDENCE_N,
+    PlaceColumn.EVIDENCE_NW,
+)
+LINK_OFFSETS = np.array([(1, 0), (1, 1), (0, 1), (-1, 1)])
+"""The offset of the neighbour that each of a cell's own four links leads to, in their order."""
+
+
+@dataclass(frozen=True, eq=False)
+class Extent:
+    """The cells (i, j) of a map with `lower` <= (i, j) < `upper`."""
+
+    lower: tuple[int, int]
+    upper: tuple[int, int]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """How many cells it has in each direction."""
+        width = max(0, self.upper[0] - self.lower[0])
+        height = max(0, self.upper[1] - self.lower[1])
+        return width, height
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """Some columns of a rectangle of place nodes, copied: `values` (k, width, height), float32.
+
+    `values[c, i, j]` is column `columns[c]` of cell (i, j) + `origin`. Cells whose tile does not
+    exist have each column's default.
+    """
+
+    origin: tuple[int, int]
+    columns: tuple[PlaceColumn, ...]
+    values: Singles
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """How many cells it has in each direction."""
+        _, width, height = self.values.shape
+        return width, height
+
+    def column(self, name: PlaceColumn) -> Singles:
+        """One column, (width, height). Raises ValueError where the window lacks it."""
+        values: Singles = self.values[self.columns.index(name)]
+        return values
+
+    def weights(self) -> Singles:
+        """The weights of links by direction, (4, width, height), in the order of LINK_OFFSETS."""
+        return self._stack(WEIGHT_COLUMNS)
+
+    def evidence(self) -> Singles:
+        """The evidence of links by direction, (4, width, height), 0 where never seen."""
+        return self._stack(EVIDENCE_COLUMNS)
+
+    def _stack(self, names: tuple[PlaceColumn, ...]) -> Singles:
+        first = self.columns.index(names[0])
+        last = first + len(names)
+        if self.columns[first:last] == names:
+            return np.asarray(self.values[first:last])
+
+        return np.stack([self.column(name) for name in names])

@@ -1,0 +1,112 @@
+"""What is sensed beside percepts: self-motion and range scans, kept until a cycle needs them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cogmap.errors import MessageError
+from schemas.array import Array
+from schemas.sensing import RangeScan, SelfMotion
+from services.workspace.config import Config
+
+SELF_MOTION_COLUMNS = 5
+MAX_SCANS = 16
+
+
+class SelfMotions:
+    """The self-motion that has not moved the self node yet, in order of its coming."""
+
+    def __init__(self) -> None:
+        self._motions: list[SelfMotion] = []
+
+    def put(self, motion: SelfMotion, moved_ns: int) -> None:
+        """Keep self-motion, once, where it is newer than `moved_ns`. Raises MessageError where its
+        rows are of another shape or dtype.
+        """
+        shape = motion.motions.shape
+        dtype = motion.motions.dtype
+        has_columns = len(shape) == 2 and shape[1] == SELF_MOTION_COLUMNS
+        if dtype != "<f8" or not has_columns:
+            raise MessageError(f"self-motion of shape {shape} and dtype {dtype}")
+
+        stamps_ns = [known.stamp_ns for known in self._motions]
+        is_new = motion.stamp_ns > moved_ns and motion.stamp_ns not in stamps_ns
+        if is_new:
+            self._motions.append(motion)
+
+    def newest_ns(self) -> int:
+        """Until when the motion is known; -1 where none is kept."""
+        return self._motions[-1].stamp_ns if self._motions else -1
+
+    def rows(self, moved_ns: int, stamp_ns: int) -> Array:
+        """The rows from `moved_ns` up to `stamp_ns`, float64 (n, 5)."""
+        rows = [np.zeros((0, SELF_MOTION_COLUMNS))]
+        for motion in self._motions:
+            is_due = motion.since_ns >= moved_ns and motion.stamp_ns <= stamp_ns
+            if is_due:
+                values = motion.motions.numpy()
+                rows.append(np.asarray(values, np.float64))
+
+        return Array.of(np.vstack(rows), "<f8")
+
+    def discard(self, moved_ns: int) -> None:
+        """Discard what has moved the self node, up to `moved_ns`."""
+        self._motions = [motion for motion in self._motions if motion.stamp_ns > moved_ns]
+
+
+class Scans:
+    """The newest range scans, of which each cycle takes the one of its view.
+
+    In lockstep a cycle does not begin before it has come, where scans are awaited; where they are
+    not, none is used. In real time it begins with the newest that is at most `max_scan_age_ms`
+    older than its view, or with none.
+    """
+
+    def __init__(self, config: Config) -> None:
+        in_lockstep = config.mode == "lockstep"
+        self._awaited = in_lockstep and config.awaits_scan
+        self._ignored = in_lockstep and not config.awaits_scan
+        self._max_age_ns = 0 if in_lockstep else int(config.max_scan_age_ms * 1e6)
+        self._scans: dict[int, RangeScan] = {}
+        self._missed_ns = -1
+
+    def put(self, scan: RangeScan) -> None:
+        """Keep a scan. Raises MessageError where it is of another shape or dtype, has a range
+        below 0, or comes after the cycle of its view has begun without it.
+        """
+        bearing_rad = scan.bearing_rad
+        range_m = scan.range_m
+        is_flat = len(bearing_rad.shape) == 1 and bearing_rad.shape == range_m.shape
+        if not is_flat or {bearing_rad.dtype, range_m.dtype} != {"<f4"}:
+            raise MessageError(
+                f"range scan of shapes {bearing_rad.shape}, {range_m.shape} "
+                f"and dtypes {bearing_rad.dtype}, {range_m.dtype}"
+            )
+
+        ranges_m = np.asarray(range_m.numpy(), np.float32)
+        if (ranges_m < 0).any():
+            raise MessageError(f"range scan with a range of {ranges_m.min():g} m")
+        if self._ignored:
+            return
+        if scan.stamp_ns == self._missed_ns:
+            raise MessageError("a range scan came after its view's cycle had begun without it")
+
+        self._scans[scan.stamp_ns] = scan
+        while len(self._scans) > MAX_SCANS:
+            del self._scans[min(self._scans)]
+
+    def has(self, stamp_ns: int) -> bool:
+        """Whether the cycle of the view at `stamp_ns` waits for its scan no longer."""
+        return not self._awaited or stamp_ns in self._scans
+
+    def take(self, stamp_ns: int) -> RangeScan | None:
+        """The scan for the cycle of the view at `stamp_ns`; None where there is none."""
+        until_view = [known_ns for known_ns in self._scans if known_ns <= stamp_ns]
+        newest_ns = max(until_view, default=-1)
+        is_missed = newest_ns != stamp_ns
+        self._missed_ns = stamp_ns if is_missed else -1
+
+        is_too_old = stamp_ns - newest_ns > self._max_age_ns
+        if newest_ns < 0 or is_too_old:
+            return None
+        return self._scans[newest_ns]
