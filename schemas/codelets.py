@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from schemas.array import Array
 from schemas.base import Count, Message, Name, Part
-from schemas.cognition import Coalition, Replay
+from schemas.cognition import Coalition, Event
 from schemas.graph import Operation
 from schemas.sensing import Percept, PlaceMatch
 
@@ -56,7 +56,7 @@ class Proposal(Message, kw_only=True, frozen=True):
     base_version: Count
     operations: list[Operation] = []
     coalitions: list[Coalition] = []
-    events: list[Replay] = []
+    events: list[Event] = []
     failure: str = ""
 
 

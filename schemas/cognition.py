@@ -13,7 +13,7 @@ from schemas.graph import Link
 from schemas.nodes import AnyNode
 
 
-class Replay(Message, kw_only=True, frozen=True):
+class Replay(Message, kw_only=True, frozen=True, tag="replay"):
     """A loop closed by reverse replay, and what it predicts of place cells (paper §5.6).
 
     Positions of the path in the order in which they are replayed, the newest first: `stamps_ns`
@@ -34,6 +34,33 @@ class Replay(Message, kw_only=True, frozen=True):
     pairs: Array
     strength_changes: Array
     decay_per_m: Annotated[float, msgspec.Meta(gt=0, le=100)]
+
+
+class Direction(enum.StrEnum):
+    """FORWARD: from the agent to the goal, before it leaves. REVERSE: from the goal back along the
+    path that it took, once it is there.
+    """
+
+    FORWARD = "forward"
+    REVERSE = "reverse"
+
+
+class RouteReplay(Message, kw_only=True, frozen=True, tag="route_replay"):
+    """A route replayed by place cells before a run or after it (paper §5.5, §5.6).
+
+    `cells` int32 (n, 2) are the place nodes of map `map` in the order in which they are active;
+    `goal` is the id of the goal, empty where the agent explores.
+    """
+
+    cycle: Count
+    direction: Direction
+    goal: str = ""
+    map: Name
+    cells: Array
+
+
+Event = Replay | RouteReplay
+"""What a codelet publishes once its operations are committed."""
 
 
 class Coalition(Part, kw_only=True, frozen=True):

@@ -12,7 +12,7 @@ import numpy as np
 from cogmap.graph.graph import Graph
 from schemas.array import Array
 from schemas.codelets import Task
-from schemas.cognition import Coalition, Replay
+from schemas.cognition import Coalition, Event
 from schemas.graph import Operation, Phase
 from schemas.nodes import GraphNode, LinkKind, PlaceColumn
 from schemas.sensing import Percept, Percepts, PlaceMatch, RangeScan
@@ -95,7 +95,7 @@ class Answer:
 
     operations: list[Operation] = field(default_factory=list)
     coalitions: list[Coalition] = field(default_factory=list)
-    events: list[Replay] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ def example_messages() -> list[Message]:
         sensing.learned(),
         cognition.replay(),
         sensing.street_closure(),
+        cognition.route_replay(),
     ]
     stamped: list[Message] = []
     for seq, message in enumerate(messages):

@@ -16,7 +16,7 @@ def proposal() -> Proposal:
         base_version=41,
         operations=graph.operations(),
         coalitions=[cognition.coalition()],
-        events=[cognition.replay()],
+        events=[cognition.replay(), cognition.route_replay()],
         failure="too few samples",
     )
 

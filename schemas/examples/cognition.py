@@ -11,9 +11,11 @@ from schemas.cognition import (
     Coalitions,
     Competition,
     Contender,
+    Direction,
     Fate,
     Rejection,
     Replay,
+    RouteReplay,
     Trigger,
 )
 from schemas.examples import nodes
@@ -22,7 +24,7 @@ from schemas.examples.graph import instance_link
 
 
 def messages() -> list[Message]:
-    """A message of every type but the replay, from coalitions to the selected action."""
+    """A message of every type but the replays, from coalitions to the selected action."""
     return [
         Coalitions(cycle=6, coalitions=[coalition()]),
         _competition(),
@@ -88,4 +90,15 @@ def _action() -> Action:
         activation=0.5,
         parameters={"speed_m_s": 3.0, "turn": "left"},
         behaviours=[chosen, rejected],
+    )
+
+
+def route_replay() -> RouteReplay:
+    """A route replayed from its goal."""
+    return RouteReplay(
+        cycle=6,
+        direction=Direction.REVERSE,
+        goal="goal:bakery",
+        map="map:1",
+        cells=ramp(3, 2, dtype="<i4"),
     )

@@ -7,10 +7,12 @@ from typing import Any
 from schemas.examples.arrays import matrix
 from schemas.nodes import (
     CORRECTION_ID,
+    PLAN_ID,
     ROOT_MAP,
     SELF_ID,
     AnyNode,
     Correction,
+    Goal,
     LoopClosure,
     Map,
     Node,
@@ -18,7 +20,10 @@ from schemas.nodes import (
     Observations,
     PathSegment,
     Percept,
+    Plan,
+    PlanState,
     Self,
+    goal_id,
     object_id,
     observations_id,
     percept_id,
@@ -40,6 +45,8 @@ def every_kind() -> list[AnyNode]:
         _closure(),
         Correction(id=CORRECTION_ID, rows=matrix(2, 7), **_USUAL),
         _map(),
+        _goal(),
+        _plan(),
     ]
 
 
@@ -165,5 +172,32 @@ def _map() -> Map:
         x_m=3.0,
         y_m=-2.0,
         heading_rad=0.25,
+        **_USUAL,
+    )
+
+
+def _goal() -> Goal:
+    return Goal(
+        id=goal_id("bakery"),
+        object="bakery",
+        map="map:1",
+        x_m=12.5,
+        y_m=-3.25,
+        reached_ns=1_000_000_000,
+        **_USUAL,
+    )
+
+
+def _plan() -> Plan:
+    return Plan(
+        id=PLAN_ID,
+        map="map:1",
+        state=PlanState.NO_ROUTE,
+        explores=True,
+        goals=[goal_id("bakery"), goal_id("school")],
+        unreachable={goal_id("harbour"): PlanState.OUTSIDE},
+        planned_ns=1_000_000_000,
+        length_m=42.5,
+        route=matrix(3, 2),
         **_USUAL,
     )

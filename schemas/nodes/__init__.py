@@ -12,12 +12,15 @@ from schemas.nodes.columns import (
     ObservationColumn,
     PathColumn,
     PlaceColumn,
+    RouteColumn,
     SelfColumn,
 )
 from schemas.nodes.ids import (
     CORRECTION_ID,
+    PLAN_ID,
     ROOT_MAP,
     SELF_ID,
+    goal_id,
     nearest_place,
     object_id,
     observations_id,
@@ -28,6 +31,7 @@ from schemas.nodes.ids import (
 )
 from schemas.nodes.links import EXCLUSIVE_LINKS, LinkKind
 from schemas.nodes.path import Correction, LoopClosure, Observations, PathSegment
+from schemas.nodes.planning import Goal, Plan, PlanState
 from schemas.nodes.rules import KINDS, AnyNode, KindRules, kind_name, kind_of
 from schemas.nodes.situation import Map, Object, Percept, Self
 
@@ -36,12 +40,14 @@ __all__ = [
     "EXCLUSIVE_LINKS",
     "KINDS",
     "NEVER_NS",
+    "PLAN_ID",
     "POSE_COLUMNS",
     "ROOT_MAP",
     "SELF_ID",
     "AnyNode",
     "Correction",
     "CorrectionColumn",
+    "Goal",
     "GraphNode",
     "KindRules",
     "LinkKind",
@@ -55,8 +61,12 @@ __all__ = [
     "PathSegment",
     "Percept",
     "PlaceColumn",
+    "Plan",
+    "PlanState",
+    "RouteColumn",
     "Self",
     "SelfColumn",
+    "goal_id",
     "kind_name",
     "kind_of",
     "nearest_place",

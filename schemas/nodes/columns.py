@@ -85,6 +85,13 @@ class CorrectionColumn(enum.IntEnum):
     NEW_HEADING_RAD = 6
 
 
+class RouteColumn(enum.IntEnum):
+    """Columns of a route: positions on its map, from the agent to the goal."""
+
+    X_M = 0
+    Y_M = 1
+
+
 def check_matrix(node: str, matrix: Matrix, dtype: str, columns: tuple[int, ...]) -> None:
     """Raise ValueError where a matrix is of another dtype or width, or has no rows or too many."""
     rows, width = matrix.shape

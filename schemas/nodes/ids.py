@@ -5,11 +5,17 @@ from __future__ import annotations
 ROOT_MAP = "map:0"
 SELF_ID = "self"
 CORRECTION_ID = "correction"
+PLAN_ID = "plan"
 
 
 def object_id(label: str) -> str:
     """The id of the object that perception calls `label`."""
     return f"object:{label}"
+
+
+def goal_id(name: str) -> str:
+    """The id of the goal that a person calls `name`."""
+    return f"goal:{name}"
 
 
 def percept_id(label: str) -> str:

@@ -11,7 +11,7 @@ class LinkKind(enum.StrEnum):
     AT: from the self or an object to the place node nearest to it. INSTANCE: from a percept to the
     object that it is a sighting of. OBSERVES and ALONG: from observations to the object observed,
     and to the path segment that they were made along. NEXT: between neighbouring place nodes; these
-    are kept in the tiles' columns.
+    are kept in the tiles' columns. TOWARDS: from a plan to its next goal.
     """
 
     AT = "at"
@@ -19,7 +19,16 @@ class LinkKind(enum.StrEnum):
     OBSERVES = "observes"
     ALONG = "along"
     NEXT = "next"
+    TOWARDS = "towards"
 
 
-EXCLUSIVE_LINKS = frozenset({LinkKind.AT, LinkKind.INSTANCE, LinkKind.OBSERVES, LinkKind.ALONG})
+EXCLUSIVE_LINKS = frozenset(
+    {
+        LinkKind.AT,
+        LinkKind.INSTANCE,
+        LinkKind.OBSERVES,
+        LinkKind.ALONG,
+        LinkKind.TOWARDS,
+    }
+)
 """Kinds of which a node has one link: a new one replaces it."""

@@ -6,10 +6,21 @@ from dataclasses import dataclass
 
 from schemas.nodes.base import GraphNode, Node
 from schemas.nodes.path import Correction, LoopClosure, Observations, PathSegment
+from schemas.nodes.planning import Goal, Plan
 from schemas.nodes.situation import Map, Object, Percept, Self
 
 AnyNode = (
-    Node | Self | Percept | Object | PathSegment | Observations | LoopClosure | Correction | Map
+    Node
+    | Self
+    | Percept
+    | Object
+    | PathSegment
+    | Observations
+    | LoopClosure
+    | Correction
+    | Map
+    | Goal
+    | Plan
 )
 
 
@@ -39,6 +50,8 @@ KINDS: dict[type[GraphNode], KindRules] = {
     LoopClosure: KindRules(persistent=True, indexed=True),
     Correction: KindRules(persistent=True),
     Map: KindRules(persistent=True, indexed=True, offered=True, droppable=False),
+    Goal: KindRules(persistent=True, indexed=True, offered=True),
+    Plan: KindRules(persistent=True, indexed=True),
 }
 
 

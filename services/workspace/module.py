@@ -17,7 +17,14 @@ def build(config: Config, instance: str, codelets: Sequence[ConfiguredCodelet]) 
     """The module `workspace`, the single writer of the graph, which calls `codelets`."""
     workspace = Workspace(config, codelets)
 
-    published = (topics.DELTA, topics.TASK, topics.LEASES, topics.COALITIONS, topics.REPLAY)
+    published = (
+        topics.DELTA,
+        topics.TASK,
+        topics.LEASES,
+        topics.COALITIONS,
+        topics.REPLAY,
+        topics.ROUTE_REPLAY,
+    )
     return (
         Module("workspace", instance, emits={topics.PRESENCE})
         .on(topics.SELF_MOTION, workspace.on_motion, emits=published)

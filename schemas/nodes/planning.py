@@ -1,0 +1,65 @@
+"""Where the agent is to go, and the route that leads there (paper §5.5)."""
+
+from __future__ import annotations
+
+import enum
+
+from schemas.array import Matrix
+from schemas.base import Finite, Name
+from schemas.nodes.base import NEVER_NS, GraphNode, Metres, Stamp
+from schemas.nodes.columns import RouteColumn, check_matrix
+from schemas.nodes.ids import ROOT_MAP
+
+
+class PlanState(enum.StrEnum):
+    """What a plan came to, or why a goal has no route.
+
+    READY: its route is to be driven. AT_GOAL: the agent is there already. NO_ROUTE: no links lead
+    to the goal. UNKNOWN_GOAL: the map has no object of that name. OUTSIDE: the goal is on no map.
+    BLOCKED: the goal, or the agent, is at a place node without links. NO_GOAL: there is none, and
+    nothing is left to explore.
+    """
+
+    READY = "ready"
+    AT_GOAL = "the agent is at the goal"
+    NO_ROUTE = "no route leads to the goal"
+    UNKNOWN_GOAL = "the map has no object of that name"
+    OUTSIDE = "the goal is outside every map"
+    BLOCKED = "the goal or the agent is at a blocked place"
+    NO_GOAL = "there is no goal"
+
+
+class Goal(GraphNode, kw_only=True, frozen=True, tag="goal"):
+    """A place to go to: the object `object`, by its label, or a position where that is empty.
+
+    `reached_ns` is the time of the view in which the agent was there, NEVER_NS before.
+    """
+
+    object: str = ""
+    map: Name = ROOT_MAP
+    x_m: Finite = 0.0
+    y_m: Finite = 0.0
+    reached_ns: Stamp = NEVER_NS
+
+
+class Plan(GraphNode, kw_only=True, frozen=True, tag="plan"):
+    """A route to the next goal, and the order of those after it.
+
+    `goals` are ids of goals in the order of their visits; none where the plan explores. `route`:
+    float64 (n, 2) of the map `map`, see RouteColumn, from where the agent was at `planned_ns` to
+    the next goal, in place nodes `length_m` long. `unreachable` has the reason for each goal that
+    has no route.
+    """
+
+    map: Name = ROOT_MAP
+    state: PlanState
+    explores: bool = False
+    goals: list[Name] = []
+    unreachable: dict[Name, PlanState] = {}
+    planned_ns: Stamp = NEVER_NS
+    length_m: Metres = 0.0
+    route: Matrix | None = None
+
+    def __post_init__(self) -> None:
+        if self.route is not None:
+            check_matrix(self.id, self.route, "<f8", (len(RouteColumn),))
