@@ -42,6 +42,13 @@ def _experiment() -> click.Command:
     return experiment
 
 
+def _goal() -> click.Command:
+    """Send the agent somewhere, and print its plan."""
+    from cli.goal import goal
+
+    return goal
+
+
 def _graph() -> click.Command:
     """Show which process publishes and subscribes what."""
     from cli.graph import graph
@@ -103,6 +110,7 @@ COMMANDS: dict[str, Loader] = {
     "config": _config,
     "doctor": _doctor,
     "experiment": _experiment,
+    "goal": _goal,
     "graph": _graph,
     "log": _log,
     "module": _module,

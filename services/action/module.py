@@ -6,13 +6,16 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
+import numpy as np
+
 from cogmap.errors import MessageError
+from cogmap.graph.graph import Graph
 from cogmap.runtime.module import Module
 from schemas import topics
 from schemas.base import Message, Scalar
 from schemas.cognition import Action, Broadcast, Competition
 from schemas.graph import Delta, Phase
-from schemas.nodes import Self
+from schemas.nodes import NEVER_NS, PLAN_ID, Plan, PlanState, Self
 from schemas.process import Clock
 from schemas.sensing import MotorCommand, Pose, RangeScan, SelfMotion, SpeedLimit
 from services.action.config import Config
@@ -42,17 +45,19 @@ class ActionModule:
     the simulator publishes a frame again that nobody answered, is answered at once.
     """
 
-    def __init__(self, config: Config) -> None:
+    def __init__(self, config: Config, graph: Graph) -> None:
         self._config = config
         self._is_lockstep = config.mode == "lockstep"
         self._gate = LockstepGate()
         self._selection = ActionSelection(config)
         self._stuck = StuckDetector(config.stuck_m_s, config.stuck_after_s)
         self._route: Route | None = None
-        self._motor: SensoryMotorMemory | None = None
+        self._motor = SensoryMotorMemory(config)
         if config.route:
-            self._route = Route(config.route, config.corner_radius_m, config.overrun_m)
-            self._motor = SensoryMotorMemory(config, self._route)
+            self._route = Route.of_legs(config.route, config.corner_radius_m, config.overrun_m)
+
+        self._graph = graph
+        self._planned_ns = NEVER_NS
 
         self._chosen: Action | None = None
         self._is_resumed = False
@@ -117,8 +122,9 @@ class ActionModule:
 
     def on_delta(self, delta: Delta) -> MotorCommand | None:
         """Command the wheels for a new pose of the self node; repeat the command for a repeated
-        pose.
+        pose. A new plan is driven from then on.
         """
+        self.take_plan()
         pose = _self_pose(delta)
         if pose is None:
             return None
@@ -133,6 +139,17 @@ class ActionModule:
             self._is_resumed = False
 
         return self._command(at_once=is_repeated and delta.phase is Phase.LOCALIZATION)
+
+    def take_plan(self) -> None:
+        """Drive the route of the graph's plan from now on, where it is new and no legs are set."""
+        plan = self._graph.get(Plan, PLAN_ID)
+        if plan is None or plan.planned_ns == self._planned_ns or self._config.route:
+            return
+
+        self._planned_ns = plan.planned_ns
+        self._route = None
+        if plan.state is PlanState.READY and plan.route is not None:
+            self._route = Route.of_plan(np.asarray(plan.route.numpy(), np.float64))
 
     def on_competition(self, competition: Competition) -> MotorCommand | None:
         """A cycle's competition has ended."""
@@ -168,6 +185,9 @@ class ActionModule:
         if self._route is None:
             return {}
 
+        if not self._config.route:
+            return {"travelled_m": self._route.travelled_m}
+
         leg = self._route.leg
         length_m, turn_rad = self._config.route[leg]
 
@@ -196,7 +216,7 @@ class ActionModule:
         stamp_ns = estimate.stamp_ns
         age_ns = self._age_ns(stamp_ns)
 
-        if self._motor is None or self._route is None:
+        if self._route is None:
             return halted(stamp_ns, SpeedLimit.NO_ROUTE, age_ns)
 
         self._route.advance(estimate.pose.x_m, estimate.pose.y_m)
@@ -206,7 +226,7 @@ class ActionModule:
         if self._stuck.is_stuck:
             return halted(stamp_ns, SpeedLimit.STUCK, age_ns)
 
-        return self._motor.command(stamp_ns, estimate.pose, self._clear_m, age_ns)
+        return self._motor.command(stamp_ns, estimate.pose, self._route, self._clear_m, age_ns)
 
     def _remember(self, command: MotorCommand) -> MotorCommand:
         wheels_rad_s = (command.left_wheel_rad_s + command.right_wheel_rad_s) / 2
@@ -244,13 +264,14 @@ def _self_pose(delta: Delta) -> Pose | None:
 
 def build(config: Config, instance: str) -> Module:
     """The module `action`."""
-    action = ActionModule(config)
+    graph = Graph()
+    action = ActionModule(config, graph)
     commands = (topics.MOTOR_COMMAND,)
     module = (
         Module("action", instance)
         .on(topics.SELF_MOTION, action.on_motion, emits=commands)
         .on(topics.SCAN, action.on_scan, emits=commands)
-        .on(topics.DELTA, action.on_delta, emits=commands)
+        .following(graph, action.on_delta, emits=commands, on_load=action.take_plan)
         .on(topics.COMPETITION, action.on_competition, emits=commands)
         .on(topics.BROADCAST, action.on_broadcast, emits=[topics.ACTION, *commands])
         .journaling(topics.ACTION, action.restore, action.chosen)

@@ -16,6 +16,8 @@ from services.action.route import Route
 
 MAX_BEARING_RAD = math.pi / 3
 TURNING_SPEED_M_S = 0.5
+BEHIND_RAD = 3 * math.pi / 4
+ASIDE_RAD = 0.3
 
 
 class Speed(NamedTuple):
@@ -23,6 +25,13 @@ class Speed(NamedTuple):
 
     m_s: float
     limit: SpeedLimit
+
+
+class Ahead(NamedTuple):
+    """The point that the robot steers to: its bearing, left positive, and its distance."""
+
+    bearing_rad: float
+    distance_m: float
 
 
 def obstacle_ahead_m(scan: RangeScan, half_width_m: float) -> float:
@@ -63,64 +72,85 @@ class SensoryMotorMemory:
     before obstacles.
     """
 
-    def __init__(self, config: Config, route: Route) -> None:
+    def __init__(self, config: Config) -> None:
         self._config = config
-        self._route = route
 
     def command(
-        self, stamp_ns: int, pose: Pose, clear_m: float, pose_age_ns: int = 0
+        self, stamp_ns: int, pose: Pose, route: Route, clear_m: float, pose_age_ns: int = 0
     ) -> MotorCommand:
-        """Wheel speeds at `pose`, which is `pose_age_ns` old, with `clear_m` free ahead."""
-        speed = self._speed(clear_m, pose_age_ns / 1e9)
-        if speed.m_s <= 0.0:
+        """Wheel speeds at `pose`, which is `pose_age_ns` old, with `clear_m` free ahead.
+
+        Where the route leads back, or aside of an obstacle, the robot turns on the spot.
+        """
+        speed = self._speed(route, clear_m, pose_age_ns / 1e9)
+        ahead = self._ahead(route, pose)
+        is_blocked = speed.m_s <= 0.0
+        may_turn = not is_blocked or speed.limit is SpeedLimit.OBSTACLE
+        if may_turn and self._must_turn(ahead.bearing_rad, is_blocked):
+            turn_m_s = math.copysign(TURNING_SPEED_M_S, ahead.bearing_rad)
+            return self._wheels(stamp_ns, -turn_m_s, turn_m_s, speed.limit, pose_age_ns)
+
+        if is_blocked:
             return halted(stamp_ns, speed.limit, pose_age_ns)
 
-        config = self._config
-        speed_m_s, curvature_per_m = self._steer(speed.m_s, pose)
-        half_turn_m_s = speed_m_s * curvature_per_m * config.track_m / 2
+        steered_rad = max(-math.pi / 2, min(math.pi / 2, ahead.bearing_rad))
+        curvature_per_m = 2 * math.sin(steered_rad) / ahead.distance_m
+        speed_m_s = speed.m_s
+        if abs(ahead.bearing_rad) > math.pi / 2:
+            speed_m_s = min(speed_m_s, TURNING_SPEED_M_S)
 
+        half_turn_m_s = speed_m_s * curvature_per_m * self._config.track_m / 2
+        left_m_s = speed_m_s - half_turn_m_s
+        right_m_s = speed_m_s + half_turn_m_s
+        return self._wheels(stamp_ns, left_m_s, right_m_s, speed.limit, pose_age_ns)
+
+    def _must_turn(self, bearing_rad: float, is_blocked: bool) -> bool:
+        """Whether the point ahead is so far aside that the robot turns before it drives."""
+        least_rad = ASIDE_RAD if is_blocked else BEHIND_RAD
+        return abs(bearing_rad) > least_rad
+
+    def _wheels(
+        self,
+        stamp_ns: int,
+        left_m_s: float,
+        right_m_s: float,
+        limit: SpeedLimit,
+        pose_age_ns: int,
+    ) -> MotorCommand:
+        radius_m = self._config.wheel_radius_m
         return MotorCommand(
             stamp_ns=stamp_ns,
-            left_wheel_rad_s=(speed_m_s - half_turn_m_s) / config.wheel_radius_m,
-            right_wheel_rad_s=(speed_m_s + half_turn_m_s) / config.wheel_radius_m,
-            slowed_by=speed.limit,
+            left_wheel_rad_s=left_m_s / radius_m,
+            right_wheel_rad_s=right_m_s / radius_m,
+            slowed_by=limit,
             pose_age_ns=pose_age_ns,
         )
 
-    def _steer(self, speed_m_s: float, pose: Pose) -> tuple[float, float]:
-        """Speed and curvature (left positive) of the arc to the point ahead; slow where that is
-        behind the robot.
-        """
+    def _ahead(self, route: Route, pose: Pose) -> Ahead:
+        """The point of the route that pure pursuit steers to, as seen from the robot."""
         lookahead_m = self._config.lookahead_m
-        target_x_m, target_y_m = self._route.ahead(lookahead_m)
+        target_x_m, target_y_m = route.ahead(lookahead_m)
         dx_m = target_x_m - pose.x_m
         dy_m = target_y_m - pose.y_m
 
         direction_rad = math.atan2(dy_m, dx_m)
         bearing_rad = math.remainder(direction_rad - pose.heading_rad, math.tau)
-        reach_m = max(lookahead_m / 2, math.hypot(dx_m, dy_m))
-        steered_rad = max(-math.pi / 2, min(math.pi / 2, bearing_rad))
-        curvature_per_m = 2 * math.sin(steered_rad) / reach_m
+        return Ahead(bearing_rad, max(lookahead_m / 2, math.hypot(dx_m, dy_m)))
 
-        if abs(bearing_rad) > math.pi / 2:
-            speed_m_s = min(speed_m_s, TURNING_SPEED_M_S)
-
-        return speed_m_s, curvature_per_m
-
-    def _speed(self, clear_m: float, pose_age_s: float) -> Speed:
+    def _speed(self, route: Route, clear_m: float, pose_age_s: float) -> Speed:
         """The highest speed that the bend ahead, the end of the route, an obstacle and the pose's
         age allow.
         """
         config = self._config
         braking_distance_m = config.cruise_m_s**2 / (2 * config.braking_m_s2)
-        bend_per_m = self._route.sharpest(braking_distance_m)
+        bend_per_m = route.sharpest(braking_distance_m)
 
         free_m = max(0.0, clear_m - config.clearance_m)
 
         limits = {
             SpeedLimit.NONE: config.cruise_m_s,
             SpeedLimit.BEND: math.sqrt(config.lateral_m_s2 / max(bend_per_m, 1e-6)),
-            SpeedLimit.ROUTE_END: math.sqrt(2 * config.braking_m_s2 * self._route.left_m),
+            SpeedLimit.ROUTE_END: math.sqrt(2 * config.braking_m_s2 * route.left_m),
             SpeedLimit.OBSTACLE: math.sqrt(2 * config.braking_m_s2 * free_m),
             SpeedLimit.POSE_AGE: self._speed_by_age(pose_age_s),
         }

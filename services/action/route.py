@@ -1,4 +1,4 @@
-"""A route as a line in the plane: legs and turns, corners rounded. Pure."""
+"""A route as a line in the plane, of legs and turns or of a plan, corners rounded. Pure."""
 
 from __future__ import annotations
 
@@ -13,22 +13,37 @@ from services.action.config import Leg
 STEP_M = 0.25
 SEARCH_M = 6.0
 ARC_POINTS = 12
+SMOOTHED_M = 3.0
 
 
 class Route:
-    """Points every STEP_M along the legs, from the agent's origin, heading along x."""
+    """Points every STEP_M along `line_m`, (n, 2), that the agent is to follow."""
 
-    def __init__(self, legs: list[Leg], corner_radius_m: float, overrun_m: float) -> None:
-        overrun_m = max(overrun_m, STEP_M)
-        corners = _corners(legs, overrun_m)
-        line_m = _rounded(corners, corner_radius_m)
-        along_m = distances_along(line_m)
-
-        self.length_m = sum(length_m for length_m, _ in legs)
-        self.leg_ends_m = along_m[ARC_POINTS // 2 + 1 : -1 : ARC_POINTS]
+    def __init__(self, line_m: Floats, leg_ends_m: Floats | None = None) -> None:
+        self.leg_ends_m = np.zeros(0) if leg_ends_m is None else leg_ends_m
         self.points_m = resample(line_m, STEP_M)
         self.curvature_per_m = _curvature(self.points_m)
         self._index = 0
+
+    @classmethod
+    def of_legs(cls, legs: list[Leg], corner_radius_m: float, overrun_m: float) -> Route:
+        """The line along the legs, from the agent's origin, heading along x."""
+        overrun_m = max(overrun_m, STEP_M)
+        corners = _corners(legs, overrun_m)
+        line_m = _rounded(corners, corner_radius_m)
+
+        along_m = distances_along(line_m)
+        return cls(line_m, along_m[ARC_POINTS // 2 + 1 : -1 : ARC_POINTS])
+
+    @classmethod
+    def of_plan(cls, places_m: Floats) -> Route:
+        """The line past the place nodes of a plan, (n, 2), smoothed over SMOOTHED_M."""
+        if len(places_m) < 2:
+            a_step_m = np.array([STEP_M, 0.0])
+            places_m = np.vstack([places_m, places_m[-1] + a_step_m])
+
+        line_m = resample(places_m, STEP_M)
+        return cls(_smoothed(line_m))
 
     @property
     def travelled_m(self) -> float:
@@ -44,7 +59,7 @@ class Route:
     def leg(self) -> int:
         """The index of the leg that the agent is on."""
         passed = int(np.searchsorted(self.leg_ends_m, self.travelled_m, "right"))
-        return min(passed, len(self.leg_ends_m) - 1)
+        return max(0, min(passed, len(self.leg_ends_m) - 1))
 
     def advance(self, x_m: float, y_m: float) -> None:
         """Find the point nearest to the agent within SEARCH_M ahead, never backwards."""
@@ -141,3 +156,14 @@ def _curvature(points_m: Floats) -> Floats:
     curvature_per_m: Floats = turn_rad / STEP_M
 
     return curvature_per_m
+
+
+def _smoothed(points_m: Floats) -> Floats:
+    """The line of (n, 2) points, each the mean of those within SMOOTHED_M / 2, its ends kept."""
+    reach = round(SMOOTHED_M / 2 / STEP_M)
+    padded = np.pad(points_m, ((reach, reach), (0, 0)), mode="reflect", reflect_type="odd")
+
+    kernel = np.full(2 * reach + 1, 1 / (2 * reach + 1))
+    columns = [np.convolve(column, kernel, mode="valid") for column in padded.T]
+    smoothed: Floats = np.column_stack(columns)
+    return smoothed

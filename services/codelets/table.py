@@ -16,6 +16,8 @@ from services.codelets.attention import novelty, whereabouts
 from services.codelets.correction import apply_correction, map_correction
 from services.codelets.localization import landmarks, localization
 from services.codelets.mapping import boundary, loop_detection, object_place, path, road_place
+from services.codelets.mapping import loop_detection, object_place, path, road_place
+from services.codelets.planning import route_plan
 
 CODELETS: tuple[Codelet, ...] = (
     apply_correction.CODELET,
@@ -27,6 +29,7 @@ CODELETS: tuple[Codelet, ...] = (
     path.CODELET,
     loop_detection.CODELET,
     map_correction.CODELET,
+    route_plan.CODELET,
     whereabouts.CODELET,
     novelty.CODELET,
 )

@@ -35,13 +35,13 @@ def _command(
 ) -> MotorCommand:
     """The command on a straight drive so far along the route."""
     config = Config()
-    route = Route([*legs], config.corner_radius_m, config.overrun_m)
+    route = Route.of_legs([*legs], config.corner_radius_m, config.overrun_m)
     for x_m in np.arange(0.0, pose.x_m, 1.0):
         route.advance(x_m, 0.0)
     route.advance(pose.x_m, pose.y_m)
 
-    motor = SensoryMotorMemory(config, route)
-    return motor.command(7, pose, clear_m, round(age_s * 1e9))
+    motor = SensoryMotorMemory(config)
+    return motor.command(7, pose, route, clear_m, round(age_s * 1e9))
 
 
 def _at(x_m: float = 0.0, y_m: float = 0.0, heading_rad: float = 0.0) -> Pose:
@@ -76,10 +76,24 @@ def test_right_of_the_line_or_headed_right_the_robot_turns_left(pose: Pose) -> N
     assert command.left_wheel_rad_s < command.right_wheel_rad_s
 
 
-def test_a_robot_that_looks_backwards_turns_slowly() -> None:
-    command = _command(_at(5.0, 0.0, 3.0))
+def test_a_robot_that_looks_aside_turns_slowly() -> None:
+    command = _command(_at(5.0, 0.0, 2.0))
 
     assert _driven(command) == pytest.approx(0.5)
+    assert command.left_wheel_rad_s > command.right_wheel_rad_s
+
+
+def test_a_robot_that_looks_backwards_turns_on_the_spot() -> None:
+    command = _command(_at(5.0, 0.0, 3.0))
+
+    assert _driven(command) == pytest.approx(0.0)
+    assert command.left_wheel_rad_s > command.right_wheel_rad_s
+
+
+def test_before_an_obstacle_the_robot_turns_to_where_the_route_leads() -> None:
+    command = _command(_at(5.0, 0.0, 1.0), clear_m=0.5)
+
+    assert _driven(command) == pytest.approx(0.0)
     assert command.left_wheel_rad_s > command.right_wheel_rad_s
 
 

@@ -1,0 +1,233 @@
+"""`cogmap goal`: gives a running system goals, and prints the plan that it makes of them."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+import threading
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import click
+import msgspec
+
+from cli.options import FiniteRange, agent_option, connect_option, json_option
+from cogmap.errors import NoAnswerError, UsageError
+from cogmap.graph.graph import Graph
+from cogmap.runtime.client import Client
+from cogmap.runtime.module import Module
+from schemas import topics
+from schemas.base import Message
+from schemas.codelets import Offer
+from schemas.graph import Delta, DropNode, Operation
+from schemas.nodes import NEVER_NS, PLAN_ID, Goal, Plan, PlanState, goal_id
+
+FARTHEST_M = 1e6
+
+
+class Person:
+    """Offers goals once it has the graph, and waits for the plan that has them all."""
+
+    def __init__(self, goals: Sequence[Goal], clears: bool) -> None:
+        self.graph = Graph()
+        self.has_joined = threading.Event()
+        self.has_plan = threading.Event()
+        self._goals = goals
+        self._clears = clears
+        self._offered_version: int | None = None
+
+        name = f"goal-{os.getpid()}"
+        self.module = Module("goal", name).following(
+            self.graph,
+            self._on_delta,
+            emits=[topics.OFFER],
+            on_load=self._on_load,
+        )
+
+    @property
+    def plan(self) -> Plan | None:
+        """The plan as it is now."""
+        return self.graph.get(Plan, PLAN_ID)
+
+    def _on_load(self) -> list[Message]:
+        return self._offer()
+
+    def _on_delta(self, delta: Delta) -> list[Message]:
+        """Offer once; look for the plan in what follows."""
+        published = self._offer()
+        if not published and self._is_planned(delta):
+            self.has_plan.set()
+        return published
+
+    def _offer(self) -> list[Message]:
+        if self._offered_version is not None:
+            return []
+
+        self._offered_version = self.graph.version
+        self.has_joined.set()
+        operations: list[Operation] = []
+        if self._clears:
+            given = {goal.id for goal in self._goals}
+            operations += [
+                DropNode(id=goal.id) for goal in self.graph.of_kind(Goal) if goal.id not in given
+            ]
+
+        return [Offer(cycle=self.graph.cycle, operations=[*operations, *self._goals])]
+
+    def _is_planned(self, delta: Delta) -> bool:
+        """Whether the plan, committed since the offer, has all goals that were given."""
+        plan = self.plan
+        if plan is None or not any(isinstance(item, Plan | Goal) for item in delta.operations):
+            return False
+
+        planned = {*plan.goals, *plan.unreachable}
+        for goal in self._goals:
+            kept = self.graph.get(Goal, goal.id)
+            is_reached = kept is not None and kept.reached_ns != NEVER_NS
+            if goal.id not in planned and not is_reached:
+                return False
+
+        return True
+
+
+@click.command()
+@click.argument("places", nargs=-1, metavar="[NAME | X Y]...")
+@click.option(
+    "--file",
+    "path",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="More goals, one a line: a name, or x and y.",
+)
+@click.option("--clear", is_flag=True, help="Forget the goals that the agent has; alone it stops.")
+@click.option(
+    "--wait",
+    "timeout_s",
+    type=FiniteRange(0, 3600),
+    default=5.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="How long to wait for the plan.",
+)
+@json_option
+@connect_option
+@agent_option
+def goal(
+    places: tuple[str, ...],
+    path: Path | None,
+    clear: bool,
+    timeout_s: float,
+    as_json: bool,
+    connect: str,
+    agent: str,
+) -> None:
+    """Send the agent of a running system somewhere.
+
+    A goal is the name of an object that is on its map, or a position in metres in the frame of the
+    map, whose origin is where the agent began, x ahead and y to the left. The agent plans the order
+    of several goals itself. Prints the plan; ends with 1 where a goal has no route.
+
+    \b
+    cogmap goal bakery
+    cogmap goal 12.5 -3
+    cogmap goal bakery school 12.5 -3
+    cogmap goal --file goals.txt
+    """
+    goals = parsed(places)
+    if path is not None:
+        goals += _of_file(path)
+    if not goals and not clear:
+        raise UsageError("no goal is given: name an object, or a position as X Y")
+
+    person = Person(goals, clear)
+    with Client(person.module, connect, agent):
+        if not person.has_joined.wait(timeout_s):
+            raise NoAnswerError(
+                "no workspace answered: start the system with `cogmap run`, "
+                "or name another agent with --agent"
+            )
+        if not person.has_plan.wait(timeout_s):
+            raise NoAnswerError(
+                f"no plan came within {timeout_s:g} s: see `cogmap topic echo workspace/delta`"
+            )
+
+    plan = person.plan
+    assert plan is not None
+    click.echo(msgspec.json.encode(_summary(plan)) if as_json else _shown(plan))
+    if plan.unreachable:
+        sys.exit(1)
+
+
+def parsed(words: Iterable[str]) -> list[Goal]:
+    """The goals that words give: two numbers in a row are a position, any other word a name.
+
+    Raises UsageError where a number stands alone or is absurd.
+    """
+    goals = []
+    left = list(words)
+    while left:
+        word = left.pop(0)
+        x_m = _number(word)
+        if x_m is None:
+            goals.append(Goal(id=goal_id(word), base_level=1.0, object=word))
+            continue
+
+        y_m = _number(left.pop(0)) if left else None
+        if y_m is None:
+            raise UsageError(f"{word} is a number alone: a position is X and Y, in metres")
+        goals.append(Goal(id=goal_id(f"{x_m:g},{y_m:g}"), base_level=1.0, x_m=x_m, y_m=y_m))
+
+    return goals
+
+
+def _number(word: str) -> float | None:
+    """The metres that a word gives; None where it is no number. Raises UsageError."""
+    try:
+        value = float(word)
+    except ValueError:
+        return None
+
+    if not math.isfinite(value) or abs(value) > FARTHEST_M:
+        raise UsageError(f"{word} is no position: give metres between -{FARTHEST_M:g} and 1e6")
+    return value
+
+
+def _of_file(path: Path) -> list[Goal]:
+    """The goals of a file, one a line. Raises UsageError, which names the line."""
+    goals = []
+    for number, line in enumerate(path.read_text("utf-8").splitlines(), start=1):
+        try:
+            goals += parsed(line.split())
+        except UsageError as error:
+            raise UsageError(f"{path}, line {number}: {error}") from None
+
+    return goals
+
+
+def _summary(plan: Plan) -> dict[str, object]:
+    return {
+        "state": plan.state,
+        "goals": [_name(goal) for goal in plan.goals],
+        "length_m": plan.length_m,
+        "unreachable": {_name(goal): state for goal, state in plan.unreachable.items()},
+    }
+
+
+def _shown(plan: Plan) -> str:
+    """The plan as a person reads it."""
+    lines = []
+    for number, name in enumerate(plan.goals, start=1):
+        distance = f", {plan.length_m:.0f} m" if number == 1 else ""
+        lines.append(f"{number}. {_name(name)}{distance}")
+
+    for name, state in plan.unreachable.items():
+        lines.append(f"{_name(name)}: {state.value}")
+
+    if not lines:
+        lines.append(PlanState.NO_GOAL.value if plan.explores else plan.state.value)
+    return "\n".join(lines)
+
+
+def _name(identifier: str) -> str:
+    return identifier.removeprefix(goal_id(""))

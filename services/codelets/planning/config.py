@@ -1,0 +1,88 @@
+"""The settings of route planning and exploration."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+from schemas.base import PositiveMetres, PositiveShare, Share
+
+Cells = Annotated[int, Meta(ge=1, le=10_000)]
+
+
+class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """How routes are planned, and where the agent explores."""
+
+    replan_cycles: Annotated[
+        Cells, Meta(description="Cycles between two plans of an unchanged goal, 1 to 10000.")
+    ] = 5
+    explore: Annotated[
+        bool, Meta(description="Whether the agent explores while it has no goal with a route.")
+    ] = False
+    reached_m: Annotated[
+        PositiveMetres,
+        Meta(description="Distance at which a goal counts as reached, in m, above 0 to 10000."),
+    ] = 2.0
+    approach_m: Annotated[
+        PositiveMetres,
+        Meta(
+            description="Distance from an object within which the agent is at it, in m, "
+            "above 0 to 10000: its goal is the nearest free place."
+        ),
+    ] = 20.0
+    snap_m: Annotated[
+        PositiveMetres,
+        Meta(
+            description="Distance within which a blocked position is replaced by the nearest free "
+            "place, in m, above 0 to 10000."
+        ),
+    ] = 3.0
+    unknown_weight: Annotated[
+        PositiveShare,
+        Meta(description="Weight of links to places never seen as road, above 0 to 1."),
+    ] = 0.1
+    margin_cells: Annotated[
+        Cells, Meta(description="Unknown places around the map that are planned over, 1 to 10000.")
+    ] = 8
+    keep_route: Annotated[
+        float,
+        Meta(
+            ge=1,
+            le=100,
+            description="A plan is kept while its route is at most so many times the length of a "
+            "new one, 1 to 100.",
+        ),
+    ] = 1.15
+    off_route_m: Annotated[
+        PositiveMetres,
+        Meta(
+            description="Distance from its route at which the agent plans anew, in m, "
+            "above 0 to 10000."
+        ),
+    ] = 3.0
+    sight_m: Annotated[
+        PositiveMetres,
+        Meta(description="Distance at which road is seen, in m, above 0 to 10000."),
+    ] = 12.0
+    frontier_cells: Annotated[
+        Cells, Meta(description="Places that a frontier has at least, 1 to 10000.")
+    ] = 3
+    frontier_offset_m: Annotated[
+        PositiveMetres,
+        Meta(
+            description="Distance added to that of each frontier, so that a near one of little "
+            "promise does not win, in m, above 0 to 10000."
+        ),
+    ] = 10.0
+    same_frontier_cells: Annotated[
+        Cells, Meta(description="Cells by which a frontier moves from plan to plan, 1 to 10000.")
+    ] = 6
+    keep_share: Annotated[
+        Share,
+        Meta(
+            description="The frontier that the agent goes to is kept while it promises at least "
+            "this share of the best, 0 to 1."
+        ),
+    ] = 0.6

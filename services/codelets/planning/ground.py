@@ -1,0 +1,111 @@
+"""The ground that the agent may drive over: place nodes and links of a map, as planners need them.
+
+Links that a boundary cuts are not crossed (paper §5.3). Beyond the paper, place nodes beside a cut
+link or an obstacle are avoided by the robot's width, and those that were never seen as road cost
+more.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy import ndimage
+
+from cogmap.geometry.arrays import Booleans, Floats, Singles
+from cogmap.graph.graph import Graph
+from cogmap.graph.window import WEIGHT_COLUMNS, Extent
+from schemas.nodes import PlaceColumn
+from services.codelets.planning.config import Config
+from services.codelets.planning.network import LINK_OFFSETS, PlaceNetwork
+
+COLUMNS = (PlaceColumn.ROAD, PlaceColumn.OBSTACLE, *WEIGHT_COLUMNS)
+CUT_BELOW = 0.5
+OBSTACLE_FROM = 0.5
+ROAD_FROM = 0.3
+BESIDE_CUT = 0.5
+SQUARE = np.ones((3, 3), bool)
+
+Slices = tuple[slice, slice]
+
+
+class Ground(NamedTuple):
+    """The place nodes of one map within a rectangle.
+
+    `is_free` (w, h): the robot fits there. `is_known` (w, h): seen as road. `network` has links
+    between free places, lighter where unknown; `known` has those between known places only.
+    """
+
+    is_free: Booleans
+    is_known: Booleans
+    network: PlaceNetwork
+    known: PlaceNetwork
+
+
+def ground(graph: Graph, map_id: str, config: Config) -> Ground:
+    """The ground of a map and some unknown places around it."""
+    extent = _with_margin(graph.places.extent(map_id), config.margin_cells)
+    window = graph.places.window(map_id, COLUMNS, extent)
+    weights = window.weights()
+
+    is_known = window.column(PlaceColumn.ROAD) >= ROAD_FROM
+    is_obstacle = window.column(PlaceColumn.OBSTACLE) >= OBSTACLE_FROM
+    is_edge = _has_cut(weights) | is_obstacle
+    is_free = ~is_edge
+
+    share = np.where(is_free, 1.0, 0.0)
+    is_beside = ndimage.binary_dilation(is_edge, SQUARE) & is_free
+    share[is_beside] = BESIDE_CUT
+
+    only_known = np.where(is_known, share, 0.0)
+    optimistic = np.where(is_known, share, share * config.unknown_weight)
+
+    cell_m = graph.cell_m(map_id)
+    return Ground(
+        is_free=is_free,
+        is_known=is_known & is_free,
+        network=PlaceNetwork(window.origin, cell_m, _links(weights, optimistic)),
+        known=PlaceNetwork(window.origin, cell_m, _links(weights, only_known)),
+    )
+
+
+def _with_margin(extent: Extent, cells: int) -> Extent:
+    first_i, first_j = extent.lower
+    last_i, last_j = extent.upper
+    return Extent((first_i - cells, first_j - cells), (last_i + cells, last_j + cells))
+
+
+def _ends(shape: tuple[int, int], offset: tuple[int, int]) -> tuple[Slices, Slices]:
+    """The places of a (w, h) grid that have a neighbour at `offset`, and those neighbours."""
+    here = []
+    there = []
+    for size, step in zip(shape, offset, strict=True):
+        here.append(slice(max(0, -step), size - max(0, step)))
+        there.append(slice(max(0, step), size - max(0, -step)))
+
+    return (here[0], here[1]), (there[0], there[1])
+
+
+def _has_cut(weights: Singles) -> Booleans:
+    """(w, h): whether any link of a place to its neighbours is cut."""
+    _, width, height = weights.shape
+    has_cut = np.zeros((width, height), bool)
+    for of_link, offset in zip(weights, LINK_OFFSETS.tolist(), strict=True):
+        here, there = _ends((width, height), offset)
+        is_cut = of_link[here] < CUT_BELOW
+        has_cut[here] |= is_cut
+        has_cut[there] |= is_cut
+
+    return has_cut
+
+
+def _links(weights: Singles, share: Floats) -> Singles:
+    """(4, w, h): the weights of links, by the lower share of the two places each joins."""
+    _, width, height = weights.shape
+    links = np.zeros_like(weights)
+    for number, offset in enumerate(LINK_OFFSETS.tolist()):
+        here, there = _ends((width, height), offset)
+        lower = np.minimum(share[here], share[there])
+        links[number][here] = lower * (weights[number][here] >= CUT_BELOW)
+
+    return links

@@ -1,0 +1,324 @@
+"""The route-plan codelet: the shortest route to the next goal, or to a frontier where the agent
+explores, as a node of the Workspace (paper §5.5).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+
+from cogmap.errors import MessageError
+from cogmap.geometry.arrays import Floats, Indices
+from cogmap.graph.graph import Graph
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from schemas.array import Array, Matrix
+from schemas.codelets import Task
+from schemas.cognition import Direction, RouteReplay
+from schemas.graph import DropLink, Link, Operation, Phase
+from schemas.nodes import (
+    NEVER_NS,
+    PLAN_ID,
+    SELF_ID,
+    Goal,
+    LinkKind,
+    Map,
+    Object,
+    PlaceColumn,
+    Plan,
+    PlanState,
+    Self,
+)
+from services.codelets.planning.config import Config
+from services.codelets.planning.frontier import best_frontier
+from services.codelets.planning.ground import Ground, ground
+from services.codelets.planning.routes import (
+    Route,
+    Visit,
+    cost_m,
+    lengths_m,
+    route_to,
+    visits,
+)
+from services.codelets.planning.targets import Cell, Target, nearest_free, target_of
+
+START_M = 6.0
+SECTION = "planning"
+
+
+def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
+    """One task every `replan_cycles`, and at once where a goal is new or the route at its end."""
+    has_aim = config.explore or graph.count(Goal) > 0
+    if graph.agent is None or not has_aim:
+        return []
+
+    is_time = context.cycle % config.replan_cycles == 0
+    if is_time or _is_urgent(graph, graph.agent, config):
+        return [context.task(CODELET.name, about=[SELF_ID, PLAN_ID])]
+    return []
+
+
+def run(task: Task, graph: Graph, config: Config) -> Answer:
+    """Goals that are reached, and a new plan where the last one does not serve any longer."""
+    agent = graph.agent
+    if agent is None:
+        raise MessageError(f"task {task.task_id}: the graph has no self node")
+
+    where = ground(graph, agent.map, config)
+    now = Situation(task, agent, where, graph.get(Plan, PLAN_ID), config)
+    targets = [target_of(goal, graph, where, config) for goal in open_goals(graph)]
+    reached = [target for target in targets if _is_at(target, now)]
+    left = [target for target in targets if target not in reached]
+
+    answer = Answer()
+    for target in reached:
+        goal = msgspec.structs.replace(target.goal, reached_ns=task.stamp_ns)
+        answer.operations.append(goal)
+        if now.before is not None and now.before.route is not None:
+            answer.events.append(_replay(now.before, Direction.REVERSE, now))
+
+    plan = _plan(left, now)
+    if not _serves(plan, now):
+        answer.operations.extend(_written(plan, now.before))
+        if plan.route is not None and _next_goal(plan) != _next_goal(now.before):
+            answer.events.append(_replay(plan, Direction.FORWARD, now))
+
+    return answer
+
+
+class Situation(NamedTuple):
+    """What a plan is made from: the agent, the ground around it, and the plan before."""
+
+    task: Task
+    agent: Self
+    where: Ground
+    before: Plan | None
+    config: Config
+
+    @property
+    def start(self) -> Cell | None:
+        """The free place nearest to the agent."""
+        agent = self.agent
+        return nearest_free(agent.x_m, agent.y_m, self.where, self.where.is_free, START_M)
+
+
+CODELET = Codelet(
+    name="route_plan",
+    phase=Phase.BACKGROUND,
+    due=due,
+    run=run,
+    reads=frozenset({Self, Goal, Plan, Object, Map, PlaceColumn.ROAD, PlaceColumn.OBSTACLE}),
+    writes=frozenset({Plan, Goal, LinkKind.TOWARDS}),
+    config=Config,
+    section=SECTION,
+)
+
+
+def open_goals(graph: Graph) -> list[Goal]:
+    """The goals that were not reached yet, by id."""
+    return [goal for goal in graph.of_kind(Goal) if goal.reached_ns == NEVER_NS]
+
+
+def _is_urgent(graph: Graph, agent: Self, config: Config) -> bool:
+    """Whether there is no plan, a goal is in none, or the agent is at the end of its route."""
+    plan = graph.get(Plan, PLAN_ID)
+    if plan is None:
+        return True
+
+    planned = {*plan.goals, *plan.unreachable}
+    if any(goal.id not in planned for goal in open_goals(graph)):
+        return True
+    if plan.route is None:
+        return False
+
+    end_x_m, end_y_m = plan.route.numpy()[-1].tolist()
+    return math.hypot(end_x_m - agent.x_m, end_y_m - agent.y_m) <= config.reached_m
+
+
+def _is_at(target: Target, now: Situation) -> bool:
+    """Whether the agent is at the place of a goal."""
+    if target.cell is None:
+        return False
+
+    i, j = target.cell
+    cell_m = now.where.network.cell_m
+    away_m = math.hypot(i * cell_m - now.agent.x_m, j * cell_m - now.agent.y_m)
+    return away_m <= now.config.reached_m
+
+
+def _next_goal(plan: Plan | None) -> str:
+    """The id of a plan's next goal, empty where it has none."""
+    if plan is None or not plan.goals:
+        return ""
+    return plan.goals[0]
+
+
+def _plan(targets: list[Target], now: Situation) -> Plan:
+    """A plan for the goals that are left; to explore, where none has a route and that is wanted."""
+    plan = Plan(
+        id=PLAN_ID,
+        base_level=1.0,
+        map=now.agent.map,
+        state=PlanState.NO_GOAL,
+        planned_ns=now.task.stamp_ns,
+    )
+    start = now.start
+    if start is None:
+        unreachable = {target.goal.id: PlanState.BLOCKED for target in targets}
+        return msgspec.structs.replace(plan, state=PlanState.BLOCKED, unreachable=unreachable)
+
+    found, unreachable = _reachable(now.where, start, targets)
+    plan = msgspec.structs.replace(plan, unreachable=unreachable)
+    if found:
+        return _to_goals(plan, now.where, start, found)
+
+    if now.config.explore:
+        plan = _to_frontier(plan, start, now)
+    if plan.route is None and unreachable:
+        state = next(iter(unreachable.values()))
+        plan = msgspec.structs.replace(plan, state=state)
+    return plan
+
+
+def _reachable(
+    where: Ground, start: Cell, targets: list[Target]
+) -> tuple[list[Visit], dict[str, PlanState]]:
+    """The targets to which routes lead from `start`, and why none leads to the others."""
+    at_start = where.network.index_of(start)
+    unreachable = {target.goal.id: target.state for target in targets if target.cell is None}
+
+    found = []
+    for visit in visits(where.network, targets):
+        if math.isfinite(visit.field.distance_m[at_start]):
+            found.append(visit)
+        else:
+            unreachable[visit.target.goal.id] = PlanState.NO_ROUTE
+
+    return found, unreachable
+
+
+def _to_goals(plan: Plan, where: Ground, start: Cell, found: list[Visit]) -> Plan:
+    """The plan with the order of the goals found, and the route to the first."""
+    order = _nearest_first(lengths_m(where.network, start, found))
+    ordered = [found[number] for number in order]
+
+    route = route_to(where.network, start, ordered[0])
+    assert route is not None
+    goals = [visit.target.goal.id for visit in ordered]
+    return _with_route(msgspec.structs.replace(plan, goals=goals), route, where)
+
+
+def _nearest_first(lengths: Floats) -> list[int]:
+    """The order of n goals by (n + 1, n + 1) lengths, the first being the agent's."""
+    left = set(range(len(lengths) - 1))
+    order: list[int] = []
+    here = 0
+    while left:
+        nearest = min(left, key=lambda number: (lengths[here, number + 1], number))
+        order.append(nearest)
+        left.remove(nearest)
+        here = nearest + 1
+
+    return order
+
+
+def _to_frontier(plan: Plan, start: Cell, now: Situation) -> Plan:
+    """The plan with a route to the frontier that promises most, where there is one."""
+    where = now.where
+    frontier = best_frontier(where, start, now.config, _frontier_before(now))
+    if frontier is None:
+        return plan
+
+    nowhere = Goal(id="frontier")
+    visit = visits(where.known, [Target(nowhere, frontier.cell)])[0]
+    route = route_to(where.known, start, visit)
+    if route is None:
+        return plan
+    return _with_route(msgspec.structs.replace(plan, explores=True), route, where)
+
+
+def _frontier_before(now: Situation) -> Cell | None:
+    """The cell of the frontier that the agent goes to by the plan before."""
+    before = now.before
+    if before is None or not before.explores or before.route is None:
+        return None
+
+    i, j = _cells(before, now.where)[-1].tolist()
+    return i, j
+
+
+def _with_route(plan: Plan, route: Route, where: Ground) -> Plan:
+    """The plan, ready to be driven along `route`."""
+    positions_m = route.cells * where.network.cell_m
+    return msgspec.structs.replace(
+        plan,
+        state=PlanState.READY,
+        length_m=route.length_m,
+        route=Matrix.of(positions_m.astype(np.float64)),
+    )
+
+
+def _cells(plan: Plan, where: Ground) -> Indices:
+    """(n, 2): the place nodes of a plan's route."""
+    assert plan.route is not None
+    cells = np.rint(plan.route.numpy() / where.network.cell_m)
+    return cells.astype(np.int64)
+
+
+def _serves(plan: Plan, now: Situation) -> bool:
+    """Whether the plan before leads to the same goals as `plan` does, nearly as shortly, from where
+    the agent is.
+    """
+    before = now.before
+    if before is None or _aim(before) != _aim(plan):
+        return False
+    if before.route is None or plan.route is None:
+        return before.route is plan.route
+
+    cells = _cells(before, now.where)
+    away_m = np.hypot(*(before.route.numpy() - (now.agent.x_m, now.agent.y_m)).T)
+    nearest = int(away_m.argmin())
+    moved = np.abs(cells[-1] - _cells(plan, now.where)[-1]).max()
+    is_off = away_m[nearest] > now.config.off_route_m
+    if is_off or moved > now.config.same_frontier_cells // 2:
+        return False
+
+    network = now.where.known if plan.explores else now.where.network
+    left_m = cost_m(network, cells[nearest:])
+    return left_m <= now.config.keep_route * plan.length_m + network.cell_m
+
+
+def _aim(plan: Plan) -> tuple[object, ...]:
+    """What a plan is to reach, and what it came to."""
+    return plan.map, plan.state, plan.explores, plan.goals, plan.unreachable
+
+
+def _written(plan: Plan, before: Plan | None) -> list[Operation]:
+    """The plan, and its link to the next goal."""
+    operations: list[Operation] = [plan]
+    goal = _next_goal(plan)
+    goal_before = _next_goal(before)
+    if goal:
+        operations.append(Link(source=PLAN_ID, target=goal, kind=LinkKind.TOWARDS))
+    elif goal_before:
+        operations.append(DropLink(source=PLAN_ID, target=goal_before, kind=LinkKind.TOWARDS))
+
+    return operations
+
+
+def _replay(plan: Plan, direction: Direction, now: Situation) -> RouteReplay:
+    """The place nodes of a plan's route, from the agent to the goal or back."""
+    cells = _cells(plan, now.where)
+    if direction is Direction.REVERSE:
+        cells = cells[::-1]
+
+    return RouteReplay(
+        stamp_ns=now.task.stamp_ns,
+        cycle=now.task.cycle,
+        direction=direction,
+        goal=_next_goal(plan),
+        map=plan.map,
+        cells=Array.of(cells, "<i4"),
+    )

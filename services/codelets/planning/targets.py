@@ -1,0 +1,84 @@
+"""Where the agent must be for a goal to be reached."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from cogmap.geometry.arrays import Booleans
+from cogmap.graph.graph import Graph
+from schemas.nodes import Goal, Object, PlanState, object_id
+from services.codelets.planning.config import Config
+from services.codelets.planning.ground import Ground
+
+Cell = tuple[int, int]
+
+
+class Target(NamedTuple):
+    """A goal, and the cell to drive to; None, with the reason, where there is none."""
+
+    goal: Goal
+    cell: Cell | None
+    state: PlanState = PlanState.READY
+
+
+def target_of(goal: Goal, graph: Graph, ground: Ground, config: Config) -> Target:
+    """The free place nearest to a goal.
+
+    An object is reached from a known place within `approach_m`; a position that is not free from a
+    place within `snap_m`.
+    """
+    x_m = goal.x_m
+    y_m = goal.y_m
+    if goal.object:
+        found = graph.get(Object, object_id(goal.object))
+        if found is None:
+            return Target(goal, None, PlanState.UNKNOWN_GOAL)
+
+        cell = nearest_free(found.x_m, found.y_m, ground, ground.is_known, config.approach_m)
+        if cell is None:
+            return Target(goal, None, PlanState.NO_ROUTE)
+        return Target(goal, cell)
+
+    if not _is_inside(x_m, y_m, ground):
+        return Target(goal, None, PlanState.OUTSIDE)
+
+    cell = nearest_free(x_m, y_m, ground, ground.is_free, config.snap_m)
+    if cell is None:
+        return Target(goal, None, PlanState.BLOCKED)
+    return Target(goal, cell)
+
+
+def nearest_free(
+    x_m: float, y_m: float, ground: Ground, is_free: Booleans, within_m: float
+) -> Cell | None:
+    """The cell of `is_free` (w, h) nearest to a position; None where none is within `within_m`."""
+    i0, j0 = ground.network.origin
+    cell_m = ground.network.cell_m
+    reach = math.ceil(within_m / cell_m)
+    i = round(x_m / cell_m) - i0
+    j = round(y_m / cell_m) - j0
+
+    low_i = max(0, i - reach)
+    low_j = max(0, j - reach)
+    near = is_free[low_i : max(0, i + reach + 1), low_j : max(0, j + reach + 1)]
+    corner = np.array([low_i + i0, low_j + j0])
+    cells = corner + np.argwhere(near)
+    if not len(cells):
+        return None
+
+    away_m = np.hypot(*(cells * cell_m - (x_m, y_m)).T)
+    nearest = int(away_m.argmin())
+    if away_m[nearest] > within_m:
+        return None
+
+    found_i, found_j = cells[nearest].tolist()
+    return found_i, found_j
+
+
+def _is_inside(x_m: float, y_m: float, ground: Ground) -> bool:
+    """Whether a position is on the ground's rectangle."""
+    cell_m = ground.network.cell_m
+    return ground.network.contains((round(x_m / cell_m), round(y_m / cell_m)))

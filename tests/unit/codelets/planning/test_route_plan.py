@@ -1,0 +1,234 @@
+"""Plans: routes to goals over the map, their order, and what is replayed; exploration."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import numpy as np
+import pytest
+
+from cogmap.graph.graph import Graph
+from cogmap.runtime.codelet import Answer
+from schemas.array import Array
+from schemas.codelets import Task
+from schemas.cognition import Direction, RouteReplay
+from schemas.graph import Cells, DropNode, Operation
+from schemas.nodes import (
+    NEVER_NS,
+    PLAN_ID,
+    ROOT_MAP,
+    Goal,
+    Map,
+    Object,
+    PlaceColumn,
+    Plan,
+    PlanState,
+    goal_id,
+    object_id,
+)
+from services.codelets.planning.config import Config
+from services.codelets.planning.route_plan import run
+from tests.support.world.scenes import agent
+
+STAMP_NS = 7_000_000_000
+SOUTH = (0, 60, -3, 3)
+EAST = (54, 60, -3, 43)
+NORTH = (0, 60, 37, 43)
+WEST = (0, 6, -3, 43)
+
+
+def _road(*streets: tuple[int, int, int, int]) -> Cells:
+    """Streets as rectangles of cells: from and to i, from and to j."""
+    parts = []
+    for i0, i1, j0, j1 in streets:
+        i, j = np.mgrid[i0 : i1 + 1, j0 : j1 + 1]
+        parts.append(np.column_stack([i.ravel(), j.ravel()]))
+
+    cells = np.unique(np.vstack(parts), axis=0)
+    return _column(PlaceColumn.ROAD, cells, 1.0)
+
+
+def _column(
+    column: PlaceColumn, cells: np.ndarray[tuple[int, ...], np.dtype[np.int64]], value: float
+) -> Cells:
+    values = np.full(len(cells), value, np.float32)
+    return Cells(column=column, cells=Array.of(cells, "<i4"), values=Array.of(values))
+
+
+def _barrier(i: int, j: int) -> Cells:
+    """Obstacles across a street that leads along x, at column i around row j."""
+    rows = np.arange(j - 4, j + 5)
+    return _column(PlaceColumn.OBSTACLE, np.column_stack([np.full(len(rows), i), rows]), 1.0)
+
+
+def _walls() -> list[Operation]:
+    """Obstacles everywhere but on the loop of streets."""
+    i, j = np.mgrid[-32:96, -32:96]
+    is_road = np.zeros(i.shape, bool)
+    for i0, i1, j0, j1 in (SOUTH, EAST, NORTH, WEST):
+        is_road |= (i >= i0) & (i <= i1) & (j >= j0) & (j <= j1)
+
+    cells = np.column_stack([i[~is_road], j[~is_road]])
+    return [_column(PlaceColumn.OBSTACLE, cells, 1.0)]
+
+
+def _loop(*more: Operation) -> Graph:
+    """A loop of four streets, 54 m and 40 m long, with the agent in its south-west corner."""
+    graph = Graph()
+    first: list[Operation] = [Map(id=ROOT_MAP, cell_m=1.0), agent(x_m=3.0)]
+    graph.change([*first, _road(SOUTH, EAST, NORTH, WEST), *_walls(), *more])
+    return graph
+
+
+def _goal(name: str, x_m: float, y_m: float) -> Goal:
+    return Goal(id=goal_id(name), base_level=1.0, x_m=x_m, y_m=y_m)
+
+
+def _answer(graph: Graph, config: Config | None = None) -> Answer:
+    """What the codelet answers now; it is applied to the graph."""
+    task = Task(stamp_ns=STAMP_NS, task_id="1/route_plan", codelet="route_plan", cycle=1, version=0)
+    answer = run(task, graph, config or Config())
+    graph.change(answer.operations)
+    return answer
+
+
+def _plan(graph: Graph, config: Config | None = None) -> Plan:
+    """The plan that the graph has then."""
+    _answer(graph, config)
+    plan = graph.get(Plan, PLAN_ID)
+    assert plan is not None
+    return plan
+
+
+def test_a_route_leads_along_the_streets_to_the_goal() -> None:
+    plan = _plan(_loop(_goal("corner", 57.0, 40.0)))
+
+    assert plan.state is PlanState.READY
+    assert plan.route is not None
+    route_m = plan.route.numpy()
+    assert route_m[0] == pytest.approx((3.0, 0.0))
+    assert route_m[-1] == pytest.approx((57.0, 40.0))
+    assert np.hypot(*np.diff(route_m, axis=0).T).max() <= math.sqrt(2) + 1e-9
+
+
+def test_where_a_street_is_closed_the_plan_takes_the_other() -> None:
+    graph = _loop(_goal("far", 40.0, 0.0))
+    before = _plan(graph)
+    graph.change([_barrier(20, 0)])
+    after = _plan(graph)
+
+    assert after.length_m > before.length_m + 60.0
+    assert after.route is not None
+    assert after.route.numpy()[:, 1].max() > 35.0
+
+
+def test_goals_are_visited_from_near_to_far() -> None:
+    plan = _plan(_loop(_goal("a", 57.0, 40.0), _goal("b", 30.0, 0.0), _goal("c", 3.0, 20.0)))
+
+    assert plan.goals == [goal_id("c"), goal_id("b"), goal_id("a")]
+
+
+@pytest.mark.parametrize(
+    ("goal", "state"),
+    [
+        (_goal("x", 900.0, 0.0), PlanState.OUTSIDE),
+        (_goal("x", 30.0, 20.0), PlanState.BLOCKED),
+        (Goal(id=goal_id("x"), object="harbour"), PlanState.UNKNOWN_GOAL),
+    ],
+    ids=["outside", "blocked", "unknown"],
+)
+def test_a_goal_without_a_route_is_in_the_plan_with_the_reason(
+    goal: Goal, state: PlanState
+) -> None:
+    plan = _plan(_loop(goal, _goal("near", 20.0, 0.0)))
+
+    assert plan.unreachable == {goal.id: state}
+    assert plan.goals == [goal_id("near")]
+
+
+def test_a_goal_behind_closed_streets_has_no_route() -> None:
+    graph = _loop(_goal("far", 40.0, 40.0), _barrier(20, 0), _barrier(20, 40))
+    plan = _plan(graph)
+
+    assert plan.state is PlanState.NO_ROUTE
+    assert plan.unreachable == {goal_id("far"): PlanState.NO_ROUTE}
+
+
+def test_an_object_is_reached_from_the_street_beside_it() -> None:
+    bakery = Object(id=object_id("bakery"), label="bakery", x_m=30.0, y_m=-12.0)
+    plan = _plan(_loop(bakery, Goal(id=goal_id("bakery"), object="bakery")))
+
+    assert plan.route is not None
+    assert plan.route.numpy()[-1] == pytest.approx((30.0, -2.0), abs=1.0)
+
+
+def test_a_goal_where_the_agent_is_counts_as_reached_and_is_replayed_backwards() -> None:
+    graph = _loop(_goal("b", 30.0, 0.0))
+    plan = _plan(graph)
+    graph.change([agent(x_m=29.0)])
+    answer = _answer(graph)
+
+    goal = graph.get(Goal, goal_id("b"))
+    assert goal is not None
+    assert goal.reached_ns == STAMP_NS
+    replay = answer.events[0]
+    assert isinstance(replay, RouteReplay)
+    assert replay.direction is Direction.REVERSE
+    assert plan.route is not None
+    assert replay.cells.numpy()[-1] == pytest.approx(plan.route.numpy()[0])
+
+
+def test_a_new_goal_is_replayed_forward_once() -> None:
+    graph = _loop(_goal("b", 30.0, 0.0))
+    first = _answer(graph)
+    second = _answer(graph)
+
+    directions = [event.direction for event in first.events if isinstance(event, RouteReplay)]
+    assert directions == [Direction.FORWARD]
+    assert second.events == []
+
+
+def test_a_plan_that_serves_is_not_written_again() -> None:
+    graph = _loop(_goal("b", 40.0, 0.0))
+    _answer(graph)
+    graph.change([agent(x_m=12.0, y_m=0.5)])
+
+    assert _answer(graph).operations == []
+
+
+def test_a_goal_reached_already_leaves_no_plan() -> None:
+    goal = msgspec.structs.replace(_goal("b", 40.0, 0.0), reached_ns=1)
+    plan = _plan(_loop(goal))
+
+    assert plan.state is PlanState.NO_GOAL
+    assert plan.route is None
+
+
+def test_without_a_goal_the_agent_explores_where_the_road_is_open() -> None:
+    i, j = np.mgrid[54:61, 10:44]
+    unknown = _column(PlaceColumn.ROAD, np.column_stack([i.ravel(), j.ravel()]), 0.0)
+    plan = _plan(_loop(unknown), Config(explore=True))
+
+    assert plan.explores
+    assert plan.route is not None
+    end_x_m, end_y_m = plan.route.numpy()[-1].tolist()
+    assert 50.0 <= end_x_m <= 60.0
+    assert 8.0 <= end_y_m <= 40.0
+
+
+def test_where_all_is_known_there_is_nothing_to_explore() -> None:
+    plan = _plan(_loop(), Config(explore=True))
+
+    assert plan.state is PlanState.NO_GOAL
+    assert not plan.explores
+
+
+def test_a_goal_that_is_forgotten_is_no_longer_in_the_plan() -> None:
+    graph = _loop(_goal("b", 40.0, 0.0))
+    _answer(graph)
+    graph.change([DropNode(id=goal_id("b"))])
+    plan = _plan(graph)
+
+    assert plan.goals == []
+    assert plan.planned_ns > NEVER_NS
