@@ -39,6 +39,13 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             "place, in m, above 0 to 10000."
         ),
     ] = 3.0
+    blind_m: Annotated[
+        PositiveMetres,
+        Meta(
+            description="Distance around the agent at which the camera sees no ground, in m, "
+            "above 0 to 10000: what is there counts as road."
+        ),
+    ] = 5.0
     unknown_weight: Annotated[
         PositiveShare,
         Meta(description="Weight of links to places never seen as road, above 0 to 1."),

@@ -14,8 +14,8 @@ from scipy import ndimage
 
 from cogmap.geometry.arrays import Booleans, Floats, Singles
 from cogmap.graph.graph import Graph
-from cogmap.graph.window import WEIGHT_COLUMNS, Extent
-from schemas.nodes import PlaceColumn
+from cogmap.graph.window import WEIGHT_COLUMNS, Extent, Window
+from schemas.nodes import PlaceColumn, Self
 from services.codelets.planning.config import Config
 from services.codelets.planning.network import LINK_OFFSETS, PlaceNetwork
 
@@ -42,13 +42,19 @@ class Ground(NamedTuple):
     known: PlaceNetwork
 
 
-def ground(graph: Graph, map_id: str, config: Config) -> Ground:
-    """The ground of a map and some unknown places around it."""
+def ground(graph: Graph, agent: Self, config: Config) -> Ground:
+    """The ground of the agent's map and some unknown places around it.
+
+    The place that the agent is at, which its camera does not see, counts as known.
+    """
+    map_id = agent.map
     extent = _with_margin(graph.places.extent(map_id), config.margin_cells)
     window = graph.places.window(map_id, COLUMNS, extent)
     weights = window.weights()
 
-    is_known = window.column(PlaceColumn.ROAD) >= ROAD_FROM
+    cell_m = graph.cell_m(map_id)
+    is_seen = window.column(PlaceColumn.ROAD) >= ROAD_FROM
+    is_known = is_seen | _is_near(agent, window, cell_m, config.blind_m)
     is_obstacle = window.column(PlaceColumn.OBSTACLE) >= OBSTACLE_FROM
     is_edge = _has_cut(weights) | is_obstacle
     is_free = ~is_edge
@@ -60,13 +66,23 @@ def ground(graph: Graph, map_id: str, config: Config) -> Ground:
     only_known = np.where(is_known, share, 0.0)
     optimistic = np.where(is_known, share, share * config.unknown_weight)
 
-    cell_m = graph.cell_m(map_id)
     return Ground(
         is_free=is_free,
         is_known=is_known & is_free,
         network=PlaceNetwork(window.origin, cell_m, _links(weights, optimistic)),
         known=PlaceNetwork(window.origin, cell_m, _links(weights, only_known)),
     )
+
+
+def _is_near(agent: Self, window: Window, cell_m: float, within_m: float) -> Booleans:
+    """(w, h): the cells within a distance of the agent."""
+    i0, j0 = window.origin
+    width, height = window.shape
+    x_m = (np.arange(width) + i0) * cell_m - agent.x_m
+    y_m = (np.arange(height) + j0) * cell_m - agent.y_m
+
+    is_near: Booleans = np.hypot(x_m[:, None], y_m) <= within_m
+    return is_near
 
 
 def _with_margin(extent: Extent, cells: int) -> Extent:

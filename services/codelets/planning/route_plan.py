@@ -66,7 +66,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     if agent is None:
         raise MessageError(f"task {task.task_id}: the graph has no self node")
 
-    where = ground(graph, agent.map, config)
+    where = ground(graph, agent, config)
     now = Situation(task, agent, where, graph.get(Plan, PLAN_ID), config)
     targets = [target_of(goal, graph, where, config) for goal in open_goals(graph)]
     reached = [target for target in targets if _is_at(target, now)]
