@@ -119,9 +119,14 @@ def task(codelet: str, identifier: str = "", **facts: Any) -> Task:
 
 
 def configured(config: WorkerConfig | None = None) -> list[ConfiguredCodelet]:
-    """All our codelets, with these settings."""
+    """All our codelets: those that workers configure with these settings, others with none."""
     settings = config or WorkerConfig()
-    return [ConfiguredCodelet(codelet, settings) for codelet in CODELETS]
+    result = []
+    for codelet in CODELETS:
+        is_workers = codelet.config is WorkerConfig
+        result.append(ConfiguredCodelet(codelet, settings if is_workers else codelet.config()))
+
+    return result
 
 
 def run(asked: Task, graph: Graph, config: WorkerConfig) -> Answer:

@@ -65,7 +65,7 @@ def test_the_schema_has_an_object_a_module() -> None:
     schema = json.loads(printed("--schema"))
 
     assert schema == json.loads(json.dumps(file_schema()))
-    assert list(schema["properties"]) == list(registry.MODULES)
+    assert list(schema["properties"]) == list(registry.sections())
 
     for section in schema["properties"].values():
         name = section["$ref"].removeprefix("#/$defs/")
