@@ -17,11 +17,13 @@ from schemas.graph import Cells, Delta, Link, Phase
 from schemas.nodes import (
     CORRECTION_ID,
     Correction,
+    Goal,
     LoopClosure,
     Node,
     Object,
     PathSegment,
     Self,
+    goal_id,
 )
 from schemas.sensing import PlaceMatch
 from services.codelets.config import Config
@@ -89,7 +91,8 @@ def _correction() -> Correction:
 
 def _graph() -> Graph:
     """What every codelet finds something to do with."""
-    return graph_of(_self(), _house(), _path(), _closure(), _correction())
+    goal = Goal(id=goal_id("house"), object="house")
+    return graph_of(_self(), _house(), _path(), _closure(), _correction(), goal)
 
 
 _KERB_M = Array.of(np.array([[4.0, 1.6], [4.6, 1.6]], np.float32))
@@ -110,6 +113,7 @@ def _every_task() -> list[Task]:
         task("path", percepts=house),
         task("loop_detection", matches=[PlaceMatch(frame=0, view_ns=0, score=0.9)]),
         task("map_correction"),
+        task("route_plan"),
         task("whereabouts", percepts=house),
         task("novelty", percepts=house),
     ]
