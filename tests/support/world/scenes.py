@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from cogmap.bus.codec import decode, encode
 from cogmap.graph.graph import Graph
-from cogmap.runtime.codelet import Answer, ConfiguredCodelet
+from cogmap.runtime.codelet import Answer, Codelet, ConfiguredCodelet
 from cogmap.runtime.module import Module
 from schemas import topics
 from schemas.array import Array, Matrix
@@ -119,20 +119,20 @@ def task(codelet: str, identifier: str = "", **facts: Any) -> Task:
 
 
 def configured(config: WorkerConfig | None = None) -> list[ConfiguredCodelet]:
-    """All our codelets: those that workers configure with these settings, others with none."""
+    """All our codelets: with these settings, where they are of their kind."""
     settings = config or WorkerConfig()
-    result = []
-    for codelet in CODELETS:
-        is_workers = codelet.config is WorkerConfig
-        result.append(ConfiguredCodelet(codelet, settings if is_workers else codelet.config()))
+    return [ConfiguredCodelet(codelet, _settings(codelet, settings)) for codelet in CODELETS]
 
-    return result
+
+def _settings(codelet: Codelet, settings: WorkerConfig) -> msgspec.Struct:
+    """`settings`, or a codelet's defaults where it has others."""
+    return settings if codelet.config is WorkerConfig else codelet.config()
 
 
 def run(asked: Task, graph: Graph, config: WorkerConfig) -> Answer:
     """What the codelet of `asked` answers."""
     (codelet,) = (codelet for codelet in CODELETS if codelet.name == asked.codelet)
-    return codelet.run(asked, graph, config)
+    return codelet.run(asked, graph, _settings(codelet, config))
 
 
 def answer(asked: Task, operations: Iterable[Operation] = (), failure: str = "") -> Proposal:
