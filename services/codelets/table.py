@@ -16,7 +16,6 @@ from services.codelets.attention import novelty, whereabouts
 from services.codelets.correction import apply_correction, map_correction
 from services.codelets.localization import landmarks, localization
 from services.codelets.mapping import boundary, loop_detection, object_place, path, road_place
-from services.codelets.mapping import loop_detection, object_place, path, road_place
 from services.codelets.planning import route_plan
 
 CODELETS: tuple[Codelet, ...] = (
