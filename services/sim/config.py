@@ -10,6 +10,7 @@ from cogmap.errors import ConfigError
 from schemas.base import PositiveSeconds
 from services.sim.layout.catalogue import CATALOGUE
 from services.sim.layout.closures import Closure
+from services.sim.layout.towns import PATTERN
 from services.sim.odometry import Noise
 from services.sim.scripted.percepts import PerceptErrors
 from services.sim.scripted.trajectory import Trajectory
@@ -63,9 +64,10 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     town: Annotated[
         str,
         msgspec.Meta(
-            pattern="^(loop|blocks)$",
+            pattern=PATTERN,
             description="loop: a loop of streets with a route around it. blocks: several blocks, "
-            "with districts, and no route.",
+            "with districts, and no route. osm:FILE: the streets and buildings of an "
+            "OpenStreetMap extract, and no route.",
         ),
     ] = "loop"
     town_size_m: Annotated[

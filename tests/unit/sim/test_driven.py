@@ -22,10 +22,11 @@ from schemas.sensing import (
 )
 from services.sim.driven.camera import ColumnCamera, depths_m
 from services.sim.driven.ground import MAX_RANGE_M
-from services.sim.driven.robot import BODY_RADIUS_M, KinematicRobot, clearance_m
+from services.sim.driven.robot import BODY_RADIUS_M, KinematicRobot
 from services.sim.driven.sensors import Sensors, scan
 from services.sim.driven.surroundings import Surroundings
 from services.sim.layout.blocks.town import generate
+from services.sim.layout.boundaries import clearance_m
 from services.sim.layout.catalogue import CATALOGUE
 from services.sim.layout.closures import Closure
 from services.sim.layout.place import Place
