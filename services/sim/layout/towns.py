@@ -12,7 +12,12 @@ from services.sim.layout.town import generate
 LOOP = "loop"
 BLOCKS = "blocks"
 OSM = "osm:"
-PATTERN = f"^({LOOP}|{BLOCKS}|{OSM}.+)$"
+
+
+def is_town(town: str) -> bool:
+    """Whether there is a town of that name: LOOP, BLOCKS, or OSM and a path."""
+    is_extract = town.startswith(OSM) and town != OSM
+    return is_extract or town in (LOOP, BLOCKS)
 
 
 def place(town: str, seed: int, size_m: float) -> Place:

@@ -341,6 +341,12 @@ def test_a_closure_of_a_street_that_is_not_there_is_refused() -> None:
         build(_config(closures=[closure]))
 
 
+@pytest.mark.parametrize("town", ["village", "osm:", ""])
+def test_a_town_that_there_is_none_of_is_refused(town: str) -> None:
+    with pytest.raises(ConfigError, match="choose loop, blocks or osm:FILE"):
+        build(Config(town=town))
+
+
 def test_percepts_of_a_town_in_real_time_are_refused() -> None:
     with pytest.raises(ConfigError, match="lockstep"):
         build(Config(mode="real_time", sensing="percepts"))
