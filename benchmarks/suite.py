@@ -17,11 +17,10 @@ from benchmarks.localization import measure as localization
 from benchmarks.machine import machine_unit_ms
 from benchmarks.map_correction import measure as map_correction
 from benchmarks.map_size import measure as map_size
-from benchmarks.map_structure import measure as map_structure
 from benchmarks.perception import measure as perception
 from benchmarks.perception import photographs, stereo
 from benchmarks.place_grid import measure as place_grid
-from benchmarks.planning import grid
+from benchmarks.planning import grid, tours
 from benchmarks.report import Metrics, Outcome
 from benchmarks.spiking import measure as spiking
 from benchmarks.threshold import Thresholds
@@ -120,12 +119,15 @@ def _planning(setting: Setting) -> Metrics:
     return grid.measure(map_path, scenario_path)
 
 
+def _tours(setting: Setting) -> Metrics:
+    problems = setting.set_of("tsplib")
+    people = setting.set_of("human_tsp")
+    on_problems = tours.measure_tsp(problems, setting.processes)
+    return on_problems | tours.measure_human(people, setting.processes)
+
+
 def _map_size(setting: Setting) -> Metrics:
     return map_size.measure(setting.announce)
-
-
-def _map_structure(setting: Setting) -> Metrics:
-    return map_structure.measure(setting.announce)
 
 
 def _place_grid(setting: Setting) -> Metrics:
@@ -150,9 +152,9 @@ SUITE = (
     Benchmark("localization", localization.THRESHOLDS, _localization),
     Benchmark("map_correction", map_correction.THRESHOLDS, _map_correction),
     Benchmark("map_size", map_size.THRESHOLDS, _map_size),
-    Benchmark("map_structure", map_structure.THRESHOLDS, _map_structure),
     Benchmark("place_grid", place_grid.THRESHOLDS, _place_grid),
     Benchmark("planning", grid.THRESHOLDS, _planning),
+    Benchmark("tours", tours.THRESHOLDS, _tours),
     Benchmark("cue-integration", paper.CUE_INTEGRATION_THRESHOLDS, _cue_integration),
     Benchmark("city-maps", paper.CITY_MAPS_THRESHOLDS, _city_maps),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,8 @@ from typing import Any
 import click
 
 from cogmap.errors import UsageError
+
+Command = Callable[..., None]
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,7 @@ def _writable(context: click.Context, parameter: click.Parameter, path: Path | N
     return path
 
 
-_OPTIONS = (
+_SENSING_OPTIONS = (
     click.option(
         "--cameras",
         is_flag=True,
@@ -45,6 +47,8 @@ _OPTIONS = (
         is_flag=True,
         help="Run one more through real processes and compare bytes; code 1 where they differ.",
     ),
+)
+_OPTIONS = (
     click.option(
         "--seed",
         type=click.IntRange(0, 2**32),
@@ -74,24 +78,34 @@ _OPTIONS = (
 )
 
 
-def common_options(command: Callable[..., None]) -> Callable[..., None]:
+def common_options(command: Command) -> Command:
     """Give `command` the shared options, as a `Common`, its first argument."""
+    return _with(command, (*_SENSING_OPTIONS, *_OPTIONS))
 
+
+def common_options_without_sensing(command: Command) -> Command:
+    """As `common_options`, for an experiment in which nothing is sensed: without --cameras and
+    --live.
+    """
+    return _with(command, _OPTIONS)
+
+
+def _with(command: Command, options: Sequence[Callable[[Command], Command]]) -> Command:
     @functools.wraps(command)
     def with_common(
         *,
-        cameras: bool,
-        live: bool,
         seed: int,
         processes: int,
         out: Path | None,
         json_path: Path | None,
+        cameras: bool = False,
+        live: bool = False,
         **own: Any,
     ) -> None:
         command(Common(cameras, live, seed, processes, out, json_path), **own)
 
-    decorated: Callable[..., None] = with_common
-    for option in reversed(_OPTIONS):
+    decorated: Command = with_common
+    for option in reversed(options):
         decorated = option(decorated)
 
     return decorated

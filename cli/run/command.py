@@ -7,7 +7,6 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import click
 import msgspec
@@ -23,20 +22,13 @@ from cogmap.errors import ConfigError, StorageError
 from cogmap.runtime import config
 from cogmap.runtime.process import Stop
 from services import registry
-from services.sim.layout.towns import BLOCKS, LOOP, OSM
 
 RUNS = Path("runs")
 LAP_LIMIT_S = 85.0
-AROUND_S = 30.0
 FINISH_S = 4.0
 
 seed_option = click.option(
     "--seed", type=click.IntRange(0, 2**32), help="Which town, and which noise.  [default: 1]"
-)
-town_option = click.option(
-    "--town",
-    metavar="TOWN",
-    help="loop, blocks, or osm:FILE, the extract of OpenStreetMap in FILE.  [default: loop]",
 )
 laps_option = click.option(
     "--laps", type=FiniteRange(0, 1000, min_open=True), help="How far.  [default: 1]"
@@ -53,7 +45,6 @@ lockstep_option = click.option(
 
 @click.command()
 @seed_option
-@town_option
 @laps_option
 @lockstep_option
 @codelets_option
@@ -90,7 +81,6 @@ lockstep_option = click.option(
 @set_option
 def run(
     seed: int | None,
-    town: str | None,
     laps: float | None,
     lockstep: bool,
     codelets: int,
@@ -105,7 +95,7 @@ def run(
     config_path: Path | None,
     settings: tuple[str, ...],
 ) -> None:
-    """Drive the robot through a simulated town: around its loop of streets, or where it decides.
+    """Drive the robot around a loop of streets in a simulated town.
 
     Starts a router and every module as a process of its own, shows how the drive proceeds, and
     leaves a folder with the log, a map and a summary, which runs/latest links to. Ends with 0
@@ -116,7 +106,6 @@ def run(
     console = Console(stderr=as_json)
     choices = Choices(
         seed=seed,
-        town=town,
         laps=laps,
         lockstep=lockstep,
         codelets=codelets,
@@ -132,7 +121,7 @@ def run(
 
     endpoint = router or connect
     drive = Drive(_new_folder(out), endpoint, agent, choices, sections, began_s)
-    limit_s = time_limit or default_limit_s(sections["sim"])
+    limit_s = time_limit or default_limit_s(sections["sim"]["laps"])
     screen = display_on(console)
     _introduce(screen, drive)
     with _writing(drive.folder):
@@ -149,38 +138,20 @@ def run(
     sys.exit(ending.outcome.exit_code)
 
 
-def default_limit_s(sim: dict[str, Any]) -> float:
-    """The time limit of a drive with these settings of the simulation.
-
-    It grows with each lap of a route, and is one lap's at least; without a route it is the drive's
-    duration, and time to start and to end.
-    """
-    if sim["town"] == LOOP:
-        laps = float(sim["laps"])
-        return LAP_LIMIT_S * max(1.0, laps)
-
-    return float(sim["duration_s"]) + AROUND_S
+def default_limit_s(laps: float) -> float:
+    """The time limit of a drive of so many laps: it grows with each, and is one lap's at least."""
+    return LAP_LIMIT_S * max(1.0, laps)
 
 
 def _introduce(screen: Display, drive: Drive) -> None:
-    screen.show(f"{_town(drive)}, files in {drive.folder}")
+    seed = drive.sections["sim"]["seed"]
+    screen.show(f"town {seed}, files in {drive.folder}")
     if not drive.choices.without:
         return
 
     names = ", ".join(drive.choices.without)
     config_path = drive.folder / CONFIG_NAME
     screen.show(f"start {names} yourself with --connect {drive.endpoint} --config {config_path}")
-
-
-def _town(drive: Drive) -> str:
-    """The town of a drive, in words."""
-    sim = drive.sections["sim"]
-    if sim["town"] == LOOP:
-        return f"town {sim['seed']}"
-    if sim["town"] == BLOCKS:
-        return f"town {sim['seed']} of blocks"
-
-    return f"the town in {sim['town'].removeprefix(OSM)}"
 
 
 def _new_folder(out: Path | None) -> Path:

@@ -59,3 +59,33 @@ def test_a_loop_is_closed_with_the_same_bytes_through_real_processes() -> None:
 
     assert driven(configured, modules).replays
     assert live.differing(configured, MODULES) == []
+
+
+def test_route_planning_compares_people_the_model_and_the_shortest_tours(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    tours = _people_tours(tmp_path)
+    options = ("--drawn", "1", "--participants", "3", "--max-goals", "30")
+
+    done = _run("route-planning", "--data", str(tours), *options, "--out", str(out))
+    assert done.returncode == 0, done.stdout + done.stderr
+
+    metrics = json.loads((out / "route-planning.json").read_text())
+    assert metrics["within_iqr_share"] == 1.0
+    assert metrics["graph0_people_above_optimum_quartile_1"] == 0.0
+    assert metrics["graph0_people_above_optimum_quartile_3"] > 0.0
+    assert metrics["goals_030_hierarchical_above_optimum"] < metrics["goals_030_flat_above_optimum"]
+    assert "±0.2" in metrics["published_of_4_to_9_goals"]
+    assert (out / "route-planning.png").read_bytes().startswith(b"\x89PNG")
+    assert (out / "route-planning.pdf").read_bytes().startswith(b"%PDF")
+
+
+def _people_tours(folder: Path) -> Path:
+    """A square that four people drew a tour of, two of them across."""
+    (folder / "Graph0.lib").write_text(
+        "DIMENSION : 4\nEDGE_WEIGHT_TYPE : EUC_2D\nNODE_COORD_SECTION\n1 0 0\n2 0 9\n3 9 9\n4 9 0\n"
+    )
+    around = '"0,0,9,9","0,9,9,0"'
+    across = '"0,9,0,9","0,9,9,0"'
+    rows = [f"0,{person},{tour}" for person, tour in enumerate([around, around, across, across])]
+    (folder / "tours.csv").write_text("\n".join(["graph,participant,x,y", *rows]) + "\n")
+    return folder

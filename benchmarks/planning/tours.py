@@ -1,0 +1,126 @@
+"""Several goals in order: against the optima of TSPLIB's problems, and against people's tours."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.report import Metrics
+from benchmarks.threshold import at_least, at_most
+from cogmap.data import tsplib
+from cogmap.data.human_tours import read_folder
+from cogmap.data.tsplib import Problem
+from cogmap.errors import UsageError
+from cogmap.parallel import Progress, parallel_map
+from experiments.route_planning.measure import human_jobs, measure
+from experiments.route_planning.metrics import human_metrics
+from experiments.route_planning.optimum import shortest_tour
+from services.codelets.planning.tours import TourSettings, follow_activation, order, route_length
+
+THRESHOLDS = {
+    "hierarchical_above_optimum": at_most(0.08),
+    "within_iqr_share": at_least(0.7),
+}
+MIN_CITIES = 50
+MAX_CITIES = 80
+SEED = 1
+# Medians over fewer participants differ from seed to seed.
+PARTICIPANTS = 400
+
+
+def _ignore(share: float) -> None:
+    """Where nobody waits."""
+
+
+class _Excess(NamedTuple):
+    """The length of the shortest tour of one problem, and by what share longer others are, on the
+    mean over the cities that they begin at.
+    """
+
+    optimum: float
+    hierarchical: float
+    unstraightened: float
+    flat: float
+
+
+class _Job(NamedTuple):
+    folder: Path
+    problem: Problem
+
+
+def measure_tsp(folder: Path, processes: int, progress: Progress = _ignore) -> Metrics:
+    """The mean excess over the problems of MIN_CITIES to MAX_CITIES cities in a folder, and each.
+
+    A problem's own is the mean over tours that begin at each of its cities. The optimum is that of
+    NAME.opt.tour, or else computed exactly. Raises UsageError where no problem is of that size.
+    """
+    jobs = _jobs(folder)
+    found = parallel_map(_excess, jobs, processes, progress)
+    metrics: Metrics = {}
+    for planned in ("hierarchical", "unstraightened", "flat"):
+        excess = [getattr(one, planned) for one in found]
+        metrics[f"{planned}_above_optimum"] = float(np.mean(excess))
+
+    metrics["tsp_problems"] = float(len(found))
+    for job, one in zip(jobs, found, strict=True):
+        name = job.problem.name
+        metrics[f"{name}_optimum"] = one.optimum
+        metrics[f"{name}_hierarchical_above_optimum"] = one.hierarchical
+        metrics[f"{name}_flat_above_optimum"] = one.flat
+
+    return metrics
+
+
+def measure_human(folder: Path, processes: int, progress: Progress = _ignore) -> Metrics:
+    """How far the model's participants agree with the people of a folder of tours."""
+    problems = read_folder(folder)
+    jobs = human_jobs(problems, PARTICIPANTS, SEED)
+    planned = measure(jobs, processes, progress)
+    return human_metrics(planned)
+
+
+def _jobs(folder: Path) -> list[_Job]:
+    jobs = []
+    for problem in tsplib.folder(folder):
+        if MIN_CITIES <= len(problem) <= MAX_CITIES:
+            jobs.append(_Job(folder, problem))
+
+    if not jobs:
+        raise UsageError(
+            f"{folder} has no problem of {MIN_CITIES} to {MAX_CITIES} cities: give one with some"
+        )
+    return jobs
+
+
+def _excess(job: _Job) -> _Excess:
+    problem = job.problem
+    shortest = tsplib.optimal_tour(job.folder, problem)
+    if shortest is None:
+        shortest = shortest_tour(problem.lengths)
+
+    optimum = route_length(problem.lengths, shortest, closed=True)
+    lengths = [_lengths_from(problem, start) for start in range(len(problem))]
+    hierarchical, unstraightened, flat = np.mean(lengths, axis=0).tolist()
+    return _Excess(
+        optimum=optimum,
+        hierarchical=hierarchical / optimum - 1.0,
+        unstraightened=unstraightened / optimum - 1.0,
+        flat=flat / optimum - 1.0,
+    )
+
+
+def _lengths_from(problem: Problem, start: int) -> tuple[float, float, float]:
+    """The length of a tour that begins at city `start`: hierarchical, not straightened, flat."""
+    cities = np.roll(np.arange(len(problem)), -start)
+    lengths = problem.lengths[np.ix_(cities, cities)]
+    positions = problem.positions[cities]
+    tours = (
+        order(lengths, positions, TourSettings()),
+        order(lengths, positions, TourSettings(straightens=False)),
+        follow_activation(lengths),
+    )
+    found = [route_length(lengths, tour, closed=True) for tour in tours]
+    hierarchical, unstraightened, flat = found
+    return hierarchical, unstraightened, flat

@@ -1,0 +1,183 @@
+"""Figure 5 of the paper, from our own runs: tours on a flat map and on a hierarchy, and how much
+longer than the shortest they are, beside people's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from cli.plots.draw import STYLE
+from cli.plots.palette import ESTIMATE, FAINT, INK, KERB, PAPER, ROAD, SEVERAL, STREET, TRUE, WHEELS
+from cogmap.geometry.arrays import Floats, Indices
+from experiments.route_planning import published
+from experiments.route_planning.measure import EXAMPLE_GOALS, Planned
+from services.codelets.planning.tours import TourSettings
+
+HIERARCHICAL = ESTIMATE
+STRAIGHTENED = ROAD
+FLAT = WHEELS
+PEOPLE = TRUE
+PUBLISHED = SEVERAL[0]
+
+
+def figure(human: Sequence[Planned], drawn: Sequence[Planned], metrics: dict[str, Any]) -> Figure:
+    """The sheet: two tours of one problem above, below all problems by their number of goals, and
+    those of people one by one.
+    """
+    example = next(problem for problem in drawn if problem.goals == EXAMPLE_GOALS)
+    with mpl.rc_context(STYLE):
+        sheet = Figure(figsize=(14.0, 10.5), dpi=110, facecolor=PAPER, layout="constrained")
+        panels = sheet.subplot_mosaic(
+            [["flat", "hierarchical", "shortest"], ["sizes", "people", "errors"]]
+        )
+        _draw_tour(panels["flat"], example, example.typical_flat, FLAT, "c   on a flat map")
+        _draw_tour(
+            panels["hierarchical"], example, example.typical, HIERARCHICAL, "d   on a hierarchy"
+        )
+        _draw_tour(panels["shortest"], example, example.shortest, INK, "    the shortest")
+        _draw_grids(panels["hierarchical"], example.positions, TourSettings())
+        _draw_sizes(panels["sizes"], drawn)
+        _draw_people(panels["people"], human)
+        _draw_errors(panels["errors"], human, metrics)
+        sheet.suptitle(
+            f"Several goals in order, {metrics['participants']:g} simulated participants a problem",
+            x=0.01,
+            ha="left",
+            color=INK,
+            fontsize=12,
+            fontweight="bold",
+        )
+        sheet.draw_without_rendering()
+    return sheet
+
+
+def _draw_tour(axes: Axes, problem: Planned, tour: Indices, colour: str, title: str) -> None:
+    """A closed tour past the goals."""
+    line = problem.positions[np.append(tour, tour[0])]
+    axes.plot(*line.T, color=colour, lw=1.8, zorder=3)
+    axes.plot(*problem.positions.T, "o", ms=6, color=TRUE, mec="white", zorder=4)
+    axes.plot(*line[0], "s", ms=9, mfc="white", mec=TRUE, zorder=4)
+    axes.set_aspect("equal")
+    axes.set_xticks([])
+    axes.set_yticks([])
+
+    above = _length(line) / _length(problem.positions[np.append(problem.shortest, 0)]) - 1
+    axes.set_title(f"{title}: {above:.1%} above the shortest", loc="left", fontsize=10)
+    _label(axes, "", "")
+
+
+def _length(line: Floats) -> float:
+    steps = np.diff(line, axis=0)
+    return float(np.hypot(*steps.T).sum())
+
+
+def _draw_grids(axes: Axes, positions: Floats, settings: TourSettings) -> None:
+    """The two coarsest grids, as they lie over the problem where they are not turned."""
+    middle = (positions.min(axis=0) + positions.max(axis=0)) / 2
+    side = float(np.ptp(positions, axis=0).max())
+    corner = middle - side / 2
+
+    for level, width in ((2, 0.5), (1, 1.4)):
+        shares = np.linspace(0.0, side, settings.factor**level + 1)
+        style: dict[str, Any] = {"colors": STREET, "linewidths": width, "zorder": 1}
+        axes.vlines(corner[0] + shares, corner[1], corner[1] + side, **style)
+        axes.hlines(corner[1] + shares, corner[0], corner[0] + side, **style)
+
+
+def _draw_sizes(axes: Axes, drawn: Sequence[Planned]) -> None:
+    """Means over the problems of each size, beside published ones."""
+    sizes = sorted({problem.goals for problem in drawn})
+    for name, colour, label in (
+        ("flat", FLAT, "ours, flat"),
+        ("hierarchical", HIERARCHICAL, "ours, hierarchical"),
+        ("straightened", STRAIGHTENED, "ours, straightened in the end"),
+    ):
+        means = []
+        for size in sizes:
+            same = [getattr(problem, name).mean() for problem in drawn if problem.goals == size]
+            means.append(100 * np.mean(same))
+        axes.plot(sizes, means, "o-", ms=4, color=colour, label=label)
+
+    percent = {size: 100 * share for size, share in published.DRAWN_HUMAN.items()}
+    for values, marker, colour, label in (
+        (percent, "s", PEOPLE, "people, drawn problems, published"),
+        (published.HUMAN_PERCENT, "^", PEOPLE, "people, Madl et al. 2013*"),
+        (published.MODEL_PERCENT, "^", PUBLISHED, "their model*"),
+    ):
+        axes.plot(list(values), list(values.values()), marker, ms=5, color=colour, label=label)
+
+    axes.set_xscale("log")
+    axes.set_xticks([4, 6, 10, 20, 40, 80, 120], ["4", "6", "10", "20", "40", "80", "120"])
+    axes.minorticks_off()
+    axes.set_ylim(bottom=-1)
+    axes.legend(frameon=False, fontsize=8, title=f"* {published.READ_OFF_BY_EYE}", title_fontsize=7)
+    axes.set_title("e   drawn at random, by number of goals", loc="left", fontsize=10)
+    _label(axes, "goals", "% above the shortest")
+
+
+def _draw_people(axes: Axes, human: Sequence[Planned]) -> None:
+    """People's quartiles on each problem, the medians of the model and of the flat map."""
+    axes.set_title("f   problems that people drew tours of", loc="left", fontsize=10)
+    _label(axes, "", "% above the shortest")
+    if not human:
+        _draw_nothing(axes)
+        return
+
+    places = np.arange(len(human))
+    quartiles = 100 * np.array([problem.people_quartiles for problem in human])
+    medians = [100 * float(np.median(problem.people)) for problem in human]
+    heights = quartiles[:, 1] - quartiles[:, 0]
+    axes.bar(places, heights, 0.6, quartiles[:, 0], color=KERB, label="people, the middle half")
+    axes.plot(places, medians, "_", ms=22, mew=2, color=PEOPLE, label="people, median")
+    for name, colour, marker, label in (
+        ("hierarchical", HIERARCHICAL, "o", "hierarchical, median"),
+        ("straightened", STRAIGHTENED, "^", "straightened, median"),
+        ("flat", FLAT, "v", "flat, median"),
+    ):
+        ours = [100 * float(np.median(getattr(problem, name))) for problem in human]
+        axes.plot(places, ours, marker, ms=7, color=colour, mec="white", label=label)
+
+    names = [f"{problem.name.removeprefix('Graph')}\n{problem.goals}" for problem in human]
+    axes.set_xticks(places, names)
+    axes.set_xlabel("problem, and its goals", color=FAINT)
+    axes.legend(frameon=False, fontsize=8)
+
+
+def _draw_errors(axes: Axes, human: Sequence[Planned], metrics: dict[str, Any]) -> None:
+    """The mean excess of the model against that of people, a point each problem."""
+    axes.set_title("g   do they err on the same problems?", loc="left", fontsize=10)
+    _label(axes, "people, mean % above the shortest", "model, mean % above the shortest")
+    if not human:
+        _draw_nothing(axes)
+        return
+
+    people = [100 * problem.people.mean() for problem in human]
+    for name, key, colour in (
+        ("flat", "flat_correlation_with_people", FLAT),
+        ("hierarchical", "correlation_with_people", HIERARCHICAL),
+    ):
+        ours = [100 * getattr(problem, name).mean() for problem in human]
+        label = f"{name}, r = {metrics[key]:.2f}"
+        axes.plot(people, ours, "o", ms=6, color=colour, mec="white", label=label)
+
+    axes.axline((0.0, 0.0), slope=1.0, color=FAINT, lw=1.0, ls=(0, (4, 2)))
+    axes.legend(frameon=False, fontsize=8)
+
+
+def _draw_nothing(axes: Axes) -> None:
+    axes.set_xticks([])
+    axes.set_yticks([])
+    axes.text(0.5, 0.5, "no people's tours: see --data", ha="center", color=FAINT)
+
+
+def _label(axes: Axes, x: str, y: str) -> None:
+    axes.set_xlabel(x, color=FAINT)
+    axes.set_ylabel(y, color=FAINT)
+    axes.tick_params(colors=FAINT, length=3)
+    axes.set_facecolor(PAPER)

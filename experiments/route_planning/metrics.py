@@ -1,0 +1,109 @@
+"""The metrics of the experiment as one flat object. Shares are of the shortest tour."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cogmap.geometry.arrays import Floats
+from experiments.route_planning import published
+from experiments.route_planning.measure import Planned
+
+MIN_PROBLEMS = 3
+# How tours are planned: see Planned.
+PLANNED = ("hierarchical", "straightened", "flat")
+Metrics = dict[str, float]
+
+
+def human_metrics(problems: Sequence[Planned]) -> Metrics:
+    """Of the problems that people drew tours of: each, and how far the model agrees with people.
+
+    `within_iqr_share` is the share of problems on which the median of the model's participants lies
+    within people's quartiles. Correlations are over the problems, of mean with mean.
+    """
+    if not problems:
+        return {}
+
+    people = _means([problem.people for problem in problems])
+    hierarchical = _means([problem.hierarchical for problem in problems])
+    straightened = _means([problem.straightened for problem in problems])
+    flat = _means([problem.flat for problem in problems])
+    is_within = [problem.is_within_quartiles for problem in problems]
+    metrics: Metrics = {
+        "human_problems": float(len(problems)),
+        "within_iqr_share": float(np.mean(is_within)),
+        "human_people_above_optimum": float(people.mean()),
+        "human_hierarchical_above_optimum": float(hierarchical.mean()),
+        "human_straightened_above_optimum": float(straightened.mean()),
+        "human_flat_above_optimum": float(flat.mean()),
+        "correlation_with_people": correlation(hierarchical, people),
+        "straightened_correlation_with_people": correlation(straightened, people),
+        "flat_correlation_with_people": correlation(flat, people),
+    }
+
+    for problem in problems:
+        metrics |= _of_problem(problem)
+    return metrics
+
+
+def drawn_metrics(problems: Sequence[Planned]) -> Metrics:
+    """Means over the drawn problems of each size, beside what is published of people.
+
+    Published problems are others, of the same numbers of goals.
+    """
+    metrics: Metrics = {}
+
+    for goals in sorted({problem.goals for problem in problems}):
+        prefix = f"goals_{goals:03d}"
+        same = [problem for problem in problems if problem.goals == goals]
+        for name in PLANNED:
+            means = _means([getattr(problem, name) for problem in same])
+            metrics[f"{prefix}_{name}_above_optimum"] = float(means.mean())
+
+        metrics |= _published(prefix, goals)
+
+    return metrics
+
+
+def _published(prefix: str, goals: int) -> Metrics:
+    metrics: Metrics = {}
+
+    if goals in published.HUMAN_PERCENT:
+        metrics[f"{prefix}_published_people"] = published.HUMAN_PERCENT[goals] / 100
+        metrics[f"{prefix}_published_model"] = published.MODEL_PERCENT[goals] / 100
+    if goals in published.DRAWN_HUMAN:
+        metrics[f"{prefix}_published_people"] = published.DRAWN_HUMAN[goals]
+
+    return metrics
+
+
+def _of_problem(problem: Planned) -> Metrics:
+    prefix = problem.name.lower()
+    low, high = problem.people_quartiles
+    return {
+        f"{prefix}_goals": float(problem.goals),
+        f"{prefix}_people": float(len(problem.people)),
+        f"{prefix}_people_above_optimum_median": float(np.median(problem.people)),
+        f"{prefix}_people_above_optimum_quartile_1": low,
+        f"{prefix}_people_above_optimum_quartile_3": high,
+        f"{prefix}_hierarchical_above_optimum_median": float(np.median(problem.hierarchical)),
+        f"{prefix}_straightened_above_optimum_median": float(np.median(problem.straightened)),
+        f"{prefix}_flat_above_optimum_median": float(np.median(problem.flat)),
+    }
+
+
+def correlation(first: Floats, second: Floats) -> float:
+    """Pearson's, 0 where there are too few, or one does not vary."""
+    is_constant = np.ptp(first) == 0 or np.ptp(second) == 0
+    if len(first) < MIN_PROBLEMS or is_constant:
+        return 0.0
+
+    matrix = np.corrcoef(first, second)
+    return float(matrix[0, 1])
+
+
+def _means(values: Sequence[Floats]) -> Floats:
+    """(n,): the mean of each."""
+    means = [each.mean() for each in values]
+    return np.array(means)
