@@ -29,7 +29,7 @@ $(TRAINS): $(INSTALLED) requirements/train.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements/train.txt
 	touch $@
 
-bench-setup: $(MEASURES) ## gtsam besides, which benchmarks compare with
+bench-setup: $(MEASURES) ## gtsam and scikit-learn besides, which benchmarks compare with
 
 $(MEASURES): $(INSTALLED) requirements/bench.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements/bench.txt

@@ -16,6 +16,7 @@ from benchmarks.cycle import measure as cycle
 from benchmarks.localization import measure as localization
 from benchmarks.map_correction import measure as map_correction
 from benchmarks.map_size import measure as map_size
+from benchmarks.map_structure import measure as map_structure
 from benchmarks.options import announce, json_option, processes_option, report_metrics
 from benchmarks.perception import measure as perception
 from benchmarks.perception import photographs, stereo
@@ -140,6 +141,19 @@ def place_grid_command(json_path: Path | None) -> None:
     """
     metrics = place_grid.measure(announce)
     report_metrics("place grid", place_grid.THRESHOLDS, metrics, json_path)
+
+
+@benchmarks.command(name="map_structure")
+@json_option
+def map_structure_command(json_path: Path | None) -> None:
+    """How well sub-maps find the districts of towns again, and how fast.
+
+    Towns made up from seeds, with known districts and boundaries between most of them. The adjusted
+    Rand index is compared with that of scikit-learn's Gaussian mixture with a Dirichlet-process
+    prior on the same positions, which `make bench-setup` installs. Takes about two minutes.
+    """
+    metrics = map_structure.measure(announce)
+    report_metrics("map structure", map_structure.THRESHOLDS, metrics, json_path)
 
 
 @benchmarks.command(name="bus")

@@ -23,6 +23,17 @@ def gtsam() -> Any:
     return gtsam
 
 
+def scikit_learn() -> Any:
+    """The package scikit-learn, which has no types. Raises UsageError where it is not installed."""
+    try:
+        import sklearn.metrics
+        import sklearn.mixture
+    except ImportError:
+        raise UsageError(f"scikit-learn {REMEDY}") from None
+
+    return sklearn
+
+
 def gtsam_poses(values: Any, keys: Iterable[int]) -> Floats:
     """(n, 3) poses in the plane, of gtsam's `values` at `keys`: x_m, y_m, heading_rad."""
     poses = []

@@ -17,6 +17,7 @@ from benchmarks.localization import measure as localization
 from benchmarks.machine import machine_unit_ms
 from benchmarks.map_correction import measure as map_correction
 from benchmarks.map_size import measure as map_size
+from benchmarks.map_structure import measure as map_structure
 from benchmarks.perception import measure as perception
 from benchmarks.perception import photographs, stereo
 from benchmarks.place_grid import measure as place_grid
@@ -130,6 +131,10 @@ def _map_size(setting: Setting) -> Metrics:
     return map_size.measure(setting.announce)
 
 
+def _map_structure(setting: Setting) -> Metrics:
+    return map_structure.measure(setting.announce)
+
+
 def _place_grid(setting: Setting) -> Metrics:
     return place_grid.measure(setting.announce)
 
@@ -152,6 +157,7 @@ SUITE = (
     Benchmark("localization", localization.THRESHOLDS, _localization),
     Benchmark("map_correction", map_correction.THRESHOLDS, _map_correction),
     Benchmark("map_size", map_size.THRESHOLDS, _map_size),
+    Benchmark("map_structure", map_structure.THRESHOLDS, _map_structure),
     Benchmark("place_grid", place_grid.THRESHOLDS, _place_grid),
     Benchmark("planning", grid.THRESHOLDS, _planning),
     Benchmark("tours", tours.THRESHOLDS, _tours),

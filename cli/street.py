@@ -17,7 +17,7 @@ from cogmap.runtime.delivery.intake import Intake
 from schemas import topics
 from schemas.sensing import StreetClosure, TrueTown
 
-ANSWER_S = 10.0
+ANSWER_S = 10
 
 name_argument = click.argument("name")
 
@@ -50,19 +50,29 @@ def open_(name: str, connect: str, agent: str) -> None:
 
 
 def _change(closure: StreetClosure, connect: str, agent: str) -> None:
-    """Publish `closure`, and wait until the town is published as it should be. Raises
-    NoAnswerError.
-    """
+    """Publish `closure` until the town is published as it should be. Raises NoAnswerError."""
     with observing(connect, agent, "street") as bus:
         towns = _Towns(bus)
-        Publisher(bus, topics.STREET_CLOSURE, closure).publish()
-        if not towns.show(closure, ANSWER_S):
+        publisher = Publisher(bus, topics.STREET_CLOSURE, closure)
+        if not _is_answered(publisher, towns, closure):
             raise NoAnswerError(
                 f"no street {closure.street!r} was {_done(closure)} within {ANSWER_S:g} s: see that "
                 f"the simulation runs, and for the names `cogmap topic echo --once truth/town`"
             )
 
     click.echo(f"{closure.street} is {_done(closure)}")
+
+
+def _is_answered(publisher: Publisher, towns: _Towns, closure: StreetClosure) -> bool:
+    """Publish once a second, as the simulation may not have subscribed yet; whether the town
+    changes.
+    """
+    for _ in range(ANSWER_S):
+        publisher.publish()
+        if towns.show(closure, 1.0):
+            return True
+
+    return False
 
 
 def _done(closure: StreetClosure) -> str:

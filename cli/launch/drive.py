@@ -140,12 +140,18 @@ class Drive:
         if stop.asked:
             return Ending(Outcome.INTERRUPTED, "it was interrupted")
         if observer.progress >= 1.0:
-            return Ending(Outcome.ROUTE_COMPLETE, "the robot has completed its route")
+            return Ending(Outcome.ROUTE_COMPLETE, self._complete())
         if time.monotonic() >= until_s:
             return _out_of_time(watch, missing)
         if observer.start is None:
             return None
         return self._watchdog.check(_situation(watch, missing))
+
+    def _complete(self) -> str:
+        if self.sections["action"]["route"]:
+            return "the robot has completed its route"
+
+        return "the time of the drive is over"
 
     def _close(self, watch: Watch | None) -> None:
         """End first what moves, then what thinks, then what records, the router last."""

@@ -34,6 +34,7 @@ class Choices:
     """
 
     seed: int | None = None
+    town: str | None = None
     laps: float | None = None
     lockstep: bool = False
     codelets: int = 1
@@ -71,6 +72,8 @@ def _chosen(base: Sections, choices: Choices, awaits: dict[str, int]) -> Section
     sim.setdefault("awaits", awaits)
     if choices.seed is not None:
         sim["seed"] = choices.seed
+    if choices.town is not None:
+        sim["town"] = choices.town
     if choices.laps is not None:
         sim["laps"] = choices.laps
     return sections

@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import click
 import msgspec
@@ -22,13 +23,20 @@ from cogmap.errors import ConfigError, StorageError
 from cogmap.runtime import config
 from cogmap.runtime.process import Stop
 from services import registry
+from services.sim.layout.towns import BLOCKS, LOOP, OSM
 
 RUNS = Path("runs")
 LAP_LIMIT_S = 85.0
+AROUND_S = 30.0
 FINISH_S = 4.0
 
 seed_option = click.option(
     "--seed", type=click.IntRange(0, 2**32), help="Which town, and which noise.  [default: 1]"
+)
+town_option = click.option(
+    "--town",
+    metavar="TOWN",
+    help="loop, blocks, or osm:FILE, the extract of OpenStreetMap in FILE.  [default: loop]",
 )
 laps_option = click.option(
     "--laps", type=FiniteRange(0, 1000, min_open=True), help="How far.  [default: 1]"
@@ -45,6 +53,7 @@ lockstep_option = click.option(
 
 @click.command()
 @seed_option
+@town_option
 @laps_option
 @lockstep_option
 @codelets_option
@@ -81,6 +90,7 @@ lockstep_option = click.option(
 @set_option
 def run(
     seed: int | None,
+    town: str | None,
     laps: float | None,
     lockstep: bool,
     codelets: int,
@@ -95,7 +105,7 @@ def run(
     config_path: Path | None,
     settings: tuple[str, ...],
 ) -> None:
-    """Drive the robot around a loop of streets in a simulated town.
+    """Drive the robot through a simulated town: around its loop of streets, or where it decides.
 
     Starts a router and every module as a process of its own, shows how the drive proceeds, and
     leaves a folder with the log, a map and a summary, which runs/latest links to. Ends with 0
@@ -106,6 +116,7 @@ def run(
     console = Console(stderr=as_json)
     choices = Choices(
         seed=seed,
+        town=town,
         laps=laps,
         lockstep=lockstep,
         codelets=codelets,
@@ -121,7 +132,7 @@ def run(
 
     endpoint = router or connect
     drive = Drive(_new_folder(out), endpoint, agent, choices, sections, began_s)
-    limit_s = time_limit or default_limit_s(sections["sim"]["laps"])
+    limit_s = time_limit or default_limit_s(sections["sim"])
     screen = display_on(console)
     _introduce(screen, drive)
     with _writing(drive.folder):
@@ -138,20 +149,38 @@ def run(
     sys.exit(ending.outcome.exit_code)
 
 
-def default_limit_s(laps: float) -> float:
-    """The time limit of a drive of so many laps: it grows with each, and is one lap's at least."""
-    return LAP_LIMIT_S * max(1.0, laps)
+def default_limit_s(sim: dict[str, Any]) -> float:
+    """The time limit of a drive with these settings of the simulation.
+
+    It grows with each lap of a route, and is one lap's at least; without a route it is the drive's
+    duration, and time to start and to end.
+    """
+    if sim["town"] == LOOP:
+        laps = float(sim["laps"])
+        return LAP_LIMIT_S * max(1.0, laps)
+
+    return float(sim["duration_s"]) + AROUND_S
 
 
 def _introduce(screen: Display, drive: Drive) -> None:
-    seed = drive.sections["sim"]["seed"]
-    screen.show(f"town {seed}, files in {drive.folder}")
+    screen.show(f"{_town(drive)}, files in {drive.folder}")
     if not drive.choices.without:
         return
 
     names = ", ".join(drive.choices.without)
     config_path = drive.folder / CONFIG_NAME
     screen.show(f"start {names} yourself with --connect {drive.endpoint} --config {config_path}")
+
+
+def _town(drive: Drive) -> str:
+    """The town of a drive, in words."""
+    sim = drive.sections["sim"]
+    if sim["town"] == LOOP:
+        return f"town {sim['seed']}"
+    if sim["town"] == BLOCKS:
+        return f"town {sim['seed']} of blocks"
+
+    return f"the town in {sim['town'].removeprefix(OSM)}"
 
 
 def _new_folder(out: Path | None) -> Path:

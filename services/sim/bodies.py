@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -72,6 +73,28 @@ class Bodies:
                 pybullet.GEOM_BOX,
                 halfExtents=list(half_m),
                 collisionFramePosition=[0, 0, middle_m],
+                physicsClientId=self._client,
+            )
+        )
+
+    def walls(self, outline: Sequence[Point], height_m: float) -> int:
+        """Walls that nothing passes, over a polygon, for `add`."""
+        count = len(outline)
+        vertices = [(x, y, 0.0) for x, y in outline]
+        vertices += [(x, y, height_m) for x, y in outline]
+
+        indices = []
+        for number in range(count):
+            following = (number + 1) % count
+            indices += [number, following, following + count]
+            indices += [number, following + count, number + count]
+
+        return int(
+            pybullet.createCollisionShape(
+                pybullet.GEOM_MESH,
+                vertices=vertices,
+                indices=indices,
+                flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
                 physicsClientId=self._client,
             )
         )

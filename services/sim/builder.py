@@ -46,11 +46,22 @@ class Builder:
 
     def building(self, plot: Plot) -> int:
         """A building that nothing passes."""
+        if plot.outline:
+            return self._prism(plot)
+
         kind = plot.kind
         size_m = (kind.width_m, kind.depth_m, kind.height_m)
         (model,) = self._kept(plot, lambda: mesh.building(kind))
         at_m = (plot.x_m, plot.y_m)
         return self._bodies.add(model, self._box(size_m), at_m, plot.heading_rad)
+
+    def _prism(self, plot: Plot) -> int:
+        """A building that is no rectangle."""
+        at_m = (plot.x_m, plot.y_m)
+        outline = [(x - plot.x_m, y - plot.y_m) for x, y in plot.outline]
+        (model,) = self._kept(plot, lambda: mesh.prism(plot.kind, outline))
+        solid = self._bodies.walls(outline, plot.kind.height_m)
+        return self._bodies.add(model, solid, at_m)
 
     def prop(self, prop: Prop, is_solid: bool) -> int:
         """A prop, which nothing passes where it is solid."""

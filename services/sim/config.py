@@ -10,6 +10,7 @@ from cogmap.errors import ConfigError
 from schemas.base import PositiveSeconds
 from services.sim.layout.catalogue import CATALOGUE
 from services.sim.layout.closures import Closure
+from services.sim.layout.towns import is_town
 from services.sim.odometry import Noise
 from services.sim.scripted.percepts import PerceptErrors
 from services.sim.scripted.trajectory import Trajectory
@@ -63,9 +64,9 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     town: Annotated[
         str,
         msgspec.Meta(
-            pattern="^(loop|blocks)$",
             description="loop: a loop of streets with a route around it. blocks: several blocks, "
-            "with districts, and no route.",
+            "with districts, and no route. osm:FILE: the streets and buildings of an "
+            "OpenStreetMap extract, and no route.",
         ),
     ] = "loop"
     town_size_m: Annotated[
@@ -136,6 +137,12 @@ def check(config: Config) -> None:
     if steps_hz % config.odometry_hz:
         raise ConfigError(
             f"[sim] odometry_hz is {config.odometry_hz}: choose one that divides {steps_hz}"
+        )
+
+    if not is_town(config.town):
+        raise ConfigError(
+            f"[sim] town is {config.town!r}: choose loop, blocks or osm:FILE, the path of an "
+            "OpenStreetMap extract"
         )
 
     if config.sensing == "percepts" and config.mode != "lockstep":

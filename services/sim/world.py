@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import weakref
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -14,10 +14,10 @@ from cogmap.geometry.arrays import Singles
 from schemas.sensing import Pose
 from services.sim.bodies import Bodies
 from services.sim.builder import Builder
-from services.sim.layout.barriers import barrier
+from services.sim.layout.barriers import barriers
 from services.sim.layout.furniture import Prop
 from services.sim.layout.place import Place
-from services.sim.layout.plan import Plot, Road
+from services.sim.layout.plan import Plot, Point, Road
 from services.sim.nearby import Nearby, Piece
 from services.sim.rendering import scenery
 from services.sim.rendering.egl import Egl
@@ -29,6 +29,8 @@ from services.sim.stdio import pybullet, quiet
 STEP_S = 1 / 240
 _GRAVITY_M_S2 = -9.81
 _CONTACT_BODY = 2
+# A collision is over where the robot has moved so far from it.
+_RELEASED_M = 0.3
 _TILE_M = 64.0
 _log = logging.getLogger(__name__)
 
@@ -57,8 +59,9 @@ class World:
         self.streets: list[int] = []
         self.collisions = 0
         self._barriers: dict[str, int] = {}
+        self._closing = barriers(town.roads)
         self._solid: set[int] = set()
-        self._is_touching = False
+        self._touched_m: Point | None = None
 
         self._bodies = Bodies(self.client)
         self._builder = Builder(self._bodies)
@@ -89,30 +92,35 @@ class World:
         self.robot.place(pose)
         self._follow(pose.x_m, pose.y_m)
 
-    def close_streets(self, names: Collection[str]) -> None:
+    def close_streets(self, names: frozenset[str]) -> None:
         """Let barriers close these streets, and no others."""
         for name in sorted(self._barriers.keys() - names):
             self._remove(self._barriers.pop(name))
 
-        for road in self.town.roads:
-            if road.name in names and road.name not in self._barriers:
-                body = self._builder.prop(barrier(road), is_solid=True)
-                self._solid.add(body)
-                self._barriers[road.name] = body
+        for name in sorted(names - self._barriers.keys()):
+            (self._barriers[name],) = self._add_obstacle(self._closing[name])
 
     def close(self) -> None:
         """Leave pybullet; nothing of it stays."""
         self._leave()
 
     def _count_collisions(self) -> None:
-        """Count when the robot begins to touch something that stands on the ground."""
+        """Count when the robot begins to touch something that stands on the ground; it may bounce
+        there.
+        """
         contacts = pybullet.getContactPoints(self.robot.body, physicsClientId=self.client)
         touched = {contact[_CONTACT_BODY] for contact in contacts or ()}
         is_touching = not self._solid.isdisjoint(touched)
-        if is_touching and not self._is_touching:
+        pose = self.robot.pose()
+        here_m = (pose.x_m, pose.y_m)
+        if is_touching and self._touched_m is None:
             self.collisions += 1
+            self._touched_m = here_m
 
-        self._is_touching = is_touching
+        if self._touched_m is None or is_touching:
+            return
+        if math.dist(self._touched_m, here_m) > _RELEASED_M:
+            self._touched_m = None
 
     def _follow(self, x_m: float, y_m: float) -> None:
         """Let the ground, the sky and what is near follow the robot."""

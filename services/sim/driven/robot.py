@@ -6,11 +6,9 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from cogmap.geometry.arrays import Floats
 from schemas.sensing import MotorCommand, Pose
 from services.sim.driven.surroundings import Surroundings
+from services.sim.layout.boundaries import clearance_m
 
 TRACK_M = 0.8
 WHEEL_RADIUS_M = 0.2
@@ -104,21 +102,6 @@ class KinematicRobot:
         if not self._is_touching:
             self.collisions += 1
         self._is_touching = True
-
-
-def clearance_m(segments_m: Floats, x_m: float, y_m: float) -> float:
-    """The distance from a point to the nearest of (n, 4) segments, infinite where there is none."""
-    if not len(segments_m):
-        return math.inf
-
-    start_m = segments_m[:, :2]
-    along_m = segments_m[:, 2:] - start_m
-    to_point_m = (x_m, y_m) - start_m
-
-    length_m2 = np.maximum((along_m**2).sum(axis=1), 1e-12)
-    share = ((to_point_m * along_m).sum(axis=1) / length_m2).clip(0.0, 1.0)
-    away_m = to_point_m - share[:, None] * along_m
-    return float(np.hypot(away_m[:, 0], away_m[:, 1]).min())
 
 
 def _within(value: float, most: float) -> float:

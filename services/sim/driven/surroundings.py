@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from services.sim.layout.barriers import barrier
+from services.sim.layout.barriers import barriers
 from services.sim.layout.boundaries import Surfaces, outlines, surfaces
 from services.sim.layout.place import Place
 
@@ -18,7 +18,6 @@ BODY_REACH_M = 2.0
 # How far the robot moves before what is near it is chosen again.
 MOVED_M = 8.0
 KERB_STEP_M = 0.1
-WALLS_A_PLOT = 4
 
 
 class Near(NamedTuple):
@@ -41,11 +40,12 @@ class Surroundings:
 
     def __init__(self, place: Place) -> None:
         self._walls_m = place.walls_m
-        self._plots = np.arange(len(self._walls_m)) // WALLS_A_PLOT
+        walls = [len(plot.corners) for plot in place.plots]
+        self._plots = np.repeat(np.arange(len(walls)), walls)
         self._props_m = outlines([prop.solid for prop in place.props])
         self._kerbs_m = _points_along(place.kerbs_m)
         self._streets = surfaces(place.roads)
-        self._roads = {road.name: road for road in place.roads}
+        self._barriers = barriers(place.roads)
 
         self._obstacles_m = self._props_m
         self._middle_m: tuple[float, float] | None = None
@@ -53,8 +53,8 @@ class Surroundings:
 
     def close(self, names: Collection[str]) -> None:
         """Let barriers close these streets, and no others."""
-        barriers = [barrier(self._roads[name]).solid for name in sorted(names)]
-        self._obstacles_m = np.vstack([self._props_m, outlines(barriers)])
+        closing = [self._barriers[name].solid for name in sorted(names)]
+        self._obstacles_m = np.vstack([self._props_m, outlines(closing)])
         self._middle_m = None
 
     def near(self, x_m: float, y_m: float) -> Near:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from services.sim.layout.furniture import Prop
 from services.sim.layout.plan import PAVEMENT_WIDTH_M, Road
@@ -11,7 +12,18 @@ THICKNESS_M = 0.4
 HEIGHT_M = 1.2
 
 
-def barrier(road: Road) -> Prop:
+def barriers(roads: Sequence[Road]) -> dict[str, Prop]:
+    """What would close each street, by its name: of several roads of one name, the longest."""
+    longest: dict[str, Road] = {}
+    for road in roads:
+        other = longest.setdefault(road.name, road)
+        if road.length_m > other.length_m:
+            longest[road.name] = road
+
+    return {name: _barrier(road) for name, road in longest.items()}
+
+
+def _barrier(road: Road) -> Prop:
     """A barrier across the middle of a road and its pavements."""
     x_m, y_m = road.middle
     across_rad = math.remainder(road.heading_rad + math.pi / 2, math.tau)

@@ -71,9 +71,19 @@ def outlines(shapes: Sequence[Sequence[Point]]) -> Floats:
     return np.array(sides, float).reshape(-1, 4)
 
 
-def walls(footprints: Sequence[Sequence[Point]]) -> Floats:
-    """(n, 4): the sides of buildings' footprints, in order."""
-    return outlines(footprints)
+def clearance_m(segments_m: Floats, x_m: float, y_m: float) -> float:
+    """The distance from a point to the nearest of (n, 4) segments, infinite where there is none."""
+    if not len(segments_m):
+        return math.inf
+
+    start_m = segments_m[:, :2]
+    along_m = segments_m[:, 2:] - start_m
+    to_point_m = (x_m, y_m) - start_m
+
+    length_m2 = np.maximum((along_m**2).sum(axis=1), 1e-12)
+    share = ((to_point_m * along_m).sum(axis=1) / length_m2).clip(0.0, 1.0)
+    away_m = to_point_m - share[:, None] * along_m
+    return float(np.hypot(away_m[:, 0], away_m[:, 1]).min())
 
 
 def kerbs(roads: Sequence[Road]) -> Floats:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import cached_property
 
 from cogmap.geometry.arrays import Floats
 from schemas.array import Array
 from schemas.sensing import Building, Obstacle, Pose, Street, TrueTown
-from services.sim.layout.boundaries import kerbs, walls
+from services.sim.layout.boundaries import kerbs, outlines
 from services.sim.layout.furniture import Prop
 from services.sim.layout.plan import Plot, Road
 
@@ -23,15 +24,15 @@ class Place:
     props: tuple[Prop, ...]
     start: Pose
 
-    @property
+    @cached_property
     def kerbs_m(self) -> Floats:
         """(n, 4): where the streets' surface ends, x and y of both ends of each segment."""
         return kerbs(self.roads)
 
-    @property
+    @cached_property
     def walls_m(self) -> Floats:
         """(n, 4): the outer walls of the buildings, in the order of `plots`."""
-        return walls([plot.corners for plot in self.plots])
+        return outlines([plot.corners for plot in self.plots])
 
     def message(self, closed: Collection[str] = ()) -> TrueTown:
         """The place as it travels, with the streets named in `closed` closed."""
@@ -63,6 +64,7 @@ def _building(plot: Plot) -> Building:
         height_m=plot.kind.height_m,
         district=plot.district,
         function=plot.function,
+        outline_m=list(plot.outline),
     )
 
 

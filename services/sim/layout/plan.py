@@ -93,6 +93,9 @@ class Road:
 class Plot:
     """A building where it stands. Its front looks to the right of `heading_rad`; that heading runs
     along its width. `function` is what it is used for.
+
+    One that is no rectangle has an `outline`, its corners counter-clockwise, within the rectangle
+    of its kind's width and depth.
     """
 
     kind: BuildingType
@@ -101,10 +104,15 @@ class Plot:
     heading_rad: float
     district: str = ""
     function: str = ""
+    outline: tuple[Point, ...] = ()
 
     @property
     def footprint(self) -> Rectangle:
         """West, south, east, north in metres."""
+        if self.outline:
+            x_m, y_m = zip(*self.outline, strict=True)
+            return min(x_m), min(y_m), max(x_m), max(y_m)
+
         half_x_m = self.kind.width_m / 2
         half_y_m = self.kind.depth_m / 2
         is_along_y = abs(math.sin(self.heading_rad)) > 0.5
@@ -120,7 +128,10 @@ class Plot:
 
     @property
     def corners(self) -> tuple[Point, ...]:
-        """The corners of its walls, counter-clockwise from the front's left."""
+        """The corners of its walls, counter-clockwise."""
+        if self.outline:
+            return self.outline
+
         size_m = (self.kind.width_m, self.kind.depth_m)
         return corners((self.x_m, self.y_m), self.heading_rad, size_m)
 

@@ -2,17 +2,31 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from services.sim.layout.blocks import town as blocks
+from services.sim.layout.osm import town as osm
 from services.sim.layout.place import Place
 from services.sim.layout.town import generate
 
 LOOP = "loop"
 BLOCKS = "blocks"
+OSM = "osm:"
+
+
+def is_town(town: str) -> bool:
+    """Whether there is a town of that name: LOOP, BLOCKS, or OSM and a path."""
+    is_extract = town.startswith(OSM) and town != OSM
+    return is_extract or town in (LOOP, BLOCKS)
 
 
 def place(town: str, seed: int, size_m: float) -> Place:
-    """The town of that name, LOOP or BLOCKS, from `seed`; `size_m` is the side of one of blocks."""
+    """The town of that name: LOOP or BLOCKS, from `seed`, or OSM and the path of an extract;
+    `size_m` is the side of a town of blocks. Raises UsageError where the extract makes no town.
+    """
     if town == LOOP:
         return generate(seed)
+    if town.startswith(OSM):
+        return osm.read(Path(town.removeprefix(OSM)))
 
     return blocks.generate(seed, size_m)

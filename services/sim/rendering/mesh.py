@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -18,6 +19,7 @@ Vertex = tuple[float, float, float]
 UV = tuple[float, float]
 _ROOF_RISE_M = 2.2
 _ROOF = 4
+_BAY_M = 8.0
 
 
 @dataclass
@@ -90,6 +92,29 @@ def building(kind: BuildingType) -> tuple[Mesh, Image]:
     shell.add_roof()
 
     return shell.mesh, shell.atlas
+
+
+def prism(kind: BuildingType, outline: Sequence[Point]) -> tuple[Mesh, Image]:
+    """The walls of a building over its outline, counter-clockwise, and the picture on all of them:
+    a bay that is repeated. Its roof is flat, and seen by nobody in the street.
+    """
+    bay = facade.side(kind, _BAY_M, 1)
+    picture, _ = _side_by_side([bay])
+    share = bay.shape[1] / picture.shape[1]
+
+    mesh = Mesh()
+    for start, end in pairwise([*outline, outline[0]]):
+        bays = max(1, round(math.dist(start, end) / _BAY_M))
+        right = bays * share
+        wall = [
+            (*start, 0.0),
+            (*end, 0.0),
+            (*end, kind.height_m),
+            (*start, kind.height_m),
+        ]
+        mesh.polygon(wall, [(0.0, 1.0), (right, 1.0), (right, 0.0), (0.0, 0.0)])
+
+    return mesh, picture
 
 
 class _Shell:

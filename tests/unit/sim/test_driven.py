@@ -22,10 +22,11 @@ from schemas.sensing import (
 )
 from services.sim.driven.camera import ColumnCamera, depths_m
 from services.sim.driven.ground import MAX_RANGE_M
-from services.sim.driven.robot import BODY_RADIUS_M, KinematicRobot, clearance_m
+from services.sim.driven.robot import BODY_RADIUS_M, KinematicRobot
 from services.sim.driven.sensors import Sensors, scan
 from services.sim.driven.surroundings import Surroundings
 from services.sim.layout.blocks.town import generate
+from services.sim.layout.boundaries import clearance_m
 from services.sim.layout.catalogue import CATALOGUE
 from services.sim.layout.closures import Closure
 from services.sim.layout.place import Place
@@ -338,6 +339,12 @@ def test_a_closure_of_a_street_that_is_not_there_is_refused() -> None:
 
     with pytest.raises(ConfigError, match=r"'Nowhere 1'.*name one of"):
         build(_config(closures=[closure]))
+
+
+@pytest.mark.parametrize("town", ["village", "osm:", ""])
+def test_a_town_that_there_is_none_of_is_refused(town: str) -> None:
+    with pytest.raises(ConfigError, match="choose loop, blocks or osm:FILE"):
+        build(Config(town=town))
 
 
 def test_percepts_of_a_town_in_real_time_are_refused() -> None:

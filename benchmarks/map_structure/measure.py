@@ -1,0 +1,150 @@
+"""The metrics of map structure: how well sub-maps find districts again, and how fast."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from benchmarks.map_structure.peer import adjusted_rand_index, gaussian_mixture
+from benchmarks.map_structure.towns import FUNCTIONS, Town, town
+from benchmarks.report import Metrics
+from benchmarks.threshold import at_least, at_most, more_than
+from cogmap.geometry.arrays import Indices
+from services.codelets.structure.config import Config
+from services.codelets.structure.crossings import Boundaries
+from services.codelets.structure.sub_maps import SubMaps
+
+THRESHOLDS = {
+    "ari": at_least(0.9),
+    "ari_over_sklearn": more_than(0.0),
+    "objects_10k_s": at_most(5.0),
+    "incremental_ms_p99": at_most(20.0),
+}
+SEEDS = range(40)
+ONE_AT_A_TIME = 4
+CITY_SEED = 100
+CITY_DISTRICTS = 45
+CITY_PLOT_M = 115.0
+CITY_OBJECTS = 10_000
+ARRIVALS = 500
+REPEATS = 3
+ORDER_SEED = 7
+
+WITHOUT: Mapping[str, Mapping[str, float]] = {
+    "ari_without_position": {"position_weight": 0.0, "spacing_weight": 0.0},
+    "ari_without_function": {"function_weight": 0.0},
+    "ari_without_boundary": {"boundary_weight": 0.0},
+}
+"""The weights of the features that are left out, by the key of what remains."""
+
+
+def measure(announce: Callable[[str], None]) -> Metrics:
+    """Every metric of THRESHOLDS, and others that explain them.
+
+    Raises UsageError where scikit-learn is not installed.
+    """
+    announce(f"finding the districts of {len(SEEDS)} towns")
+    towns = [town(seed) for seed in SEEDS]
+    metrics = _accuracy(towns)
+
+    announce(f"a city of {CITY_OBJECTS} objects")
+    return metrics | _speed()
+
+
+def sub_maps_of(made: Town, config: Config, labels: Indices | None = None) -> SubMaps:
+    """The objects of a town, that are in no sub-map yet, or in those that `labels` name."""
+    return SubMaps(
+        made.positions_m,
+        made.functions,
+        Boundaries(made.boundaries_m),
+        config,
+        kinds=FUNCTIONS,
+        labels=labels,
+    )
+
+
+def _accuracy(towns: list[Town]) -> Metrics:
+    """The adjusted Rand index, mean over towns: of all features, without each, and of the peer; of
+    objects that come one at a time, in the first few.
+    """
+    config = Config()
+    scores = []
+    ratios = []
+    peers = []
+    for made in towns:
+        labels = _settled(made, config)
+        found = len(np.unique(labels))
+        there_are = len(np.unique(made.districts))
+
+        scores.append(adjusted_rand_index(made.districts, labels))
+        ratios.append(found / there_are)
+        peers.append(adjusted_rand_index(made.districts, gaussian_mixture(made.positions_m)))
+
+    arriving = [_arriving(made, config) for made in towns[:ONE_AT_A_TIME]]
+    metrics = {
+        "ari": float(np.mean(scores)),
+        "ari_worst": min(scores),
+        "ari_sklearn": float(np.mean(peers)),
+        "ari_over_sklearn": float(np.mean(scores) - np.mean(peers)),
+        "sub_maps_over_districts": float(np.mean(ratios)),
+        "ari_first": float(np.mean(scores[:ONE_AT_A_TIME])),
+        "ari_first_incremental": float(np.mean(arriving)),
+    }
+    for key, weights in WITHOUT.items():
+        less = Config(**weights)
+        without = [adjusted_rand_index(made.districts, _settled(made, less)) for made in towns]
+        metrics[key] = float(np.mean(without))
+
+    return metrics
+
+
+def _settled(made: Town, config: Config) -> Indices:
+    """(n,): the labels of a town's objects, clustered at once."""
+    sub_maps = sub_maps_of(made, config)
+    sub_maps.settle()
+    return sub_maps.labels
+
+
+def _arriving(made: Town, config: Config) -> float:
+    """The adjusted Rand index after the objects came one at a time, in random order."""
+    order = np.random.default_rng(ORDER_SEED).permutation(len(made.positions_m))
+    sub_maps = sub_maps_of(made.select(order[:1]), config)
+    sub_maps.settle()
+    for index in order[1:].tolist():
+        sub_maps.add(made.positions_m[index], int(made.functions[index]))
+
+    return adjusted_rand_index(made.districts[order], sub_maps.labels)
+
+
+def _speed() -> Metrics:
+    """How long 10,000 objects take at once, the least of some times, and each of some more that
+    arrive then.
+    """
+    city = town(CITY_SEED, CITY_DISTRICTS, CITY_PLOT_M)
+    order = np.random.default_rng(ORDER_SEED).permutation(len(city.positions_m))
+    there = city.select(order[:CITY_OBJECTS])
+    arriving = city.select(order[CITY_OBJECTS : CITY_OBJECTS + ARRIVALS])
+
+    took_s = []
+    for _ in range(REPEATS):
+        began_s = time.perf_counter()
+        sub_maps = sub_maps_of(there, Config())
+        sub_maps.settle()
+        took_s.append(time.perf_counter() - began_s)
+
+    score = adjusted_rand_index(there.districts, sub_maps.labels)
+    added_ms = []
+    for position_m, function in zip(arriving.positions_m, arriving.functions, strict=True):
+        began_s = time.perf_counter()
+        sub_maps.add(position_m, int(function))
+        added_ms.append(1e3 * (time.perf_counter() - began_s))
+
+    return {
+        "objects_10k_s": min(took_s),
+        "ari_10k": score,
+        "incremental_ms_p50": float(np.percentile(added_ms, 50)),
+        "incremental_ms_p99": float(np.percentile(added_ms, 99)),
+        "incremental_ms_max": max(added_ms),
+    }

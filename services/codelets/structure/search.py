@@ -1,0 +1,238 @@
+"""The search for the most probable partition: clusters merge, objects move, clusters are parted.
+
+Each step raises the probability of the partition, so the search ends at a local maximum. It draws
+no random numbers. All that is done at once in one step is far enough apart not to matter to one
+another, which lets a step be computed for all objects in one pass.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cogmap.geometry.arrays import Booleans, Floats, Indices
+from services.codelets.structure.mixture import COUNT, Mixture, Scene, summed
+
+MAX_SWEEPS = 50
+MAX_ROUNDS = 8
+MIN_GAIN = 1e-6
+
+
+def partition(mixture: Mixture, scene: Scene, labels: Indices | None = None) -> Indices:
+    """(n,): the labels of the clusters of a probable partition, from 0, found from `labels`, or
+    where there are none from every object for itself.
+    """
+    if labels is None:
+        labels = np.arange(len(scene.rows))
+    best = compact(labels)
+
+    for _ in range(MAX_ROUNDS):
+        merged = merge_clusters(mixture, scene, best)
+        moved = move_objects(mixture, scene, merged)
+        parted = part_clusters(mixture, scene, moved)
+        if np.array_equal(parted, best):
+            break
+        best = parted
+
+    return best
+
+
+def compact(labels: Indices) -> Indices:
+    """(n,): the same partition with labels from 0 without a gap, in their order."""
+    _, numbers = np.unique(labels, return_inverse=True)
+    compacted: Indices = numbers.astype(np.int64)
+    return compacted
+
+
+class _Pairs(NamedTuple):
+    """Clusters that neighbour one another, (p, 2), and the sums of the bonds between them, (p,)."""
+
+    clusters: Indices
+    bonds: Floats
+
+
+def merge_clusters(mixture: Mixture, scene: Scene, labels: Indices, at_least: int = 0) -> Indices:
+    """Merge neighbouring clusters as long as that raises the probability; with `at_least`, as long
+    as there are more clusters than that, whatever it does to the probability.
+
+    In each round two clusters merge where each gains most with the other. A gain is counted by the
+    objects of the smaller one: otherwise the largest would take all.
+    """
+    statistics = summed(scene.rows, labels)
+    floor = -np.inf if at_least else MIN_GAIN
+    while len(statistics) > max(1, at_least):
+        pairs = _pairs(scene, labels, len(statistics))
+        gains = _merge_gains(mixture, statistics, pairs)
+        sizes = statistics[pairs.clusters, COUNT].min(axis=1)
+        scores = np.where(gains > floor, gains / sizes, -np.inf)
+
+        chosen = _matched(pairs.clusters, scores, len(statistics))
+        if not len(chosen):
+            break
+        if at_least:
+            spare = len(statistics) - at_least
+            chosen = chosen[np.argsort(-scores[chosen], kind="stable")][:spare]
+
+        target = np.arange(len(statistics))
+        target[pairs.clusters[chosen, 1]] = pairs.clusters[chosen, 0]
+        labels = compact(target[labels])
+        statistics = summed(scene.rows, labels)
+
+    return labels
+
+
+def _pairs(scene: Scene, labels: Indices, clusters: int) -> _Pairs:
+    """The pairs of neighbouring clusters, the lower label first."""
+    ends = np.sort(labels[scene.edges], axis=1)
+    is_between = ends[:, 0] != ends[:, 1]
+    keys = ends[is_between, 0] * clusters + ends[is_between, 1]
+
+    found, number = np.unique(keys, return_inverse=True)
+    bonds = np.asarray(np.bincount(number, scene.bonds[is_between], len(found)), np.float64)
+    return _Pairs(np.column_stack(np.divmod(found, clusters)), bonds)
+
+
+def _merge_gains(mixture: Mixture, statistics: Floats, pairs: _Pairs) -> Floats:
+    """(p,): by how much merging raises the logarithm of the probability."""
+    evidence = mixture.log_evidence(statistics)
+    first, second = pairs.clusters.T
+    together = mixture.log_evidence(statistics[first] + statistics[second])
+    gains: Floats = together - evidence[first] - evidence[second] + pairs.bonds
+    return gains
+
+
+def _matched(clusters: Indices, scores: Floats, count: int) -> Indices:
+    """(m,): the pairs, of (p, 2), that are the best of both; no cluster is in two."""
+    order = np.lexsort((np.arange(len(scores)), -scores))
+    rank = np.empty(len(order), np.int64)
+    rank[order] = np.arange(len(order))
+
+    best = np.full(count, len(scores))
+    np.minimum.at(best, clusters[:, 0], rank)
+    np.minimum.at(best, clusters[:, 1], rank)
+    is_best = (best[clusters] == rank[:, None]).all(axis=1)
+    return np.flatnonzero(is_best & np.isfinite(scores))
+
+
+class _Moves(NamedTuple):
+    """Objects (m,), the clusters that they may move to, and what each move gains."""
+
+    objects: Indices
+    targets: Indices
+    gains: Floats
+
+
+def move_objects(mixture: Mixture, scene: Scene, labels: Indices) -> Indices:
+    """Move objects to clusters of their neighbours as long as that raises the probability.
+
+    Of neighbours, only the one that gains most moves in one sweep.
+    """
+    labels = labels.copy()
+    for _ in range(MAX_SWEEPS):
+        moves = _best_moves(mixture, scene, labels)
+        if not len(moves.objects):
+            break
+
+        is_first = _gains_most(scene, moves)
+        labels[moves.objects[is_first]] = moves.targets[is_first]
+
+    return compact(labels)
+
+
+def _best_moves(mixture: Mixture, scene: Scene, labels: Indices) -> _Moves:
+    """The best move of each object that gains by one."""
+    clusters = int(labels.max(initial=-1)) + 1
+    at_border = _objects_at_borders(scene, labels)
+    keys, bonds = _bonds_to_clusters(scene, labels, at_border, clusters)
+    objects, targets = np.divmod(keys, clusters)
+    own = labels[objects]
+    is_own = targets == own
+    own_bonds = np.zeros(len(labels))
+    own_bonds[objects[is_own]] = bonds[is_own]
+
+    objects, targets, own = (each[~is_own] for each in (objects, targets, own))
+    statistics = summed(scene.rows, labels)
+    evidence = mixture.log_evidence(statistics)
+    rows = scene.rows[objects]
+    joined = mixture.log_evidence(statistics[targets] + rows) - evidence[targets]
+    left = mixture.log_evidence(statistics[own] - rows) - evidence[own]
+    gains = joined + left + bonds[~is_own] - own_bonds[objects]
+
+    order = np.lexsort((-gains, objects))
+    is_best = np.ones(len(order), bool)
+    is_best[1:] = objects[order[1:]] != objects[order[:-1]]
+    best = order[is_best & (gains[order] > MIN_GAIN)]
+    return _Moves(objects[best], targets[best], gains[best])
+
+
+def _objects_at_borders(scene: Scene, labels: Indices) -> Booleans:
+    """(n,): whether an object has a neighbour in another cluster."""
+    is_between = labels[scene.edges[:, 0]] != labels[scene.edges[:, 1]]
+    at_border = np.zeros(len(labels), bool)
+    at_border[scene.edges[is_between].ravel()] = True
+    return at_border
+
+
+def _bonds_to_clusters(
+    scene: Scene, labels: Indices, chosen: Booleans, clusters: int
+) -> tuple[Indices, Floats]:
+    """Of the objects that are chosen, (n,): each pair of an object and a cluster of its neighbours,
+    as object * clusters + cluster, and the sum of the bonds between them.
+    """
+    both = np.concatenate([scene.edges, scene.edges[:, ::-1]])
+    bonds = np.concatenate([scene.bonds, scene.bonds])
+    is_chosen = chosen[both[:, 0]]
+
+    keys = both[is_chosen, 0] * clusters + labels[both[is_chosen, 1]]
+    found, number = np.unique(keys, return_inverse=True)
+    summed_bonds = np.bincount(number, bonds[is_chosen], len(found))
+    return found, np.asarray(summed_bonds, np.float64)
+
+
+def _gains_most(scene: Scene, moves: _Moves) -> Booleans:
+    """(m,): whether a move gains more than those of all neighbours; of equals, the first does."""
+    count = len(scene.rows)
+    order = np.lexsort((moves.objects, -moves.gains))
+    rank = np.full(count, count)
+    rank[moves.objects[order]] = np.arange(len(order))
+
+    first_neighbour = np.full(count, count)
+    ends = scene.edges
+    np.minimum.at(first_neighbour, ends[:, 0], rank[ends[:, 1]])
+    np.minimum.at(first_neighbour, ends[:, 1], rank[ends[:, 0]])
+    is_first: Booleans = rank[moves.objects] < first_neighbour[moves.objects]
+    return is_first
+
+
+def part_clusters(mixture: Mixture, scene: Scene, labels: Indices) -> Indices:
+    """Part each cluster in two where that raises the probability."""
+    labels = labels.copy()
+    clusters = int(labels.max(initial=-1)) + 1
+    for cluster in range(clusters):
+        members = np.flatnonzero(labels == cluster)
+        is_second = parts(mixture, scene.part(members))
+        labels[members[is_second]] = int(labels.max()) + 1
+
+    return labels
+
+
+def parts(mixture: Mixture, scene: Scene) -> Booleans:
+    """(n,): which objects of one cluster are better in a cluster of their own; none where none are.
+
+    The two parts are what remains when neighbours merge until two clusters are left, after objects
+    have moved between these.
+    """
+    together = np.zeros(len(scene.rows), np.int64)
+    if len(together) < 2:
+        return together > 0
+
+    alone = np.arange(len(together))
+    in_two = merge_clusters(mixture, scene, alone, at_least=2)
+    in_two = move_objects(mixture, scene, in_two)
+
+    gain = mixture.log_probability(scene, in_two) - mixture.log_probability(scene, together)
+    if gain < MIN_GAIN:
+        return together > 0
+    is_second: Booleans = in_two > 0
+    return is_second

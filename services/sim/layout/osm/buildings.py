@@ -1,0 +1,168 @@
+"""The buildings of an OpenStreetMap extract: footprints, extruded by their height or their levels.
+Pure.
+"""
+
+from __future__ import annotations
+
+import colorsys
+import zlib
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from cogmap.data.osm import Extract, Tags, Way
+from cogmap.geometry.arrays import Floats
+from services.sim.layout.catalogue import BuildingType, Colour
+from services.sim.layout.osm.streets import Positions, metres
+from services.sim.layout.plan import Plot, Point
+
+LEVEL_M = 3.0
+USUAL_M = 7.0
+LOWEST_M = 2.5
+HIGHEST_M = 120.0
+SMALLEST_M2 = 8.0
+STRAIGHT_M = 0.2
+CORNERS = 3
+NO_WALLS = ("no", "roof", "carport")
+_TRIM: Colour = (240, 238, 232)
+_ROOF: Colour = (110, 100, 96)
+_PATTERNS = ("", "bands", "stripes", "columns", "grid", "timber")
+# What a building is used for, by the values of its tags.
+_FUNCTIONS = {
+    "school": ("school", "university", "college", "kindergarten", "library", "museum", "theatre"),
+    "shop": ("retail", "supermarket", "shop", "restaurant", "cafe", "kiosk", "pharmacy", "bank"),
+    "works": ("industrial", "warehouse", "garage", "garages", "train_station", "fire_station"),
+    "office": ("office", "commercial", "townhall", "public", "civic", "government", "church"),
+    "home": ("apartments", "house", "residential", "detached", "terrace", "hotel", "dormitory"),
+}
+
+
+class Rectangle(NamedTuple):
+    """The smallest rectangle around a footprint."""
+
+    middle: Point
+    length_m: float
+    width_m: float
+    heading_rad: float
+
+
+def plots(extract: Extract, at_m: Positions) -> list[Plot]:
+    """The buildings of an extract whose nodes are `at_m`. Those without walls, and those that are
+    cut off or tiny, are left out.
+    """
+    found = []
+    names: set[str] = set()
+    for way in extract.ways:
+        outline_m = _outline_m(way, at_m)
+        if len(outline_m) < CORNERS:
+            continue
+
+        name = _name(way)
+        if name in names:
+            name = f"{name} ({way.id})"
+        names.add(name)
+        found.append(_plot(name, way.tags, outline_m))
+
+    return found
+
+
+def _outline_m(way: Way, at_m: Positions) -> Floats:
+    """(n, 2): the corners of a building, counter-clockwise; none where the way is no building."""
+    kind = way.tags.get("building", "no")
+    is_closed = len(way.nodes) > CORNERS and way.nodes[0] == way.nodes[-1]
+    is_known = all(node in at_m for node in way.nodes)
+    if kind in NO_WALLS or not is_closed or not is_known:
+        return np.zeros((0, 2))
+
+    corners_m = np.array([at_m[node] for node in way.nodes[:-1]])
+    contour = corners_m.astype(np.float32)[:, None]
+    simple_m = cv2.approxPolyDP(contour, STRAIGHT_M, closed=True)[:, 0]
+    area_m2 = cv2.contourArea(simple_m, oriented=True)
+    if abs(area_m2) < SMALLEST_M2:
+        return np.zeros((0, 2))
+
+    counter_clockwise = simple_m if area_m2 > 0 else simple_m[::-1]
+    return counter_clockwise.astype(float).round(2)
+
+
+def _name(way: Way) -> str:
+    """Its name or, where it has none, its address or its number."""
+    tags = way.tags
+    if "name" in tags:
+        return tags["name"][:200]
+
+    number = tags.get("addr:housenumber")
+    street = tags.get("addr:street")
+    if number and street:
+        return f"{street} {number}"[:200]
+
+    return f"building {way.id}"
+
+
+def _plot(name: str, tags: Tags, outline_m: Floats) -> Plot:
+    around = _rectangle(outline_m)
+    kind = _kind(name, around, height_m(tags))
+    x_m, y_m = around.middle
+
+    return Plot(
+        kind=kind,
+        x_m=round(x_m, 2),
+        y_m=round(y_m, 2),
+        heading_rad=around.heading_rad,
+        function=function(tags),
+        outline=tuple((x, y) for x, y in outline_m.tolist()),
+    )
+
+
+def height_m(tags: Tags) -> float:
+    """The height that a building is tagged with, that of its levels, or the usual one."""
+    height = metres(tags.get("height", ""))
+    levels = metres(tags.get("building:levels", ""))
+    if height is None:
+        height = USUAL_M if levels is None else LEVEL_M * levels
+
+    return min(HIGHEST_M, max(LOWEST_M, height))
+
+
+def function(tags: Tags) -> str:
+    """What a building is used for: a shop, a school, an office, works, or otherwise a home."""
+    if "shop" in tags:
+        return "shop"
+
+    values = {tags.get(key, "") for key in ("building", "amenity", "tourism", "office")}
+    for name, words in _FUNCTIONS.items():
+        if not values.isdisjoint(words):
+            return name
+
+    return "home"
+
+
+def _rectangle(outline_m: Floats) -> Rectangle:
+    (x_m, y_m), (length_m, width_m), degrees = cv2.minAreaRect(outline_m.astype(np.float32))
+    heading_rad = float(np.remainder(np.radians(degrees) + np.pi, 2 * np.pi) - np.pi)
+    return Rectangle((float(x_m), float(y_m)), float(length_m), float(width_m), heading_rad)
+
+
+def _kind(name: str, around: Rectangle, height: float) -> BuildingType:
+    """What it looks like: nothing is known of that, so it is drawn from its name."""
+    rng = np.random.default_rng(zlib.crc32(name.encode()))
+    hue = float(rng.random())
+
+    return BuildingType(
+        name=name,
+        width_m=round(around.length_m, 2),
+        depth_m=round(around.width_m, 2),
+        height_m=round(height, 2),
+        wall=_paint(hue, 0.35, 0.85),
+        accent=_paint((hue + 0.4) % 1.0, 0.5, 0.45),
+        trim=_TRIM,
+        door=_paint((hue + 0.7) % 1.0, 0.5, 0.4),
+        roof=_ROOF,
+        pattern=str(rng.choice(_PATTERNS)),
+    )
+
+
+def _paint(hue: float, saturation: float, value: float) -> Colour:
+    red, green, blue = (round(255 * share) for share in colorsys.hsv_to_rgb(hue, saturation, value))
+    return red, green, blue
