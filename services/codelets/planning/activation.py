@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
 from cogmap.geometry.arrays import Floats, Indices
-from services.codelets.planning.links import MAX_COST_M, Links
+from services.codelets.planning.links import Links
 from services.codelets.planning.network import Cell, PlaceNetwork
 from services.codelets.planning.route import (
     NoRoute,
@@ -22,6 +22,7 @@ from services.codelets.planning.route import (
     refusal,
     route_along,
 )
+from services.codelets.planning.slots import MAX_COST_M
 
 DECAY_PER_CELL = 2.0
 

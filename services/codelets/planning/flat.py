@@ -11,13 +11,12 @@ import math
 import numpy as np
 
 from cogmap.geometry.arrays import Indices
-from services.codelets.planning.corridor import Corridor
 from services.codelets.planning.links import COST_UNIT_M, Links, octile
 from services.codelets.planning.network import Cell, PlaceNetwork
 from services.codelets.planning.route import NoRoute, NoRouteReason, Route, refusal, route_along
 
 # How much longer than the way over free ground a route is first sought; then without limit.
-DETOURS = (1.1, 1.5, math.inf)
+DETOURS = (1.2, 1.5, math.inf)
 MARGIN_CELLS = 2.0
 
 
@@ -46,8 +45,9 @@ class FlatPlanner:
         for detour in DETOURS:
             limit_m = detour * free_m + MARGIN_CELLS * self._links.cell_m
             nodes = self._ellipse(start_node, goal_node, limit_m)
-            field = self._corridor.spread(nodes, goal_node)
-            cost_m = field.distance_to(start_node)
+            part = self._graph.part(nodes)
+            distance_m = part.distances_m(goal_node)
+            cost_m = float(distance_m[part.row(start_node)])
             if math.isfinite(cost_m):
                 break
         else:
@@ -55,13 +55,16 @@ class FlatPlanner:
 
         if cost_m > limit_m:
             nodes = self._ellipse(start_node, goal_node, cost_m)
-            field = self._corridor.spread(nodes, goal_node)
+            part = self._graph.part(nodes)
+            distance_m = part.distances_m(goal_node)
+            cost_m = float(distance_m[part.row(start_node)])
 
-        return route_along(self._links, field.climb(start_node), field.distance_to(start_node))
+        route = part.climb(distance_m, start_node)
+        return route_along(self._links, route, cost_m)
 
     def _take(self, network: PlaceNetwork) -> None:
         self._links = Links(network)
-        self._corridor = Corridor(self._links)
+        self._graph = self._links.graph()
 
     def _ellipse(self, start: int, goal: int, limit_m: float) -> Indices:
         """The linked nodes, ascending, that a route of `limit_m` between two nodes can pass."""

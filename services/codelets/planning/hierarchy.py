@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from services.codelets.planning.corridor import Corridor, CorridorField
 from services.codelets.planning.links import BLOCK, Links
 from services.codelets.planning.network import NEIGHBOUR_OFFSETS, Cell, PlaceNetwork
 from services.codelets.planning.regions import Regions, Rows, Traits
 from services.codelets.planning.route import NoRoute, NoRouteReason, Route, refusal, route_along
+from services.codelets.planning.slots import Part
 
 FACTOR = 3
 
@@ -54,34 +54,49 @@ class Hierarchy:
 
     def __init__(self, links: Links) -> None:
         grid = (links.width, links.height)
-        self._corridor = Corridor(links)
+        self._places = links.graph()
         self._middle = Regions(Places(links), grid, FACTOR, links.cell_m)
         self._coarse = Regions(self._middle, grid, BLOCK, links.cell_m)
-        self._top = self._coarse.graph(self._coarse.all())
+        self._number()
 
     def update(self, nodes: Indices) -> None:
         """Take changes of the links of `nodes`."""
         changed = self._middle.update(nodes)
         self._coarse.update(changed)
-        self._top = self._coarse.graph(self._coarse.all())
+        self._number()
 
-    def field(self, start: int, goal: int) -> CorridorField | None:
-        """Activation from `goal` within a corridor of places that holds a route from `start`, both
-        of them linked; None where they are not connected.
-        """
-        middle_start, middle_goal = self._middle.region[[start, goal]].tolist()
-        coarse_start, coarse_goal = self._coarse.region[[middle_start, middle_goal]].tolist()
+    def corridor(self, start: int, goal: int) -> Part | None:
+        """Places that hold a route between two, both of them linked; None where there is none."""
+        ends = self._middle.region[[start, goal]]
+        middle_start, middle_goal = self._middle_regions.searchsorted(ends).tolist()
+        coarse_start, coarse_goal = self._coarse_of[[middle_start, middle_goal]].tolist()
 
-        coarse = self._top.route(coarse_start, coarse_goal)
+        coarse = self._coarse_part.route(coarse_start, coarse_goal)
         if coarse is None:
             return None
 
-        beside = self._coarse.members(self._coarse.beside(coarse))
-        middle = self._middle.graph(beside).route(middle_start, middle_goal)
+        within = self._members(coarse)
+        middle = self._middle_graph.part(within).route(middle_start, middle_goal)
         if middle is None:
             return None
 
-        return self._corridor.spread(self._middle.members(middle), goal)
+        regions = self._middle_regions.take(middle)
+        return self._places.part(self._middle.members(regions))
+
+    def _members(self, coarse: Indices) -> Indices:
+        """The regions of the middle level in coarse ones and those beside them."""
+        is_within = np.zeros(len(self._coarse_graph.neighbours), bool)
+        is_within[coarse] = True
+        is_within[self._coarse_graph.neighbours.take(coarse, axis=0)] = True
+        return np.flatnonzero(is_within.take(self._coarse_of))
+
+    def _number(self) -> None:
+        """Number the regions of each level, as their graphs do."""
+        self._middle_regions, self._middle_graph = self._middle.graph()
+        coarse_regions, self._coarse_graph = self._coarse.graph()
+        regions = self._coarse.region[self._middle_regions]
+        self._coarse_of = coarse_regions.searchsorted(regions)
+        self._coarse_part = self._coarse_graph.part(np.arange(len(coarse_regions)))
 
 
 class HierarchicalPlanner:
@@ -107,13 +122,15 @@ class HierarchicalPlanner:
             return refused
 
         start_node = self._links.node(start)
-        field = self._hierarchy.field(start_node, self._links.node(goal))
-        if field is None:
+        goal_node = self._links.node(goal)
+        corridor = self._hierarchy.corridor(start_node, goal_node)
+        if corridor is None:
             return NoRoute(NoRouteReason.NOT_CONNECTED)
 
-        return route_along(
-            self._links, field.climb_short(start_node), field.distance_to(start_node)
-        )
+        distance_m = corridor.distances_m(goal_node)
+        route = corridor.climb_all(distance_m, start_node)
+        cost_m = float(distance_m[corridor.row(start_node)])
+        return route_along(self._links, route, cost_m)
 
     def _take(self, network: PlaceNetwork) -> None:
         self._links = Links(network)

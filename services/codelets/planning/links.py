@@ -19,19 +19,14 @@ from services.codelets.planning.network import (
     Cell,
     PlaceNetwork,
 )
+from services.codelets.planning.slots import Numbers, SlotGraph
 
 # Costs are multiples of this, so that their sums are exact and ties are ties on every machine.
 COST_UNIT_M = 2.0**-20
-# A limit that keeps a search from following links that are cut, whose cost is infinite.
-MAX_COST_M = float(np.finfo(np.float64).max)
 # The edge of a block of the coarsest level of the hierarchy, in cells.
 BLOCK = 9
-# The row of a node that does not belong to a part of the network: larger than any.
-OUTSIDE = np.iinfo(np.int32).max
 SLOTS = len(NEIGHBOUR_OFFSETS)
 _LINKS = len(LINK_OFFSETS)
-
-Rows = npt.NDArray[np.int32]
 
 
 class Links:
@@ -50,11 +45,13 @@ class Links:
         self.height = _padded(height)
         self.count = self.width * self.height
         self._weights = network.weights.copy()
+        i, j = np.divmod(np.arange(self.count), self.height)
+        self._cells: Indices = np.stack([i, j], axis=-1) + np.array(self.origin)
 
         # What lies beyond an edge is a blocked node of the padding.
         nodes = np.arange(self.count, dtype=np.int32)
         offsets = NEIGHBOUR_OFFSETS @ (self.height, 1)
-        self.neighbours: Rows = nodes[:, None] + offsets.astype(np.int32)
+        self.neighbours: Numbers = nodes[:, None] + offsets.astype(np.int32)
         self.neighbours %= self.count
 
         costs_m = np.full((self.width, self.height, SLOTS), np.inf)
@@ -104,14 +101,17 @@ class Links:
 
     def cells(self, nodes: Indices) -> Indices:
         """(k, 2): the cells of the map of nodes."""
-        i, j = np.divmod(nodes, self.height)
-        return np.stack([i + self.origin[0], j + self.origin[1]], axis=-1)
+        return self._cells.take(nodes, axis=0)
+
+    def graph(self) -> SlotGraph:
+        """The graph of the links, which has their updates too."""
+        return SlotGraph(self.neighbours, self.costs_m)
 
     def matrix(self) -> sparse.csr_matrix:
         """(n, n): the costs of all links, those that are cut among them; it shares their memory."""
         starts = np.arange(0, self.count * SLOTS + 1, SLOTS, dtype=np.int32)
-        parts = (self.costs_m.ravel(), self.neighbours.ravel(), starts)
-        return sparse.csr_matrix(parts, shape=(self.count, self.count))
+        entries = (self.costs_m.ravel(), self.neighbours.ravel(), starts)
+        return sparse.csr_matrix(entries, shape=(self.count, self.count))
 
 
 def link_costs_m(weights: Singles, length_m: float) -> Floats:

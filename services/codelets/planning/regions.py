@@ -7,16 +7,16 @@ by its first place node, so that a level does not depend on the order of changes
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
 from scipy import sparse
-from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.sparse.csgraph import connected_components
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from services.codelets.planning.links import COST_UNIT_M, MAX_COST_M, OUTSIDE, octile
+from services.codelets.planning.links import COST_UNIT_M, octile
+from services.codelets.planning.slots import SlotGraph
 
 Integers = npt.NDArray[np.integer[Any]]
 
@@ -59,36 +59,6 @@ class Level(Protocol):
         """What is known of nodes."""
 
 
-class RegionGraph(NamedTuple):
-    """Some n regions, ascending.
-
-    `matrix`: (n + 1, n + 1), the costs of the links from row to column; the last row is of all
-    regions outside.
-    """
-
-    regions: Indices
-    matrix: sparse.csr_matrix
-
-    def route(self, start: int, goal: int) -> Indices | None:
-        """The regions from one to another up the activation that spreads from `goal`; None where
-        none arrives at `start`.
-        """
-        row = int(self.regions.searchsorted(start))
-        goal_row = int(self.regions.searchsorted(goal))
-        distance_m, upward = dijkstra(
-            self.matrix, indices=goal_row, limit=MAX_COST_M, return_predecessors=True
-        )
-        if not math.isfinite(distance_m[row]):
-            return None
-
-        route = [row]
-        while row != goal_row:
-            row = int(upward[row])
-            route.append(row)
-
-        return self.regions.take(route)
-
-
 class Regions:
     """The regions of a level, in blocks of `edge` places a side, over a grid (width, height).
 
@@ -105,6 +75,7 @@ class Regions:
 
         corner = np.arange(edge)
         self._inside = (corner[:, None] * self._height + corner).ravel()
+        self._corner_of = self._corners(width)
         self.region = np.full(self._count, -1, np.int32)
         self._centre = np.zeros((self._count, 2))
         self._size = np.zeros(self._count)
@@ -115,7 +86,6 @@ class Regions:
         self._columns = np.zeros(0, np.int32)
         self._costs_m = np.zeros(0)
         self._starts = np.zeros(self._count + 1, np.int32)
-        self._row_of = np.full(self._count, OUTSIDE, np.int32)
         self.update(np.arange(self._count))
 
     def update(self, nodes: Indices) -> Indices:
@@ -154,38 +124,36 @@ class Regions:
 
     def members(self, regions: Indices) -> Indices:
         """The nodes of the finer level in `regions`, in ascending order."""
-        i, j = np.divmod(regions, self._height)
-        corners = (i - i % self._edge) * self._height + j - j % self._edge
-        places = corners[:, None] + self._inside
+        places = self._corner_of.take(regions)[:, None] + self._inside
         is_member = self.region.take(places) == regions[:, None]
-        return np.sort(places[is_member])
+        members: Indices = places[is_member]
+        members.sort()
+        return members
 
-    def beside(self, regions: Indices) -> Indices:
-        """`regions` and those linked to them, in ascending order."""
-        together = np.concatenate([regions, self.rows(regions).columns])
-        return np.unique(together)
+    def graph(self) -> tuple[Indices, SlotGraph]:
+        """Every region, ascending, and their graph, in which they are numbered in that order."""
+        regions = np.flatnonzero(self.region == np.arange(self._count))
+        links = self.rows(regions)
+        number_of = np.zeros(self._count, np.int32)
+        number_of[regions] = np.arange(len(regions), dtype=np.int32)
 
-    def all(self) -> Indices:
-        """Every region, in ascending order."""
-        return np.flatnonzero(self.region == np.arange(self._count))
+        before = np.cumsum(links.counts) - links.counts
+        owners = links.owners()
+        slots = np.arange(len(owners)) - before[owners]
+        most = links.counts.max(initial=1)
+        costs_m = np.full((len(regions), most), np.inf)
+        neighbours = np.empty(costs_m.shape, np.int32)
+        neighbours[:] = np.arange(len(regions))[:, None]
+        neighbours[owners, slots] = number_of[links.columns]
+        costs_m[owners, slots] = links.costs_m
+        return regions, SlotGraph(neighbours, costs_m)
 
-    def graph(self, within: Indices) -> RegionGraph:
-        """The graph of the regions `within`, which are ascending, and of the links among them."""
-        count = len(within)
-        links = self.rows(within)
-        self._row_of[within] = np.arange(count, dtype=np.int32)
-        columns = self._row_of.take(links.columns)
-        self._row_of[within] = OUTSIDE
-
-        # All regions outside are one row, from which nothing spreads.
-        np.minimum(columns, count, out=columns)
-        starts = np.empty(count + 2, np.int32)
-        starts[0] = 0
-        np.cumsum(links.counts, out=starts[1:-1])
-        starts[-1] = starts[-2]
-        parts = (links.costs_m, columns, starts)
-        matrix = sparse.csr_matrix(parts, shape=(count + 1, count + 1))
-        return RegionGraph(within, matrix)
+    def _corners(self, width: int) -> Indices:
+        """(n,): the first place of the block that each place lies in."""
+        i = np.arange(width) // self._edge * self._edge
+        j = np.arange(self._height) // self._edge * self._edge
+        corners: Indices = i[:, None] * self._height + j
+        return corners.ravel()
 
     def _block_of(self, nodes: Integers) -> Indices:
         i, j = np.divmod(nodes, self._height)

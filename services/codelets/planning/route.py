@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import enum
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,13 +27,18 @@ class NoRouteReason(enum.StrEnum):
 class Route:
     """A route over place nodes: (n, 2) cells of the map, from start to goal.
 
-    `length_m` is measured along its links; `cost_m` is the same with each link's length over its
-    weight.
+    `cost_m` is the sum of its links' lengths over their weights.
     """
 
     cells: Indices
-    length_m: float
+    cell_m: float
     cost_m: float
+
+    @property
+    def length_m(self) -> float:
+        """The length along the links."""
+        steps = np.diff(self.cells, axis=0)
+        return self.cell_m * float(np.hypot(*steps.T).sum())
 
 
 @dataclass(frozen=True)
@@ -62,11 +66,7 @@ def refusal(links: Links, start: Cell, goal: Cell) -> NoRoute | None:
 
 def route_along(links: Links, nodes: Indices, cost_m: float) -> Route:
     """The route along (n,) nodes, each linked to the next."""
-    steps = np.abs(np.diff(nodes))
-    straight = np.count_nonzero((steps == 1) | (steps == links.height))
-    diagonal = len(steps) - straight
-    length_m = links.cell_m * (straight + math.sqrt(2) * diagonal)
-    return Route(links.cells(nodes), length_m, cost_m)
+    return Route(links.cells(nodes), links.cell_m, cost_m)
 
 
 def _is_inside(links: Links, cell: Cell) -> bool:
