@@ -13,16 +13,15 @@ import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
 from cogmap.geometry.arrays import Floats, Indices
-from services.codelets.planning.links import Links
 from services.codelets.planning.network import Cell, PlaceNetwork
-from services.codelets.planning.route import (
+from services.codelets.planning.search.links import Links
+from services.codelets.planning.search.route import (
     NoRoute,
     NoRouteReason,
     Route,
     refusal,
-    route_along,
 )
-from services.codelets.planning.slots import MAX_COST_M
+from services.codelets.planning.search.slots import MAX_COST_M
 
 DECAY_PER_CELL = 2.0
 
@@ -43,8 +42,9 @@ class Field:
         """(width, height): the cost of the cheapest route to the nearest goal, inf where no
         activation arrives.
         """
-        width, height = self.links.shape
-        padded = self.node_distance_m.reshape(self.links.width, self.links.height)
+        links = self.links
+        width, height = links.shape
+        padded = self.node_distance_m.reshape(links.width, links.height)
         return padded[:width, :height]
 
     @property
@@ -60,7 +60,7 @@ class Field:
 
 
 def spread(network: PlaceNetwork, goals: Indices) -> Field:
-    """The activation that spreads from `goals`, (k, 2) cells of the map; those outside are ignored.
+    """The activation from `goals`, (k, 2) cells of the map; those outside are ignored.
 
     Whoever plans again and again on one network keeps its Links, and calls `spread_over`.
     """
@@ -68,13 +68,13 @@ def spread(network: PlaceNetwork, goals: Indices) -> Field:
 
 
 def spread_over(links: Links, goals: Indices) -> Field:
-    """The activation that spreads from `goals`, (k, 2) cells of the map; those outside are ignored."""
-    width, height = links.shape
-    i, j = (goals - np.array(links.origin)).T
-    is_inside = (i >= 0) & (i < width) & (j >= 0) & (j < height)
-    nodes = i[is_inside] * links.height + j[is_inside]
+    """The activation from `goals`, (k, 2) cells of the map; those outside are ignored."""
+    nodes = []
+    for i, j in goals.tolist():
+        if links.contain((i, j)):
+            nodes.append(links.node((i, j)))
 
-    if not len(nodes):
+    if not nodes:
         return Field(links, np.full(links.count, np.inf))
 
     distance_m = dijkstra(links.matrix(), indices=nodes, min_only=True, limit=MAX_COST_M)
@@ -91,8 +91,12 @@ def climb(network: PlaceNetwork, field: Field, start: Cell) -> Indices | None:
     if not network.contains(start):
         return None
 
-    nodes = _climb(field, field.links.node(start))
-    return None if nodes is None else field.links.cells(nodes)
+    links = field.links
+    nodes = _climb(field, links.node(start))
+    if nodes is None:
+        return None
+
+    return links.cells(nodes)
 
 
 def find_route(network: PlaceNetwork, start: Cell, goal: Cell) -> Route | NoRoute:
@@ -111,7 +115,8 @@ def find_route(network: PlaceNetwork, start: Cell, goal: Cell) -> Route | NoRout
     if nodes is None:
         return NoRoute(NoRouteReason.NOT_CONNECTED)
 
-    return route_along(links, nodes, float(field.node_distance_m[start_node]))
+    cost_m = float(field.node_distance_m[start_node])
+    return Route(links.cells(nodes), links.cell_m, cost_m)
 
 
 def _climb(field: Field, start: int) -> Indices | None:

@@ -35,11 +35,15 @@ class PlaceNetwork(NamedTuple):
         """Whether a cell of the map lies in the network."""
         i, j = self.index_of(cell)
         width, height = self.shape
-        return 0 <= i < width and 0 <= j < height
+        is_inside_i = 0 <= i < width
+        is_inside_j = 0 <= j < height
+        return is_inside_i and is_inside_j
 
     def index_of(self, cell: Cell) -> Cell:
         """The index in arrays of this network of a cell of the map."""
-        return cell[0] - self.origin[0], cell[1] - self.origin[1]
+        i, j = cell
+        first_i, first_j = self.origin
+        return i - first_i, j - first_j
 
 
 def grid_network(free: Booleans, cell_m: float = 1.0, origin: Cell = (0, 0)) -> PlaceNetwork:
@@ -47,20 +51,22 @@ def grid_network(free: Booleans, cell_m: float = 1.0, origin: Cell = (0, 0)) -> 
 
     A diagonal link exists only where both cells beside it are free too: no corner is cut.
     """
+    around = np.pad(free, 1)
     width, height = free.shape
-    padded = np.zeros((width + 2, height + 2), bool)
-    padded[1:-1, 1:-1] = free
-
     weights = np.empty((len(LINK_OFFSETS), width, height), np.float32)
+
     for link, (di, dj) in enumerate(LINK_OFFSETS.tolist()):
-        beside_i = _shifted(padded, di, 0)
-        beside_j = _shifted(padded, 0, dj)
-        weights[link] = free & beside_i & beside_j & _shifted(padded, di, dj)
+        beside_i = _shifted(around, di, 0)
+        beside_j = _shifted(around, 0, dj)
+        across = _shifted(around, di, dj)
+        weights[link] = free & beside_i & beside_j & across
 
     return PlaceNetwork(origin, cell_m, weights)
 
 
-def _shifted(padded: Booleans, di: int, dj: int) -> Booleans:
+def _shifted(around: Booleans, di: int, dj: int) -> Booleans:
     """The neighbours at an offset, of a grid that is padded by one cell on each side."""
-    width, height = padded.shape
-    return padded[1 + di : width - 1 + di, 1 + dj : height - 1 + dj]
+    width, height = around.shape
+    i = slice(1 + di, width - 1 + di)
+    j = slice(1 + dj, height - 1 + dj)
+    return around[i, j]

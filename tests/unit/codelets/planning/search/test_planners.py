@@ -9,11 +9,11 @@ import pytest
 from scipy.sparse.csgraph import dijkstra
 
 from services.codelets.planning.activation import find_route
-from services.codelets.planning.flat import FlatPlanner
-from services.codelets.planning.hierarchy import HierarchicalPlanner
-from services.codelets.planning.links import Links
 from services.codelets.planning.network import PlaceNetwork, grid_network
-from services.codelets.planning.route import NoRoute, NoRouteReason, Route
+from services.codelets.planning.search.flat import FlatPlanner
+from services.codelets.planning.search.hierarchy import HierarchicalPlanner
+from services.codelets.planning.search.links import Links
+from services.codelets.planning.search.route import NoRoute, NoRouteReason, Route
 
 SIDE = 48
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cogmap.geometry.arrays import Indices
-from services.codelets.planning.links import Links
 from services.codelets.planning.network import Cell
+from services.codelets.planning.search.links import Links
 
 
 class NoRouteReason(enum.StrEnum):
@@ -27,7 +27,7 @@ class NoRouteReason(enum.StrEnum):
 class Route:
     """A route over place nodes: (n, 2) cells of the map, from start to goal.
 
-    `cost_m` is the sum of its links' lengths over their weights.
+    `cost_m` is the sum of its links' lengths, each over the link's weight.
     """
 
     cells: Indices
@@ -38,7 +38,11 @@ class Route:
     def length_m(self) -> float:
         """The length along the links."""
         steps = np.diff(self.cells, axis=0)
-        return self.cell_m * float(np.hypot(*steps.T).sum())
+        i, j = steps.T
+        lengths = np.hypot(i, j)
+
+        total = float(lengths.sum())
+        return self.cell_m * total
 
 
 @dataclass(frozen=True)
@@ -50,27 +54,14 @@ class NoRoute:
 
 def refusal(links: Links, start: Cell, goal: Cell) -> NoRoute | None:
     """Why there is no route, where start and goal alone show it."""
-    if not _is_inside(links, start):
+    if not links.contain(start):
         return NoRoute(NoRouteReason.START_OUTSIDE)
-    if not _is_inside(links, goal):
+    if not links.contain(goal):
         return NoRoute(NoRouteReason.GOAL_OUTSIDE)
     if start == goal:
         return NoRoute(NoRouteReason.AT_GOAL)
-
     if not links.is_linked[links.node(start)]:
         return NoRoute(NoRouteReason.START_BLOCKED)
     if not links.is_linked[links.node(goal)]:
         return NoRoute(NoRouteReason.GOAL_BLOCKED)
     return None
-
-
-def route_along(links: Links, nodes: Indices, cost_m: float) -> Route:
-    """The route along (n,) nodes, each linked to the next."""
-    return Route(links.cells(nodes), links.cell_m, cost_m)
-
-
-def _is_inside(links: Links, cell: Cell) -> bool:
-    width, height = links.shape
-    i = cell[0] - links.origin[0]
-    j = cell[1] - links.origin[1]
-    return 0 <= i < width and 0 <= j < height

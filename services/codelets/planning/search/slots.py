@@ -1,6 +1,6 @@
 """Graphs whose nodes have a fixed number of slots for links, and activation within a part of one.
 
-A part takes a few array operations to cut out, so a search pays for the part alone.
+A part takes a few array operations to cut out, so that a search pays for the part alone.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Numbers = npt.NDArray[np.int32]
 
 # A limit that keeps a search from following links that are cut, whose cost is infinite.
 MAX_COST_M = float(np.finfo(np.float64).max)
-# All nodes outside a part are this row of it, from which nothing spreads.
+# The one row of a part that stands for all nodes outside, from which nothing spreads.
 _OUTSIDE = 0
 
 
@@ -35,30 +35,31 @@ class SlotGraph:
         self.neighbours = neighbours
         self.costs_m = costs_m
         self._row_of = np.full(count, _OUTSIDE, np.int32)
-        self._numbers = np.arange(1, count + 1, dtype=np.int32)
+        self._rows = np.arange(1, count + 1, dtype=np.int32)
 
-        # The first row, which is all that lies outside, has no links.
-        starts = np.arange(-slots, slots * count + 1, slots, dtype=np.int32)
-        starts[0] = 0
-        self._starts = starts
+        self._starts = np.zeros(count + 2, np.int32)
+        self._starts[2:] = slots * self._rows
 
     def part(self, nodes: Indices) -> Part:
         """The part of the graph that consists of `nodes`, which are ascending."""
         count = len(nodes)
-        self._row_of[nodes] = self._numbers[:count]
-        rows = self._row_of.take(self.neighbours.take(nodes, axis=0))
+        self._row_of[nodes] = self._rows[:count]
+        neighbours = self.neighbours.take(nodes, axis=0)
+        rows = self._row_of.take(neighbours)
         self._row_of[nodes] = _OUTSIDE
 
         costs_m = self.costs_m.take(nodes, axis=0)
-        entries = (costs_m.ravel(), rows.ravel(), self._starts[: count + 2])
-        matrix = sparse.csr_matrix(entries, shape=(count + 1, count + 1))
+        starts = self._starts[: count + 2]
+        entries = (costs_m.ravel(), rows.ravel(), starts)
+        shape = (count + 1, count + 1)
+        matrix = sparse.csr_matrix(entries, shape=shape)
         return Part(nodes, rows, costs_m, matrix)
 
 
 class Part(NamedTuple):
     """A part of a graph: `nodes[r]`, ascending, is row r + 1 of `matrix`.
 
-    `rows`: (n, slots), the rows of neighbours. `costs_m`: (n, slots), of the links to them.
+    `rows`: (n, slots), those of neighbours. `costs_m`: (n, slots), of the links to them.
     """
 
     nodes: Indices
@@ -68,58 +69,62 @@ class Part(NamedTuple):
 
     def row(self, node: int) -> int:
         """The row of one of the nodes."""
-        return int(self.nodes.searchsorted(node)) + 1
+        index = int(self.nodes.searchsorted(node))
+        return index + 1
 
     def route(self, start: int, goal: int) -> Indices | None:
-        """The nodes on a cheapest route; None where the part holds none."""
+        """The nodes on a cheapest route within the part; None where there is none."""
         row = self.row(start)
         goal_row = self.row(goal)
-        distance_m, upward = dijkstra(
+        distances_m, upward = dijkstra(
             self.matrix, indices=goal_row, limit=MAX_COST_M, return_predecessors=True
         )
-        if not math.isfinite(distance_m[row]):
+        if not math.isfinite(distances_m[row]):
             return None
 
-        route = [row - 1]
+        indices = [row - 1]
         while row != goal_row:
             row = int(upward[row])
-            route.append(row - 1)
+            indices.append(row - 1)
 
-        return self.nodes.take(route)
+        return self.nodes.take(indices)
 
     def distances_m(self, goal: int) -> Floats:
         """(n + 1,): the distance of each row from `goal`, inf where no activation arrives."""
-        distance_m: Floats = dijkstra(self.matrix, indices=self.row(goal), limit=MAX_COST_M)
-        distance_m[_OUTSIDE] = math.inf
-        return distance_m
+        distances_m: Floats = dijkstra(self.matrix, indices=self.row(goal), limit=MAX_COST_M)
+        distances_m[_OUTSIDE] = math.inf
+        return distances_m
 
-    def climb(self, distance_m: Floats, start: int) -> Indices:
+    def climb(self, distances_m: Floats, start: int) -> Indices:
         """The nodes from `start`, at which activation arrives, up its gradient to the goal.
 
         Of equal neighbours the one in the first slot is taken.
         """
         row = self.row(start)
-        route = [row - 1]
-        while distance_m[row] > 0:
+        indices = [row - 1]
+
+        while distances_m[row] > 0:
             neighbours = self.rows[row - 1]
-            through_m = distance_m[neighbours] + self.costs_m[row - 1]
-            row = int(neighbours[through_m.argmin()])
-            route.append(row - 1)
+            through_m = distances_m[neighbours] + self.costs_m[row - 1]
+            best = through_m.argmin()
+            row = int(neighbours[best])
+            indices.append(row - 1)
 
-        return self.nodes.take(route)
+        return self.nodes.take(indices)
 
-    def climb_all(self, distance_m: Floats, start: int) -> Indices:
-        """What `climb` returns, faster where few nodes are not on the route."""
-        through_m = distance_m.take(self.rows)
+    def climb_narrow(self, distances_m: Floats, start: int) -> Indices:
+        """What `climb` returns, faster where most nodes are near the route."""
+        through_m = distances_m.take(self.rows)
         through_m += self.costs_m
         best = through_m.argmin(axis=1)
-        upward = self.rows[np.arange(len(best)), best].tolist()
-        goal_row = int(distance_m.argmin())
+        every = np.arange(len(best))
+        upward = self.rows[every, best].tolist()
 
         row = self.row(start)
-        route = [row - 1]
+        goal_row = int(distances_m.argmin())
+        indices = [row - 1]
         while row != goal_row:
             row = upward[row - 1]
-            route.append(row - 1)
+            indices.append(row - 1)
 
-        return self.nodes.take(route)
+        return self.nodes.take(indices)

@@ -1,0 +1,1 @@
+"""Routes over one network that changes: exact, or on a hierarchy of its levels."""

@@ -1,0 +1,127 @@
+"""The cheapest route over the place nodes of one map, found again and again as its links change.
+
+Activation spreads only where a route shorter than a limit could pass: an ellipse about start and
+goal. Where the route found is longer than its ellipse was made for, another is made for its length.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from cogmap.geometry.arrays import Floats, Indices
+from services.codelets.planning.network import Cell, PlaceNetwork
+from services.codelets.planning.search.links import COST_UNIT_M, Links, octile
+from services.codelets.planning.search.route import NoRoute, NoRouteReason, Route, refusal
+from services.codelets.planning.search.slots import Part
+
+# How much longer than over free ground a route may be that is sought, and without limit at last.
+DETOURS = (1.2, 1.5, math.inf)
+MARGIN_CELLS = 2.0
+
+
+class FlatPlanner:
+    """Finds the cheapest routes over one network, which may change."""
+
+    def __init__(self, network: PlaceNetwork) -> None:
+        self._take(network)
+
+    def update(self, network: PlaceNetwork) -> None:
+        """Plan over `network` from now on."""
+        if self._links.fits(network):
+            self._links.update(network)
+        else:
+            self._take(network)
+
+    def find_route(self, start: Cell, goal: Cell) -> Route | NoRoute:
+        """The cheapest route between two cells of the map, or the reason why there is none."""
+        refused = refusal(self._links, start, goal)
+        if refused is not None:
+            return refused
+
+        start_node = self._links.node(start)
+        goal_node = self._links.node(goal)
+        found = self._find(start_node, goal_node)
+        if found is None:
+            return NoRoute(NoRouteReason.NOT_CONNECTED)
+
+        nodes = found.part.climb(found.distances_m, start_node)
+        return Route(self._links.cells(nodes), self._links.cell_m, found.cost_m)
+
+    def _take(self, network: PlaceNetwork) -> None:
+        self._links = Links(network)
+        self._graph = self._links.graph()
+
+    def _find(self, start: int, goal: int) -> _Found | None:
+        """Activation that has reached `start` by the cheapest route; None where there is none."""
+        cell_m = self._links.cell_m
+        free_m = cell_m * self._free_cells(start, goal)
+
+        for detour in DETOURS:
+            limit_m = detour * free_m + MARGIN_CELLS * cell_m
+            found = self._spread(start, goal, limit_m)
+            if math.isinf(found.cost_m):
+                continue
+            if found.cost_m <= limit_m:
+                return found
+            return self._spread(start, goal, found.cost_m)
+
+        return None
+
+    def _free_cells(self, start: int, goal: int) -> float:
+        """The length of the shortest route between two nodes if all places were free."""
+        ends = np.array([start, goal])
+        cells = self._links.cells(ends)
+
+        i, j = cells[1] - cells[0]
+        return float(octile(i, j))
+
+    def _spread(self, start: int, goal: int, limit_m: float) -> _Found:
+        """Activation from `goal` where a route of `limit_m` to `start` can pass."""
+        nodes = self._ellipse(start, goal, limit_m)
+        part = self._graph.part(nodes)
+        distances_m = part.distances_m(goal)
+        cost_m = float(distances_m[part.row(start)])
+        return _Found(part, distances_m, cost_m)
+
+    def _ellipse(self, start: int, goal: int, limit_m: float) -> Indices:
+        """The linked nodes, ascending, that a route of `limit_m` between two nodes can pass."""
+        links = self._links
+        limit = (limit_m + COST_UNIT_M) / links.cell_m
+        start_i, start_j = divmod(start, links.height)
+        goal_i, goal_j = divmod(goal, links.height)
+        i = _between(start_i, goal_i, limit, links.width)
+        j = _between(start_j, goal_j, limit, links.height)
+
+        column = i[:, None]
+        from_start = octile(column - start_i, j - start_j)
+        from_goal = octile(column - goal_i, j - goal_j)
+        is_near = from_start + from_goal <= limit
+
+        near_i, near_j = np.nonzero(is_near)
+        nodes: Indices = i[near_i] * links.height + j[near_j]
+        is_linked = links.is_linked[nodes]
+        return nodes[is_linked]
+
+
+class _Found(NamedTuple):
+    """Activation within a part of the network, and what the route from the start costs there."""
+
+    part: Part
+    distances_m: Floats
+    cost_m: float
+
+
+def _between(start: int, goal: int, limit: float, count: int) -> Indices:
+    """The coordinates along one axis, out of `count`, that a route of length `limit` can reach."""
+    apart = abs(start - goal)
+    beyond = (limit - apart) / 2
+    slack = math.ceil(min(beyond, count))
+
+    first = min(start, goal) - slack
+    last = max(start, goal) + slack
+    first = max(first, 0)
+    end = min(last + 1, count)
+    return np.arange(first, end)
