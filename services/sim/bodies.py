@@ -18,6 +18,7 @@ from services.sim.robot import upright_quaternion
 from services.sim.stdio import pybullet
 
 NOT_SOLID = -1
+HIDDEN_M = -1000.0
 _ORIGIN = (0.0, 0.0)
 _UPRIGHT = (0, 0, 0, 1)
 
@@ -31,11 +32,10 @@ class Model(NamedTuple):
 
 
 class Bodies:
-    """Adds bodies to a pybullet client, and removes them.
+    """Adds bodies to a pybullet client.
 
     Shapes and pictures go through files, as all renderers of pybullet load nothing else; none is
-    left. pybullet remembers both by the names of their files: each has a name of its own, so that
-    adding it again is quick.
+    left. pybullet remembers both by the names of their files: each has a name of its own.
     """
 
     def __init__(self, client: int) -> None:
@@ -46,7 +46,7 @@ class Bodies:
         self._folder.rmdir()
 
     def model(self, surface: Mesh, picture: Image) -> Model:
-        """A shape with a picture on it, to be added as often as there is need."""
+        """A shape with a picture on it, to be added."""
         return self.painted(surface, self.texture(picture))
 
     def painted(self, surface: Mesh, texture: int) -> Model:
@@ -146,6 +146,22 @@ class Bodies:
             physicsClientId=self._client,
         )
 
-    def remove(self, body: int) -> None:
-        """Take a body away."""
-        pybullet.removeBody(body, physicsClientId=self._client)
+    def hide(self, body: int) -> None:
+        """Put a body where nothing meets it and no camera sees it.
+
+        None is ever removed: pybullet's EGL plugin would confuse the textures of those that come
+        later.
+        """
+        self._lift(body, HIDDEN_M)
+
+    def show(self, body: int) -> None:
+        """Put a body that was hidden back to its place."""
+        self._lift(body, 0.0)
+
+    def _lift(self, body: int, z_m: float) -> None:
+        (x_m, y_m, _), turned = pybullet.getBasePositionAndOrientation(
+            body, physicsClientId=self._client
+        )
+        pybullet.resetBasePositionAndOrientation(
+            body, (x_m, y_m, z_m), turned, physicsClientId=self._client
+        )

@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
-from services.sim.bodies import NOT_SOLID, Bodies, Model
+from services.sim.bodies import NOT_SOLID, Bodies
 from services.sim.layout.furniture import Prop
 from services.sim.layout.plan import Plot, Road
 from services.sim.rendering import mesh, prop_shapes, scenery
-from services.sim.rendering.mesh import Mesh
-from services.sim.rendering.wall import Image
-
-Key = Plot | Prop | tuple[Road, ...]
 
 
 class Builder:
-    """Adds parts of a place to `bodies`. A part that is added again looks as before, and is not
-    drawn again.
-    """
+    """Adds parts of a place to `bodies`, and returns which bodies these are."""
 
     def __init__(self, bodies: Bodies) -> None:
         self._bodies = bodies
-        self._models: dict[Key, list[Model]] = {}
         grass, *layers = scenery.pictures()
         self._grass = bodies.texture(grass)
         self._layers = [bodies.texture(picture) for picture in layers]
@@ -38,11 +31,12 @@ class Builder:
 
     def streets(self, roads: Sequence[Road]) -> list[int]:
         """Pavements, asphalt, and the lines on it, where there are any."""
-        key = tuple(roads)
-        if key not in self._models:
-            self._models[key] = self._paving(key)
+        added = []
+        for surface, texture in zip(scenery.streets(roads), self._layers, strict=True):
+            if surface.triangles:
+                added.append(self._bodies.add(self._bodies.painted(surface, texture)))
 
-        return [self._bodies.add(model) for model in self._models[key]]
+        return added
 
     def building(self, plot: Plot) -> int:
         """A building that nothing passes."""
@@ -51,7 +45,7 @@ class Builder:
 
         kind = plot.kind
         size_m = (kind.width_m, kind.depth_m, kind.height_m)
-        (model,) = self._kept(plot, lambda: mesh.building(kind))
+        model = self._bodies.model(*mesh.building(kind))
         at_m = (plot.x_m, plot.y_m)
         return self._bodies.add(model, self._box(size_m), at_m, plot.heading_rad)
 
@@ -59,13 +53,13 @@ class Builder:
         """A building that is no rectangle."""
         at_m = (plot.x_m, plot.y_m)
         outline = [(x - plot.x_m, y - plot.y_m) for x, y in plot.outline]
-        (model,) = self._kept(plot, lambda: mesh.prism(plot.kind, outline))
+        model = self._bodies.model(*mesh.prism(plot.kind, outline))
         solid = self._bodies.walls(outline, plot.kind.height_m)
         return self._bodies.add(model, solid, at_m)
 
     def prop(self, prop: Prop, is_solid: bool) -> int:
         """A prop, which nothing passes where it is solid."""
-        (model,) = self._kept(prop, lambda: prop_shapes.shape(prop))
+        model = self._bodies.model(*prop_shapes.shape(prop))
         solid = self._box(prop.solid_size_m) if is_solid else NOT_SOLID
         return self._bodies.add(model, solid, (prop.x_m, prop.y_m), prop.heading_rad)
 
@@ -73,18 +67,3 @@ class Builder:
         length_m, width_m, height_m = size_m
         half_m = (length_m / 2, width_m / 2, height_m / 2)
         return self._bodies.box(half_m, middle_m=height_m / 2)
-
-    def _paving(self, roads: tuple[Road, ...]) -> list[Model]:
-        models = []
-        for surface, texture in zip(scenery.streets(roads), self._layers, strict=True):
-            if surface.triangles:
-                models.append(self._bodies.painted(surface, texture))
-
-        return models
-
-    def _kept(self, key: Key, draw: Callable[[], tuple[Mesh, Image]]) -> list[Model]:
-        """The model that was drawn for `key` before, or that `draw` draws now."""
-        if key not in self._models:
-            self._models[key] = [self._bodies.model(*draw())]
-
-        return self._models[key]

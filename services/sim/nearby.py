@@ -1,5 +1,5 @@
-"""Which parts of a large place there are: those near the robot, so that neither rendering nor
-physics grows with the place. Pure.
+"""Which parts of a large place there are: those near the robot, so that the time to start, to
+render and to simulate does not grow with the place. Pure.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from cogmap.geometry.arrays import Floats
 from services.sim.layout.plan import Point
 
 ADDED_M = 80.0
-REMOVED_M = 95.0
+HIDDEN_M = 95.0
 # How far the robot moves before the parts near it are chosen again, and how many are added then.
 MOVED_M = 2.0
 MOST_ADDED = 6
@@ -30,11 +30,15 @@ class Piece:
 
 @dataclass
 class Nearby:
-    """Adds and removes `pieces` as the robot moves; `remove` takes a body away."""
+    """Adds `pieces` as the robot moves; `hide` takes a body of one that is far away, `show` brings
+    it back.
+    """
 
     pieces: list[Piece]
-    remove: Callable[[int], None]
-    _shown: dict[int, list[int]] = field(default_factory=dict)
+    hide: Callable[[int], None]
+    show: Callable[[int], None]
+    _built: dict[int, list[int]] = field(default_factory=dict)
+    _shown: set[int] = field(default_factory=set)
     _last_m: Point | None = None
 
     def __post_init__(self) -> None:
@@ -53,12 +57,12 @@ class Nearby:
 
         self._last_m = (x_m, y_m)
         apart_m = np.hypot(*(self._middles_m - (x_m, y_m)).T) - self._reaches_m
-        self._remove_far(apart_m)
+        self._hide_far(apart_m)
 
         missing = self._missing(apart_m)
-        is_moved_on = moved_m <= REMOVED_M - ADDED_M
+        is_moved_on = moved_m <= HIDDEN_M - ADDED_M
         for number in missing[:MOST_ADDED] if is_moved_on else missing:
-            self._shown[number] = self.pieces[number].add()
+            self._add(number)
 
     def _moved_m(self, x_m: float, y_m: float) -> float:
         if self._last_m is None:
@@ -67,11 +71,21 @@ class Nearby:
         last_x_m, last_y_m = self._last_m
         return float(np.hypot(x_m - last_x_m, y_m - last_y_m))
 
-    def _remove_far(self, apart_m: Floats) -> None:
-        for number in list(self._shown):
-            if apart_m[number] > REMOVED_M:
-                for body in self._shown.pop(number):
-                    self.remove(body)
+    def _add(self, number: int) -> None:
+        self._shown.add(number)
+        if number not in self._built:
+            self._built[number] = self.pieces[number].add()
+            return
+
+        for body in self._built[number]:
+            self.show(body)
+
+    def _hide_far(self, apart_m: Floats) -> None:
+        for number in sorted(self._shown):
+            if apart_m[number] > HIDDEN_M:
+                self._shown.remove(number)
+                for body in self._built[number]:
+                    self.hide(body)
 
     def _missing(self, apart_m: Floats) -> list[int]:
         """The pieces near enough that are not there yet, from the nearest on."""

@@ -94,8 +94,11 @@ class World:
 
     def close_streets(self, names: frozenset[str]) -> None:
         """Let barriers close these streets, and no others."""
-        for name in sorted(self._barriers.keys() - names):
-            self._remove(self._barriers.pop(name))
+        for name, body in self._barriers.items():
+            if name in names:
+                self._bodies.show(body)
+            else:
+                self._bodies.hide(body)
 
         for name in sorted(names - self._barriers.keys()):
             (self._barriers[name],) = self._add_obstacle(self._closing[name])
@@ -138,7 +141,7 @@ class World:
         pybullet.changeDynamics(self._soil, -1, lateralFriction=1.0, physicsClientId=client)
         if not whole:
             self.sky = self._builder.sky()
-            self._nearby = Nearby(self._pieces(), self._remove)
+            self._nearby = Nearby(self._pieces(), self._bodies.hide, self._bodies.show)
             self._follow(self.town.start.x_m, self.town.start.y_m)
             return
 
@@ -172,11 +175,6 @@ class World:
         body = self._builder.prop(prop, is_solid=True)
         self._solid.add(body)
         return [body]
-
-    def _remove(self, body: int) -> None:
-        self._solid.discard(body)
-        self.building_of_body.pop(body, None)
-        self._bodies.remove(body)
 
 
 def _tiles(roads: Sequence[Road]) -> list[tuple[Road, ...]]:

@@ -18,7 +18,7 @@ from services.sim.layout.plan import Plot
 from services.sim.scripted.percepts import Landmark, PerceptErrors, PerceptSim
 
 SECTORS = 32
-# Stereo matching finds no depth that is less; what is farther is not simulated.
+# Stereo matching takes what is nearer for as near as this; what is farther is not simulated.
 NEAREST_M = 2.2
 FARTHEST_M = 60.0
 # A building is seen where so many columns show it, and whole where so large a part of it is seen.
@@ -118,8 +118,8 @@ def scan(camera: ColumnCamera, depth_m: Floats) -> tuple[Floats, Floats]:
     nearest in it, 0 where there is nothing; both from the robot's origin. `depth_m` (width,) is
     that of each image column.
     """
-    is_measured = (depth_m >= NEAREST_M) & (depth_m <= FARTHEST_M)
-    seen_m = depth_m[is_measured]
+    is_measured = depth_m <= FARTHEST_M
+    seen_m = np.maximum(depth_m[is_measured], NEAREST_M)
     forward_m = seen_m + camera.mount.mount_forward_m
     left_m = camera.left_slope[is_measured] * seen_m
     bearing_rad = np.arctan2(left_m, forward_m)

@@ -23,8 +23,8 @@ KERB_STEP_M = 0.1
 class Near(NamedTuple):
     """What is within reach of the robot.
 
-    `walls_m` (n, 4) with `plot` (n,), the building of each; `obstacles_m` (m, 4); `solid_m`, those
-    of both that it may touch; `kerbs_m`, points along the kerbs, (k, 2); the streets.
+    `walls_m` (n, 4) with `plot` (n,), the building of each; `obstacles_m` (m, 4), as they are seen;
+    `solid_m` (k, 4), what it may run into; `kerbs_m`, points along the kerbs, (k, 2); the streets.
     """
 
     walls_m: Floats
@@ -42,19 +42,20 @@ class Surroundings:
         self._walls_m = place.walls_m
         walls = [len(plot.corners) for plot in place.plots]
         self._plots = np.repeat(np.arange(len(walls)), walls)
-        self._props_m = outlines([prop.solid for prop in place.props])
+        self._seen_props_m = outlines([prop.seen for prop in place.props])
+        self._solid_props_m = outlines([prop.solid for prop in place.props])
         self._kerbs_m = _points_along(place.kerbs_m)
         self._streets = surfaces(place.roads)
         self._barriers = barriers(place.roads)
 
-        self._obstacles_m = self._props_m
+        self._closing_m = outlines([])
         self._middle_m: tuple[float, float] | None = None
         self._near = self._search(place.start.x_m, place.start.y_m)
 
     def close(self, names: Collection[str]) -> None:
         """Let barriers close these streets, and no others."""
         closing = [self._barriers[name].solid for name in sorted(names)]
-        self._obstacles_m = np.vstack([self._props_m, outlines(closing)])
+        self._closing_m = outlines(closing)
         self._middle_m = None
 
     def near(self, x_m: float, y_m: float) -> Near:
@@ -68,8 +69,9 @@ class Surroundings:
 
     def _search(self, x_m: float, y_m: float) -> Near:
         is_near = _within(self._walls_m, x_m, y_m, REACH_M + MOVED_M)
-        is_obstacle = _within(self._obstacles_m, x_m, y_m, REACH_M + MOVED_M)
-        solid_m = np.vstack([self._walls_m, self._obstacles_m])
+        seen_m = np.vstack([self._seen_props_m, self._closing_m])
+        is_obstacle = _within(seen_m, x_m, y_m, REACH_M + MOVED_M)
+        solid_m = np.vstack([self._walls_m, self._solid_props_m, self._closing_m])
         is_solid = _within(solid_m, x_m, y_m, BODY_REACH_M + MOVED_M)
 
         ground_m = GROUND_REACH_M + MOVED_M
@@ -80,7 +82,7 @@ class Surroundings:
         return Near(
             walls_m=self._walls_m[is_near],
             plot=self._plots[is_near],
-            obstacles_m=self._obstacles_m[is_obstacle],
+            obstacles_m=seen_m[is_obstacle],
             solid_m=solid_m[is_solid],
             kerbs_m=self._kerbs_m[kerb_m <= ground_m],
             streets=self._streets.chosen(street_m <= ground_m + half_m),

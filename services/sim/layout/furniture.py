@@ -72,12 +72,22 @@ class Prop:
         return trunk_m, trunk_m, height_m
 
     @property
+    def seen(self) -> tuple[Point, ...]:
+        """The corners of what a range scan meets, counter-clockwise: of a tree its crown."""
+        length_m, width_m, _ = self.size_m
+        share = _CROWN_SHARE if self.kind == "tree" else 1.0
+        size_m = (share * length_m, share * width_m)
+        return corners((self.x_m, self.y_m), self.heading_rad, size_m)
+
+    @property
     def solid(self) -> tuple[Point, ...]:
         """The corners of what stands in the way of a robot, counter-clockwise."""
         length_m, width_m, _ = self.solid_size_m
         return corners((self.x_m, self.y_m), self.heading_rad, (length_m, width_m))
 
 
+# A crown is an ellipse: a box of the same width would reach too far.
+_CROWN_SHARE = 0.8
 _TRUNKS_M = {"tree": 0.4, "lamp": 0.2}
 _SIZES: dict[str, tuple[Size, Size]] = {
     "tree": ((1.4, 1.4, 3.0), (2.6, 2.6, 6.0)),

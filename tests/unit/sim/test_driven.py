@@ -137,12 +137,13 @@ def test_the_scan_has_the_range_of_a_wall_ahead_from_the_robots_origin() -> None
     assert range_m * np.cos(bearing_rad) == pytest.approx(10.0, abs=0.25)
 
 
-def test_the_scan_has_nothing_nearer_than_stereo_matches() -> None:
+def test_the_scan_is_limited_to_the_ranges_that_stereo_matches() -> None:
     camera = ColumnCamera(MOUNT)
-    for ahead_m, is_seen in ((2.3, False), (2.7, True), (70.0, False)):
+    for ahead_m, expected_m in ((1.0, 2.5), (2.5, 2.5), (5.0, 5.0), (70.0, 0.0)):
         wall_m = np.array([[ahead_m, -90.0, ahead_m, 90.0]])
         depth_m = depths_m(camera.nearest(np.zeros(3), wall_m).inverse_m)
-        assert scan(camera, depth_m)[1].any() == is_seen
+        _, range_m = scan(camera, depth_m)
+        assert range_m[16] == pytest.approx(expected_m, abs=0.05)
 
 
 def _seen(place: Place, pose: Pose = AT_ORIGIN, errors: PerceptErrors = EXACT):

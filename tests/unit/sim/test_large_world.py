@@ -14,8 +14,9 @@ from services.sim.layout.blocks.town import generate
 from services.sim.layout.catalogue import BuildingType
 from services.sim.layout.place import Place
 from services.sim.layout.plan import Plot, Road
-from services.sim.nearby import ADDED_M, REMOVED_M, Nearby, Piece
+from services.sim.nearby import ADDED_M, HIDDEN_M, Nearby, Piece
 from services.sim.simulation import Simulation
+from services.sim.stdio import pybullet
 from services.sim.world import World
 
 TOWN = generate(1, 150.0)
@@ -60,6 +61,17 @@ def _drive(world: World, seconds: float, wheels_rad_s: float = 15.0) -> Pose:
     return world.pose()
 
 
+def _names_there(world: World) -> set[str]:
+    """The buildings that stand on the ground."""
+    names = set()
+    for body, name in world.building_of_body.items():
+        (_, _, z_m), _ = pybullet.getBasePositionAndOrientation(body, physicsClientId=world.client)
+        if z_m == 0.0:
+            names.add(name)
+
+    return names
+
+
 def _near_names(place: Place, pose: Pose, reach_m: float) -> set[str]:
     """The buildings that come within reach of a pose."""
     names = set()
@@ -75,10 +87,10 @@ def test_only_what_is_near_the_robot_is_there(world: World) -> None:
     for x_m, y_m in ((START.x_m, START.y_m), (-70.0, -70.0), (70.0, 60.0)):
         pose = Pose(x_m=x_m, y_m=y_m, heading_rad=0.0)
         world.place_robot(pose)
-        there = set(world.building_of_body.values())
+        there = _names_there(world)
 
         assert _near_names(TOWN, pose, ADDED_M) <= there
-        assert there <= _near_names(TOWN, pose, REMOVED_M)
+        assert there <= _near_names(TOWN, pose, HIDDEN_M)
         assert len(there) < len(TOWN.plots)
 
 
@@ -108,23 +120,28 @@ def test_a_building_of_any_outline_stops_the_robot() -> None:
 
 def test_pieces_come_and_go_as_the_robot_moves() -> None:
     there: set[int] = set()
+    built: list[int] = []
 
     def piece(number: int) -> Piece:
         def add() -> list[int]:
             there.add(number)
+            built.append(number)
             return [number]
 
         return Piece((10.0 * number, 0.0), 0.0, add)
 
-    nearby = Nearby([piece(number) for number in range(60)], there.discard)
+    nearby = Nearby([piece(number) for number in range(60)], there.discard, there.add)
     nearby.update(0.0, 0.0)
     assert there == set(range(9))
 
-    for x_m in np.arange(0.0, 400.0, 2.5).tolist():
+    there_and_back_m = [*np.arange(0.0, 400.0, 2.5), *np.arange(400.0, 0.0, -2.5)]
+    for x_m in there_and_back_m:
         nearby.update(x_m, 0.0)
         wanted = {number for number in range(60) if abs(10.0 * number - x_m) <= ADDED_M - 2.5}
-        most = {number for number in range(60) if abs(10.0 * number - x_m) <= REMOVED_M + 2.5}
+        most = {number for number in range(60) if abs(10.0 * number - x_m) <= HIDDEN_M + 2.5}
         assert wanted <= there <= most
+
+    assert len(built) == len(set(built))
 
 
 def test_a_town_of_blocks_ends_by_time_and_publishes_what_closes() -> None:
