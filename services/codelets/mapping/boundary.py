@@ -7,19 +7,19 @@ free again once it is seen to be.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cogmap.errors import MessageError
-from cogmap.geometry.arrays import Booleans, Floats
+from cogmap.geometry.arrays import Booleans, Floats, Singles
 from cogmap.graph.crossings import crossings
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import EVIDENCE_COLUMNS, LINK_OFFSETS, WEIGHT_COLUMNS, Window
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.array import Array
 from schemas.codelets import Task
-from schemas.graph import Operation, Phase
+from schemas.graph import Phase
 from schemas.nodes import SELF_ID, PlaceColumn, Self
 from services.codelets.config import SECTION, Config
 from services.codelets.mapping.evidence import accumulated, blended, weights_of
@@ -27,10 +27,25 @@ from services.codelets.mapping.local_grid import LocalGrid
 from services.codelets.mapping.rays import Rays, clear_cells, rays_of, walls
 
 JOIN_M = 1.2
-CENTRAL = 0.35
+# In cells, from the middle of one along both axes: road there is road at the place node, and an
+# edge there is right beside it.
+ROAD_WITHIN = 0.35
+BESIDE_WITHIN = 0.2
 ROAD_STEP = 0.25
 RAY_CERTAINTY = 0.5
-COLUMNS = (*EVIDENCE_COLUMNS, *WEIGHT_COLUMNS, PlaceColumn.ROAD, PlaceColumn.OBSTACLE)
+WRITTEN = (*EVIDENCE_COLUMNS, *WEIGHT_COLUMNS, PlaceColumn.OBSTACLE)
+COLUMNS = (*WRITTEN, PlaceColumn.ROAD)
+
+
+class Edges(NamedTuple):
+    """Where the ground ends that can be driven on, as straight segments, (k, 2) each, in cells."""
+
+    starts: Floats
+    ends: Floats
+
+    def middles(self) -> Floats:
+        """(k, 2): the middle of each."""
+        return (self.starts + self.ends) / 2
 
 
 class Seen(NamedTuple):
@@ -69,18 +84,22 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
 
     grid = LocalGrid.around(agent, graph.cell_m(agent.map), config.boundary_reach_m)
     rays = rays_of(task.scan, grid, config.boundary_reach_m, config.range_sd_share)
-    seen = _seen(task.road_m, rays, grid, config)
+    edges = _edges(task.road_boundary_m, rays, grid, config)
+    seen = _seen(task.road_m, edges, rays, grid, config)
     known = graph.places.window(agent.map, COLUMNS, grid.extent)
 
-    cut = _cut(task.road_boundary_m, rays, grid, config)
-    free = _free(seen, known)
-    operations = _links(grid, known, cut, free)
+    cut = _cut(edges, grid, config)
+    evidence = accumulated(known.evidence(), cut, _free(seen, known))
+    has_changed = evidence != known.evidence()
+    weights = np.where(has_changed, weights_of(evidence), known.weights())
 
     obstacle = known.column(PlaceColumn.OBSTACLE)
     in_view = np.where(seen.is_hit | seen.is_clear, seen.certainty, 0.0)
-    after = blended(obstacle, seen.is_hit.astype(np.float64), in_view)
-    operations += grid.changed(PlaceColumn.OBSTACLE, obstacle, after)
-    return Answer(operations)
+    obstacle = blended(obstacle, seen.is_hit.astype(np.float64), in_view)
+
+    written = len(WRITTEN)
+    after = np.concatenate([evidence, weights, obstacle[None]])
+    return Answer(grid.changed(WRITTEN, known.values[:written], after))
 
 
 CODELET = Codelet(
@@ -89,40 +108,52 @@ CODELET = Codelet(
     due=due,
     run=run,
     reads=frozenset({Self, *COLUMNS}),
-    writes=frozenset({*EVIDENCE_COLUMNS, *WEIGHT_COLUMNS, PlaceColumn.OBSTACLE}),
+    writes=frozenset(WRITTEN),
     config=Config,
     section=SECTION,
 )
 
 
-def _seen(road_m: Array, rays: Rays, grid: LocalGrid, config: Config) -> Seen:
-    points_m = np.asarray(road_m.numpy(), np.float64)
-    road = grid.positions(points_m)
-    from_centre = np.abs(road - np.rint(road)).max(axis=1, initial=0.0)
-    is_central = from_centre <= CENTRAL
+def _seen(road_m: Array, edges: Edges, rays: Rays, grid: LocalGrid, config: Config) -> Seen:
+    road = grid.positions(np.asarray(road_m.numpy(), np.float64))
+    is_road = grid.counts(_central(road, ROAD_WITHIN)) > 0
+    # Whether a place node right beside a boundary is before or behind it no view can decide.
+    is_beside = grid.counts(_central(edges.middles(), BESIDE_WITHIN)) > 0
 
     return Seen(
-        is_road=grid.counts(road[is_central]) > 0,
+        is_road=is_road & ~is_beside,
         is_hit=grid.counts(rays.hits()) > 0,
-        is_clear=clear_cells(rays, grid),
+        is_clear=clear_cells(rays, grid) & ~is_beside,
         certainty=grid.certainty(grid.range_m(), config.range_sd_share),
     )
 
 
-def _cut(boundary_m: Array, rays: Rays, grid: LocalGrid, config: Config) -> Floats:
-    """(4, w, h): the links that something seen crosses, by how sure its place is, 0 to 1."""
-    points_m = np.asarray(boundary_m.numpy(), np.float64)
-    edge_starts, edge_ends = _road_edges(points_m, config.boundary_reach_m)
-    wall_starts, wall_ends = walls(rays, grid.cell_m)
-    starts = np.concatenate([grid.positions(edge_starts), wall_starts])
-    ends = np.concatenate([grid.positions(edge_ends), wall_ends])
+def _central(positions: Floats, within: float) -> Floats:
+    """(k, 2): those of (n, 2) positions that are near the middle of their cell, along both axes."""
+    from_middle = np.abs(positions - np.rint(positions))
+    central: Floats = positions[(from_middle <= within).all(axis=1)]
+    return central
 
-    middle = (starts + ends) / 2
-    away = middle - grid.pose[:2] / grid.cell_m
+
+def _edges(boundary_m: Array, rays: Rays, grid: LocalGrid, config: Config) -> Edges:
+    """Where the road ends, and what the rays hit."""
+    points_m = np.asarray(boundary_m.numpy(), np.float64)
+    road_starts, road_ends = _road_edges(points_m, config.boundary_reach_m)
+    wall_starts, wall_ends = walls(rays, grid.cell_m)
+
+    return Edges(
+        starts=np.concatenate([grid.positions(road_starts), wall_starts]),
+        ends=np.concatenate([grid.positions(road_ends), wall_ends]),
+    )
+
+
+def _cut(edges: Edges, grid: LocalGrid, config: Config) -> Floats:
+    """(4, w, h): the links that edges cross, by how sure their place is, 0 to 1."""
+    away = edges.middles() - grid.pose[:2] / grid.cell_m
     range_m = np.hypot(away[:, 0], away[:, 1]) * grid.cell_m
     certainty = grid.certainty(range_m, config.range_sd_share)
 
-    crossed = crossings(starts, ends)
+    crossed = crossings(edges.starts, edges.ends)
     i = crossed.i - grid.extent.lower[0]
     j = crossed.j - grid.extent.lower[1]
     width, height = grid.extent.shape
@@ -153,41 +184,28 @@ def _free(seen: Seen, known: Window) -> Floats:
     Those between place nodes that are both seen as road are. A ray passes over a kerb: that it
     passes through both place nodes is believed where the ground at both is of one kind, and less.
     """
-    road_between = seen.is_road & _beyond(seen.is_road)
-    clear_between = seen.is_clear & _beyond(seen.is_clear)
-
     road = np.maximum(known.column(PlaceColumn.ROAD), seen.is_road)
-    same_ground = np.abs(road - _beyond(road)) < ROAD_STEP
+    here = np.stack([seen.is_road, seen.is_clear, road])
+    there = _beyond(here)
+
+    road_between = (here[0] > 0) & (there[:, 0] > 0)
+    clear_between = (here[1] > 0) & (there[:, 1] > 0)
+    same_ground = np.abs(road - there[:, 2]) < ROAD_STEP
 
     sure = np.where(road_between, 1.0, np.where(clear_between & same_ground, RAY_CERTAINTY, 0.0))
     return sure * seen.certainty
 
 
-def _beyond(values: Any) -> Any:
-    """(4, w, h): of each link of (w, h) cells, the value at its other end; 0 outside."""
-    width, height = values.shape
-    padded = np.pad(values, 1)
+def _beyond(values: Singles) -> Singles:
+    """(4, k, w, h): of each link of (k, w, h) cells, the values at its other end; 0 outside."""
+    number, width, height = values.shape
+    padded = np.zeros((number, width + 2, height + 2), values.dtype)
+    padded[:, 1:-1, 1:-1] = values
+
     shifted = []
     for di, dj in LINK_OFFSETS.tolist():
         rows = slice(1 + di, 1 + di + width)
         columns = slice(1 + dj, 1 + dj + height)
-        shifted.append(padded[rows, columns])
+        shifted.append(padded[:, rows, columns])
 
-    stacked: Any = np.stack(shifted)
-    return stacked
-
-
-def _links(grid: LocalGrid, known: Window, cut: Floats, free: Floats) -> list[Operation]:
-    """The operations that write the links' evidence and weights as they are after this view."""
-    evidence = known.evidence()
-    after = accumulated(evidence, cut, free)
-    known_weights = known.weights()
-    weights = np.where(after != evidence, weights_of(after), known_weights)
-
-    operations = []
-    for column, before, now in zip(EVIDENCE_COLUMNS, evidence, after, strict=True):
-        operations += grid.changed(column, before, now)
-    for column, before, now in zip(WEIGHT_COLUMNS, known_weights, weights, strict=True):
-        operations += grid.changed(column, before, now)
-
-    return operations
+    return np.stack(shifted)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from cogmap.geometry.arrays import Floats, Indices, Singles
-from cogmap.geometry.se2 import mean_pose, transform_from
+from cogmap.geometry.se2 import transform_from
 from cogmap.graph.window import Extent
 from schemas.array import Array
 from schemas.graph import Cells, Operation
@@ -31,7 +32,7 @@ class LocalGrid:
     @classmethod
     def around(cls, agent: Self, cell_m: float, reach_m: float) -> LocalGrid:
         """The cells within `reach_m` of the agent, and some more."""
-        pose = mean_pose(agent.samples.numpy())
+        pose = np.array([agent.x_m, agent.y_m, agent.heading_rad])
         here = np.rint(pose[:2] / cell_m).astype(np.int64)
         reach = int(np.ceil(reach_m / cell_m)) + MARGIN_CELLS
         lower_i, lower_j = (here - reach).tolist()
@@ -75,17 +76,28 @@ class LocalGrid:
         found = np.bincount(i * height + j, minlength=width * height)
         return found.reshape(width, height)
 
-    def changed(self, column: PlaceColumn, before: Singles, after: Singles) -> list[Operation]:
-        """The operation that writes the cells of a column whose value changes, if any does."""
-        is_changed = after != before
-        if not is_changed.any():
-            return []
+    def changed(
+        self, columns: Sequence[PlaceColumn], before: Singles, after: Singles
+    ) -> list[Operation]:
+        """The operations that write the cells whose value in one of k columns changes, from
+        (k, w, h) `before` to `after`; none of a column that does not.
+        """
+        column, i, j = np.nonzero(after != before)
+        cells = np.column_stack([i, j]).astype(np.int32) + np.int32(self.extent.lower)
+        values = after[column, i, j]
+        ends = np.searchsorted(column, np.arange(len(columns)), side="right").tolist()
 
-        cells = np.argwhere(is_changed) + self.extent.lower
-        operation = Cells(
-            map=self.map_id,
-            column=column,
-            cells=Array.of(cells, "<i4"),
-            values=Array.of(after[is_changed], "<f4"),
-        )
-        return [operation]
+        operations: list[Operation] = []
+        start = 0
+        for name, end in zip(columns, ends, strict=True):
+            if end > start:
+                operation = Cells(
+                    map=self.map_id,
+                    column=name,
+                    cells=Array.of(cells[start:end], "<i4"),
+                    values=Array.of(values[start:end], "<f4"),
+                )
+                operations.append(operation)
+            start = end
+
+        return operations

@@ -91,9 +91,8 @@ def _road(
     is_in_view = (points > 0) | is_missed
     certainty = grid.certainty(range_m, config.range_sd_share)
     window = graph.places.window(grid.map_id, [PlaceColumn.ROAD], grid.extent)
-    before = window.column(PlaceColumn.ROAD)
-    after = blended(before, shares, np.where(is_in_view, certainty, 0.0))
-    return grid.changed(PlaceColumn.ROAD, before, after)
+    after = blended(window.values, shares, np.where(is_in_view, certainty, 0.0))
+    return grid.changed(window.columns, window.values, after)
 
 
 def _near_m(points_m: Array) -> Floats:
