@@ -23,7 +23,7 @@ from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.array import Array
 from schemas.graph import Snapshot
-from schemas.sensing import Percepts, RangeScan, SelfMotion
+from schemas.sensing import Percepts, SelfMotion
 from services import registry
 
 AGENT = "benchmark"
@@ -85,7 +85,9 @@ def join(learned: Snapshot) -> Joined:
     """Measure a worker of its own process. Raises CogmapError where it answers nothing in time."""
     endpoint = free_endpoint()
     router = open_router(endpoint)
-    workspace = registry.build("workspace", sections())
+    configured = sections()
+    without_scans = configured["workspace"] | {"awaits_scan": False}
+    workspace = registry.build("workspace", configured | {"workspace": without_scans})
     if workspace.restore is not None:
         workspace.restore([learned])
 
@@ -126,11 +128,11 @@ def _join_late(endpoint: str) -> Joined:
 
 def _senses() -> Module:
     module = Module("senses")
-    module.emits.update((topics.SELF_MOTION, topics.SCAN, topics.PERCEPTS))
+    module.emits.update((topics.SELF_MOTION, topics.PERCEPTS))
     return module
 
 
-def _first_view() -> list[SelfMotion | RangeScan | Percepts]:
+def _first_view() -> list[SelfMotion | Percepts]:
     """A view of nothing, and the motion up to it."""
     stamp_ns = 1_000_000_000
     motions = np.array([[1.0, 0.0, 1.0, 0.1, 0.01]])
@@ -147,9 +149,7 @@ def _first_view() -> list[SelfMotion | RangeScan | Percepts]:
         objects=[],
         road_m=Array.of(no_road_m),
     )
-    nothing = Array.of(np.zeros(0, np.float32))
-    scan = RangeScan(stamp_ns=stamp_ns, frame=0, bearing_rad=nothing, range_m=nothing)
-    return [motion, scan, percepts]
+    return [motion, percepts]
 
 
 def _serve(shell: Shell, ended: threading.Event) -> None:
