@@ -83,7 +83,7 @@ class LocalGrid:
         (k, w, h) `before` to `after`; none of a column that does not.
         """
         column, i, j = np.nonzero(after != before)
-        cells = np.column_stack([i, j]).astype(np.int32) + np.int32(self.extent.lower)
+        cells = np.column_stack([i, j]) + self.extent.lower
         values = after[column, i, j]
         ends = np.searchsorted(column, np.arange(len(columns)), side="right").tolist()
 
