@@ -56,7 +56,7 @@ def _change(closure: StreetClosure, connect: str, agent: str) -> None:
         publisher = Publisher(bus, topics.STREET_CLOSURE, closure)
         if not _is_answered(publisher, towns, closure):
             raise NoAnswerError(
-                f"no street {closure.street!r} was {_done(closure)} within {ANSWER_S:g} s: see that "
+                f"no street {closure.street!r} was {_done(closure)} within {ANSWER_S} s: see that "
                 f"the simulation runs, and for the names `cogmap topic echo --once truth/town`"
             )
 

@@ -93,47 +93,73 @@ class ColumnCamera:
         left_m = ends_m[..., 1]
 
         is_before = (forward_m > NEAR_M).any(axis=1)
-        beyond_left = (left_m > self.left_slope[0] * forward_m).all(axis=1)
-        beyond_right = (left_m < self.left_slope[-1] * forward_m).all(axis=1)
-        return np.asarray(is_before & ~beyond_left & ~beyond_right)
+
+        left_border_m = self.left_slope[0] * forward_m
+        right_border_m = self.left_slope[-1] * forward_m
+        beyond_left = (left_m > left_border_m).all(axis=1)
+        beyond_right = (left_m < right_border_m).all(axis=1)
+
+        is_beside = beyond_left | beyond_right
+        return np.asarray(is_before & ~is_beside)
 
     def _inverse_depths(self, ends_m: Floats) -> Floats:
         """(n, width): the inverse depth of (n, 2, 2) segments in each column, 0 where they are not
         seen.
         """
         clipped_m = _before_camera(ends_m)
-        start_m = clipped_m[:, 0]
-        end_m = clipped_m[:, 1]
+        at_axis, by_slope = _inverse_depth_of_lines(clipped_m)
+        inverse_m: Floats = at_axis[:, None] + by_slope[:, None] * self.left_slope
 
-        # The line through both ends: normal . point = offset.
-        along_m = end_m - start_m
-        normal_forward = -along_m[:, 1]
-        normal_left = along_m[:, 0]
-        offset_m2 = normal_forward * start_m[:, 0] + normal_left * start_m[:, 1]
-
-        is_edge_on = np.abs(offset_m2) < _EDGE_ON_M
-        safe_m2 = np.where(is_edge_on, 1.0, offset_m2)
-        at_axis = (normal_forward / safe_m2)[:, None]
-        by_slope = (normal_left / safe_m2)[:, None]
-        inverse_m: Floats = at_axis + by_slope * self.left_slope
-
-        slopes = clipped_m[..., 1] / clipped_m[..., 0]
-        lowest = slopes.min(axis=1)[:, None]
-        highest = slopes.max(axis=1)[:, None]
-        is_outside = (self.left_slope < lowest) | (self.left_slope > highest)
-        inverse_m[is_outside | is_edge_on[:, None]] = 0.0
+        is_outside = self._is_outside(clipped_m)
+        inverse_m[is_outside] = 0.0
         return inverse_m
+
+    def _is_outside(self, ends_m: Floats) -> Booleans:
+        """(n, width): which columns lie beside (n, 2, 2) segments, whose ends are before the
+        camera.
+        """
+        forward_m = ends_m[..., 0]
+        left_m = ends_m[..., 1]
+
+        slopes = left_m / forward_m
+        lowest = slopes.min(axis=1)
+        highest = slopes.max(axis=1)
+
+        is_right = self.left_slope < lowest[:, None]
+        is_left = self.left_slope > highest[:, None]
+        return np.asarray(is_right | is_left)
+
+
+def _inverse_depth_of_lines(ends_m: Floats) -> tuple[Floats, Floats]:
+    """(n,) each: the inverse depth of the lines through (n, 2, 2) segments on the optical axis, and
+    its change with the slope to the left; 0 for lines through the camera.
+    """
+    start_m = ends_m[:, 0]
+    along_m = ends_m[:, 1] - start_m
+
+    # Of the points of a line: normal . point = offset.
+    normal_forward = -along_m[:, 1]
+    normal_left = along_m[:, 0]
+    forward_part_m2 = normal_forward * start_m[:, 0]
+    left_part_m2 = normal_left * start_m[:, 1]
+    offset_m2 = forward_part_m2 + left_part_m2
+
+    is_edge_on = np.abs(offset_m2) < _EDGE_ON_M
+    offset_m2[is_edge_on] = np.inf
+    return normal_forward / offset_m2, normal_left / offset_m2
 
 
 def _before_camera(ends_m: Floats) -> Floats:
     """(n, 2, 2) segments, cut off at NEAR_M before the camera."""
     forward_m = ends_m[..., 0]
-    change_m = forward_m[:, 1] - forward_m[:, 0]
+    start_m = ends_m[:, 0]
+    along_m = ends_m[:, 1] - start_m
+
+    change_m = along_m[:, 0]
     is_level = np.abs(change_m) < _EDGE_ON_M
-    share = (NEAR_M - forward_m[:, 0]) / np.where(is_level, 1.0, change_m)
+    divisor_m = np.where(is_level, 1.0, change_m)
+    share = (NEAR_M - start_m[:, 0]) / divisor_m
 
-    along_m = ends_m[:, 1] - ends_m[:, 0]
-    cut_m = ends_m[:, 0] + share[:, None] * along_m
-
+    cut_m = start_m + share[:, None] * along_m
     is_behind = forward_m < NEAR_M
     return np.where(is_behind[..., None], cut_m[:, None], ends_m)

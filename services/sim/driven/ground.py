@@ -4,12 +4,12 @@ of each cell. Pure.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import minimum_filter1d
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices, Singles
+from cogmap.geometry.se2 import rotate
 from services.sim.driven.camera import ColumnCamera
 from services.sim.layout.boundaries import Surfaces
 
@@ -23,27 +23,41 @@ _CELLS = round(MAX_RANGE_M / CELL_M) + 1
 
 
 class Lattice:
-    """Points on the ground in the field of view, fixed to the robot."""
+    """Points on the ground in the field of view, fixed to the robot: where they are, (n, 2), their
+    depth and image column, and the cell that each is in, numbered from 0, (n,).
+    """
 
     def __init__(self, camera: ColumnCamera) -> None:
-        step_m = CELL_M / POINTS_A_CELL
-        at_m = np.arange(-MAX_RANGE_M + step_m / 2, MAX_RANGE_M, step_m)
-        forward_m, left_m = np.meshgrid(at_m, at_m, indexing="ij")
-        points_m = np.column_stack([forward_m.ravel(), left_m.ravel()])
-
-        mount = camera.mount
-        depth_m = points_m[:, 0] - mount.mount_forward_m
+        points_m = _square_m()
+        depth_m = points_m[:, 0] - camera.mount.mount_forward_m
         is_ahead = depth_m > nearest_ground_m(camera)
         is_in_range = np.hypot(*points_m.T) <= MAX_RANGE_M
-        points_m = points_m[is_ahead & is_in_range]
 
-        depth_m = points_m[:, 0] - mount.mount_forward_m
-        column = camera.column(depth_m, points_m[:, 1])
+        ahead = np.flatnonzero(is_ahead & is_in_range)
+        column = camera.column(depth_m[ahead], points_m[ahead, 1])
         is_seen = _is_inside(column, camera.width)
+        seen = ahead[is_seen]
 
-        self.points_m = points_m[is_seen]
-        self.depth_m = depth_m[is_seen]
+        self.points_m = points_m[seen]
+        self.depth_m = depth_m[seen]
         self.column: Indices = np.rint(column[is_seen]).astype(np.int64)
+        cells, self.cell = np.unique(_cell_numbers(self.points_m), return_inverse=True)
+        self.cells = len(cells)
+
+    def thinned(self, chosen: Indices) -> Singles:
+        """(k, 2): the mean of the chosen points in each cell, in the order of the cells."""
+        return _means_m(self.points_m[chosen], self.cell[chosen], self.cells)
+
+
+def _square_m() -> Floats:
+    """(n, 2): points on all sides of the robot."""
+    step_m = CELL_M / POINTS_A_CELL
+    first_m = step_m / 2 - MAX_RANGE_M
+    at_m = np.arange(first_m, MAX_RANGE_M, step_m)
+
+    forward_m, left_m = np.meshgrid(at_m, at_m, indexing="ij")
+    points_m = np.stack([forward_m, left_m], axis=-1)
+    return points_m.reshape(-1, 2)
 
 
 def nearest_ground_m(camera: ColumnCamera) -> float:
@@ -61,31 +75,28 @@ def road_points_m(
 
     `error_m` is by how much the street is seen beside its place.
     """
-    is_visible = lattice.depth_m < depth_m[lattice.column]
-    visible_m = lattice.points_m[is_visible]
-
-    is_road = is_on_street(visible_m - error_m, pose, streets)
-    return thin(visible_m[is_road])
+    visible = np.flatnonzero(lattice.depth_m < depth_m[lattice.column])
+    seen_m = lattice.points_m[visible] - error_m
+    is_road = is_on_street(seen_m, pose, streets)
+    return lattice.thinned(visible[is_road])
 
 
 def is_on_street(points_m: Floats, pose: Floats, streets: Surfaces) -> Booleans:
     """(k,): which of (k, 2) points in the robot's frame lie on a street."""
-    cos = math.cos(pose[2])
-    sin = math.sin(pose[2])
-    robot_along_m, robot_left_m = streets.local(pose[None, :2])
-    ahead = streets.ahead[:, 0] * cos + streets.ahead[:, 1] * sin
-    left = streets.ahead[:, 1] * cos - streets.ahead[:, 0] * sin
+    here_along_m, here_left_m = streets.local(pose[None, :2])
+    # Each street's directions along and to the left, in the robot's frame.
+    along = rotate(streets.ahead, -pose[2])
+    left = np.column_stack([-along[:, 1], along[:, 0]])
 
-    on_street = np.zeros(len(points_m), bool)
-    forward_m, sideways_m = points_m.T
-    for number in range(len(ahead)):
-        along_m = robot_along_m[0, number] + forward_m * ahead[number] + sideways_m * left[number]
-        aside_m = robot_left_m[0, number] + sideways_m * ahead[number] - forward_m * left[number]
-        is_along = np.abs(along_m) <= streets.half_length_m[number]
-        is_across = np.abs(aside_m) <= streets.half_width_m[number]
-        on_street |= is_along & is_across
+    from_here_m = points_m @ along.T
+    beside_here_m = points_m @ left.T
+    along_m = here_along_m + from_here_m
+    left_m = here_left_m + beside_here_m
 
-    return on_street
+    is_along = np.abs(along_m) <= streets.half_length_m
+    is_across = np.abs(left_m) <= streets.half_width_m
+    is_inside = is_along & is_across
+    return np.asarray(is_inside.any(axis=1))
 
 
 def boundary_points_m(
@@ -115,9 +126,8 @@ def _is_inside(column: Floats, width: int, border: float = 0.0) -> Booleans:
 
 def _least_around(depth_m: Floats) -> Floats:
     """(width,): the least depth within BESIDE_PX columns of each."""
-    padded = np.pad(depth_m, BESIDE_PX, mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * BESIDE_PX + 1)
-    return np.asarray(windows.min(axis=1))
+    least_m: Floats = minimum_filter1d(depth_m, 2 * BESIDE_PX + 1, mode="nearest")
+    return least_m
 
 
 def thin(points_m: Floats) -> Singles:
@@ -125,11 +135,15 @@ def thin(points_m: Floats) -> Singles:
     range_m = np.hypot(points_m[:, 0], points_m[:, 1])
     near_m = points_m[range_m <= MAX_RANGE_M]
     cell = _cell_numbers(near_m)
+    return _means_m(near_m, cell, 1)
 
-    count = np.bincount(cell, minlength=1)
+
+def _means_m(points_m: Floats, cell: npt.NDArray[np.intp], cells: int) -> Singles:
+    """(k, 2): the mean of the points (n, 2) in each of the cells that they are in, (n,)."""
+    count = np.bincount(cell, minlength=cells)
     occupied = np.flatnonzero(count)
-    sum_x_m = np.bincount(cell, near_m[:, 0], minlength=1)
-    sum_y_m = np.bincount(cell, near_m[:, 1], minlength=1)
+    sum_x_m = np.bincount(cell, points_m[:, 0], minlength=cells)
+    sum_y_m = np.bincount(cell, points_m[:, 1], minlength=cells)
     sums_m = np.column_stack([sum_x_m[occupied], sum_y_m[occupied]])
 
     means_m = sums_m / count[occupied, None]
@@ -138,6 +152,10 @@ def thin(points_m: Floats) -> Singles:
 
 def _cell_numbers(points_m: Floats) -> npt.NDArray[np.intp]:
     """The number of the cell of each point (n, 2), x before y."""
-    cells = np.floor(points_m / CELL_M).astype(np.intp) + _CELLS
-    row, column = cells.T
-    return np.asarray(row * 2 * _CELLS + column)
+    in_cells = points_m / CELL_M
+    lower = np.floor(in_cells).astype(np.intp)
+    row, column = lower.T + _CELLS
+
+    columns = 2 * _CELLS
+    numbers = row * columns + column
+    return np.asarray(numbers)

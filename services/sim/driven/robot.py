@@ -49,28 +49,36 @@ class KinematicRobot:
 
     def advance(self, dt_s: float) -> None:
         """Move for `dt_s`, as far as nothing is in the way."""
-        before = self._wheels_rad_s
-        after = self._accelerated(dt_s)
-        left_m_s = WHEEL_RADIUS_M * (before[0] + after[0]) / 2
-        right_m_s = WHEEL_RADIUS_M * (before[1] + after[1]) / 2
+        distance_m, turn_rad = self._step(dt_s)
 
-        distance_m = dt_s * (left_m_s + right_m_s) / 2
-        turn_rad = dt_s * (right_m_s - left_m_s) / TRACK_M
         x_m, y_m, heading_rad = self._pose
         middle_rad = heading_rad + turn_rad / 2
         to_rad = math.remainder(heading_rad + turn_rad, math.tau)
         to_x_m = x_m + distance_m * math.cos(middle_rad)
         to_y_m = y_m + distance_m * math.sin(middle_rad)
 
-        self._wheels_rad_s = after
         if distance_m and self._is_in_the_way(to_x_m, to_y_m):
             self._stop()
             self._pose = (x_m, y_m, to_rad)
             return
 
         self._pose = (to_x_m, to_y_m, to_rad)
-        self._is_touching = self._is_touching and self._clearance_m() < RELEASED_M
         self.travelled_m += abs(distance_m)
+        if self._is_touching and self._clearance_m() >= RELEASED_M:
+            self._is_touching = False
+
+    def _step(self, dt_s: float) -> tuple[float, float]:
+        """How far the wheels roll in `dt_s`, and by how much they turn the body."""
+        left_before, right_before = self._wheels_rad_s
+        self._wheels_rad_s = self._accelerated(dt_s)
+        left_after, right_after = self._wheels_rad_s
+
+        left_m = dt_s * WHEEL_RADIUS_M * (left_before + left_after) / 2
+        right_m = dt_s * WHEEL_RADIUS_M * (right_before + right_after) / 2
+
+        distance_m = (left_m + right_m) / 2
+        turn_rad = (right_m - left_m) / TRACK_M
+        return distance_m, turn_rad
 
     def _accelerated(self, dt_s: float) -> tuple[float, float]:
         """The wheels' speeds after `dt_s`."""

@@ -4,6 +4,7 @@ plan, with the errors that they were measured to make. Pure.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -75,30 +76,42 @@ class Sensors:
         """Bearing and range of the nearest in each sector, range 0 where there is nothing."""
         middle_rad, nearest_m = scan(self._camera, depth_m)
         factor = self._rng.normal(1.0, self._errors.range_sd_share, SECTORS)
-        return middle_rad.astype(np.float32), (nearest_m * factor).astype(np.float32)
+        noisy_m = nearest_m * factor
+
+        return middle_rad.astype(np.float32), noisy_m.astype(np.float32)
 
     def _ground(self, at: Floats, depth_m: Floats, near: Near) -> tuple[Singles, Singles]:
         """Points of the road and of its boundary. Both are seen beside their place by one error;
         each point of the boundary has one of its own.
         """
-        variance_m2 = self._errors.road_edge_sd_m**2
-        common_m = self._rng.normal(0.0, np.sqrt(COMMON_SHARE * variance_m2), 2)
+        sd_m = self._errors.road_edge_sd_m
+        common_m = self._rng.normal(0.0, sd_m * math.sqrt(COMMON_SHARE), 2)
         road_m = road_points_m(self._lattice, at, depth_m, near.streets, common_m)
 
-        exact_m = boundary_points_m(self._camera, at, depth_m, near.kerbs_m, common_m)
-        thinned_m = thin(exact_m)
-        own_sd_m = np.sqrt((1 - COMMON_SHARE) * variance_m2)
+        seen_m = boundary_points_m(self._camera, at, depth_m, near.kerbs_m, common_m)
+        thinned_m = thin(seen_m)
+
+        own_sd_m = sd_m * math.sqrt(1 - COMMON_SHARE)
         own_m = self._rng.normal(0.0, own_sd_m, thinned_m.shape)
-        return road_m, (thinned_m + own_m).astype(np.float32)
+        boundary_m = thinned_m + own_m
+        return road_m, boundary_m.astype(np.float32)
 
     def _objects(self, pose: Pose, at: Floats, walls: Buffer, near: Near) -> list[Percept]:
         """Percepts of the buildings that no other hides."""
         segment = walls.segment[walls.segment != NOTHING]
-        columns = np.bincount(near.plot[segment], minlength=len(self._corners_m))
+        shown = near.plot[segment]
+        columns = np.bincount(shown, minlength=len(self._corners_m))
 
-        in_view = self._percepts.in_view(pose)
-        visible = [number for number in in_view if columns[number] >= MIN_COLUMNS]
-        cut = [number for number in visible if self._is_cut(at, number, int(columns[number]))]
+        visible = []
+        cut = []
+        for number in self._percepts.in_view(pose):
+            if columns[number] < MIN_COLUMNS:
+                continue
+
+            visible.append(number)
+            if self._is_cut(at, number, int(columns[number])):
+                cut.append(number)
+
         return self._percepts.perceive(pose, visible, cut)
 
     def _is_cut(self, at: Floats, number: int, columns: int) -> bool:
@@ -109,8 +122,12 @@ class Sensors:
             return True
 
         column = self._camera.column(forward_m, left_m)
-        is_inside = column.min() >= 1 and column.max() <= self._camera.width - 2
-        return bool(not is_inside or columns < WHOLE_SHARE * np.ptp(column))
+        leftmost = float(column.min())
+        rightmost = float(column.max())
+        if leftmost < 1 or rightmost > self._camera.width - 2:
+            return True
+
+        return columns < WHOLE_SHARE * (rightmost - leftmost)
 
 
 def scan(camera: ColumnCamera, depth_m: Floats) -> tuple[Floats, Floats]:
@@ -122,15 +139,16 @@ def scan(camera: ColumnCamera, depth_m: Floats) -> tuple[Floats, Floats]:
     seen_m = np.maximum(depth_m[is_measured], NEAREST_M)
     forward_m = seen_m + camera.mount.mount_forward_m
     left_m = camera.left_slope[is_measured] * seen_m
+    range_m = np.hypot(forward_m, left_m)
     bearing_rad = np.arctan2(left_m, forward_m)
 
     half_rad = camera.half_field_of_view_rad
     sector_rad = 2 * half_rad / SECTORS
-    from_left = np.floor((half_rad - bearing_rad) / sector_rad).astype(np.int64)
-    sector = from_left.clip(0, SECTORS - 1)
+    from_left_rad = half_rad - bearing_rad
+    sector = np.floor(from_left_rad / sector_rad).astype(np.int64)
 
     nearest_m: Floats = np.full(SECTORS, np.inf)
-    np.minimum.at(nearest_m, sector, np.hypot(forward_m, left_m))
+    np.minimum.at(nearest_m, sector.clip(0, SECTORS - 1), range_m)
     nearest_m[np.isinf(nearest_m)] = 0.0
 
     middles = np.arange(SECTORS, dtype=float) + 0.5

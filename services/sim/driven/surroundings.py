@@ -68,50 +68,70 @@ class Surroundings:
         return self._near
 
     def _search(self, x_m: float, y_m: float) -> Near:
-        is_near = _within(self._walls_m, x_m, y_m, REACH_M + MOVED_M)
+        reach_m = REACH_M + MOVED_M
         seen_m = np.vstack([self._seen_props_m, self._closing_m])
-        is_obstacle = _within(seen_m, x_m, y_m, REACH_M + MOVED_M)
+        is_wall = _within(self._walls_m, x_m, y_m, reach_m)
+        is_seen = _within(seen_m, x_m, y_m, reach_m)
+
         solid_m = np.vstack([self._walls_m, self._solid_props_m, self._closing_m])
         is_solid = _within(solid_m, x_m, y_m, BODY_REACH_M + MOVED_M)
 
-        ground_m = GROUND_REACH_M + MOVED_M
-        kerb_m = np.hypot(self._kerbs_m[:, 0] - x_m, self._kerbs_m[:, 1] - y_m)
-        half_m = self._streets.half_length_m + self._streets.half_width_m
-        street_m = np.hypot(*(self._streets.middle_m - (x_m, y_m)).T)
-
         return Near(
-            walls_m=self._walls_m[is_near],
-            plot=self._plots[is_near],
-            obstacles_m=seen_m[is_obstacle],
+            walls_m=self._walls_m[is_wall],
+            plot=self._plots[is_wall],
+            obstacles_m=seen_m[is_seen],
             solid_m=solid_m[is_solid],
-            kerbs_m=self._kerbs_m[kerb_m <= ground_m],
-            streets=self._streets.chosen(street_m <= ground_m + half_m),
+            kerbs_m=self._near_kerbs_m(x_m, y_m),
+            streets=self._near_streets(x_m, y_m),
         )
+
+    def _near_kerbs_m(self, x_m: float, y_m: float) -> Floats:
+        away_m = self._kerbs_m - (x_m, y_m)
+        range_m = np.hypot(away_m[:, 0], away_m[:, 1])
+        near_m: Floats = self._kerbs_m[range_m <= GROUND_REACH_M + MOVED_M]
+        return near_m
+
+    def _near_streets(self, x_m: float, y_m: float) -> Surfaces:
+        streets = self._streets
+        away_m = streets.middle_m - (x_m, y_m)
+        range_m = np.hypot(away_m[:, 0], away_m[:, 1])
+
+        half_m = streets.half_length_m + streets.half_width_m
+        return streets.chosen(range_m <= GROUND_REACH_M + MOVED_M + half_m)
 
 
 def _within(segments_m: Floats, x_m: float, y_m: float, reach_m: float) -> Booleans:
     """(n,): which of (n, 4) segments have a bounding box that comes within reach, along both
     axes.
     """
-    west_m = np.minimum(segments_m[:, 0], segments_m[:, 2])
-    east_m = np.maximum(segments_m[:, 0], segments_m[:, 2])
-    south_m = np.minimum(segments_m[:, 1], segments_m[:, 3])
-    north_m = np.maximum(segments_m[:, 1], segments_m[:, 3])
+    at_m = np.array([x_m, y_m])
+    one_end_m = segments_m[:, :2]
+    other_end_m = segments_m[:, 2:]
 
-    is_near_x = (west_m <= x_m + reach_m) & (east_m >= x_m - reach_m)
-    is_near_y = (south_m <= y_m + reach_m) & (north_m >= y_m - reach_m)
-    return np.asarray(is_near_x & is_near_y)
+    low_m = np.minimum(one_end_m, other_end_m)
+    high_m = np.maximum(one_end_m, other_end_m)
+
+    begins_before = low_m <= at_m + reach_m
+    ends_behind = high_m >= at_m - reach_m
+    is_near = begins_before & ends_behind
+    return np.asarray(is_near.all(axis=1))
 
 
 def _points_along(segments_m: Floats) -> Floats:
     """(k, 2): points along (n, 4) segments, KERB_STEP_M apart at most."""
     starts_m = segments_m[:, :2]
     along_m = segments_m[:, 2:] - starts_m
-    counts = np.ceil(np.hypot(*along_m.T) / KERB_STEP_M).astype(int).clip(1)
+    lengths_m = np.hypot(along_m[:, 0], along_m[:, 1])
 
-    number = np.repeat(np.arange(len(segments_m)), counts)
-    first = np.repeat(np.cumsum(counts) - counts, counts)
-    share = (np.arange(len(number)) - first + 0.5) / counts[number]
+    needed = np.ceil(lengths_m / KERB_STEP_M)
+    counts = needed.astype(int).clip(1)
+    firsts = np.cumsum(counts) - counts
 
-    points_m: Floats = starts_m[number] + share[:, None] * along_m[number]
+    # Of each point: the number of its segment, and its place among the points of that one.
+    segment = np.repeat(np.arange(len(segments_m)), counts)
+    place = np.arange(len(segment)) - firsts[segment]
+    share = (place + 0.5) / counts[segment]
+
+    offset_m = share[:, None] * along_m[segment]
+    points_m: Floats = starts_m[segment] + offset_m
     return points_m
