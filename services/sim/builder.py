@@ -23,7 +23,9 @@ class Builder:
         """The ground around and between the streets, which carries the robot."""
         half_m = (scenery.GROUND_M, scenery.GROUND_M, 1.0)
         floor = self._bodies.box(half_m, middle_m=-1.0)
-        return self._bodies.add(self._bodies.painted(scenery.grass(), self._grass), floor)
+        model = self._bodies.painted(scenery.grass(), self._grass)
+
+        return self._bodies.add(model, floor)
 
     def sky(self) -> int:
         """The ring of hills and clouds."""
@@ -52,7 +54,10 @@ class Builder:
     def _prism(self, plot: Plot) -> int:
         """A building that is no rectangle."""
         at_m = (plot.x_m, plot.y_m)
-        outline = [(x - plot.x_m, y - plot.y_m) for x, y in plot.outline]
+        outline = []
+        for x_m, y_m in plot.outline:
+            outline.append((x_m - plot.x_m, y_m - plot.y_m))
+
         model = self._bodies.model(*mesh.prism(plot.kind, outline))
         solid = self._bodies.walls(outline, plot.kind.height_m)
         return self._bodies.add(model, solid, at_m)
@@ -60,8 +65,10 @@ class Builder:
     def prop(self, prop: Prop, is_solid: bool) -> int:
         """A prop, which nothing passes where it is solid."""
         model = self._bodies.model(*prop_shapes.shape(prop))
+        at_m = (prop.x_m, prop.y_m)
         solid = self._box(prop.solid_size_m) if is_solid else NOT_SOLID
-        return self._bodies.add(model, solid, (prop.x_m, prop.y_m), prop.heading_rad)
+
+        return self._bodies.add(model, solid, at_m, prop.heading_rad)
 
     def _box(self, size_m: tuple[float, float, float]) -> int:
         length_m, width_m, height_m = size_m

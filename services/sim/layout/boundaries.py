@@ -33,11 +33,13 @@ class Surfaces(NamedTuple):
         """(k, n) each: how far (k, 2) points are from each middle, along the street and to its
         left.
         """
-        x_m = points_m[:, :1] - self.middle_m[:, 0]
-        y_m = points_m[:, 1:] - self.middle_m[:, 1]
+        ahead_x, ahead_y = self.ahead.T
+        middle_x_m, middle_y_m = self.middle_m.T
+        x_m = points_m[:, :1] - middle_x_m
+        y_m = points_m[:, 1:] - middle_y_m
 
-        along_m = x_m * self.ahead[:, 0] + y_m * self.ahead[:, 1]
-        left_m = y_m * self.ahead[:, 0] - x_m * self.ahead[:, 1]
+        along_m = x_m * ahead_x + y_m * ahead_y
+        left_m = y_m * ahead_x - x_m * ahead_y
         return along_m, left_m
 
     def chosen(self, numbers: Booleans) -> Surfaces:
@@ -80,9 +82,12 @@ def clearance_m(segments_m: Floats, x_m: float, y_m: float) -> float:
     along_m = segments_m[:, 2:] - start_m
     to_point_m = (x_m, y_m) - start_m
 
-    length_m2 = np.maximum((along_m**2).sum(axis=1), 1e-12)
-    share = ((to_point_m * along_m).sum(axis=1) / length_m2).clip(0.0, 1.0)
-    away_m = to_point_m - share[:, None] * along_m
+    length_m2 = (along_m**2).sum(axis=1)
+    dot_m2 = (to_point_m * along_m).sum(axis=1)
+    share = dot_m2 / np.maximum(length_m2, _SAME_M**2)
+
+    foot_m = share.clip(0.0, 1.0)[:, None] * along_m
+    away_m = to_point_m - foot_m
     return float(np.hypot(away_m[:, 0], away_m[:, 1]).min())
 
 
@@ -135,20 +140,19 @@ def _uncovered(sides: Floats, owners: Indices, streets: Surfaces) -> list[list[f
 def _covered(sides: Floats, owners: Indices, streets: Surfaces) -> tuple[Floats, Floats]:
     """(k, n) each: from which to which share of its length each side lies on each street."""
     numbers = np.arange(len(streets.half_width_m))
-    is_before = numbers < owners[:, None]
-    wider_m = np.where(is_before, _SAME_M, -_SAME_M)
+    owner = owners[:, None]
+    wider_m = np.where(numbers < owner, _SAME_M, -_SAME_M)
+    half_length_m = streets.half_length_m + wider_m
+    half_width_m = streets.half_width_m + wider_m
 
     start_along_m, start_left_m = streets.local(sides[:, :2])
     end_along_m, end_left_m = streets.local(sides[:, 2:])
+    along_begin, along_end = _crossing(start_along_m, end_along_m, half_length_m)
+    left_begin, left_end = _crossing(start_left_m, end_left_m, half_width_m)
 
-    along = _crossing(start_along_m, end_along_m, streets.half_length_m + wider_m)
-    across = _crossing(start_left_m, end_left_m, streets.half_width_m + wider_m)
-
-    begins = np.maximum(along[0], across[0]).clip(0.0, 1.0)
-    ends = np.minimum(along[1], across[1]).clip(0.0, 1.0)
-
-    is_own = numbers == owners[:, None]
-    ends[is_own] = 0.0
+    begins = np.maximum(along_begin, left_begin).clip(0.0, 1.0)
+    ends = np.minimum(along_end, left_end).clip(0.0, 1.0)
+    ends[numbers == owner] = 0.0
     return begins, ends
 
 
@@ -165,10 +169,10 @@ def _crossing(start_m: Floats, end_m: Floats, half_m: Floats) -> tuple[Floats, F
     begin = np.minimum(at_low, at_high)
     end = np.maximum(at_low, at_high)
 
+    # What runs along is inside from the start to the end, or nowhere.
     is_inside = np.abs(start_m) <= half_m
-    begin = np.where(is_level, np.where(is_inside, -math.inf, math.inf), begin)
-    end = np.where(is_level, np.where(is_inside, math.inf, -math.inf), end)
-    return begin, end
+    reach = np.where(is_inside, math.inf, -math.inf)
+    return np.where(is_level, -reach, begin), np.where(is_level, reach, end)
 
 
 def _gaps(starts: Floats, stops: Floats, shortest: float) -> list[tuple[float, float]]:

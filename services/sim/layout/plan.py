@@ -138,22 +138,21 @@ class Plot:
 
 def corners(middle: Point, heading_rad: float, size_m: Point) -> tuple[Point, Point, Point, Point]:
     """The corners of a rectangle, counter-clockwise; `size_m`: along its heading, and across it."""
-    middle_x, middle_y = middle
+    x_m, y_m = middle
     length_m, width_m = size_m
     cos = math.cos(heading_rad)
     sin = math.sin(heading_rad)
 
-    forward_x = cos * length_m / 2
-    forward_y = sin * length_m / 2
+    ahead_x = cos * length_m / 2
+    ahead_y = sin * length_m / 2
     left_x = -sin * width_m / 2
     left_y = cos * width_m / 2
 
-    return (
-        (middle_x - forward_x - left_x, middle_y - forward_y - left_y),
-        (middle_x + forward_x - left_x, middle_y + forward_y - left_y),
-        (middle_x + forward_x + left_x, middle_y + forward_y + left_y),
-        (middle_x - forward_x + left_x, middle_y - forward_y + left_y),
-    )
+    rear_right = (x_m - ahead_x - left_x, y_m - ahead_y - left_y)
+    front_right = (x_m + ahead_x - left_x, y_m + ahead_y - left_y)
+    front_left = (x_m + ahead_x + left_x, y_m + ahead_y + left_y)
+    rear_left = (x_m - ahead_x + left_x, y_m - ahead_y + left_y)
+    return rear_right, front_right, front_left, rear_left
 
 
 def overlap(a: Rectangle, b: Rectangle, gap_m: float = 0.0) -> bool:

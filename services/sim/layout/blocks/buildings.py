@@ -103,11 +103,15 @@ class _Settlement:
 
     def _is_free(self, area: Rectangle) -> bool:
         west, south, east, north = area
-        occupied = self._occupied
+        others_west, others_south, others_east, others_north = self._occupied.T
 
-        overlaps_x = (west < occupied[:, 2]) & (occupied[:, 0] < east)
-        overlaps_y = (south < occupied[:, 3]) & (occupied[:, 1] < north)
-        return not bool((overlaps_x & overlaps_y).any())
+        begins_in_x = west < others_east
+        ends_in_x = others_west < east
+        begins_in_y = south < others_north
+        ends_in_y = others_south < north
+
+        overlaps = begins_in_x & ends_in_x & begins_in_y & ends_in_y
+        return not bool(overlaps.any())
 
 
 def _plot(kind: BuildingType, district: District, front: Front) -> Plot:

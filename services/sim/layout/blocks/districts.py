@@ -14,6 +14,7 @@ from services.sim.layout.catalogue import CATALOGUE, BuildingType, Colour
 from services.sim.layout.plan import Point
 
 OWN_FUNCTION = 0.85
+FEWEST = 3
 METRES_A_DISTRICT = 75.0
 TRIES = 24
 FUNCTIONS: dict[str, tuple[str, ...]] = {
@@ -85,7 +86,10 @@ class Districts:
 
     def at(self, x_m: float, y_m: float) -> District:
         """The district of a place."""
-        middle = (_block_middle(self.grid.x_m, x_m), _block_middle(self.grid.y_m, y_m))
+        middle_x = _block_middle(self.grid.x_m, x_m)
+        middle_y = _block_middle(self.grid.y_m, y_m)
+        middle = (middle_x, middle_y)
+
         return min(self.all, key=lambda district: _apart_m2(district.middle, middle))
 
 
@@ -93,22 +97,28 @@ def _block_middle(lines_m: tuple[float, ...], at_m: float) -> float:
     """The middle of the block between two of the lines that holds `at_m`, or is nearest to it."""
     after = int(np.searchsorted(lines_m, at_m))
     last = min(max(after, 1), len(lines_m) - 1)
-    return (lines_m[last - 1] + lines_m[last]) / 2
+
+    begin_m = lines_m[last - 1]
+    end_m = lines_m[last]
+    return (begin_m + end_m) / 2
 
 
 def divide(rng: np.random.Generator, grid: Grid) -> Districts:
-    """Three districts at least, more in a larger town."""
+    """FEWEST districts at least, more in a larger town."""
     span_m = grid.x_m[-1] - grid.x_m[0]
-    count = min(len(FUNCTIONS), max(3, round(span_m / METRES_A_DISTRICT)))
-    functions = [str(function) for function in rng.permutation(list(FUNCTIONS))[:count]]
+    wanted = round(span_m / METRES_A_DISTRICT)
+    count = min(len(FUNCTIONS), max(FEWEST, wanted))
+
+    shuffled = rng.permutation(list(FUNCTIONS))
+    functions = [str(function) for function in shuffled[:count]]
     middles = _spread(rng, grid, count)
-    hue = float(rng.random())
+    first_hue = float(rng.random())
 
     districts = []
     for number, function in enumerate(functions):
-        style = _style(rng, (hue + number / count) % 1.0)
-        district = District(_NAMES[function], function, middles[number], style)
-        districts.append(district)
+        hue = (first_hue + number / count) % 1.0
+        style = _style(rng, hue)
+        districts.append(District(_NAMES[function], function, middles[number], style))
 
     return Districts(grid, tuple(districts))
 
@@ -219,9 +229,12 @@ def _invent(rng: np.random.Generator, name: str, function: str, style: Style) ->
 
 def _paint(rng: np.random.Generator, hue: float, value: tuple[float, float]) -> Colour:
     """A colour near a hue."""
-    turned = (hue + float(rng.normal(0.0, 0.03))) % 1.0
+    deviation = float(rng.normal(0.0, 0.03))
     saturation = float(rng.uniform(0.35, 0.8))
-    shares = colorsys.hsv_to_rgb(turned, saturation, float(rng.uniform(*value)))
+    brightness = float(rng.uniform(*value))
+
+    near_hue = (hue + deviation) % 1.0
+    shares = colorsys.hsv_to_rgb(near_hue, saturation, brightness)
 
     red, green, blue = (round(255 * share) for share in shares)
     return red, green, blue

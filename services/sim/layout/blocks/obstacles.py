@@ -49,8 +49,9 @@ def _car(rng: np.random.Generator, road: Road, along_m: float) -> Prop:
     _, width_m, _ = car.size_m
 
     side = float(rng.choice([-1.0, 1.0]))
-    left_m = side * (road.width_m / 2 - KERB_GAP_M - width_m / 2)
-    x_m, y_m = road.point(along_m, left_m)
+    from_middle_m = road.width_m / 2 - KERB_GAP_M - width_m / 2
+
+    x_m, y_m = road.point(along_m, side * from_middle_m)
     return replace(car, x_m=round(x_m, 3), y_m=round(y_m, 3))
 
 
@@ -60,5 +61,7 @@ def _kiosk(rng: np.random.Generator, square: Road) -> Prop:
     sign_x, sign_y = rng.choice([-1.0, 1.0], 2).tolist()
     aside_x, aside_y = rng.uniform(*ASIDE_M, 2).tolist()
 
-    at_m = (middle_x + sign_x * aside_x, middle_y + sign_y * aside_y)
+    x_m = middle_x + sign_x * aside_x
+    y_m = middle_y + sign_y * aside_y
+    at_m = (x_m, y_m)
     return prop_of_kind(rng, "kiosk", at_m, 0.0)

@@ -179,9 +179,10 @@ class _Names:
         return self._numbered(lines + number, "Alley")
 
     def _numbered(self, number: int, kind: str) -> str:
-        word = self._words[number % len(self._words)]
-        more = number // len(self._words)
-        line = f"{word} {kind}" if not more else f"{word} {kind} {'I' * (more + 1)}"
+        more, place = divmod(number, len(self._words))
+        line = f"{self._words[place]} {kind}"
+        if more:
+            line = f"New {line}" if more == 1 else f"New {line} {more}"
 
         count = self._used.get(line, 0) + 1
         self._used[line] = count
@@ -272,11 +273,13 @@ def _dead_ends(
 
 def _outward(rng: np.random.Generator, grid: Grid, sign: float) -> tuple[Point, Point]:
     """A stretch from the western (-1) or eastern (1) border out of the town."""
-    x_m = grid.x_m[0] if sign < 0 else grid.x_m[-1]
-    y_m = grid.y_m[int(rng.integers(len(grid.y_m)))]
-    length_m = float(rng.uniform(*OUTWARD_M))
+    border = 0 if sign < 0 else len(grid.x_m) - 1
+    row = int(rng.integers(len(grid.y_m)))
+    start_x, y_m = grid.at((border, row))
 
-    return (x_m, y_m), (round(x_m + sign * length_m, 1), y_m)
+    length_m = float(rng.uniform(*OUTWARD_M))
+    end_x = round(start_x + sign * length_m, 1)
+    return (start_x, y_m), (end_x, y_m)
 
 
 def _square(rng: np.random.Generator, grid: Grid) -> Road:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -13,7 +12,7 @@ from services.sim.layout.blocks import districts, obstacles, streets
 from services.sim.layout.blocks.buildings import settle
 from services.sim.layout.furniture import Prop
 from services.sim.layout.place import Place
-from services.sim.layout.plan import Road
+from services.sim.layout.plan import Point, Road
 
 SIZE_M = 200.0
 CLEAR_M = 8.0
@@ -58,15 +57,16 @@ def _start(rng: np.random.Generator, roads: Sequence[Road], props: Sequence[Prop
 
     for number in rng.permutation(len(roads)).tolist():
         road = roads[number]
-        for along_m in np.arange(CLEAR_M, road.length_m - CLEAR_M, STEP_M).tolist():
-            x_m, y_m = road.point(along_m)
-            nearest_m = np.hypot(middles_m[:, 0] - x_m, middles_m[:, 1] - y_m).min()
-            if nearest_m > CLEAR_M:
-                return Pose(x_m=x_m, y_m=y_m, heading_rad=road.heading_rad)
+        last_m = road.length_m - CLEAR_M
+        for along_m in np.arange(CLEAR_M, last_m, STEP_M).tolist():
+            here_m = road.point(along_m)
+            away_m = middles_m - here_m
+            if np.hypot(away_m[:, 0], away_m[:, 1]).min() > CLEAR_M:
+                return _heading_along(road, here_m)
 
-    return _at_start_of(roads[0])
+    return _heading_along(roads[0], roads[0].start)
 
 
-def _at_start_of(road: Road) -> Pose:
-    x_m, y_m = road.start
-    return Pose(x_m=x_m, y_m=y_m, heading_rad=math.remainder(road.heading_rad, math.tau))
+def _heading_along(road: Road, here_m: Point) -> Pose:
+    x_m, y_m = here_m
+    return Pose(x_m=x_m, y_m=y_m, heading_rad=road.heading_rad)

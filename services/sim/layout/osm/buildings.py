@@ -5,6 +5,7 @@ Pure.
 from __future__ import annotations
 
 import colorsys
+import math
 import zlib
 from typing import NamedTuple
 
@@ -69,21 +70,29 @@ def plots(extract: Extract, at_m: Positions) -> list[Plot]:
 
 def _outline_m(way: Way, at_m: Positions) -> Floats:
     """(n, 2): the corners of a building, counter-clockwise; none where the way is no building."""
-    kind = way.tags.get("building", "no")
-    is_closed = len(way.nodes) > CORNERS and way.nodes[0] == way.nodes[-1]
-    is_known = all(node in at_m for node in way.nodes)
-    if kind in NO_WALLS or not is_closed or not is_known:
+    if not _has_walls(way, at_m):
         return np.zeros((0, 2))
 
-    corners_m = np.array([at_m[node] for node in way.nodes[:-1]])
-    contour = corners_m.astype(np.float32)[:, None]
-    simple_m = cv2.approxPolyDP(contour, STRAIGHT_M, closed=True)[:, 0]
-    area_m2 = cv2.contourArea(simple_m, oriented=True)
+    corners_m = [at_m[node] for node in way.nodes[:-1]]
+    contour = np.array(corners_m, np.float32)[:, None]
+    simple = cv2.approxPolyDP(contour, STRAIGHT_M, closed=True)
+    outline_m = simple[:, 0].astype(float).round(2)
+
+    area_m2 = cv2.contourArea(simple, oriented=True)
     if abs(area_m2) < SMALLEST_M2:
         return np.zeros((0, 2))
 
-    counter_clockwise = simple_m if area_m2 > 0 else simple_m[::-1]
-    return counter_clockwise.astype(float).round(2)
+    return outline_m if area_m2 > 0 else outline_m[::-1]
+
+
+def _has_walls(way: Way, at_m: Positions) -> bool:
+    """Whether a way is the whole outline of a building with walls."""
+    kind = way.tags.get("building", "no")
+    if kind in NO_WALLS or len(way.nodes) <= CORNERS:
+        return False
+
+    is_closed = way.nodes[0] == way.nodes[-1]
+    return is_closed and all(node in at_m for node in way.nodes)
 
 
 def _name(way: Way) -> str:
@@ -139,9 +148,17 @@ def function(tags: Tags) -> str:
 
 
 def _rectangle(outline_m: Floats) -> Rectangle:
-    (x_m, y_m), (length_m, width_m), degrees = cv2.minAreaRect(outline_m.astype(np.float32))
-    heading_rad = float(np.remainder(np.radians(degrees) + np.pi, 2 * np.pi) - np.pi)
-    return Rectangle((float(x_m), float(y_m)), float(length_m), float(width_m), heading_rad)
+    middle, size_m, degrees = cv2.minAreaRect(outline_m.astype(np.float32))
+    x_m, y_m = middle
+    length_m, width_m = size_m
+    heading_rad = math.remainder(math.radians(degrees), math.tau)
+
+    return Rectangle(
+        middle=(float(x_m), float(y_m)),
+        length_m=float(length_m),
+        width_m=float(width_m),
+        heading_rad=heading_rad,
+    )
 
 
 def _kind(name: str, around: Rectangle, height: float) -> BuildingType:

@@ -38,18 +38,26 @@ Positions = dict[int, Point]
 def is_street(way: Way) -> bool:
     """Whether cars may drive along a way, in the open and on the ground."""
     tags = way.tags
-    kind = tags.get("highway", "").removesuffix(_LINK)
-    is_covered = tags.get("tunnel", "no") != "no" or tags.get("covered", "no") != "no"
-    is_area = tags.get("area") == "yes"
-    return kind in WIDTHS_M and not is_covered and not is_area
+    if _kind(tags) not in WIDTHS_M or tags.get("area") == "yes":
+        return False
+
+    in_tunnel = tags.get("tunnel", "no") != "no"
+    is_covered = tags.get("covered", "no") != "no"
+    return not in_tunnel and not is_covered
 
 
 def width_m(tags: Tags) -> float:
     """The width that a way is tagged with or, where it is not, the usual one of its kind."""
-    kind = tags.get("highway", "").removesuffix(_LINK)
-    tagged = metres(tags.get("width", ""))
-    width = WIDTHS_M[kind] if tagged is None else tagged
+    width = metres(tags.get("width", ""))
+    if width is None:
+        width = WIDTHS_M[_kind(tags)]
+
     return min(WIDEST_M, max(NARROWEST_M, width))
+
+
+def _kind(tags: Tags) -> str:
+    """Its value of `highway`; a link is of the kind that it leads to."""
+    return tags.get("highway", "").removesuffix(_LINK)
 
 
 def metres(text: str) -> float | None:
@@ -68,14 +76,15 @@ def roads(extract: Extract, at_m: Positions) -> list[Road]:
     several of one name, such as "Rue Grimaldi 3".
     """
     ways = [way for way in extract.ways if is_street(way)]
-    uses = Counter(node for way in ways for node in _known(way, at_m))
+    uses: Counter[int] = Counter()
     for way in ways:
-        uses.update(_known(way, at_m)[:1] + _known(way, at_m)[-1:])
+        uses.update(_known(way, at_m))
 
     numbers: Counter[str] = Counter()
     found = []
     for way in ways:
-        title = way.tags.get("name", f"{way.tags['highway']} way")
+        kind = way.tags["highway"]
+        title = way.tags.get("name", f"{kind} way")
         for stretch in _stretches(_known(way, at_m), uses):
             numbers[title] += 1
             name = f"{title} {numbers[title]}"
@@ -98,6 +107,9 @@ def _stretches(nodes: list[int], uses: Counter[int]) -> Iterable[list[int]]:
         if uses[node] > 1:
             yield stretch
             stretch = [node]
+
+    if len(stretch) > 1:
+        yield stretch
 
 
 def _straight(name: str, line_m: Floats, width: float) -> list[Road]:

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from cogmap.data import osm
 from cogmap.data.osm import Extract
 from cogmap.errors import ConfigError
-from cogmap.geometry.arrays import Booleans, Floats
+from cogmap.geometry.arrays import Booleans, Floats, Indices
 from schemas.sensing import Pose
 from services.sim.layout.boundaries import clearance_m, outlines
 from services.sim.layout.osm.buildings import plots
 from services.sim.layout.osm.streets import Positions, roads
 from services.sim.layout.place import Place
-from services.sim.layout.plan import Plot, Road
+from services.sim.layout.plan import Plot, Point, Road
 
 EARTH_M = 6_371_008.8
 LARGEST_KM2 = 4.0
@@ -57,11 +60,15 @@ def _used(extract: Extract) -> list[int]:
 
 def _plane_m(lonlat: Floats) -> Floats:
     """(n, 2): metres east and north of the middle of (n, 2) degrees."""
-    middle = (lonlat.min(axis=0) + lonlat.max(axis=0)) / 2
-    degree_m = np.radians(1.0) * EARTH_M
-    shares = np.array([np.cos(np.radians(middle[1])), 1.0])
+    lowest = lonlat.min(axis=0)
+    highest = lonlat.max(axis=0)
+    middle = (lowest + highest) / 2
 
-    positions_m: Floats = (lonlat - middle) * shares * degree_m
+    degree_m = math.radians(1.0) * EARTH_M
+    shrinking = math.cos(math.radians(middle[1]))
+    metres = np.array([shrinking * degree_m, degree_m])
+
+    positions_m: Floats = (lonlat - middle) * metres
     return positions_m
 
 
@@ -89,18 +96,19 @@ def _place(path: Path, found: list[Road], buildings: list[Plot]) -> Place:
         raise _without(path, "buildings", "building")
 
     walls_m = outlines([plot.corners for plot in buildings])
-    open_roads = _largest_part(_passable(found, walls_m))
-    if not open_roads:
+    passable = _passable(found, walls_m)
+    if not passable:
         raise ConfigError(
             f"{path} has no street that no building stands on: give an extract of another area"
         )
 
+    connected = _largest_part(passable)
     return Place(
         seed=0,
-        roads=tuple(open_roads),
+        roads=tuple(connected),
         plots=tuple(buildings),
         props=(),
-        start=_start(open_roads, walls_m),
+        start=_start(connected, walls_m),
     )
 
 
@@ -119,54 +127,67 @@ def _passable(found: list[Road], walls_m: Floats) -> list[Road]:
 def _is_crossed(lines_m: Floats, walls_m: Floats) -> Booleans:
     """(k,): which of (k, 4) segments cross any of (n, 4) others."""
     starts = lines_m[:, None, :2]
-    along = lines_m[:, None, 2:] - starts
+    ends = lines_m[:, None, 2:]
     wall_starts = walls_m[None, :, :2]
-    wall_along = walls_m[None, :, 2:] - wall_starts
+    wall_ends = walls_m[None, :, 2:]
 
-    apart = _side(along, wall_starts - starts) * _side(along, wall_starts + wall_along - starts)
-    ends = starts + along
-    across = _side(wall_along, starts - wall_starts) * _side(wall_along, ends - wall_starts)
-    return np.asarray(((apart < 0) & (across < 0)).any(axis=1))
+    wall_start_side = _side(starts, ends, wall_starts)
+    wall_end_side = _side(starts, ends, wall_ends)
+    start_side = _side(wall_starts, wall_ends, starts)
+    end_side = _side(wall_starts, wall_ends, ends)
+
+    parts_wall = wall_start_side * wall_end_side < 0
+    parts_line = start_side * end_side < 0
+    crosses = parts_wall & parts_line
+    return np.asarray(crosses.any(axis=1))
 
 
-def _side(along: Floats, offset: Floats) -> Floats:
-    """On which side of a direction an offset lies, by its sign."""
+def _side(starts: Floats, ends: Floats, points: Floats) -> Floats:
+    """On which side of a line each point is, by its sign; (..., 2) each."""
+    along = ends - starts
+    offset = points - starts
+
     side: Floats = along[..., 0] * offset[..., 1] - along[..., 1] * offset[..., 0]
     return side
 
 
 def _largest_part(found: list[Road]) -> list[Road]:
-    """Of the parts that no road connects, the one with the longest roads."""
-    parents: dict[tuple[float, float], tuple[float, float]] = {}
+    """Of the parts that no road connects, the one whose roads are the longest together."""
+    part = _parts(found)
+    lengths_m = np.bincount(part, [road.length_m for road in found], minlength=1)
 
-    def root(point: tuple[float, float]) -> tuple[float, float]:
-        parents.setdefault(point, point)
-        while parents[point] != point:
-            parents[point] = parents[parents[point]]
-            point = parents[point]
-        return point
+    largest = int(lengths_m.argmax())
+    return [road for road, number in zip(found, part, strict=True) if number == largest]
 
+
+def _parts(found: list[Road]) -> Indices:
+    """(n,): the number of the part that each road belongs to."""
+    numbers: dict[Point, int] = {}
     for road in found:
-        parents[root(road.start)] = root(road.end)
+        numbers.setdefault(road.start, len(numbers))
+        numbers.setdefault(road.end, len(numbers))
 
-    lengths_m: dict[tuple[float, float], float] = {}
-    for road in found:
-        part = root(road.start)
-        lengths_m[part] = lengths_m.get(part, 0.0) + road.length_m
+    starts = np.array([numbers[road.start] for road in found], np.int64)
+    ends = np.array([numbers[road.end] for road in found], np.int64)
+    links = np.ones(len(found))
 
-    if not lengths_m:
-        return []
-
-    largest = max(lengths_m, key=lambda part: (lengths_m[part], part))
-    return [road for road in found if root(road.start) == largest]
+    shape = (len(numbers), len(numbers))
+    graph = coo_array((links, (starts, ends)), shape)
+    _, part = connected_components(graph, directed=False)
+    return np.asarray(part[starts], np.int64)
 
 
 def _start(found: list[Road], walls_m: Floats) -> Pose:
     """The middle of the road nearest to the middle of the town that is long and has room."""
-    for road in sorted(found, key=lambda road: np.hypot(*road.middle)):
-        x_m, y_m = road.middle
-        if road.length_m > 2 * ROOM_M and clearance_m(walls_m, x_m, y_m) > ROOM_M:
-            return Pose(x_m=x_m, y_m=y_m, heading_rad=road.heading_rad)
+    by_distance = sorted(found, key=lambda road: math.hypot(*road.middle))
+    roomy = [road for road in by_distance if _has_room(road, walls_m)]
+    road = roomy[0] if roomy else by_distance[0]
 
-    x_m, y_m = found[0].middle
-    return Pose(x_m=x_m, y_m=y_m, heading_rad=found[0].heading_rad)
+    x_m, y_m = road.middle
+    return Pose(x_m=x_m, y_m=y_m, heading_rad=road.heading_rad)
+
+
+def _has_room(road: Road, walls_m: Floats) -> bool:
+    x_m, y_m = road.middle
+    is_long = road.length_m > 2 * ROOM_M
+    return is_long and clearance_m(walls_m, x_m, y_m) > ROOM_M
