@@ -17,8 +17,8 @@ from services.codelets.planning.search.links import COST_UNIT_M, Links, octile
 from services.codelets.planning.search.route import NoRoute, NoRouteReason, Route, refusal
 from services.codelets.planning.search.slots import Part
 
-# How much longer than over free ground a route may be that is sought, and without limit at last.
-DETOURS = (1.2, 1.5, math.inf)
+# How much longer than over free ground a route may be that is sought: first, and if none is found.
+DETOURS = (1.2, math.inf)
 MARGIN_CELLS = 2.0
 
 
@@ -47,7 +47,8 @@ class FlatPlanner:
         if found is None:
             return NoRoute(NoRouteReason.NOT_CONNECTED)
 
-        nodes = found.part.climb(found.distances_m, start_node)
+        steps = found.cost_m / self._links.cell_m
+        nodes = found.part.climb(found.distances_m, start_node, steps)
         return Route(self._links.cells(nodes), self._links.cell_m, found.cost_m)
 
     def _take(self, network: PlaceNetwork) -> None:

@@ -48,8 +48,8 @@ class HierarchicalPlanner:
             return NoRoute(NoRouteReason.NOT_CONNECTED)
 
         distances_m = corridor.distances_m(goal_node)
-        nodes = corridor.climb_narrow(distances_m, start_node)
         cost_m = float(distances_m[corridor.row(start_node)])
+        nodes = corridor.climb(distances_m, start_node, cost_m / self._links.cell_m)
         return Route(self._links.cells(nodes), self._links.cell_m, cost_m)
 
     def _take(self, network: PlaceNetwork) -> None:

@@ -19,6 +19,8 @@ Numbers = npt.NDArray[np.int32]
 
 # A limit that keeps a search from following links that are cut, whose cost is infinite.
 MAX_COST_M = float(np.finfo(np.float64).max)
+# In the time of one step up a gradient, numpy computes it for so many nodes at once.
+NODES_PER_STEP = 50
 # The one row of a part that stands for all nodes outside, from which nothing spreads.
 _OUTSIDE = 0
 
@@ -95,11 +97,20 @@ class Part(NamedTuple):
         distances_m[_OUTSIDE] = math.inf
         return distances_m
 
-    def climb(self, distances_m: Floats, start: int) -> Indices:
+    def climb(self, distances_m: Floats, start: int, steps: float) -> Indices:
         """The nodes from `start`, at which activation arrives, up its gradient to the goal.
 
-        Of equal neighbours the one in the first slot is taken.
+        Of equal neighbours the one in the first slot is taken. `steps`: about how many the route
+        has; where these are many of the part's nodes, the gradient is computed everywhere at once.
         """
+        if steps * NODES_PER_STEP < len(self.nodes):
+            indices = self._climb_step_by_step(distances_m, start)
+        else:
+            indices = self._climb_everywhere(distances_m, start)
+
+        return self.nodes.take(indices)
+
+    def _climb_step_by_step(self, distances_m: Floats, start: int) -> list[int]:
         row = self.row(start)
         indices = [row - 1]
 
@@ -110,10 +121,9 @@ class Part(NamedTuple):
             row = int(neighbours[best])
             indices.append(row - 1)
 
-        return self.nodes.take(indices)
+        return indices
 
-    def climb_narrow(self, distances_m: Floats, start: int) -> Indices:
-        """What `climb` returns, faster where most nodes are near the route."""
+    def _climb_everywhere(self, distances_m: Floats, start: int) -> list[int]:
         through_m = distances_m.take(self.rows)
         through_m += self.costs_m
         best = through_m.argmin(axis=1)
@@ -127,4 +137,4 @@ class Part(NamedTuple):
             row = upward[row - 1]
             indices.append(row - 1)
 
-        return self.nodes.take(indices)
+        return indices
