@@ -17,8 +17,8 @@ from services.codelets.planning.search.links import COST_UNIT_M, Links, octile
 from services.codelets.planning.search.route import NoRoute, NoRouteReason, Route, refusal
 from services.codelets.planning.search.slots import Part
 
-# How much longer than over free ground a route may be that is sought: first, and if none is found.
-DETOURS = (1.2, math.inf)
+# How much longer than over free ground a route may be that is sought first.
+DETOUR = 1.4
 MARGIN_CELLS = 2.0
 
 
@@ -57,19 +57,22 @@ class FlatPlanner:
 
     def _find(self, start: int, goal: int) -> _Found | None:
         """Activation that has reached `start` by the cheapest route; None where there is none."""
-        cell_m = self._links.cell_m
-        free_m = cell_m * self._free_cells(start, goal)
+        cells = DETOUR * self._free_cells(start, goal) + MARGIN_CELLS
+        limit_m = cells * self._links.cell_m
+        part = self._graph.part(self._ellipse(start, goal, limit_m))
 
-        for detour in DETOURS:
-            limit_m = detour * free_m + MARGIN_CELLS * cell_m
-            found = self._spread(start, goal, limit_m)
-            if math.isinf(found.cost_m):
-                continue
-            if found.cost_m <= limit_m:
-                return found
-            return self._spread(start, goal, found.cost_m)
+        found = _spread(part, start, goal)
+        if found.cost_m <= limit_m:
+            return found
+        if math.isfinite(found.cost_m):
+            part = self._graph.part(self._ellipse(start, goal, found.cost_m))
+            return _spread(part, start, goal)
 
-        return None
+        found = _spread(self._graph.whole, start, goal)
+        if math.isinf(found.cost_m):
+            return None
+
+        return found
 
     def _free_cells(self, start: int, goal: int) -> float:
         """The length of the shortest route between two nodes if all places were free."""
@@ -78,14 +81,6 @@ class FlatPlanner:
 
         i, j = cells[1] - cells[0]
         return float(octile(i, j))
-
-    def _spread(self, start: int, goal: int, limit_m: float) -> _Found:
-        """Activation from `goal` where a route of `limit_m` to `start` can pass."""
-        nodes = self._ellipse(start, goal, limit_m)
-        part = self._graph.part(nodes)
-        distances_m = part.distances_m(goal)
-        cost_m = float(distances_m[part.row(start)])
-        return _Found(part, distances_m, cost_m)
 
     def _ellipse(self, start: int, goal: int, limit_m: float) -> Indices:
         """The linked nodes, ascending, that a route of `limit_m` between two nodes can pass."""
@@ -113,6 +108,13 @@ class _Found(NamedTuple):
     part: Part
     distances_m: Floats
     cost_m: float
+
+
+def _spread(part: Part, start: int, goal: int) -> _Found:
+    """Activation from `goal` within a part of the network."""
+    distances_m = part.distances_m(goal)
+    row = part.row(start)
+    return _Found(part, distances_m, float(distances_m[row]))
 
 
 def _between(start: int, goal: int, limit: float, count: int) -> Indices:

@@ -80,7 +80,7 @@ class Hierarchy:
         middle_start, middle_goal = numbers.tolist()
         coarse_start, coarse_goal = self._coarse_of[numbers].tolist()
 
-        coarse = self._coarse_part.route(coarse_start, coarse_goal)
+        coarse = self._coarse_graph.whole.route(coarse_start, coarse_goal)
         if coarse is None:
             return None
 
@@ -95,7 +95,7 @@ class Hierarchy:
     def _beside(self, coarse: Indices) -> Indices:
         """The regions of the middle level in coarse ones and in their neighbours, ascending."""
         neighbours = self._coarse_graph.neighbours.take(coarse, axis=0)
-        is_beside = np.zeros(len(self._coarse_part.nodes), bool)
+        is_beside = np.zeros(len(self._coarse_graph.neighbours), bool)
         is_beside[coarse] = True
         is_beside[neighbours] = True
         return np.flatnonzero(is_beside.take(self._coarse_of))
@@ -107,8 +107,6 @@ class Hierarchy:
 
         coarse_of = self._coarse.region[self._middle_regions]
         self._coarse_of = coarse_regions.searchsorted(coarse_of)
-        every = np.arange(len(coarse_regions))
-        self._coarse_part = self._coarse_graph.part(every)
 
 
 class PlaceLevel:

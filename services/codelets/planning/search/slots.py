@@ -6,6 +6,7 @@ A part takes a few array operations to cut out, so that a search pays for the pa
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -41,6 +42,16 @@ class SlotGraph:
 
         self._starts = np.zeros(count + 2, np.int32)
         self._starts[2:] = slots * self._rows
+
+    @cached_property
+    def whole(self) -> Part:
+        """All of the graph, as a part of it; costs that change later change there too."""
+        count = len(self.neighbours)
+        rows = self.neighbours + np.int32(1)
+        entries = (self.costs_m.ravel(), rows.ravel(), self._starts)
+        shape = (count + 1, count + 1)
+        matrix = sparse.csr_matrix(entries, shape=shape)
+        return Part(np.arange(count), rows, self.costs_m, matrix)
 
     def part(self, nodes: Indices) -> Part:
         """The part of the graph that consists of `nodes`, which are ascending."""

@@ -158,6 +158,8 @@ def test_after_links_are_cut_and_opened_plans_are_those_of_a_new_planner(kind):
 
     for planner_class in (FlatPlanner, HierarchicalPlanner):
         updated = planner_class(network)
+        for start, goal, _ in pairs(network, 5):
+            updated.find_route(start, goal)
         updated.update(other)
         new = planner_class(other)
         for start, goal, _ in pairs(other, 30):
