@@ -71,7 +71,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     ] = "loop"
     town_size_m: Annotated[
         float,
-        msgspec.Meta(ge=120, le=1000, description="Side of a town of blocks, in m, 120 to 1000."),
+        msgspec.Meta(ge=120, le=500, description="Side of a town of blocks, in m, 120 to 500."),
     ] = 200.0
     sensing: Annotated[
         Literal["cameras", "percepts"],

@@ -7,7 +7,7 @@ reachable.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -213,41 +213,58 @@ def _missing(rng: np.random.Generator, stretches: list[Stretch]) -> list[Stretch
 
         stretch = stretches[number]
         others = [other for other in kept if other != stretch]
-        if _is_robust(others):
+        if _is_spare(stretch, others):
             kept = others
             missing.append(stretch)
 
     return missing
 
 
-def _is_robust(stretches: list[Stretch]) -> bool:
-    """Whether every crossing is reached from every other with any one stretch closed."""
-    crossings = {crossing for stretch in stretches for crossing in stretch}
-    for closed in stretches:
-        others = [other for other in stretches if other != closed]
-        if len(reachable(others)) < len(crossings):
-            return False
+def _is_spare(stretch: Stretch, others: list[Stretch]) -> bool:
+    """Whether `others` lead from one end of a stretch to its other end, also with any one of them
+    closed.
+    """
+    start, end = stretch
+    detour = _route(others, start, end)
+    if not detour:
+        return False
 
-    return True
+    return all(_route(_without(others, closed), start, end) for closed in detour)
 
 
-def reachable(stretches: Iterable[Stretch]) -> set[Crossing]:
-    """The crossings that are reached from the first one."""
-    neighbours: dict[Crossing, list[Crossing]] = {}
-    for first, second in stretches:
-        neighbours.setdefault(first, []).append(second)
-        neighbours.setdefault(second, []).append(first)
+def _without(stretches: list[Stretch], closed: Stretch) -> list[Stretch]:
+    return [stretch for stretch in stretches if stretch != closed]
 
-    start = next(iter(neighbours))
-    found = {start}
-    waiting = [start]
-    while waiting:
-        for crossing in neighbours[waiting.pop()]:
-            if crossing not in found:
-                found.add(crossing)
-                waiting.append(crossing)
 
-    return found
+def _route(stretches: list[Stretch], start: Crossing, end: Crossing) -> list[Stretch]:
+    """The fewest stretches that lead from a crossing to another, none where no way leads there."""
+    leads: dict[Crossing, list[Stretch]] = {}
+    for stretch in stretches:
+        for crossing in stretch:
+            leads.setdefault(crossing, []).append(stretch)
+
+    by: dict[Crossing, Stretch] = {}
+    waiting = deque([start])
+    while waiting and end not in by:
+        here = waiting.popleft()
+        for stretch in leads.get(here, ()):
+            there = _other_end(stretch, here)
+            if there != start and there not in by:
+                by[there] = stretch
+                waiting.append(there)
+
+    route: list[Stretch] = []
+    here = end
+    while here in by:
+        route.append(by[here])
+        here = _other_end(by[here], here)
+
+    return route
+
+
+def _other_end(stretch: Stretch, crossing: Crossing) -> Crossing:
+    first, second = stretch
+    return second if crossing == first else first
 
 
 def _dead_ends(
