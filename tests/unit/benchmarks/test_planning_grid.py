@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from benchmarks.commands import benchmarks
 from benchmarks.planning.grid import measure
 from cogmap.errors import UsageError
 
@@ -40,3 +42,11 @@ def test_a_scenario_of_another_map_is_refused(tmp_path: Path) -> None:
 
     with pytest.raises(UsageError, match="passable cell"):
         measure(map_path, scenario_path)
+
+
+@pytest.mark.parametrize("given", [[], ["--grid", "a.map"], ["--scen", "a.scen"]])
+def test_a_map_without_its_problems_is_refused(given: list[str]) -> None:
+    result = CliRunner().invoke(benchmarks, ["planning", *given])
+
+    assert result.exit_code == 2
+    assert "--grid and --scen" in result.output

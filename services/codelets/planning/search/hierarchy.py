@@ -2,7 +2,7 @@
 
 Three levels, each three times as fine as the one above. Activation spreads from the goal over the
 coarsest; over the next only within the regions of the coarse route and those beside it; and over
-places only within the regions of that level's route.
+places only within the regions of that level's route, and those beside it where it is short.
 """
 
 from __future__ import annotations
@@ -17,6 +17,9 @@ from services.codelets.planning.search.route import NoRoute, NoRouteReason, Rout
 from services.codelets.planning.search.slots import Part
 
 FACTOR = 3
+# A route over so few regions of the middle level is refined within those beside it too: blocks are
+# large beside it, and it costs little.
+NEAR_REGIONS = 12
 
 
 class HierarchicalPlanner:
@@ -84,21 +87,16 @@ class Hierarchy:
         if coarse is None:
             return None
 
-        beside = self._middle_graph.part(self._beside(coarse))
-        middle = beside.route(middle_start, middle_goal)
+        is_beside = self._coarse_graph.with_neighbours(coarse)
+        within = np.flatnonzero(is_beside.take(self._coarse_of))
+        middle = self._middle_graph.part(within).route(middle_start, middle_goal)
         if middle is None:
             return None
 
+        if len(middle) <= NEAR_REGIONS:
+            middle = np.flatnonzero(self._middle_graph.with_neighbours(middle))
         regions = self._middle_regions.take(middle)
         return self._places.part(self._middle.members(regions))
-
-    def _beside(self, coarse: Indices) -> Indices:
-        """The regions of the middle level in coarse ones and in their neighbours, ascending."""
-        neighbours = self._coarse_graph.neighbours.take(coarse, axis=0)
-        is_beside = np.zeros(len(self._coarse_graph.neighbours), bool)
-        is_beside[coarse] = True
-        is_beside[neighbours] = True
-        return np.flatnonzero(is_beside.take(self._coarse_of))
 
     def _number(self) -> None:
         """Number the regions of both levels, as their graphs do."""

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from scipy import sparse
 from scipy.sparse.csgraph import dijkstra
 
-from cogmap.geometry.arrays import Floats, Indices
+from cogmap.geometry.arrays import Booleans, Floats, Indices
 
 Numbers = npt.NDArray[np.int32]
 
@@ -52,6 +52,14 @@ class SlotGraph:
         shape = (count + 1, count + 1)
         matrix = sparse.csr_matrix(entries, shape=shape)
         return Part(np.arange(count), rows, self.costs_m, matrix)
+
+    def with_neighbours(self, nodes: Indices) -> Booleans:
+        """(n,): which nodes are one of `nodes`, or a neighbour of one."""
+        neighbours = self.neighbours.take(nodes, axis=0)
+        is_near = np.zeros(len(self.neighbours), bool)
+        is_near[nodes] = True
+        is_near[neighbours] = True
+        return is_near
 
     def part(self, nodes: Indices) -> Part:
         """The part of the graph that consists of `nodes`, which are ascending."""
