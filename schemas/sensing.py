@@ -91,6 +91,7 @@ class Percept(Part, kw_only=True, frozen=True):
     Bearing (left positive) and range point to the object's estimated centre; `whole` says that
     neither image border nor another object cuts it. `box_px` is left, top, width, height in the
     view; `outline_px` are the corners, column and row, of a polygon around what is seen of it.
+    `function` is what it is used for, as far as what it was recognised as implies that.
     """
 
     label: Name
@@ -104,6 +105,7 @@ class Percept(Part, kw_only=True, frozen=True):
     whole: bool
     box_px: tuple[int, int, int, int]
     outline_px: list[tuple[int, int]] = []
+    function: str = ""
 
 
 class PlaceMatch(Part, kw_only=True, frozen=True):

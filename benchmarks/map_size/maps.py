@@ -17,6 +17,7 @@ from schemas.nodes import (
     Map,
     Object,
     PlaceColumn,
+    map_id,
     nearest_place,
     object_id,
 )
@@ -24,6 +25,8 @@ from services.codelets.config import Config
 
 SPREAD_M = 0.3
 CELL_M = 1.0
+SUB_MAP_SIDE_M = 80.0
+SUB_MAP_CELL_M = 2.0
 SEED = 17
 # Objects are farther away than anything is seen, so that none of them is taken for one in view.
 CLEAR_M = 150.0
@@ -52,13 +55,14 @@ def cognitive_map(size: Size, cycle: int = 1000) -> Snapshot:
         place = nearest_place(node.x_m, node.y_m, CELL_M)
         weights[node.id] = {place: 1.0}
 
-    nodes: list[AnyNode] = [Map(id=ROOT_MAP, cell_m=CELL_M), *objects]
+    maps, within = _sub_maps(objects)
+    nodes: list[AnyNode] = [Map(id=ROOT_MAP, cell_m=CELL_M), *maps, *objects]
     return Snapshot(
         version=1,
         cycle=cycle,
         decay=Decay(),
         nodes=nodes,
-        links=[Links(kind=LinkKind.AT, weights=weights)],
+        links=[Links(kind=LinkKind.AT, weights=weights), within],
         tiles=_tiles(size.places, rng),
     )
 
@@ -97,6 +101,37 @@ def _object(index: int, x_m: float, y_m: float, offsets_m: Floats, cycle: int) -
         last_seen_ns=10**12 + index,
         created_ns=10**11 + index,
         offsets_m=Matrix.of(offsets_m, "<f2"),
+    )
+
+
+def _sub_maps(objects: list[Object]) -> tuple[list[Map], Links]:
+    """Sub-maps of some hundred objects each, squares of one size, and what is within them."""
+    sides_m = SUB_MAP_SIDE_M
+    number_of: dict[tuple[int, int], int] = {}
+    weights = {}
+    maps = []
+
+    for node in objects:
+        square = (math.floor(node.x_m / sides_m), math.floor(node.y_m / sides_m))
+        if square not in number_of:
+            number_of[square] = len(number_of) + 1
+            maps.append(_sub_map(number_of[square], square))
+        weights[node.id] = {map_id(number_of[square]): 1.0}
+
+    return maps, Links(kind=LinkKind.WITHIN, weights=weights)
+
+
+def _sub_map(number: int, square: tuple[int, int]) -> Map:
+    column, row = square
+    return Map(
+        id=map_id(number),
+        base_level=1.0,
+        cell_m=SUB_MAP_CELL_M,
+        parent=ROOT_MAP,
+        x_m=(column + 0.5) * SUB_MAP_SIDE_M,
+        y_m=(row + 0.5) * SUB_MAP_SIDE_M,
+        width_m=SUB_MAP_SIDE_M,
+        height_m=SUB_MAP_SIDE_M,
     )
 
 

@@ -105,6 +105,7 @@ def object_node() -> Object:
         base_level=0.25,
         cycle=6,
         label="building-07",
+        function="shop",
         map="map:1",
         x_m=12.5,
         y_m=4.25,
@@ -172,6 +173,8 @@ def _map() -> Map:
         x_m=3.0,
         y_m=-2.0,
         heading_rad=0.25,
+        width_m=120.0,
+        height_m=80.0,
         **_USUAL,
     )
 

@@ -69,6 +69,7 @@ def percept() -> Percept:
         whole=True,
         box_px=(12, 34, 56, 78),
         outline_px=[(12, 34), (68, 34), (68, 112)],
+        function="shop",
     )
 
 

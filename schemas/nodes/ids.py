@@ -23,6 +23,20 @@ def percept_id(label: str) -> str:
     return f"percept:{label}"
 
 
+def map_id(number: int) -> str:
+    """The id of a sub-map. Sub-maps are numbered from 1; the root map is number 0."""
+    return f"map:{number}"
+
+
+def map_number(identifier: str) -> int | None:
+    """The number of a map's id; None for any other id."""
+    number = identifier.removeprefix("map:")
+    if number == identifier or not number.isdecimal():
+        return None
+
+    return int(number)
+
+
 def segment_id(number: int) -> str:
     """The id of a path segment."""
     return f"path:{number}"

@@ -11,7 +11,8 @@ class LinkKind(enum.StrEnum):
     AT: from the self or an object to the place node nearest to it. INSTANCE: from a percept to the
     object that it is a sighting of. OBSERVES and ALONG: from observations to the object observed,
     and to the path segment that they were made along. NEXT: between neighbouring place nodes; these
-    are kept in the tiles' columns. TOWARDS: from a plan to its next goal.
+    are kept in the tiles' columns. TOWARDS: from a plan to its next goal. WITHIN: from an object to
+    the sub-map that holds it.
     """
 
     AT = "at"
@@ -20,6 +21,7 @@ class LinkKind(enum.StrEnum):
     ALONG = "along"
     NEXT = "next"
     TOWARDS = "towards"
+    WITHIN = "within"
 
 
 EXCLUSIVE_LINKS = frozenset(
@@ -29,6 +31,7 @@ EXCLUSIVE_LINKS = frozenset(
         LinkKind.OBSERVES,
         LinkKind.ALONG,
         LinkKind.TOWARDS,
+        LinkKind.WITHIN,
     }
 )
 """Kinds of which a node has one link: a new one replaces it."""

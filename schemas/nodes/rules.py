@@ -30,7 +30,8 @@ class KindRules:
 
     Nodes that are `persistent` do not decay. All nodes of an `indexed` kind are found without a
     search. What `moves_with_path` is moved when the map is corrected. `offered` kinds may be
-    written by an offer, all others by codelets alone. What is not `droppable` is never forgotten.
+    written by an offer, all others by codelets alone. What is not `droppable` is never forgotten,
+    and neither is the root map.
     """
 
     persistent: bool = False
@@ -49,7 +50,7 @@ KINDS: dict[type[GraphNode], KindRules] = {
     Observations: KindRules(persistent=True, indexed=True),
     LoopClosure: KindRules(persistent=True, indexed=True),
     Correction: KindRules(persistent=True),
-    Map: KindRules(persistent=True, indexed=True, offered=True, droppable=False),
+    Map: KindRules(persistent=True, indexed=True, offered=True),
     Goal: KindRules(persistent=True, indexed=True, offered=True),
     Plan: KindRules(persistent=True, indexed=True),
 }

@@ -67,10 +67,12 @@ class Object(GraphNode, kw_only=True, frozen=True, tag="object"):
     `offsets_m`: float16 (n, 2), the samples relative to their mean (`x_m`, `y_m`), which keeps them
     to a thousandth of their spread. `sightings` is the number of views that agree with the
     position, `misses` that of views in a row that do not. One that is `surveyed` was given, and
-    stays where it is. `last_seen_ns` and `created_ns` are times of views.
+    stays where it is. `last_seen_ns` and `created_ns` are times of views. `function` is what it is
+    used for, such as "shop", empty where that is unknown.
     """
 
     label: Name
+    function: str = ""
     map: Name = ROOT_MAP
     x_m: Finite
     y_m: Finite
@@ -102,7 +104,9 @@ class Object(GraphNode, kw_only=True, frozen=True, tag="object"):
 class Map(GraphNode, kw_only=True, frozen=True, tag="map"):
     """A cognitive map: a grid of place nodes `cell_m` apart, in a frame of its own.
 
-    The frame's origin and direction are in the frame of `parent`; the root map has none.
+    The frame's origin and direction are in the frame of `parent`; the root map has none. A sub-map
+    holds what is at most `width_m` / 2 east or west and `height_m` / 2 north or south of its
+    origin; both are 0 of a map without limits.
     """
 
     cell_m: Annotated[float, msgspec.Meta(gt=0, le=1e4)]
@@ -110,3 +114,5 @@ class Map(GraphNode, kw_only=True, frozen=True, tag="map"):
     x_m: Finite = 0.0
     y_m: Finite = 0.0
     heading_rad: Finite = 0.0
+    width_m: Metres = 0.0
+    height_m: Metres = 0.0

@@ -26,6 +26,7 @@ from services.epam.recognition.candidate import (
     joined,
     outline_px,
 )
+from services.epam.recognition.functions import function_of
 from services.epam.recognition.objects import Appearance, ObjectRecognizer, Recognition
 from services.epam.recognition.segments import Segment, Segmenter
 from services.epam.view import ViewArrays
@@ -246,6 +247,7 @@ class ExtendedPam:
             whole=candidate.walls.whole,
             box_px=candidate.segment.box_px,
             outline_px=outline_px(candidate.segment),
+            function=function_of(recognition.label),
         )
 
 

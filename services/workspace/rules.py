@@ -132,7 +132,7 @@ def _check_drop(name: str, drop: DropNode, graph: Graph, writer: Writer) -> None
         return
 
     kind = type(node)
-    if not KINDS[kind].droppable:
+    if not KINDS[kind].droppable or drop.id == ROOT_MAP:
         raise MessageError(f"{name}: {drop.id} is never forgotten")
     if not writer(kind):
         raise MessageError(f"{name} may not forget nodes of kind {kind_name(kind)}")

@@ -200,6 +200,7 @@ def _kept_answer(task: Task, graph: Graph, node: Object, record: Record) -> Answ
     (percept,) = task.percepts
     seen = msgspec.structs.replace(
         node,
+        function=percept.function or node.function,
         activation=percept.activation,
         base_level=min(1.0, graph.base_level(node) + BASE_LEVEL_GAIN),
         cycle=task.cycle,

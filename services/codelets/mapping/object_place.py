@@ -10,6 +10,7 @@ from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.codelets import Task
 from schemas.graph import Phase
 from schemas.nodes import SELF_ID, LinkKind, Object, Self, object_id
+from schemas.sensing import Percept
 from services.codelets.config import SECTION, Config
 from services.codelets.localization.landmarks import (
     FIRST,
@@ -59,7 +60,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     nearby = nearby_selves(samples, config)
     selves = resample(nearby, config.landmark_samples, 0.0, rng)
 
-    node = _new(percept.label, agent, task)
+    node = _new(percept, agent, task)
     positions_m = first_positions(selves, percept, config, rng)
     return object_answer(task, graph, node, positions_m, FIRST)
 
@@ -76,13 +77,14 @@ CODELET = Codelet(
 )
 
 
-def _new(label: str, agent: Self, task: Task) -> Object:
+def _new(percept: Percept, agent: Self, task: Task) -> Object:
     """An object that the map lacks, on the map where the agent is."""
     return Object(
-        id=object_id(label),
+        id=object_id(percept.label),
         base_level=FIRST_BASE_LEVEL,
         cycle=task.cycle,
-        label=label,
+        label=percept.label,
+        function=percept.function,
         map=agent.map,
         x_m=agent.x_m,
         y_m=agent.y_m,

@@ -45,6 +45,13 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         Weight,
         Meta(description="weight of the boundaries between neighbouring objects, 0 to 1000"),
     ] = 0.7
+    gap_weight: Annotated[
+        Weight,
+        Meta(
+            description="weight of open ground between neighbouring objects, wider than between "
+            "others there, 0 to 1000"
+        ),
+    ] = 1.0
     sub_map_sd_m: Annotated[
         float,
         Meta(
@@ -77,3 +84,38 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             "between them, between 0 and 1"
         ),
     ] = 0.6
+    min_sightings: Annotated[
+        int,
+        Meta(
+            description="views of an object before it gets into a sub-map, 1 to 1000",
+            ge=1,
+            le=1000,
+        ),
+    ] = 2
+    reach_m: Annotated[
+        float,
+        Meta(
+            description="distance up to which an object that arrives may change a sub-map, in m, "
+            "above 0, at most 10000",
+            gt=0,
+            le=1e4,
+        ),
+    ] = 50.0
+    moved_m: Annotated[
+        float,
+        Meta(
+            description="a sub-map is sorted anew when its objects have moved its border by more, "
+            "in m, above 0, at most 10000",
+            gt=0,
+            le=1e4,
+        ),
+    ] = 5.0
+    places: Annotated[
+        int,
+        Meta(
+            description="place nodes that the grid of a sub-map has about, by which it is fine or "
+            "coarse, 1 to 1000000",
+            ge=1,
+            le=1_000_000,
+        ),
+    ] = 1600

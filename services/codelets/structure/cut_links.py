@@ -5,9 +5,25 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
+from cogmap.graph.graph import Graph
+from cogmap.graph.window import WEIGHT_COLUMNS, Extent
+from schemas.nodes import ROOT_MAP
 from services.codelets.planning.network import LINK_OFFSETS, PlaceNetwork
+from services.codelets.structure.crossings import Boundaries
 
 CUT_BELOW = 0.5
+
+
+def boundaries_around(graph: Graph, positions_m: Floats) -> Boundaries:
+    """The boundaries of the root map in the rectangle that holds (n, 2) positions."""
+    cell_m = graph.cell_m(ROOT_MAP)
+    low_i, low_j = np.floor(positions_m.min(axis=0) / cell_m).astype(int).tolist()
+    high_i, high_j = np.ceil(positions_m.max(axis=0) / cell_m).astype(int).tolist()
+    extent = Extent((low_i, low_j), (high_i + 1, high_j + 1))
+
+    window = graph.places.window(ROOT_MAP, WEIGHT_COLUMNS, extent)
+    network = PlaceNetwork(window.origin, cell_m, window.weights())
+    return Boundaries(boundary_segments(network))
 
 
 def boundary_segments(network: PlaceNetwork) -> Floats:

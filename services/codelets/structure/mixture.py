@@ -11,7 +11,8 @@ A cluster is a sub-map. The logarithm of a partition's probability is a sum over
 All parameters are integrated out. To this comes a sum over pairs of neighbours:
 
 - **boundary**: a boundary between two neighbours is frequent where their clusters differ and rare
-  where they are one, as in a stochastic block model (Holland, Laskey and Leinhardt 1983).
+  where they are one, as in a stochastic block model (Holland, Laskey and Leinhardt 1983);
+- **gap**: open ground between them, much wider than from other neighbours, is rare in a cluster.
 
 Each feature's share is multiplied by its weight, which is what one observation of it counts for:
 neighbouring objects are no independent evidence.
@@ -35,6 +36,9 @@ SCATTER_PRIOR_COUNT = 4.0
 SPACING_MEAN_PRIOR_COUNT = 0.01
 SPACING_PRIOR_COUNT = 4.0
 SPACING_PRIOR_SD = 0.25
+USUAL_GAP = math.log(2.0)
+GAP_SD = 0.35
+MIN_GAP_BOND = -10.0
 
 COUNT = 0
 SUM = slice(1, 3)
@@ -120,16 +124,21 @@ class Mixture:
         evidence[is_empty] = 0.0
         return evidence
 
-    def bonds(self, is_crossed: Booleans) -> Floats:
+    def bonds(self, is_crossed: Booleans, gaps: Floats) -> Floats:
         """(e,): by how much more probable it is that two neighbours are of one cluster than of two,
-        as a logarithm, by whether a boundary is between them.
+        as a logarithm: by whether a boundary is between them, and by the logarithm of how far apart
+        they are over the spacing of objects there.
         """
         within = self.config.crossed_within
         between = self.config.crossed_between
 
         crossed = math.log(within / between)
         clear = math.log((1 - within) / (1 - between))
-        bonds: Floats = self.config.boundary_weight * np.where(is_crossed, crossed, clear)
+        by_boundary = self.config.boundary_weight * np.where(is_crossed, crossed, clear)
+
+        excess = np.maximum(gaps - USUAL_GAP, 0.0) / GAP_SD
+        by_gap = self.config.gap_weight * np.maximum(-(excess**2) / 2, MIN_GAP_BOND)
+        bonds: Floats = by_boundary + by_gap
         return bonds
 
     @property

@@ -135,7 +135,11 @@ class SubMaps:
         return near
 
     def _scene(self) -> Scene:
-        return Scene(self._rows, self._edges, self._mixture.bonds(self._is_crossed))
+        """What is to be clustered, as it is now."""
+        spacings = self._rows[:, SPACING_SUM]
+        usual = spacings[self._edges].max(axis=1)
+        bonds = self._mixture.bonds(self._is_crossed, np.log(self._distances()) - usual)
+        return Scene(self._rows, self._edges, bonds)
 
     def _crossed(self, edges: Indices) -> Booleans:
         """(e,): whether a boundary is between two objects, (e, 2)."""
@@ -148,9 +152,7 @@ class SubMaps:
 
         It is the harmonic mean, on which a neighbour far away has little influence.
         """
-        first, second = self._positions_m[self._edges].transpose(1, 0, 2)
-        apart = np.hypot(*(second - first).T) / self._reference_m
-        closeness = 1 / np.maximum(apart, MIN_SPACING)
+        closeness = 1 / self._distances()
         weights = np.where(self._is_crossed, CROSSED_SHARE, 1.0)
 
         ends = self._edges.ravel()
@@ -162,3 +164,10 @@ class SubMaps:
         has_any = counted > 0
         spacings[has_any] = np.log(counted[has_any] / summed[has_any])
         return spacings
+
+    def _distances(self) -> Floats:
+        """(e,): how far apart neighbours are, as a share of a sub-map's extent."""
+        first, second = self._positions_m[self._edges].transpose(1, 0, 2)
+        apart_m = np.hypot(*(second - first).T)
+        distances: Floats = np.maximum(apart_m / self._reference_m, MIN_SPACING)
+        return distances

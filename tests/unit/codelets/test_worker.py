@@ -113,6 +113,7 @@ def _every_task() -> list[Task]:
         task("path", percepts=house),
         task("loop_detection", matches=[PlaceMatch(frame=0, view_ns=0, score=0.9)]),
         task("map_correction"),
+        task("map_structure"),
         task("route_plan"),
         task("whereabouts", percepts=house),
         task("novelty", percepts=house),

@@ -80,6 +80,7 @@ SENSELESS: dict[str, Operation] = {
         where=[(TILE_SIDE * tile, 0) for tile in range(1025)], number=1025
     ),
     "self is never forgotten": DropNode(id="self"),
+    "map:0 is never forgotten": DropNode(id="map:0"),
     "may not forget nodes of kind object": DropNode(id=object_id("a")),
 }
 
@@ -94,7 +95,8 @@ def test_an_invalid_proposal_is_rejected_and_the_next_delta_counts_it(
     reason: str,
 ) -> None:
     ledger = _ledger()
-    ledger.commit(0, 1, Phase.OBJECTS, [agent(), landmark("a")])
+    root = Map(id=ROOT_MAP, cell_m=1.0)
+    ledger.commit(0, 1, Phase.OBJECTS, [root, agent(), landmark("a")])
     proposal = _proposal(thing("new"), SENSELESS[reason], base_version=4)
 
     with pytest.raises(MessageError) as refusal:

@@ -187,7 +187,7 @@ def test_an_object_that_is_no_longer_seen_stays_and_its_percept_is_forgotten() -
     desk = Desk("w1")
     desk.drive(range(3), percept("a"))
     desk.drive(range(3, 15))
-    expected = {"self", "map:0", "path:0", "observations:0:a", "object:a"}
+    expected = {"self", "map:0", "map:1", "path:0", "observations:0:a", "object:a"}
     assert set(desk.graph.nodes) == expected
 
     dropped = []

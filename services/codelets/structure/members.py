@@ -1,0 +1,86 @@
+"""The sub-maps of the graph, and the objects in them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from cogmap.geometry.arrays import Floats
+from cogmap.graph.graph import Graph
+from schemas.nodes import ROOT_MAP, LinkKind, Map, Object, map_number
+from services.codelets.nodes import nodes_of
+
+
+def sub_maps_of(graph: Graph) -> list[Map]:
+    """The sub-maps of the root map, by number."""
+    maps = []
+    for node in graph.of_kind(Map):
+        if node.parent == ROOT_MAP and map_number(node.id) is not None:
+            maps.append(node)
+
+    return sorted(maps, key=number_of)
+
+
+def number_of(node: Map) -> int:
+    """The number of a sub-map."""
+    return map_number(node.id) or 0
+
+
+def next_number(graph: Graph) -> int:
+    """The number of the next sub-map: one more than that of any map."""
+    numbers = [number_of(node) for node in graph.of_kind(Map)]
+    return max(numbers, default=0) + 1
+
+
+def members_of(maps: Iterable[Map], graph: Graph) -> dict[int, list[Object]]:
+    """The objects of each sub-map, by its number, in the order of their ids."""
+    members = {}
+    for node in maps:
+        names = sorted(graph.links.sources(node.id, LinkKind.WITHIN))
+        members[number_of(node)] = nodes_of(graph, Object, names)
+
+    return members
+
+
+def maps_around(
+    maps: Sequence[Map], new: Sequence[Object], moved: Sequence[Map], reach_m: float
+) -> list[Map]:
+    """The sub-maps that a new object may join or change, and those that have moved with their
+    neighbours: all within `reach_m`, and of each new object the nearest.
+    """
+    if not maps:
+        return []
+
+    low_m, high_m = _boxes(maps)
+    is_near = np.zeros(len(maps), bool)
+    for position_m in positions_of(new):
+        away_m = _distances_m(low_m, high_m, position_m, position_m)
+        is_near |= away_m <= reach_m
+        is_near[int(away_m.argmin())] = True
+
+    if moved:
+        for low, high in zip(*_boxes(moved), strict=True):
+            is_near |= _distances_m(low_m, high_m, low, high) <= reach_m
+
+    return [node for node, near in zip(maps, is_near.tolist(), strict=True) if near]
+
+
+def positions_of(objects: Iterable[Object]) -> Floats:
+    """(n, 2): where objects are."""
+    positions_m = [(node.x_m, node.y_m) for node in objects]
+    return np.array(positions_m, np.float64).reshape(-1, 2)
+
+
+def _boxes(maps: Sequence[Map]) -> tuple[Floats, Floats]:
+    """(k, 2) lower and upper corners of sub-maps."""
+    centres_m = np.array([(node.x_m, node.y_m) for node in maps])
+    halves_m = np.array([(node.width_m, node.height_m) for node in maps]) / 2
+    return centres_m - halves_m, centres_m + halves_m
+
+
+def _distances_m(low_m: Floats, high_m: Floats, low: Floats, high: Floats) -> Floats:
+    """(k,): the distances of boxes from another box."""
+    gaps_m = np.maximum(low_m - high, low - high_m).clip(0.0)
+    distances_m: Floats = np.hypot(gaps_m[:, 0], gaps_m[:, 1])
+    return distances_m
