@@ -2,7 +2,7 @@
 
 Three levels, each three times as fine as the one above. Activation spreads from the goal over the
 coarsest; over the next only within the regions of the coarse route and those beside it; and over
-places only within the regions of that level's route, and those beside it where it is short.
+places only within the regions of that level's route, and at times those beside it.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from services.codelets.planning.search.route import NoRoute, NoRouteReason, Rout
 from services.codelets.planning.search.slots import Part
 
 FACTOR = 3
-# A route over so few regions of the middle level is refined within those beside it too: blocks are
-# large beside it, and it costs little.
+# A route over so few regions of the middle level is refined within those beside it too, for blocks
+# are large beside it; any route is, where links differ, for regions know their mean weight only.
 NEAR_REGIONS = 12
 
 
@@ -65,16 +65,17 @@ class Hierarchy:
 
     def __init__(self, links: Links) -> None:
         grid = (links.width, links.height)
+        self._links = links
         self._places = links.graph()
         self._middle = Regions(PlaceLevel(links), grid, FACTOR, links.cell_m)
         self._coarse = Regions(self._middle, grid, BLOCK, links.cell_m)
-        self._number()
+        self._make_graphs()
 
     def update(self, nodes: Indices) -> None:
         """Take changes of the links of `nodes`."""
         changed = self._middle.update(nodes)
         self._coarse.update(changed)
-        self._number()
+        self._make_graphs()
 
     def corridor(self, start: int, goal: int) -> Part | None:
         """Places that hold a route between two, both of them linked; None where there is none."""
@@ -93,13 +94,14 @@ class Hierarchy:
         if middle is None:
             return None
 
-        if len(middle) <= NEAR_REGIONS:
+        if len(middle) <= NEAR_REGIONS or not self._are_alike:
             middle = np.flatnonzero(self._middle_graph.with_neighbours(middle))
         regions = self._middle_regions.take(middle)
         return self._places.part(self._middle.members(regions))
 
-    def _number(self) -> None:
-        """Number the regions of both levels, as their graphs do."""
+    def _make_graphs(self) -> None:
+        """Make the graphs of both levels, in which regions are numbered from 0."""
+        self._are_alike = self._links.are_alike()
         self._middle_regions, self._middle_graph = self._middle.graph()
         coarse_regions, self._coarse_graph = self._coarse.graph()
 

@@ -64,10 +64,11 @@ class Links:
         i, j = np.divmod(nodes, self.height)
         self._cells: Indices = np.stack([i, j], axis=-1) + np.array(self.origin)
 
-        # What lies beyond an edge is a blocked node of the padding.
         offsets = NEIGHBOUR_OFFSETS @ (self.height, 1)
-        beyond = (nodes[:, None] + offsets) % self.count
-        self.neighbours: Numbers = beyond.astype(np.int32)
+        self.neighbours: Numbers = np.add.outer(nodes, offsets, dtype=np.int32)
+        # What lies beyond the first or last column is a blocked node of the padding.
+        self.neighbours[self.neighbours < 0] += self.count
+        self.neighbours[self.neighbours >= self.count] -= self.count
 
         self._directions = _directions(width, height)
         self._weights = network.weights.copy()
@@ -94,6 +95,11 @@ class Links:
         self.is_linked[nodes] = is_open.any(axis=1)
         self._weights[:] = network.weights
         return nodes
+
+    def are_alike(self) -> bool:
+        """Whether all links that are not cut have one weight."""
+        is_between = (self._weights > 0) & (self._weights < 1)
+        return not is_between.any()
 
     def contain(self, cell: Cell) -> bool:
         """Whether a cell of the map lies in the network."""
