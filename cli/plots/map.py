@@ -16,6 +16,7 @@ from cli.launch.observer import Observer
 from cli.plots import map_layers as layers
 from cli.plots import palette
 from cli.plots.palette import ESTIMATE, FAINT, FUSED, INK, PAPER, TRUE, WHEELS
+from cli.plots.town_layer import draw_town
 from cogmap.graph.graph import Graph
 
 MARGIN_M = 5.0
@@ -31,7 +32,8 @@ def draw(path: Path, observer: Observer, graph: Graph, metrics: RecordedMetrics)
         figure = Figure(figsize=(11, 10), dpi=130, facecolor=PAPER, layout="constrained")
         axes = figure.add_subplot()
         axes.set_facecolor(PAPER)
-        layers.draw_town(axes, observer)
+        if observer.town is not None:
+            draw_town(axes, observer.town)
         layers.draw_road(axes, observer, graph)
         layers.draw_objects(axes, observer, graph)
         _draw_paths(axes, observer)

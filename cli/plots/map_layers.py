@@ -1,93 +1,20 @@
-"""The layers of the map: the town as it is, and what the agent has learned of it."""
+"""The layers of the map: what the agent has learned of the town."""
 
 from __future__ import annotations
 
-import math
-from itertools import pairwise
-from typing import Any
-
-import matplotlib.patheffects as outlines
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
-from matplotlib.patches import Ellipse, Rectangle
+from matplotlib.patches import Ellipse
 from matplotlib.transforms import Affine2D, Transform
 
 from cli.launch.metrics import objects, position_m
 from cli.launch.observer import Observer
-from cli.plots.palette import HOUSE, KERB, NAME, OBJECT, ROAD, ROAD_OPACITY, STREET, WALL
+from cli.plots.palette import OBJECT, ROAD, ROAD_OPACITY
 from cogmap.graph.graph import Graph
 from schemas.graph import TILE_SIDE
 from schemas.nodes import ROOT_MAP, Object, PlaceColumn
-from schemas.sensing import Building, Pose
-
-
-def draw_town(axes: Axes, observer: Observer) -> None:
-    if observer.town is None:
-        return
-    for wider_m, colour, order in ((1.0, KERB, 1.0), (0.0, STREET, 1.1)):
-        for street in observer.town.streets:
-            line = np.array(street.line_m)
-            for start, end in pairwise(line):
-                _band(axes, start, end, street.width_m + wider_m, colour, order)
-    for building in observer.town.buildings:
-        _draw_building(axes, building)
-
-
-def _band(
-    axes: Axes,
-    start: npt.NDArray[np.float64],
-    end: npt.NDArray[np.float64],
-    width_m: float,
-    colour: str,
-    order: float,
-) -> None:
-    """A stretch of street, its ends reaching half a width further, so that corners close."""
-    along = end - start
-    length_m = float(np.hypot(*along)) + width_m
-    heading = float(np.arctan2(along[1], along[0]))
-    _box(
-        axes, (start + end) / 2, length_m, width_m, heading, {"facecolor": colour, "zorder": order}
-    )
-
-
-def _box(
-    axes: Axes,
-    middle: npt.NDArray[np.float64],
-    width_m: float,
-    depth_m: float,
-    heading_rad: float,
-    style: dict[str, Any],
-) -> None:
-    turned = (
-        Affine2D().rotate(heading_rad).translate(float(middle[0]), float(middle[1]))
-        + axes.transData
-    )
-    axes.add_patch(
-        Rectangle((-width_m / 2, -depth_m / 2), width_m, depth_m, transform=turned, **style)
-    )
-
-
-def _draw_building(axes: Axes, building: Building) -> None:
-    pose = building.pose
-    style = {"facecolor": HOUSE, "edgecolor": WALL, "linewidth": 0.8, "zorder": 2}
-    _box(
-        axes,
-        np.array([pose.x_m, pose.y_m]),
-        building.width_m,
-        building.depth_m,
-        pose.heading_rad,
-        style,
-    )
-    half_m = abs(building.width_m * math.sin(pose.heading_rad)) + abs(
-        building.depth_m * math.cos(pose.heading_rad)
-    )
-    place = (pose.x_m, pose.y_m - half_m / 2 + 0.6)
-    name = axes.text(
-        *place, building.name.replace("_", " "), ha="center", va="bottom", fontsize=6.5, color=NAME
-    )
-    name.set(zorder=6, path_effects=[outlines.withStroke(linewidth=1.8, foreground=HOUSE)])
+from schemas.sensing import Pose
 
 
 def _agent_frame(axes: Axes, start: Pose | None) -> Transform:

@@ -1,0 +1,63 @@
+"""The true town on the map."""
+
+from __future__ import annotations
+
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.patches import Polygon
+
+from cli.plots.palette import CLOSED
+from cli.plots.town_layer import MAX_NAMES, draw_town
+from schemas.sensing import Building, Pose, Street, TrueTown
+
+LINE_M = [(0.0, 0.0), (40.0, 0.0)]
+
+
+def _building(number: int, **changes) -> Building:
+    pose = Pose(x_m=10.0 * number, y_m=8.0, heading_rad=0.0)
+    return Building(
+        name=f"home_{number}", pose=pose, width_m=8.0, depth_m=6.0, height_m=5.0, **changes
+    )
+
+
+def _drawn(buildings: list[Building], closed: bool = False) -> Axes:
+    street = Street(name="Elm Street 1", line_m=LINE_M, width_m=8.0, closed=closed)
+    axes = Figure().add_subplot()
+    draw_town(axes, TrueTown(seed=1, streets=[street], buildings=buildings))
+    return axes
+
+
+def _colours(axes: Axes) -> list[tuple[float, float, float]]:
+    return [patch.get_facecolor()[:3] for patch in axes.patches]
+
+
+def test_the_buildings_of_a_district_share_a_tint() -> None:
+    hill = [_building(number, district="Garden Hill") for number in range(2)]
+    market = [_building(number, district="Old Market") for number in range(2, 4)]
+    colours = _colours(_drawn([*hill, *market]))[-4:]
+
+    assert colours[0] == colours[1]
+    assert colours[2] == colours[3]
+    assert colours[0] != colours[2]
+
+
+def test_a_closed_street_has_a_barrier() -> None:
+    assert to_rgb(CLOSED) not in _colours(_drawn([]))
+    assert to_rgb(CLOSED) in _colours(_drawn([], closed=True))
+
+
+def test_a_building_that_is_no_rectangle_has_its_outline() -> None:
+    outline_m = [(0.0, 0.0), (9.0, 0.0), (9.0, 8.0)]
+    axes = _drawn([_building(0, outline_m=outline_m)])
+    (polygon,) = [patch for patch in axes.patches if isinstance(patch, Polygon)]
+
+    assert polygon.get_xy()[:3].tolist() == [list(corner) for corner in outline_m]
+
+
+def test_names_are_shown_of_some_buildings_and_not_of_many() -> None:
+    few = _drawn([_building(number) for number in range(3)])
+    many = _drawn([_building(number) for number in range(MAX_NAMES + 1)])
+
+    assert [text.get_text() for text in few.texts] == ["home 0", "home 1", "home 2"]
+    assert not many.texts
