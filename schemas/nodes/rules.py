@@ -50,7 +50,7 @@ KINDS: dict[type[GraphNode], KindRules] = {
     Observations: KindRules(persistent=True, indexed=True),
     LoopClosure: KindRules(persistent=True, indexed=True),
     Correction: KindRules(persistent=True),
-    Map: KindRules(persistent=True, indexed=True, offered=True),
+    Map: KindRules(persistent=True, indexed=True, moves_with_path=True, offered=True),
     Goal: KindRules(persistent=True, indexed=True, offered=True),
     Plan: KindRules(persistent=True, indexed=True),
 }

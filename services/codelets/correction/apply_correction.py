@@ -1,8 +1,8 @@
 """The apply-correction codelet: it applies a correction of the path to the map (paper §5.6).
 
-Each object and each place node moves with the place of the path that is nearest to it. What was
-written since the correction was computed is kept: places that the path has gained move with its
-last.
+Each object and each place node moves with the place of the path that is nearest to it, and so does
+the frame of each sub-map, whose place nodes stay as they are in it. What was written since the
+correction was computed is kept: places that the path has gained move with its last.
 """
 
 from __future__ import annotations
@@ -21,9 +21,11 @@ from schemas.graph import DropNode, Link, Operation, Phase
 from schemas.nodes import (
     CORRECTION_ID,
     POSE_COLUMNS,
+    ROOT_MAP,
     Correction,
     CorrectionColumn,
     LinkKind,
+    Map,
     Object,
     Observations,
     PathSegment,
@@ -64,6 +66,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     if graph.agent is not None:
         operations += _move_self(graph, graph.agent, rows[-1:])
     operations += _move_objects(graph, rows, path)
+    operations += _move_maps(graph, rows)
     operations += move_places(graph, rows[:, OLD], rows[:, NEW])
 
     return Answer(operations)
@@ -74,8 +77,8 @@ CODELET = Codelet(
     phase=Phase.CORRECTION,
     due=due,
     run=run,
-    reads=frozenset({Correction, PathSegment, Observations, Self, Object, *MOVED_COLUMNS}),
-    writes=frozenset({Correction, PathSegment, Self, Object, LinkKind.AT, *MOVED_COLUMNS}),
+    reads=frozenset({Correction, PathSegment, Observations, Self, Object, Map, *MOVED_COLUMNS}),
+    writes=frozenset({Correction, PathSegment, Self, Object, Map, LinkKind.AT, *MOVED_COLUMNS}),
     config=Config,
     section=SECTION,
 )
@@ -140,6 +143,27 @@ def _move_objects(graph: Graph, rows: Floats, path: Floats) -> list[Operation]:
         if not node.surveyed:
             seen_m = landmarks_m.get(node.label)
             operations += _move_object(graph, node, rows, seen_m)
+
+    return operations
+
+
+def _move_maps(graph: Graph, rows: Floats) -> list[Operation]:
+    """The frames of the root map's sub-maps move; those of their own sub-maps are in theirs."""
+    operations: list[Operation] = []
+    for node in graph.of_kind(Map):
+        if node.parent != ROOT_MAP:
+            continue
+
+        pose = np.array([[node.x_m, node.y_m, node.heading_rad]])
+        away_m = np.hypot(*(rows[:, OLD_POSITION] - pose[:, :2]).T)
+        nearest = away_m.argmin()
+        moved = _moved_poses(pose, rows[[nearest]])
+        if np.array_equal(moved, pose):
+            continue
+
+        ((x_m, y_m, heading_rad),) = moved.tolist()
+        after = msgspec.structs.replace(node, x_m=x_m, y_m=y_m, heading_rad=heading_rad)
+        operations.append(after)
 
     return operations
 

@@ -8,7 +8,7 @@ import pytest
 from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
 from schemas.array import Array
-from schemas.graph import TILE_SIDE, Cells, Operation, PlaceTile
+from schemas.graph import TILE_SIDE, Cells, Decay, Operation, PlaceTile
 from schemas.nodes import ROOT_MAP, Map, PlaceColumn
 
 
@@ -52,6 +52,40 @@ def test_maps_have_place_nodes_of_their_own() -> None:
     assert place is not None
     assert (place.id, place.x_m, place.y_m) == ("place:map:1:2:3", 8.0, 12.0)
     assert graph.place(2, 3) is None
+
+
+def test_a_snapshot_keeps_the_place_nodes_of_each_map_apart() -> None:
+    graph = _graph(
+        Map(id="map:1", cell_m=4.0, parent=ROOT_MAP),
+        _cells(PlaceColumn.ROAD, {(2, 3): 1.0}),
+        _cells(PlaceColumn.OBSTACLE, {(2, 3): 0.5}, "map:1"),
+        _cells(PlaceColumn.EVIDENCE_N, {(-9, 40): -3.0}, "map:1"),
+    )
+    again = Graph()
+    again.load(graph.snapshot())
+
+    assert again.digest() == graph.digest()
+    assert again.places.value(ROOT_MAP, 2, 3, PlaceColumn.OBSTACLE) == 0.0
+    assert again.places.value("map:1", 2, 3, PlaceColumn.OBSTACLE) == 0.5
+    assert again.places.value("map:1", -9, 40, PlaceColumn.EVIDENCE_N) == -3.0
+    assert again.places.value(ROOT_MAP, -9, 40, PlaceColumn.EVIDENCE_N) is None
+
+
+def test_the_activation_of_a_sub_maps_place_nodes_decays_as_the_roots_does() -> None:
+    fine = Map(id="map:1", cell_m=0.5, parent=ROOT_MAP)
+    graph = _graph(
+        Decay(place_activation=0.1),
+        fine,
+        _cells(PlaceColumn.ACTIVATION, {(2, 3): 1.0}),
+        _cells(PlaceColumn.ACTIVATION, {(2, 3): 1.0}, "map:1"),
+    )
+    graph.cycle = 4
+    here = graph.place(2, 3)
+    there = graph.place(2, 3, "map:1")
+
+    assert here is not None
+    assert there is not None
+    assert here.activation == there.activation == pytest.approx(0.6)
 
 
 def test_each_of_the_eight_links_of_a_place_node_is_kept_once() -> None:

@@ -12,12 +12,13 @@ from cogmap.geometry.se2 import rotate
 from cogmap.graph.crossings import crossings
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import EVIDENCE_COLUMNS, WEIGHT_COLUMNS
-from schemas.array import Array
+from schemas.array import Array, Matrix
 from schemas.graph import Cells
-from schemas.nodes import ROOT_MAP, PlaceColumn
+from schemas.nodes import CORRECTION_ID, ROOT_MAP, Correction, Map, PlaceColumn
+from services.codelets.config import Config
 from services.codelets.correction.place_columns import MAX_CELLS, move_places
 from services.codelets.mapping.evidence import weights_of
-from tests.support.world.scenes import graph_of
+from tests.support.world.scenes import graph_of, run, task
 
 CUT = -3.0
 FREE = 2.0
@@ -163,3 +164,36 @@ def test_many_cells_are_written_in_parts() -> None:
     assert len(sizes) > 1
     assert max(sizes) <= MAX_CELLS
     assert sum(sizes) == 2 * side**2
+
+
+def _correction(old: Floats, new: Floats) -> Correction:
+    """That the path is corrected from one to the other."""
+    stamps_s = np.arange(len(old), dtype=float)
+    rows = np.column_stack([stamps_s, old, new])
+    return Correction(id=CORRECTION_ID, rows=Matrix.of(rows))
+
+
+def test_a_sub_map_moves_by_its_frame_and_keeps_its_place_nodes() -> None:
+    hall = Map(id="map:hall", cell_m=0.5, parent=ROOT_MAP, x_m=10.0, y_m=2.0, heading_rad=0.3)
+    room = Map(id="map:room", cell_m=0.1, parent="map:hall", x_m=1.0)
+    graph = graph_of(
+        hall,
+        room,
+        _one(PlaceColumn.ROAD, 3, 4, 0.75),
+        Cells(
+            map="map:hall",
+            column=PlaceColumn.ROAD,
+            cells=Array.of([(3, 4)], "<i4"),
+            values=Array.of([0.5], "<f4"),
+        ),
+        _correction(_path(), _path(shift_m=(2.0, -3.0))),
+    )
+    graph.change(run(task("apply_correction"), graph, Config()).operations)
+
+    moved = graph.get(Map, "map:hall")
+    assert moved is not None
+    assert (moved.x_m, moved.y_m) == pytest.approx((12.0, -1.0))
+    assert moved.heading_rad == pytest.approx(0.3)
+    assert graph.get(Map, "map:room") == room
+    assert graph.places.value("map:hall", 3, 4, PlaceColumn.ROAD) == 0.5
+    assert _values(graph, PlaceColumn.ROAD) == {(5, 1): 0.75}
