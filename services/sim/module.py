@@ -30,6 +30,7 @@ def build(config: Config, instance: str = "sim") -> Module:
     if config.sensing == "percepts":
         percepts = DrivenPerceptLevelSim(config)
         module.on(topics.STREET_CLOSURE, percepts.closed_streets.on_closure)
+        module.journaling(topics.TRUE_POSE, percepts.resume, percepts.truth)
         return _in_lockstep(module, config, percepts, _PERCEPT_LEVEL)
 
     simulation = Simulation(config)

@@ -57,6 +57,7 @@ class Simulation:
         self.world.robot.place(last.pose)
         self._pose = self.world.pose()
         self._travelled_m = last.travelled_m
+        self.world.collisions = last.collisions
         if self._progress is not None:
             self._progress.resume(last.progress)
         self.now_ns = last.stamp_ns

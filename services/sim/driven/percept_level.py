@@ -6,6 +6,7 @@ Neither physics nor images are simulated: an hour of driving takes a minute or t
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import msgspec
 import numpy as np
@@ -64,6 +65,19 @@ class DrivenPerceptLevelSim:
         self._duration_s = config.duration_s
         self._motions: list[Row] = []
         self._frames = 0
+
+    def resume(self, past: Iterable[Message]) -> None:
+        """Continue at the time and the place of the last true pose, at rest."""
+        last: Message | None = None
+        for message in past:
+            last = message
+
+        if not isinstance(last, TruePose):
+            return
+
+        self._robot.resume(last)
+        self.now_ns = last.stamp_ns
+        self._frames = self.now_ns // self.tick_ns // self.ticks_per_frame
 
     def drive(self, command: MotorCommand) -> None:
         """Set the wheels' speeds."""

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 
-from schemas.sensing import MotorCommand, Pose
+from schemas.sensing import MotorCommand, Pose, TruePose
 from services.sim.driven.surroundings import Surroundings
 from services.sim.layout.boundaries import clearance_m
 
@@ -40,6 +40,13 @@ class KinematicRobot:
         """The middle of the axle, and the heading."""
         x_m, y_m, heading_rad = self._pose
         return Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad)
+
+    def resume(self, last: TruePose) -> None:
+        """Continue at the last true pose, at rest."""
+        pose = last.pose
+        self._pose = (pose.x_m, pose.y_m, pose.heading_rad)
+        self.collisions = last.collisions
+        self.travelled_m = last.travelled_m
 
     def drive(self, command: MotorCommand) -> None:
         """Obey a command from now on."""

@@ -318,6 +318,22 @@ def test_self_motion_without_noise_leads_to_the_true_pose() -> None:
     assert math.remainder(heading_rad - end.heading_rad, math.tau) == pytest.approx(0.0, abs=1e-6)
 
 
+def test_a_simulation_that_was_killed_continues_where_the_robot_was() -> None:
+    truths = of_type(TruePose, _drive(_config()))[:40]
+    module = build(_config())
+    assert module.restore is not None
+    assert module.start is not None
+    module.restore(truths)
+    again = module.stamp(module.start())
+
+    (truth,) = of_type(TruePose, again)
+    (percepts,) = of_type(Percepts, again)
+    assert truth.pose == truths[-1].pose
+    assert truth.stamp_ns == truths[-1].stamp_ns + 200_000_000
+    assert truth.travelled_m == truths[-1].travelled_m
+    assert percepts.frame == 40
+
+
 def test_the_same_seed_gives_the_same_bytes() -> None:
     first = [encode(message) for message in _drive(_config(seed=2))]
 
