@@ -14,7 +14,7 @@ from cogmap.data.human_tours import read_folder
 from cogmap.data.tsplib import Problem
 from cogmap.errors import UsageError
 from cogmap.parallel import Progress, parallel_map
-from experiments.route_planning.measure import human_jobs, measure
+from experiments.route_planning.measure import PARTICIPANTS, human_jobs, measure
 from experiments.route_planning.metrics import human_metrics
 from experiments.route_planning.optimum import shortest_tour
 from services.codelets.planning.tours import TourSettings, follow_activation, order, route_length
@@ -26,8 +26,6 @@ THRESHOLDS = {
 MIN_CITIES = 50
 MAX_CITIES = 80
 SEED = 1
-# Medians over fewer participants differ from seed to seed.
-PARTICIPANTS = 400
 
 
 def _ignore(share: float) -> None:

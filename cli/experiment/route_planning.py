@@ -13,6 +13,7 @@ from cogmap.data.human_tours import read_folder
 from experiments.route_planning import published
 from experiments.route_planning.measure import (
     DRAWN,
+    DRAWN_PARTICIPANTS,
     EXAMPLE_GOALS,
     PARTICIPANTS,
     SIZES,
@@ -43,7 +44,7 @@ Examples:
     type=click.IntRange(1, 10_000),
     default=PARTICIPANTS,
     show_default=True,
-    help="Simulated, of each problem.",
+    help="Simulated, of each problem that people drew tours of.",
 )
 @click.option(
     "--drawn",
@@ -73,7 +74,7 @@ def route_planning(
     folder = outcome.folder_for(NAME, common.out)
     from_people = human_jobs(read_folder(data), participants, common.seed) if data else []
     sizes = [size for size in SIZES if size <= max_goals]
-    from_seed = drawn_jobs(sizes, drawn, participants, common.seed)
+    from_seed = drawn_jobs(sizes, drawn, common.seed)
 
     with bar("planning tours") as progress:
         planned = measure([*from_people, *from_seed], common.processes, progress)
@@ -84,6 +85,7 @@ def route_planning(
         **human_metrics(human),
         **drawn_metrics(drawn_at_random),
         "participants": float(participants),
+        "participants_of_drawn_problems": float(DRAWN_PARTICIPANTS),
         "published_of_4_to_9_goals": published.READ_OFF_BY_EYE,
     }
     outcome.show(NAME, metrics)

@@ -1,5 +1,5 @@
-"""Figure 5 of the paper, from our own runs: tours on a flat map and on a hierarchy, and how much
-longer than the shortest they are, beside people's.
+"""Figure 5 of the paper, from our own runs: activation and the route that follows it, tours on a
+flat map and on a hierarchy, and how much longer than the shortest they are, beside people's.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from cli.plots.draw import STYLE
 from cli.plots.palette import ESTIMATE, FAINT, INK, KERB, PAPER, ROAD, SEVERAL, STREET, TRUE, WHEELS
 from cogmap.geometry.arrays import Floats, Indices
 from experiments.route_planning import published
+from experiments.route_planning.activation import Spread, free_ground, walled_ground
 from experiments.route_planning.measure import EXAMPLE_GOALS, Planned
 from services.codelets.planning.tours import TourSettings
 
@@ -27,26 +28,24 @@ PUBLISHED = SEVERAL[0]
 
 
 def figure(human: Sequence[Planned], drawn: Sequence[Planned], metrics: dict[str, Any]) -> Figure:
-    """The sheet: two tours of one problem above, below all problems by their number of goals, and
+    """The sheet: above, one goal and several; below, all problems by their number of goals, and
     those of people one by one.
     """
     example = next(problem for problem in drawn if problem.goals == EXAMPLE_GOALS)
     with mpl.rc_context(STYLE):
-        sheet = Figure(figsize=(14.0, 10.5), dpi=110, facecolor=PAPER, layout="constrained")
-        panels = sheet.subplot_mosaic(
-            [["flat", "hierarchical", "shortest"], ["sizes", "people", "errors"]]
-        )
-        _draw_tour(panels["flat"], example, example.typical_flat, FLAT, "c   on a flat map")
-        _draw_tour(
-            panels["hierarchical"], example, example.typical, HIERARCHICAL, "d   on a hierarchy"
-        )
-        _draw_tour(panels["shortest"], example, example.shortest, INK, "    the shortest")
-        _draw_grids(panels["hierarchical"], example.positions, TourSettings())
-        _draw_sizes(panels["sizes"], drawn)
-        _draw_people(panels["people"], human)
-        _draw_errors(panels["errors"], human, metrics)
+        sheet = Figure(figsize=(15.0, 10.0), dpi=110, facecolor=PAPER, layout="constrained")
+        parts: Any = sheet.subfigures(2, 1, height_ratios=(1, 1.35))
+        for part in parts:
+            part.set_facecolor(PAPER)
+
+        _draw_principle(parts[0].subplots(1, 4), example)
+        sizes, people, errors = parts[1].subplots(1, 3)
+        _draw_sizes(sizes, drawn)
+        _draw_people(people, human)
+        _draw_errors(errors, human, metrics)
         sheet.suptitle(
-            f"Several goals in order, {metrics['participants']:g} simulated participants a problem",
+            f"Figure 5 from our own runs, {metrics['participants']:g} simulated participants on "
+            f"each problem of people, {metrics['participants_of_drawn_problems']:g} on the others",
             x=0.01,
             ha="left",
             color=INK,
@@ -55,6 +54,29 @@ def figure(human: Sequence[Planned], drawn: Sequence[Planned], metrics: dict[str
         )
         sheet.draw_without_rendering()
     return sheet
+
+
+def _draw_principle(panels: Sequence[Axes], example: Planned) -> None:
+    """One goal by activation, without walls and with them, and several goals."""
+    free, walled, flat, hierarchical = panels
+    _draw_activation(free, free_ground(), "a   one goal, by activation")
+    _draw_activation(walled, walled_ground(), "b   the same with walls")
+    _draw_tour(flat, example, example.typical_flat, FLAT, "c   flat")
+    _draw_tour(hierarchical, example, example.typical, HIERARCHICAL, "d   hierarchy")
+    _draw_grids(hierarchical, example.positions, TourSettings())
+
+
+def _draw_activation(axes: Axes, ground: Spread, title: str) -> None:
+    """The logarithm of the activation in colours, walls in grey, and the route up to the goal."""
+    activation = np.ma.masked_invalid(ground.log_activation.T)
+    colours = mpl.colormaps["viridis"].with_extremes(bad=KERB)
+    axes.imshow(activation, origin="lower", cmap=colours, interpolation="nearest")
+    axes.plot(*ground.route.T, color=HIERARCHICAL, lw=2.0)
+    axes.plot(*ground.route[0], "s", ms=8, mfc="white", mec=TRUE)
+    axes.plot(*ground.route[-1], "*", ms=14, color=PUBLISHED, mec="white")
+    axes.set_xticks([])
+    axes.set_yticks([])
+    axes.set_title(title, loc="left", fontsize=10)
 
 
 def _draw_tour(axes: Axes, problem: Planned, tour: Indices, colour: str, title: str) -> None:
@@ -115,8 +137,14 @@ def _draw_sizes(axes: Axes, drawn: Sequence[Planned]) -> None:
     axes.set_xscale("log")
     axes.set_xticks([4, 6, 10, 20, 40, 80, 120], ["4", "6", "10", "20", "40", "80", "120"])
     axes.minorticks_off()
-    axes.set_ylim(bottom=-1)
-    axes.legend(frameon=False, fontsize=8, title=f"* {published.READ_OFF_BY_EYE}", title_fontsize=7)
+    _leave_room(axes)
+    axes.legend(
+        frameon=False,
+        fontsize=8,
+        loc="upper left",
+        title=f"* {published.READ_OFF_BY_EYE}",
+        title_fontsize=7,
+    )
     axes.set_title("e   drawn at random, by number of goals", loc="left", fontsize=10)
     _label(axes, "goals", "% above the shortest")
 
@@ -146,7 +174,8 @@ def _draw_people(axes: Axes, human: Sequence[Planned]) -> None:
     names = [f"{problem.name.removeprefix('Graph')}\n{problem.goals}" for problem in human]
     axes.set_xticks(places, names)
     axes.set_xlabel("problem, and its goals", color=FAINT)
-    axes.legend(frameon=False, fontsize=8)
+    _leave_room(axes)
+    axes.legend(frameon=False, fontsize=8, loc="upper left")
 
 
 def _draw_errors(axes: Axes, human: Sequence[Planned], metrics: dict[str, Any]) -> None:
@@ -168,6 +197,12 @@ def _draw_errors(axes: Axes, human: Sequence[Planned], metrics: dict[str, Any]) 
 
     axes.axline((0.0, 0.0), slope=1.0, color=FAINT, lw=1.0, ls=(0, (4, 2)))
     axes.legend(frameon=False, fontsize=8)
+
+
+def _leave_room(axes: Axes) -> None:
+    """For the legend, above what is drawn."""
+    _, top = axes.get_ylim()
+    axes.set_ylim(-0.03 * top, 1.45 * top)
 
 
 def _draw_nothing(axes: Axes) -> None:

@@ -17,7 +17,10 @@ from experiments.route_planning.optimum import shortest_tour
 from experiments.route_planning.participants import tours_of
 from services.codelets.planning.tours import route_length
 
-PARTICIPANTS = 100
+# Of people's problems: medians over fewer participants differ from seed to seed.
+PARTICIPANTS = 400
+# Of problems drawn at random, DRAWN of each size.
+DRAWN_PARTICIPANTS = 20
 DRAWN = 5
 SIZES = (*range(4, 10), *range(10, 121, 10))
 # The same tour begun elsewhere adds up to another last digit.
@@ -86,7 +89,7 @@ def human_jobs(problems: Sequence[HumanTours], participants: int, seed: int) -> 
     ]
 
 
-def drawn_jobs(sizes: Sequence[int], number: int, participants: int, seed: int) -> list[Job]:
+def drawn_jobs(sizes: Sequence[int], number: int, seed: int) -> list[Job]:
     """`number` problems of each size, their goals drawn uniformly from a square."""
     jobs = []
 
@@ -94,7 +97,7 @@ def drawn_jobs(sizes: Sequence[int], number: int, participants: int, seed: int) 
         for problem in range(number):
             rng = np.random.default_rng([seed, size, problem])
             positions = rng.uniform(0.0, 1.0, (size, 2))
-            jobs.append(Job(f"drawn {size} {problem}", positions, [], participants, seed))
+            jobs.append(Job(f"drawn {size} {problem}", positions, [], DRAWN_PARTICIPANTS, seed))
 
     return jobs
 

@@ -59,10 +59,10 @@ class _Programme:
         return csr_array(rows)
 
     def reduced(self, is_kept: Booleans) -> _Programme:
-        """The same with fewer edges; sets that are added to one are not added to the other."""
+        """The same with fewer edges; a set that is added to one is added to both."""
         edges = self.edges[is_kept]
         lengths = self.lengths[is_kept]
-        return _Programme(self.count, edges, lengths, [*self.sets])
+        return _Programme(self.count, edges, lengths, self.sets)
 
     def graph(self, values: Floats) -> csr_array:
         """(count, count), symmetric: edges that have a value, with it."""
@@ -78,7 +78,7 @@ class _Programme:
 def shortest_tour(lengths: Floats) -> Indices:
     """The order (n,) of the shortest closed tour by (n, n) symmetric lengths, beginning with 0.
 
-    A hundred goals take seconds, few of them a minute. Raises CogmapError where the solver fails.
+    A hundred goals take seconds, or half a minute. Raises CogmapError where the solver fails.
     """
     count = len(lengths)
     if count < 4:

@@ -10,7 +10,7 @@ import pytest
 from cogmap.data.human_tours import HumanTours
 from cogmap.data.tsplib import EUC_2D, Problem, lengths, straight
 from cogmap.geometry.arrays import Floats
-from experiments.route_planning import published
+from experiments.route_planning import activation, published
 from experiments.route_planning.measure import Planned, drawn_jobs, human_jobs, measure, planned
 from experiments.route_planning.metrics import correlation, drawn_metrics, human_metrics
 from experiments.route_planning.optimum import shortest_tour
@@ -116,7 +116,7 @@ def test_errors_correlate_over_problems_by_their_means() -> None:
 
 
 def test_drawn_problems_stand_beside_what_is_published_for_their_size() -> None:
-    jobs = drawn_jobs((4, 10), 2, participants=3, seed=5)
+    jobs = drawn_jobs((4, 10), 2, seed=5)
     metrics = drawn_metrics(measure(jobs, 1, lambda share: None))
 
     assert metrics["goals_004_published_people"] == pytest.approx(0.009)
@@ -126,3 +126,16 @@ def test_drawn_problems_stand_beside_what_is_published_for_their_size() -> None:
 
 def test_without_peoples_tours_nothing_is_reported_of_them() -> None:
     assert human_metrics([]) == {}
+
+
+def test_routes_of_figure_5_follow_activation_and_go_round_walls() -> None:
+    straight_on = activation.free_ground()
+    round_walls = activation.walled_ground()
+
+    for ground in (straight_on, round_walls):
+        along = ground.log_activation[tuple(ground.route.T)]
+        assert (np.diff(along) > 0).all()
+        assert ground.is_free[tuple(ground.route.T)].all()
+        assert ground.route[0].tolist() == list(activation.START)
+        assert ground.route[-1].tolist() == list(activation.GOAL)
+    assert len(round_walls.route) > len(straight_on.route) + 10
