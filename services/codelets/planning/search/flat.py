@@ -13,13 +13,15 @@ import numpy as np
 
 from cogmap.geometry.arrays import Floats, Indices
 from services.codelets.planning.network import Cell, PlaceNetwork
-from services.codelets.planning.search.links import COST_UNIT_M, Links, octile
+from services.codelets.planning.search.links import Links, octile
 from services.codelets.planning.search.route import NoRoute, NoRouteReason, Route, refusal
 from services.codelets.planning.search.slots import Part
 
 # How much longer than over free ground a route may be that is sought first.
-DETOUR = 1.4
+DETOUR = 1.3
 MARGIN_CELLS = 2.0
+# Lengths are compared in single precision, which is to lose no node.
+ROUNDING = 1 + 1e-5
 
 
 class FlatPlanner:
@@ -85,21 +87,20 @@ class FlatPlanner:
     def _ellipse(self, start: int, goal: int, limit_m: float) -> Indices:
         """The linked nodes, ascending, that a route of `limit_m` between two nodes can pass."""
         links = self._links
-        limit = (limit_m + COST_UNIT_M) / links.cell_m
+        limit = limit_m / links.cell_m * ROUNDING
         start_i, start_j = divmod(start, links.height)
         goal_i, goal_j = divmod(goal, links.height)
-        i = _between(start_i, goal_i, limit, links.width)
-        j = _between(start_j, goal_j, limit, links.height)
+        first, end = _between(start_i, goal_i, limit, links.width)
 
-        column = i[:, None]
-        from_start = octile(column - start_i, j - start_j)
-        from_goal = octile(column - goal_i, j - goal_j)
+        i = np.arange(first, end, dtype=np.float32)[:, None]
+        j = np.arange(links.height, dtype=np.float32)
+        from_start = octile(i - start_i, j - start_j)
+        from_goal = octile(i - goal_i, j - goal_j)
         is_near = from_start + from_goal <= limit
 
-        near_i, near_j = np.nonzero(is_near)
-        nodes: Indices = i[near_i] * links.height + j[near_j]
-        is_linked = links.is_linked[nodes]
-        return nodes[is_linked]
+        is_linked = links.is_linked.reshape(links.width, links.height)
+        is_near &= is_linked[first:end]
+        return np.flatnonzero(is_near) + first * links.height
 
 
 class _Found(NamedTuple):
@@ -117,14 +118,14 @@ def _spread(part: Part, start: int, goal: int) -> _Found:
     return _Found(part, distances_m, float(distances_m[row]))
 
 
-def _between(start: int, goal: int, limit: float, count: int) -> Indices:
-    """The coordinates along one axis, out of `count`, that a route of length `limit` can reach."""
+def _between(start: int, goal: int, limit: float, count: int) -> tuple[int, int]:
+    """The range of coordinates along one axis, out of `count`, that a route can reach whose length
+    is at most `limit`.
+    """
     apart = abs(start - goal)
     beyond = (limit - apart) / 2
     slack = math.ceil(min(beyond, count))
 
     first = min(start, goal) - slack
     last = max(start, goal) + slack
-    first = max(first, 0)
-    end = min(last + 1, count)
-    return np.arange(first, end)
+    return max(first, 0), min(last + 1, count)
