@@ -25,7 +25,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_array
 from scipy.special import gammaln
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
@@ -67,19 +66,17 @@ class Scene(NamedTuple):
         return Scene(self.rows[members], renumbered[is_inside], self.bonds[is_inside])
 
 
-def rows_of(positions_m: Floats, spacing: Floats, functions: Indices, kinds: int) -> Floats:
+def rows_of(positions_m: Floats, functions: Indices, kinds: int) -> Floats:
     """(n, 8 + kinds): the sufficient statistics of each object; those of a cluster are their sum.
 
-    They are 1, x, y, xx, xy, yy, the spacing s, ss, and 1 in the column of the function, which is
-    from 0 to `kinds` - 1, or -1 where it is unknown.
+    They are 1, x, y, xx, xy, yy, the spacing s, ss, both 0 as yet, and 1 in the column of the
+    function, which is from 0 to `kinds` - 1, or -1 where it is unknown.
     """
     x_m, y_m = positions_m.T
     rows = np.zeros((len(positions_m), FUNCTIONS + kinds))
     rows[:, COUNT] = 1.0
     rows[:, SUM] = positions_m
     rows[:, SQUARES] = np.column_stack([x_m**2, x_m * y_m, y_m**2])
-    rows[:, SPACING_SUM] = spacing
-    rows[:, SPACING_SQUARES] = spacing**2
 
     known = np.flatnonzero(functions >= 0)
     rows[known, FUNCTIONS + functions[known]] = 1.0
@@ -88,11 +85,12 @@ def rows_of(positions_m: Floats, spacing: Floats, functions: Indices, kinds: int
 
 def summed(rows: Floats, labels: Indices) -> Floats:
     """(k, d): the sums of (n, d) rows by label, from 0 to k - 1."""
-    count = len(labels)
+    _, columns = rows.shape
     clusters = int(labels.max(initial=-1)) + 1
-    belongs = csr_array((np.ones(count), (labels, np.arange(count))), shape=(clusters, count))
-    sums: Floats = belongs @ rows
-    return sums
+    place = labels[:, None] * columns + np.arange(columns)
+
+    sums = np.bincount(place.ravel(), rows.ravel(), clusters * columns)
+    return sums.astype(np.float64).reshape(clusters, columns)
 
 
 @dataclass(frozen=True)

@@ -57,8 +57,9 @@ def neighbours_of(positions_m: Floats, point_m: Floats) -> Indices:
 
 def comes_between(positions_m: Floats, edges: Indices, point_m: Floats) -> Booleans:
     """(e,): whether a new point parts two neighbours, (e, 2)."""
-    offsets_m = positions_m - point_m
-    dots = (offsets_m[edges[:, 0]] * offsets_m[edges[:, 1]]).sum(axis=1)
+    x_m, y_m = (positions_m - point_m).T.copy()
+    first, second = edges.T
+    dots = x_m[first] * x_m[second] + y_m[first] * y_m[second]
     parted: Booleans = dots < 0
     return parted
 

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from services.codelets.structure.mixture import COUNT, Mixture, Scene, summed
+from services.codelets.structure.merging import Merging
+from services.codelets.structure.mixture import Mixture, Scene, summed
 
 MAX_SWEEPS = 50
 MAX_ROUNDS = 8
@@ -45,13 +46,6 @@ def compact(labels: Indices) -> Indices:
     return compacted
 
 
-class _Pairs(NamedTuple):
-    """Clusters that neighbour one another, (p, 2), and the sums of the bonds between them, (p,)."""
-
-    clusters: Indices
-    bonds: Floats
-
-
 def merge_clusters(mixture: Mixture, scene: Scene, labels: Indices, at_least: int = 0) -> Indices:
     """Merge neighbouring clusters as long as that raises the probability; with `at_least`, as long
     as there are more clusters than that, whatever it does to the probability.
@@ -59,47 +53,20 @@ def merge_clusters(mixture: Mixture, scene: Scene, labels: Indices, at_least: in
     In each round two clusters merge where each gains most with the other. A gain is counted by the
     objects of the smaller one: otherwise the largest would take all.
     """
-    statistics = summed(scene.rows, labels)
+    merging = Merging(mixture, scene, labels)
     floor = -np.inf if at_least else MIN_GAIN
-    while len(statistics) > max(1, at_least):
-        pairs = _pairs(scene, labels, len(statistics))
-        gains = _merge_gains(mixture, statistics, pairs)
-        sizes = statistics[pairs.clusters, COUNT].min(axis=1)
-        scores = np.where(gains > floor, gains / sizes, -np.inf)
-
-        chosen = _matched(pairs.clusters, scores, len(statistics))
+    while merging.count > max(1, at_least):
+        scores = merging.scores(floor)
+        chosen = _matched(merging.pairs, scores, merging.count)
         if not len(chosen):
             break
+
         if at_least:
-            spare = len(statistics) - at_least
+            spare = merging.count - at_least
             chosen = chosen[np.argsort(-scores[chosen], kind="stable")][:spare]
+        merging.merge(chosen)
 
-        target = np.arange(len(statistics))
-        target[pairs.clusters[chosen, 1]] = pairs.clusters[chosen, 0]
-        labels = compact(target[labels])
-        statistics = summed(scene.rows, labels)
-
-    return labels
-
-
-def _pairs(scene: Scene, labels: Indices, clusters: int) -> _Pairs:
-    """The pairs of neighbouring clusters, the lower label first."""
-    ends = np.sort(labels[scene.edges], axis=1)
-    is_between = ends[:, 0] != ends[:, 1]
-    keys = ends[is_between, 0] * clusters + ends[is_between, 1]
-
-    found, number = np.unique(keys, return_inverse=True)
-    bonds = np.asarray(np.bincount(number, scene.bonds[is_between], len(found)), np.float64)
-    return _Pairs(np.column_stack(np.divmod(found, clusters)), bonds)
-
-
-def _merge_gains(mixture: Mixture, statistics: Floats, pairs: _Pairs) -> Floats:
-    """(p,): by how much merging raises the logarithm of the probability."""
-    evidence = mixture.log_evidence(statistics)
-    first, second = pairs.clusters.T
-    together = mixture.log_evidence(statistics[first] + statistics[second])
-    gains: Floats = together - evidence[first] - evidence[second] + pairs.bonds
-    return gains
+    return merging.labels(labels)
 
 
 def _matched(clusters: Indices, scores: Floats, count: int) -> Indices:
