@@ -16,7 +16,7 @@ from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most
 from cli.log.progress import bar
 from cogmap.data.moving_ai import Problem, read_map, read_problems
-from cogmap.geometry.arrays import Booleans, Floats
+from cogmap.geometry.arrays import Booleans, Floats, Indices
 from services.codelets.planning.network import Cell, PlaceNetwork, grid_network
 from services.codelets.planning.search.flat import FlatPlanner
 from services.codelets.planning.search.hierarchy import HierarchicalPlanner
@@ -58,7 +58,8 @@ class Subject(NamedTuple):
     def peer_number(self, goal: Cell) -> int:
         """The number of a cell's node for scipy."""
         node = self.links.node(goal)
-        return int(np.count_nonzero(self.links.is_linked[:node]))
+        before = self.links.is_linked[:node]
+        return int(before.sum())
 
 
 def measure(map_path: Path, scenario_path: Path) -> Metrics:
@@ -150,20 +151,29 @@ def _length(answer: Route | NoRoute, problem: Problem, is_passable: Booleans) ->
         return 0.0 if answer.reason is NoRouteReason.AT_GOAL else None
 
     cells = answer.cells
-    steps = np.diff(cells, axis=0)
     ends = cells[[0, -1]].tolist()
-    if ends != [list(problem.start), list(problem.goal)] or np.abs(steps).max() > 1:
+    if ends != [list(problem.start), list(problem.goal)] or not _is_open(cells, is_passable):
         return None
 
-    # A step across needs both cells beside it: no corner is cut.
+    steps = np.diff(cells, axis=0)
+    lengths = np.hypot(steps[:, 0], steps[:, 1])
+    return float(lengths.sum())
+
+
+def _is_open(cells: Indices, is_passable: Booleans) -> bool:
+    """Whether (n, 2) cells are neighbours one after the other, free, and cut no corner."""
+    steps = np.diff(cells, axis=0)
+    if np.abs(steps).max() > 1:
+        return False
+
     i, j = cells[:-1].T
     di, dj = steps.T
-    beside = is_passable[i + di, j] & is_passable[i, j + dj]
-    is_free = is_passable[i, j] & is_passable[i + di, j + dj] & beside
-    if not is_free.all():
-        return None
-
-    return float(np.hypot(di, dj).sum())
+    here = is_passable[i, j]
+    there = is_passable[i + di, j + dj]
+    beside_i = is_passable[i + di, j]
+    beside_j = is_passable[i, j + dj]
+    is_open = here & there & beside_i & beside_j
+    return bool(is_open.all())
 
 
 def _graph(links: Links) -> sparse.csr_matrix:

@@ -19,8 +19,8 @@ from cogmap.data.packed import lines
 from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Booleans
 
-PASSABLE = b".GS"
-BLOCKED = b"@OTW"
+PASSABLE = frozenset(".GS")
+KNOWN = PASSABLE | frozenset("@OTW")
 HEADER = ("type octile", "height and a number", "width and a number", "map")
 MAX_CELLS = 1 << 28
 _FIELDS = 9
@@ -47,12 +47,10 @@ def read_map(path: Path) -> Booleans:
     is_passable = np.zeros((width, height), bool)
     for y in range(height):
         number, line = _next(path, numbered, f"row {y + 1} of {height}")
-        row = np.frombuffer(line.encode("latin-1"), np.uint8)
-        is_free = np.isin(row, np.frombuffer(PASSABLE, np.uint8))
-        is_blocked = np.isin(row, np.frombuffer(BLOCKED, np.uint8))
-        if len(row) != width or not (is_free | is_blocked).all():
+        if len(line) != width or not KNOWN.issuperset(line):
             raise wrong_line(path, number, line, f"{width} cells out of . G S @ O T W")
-        is_passable[:, y] = is_free
+
+        is_passable[:, y] = [cell in PASSABLE for cell in line]
 
     return is_passable
 
@@ -91,16 +89,22 @@ def _problem(path: Path, number: int, line: str, is_passable: Booleans) -> Probl
         map_width, map_height = is_passable.shape
         expected = f"a problem for a map of {map_width} x {map_height} cells"
         raise wrong_line(path, number, line, expected)
-    if not (math.isfinite(optimal) and optimal >= 0):
+    if not math.isfinite(optimal) or optimal < 0:
         raise wrong_line(path, number, line, "an optimal length that is finite and not below 0")
 
     problem = Problem((start_x, start_y), (goal_x, goal_y), optimal)
     for x, y in (problem.start, problem.goal):
-        is_inside = 0 <= x < width and 0 <= y < height
-        if not is_inside or not is_passable[x, y]:
+        if not _can_pass(is_passable, x, y):
             raise wrong_line(path, number, line, f"({x}, {y}) to be a passable cell of the map")
 
     return problem
+
+
+def _can_pass(is_passable: Booleans, x: int, y: int) -> bool:
+    """Whether a cell lies on the map and can be passed."""
+    width, height = is_passable.shape
+    is_inside = 0 <= x < width and 0 <= y < height
+    return is_inside and bool(is_passable[x, y])
 
 
 def _size(path: Path, numbered: Iterator[tuple[int, str]]) -> tuple[int, int]:

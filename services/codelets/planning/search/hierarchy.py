@@ -80,24 +80,29 @@ class Hierarchy:
     def corridor(self, start: int, goal: int) -> Part | None:
         """Places that hold a route between two, both of them linked; None where there is none."""
         ends = self._middle.region[[start, goal]]
-        numbers = self._middle_regions.searchsorted(ends)
-        middle_start, middle_goal = numbers.tolist()
-        coarse_start, coarse_goal = self._coarse_of[numbers].tolist()
+        middle = self._middle_route(self._middle_regions.searchsorted(ends))
+        if middle is None:
+            return None
 
+        if len(middle) <= NEAR_REGIONS or not self._are_alike:
+            is_beside = self._middle_graph.with_neighbours(middle)
+            middle = np.flatnonzero(is_beside)
+
+        regions = self._middle_regions.take(middle)
+        places = self._middle.members(regions)
+        return self._places.part(places)
+
+    def _middle_route(self, ends: Indices) -> Indices | None:
+        """The route over the middle level between two of its regions."""
+        coarse_start, coarse_goal = self._coarse_of[ends].tolist()
         coarse = self._coarse_graph.whole.route(coarse_start, coarse_goal)
         if coarse is None:
             return None
 
         is_beside = self._coarse_graph.with_neighbours(coarse)
         within = np.flatnonzero(is_beside.take(self._coarse_of))
-        middle = self._middle_graph.part(within).route(middle_start, middle_goal)
-        if middle is None:
-            return None
-
-        if len(middle) <= NEAR_REGIONS or not self._are_alike:
-            middle = np.flatnonzero(self._middle_graph.with_neighbours(middle))
-        regions = self._middle_regions.take(middle)
-        return self._places.part(self._middle.members(regions))
+        start, goal = ends.tolist()
+        return self._middle_graph.part(within).route(start, goal)
 
     def _make_graphs(self) -> None:
         """Make the graphs of both levels, in which regions are numbered from 0."""

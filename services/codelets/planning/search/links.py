@@ -63,12 +63,7 @@ class Links:
         nodes = np.arange(self.count)
         i, j = np.divmod(nodes, self.height)
         self._cells: Indices = np.stack([i, j], axis=-1) + np.array(self.origin)
-
-        offsets = NEIGHBOUR_OFFSETS @ (self.height, 1)
-        self.neighbours: Numbers = np.add.outer(nodes, offsets, dtype=np.int32)
-        # What lies beyond the first or last column is a blocked node of the padding.
-        self.neighbours[self.neighbours < 0] += self.count
-        self.neighbours[self.neighbours >= self.count] -= self.count
+        self.neighbours = _neighbours(self.count, self.height)
 
         self._directions = _directions(width, height)
         self._weights = network.weights.copy()
@@ -98,7 +93,9 @@ class Links:
 
     def are_alike(self) -> bool:
         """Whether all links that are not cut have one weight."""
-        is_between = (self._weights > 0) & (self._weights < 1)
+        is_open = self._weights > 0
+        is_slow = self._weights < 1
+        is_between = is_open & is_slow
         return not is_between.any()
 
     def contain(self, cell: Cell) -> bool:
@@ -203,6 +200,19 @@ def _padded(cells: int) -> int:
     """The side of a grid in whole blocks, with at least one blocked cell at its end."""
     blocks = cells // BLOCK + 1
     return BLOCK * blocks
+
+
+def _neighbours(count: int, height: int) -> Numbers:
+    """(n, SLOTS): the neighbours of nodes; beyond the first or last column, a node of the padding
+    on the other side, which is blocked.
+    """
+    nodes = np.arange(count)
+    offsets = NEIGHBOUR_OFFSETS @ (height, 1)
+    neighbours: Numbers = np.add.outer(nodes, offsets, dtype=np.int32)
+
+    neighbours[neighbours < 0] += count
+    neighbours[neighbours >= count] -= count
+    return neighbours
 
 
 def _directions(width: int, height: int) -> list[Direction]:

@@ -37,6 +37,14 @@ class Rows(NamedTuple):
         every = np.arange(count)
         return np.repeat(every, self.counts)
 
+    def slots(self) -> Indices:
+        """For each link, which of its node's links it is, from 0."""
+        ends = np.cumsum(self.counts)
+        starts = ends - self.counts
+        every = np.arange(self.counts.sum())
+        slots: Indices = every - np.repeat(starts, self.counts)
+        return slots
+
 
 class Traits(NamedTuple):
     """What regions are described by: `centre` (n, 2) in cells, `size` in places, and `slowness`,
@@ -104,14 +112,11 @@ class Regions:
         self.region[places] = -1
 
         members = places[self._finer.exist(places)]
-        if len(members):
-            links = self._finer.rows(members)
-            self._label(members, links)
-            self._describe(members)
-            added = self._links_between(members, links)
-        else:
-            added = np.zeros(0, np.int64)
+        links = self._finer.rows(members)
+        self._label(members, links)
+        self._describe(members)
 
+        added = self._links_between(members, links)
         self._replace_links(places, added)
         return places
 
@@ -131,8 +136,9 @@ class Regions:
         counts = self._starts[nodes + 1] - starts
         ends = np.cumsum(counts)
 
-        links = np.repeat(starts + counts - ends, counts)
-        links += np.arange(len(links))
+        # Number k of all these links is number k + first of those that are kept.
+        first = np.repeat(starts + counts - ends, counts)
+        links = first + np.arange(len(first))
         return Rows(counts, self._columns[links])
 
     def members(self, regions: Indices) -> Indices:
@@ -151,12 +157,7 @@ class Regions:
         is_region = self.exist(every)
         regions = np.flatnonzero(is_region)
         number_of = np.cumsum(is_region, dtype=np.int32) - np.int32(1)
-
         links = self.rows(regions)
-        owners = links.owners()
-        lasts = np.cumsum(links.counts)
-        firsts = lasts - links.counts
-        slots = np.arange(len(owners)) - firsts[owners]
 
         # An empty slot leads back to its owner, at an infinite cost.
         shape = (len(regions), links.counts.max(initial=1))
@@ -164,6 +165,8 @@ class Regions:
         neighbours = np.empty(shape, np.int32)
         neighbours.T[:] = number_of[regions]
 
+        owners = links.owners()
+        slots = links.slots()
         costs_m[owners, slots] = self._costs_m(regions[owners], links.columns)
         neighbours[owners, slots] = number_of[links.columns]
         return regions, SlotGraph(neighbours, costs_m)
@@ -183,6 +186,9 @@ class Regions:
 
     def _label(self, members: Indices, links: Rows) -> None:
         """Find the regions of finer nodes: what is connected inside a block."""
+        if not len(members):
+            return
+
         owners = links.owners()
         here = self._corner_of[members][owners]
         there = self._corner_of[links.columns]

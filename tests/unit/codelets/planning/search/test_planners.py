@@ -209,3 +209,18 @@ def test_planners_state_why_there_is_no_route(planner_class):
 
     for reason, answer in reasons.items():
         assert answer == NoRoute(reason)
+
+
+@pytest.mark.parametrize("planner_class", [FlatPlanner, HierarchicalPlanner])
+def test_ground_that_is_blocked_everywhere_may_be_opened(planner_class):
+    free = np.zeros((10, 4), bool)
+    planner = planner_class(grid_network(free))
+    blocked = planner.find_route((0, 0), (9, 3))
+    free[:, 2] = True
+    planner.update(grid_network(free))
+
+    opened = planner.find_route((0, 2), (9, 2))
+
+    assert blocked == NoRoute(NoRouteReason.START_BLOCKED)
+    assert isinstance(opened, Route)
+    assert opened.length_m == 9
