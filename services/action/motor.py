@@ -16,8 +16,9 @@ from services.action.route import Route
 
 MAX_BEARING_RAD = math.pi / 3
 TURNING_SPEED_M_S = 0.5
-BEHIND_RAD = 3 * math.pi / 4
+BEHIND_RAD = 1.0
 ASIDE_RAD = 0.3
+TURN_TIME_S = 0.5
 
 
 class Speed(NamedTuple):
@@ -87,27 +88,30 @@ class SensoryMotorMemory:
         is_blocked = speed.m_s <= 0.0
         may_turn = not is_blocked or speed.limit is SpeedLimit.OBSTACLE
         if may_turn and self._must_turn(ahead.bearing_rad, is_blocked):
-            turn_m_s = math.copysign(TURNING_SPEED_M_S, ahead.bearing_rad)
+            turn_m_s = self._turning_m_s(ahead.bearing_rad, pose_age_ns / 1e9)
             return self._wheels(stamp_ns, -turn_m_s, turn_m_s, speed.limit, pose_age_ns)
 
         if is_blocked:
             return halted(stamp_ns, speed.limit, pose_age_ns)
 
-        steered_rad = max(-math.pi / 2, min(math.pi / 2, ahead.bearing_rad))
-        curvature_per_m = 2 * math.sin(steered_rad) / ahead.distance_m
-        speed_m_s = speed.m_s
-        if abs(ahead.bearing_rad) > math.pi / 2:
-            speed_m_s = min(speed_m_s, TURNING_SPEED_M_S)
-
-        half_turn_m_s = speed_m_s * curvature_per_m * self._config.track_m / 2
-        left_m_s = speed_m_s - half_turn_m_s
-        right_m_s = speed_m_s + half_turn_m_s
+        curvature_per_m = 2 * math.sin(ahead.bearing_rad) / ahead.distance_m
+        half_turn_m_s = speed.m_s * curvature_per_m * self._config.track_m / 2
+        left_m_s = speed.m_s - half_turn_m_s
+        right_m_s = speed.m_s + half_turn_m_s
         return self._wheels(stamp_ns, left_m_s, right_m_s, speed.limit, pose_age_ns)
 
     def _must_turn(self, bearing_rad: float, is_blocked: bool) -> bool:
         """Whether the point ahead is so far aside that the robot turns before it drives."""
         least_rad = ASIDE_RAD if is_blocked else BEHIND_RAD
         return abs(bearing_rad) > least_rad
+
+    def _turning_m_s(self, bearing_rad: float, pose_age_s: float) -> float:
+        """The speed of the right wheel, and of the left one backwards, to turn on the spot: slower
+        near the end of the turn, the more so the older the pose is.
+        """
+        duration_s = max(TURN_TIME_S, 2 * pose_age_s)
+        speed_m_s = abs(bearing_rad) / duration_s * self._config.track_m / 2
+        return math.copysign(min(speed_m_s, TURNING_SPEED_M_S), bearing_rad)
 
     def _wheels(
         self,

@@ -42,10 +42,31 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     blind_m: Annotated[
         PositiveMetres,
         Meta(
-            description="Distance around the agent at which the camera sees no ground, in m, "
-            "above 0 to 10000: what is there counts as road."
+            description="Distance ahead up to which the camera sees no ground, in m, above 0 to "
+            "10000: what is there counts as road."
         ),
-    ] = 5.0
+    ] = 4.5
+    driven_m: Annotated[
+        PositiveMetres,
+        Meta(
+            description="Distance from the path within which the ground counts as road, in m, "
+            "above 0 to 10000."
+        ),
+    ] = 1.5
+    visited_m: Annotated[
+        PositiveMetres,
+        Meta(
+            description="Distance from the path within which a frontier promises nothing any "
+            "longer, in m, above 0 to 10000."
+        ),
+    ] = 3.0
+    turn_m: Annotated[
+        PositiveMetres,
+        Meta(
+            description="Distance that is as much effort as turning round towards a frontier, in "
+            "m, above 0 to 10000."
+        ),
+    ] = 15.0
     unknown_weight: Annotated[
         PositiveShare,
         Meta(description="Weight of links to places never seen as road, above 0 to 1."),
@@ -73,9 +94,6 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         PositiveMetres,
         Meta(description="Distance at which road is seen, in m, above 0 to 10000."),
     ] = 12.0
-    frontier_cells: Annotated[
-        Cells, Meta(description="Places that a frontier has at least, 1 to 10000.")
-    ] = 3
     frontier_offset_m: Annotated[
         PositiveMetres,
         Meta(

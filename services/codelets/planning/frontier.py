@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -14,6 +15,13 @@ from services.codelets.planning.config import Config
 from services.codelets.planning.ground import SQUARE, Ground
 
 
+class Standpoint(NamedTuple):
+    """The cell that the agent is at, and where it heads."""
+
+    cell: tuple[int, int]
+    heading_rad: float
+
+
 class Frontier(NamedTuple):
     """An edge of the known ground: the cell (i, j) to drive to, and what it promises."""
 
@@ -22,27 +30,42 @@ class Frontier(NamedTuple):
 
 
 def best_frontier(
-    ground: Ground, agent: tuple[int, int], config: Config, near: tuple[int, int] | None = None
+    ground: Ground, agent: Standpoint, config: Config, near: tuple[int, int] | None = None
 ) -> Frontier | None:
-    """The frontier that promises most from the agent's cell; None where all is known.
+    """The frontier that promises most from where the agent is; None where all is known.
 
-    A frontier promises the unknown places around it, over its distance. The one beside `near`,
-    where the agent goes already, is kept until another promises clearly more.
+    A frontier promises the unknown places around it, over the effort to get there: its distance,
+    and the turn that it takes. The one beside `near`, where the agent goes already, is kept until
+    another promises clearly more.
     """
-    distance_m = spread(ground.known, np.array([agent])).distance_m
+    distance_m = spread(ground.known, np.array([agent.cell])).distance_m
     is_unknown = ground.is_free & ~ground.is_known
     is_reached = ground.is_known & np.isfinite(distance_m)
-    is_edge = ndimage.binary_dilation(is_unknown, SQUARE) & is_reached
+    is_open = ndimage.binary_dilation(is_unknown, SQUARE) & ~ground.is_visited
+    is_edge = is_open & is_reached
 
-    cost_m = distance_m + config.frontier_offset_m
-    promise = _unknown_around(is_unknown, ground, config) / cost_m
+    effort_m = distance_m + config.frontier_offset_m + _turning_m(ground, agent, config)
+    promise = _unknown_around(is_unknown, ground, config) / effort_m
     frontiers = []
-    for cells in _edges(is_edge, config):
+    for cells in _edges(is_edge):
         i, j = _middle(cells)
         i0, j0 = ground.network.origin
         frontiers.append(Frontier((i0 + i, j0 + j), float(promise[i, j]) * len(cells)))
 
     return _chosen(frontiers, near, config)
+
+
+def _turning_m(ground: Ground, agent: Standpoint, config: Config) -> Floats:
+    """(w, h): the effort of turning towards each place, `turn_m` for one behind the agent."""
+    width, height = ground.is_free.shape
+    i, j = ground.network.index_of(agent.cell)
+    ahead = (np.arange(width) - i)[:, None] * math.cos(agent.heading_rad)
+    aside = (np.arange(height) - j) * math.sin(agent.heading_rad)
+    away = np.hypot((np.arange(width) - i)[:, None], np.arange(height) - j)
+
+    cos = (ahead + aside) / np.maximum(away, 1.0)
+    turning_m: Floats = config.turn_m * (1 - cos) / 2
+    return turning_m
 
 
 def _unknown_around(is_unknown: Booleans, ground: Ground, config: Config) -> Floats:
@@ -54,14 +77,12 @@ def _unknown_around(is_unknown: Booleans, ground: Ground, config: Config) -> Flo
     return around
 
 
-def _edges(is_edge: Booleans, config: Config) -> Iterator[Indices]:
-    """The connected edges that are wide enough to pass, (k, 2) indices each."""
+def _edges(is_edge: Booleans) -> Iterator[Indices]:
+    """The connected edges, (k, 2) indices each."""
     labels, _ = ndimage.label(is_edge, SQUARE)
     for number, box in enumerate(ndimage.find_objects(labels), start=1):
         corner = np.array([side.start for side in box])
-        cells = corner + np.argwhere(labels[box] == number)
-        if len(cells) >= config.frontier_cells:
-            yield cells
+        yield corner + np.argwhere(labels[box] == number)
 
 
 def _middle(cells: Indices) -> tuple[int, int]:

@@ -7,6 +7,7 @@ more.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from scipy import ndimage
 from cogmap.geometry.arrays import Booleans, Floats, Singles
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import WEIGHT_COLUMNS, Extent, Window
-from schemas.nodes import PlaceColumn, Self
+from schemas.nodes import PathColumn, PathSegment, PlaceColumn, Self
 from services.codelets.planning.config import Config
 from services.codelets.planning.network import LINK_OFFSETS, PlaceNetwork
 
@@ -24,6 +25,9 @@ CUT_BELOW = 0.5
 OBSTACLE_FROM = 0.5
 ROAD_FROM = 0.3
 BESIDE_CUT = 0.5
+BLIND_STEP_M = 0.5
+LEFT_START_M = 3.0
+POSITION = slice(PathColumn.X_M, PathColumn.Y_M + 1)
 SQUARE = np.ones((3, 3), bool)
 
 Slices = tuple[slice, slice]
@@ -32,12 +36,14 @@ Slices = tuple[slice, slice]
 class Ground(NamedTuple):
     """The place nodes of one map within a rectangle.
 
-    `is_free` (w, h): the robot fits there. `is_known` (w, h): seen as road. `network` has links
+    `is_free` (w, h): the robot fits there. `is_known` (w, h): seen as road, or driven over.
+    `is_visited` (w, h): beside the path, seen from as near as can be. `network` has links
     between free places, lighter where unknown; `known` has those between known places only.
     """
 
     is_free: Booleans
     is_known: Booleans
+    is_visited: Booleans
     network: PlaceNetwork
     known: PlaceNetwork
 
@@ -45,7 +51,8 @@ class Ground(NamedTuple):
 def ground(graph: Graph, agent: Self, config: Config) -> Ground:
     """The ground of the agent's map and some unknown places around it.
 
-    The place that the agent is at, which its camera does not see, counts as known.
+    The path that the agent took counts as known, and so does the ground ahead that is too near for
+    its camera.
     """
     map_id = agent.map
     extent = _with_margin(graph.places.extent(map_id), config.margin_cells)
@@ -54,7 +61,9 @@ def ground(graph: Graph, agent: Self, config: Config) -> Ground:
 
     cell_m = graph.cell_m(map_id)
     is_seen = window.column(PlaceColumn.ROAD) >= ROAD_FROM
-    is_known = is_seen | _is_near(agent, window, cell_m, config.blind_m)
+    path_m = _path_m(graph)
+    driven_m = np.vstack([path_m, _blind_m(agent, config)])
+    is_known = is_seen | _is_within(config.driven_m, driven_m, window, cell_m)
     is_obstacle = window.column(PlaceColumn.OBSTACLE) >= OBSTACLE_FROM
     is_edge = _has_cut(weights) | is_obstacle
     is_free = ~is_edge
@@ -69,20 +78,52 @@ def ground(graph: Graph, agent: Self, config: Config) -> Ground:
     return Ground(
         is_free=is_free,
         is_known=is_known & is_free,
+        is_visited=_is_within(config.visited_m, _since_start_m(path_m), window, cell_m),
         network=PlaceNetwork(window.origin, cell_m, _links(weights, optimistic)),
         known=PlaceNetwork(window.origin, cell_m, _links(weights, only_known)),
     )
 
 
-def _is_near(agent: Self, window: Window, cell_m: float, within_m: float) -> Booleans:
-    """(w, h): the cells within a distance of the agent."""
-    i0, j0 = window.origin
-    width, height = window.shape
-    x_m = (np.arange(width) + i0) * cell_m - agent.x_m
-    y_m = (np.arange(height) + j0) * cell_m - agent.y_m
+def _blind_m(agent: Self, config: Config) -> Floats:
+    """(n, 2): positions ahead of the agent that its camera does not see."""
+    ahead_m = np.arange(0.0, config.blind_m, BLIND_STEP_M)
+    direction = np.array([math.cos(agent.heading_rad), math.sin(agent.heading_rad)])
+    positions_m: Floats = np.array([agent.x_m, agent.y_m]) + ahead_m[:, None] * direction
+    return positions_m
 
-    is_near: Booleans = np.hypot(x_m[:, None], y_m) <= within_m
-    return is_near
+
+def _path_m(graph: Graph) -> Floats:
+    """(n, 2): the places of the path, the oldest first."""
+    segments = sorted(graph.of_kind(PathSegment), key=lambda segment: segment.number)
+    positions = [np.zeros((0, 2))]
+    for segment in segments:
+        rows = np.asarray(segment.rows.numpy(), np.float64)
+        positions.append(rows[:, POSITION])
+
+    return np.vstack(positions)
+
+
+def _since_start_m(path_m: Floats) -> Floats:
+    """The places of a path from where it has left its start: from there the agent did not look
+    round.
+    """
+    from_start_m = np.hypot(*(path_m - path_m[:1]).T)
+    has_left = from_start_m > LEFT_START_M
+    since_m: Floats = path_m[has_left.cumsum() > 0]
+    return since_m
+
+
+def _is_within(within_m: float, positions_m: Floats, window: Window, cell_m: float) -> Booleans:
+    """(w, h): the cells within a distance of any of (n, 2) positions."""
+    cells = np.rint(positions_m / cell_m).astype(np.int64) - np.array(window.origin)
+    is_inside = ((cells >= 0) & (cells < window.shape)).all(axis=1)
+    if not is_inside.any():
+        return np.zeros(window.shape, bool)
+
+    is_away = np.ones(window.shape, bool)
+    is_away[tuple(cells[is_inside].T)] = False
+    is_within: Booleans = ndimage.distance_transform_edt(is_away) * cell_m <= within_m
+    return is_within
 
 
 def _with_margin(extent: Extent, cells: int) -> Extent:

@@ -26,13 +26,14 @@ from schemas.nodes import (
     LinkKind,
     Map,
     Object,
+    PathSegment,
     PlaceColumn,
     Plan,
     PlanState,
     Self,
 )
 from services.codelets.planning.config import Config
-from services.codelets.planning.frontier import best_frontier
+from services.codelets.planning.frontier import Standpoint, best_frontier
 from services.codelets.planning.ground import Ground, ground
 from services.codelets.planning.routes import (
     Route,
@@ -109,7 +110,9 @@ CODELET = Codelet(
     phase=Phase.BACKGROUND,
     due=due,
     run=run,
-    reads=frozenset({Self, Goal, Plan, Object, Map, PlaceColumn.ROAD, PlaceColumn.OBSTACLE}),
+    reads=frozenset(
+        {Self, Goal, Plan, Object, Map, PathSegment, PlaceColumn.ROAD, PlaceColumn.OBSTACLE}
+    ),
     writes=frozenset({Plan, Goal, LinkKind.TOWARDS}),
     config=Config,
     section=SECTION,
@@ -227,7 +230,8 @@ def _nearest_first(lengths: Floats) -> list[int]:
 def _to_frontier(plan: Plan, start: Cell, now: Situation) -> Plan:
     """The plan with a route to the frontier that promises most, where there is one."""
     where = now.where
-    frontier = best_frontier(where, start, now.config, _frontier_before(now))
+    standpoint = Standpoint(start, now.agent.heading_rad)
+    frontier = best_frontier(where, standpoint, now.config, _frontier_before(now))
     if frontier is None:
         return plan
 
@@ -282,7 +286,8 @@ def _serves(plan: Plan, now: Situation) -> bool:
     nearest = int(away_m.argmin())
     moved = np.abs(cells[-1] - _cells(plan, now.where)[-1]).max()
     is_off = away_m[nearest] > now.config.off_route_m
-    if is_off or moved > now.config.same_frontier_cells // 2:
+    is_at_end = plan.explores and away_m[-1] <= now.config.reached_m
+    if is_off or is_at_end or moved > now.config.same_frontier_cells // 2:
         return False
 
     network = now.where.known if plan.explores else now.where.network
