@@ -13,6 +13,7 @@ from rich.console import Console
 from benchmarks import suite
 from benchmarks.bus import measure as bus
 from benchmarks.cycle import measure as cycle
+from benchmarks.explore.command import explore_command
 from benchmarks.localization import measure as localization
 from benchmarks.map_correction import measure as map_correction
 from benchmarks.map_size import measure as map_size
@@ -340,3 +341,4 @@ def spiking_command(seed: int, processes: int, folder: Path | None, json_path: P
 
 
 benchmarks.add_command(planning_command)
+benchmarks.add_command(explore_command)

@@ -13,6 +13,7 @@ from pathlib import Path
 from benchmarks import paper
 from benchmarks.bus import measure as bus
 from benchmarks.cycle import measure as cycle
+from benchmarks.explore import measure as explore
 from benchmarks.localization import measure as localization
 from benchmarks.machine import machine_unit_ms
 from benchmarks.map_correction import measure as map_correction
@@ -139,6 +140,10 @@ def _place_grid(setting: Setting) -> Metrics:
     return place_grid.measure(setting.announce)
 
 
+def _explore(setting: Setting) -> Metrics:
+    return explore.measure(setting.processes)
+
+
 def _cue_integration(setting: Setting) -> Metrics:
     return paper.measure_cue_integration(setting.processes)
 
@@ -161,6 +166,7 @@ SUITE = (
     Benchmark("place_grid", place_grid.THRESHOLDS, _place_grid),
     Benchmark("planning", grid.THRESHOLDS, _planning),
     Benchmark("tours", tours.THRESHOLDS, _tours),
+    Benchmark("explore", explore.THRESHOLDS, _explore),
     Benchmark("cue-integration", paper.CUE_INTEGRATION_THRESHOLDS, _cue_integration),
     Benchmark("city-maps", paper.CITY_MAPS_THRESHOLDS, _city_maps),
 )

@@ -1,0 +1,148 @@
+"""Where a robot can drive in a town as it was built, and the length of the shortest route there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import pairwise
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import dijkstra
+
+from cogmap.geometry.arrays import Booleans, Floats, Indices
+from schemas.sensing import Obstacle, Street, TrueTown
+
+CELL_M = 0.5
+MARGIN_M = 5.0
+HALF_WIDTH_M = 0.7
+BARRIER_M = 1.0
+MOVES = ((1, 0), (1, 1), (0, 1), (-1, 1), (2, 1), (1, 2), (-1, 2), (-2, 1))
+"""Half of the moves on the grid: with the knight's of chess, a length is 2.7 % too long at most."""
+
+Canvas = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
+
+
+class Drivable(NamedTuple):
+    """Cells of CELL_M that the robot's centre may be on: `is_free` (w, h), from `corner_m`."""
+
+    corner_m: Floats
+    is_free: Booleans
+
+    @classmethod
+    def of(cls, town: TrueTown) -> Drivable:
+        """The streets of a town without its obstacles, and with barriers across closed ones."""
+        corner_m, canvas = _blank(town)
+        for street in town.streets:
+            _draw_street(canvas, street, corner_m)
+
+        for obstacle in town.obstacles:
+            _draw_obstacle(canvas, obstacle, corner_m)
+
+        for street in town.streets:
+            if street.closed:
+                _draw_barrier(canvas, street, corner_m)
+
+        width = 2 * round(HALF_WIDTH_M / CELL_M) + 1
+        robot = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (width, width))
+        is_free = cv2.erode(canvas, robot) > 0
+        return cls(corner_m, np.asarray(is_free))
+
+    def cell(self, x_m: float, y_m: float) -> int:
+        """The number of the free cell nearest to a position."""
+        cells = np.argwhere(self.is_free)
+        away_m = self.corner_m + cells * CELL_M - (x_m, y_m)
+        nearest = cells[int(np.hypot(*away_m.T).argmin())]
+        return int(np.ravel_multi_index(tuple(nearest), self.is_free.shape))
+
+    def is_on(self, x_m: float, y_m: float) -> bool:
+        """Whether the robot's centre may be at a position."""
+        i, j = np.rint((np.array([x_m, y_m]) - self.corner_m) / CELL_M).astype(int).tolist()
+        width, height = self.is_free.shape
+        return 0 <= i < width and 0 <= j < height and bool(self.is_free[i, j])
+
+    def lengths_from(self, x_m: float, y_m: float) -> Floats:
+        """(w, h): the length of the shortest route from a position, infinite where none leads."""
+        start = self.cell(x_m, y_m)
+        lengths_m = dijkstra(_links(self.is_free), indices=start)
+        return np.asarray(lengths_m, np.float64).reshape(self.is_free.shape)
+
+    def length_m(self, start_m: tuple[float, float], end_m: tuple[float, float]) -> float:
+        """The length of the shortest route between two positions; infinite where none leads."""
+        lengths_m = self.lengths_from(*start_m)
+        return float(lengths_m.ravel()[self.cell(*end_m)])
+
+
+def _blank(town: TrueTown) -> tuple[Floats, Canvas]:
+    """The corner of a canvas on which a town has room, and the canvas."""
+    lines = [np.array(street.line_m, float) for street in town.streets]
+    points_m = np.vstack(lines)
+    corner_m = points_m.min(axis=0) - MARGIN_M
+
+    extent_m = np.ptp(points_m, axis=0) + 2 * MARGIN_M
+    width, height = np.ceil(extent_m / CELL_M).astype(int).tolist()
+    return corner_m, np.zeros((width, height), np.uint8)
+
+
+def _draw_street(canvas: Canvas, street: Street, corner_m: Floats) -> None:
+    """Draw the surface of a street, its ends round."""
+    points = [_pixel(point, corner_m) for point in street.line_m]
+    width = max(1, round(street.width_m / CELL_M))
+    for start, end in pairwise(points):
+        cv2.line(canvas, start, end, 1, width)
+
+
+def _draw_obstacle(canvas: Canvas, obstacle: Obstacle, corner_m: Floats) -> None:
+    pose = obstacle.pose
+    size = (obstacle.width_m / CELL_M, obstacle.length_m / CELL_M)
+    centre = _pixel((pose.x_m, pose.y_m), corner_m)
+    corners = cv2.boxPoints((centre, size, -float(np.degrees(pose.heading_rad))))
+    cv2.fillConvexPoly(canvas, np.rint(corners).astype(np.int32), 0)
+
+
+def _draw_barrier(canvas: Canvas, street: Street, corner_m: Floats) -> None:
+    """Close a street in its middle, from kerb to kerb."""
+    start_m = np.array(street.line_m[0])
+    end_m = np.array(street.line_m[-1])
+    middle_m = (start_m + end_m) / 2
+    along = (end_m - start_m) / np.linalg.norm(end_m - start_m)
+    across_m = np.array([-along[1], along[0]]) * (street.width_m / 2 + MARGIN_M / 2)
+
+    first = _pixel(middle_m - across_m, corner_m)
+    last = _pixel(middle_m + across_m, corner_m)
+    cv2.line(canvas, first, last, 0, round(BARRIER_M / CELL_M))
+
+
+def _pixel(point_m: Iterable[float], corner_m: Floats) -> tuple[int, int]:
+    """A position as OpenCV takes it: the second index first."""
+    x_m, y_m = point_m
+    i, j = np.rint((np.array([x_m, y_m]) - corner_m) / CELL_M).astype(int).tolist()
+    return j, i
+
+
+def _links(is_free: Booleans) -> sparse.csr_matrix:
+    """(n, n): the length of each move between free cells."""
+    number = np.arange(is_free.size).reshape(is_free.shape)
+    rows: list[Indices] = []
+    columns: list[Indices] = []
+    lengths: list[Floats] = []
+    for di, dj in MOVES:
+        here, there = _pairs(is_free, number, di, dj)
+        rows.append(here)
+        columns.append(there)
+        lengths.append(np.full(len(here), CELL_M * np.hypot(di, dj)))
+
+    entries = np.concatenate(lengths)
+    places = (np.concatenate(rows), np.concatenate(columns))
+    one_way = sparse.csr_matrix((entries, places), shape=(is_free.size, is_free.size))
+    return one_way + one_way.T
+
+
+def _pairs(is_free: Booleans, number: Indices, di: int, dj: int) -> tuple[Indices, Indices]:
+    """The numbers of free cells, and of those a move away that are free too."""
+    width, height = is_free.shape
+    here = (slice(max(0, -di), width - max(0, di)), slice(0, height - dj))
+    there = (slice(max(0, di), width - max(0, -di)), slice(dj, height))
+    both = is_free[here] & is_free[there]
+    return number[here][both], number[there][both]

@@ -1,0 +1,117 @@
+"""Drives to goals in a town: which goals are fair, which street is closed, what counts as there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import msgspec
+import numpy as np
+
+from benchmarks.explore.drivable import Drivable
+from cogmap.geometry.arrays import Floats
+from cogmap.geometry.polylines import resample
+from schemas.sensing import TrueTown
+
+LINE_STEP_M = 1.0
+MIN_AWAY_M = 40.0
+BARRIER_AHEAD_M = 15.0
+ON_ROUTE_M = 3.0
+REACHED_WITHIN_M = 4.0
+SLOWEST_M_S = 1.0
+GRACE_S = 60.0
+
+Point = tuple[float, float]
+
+
+@dataclass
+class Trial:
+    """A drive from `start_m` to `goal_m`, in the true frame.
+
+    `closes`: whether a street is to be closed once a route is planned; `closed` is that street.
+    `driven_m` is None while the goal is not reached; `shortest_m` is the shortest route's length in
+    the town as it is then.
+    """
+
+    start_m: Point
+    goal_m: Point
+    began_ns: int
+    began_travelled_m: float
+    closes: bool
+    shortest_m: float
+    closed: str = ""
+    driven_m: float | None = None
+
+    @property
+    def limit_ns(self) -> int:
+        """The time at which the drive counts as failed."""
+        limit_s = GRACE_S + 3 * self.shortest_m / SLOWEST_M_S
+        return self.began_ns + round(limit_s * 1e9)
+
+    @property
+    def over_shortest(self) -> float:
+        """The distance driven over that of the shortest route."""
+        assert self.driven_m is not None
+        return self.driven_m / self.shortest_m
+
+
+def centre_lines_m(town: TrueTown) -> Floats:
+    """(n, 2): points of the streets' centre lines, LINE_STEP_M apart."""
+    lines = []
+    for street in town.streets:
+        line_m = np.array(street.line_m, float)
+        lines.append(resample(line_m, LINE_STEP_M))
+
+    return np.vstack(lines)
+
+
+def closed_as(town: TrueTown, street: str) -> TrueTown:
+    """The town with that street closed too."""
+    streets = []
+    for each in town.streets:
+        is_closed = each.closed or each.name == street
+        streets.append(msgspec.structs.replace(each, closed=is_closed))
+
+    return msgspec.structs.replace(town, streets=streets)
+
+
+def draw_goal(
+    rng: np.random.Generator, town: TrueTown, drivable: Drivable, here_m: Point
+) -> tuple[Point, float]:
+    """A point of the streets that can be reached from `here_m`, and the length of the shortest
+    route to it, at least MIN_AWAY_M.
+    """
+    lengths_m = drivable.lengths_from(*here_m)
+    for point_m in rng.permutation(centre_lines_m(town)):
+        x_m, y_m = point_m.tolist()
+        length_m = float(lengths_m.ravel()[drivable.cell(x_m, y_m)])
+        if drivable.is_on(x_m, y_m) and MIN_AWAY_M <= length_m < math.inf:
+            return (x_m, y_m), length_m
+
+    raise ValueError(f"no goal is {MIN_AWAY_M} m from {here_m}")
+
+
+def street_to_close(
+    rng: np.random.Generator, town: TrueTown, route_m: Floats, goal_m: Point
+) -> tuple[str, float] | None:
+    """A street that the (n, 2) route passes, BARRIER_AHEAD_M ahead at least, without which the goal
+    can still be reached, and the length of the shortest route then; None where there is none.
+    """
+    along_m = np.concatenate([[0.0], np.hypot(*np.diff(route_m, axis=0).T).cumsum()])
+    start_x_m, start_y_m = route_m[0].tolist()
+    for number in rng.permutation(len(town.streets)).tolist():
+        street = town.streets[number]
+        middle_m = (np.array(street.line_m[0]) + street.line_m[-1]) / 2
+        away_m = np.hypot(*(route_m - middle_m).T)
+        nearest = int(away_m.argmin())
+        if away_m[nearest] > ON_ROUTE_M or along_m[nearest] < BARRIER_AHEAD_M:
+            continue
+        if math.dist(middle_m, goal_m) < REACHED_WITHIN_M:
+            continue
+
+        closed = Drivable.of(closed_as(town, street.name))
+        length_m = closed.length_m((start_x_m, start_y_m), goal_m)
+        if math.isfinite(length_m):
+            return street.name, length_m
+
+    return None

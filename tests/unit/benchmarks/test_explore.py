@@ -1,0 +1,128 @@
+"""What exploration is judged by: routes in the true town, goals, closed streets, cut links."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from benchmarks.explore.drivable import Drivable
+from benchmarks.explore.judge import boundary_score, explored_share
+from benchmarks.explore.measure import Town, metrics
+from benchmarks.explore.trials import Trial, closed_as, draw_goal, street_to_close
+from cogmap.graph.graph import Graph
+from schemas.array import Array
+from schemas.graph import Cells
+from schemas.nodes import ROOT_MAP, Map, PlaceColumn
+from schemas.sensing import Street, TrueTown
+
+ORIGIN = np.zeros(3)
+CORNERS = ((0.0, 0.0), (60.0, 0.0), (60.0, 40.0), (0.0, 40.0))
+NAMES = ("south", "east", "north", "west")
+
+
+def _town() -> TrueTown:
+    """A loop of four streets, 60 m and 40 m long, 6 m wide."""
+    ends = zip(NAMES, CORNERS, (*CORNERS[1:], CORNERS[0]), strict=True)
+    streets = [Street(name=name, line_m=[a, b], width_m=6.0) for name, a, b in ends]
+    kerbs_m = np.array([[0.0, -3.0, 60.0, -3.0]], np.float32)
+    return TrueTown(seed=1, streets=streets, buildings=[], kerbs_m=Array.of(kerbs_m))
+
+
+def _graph(*cells: Cells) -> Graph:
+    graph = Graph()
+    graph.change([Map(id=ROOT_MAP, cell_m=1.0), *cells])
+    return graph
+
+
+def _cells(column: PlaceColumn, i: range, j: range, value: float) -> Cells:
+    where = np.array([(each_i, each_j) for each_i in i for each_j in j], np.int32)
+    values = np.full(len(where), value, np.float32)
+    return Cells(column=column, cells=Array.of(where), values=Array.of(values))
+
+
+def _trial(driven_m: float | None, closed: str = "") -> Trial:
+    return Trial(
+        start_m=(0.0, 0.0),
+        goal_m=(50.0, 0.0),
+        began_ns=0,
+        began_travelled_m=0.0,
+        closes=bool(closed),
+        shortest_m=50.0,
+        closed=closed,
+        driven_m=driven_m,
+    )
+
+
+def test_the_shortest_route_leads_along_the_street() -> None:
+    length_m = Drivable.of(_town()).length_m((0.0, 0.0), (50.0, 0.0))
+
+    assert length_m == pytest.approx(50.0, rel=0.03)
+
+
+def test_where_a_street_is_closed_the_shortest_route_leads_round() -> None:
+    town = closed_as(_town(), "south")
+    length_m = Drivable.of(town).length_m((0.0, 0.0), (50.0, 0.0))
+
+    assert 120.0 < length_m < 155.0
+
+
+def test_to_a_place_that_is_shut_off_there_is_no_route() -> None:
+    town = closed_as(closed_as(_town(), "south"), "north")
+
+    assert math.isinf(Drivable.of(town).length_m((0.0, 0.0), (60.0, 20.0)))
+
+
+def test_a_goal_is_on_a_street_and_far_enough() -> None:
+    town = _town()
+    goal_m, length_m = draw_goal(np.random.default_rng(1), town, Drivable.of(town), (0.0, 0.0))
+
+    assert Drivable.of(town).is_on(*goal_m)
+    assert length_m >= 40.0
+
+
+def test_the_street_that_is_closed_is_on_the_route_and_leaves_another() -> None:
+    route_m = np.column_stack([np.arange(51.0), np.zeros(51)])
+    found = street_to_close(np.random.default_rng(1), _town(), route_m, (50.0, 0.0))
+
+    assert found is not None
+    name, length_m = found
+    assert name == "south"
+    assert length_m > 120.0
+
+
+def test_explored_is_what_the_map_has_as_road() -> None:
+    south = _cells(PlaceColumn.ROAD, range(61), range(-2, 3), 1.0)
+
+    assert explored_share(_graph(south), _town(), ORIGIN) == pytest.approx(0.3, abs=0.05)
+    assert explored_share(_graph(), _town(), ORIGIN) == 0.0
+
+
+def test_links_cut_along_the_kerb_are_right_and_those_amid_the_street_wrong() -> None:
+    south = _cells(PlaceColumn.ROAD, range(61), range(-2, 3), 1.0)
+    kerb = _cells(PlaceColumn.WEIGHT_N, range(61), range(-4, -3), 0.0)
+    amid = _cells(PlaceColumn.WEIGHT_N, range(61), range(0, 1), 0.0)
+    right = boundary_score(_graph(south, kerb), _town(), ORIGIN)
+    half = boundary_score(_graph(south, kerb, amid), _town(), ORIGIN)
+
+    assert (right.precision, right.recall) == (1.0, 1.0)
+    assert half.precision == pytest.approx(0.5)
+
+
+def test_goals_that_are_not_reached_count_and_do_not_lengthen_the_way() -> None:
+    score = boundary_score(
+        _graph(
+            _cells(PlaceColumn.ROAD, range(61), range(-2, 3), 1.0),
+            _cells(PlaceColumn.WEIGHT_N, range(61), range(-4, -3), 0.0),
+        ),
+        _town(),
+        ORIGIN,
+    )
+    town = Town(0.9, score, [_trial(55.0), _trial(None), _trial(60.0, "south")], collisions=1)
+    found = metrics([town])
+
+    assert found["goals_reached_share"] == pytest.approx(2 / 3)
+    assert found["way_over_shortest"] == pytest.approx(1.15)
+    assert found["way_over_shortest_open"] == pytest.approx(1.1)
+    assert found["collisions"] == 1.0
