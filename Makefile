@@ -35,8 +35,8 @@ $(MEASURES): $(INSTALLED) requirements/bench.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements/bench.txt
 	touch $@
 
-demo: setup ## drive around a simulated town; more options: make demo ARGS="--seed 2"
-	$(BIN)/cogmap run $(ARGS)
+demo: setup ## drive around a simulated town; make demo TOUR=1 explores one; ARGS="--seed 2" for more
+	$(BIN)/cogmap run $(if $(TOUR),--tour) $(ARGS)
 
 test: setup ## every test but those of the containers; those of training are skipped without torch
 	$(BIN)/python -m pytest

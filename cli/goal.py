@@ -136,7 +136,7 @@ def goal(
     """
     goals = parsed(places)
     if path is not None:
-        goals += _of_file(path)
+        goals += read_goals(path)
     if not goals and not clear:
         raise UsageError("no goal is given: name an object, or a position as X Y")
 
@@ -193,7 +193,7 @@ def _number(word: str) -> float | None:
     return value
 
 
-def _of_file(path: Path) -> list[Goal]:
+def read_goals(path: Path) -> list[Goal]:
     """The goals of a file, one a line. Raises UsageError, which names the line."""
     goals = []
     for number, line in enumerate(path.read_text("utf-8").splitlines(), start=1):

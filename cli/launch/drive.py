@@ -5,12 +5,15 @@ from __future__ import annotations
 import shutil
 import time
 from collections.abc import Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from cli.launch.guide import Guide, Stage
 from cli.launch.outcome import Ending, Outcome
 from cli.launch.plan import (
     CONFIG_NAME,
+    EXPLORE_S,
     RECORDER,
     ROUTER,
     STATE_NAME,
@@ -25,6 +28,7 @@ from cli.launch.watchdog import REMEDY, Situation, Watchdog
 from cli.run.display import Display
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.errors import ProcessFailedError
+from cogmap.runtime.client import Client
 from cogmap.runtime.config import Sections
 from cogmap.runtime.process import Stop
 from schemas.sensing import SpeedLimit
@@ -53,6 +57,11 @@ class Drive:
     def __post_init__(self) -> None:
         self.supervisor = Supervisor(self.folder)
         self._watchdog = Watchdog()
+        self.guide: Guide | None = None
+        if self.choices.tour:
+            self.guide = Guide(EXPLORE_S, self.choices.goals, closes_street=True)
+        elif self.choices.goals:
+            self.guide = Guide(0.0, self.choices.goals)
 
     @property
     def awaited(self) -> Mapping[str, int]:
@@ -86,7 +95,8 @@ class Drive:
                 for program in modules(self.folder, self.endpoint, self.agent, self.choices):
                     self.supervisor.start(program)
                 self._note("processes started")
-                ending = self._follow(watch, until_s, stop, display)
+                with self._guiding():
+                    ending = self._follow(watch, until_s, stop, display)
         except ProcessFailedError as error:
             if watch.tally.observer.start is None:
                 raise
@@ -96,6 +106,12 @@ class Drive:
         if in_lockstep and ending.outcome is Outcome.ROUTE_COMPLETE:
             watch.pump_until_quiet(QUIET_S)
         return ending
+
+    def _guiding(self) -> AbstractContextManager[object]:
+        """Run the guide, where there is one, on a thread of its own."""
+        if self.guide is None:
+            return nullcontext()
+        return Client(self.guide.module(), self.endpoint, self.agent)
 
     def _await_recorder(self, watch: Watch, until_s: float, stop: Stop) -> Ending | None:
         """Wait for it, so that the log holds every message of each module from its first on.
@@ -113,6 +129,7 @@ class Drive:
 
     def _follow(self, watch: Watch, until_s: float, stop: Stop, display: Display) -> Ending:
         next_s = 0.0
+        shown: Stage | None = None
         missing = watch.missing(self.awaited)
         while (ending := self._ending(watch, missing, until_s, stop)) is None:
             watch.pump(PUMP_S)
@@ -122,7 +139,17 @@ class Drive:
             if time.monotonic() >= next_s:
                 next_s = time.monotonic() + SHOW_PERIOD_S
                 _show(watch, missing, display)
+                shown = self._show_stage(shown, display)
         return ending
+
+    def _show_stage(self, shown: Stage | None, display: Display) -> Stage | None:
+        """Show what the agent does on its tour, once for each stage; the stage that is shown."""
+        guide = self.guide
+        if guide is None or guide.stage is shown:
+            return shown
+
+        display.show(guide.sentence)
+        return guide.stage
 
     def _note_progress(self, watch: Watch, missing: list[str]) -> None:
         if not missing:
@@ -141,6 +168,8 @@ class Drive:
             return Ending(Outcome.INTERRUPTED, "it was interrupted")
         if observer.progress >= 1.0:
             return Ending(Outcome.ROUTE_COMPLETE, self._complete())
+        if self.guide is not None and self.guide.stage is Stage.COMPLETE:
+            return Ending(Outcome.ROUTE_COMPLETE, self.guide.sentence)
         if time.monotonic() >= until_s:
             return _out_of_time(watch, missing)
         if observer.start is None:

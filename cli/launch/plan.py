@@ -13,9 +13,10 @@ import tomli_w
 from cli.launch.supervisor import Program, cogmap_command
 from cogmap.runtime import config
 from cogmap.runtime.config import Sections
+from schemas.nodes import Goal
 from services import registry
 from services.sim.layout.town import generate
-from services.sim.layout.towns import LOOP
+from services.sim.layout.towns import BLOCKS, LOOP
 
 OBSERVER = "observer"
 RECORDER = "recorder"
@@ -24,6 +25,9 @@ LOG_NAME = "log.mcap"
 CONFIG_NAME = "config.toml"
 STATE_NAME = "state"
 REPLICATED = "codelets"
+TOUR_TOWN_M = 120.0
+TOUR_LIMIT_S = 600.0
+EXPLORE_S = 150.0
 
 
 @dataclass(frozen=True)
@@ -31,6 +35,7 @@ class Choices:
     """What the user chooses about a drive; None leaves it to the configuration.
 
     `without` are the modules that somebody else starts. `own_router` is whether the run starts one.
+    On a `tour` the agent explores first; it is given `goals`, or such as it knows then.
     """
 
     seed: int | None = None
@@ -41,6 +46,8 @@ class Choices:
     record: bool = True
     without: Sequence[str] = ()
     own_router: bool = True
+    tour: bool = False
+    goals: Sequence[Goal] = ()
 
 
 def effective(base: Sections, choices: Choices, awaits: dict[str, int]) -> Sections:
@@ -53,7 +60,8 @@ def effective(base: Sections, choices: Choices, awaits: dict[str, int]) -> Secti
 
     sim = complete["sim"]
     action = complete["action"]
-    if not action["route"] and sim["town"] == LOOP:
+    has_goals = choices.tour or bool(choices.goals)
+    if not action["route"] and sim["town"] == LOOP and not has_goals:
         action["route"] = _route(sim["seed"], sim["laps"])
     return complete
 
@@ -74,9 +82,20 @@ def _chosen(base: Sections, choices: Choices, awaits: dict[str, int]) -> Section
         sim["seed"] = choices.seed
     if choices.town is not None:
         sim["town"] = choices.town
+    if choices.tour:
+        _set_out(sim)
+    if sim.get("town", LOOP) != LOOP or choices.goals:
+        sections["planning"].setdefault("explore", True)
     if choices.laps is not None:
         sim["laps"] = choices.laps
     return sections
+
+
+def _set_out(sim: dict[str, Any]) -> None:
+    """The town and the time of a tour, as far as they are not set."""
+    sim.setdefault("town", BLOCKS)
+    sim.setdefault("town_size_m", TOUR_TOWN_M)
+    sim.setdefault("duration_s", TOUR_LIMIT_S)
 
 
 def _complete(sections: Sections, name: str) -> dict[str, Any]:

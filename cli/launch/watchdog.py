@@ -41,7 +41,7 @@ class Watchdog:
         """How the drive must end, if it must.
 
         It is stalled after STALLED_S in which its time stood still, and stuck after STUCK_S of its
-        own time in which the robot moved less than MIN_MOVE_M.
+        own time in which the robot moved less than MIN_MOVE_M, though it has a route.
         """
         ticked = self._ticked
         moved = self._moved
@@ -55,7 +55,9 @@ class Watchdog:
         elif situation.now_s - ticked.now_s >= STALLED_S:
             return Ending(Outcome.STALLED, _stalled(situation))
 
-        if situation.travelled_m - moved.travelled_m >= MIN_MOVE_M:
+        has_moved = situation.travelled_m - moved.travelled_m >= MIN_MOVE_M
+        waits_for_goal = situation.halted_by is SpeedLimit.NO_ROUTE
+        if has_moved or waits_for_goal:
             self._moved = situation
         elif situation.drive_s - moved.drive_s >= STUCK_S:
             return _stuck(situation, situation.commands - moved.commands)

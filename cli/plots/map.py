@@ -15,6 +15,7 @@ from cli.launch.metrics import RecordedMetrics
 from cli.launch.observer import Observer
 from cli.plots import map_layers as layers
 from cli.plots import palette
+from cli.plots.map_structure import draw_structure
 from cli.plots.palette import ESTIMATE, FAINT, FUSED, INK, PAPER, TRUE, WHEELS
 from cli.plots.town_layer import draw_town
 from cogmap.graph.graph import Graph
@@ -37,7 +38,8 @@ def draw(path: Path, observer: Observer, graph: Graph, metrics: RecordedMetrics)
         layers.draw_road(axes, observer, graph)
         layers.draw_objects(axes, observer, graph)
         _draw_paths(axes, observer)
-        _dress(axes, observer, metrics)
+        structure = draw_structure(axes, observer, graph)
+        _dress(axes, observer, metrics, structure)
         figure.savefig(path, facecolor=PAPER)
 
 
@@ -62,7 +64,9 @@ def _draw_paths(axes: Axes, observer: Observer) -> None:
         )
 
 
-def _dress(axes: Axes, observer: Observer, metrics: RecordedMetrics) -> None:
+def _dress(
+    axes: Axes, observer: Observer, metrics: RecordedMetrics, structure: list[Line2D]
+) -> None:
     """Limits, scale, title and legend."""
     town = observer.town
     corners = [point for street in (town.streets if town else []) for point in street.line_m]
@@ -91,7 +95,7 @@ def _dress(axes: Axes, observer: Observer, metrics: RecordedMetrics) -> None:
     axes.set_ylabel("y, metres north", color=FAINT)
     _title(axes, metrics)
     axes.legend(
-        handles=_legend(),
+        handles=[*_legend(), *structure],
         loc="upper center",
         bbox_to_anchor=(0.5, -0.06),
         ncols=4,

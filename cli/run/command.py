@@ -13,6 +13,7 @@ import click
 import msgspec
 from rich.console import Console
 
+from cli.goal import read_goals
 from cli.launch.drive import Drive
 from cli.launch.plan import CONFIG_NAME, Choices, awaited, effective
 from cli.options import FiniteRange, agent_option, config_option, connect_option, set_option
@@ -38,6 +39,17 @@ town_option = click.option(
     metavar="TOWN",
     help="loop, blocks, or osm:FILE, the extract of OpenStreetMap in FILE.  [default: loop]",
 )
+tour_option = click.option(
+    "--tour",
+    is_flag=True,
+    help="In a town of blocks: explore, plan the order of three goals, find round a closed street.",
+)
+goals_option = click.option(
+    "--goals",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Drive to the goals in FILE, one a line: a name, or x and y; end at the last.",
+)
 laps_option = click.option(
     "--laps", type=FiniteRange(0, 1000, min_open=True), help="How far.  [default: 1]"
 )
@@ -54,6 +66,8 @@ lockstep_option = click.option(
 @click.command()
 @seed_option
 @town_option
+@tour_option
+@goals_option
 @laps_option
 @lockstep_option
 @codelets_option
@@ -91,6 +105,8 @@ lockstep_option = click.option(
 def run(
     seed: int | None,
     town: str | None,
+    tour: bool,
+    goals: Path | None,
     laps: float | None,
     lockstep: bool,
     codelets: int,
@@ -109,7 +125,8 @@ def run(
 
     Starts a router and every module as a process of its own, shows how the drive proceeds, and
     leaves a folder with the log, a map and a summary, which runs/latest links to. Ends with 0
-    where the route was completed, 130 after Ctrl-C, else with 1; the summary gives the reason.
+    where the route or the tour was completed, 130 after Ctrl-C, else with 1; the summary gives the
+    reason.
     """
     began_s = time.monotonic()
     stop = Stop()
@@ -123,6 +140,8 @@ def run(
         record=record,
         without=registry.MODULES if "all" in without else without,
         own_router=router is None,
+        tour=tour,
+        goals=() if goals is None else read_goals(goals),
     )
     sections = effective(
         config.load(config_path, settings), choices, awaited(choices, observer=True)
@@ -132,7 +151,7 @@ def run(
 
     endpoint = router or connect
     drive = Drive(_new_folder(out), endpoint, agent, choices, sections, began_s)
-    limit_s = time_limit or default_limit_s(sections["sim"])
+    limit_s = time_limit or default_limit_s(sections["sim"], choices.tour or bool(choices.goals))
     screen = display_on(console)
     _introduce(screen, drive)
     with _writing(drive.folder):
@@ -149,13 +168,13 @@ def run(
     sys.exit(ending.outcome.exit_code)
 
 
-def default_limit_s(sim: dict[str, Any]) -> float:
+def default_limit_s(sim: dict[str, Any], has_goals: bool = False) -> float:
     """The time limit of a drive with these settings of the simulation.
 
     It grows with each lap of a route, and is one lap's at least; without a route it is the drive's
     duration, and time to start and to end.
     """
-    if sim["town"] == LOOP:
+    if sim["town"] == LOOP and not has_goals:
         laps = float(sim["laps"])
         return LAP_LIMIT_S * max(1.0, laps)
 

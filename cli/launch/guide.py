@@ -1,0 +1,201 @@
+"""Guides an agent through a town: lets it explore, gives it goals, closes a street on its way."""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from cogmap.geometry import se2
+from cogmap.geometry.arrays import Floats
+from cogmap.graph.graph import Graph
+from cogmap.runtime.module import Module
+from schemas import topics
+from schemas.base import Message
+from schemas.codelets import Offer
+from schemas.nodes import NEVER_NS, PLAN_ID, Goal, Object, Plan, PlanState, goal_id
+from schemas.sensing import Street, StreetClosure, TruePose, TrueTown
+
+TOUR_GOALS = 3
+KNOWN_SIGHTINGS = 3
+BARRIER_AHEAD_M = 15.0
+ON_ROUTE_M = 3.0
+SAME_CROSSING_M = 1.0
+
+
+class Stage(enum.Enum):
+    """What the agent does on the tour."""
+
+    EXPLORES = enum.auto()
+    DRIVES = enum.auto()
+    DETOURS = enum.auto()
+    COMPLETE = enum.auto()
+
+
+class Guide:
+    """A module that follows the agent's graph and the town, and offers goals when it is time.
+
+    The agent explores for `explore_s`, or until nothing is left to explore. `goals` are then
+    offered; TOUR_GOALS objects of its map, far from one another, where they are not given. Where it
+    `closes_street`, a street of the route to the last goal is closed.
+    """
+
+    def __init__(
+        self, explore_s: float, goals: Sequence[Goal] = (), closes_street: bool = False
+    ) -> None:
+        self.graph = Graph()
+        self.stage = Stage.EXPLORES
+        self.closed = ""
+
+        self._explore_ns = round(explore_s * 1e9)
+        self._given = list(goals)
+        self._closes_street = closes_street
+        self._goals: list[str] = []
+        self._town: TrueTown | None = None
+        self._start: Floats | None = None
+        self._began_ns = 0
+
+    def module(self) -> Module:
+        """The module to run beside the agent's."""
+        emits = (topics.OFFER, topics.STREET_CLOSURE)
+        return (
+            Module("guide")
+            .following(self.graph)
+            .on(topics.TRUE_TOWN, self.on_town)
+            .on(topics.TRUE_POSE, self.on_pose, emits)
+        )
+
+    @property
+    def sentence(self) -> str:
+        """What the agent does now."""
+        names = ", ".join(name.removeprefix(goal_id("")) for name in self._goals)
+        match self.stage:
+            case Stage.EXPLORES:
+                return "the agent explores the town"
+            case Stage.DRIVES:
+                return f"its goals, in an order of its own: {names}"
+            case Stage.DETOURS:
+                return f"{self.closed} is closed on its route: it has to find another"
+            case Stage.COMPLETE:
+                return f"the agent was at every goal: {names}"
+
+    def on_town(self, town: TrueTown) -> None:
+        """The town as it is now."""
+        self._town = town
+
+    def on_pose(self, pose: TruePose) -> list[Message]:
+        """Offer the goals, close the street, see whether all is done."""
+        if self._start is None:
+            self._start = np.array([pose.pose.x_m, pose.pose.y_m, pose.pose.heading_rad])
+            self._began_ns = pose.stamp_ns
+
+        if self.stage is Stage.EXPLORES:
+            return self._offer() if self._has_explored(pose.stamp_ns) else []
+        if self.stage in {Stage.DRIVES, Stage.DETOURS}:
+            return self._follow()
+        return []
+
+    def _has_explored(self, now_ns: int) -> bool:
+        """Whether the time is over, or the plan states that nothing is left to explore."""
+        if now_ns - self._began_ns >= self._explore_ns:
+            return self.graph.agent is not None
+
+        plan = self.graph.get(Plan, PLAN_ID)
+        return plan is not None and plan.planned_ns > 0 and plan.state is PlanState.NO_GOAL
+
+    def _offer(self) -> list[Message]:
+        goals = self._given or _far_apart(self.graph)
+        if not goals:
+            return []
+
+        self.stage = Stage.DRIVES
+        self._goals = [goal.id for goal in goals]
+        return [Offer(cycle=self.graph.cycle, operations=[*goals])]
+
+    def _follow(self) -> list[Message]:
+        """Close a street once only the last goal is left; end where all are reached."""
+        goals = [self.graph.get(Goal, name) for name in self._goals]
+        known = [goal for goal in goals if goal is not None]
+        left = [goal for goal in known if goal.reached_ns == NEVER_NS]
+        plan = self.graph.get(Plan, PLAN_ID)
+        if len(known) == len(goals) and not left:
+            self.stage = Stage.COMPLETE
+            return []
+        if plan is None or plan.route is None:
+            return []
+
+        is_last = len(left) == 1 and plan.goals == [left[0].id]
+        if not (self._closes_street and is_last) or self.stage is Stage.DETOURS:
+            return []
+        return self._close(np.asarray(plan.route.numpy(), np.float64))
+
+    def _close(self, route_m: Floats) -> list[Message]:
+        """Close a street that the (n, 2) route passes ahead, and that can be driven round."""
+        assert self._start is not None
+        if self._town is None:
+            return []
+
+        where_m = se2.transform_from(self._start, route_m)
+        street = street_ahead(self._town, where_m)
+        if street is None:
+            return []
+
+        self.stage = Stage.DETOURS
+        self.closed = street.name
+        return [StreetClosure(street=street.name, closed=True)]
+
+
+def _far_apart(graph: Graph) -> list[Goal]:
+    """TOUR_GOALS objects of the map as goals: each the farthest from those before and the agent."""
+    agent = graph.agent
+    known = [node for node in graph.of_kind(Object) if node.sightings >= KNOWN_SIGHTINGS]
+    if agent is None or len(known) < TOUR_GOALS:
+        return []
+
+    places_m = np.array([(node.x_m, node.y_m) for node in known])
+    away_m = np.hypot(*(places_m - (agent.x_m, agent.y_m)).T)
+    goals = []
+    for _ in range(TOUR_GOALS):
+        farthest = int(away_m.argmax())
+        label = known[farthest].label
+        goals.append(Goal(id=goal_id(label), base_level=1.0, object=label))
+        from_it_m = np.hypot(*(places_m - places_m[farthest]).T)
+        away_m = np.minimum(away_m, from_it_m)
+
+    return goals
+
+
+def street_ahead(town: TrueTown, route_m: Floats) -> Street | None:
+    """The street that a (n, 2) route passes first, BARRIER_AHEAD_M ahead at least, of those whose
+    ends stay connected without it; None where there is none.
+    """
+    steps_m = np.hypot(*np.diff(route_m, axis=0).T)
+    along_m = np.concatenate([[0.0], steps_m.cumsum()])
+    first = None
+    first_m = math.inf
+    for street in town.streets:
+        middle_m = (np.array(street.line_m[0]) + street.line_m[-1]) / 2
+        away_m = np.hypot(*(route_m - middle_m).T)
+        nearest = int(away_m.argmin())
+        is_on_route = away_m[nearest] <= ON_ROUTE_M and along_m[nearest] >= BARRIER_AHEAD_M
+        if is_on_route and along_m[nearest] < first_m and _is_avoidable(town, street):
+            first = street
+            first_m = float(along_m[nearest])
+
+    return first
+
+
+def _is_avoidable(town: TrueTown, street: Street) -> bool:
+    """Whether the ends of a street are connected by others."""
+    reached = [street.line_m[0]]
+    left = [each for each in town.streets if each.name != street.name and not each.closed]
+    for here in reached:
+        for each in list(left):
+            ends = (each.line_m[0], each.line_m[-1])
+            if min(math.dist(here, end) for end in ends) <= SAME_CROSSING_M:
+                left.remove(each)
+                reached.extend(ends)
+
+    return min(math.dist(end, street.line_m[-1]) for end in reached) <= SAME_CROSSING_M

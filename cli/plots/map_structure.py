@@ -1,0 +1,113 @@
+"""The map's layers of structure: links that are cut, sub-maps, goals, and the plan."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.lines import Line2D
+from matplotlib.patches import Polygon
+from scipy.spatial import ConvexHull, QhullError
+
+from cli.launch.observer import Observer
+from cli.plots.palette import CUT, GOAL, PLAN, SEVERAL
+from cogmap.geometry.arrays import Floats
+from cogmap.graph.graph import Graph
+from cogmap.graph.window import LINK_OFFSETS, WEIGHT_COLUMNS
+from schemas.nodes import NEVER_NS, PLAN_ID, ROOT_MAP, Goal, LinkKind, Map, Object, Plan, object_id
+
+CUT_BELOW = 0.5
+STRAIGHT_LINKS = (0, 2)
+MIN_CORNERS = 3
+
+
+def draw_structure(axes: Axes, observer: Observer, graph: Graph) -> list[Line2D]:
+    """All of these layers, and the lines of the legend for those that there are."""
+    legend = []
+    if _draw_cuts(axes, observer, graph):
+        legend.append(Line2D([], [], color=CUT, lw=1.4, label="links cut"))
+    if _draw_sub_maps(axes, observer, graph):
+        legend.append(Line2D([], [], color=SEVERAL[1], lw=6, alpha=0.3, label="sub-maps"))
+    if _draw_goals(axes, observer, graph):
+        legend.append(Line2D([], [], color=GOAL, marker="*", ms=11, ls="", label="goals"))
+    if _draw_plan(axes, observer, graph):
+        legend.append(Line2D([], [], color=PLAN, lw=2.2, label="plan"))
+
+    return legend
+
+
+def _draw_cuts(axes: Axes, observer: Observer, graph: Graph) -> bool:
+    """Each straight link that is cut as the side that its two place nodes share."""
+    extent = graph.places.extent(ROOT_MAP)
+    window = graph.places.window(ROOT_MAP, WEIGHT_COLUMNS, extent)
+    weights = window.weights()
+    sides = [np.zeros((0, 2, 2))]
+    for link in STRAIGHT_LINKS:
+        offset = LINK_OFFSETS[link]
+        cells = np.argwhere(weights[link] < CUT_BELOW) + np.array(window.origin)
+        middles = cells + offset / 2
+        across = offset[::-1] / 2
+        sides.append(np.stack([middles - across, middles + across], axis=1))
+
+    ends_m = np.vstack(sides) * graph.cell_m()
+    if not len(ends_m):
+        return False
+
+    lines = observer.to_world(ends_m.reshape(-1, 2)).reshape(-1, 2, 2)
+    axes.add_collection(LineCollection(list(lines), colors=CUT, linewidths=1.0, zorder=3.5))
+    return True
+
+
+def _draw_sub_maps(axes: Axes, observer: Observer, graph: Graph) -> bool:
+    """The hull of the objects of each sub-map."""
+    maps = [node for node in graph.of_kind(Map) if node.id != ROOT_MAP]
+    has_any = False
+    for number, sub_map in enumerate(maps):
+        members = graph.links.sources(sub_map.id, LinkKind.WITHIN)
+        objects = [node for name in members if (node := graph.get(Object, name)) is not None]
+        corners_m = _hull_m(np.array([(node.x_m, node.y_m) for node in objects]).reshape(-1, 2))
+        if corners_m is None:
+            continue
+
+        colour = SEVERAL[number % len(SEVERAL)]
+        where_m = observer.to_world(corners_m)
+        axes.add_patch(Polygon(where_m, fc=colour, ec=colour, alpha=0.16, lw=2, zorder=1.5))
+        has_any = True
+
+    return has_any
+
+
+def _hull_m(points_m: Floats) -> Floats | None:
+    """The corners of the convex hull of (n, 2) points; None where they span no area."""
+    if len(points_m) < MIN_CORNERS:
+        return None
+
+    try:
+        corners_m: Floats = points_m[ConvexHull(points_m).vertices]
+    except QhullError:
+        return None
+    return corners_m
+
+
+def _draw_goals(axes: Axes, observer: Observer, graph: Graph) -> bool:
+    """A star where each goal is, filled where it was reached."""
+    goals = list(graph.of_kind(Goal))
+    for goal in goals:
+        where = graph.get(Object, object_id(goal.object)) if goal.object else None
+        x_m, y_m = (goal.x_m, goal.y_m) if where is None else (where.x_m, where.y_m)
+        point_m = observer.to_world(np.array([[x_m, y_m]]))[0]
+        colour = GOAL if goal.reached_ns != NEVER_NS else "white"
+        axes.plot(*point_m, "*", ms=16, mfc=colour, mec=GOAL, mew=1.4, zorder=12)
+
+    return bool(goals)
+
+
+def _draw_plan(axes: Axes, observer: Observer, graph: Graph) -> bool:
+    """The route of the plan as it is now."""
+    plan = graph.get(Plan, PLAN_ID)
+    if plan is None or plan.route is None:
+        return False
+
+    route_m = observer.to_world(np.asarray(plan.route.numpy(), np.float64))
+    axes.plot(*route_m.T, color=PLAN, lw=2.2, alpha=0.9, zorder=8.5)
+    return True
