@@ -1,0 +1,46 @@
+"""Goals as a person writes them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from cli.goal import parsed, read_goals
+from cogmap.errors import UsageError
+from schemas.nodes import goal_id
+
+
+def test_two_numbers_are_a_position_and_other_words_names() -> None:
+    bakery, place, school = parsed(["bakery", "12.5", "-3", "school"])
+
+    assert (bakery.id, bakery.object) == (goal_id("bakery"), "bakery")
+    assert (place.object, place.x_m, place.y_m) == ("", 12.5, -3.0)
+    assert school.object == "school"
+
+
+@pytest.mark.parametrize("words", [["12.5"], ["1", "bakery"], ["bakery", "3"]])
+def test_a_number_alone_is_refused(words: list[str]) -> None:
+    with pytest.raises(UsageError, match="a position is X and Y"):
+        parsed(words)
+
+
+@pytest.mark.parametrize("word", ["inf", "nan", "1e9"])
+def test_an_absurd_position_is_refused(word: str) -> None:
+    with pytest.raises(UsageError, match="is no position"):
+        parsed([word, "0"])
+
+
+def test_a_file_has_a_goal_a_line(tmp_path: Path) -> None:
+    path = tmp_path / "goals.txt"
+    path.write_text("bakery\n\n3 4\n", "utf-8")
+
+    assert [goal.id for goal in read_goals(path)] == [goal_id("bakery"), goal_id("3,4")]
+
+
+def test_the_line_that_is_wrong_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "goals.txt"
+    path.write_text("bakery\n3\n", "utf-8")
+
+    with pytest.raises(UsageError, match="line 2"):
+        read_goals(path)
