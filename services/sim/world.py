@@ -12,18 +12,18 @@ import numpy as np
 
 from cogmap.geometry.arrays import Singles
 from schemas.sensing import Pose
-from services.sim.bodies import Bodies
-from services.sim.builder import Builder
 from services.sim.layout.barriers import barriers
 from services.sim.layout.furniture import Prop
 from services.sim.layout.place import Place
 from services.sim.layout.plan import Plot, Point, Road
-from services.sim.nearby import Nearby, Piece
 from services.sim.rendering import scenery
 from services.sim.rendering.egl import Egl
 from services.sim.rendering.egl import works as egl_works
 from services.sim.rendering.light import relief
 from services.sim.robot import Robot
+from services.sim.scene.bodies import Bodies
+from services.sim.scene.builder import Builder
+from services.sim.scene.nearby import Nearby, Piece
 from services.sim.stdio import pybullet, quiet
 
 STEP_S = 1 / 240
@@ -156,12 +156,15 @@ class World:
     def _pieces(self) -> list[Piece]:
         """The streets tile by tile, the buildings and the props."""
         pieces = [_tile(self._builder, roads) for roads in _tiles(self.town.roads)]
+
         for plot in self.town.plots:
+            at_m = (plot.x_m, plot.y_m)
             reach_m = math.hypot(plot.kind.width_m, plot.kind.depth_m) / 2
-            pieces.append(Piece((plot.x_m, plot.y_m), reach_m, partial(self._add_building, plot)))
+            pieces.append(Piece(at_m, reach_m, partial(self._add_building, plot)))
 
         for prop in self.town.props:
-            pieces.append(Piece((prop.x_m, prop.y_m), 0.0, partial(self._add_obstacle, prop)))
+            at_m = (prop.x_m, prop.y_m)
+            pieces.append(Piece(at_m, 0.0, partial(self._add_obstacle, prop)))
 
         return pieces
 
@@ -182,22 +185,29 @@ def _tiles(roads: Sequence[Road]) -> list[tuple[Road, ...]]:
     tiles: dict[tuple[int, int], list[Road]] = {}
     for road in roads:
         x_m, y_m = road.middle
-        key = (math.floor(x_m / _TILE_M), math.floor(y_m / _TILE_M))
-        tiles.setdefault(key, []).append(road)
+        column = math.floor(x_m / _TILE_M)
+        row = math.floor(y_m / _TILE_M)
+
+        tile = tiles.setdefault((column, row), [])
+        tile.append(road)
 
     return [tuple(tiles[key]) for key in sorted(tiles)]
 
 
 def _tile(builder: Builder, roads: tuple[Road, ...]) -> Piece:
     """The streets of a tile."""
-    ends_m = np.array([point for road in roads for point in (road.start, road.end)])
-    widest_m = max(road.width_m for road in roads)
+    lines = [(road.start, road.end) for road in roads]
+    ends_m = np.array(lines, float).reshape(-1, 2)
     low_m = ends_m.min(axis=0)
     high_m = ends_m.max(axis=0)
+    widest_m = max(road.width_m for road in roads)
 
     middle_x_m, middle_y_m = ((low_m + high_m) / 2).tolist()
-    reach_m = float(np.hypot(*(high_m - low_m))) / 2 + widest_m
-    return Piece((middle_x_m, middle_y_m), reach_m, partial(builder.streets, roads))
+    diagonal_m = float(np.hypot(*(high_m - low_m)))
+    reach_m = diagonal_m / 2 + widest_m
+
+    add = partial(builder.streets, roads)
+    return Piece((middle_x_m, middle_y_m), reach_m, add)
 
 
 def _relief(town: Place) -> Singles:

@@ -41,14 +41,19 @@ class Surroundings:
     def __init__(self, place: Place) -> None:
         self._walls_m = place.walls_m
         walls = [len(plot.corners) for plot in place.plots]
-        self._plots = np.repeat(np.arange(len(walls)), walls)
-        self._seen_props_m = outlines([prop.seen for prop in place.props])
-        self._solid_props_m = outlines([prop.solid for prop in place.props])
+        numbers = np.arange(len(walls))
+        self._plots = np.repeat(numbers, walls)
+
+        seen = [prop.seen for prop in place.props]
+        solid = [prop.solid for prop in place.props]
+        self._seen_props_m = outlines(seen)
+        self._solid_props_m = outlines(solid)
+
         self._kerbs_m = _points_along(place.kerbs_m)
         self._streets = surfaces(place.roads)
         self._barriers = barriers(place.roads)
-
         self._closing_m = outlines([])
+
         self._middle_m: tuple[float, float] | None = None
         self._near = self._search(place.start.x_m, place.start.y_m)
 
@@ -97,7 +102,8 @@ class Surroundings:
         range_m = np.hypot(away_m[:, 0], away_m[:, 1])
 
         half_m = streets.half_length_m + streets.half_width_m
-        return streets.chosen(range_m <= GROUND_REACH_M + MOVED_M + half_m)
+        nearest_m = range_m - half_m
+        return streets.chosen(nearest_m <= GROUND_REACH_M + MOVED_M)
 
 
 def _within(segments_m: Floats, x_m: float, y_m: float, reach_m: float) -> Booleans:

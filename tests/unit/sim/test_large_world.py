@@ -14,7 +14,7 @@ from services.sim.layout.blocks.town import generate
 from services.sim.layout.catalogue import BuildingType
 from services.sim.layout.place import Place
 from services.sim.layout.plan import Plot, Road
-from services.sim.nearby import ADDED_M, HIDDEN_M, Nearby, Piece
+from services.sim.scene.nearby import ADDED_M, HIDDEN_M, Nearby, Piece
 from services.sim.simulation import Simulation
 from services.sim.stdio import pybullet
 from services.sim.world import World

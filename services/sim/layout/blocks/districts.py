@@ -182,8 +182,10 @@ class Builder:
         self._rng = rng
         self._counts: dict[str, int] = {}
         self._free: dict[str, list[str]] = {}
+
         for function, names in FUNCTIONS.items():
-            self._free[function] = [str(name) for name in rng.permutation(names)]
+            shuffled = rng.permutation(names)
+            self._free[function] = [str(name) for name in shuffled]
 
     def next(self, district: District) -> BuildingType:
         """A kind that the district may have next."""

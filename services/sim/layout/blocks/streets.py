@@ -134,9 +134,10 @@ def plan(rng: np.random.Generator, size_m: float) -> Streets:
 def _grid(rng: np.random.Generator, size_m: float) -> Grid:
     x_m = _lines_m(rng, size_m)
     y_m = _lines_m(rng, size_m)
-    widths_m = _widths_m(rng, len(x_m) + len(y_m))
 
-    return Grid(x_m, y_m, widths_m[: len(x_m)], widths_m[len(x_m) :])
+    columns = len(x_m)
+    widths_m = _widths_m(rng, columns + len(y_m))
+    return Grid(x_m, y_m, widths_m[:columns], widths_m[columns:])
 
 
 def _lines_m(rng: np.random.Generator, size_m: float) -> tuple[float, ...]:
@@ -292,11 +293,12 @@ def _outward(rng: np.random.Generator, grid: Grid, sign: float) -> tuple[Point, 
     """A stretch from the western (-1) or eastern (1) border out of the town."""
     border = 0 if sign < 0 else len(grid.x_m) - 1
     row = int(rng.integers(len(grid.y_m)))
-    start_x, y_m = grid.at((border, row))
+    start = grid.at((border, row))
+    start_x, y_m = start
 
     length_m = float(rng.uniform(*OUTWARD_M))
     end_x = round(start_x + sign * length_m, 1)
-    return (start_x, y_m), (end_x, y_m)
+    return start, (end_x, y_m)
 
 
 def _square(rng: np.random.Generator, grid: Grid) -> Road:

@@ -163,28 +163,34 @@ def _largest_part(found: list[Road]) -> list[Road]:
 def _parts(found: list[Road]) -> Indices:
     """(n,): the number of the part that each road belongs to."""
     numbers: dict[Point, int] = {}
+    starts = []
+    ends = []
     for road in found:
-        numbers.setdefault(road.start, len(numbers))
-        numbers.setdefault(road.end, len(numbers))
+        start = numbers.setdefault(road.start, len(numbers))
+        end = numbers.setdefault(road.end, len(numbers))
+        starts.append(start)
+        ends.append(end)
 
-    starts = np.array([numbers[road.start] for road in found], np.int64)
-    ends = np.array([numbers[road.end] for road in found], np.int64)
+    crossings = len(numbers)
     links = np.ones(len(found))
+    graph = coo_array((links, (starts, ends)), (crossings, crossings))
 
-    shape = (len(numbers), len(numbers))
-    graph = coo_array((links, (starts, ends)), shape)
-    _, part = connected_components(graph, directed=False)
-    return np.asarray(part[starts], np.int64)
+    _, part_of_crossing = connected_components(graph, directed=False)
+    parts = part_of_crossing[starts]
+    return np.asarray(parts, np.int64)
 
 
 def _start(found: list[Road], walls_m: Floats) -> Pose:
     """The middle of the road nearest to the middle of the town that is long and has room."""
     by_distance = sorted(found, key=lambda road: math.hypot(*road.middle))
-    roomy = [road for road in by_distance if _has_room(road, walls_m)]
-    road = roomy[0] if roomy else by_distance[0]
+    chosen = by_distance[0]
+    for road in by_distance:
+        if _has_room(road, walls_m):
+            chosen = road
+            break
 
-    x_m, y_m = road.middle
-    return Pose(x_m=x_m, y_m=y_m, heading_rad=road.heading_rad)
+    x_m, y_m = chosen.middle
+    return Pose(x_m=x_m, y_m=y_m, heading_rad=chosen.heading_rad)
 
 
 def _has_room(road: Road, walls_m: Floats) -> bool:

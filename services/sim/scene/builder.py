@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from services.sim.bodies import NOT_SOLID, Bodies
 from services.sim.layout.furniture import Prop
 from services.sim.layout.plan import Plot, Road
 from services.sim.rendering import mesh, prop_shapes, scenery
+from services.sim.scene.bodies import NOT_SOLID, Bodies
 
 
 class Builder:

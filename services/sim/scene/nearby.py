@@ -43,8 +43,10 @@ class Nearby:
 
     def __post_init__(self) -> None:
         middles = [piece.middle_m for piece in self.pieces]
+        middles_m = np.array(middles, float)
+        self._middles_m = middles_m.reshape(-1, 2)
+
         reaches = [piece.reach_m for piece in self.pieces]
-        self._middles_m = np.array(middles, float).reshape(-1, 2)
         self._reaches_m = np.array(reaches, float)
 
     def update(self, x_m: float, y_m: float) -> None:
@@ -56,7 +58,8 @@ class Nearby:
             return
 
         self._last_m = (x_m, y_m)
-        apart_m = np.hypot(*(self._middles_m - (x_m, y_m)).T) - self._reaches_m
+        away_m = self._middles_m - (x_m, y_m)
+        apart_m = np.hypot(away_m[:, 0], away_m[:, 1]) - self._reaches_m
         self._hide_far(apart_m)
 
         missing = self._missing(apart_m)
