@@ -24,6 +24,7 @@ from cogmap.errors import ConfigError, StorageError
 from cogmap.runtime import config
 from cogmap.runtime.process import Stop
 from services import registry
+from services.sim.layout import towns
 from services.sim.layout.towns import BLOCKS, LOOP, OSM
 
 RUNS = Path("runs")
@@ -34,9 +35,19 @@ FINISH_S = 4.0
 seed_option = click.option(
     "--seed", type=click.IntRange(0, 2**32), help="Which town, and which noise.  [default: 1]"
 )
+
+
+def _known_town(context: click.Context, option: click.Parameter, value: str | None) -> str | None:
+    """Refuse a town that there is none of. Raises ConfigError."""
+    if value is not None:
+        towns.check(value)
+    return value
+
+
 town_option = click.option(
     "--town",
     metavar="TOWN",
+    callback=_known_town,
     help="loop, blocks, or osm:FILE, the extract of OpenStreetMap in FILE.  [default: loop]",
 )
 tour_option = click.option(

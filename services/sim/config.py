@@ -8,9 +8,9 @@ import msgspec
 
 from cogmap.errors import ConfigError
 from schemas.base import PositiveSeconds
+from services.sim.layout import towns
 from services.sim.layout.catalogue import CATALOGUE
 from services.sim.layout.closures import Closure
-from services.sim.layout.towns import is_town
 from services.sim.odometry import Noise
 from services.sim.scripted.percepts import PerceptErrors
 from services.sim.scripted.trajectory import Trajectory
@@ -139,11 +139,7 @@ def check(config: Config) -> None:
             f"[sim] odometry_hz is {config.odometry_hz}: choose one that divides {steps_hz}"
         )
 
-    if not is_town(config.town):
-        raise ConfigError(
-            f"[sim] town is {config.town!r}: choose loop, blocks or osm:FILE, the path of an "
-            "OpenStreetMap extract"
-        )
+    towns.check(config.town)
 
     if config.sensing == "percepts" and config.mode != "lockstep":
         raise ConfigError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from cogmap.errors import ConfigError
 from services.sim.layout.blocks import town as blocks
 from services.sim.layout.osm import town as osm
 from services.sim.layout.place import Place
@@ -14,10 +15,14 @@ BLOCKS = "blocks"
 OSM = "osm:"
 
 
-def is_town(town: str) -> bool:
-    """Whether there is a town of that name: LOOP, BLOCKS, or OSM and a path."""
+def check(town: str) -> None:
+    """Raise ConfigError where there is no town of that name: LOOP, BLOCKS, or OSM and a path."""
     is_extract = town.startswith(OSM) and town != OSM
-    return is_extract or town in (LOOP, BLOCKS)
+    if not is_extract and town not in (LOOP, BLOCKS):
+        raise ConfigError(
+            f"there is no town {town!r}: choose {LOOP}, {BLOCKS} or {OSM}FILE, the path of an "
+            "OpenStreetMap extract"
+        )
 
 
 def place(town: str, seed: int, size_m: float) -> Place:
