@@ -65,6 +65,17 @@ class Scene(NamedTuple):
         is_inside = (renumbered >= 0).all(axis=1)
         return Scene(self.rows[members], renumbered[is_inside], self.bonds[is_inside])
 
+    def within(self, labels: Indices) -> Scene:
+        """The same where only objects of one cluster are neighbours."""
+        is_within = labels[self.edges[:, 0]] == labels[self.edges[:, 1]]
+        return Scene(self.rows, self.edges[is_within], self.bonds[is_within])
+
+    def merged(self, pieces: Indices) -> Scene:
+        """The same where the objects of each piece, (n,) from 0, are one."""
+        ends = pieces[self.edges]
+        is_between = ends[:, 0] != ends[:, 1]
+        return Scene(summed(self.rows, pieces), ends[is_between], self.bonds[is_between])
+
 
 def rows_of(positions_m: Floats, functions: Indices, kinds: int) -> Floats:
     """(n, 8 + kinds): the sufficient statistics of each object; those of a cluster are their sum.

@@ -16,6 +16,7 @@ from services.codelets.structure.merging import Merging
 from services.codelets.structure.mixture import Mixture, Scene, summed
 
 MAX_SWEEPS = 50
+PIECES_A_LEVEL = 4
 MAX_ROUNDS = 8
 MIN_GAIN = 1e-6
 
@@ -30,7 +31,7 @@ def partition(mixture: Mixture, scene: Scene, labels: Indices | None = None) -> 
 
     for _ in range(MAX_ROUNDS):
         merged = merge_clusters(mixture, scene, best)
-        moved = move_objects(mixture, scene, merged)
+        moved = move_pieces(mixture, scene, merged)
         parted = part_clusters(mixture, scene, moved)
         if np.array_equal(parted, best):
             break
@@ -172,34 +173,64 @@ def _gains_most(scene: Scene, moves: _Moves) -> Booleans:
     return is_first
 
 
+def move_pieces(mixture: Mixture, scene: Scene, labels: Indices) -> Indices:
+    """Move pieces of clusters to neighbouring ones as long as that raises the probability: large
+    pieces first, then smaller ones, then single objects.
+
+    Pieces are what the objects of a cluster merge to, a tenth as many at each level.
+    """
+    within = scene.within(labels)
+    levels = [np.arange(len(labels))]
+    clusters = int(labels.max(initial=-1)) + 1
+    while True:
+        finer = levels[-1]
+        count = int(finer.max(initial=-1)) + 1
+        wanted = count // PIECES_A_LEVEL
+        if wanted <= clusters:
+            break
+
+        coarser = merge_clusters(mixture, within, finer, at_least=wanted)
+        if int(coarser.max()) + 1 == count:
+            break
+        levels.append(coarser)
+
+    for pieces in reversed(levels):
+        coarse = scene.merged(pieces)
+        first = np.unique(pieces, return_index=True)[1]
+        labels = compact(move_objects(mixture, coarse, labels[first]))[pieces]
+
+    return compact(labels)
+
+
 def part_clusters(mixture: Mixture, scene: Scene, labels: Indices) -> Indices:
-    """Part each cluster in two where that raises the probability."""
+    """Part each cluster in two or more where that raises the probability."""
     labels = labels.copy()
     clusters = int(labels.max(initial=-1)) + 1
     for cluster in range(clusters):
         members = np.flatnonzero(labels == cluster)
-        is_second = parts(mixture, scene.part(members))
-        labels[members[is_second]] = int(labels.max()) + 1
+        part = parts(mixture, scene.part(members))
+        is_other = part > 0
+        labels[members[is_other]] = int(labels.max()) + part[is_other]
 
     return labels
 
 
-def parts(mixture: Mixture, scene: Scene) -> Booleans:
-    """(n,): which objects of one cluster are better in a cluster of their own; none where none are.
+def parts(mixture: Mixture, scene: Scene) -> Indices:
+    """(n,): in which part of one cluster each of its objects is better, from 0; 0 of all where the
+    cluster is best as it is.
 
-    The two parts are what remains when neighbours merge until two clusters are left, after objects
-    have moved between these.
+    It may have as many parts as there are when no two gain by merging, or two.
     """
-    together = np.zeros(len(scene.rows), np.int64)
-    if len(together) < 2:
-        return together > 0
+    best = np.zeros(len(scene.rows), np.int64)
+    most = mixture.log_probability(scene, best) + MIN_GAIN
+    found = np.arange(len(best))
 
-    alone = np.arange(len(together))
-    in_two = merge_clusters(mixture, scene, alone, at_least=2)
-    in_two = move_objects(mixture, scene, in_two)
+    for at_least in (0, 2):
+        found = merge_clusters(mixture, scene, found, at_least)
+        moved = move_objects(mixture, scene, found)
+        probability = mixture.log_probability(scene, moved)
+        if probability > most:
+            most = probability
+            best = moved
 
-    gain = mixture.log_probability(scene, in_two) - mixture.log_probability(scene, together)
-    if gain < MIN_GAIN:
-        return together > 0
-    is_second: Booleans = in_two > 0
-    return is_second
+    return best

@@ -27,6 +27,7 @@ from services.codelets.structure.search import (
 )
 
 PARTING_GROWTH = 1.2
+REVIEW_GROWTH = 1.6
 
 
 class SubMaps:
@@ -90,20 +91,29 @@ class SubMaps:
         moved = move_objects(self._mixture, scene, merged)
         self._relabel(members, moved)
 
-        self._part_if_grown(int(self.labels[-1]))
+        label = int(self.labels[-1])
+        size = int((self.labels == label).sum())
+        if _has_grown(size, REVIEW_GROWTH):
+            self._review(label)
+        elif _has_grown(size, PARTING_GROWTH):
+            self._part(label)
         return int(self.labels[-1])
 
-    def _part_if_grown(self, label: int) -> None:
-        """Part a sub-map in two where that is more probable; asked at every growth by a share, so
-        that it costs little for each object.
-        """
+    def _part(self, label: int) -> None:
+        """Part a sub-map where that is more probable."""
         members = np.flatnonzero(self.labels == label)
-        step = math.log(PARTING_GROWTH)
-        stage = math.floor(math.log(len(members)) / step)
-        before = math.floor(math.log(max(1, len(members) - 1)) / step)
-        if stage > before:
-            is_second = parts(self._mixture, self._scene(members))
-            self._relabel(members, is_second.astype(np.int64))
+        self._relabel(members, parts(self._mixture, self._scene(members)))
+
+    def _review(self, label: int) -> None:
+        """Sort the objects of a sub-map and of its neighbours anew, from the labels they have."""
+        is_own = self.labels == label
+        edges = self._near.edges
+        beside = edges[is_own[edges[:, 0]] | is_own[edges[:, 1]]]
+        around = np.unique(self.labels[beside])
+
+        members = np.flatnonzero(np.isin(self.labels, around) | is_own)
+        found = partition(self._mixture, self._scene(members), self.labels[members])
+        self._relabel(members, found)
 
     def _relabel(self, members: Indices, clusters: Indices) -> None:
         """Give the clusters of some objects, (m,), the labels that they had, where they had any."""
@@ -139,3 +149,15 @@ class SubMaps:
         crossed = self._near.is_crossed[is_inside]
         bonds = self._mixture.bonds(crossed, self._near.gaps(is_inside))
         return Scene(self._rows[members], number[self._near.edges[is_inside]], bonds)
+
+
+def _has_grown(size: int, growth: float) -> bool:
+    """Whether something has grown by a factor with the last of its objects, since it had one.
+
+    What is done then is done the more seldom the larger it is, and costs little for each object.
+    """
+    if size < 2:
+        return False
+
+    step = math.log(growth)
+    return math.floor(math.log(size) / step) > math.floor(math.log(size - 1) / step)
