@@ -44,6 +44,7 @@ from services.codelets.planning.routes import (
     visits,
 )
 from services.codelets.planning.targets import Cell, Target, nearest_free, target_of
+from services.codelets.planning.tours import TourSettings, order_from
 
 START_M = 6.0
 SECTION = "planning"
@@ -175,7 +176,7 @@ def _plan(targets: list[Target], now: Situation) -> Plan:
     found, unreachable = _reachable(now.where, start, targets)
     plan = msgspec.structs.replace(plan, unreachable=unreachable)
     if found:
-        return _to_goals(plan, now.where, start, found)
+        return _to_goals(plan, start, found, now)
 
     if now.config.explore:
         plan = _to_frontier(plan, start, now)
@@ -202,29 +203,49 @@ def _reachable(
     return found, unreachable
 
 
-def _to_goals(plan: Plan, where: Ground, start: Cell, found: list[Visit]) -> Plan:
+def _to_goals(plan: Plan, start: Cell, found: list[Visit], now: Situation) -> Plan:
     """The plan with the order of the goals found, and the route to the first."""
-    order = _nearest_first(lengths_m(where.network, start, found))
+    lengths = lengths_m(now.where.network, start, found)
+    order = _order(lengths, start, found, now)
     ordered = [found[number] for number in order]
 
-    route = route_to(where.network, start, ordered[0])
+    route = route_to(now.where.network, start, ordered[0])
     assert route is not None
     goals = [visit.target.goal.id for visit in ordered]
-    return _with_route(msgspec.structs.replace(plan, goals=goals), route, where)
+    return _with_route(msgspec.structs.replace(plan, goals=goals), route, now.where)
 
 
-def _nearest_first(lengths: Floats) -> list[int]:
-    """The order of n goals by (n + 1, n + 1) lengths, the first being the agent's."""
-    left = set(range(len(lengths) - 1))
-    order: list[int] = []
-    here = 0
-    while left:
-        nearest = min(left, key=lambda number: (lengths[here, number + 1], number))
-        order.append(nearest)
-        left.remove(nearest)
-        here = nearest + 1
+def _order(lengths: Floats, start: Cell, found: list[Visit], now: Situation) -> list[int]:
+    """The order of n goals by (n + 1, n + 1) lengths, the first being the agent's.
 
-    return order
+    That of the plan before is kept while it is nearly as short, so that the agent does not waver.
+    """
+    cells = np.array([start, *(visit.cell for visit in found)])
+    positions_m = cells * now.where.network.cell_m
+    best = order_from(lengths, positions_m, TourSettings())
+
+    longest_m = now.config.keep_route * _tour_m(lengths, best)
+    kept = _order_before(found, now.before)
+    if kept is not None and _tour_m(lengths, kept) <= longest_m:
+        best = kept
+
+    return [number - 1 for number in best.tolist()[1:]]
+
+
+def _order_before(found: list[Visit], before: Plan | None) -> Indices | None:
+    """The order of the plan before, of the goals that are left; None where it lacks one of them."""
+    names = [visit.target.goal.id for visit in found]
+    planned = [] if before is None else before.goals
+    if not set(names) <= set(planned):
+        return None
+
+    order = [names.index(name) + 1 for name in planned if name in names]
+    return np.array([0, *order])
+
+
+def _tour_m(lengths: Floats, order: Indices) -> float:
+    """The length of an open tour."""
+    return float(lengths[order[:-1], order[1:]].sum())
 
 
 def _to_frontier(plan: Plan, start: Cell, now: Situation) -> Plan:

@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from cogmap.geometry.arrays import Floats, Indices
-from services.codelets.planning.activation import Field, climb, spread
+from services.codelets.planning.activation import Field, climb, spread_over
 from services.codelets.planning.network import LINK_OFFSETS, PlaceNetwork
+from services.codelets.planning.search.links import Links
 from services.codelets.planning.targets import Cell, Target
 
 
@@ -29,10 +30,15 @@ class Visit(NamedTuple):
 
 def visits(network: PlaceNetwork, targets: list[Target]) -> list[Visit]:
     """The targets that have a place, with their activation."""
+    placed = [target for target in targets if target.cell is not None]
+    if not placed:
+        return []
+
+    links = Links(network)
     found = []
-    for target in targets:
+    for target in placed:
         if target.cell is not None:
-            field = spread(network, np.array([target.cell]))
+            field = spread_over(links, np.array([target.cell]))
             found.append(Visit(target, target.cell, field))
 
     return found
