@@ -5,7 +5,7 @@ flat map and on a hierarchy, and how much longer than the shortest they are, bes
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
@@ -20,11 +20,25 @@ from experiments.route_planning.activation import Spread, free_ground, walled_gr
 from experiments.route_planning.measure import EXAMPLE_GOALS, Planned
 from services.codelets.planning.tours import TourSettings
 
-HIERARCHICAL = ESTIMATE
-STRAIGHTENED = ROAD
-FLAT = WHEELS
 PEOPLE = TRUE
 PUBLISHED = SEVERAL[0]
+TICKS = (4, 6, 10, 20, 40, 80, 120)
+
+
+class Style(NamedTuple):
+    """How the tours of one plan are drawn, and what they are called."""
+
+    colour: str
+    marker: str
+    label: str
+
+
+# By the names of the plans in Planned.
+PLANS = {
+    "flat": Style(WHEELS, "v", "flat"),
+    "hierarchical": Style(ESTIMATE, "o", "hierarchical"),
+    "straightened": Style(ROAD, "^", "straightened in the end"),
+}
 
 
 def figure(human: Sequence[Planned], drawn: Sequence[Planned], metrics: dict[str, Any]) -> Figure:
@@ -61,8 +75,8 @@ def _draw_principle(panels: Sequence[Axes], example: Planned) -> None:
     free, walled, flat, hierarchical = panels
     _draw_activation(free, free_ground(), "a   one goal, by activation")
     _draw_activation(walled, walled_ground(), "b   the same with walls")
-    _draw_tour(flat, example, example.typical_flat, FLAT, "c   flat")
-    _draw_tour(hierarchical, example, example.typical, HIERARCHICAL, "d   hierarchy")
+    _draw_tour(flat, example, example.typical_flat, "flat", "c   flat")
+    _draw_tour(hierarchical, example, example.typical, "hierarchical", "d   hierarchy")
     _draw_grids(hierarchical, example.positions, TourSettings())
 
 
@@ -71,71 +85,68 @@ def _draw_activation(axes: Axes, ground: Spread, title: str) -> None:
     activation = np.ma.masked_invalid(ground.log_activation.T)
     colours = mpl.colormaps["viridis"].with_extremes(bad=KERB)
     axes.imshow(activation, origin="lower", cmap=colours, interpolation="nearest")
-    axes.plot(*ground.route.T, color=HIERARCHICAL, lw=2.0)
-    axes.plot(*ground.route[0], "s", ms=8, mfc="white", mec=TRUE)
-    axes.plot(*ground.route[-1], "*", ms=14, color=PUBLISHED, mec="white")
-    axes.set_xticks([])
-    axes.set_yticks([])
+    start, *_, goal = ground.route.tolist()
+    axes.plot(*ground.route.T, color=ESTIMATE, lw=2.0)
+    axes.plot(*start, "s", ms=8, mfc="white", mec=TRUE)
+    axes.plot(*goal, "*", ms=14, color=PUBLISHED, mec="white")
     axes.set_title(title, loc="left", fontsize=10)
+    _without_scales(axes)
 
 
-def _draw_tour(axes: Axes, problem: Planned, tour: Indices, colour: str, title: str) -> None:
-    """A closed tour past the goals."""
-    line = problem.positions[np.append(tour, tour[0])]
-    axes.plot(*line.T, color=colour, lw=1.8, zorder=3)
-    axes.plot(*problem.positions.T, "o", ms=6, color=TRUE, mec="white", zorder=4)
+def _draw_tour(axes: Axes, problem: Planned, tour: Indices, name: str, title: str) -> None:
+    """A closed tour past the goals, of one of the PLANS."""
+    positions = problem.positions
+    line = _closed(positions, tour)
+    axes.plot(*line.T, color=PLANS[name].colour, lw=1.8, zorder=3)
+    axes.plot(*positions.T, "o", ms=6, color=TRUE, mec="white", zorder=4)
     axes.plot(*line[0], "s", ms=9, mfc="white", mec=TRUE, zorder=4)
     axes.set_aspect("equal")
-    axes.set_xticks([])
-    axes.set_yticks([])
+    _without_scales(axes)
 
-    above = _length(line) / _length(problem.positions[np.append(problem.shortest, 0)]) - 1
+    shortest = _length(_closed(positions, problem.shortest))
+    above = _length(line) / shortest - 1
     axes.set_title(f"{title}: {above:.1%} above the shortest", loc="left", fontsize=10)
-    _label(axes, "", "")
+
+
+def _closed(positions: Floats, tour: Indices) -> Floats:
+    """(n + 1, 2): the line of a tour, back to where it begins."""
+    line: Floats = positions[np.append(tour, tour[0])]
+    return line
 
 
 def _length(line: Floats) -> float:
     steps = np.diff(line, axis=0)
-    return float(np.hypot(*steps.T).sum())
+    lengths = np.hypot(*steps.T)
+    return float(lengths.sum())
 
 
 def _draw_grids(axes: Axes, positions: Floats, settings: TourSettings) -> None:
     """The two coarsest grids, as they lie over the problem where they are not turned."""
-    middle = (positions.min(axis=0) + positions.max(axis=0)) / 2
-    side = float(np.ptp(positions, axis=0).max())
-    corner = middle - side / 2
+    lowest = positions.min(axis=0)
+    highest = positions.max(axis=0)
+    side = float(np.max(highest - lowest))
+    left, bottom = (lowest + highest - side) / 2
 
     for level, width in ((2, 0.5), (1, 1.4)):
-        shares = np.linspace(0.0, side, settings.factor**level + 1)
         style: dict[str, Any] = {"colors": STREET, "linewidths": width, "zorder": 1}
-        axes.vlines(corner[0] + shares, corner[1], corner[1] + side, **style)
-        axes.hlines(corner[1] + shares, corner[0], corner[0] + side, **style)
+        shares = np.linspace(0.0, side, settings.factor**level + 1)
+        axes.vlines(left + shares, bottom, bottom + side, **style)
+        axes.hlines(bottom + shares, left, left + side, **style)
 
 
 def _draw_sizes(axes: Axes, drawn: Sequence[Planned]) -> None:
     """Means over the problems of each size, beside published ones."""
     sizes = sorted({problem.goals for problem in drawn})
-    for name, colour, label in (
-        ("flat", FLAT, "ours, flat"),
-        ("hierarchical", HIERARCHICAL, "ours, hierarchical"),
-        ("straightened", STRAIGHTENED, "ours, straightened in the end"),
-    ):
-        means = []
+    for name, style in PLANS.items():
+        percent = []
         for size in sizes:
-            same = [getattr(problem, name).mean() for problem in drawn if problem.goals == size]
-            means.append(100 * np.mean(same))
-        axes.plot(sizes, means, "o-", ms=4, color=colour, label=label)
+            means = [getattr(problem, name).mean() for problem in drawn if problem.goals == size]
+            percent.append(100 * np.mean(means))
+        axes.plot(sizes, percent, "o-", ms=4, color=style.colour, label=f"ours, {style.label}")
 
-    percent = {size: 100 * share for size, share in published.DRAWN_HUMAN.items()}
-    for values, marker, colour, label in (
-        (percent, "s", PEOPLE, "people, drawn problems, published"),
-        (published.HUMAN_PERCENT, "^", PEOPLE, "people, Madl et al. 2013*"),
-        (published.MODEL_PERCENT, "^", PUBLISHED, "their model*"),
-    ):
-        axes.plot(list(values), list(values.values()), marker, ms=5, color=colour, label=label)
-
+    _draw_published(axes)
     axes.set_xscale("log")
-    axes.set_xticks([4, 6, 10, 20, 40, 80, 120], ["4", "6", "10", "20", "40", "80", "120"])
+    axes.set_xticks(TICKS, [str(size) for size in TICKS])
     axes.minorticks_off()
     _leave_room(axes)
     axes.legend(
@@ -149,6 +160,18 @@ def _draw_sizes(axes: Axes, drawn: Sequence[Planned]) -> None:
     _label(axes, "goals", "% above the shortest")
 
 
+def _draw_published(axes: Axes) -> None:
+    """What is published of other problems of the same sizes."""
+    percent = {size: 100 * share for size, share in published.DRAWN_HUMAN.items()}
+    for values, marker, colour, label in (
+        (percent, "s", PEOPLE, "people, drawn problems, published"),
+        (published.HUMAN_PERCENT, "^", PEOPLE, "people, Madl et al. 2013*"),
+        (published.MODEL_PERCENT, "^", PUBLISHED, "their model*"),
+    ):
+        sizes = list(values)
+        axes.plot(sizes, list(values.values()), marker, ms=5, color=colour, label=label)
+
+
 def _draw_people(axes: Axes, human: Sequence[Planned]) -> None:
     """People's quartiles on each problem, the medians of the model and of the flat map."""
     axes.set_title("f   problems that people drew tours of", loc="left", fontsize=10)
@@ -157,25 +180,27 @@ def _draw_people(axes: Axes, human: Sequence[Planned]) -> None:
         _draw_nothing(axes)
         return
 
-    places = np.arange(len(human))
     quartiles = 100 * np.array([problem.people_quartiles for problem in human])
-    medians = [100 * float(np.median(problem.people)) for problem in human]
-    heights = quartiles[:, 1] - quartiles[:, 0]
-    axes.bar(places, heights, 0.6, quartiles[:, 0], color=KERB, label="people, the middle half")
+    lows, highs = quartiles.T
+    places = np.arange(len(human))
+    axes.bar(places, highs - lows, 0.6, lows, color=KERB, label="people, the middle half")
+
+    medians = _medians_percent(human, "people")
     axes.plot(places, medians, "_", ms=22, mew=2, color=PEOPLE, label="people, median")
-    for name, colour, marker, label in (
-        ("hierarchical", HIERARCHICAL, "o", "hierarchical, median"),
-        ("straightened", STRAIGHTENED, "^", "straightened, median"),
-        ("flat", FLAT, "v", "flat, median"),
-    ):
-        ours = [100 * float(np.median(getattr(problem, name))) for problem in human]
-        axes.plot(places, ours, marker, ms=7, color=colour, mec="white", label=label)
+    for name, style in PLANS.items():
+        drawn: dict[str, Any] = {"color": style.colour, "label": f"{style.label}, median"}
+        axes.plot(places, _medians_percent(human, name), style.marker, ms=7, mec="white", **drawn)
 
     names = [f"{problem.name.removeprefix('Graph')}\n{problem.goals}" for problem in human]
     axes.set_xticks(places, names)
     axes.set_xlabel("problem, and its goals", color=FAINT)
     _leave_room(axes)
     axes.legend(frameon=False, fontsize=8, loc="upper left")
+
+
+def _medians_percent(human: Sequence[Planned], name: str) -> list[float]:
+    """The median excess on each problem, of people or of a plan."""
+    return [100 * float(np.median(getattr(problem, name))) for problem in human]
 
 
 def _draw_errors(axes: Axes, human: Sequence[Planned], metrics: dict[str, Any]) -> None:
@@ -187,13 +212,11 @@ def _draw_errors(axes: Axes, human: Sequence[Planned], metrics: dict[str, Any]) 
         return
 
     people = [100 * problem.people.mean() for problem in human]
-    for name, key, colour in (
-        ("flat", "flat_correlation_with_people", FLAT),
-        ("hierarchical", "correlation_with_people", HIERARCHICAL),
-    ):
+    for name, style in PLANS.items():
         ours = [100 * getattr(problem, name).mean() for problem in human]
-        label = f"{name}, r = {metrics[key]:.2f}"
-        axes.plot(people, ours, "o", ms=6, color=colour, mec="white", label=label)
+        r = metrics[f"{name}_correlation_with_people"]
+        label = f"{style.label}, r = {r:.2f}"
+        axes.plot(people, ours, style.marker, ms=6, color=style.colour, mec="white", label=label)
 
     axes.axline((0.0, 0.0), slope=1.0, color=FAINT, lw=1.0, ls=(0, (4, 2)))
     axes.legend(frameon=False, fontsize=8)
@@ -205,9 +228,14 @@ def _leave_room(axes: Axes) -> None:
     axes.set_ylim(-0.03 * top, 1.45 * top)
 
 
-def _draw_nothing(axes: Axes) -> None:
+def _without_scales(axes: Axes) -> None:
     axes.set_xticks([])
     axes.set_yticks([])
+    axes.set_facecolor(PAPER)
+
+
+def _draw_nothing(axes: Axes) -> None:
+    _without_scales(axes)
     axes.text(0.5, 0.5, "no people's tours: see --data", ha="center", color=FAINT)
 
 

@@ -101,19 +101,24 @@ def read_tour(path: Path) -> Indices:
     dimension = _dimension(file)
     visited: dict[int, None] = {}
 
-    for number, line in file.section:
-        for word in line.split():
-            node = int(word) if word.lstrip("-").isdigit() else 0
-            if node == _TOUR_END:
-                continue
-            if not 1 <= node <= dimension or node in visited:
-                expected = f"a node from 1 to {dimension} that was not visited before"
-                raise wrong_line(path, number, line, expected)
-            visited[node] = None
+    for number, line, node in _nodes(file):
+        if not 1 <= node <= dimension or node in visited:
+            expected = f"a node from 1 to {dimension} that was not visited before"
+            raise wrong_line(path, number, line, expected)
+        visited[node] = None
 
     if len(visited) != dimension:
         raise UsageError(f"{path} visits {len(visited)} of {dimension} nodes: give a whole tour")
     return np.array(list(visited), np.int64) - 1
+
+
+def _nodes(file: _File) -> Iterator[tuple[int, str, int]]:
+    """The nodes of a tour, each with the line that it stands on; 0 for what is no number."""
+    for number, line in file.section:
+        for word in line.split():
+            node = int(word) if word.lstrip("-").isdigit() else 0
+            if node != _TOUR_END:
+                yield number, line, node
 
 
 def folder(path: Path) -> list[Problem]:
@@ -175,12 +180,7 @@ def straight(positions: Floats) -> Floats:
 
 def _geo_km(positions: Floats) -> Floats:
     """(n, n): whole kilometres along great circles between latitudes and longitudes as DDD.MM."""
-    degrees = np.trunc(positions)
-    minutes = positions - degrees
-    radians = _GEO_PI * (degrees + 5.0 * minutes / 3.0) / 180.0
-    latitude = radians[:, 0]
-    longitude = radians[:, 1]
-
+    latitude, longitude = _geo_radians(positions).T
     across = np.cos(longitude[:, None] - longitude)
     apart = np.cos(latitude[:, None] - latitude)
     opposite = np.cos(latitude[:, None] + latitude)
@@ -190,6 +190,14 @@ def _geo_km(positions: Floats) -> Floats:
     distances_km = np.floor(_GEO_RADIUS_KM * angle + 1.0)
     np.fill_diagonal(distances_km, 0.0)
     return np.asarray(distances_km)
+
+
+def _geo_radians(positions: Floats) -> Floats:
+    """(n, 2), of latitudes and longitudes as DDD.MM."""
+    degrees = np.trunc(positions)
+    minutes = positions - degrees
+    decimal = degrees + 5.0 * minutes / 3.0
+    return np.asarray(_GEO_PI * decimal / 180.0)
 
 
 def _read(path: Path, section: str) -> _File:

@@ -26,21 +26,17 @@ def human_metrics(problems: Sequence[Planned]) -> Metrics:
         return {}
 
     people = _means([problem.people for problem in problems])
-    hierarchical = _means([problem.hierarchical for problem in problems])
-    straightened = _means([problem.straightened for problem in problems])
-    flat = _means([problem.flat for problem in problems])
     is_within = [problem.is_within_quartiles for problem in problems]
     metrics: Metrics = {
         "human_problems": float(len(problems)),
         "within_iqr_share": float(np.mean(is_within)),
         "human_people_above_optimum": float(people.mean()),
-        "human_hierarchical_above_optimum": float(hierarchical.mean()),
-        "human_straightened_above_optimum": float(straightened.mean()),
-        "human_flat_above_optimum": float(flat.mean()),
-        "correlation_with_people": correlation(hierarchical, people),
-        "straightened_correlation_with_people": correlation(straightened, people),
-        "flat_correlation_with_people": correlation(flat, people),
     }
+
+    for name in PLANNED:
+        means = _means([getattr(problem, name) for problem in problems])
+        metrics[f"human_{name}_above_optimum"] = float(means.mean())
+        metrics[f"{name}_correlation_with_people"] = correlation(means, people)
 
     for problem in problems:
         metrics |= _of_problem(problem)

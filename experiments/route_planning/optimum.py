@@ -84,14 +84,20 @@ def shortest_tour(lengths: Floats) -> Indices:
     if count < 4:
         return np.arange(count)
 
-    edges = np.column_stack(np.triu_indices(count, 1))
-    programme = _Programme(count, edges, lengths[edges[:, 0], edges[:, 1]])
+    first, second = np.triu_indices(count, 1)
+    edges = np.column_stack([first, second])
+    return _shortest(_Programme(count, edges, lengths[first, second]))
+
+
+def _shortest(programme: _Programme) -> Indices:
     bound, reduced_costs = _relaxation(programme)
     slack = _FIRST_SLACK * bound
 
     while True:
         kept = programme.reduced(reduced_costs <= slack)
         chosen = _whole(kept)
+        if chosen is None and len(kept.edges) == len(programme.edges):
+            raise CogmapError("no shortest tour: the solver of the integer programme found none")
         if chosen is None:
             slack *= _MORE_SLACK
             continue
@@ -152,8 +158,10 @@ def _violated_sets(graph: csr_array) -> list[Booleans]:
         return [part == number for number in range(parts)]
 
     capacities = csr_array(graph)
-    capacities.data = np.rint(graph.data * _CAPACITY).astype(np.int32)
+    whole = np.rint(graph.data * _CAPACITY)
+    capacities.data = whole.astype(np.int32)
     violated: dict[bytes, Booleans] = {}
+
     for goal in range(1, graph.shape[0]):
         flow = maximum_flow(capacities, 0, goal)
         if flow.flow_value < 2 * _CAPACITY - _MIN_VIOLATION:

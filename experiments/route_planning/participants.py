@@ -37,19 +37,27 @@ def tours_of(lengths: Floats, positions: Floats, number: int, seed: int) -> Tour
         rng = np.random.default_rng([seed, participant])
         start = int(rng.integers(len(lengths)))
         goals = np.roll(np.arange(len(lengths)), -start)
-        judged = _judged(lengths[np.ix_(goals, goals)], rng)
-        seen = _turned(positions[goals], rng)
-
-        span = int(rng.choice(SPANS))
-
-        drawn = order(judged, seen, TourSettings(span=span, straightens=False))
-        straightened = order(judged, seen, TourSettings(span=span))
-        flat = follow_activation(judged)
-        tours.hierarchical.append(goals[drawn])
+        hierarchical, straightened, flat = _orders(
+            lengths[np.ix_(goals, goals)], positions[goals], rng
+        )
+        tours.hierarchical.append(goals[hierarchical])
         tours.straightened.append(goals[straightened])
         tours.flat.append(goals[flat])
 
     return tours
+
+
+def _orders(
+    lengths: Floats, positions: Floats, rng: np.random.Generator
+) -> tuple[Indices, Indices, Indices]:
+    """The order (n,) of one participant by each plan."""
+    judged = _judged(lengths, rng)
+    seen = _turned(positions, rng)
+    limits = TourSettings(span=int(rng.choice(SPANS)))
+
+    hierarchical = order(judged, seen, limits._replace(straightens=False))
+    straightened = order(judged, seen, limits)
+    return hierarchical, straightened, follow_activation(judged)
 
 
 def _judged(lengths: Floats, rng: np.random.Generator) -> Floats:

@@ -116,11 +116,7 @@ def _ordered(
     for level, cells in enumerate(_grids(positions_m, settings), start=1):
         cell_length = lengths.max() / settings.factor**level
         clusters = _finer(clusters, cells, lengths, cell_length)
-        stops = [_middle(members, lengths) for members in clusters]
-
-        rough = np.array([_START, *stops, end])
-        route = reorder(rough, lengths, settings.span)
-        clusters = _as_on(route, stops, clusters)
+        route, clusters = _reordered(clusters, lengths, settings.span)
 
     if settings.straightens:
         route = _straightened(route, lengths, settings.span)
@@ -145,11 +141,7 @@ def _grids(positions_m: Floats, settings: TourSettings) -> list[Indices]:
 
     The grids cover the same square around all goals.
     """
-    lowest_m = positions_m.min(axis=0)
-    highest_m = positions_m.max(axis=0)
-    side_m = float(np.max(highest_m - lowest_m)) or 1.0
-    corner_m = (lowest_m + highest_m - side_m) / 2
-    share = (positions_m - corner_m) / side_m
+    share = _shares(positions_m)
     grids = []
 
     for level in range(1, settings.levels + 1):
@@ -160,6 +152,15 @@ def _grids(positions_m: Floats, settings: TourSettings) -> list[Indices]:
 
     every_goal = np.arange(len(positions_m))
     return [*grids, every_goal]
+
+
+def _shares(positions_m: Floats) -> Floats:
+    """(n, 2): where in the square around all goals each lies, 0 to 1 along both of its sides."""
+    lowest_m = positions_m.min(axis=0)
+    highest_m = positions_m.max(axis=0)
+    side_m = float(np.max(highest_m - lowest_m)) or 1.0
+    corner_m = (lowest_m + highest_m - side_m) / 2
+    return np.asarray((positions_m - corner_m) / side_m)
 
 
 def _finer(
@@ -193,11 +194,19 @@ def _middle(members: Indices, lengths: Indices) -> int:
     return int(members[nearest])
 
 
-def _as_on(route: Indices, stops: list[int], clusters: list[Indices]) -> list[Indices]:
-    """The clusters in the order in which `route` visits the stops that stand for them."""
-    by_stop = dict(zip(stops, clusters, strict=True))
+def _reordered(
+    clusters: Sequence[Indices], lengths: Indices, span: int
+) -> tuple[Indices, list[Indices]]:
+    """The route past the stops that stand for the clusters, as many at a time in their best order
+    as `span`; the clusters in its order.
+    """
+    by_stop = {_middle(members, lengths): members for members in clusters}
+    end = len(lengths) - 1
+    rough = np.array([_START, *by_stop, end])
+
+    route = reorder(rough, lengths, span)
     visited = route[1:-1].tolist()
-    return [by_stop[stop] for stop in visited]
+    return route, [by_stop[stop] for stop in visited]
 
 
 def _straightened(route: Indices, lengths: Indices, span: int) -> Indices:

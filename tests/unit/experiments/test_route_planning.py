@@ -111,7 +111,7 @@ def test_errors_correlate_over_problems_by_their_means() -> None:
     metrics = human_metrics(problems)
 
     expected = float(np.corrcoef([0.01, 0.04, 0.09], [0.1, 0.2, 0.3])[0, 1])
-    assert metrics["correlation_with_people"] == pytest.approx(expected)
+    assert metrics["hierarchical_correlation_with_people"] == pytest.approx(expected)
     assert correlation(np.ones(5), np.arange(5.0)) == 0.0
 
 
