@@ -7,6 +7,7 @@ import click
 from cli.experiment.city_maps import city_maps
 from cli.experiment.cue_integration import cue_integration
 from cli.experiment.loop_closing import loop_closing
+from cli.experiment.map_structure import map_structure
 from cli.experiment.route_planning import route_planning
 
 _EPILOG = """\b
@@ -23,4 +24,5 @@ def experiment() -> None:
 experiment.add_command(city_maps)
 experiment.add_command(cue_integration)
 experiment.add_command(loop_closing)
+experiment.add_command(map_structure)
 experiment.add_command(route_planning)

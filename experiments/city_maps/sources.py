@@ -42,17 +42,26 @@ def from_osm(path: Path) -> City:
     is wrong.
     """
     extract = osm.read(path)
-    ways = [way for way in extract.ways if _is_street(way)]
+    streets = streets_of(extract, path)
+    names, lonlat = _buildings(extract)
+    return City(name_of(path), streets, names, plane_m(lonlat, middle_of(extract)))
 
+
+def streets_of(extract: Extract, path: Path) -> Streets:
+    """The streets of the extract in a file. Raises UsageError where there are none."""
+    ways = [way for way in extract.ways if _is_street(way)]
     if not ways or not extract.nodes:
         raise UsageError(
             f"{path} has no streets: give an extract with ways that are tagged highway=…"
         )
 
-    middle = np.array(list(extract.nodes.values())).mean(axis=0)
-    streets = _streets(extract, ways, middle)
-    names, lonlat = _buildings(extract)
-    return City(_name(path), streets, names, plane_m(lonlat, middle))
+    return _streets(extract, ways, middle_of(extract))
+
+
+def middle_of(extract: Extract) -> Points:
+    """(2,): the mean longitude and latitude of an extract's nodes."""
+    lonlat = np.array(list(extract.nodes.values()))
+    return np.asarray(lonlat.mean(axis=0))
 
 
 def from_street_graph(graph: StreetGraph, seed: int) -> City:
@@ -264,7 +273,8 @@ def _is_known(tags: Tags) -> bool:
     return is_of_use and "name" in tags
 
 
-def _name(path: Path) -> str:
+def name_of(path: Path) -> str:
+    """The name of a city, by that of its file."""
     name = path.name
 
     for suffix in sorted(osm.SUFFIXES, key=len, reverse=True):

@@ -79,6 +79,33 @@ def test_route_planning_compares_people_the_model_and_the_shortest_tours(tmp_pat
     assert (out / "route-planning.pdf").read_bytes().startswith(b"%PDF")
 
 
+def test_sub_maps_of_a_city_are_drawn_and_described(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    city = _city(tmp_path / "city.osm")
+
+    done = _run("map-structure", "--osm", str(city), "--out", str(out))
+    assert done.returncode == 0, done.stdout + done.stderr
+
+    metrics = json.loads((out / "map-structure.json").read_text())
+    assert metrics["city_objects"] == 48.0
+    assert metrics["city_sub_maps"] >= 1.0
+    assert (out / "map-structure.png").read_bytes().startswith(b"\x89PNG")
+    assert (out / "map-structure.pdf").read_bytes().startswith(b"%PDF")
+
+
+def _city(path: Path) -> Path:
+    """48 shops in rows, and a street."""
+    nodes = []
+    for number in range(48):
+        row, column = divmod(number, 8)
+        place = f'lon="{column * 2e-4:.6f}" lat="{row * 2e-4:.6f}"'
+        nodes.append(f'<node id="{number + 1}" {place}><tag k="shop" v="books"/></node>')
+
+    street = '<way id="90"><nd ref="1"/><nd ref="8"/><tag k="highway" v="residential"/></way>'
+    path.write_text("\n".join(['<osm version="0.6">', *nodes, street, "</osm>"]))
+    return path
+
+
 def _people_tours(folder: Path) -> Path:
     """A square that four people drew a tour of, two of them across."""
     (folder / "Graph0.lib").write_text(

@@ -1,0 +1,77 @@
+"""`cogmap experiment map-structure`: sub-maps of real cities."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from cli.experiment import outcome
+from cli.experiment.options import Common, common_options_without_sensing
+from cli.log.progress import bar
+from cogmap.data.osm import SUFFIXES
+from cogmap.errors import UsageError
+from experiments.map_structure.city import StructuredCity, read_city
+from experiments.map_structure.measure import measure, metrics_of
+
+NAME = "map-structure"
+_EPILOG = """\b
+Examples:
+  cogmap experiment map-structure --osm monaco.osm.gz
+  cogmap experiment map-structure --all extracts --json structure.json
+"""
+
+
+@click.command(name=NAME, epilog=_EPILOG)
+@click.option(
+    "--osm",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="An OpenStreetMap extract with streets and buildings.",
+)
+@click.option(
+    "--all",
+    "all_in",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Every extract (.osm, packed or not, .osm.pbf) in a folder.",
+)
+@common_options_without_sensing
+def map_structure(common: Common, osm: Path | None, all_in: Path | None) -> None:
+    """Sub-maps of real cities, found by the model that structures the agent's map.
+
+    Objects are buildings, and places that people use; their functions come from tags. Railways,
+    water, walls and main roads are boundaries. Nobody knows the true sub-maps: how many there are,
+    how large, how often a boundary is between neighbours, and how many stay the same where
+    positions err by 2 m. Where an extract names quarters, the agreement with the nearest of those.
+    """
+    folder = outcome.folder_for(NAME, common.out)
+    cities = _cities(osm, all_in)
+
+    with bar("structuring") as progress:
+        found = measure(cities, common.seed, common.processes, progress)
+
+    metrics = metrics_of(found)
+    outcome.show(NAME, metrics)
+
+    from cli.plots.sub_maps import figure  # matplotlib takes long to import
+
+    outcome.save(folder, NAME, figure(found), metrics, common)
+
+
+def _cities(osm: Path | None, all_in: Path | None) -> list[StructuredCity]:
+    if (osm is None) == (all_in is None):
+        raise UsageError("give one of --osm FILE, --all DIR: there are no sub-maps without a city")
+
+    if osm is not None:
+        return [read_city(osm)]
+
+    assert all_in is not None
+    if not all_in.is_dir():
+        raise UsageError(f"there is no folder {all_in}")
+
+    files = [file for file in sorted(all_in.iterdir()) if file.name.endswith(SUFFIXES)]
+    if not files:
+        raise UsageError(f"{all_in} has no OpenStreetMap extracts ({SUFFIXES[0]}): put some there")
+
+    return [read_city(file) for file in files]

@@ -1,0 +1,1 @@
+"""Sub-maps of real cities (paper §5.3)."""
