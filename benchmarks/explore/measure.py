@@ -28,6 +28,10 @@ SELF_MOTION = {"speed": 0.04, "turn": 0.005, "drift_rad_per_sqrt_m": 0.0005}
 demo's loop, 180 m each: the heading drifts by 0.0005 rad after a metre and errs by 0.4 % of a turn,
 the speed by 2 % in a view of four ticks.
 """
+CLOSURE_SPACING_S = 10.0
+"""Between two loop closures: on streets that are driven again and again there is one at any time,
+and each makes map correction judge all of them.
+"""
 COGNITION = ("workspace", "codelets", "global_workspace", "action")
 THRESHOLDS = {
     "explored_share": at_least(0.9),
@@ -64,6 +68,7 @@ def sections(seed: int) -> Sections:
         "sim": sim,
         "workspace": {"mode": "lockstep"},
         "action": {"mode": "lockstep"},
+        "codelets": {"closure_spacing_s": CLOSURE_SPACING_S},
         "planning": {"explore": True},
     }
 
