@@ -5,7 +5,6 @@ from __future__ import annotations
 import shutil
 import time
 from collections.abc import Mapping
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -28,7 +27,6 @@ from cli.launch.watchdog import REMEDY, Situation, Watchdog
 from cli.run.display import Display
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.errors import ProcessFailedError
-from cogmap.runtime.client import Client
 from cogmap.runtime.config import Sections
 from cogmap.runtime.process import Stop
 from schemas.sensing import SpeedLimit
@@ -95,8 +93,7 @@ class Drive:
                 for program in modules(self.folder, self.endpoint, self.agent, self.choices):
                     self.supervisor.start(program)
                 self._note("processes started")
-                with self._guiding():
-                    ending = self._follow(watch, until_s, stop, display)
+                ending = self._follow(watch, until_s, stop, display)
         except ProcessFailedError as error:
             if watch.tally.observer.start is None:
                 raise
@@ -106,12 +103,6 @@ class Drive:
         if in_lockstep and ending.outcome is Outcome.ROUTE_COMPLETE:
             watch.pump_until_quiet(QUIET_S)
         return ending
-
-    def _guiding(self) -> AbstractContextManager[object]:
-        """Run the guide, where there is one, on a thread of its own."""
-        if self.guide is None:
-            return nullcontext()
-        return Client(self.guide.module(), self.endpoint, self.agent)
 
     def _await_recorder(self, watch: Watch, until_s: float, stop: Stop) -> Ending | None:
         """Wait for it, so that the log holds every message of each module from its first on.
@@ -133,6 +124,7 @@ class Drive:
         missing = watch.missing(self.awaited)
         while (ending := self._ending(watch, missing, until_s, stop)) is None:
             watch.pump(PUMP_S)
+            self._guide_agent(watch)
             self.supervisor.check()
             missing = watch.missing(self.awaited)
             self._note_progress(watch, missing)
@@ -141,6 +133,15 @@ class Drive:
                 _show(watch, missing, display)
                 shown = self._show_stage(shown, display)
         return ending
+
+    def _guide_agent(self, watch: Watch) -> None:
+        """Publish what the guide wants now, where there is one."""
+        if self.guide is None:
+            return
+
+        tally = watch.tally
+        for message in self.guide.step(tally.observer, tally.replica.graph):
+            watch.publish(message)
 
     def _show_stage(self, shown: Stage | None, display: Display) -> Stage | None:
         """Show what the agent does on its tour, once for each stage; the stage that is shown."""

@@ -8,15 +8,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cogmap.geometry import se2
+from cli.launch.observer import Observer
 from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
-from cogmap.runtime.module import Module
-from schemas import topics
 from schemas.base import Message
 from schemas.codelets import Offer
 from schemas.nodes import NEVER_NS, PLAN_ID, Goal, Object, Plan, PlanState, goal_id
-from schemas.sensing import Street, StreetClosure, TruePose, TrueTown
+from schemas.sensing import Street, StreetClosure, TrueTown
 
 TOUR_GOALS = 3
 KNOWN_SIGHTINGS = 3
@@ -35,7 +33,7 @@ class Stage(enum.Enum):
 
 
 class Guide:
-    """A module that follows the agent's graph and the town, and offers goals when it is time.
+    """Offers goals when it is time, by the agent's graph and the town as it is.
 
     The agent explores for `explore_s`, or until nothing is left to explore. `goals` are then
     offered; TOUR_GOALS objects of its map, far from one another, where they are not given. Where it
@@ -45,27 +43,13 @@ class Guide:
     def __init__(
         self, explore_s: float, goals: Sequence[Goal] = (), closes_street: bool = False
     ) -> None:
-        self.graph = Graph()
         self.stage = Stage.EXPLORES
         self.closed = ""
 
-        self._explore_ns = round(explore_s * 1e9)
+        self._explore_s = explore_s
         self._given = list(goals)
         self._closes_street = closes_street
         self._goals: list[str] = []
-        self._town: TrueTown | None = None
-        self._start: Floats | None = None
-        self._began_ns = 0
-
-    def module(self) -> Module:
-        """The module to run beside the agent's."""
-        emits = (topics.OFFER, topics.STREET_CLOSURE)
-        return (
-            Module("guide")
-            .following(self.graph)
-            .on(topics.TRUE_TOWN, self.on_town)
-            .on(topics.TRUE_POSE, self.on_pose, emits)
-        )
 
     @property
     def sentence(self) -> str:
@@ -81,64 +65,59 @@ class Guide:
             case Stage.COMPLETE:
                 return f"the agent was at every goal: {names}"
 
-    def on_town(self, town: TrueTown) -> None:
-        """The town as it is now."""
-        self._town = town
+    def step(self, observer: Observer, graph: Graph) -> list[Message]:
+        """Offer the goals, close the street, see whether all is done; what is to be published."""
+        if observer.start is None:
+            return []
 
-    def on_pose(self, pose: TruePose) -> list[Message]:
-        """Offer the goals, close the street, see whether all is done."""
-        if self._start is None:
-            self._start = np.array([pose.pose.x_m, pose.pose.y_m, pose.pose.heading_rad])
-            self._began_ns = pose.stamp_ns
+        match self.stage:
+            case Stage.EXPLORES:
+                has_explored = self._has_explored(observer.elapsed_s, graph)
+                return self._offer(graph) if has_explored else []
+            case Stage.DRIVES | Stage.DETOURS:
+                return self._follow(observer, graph)
+            case Stage.COMPLETE:
+                return []
 
-        if self.stage is Stage.EXPLORES:
-            return self._offer() if self._has_explored(pose.stamp_ns) else []
-        if self.stage in {Stage.DRIVES, Stage.DETOURS}:
-            return self._follow()
-        return []
-
-    def _has_explored(self, now_ns: int) -> bool:
+    def _has_explored(self, elapsed_s: float, graph: Graph) -> bool:
         """Whether the time is over, or the plan states that nothing is left to explore."""
-        if now_ns - self._began_ns >= self._explore_ns:
-            return self.graph.agent is not None
+        if elapsed_s >= self._explore_s:
+            return graph.agent is not None
 
-        plan = self.graph.get(Plan, PLAN_ID)
+        plan = graph.get(Plan, PLAN_ID)
         return plan is not None and plan.planned_ns > 0 and plan.state is PlanState.NO_GOAL
 
-    def _offer(self) -> list[Message]:
-        goals = self._given or _far_apart(self.graph)
+    def _offer(self, graph: Graph) -> list[Message]:
+        goals = self._given or _far_apart(graph)
         if not goals:
             return []
 
         self.stage = Stage.DRIVES
         self._goals = [goal.id for goal in goals]
-        return [Offer(cycle=self.graph.cycle, operations=[*goals])]
+        return [Offer(cycle=graph.cycle, operations=[*goals])]
 
-    def _follow(self) -> list[Message]:
+    def _follow(self, observer: Observer, graph: Graph) -> list[Message]:
         """Close a street once only the last goal is left; end where all are reached."""
-        goals = [self.graph.get(Goal, name) for name in self._goals]
+        goals = [graph.get(Goal, name) for name in self._goals]
         known = [goal for goal in goals if goal is not None]
         left = [goal for goal in known if goal.reached_ns == NEVER_NS]
-        plan = self.graph.get(Plan, PLAN_ID)
         if len(known) == len(goals) and not left:
             self.stage = Stage.COMPLETE
             return []
-        if plan is None or plan.route is None:
-            return []
 
-        is_last = len(left) == 1 and plan.goals == [left[0].id]
+        plan = graph.get(Plan, PLAN_ID)
+        is_last = len(left) == 1 and plan is not None and plan.goals == [left[0].id]
         if not (self._closes_street and is_last) or self.stage is Stage.DETOURS:
             return []
-        return self._close(np.asarray(plan.route.numpy(), np.float64))
+        return self._close(plan, observer)
 
-    def _close(self, route_m: Floats) -> list[Message]:
-        """Close a street that the (n, 2) route passes ahead, and that can be driven round."""
-        assert self._start is not None
-        if self._town is None:
+    def _close(self, plan: Plan | None, observer: Observer) -> list[Message]:
+        """Close a street that the plan's route passes ahead, and that can be driven round."""
+        if plan is None or plan.route is None or observer.town is None:
             return []
 
-        where_m = se2.transform_from(self._start, route_m)
-        street = street_ahead(self._town, where_m)
+        route_m = np.asarray(plan.route.numpy(), np.float64)
+        street = street_ahead(observer.town, observer.to_world(route_m))
         if street is None:
             return []
 

@@ -6,14 +6,21 @@ import time
 from collections import Counter
 from collections.abc import Mapping
 
+import msgspec
+
 from cli.launch.plan import OBSERVER
 from cli.launch.tally import FOLLOWED, Tally
+from cogmap.bus.codec import Envelope, encode
 from cogmap.bus.interface import Arrival, Bus, Member
 from cogmap.errors import MessageError
 from cogmap.graph.replica import Replica, snapshot_over
 from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.delivery.intake import Intake
 from schemas import topics
+from schemas.base import Message
+from schemas.topics import Topic
+
+PUBLISHED = (topics.OFFER, topics.STREET_CLOSURE)
 
 
 class Watch:
@@ -26,6 +33,10 @@ class Watch:
         self._inbox = Inbox()
         self._intake = Intake()
 
+        self._published: Counter[Topic] = Counter()
+        self._incarnation = time.time_ns()
+        for topic in PUBLISHED:
+            bus.declare(topic)
         for topic in FOLLOWED:
             bus.subscribe(topic, self._inbox.put, self._intake.count_lost)
         bus.watch(lambda member, alive: self._inbox.call(lambda: self._on_presence(member, alive)))
@@ -67,6 +78,17 @@ class Watch:
             self.tally.update(message, arrival.envelope, arrival.received_ns)
         except MessageError as error:
             self._intake.reject(arrival.topic.name, str(error))
+
+    def publish(self, message: Message) -> None:
+        """Publish a message of one of the topics PUBLISHED."""
+        topic = topics.of(message)
+        number = self._published[topic]
+        self._published[topic] += 1
+
+        now_ns = time.time_ns()
+        envelope = Envelope(OBSERVER, number, self._incarnation, now_ns, now_ns)
+        numbered = msgspec.structs.replace(message, source=OBSERVER, seq=number)
+        self._bus.publish(topic, encode(numbered), envelope)
 
     def missing(self, awaited: Mapping[str, int]) -> list[str]:
         """The modules of which not all instances are ready yet."""

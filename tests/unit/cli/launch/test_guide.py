@@ -6,6 +6,8 @@ import msgspec
 import numpy as np
 
 from cli.launch.guide import Guide, Stage, street_ahead
+from cli.launch.observer import Observer
+from cogmap.graph.graph import Graph
 from schemas.array import Matrix
 from schemas.base import Message
 from schemas.codelets import Offer
@@ -40,14 +42,27 @@ def _plan(*goals: str, state: PlanState = PlanState.READY) -> Plan:
     return Plan(id=PLAN_ID, state=state, goals=[*goals], planned_ns=1, route=route)
 
 
-def _guide() -> Guide:
+class Tour:
     """A guide whose agent knows four buildings and has explored for 10 s."""
-    guide = Guide(100.0, closes_street=True)
-    guide.graph.change([agent(), *map(_object, PLACES)])
-    guide.on_town(_town())
-    guide.on_pose(_at(0.0))
-    guide.on_pose(_at(10.0))
-    return guide
+
+    def __init__(self, *goals: Goal, explore_s: float = 100.0) -> None:
+        self.guide = Guide(explore_s, goals, closes_street=True)
+        self.graph = Graph()
+        self.graph.change([agent(), *map(_object, PLACES)])
+        self._observer = Observer()
+        self._observer.update(_town())
+        self.at(0.0)
+        self.at(10.0)
+
+    def at(self, seconds: float) -> list[Message]:
+        """What the guide publishes then."""
+        self._observer.update(_at(seconds))
+        return self.guide.step(self._observer, self.graph)
+
+    def reach(self, *goals: Goal) -> None:
+        """Let the agent have been at these goals."""
+        for goal in goals:
+            self.graph.change([msgspec.structs.replace(goal, reached_ns=1)])
 
 
 def _offered(published: list[Message]) -> list[Goal]:
@@ -56,61 +71,54 @@ def _offered(published: list[Message]) -> list[Goal]:
     return [goal for goal in offer.operations if isinstance(goal, Goal)]
 
 
-def _reach(guide: Guide, *goals: Goal) -> None:
-    for goal in goals:
-        guide.graph.change([msgspec.structs.replace(goal, reached_ns=1)])
-
-
 def test_the_agent_explores_for_its_time() -> None:
-    guide = _guide()
+    tour = Tour()
 
-    assert guide.on_pose(_at(99.0)) == []
-    assert guide.stage is Stage.EXPLORES
-    assert _offered(guide.on_pose(_at(100.0)))
+    assert tour.at(99.0) == []
+    assert tour.guide.stage is Stage.EXPLORES
+    assert _offered(tour.at(100.0))
 
 
 def test_it_explores_no_longer_where_nothing_is_left() -> None:
-    guide = _guide()
-    guide.graph.change([_plan(state=PlanState.NO_GOAL)])
+    tour = Tour()
+    tour.graph.change([_plan(state=PlanState.NO_GOAL)])
 
-    assert _offered(guide.on_pose(_at(20.0)))
+    assert _offered(tour.at(20.0))
 
 
 def test_the_goals_are_objects_far_from_one_another() -> None:
-    goals = _offered(_guide().on_pose(_at(100.0)))
+    goals = _offered(Tour().at(100.0))
 
     assert {goal.object for goal in goals} == {"inn", "bakery", "school"}
 
 
 def test_given_goals_are_offered_instead() -> None:
     given = Goal(id="goal:a", x_m=3.0, y_m=0.0)
-    guide = Guide(0.0, [given])
-    guide.graph.change([agent()])
 
-    assert _offered(guide.on_pose(_at(0.0))) == [given]
+    assert _offered(Tour(given).at(100.0)) == [given]
 
 
 def test_a_street_of_the_route_to_the_last_goal_is_closed_once() -> None:
-    guide = _guide()
-    goals = _offered(guide.on_pose(_at(100.0)))
-    guide.graph.change([*goals])
-    _reach(guide, *goals[1:])
-    guide.graph.change([_plan(goals[0].id)])
+    tour = Tour()
+    goals = _offered(tour.at(100.0))
+    tour.graph.change([*goals])
+    tour.reach(*goals[1:])
+    tour.graph.change([_plan(goals[0].id)])
 
-    assert guide.on_pose(_at(101.0)) == [StreetClosure(street="south", closed=True)]
-    assert guide.stage is Stage.DETOURS
-    assert guide.on_pose(_at(102.0)) == []
+    assert tour.at(101.0) == [StreetClosure(street="south", closed=True)]
+    assert tour.guide.stage is Stage.DETOURS
+    assert tour.at(102.0) == []
 
 
 def test_where_the_agent_was_at_every_goal_the_tour_is_complete() -> None:
-    guide = _guide()
-    goals = _offered(guide.on_pose(_at(100.0)))
-    guide.graph.change([*goals])
-    _reach(guide, *goals)
-    guide.on_pose(_at(101.0))
+    tour = Tour()
+    goals = _offered(tour.at(100.0))
+    tour.graph.change([*goals])
+    tour.reach(*goals)
+    tour.at(101.0)
 
-    assert guide.stage is Stage.COMPLETE
-    assert "every goal" in guide.sentence
+    assert tour.guide.stage is Stage.COMPLETE
+    assert "every goal" in tour.guide.sentence
 
 
 def test_a_street_that_alone_leads_on_is_not_closed() -> None:
