@@ -83,7 +83,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         return Answer()
 
     grid = LocalGrid.around(agent, graph.cell_m(agent.map), config.boundary_reach_m)
-    rays = rays_of(task.scan, grid, config.boundary_reach_m, config.range_sd_share)
+    rays = rays_of(task.scan, task.road_m, grid, config.boundary_reach_m, config.range_sd_share)
     edges = _edges(task.road_boundary_m, rays, grid, config)
     seen = _seen(task.road_m, edges, rays, grid, config)
     known = graph.places.window(agent.map, COLUMNS, grid.extent)
@@ -94,7 +94,8 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     weights = np.where(has_changed, weights_of(evidence), known.weights())
 
     obstacle = known.column(PlaceColumn.OBSTACLE)
-    in_view = np.where(seen.is_hit | seen.is_clear, seen.certainty, 0.0)
+    is_seen = seen.is_hit | seen.is_clear | seen.is_road
+    in_view = np.where(is_seen, seen.certainty, 0.0)
     obstacle = blended(obstacle, seen.is_hit.astype(np.float64), in_view)
 
     written = len(WRITTEN)

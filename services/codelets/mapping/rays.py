@@ -15,6 +15,10 @@ STEP = 0.5
 MIN_WIDTH_M = 0.3
 MAX_GAP_M = 1.0
 MAX_GAP_SHARE = 0.05
+# So many points of the road, so far behind what a ray hits, show that nothing stands there.
+BEYOND_M = 1.0
+MIN_BEYOND = 2
+MIN_RAYS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,14 +42,18 @@ class Rays:
         return ends[self.is_hit]
 
 
-def rays_of(scan: Array | None, grid: LocalGrid, reach_m: float, range_sd_share: float) -> Rays:
-    """The rays of a task's scan on `grid`; none where there is no scan.
+def rays_of(
+    scan: Array | None, road_m: Array, grid: LocalGrid, reach_m: float, range_sd_share: float
+) -> Rays:
+    """The rays of a task's scan on `grid`; none where there is no scan. Those that hit something
+    before road that is seen, `road_m` (n, 2), are left out: nothing stands there.
 
     A ray is clear up to half a cell, and twice the standard deviation, before what it hits. One
     that saw nothing at all, which may be the fault of the sensor, is clear for half the reach.
     """
     rays = np.zeros((0, 2)) if scan is None else np.asarray(scan.numpy(), np.float64)
-    bearing_rad, range_m = rays.reshape(-1, 2).T
+    rays = _before_road(rays.reshape(-1, 2), np.asarray(road_m.numpy(), np.float64))
+    bearing_rad, range_m = rays.T
     has_seen = range_m > 0
 
     before_hit_m = range_m * (1 - 2 * range_sd_share) - grid.cell_m / 2
@@ -61,6 +69,28 @@ def rays_of(scan: Array | None, grid: LocalGrid, reach_m: float, range_sd_share:
         clear=clear_m / grid.cell_m,
         angle_rad=float(np.median(between_rad)) if len(between_rad) else 0.0,
     )
+
+
+def _before_road(rays: Floats, road_m: Floats) -> Floats:
+    """(k, 2): the rays, bearing and range each, beyond whose hit no road is seen in their sector.
+
+    Of two senses that contradict each other the eye for the road is the better one: where stereo
+    finds an obstacle by a wrong match, the road goes on behind it.
+    """
+    if len(rays) < MIN_RAYS:
+        return rays
+
+    order = np.argsort(rays[:, 0])
+    bearing_rad, range_m = rays[order].T
+    borders_rad = (bearing_rad[1:] + bearing_rad[:-1]) / 2
+    road_rad = np.arctan2(road_m[:, 1], road_m[:, 0])
+    sector = np.searchsorted(borders_rad, road_rad)
+
+    beyond_m = np.hypot(road_m[:, 0], road_m[:, 1]) - range_m[sector]
+    seen = np.bincount(sector[beyond_m > BEYOND_M], minlength=len(rays))
+    is_kept = np.ones(len(rays), bool)
+    is_kept[order] = (range_m == 0) | (seen < MIN_BEYOND)
+    return rays[is_kept]
 
 
 def clear_cells(rays: Rays, grid: LocalGrid) -> Booleans:

@@ -83,7 +83,7 @@ def _road(
     points = grid.counts(grid.positions(near_m))
     shares = np.minimum(1.0, points / ENOUGH_POINTS)
 
-    rays = rays_of(scan, grid, ROAD_REACH_M, config.range_sd_share)
+    rays = rays_of(scan, road_m, grid, ROAD_REACH_M, config.range_sd_share)
     range_m = grid.range_m()
     nearest_m, farthest_m = NOT_ROAD_M
     is_missed = clear_cells(rays, grid) & (range_m >= nearest_m) & (range_m <= farthest_m)

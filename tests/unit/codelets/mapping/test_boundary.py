@@ -143,6 +143,16 @@ def test_an_obstacle_that_is_gone_is_withdrawn_and_its_links_are_free() -> None:
     assert _weight(graph, 5, 0) == 1.0
 
 
+def test_what_stereo_finds_before_road_that_is_seen_is_no_obstacle() -> None:
+    rays = [(bearing_rad, 5.8) for bearing_rad in np.linspace(-0.3, 0.3, 15)]
+    road_beyond = View(road_m=AHEAD_M, rays=rays)
+    road_before = View(road_m=AHEAD_M[AHEAD_M[..., 0] < 5.8], rays=rays)
+
+    graph = _seen(*[road_beyond] * 4)
+    assert _weight(graph, 5, 0) == 1.0
+    assert _weight(_seen(*[road_before] * 4), 5, 0) == 0.0
+
+
 def test_what_is_far_or_seen_from_an_unsure_pose_counts_less() -> None:
     far_m = [(x_m + 6.0, y_m) for x_m, y_m in ACROSS_M]
     near = _seen(BLOCKED)
