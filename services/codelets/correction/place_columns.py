@@ -92,6 +92,43 @@ class Links(NamedTuple):
         return cls(direction, _cells(cell_keys))
 
 
+class Known:
+    """The (n,) values at (n,) numbers of cells or links; 0 at any other."""
+
+    def __init__(self, keys: Indices, values: Floats) -> None:
+        order = np.argsort(keys)
+        self.keys = keys[order]
+        self._values = values[order]
+
+    def values_at(self, keys: Indices) -> Floats:
+        """(k,): the values at these numbers."""
+        last = len(self.keys) - 1
+        place = np.searchsorted(self.keys, keys).clip(0, last)
+        is_known = self.keys[place] == keys
+
+        found: Floats = np.where(is_known, self._values[place], 0.0)
+        return found
+
+
+class Merged(NamedTuple):
+    """All numbers of cells or links that a movement concerns, (n,), and which of them those around
+    are, (a,), and those where something arrives, (k,).
+    """
+
+    keys: Indices
+    around: Indices
+    arrived: Indices
+
+    @classmethod
+    def of(cls, known: Known, around: Indices, arrived: Indices) -> Merged:
+        """Those that are known, those around and those where something arrives."""
+        every = np.concatenate([known.keys, around, arrived])
+        keys, place = np.unique(every, return_inverse=True)
+        ends = np.cumsum([len(known.keys), len(around)])
+        _, at_around, at_arrived = np.split(place, ends)
+        return cls(keys, at_around, at_arrived)
+
+
 def move_places(graph: Graph, old: Floats, new: Floats) -> list[Operation]:
     """Move what is known of the root map's place nodes with the place of the path nearest to each,
     from (n, 3) `old` poses to `new`, and fill the gaps that a turn would leave between them.
@@ -111,21 +148,20 @@ def _move_shares(graph: Graph, column: PlaceColumn, movement: Movement) -> Itera
     if not len(cells):
         return
 
-    known = _keys(cells)
+    known = Known(_keys(cells), shares)
     arrived = _nearest_cells(movement, cells)
     neighbours = arrived[:, None, :] + NEIGHBOURHOOD
     around = np.unique(_keys(neighbours.reshape(-1, 2)))
-
     origins = _nearest_cells(movement.back(), _cells(around))
-    gathered = _looked_up(known, shares, _keys(origins))
+    gathered = known.values_at(_keys(origins))
 
-    keys, where = np.unique(np.concatenate([known, around, _keys(arrived)]), return_inverse=True)
-    after = np.zeros(len(keys))
-    np.maximum.at(after, where[len(known) :], np.concatenate([gathered, shares]))
+    merged = Merged.of(known, around, _keys(arrived))
+    after = np.zeros(len(merged.keys))
+    np.maximum.at(after, merged.around, gathered)
+    np.maximum.at(after, merged.arrived, shares)
 
-    before = _looked_up(known, shares, keys)
-    is_changed = after != before
-    yield from _written(column, _cells(keys[is_changed]), after[is_changed])
+    is_changed = after != known.values_at(merged.keys)
+    yield from _written(column, _cells(merged.keys[is_changed]), after[is_changed])
 
 
 def _move_links(graph: Graph, movement: Movement) -> Iterator[Operation]:
@@ -134,28 +170,33 @@ def _move_links(graph: Graph, movement: Movement) -> Iterator[Operation]:
     if not len(evidence):
         return
 
-    known = links.keys()
+    known = Known(links.keys(), evidence)
     arrived = links.moved(movement)
     around = arrived.neighbourhood()
     origins = around.moved(movement.back())
-    gathered = _looked_up(known, evidence, origins.keys())
+    gathered = known.values_at(origins.keys())
 
-    all_keys = np.concatenate([known, around.keys(), arrived.keys()])
-    keys, where = np.unique(all_keys, return_inverse=True)
-    after = np.zeros(len(keys))
-    at_around, at_arrived = np.split(where[len(known) :], [len(gathered)])
-    after[at_around] = gathered
-
-    free = np.zeros(len(keys))
-    np.maximum.at(free, at_arrived, evidence)
-    after = np.where(after == 0, free, after)
-    is_cut = evidence < 0
-    np.minimum.at(after, at_arrived[is_cut], evidence[is_cut])
-
-    before = _looked_up(known, evidence, keys)
+    merged = Merged.of(known, around.keys(), arrived.keys())
+    after = _merged_evidence(merged, gathered, evidence)
+    before = known.values_at(merged.keys)
     is_changed = after != before
-    changed = Links.of(keys[is_changed])
+    changed = Links.of(merged.keys[is_changed])
     yield from _written_links(changed, before[is_changed], after[is_changed])
+
+
+def _merged_evidence(merged: Merged, gathered: Floats, arrived: Floats) -> Floats:
+    """(n,): the evidence that (a,) `gathered` and (k,) `arrived` give: what was gathered, where
+    nothing was the strongest that arrived for free, and everywhere what arrived for cut.
+    """
+    free = np.zeros(len(merged.keys))
+    np.maximum.at(free, merged.arrived, arrived)
+    after = np.zeros(len(merged.keys))
+    after[merged.around] = gathered
+    after = np.where(after == 0, free, after)
+
+    is_cut = arrived < 0
+    np.minimum.at(after, merged.arrived[is_cut], arrived[is_cut])
+    return after
 
 
 def _links(graph: Graph) -> tuple[Links, Floats]:
@@ -203,19 +244,6 @@ def _cells(keys: Indices) -> Indices:
     j = (keys + half) % _KEY_STEP - half
     i = (keys - j) // _KEY_STEP
     return np.column_stack([i, j])
-
-
-def _looked_up(known: Indices, values: Floats, wanted: Indices) -> Floats:
-    """(k,): the values at the numbers `wanted`, of those (n,) at the numbers `known`; 0 where there
-    is none.
-    """
-    order = np.argsort(known)
-    ordered = known[order]
-    place = np.searchsorted(ordered, wanted).clip(0, len(known) - 1)
-    is_known = ordered[place] == wanted
-
-    found: Floats = np.where(is_known, values[order[place]], 0.0)
-    return found
 
 
 def _written(column: PlaceColumn, cells: Indices, values: npt.ArrayLike) -> Iterator[Operation]:

@@ -13,7 +13,6 @@ import numpy as np
 
 from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Booleans, Floats, Singles
-from cogmap.graph.crossings import crossings
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import EVIDENCE_COLUMNS, LINK_OFFSETS, WEIGHT_COLUMNS, Window
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
@@ -22,11 +21,11 @@ from schemas.codelets import Task
 from schemas.graph import Phase
 from schemas.nodes import SELF_ID, PlaceColumn, Self
 from services.codelets.config import SECTION, Config
+from services.codelets.mapping.edges import Edges, cut_links, edges_of
 from services.codelets.mapping.evidence import accumulated, blended, weights_of
 from services.codelets.mapping.local_grid import LocalGrid
-from services.codelets.mapping.rays import Rays, clear_cells, rays_of, walls
+from services.codelets.mapping.rays import Rays, clear_cells, rays_of
 
-JOIN_M = 1.2
 # In cells, from the middle of one along both axes: road there is road at the place node, and an
 # edge there is right beside it.
 ROAD_WITHIN = 0.35
@@ -35,17 +34,6 @@ ROAD_STEP = 0.25
 RAY_CERTAINTY = 0.5
 WRITTEN = (*EVIDENCE_COLUMNS, *WEIGHT_COLUMNS, PlaceColumn.OBSTACLE)
 COLUMNS = (*WRITTEN, PlaceColumn.ROAD)
-
-
-class Edges(NamedTuple):
-    """Where the ground ends that can be driven on, as straight segments, (k, 2) each, in cells."""
-
-    starts: Floats
-    ends: Floats
-
-    def middles(self) -> Floats:
-        """(k, 2): the middle of each."""
-        return (self.starts + self.ends) / 2
 
 
 class Seen(NamedTuple):
@@ -82,25 +70,10 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     if agent.is_lost:
         return Answer()
 
-    grid = LocalGrid.around(agent, graph.cell_m(agent.map), config.boundary_reach_m)
-    rays = rays_of(task.scan, task.road_m, grid, config.boundary_reach_m, config.range_sd_share)
-    edges = _edges(task.road_boundary_m, rays, grid, config)
-    seen = _seen(task.road_m, edges, rays, grid, config)
+    grid = LocalGrid.around(agent, graph.cell_m(agent.map), config.boundary_reach_m, config)
     known = graph.places.window(agent.map, COLUMNS, grid.extent)
-
-    cut = _cut(edges, grid, config)
-    evidence = accumulated(known.evidence(), cut, _free(seen, known))
-    has_changed = evidence != known.evidence()
-    weights = np.where(has_changed, weights_of(evidence), known.weights())
-
-    obstacle = known.column(PlaceColumn.OBSTACLE)
-    is_seen = seen.is_hit | seen.is_clear | seen.is_road
-    in_view = np.where(is_seen, seen.certainty, 0.0)
-    obstacle = blended(obstacle, seen.is_hit.astype(np.float64), in_view)
-
-    written = len(WRITTEN)
-    after = np.concatenate([evidence, weights, obstacle[None]])
-    return Answer(grid.changed(WRITTEN, known.values[:written], after))
+    after = _after(task.road_m, task.road_boundary_m, task.scan, grid, known)
+    return Answer(grid.changed(WRITTEN, known.values[: len(WRITTEN)], after))
 
 
 CODELET = Codelet(
@@ -115,68 +88,51 @@ CODELET = Codelet(
 )
 
 
-def _seen(road_m: Array, edges: Edges, rays: Rays, grid: LocalGrid, config: Config) -> Seen:
-    road = grid.positions(np.asarray(road_m.numpy(), np.float64))
-    is_road = grid.counts(_central(road, ROAD_WITHIN)) > 0
-    # Whether a place node right beside a boundary is before or behind it no view can decide.
-    is_beside = grid.counts(_central(edges.middles(), BESIDE_WITHIN)) > 0
+def _after(
+    road: Array, boundary: Array, scan: Array | None, grid: LocalGrid, known: Window
+) -> Singles:
+    """(k, w, h): the columns WRITTEN after this view."""
+    road_m = np.asarray(road.numpy(), np.float64)
+    boundary_m = np.asarray(boundary.numpy(), np.float64)
+    rays = rays_of(scan, road_m, grid)
+    edges = edges_of(boundary_m, rays, grid)
+    seen = _seen(road_m, edges, rays, grid)
+
+    evidence = accumulated(known.evidence(), cut_links(edges, grid), _free(seen, known))
+    has_changed = evidence != known.evidence()
+    weights = np.where(has_changed, weights_of(evidence), known.weights())
+
+    obstacle = _obstacle(seen, known)
+    return np.concatenate([evidence, weights, obstacle[None]])
+
+
+def _seen(road_m: Floats, edges: Edges, rays: Rays, grid: LocalGrid) -> Seen:
+    """What a view shows, of which (n, 2) points are road."""
+    road = _central(grid.positions(road_m), ROAD_WITHIN)
+    # Whether a place node right beside an edge is before or behind it no view can decide.
+    is_beside = grid.has(_central(edges.middles(), BESIDE_WITHIN))
 
     return Seen(
-        is_road=is_road & ~is_beside,
-        is_hit=grid.counts(rays.hits()) > 0,
+        is_road=grid.has(road) & ~is_beside,
+        is_hit=grid.has(rays.hits()),
         is_clear=clear_cells(rays, grid) & ~is_beside,
-        certainty=grid.certainty(grid.range_m(), config.range_sd_share),
+        certainty=grid.certainty(grid.range_m()),
     )
 
 
 def _central(positions: Floats, within: float) -> Floats:
     """(k, 2): those of (n, 2) positions that are near the middle of their cell, along both axes."""
     from_middle = np.abs(positions - np.rint(positions))
-    central: Floats = positions[(from_middle <= within).all(axis=1)]
+    is_central = (from_middle <= within).all(axis=1)
+    central: Floats = positions[is_central]
     return central
 
 
-def _edges(boundary_m: Array, rays: Rays, grid: LocalGrid, config: Config) -> Edges:
-    """Where the road ends, and what the rays hit."""
-    points_m = np.asarray(boundary_m.numpy(), np.float64)
-    road_starts, road_ends = _road_edges(points_m, config.boundary_reach_m)
-    wall_starts, wall_ends = walls(rays, grid.cell_m)
-
-    return Edges(
-        starts=np.concatenate([grid.positions(road_starts), wall_starts]),
-        ends=np.concatenate([grid.positions(road_ends), wall_ends]),
-    )
-
-
-def _cut(edges: Edges, grid: LocalGrid, config: Config) -> Floats:
-    """(4, w, h): the links that edges cross, by how sure their place is, 0 to 1."""
-    away = edges.middles() - grid.pose[:2] / grid.cell_m
-    range_m = np.hypot(away[:, 0], away[:, 1]) * grid.cell_m
-    certainty = grid.certainty(range_m, config.range_sd_share)
-
-    crossed = crossings(edges.starts, edges.ends)
-    i = crossed.i - grid.extent.lower[0]
-    j = crossed.j - grid.extent.lower[1]
-    width, height = grid.extent.shape
-    is_inside = (i >= 0) & (i < width) & (j >= 0) & (j < height)
-
-    cut = np.zeros((len(LINK_OFFSETS), width, height))
-    links = (crossed.direction[is_inside], i[is_inside], j[is_inside])
-    np.maximum.at(cut, links, certainty[crossed.segment[is_inside]])
-    return cut
-
-
-def _road_edges(points_m: Floats, reach_m: float) -> tuple[Floats, Floats]:
-    """Where the road ends, as straight segments from (k, 2) to (k, 2): each two of the points
-    within reach that are at most JOIN_M apart. A point alone is taken for a mistake.
-    """
-    range_m = np.hypot(points_m[:, 0], points_m[:, 1])
-    near_m = points_m[range_m <= reach_m]
-
-    apart_m = near_m[:, None] - near_m
-    squared_m2 = (apart_m**2).sum(axis=2)
-    one, other = np.nonzero(np.triu(squared_m2 <= JOIN_M**2, k=1))
-    return near_m[one], near_m[other]
+def _obstacle(seen: Seen, known: Window) -> Singles:
+    """(w, h): how much the cells are obstacles."""
+    is_seen = seen.is_hit | seen.is_clear | seen.is_road
+    certainty = np.where(is_seen, seen.certainty, 0.0)
+    return blended(known.column(PlaceColumn.OBSTACLE), seen.is_hit.astype(np.float64), certainty)
 
 
 def _free(seen: Seen, known: Window) -> Floats:
@@ -193,7 +149,8 @@ def _free(seen: Seen, known: Window) -> Floats:
     clear_between = (here[1] > 0) & (there[:, 1] > 0)
     same_ground = np.abs(road - there[:, 2]) < ROAD_STEP
 
-    sure = np.where(road_between, 1.0, np.where(clear_between & same_ground, RAY_CERTAINTY, 0.0))
+    by_rays = np.where(clear_between & same_ground, RAY_CERTAINTY, 0.0)
+    sure = np.where(road_between, 1.0, by_rays)
     return sure * seen.certainty
 
 

@@ -7,54 +7,70 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cogmap.geometry.arrays import Floats, Indices, Singles
+from cogmap.geometry.arrays import Booleans, Floats, Indices, Singles
 from cogmap.geometry.se2 import transform_from
 from cogmap.graph.window import Extent
 from schemas.array import Array
 from schemas.graph import Cells, Operation
 from schemas.nodes import PlaceColumn, Self
+from services.codelets.config import Config
 
 MARGIN_CELLS = 2
 
 
 @dataclass(frozen=True, eq=False)
 class LocalGrid:
-    """The cells of a map within reach of a pose, arrays (w, h) being indexed [i, j] from the cell
-    `extent.lower`. Positions on it are in cells.
+    """The cells of a map within reach of a pose; arrays (w, h) are indexed [i, j] from the cell
+    `extent.lower`. Positions on it are in cells of the map.
+
+    What is seen errs by `range_sd_share` of its distance, and by the standard deviation of the
+    pose.
     """
 
     map_id: str
     cell_m: float
     pose: Floats
     pose_sd_m: float
+    reach_m: float
+    range_sd_share: float
     extent: Extent
 
     @classmethod
-    def around(cls, agent: Self, cell_m: float, reach_m: float) -> LocalGrid:
+    def around(cls, agent: Self, cell_m: float, reach_m: float, config: Config) -> LocalGrid:
         """The cells within `reach_m` of the agent, and some more."""
         pose = np.array([agent.x_m, agent.y_m, agent.heading_rad])
-        here = np.rint(pose[:2] / cell_m).astype(np.int64)
-        reach = int(np.ceil(reach_m / cell_m)) + MARGIN_CELLS
-        lower_i, lower_j = (here - reach).tolist()
-        upper_i, upper_j = (here + reach + 1).tolist()
+        return cls(
+            map_id=agent.map,
+            cell_m=cell_m,
+            pose=pose,
+            pose_sd_m=float(np.hypot(agent.x_sd_m, agent.y_sd_m)),
+            reach_m=reach_m,
+            range_sd_share=config.range_sd_share,
+            extent=_around(pose[:2] / cell_m, reach_m / cell_m),
+        )
 
-        pose_sd_m = float(np.hypot(agent.x_sd_m, agent.y_sd_m))
-        extent = Extent((lower_i, lower_j), (upper_i, upper_j))
-        return cls(agent.map, cell_m, pose, pose_sd_m, extent)
+    @property
+    def eye(self) -> Floats:
+        """(2,): where the agent is."""
+        position: Floats = self.pose[:2] / self.cell_m
+        return position
 
     def positions(self, points_m: Floats) -> Floats:
-        """(n, 2) points in the robot's frame, as positions in cells."""
+        """(n, 2) points in the robot's frame, as positions."""
         return transform_from(self.pose, points_m) / self.cell_m
 
     def range_m(self) -> Floats:
         """(w, h): the distance of each cell from the agent."""
-        i, j = np.indices(self.extent.shape)
-        away_i = i + self.extent.lower[0] - self.pose[0] / self.cell_m
-        away_j = j + self.extent.lower[1] - self.pose[1] / self.cell_m
-        range_m: Floats = np.hypot(away_i, away_j) * self.cell_m
+        at_i, at_j = self.eye.tolist()
+        first_i, first_j = self.extent.lower
+        last_i, last_j = self.extent.upper
+
+        away_i = np.arange(first_i, last_i) - at_i
+        away_j = np.arange(first_j, last_j) - at_j
+        range_m: Floats = np.hypot(away_i[:, None], away_j) * self.cell_m
         return range_m
 
-    def certainty(self, range_m: Floats, range_sd_share: float) -> Floats:
+    def certainty(self, range_m: Floats) -> Floats:
         """How much something seen at these ranges is worth, 0 to 1: half where the standard
         deviation of its position is half a cell.
 
@@ -63,17 +79,25 @@ class LocalGrid:
         """
         half_m = self.cell_m / 2
         pose_sd_m = min(self.pose_sd_m, half_m)
-        variance_m2 = (range_sd_share * range_m) ** 2 + pose_sd_m**2
+        range_sd_m = self.range_sd_share * range_m
+
+        variance_m2 = range_sd_m**2 + pose_sd_m**2
         certain: Floats = half_m**2 / (half_m**2 + variance_m2)
         return certain
 
+    def has(self, positions: Floats) -> Booleans:
+        """(w, h): whether any of (n, 2) positions lies in each cell."""
+        return self.counts(positions) > 0
+
     def counts(self, positions: Floats) -> Indices:
         """(w, h): how many of (n, 2) positions lie in each cell."""
-        cells = np.rint(positions).astype(np.int64) - self.extent.lower
         width, height = self.extent.shape
-        is_inside = ((cells >= 0) & (cells < (width, height))).all(axis=1)
-        i, j = cells[is_inside].T
-        found = np.bincount(i * height + j, minlength=width * height)
+        cells = np.rint(positions).astype(np.int64) - self.extent.lower
+        is_inside = (cells >= 0) & (cells < (width, height))
+
+        i, j = cells[is_inside.all(axis=1)].T
+        number = i * height + j
+        found = np.bincount(number, minlength=width * height)
         return found.reshape(width, height)
 
     def changed(
@@ -83,21 +107,31 @@ class LocalGrid:
         (k, w, h) `before` to `after`; none of a column that does not.
         """
         column, i, j = np.nonzero(after != before)
-        cells = np.column_stack([i, j]) + self.extent.lower
         values = after[column, i, j]
-        ends = np.searchsorted(column, np.arange(len(columns)), side="right").tolist()
+        cells = np.column_stack([i, j]) + self.extent.lower
+        starts = np.searchsorted(column, np.arange(len(columns) + 1)).tolist()
 
         operations: list[Operation] = []
-        start = 0
-        for name, end in zip(columns, ends, strict=True):
-            if end > start:
-                operation = Cells(
-                    map=self.map_id,
-                    column=name,
-                    cells=Array.of(cells[start:end], "<i4"),
-                    values=Array.of(values[start:end], "<f4"),
-                )
-                operations.append(operation)
-            start = end
+        for number, name in enumerate(columns):
+            of_column = slice(starts[number], starts[number + 1])
+            if len(values[of_column]):
+                operations.append(self._cells(name, cells[of_column], values[of_column]))
 
         return operations
+
+    def _cells(self, column: PlaceColumn, cells: Indices, values: Singles) -> Cells:
+        return Cells(
+            map=self.map_id,
+            column=column,
+            cells=Array.of(cells, "<i4"),
+            values=Array.of(values, "<f4"),
+        )
+
+
+def _around(position: Floats, reach: float) -> Extent:
+    """The cells within reach of a position, (2,), and some more."""
+    here_i, here_j = np.rint(position).astype(int).tolist()
+    side = int(np.ceil(reach)) + MARGIN_CELLS
+    lower = (here_i - side, here_j - side)
+    upper = (here_i + side + 1, here_j + side + 1)
+    return Extent(lower, upper)

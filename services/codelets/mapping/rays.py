@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cogmap.geometry.arrays import Booleans, Floats
+from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.geometry.se2 import rotate
 from schemas.array import Array
 from services.codelets.mapping.local_grid import LocalGrid
@@ -18,7 +18,6 @@ MAX_GAP_SHARE = 0.05
 # So many points of the road, so far behind what a ray hits, show that nothing stands there.
 BEYOND_M = 1.0
 MIN_BEYOND = 2
-MIN_RAYS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,13 +37,13 @@ class Rays:
 
     def hits(self) -> Floats:
         """(k, 2): where something stands."""
-        ends: Floats = self.eye + self.length[:, None] * self.directions
-        return ends[self.is_hit]
+        lengths = self.length[self.is_hit]
+        along = lengths[:, None] * self.directions[self.is_hit]
+        ends: Floats = self.eye + along
+        return ends
 
 
-def rays_of(
-    scan: Array | None, road_m: Array, grid: LocalGrid, reach_m: float, range_sd_share: float
-) -> Rays:
+def rays_of(scan: Array | None, road_m: Floats, grid: LocalGrid) -> Rays:
     """The rays of a task's scan on `grid`; none where there is no scan. Those that hit something
     before road that is seen, `road_m` (n, 2), are left out: nothing stands there.
 
@@ -52,23 +51,30 @@ def rays_of(
     that saw nothing at all, which may be the fault of the sensor, is clear for half the reach.
     """
     rays = np.zeros((0, 2)) if scan is None else np.asarray(scan.numpy(), np.float64)
-    rays = _before_road(rays.reshape(-1, 2), np.asarray(road_m.numpy(), np.float64))
-    bearing_rad, range_m = rays.T
+    bearing_rad, range_m = _before_road(rays, road_m).T
     has_seen = range_m > 0
 
-    before_hit_m = range_m * (1 - 2 * range_sd_share) - grid.cell_m / 2
-    clear_m = np.where(has_seen, before_hit_m, reach_m / 2).clip(0.0, reach_m)
+    before_hit_m = range_m * (1 - 2 * grid.range_sd_share) - grid.cell_m / 2
+    clear_m = np.where(has_seen, before_hit_m, grid.reach_m / 2)
 
     ahead = np.column_stack([np.cos(bearing_rad), np.sin(bearing_rad)])
-    between_rad = np.abs(np.diff(bearing_rad))
     return Rays(
-        eye=grid.pose[:2] / grid.cell_m,
+        eye=grid.eye,
         directions=rotate(ahead, grid.pose[2]),
         length=range_m / grid.cell_m,
-        is_hit=has_seen & (range_m <= reach_m),
-        clear=clear_m / grid.cell_m,
-        angle_rad=float(np.median(between_rad)) if len(between_rad) else 0.0,
+        is_hit=has_seen & (range_m <= grid.reach_m),
+        clear=clear_m.clip(0.0, grid.reach_m) / grid.cell_m,
+        angle_rad=_angle_between(rays[:, 0]),
     )
+
+
+def _angle_between(bearing_rad: Floats) -> float:
+    """The angle between successive rays; 0 of fewer than two."""
+    if len(bearing_rad) < 2:
+        return 0.0
+
+    between_rad = np.abs(np.diff(bearing_rad))
+    return float(np.median(between_rad))
 
 
 def _before_road(rays: Floats, road_m: Floats) -> Floats:
@@ -77,32 +83,37 @@ def _before_road(rays: Floats, road_m: Floats) -> Floats:
     Of two senses that contradict each other the eye for the road is the better one: where stereo
     finds an obstacle by a wrong match, the road goes on behind it.
     """
-    if len(rays) < MIN_RAYS:
+    if not len(rays):
         return rays
 
     order = np.argsort(rays[:, 0])
     bearing_rad, range_m = rays[order].T
-    borders_rad = (bearing_rad[1:] + bearing_rad[:-1]) / 2
-    road_rad = np.arctan2(road_m[:, 1], road_m[:, 0])
-    sector = np.searchsorted(borders_rad, road_rad)
-
+    sector = _sectors(bearing_rad, road_m)
     beyond_m = np.hypot(road_m[:, 0], road_m[:, 1]) - range_m[sector]
-    seen = np.bincount(sector[beyond_m > BEYOND_M], minlength=len(rays))
+
+    number_beyond = np.bincount(sector[beyond_m > BEYOND_M], minlength=len(rays))
+    saw_nothing = range_m == 0
     is_kept = np.ones(len(rays), bool)
-    is_kept[order] = (range_m == 0) | (seen < MIN_BEYOND)
+    is_kept[order] = saw_nothing | (number_beyond < MIN_BEYOND)
     return rays[is_kept]
+
+
+def _sectors(bearing_rad: Floats, points_m: Floats) -> Indices:
+    """(n,): the ray nearest in direction to each of (n, 2) points, of ascending bearings."""
+    borders_rad = (bearing_rad[1:] + bearing_rad[:-1]) / 2
+    direction_rad = np.arctan2(points_m[:, 1], points_m[:, 0])
+    return np.searchsorted(borders_rad, direction_rad)
 
 
 def clear_cells(rays: Rays, grid: LocalGrid) -> Booleans:
     """(w, h): the cells that rays pass through and in which they hit nothing."""
-    longest = np.max(rays.clear, initial=0.0)
-    along = np.arange(0.0, longest, STEP)
+    farthest = np.max(rays.clear, initial=0.0)
+    along = np.arange(0.0, farthest, STEP)
     is_clear = along < rays.clear[:, None]
 
-    passed = rays.eye + along[:, None] * rays.directions[:, None, :]
-    is_passed = grid.counts(passed[is_clear]) > 0
-    has_hit = grid.counts(rays.hits()) > 0
-    return is_passed & ~has_hit
+    steps = along[:, None] * rays.directions[:, None, :]
+    passed = rays.eye + steps[is_clear]
+    return grid.has(passed) & ~grid.has(rays.hits())
 
 
 def walls(rays: Rays, cell_m: float) -> tuple[Floats, Floats]:
@@ -111,17 +122,32 @@ def walls(rays: Rays, cell_m: float) -> tuple[Floats, Floats]:
     Each hit stands across its ray, as wide as the ray is there; hits of successive rays that are
     near each other are joined, for a wall that runs away from the agent.
     """
-    across = rotate(rays.directions, np.pi / 2)[rays.is_hit]
-    length = rays.length[rays.is_hit]
-    half = np.maximum(rays.angle_rad * length, MIN_WIDTH_M / cell_m) / 2
-
     hits = rays.hits()
-    aside = half[:, None] * across
-    number = np.flatnonzero(rays.is_hit)
-    gap = np.hypot(*np.diff(hits, axis=0).T)
+    aside = _half_widths(rays, cell_m)
+    is_joined = _are_joined(hits, rays, cell_m)
 
-    max_gap = MAX_GAP_M / cell_m + MAX_GAP_SHARE * length[1:]
-    is_joined = (np.diff(number) == 1) & (gap <= max_gap)
     starts = np.concatenate([hits - aside, hits[:-1][is_joined]])
     ends = np.concatenate([hits + aside, hits[1:][is_joined]])
     return starts, ends
+
+
+def _half_widths(rays: Rays, cell_m: float) -> Floats:
+    """(k, 2): from the middle of each hit to its left end."""
+    length = rays.length[rays.is_hit]
+    across = rotate(rays.directions[rays.is_hit], np.pi / 2)
+    width = np.maximum(rays.angle_rad * length, MIN_WIDTH_M / cell_m)
+
+    half: Floats = width[:, None] / 2 * across
+    return half
+
+
+def _are_joined(hits: Floats, rays: Rays, cell_m: float) -> Booleans:
+    """(k - 1,): whether each of (k, 2) hits is near that of the next ray."""
+    number = np.flatnonzero(rays.is_hit)
+    are_successive = np.diff(number) == 1
+
+    gap = np.hypot(*np.diff(hits, axis=0).T)
+    length = rays.length[number[1:]]
+    largest_gap = MAX_GAP_M / cell_m + MAX_GAP_SHARE * length
+    are_joined: Booleans = are_successive & (gap <= largest_gap)
+    return are_joined

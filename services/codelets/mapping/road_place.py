@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.errors import MessageError
-from cogmap.geometry.arrays import Floats
+from cogmap.geometry.arrays import Booleans, Floats, Singles
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.array import Array
@@ -40,10 +40,12 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     if agent is None or task.road_m is None:
         raise MessageError(f"task {task.task_id}: no self node, or no road points")
 
-    grid = LocalGrid.around(agent, graph.cell_m(agent.map), ROAD_REACH_M)
+    grid = LocalGrid.around(agent, graph.cell_m(agent.map), ROAD_REACH_M, config)
     operations: list[Operation] = [_activated(grid, task.cycle)]
     if not agent.is_lost and task.road_m.shape[0]:
-        operations += _road(task.road_m, task.scan, grid, graph, config)
+        window = graph.places.window(agent.map, [PlaceColumn.ROAD], grid.extent)
+        after = _road(task.road_m, task.scan, grid, window.values)
+        operations += grid.changed(window.columns, window.values, after)
 
     return Answer(operations)
 
@@ -75,31 +77,23 @@ def _activated(grid: LocalGrid, cycle: int) -> Cells:
     )
 
 
-def _road(
-    road_m: Array, scan: Array | None, grid: LocalGrid, graph: Graph, config: Config
-) -> list[Operation]:
-    """The operation that writes how much the place nodes in view are road, if that changes."""
-    near_m = _near_m(road_m)
+def _road(road: Array, scan: Array | None, grid: LocalGrid, before: Singles) -> Singles:
+    """(1, w, h): how much the cells are road after this view, `before` being how much they were."""
+    road_m = np.asarray(road.numpy(), np.float64)
+    range_m = np.hypot(road_m[:, 0], road_m[:, 1])
+    near_m = road_m[range_m < ROAD_REACH_M]
     points = grid.counts(grid.positions(near_m))
     shares = np.minimum(1.0, points / ENOUGH_POINTS)
 
-    rays = rays_of(scan, road_m, grid, ROAD_REACH_M, config.range_sd_share)
+    is_in_view = (points > 0) | _is_missed(road_m, scan, grid)
+    certainty = grid.certainty(grid.range_m())
+    return blended(before, shares, np.where(is_in_view, certainty, 0.0))
+
+
+def _is_missed(road_m: Floats, scan: Array | None, grid: LocalGrid) -> Booleans:
+    """(w, h): the cells that are in view, and where road would be seen if there were any."""
+    rays = rays_of(scan, road_m, grid)
     range_m = grid.range_m()
     nearest_m, farthest_m = NOT_ROAD_M
-    is_missed = clear_cells(rays, grid) & (range_m >= nearest_m) & (range_m <= farthest_m)
-
-    is_in_view = (points > 0) | is_missed
-    certainty = grid.certainty(range_m, config.range_sd_share)
-    window = graph.places.window(grid.map_id, [PlaceColumn.ROAD], grid.extent)
-    after = blended(window.values, shares, np.where(is_in_view, certainty, 0.0))
-    return grid.changed(window.columns, window.values, after)
-
-
-def _near_m(points_m: Array) -> Floats:
-    """(k, 2): the points within reach, of (n, 2) in the robot's frame."""
-    points = np.asarray(points_m.numpy(), np.float64)
-    seen_m = points.reshape(-1, 2)
-
-    range_m = np.hypot(seen_m[:, 0], seen_m[:, 1])
-    near_m: Floats = seen_m[range_m < ROAD_REACH_M]
-    return near_m
+    is_at_range = (range_m >= nearest_m) & (range_m <= farthest_m)
+    return clear_cells(rays, grid) & is_at_range

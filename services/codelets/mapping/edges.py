@@ -1,0 +1,84 @@
+"""Where the ground ends that can be driven on, and the links that this cuts."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cogmap.geometry.arrays import Floats, Indices
+from cogmap.graph.crossings import Crossings, crossings
+from cogmap.graph.window import LINK_OFFSETS
+from services.codelets.mapping.local_grid import LocalGrid
+from services.codelets.mapping.rays import Rays, walls
+
+JOIN_M = 1.2
+
+
+class Edges(NamedTuple):
+    """Straight segments, (k, 2) each, in cells."""
+
+    starts: Floats
+    ends: Floats
+
+    def middles(self) -> Floats:
+        """(k, 2): the middle of each."""
+        return (self.starts + self.ends) / 2
+
+
+def edges_of(boundary_m: Floats, rays: Rays, grid: LocalGrid) -> Edges:
+    """Where the road ends, by (n, 2) points in the robot's frame, and what rays hit.
+
+    Each two points within reach that are at most JOIN_M apart are joined; a point alone is taken
+    for a mistake.
+    """
+    range_m = np.hypot(boundary_m[:, 0], boundary_m[:, 1])
+    near_m = boundary_m[range_m <= grid.reach_m]
+    one, other = _pairs(near_m)
+
+    kerb = grid.positions(near_m)
+    wall_starts, wall_ends = walls(rays, grid.cell_m)
+    return Edges(
+        starts=np.concatenate([kerb[one], wall_starts]),
+        ends=np.concatenate([kerb[other], wall_ends]),
+    )
+
+
+def cut_links(edges: Edges, grid: LocalGrid) -> Floats:
+    """(4, w, h): the links that edges cross, by how sure their place is, 0 to 1."""
+    away = edges.middles() - grid.eye
+    range_m = np.hypot(away[:, 0], away[:, 1]) * grid.cell_m
+    certainty = grid.certainty(range_m)
+
+    crossed = _within(crossings(edges.starts, edges.ends), grid)
+    links = (crossed.direction, crossed.i, crossed.j)
+    cut = np.zeros((len(LINK_OFFSETS), *grid.extent.shape))
+    np.maximum.at(cut, links, certainty[crossed.segment])
+    return cut
+
+
+def _pairs(points_m: Floats) -> tuple[Indices, Indices]:
+    """The numbers of each two of (n, 2) points that are near each other, (k,) each."""
+    apart_m = points_m[:, None] - points_m
+    squared_m2 = (apart_m**2).sum(axis=2)
+    is_near = squared_m2 <= JOIN_M**2
+
+    one, other = np.nonzero(np.triu(is_near, k=1))
+    return one, other
+
+
+def _within(crossed: Crossings, grid: LocalGrid) -> Crossings:
+    """The links of a grid's cells, by the index of the cell in the grid."""
+    width, height = grid.extent.shape
+    i = crossed.i - grid.extent.lower[0]
+    j = crossed.j - grid.extent.lower[1]
+
+    is_inside_i = (i >= 0) & (i < width)
+    is_inside_j = (j >= 0) & (j < height)
+    is_inside = is_inside_i & is_inside_j
+    return Crossings(
+        crossed.direction[is_inside],
+        i[is_inside],
+        j[is_inside],
+        crossed.segment[is_inside],
+    )
