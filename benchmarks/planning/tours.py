@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -52,9 +53,11 @@ def measure_tsp(folder: Path, processes: int, progress: Progress = _ignore) -> M
     """The mean excess over the problems of MIN_CITIES to MAX_CITIES cities in a folder, and each.
 
     A problem's own is the mean over tours that begin at each of its cities. The optimum is that of
-    NAME.opt.tour, or else computed exactly. Raises UsageError where no problem is of that size.
+    NAME.opt.tour, or else computed exactly. `tsp_left_out` files are of a type that is not read.
+    Raises UsageError where no problem is of that size.
     """
-    jobs = _jobs(folder)
+    read = tsplib.folder(folder)
+    jobs = _jobs(folder, read.problems)
     found = parallel_map(_excess, jobs, processes, progress)
     metrics: Metrics = {}
     for planned in ("hierarchical", "unstraightened", "flat"):
@@ -62,6 +65,7 @@ def measure_tsp(folder: Path, processes: int, progress: Progress = _ignore) -> M
         metrics[f"{planned}_above_optimum"] = float(np.mean(excess))
 
     metrics["tsp_problems"] = float(len(found))
+    metrics["tsp_left_out"] = float(len(read.left_out))
     for job, one in zip(jobs, found, strict=True):
         name = job.problem.name
         metrics[f"{name}_optimum"] = one.optimum
@@ -79,9 +83,10 @@ def measure_human(folder: Path, processes: int, progress: Progress = _ignore) ->
     return human_metrics(planned)
 
 
-def _jobs(folder: Path) -> list[_Job]:
+def _jobs(folder: Path, problems: Sequence[Problem]) -> list[_Job]:
+    """Those of the problems that are of the size to be measured."""
     jobs = []
-    for problem in tsplib.folder(folder):
+    for problem in problems:
         if MIN_CITIES <= len(problem) <= MAX_CITIES:
             jobs.append(_Job(folder, problem))
 

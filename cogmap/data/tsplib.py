@@ -9,7 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,6 +27,7 @@ WEIGHT_TYPES = (EUC_2D, ATT, GEO)
 SUFFIXES = (".tsp", ".tsp.xz")
 TOUR_SUFFIXES = (".opt.tour", ".opt.tour.xz")
 
+_WEIGHT_TYPE = "EDGE_WEIGHT_TYPE"
 _COORDINATES = "NODE_COORD_SECTION"
 _TOUR = "TOUR_SECTION"
 _END = "EOF"
@@ -36,10 +39,13 @@ _GEO_RADIUS_KM = 6378.388
 Line = tuple[int, str]
 
 
+class UnsupportedProblemError(UsageError):
+    """A problem whose lengths are of a type that is not read."""
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """`positions` (n, 2) as in the file and `lengths` (n, n) between them, rounded to whole numbers
-    as the type of the problem prescribes.
+    """`positions` (n, 2) as in the file.
 
     `weight_type` is one of WEIGHT_TYPES. With GEO, positions are latitude and longitude, in degrees
     and minutes: DDD.MM.
@@ -48,10 +54,21 @@ class Problem:
     name: str
     weight_type: str
     positions: Floats
-    lengths: Floats
 
     def __len__(self) -> int:
         return len(self.positions)
+
+    @cached_property
+    def lengths(self) -> Floats:
+        """(n, n): between the positions, rounded to whole numbers as the type prescribes."""
+        return lengths(self.positions, self.weight_type)
+
+
+class Folder(NamedTuple):
+    """The problems of a folder, and for each file whose type is not read, why."""
+
+    problems: list[Problem]
+    left_out: list[str]
 
 
 @dataclass(frozen=True)
@@ -77,19 +94,14 @@ class _File:
 
 
 def read(path: Path) -> Problem:
-    """The problem in a file. Raises UsageError naming file and line where it is none of ours."""
-    file = _read(path, _COORDINATES)
-    weight_type = file.value("EDGE_WEIGHT_TYPE")
-    if weight_type not in WEIGHT_TYPES:
-        raise file.wrong("EDGE_WEIGHT_TYPE", f"one of {', '.join(WEIGHT_TYPES)}")
+    """The problem in a file.
 
-    positions = _positions(file)
-    return Problem(
-        name=stem(path),
-        weight_type=weight_type,
-        positions=positions,
-        lengths=lengths(positions, weight_type),
-    )
+    Raises UsageError naming file and line where something is wrong, UnsupportedProblemError where
+    its lengths are of another type.
+    """
+    file = _read(path, _COORDINATES)
+    weight_type = file.value(_WEIGHT_TYPE)
+    return Problem(stem(path), weight_type, _positions(file))
 
 
 def read_tour(path: Path) -> Indices:
@@ -121,15 +133,24 @@ def _nodes(file: _File) -> Iterator[tuple[int, str, int]]:
                 yield number, line, node
 
 
-def folder(path: Path) -> list[Problem]:
-    """The problems of every TSPLIB file in a folder, by name. Raises UsageError without one."""
+def folder(path: Path) -> Folder:
+    """The TSPLIB files in a folder, by name. Raises UsageError where none can be read."""
     if not path.is_dir():
         raise UsageError(f"there is no folder {path}: give one with TSPLIB files")
 
-    files = sorted(file for file in path.iterdir() if file.name.endswith(SUFFIXES))
-    if not files:
-        raise UsageError(f"{path} has no {' or '.join(SUFFIXES)}: give a folder of TSPLIB files")
-    return [read(file) for file in files]
+    found = Folder([], [])
+    for file in sorted(path.iterdir()):
+        if not file.name.endswith(SUFFIXES):
+            continue
+        try:
+            found.problems.append(read(file))
+        except UnsupportedProblemError as error:
+            found.left_out.append(str(error))
+
+    if not found.problems:
+        types = ", ".join(WEIGHT_TYPES)
+        raise UsageError(f"{path} has no {' or '.join(SUFFIXES)} of the types {types}: give one")
+    return found
 
 
 def optimal_tour(path: Path, problem: Problem) -> Indices | None:
@@ -209,6 +230,9 @@ def _read(path: Path, section: str) -> _File:
         key, colon, value = line.partition(":")
         if line.strip() == section:
             return _File(path, keys, list(_until_end(lines)))
+        if key.strip() == _WEIGHT_TYPE and value.strip() not in WEIGHT_TYPES:
+            expected = f"one of {', '.join(WEIGHT_TYPES)}"
+            raise UnsupportedProblemError(str(wrong_line(path, number, line, expected)))
         if colon:
             keys[key.strip()] = ((number, line), value.strip())
         elif line.strip():

@@ -148,12 +148,20 @@ def test_a_wrong_tour_is_named_by_what_was_expected(
         tsplib.read_tour(path)
 
 
-def test_a_folder_is_read_by_name_and_one_without_problems_refused(tmp_path: Path) -> None:
+def test_a_folder_is_read_by_name_and_what_is_left_out_is_named(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"has no \.tsp"):
         tsplib.folder(tmp_path)
     with pytest.raises(UsageError, match="there is no folder"):
         tsplib.folder(tmp_path / "none")
 
+    _file(tmp_path, "EDGE_WEIGHT_TYPE : EXPLICIT\nEDGE_WEIGHT_SECTION\n0 1\n", "c.tsp")
+    with pytest.raises(UsageError, match="of the types EUC_2D, ATT, GEO"):
+        tsplib.folder(tmp_path)
+
     for name in ("b", "a"):
         _file(tmp_path, SQUARE, f"{name}.tsp")
-    assert [problem.name for problem in tsplib.folder(tmp_path)] == ["a", "b"]
+    found = tsplib.folder(tmp_path)
+
+    assert [problem.name for problem in found.problems] == ["a", "b"]
+    assert len(found.left_out) == 1
+    assert "c.tsp, line 1: expected one of EUC_2D" in found.left_out[0]

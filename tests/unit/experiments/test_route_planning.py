@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cogmap.data.human_tours import HumanTours
-from cogmap.data.tsplib import EUC_2D, Problem, lengths, straight
+from cogmap.data.tsplib import EUC_2D, Problem, straight
 from cogmap.geometry.arrays import Floats
 from experiments.route_planning import activation, published
 from experiments.route_planning.measure import Planned, drawn_jobs, human_jobs, measure, planned
@@ -82,7 +82,7 @@ def test_participants_are_the_same_for_a_seed_and_differ_from_each_other() -> No
 
 def test_a_planned_problem_has_excesses_of_people_and_model() -> None:
     positions = _goals(12)
-    problem = Problem("Graph0", EUC_2D, positions, lengths(positions, EUC_2D))
+    problem = Problem("Graph0", EUC_2D, positions)
     best = shortest_tour(straight(positions))
     (job,) = human_jobs([HumanTours(problem, [best, best[::-1], np.arange(12)])], 5, seed=1)
 
