@@ -28,6 +28,8 @@ SELF_MOTION = {"speed": 0.04, "turn": 0.005, "drift_rad_per_sqrt_m": 0.0005}
 demo's loop, 180 m each: the heading drifts by 0.0005 rad after a metre and errs by 0.4 % of a turn,
 the speed by 2 % in a view of four ticks.
 """
+NEAREST_SCAN_M = 2.6
+"""The scan has no range below: what it has at that may be nearer."""
 CLOSURE_SPACING_S = 10.0
 """Between two loop closures: on streets that are driven again and again there is one at any time,
 and each makes map correction judge all of them.
@@ -67,7 +69,7 @@ def sections(seed: int) -> Sections:
     return {
         "sim": sim,
         "workspace": {"mode": "lockstep"},
-        "action": {"mode": "lockstep"},
+        "action": {"mode": "lockstep", "clearance_m": NEAREST_SCAN_M},
         "codelets": {"closure_spacing_s": CLOSURE_SPACING_S},
         "planning": {"explore": True},
     }

@@ -28,6 +28,7 @@ REPLICATED = "codelets"
 TOUR_TOWN_M = 120.0
 TOUR_LIMIT_S = 600.0
 EXPLORE_S = 150.0
+NEAREST_SCAN_M = 2.6
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,7 @@ def _chosen(base: Sections, choices: Choices, awaits: dict[str, int]) -> Section
         _set_out(sim)
     if sim.get("town", LOOP) != LOOP or choices.goals:
         sections["planning"].setdefault("explore", True)
+        sections["action"].setdefault("clearance_m", NEAREST_SCAN_M)
     if choices.laps is not None:
         sim["laps"] = choices.laps
     return sections

@@ -19,6 +19,7 @@ from schemas.nodes import NEVER_NS, PLAN_ID, Plan, PlanState, Self
 from schemas.process import Clock
 from schemas.sensing import MotorCommand, Pose, RangeScan, SelfMotion, SpeedLimit
 from services.action.config import Config
+from services.action.escape import Escape
 from services.action.gate import LockstepGate
 from services.action.motor import SensoryMotorMemory, halted, obstacle_ahead_m
 from services.action.route import Route
@@ -51,6 +52,7 @@ class ActionModule:
         self._gate = LockstepGate()
         self._selection = ActionSelection(config)
         self._stuck = StuckDetector(config.stuck_m_s, config.stuck_after_s)
+        self._escape = Escape(config)
         self._route: Route | None = None
         self._motor = SensoryMotorMemory(config)
         if config.route:
@@ -223,10 +225,13 @@ class ActionModule:
         if self._chosen is None or self._chosen.scheme == HALT:
             return halted(stamp_ns, SpeedLimit.NO_ACTION, age_ns)
 
-        if self._stuck.is_stuck:
+        if self._config.route and self._stuck.is_stuck:
             return halted(stamp_ns, SpeedLimit.STUCK, age_ns)
 
-        return self._motor.command(stamp_ns, estimate.pose, self._route, self._clear_m, age_ns)
+        command = self._motor.command(stamp_ns, estimate.pose, self._route, self._clear_m, age_ns)
+        if self._config.route:
+            return command
+        return self._escape.command(command, self._stuck.is_stuck)
 
     def _remember(self, command: MotorCommand) -> MotorCommand:
         wheels_rad_s = (command.left_wheel_rad_s + command.right_wheel_rad_s) / 2
