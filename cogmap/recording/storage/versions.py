@@ -8,7 +8,7 @@ from pathlib import Path
 from cogmap.errors import LogError
 from cogmap.version import VERSION
 
-OLDEST_READABLE = "0.2.0"
+OLDEST_READABLE = "0.3.0"
 _SOFTWARE = re.compile(r"cogmap (\d+)\.(\d+)(?:\.\d+)?\S*")
 Release = tuple[int, int]
 
