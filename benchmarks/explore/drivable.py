@@ -52,21 +52,26 @@ class Drivable(NamedTuple):
     def cell(self, x_m: float, y_m: float) -> int:
         """The number of the free cell nearest to a position."""
         cells = np.argwhere(self.is_free)
-        away_m = self.corner_m + cells * CELL_M - (x_m, y_m)
-        nearest = cells[int(np.hypot(*away_m.T).argmin())]
-        return int(np.ravel_multi_index(tuple(nearest), self.is_free.shape))
+        centres_m = self.corner_m + cells * CELL_M
+        away_m = np.hypot(*(centres_m - (x_m, y_m)).T)
+
+        i, j = cells[away_m.argmin()].tolist()
+        _, height = self.is_free.shape
+        return int(i * height + j)
 
     def is_on(self, x_m: float, y_m: float) -> bool:
         """Whether the robot's centre may be at a position."""
-        i, j = np.rint((np.array([x_m, y_m]) - self.corner_m) / CELL_M).astype(int).tolist()
+        j, i = _pixel((x_m, y_m), self.corner_m)
         width, height = self.is_free.shape
-        return 0 <= i < width and 0 <= j < height and bool(self.is_free[i, j])
+        is_inside = 0 <= i < width and 0 <= j < height
+        return is_inside and bool(self.is_free[i, j])
 
     def lengths_from(self, x_m: float, y_m: float) -> Floats:
         """(w, h): the length of the shortest route from a position, infinite where none leads."""
         start = self.cell(x_m, y_m)
-        lengths_m = dijkstra(_links(self.is_free), indices=start)
-        return np.asarray(lengths_m, np.float64).reshape(self.is_free.shape)
+        links = _links(self.is_free)
+        lengths_m = np.asarray(dijkstra(links, indices=start), np.float64)
+        return lengths_m.reshape(self.is_free.shape)
 
     def length_m(self, start_m: tuple[float, float], end_m: tuple[float, float]) -> float:
         """The length of the shortest route between two positions; infinite where none leads."""
@@ -95,10 +100,14 @@ def _draw_street(canvas: Canvas, street: Street, corner_m: Floats) -> None:
 
 def _draw_obstacle(canvas: Canvas, obstacle: Obstacle, corner_m: Floats) -> None:
     pose = obstacle.pose
-    size = (obstacle.width_m / CELL_M, obstacle.length_m / CELL_M)
+    width = obstacle.width_m / CELL_M
+    length = obstacle.length_m / CELL_M
+    turn_degrees = -float(np.degrees(pose.heading_rad))
+
     centre = _pixel((pose.x_m, pose.y_m), corner_m)
-    corners = cv2.boxPoints((centre, size, -float(np.degrees(pose.heading_rad))))
-    cv2.fillConvexPoly(canvas, np.rint(corners).astype(np.int32), 0)
+    corners = cv2.boxPoints((centre, (width, length), turn_degrees))
+    pixels = np.rint(corners).astype(np.int32)
+    cv2.fillConvexPoly(canvas, pixels, 0)
 
 
 def _draw_barrier(canvas: Canvas, street: Street, corner_m: Floats) -> None:
@@ -106,8 +115,11 @@ def _draw_barrier(canvas: Canvas, street: Street, corner_m: Floats) -> None:
     start_m = np.array(street.line_m[0])
     end_m = np.array(street.line_m[-1])
     middle_m = (start_m + end_m) / 2
-    along = (end_m - start_m) / np.linalg.norm(end_m - start_m)
-    across_m = np.array([-along[1], along[0]]) * (street.width_m / 2 + MARGIN_M / 2)
+
+    ahead_x_m, ahead_y_m = end_m - start_m
+    length_m = np.hypot(ahead_x_m, ahead_y_m)
+    left = np.array([-ahead_y_m, ahead_x_m]) / length_m
+    across_m = left * (street.width_m + MARGIN_M) / 2
 
     first = _pixel(middle_m - across_m, corner_m)
     last = _pixel(middle_m + across_m, corner_m)
@@ -117,7 +129,10 @@ def _draw_barrier(canvas: Canvas, street: Street, corner_m: Floats) -> None:
 def _pixel(point_m: Iterable[float], corner_m: Floats) -> tuple[int, int]:
     """A position as OpenCV takes it: the second index first."""
     x_m, y_m = point_m
-    i, j = np.rint((np.array([x_m, y_m]) - corner_m) / CELL_M).astype(int).tolist()
+    offset_m = np.array([x_m, y_m]) - corner_m
+    cell = np.rint(offset_m / CELL_M)
+
+    i, j = cell.astype(int).tolist()
     return j, i
 
 
@@ -142,7 +157,10 @@ def _links(is_free: Booleans) -> sparse.csr_matrix:
 def _pairs(is_free: Booleans, number: Indices, di: int, dj: int) -> tuple[Indices, Indices]:
     """The numbers of free cells, and of those a move away that are free too."""
     width, height = is_free.shape
-    here = (slice(max(0, -di), width - max(0, di)), slice(0, height - dj))
-    there = (slice(max(0, di), width - max(0, -di)), slice(dj, height))
+    west = max(0, -di)
+    east = max(0, di)
+    here = (slice(west, width - east), slice(0, height - dj))
+    there = (slice(east, width - west), slice(dj, height))
+
     both = is_free[here] & is_free[there]
     return number[here][both], number[there][both]
