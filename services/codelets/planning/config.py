@@ -83,6 +83,22 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             "new one, 1 to 100.",
         ),
     ] = 1.15
+    tour_levels: Annotated[
+        int,
+        Meta(ge=1, le=6, description="Grids on which several goals are put into an order, 1 to 6."),
+    ] = 3
+    tour_factor: Annotated[
+        int,
+        Meta(
+            ge=2,
+            le=10,
+            description="Cells of the first of these grids along a side, and of each next one "
+            "along the side of a cell, 2 to 10.",
+        ),
+    ] = 3
+    working_memory: Annotated[
+        int, Meta(ge=2, le=7, description="Goals that are ordered exactly at a time, 2 to 7.")
+    ] = 4
     off_route_m: Annotated[
         PositiveMetres,
         Meta(

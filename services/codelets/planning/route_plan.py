@@ -222,7 +222,9 @@ def _order(lengths: Floats, start: Cell, found: list[Visit], now: Situation) -> 
     """
     cells = np.array([start, *(visit.cell for visit in found)])
     positions_m = cells * now.where.network.cell_m
-    best = order_from(lengths, positions_m, TourSettings())
+    config = now.config
+    settings = TourSettings(config.tour_levels, config.tour_factor, config.working_memory)
+    best = order_from(lengths, positions_m, settings)
 
     longest_m = now.config.keep_route * _tour_m(lengths, best)
     kept = _order_before(found, now.before)
