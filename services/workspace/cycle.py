@@ -98,9 +98,12 @@ class Workspace:
 
     def on_percepts(self, percepts: Percepts) -> list[Message]:
         """Begin a cycle with the view's percepts, as soon as the one before has ended."""
-        shape = percepts.road_m.shape
-        if len(shape) != 2 or shape[1] != 2:
-            raise MessageError(f"road points of shape {shape}")
+        for name, points_m in (
+            ("road", percepts.road_m),
+            ("boundary", percepts.road_boundary_m),
+        ):
+            if len(points_m.shape) != 2 or points_m.shape[1] != 2:
+                raise MessageError(f"{name} points of shape {points_m.shape}")
 
         is_past = percepts.stamp_ns <= self._begun_ns
         if is_past and not self._is_interrupted(percepts):

@@ -230,13 +230,16 @@ def test_self_motion_of_a_wrong_shape_is_refused_and_changes_nothing(
     assert desk.feed(motion(0))
 
 
-def test_road_points_of_a_wrong_shape_are_refused() -> None:
+def test_ground_points_of_a_wrong_shape_are_refused() -> None:
     desk = Desk("w1")
-    road_m = Array.of(np.zeros((2, 3), np.float32))
-    bad = msgspec.structs.replace(percepts(0), road_m=road_m)
+    points_m = Array.of(np.zeros((2, 3), np.float32))
+    bad_road = msgspec.structs.replace(percepts(0), road_m=points_m)
+    bad_boundary = msgspec.structs.replace(percepts(0), road_boundary_m=points_m)
 
     with pytest.raises(MessageError, match="road points of shape"):
-        desk.feed(bad)
+        desk.feed(bad_road)
+    with pytest.raises(MessageError, match="boundary points of shape"):
+        desk.feed(bad_boundary)
 
 
 def test_replicas_that_apply_the_deltas_equal_the_workspace() -> None:
