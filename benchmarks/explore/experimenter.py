@@ -33,7 +33,7 @@ class Experimenter:
     """A module that follows the truth and the agent's graph, and offers one goal after another.
 
     The first `explore_s` are the agent's own. Of every two goals, one has a street on the planned
-    route closed; it is opened again for the next.
+    route closed, which stays closed.
     """
 
     def __init__(self, seed: int, explore_s: float, goals: int) -> None:
@@ -141,21 +141,16 @@ class Experimenter:
         return [StreetClosure(street=trial.closed, closed=True)]
 
     def _end(self, pose: TruePose, trial: Trial) -> list[Message]:
-        """Note whether the agent is at the goal in truth, and take both back."""
+        """Note whether the agent is at the goal in truth, and take the goal back."""
         away_m = math.dist((pose.pose.x_m, pose.pose.y_m), trial.goal_m)
         if away_m <= REACHED_WITHIN_M:
             trial.driven_m = pose.travelled_m - trial.began_travelled_m
 
-        published: list[Message] = []
         drop = DropNode(id=self._goal_id)
-        published.append(Offer(cycle=self.graph.cycle, operations=[drop]))
-        if trial.closed:
-            published.append(StreetClosure(street=trial.closed, closed=False))
-
         self.trials.append(trial)
         self._trial = None
         self._draws = 0
-        return published
+        return [Offer(cycle=self.graph.cycle, operations=[drop])]
 
     @property
     def _goal_id(self) -> str:

@@ -187,6 +187,7 @@ def _goal() -> Goal:
         x_m=12.5,
         y_m=-3.25,
         reached_ns=1_000_000_000,
+        doubts=2,
         **_USUAL,
     )
 
@@ -197,6 +198,7 @@ def _plan() -> Plan:
         map="map:1",
         state=PlanState.NO_ROUTE,
         explores=True,
+        doubtful=True,
         goals=[goal_id("bakery"), goal_id("school")],
         unreachable={goal_id("harbour"): PlanState.OUTSIDE},
         planned_ns=1_000_000_000,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 
 from schemas.array import Matrix
-from schemas.base import Finite, Name
+from schemas.base import Count, Finite, Name
 from schemas.nodes.base import NEVER_NS, GraphNode, Metres, Stamp
 from schemas.nodes.columns import RouteColumn, check_matrix
 from schemas.nodes.ids import ROOT_MAP
@@ -32,7 +32,8 @@ class PlanState(enum.StrEnum):
 class Goal(GraphNode, kw_only=True, frozen=True, tag="goal"):
     """A place to go to: the object `object`, by its label, or a position where that is empty.
 
-    `reached_ns` is the time of the view in which the agent was there, NEVER_NS before.
+    `reached_ns` is the time of the view in which the agent was there, NEVER_NS before. `doubts`
+    counts the routes to it that were tried over road that was blocked.
     """
 
     object: str = ""
@@ -40,6 +41,7 @@ class Goal(GraphNode, kw_only=True, frozen=True, tag="goal"):
     x_m: Finite = 0.0
     y_m: Finite = 0.0
     reached_ns: Stamp = NEVER_NS
+    doubts: Count = 0
 
 
 class Plan(GraphNode, kw_only=True, frozen=True, tag="plan"):
@@ -47,13 +49,14 @@ class Plan(GraphNode, kw_only=True, frozen=True, tag="plan"):
 
     `goals` are ids of goals in the order of their visits; none where the plan explores. `route`:
     float64 (n, 2) of the map `map`, see RouteColumn, from where the agent was at `planned_ns` to
-    the next goal, in place nodes `length_m` long. `unreachable` has the reason for each goal that
-    has no route.
+    the next goal, in place nodes `length_m` long. It is `doubtful` where it leads over road that
+    was blocked. `unreachable` has the reason for each goal that has no route.
     """
 
     map: Name = ROOT_MAP
     state: PlanState
     explores: bool = False
+    doubtful: bool = False
     goals: list[Name] = []
     unreachable: dict[Name, PlanState] = {}
     planned_ns: Stamp = NEVER_NS

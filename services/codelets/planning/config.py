@@ -71,6 +71,26 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         PositiveShare,
         Meta(description="Weight of links to places never seen as road, above 0 to 1."),
     ] = 0.1
+    doubt_weight: Annotated[
+        PositiveShare,
+        Meta(
+            description="Weight of links over road that is blocked, where no other route is left: "
+            "it may be free again, above 0 to 1."
+        ),
+    ] = 0.02
+    doubt_from_m: Annotated[
+        PositiveMetres,
+        Meta(
+            description="Distance from the agent up to which it sees whether blocked road is free "
+            "again, in m, above 0 to 10000."
+        ),
+    ] = 6.0
+    max_doubts: Annotated[
+        Cells,
+        Meta(
+            description="Routes over road that was blocked that are tried for a goal, 1 to 10000."
+        ),
+    ] = 3
     margin_cells: Annotated[
         Cells, Meta(description="Unknown places around the map that are planned over, 1 to 10000.")
     ] = 8

@@ -37,8 +37,9 @@ class Ground(NamedTuple):
     """The place nodes of one map within a rectangle.
 
     `is_free` (w, h): the robot fits there. `is_known` (w, h): seen as road, or driven over.
-    `is_visited` (w, h): beside the path, seen from as near as can be. `network` has links
-    between free places, lighter where unknown; `known` has those between known places only.
+    `is_visited` (w, h): beside the path, seen from as near as can be. `network` has links between
+    free places, lighter where unknown; `known` has those between known places only. `doubted` has
+    those of `network`, and the lightest where road out of sight is blocked: it may be free again.
     """
 
     is_free: Booleans
@@ -46,6 +47,7 @@ class Ground(NamedTuple):
     is_visited: Booleans
     network: PlaceNetwork
     known: PlaceNetwork
+    doubted: PlaceNetwork
 
 
 def ground(graph: Graph, agent: Self, config: Config) -> Ground:
@@ -74,6 +76,9 @@ def ground(graph: Graph, agent: Self, config: Config) -> Ground:
 
     only_known = np.where(is_known, share, 0.0)
     optimistic = np.where(is_known, share, share * config.unknown_weight)
+    is_in_sight = _is_within(config.doubt_from_m, driven_m[-1:], window, cell_m)
+    is_in_doubt = is_known & is_edge & ~is_in_sight
+    in_doubt = np.where(is_in_doubt, config.doubt_weight, optimistic)
 
     return Ground(
         is_free=is_free,
@@ -81,6 +86,7 @@ def ground(graph: Graph, agent: Self, config: Config) -> Ground:
         is_visited=_is_within(config.visited_m, _since_start_m(path_m), window, cell_m),
         network=PlaceNetwork(window.origin, cell_m, _links(weights, optimistic)),
         known=PlaceNetwork(window.origin, cell_m, _links(weights, only_known)),
+        doubted=PlaceNetwork(window.origin, cell_m, _links(_doubted(weights, is_known), in_doubt)),
     )
 
 
@@ -154,6 +160,17 @@ def _has_cut(weights: Singles) -> Booleans:
         has_cut[there] |= is_cut
 
     return has_cut
+
+
+def _doubted(weights: Singles, is_known: Booleans) -> Singles:
+    """(4, w, h): the weights, with links between known places open."""
+    doubted = weights.copy()
+    for number, offset in enumerate(LINK_OFFSETS.tolist()):
+        here, there = _ends(is_known.shape, offset)
+        of_link = doubted[number][here]
+        of_link[is_known[here] & is_known[there]] = 1.0
+
+    return doubted
 
 
 def _links(weights: Singles, share: Floats) -> Singles:

@@ -35,6 +35,7 @@ from schemas.nodes import (
 from services.codelets.planning.config import Config
 from services.codelets.planning.frontier import Standpoint, best_frontier
 from services.codelets.planning.ground import Ground, ground
+from services.codelets.planning.network import PlaceNetwork
 from services.codelets.planning.routes import (
     Route,
     Visit,
@@ -84,6 +85,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     plan = _plan(left, now)
     if not _serves(plan, now):
         answer.operations.extend(_written(plan, now.before))
+        answer.operations.extend(_doubted(plan, now.before, left))
         if plan.route is not None and _next_goal(plan) != _next_goal(now.before):
             answer.events.append(_replay(plan, Direction.FORWARD, now))
 
@@ -173,7 +175,7 @@ def _plan(targets: list[Target], now: Situation) -> Plan:
         unreachable = {target.goal.id: PlanState.BLOCKED for target in targets}
         return msgspec.structs.replace(plan, state=PlanState.BLOCKED, unreachable=unreachable)
 
-    found, unreachable = _reachable(now.where, start, targets)
+    found, unreachable = _reachable(now.where, start, targets, now.config)
     plan = msgspec.structs.replace(plan, unreachable=unreachable)
     if found:
         return _to_goals(plan, start, found, now)
@@ -187,20 +189,36 @@ def _plan(targets: list[Target], now: Situation) -> Plan:
 
 
 def _reachable(
-    where: Ground, start: Cell, targets: list[Target]
+    where: Ground, start: Cell, targets: list[Target], config: Config
 ) -> tuple[list[Visit], dict[str, PlanState]]:
-    """The targets to which routes lead from `start`, and why none leads to the others."""
+    """The targets to which routes lead from `start`, and why none leads to the others.
+
+    Where a street that was blocked is the only one that is left, it may be free again.
+    """
     at_start = where.network.index_of(start)
     unreachable = {target.goal.id: target.state for target in targets if target.cell is None}
 
-    found = []
-    for visit in visits(where.network, targets):
-        if math.isfinite(visit.field.distance_m[at_start]):
-            found.append(visit)
-        else:
-            unreachable[visit.target.goal.id] = PlanState.NO_ROUTE
+    found = [visit for visit in visits(where.network, targets) if _arrives(visit, at_start)]
+    left = _without(targets, found)
+    in_doubt = [target for target in left if target.goal.doubts < config.max_doubts]
+    found += [visit for visit in visits(where.doubted, in_doubt) if _arrives(visit, at_start)]
+
+    for target in _without(targets, found):
+        if target.cell is not None:
+            unreachable[target.goal.id] = PlanState.NO_ROUTE
 
     return found, unreachable
+
+
+def _arrives(visit: Visit, index: Cell) -> bool:
+    """Whether activation arrives from a target at the place of that index."""
+    return math.isfinite(visit.field.distance_m[index])
+
+
+def _without(targets: list[Target], found: list[Visit]) -> list[Target]:
+    """The targets that were not found."""
+    names = {visit.target.goal.id for visit in found}
+    return [target for target in targets if target.goal.id not in names]
 
 
 def _to_goals(plan: Plan, start: Cell, found: list[Visit], now: Situation) -> Plan:
@@ -209,10 +227,12 @@ def _to_goals(plan: Plan, start: Cell, found: list[Visit], now: Situation) -> Pl
     order = _order(lengths, start, found, now)
     ordered = [found[number] for number in order]
 
-    route = route_to(now.where.network, start, ordered[0])
+    route = route_to(start, ordered[0])
     assert route is not None
     goals = [visit.target.goal.id for visit in ordered]
-    return _with_route(msgspec.structs.replace(plan, goals=goals), route, now.where)
+    is_doubtful = ordered[0].network is now.where.doubted
+    plan = msgspec.structs.replace(plan, goals=goals, doubtful=is_doubtful)
+    return _with_route(plan, route, now.where)
 
 
 def _order(lengths: Floats, start: Cell, found: list[Visit], now: Situation) -> list[int]:
@@ -260,7 +280,7 @@ def _to_frontier(plan: Plan, start: Cell, now: Situation) -> Plan:
 
     nowhere = Goal(id="frontier")
     visit = visits(where.known, [Target(nowhere, frontier.cell)])[0]
-    route = route_to(where.known, start, visit)
+    route = route_to(start, visit)
     if route is None:
         return plan
     return _with_route(msgspec.structs.replace(plan, explores=True), route, where)
@@ -313,14 +333,21 @@ def _serves(plan: Plan, now: Situation) -> bool:
     if is_off or is_at_end or moved > now.config.same_frontier_cells // 2:
         return False
 
-    network = now.where.known if plan.explores else now.where.network
+    network = _network_of(plan, now.where)
     left_m = cost_m(network, cells[nearest:])
     return left_m <= now.config.keep_route * plan.length_m + network.cell_m
 
 
+def _network_of(plan: Plan, where: Ground) -> PlaceNetwork:
+    """The links that a plan's route follows."""
+    if plan.explores:
+        return where.known
+    return where.doubted if plan.doubtful else where.network
+
+
 def _aim(plan: Plan) -> tuple[object, ...]:
     """What a plan is to reach, and what it came to."""
-    return plan.map, plan.state, plan.explores, plan.goals, plan.unreachable
+    return plan.map, plan.state, plan.explores, plan.doubtful, plan.goals, plan.unreachable
 
 
 def _written(plan: Plan, before: Plan | None) -> list[Operation]:
@@ -334,6 +361,16 @@ def _written(plan: Plan, before: Plan | None) -> list[Operation]:
         operations.append(DropLink(source=PLAN_ID, target=goal_before, kind=LinkKind.TOWARDS))
 
     return operations
+
+
+def _doubted(plan: Plan, before: Plan | None, targets: list[Target]) -> list[Operation]:
+    """The next goal with one doubt more, where the plan begins to lead over blocked road."""
+    goal_before = _next_goal(before) if before is not None and before.doubtful else ""
+    if not plan.doubtful or _next_goal(plan) == goal_before:
+        return []
+
+    goals = [target.goal for target in targets if target.goal.id == _next_goal(plan)]
+    return [msgspec.structs.replace(goal, doubts=goal.doubts + 1) for goal in goals]
 
 
 def _replay(plan: Plan, direction: Direction, now: Situation) -> RouteReplay:

@@ -21,11 +21,12 @@ class Route(NamedTuple):
 
 
 class Visit(NamedTuple):
-    """A target, and the activation that spreads from it."""
+    """A target, and the activation that spreads from it over a network."""
 
     target: Target
     cell: Cell
     field: Field
+    network: PlaceNetwork
 
 
 def visits(network: PlaceNetwork, targets: list[Target]) -> list[Visit]:
@@ -39,7 +40,7 @@ def visits(network: PlaceNetwork, targets: list[Target]) -> list[Visit]:
     for target in placed:
         if target.cell is not None:
             field = spread_over(links, np.array([target.cell]))
-            found.append(Visit(target, target.cell, field))
+            found.append(Visit(target, target.cell, field, network))
 
     return found
 
@@ -60,13 +61,13 @@ def lengths_m(network: PlaceNetwork, start: Cell, found: list[Visit]) -> Floats:
     return lengths
 
 
-def route_to(network: PlaceNetwork, start: Cell, visit: Visit) -> Route | None:
+def route_to(start: Cell, visit: Visit) -> Route | None:
     """The route that follows the activation of a visit; None where none arrives."""
-    cells = climb(network, visit.field, start)
+    cells = climb(visit.network, visit.field, start)
     if cells is None:
         return None
 
-    return Route(cells, cost_m(network, cells))
+    return Route(cells, cost_m(visit.network, cells))
 
 
 def cost_m(network: PlaceNetwork, cells: Indices) -> float:

@@ -148,11 +148,34 @@ def test_a_goal_without_a_route_is_in_the_plan_with_the_reason(
 
 
 def test_a_goal_behind_closed_streets_has_no_route() -> None:
-    graph = _loop(_goal("far", 40.0, 40.0), _barrier(20, 0), _barrier(20, 40))
+    goal = msgspec.structs.replace(_goal("far", 40.0, 40.0), doubts=Config().max_doubts)
+    graph = _loop(goal, _barrier(20, 0), _barrier(20, 40))
     plan = _plan(graph)
 
     assert plan.state is PlanState.NO_ROUTE
     assert plan.unreachable == {goal_id("far"): PlanState.NO_ROUTE}
+
+
+def test_where_all_is_closed_a_street_out_of_sight_may_be_open_again() -> None:
+    graph = _loop(_goal("far", 40.0, 0.0), _barrier(20, 0), _barrier(20, 40))
+    plan = _plan(graph)
+    goal = graph.get(Goal, goal_id("far"))
+
+    assert plan.doubtful
+    assert plan.route is not None
+    assert np.abs(plan.route.numpy()[:, 1]).max() <= 3.0
+    assert goal is not None
+    assert goal.doubts == 1
+
+
+def test_a_street_that_is_seen_to_be_closed_is_not_in_doubt() -> None:
+    graph = _loop(_goal("far", 40.0, 0.0), _barrier(20, 0), _barrier(20, 40))
+    graph.change([agent(x_m=16.0)])
+    plan = _plan(graph)
+
+    assert plan.doubtful
+    assert plan.route is not None
+    assert plan.route.numpy()[:, 1].max() > 35.0
 
 
 def test_an_object_is_reached_from_the_street_beside_it() -> None:
