@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
@@ -36,12 +37,11 @@ def by_tile(cells: Indices) -> Iterator[tuple[tuple[int, int], Indices | slice]]
         return
 
     order = np.argsort(keys, kind="stable")
-    steps = np.diff(keys[order])
-    starts = np.flatnonzero(steps) + 1
+    ordered = keys[order]
+    starts = np.flatnonzero(ordered[1:] != ordered[:-1]) + 1
 
-    for chosen in np.split(order, starts):
-        first = int(keys[chosen[0]])
-        yield _tile(first), chosen
+    for first, last in pairwise([0, *starts.tolist(), len(keys)]):
+        yield _tile(int(ordered[first])), order[first:last]
 
 
 def _tile_keys(cells: Indices) -> Indices:

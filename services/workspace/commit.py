@@ -79,8 +79,7 @@ class Ledger:
         written: set[Key] = set()
         for proposal in proposals:
             try:
-                self.check(proposal)
-                columns = _tile_columns(proposal.operations)
+                columns = self.check(proposal)
                 _check_apart(proposal, columns & written)
             except MessageError as error:
                 self.reject(str(error))
@@ -96,8 +95,10 @@ class Ledger:
         if len(self._reasons) < MAX_REASONS:
             self._reasons.append(reason[:MAX_REASON_CHARACTERS])
 
-    def check(self, proposal: Proposal) -> None:
-        """Raise MessageError where `proposal` is not valid, stating why."""
+    def check(self, proposal: Proposal) -> set[Key]:
+        """The columns of tiles that `proposal` writes. Raises MessageError where it is not valid,
+        stating why.
+        """
         name = f"proposal {proposal.task_id}"
         if proposal.failure:
             raise MessageError(f"{name} failed: {proposal.failure}")
@@ -111,9 +112,15 @@ class Ledger:
         if writer is None:
             raise MessageError(f"{name}: no codelet {proposal.codelet!r} is configured here")
 
+        columns: set[Key] = set()
         for operation in proposal.operations:
             check_operation(name, operation, self.graph, writer)
-            self._check_late(name, operation, proposal.base_version)
+            keys = list(written_by(operation))
+            self._check_late(name, keys, proposal.base_version)
+            if isinstance(operation, Cells):
+                columns.update(keys)
+
+        return columns
 
     def check_offer(self, offer: Offer, writer: Writer) -> None:
         """Raise MessageError where an offer writes what may not be offered."""
@@ -121,8 +128,8 @@ class Ledger:
         for operation in offer.operations:
             check_operation(name, operation, self.graph, writer)
 
-    def _check_late(self, name: str, operation: Operation, base_version: int) -> None:
-        for key in written_by(operation):
+    def _check_late(self, name: str, keys: list[Key], base_version: int) -> None:
+        for key in keys:
             version = self._written.get(key, self._written_before)
             if version <= base_version:
                 continue
@@ -139,16 +146,6 @@ class Ledger:
 
             for key in written_by(operation):
                 written[key] = version
-
-
-def _tile_columns(operations: list[Operation]) -> set[Key]:
-    """The columns of tiles that `operations` write."""
-    columns: set[Key] = set()
-    for operation in operations:
-        if isinstance(operation, Cells):
-            columns.update(written_by(operation))
-
-    return columns
 
 
 def _check_apart(proposal: Proposal, shared: set[Key]) -> None:

@@ -170,6 +170,7 @@ def _check_extent(name: str, cells: np.ndarray[tuple[int, ...], np.dtype[np.int6
     if farthest > FARTHEST_CELL:
         raise MessageError(f"{name}: a cell {farthest} cells away, at most {FARTHEST_CELL}")
 
-    tiles = len(tiles_of(cells))
+    may_be_too_many = len(cells) > MAX_TILES
+    tiles = len(tiles_of(cells)) if may_be_too_many else 0
     if tiles > MAX_TILES:
         raise MessageError(f"{name}: cells in {tiles} tiles, at most {MAX_TILES} are taken at once")
