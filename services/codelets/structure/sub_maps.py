@@ -26,8 +26,10 @@ from services.codelets.structure.search import (
     parts,
 )
 
-PARTING_GROWTH = 1.2
+PARTING_GROWTH = 1.25
 REVIEW_GROWTH = 1.6
+MANY = 600
+MANY_REVIEW_GROWTH = REVIEW_GROWTH**2
 
 
 class SubMaps:
@@ -91,27 +93,38 @@ class SubMaps:
         moved = move_objects(self._mixture, scene, merged)
         self._relabel(members, moved)
 
-        label = int(self.labels[-1])
+        self._follow_growth(int(self.labels[-1]))
+        return int(self.labels[-1])
+
+    def _follow_growth(self, label: int) -> None:
+        """Sort anew, or part, a sub-map that has grown by its last object: the more seldom the
+        larger it is, so that this costs little for each object.
+        """
         size = int((self.labels == label).sum())
         if _has_grown(size, REVIEW_GROWTH):
-            self._review(label)
-        elif _has_grown(size, PARTING_GROWTH):
+            members = self._around(label)
+            if len(members) <= MANY or _has_grown(size, MANY_REVIEW_GROWTH):
+                self._review(members)
+                return
+
+        if _has_grown(size, PARTING_GROWTH):
             self._part(label)
-        return int(self.labels[-1])
 
     def _part(self, label: int) -> None:
         """Part a sub-map where that is more probable."""
         members = np.flatnonzero(self.labels == label)
         self._relabel(members, parts(self._mixture, self._scene(members)))
 
-    def _review(self, label: int) -> None:
-        """Sort the objects of a sub-map and of its neighbours anew, from the labels they have."""
+    def _around(self, label: int) -> Indices:
+        """(m,): the objects of a sub-map and of those that neighbour it."""
         is_own = self.labels == label
         edges = self._near.edges
         beside = edges[is_own[edges[:, 0]] | is_own[edges[:, 1]]]
-        around = np.unique(self.labels[beside])
+        labels = np.unique(self.labels[beside])
+        return np.flatnonzero(np.isin(self.labels, labels) | is_own)
 
-        members = np.flatnonzero(np.isin(self.labels, around) | is_own)
+    def _review(self, members: Indices) -> None:
+        """Sort some objects, (m,), anew, from the labels that they have."""
         found = partition(self._mixture, self._scene(members), self.labels[members])
         self._relabel(members, found)
 
@@ -152,10 +165,7 @@ class SubMaps:
 
 
 def _has_grown(size: int, growth: float) -> bool:
-    """Whether something has grown by a factor with the last of its objects, since it had one.
-
-    What is done then is done the more seldom the larger it is, and costs little for each object.
-    """
+    """Whether the last of so many objects completes another growth by a factor, since the first."""
     if size < 2:
         return False
 
