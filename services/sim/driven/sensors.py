@@ -164,4 +164,5 @@ def _landmark(plot: Plot) -> Landmark:
         y_m=plot.y_m,
         width_m=kind.width_m,
         height_m=kind.height_m,
+        function=plot.function,
     )

@@ -37,6 +37,14 @@ class Landmark(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=
     height_m: Annotated[
         PositiveMetres, msgspec.Meta(description="Its apparent height, in m, above 0 to 10000.")
     ] = 8.0
+    function: Annotated[
+        str,
+        msgspec.Meta(
+            description="What it is used for, as perception knows of one by that name; empty where "
+            "it does not, at most 200 characters.",
+            max_length=200,
+        ),
+    ] = ""
 
 
 class PerceptErrors(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -120,6 +128,7 @@ class PerceptSim:
     def __init__(self, errors: PerceptErrors, landmarks: Sequence[Landmark], seed: int) -> None:
         self._errors = errors
         self._landmarks = landmarks
+        self._functions = {each.name: each.function for each in landmarks}
         self._rng = np.random.default_rng([seed, 0x9E])
 
         places = [(each.x_m, each.y_m) for each in landmarks]
@@ -218,4 +227,5 @@ class PerceptSim:
             height_m=landmark.height_m,
             whole=whole,
             box_px=(0, 0, 0, 0),
+            function=self._functions[label],
         )

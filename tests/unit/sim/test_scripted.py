@@ -142,6 +142,20 @@ def test_a_name_is_perceived_once_a_view() -> None:
         assert len(labels) == len(set(labels))
 
 
+def test_a_function_is_that_of_the_name_that_is_perceived() -> None:
+    confusing = PerceptErrors(right_name=0.5, detected=1.0, precision=1.0)
+    bakery = Landmark(name="bakery", x_m=20.0, y_m=2.0, function="shop")
+    villa = Landmark(name="villa", x_m=20.0, y_m=-2.0, function="home")
+    sense = PerceptSim(confusing, [bakery, villa], seed=3)
+
+    seen = set()
+    for _ in range(20):
+        percepts = sense.perceive(AT_ORIGIN, [0, 1])
+        seen |= {(percept.label, percept.function) for percept in percepts}
+
+    assert seen == {("bakery", "shop"), ("villa", "home")}
+
+
 def test_a_place_is_recognized_in_the_same_direction_only() -> None:
     line = Line(np.array([(0.0, 0.0), (200.0, 0.0)]))
     there = [line.at(5.0 * k) for k in range(40)]
