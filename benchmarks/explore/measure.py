@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import partial
 
+import msgspec
 import numpy as np
 
 from benchmarks.explore.experimenter import Experimenter
@@ -17,17 +18,13 @@ from cogmap.parallel import Progress, parallel_map
 from cogmap.runtime.config import Sections
 from cogmap.runtime.in_process import InProcessRunner
 from services import registry
+from services.sim.odometry import FUSED
 
 TOWNS = 10
 FIRST_SEED = 101
 EXPLORE_S = 900.0
 GOALS = 10
 LONGEST_S = 6000.0
-SELF_MOTION = {"speed": 0.04, "turn": 0.005, "drift_rad_per_sqrt_m": 0.0005}
-"""The noise of self-motion, as measured of fused self-motion along four camera-level laps of the
-demo's loop, 180 m each: the heading drifts by 0.0005 rad after a metre and errs by 0.4 % of a turn,
-the speed by 2 % in a view of four ticks.
-"""
 NEAREST_SCAN_M = 2.6
 """The scan has no range below: what it has at that may be nearer."""
 CLOSURE_SPACING_S = 10.0
@@ -63,7 +60,7 @@ def sections(seed: int) -> Sections:
         "town": "blocks",
         "sensing": "percepts",
         "duration_s": LONGEST_S,
-        "noise": SELF_MOTION,
+        "noise": msgspec.to_builtins(FUSED),
         "awaits": dict.fromkeys(COGNITION, 1),
     }
     return {

@@ -30,7 +30,7 @@ class ErrorMetrics(msgspec.Struct, kw_only=True):
 
     @classmethod
     def of(cls, errors_m: Floats) -> ErrorMetrics:
-        """The metrics of (n,) distances; all 0 where there is none."""
+        """The metrics of (n,) distances; all 0 where there is none: nothing was measured."""
         if not errors_m.size:
             return cls(mean_m=0.0, max_m=0.0, final_m=0.0)
         return cls(
@@ -38,6 +38,11 @@ class ErrorMetrics(msgspec.Struct, kw_only=True):
             max_m=float(errors_m.max()),
             final_m=float(errors_m[-1]),
         )
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether there was anything to compare: no path is exact."""
+        return self.max_m > 0.0
 
 
 class Recording(msgspec.Struct, kw_only=True):

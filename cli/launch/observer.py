@@ -168,7 +168,7 @@ class Observer:
 
     def errors(self) -> Errors:
         """The errors at the stamp of every estimate that truth, wheels and fused self-motion all
-        cover.
+        cover; none of the wheels where these publish nothing, as at the level of percepts.
         """
         stamps_ns = self._compared_ns()
         if not stamps_ns.size:
@@ -185,13 +185,21 @@ class Observer:
     def _compared_ns(self) -> Indices:
         """The stamps of the estimates that every other track covers, (n,)."""
         stamps_ns = self._estimate.stamps_ns
-        for track in (self._true, self._wheels.track, self._fused.track):
+        tracks = [self._true, self._fused.track]
+        if len(self._wheels.track):
+            tracks.append(self._wheels.track)
+        for track in tracks:
             is_covered = track.covers(stamps_ns)
             stamps_ns = stamps_ns[is_covered]
         return stamps_ns
 
     def _distances_m(self, track: Track, stamps_ns: Indices) -> Floats:
-        """How far the positions of `track` at (n,) stamps are from the true ones, (n,)."""
+        """How far the positions of `track` at (n,) stamps are from the true ones, (n,); (0,) where
+        it has none.
+        """
+        if not len(track):
+            return np.zeros(0)
+
         true_m = self._true.at(stamps_ns)
         believed_m = self.to_world(track.at(stamps_ns))
 

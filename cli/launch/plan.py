@@ -17,6 +17,7 @@ from schemas.nodes import Goal
 from services import registry
 from services.sim.layout.town import generate
 from services.sim.layout.towns import BLOCKS, LOOP
+from services.sim.odometry import FUSED
 
 OBSERVER = "observer"
 RECORDER = "recorder"
@@ -69,7 +70,9 @@ def effective(base: Sections, choices: Choices, awaits: dict[str, int]) -> Secti
 
 def _chosen(base: Sections, choices: Choices, awaits: dict[str, int]) -> Sections:
     """Every section there may be, as in `base` where it is, with the choices in it."""
-    mode = "lockstep" if choices.lockstep else "real_time"
+    sensing = base.get("sim", {}).get("sensing", "percepts")
+    is_stepped = choices.lockstep or (choices.tour and sensing == "percepts")
+    mode = "lockstep" if is_stepped else "real_time"
     sections: Sections = {}
     for name in registry.sections():
         section = dict(base.get(name, {}))
@@ -94,8 +97,14 @@ def _chosen(base: Sections, choices: Choices, awaits: dict[str, int]) -> Section
 
 
 def _set_out(sim: dict[str, Any]) -> None:
-    """The town and the time of a tour, as far as they are not set."""
+    """The town and the time of a tour, as far as they are not set.
+
+    It is sensed at the level of percepts, so that its minutes take seconds.
+    """
     sim.setdefault("town", BLOCKS)
+    sim.setdefault("sensing", "percepts")
+    if sim["sensing"] == "percepts":
+        sim.setdefault("noise", msgspec.to_builtins(FUSED))
     sim.setdefault("town_size_m", TOUR_TOWN_M)
     sim.setdefault("duration_s", TOUR_LIMIT_S)
 

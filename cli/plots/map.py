@@ -126,9 +126,10 @@ def _title(axes: Axes, metrics: RecordedMetrics) -> None:
     learned = f"{metrics.objects} buildings and {metrics.road_m2:.0f} m² of street learned"
     errors = (
         f"position error {metrics.estimate.mean_m:.2f} m on average; "
-        f"{metrics.fused_alone.mean_m:.2f} m by fused self-motion alone, "
-        f"{metrics.wheels_alone.mean_m:.2f} m by wheels alone"
+        f"{metrics.fused_alone.mean_m:.2f} m by fused self-motion alone"
     )
+    if metrics.wheels_alone.is_measured:
+        errors = f"{errors}, {metrics.wheels_alone.mean_m:.2f} m by wheels alone"
     axes.set_title(f"{driven}\n\n", loc="left", color=INK, fontsize=14, fontweight="bold")
     axes.text(
         0,

@@ -34,11 +34,11 @@ def _drive_line(observer: Observer, errors: Errors) -> str:
     driven = f"{observer.elapsed_s:5.1f} s  {observer.travelled_m:6.1f} m"
     estimate_m = _last(errors.estimate_m)
     fused_m = _last(errors.fused_m)
-    wheels_m = _last(errors.wheels_m)
-    return (
-        f"{driven}  position error {estimate_m:.2f} m; "
-        f"path integration alone: fused {fused_m:.2f} m, wheels {wheels_m:.2f} m"
-    )
+    alone = f"path integration alone: fused {fused_m:.2f} m"
+    if errors.wheels_m.size:
+        alone = f"{alone}, wheels {_last(errors.wheels_m):.2f} m"
+
+    return f"{driven}  position error {estimate_m:.2f} m; {alone}"
 
 
 def _last(errors_m: Floats) -> float:

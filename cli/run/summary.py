@@ -93,10 +93,9 @@ def _table(title: str, rows: list[tuple[str, str]]) -> Table:
 def drive_rows(metrics: DriveMetrics) -> list[tuple[str, str]]:
     """The rows of the table that tell of the drive."""
     driven = f"{metrics.distance_m:.1f} m in {metrics.drive_s:.1f} s"
-    ratios = (
-        f"{metrics.error_over_fused:.3f} over fused self-motion, "
-        f"{metrics.error_ratio:.3f} over wheels"
-    )
+    ratios = f"{metrics.error_over_fused:.3f} over fused self-motion"
+    if metrics.wheels_alone.is_measured:
+        ratios = f"{ratios}, {metrics.error_ratio:.3f} over wheels"
     learned = (
         f"{metrics.objects} buildings, half of them within {metrics.object_error_median_m:.2f} m; "
         f"{metrics.road_m2:.0f} m² of street"
@@ -130,6 +129,8 @@ def _limits(metrics: DriveMetrics) -> str:
 
 
 def _errors(errors: ErrorMetrics) -> str:
+    if not errors.is_measured:
+        return "not measured"
     return f"{errors.mean_m:.2f} m on average, at most {errors.max_m:.2f} m"
 
 

@@ -32,6 +32,13 @@ class Noise(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
     ] = 0.015
 
 
+FUSED = Noise(speed=0.04, turn=0.005, drift_rad_per_sqrt_m=0.0005)
+"""The noise of self-motion that wheels and views give together, for a simulation without views: as
+measured along four camera-level laps of the loop, 180 m each. The heading drifts by 0.0005 rad
+after a metre and errs by 0.4 % of a turn, the speed by 2 % in a view of four ticks.
+"""
+
+
 class WheelOdometry:
     """Turns pairs of true poses into noisy speeds, the same from the same seed. Where nothing moves
     there is no noise.
