@@ -105,33 +105,37 @@ def _object(index: int, x_m: float, y_m: float, offsets_m: Floats, cycle: int) -
 
 
 def _sub_maps(objects: list[Object]) -> tuple[list[Map], Links]:
-    """Sub-maps of some hundred objects each, squares of one size, and what is within them."""
-    sides_m = SUB_MAP_SIDE_M
-    number_of: dict[tuple[int, int], int] = {}
-    weights = {}
-    maps = []
+    """Sub-maps of the objects in each of many squares, and which objects are within them."""
+    positions_m = np.array([(node.x_m, node.y_m) for node in objects])
+    squares = np.floor(positions_m / SUB_MAP_SIDE_M)
+    _, numbers = np.unique(squares, axis=0, return_inverse=True)
 
-    for node in objects:
-        square = (math.floor(node.x_m / sides_m), math.floor(node.y_m / sides_m))
-        if square not in number_of:
-            number_of[square] = len(number_of) + 1
-            maps.append(_sub_map(number_of[square], square))
-        weights[node.id] = {map_id(number_of[square]): 1.0}
+    maps = []
+    for number in range(int(numbers.max()) + 1):
+        maps.append(_sub_map(number + 1, positions_m[numbers == number]))
+
+    weights = {}
+    for node, number in zip(objects, numbers.tolist(), strict=True):
+        weights[node.id] = {map_id(number + 1): 1.0}
 
     return maps, Links(kind=LinkKind.WITHIN, weights=weights)
 
 
-def _sub_map(number: int, square: tuple[int, int]) -> Map:
-    column, row = square
+def _sub_map(number: int, members_m: Floats) -> Map:
+    low_m = members_m.min(axis=0)
+    high_m = members_m.max(axis=0)
+    x_m, y_m = ((low_m + high_m) / 2).tolist()
+    width_m, height_m = (high_m - low_m).tolist()
+
     return Map(
         id=map_id(number),
         base_level=1.0,
         cell_m=SUB_MAP_CELL_M,
         parent=ROOT_MAP,
-        x_m=(column + 0.5) * SUB_MAP_SIDE_M,
-        y_m=(row + 0.5) * SUB_MAP_SIDE_M,
-        width_m=SUB_MAP_SIDE_M,
-        height_m=SUB_MAP_SIDE_M,
+        x_m=x_m,
+        y_m=y_m,
+        width_m=width_m,
+        height_m=height_m,
     )
 
 

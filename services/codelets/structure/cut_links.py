@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
@@ -9,12 +11,71 @@ from cogmap.graph.graph import Graph
 from cogmap.graph.window import WEIGHT_COLUMNS, Extent
 from schemas.nodes import ROOT_MAP
 from services.codelets.planning.network import LINK_OFFSETS, PlaceNetwork
-from services.codelets.structure.crossings import Boundaries
 
 CUT_BELOW = 0.5
+STEPS_A_CELL = 2
 
 
-def boundaries_around(graph: Graph, positions_m: Floats) -> Boundaries:
+class _Steps(NamedTuple):
+    """Steps from one place to a neighbour along lines: the line, (s,), the places before and after,
+    (s, 2), and how far along the line that is, as a share, (s,).
+    """
+
+    line: Indices
+    before: Indices
+    after: Indices
+    share: Floats
+
+
+class CutLinks:
+    """The links of a place network that are cut, as boundaries."""
+
+    def __init__(self, network: PlaceNetwork) -> None:
+        self._network = network
+
+    def are_crossed(self, lines_m: Floats, clear_m: Floats | None = None) -> Booleans:
+        """(k,): whether some link along each of (k, 2, 2) lines is cut.
+
+        Links within `clear_m` of its ends, (k, 2), do not count: they are of what stands there.
+        Outside the network nothing is known to be cut.
+        """
+        cells = lines_m / self._network.cell_m - np.array(self._network.origin)
+        steps = _steps(cells)
+        is_cut = self._are_cut(steps.before, steps.after)
+
+        if clear_m is not None and len(steps.line):
+            length_m = _lengths(lines_m)[steps.line]
+            along_m = steps.share * length_m
+            is_cut &= along_m > clear_m[steps.line, 0]
+            is_cut &= length_m - along_m > clear_m[steps.line, 1]
+
+        is_crossed = np.zeros(len(lines_m), bool)
+        is_crossed[steps.line[is_cut]] = True
+        return is_crossed
+
+    def _are_cut(self, before: Indices, after: Indices) -> Booleans:
+        """(s,): whether the link between two neighbouring places, (s, 2) indices, is cut."""
+        offset = after - before
+        is_known = self._contains(before) & self._contains(after)
+        is_cut = np.zeros(len(before), bool)
+
+        for link, wanted in enumerate(LINK_OFFSETS):
+            weights = self._network.weights[link]
+            for owner, direction in ((before, wanted), (after, -wanted)):
+                chosen = np.flatnonzero((offset == direction).all(axis=1) & is_known)
+                i, j = owner[chosen].T
+                is_cut[chosen] = weights[i, j] < CUT_BELOW
+
+        return is_cut
+
+    def _contains(self, places: Indices) -> Booleans:
+        """(s,): which places, (s, 2) indices, are in the network."""
+        upper = np.array(self._network.shape)
+        inside = (places >= 0) & (places < upper)
+        return np.asarray(inside.all(axis=1))
+
+
+def boundaries_around(graph: Graph, positions_m: Floats) -> CutLinks:
     """The boundaries of the root map in the rectangle that holds (n, 2) positions."""
     cell_m = graph.cell_m(ROOT_MAP)
     low_i, low_j = np.floor(positions_m.min(axis=0) / cell_m).astype(int).tolist()
@@ -22,34 +83,32 @@ def boundaries_around(graph: Graph, positions_m: Floats) -> Boundaries:
     extent = Extent((low_i, low_j), (high_i + 1, high_j + 1))
 
     window = graph.places.window(ROOT_MAP, WEIGHT_COLUMNS, extent)
-    network = PlaceNetwork(window.origin, cell_m, window.weights())
-    return Boundaries(boundary_segments(network))
+    return CutLinks(PlaceNetwork(window.origin, cell_m, window.weights()))
 
 
-def boundary_segments(network: PlaceNetwork) -> Floats:
-    """(m, 2, 2): for each link of weight below CUT_BELOW to an eastern or northern neighbour in the
-    network, the side that the two cells share, in the map's frame.
+def _steps(cells: Floats) -> _Steps:
+    """The steps from place to place along (k, 2, 2) lines, in cells."""
+    parts = np.ceil(STEPS_A_CELL * _lengths(cells)).astype(np.int64) + 1
+    line = np.repeat(np.arange(len(parts)), parts + 1)
+    first = np.cumsum(parts + 1) - (parts + 1)
+    share = (np.arange(len(line)) - first[line]) / parts[line]
 
-    Whoever passes between two cells at a corner passes the corner of two such sides as well, so
-    diagonal links need none.
-    """
-    segments_m = [np.zeros((0, 2, 2))]
-    for link, offset in enumerate(LINK_OFFSETS):
-        if not offset.prod():
-            segments_m.append(_sides(network, network.weights[link] < CUT_BELOW, offset))
+    along = cells[:, 1] - cells[:, 0]
+    points = cells[line, 0] + share[:, None] * along[line]
+    places = np.rint(points).astype(np.int64)
 
-    return np.concatenate(segments_m)
+    is_step = (line[1:] == line[:-1]) & (places[1:] != places[:-1]).any(axis=1)
+    middle = (share[1:] + share[:-1]) / 2
+    return _Steps(
+        line=line[1:][is_step],
+        before=places[:-1][is_step],
+        after=places[1:][is_step],
+        share=middle[is_step],
+    )
 
 
-def _sides(network: PlaceNetwork, is_cut: Booleans, offset: Indices) -> Floats:
-    """(k, 2, 2): the sides that cells (width, height) whose link is cut share with the neighbour at
-    an offset, where that is in the network.
-    """
-    width, height = network.shape
-    inside = is_cut[: width - offset[0], : height - offset[1]]
-    cells = np.argwhere(inside) + np.array(network.origin)
-
-    middle = cells + offset / 2
-    along = np.array([offset[1], offset[0]]) / 2
-    sides: Floats = np.stack([middle - along, middle + along], axis=1) * network.cell_m
-    return sides
+def _lengths(lines: Floats) -> Floats:
+    """(k,): the lengths of (k, 2, 2) lines."""
+    along = lines[:, 1] - lines[:, 0]
+    lengths: Floats = np.hypot(along[:, 0], along[:, 1])
+    return lengths

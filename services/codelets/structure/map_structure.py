@@ -12,10 +12,11 @@ import numpy as np
 
 from cogmap.geometry.arrays import Indices
 from cogmap.graph.graph import Graph
+from cogmap.graph.window import WEIGHT_COLUMNS
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.codelets import Task
 from schemas.graph import DropNode, Links, Operation, Phase
-from schemas.nodes import ROOT_MAP, LinkKind, Map, Object, PlaceColumn, map_id, object_id
+from schemas.nodes import ROOT_MAP, LinkKind, Map, Object, map_id, object_id
 from services.codelets.nodes import nodes_of
 from services.codelets.structure.config import SECTION, Config
 from services.codelets.structure.cut_links import boundaries_around
@@ -73,7 +74,7 @@ CODELET = Codelet(
     phase=Phase.BACKGROUND,
     due=due,
     run=run,
-    reads=frozenset({Object, Map, LinkKind.WITHIN, PlaceColumn.WEIGHT_E, PlaceColumn.WEIGHT_N}),
+    reads=frozenset({Object, Map, LinkKind.WITHIN, *WEIGHT_COLUMNS}),
     writes=frozenset({Map, LinkKind.WITHIN}),
     config=Config,
     section=SECTION,

@@ -47,7 +47,7 @@ def maps_around(
     maps: Sequence[Map], new: Sequence[Object], moved: Sequence[Map], reach_m: float
 ) -> list[Map]:
     """The sub-maps that a new object may join or change, and those that have moved with their
-    neighbours: all within `reach_m`, and of each new object the nearest.
+    neighbours: all within `reach_m`.
     """
     if not maps:
         return []
@@ -55,9 +55,7 @@ def maps_around(
     low_m, high_m = _boxes(maps)
     is_near = np.zeros(len(maps), bool)
     for position_m in positions_of(new):
-        away_m = _distances_m(low_m, high_m, position_m, position_m)
-        is_near |= away_m <= reach_m
-        is_near[int(away_m.argmin())] = True
+        is_near |= _distances_m(low_m, high_m, position_m, position_m) <= reach_m
 
     if moved:
         for low, high in zip(*_boxes(moved), strict=True):

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from services.codelets.structure.crossings import Boundaries
 from services.codelets.structure.neighbours import comes_between, neighbours, neighbours_of
 
 CROSSED_SHARE = 0.01
 MIN_SPACING = 0.01
+
+
+class Separation(Protocol):
+    """What separates objects: boundaries as lines, or links that are cut."""
+
+    def are_crossed(self, lines_m: Floats, clear_m: Floats | None = None) -> Booleans:
+        """(k,): whether a boundary is across each of (k, 2, 2) lines, farther than `clear_m` from
+        its ends, (k, 2).
+        """
 
 
 class Neighbourhood:
@@ -23,7 +33,7 @@ class Neighbourhood:
     """
 
     def __init__(
-        self, positions_m: Floats, clear_m: Floats, boundaries: Boundaries, unit_m: float
+        self, positions_m: Floats, clear_m: Floats, boundaries: Separation, unit_m: float
     ) -> None:
         self.positions_m = positions_m
         self._clear_m = clear_m

@@ -8,7 +8,6 @@ import numpy as np
 
 from cogmap.geometry.arrays import Floats, Indices
 from services.codelets.structure.config import Config
-from services.codelets.structure.crossings import Boundaries
 from services.codelets.structure.labels import NEW, kept_labels
 from services.codelets.structure.mixture import (
     SPACING_SQUARES,
@@ -17,7 +16,7 @@ from services.codelets.structure.mixture import (
     Scene,
     rows_of,
 )
-from services.codelets.structure.neighbourhood import Neighbourhood
+from services.codelets.structure.neighbourhood import Neighbourhood, Separation
 from services.codelets.structure.search import (
     compact,
     merge_clusters,
@@ -44,7 +43,7 @@ class SubMaps:
         self,
         positions_m: Floats,
         functions: Indices,
-        boundaries: Boundaries,
+        boundaries: Separation,
         config: Config,
         *,
         kinds: int,

@@ -59,9 +59,14 @@ def context(graph, *labels, cycle=0):
 
 def cut_west_of(i, j_from=-30, j_to=90):
     """Place nodes whose links to the west are cut, along a line."""
-    cells = np.array([(i - 1, j) for j in range(j_from, j_to)], np.int32)
-    zeros = np.zeros(len(cells), np.float32)
-    return Cells(column=PlaceColumn.WEIGHT_E, cells=Array.of(cells), values=Array.of(zeros))
+    cut = []
+    of_links = [(PlaceColumn.WEIGHT_E, -1), (PlaceColumn.WEIGHT_NE, -1), (PlaceColumn.WEIGHT_NW, 0)]
+    for column, step in of_links:
+        cells = np.array([(i + step, j) for j in range(j_from, j_to)], np.int32)
+        zeros = np.zeros(len(cells), np.float32)
+        cut.append(Cells(column=column, cells=Array.of(cells), values=Array.of(zeros)))
+
+    return cut
 
 
 def test_objects_get_a_sub_map_with_its_frame_its_extent_and_their_links():
@@ -93,7 +98,7 @@ def test_links_of_place_nodes_that_are_cut_part_objects():
     objects = row_of("house", 72, rows=6)
     wall = cut_west_of(67)
 
-    apart = graph_of(*objects, wall)
+    apart = graph_of(*objects, *wall)
     structured(apart)
     together = graph_of(*objects)
     structured(together)

@@ -5,7 +5,7 @@ import pytest
 
 from services.codelets.planning.network import grid_network
 from services.codelets.structure.crossings import Boundaries
-from services.codelets.structure.cut_links import boundary_segments
+from services.codelets.structure.cut_links import CutLinks
 from services.codelets.structure.neighbours import comes_between, neighbours, neighbours_of
 
 
@@ -96,28 +96,32 @@ def test_without_boundaries_nothing_is_crossed():
     assert Boundaries(np.zeros((0, 2, 2))).are_crossed(lines).tolist() == [False]
 
 
-def test_links_that_are_cut_are_boundaries_between_their_cells():
-    free = np.ones((10, 6), bool)
-    network = grid_network(free, cell_m=2.0, origin=(-5, 0))
+def test_a_line_along_links_that_are_cut_is_crossed():
+    network = grid_network(np.ones((10, 6), bool), cell_m=2.0, origin=(-5, 0))
     network.weights[:, 4, :] = 0.0
+    lines = np.array([line(-4, 4, 4, 4), line(4, 4, -4, 4), line(2, 0, 2, 8)], float)
 
-    segments_m = boundary_segments(network)
-    boundaries = Boundaries(segments_m)
-    across = line(-4, 4, 4, 4)
-    beside = line(2, 0, 2, 8)
-
-    assert boundaries.are_crossed(np.array([across, beside], float)).tolist() == [True, False]
+    assert CutLinks(network).are_crossed(lines).tolist() == [True, True, False]
 
 
-def test_free_links_are_no_boundaries_and_neither_is_the_edge_of_what_is_known():
-    network = grid_network(np.ones((10, 6), bool))
+def test_free_links_separate_nothing_and_neither_does_what_is_not_known():
+    cut_links = CutLinks(grid_network(np.ones((10, 6), bool)))
+    lines = np.array([line(0, 0, 9, 5), line(-50, -50, 50, 50)], float)
 
-    assert len(boundary_segments(network)) == 0
+    assert cut_links.are_crossed(lines).tolist() == [False, False]
 
 
 def test_no_line_slips_through_a_diagonal_row_of_blocked_cells():
     free = ~np.eye(12, dtype=bool)
-    boundaries = Boundaries(boundary_segments(grid_network(free)))
     lines = np.array([line(k, k + 3, k + 3, k) for k in range(8)], float)
 
-    assert boundaries.are_crossed(lines).all()
+    assert CutLinks(grid_network(free)).are_crossed(lines).all()
+
+
+def test_a_link_that_is_cut_near_an_end_that_is_kept_clear_does_not_count():
+    network = grid_network(np.ones((12, 3), bool))
+    network.weights[0, 2, :] = 0.0
+    lines = np.array([line(0, 1, 10, 1), line(10, 1, 0, 1), line(0, 1, 10, 1)], float)
+    clear_m = np.array([[3.5, 0.0], [0.0, 3.5], [1.0, 3.5]])
+
+    assert CutLinks(network).are_crossed(lines, clear_m).tolist() == [False, False, True]
