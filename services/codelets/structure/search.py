@@ -7,13 +7,12 @@ another, which lets a step be computed for all objects in one pass.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from cogmap.geometry.arrays import Booleans, Floats, Indices
+from cogmap.geometry.arrays import Floats, Indices
 from services.codelets.structure.merging import Merging
-from services.codelets.structure.mixture import Mixture, Scene, summed
+from services.codelets.structure.mixture import Mixture, Scene
+from services.codelets.structure.moves import best_moves, gain_most
 
 MAX_SWEEPS = 50
 PIECES_A_LEVEL = 4
@@ -83,14 +82,6 @@ def _matched(clusters: Indices, scores: Floats, count: int) -> Indices:
     return np.flatnonzero(is_best & np.isfinite(scores))
 
 
-class _Moves(NamedTuple):
-    """Objects (m,), the clusters that they may move to, and what each move gains."""
-
-    objects: Indices
-    targets: Indices
-    gains: Floats
-
-
 def move_objects(mixture: Mixture, scene: Scene, labels: Indices) -> Indices:
     """Move objects to clusters of their neighbours as long as that raises the probability.
 
@@ -98,79 +89,14 @@ def move_objects(mixture: Mixture, scene: Scene, labels: Indices) -> Indices:
     """
     labels = labels.copy()
     for _ in range(MAX_SWEEPS):
-        moves = _best_moves(mixture, scene, labels)
+        moves = best_moves(mixture, scene, labels, MIN_GAIN)
         if not len(moves.objects):
             break
 
-        is_first = _gains_most(scene, moves)
-        labels[moves.objects[is_first]] = moves.targets[is_first]
+        chosen = gain_most(scene, moves)
+        labels[chosen.objects] = chosen.targets
 
     return compact(labels)
-
-
-def _best_moves(mixture: Mixture, scene: Scene, labels: Indices) -> _Moves:
-    """The best move of each object that gains by one."""
-    clusters = int(labels.max(initial=-1)) + 1
-    at_border = _objects_at_borders(scene, labels)
-    keys, bonds = _bonds_to_clusters(scene, labels, at_border, clusters)
-    objects, targets = np.divmod(keys, clusters)
-    own = labels[objects]
-    is_own = targets == own
-    own_bonds = np.zeros(len(labels))
-    own_bonds[objects[is_own]] = bonds[is_own]
-
-    objects, targets, own = (each[~is_own] for each in (objects, targets, own))
-    statistics = summed(scene.rows, labels)
-    evidence = mixture.log_evidence(statistics)
-    rows = scene.rows[objects]
-    joined = mixture.log_evidence(statistics[targets] + rows) - evidence[targets]
-    left = mixture.log_evidence(statistics[own] - rows) - evidence[own]
-    gains = joined + left + bonds[~is_own] - own_bonds[objects]
-
-    order = np.lexsort((-gains, objects))
-    is_best = np.ones(len(order), bool)
-    is_best[1:] = objects[order[1:]] != objects[order[:-1]]
-    best = order[is_best & (gains[order] > MIN_GAIN)]
-    return _Moves(objects[best], targets[best], gains[best])
-
-
-def _objects_at_borders(scene: Scene, labels: Indices) -> Booleans:
-    """(n,): whether an object has a neighbour in another cluster."""
-    is_between = labels[scene.edges[:, 0]] != labels[scene.edges[:, 1]]
-    at_border = np.zeros(len(labels), bool)
-    at_border[scene.edges[is_between].ravel()] = True
-    return at_border
-
-
-def _bonds_to_clusters(
-    scene: Scene, labels: Indices, chosen: Booleans, clusters: int
-) -> tuple[Indices, Floats]:
-    """Of the objects that are chosen, (n,): each pair of an object and a cluster of its neighbours,
-    as object * clusters + cluster, and the sum of the bonds between them.
-    """
-    both = np.concatenate([scene.edges, scene.edges[:, ::-1]])
-    bonds = np.concatenate([scene.bonds, scene.bonds])
-    is_chosen = chosen[both[:, 0]]
-
-    keys = both[is_chosen, 0] * clusters + labels[both[is_chosen, 1]]
-    found, number = np.unique(keys, return_inverse=True)
-    summed_bonds = np.bincount(number, bonds[is_chosen], len(found))
-    return found, np.asarray(summed_bonds, np.float64)
-
-
-def _gains_most(scene: Scene, moves: _Moves) -> Booleans:
-    """(m,): whether a move gains more than those of all neighbours; of equals, the first does."""
-    count = len(scene.rows)
-    order = np.lexsort((moves.objects, -moves.gains))
-    rank = np.full(count, count)
-    rank[moves.objects[order]] = np.arange(len(order))
-
-    first_neighbour = np.full(count, count)
-    ends = scene.edges
-    np.minimum.at(first_neighbour, ends[:, 0], rank[ends[:, 1]])
-    np.minimum.at(first_neighbour, ends[:, 1], rank[ends[:, 0]])
-    is_first: Booleans = rank[moves.objects] < first_neighbour[moves.objects]
-    return is_first
 
 
 def move_pieces(mixture: Mixture, scene: Scene, labels: Indices) -> Indices:
