@@ -28,6 +28,7 @@ from services.codelets.structure.search import (
 PARTING_GROWTH = 1.25
 REVIEW_GROWTH = 1.6
 MANY = 600
+MANY_TO_PART = 150
 MANY_REVIEW_GROWTH = REVIEW_GROWTH**2
 
 
@@ -106,7 +107,7 @@ class SubMaps:
                 self._review(members)
                 return
 
-        if _has_grown(size, PARTING_GROWTH):
+        if size <= MANY_TO_PART and _has_grown(size, PARTING_GROWTH):
             self._part(label)
 
     def _part(self, label: int) -> None:
