@@ -55,7 +55,7 @@ class Graph:
         self.decay = Decay()
 
         self.nodes: dict[str, AnyNode] = {}
-        self.links = LinkIndex()
+        self.links = LinkIndex(self._name_of)
         self.places = PlaceGrid()
         self._by_kind: defaultdict[type[GraphNode], dict[str, None]] = defaultdict(dict)
 
@@ -193,6 +193,11 @@ class Graph:
         """A hash of the content: two graphs are equal if and only if their digests are."""
         content = encode(self.snapshot())
         return hashlib.blake2b(content, digest_size=16).hexdigest()
+
+    def _name_of(self, identifier: str) -> str:
+        """The string by which a node is known already; that one itself where there is no node."""
+        node = self.nodes.get(identifier)
+        return identifier if node is None else node.id
 
     def _put_link(self, link: Link) -> None:
         self.links.put(link.kind, link.source, link.target, link.weight)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from schemas.graph import Links
 from schemas.nodes import EXCLUSIVE_LINKS
@@ -17,11 +17,14 @@ Sources = dict[str, tuple[str, ...]]
 class LinkIndex:
     """Weighted links by kind: from each source to its targets, and back.
 
-    Of an exclusive kind a source has one link, kept as a pair; sources are kept as tuples. That is
-    a third of the memory that dicts would take on a map of a hundred thousand objects.
+    Of an exclusive kind a source has one link, kept as a pair, which links to the same target
+    share; sources are kept as tuples. That is a third of the memory that dicts would take on a map
+    of a hundred thousand objects. `name_of` returns the string by which a node is known already, so
+    that the names of links take no memory of their own.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, name_of: Callable[[str], str] = str) -> None:
+        self._name_of = name_of
         self._targets: defaultdict[str, Targets] = defaultdict(dict)
         self._target: defaultdict[str, SingleTargets] = defaultdict(dict)
         self._sources: defaultdict[str, Sources] = defaultdict(dict)
@@ -128,15 +131,27 @@ class LinkIndex:
         self._sources.clear()
 
     def _put_exclusive(self, kind: str, source: str, target: str, weight: float) -> None:
+        source = self._name_of(source)
         before = self._target[kind].get(source)
 
+        pair = self._pair(kind, target, weight)
         if before is None:
-            self._add_source(kind, target, source)
+            self._add_source(kind, pair[0], source)
         elif before[0] != target:
             self._remove_source(kind, before[0], source)
-            self._add_source(kind, target, source)
+            self._add_source(kind, pair[0], source)
 
-        self._target[kind][source] = (target, weight)
+        self._target[kind][source] = pair
+
+    def _pair(self, kind: str, target: str, weight: float) -> tuple[str, float]:
+        """A target and a weight: those of another link where they are the same."""
+        sources = self._sources[kind].get(target, ())
+        if sources:
+            pair = self._target[kind][sources[0]]
+            if pair[1] == weight:
+                return pair
+
+        return self._name_of(target), weight
 
     def _drop_exclusive(self, kind: str, source: str, target: str) -> None:
         link = self._target[kind].get(source)
