@@ -106,12 +106,12 @@ def _object(index: int, x_m: float, y_m: float, offsets_m: Floats, cycle: int) -
 
 def _sub_maps(objects: list[Object]) -> tuple[list[Map], Links]:
     """Sub-maps of the objects in each of many squares, and which objects are within them."""
-    positions_m = np.array([(node.x_m, node.y_m) for node in objects])
+    positions_m = np.array([(node.x_m, node.y_m) for node in objects]).reshape(-1, 2)
     squares = np.floor(positions_m / SUB_MAP_SIDE_M)
-    _, numbers = np.unique(squares, axis=0, return_inverse=True)
+    occupied, numbers = np.unique(squares, axis=0, return_inverse=True)
 
     maps = []
-    for number in range(int(numbers.max()) + 1):
+    for number in range(len(occupied)):
         maps.append(_sub_map(number + 1, positions_m[numbers == number]))
 
     weights = {}

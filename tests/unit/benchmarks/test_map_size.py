@@ -46,3 +46,11 @@ def test_the_memory_of_a_replica_grows_with_its_map() -> None:
     large = replica_memory_mb(cognitive_map(Size(objects=5_000, places=50_000)))
 
     assert large > small + 5
+
+
+def test_a_map_may_have_place_nodes_and_no_objects() -> None:
+    graph = Graph()
+    graph.load(cognitive_map(Size(objects=0, places=1024)))
+
+    assert graph.count(Object) == 0
+    assert len(graph.places.tiles) >= 1
