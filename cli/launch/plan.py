@@ -88,6 +88,8 @@ def _chosen(base: Sections, choices: Choices, awaits: dict[str, int]) -> Section
         sim["town"] = choices.town
     if choices.tour:
         _set_out(sim)
+    if sim.get("sensing") == "percepts":
+        sim.setdefault("noise", msgspec.to_builtins(FUSED))
     if sim.get("town", LOOP) != LOOP or choices.goals:
         sections["planning"].setdefault("explore", True)
         sections["action"].setdefault("clearance_m", NEAREST_SCAN_M)
@@ -103,8 +105,6 @@ def _set_out(sim: dict[str, Any]) -> None:
     """
     sim.setdefault("town", BLOCKS)
     sim.setdefault("sensing", "percepts")
-    if sim["sensing"] == "percepts":
-        sim.setdefault("noise", msgspec.to_builtins(FUSED))
     sim.setdefault("town_size_m", TOUR_TOWN_M)
     sim.setdefault("duration_s", TOUR_LIMIT_S)
 

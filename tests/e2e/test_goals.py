@@ -34,7 +34,7 @@ def _goal(endpoint: str, *arguments: str) -> subprocess.CompletedProcess[str]:
 @pytest.fixture
 def goals_file(tmp_path: Path) -> Path:
     path = tmp_path / "goals.txt"
-    path.write_text("12 0\n", "utf-8")
+    path.write_text("45 0\n", "utf-8")
     return path
 
 
@@ -54,7 +54,6 @@ def test_a_run_ends_when_the_agent_was_at_every_goal(
 def test_the_agent_reaches_its_goal_though_processes_are_killed(
     killed: tuple[str, ...], start: Callable[..., Run], goals_file: Path
 ) -> None:
-    goals_file.write_text("45 0\n", "utf-8")
     repeats = ("--set", "sim.repeat_after_s=1")
     run = start(*PERCEPTS, *repeats, "--goals", str(goals_file))
     run.wait_for(DRIVING)
