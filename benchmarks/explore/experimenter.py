@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
+from benchmarks.explore.boundaries import BoundaryScore
 from benchmarks.explore.drivable import Drivable
-from benchmarks.explore.judge import BoundaryScore, boundary_score, explored_share
+from benchmarks.explore.judge import explored_share, score_boundaries
 from benchmarks.explore.trials import (
     REACHED_WITHIN_M,
     Point,
@@ -40,7 +41,7 @@ class Experimenter:
         self.graph = Graph()
         self.trials: list[Trial] = []
         self.explored_share = math.nan
-        self.boundaries = BoundaryScore(0.0, 0.0)
+        self.boundaries: BoundaryScore | None = None
         self.collisions = 0
 
         self._rng = np.random.default_rng([seed, 0xE8])
@@ -82,7 +83,7 @@ class Experimenter:
             return []
         if math.isnan(self.explored_share):
             self.explored_share = explored_share(self.graph, self._town, self._start)
-            self.boundaries = boundary_score(self.graph, self._town, self._start)
+            self.boundaries = score_boundaries(self.graph, self._town, self._start)
 
         if self._trial is None:
             return [] if self.is_complete else self._begin(pose)

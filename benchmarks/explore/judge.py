@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial import cKDTree
 
+from benchmarks.explore.boundaries import BoundaryScore, boundary_score
 from benchmarks.explore.trials import centre_lines_m
 from cogmap.geometry.arrays import Floats
-from cogmap.geometry.se2 import transform_from
+from cogmap.geometry.se2 import transform_from, transform_to
 from cogmap.graph.graph import Graph
-from cogmap.graph.window import LINK_OFFSETS, WEIGHT_COLUMNS
+from cogmap.graph.window import EVIDENCE_COLUMNS, ROAD_FROM, WEIGHT_COLUMNS
 from schemas.nodes import ROOT_MAP, PlaceColumn
 from schemas.sensing import TrueTown
 
-ROAD_FROM = 0.3
 SEEN_WITHIN_M = 1.5
-CUT_BELOW = 0.5
-SPACING_M = 0.5
 CORNERS = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)])
 
 
@@ -46,63 +41,31 @@ def explored_share(graph: Graph, town: TrueTown, start: Floats) -> float:
     return float(is_seen.mean())
 
 
-class BoundaryScore(NamedTuple):
+def score_boundaries(graph: Graph, town: TrueTown, start: Floats) -> BoundaryScore:
     """How well the links that are cut agree with the town's kerbs, walls and obstacles."""
-
-    precision: float
-    recall: float
-
-
-def boundary_score(graph: Graph, town: TrueTown, start: Floats) -> BoundaryScore:
-    """Precision: the share of cut links whose middle is within a cell of a true boundary. Recall:
-    the share of the kerbs beside road that the agent knows with a cut link within a cell.
-    """
-    cell_m = graph.cell_m()
-    cut_m = cut_links_m(graph, start)
-    kerbs_m = _points_along(town.kerbs_m.numpy())
-    edges_m = [kerbs_m, _points_along(town.walls_m.numpy()), _points_along(_outlines(town))]
-
-    beside_m, _ = cKDTree(road_m(graph, start)).query(kerbs_m)
-    known_m = kerbs_m[beside_m <= cell_m]
-    from_edge_m, _ = cKDTree(np.vstack(edges_m)).query(cut_m)
-    from_cut_m, _ = cKDTree(cut_m).query(known_m)
-    return BoundaryScore(
-        precision=float((from_edge_m <= cell_m).mean()),
-        recall=float((from_cut_m <= cell_m).mean()),
-    )
-
-
-def cut_links_m(graph: Graph, start: Floats) -> Floats:
-    """(n, 2): the middles of the links that are cut, in the true frame."""
     extent = graph.places.extent(ROOT_MAP)
-    window = graph.places.window(ROOT_MAP, WEIGHT_COLUMNS, extent)
-    middles = []
-    for weights, offset in zip(window.weights(), LINK_OFFSETS, strict=True):
-        cells = np.argwhere(weights < CUT_BELOW)
-        middles.append(cells + np.array(window.origin) + offset / 2)
-
-    return transform_from(start, np.vstack(middles) * graph.cell_m())
+    window = graph.places.window(ROOT_MAP, (*WEIGHT_COLUMNS, *EVIDENCE_COLUMNS), extent)
+    return boundary_score(window, graph.cell_m(), _boundaries_m(town, start))
 
 
-def _points_along(segments_m: npt.NDArray[np.generic]) -> Floats:
-    """(k, 2): points on (n, 4) segments, SPACING_M apart at most."""
-    ends = np.asarray(segments_m, np.float64).reshape(-1, 2, 2)
-    points = [np.zeros((0, 2))]
-    for first, last in ends:
-        count = 2 + int(np.hypot(*(last - first)) / SPACING_M)
-        share = np.linspace(0, 1, count)[:, None]
-        points.append(first + share * (last - first))
+def _boundaries_m(town: TrueTown, start: Floats) -> Floats:
+    """(n, 4): the town's kerbs, walls and sides of obstacles, in the frame of the agent's map."""
+    kerbs_m = np.asarray(town.kerbs_m.numpy(), np.float64)
+    walls_m = np.asarray(town.walls_m.numpy(), np.float64)
+    every_m = np.vstack([kerbs_m, walls_m, _outlines_m(town)])
 
-    return np.vstack(points)
+    on_map_m = transform_to(start, every_m.reshape(-1, 2))
+    return on_map_m.reshape(-1, 4)
 
 
-def _outlines(town: TrueTown) -> Floats:
+def _outlines_m(town: TrueTown) -> Floats:
     """(n, 4): the sides of the obstacles."""
     sides = [np.zeros((0, 4))]
     for obstacle in town.obstacles:
         pose = np.array([obstacle.pose.x_m, obstacle.pose.y_m, obstacle.pose.heading_rad])
         half_m = np.array([obstacle.length_m, obstacle.width_m]) / 2
         corners_m = transform_from(pose, CORNERS * half_m)
-        sides.append(np.hstack([corners_m, np.roll(corners_m, -1, axis=0)]))
+        following_m = np.roll(corners_m, -1, axis=0)
+        sides.append(np.hstack([corners_m, following_m]))
 
     return np.vstack(sides)

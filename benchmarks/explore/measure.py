@@ -8,8 +8,8 @@ from functools import partial
 import msgspec
 import numpy as np
 
+from benchmarks.explore.boundaries import BoundaryScore
 from benchmarks.explore.experimenter import Experimenter
-from benchmarks.explore.judge import BoundaryScore
 from benchmarks.explore.trials import Trial
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most
@@ -18,6 +18,7 @@ from cogmap.parallel import Progress, parallel_map
 from cogmap.runtime.config import Sections
 from cogmap.runtime.in_process import InProcessRunner
 from services import registry
+from services.action.config import NEAREST_SCAN_M
 from services.sim.odometry import FUSED
 
 TOWNS = 10
@@ -25,8 +26,6 @@ FIRST_SEED = 101
 EXPLORE_S = 900.0
 GOALS = 10
 LONGEST_S = 6000.0
-NEAREST_SCAN_M = 2.6
-"""The scan has no range below: what it has at that may be nearer."""
 CLOSURE_SPACING_S = 10.0
 """Between two loop closures: on streets that are driven again and again there is one at any time,
 and each makes map correction judge all of them.
@@ -85,6 +84,7 @@ def visit(explore_s: float, goals: int, seed: int) -> Town:
             if shell.intake.rejected:
                 raise CogmapError(f"{shell.module.name} rejected {dict(shell.intake.rejected)}")
 
+    assert experimenter.boundaries is not None
     return Town(
         explored_share=experimenter.explored_share,
         boundaries=experimenter.boundaries,

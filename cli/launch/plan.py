@@ -15,6 +15,7 @@ from cogmap.runtime import config
 from cogmap.runtime.config import Sections
 from schemas.nodes import Goal
 from services import registry
+from services.action.config import NEAREST_SCAN_M
 from services.sim.layout.town import generate
 from services.sim.layout.towns import BLOCKS, LOOP
 from services.sim.odometry import FUSED
@@ -29,7 +30,6 @@ REPLICATED = "codelets"
 TOUR_TOWN_M = 120.0
 TOUR_LIMIT_S = 600.0
 EXPLORE_S = 150.0
-NEAREST_SCAN_M = 2.6
 
 
 @dataclass(frozen=True)

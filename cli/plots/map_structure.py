@@ -13,10 +13,9 @@ from cli.launch.observer import Observer
 from cli.plots.palette import CUT, GOAL, PLAN, SEVERAL
 from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
-from cogmap.graph.window import LINK_OFFSETS, WEIGHT_COLUMNS
+from cogmap.graph.window import CUT_BELOW, LINK_OFFSETS, WEIGHT_COLUMNS
 from schemas.nodes import NEVER_NS, PLAN_ID, ROOT_MAP, Goal, LinkKind, Map, Object, Plan, object_id
 
-CUT_BELOW = 0.5
 STRAIGHT_LINKS = (0, 2)
 MIN_CORNERS = 3
 

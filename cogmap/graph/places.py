@@ -11,7 +11,7 @@ import numpy.typing as npt
 from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.graph.tiles import by_tile, overlap, positions_in
-from cogmap.graph.window import Extent, Window
+from cogmap.graph.window import LINK_OFFSETS, WEIGHT_COLUMNS, Extent, Window
 from schemas.array import Array
 from schemas.graph import TILE_SIDE, Cells, Link, PlaceTile
 from schemas.nodes import LinkKind, PlaceColumn, place_id
@@ -21,16 +21,8 @@ TileKey = tuple[str, int, int]
 MAX_WINDOW_CELLS = 2**25
 _SHAPE = (TILE_SIDE, TILE_SIDE)
 
-LINK_COLUMNS: dict[tuple[int, int], PlaceColumn] = {
-    (1, 0): PlaceColumn.WEIGHT_E,
-    (1, 1): PlaceColumn.WEIGHT_NE,
-    (0, 1): PlaceColumn.WEIGHT_N,
-    (-1, 1): PlaceColumn.WEIGHT_NW,
-}
-"""The column of the link to the neighbour at each offset. Links back are the neighbour's own."""
-
 DEFAULTS: dict[PlaceColumn, float] = dict.fromkeys(PlaceColumn, 0.0)
-DEFAULTS |= dict.fromkeys(LINK_COLUMNS.values(), 1.0)
+DEFAULTS |= dict.fromkeys(WEIGHT_COLUMNS, 1.0)
 
 
 class Place(NamedTuple):
@@ -250,7 +242,7 @@ class PlaceGrid:
     def links(self, map_id: str, i: int, j: int) -> Iterator[Link]:
         """The links from a place node to those of its eight neighbours that exist, by direction."""
         here = place_id(i, j, map_id)
-        for (di, dj), column in LINK_COLUMNS.items():
+        for (di, dj), column in zip(LINK_OFFSETS.tolist(), WEIGHT_COLUMNS, strict=True):
             forth = self.value(map_id, i, j, column)
             if forth is None:
                 continue

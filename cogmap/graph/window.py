@@ -24,6 +24,12 @@ EVIDENCE_COLUMNS = (
 LINK_OFFSETS = np.array([(1, 0), (1, 1), (0, 1), (-1, 1)])
 """The offset of the neighbour that each of a cell's own four links leads to, in their order."""
 
+CUT_BELOW = 0.5
+"""A link of a lower weight is cut."""
+
+ROAD_FROM = 0.3
+"""A place node of at least this share is road."""
+
 
 @dataclass(frozen=True, eq=False)
 class Extent:

@@ -27,6 +27,12 @@ Leg = tuple[
 ]
 
 
+NEAREST_SCAN_M = 2.6
+"""The range scan has no range below 2.5 m: what it has there may be nearer. A robot that decides
+its own route keeps this clearance.
+"""
+
+
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """Procedural memory, action selection and sensory-motor memory.
 

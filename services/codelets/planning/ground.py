@@ -15,15 +15,13 @@ from scipy import ndimage
 
 from cogmap.geometry.arrays import Booleans, Floats, Singles
 from cogmap.graph.graph import Graph
-from cogmap.graph.window import WEIGHT_COLUMNS, Extent, Window
+from cogmap.graph.window import CUT_BELOW, LINK_OFFSETS, ROAD_FROM, WEIGHT_COLUMNS, Extent, Window
 from schemas.nodes import PathColumn, PathSegment, PlaceColumn, Self
 from services.codelets.planning.config import Config
-from services.codelets.planning.network import LINK_OFFSETS, PlaceNetwork
+from services.codelets.planning.network import PlaceNetwork
 
 COLUMNS = (PlaceColumn.ROAD, PlaceColumn.OBSTACLE, *WEIGHT_COLUMNS)
-CUT_BELOW = 0.5
 OBSTACLE_FROM = 0.5
-ROAD_FROM = 0.3
 BESIDE_CUT = 0.5
 BLIND_STEP_M = 0.5
 LEFT_START_M = 3.0

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Indices, Singles
+from cogmap.graph.window import LINK_OFFSETS
 
-LINK_OFFSETS: Indices = np.array([(1, 0), (1, 1), (0, 1), (-1, 1)])
 NEIGHBOUR_OFFSETS: Indices = np.concatenate([LINK_OFFSETS, -LINK_OFFSETS])
 Cell = tuple[int, int]
 

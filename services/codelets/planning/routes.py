@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from cogmap.geometry.arrays import Floats, Indices
+from cogmap.graph.window import LINK_OFFSETS
 from services.codelets.planning.activation import Field, climb, spread_over
-from services.codelets.planning.network import LINK_OFFSETS, PlaceNetwork
+from services.codelets.planning.network import PlaceNetwork
 from services.codelets.planning.search.links import Links
 from services.codelets.planning.targets import Cell, Target
 

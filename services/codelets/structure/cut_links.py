@@ -8,11 +8,10 @@ import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.graph.graph import Graph
-from cogmap.graph.window import WEIGHT_COLUMNS, Extent
+from cogmap.graph.window import CUT_BELOW, LINK_OFFSETS, WEIGHT_COLUMNS, Extent
 from schemas.nodes import ROOT_MAP
-from services.codelets.planning.network import LINK_OFFSETS, PlaceNetwork
+from services.codelets.planning.network import PlaceNetwork
 
-CUT_BELOW = 0.5
 STEPS_A_CELL = 2
 
 

@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from benchmarks.explore.boundaries import BoundaryScore
 from benchmarks.explore.drivable import Drivable
-from benchmarks.explore.judge import boundary_score, explored_share
+from benchmarks.explore.judge import explored_share, score_boundaries
 from benchmarks.explore.measure import Town, metrics
 from benchmarks.explore.trials import Trial, closed_as, draw_goal, street_to_close
 from cogmap.graph.graph import Graph
@@ -26,7 +27,7 @@ def _town() -> TrueTown:
     """A loop of four streets, 60 m and 40 m long, 6 m wide."""
     ends = zip(NAMES, CORNERS, (*CORNERS[1:], CORNERS[0]), strict=True)
     streets = [Street(name=name, line_m=[a, b], width_m=6.0) for name, a, b in ends]
-    kerbs_m = np.array([[0.0, -3.0, 60.0, -3.0]], np.float32)
+    kerbs_m = np.array([[0.0, -3.4, 60.0, -3.4]], np.float32)
     return TrueTown(seed=1, streets=streets, buildings=[], kerbs_m=Array.of(kerbs_m))
 
 
@@ -99,26 +100,18 @@ def test_explored_is_what_the_map_has_as_road() -> None:
     assert explored_share(_graph(), _town(), ORIGIN) == 0.0
 
 
-def test_links_cut_along_the_kerb_are_right_and_those_amid_the_street_wrong() -> None:
-    south = _cells(PlaceColumn.ROAD, range(61), range(-2, 3), 1.0)
-    kerb = _cells(PlaceColumn.WEIGHT_N, range(61), range(-4, -3), 0.0)
-    amid = _cells(PlaceColumn.WEIGHT_N, range(61), range(0, 1), 0.0)
-    right = boundary_score(_graph(south, kerb), _town(), ORIGIN)
-    half = boundary_score(_graph(south, kerb, amid), _town(), ORIGIN)
+def test_the_links_of_a_map_are_judged_in_the_frame_of_its_agent() -> None:
+    kerb = _cells(PlaceColumn.WEIGHT_N, range(-29, 30), range(-4, -3), 0.0)
+    seen = _cells(PlaceColumn.EVIDENCE_N, range(-29, 30), range(-4, 3), -1.0)
+    start = np.array([30.0, 0.0, 0.0])
+    found = score_boundaries(_graph(kerb, seen), _town(), start)
 
-    assert (right.precision, right.recall) == (1.0, 1.0)
-    assert half.precision == pytest.approx(0.5)
+    assert found.precision == 1.0
+    assert found.recall > 0.9
 
 
 def test_goals_that_are_not_reached_count_and_do_not_lengthen_the_way() -> None:
-    score = boundary_score(
-        _graph(
-            _cells(PlaceColumn.ROAD, range(61), range(-2, 3), 1.0),
-            _cells(PlaceColumn.WEIGHT_N, range(61), range(-4, -3), 0.0),
-        ),
-        _town(),
-        ORIGIN,
-    )
+    score = BoundaryScore(precision=0.9, recall=0.8, cut=10, crossed=10)
     town = Town(0.9, score, [_trial(55.0), _trial(None), _trial(60.0, "south")], collisions=1)
     found = metrics([town])
 

@@ -14,8 +14,8 @@ import numpy.typing as npt
 from scipy import sparse
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices, Singles
+from cogmap.graph.window import LINK_OFFSETS
 from services.codelets.planning.network import (
-    LINK_OFFSETS,
     NEIGHBOUR_OFFSETS,
     Cell,
     PlaceNetwork,

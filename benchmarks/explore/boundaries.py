@@ -10,9 +10,7 @@ from scipy.spatial import cKDTree
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.geometry.polylines import nearest_on_pieces
 from cogmap.graph.crossings import crossings
-from cogmap.graph.window import LINK_OFFSETS, Window
-
-CUT_BELOW = 0.5
+from cogmap.graph.window import CUT_BELOW, LINK_OFFSETS, Window
 
 
 class BoundaryScore(NamedTuple):

@@ -1,11 +1,11 @@
-"""The benchmark of place nodes: how links are compared with the truth."""
+"""How the links of a map are compared with the true kerbs and walls."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from benchmarks.place_grid.boundaries import boundary_score
+from benchmarks.explore.boundaries import boundary_score
 from cogmap.graph.window import EVIDENCE_COLUMNS, WEIGHT_COLUMNS, Window
 
 SIDE = 12
