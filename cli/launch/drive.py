@@ -100,7 +100,8 @@ class Drive:
             return Ending(Outcome.MODULE_FAILED, str(error))
 
         in_lockstep = self.sections["sim"]["mode"] == "lockstep"
-        if in_lockstep and ending.outcome is Outcome.ROUTE_COMPLETE:
+        has_sim_ended = watch.tally.observer.progress >= 1.0
+        if in_lockstep and has_sim_ended:
             watch.pump_until_quiet(QUIET_S)
         return ending
 
