@@ -9,14 +9,13 @@ import msgspec
 import numpy as np
 
 from benchmarks.explore.drivable import Drivable
+from cli.launch.guide import streets_ahead
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.polylines import resample
 from schemas.sensing import TrueTown
 
 LINE_STEP_M = 1.0
 MIN_AWAY_M = 40.0
-BARRIER_AHEAD_M = 15.0
-ON_ROUTE_M = 3.0
 REACHED_WITHIN_M = 4.0
 SLOWEST_M_S = 1.0
 GRACE_S = 60.0
@@ -94,24 +93,19 @@ def draw_goal(
 def street_to_close(
     rng: np.random.Generator, town: TrueTown, route_m: Floats, goal_m: Point
 ) -> tuple[str, float] | None:
-    """A street that the (n, 2) route passes, BARRIER_AHEAD_M ahead at least, without which the goal
-    can still be reached, and the length of the shortest route then; None where there is none.
+    """A street ahead that the (n, 2) route passes, without which the goal can still be reached, and
+    the length of the shortest route then; None where there is none.
     """
-    along_m = np.concatenate([[0.0], np.hypot(*np.diff(route_m, axis=0).T).cumsum()])
     start_x_m, start_y_m = route_m[0].tolist()
-    for number in rng.permutation(len(town.streets)).tolist():
-        street = town.streets[number]
-        middle_m = (np.array(street.line_m[0]) + street.line_m[-1]) / 2
-        away_m = np.hypot(*(route_m - middle_m).T)
-        nearest = int(away_m.argmin())
-        if away_m[nearest] > ON_ROUTE_M or along_m[nearest] < BARRIER_AHEAD_M:
-            continue
-        if math.dist(middle_m, goal_m) < REACHED_WITHIN_M:
+    passed = streets_ahead(town, route_m)
+    for number in rng.permutation(len(passed)).tolist():
+        if math.dist(passed[number].middle_m, goal_m) < REACHED_WITHIN_M:
             continue
 
-        closed = Drivable.of(closed_as(town, street.name))
+        name = passed[number].street.name
+        closed = Drivable.of(closed_as(town, name))
         length_m = closed.length_m((start_x_m, start_y_m), goal_m)
         if math.isfinite(length_m):
-            return street.name, length_m
+            return name, length_m
 
     return None

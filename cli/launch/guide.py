@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -147,23 +148,38 @@ def _far_apart(graph: Graph) -> list[Goal]:
 
 
 def street_ahead(town: TrueTown, route_m: Floats) -> Street | None:
-    """The street that a (n, 2) route passes first, BARRIER_AHEAD_M ahead at least, of those whose
-    ends stay connected without it; None where there is none.
+    """The street that a (n, 2) route passes first, of those ahead whose ends stay connected without
+    it; None where there is none.
+    """
+    passed = [each for each in streets_ahead(town, route_m) if _is_avoidable(town, each.street)]
+    first = min(passed, key=lambda each: each.along_m, default=None)
+    return None if first is None else first.street
+
+
+class Passed(NamedTuple):
+    """A street whose middle, (x, y) `middle_m`, a route passes `along_m` from its start."""
+
+    street: Street
+    middle_m: tuple[float, float]
+    along_m: float
+
+
+def streets_ahead(town: TrueTown, route_m: Floats) -> list[Passed]:
+    """The streets whose middle, where a barrier stands, a (n, 2) route passes, BARRIER_AHEAD_M
+    ahead at least; in the order of the town.
     """
     steps_m = np.hypot(*np.diff(route_m, axis=0).T)
     along_m = np.concatenate([[0.0], steps_m.cumsum()])
-    first = None
-    first_m = math.inf
+    passed = []
     for street in town.streets:
         middle_m = (np.array(street.line_m[0]) + street.line_m[-1]) / 2
         away_m = np.hypot(*(route_m - middle_m).T)
         nearest = int(away_m.argmin())
-        is_on_route = away_m[nearest] <= ON_ROUTE_M and along_m[nearest] >= BARRIER_AHEAD_M
-        if is_on_route and along_m[nearest] < first_m and _is_avoidable(town, street):
-            first = street
-            first_m = float(along_m[nearest])
+        if away_m[nearest] <= ON_ROUTE_M and along_m[nearest] >= BARRIER_AHEAD_M:
+            x_m, y_m = middle_m.tolist()
+            passed.append(Passed(street, (x_m, y_m), float(along_m[nearest])))
 
-    return first
+    return passed
 
 
 def _is_avoidable(town: TrueTown, street: Street) -> bool:
