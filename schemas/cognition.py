@@ -38,7 +38,7 @@ class Replay(Message, kw_only=True, frozen=True, tag="replay"):
 
 class Direction(enum.StrEnum):
     """FORWARD: from the agent to the goal, before it leaves. REVERSE: from the goal back along the
-    path that it took, once it is there.
+    route that was planned last, once it is there.
     """
 
     FORWARD = "forward"

@@ -15,7 +15,7 @@ from scipy import ndimage
 
 from cogmap.geometry.arrays import Booleans, Floats, Singles
 from cogmap.graph.graph import Graph
-from cogmap.graph.window import CUT_BELOW, LINK_OFFSETS, ROAD_FROM, WEIGHT_COLUMNS, Extent, Window
+from cogmap.graph.window import CUT_BELOW, LINK_OFFSETS, ROAD_FROM, WEIGHT_COLUMNS, Extent
 from schemas.nodes import PathColumn, PathSegment, PlaceColumn, Self
 from services.codelets.planning.config import Config
 from services.codelets.planning.network import PlaceNetwork
@@ -59,33 +59,62 @@ def ground(graph: Graph, agent: Self, config: Config) -> Ground:
     window = graph.places.window(map_id, COLUMNS, extent)
     weights = window.weights()
 
-    cell_m = graph.cell_m(map_id)
-    is_seen = window.column(PlaceColumn.ROAD) >= ROAD_FROM
+    here = Here(window.origin, window.shape, graph.cell_m(map_id))
     path_m = _path_m(graph)
     driven_m = np.vstack([path_m, _blind_m(agent, config)])
-    is_known = is_seen | _is_within(config.driven_m, driven_m, window, cell_m)
+    is_seen = window.column(PlaceColumn.ROAD) >= ROAD_FROM
+    is_known = is_seen | here.is_within(config.driven_m, driven_m)
+
     is_obstacle = window.column(PlaceColumn.OBSTACLE) >= OBSTACLE_FROM
     is_edge = _has_cut(weights) | is_obstacle
-    is_free = ~is_edge
-
-    share = np.where(is_free, 1.0, 0.0)
-    is_beside = ndimage.binary_dilation(is_edge, SQUARE) & is_free
-    share[is_beside] = BESIDE_CUT
-
-    only_known = np.where(is_known, share, 0.0)
+    share = _shares(is_edge)
     optimistic = np.where(is_known, share, share * config.unknown_weight)
-    is_in_sight = _is_within(config.doubt_from_m, driven_m[-1:], window, cell_m)
-    is_in_doubt = is_known & is_edge & ~is_in_sight
+
+    agent_m = np.array([[agent.x_m, agent.y_m]])
+    is_in_doubt = is_known & is_edge & ~here.is_within(config.doubt_from_m, agent_m)
     in_doubt = np.where(is_in_doubt, config.doubt_weight, optimistic)
+    reopened = _reopened(weights, is_known)
 
     return Ground(
-        is_free=is_free,
-        is_known=is_known & is_free,
-        is_visited=_is_within(config.visited_m, _since_start_m(path_m), window, cell_m),
-        network=PlaceNetwork(window.origin, cell_m, _links(weights, optimistic)),
-        known=PlaceNetwork(window.origin, cell_m, _links(weights, only_known)),
-        doubted=PlaceNetwork(window.origin, cell_m, _links(_doubted(weights, is_known), in_doubt)),
+        is_free=~is_edge,
+        is_known=is_known & ~is_edge,
+        is_visited=here.is_within(config.visited_m, _since_start_m(path_m)),
+        network=here.network(_links(weights, optimistic)),
+        known=here.network(_links(weights, np.where(is_known, share, 0.0))),
+        doubted=here.network(_links(reopened, in_doubt)),
     )
+
+
+def _shares(is_edge: Booleans) -> Floats:
+    """(w, h): how well each place can be driven over: not at an edge, less beside one."""
+    is_beside = ndimage.binary_dilation(is_edge, SQUARE)
+    share = np.where(is_beside, BESIDE_CUT, 1.0)
+    share[is_edge] = 0.0
+    return share
+
+
+class Here(NamedTuple):
+    """The rectangle of place nodes that is planned on."""
+
+    origin: tuple[int, int]
+    shape: tuple[int, int]
+    cell_m: float
+
+    def network(self, weights: Singles) -> PlaceNetwork:
+        """Its place network, with links of (4, w, h) weights."""
+        return PlaceNetwork(self.origin, self.cell_m, weights)
+
+    def is_within(self, within_m: float, positions_m: Floats) -> Booleans:
+        """(w, h): the cells within a distance of any of (n, 2) positions."""
+        cells = np.rint(positions_m / self.cell_m).astype(np.int64) - np.array(self.origin)
+        is_inside = ((cells >= 0) & (cells < self.shape)).all(axis=1)
+        if not is_inside.any():
+            return np.zeros(self.shape, bool)
+
+        is_away = np.ones(self.shape, bool)
+        is_away[tuple(cells[is_inside].T)] = False
+        distance_m = ndimage.distance_transform_edt(is_away) * self.cell_m
+        return np.asarray(distance_m <= within_m)
 
 
 def _blind_m(agent: Self, config: Config) -> Floats:
@@ -115,19 +144,6 @@ def _since_start_m(path_m: Floats) -> Floats:
     has_left = from_start_m > LEFT_START_M
     since_m: Floats = path_m[has_left.cumsum() > 0]
     return since_m
-
-
-def _is_within(within_m: float, positions_m: Floats, window: Window, cell_m: float) -> Booleans:
-    """(w, h): the cells within a distance of any of (n, 2) positions."""
-    cells = np.rint(positions_m / cell_m).astype(np.int64) - np.array(window.origin)
-    is_inside = ((cells >= 0) & (cells < window.shape)).all(axis=1)
-    if not is_inside.any():
-        return np.zeros(window.shape, bool)
-
-    is_away = np.ones(window.shape, bool)
-    is_away[tuple(cells[is_inside].T)] = False
-    is_within: Booleans = ndimage.distance_transform_edt(is_away) * cell_m <= within_m
-    return is_within
 
 
 def _with_margin(extent: Extent, cells: int) -> Extent:
@@ -160,15 +176,15 @@ def _has_cut(weights: Singles) -> Booleans:
     return has_cut
 
 
-def _doubted(weights: Singles, is_known: Booleans) -> Singles:
+def _reopened(weights: Singles, is_known: Booleans) -> Singles:
     """(4, w, h): the weights, with links between known places open."""
-    doubted = weights.copy()
+    reopened = weights.copy()
     for number, offset in enumerate(LINK_OFFSETS.tolist()):
         here, there = _ends(is_known.shape, offset)
-        of_link = doubted[number][here]
+        of_link = reopened[number][here]
         of_link[is_known[here] & is_known[there]] = 1.0
 
-    return doubted
+    return reopened
 
 
 def _links(weights: Singles, share: Floats) -> Singles:

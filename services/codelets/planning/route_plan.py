@@ -27,14 +27,13 @@ from schemas.nodes import (
     Map,
     Object,
     PathSegment,
-    PlaceColumn,
     Plan,
     PlanState,
     Self,
 )
 from services.codelets.planning.config import Config
 from services.codelets.planning.frontier import Standpoint, best_frontier
-from services.codelets.planning.ground import Ground, ground
+from services.codelets.planning.ground import COLUMNS, Ground, ground
 from services.codelets.planning.network import PlaceNetwork
 from services.codelets.planning.routes import (
     Route,
@@ -53,8 +52,7 @@ SECTION = "planning"
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     """One task every `replan_cycles`, and at once where a goal is new or the route at its end."""
-    has_aim = config.explore or graph.count(Goal) > 0
-    if graph.agent is None or not has_aim:
+    if graph.agent is None or _is_done(graph, config):
         return []
 
     is_time = context.cycle % config.replan_cycles == 0
@@ -79,7 +77,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     for target in reached:
         goal = msgspec.structs.replace(target.goal, reached_ns=task.stamp_ns)
         answer.operations.append(goal)
-        if now.before is not None and now.before.route is not None:
+        if now.before is not None and goal.id == _next_goal(now.before):
             answer.events.append(_replay(now.before, Direction.REVERSE, now))
 
     plan = _plan(left, now)
@@ -113,9 +111,7 @@ CODELET = Codelet(
     phase=Phase.BACKGROUND,
     due=due,
     run=run,
-    reads=frozenset(
-        {Self, Goal, Plan, Object, Map, PathSegment, PlaceColumn.ROAD, PlaceColumn.OBSTACLE}
-    ),
+    reads=frozenset({Self, Goal, Plan, Object, Map, PathSegment, *COLUMNS}),
     writes=frozenset({Plan, Goal, LinkKind.TOWARDS}),
     config=Config,
     section=SECTION,
@@ -125,6 +121,13 @@ CODELET = Codelet(
 def open_goals(graph: Graph) -> list[Goal]:
     """The goals that were not reached yet, by id."""
     return [goal for goal in graph.of_kind(Goal) if goal.reached_ns == NEVER_NS]
+
+
+def _is_done(graph: Graph, config: Config) -> bool:
+    """Whether there is nothing to plan for, and no plan that states otherwise."""
+    plan = graph.get(Plan, PLAN_ID)
+    has_ended = plan is None or plan.state is PlanState.NO_GOAL
+    return has_ended and not config.explore and not open_goals(graph)
 
 
 def _is_urgent(graph: Graph, agent: Self, config: Config) -> bool:

@@ -32,16 +32,15 @@ class Visit(NamedTuple):
 
 def visits(network: PlaceNetwork, targets: list[Target]) -> list[Visit]:
     """The targets that have a place, with their activation."""
-    placed = [target for target in targets if target.cell is not None]
+    placed = [(target, target.cell) for target in targets if target.cell is not None]
     if not placed:
         return []
 
     links = Links(network)
     found = []
-    for target in placed:
-        if target.cell is not None:
-            field = spread_over(links, np.array([target.cell]))
-            found.append(Visit(target, target.cell, field, network))
+    for target, cell in placed:
+        field = spread_over(links, np.array([cell]))
+        found.append(Visit(target, cell, field, network))
 
     return found
 

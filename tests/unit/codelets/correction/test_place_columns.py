@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from benchmarks.place_grid.boundaries import boundary_score
+from benchmarks.explore.boundaries import boundary_score
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import rotate
 from cogmap.graph.crossings import crossings

@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from benchmarks.place_grid.boundaries import boundary_score
+from benchmarks.explore.boundaries import boundary_score
 from cogmap.bus.codec import encode
 from cogmap.geometry.se2 import rotate
 from cogmap.graph.graph import Graph
