@@ -8,11 +8,11 @@ import enum
 class LinkKind(enum.StrEnum):
     """The kinds of links that the architecture itself uses; a codelet may use others.
 
-    AT: from the self or an object to the place node nearest to it. INSTANCE: from a percept to the
-    object that it is a sighting of. OBSERVES and ALONG: from observations to the object observed,
-    and to the path segment that they were made along. NEXT: between neighbouring place nodes; these
-    are kept in the tiles' columns. TOWARDS: from a plan to its next goal. WITHIN: from an object to
-    the sub-map that holds it.
+    AT: from the self, an object or a goal to the place node nearest to it. INSTANCE: from a percept
+    to the object that it is a sighting of. OBSERVES and ALONG: from observations to the object
+    observed, and to the path segment that they were made along. NEXT: between neighbouring place
+    nodes; these are kept in the tiles' columns. TOWARDS: from a plan to its next goal. WITHIN: from
+    an object to the sub-map that holds it.
     """
 
     AT = "at"

@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 
 from cogmap.errors import MessageError
-from cogmap.geometry.arrays import Floats, Indices
+from cogmap.geometry.arrays import Indices
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.array import Array, Matrix
@@ -30,9 +30,11 @@ from schemas.nodes import (
     Plan,
     PlanState,
     Self,
+    place_id,
 )
 from services.codelets.planning.config import Config
 from services.codelets.planning.frontier import Standpoint, best_frontier
+from services.codelets.planning.goal_order import goal_order, order_before
 from services.codelets.planning.ground import COLUMNS, Ground, ground
 from services.codelets.planning.network import PlaceNetwork
 from services.codelets.planning.routes import (
@@ -44,7 +46,6 @@ from services.codelets.planning.routes import (
     visits,
 )
 from services.codelets.planning.targets import Cell, Target, nearest_free, target_of
-from services.codelets.planning.tours import TourSettings, order_from
 
 START_M = 6.0
 SECTION = "planning"
@@ -74,6 +75,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     left = [target for target in targets if target not in reached]
 
     answer = Answer()
+    answer.operations.extend(_links_to_places(left, agent.map, graph))
     for target in reached:
         goal = msgspec.structs.replace(target.goal, reached_ns=task.stamp_ns)
         answer.operations.append(goal)
@@ -81,6 +83,9 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
             answer.events.append(_replay(now.before, Direction.REVERSE, now))
 
     plan = _plan(left, now)
+    if reached and plan.state is PlanState.NO_GOAL:
+        plan = msgspec.structs.replace(plan, state=PlanState.AT_GOAL)
+
     if not _serves(plan, now):
         answer.operations.extend(_written(plan, now.before))
         answer.operations.extend(_doubted(plan, now.before, left))
@@ -112,7 +117,7 @@ CODELET = Codelet(
     due=due,
     run=run,
     reads=frozenset({Self, Goal, Plan, Object, Map, PathSegment, *COLUMNS}),
-    writes=frozenset({Plan, Goal, LinkKind.TOWARDS}),
+    writes=frozenset({Plan, Goal, LinkKind.TOWARDS, LinkKind.AT}),
     config=Config,
     section=SECTION,
 )
@@ -126,7 +131,7 @@ def open_goals(graph: Graph) -> list[Goal]:
 def _is_done(graph: Graph, config: Config) -> bool:
     """Whether there is nothing to plan for, and no plan that states otherwise."""
     plan = graph.get(Plan, PLAN_ID)
-    has_ended = plan is None or plan.state is PlanState.NO_GOAL
+    has_ended = plan is None or plan.state in {PlanState.NO_GOAL, PlanState.AT_GOAL}
     return has_ended and not config.explore and not open_goals(graph)
 
 
@@ -162,6 +167,21 @@ def _next_goal(plan: Plan | None) -> str:
     if plan is None or not plan.goals:
         return ""
     return plan.goals[0]
+
+
+def _links_to_places(targets: list[Target], map_id: str, graph: Graph) -> list[Operation]:
+    """The links of goals to the place nodes from which they are reached, where these are new."""
+    links: list[Operation] = []
+    for target in targets:
+        if target.cell is None:
+            continue
+
+        goal = target.goal.id
+        place = place_id(*target.cell, map_id)
+        if graph.links.target(goal, LinkKind.AT) != place:
+            links.append(Link(source=goal, target=place, kind=LinkKind.AT))
+
+    return links
 
 
 def _plan(targets: list[Target], now: Situation) -> Plan:
@@ -227,7 +247,12 @@ def _without(targets: list[Target], found: list[Visit]) -> list[Target]:
 def _to_goals(plan: Plan, start: Cell, found: list[Visit], now: Situation) -> Plan:
     """The plan with the order of the goals found, and the route to the first."""
     lengths = lengths_m(now.where.network, start, found)
-    order = _order(lengths, start, found, now)
+    cells = np.array([start, *(visit.cell for visit in found)])
+    positions_m = cells * now.where.network.cell_m
+    names = [visit.target.goal.id for visit in found]
+    planned = [] if now.before is None else now.before.goals
+
+    order = goal_order(lengths, positions_m, order_before(names, planned), now.config)
     ordered = [found[number] for number in order]
 
     route = route_to(start, ordered[0])
@@ -236,41 +261,6 @@ def _to_goals(plan: Plan, start: Cell, found: list[Visit], now: Situation) -> Pl
     is_doubtful = ordered[0].network is now.where.doubted
     plan = msgspec.structs.replace(plan, goals=goals, doubtful=is_doubtful)
     return _with_route(plan, route, now.where)
-
-
-def _order(lengths: Floats, start: Cell, found: list[Visit], now: Situation) -> list[int]:
-    """The order of n goals by (n + 1, n + 1) lengths, the first being the agent's.
-
-    That of the plan before is kept while it is nearly as short, so that the agent does not waver.
-    """
-    cells = np.array([start, *(visit.cell for visit in found)])
-    positions_m = cells * now.where.network.cell_m
-    config = now.config
-    settings = TourSettings(config.tour_levels, config.tour_factor, config.working_memory)
-    best = order_from(lengths, positions_m, settings)
-
-    longest_m = now.config.keep_route * _tour_m(lengths, best)
-    kept = _order_before(found, now.before)
-    if kept is not None and _tour_m(lengths, kept) <= longest_m:
-        best = kept
-
-    return [number - 1 for number in best.tolist()[1:]]
-
-
-def _order_before(found: list[Visit], before: Plan | None) -> Indices | None:
-    """The order of the plan before, of the goals that are left; None where it lacks one of them."""
-    names = [visit.target.goal.id for visit in found]
-    planned = [] if before is None else before.goals
-    if not set(names) <= set(planned):
-        return None
-
-    order = [names.index(name) + 1 for name in planned if name in names]
-    return np.array([0, *order])
-
-
-def _tour_m(lengths: Floats, order: Indices) -> float:
-    """The length of an open tour."""
-    return float(lengths[order[:-1], order[1:]].sum())
 
 
 def _to_frontier(plan: Plan, start: Cell, now: Situation) -> Plan:

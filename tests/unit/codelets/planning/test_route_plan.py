@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cogmap.graph.graph import Graph
-from cogmap.runtime.codelet import Answer
+from cogmap.runtime.codelet import Answer, CycleContext
 from schemas.array import Array
 from schemas.codelets import Task
 from schemas.cognition import Direction, RouteReplay
@@ -19,6 +19,7 @@ from schemas.nodes import (
     PLAN_ID,
     ROOT_MAP,
     Goal,
+    LinkKind,
     Map,
     Object,
     PlaceColumn,
@@ -26,10 +27,11 @@ from schemas.nodes import (
     PlanState,
     goal_id,
     object_id,
+    place_id,
 )
 from services.codelets.planning.config import Config
-from services.codelets.planning.route_plan import run
-from tests.support.world.scenes import agent
+from services.codelets.planning.route_plan import due, run
+from tests.support.world.scenes import agent, percepts
 
 STAMP_NS = 7_000_000_000
 SOUTH = (0, 60, -3, 3)
@@ -99,6 +101,21 @@ def _plan(graph: Graph, config: Config | None = None) -> Plan:
     plan = graph.get(Plan, PLAN_ID)
     assert plan is not None
     return plan
+
+
+def _routes(answer: Answer) -> list[RouteReplay]:
+    """The routes that an answer replays."""
+    return [event for event in answer.events if isinstance(event, RouteReplay)]
+
+
+def test_a_goal_is_linked_to_the_place_from_which_it_is_reached() -> None:
+    bakery = Object(id=object_id("bakery"), label="bakery", x_m=30.0, y_m=-12.0)
+    graph = _loop(bakery, Goal(id=goal_id("bakery"), object="bakery"))
+    plan = _plan(graph)
+
+    assert plan.route is not None
+    i, j = np.rint(plan.route.numpy()[-1]).astype(int).tolist()
+    assert graph.links.target(goal_id("bakery"), LinkKind.AT) == place_id(i, j)
 
 
 def test_a_route_leads_along_the_streets_to_the_goal() -> None:
@@ -200,6 +217,30 @@ def test_a_goal_where_the_agent_is_counts_as_reached_and_is_replayed_backwards()
     assert replay.direction is Direction.REVERSE
     assert plan.route is not None
     assert replay.cells.numpy()[-1] == pytest.approx(plan.route.numpy()[0])
+
+
+def test_a_goal_where_the_agent_starts_leaves_a_plan_that_states_so() -> None:
+    plan = _plan(_loop(_goal("here", 3.0, 0.0)))
+
+    assert plan.state is PlanState.AT_GOAL
+    assert plan.route is None
+
+
+def test_a_goal_that_was_not_the_next_one_is_not_replayed() -> None:
+    graph = _loop(_goal("b", 30.0, 0.0))
+    _answer(graph)
+    graph.change([_goal("a", 10.0, 0.0), agent(x_m=10.0)])
+
+    assert all(event.goal != goal_id("b") for event in _routes(_answer(graph)))
+
+
+def test_where_all_goals_are_reached_nothing_is_planned() -> None:
+    graph = _loop(_goal("here", 3.0, 0.0))
+    context = CycleContext(cycle=5, percepts=percepts(4), motions=Array.of(np.zeros((0, 5))))
+    assert due(context, graph, Config())
+
+    _answer(graph)
+    assert due(context, graph, Config()) == []
 
 
 def test_a_new_goal_is_replayed_forward_once() -> None:
