@@ -35,11 +35,12 @@ $(MEASURES): $(INSTALLED) requirements/bench.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements/bench.txt
 	touch $@
 
-demo: setup ## drive around a simulated town; make demo TOUR=1 explores one; ARGS="--seed 2" for more
-	$(BIN)/cogmap run $(if $(TOUR),--tour) $(ARGS)
+demo: setup ## explore a simulated town and drive home; TOUR=1 for goals and a closed street; ARGS="--seed 2" for more
+	$(BIN)/cogmap run $(if $(TOUR),--tour,--town blocks --explore 45) $(ARGS)
 
 test: setup ## every test but those of the containers; those of training are skipped without torch
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --dist loadfile --ignore tests/e2e --ignore tests/fault
+	$(BIN)/python -m pytest tests/e2e tests/fault
 
 test-compose: setup ## build the containers and test them as they run
 	$(BIN)/python -m pytest tests/compose -m compose --timeout 1200

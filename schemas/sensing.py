@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import math
 from typing import Annotated
 
 import msgspec
@@ -107,6 +108,16 @@ class Percept(Part, kw_only=True, frozen=True):
     outline_px: list[tuple[int, int]] = []
     function: str = ""
 
+    @property
+    def has_bearing(self) -> bool:
+        """Whether the bearing is known: its standard deviation is below a half turn."""
+        return self.bearing_sd_rad < math.pi
+
+    @property
+    def has_range(self) -> bool:
+        """Whether the range is known: its standard deviation is below the range."""
+        return self.range_sd_m < self.range_m
+
 
 class PlaceMatch(Part, kw_only=True, frozen=True):
     """A view from a place that was seen before, recognised by the views that led to it.
@@ -169,7 +180,8 @@ class SpeedLimit(enum.StrEnum):
     """What keeps the robot below its cruising speed; NONE where nothing does.
 
     POSE_AGE: the pose that the command is computed from is old, as the machine is too slow. STUCK:
-    the robot was commanded to move and did not. OTHER is for modules of other people.
+    the robot was commanded to move and did not. AT_GOAL: every goal is reached. OTHER is for
+    modules of other people.
     """
 
     NONE = ""
@@ -181,6 +193,7 @@ class SpeedLimit(enum.StrEnum):
     NO_ACTION = "no action"
     NO_POSE = "no pose"
     NO_ROUTE = "no route"
+    AT_GOAL = "at goal"
     OTHER = "other"
 
 

@@ -53,7 +53,7 @@ def over_fused(processes: int) -> Metrics:
 
 
 def mean_errors(town: int, laps: float) -> MeanErrors:
-    """Drive `laps` of the town of that seed. Raises CogmapError where it does not end its route."""
+    """Drive `laps` of the town of that seed. Raises CogmapError where not all goals are reached."""
     observer = _drive(town, laps)
     # A process has one renderer at a time, which goes with its module: now, before the next town.
     gc.collect()
@@ -67,7 +67,7 @@ def mean_errors(town: int, laps: float) -> MeanErrors:
 
 
 def _drive(town: int, laps: float) -> Observer:
-    """Run all modules in this process until the route is complete."""
+    """Run all modules in this process until every goal is reached."""
     choices = Choices(seed=town, laps=laps, lockstep=True, record=False)
     sections = effective({}, choices, awaited(choices, observer=True))
     observer = Observer()
@@ -75,13 +75,13 @@ def _drive(town: int, laps: float) -> Observer:
     runner = InProcessRunner([*modules, _observing(observer)])
 
     try:
-        runner.run(lambda: observer.progress >= 1.0)
+        runner.run(lambda: observer.has_ended)
     finally:
         runner.close()
 
-    if observer.progress < 1.0:
-        share = f"{observer.progress:.0%}"
-        raise CogmapError(f"the drive of town {town} ended at {share} of its route")
+    if observer.goals_reached < observer.goals:
+        reached = f"{observer.goals_reached} of {observer.goals} goals"
+        raise CogmapError(f"the drive of town {town} ended at {reached}")
 
     return observer
 

@@ -110,8 +110,8 @@ def _draw_obstacle(canvas: Canvas, obstacle: Obstacle, corner_m: Floats) -> None
     cv2.fillConvexPoly(canvas, pixels, 0)
 
 
-def _draw_barrier(canvas: Canvas, street: Street, corner_m: Floats) -> None:
-    """Close a street in its middle, from kerb to kerb."""
+def barrier_m(street: Street) -> Floats:
+    """(2, 2): the ends of the barrier that closes a street in its middle, beyond its kerbs."""
     start_m = np.array(street.line_m[0])
     end_m = np.array(street.line_m[-1])
     middle_m = (start_m + end_m) / 2
@@ -120,9 +120,11 @@ def _draw_barrier(canvas: Canvas, street: Street, corner_m: Floats) -> None:
     length_m = np.hypot(ahead_x_m, ahead_y_m)
     left = np.array([-ahead_y_m, ahead_x_m]) / length_m
     across_m = left * (street.width_m + MARGIN_M) / 2
+    return np.stack([middle_m - across_m, middle_m + across_m])
 
-    first = _pixel(middle_m - across_m, corner_m)
-    last = _pixel(middle_m + across_m, corner_m)
+
+def _draw_barrier(canvas: Canvas, street: Street, corner_m: Floats) -> None:
+    first, last = (_pixel(end_m.tolist(), corner_m) for end_m in barrier_m(street))
     cv2.line(canvas, first, last, 0, round(BARRIER_M / CELL_M))
 
 

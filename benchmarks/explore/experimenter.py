@@ -27,7 +27,7 @@ from schemas.graph import DropNode
 from schemas.nodes import NEVER_NS, PLAN_ID, Goal, Plan, goal_id
 from schemas.sensing import StreetClosure, TruePose, TrueTown
 
-MAX_DRAWS = 20
+MAX_DRAWS = 60
 
 
 class Experimenter:
@@ -133,9 +133,10 @@ class Experimenter:
         route_m = transform_from(self._start, np.asarray(plan.route.numpy(), np.float64))
         found = street_to_close(self._rng, self._town, route_m, trial.goal_m)
         if found is None:
+            drop = DropNode(id=self._goal_id)
             self._draws += 1
             self._trial = None
-            return [Offer(cycle=self.graph.cycle, operations=[DropNode(id=self._goal_id)])]
+            return [Offer(cycle=self.graph.cycle, operations=[drop])]
 
         trial.closed, length_m = found
         trial.shortest_m = length_m

@@ -1,9 +1,11 @@
-"""Metrics of exploration, and of drives to goals: ten towns, percept-level sensing."""
+"""Metrics of exploration, and of drives to goals: ten towns, percept-level sensing, the first of
+them also with cameras.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -18,7 +20,6 @@ from cogmap.parallel import Progress, parallel_map
 from cogmap.runtime.config import Sections
 from cogmap.runtime.in_process import InProcessRunner
 from services import registry
-from services.action.config import NEAREST_SCAN_M
 from services.sim.odometry import FUSED
 
 TOWNS = 10
@@ -26,11 +27,8 @@ FIRST_SEED = 101
 EXPLORE_S = 900.0
 GOALS = 10
 LONGEST_S = 6000.0
-CLOSURE_SPACING_S = 10.0
-"""Between two loop closures: on streets that are driven again and again there is one at any time,
-and each makes map correction judge all of them.
-"""
 COGNITION = ("workspace", "codelets", "global_workspace", "action")
+SENSES = ("sensory", "epam")
 THRESHOLDS = {
     "explored_share": at_least(0.9),
     "goals_reached_share": at_least(0.98),
@@ -39,6 +37,16 @@ THRESHOLDS = {
     "boundary_precision": at_least(0.9),
     "boundary_recall": at_least(0.9),
 }
+
+
+@dataclass(frozen=True)
+class Visit:
+    """A town, by its seed, whether it is seen with cameras, and what is done there."""
+
+    seed: int
+    has_cameras: bool
+    explore_s: float
+    goals: int
 
 
 @dataclass(frozen=True)
@@ -51,33 +59,44 @@ class Town:
     collisions: int
 
 
-def sections(seed: int) -> Sections:
-    """A town of several blocks, percept-level sensing, a robot that explores, in lockstep."""
-    sim = {
+def sections(seed: int, has_cameras: bool = False) -> Sections:
+    """A town of several blocks, a robot that explores, in lockstep; percept-level sensing unless it
+    has cameras.
+    """
+    sim: dict[str, Any] = {
         "seed": seed,
         "mode": "lockstep",
         "town": "blocks",
-        "sensing": "percepts",
+        "sensing": "cameras" if has_cameras else "percepts",
         "duration_s": LONGEST_S,
-        "noise": msgspec.to_builtins(FUSED),
-        "awaits": dict.fromkeys(COGNITION, 1),
+        "awaits": dict.fromkeys(_mind(has_cameras), 1),
     }
+    if not has_cameras:
+        sim["noise"] = msgspec.to_builtins(FUSED)
+
     return {
         "sim": sim,
         "workspace": {"mode": "lockstep"},
-        "action": {"mode": "lockstep", "clearance_m": NEAREST_SCAN_M},
-        "codelets": {"closure_spacing_s": CLOSURE_SPACING_S},
+        "action": {"mode": "lockstep"},
         "planning": {"explore": True},
     }
 
 
-def visit(explore_s: float, goals: int, seed: int) -> Town:
+def _mind(has_cameras: bool) -> tuple[str, ...]:
+    """The modules that the simulator waits for."""
+    if has_cameras:
+        return (*SENSES, *COGNITION)
+    return COGNITION
+
+
+def visit(chosen: Visit) -> Town:
     """Explore one town, then drive to goals in it. Raises CogmapError where a module rejected a
     message.
     """
-    configured = sections(seed)
-    experimenter = Experimenter(seed, explore_s, goals)
-    modules = [registry.build(name, configured) for name in ("sim", *COGNITION)]
+    configured = sections(chosen.seed, chosen.has_cameras)
+    experimenter = Experimenter(chosen.seed, chosen.explore_s, chosen.goals)
+    names = ("sim", *_mind(chosen.has_cameras))
+    modules = [registry.build(name, configured) for name in names]
     with InProcessRunner([*modules, experimenter.module()]) as runner:
         runner.run(lambda: experimenter.is_complete)
         for shell in runner.shells:
@@ -101,10 +120,18 @@ def measure(
     explore_s: float = EXPLORE_S,
     goals: int = GOALS,
 ) -> Metrics:
-    """The metrics over all towns."""
-    seeds = range(FIRST_SEED, FIRST_SEED + towns)
-    work = partial(visit, explore_s, goals)
-    return metrics(parallel_map(work, seeds, processes, progress))
+    """The metrics over all towns, and beside them those of the first one with cameras."""
+    visits = [Visit(FIRST_SEED, True, explore_s, goals)]
+    for seed in range(FIRST_SEED, FIRST_SEED + towns):
+        visits.append(Visit(seed, False, explore_s, goals))
+
+    with_cameras, *without = parallel_map(visit, visits, processes, progress)
+    return metrics(without) | with_prefix("cameras", metrics([with_cameras]))
+
+
+def with_prefix(prefix: str, measured: Metrics) -> Metrics:
+    """The same metrics, `prefix` before each key."""
+    return {f"{prefix}_{key}": value for key, value in measured.items()}
 
 
 def metrics(towns: list[Town]) -> Metrics:

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
-from benchmarks.explore.drivable import Drivable
+from benchmarks.explore.drivable import Drivable, barrier_m
 from cli.launch.guide import streets_ahead
 from cogmap.geometry.arrays import Floats
-from cogmap.geometry.polylines import resample
+from cogmap.geometry.polylines import nearest_on_line, resample
 from schemas.sensing import TrueTown
 
 LINE_STEP_M = 1.0
@@ -94,15 +94,18 @@ def street_to_close(
     rng: np.random.Generator, town: TrueTown, route_m: Floats, goal_m: Point
 ) -> tuple[str, float] | None:
     """A street ahead that the (n, 2) route passes, without which the goal can still be reached, and
-    the length of the shortest route then; None where there is none.
+    the length of the shortest route then; None where there is none. The goal is not at its barrier,
+    where it could be reached from both sides.
     """
     start_x_m, start_y_m = route_m[0].tolist()
     passed = streets_ahead(town, route_m)
     for number in rng.permutation(len(passed)).tolist():
-        if math.dist(passed[number].middle_m, goal_m) < REACHED_WITHIN_M:
+        street = passed[number].street
+        (foot_m,) = nearest_on_line(barrier_m(street), np.array([goal_m])).foot_m
+        if math.dist(foot_m, goal_m) < REACHED_WITHIN_M:
             continue
 
-        name = passed[number].street.name
+        name = street.name
         closed = Drivable.of(closed_as(town, name))
         length_m = closed.length_m((start_x_m, start_y_m), goal_m)
         if math.isfinite(length_m):

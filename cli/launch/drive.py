@@ -1,4 +1,4 @@
-"""One drive from start to end: processes started, the robot on its route, every process ended."""
+"""One drive from start to end: processes started, the robot driven, every process ended."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from cli.launch.guide import Guide, Stage
+from cli.launch.observer import Observer
 from cli.launch.outcome import Ending, Outcome
 from cli.launch.plan import (
     CONFIG_NAME,
@@ -36,6 +37,7 @@ SHOW_PERIOD_S = 0.25
 GRACE_S = 3.0
 QUIET_S = 0.3
 MAX_SHARE_SLOWED = 0.3
+MAX_NAMES = 8
 
 
 @dataclass
@@ -57,9 +59,7 @@ class Drive:
         self._watchdog = Watchdog()
         self.guide: Guide | None = None
         if self.choices.tour:
-            self.guide = Guide(EXPLORE_S, self.choices.goals, closes_street=True)
-        elif self.choices.goals:
-            self.guide = Guide(0.0, self.choices.goals)
+            self.guide = Guide(EXPLORE_S, self.choices.goals)
 
     @property
     def awaited(self) -> Mapping[str, int]:
@@ -68,8 +68,8 @@ class Drive:
         return awaits | {"sim": 1}
 
     def run(self, until_s: float, stop: Stop, display: Display) -> tuple[Watch, Ending]:
-        """Drive until the route is complete, the drive cannot succeed, `until_s` on the monotonic
-        clock, or `stop`; every process is ended.
+        """Drive until every goal is reached, the time of the drive is over, it cannot succeed,
+        `until_s` on the monotonic clock, or `stop`; every process is ended.
 
         Raises ProcessFailedError, with its last words, where a process failed before the drive had
         begun.
@@ -100,8 +100,7 @@ class Drive:
             return Ending(Outcome.MODULE_FAILED, str(error))
 
         in_lockstep = self.sections["sim"]["mode"] == "lockstep"
-        has_sim_ended = watch.tally.observer.progress >= 1.0
-        if in_lockstep and has_sim_ended:
+        if in_lockstep and watch.tally.observer.has_ended:
             watch.pump_until_quiet(QUIET_S)
         return ending
 
@@ -168,21 +167,39 @@ class Drive:
         observer = watch.tally.observer
         if stop.asked:
             return Ending(Outcome.INTERRUPTED, "it was interrupted")
-        if observer.progress >= 1.0:
-            return Ending(Outcome.ROUTE_COMPLETE, self._complete())
         if self.guide is not None and self.guide.stage is Stage.COMPLETE:
             return Ending(Outcome.ROUTE_COMPLETE, self.guide.sentence)
+        if observer.has_ended:
+            return self._ended(observer)
         if time.monotonic() >= until_s:
             return _out_of_time(watch, missing)
         if observer.start is None:
             return None
         return self._watchdog.check(_situation(watch, missing))
 
-    def _complete(self) -> str:
-        if self.sections["action"]["route"]:
-            return "the robot has completed its route"
+    def _ended(self, observer: Observer) -> Ending:
+        """How a drive has ended whose simulation has: at its goals, or as its time is over."""
+        sim = self.sections["sim"]
+        has_goals = sim["ends_at_goal"] or self.guide is not None
+        if not has_goals:
+            return Ending(Outcome.ROUTE_COMPLETE, "the time of the drive is over")
 
-        return "the time of the drive is over"
+        if observer.now_s < sim["duration_s"]:
+            return Ending(Outcome.ROUTE_COMPLETE, f"the agent was at every goal: {self.goals}")
+
+        came = f"the {sim['duration_s']:g} s of the drive were over"
+        return Ending(
+            Outcome.TIME_LIMIT,
+            f"{came} at {_reached(observer)}: a higher sim.duration_s allows more",
+        )
+
+    @property
+    def goals(self) -> str:
+        """The goals that the agent has from its start, the first of them by name."""
+        names = [goal["name"] for goal in self.sections["workspace"]["goals"]]
+        named = ", ".join(names[:MAX_NAMES])
+        more = len(names) - MAX_NAMES
+        return f"{named} and {more} more" if more > 0 else named
 
     def _close(self, watch: Watch | None) -> None:
         """End first what moves, then what thinks, then what records, the router last."""
@@ -207,7 +224,7 @@ def _situation(watch: Watch, missing: list[str]) -> Situation:
     return Situation(
         now_s=time.monotonic(),
         drive_s=tally.observer.elapsed_s,
-        travelled_m=tally.observer.travelled_m,
+        place_m=tally.observer.place_m,
         commands=len(tally.cycle_ms),
         halted_by=tally.command.halted_by if tally.command else SpeedLimit.NONE,
         missing=missing,
@@ -228,9 +245,16 @@ def _out_of_time(watch: Watch, missing: list[str]) -> Ending:
         waited = f"the time limit came while it waited for {names}: see its log"
         return Ending(Outcome.TIME_LIMIT, waited)
 
-    came = f"the time limit came at {watch.tally.observer.progress:.0%} of the route"
+    came = f"the time limit came at {_reached(watch.tally.observer)}"
     share = watch.tally.share_limited_by(SpeedLimit.POSE_AGE)
     if share > MAX_SHARE_SLOWED:
         slow = f"{came}: the robot drove slowly, as {share:.0%} of its poses were old: {REMEDY}"
         return Ending(Outcome.TOO_SLOW, slow)
     return Ending(Outcome.TIME_LIMIT, f"{came}: --time-limit allows more")
+
+
+def _reached(observer: Observer) -> str:
+    """How far a drive is, in words."""
+    if observer.goals:
+        return f"{observer.goals_reached} of {observer.goals} goals"
+    return f"{observer.progress:.0%} of its time"

@@ -37,19 +37,16 @@ class Guide:
     """Offers goals when it is time, by the agent's graph and the town as it is.
 
     The agent explores for `explore_s`, or until nothing is left to explore. `goals` are then
-    offered; TOUR_GOALS objects of its map, far from one another, where they are not given. Where it
-    `closes_street`, a street of the route to the last goal is closed.
+    offered; TOUR_GOALS objects of its map, far from one another, where they are not given. A street
+    of the route to the last goal is closed.
     """
 
-    def __init__(
-        self, explore_s: float, goals: Sequence[Goal] = (), closes_street: bool = False
-    ) -> None:
+    def __init__(self, explore_s: float, goals: Sequence[Goal] = ()) -> None:
         self.stage = Stage.EXPLORES
         self.closed = ""
 
         self._explore_s = explore_s
         self._given = list(goals)
-        self._closes_street = closes_street
         self._goals: list[str] = []
 
     @property
@@ -108,7 +105,7 @@ class Guide:
 
         plan = graph.get(Plan, PLAN_ID)
         is_last = len(left) == 1 and plan is not None and plan.goals == [left[0].id]
-        if not (self._closes_street and is_last) or self.stage is Stage.DETOURS:
+        if not is_last or self.stage is Stage.DETOURS:
             return []
         return self._close(plan, observer)
 
@@ -157,10 +154,9 @@ def street_ahead(town: TrueTown, route_m: Floats) -> Street | None:
 
 
 class Passed(NamedTuple):
-    """A street whose middle, (x, y) `middle_m`, a route passes `along_m` from its start."""
+    """A street whose middle a route passes `along_m` from its start."""
 
     street: Street
-    middle_m: tuple[float, float]
     along_m: float
 
 
@@ -176,8 +172,7 @@ def streets_ahead(town: TrueTown, route_m: Floats) -> list[Passed]:
         away_m = np.hypot(*(route_m - middle_m).T)
         nearest = int(away_m.argmin())
         if away_m[nearest] <= ON_ROUTE_M and along_m[nearest] >= BARRIER_AHEAD_M:
-            x_m, y_m = middle_m.tolist()
-            passed.append(Passed(street, (x_m, y_m), float(along_m[nearest])))
+            passed.append(Passed(street, float(along_m[nearest])))
 
     return passed
 

@@ -73,7 +73,10 @@ class Recording(msgspec.Struct, kw_only=True):
 
 
 class DriveMetrics(msgspec.Struct, kw_only=True):
-    """What the messages of a drive show. `drive_s` is the drive's own time.
+    """What the messages of a drive show. `drive_s` is the drive's own time; `progress` the share of
+    its `goals` that were reached, the way to the next one included, of that time where there is
+    none. `shortcut_m` of the way to goals led through streets that the robot had not been in before
+    it had any.
 
     `estimate` has the errors of the estimated position, `wheels_alone` and `fused_alone` those of
     path integration alone: of the wheels' odometry, and of the self-motion that sensory memory
@@ -89,6 +92,9 @@ class DriveMetrics(msgspec.Struct, kw_only=True):
     drive_s: float
     distance_m: float
     progress: float
+    goals: int
+    goals_reached: int
+    shortcut_m: float
     estimate: ErrorMetrics
     wheels_alone: ErrorMetrics
     fused_alone: ErrorMetrics
@@ -125,7 +131,6 @@ class RecordedMetrics(DriveMetrics, kw_only=True):
 
     completed: bool
     seed: int
-    laps: float
     mode: str
     log: Recording | None
 
@@ -185,6 +190,11 @@ def road_m2(graph: Graph) -> float:
     return int(is_road.sum()) * area_m2
 
 
+def _length_m(steps_m: Floats) -> float:
+    """The length of (n, 2, 2) steps."""
+    return float(np.hypot(*(steps_m[:, 1] - steps_m[:, 0]).T).sum())
+
+
 def drive_metrics(tally: Tally, gaps: dict[str, int], rejected: dict[str, int]) -> DriveMetrics:
     """The metrics of a drive, with the messages that were lost and rejected, by topic. A mean and a
     percentile of nothing are 0.
@@ -200,6 +210,9 @@ def drive_metrics(tally: Tally, gaps: dict[str, int], rejected: dict[str, int]) 
         drive_s=observer.elapsed_s,
         distance_m=observer.travelled_m,
         progress=observer.progress,
+        goals=observer.goals,
+        goals_reached=observer.goals_reached,
+        shortcut_m=_length_m(observer.shortcuts_m),
         estimate=ErrorMetrics.of(errors.estimate_m),
         wheels_alone=ErrorMetrics.of(errors.wheels_m),
         fused_alone=ErrorMetrics.of(errors.fused_m),

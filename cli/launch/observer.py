@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cli.launch.goals import GoalProgress
 from cli.launch.track import PathIntegrator, Track
 from cogmap.errors import MessageError
 from cogmap.geometry import se2
@@ -24,6 +25,8 @@ OBSERVED = (
     topics.DELTA,
 )
 MOTION_COLUMNS = 5
+# Farther from where it was before, the robot is in another street.
+STREET_M = 8.0
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,12 @@ class Observer:
         self.town: TrueTown | None = None
         self.start: Pose | None = None
         self.travelled_m = 0.0
-        self.progress = 0.0
+        self.place_m = (0.0, 0.0)
+        self.has_ended = False
+        self._share_of_time = 0.0
+        self._goals = GoalProgress()
+        self._explored_ns = 0
+        self._explored_m = 0.0
         self._began_ns = 0
         self._now_ns = 0
         self._true = Track()
@@ -95,11 +103,13 @@ class Observer:
             self._began_ns = true.stamp_ns
 
         pose = true.pose
+        self.place_m = (pose.x_m, pose.y_m)
         self._true.add(true.stamp_ns, pose.x_m, pose.y_m)
 
         self._now_ns = max(self._now_ns, true.stamp_ns)
         self.travelled_m = true.travelled_m
-        self.progress = true.progress
+        self.has_ended = true.progress >= 1.0
+        self._share_of_time = true.progress
 
     def _on_odometry(self, odometry: Odometry) -> None:
         if self._wheels.reached(odometry.stamp_ns):
@@ -124,9 +134,38 @@ class Observer:
         self._fused.mark(motion.stamp_ns)
 
     def _on_delta(self, delta: Delta) -> None:
-        for node in delta.operations:
-            if isinstance(node, Self):
-                self._estimate.add(delta.stamp_ns, node.x_m, node.y_m)
+        self._goals.update(delta, self.travelled_m)
+        if not self.goals:
+            self._explored_ns = self._now_ns
+            self._explored_m = self.travelled_m
+
+        for operation in delta.operations:
+            if isinstance(operation, Self):
+                self._estimate.add(delta.stamp_ns, operation.x_m, operation.y_m)
+
+    @property
+    def goals(self) -> int:
+        """How many goals the agent has."""
+        return self._goals.count
+
+    @property
+    def goals_reached(self) -> int:
+        """How many of its goals the agent has reached."""
+        return self._goals.reached
+
+    @property
+    def progress(self) -> float:
+        """The share of its goals that the agent has reached, the way to the next one included;
+        where it has none, that of the drive's time.
+        """
+        if not self.goals:
+            return self._share_of_time
+        return self._goals.share(self.travelled_m)
+
+    @property
+    def now_s(self) -> float:
+        """The simulated time."""
+        return self._now_ns / 1e9
 
     @property
     def elapsed_s(self) -> float:
@@ -147,6 +186,15 @@ class Observer:
     def true_path_m(self) -> Floats:
         """(n, 2), in the world's frame like all paths here."""
         return self._true.points_m
+
+    @property
+    def shortcuts_m(self) -> Floats:
+        """(n, 2, 2): the steps of the true path to goals through streets in which the robot had not
+        been before it had any; none where it had goals before it had left its first street.
+        """
+        if not self.goals or self._explored_m < STREET_M:
+            return np.zeros((0, 2, 2))
+        return self._true.new_since_m(self._explored_ns, STREET_M)
 
     @property
     def estimated_path_m(self) -> Floats:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 class Outcome(enum.Enum):
     """How a drive ended. The value is what `summary.json` holds as `ended_by`.
 
+    ROUTE_COMPLETE: every goal is reached or, where there was none, the time of the drive is over.
     MODULE_FAILED: a process cannot run, as it dies again and again, or the disk takes no more.
     STALLED: nothing happens any more. STUCK: time passes, and the robot stays where it is.
     TOO_SLOW: the same, as the machine is too slow for the robot to move safely.

@@ -13,9 +13,9 @@ import tomli_w
 from cli.launch.supervisor import Program, cogmap_command
 from cogmap.runtime import config
 from cogmap.runtime.config import Sections
-from schemas.nodes import Goal
+from schemas.nodes import Goal, goal_id
 from services import registry
-from services.action.config import NEAREST_SCAN_M
+from services.sim.config import Config as SimConfig
 from services.sim.layout.town import generate
 from services.sim.layout.towns import BLOCKS, LOOP
 from services.sim.odometry import FUSED
@@ -30,42 +30,44 @@ REPLICATED = "codelets"
 TOUR_TOWN_M = 120.0
 TOUR_LIMIT_S = 600.0
 EXPLORE_S = 150.0
+HOME = Goal(id=goal_id("home"))
+HOME_AFTER = 1.5
+"""An agent may take so many times as long to its goals as it explored."""
+LAP_S = 300.0
+LAP_UNKNOWN_WEIGHT = 0.5
+"""A lap leads along streets that are not known yet, where those that are known lead there too."""
 
 
 @dataclass(frozen=True)
 class Choices:
     """What the user chooses about a drive; None leaves it to the configuration.
 
-    `without` are the modules that somebody else starts. `own_router` is whether the run starts one.
-    On a `tour` the agent explores first; it is given `goals`, or such as it knows then.
+    In the loop town the agent is given the corners of `laps` laps as goals, unless it is given
+    `goals`. On a `tour` it explores first; it is given `goals` then, or such as it knows. With
+    `explore_s` it explores for so long, and then drives to `goals`, or home. `without` are the
+    modules that somebody else starts. `own_router` is whether the run starts one.
     """
 
     seed: int | None = None
     town: str | None = None
-    laps: float | None = None
+    laps: float = 1.0
     lockstep: bool = False
     codelets: int = 1
     record: bool = True
     without: Sequence[str] = ()
     own_router: bool = True
     tour: bool = False
+    explore_s: float | None = None
     goals: Sequence[Goal] = ()
 
 
 def effective(base: Sections, choices: Choices, awaits: dict[str, int]) -> Sections:
-    """The whole configuration of every module: `base`, the choices, the route through the town, and
+    """The whole configuration of every module: `base`, the choices, the agent's first goals, and
     the default of every other key. Raises ConfigError.
     """
     config.check_sections(base, registry.sections())
     chosen = _chosen(base, choices, awaits)
-    complete = {name: _complete(chosen, name) for name in registry.sections()}
-
-    sim = complete["sim"]
-    action = complete["action"]
-    has_goals = choices.tour or bool(choices.goals)
-    if not action["route"] and sim["town"] == LOOP and not has_goals:
-        action["route"] = _route(sim["seed"], sim["laps"])
-    return complete
+    return {name: _complete(chosen, name) for name in registry.sections()}
 
 
 def _chosen(base: Sections, choices: Choices, awaits: dict[str, int]) -> Sections:
@@ -90,12 +92,51 @@ def _chosen(base: Sections, choices: Choices, awaits: dict[str, int]) -> Section
         _set_out(sim)
     if sim.get("sensing") == "percepts":
         sim.setdefault("noise", msgspec.to_builtins(FUSED))
-    if sim.get("town", LOOP) != LOOP or choices.goals:
+    if "trajectory" not in sim:
         sections["planning"].setdefault("explore", True)
-        sections["action"].setdefault("clearance_m", NEAREST_SCAN_M)
-    if choices.laps is not None:
-        sim["laps"] = choices.laps
+        if not choices.tour:
+            _give_goals(sections, choices)
     return sections
+
+
+def _give_goals(sections: Sections, choices: Choices) -> None:
+    """The agent's goals, where there are any; the drive ends when they are reached.
+
+    These are the goals that are chosen, after exploring else home; else those that are set, else
+    the corners of the loop.
+    """
+    sim = sections["sim"]
+    workspace = sections["workspace"]
+    goals = choices.goals
+    if choices.explore_s is not None:
+        goals = goals or [HOME]
+        workspace["goals_after_s"] = choices.explore_s
+        sim.setdefault("duration_s", (1 + HOME_AFTER) * choices.explore_s)
+
+    if goals:
+        workspace["goals"] = [_given(goal) for goal in goals]
+    elif "goals" not in workspace and sim.get("town", LOOP) == LOOP:
+        workspace["goals"] = _of_laps(sim.get("seed", SimConfig().seed), choices.laps)
+        workspace["in_order"] = True
+        sections["planning"].setdefault("unknown_weight", LAP_UNKNOWN_WEIGHT)
+        sim.setdefault("duration_s", max(SimConfig().duration_s, LAP_S * choices.laps))
+
+    if workspace.get("goals"):
+        sim.setdefault("ends_at_goal", True)
+
+
+def _given(goal: Goal) -> dict[str, Any]:
+    """A goal as the workspace is configured with it."""
+    name = goal.id.removeprefix(goal_id(""))
+    return {"name": name, "object": goal.object, "x_m": goal.x_m, "y_m": goal.y_m}
+
+
+def _of_laps(seed: int, laps: float) -> list[dict[str, Any]]:
+    """The corners of the loop that so many laps lead past, and where they end."""
+    *corners, end = generate(seed).goals(laps)
+    places = [(f"corner {number}", place) for number, place in enumerate(corners, start=1)]
+    places.append(("end", end))
+    return [{"name": name, "x_m": x_m, "y_m": y_m} for name, (x_m, y_m) in places]
 
 
 def _set_out(sim: dict[str, Any]) -> None:
@@ -119,12 +160,6 @@ def _complete(sections: Sections, name: str) -> dict[str, Any]:
         if value is not None:
             complete[key] = value
     return complete
-
-
-def _route(seed: int, laps: float) -> list[list[float]]:
-    """What a passenger would tell the agent: so many metres, a turn in radians, and so on."""
-    legs = generate(seed).route(laps)
-    return [list(leg) for leg in legs]
 
 
 def awaited(choices: Choices, observer: bool) -> dict[str, int]:

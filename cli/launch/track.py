@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.geometry.polylines import interpolate
@@ -69,6 +70,20 @@ class Track:
         known_s = known_ns / 1e9
         wanted_s = wanted_ns / 1e9
         return interpolate(known_s, self.points_m, wanted_s)
+
+    def new_since_m(self, stamp_ns: int, away_m: float) -> Floats:
+        """(n, 2, 2): the steps after `stamp_ns` that lead farther than `away_m` past every position
+        until then; none where there is none until then.
+        """
+        points_m = self.points_m
+        count = int(np.searchsorted(self.stamps_ns, stamp_ns, side="right"))
+        steps_m = np.stack([points_m[:-1], points_m[1:]], axis=1)[max(0, count - 1) :]
+        if not count or not len(steps_m):
+            return np.zeros((0, 2, 2))
+
+        from_known_m, _ = cKDTree(points_m[:count]).query(steps_m.mean(axis=1))
+        new_m: Floats = steps_m[from_known_m > away_m]
+        return new_m
 
 
 class PathIntegrator:

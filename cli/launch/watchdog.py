@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,14 +10,16 @@ from cli.launch.outcome import Ending, Outcome
 from schemas.sensing import SpeedLimit
 
 STALLED_S = 30.0
-STUCK_S = 20.0
-MIN_MOVE_M = 0.5
+STUCK_S = 30.0
+MIN_MOVE_M = 2.0
+WAITS = (SpeedLimit.NO_ROUTE, SpeedLimit.AT_GOAL)
 REMEDY = "end other programs, or use --lockstep, which waits for every answer"
 
 
 @dataclass(frozen=True)
 class Situation:
-    """A drive at `now_s` of the monotonic clock: `drive_s` of its own time have passed.
+    """A drive at `now_s` of the monotonic clock: `drive_s` of its own time have passed, and the
+    robot is at `place_m`, (x, y).
 
     `missing` are the modules that are not ready, `halted_by` is the reason of the newest of so many
     `commands`, NONE where it moves the wheels.
@@ -24,7 +27,7 @@ class Situation:
 
     now_s: float
     drive_s: float
-    travelled_m: float
+    place_m: tuple[float, float]
     commands: int
     halted_by: SpeedLimit = SpeedLimit.NONE
     missing: Sequence[str] = ()
@@ -41,7 +44,8 @@ class Watchdog:
         """How the drive must end, if it must.
 
         It is stalled after STALLED_S in which its time stood still, and stuck after STUCK_S of its
-        own time in which the robot moved less than MIN_MOVE_M, though it has a route.
+        own time in which the robot, though it has a route, stayed within MIN_MOVE_M of a place: one
+        that backs away and returns gets nowhere.
         """
         ticked = self._ticked
         moved = self._moved
@@ -55,9 +59,8 @@ class Watchdog:
         elif situation.now_s - ticked.now_s >= STALLED_S:
             return Ending(Outcome.STALLED, _stalled(situation))
 
-        has_moved = situation.travelled_m - moved.travelled_m >= MIN_MOVE_M
-        waits_for_goal = situation.halted_by is SpeedLimit.NO_ROUTE
-        if has_moved or waits_for_goal:
+        has_moved = math.dist(situation.place_m, moved.place_m) >= MIN_MOVE_M
+        if has_moved or situation.halted_by in WAITS:
             self._moved = situation
         elif situation.drive_s - moved.drive_s >= STUCK_S:
             return _stuck(situation, situation.commands - moved.commands)

@@ -97,7 +97,6 @@ def _followed(reader: LogReader) -> tuple[RecordedMetrics, Tally]:
         **msgspec.structs.asdict(metrics),
         completed=metrics.progress >= 1.0,
         seed=int(_setting(config, "sim", "seed")),
-        laps=float(_setting(config, "sim", "laps")),
         mode=str(_setting(config, "sim", "mode")),
         log=Recording.read(reader.path),
     )

@@ -10,7 +10,7 @@ from matplotlib.patches import Polygon
 from scipy.spatial import ConvexHull, QhullError
 
 from cli.launch.observer import Observer
-from cli.plots.palette import CUT, GOAL, PLAN, SEVERAL
+from cli.plots.palette import CUT, GOAL, PLAN, SEVERAL, SHORTCUT
 from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import CUT_BELOW, LINK_OFFSETS, WEIGHT_COLUMNS
@@ -31,6 +31,8 @@ def draw_structure(axes: Axes, observer: Observer, graph: Graph) -> list[Line2D]
         legend.append(Line2D([], [], color=GOAL, marker="*", ms=11, ls="", label="goals"))
     if _draw_plan(axes, observer, graph):
         legend.append(Line2D([], [], color=PLAN, lw=2.2, label="plan"))
+    if _draw_shortcuts(axes, observer):
+        legend.append(Line2D([], [], color=SHORTCUT, lw=7, label="way through streets new to it"))
 
     return legend
 
@@ -110,3 +112,10 @@ def _draw_plan(axes: Axes, observer: Observer, graph: Graph) -> bool:
     route_m = observer.to_world(np.asarray(plan.route.numpy(), np.float64))
     axes.plot(*route_m.T, color=PLAN, lw=2.2, alpha=0.9, zorder=8.5)
     return True
+
+
+def _draw_shortcuts(axes: Axes, observer: Observer) -> bool:
+    """The way to goals where it leads through streets in which the robot had not been before."""
+    steps_m = observer.shortcuts_m
+    axes.add_collection(LineCollection(list(steps_m), colors=SHORTCUT, linewidths=9.0, zorder=8.8))
+    return bool(len(steps_m))

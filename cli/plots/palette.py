@@ -20,5 +20,6 @@ OBJECT = "#c98a12"
 CUT = "#b8457a"
 GOAL = "#d2a106"
 PLAN = "#1f9e9a"
+SHORTCUT = "#8fc93a"
 ROAD_OPACITY = 0.62
 SEVERAL = ("#c98a12", "#3f74b5", "#b8457a", "#6f9a35", "#8d5fc4", "#1f9e9a", "#d2622a", "#5b6475")

@@ -61,8 +61,19 @@ goals_option = click.option(
     metavar="FILE",
     help="Drive to the goals in FILE, one a line: a name, or x and y; end at the last.",
 )
+explore_option = click.option(
+    "--explore",
+    "explore_s",
+    type=FiniteRange(1, 1e5),
+    metavar="SECONDS",
+    help="Explore for so long, then drive to the goals, or home to where it started.",
+)
 laps_option = click.option(
-    "--laps", type=FiniteRange(0, 1000, min_open=True), help="How far.  [default: 1]"
+    "--laps",
+    type=FiniteRange(0, 1000, min_open=True),
+    default=1.0,
+    show_default="1",
+    help="Goals in the loop of streets: its corners, in order, so many times round.",
 )
 codelets_option = click.option(
     "--codelets", type=click.IntRange(1, 64), default=1, show_default=True, help="How many workers."
@@ -78,6 +89,7 @@ lockstep_option = click.option(
 @seed_option
 @town_option
 @tour_option
+@explore_option
 @goals_option
 @laps_option
 @lockstep_option
@@ -117,8 +129,9 @@ def run(
     seed: int | None,
     town: str | None,
     tour: bool,
+    explore_s: float | None,
     goals: Path | None,
-    laps: float | None,
+    laps: float,
     lockstep: bool,
     codelets: int,
     out: Path | None,
@@ -132,12 +145,11 @@ def run(
     config_path: Path | None,
     settings: tuple[str, ...],
 ) -> None:
-    """Drive the robot through a simulated town: around its loop of streets, or where it decides.
+    """Drive the robot through a simulated town: to goals, by routes of its own, or exploring.
 
     Starts a router and every module as a process of its own, shows how the drive proceeds, and
     leaves a folder with the log, a map and a summary, which runs/latest links to. Ends with 0
-    where the route or the tour was completed, 130 after Ctrl-C, else with 1; the summary gives the
-    reason.
+    where every goal was reached, 130 after Ctrl-C, else with 1; the summary gives the reason.
     """
     began_s = time.monotonic()
     stop = Stop()
@@ -152,6 +164,7 @@ def run(
         without=registry.MODULES if "all" in without else without,
         own_router=router is None,
         tour=tour,
+        explore_s=explore_s,
         goals=() if goals is None else read_goals(goals),
     )
     sections = effective(
@@ -162,7 +175,7 @@ def run(
 
     endpoint = router or connect
     drive = Drive(_new_folder(out), endpoint, agent, choices, sections, began_s)
-    limit_s = time_limit or default_limit_s(sections["sim"], choices.tour or bool(choices.goals))
+    limit_s = time_limit or default_limit_s(sections["sim"], choices)
     screen = display_on(console)
     _introduce(screen, drive)
     with _writing(drive.folder):
@@ -179,21 +192,27 @@ def run(
     sys.exit(ending.outcome.exit_code)
 
 
-def default_limit_s(sim: dict[str, Any], has_goals: bool = False) -> float:
+def default_limit_s(sim: dict[str, Any], choices: Choices) -> float:
     """The time limit of a drive with these settings of the simulation.
 
-    It grows with each lap of a route, and is one lap's at least; without a route it is the drive's
-    duration, and time to start and to end.
+    It grows with each lap, and is one lap's at least; without laps it is the drive's duration, and
+    time to start and to end.
     """
-    if sim["town"] == LOOP and not has_goals:
-        laps = float(sim["laps"])
-        return LAP_LIMIT_S * max(1.0, laps)
+    has_laps = not (choices.tour or choices.goals or choices.explore_s)
+    if sim["town"] == LOOP and has_laps:
+        return LAP_LIMIT_S * max(1.0, choices.laps)
 
     return float(sim["duration_s"]) + AROUND_S
 
 
 def _introduce(screen: Display, drive: Drive) -> None:
     screen.show(f"{_town(drive)}, files in {drive.folder}")
+    if drive.goals:
+        order = "in order" if drive.sections["workspace"]["in_order"] else "in an order of its own"
+        explore_s = drive.choices.explore_s
+        if explore_s is not None:
+            screen.show(f"the agent explores the town for {explore_s:g} s")
+        screen.show(f"its goals, {order}: {drive.goals}")
     if not drive.choices.without:
         return
 

@@ -25,6 +25,7 @@ from cli.launch.watch import Watch
 
 SUMMARY_NAME = "summary.json"
 MAP_NAME = "map.png"
+NAMED = 8
 
 
 def finish(drive: Drive, watch: Watch, ending: Ending) -> RunMetrics:
@@ -49,7 +50,6 @@ def _run_metrics(drive: Drive, watch: Watch, ending: Ending) -> RunMetrics:
         ended_by=ending.outcome.value,
         reason=ending.reason,
         seed=sim["seed"],
-        laps=sim["laps"],
         mode=sim["mode"],
         codelets=drive.choices.codelets,
         wall_s=time.monotonic() - drive.began_s,
@@ -93,6 +93,10 @@ def _table(title: str, rows: list[tuple[str, str]]) -> Table:
 def drive_rows(metrics: DriveMetrics) -> list[tuple[str, str]]:
     """The rows of the table that tell of the drive."""
     driven = f"{metrics.distance_m:.1f} m in {metrics.drive_s:.1f} s"
+    if metrics.goals:
+        driven = f"{driven}, {metrics.goals_reached} of {metrics.goals} goals reached"
+    if metrics.shortcut_m:
+        driven = f"{driven}, {metrics.shortcut_m:.0f} m of the way through streets new to it"
     ratios = f"{metrics.error_over_fused:.3f} over fused self-motion"
     if metrics.wheels_alone.is_measured:
         ratios = f"{ratios}, {metrics.error_ratio:.3f} over wheels"
@@ -100,19 +104,29 @@ def drive_rows(metrics: DriveMetrics) -> list[tuple[str, str]]:
         f"{metrics.objects} buildings, half of them within {metrics.object_error_median_m:.2f} m; "
         f"{metrics.road_m2:.0f} m² of street"
     )
-    forgotten = ", ".join(metrics.forgotten) or "nothing"
     cycle = f"{metrics.cycle_p50_ms:.0f} ms, 99 % within {metrics.cycle_p99_ms:.0f} ms"
     return [
-        ("driven", f"{driven}, {metrics.progress:.0%} of the route"),
+        ("driven", driven),
         ("position error", _errors(metrics.estimate)),
         ("path integration alone, fused self-motion", _errors(metrics.fused_alone)),
         ("path integration alone, wheels", _errors(metrics.wheels_alone)),
         ("error ratio", ratios),
         ("learned", learned),
-        ("forgotten", forgotten),
+        ("forgotten", _forgotten(metrics)),
         ("cycle", cycle),
         ("slowed or halted", _limits(metrics)),
     ]
+
+
+def _forgotten(metrics: DriveMetrics) -> str:
+    """The first objects that left the map, and how many others did."""
+    names = metrics.forgotten
+    if not names:
+        return "nothing"
+
+    others = len(names) - NAMED
+    first = ", ".join(names[:NAMED])
+    return f"{first} and {others} more" if others > 0 else first
 
 
 def _limits(metrics: DriveMetrics) -> str:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import osmium
-from osmium.osm import Node
+from osmium.osm import Node, Relation
 from osmium.osm import Way as ReadWay
 
 from cogmap.errors import UsageError
@@ -29,7 +29,9 @@ Tags = dict[str, str]
 
 @dataclass
 class Way:
-    """A way: the nodes along it, in order, and its tags."""
+    """A way: the nodes along it, in order, and its tags. Or an outer ring of a building that is a
+    multipolygon, with the id and the tags of that relation.
+    """
 
     id: int
     nodes: list[int] = field(default_factory=list)
@@ -41,7 +43,7 @@ class Extract:
     """The contents of a file: nodes as (longitude, latitude) in degrees by id, the tags of those
     that have any, and ways.
 
-    A way may name nodes that lie outside the extract.
+    A way may name nodes that lie outside the extract; a multipolygon that is not whole is left out.
     """
 
     nodes: dict[int, tuple[float, float]] = field(default_factory=dict)
@@ -54,15 +56,21 @@ def read(path: Path) -> Extract:
     the line where its XML is.
     """
     extract = Extract()
-    kinds = osmium.osm.NODE | osmium.osm.WAY
+    buildings = []
     try:
-        for element in osmium.FileProcessor(_source(path), kinds):
+        for element in osmium.FileProcessor(_source(path)):
             if isinstance(element, Node):
                 _add_node(extract, path, element)
             elif isinstance(element, ReadWay):
                 _add_way(extract, path, element)
+            elif isinstance(element, Relation) and _is_building(element):
+                buildings.append(_outlined(element))
     except _LIBRARY_ERRORS as error:
         raise UsageError(f"{path} cannot be read ({error}): {_REMEDY}") from None
+
+    way_of = {way.id: way for way in extract.ways}
+    for building in buildings:
+        extract.ways.extend(_rings(building, way_of))
     return extract
 
 
@@ -93,3 +101,56 @@ def _add_way(extract: Extract, path: Path, way: ReadWay) -> None:
 
     tags = dict(way.tags)
     extract.ways.append(Way(way.id, nodes, tags))
+
+
+@dataclass
+class _Multipolygon:
+    """A relation whose outer rings are made of ways, in any order and direction."""
+
+    id: int
+    ways: list[int]
+    tags: Tags
+
+
+def _is_building(relation: Relation) -> bool:
+    tags = relation.tags
+    return tags.get("type") == "multipolygon" and "building" in tags
+
+
+def _outlined(relation: Relation) -> _Multipolygon:
+    members = [each for each in relation.members if each.type == "w" and each.role != "inner"]
+    return _Multipolygon(relation.id, [each.ref for each in members], dict(relation.tags))
+
+
+def _rings(outlined: _Multipolygon, way_of: dict[int, Way]) -> list[Way]:
+    """The outer rings of a multipolygon, none where it is not whole in the extract, or no more than
+    a way that is a building itself.
+    """
+    if not all(way in way_of for way in outlined.ways):
+        return []
+
+    members = [way_of[way] for way in outlined.ways]
+    lines = [way.nodes for way in members if len(way.nodes) > 1 and "building" not in way.tags]
+    rings = []
+    while lines:
+        ring = _joined(lines)
+        if ring[0] != ring[-1]:
+            return []
+        rings.append(Way(outlined.id, ring, outlined.tags))
+
+    return rings
+
+
+def _joined(lines: list[list[int]]) -> list[int]:
+    """The first of lines of nodes with those that continue it, which are taken from `lines`."""
+    joined = list(lines.pop(0))
+    while joined[0] != joined[-1]:
+        following = next((line for line in lines if joined[-1] in (line[0], line[-1])), None)
+        if following is None:
+            return joined
+
+        lines.remove(following)
+        onward = following if following[0] == joined[-1] else following[::-1]
+        joined.extend(onward[1:])
+
+    return joined

@@ -186,6 +186,7 @@ def _goal() -> Goal:
         map="map:1",
         x_m=12.5,
         y_m=-3.25,
+        after=goal_id("school"),
         reached_ns=1_000_000_000,
         doubts=2,
         **_USUAL,

@@ -13,6 +13,11 @@ def object_id(label: str) -> str:
     return f"object:{label}"
 
 
+def individual_label(look: str, number: int) -> str:
+    """The label of one of the objects that perception calls `look`, numbered from 1."""
+    return look if number == 1 else f"{look}~{number}"
+
+
 def goal_id(name: str) -> str:
     """The id of the goal that a person calls `name`."""
     return f"goal:{name}"

@@ -14,8 +14,9 @@ from schemas.nodes.ids import ROOT_MAP
 class PlanState(enum.StrEnum):
     """What a plan came to, or why a goal has no route.
 
-    READY: its route is to be driven. AT_GOAL: the agent is there already. NO_ROUTE: no links lead
-    to the goal. UNKNOWN_GOAL: the map has no object of that name. OUTSIDE: the goal is on no map.
+    READY: its route is to be driven. AT_GOAL: the last of its goals is reached. NO_ROUTE: no links
+    lead to the goal. UNKNOWN_GOAL: the map has no object of that name. OUTSIDE: the goal is on no
+    map.
     BLOCKED: the goal, or the agent, is at a place node without links. NO_GOAL: there is none, and
     nothing is left to explore.
     """
@@ -32,6 +33,7 @@ class PlanState(enum.StrEnum):
 class Goal(GraphNode, kw_only=True, frozen=True, tag="goal"):
     """A place to go to: the object `object`, by its label, or a position where that is empty.
 
+    It counts once the goal whose id is `after` is reached, at once where there is none of that id.
     `reached_ns` is the time of the view in which the agent was there, NEVER_NS before. `doubts`
     counts the routes to it that were tried over road that was blocked.
     """
@@ -40,6 +42,7 @@ class Goal(GraphNode, kw_only=True, frozen=True, tag="goal"):
     map: Name = ROOT_MAP
     x_m: Finite = 0.0
     y_m: Finite = 0.0
+    after: str = ""
     reached_ns: Stamp = NEVER_NS
     doubts: Count = 0
 

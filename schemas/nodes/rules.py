@@ -44,7 +44,7 @@ class KindRules:
 KINDS: dict[type[GraphNode], KindRules] = {
     Node: KindRules(offered=True),
     Self: KindRules(persistent=True, moves_with_path=True, droppable=False),
-    Percept: KindRules(),
+    Percept: KindRules(indexed=True),
     Object: KindRules(indexed=True, moves_with_path=True, offered=True),
     PathSegment: KindRules(persistent=True, indexed=True, moves_with_path=True),
     Observations: KindRules(persistent=True, indexed=True),

@@ -21,7 +21,9 @@ class Self(GraphNode, kw_only=True, frozen=True, tag="self"):
     `samples`: float64 (n, 3) or (n, 7), see SelfColumn. The pose is their mean. `kept_share` is the
     share of the samples that rejection kept. `misfit_count` is the number of views in a row in
     which nothing fitted, `first_misfit` the landmark that did not fit first, and `is_lost` whether
-    another did not fit since. `stationary_since_ns` is NEVER_NS while the agent moves.
+    another did not fit since. `not_elsewhere_ns` is the stamp at which what did not fit was found
+    to fit nowhere else on the map together either. `stationary_since_ns` is NEVER_NS while the
+    agent moves.
     """
 
     map: Name = ROOT_MAP
@@ -38,6 +40,7 @@ class Self(GraphNode, kw_only=True, frozen=True, tag="self"):
     is_lost: bool = False
     last_misfit_ns: Stamp = 0
     last_fit_ns: Stamp = 0
+    not_elsewhere_ns: Stamp = NEVER_NS
     stationary_since_ns: Stamp = NEVER_NS
     speed_gain: Finite = 0.0
     turn_gain: Finite = 0.0

@@ -14,30 +14,12 @@ from schemas.base import (
     Share,
 )
 
-Leg = tuple[
-    Annotated[
-        float, msgspec.Meta(gt=0, le=1e5, description="Length in metres, above 0, at most 100000.")
-    ],
-    Annotated[
-        float,
-        msgspec.Meta(
-            ge=-3.2, le=3.2, description="Turn at its end in radians, left positive, -3.2 to 3.2."
-        ),
-    ],
-]
-
-
 NEAREST_SCAN_M = 2.6
-"""The range scan has no range below 2.5 m: what it has there may be nearer. A robot that decides
-its own route keeps this clearance.
-"""
+"""The range scan has no range below 2.5 m: what it has there may be nearer."""
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Procedural memory, action selection and sensory-motor memory.
-
-    The route is given as a passer-by would describe it: lengths and turns.
-    """
+    """Procedural memory, action selection and sensory-motor memory."""
 
     mode: Annotated[
         Literal["lockstep", "real_time"],
@@ -46,22 +28,6 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             "real_time: it does not."
         ),
     ] = "real_time"
-    route: Annotated[
-        list[Leg],
-        msgspec.Meta(description="Legs (length in m, turn in rad), in order from the start."),
-    ] = []
-    overrun_m: Annotated[
-        float,
-        msgspec.Meta(
-            ge=0,
-            le=1e4,
-            description="Distance by which the route continues behind its end, in m, 0 to 10000.",
-        ),
-    ] = 5.0
-    corner_radius_m: Annotated[
-        PositiveMetres,
-        msgspec.Meta(description="Radius of the route's rounded corners, in m, above 0 to 10000."),
-    ] = 3.5
     cruise_m_s: Annotated[
         PositiveSpeed, msgspec.Meta(description="Speed on a free straight, in m/s, above 0 to 100.")
     ] = 4.0
@@ -87,7 +53,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         msgspec.Meta(
             description="Distance to an obstacle at which the robot stops, in m, above 0 to 10000."
         ),
-    ] = 1.5
+    ] = NEAREST_SCAN_M
     half_width_m: Annotated[
         PositiveMetres,
         msgspec.Meta(description="Half the width that must be free ahead, in m, above 0 to 10000."),

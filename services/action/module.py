@@ -22,6 +22,7 @@ from services.action.config import Config
 from services.action.escape import Escape
 from services.action.gate import LockstepGate
 from services.action.motor import SensoryMotorMemory, halted, obstacle_ahead_m
+from services.action.near import NearObstacles
 from services.action.route import Route
 from services.action.selection import HALT, ActionSelection
 from services.action.stuck import StuckDetector
@@ -32,18 +33,20 @@ POSE_PHASES = frozenset({Phase.LOCALIZATION, Phase.LATE})
 
 
 class Estimate(NamedTuple):
-    """A committed pose of the self node, the stamp of its view and its cycle."""
+    """A committed pose of the self node, the stamp of its view, its cycle, and the plan then."""
 
     stamp_ns: int
     cycle: int
     pose: Pose
+    plan: Plan | None
 
 
 class ActionModule:
     """Broadcasts choose the action; each new pose of the self node leads to a motor command.
 
-    In lockstep a command waits for what `LockstepGate` names. A pose that is published again, as
-    the simulator publishes a frame again that nobody answered, is answered at once.
+    It drives the route of the graph's plan, as it is when the pose is committed. In lockstep a
+    command waits for what `LockstepGate` names. A pose that is published again, as the simulator
+    publishes a frame again that nobody answered, is answered at once.
     """
 
     def __init__(self, config: Config, graph: Graph) -> None:
@@ -53,13 +56,13 @@ class ActionModule:
         self._selection = ActionSelection(config)
         self._stuck = StuckDetector(config.stuck_m_s, config.stuck_after_s)
         self._escape = Escape(config)
-        self._route: Route | None = None
-        self._motor = SensoryMotorMemory(config)
-        if config.route:
-            self._route = Route.of_legs(config.route, config.corner_radius_m, config.overrun_m)
+        self._near = NearObstacles(config.half_width_m)
+        self._motor = SensoryMotorMemory(config, self._near)
 
         self._graph = graph
         self._planned_ns = NEVER_NS
+        self._route: Route | None = None
+        self._without_route = SpeedLimit.NO_ROUTE
 
         self._chosen: Action | None = None
         self._is_resumed = False
@@ -67,17 +70,15 @@ class ActionModule:
         self._newest_ns = 0
         self._waiting: Estimate | None = None
         self._answered: MotorCommand | None = None
+        self._answered_cycle = 0
+        self._broadcasts: list[Broadcast] = []
 
     def restore(self, past: Iterable[Message]) -> None:
-        """Resume the action that was chosen last, and the route at the agent's place then."""
+        """Resume the action that was chosen last."""
         for message in past:
             if isinstance(message, Action):
                 self._chosen = message
                 self._is_resumed = True
-
-        if self._chosen is not None and self._route is not None:
-            travelled_m = float(self._chosen.parameters.get("travelled_m", 0.0))
-            self._route.resume(travelled_m)
 
     def chosen(self) -> Action:
         """The action that was chosen last. Raises MessageError where none was."""
@@ -98,15 +99,17 @@ class ActionModule:
 
         return self._remember(halted(last.stamp_ns, SpeedLimit.POSE_AGE, age_ns))
 
-    def on_motion(self, motion: SelfMotion) -> MotorCommand | None:
+    def on_motion(self, motion: SelfMotion) -> list[Message]:
         """Compare the motion with the commands before it."""
         self._stuck.on_motion(motion)
+        if motion.stamp_ns > self._gate.motion_ns:
+            self._near.on_motion(motion)
         self._gate.motion_ns = motion.stamp_ns
         self._newest_ns = max(self._newest_ns, motion.stamp_ns)
 
-        return self._command()
+        return self._replies()
 
-    def on_scan(self, scan: RangeScan) -> MotorCommand | None:
+    def on_scan(self, scan: RangeScan) -> list[Message]:
         """Measure how far it is free ahead.
 
         In lockstep a repeated scan is answered at once: by the command for the pose that waits, or
@@ -114,55 +117,94 @@ class ActionModule:
         """
         self._clear_m = obstacle_ahead_m(scan, self._config.half_width_m)
         is_repeated = scan.stamp_ns == self._gate.scan_ns
+        if not is_repeated:
+            self._near.on_scan(scan)
 
         self._gate.scan_ns = scan.stamp_ns
         self._newest_ns = max(self._newest_ns, scan.stamp_ns)
 
         if is_repeated and self._is_lockstep and self._has_no_pose:
-            return self._remember(halted(scan.stamp_ns, SpeedLimit.NO_POSE))
-        return self._command(at_once=is_repeated)
+            return [self._remember(halted(scan.stamp_ns, SpeedLimit.NO_POSE))]
+        return self._replies(at_once=is_repeated)
 
-    def on_delta(self, delta: Delta) -> MotorCommand | None:
+    def on_delta(self, delta: Delta) -> list[Message]:
         """Command the wheels for a new pose of the self node; repeat the command for a repeated
-        pose. A new plan is driven from then on.
+        pose.
         """
-        self.take_plan()
         pose = _self_pose(delta)
         if pose is None:
-            return None
+            return []
 
-        if self._is_lockstep and self._is_answered(delta):
-            return self._answered
+        if self._answered is not None and self._is_lockstep and self._is_answered(delta):
+            return [self._answered]
 
         is_repeated = self._waiting is not None and self._waiting.stamp_ns == delta.stamp_ns
-        self._waiting = Estimate(delta.stamp_ns, delta.cycle, pose)
+        plan = self._graph.get(Plan, PLAN_ID)
+        self._waiting = Estimate(delta.stamp_ns, delta.cycle, pose, plan)
         if self._is_resumed:
             self._gate.resume(delta.cycle)
             self._is_resumed = False
 
-        return self._command(at_once=is_repeated and delta.phase is Phase.LOCALIZATION)
+        return self._replies(at_once=is_repeated and delta.phase is Phase.LOCALIZATION)
 
-    def take_plan(self) -> None:
-        """Drive the route of the graph's plan from now on, where it is new and no legs are set."""
-        plan = self._graph.get(Plan, PLAN_ID)
-        if plan is None or plan.planned_ns == self._planned_ns or self._config.route:
+    def on_load(self) -> None:
+        """Take up the plan of a graph that was loaded as a whole."""
+        self._take(self._graph.get(Plan, PLAN_ID), self._graph.agent)
+
+    def _take(self, plan: Plan | None, agent: Pose | Self | None) -> None:
+        """Drive the route of a plan from where the agent is, where it is new. A route of one place
+        is at its end.
+        """
+        if plan is None or plan.planned_ns == self._planned_ns:
             return
 
+        is_at_goal = plan.state is PlanState.AT_GOAL
+        self._without_route = SpeedLimit.AT_GOAL if is_at_goal else SpeedLimit.NO_ROUTE
         self._planned_ns = plan.planned_ns
         self._route = None
-        if plan.state is PlanState.READY and plan.route is not None:
-            self._route = Route.of_plan(np.asarray(plan.route.numpy(), np.float64))
+        if plan.state is not PlanState.READY or plan.route is None:
+            return
 
-    def on_competition(self, competition: Competition) -> MotorCommand | None:
+        places_m = np.asarray(plan.route.numpy(), np.float64)
+        if len(places_m) > 1:
+            self._route = Route(places_m)
+        if self._route is not None and agent is not None:
+            self._route.join(agent.x_m, agent.y_m)
+
+    def on_competition(self, competition: Competition) -> list[Message]:
         """A cycle's competition has ended."""
         self._gate.on_competition(competition)
-        return self._command()
+        return self._replies()
 
     def on_broadcast(self, broadcast: Broadcast) -> list[Message]:
         """Choose an action by the content of consciousness."""
         self._gate.on_broadcast(broadcast.cycle)
-        answers = (self._select(broadcast), self._command())
-        return [message for message in answers if message is not None]
+        self._broadcasts.append(broadcast)
+        return self._replies()
+
+    def _replies(self, at_once: bool = False) -> list[Message]:
+        """The actions that are due, and the command for the newest pose."""
+        replies: list[Message] = [*self._actions()]
+        command = self._command(at_once)
+        if command is not None:
+            replies += [command, *self._actions()]
+        return replies
+
+    def _actions(self) -> list[Action]:
+        """What the broadcasts choose that are due."""
+        due = [each for each in self._broadcasts if self._is_due(each)]
+        self._broadcasts = [each for each in self._broadcasts if each not in due]
+
+        chosen = [self._select(each) for each in due]
+        return [action for action in chosen if action is not None]
+
+    def _is_due(self, broadcast: Broadcast) -> bool:
+        """Whether a broadcast chooses now: in lockstep after the command of its own cycle,
+        whichever comes first, and before that of the next.
+        """
+        if not self._is_lockstep or broadcast.cycle <= self._answered_cycle:
+            return True
+        return self._waiting is not None and broadcast.cycle < self._waiting.cycle
 
     def _select(self, broadcast: Broadcast) -> Action | None:
         has_ended = self._route is None or self._route.left_m <= 0.0
@@ -186,19 +228,7 @@ class ActionModule:
     def _parameters(self) -> dict[str, Scalar]:
         if self._route is None:
             return {}
-
-        if not self._config.route:
-            return {"travelled_m": self._route.travelled_m}
-
-        leg = self._route.leg
-        length_m, turn_rad = self._config.route[leg]
-
-        return {
-            "leg": leg,
-            "length_m": length_m,
-            "turn_rad": turn_rad,
-            "travelled_m": self._route.travelled_m,
-        }
+        return {"travelled_m": self._route.travelled_m}
 
     def _command(self, at_once: bool = False) -> MotorCommand | None:
         """The command for the newest pose, if there is one that waits for nothing any longer."""
@@ -211,6 +241,7 @@ class ActionModule:
             return None
 
         self._waiting = None
+        self._answered_cycle = estimate.cycle
 
         return self._remember(self._answer(estimate))
 
@@ -218,19 +249,15 @@ class ActionModule:
         stamp_ns = estimate.stamp_ns
         age_ns = self._age_ns(stamp_ns)
 
+        self._take(estimate.plan, estimate.pose)
         if self._route is None:
-            return halted(stamp_ns, SpeedLimit.NO_ROUTE, age_ns)
+            return halted(stamp_ns, self._without_route, age_ns)
 
         self._route.advance(estimate.pose.x_m, estimate.pose.y_m)
         if self._chosen is None or self._chosen.scheme == HALT:
             return halted(stamp_ns, SpeedLimit.NO_ACTION, age_ns)
 
-        if self._config.route and self._stuck.is_stuck:
-            return halted(stamp_ns, SpeedLimit.STUCK, age_ns)
-
         command = self._motor.command(stamp_ns, estimate.pose, self._route, self._clear_m, age_ns)
-        if self._config.route:
-            return command
         return self._escape.command(command, self._stuck.is_stuck)
 
     def _remember(self, command: MotorCommand) -> MotorCommand:
@@ -271,17 +298,17 @@ def build(config: Config, instance: str) -> Module:
     """The module `action`."""
     graph = Graph()
     action = ActionModule(config, graph)
-    commands = (topics.MOTOR_COMMAND,)
+    replies = (topics.ACTION, topics.MOTOR_COMMAND)
     module = (
         Module("action", instance)
-        .on(topics.SELF_MOTION, action.on_motion, emits=commands)
-        .on(topics.SCAN, action.on_scan, emits=commands)
-        .following(graph, action.on_delta, emits=commands, on_load=action.take_plan)
-        .on(topics.COMPETITION, action.on_competition, emits=commands)
-        .on(topics.BROADCAST, action.on_broadcast, emits=[topics.ACTION, *commands])
+        .on(topics.SELF_MOTION, action.on_motion, emits=replies)
+        .on(topics.SCAN, action.on_scan, emits=replies)
+        .following(graph, action.on_delta, emits=replies, on_load=action.on_load)
+        .on(topics.COMPETITION, action.on_competition, emits=replies)
+        .on(topics.BROADCAST, action.on_broadcast, emits=replies)
         .journaling(topics.ACTION, action.restore, action.chosen)
     )
     if config.mode == "real_time":
-        module.on(topics.CLOCK, action.on_clock, emits=commands)
+        module.on(topics.CLOCK, action.on_clock, emits=replies)
 
     return module

@@ -12,6 +12,7 @@ import numpy as np
 from cogmap.errors import MessageError
 from schemas.sensing import MotorCommand, Pose, RangeScan, SpeedLimit
 from services.action.config import Config
+from services.action.near import NearObstacles
 from services.action.route import Route
 
 MAX_BEARING_RAD = math.pi / 3
@@ -69,12 +70,13 @@ def halted(stamp_ns: int, reason: SpeedLimit, pose_age_ns: int = 0) -> MotorComm
 
 
 class SensoryMotorMemory:
-    """Follows the route's line by pure pursuit, slower in bends and with an old pose, and stops
-    before obstacles.
+    """Follows the route's line by pure pursuit, slower in bends and with an old pose, past what is
+    near, and stops before obstacles.
     """
 
-    def __init__(self, config: Config) -> None:
+    def __init__(self, config: Config, near: NearObstacles) -> None:
         self._config = config
+        self._near = near
 
     def command(
         self, stamp_ns: int, pose: Pose, route: Route, clear_m: float, pose_age_ns: int = 0
@@ -94,7 +96,11 @@ class SensoryMotorMemory:
         if is_blocked:
             return halted(stamp_ns, speed.limit, pose_age_ns)
 
-        curvature_per_m = 2 * math.sin(ahead.bearing_rad) / ahead.distance_m
+        wanted_per_m = 2 * math.sin(ahead.bearing_rad) / ahead.distance_m
+        curvature_per_m = self._near.clear_curvature(wanted_per_m)
+        if curvature_per_m is None:
+            return halted(stamp_ns, SpeedLimit.OBSTACLE, pose_age_ns)
+
         half_turn_m_s = speed.m_s * curvature_per_m * self._config.track_m / 2
         left_m_s = speed.m_s - half_turn_m_s
         right_m_s = speed.m_s + half_turn_m_s

@@ -145,7 +145,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             gt=0,
             le=100,
         ),
-    ] = 15.0
+    ] = 25.0
     range_sd_share: Annotated[
         Gain,
         Meta(

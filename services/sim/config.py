@@ -52,10 +52,6 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         bool,
         msgspec.Meta(description="Render by EGL where it works; otherwise by TinyRenderer."),
     ] = True
-    laps: Annotated[
-        float,
-        msgspec.Meta(gt=0, le=1000, description="Length of the route, in laps, above 0 to 1000."),
-    ] = 1.0
     noise: Annotated[Noise, msgspec.Meta(description="Noise of the wheels' odometry.")] = Noise()
     percepts: Annotated[
         PerceptErrors,
@@ -64,9 +60,8 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     town: Annotated[
         str,
         msgspec.Meta(
-            description="loop: a loop of streets with a route around it. blocks: several blocks, "
-            "with districts, and no route. osm:FILE: the streets and buildings of an "
-            "OpenStreetMap extract, and no route.",
+            description="loop: a loop of streets. blocks: several blocks, with districts. "
+            "osm:FILE: the streets and buildings of an OpenStreetMap extract.",
         ),
     ] = "loop"
     town_size_m: Annotated[
@@ -86,9 +81,15 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         msgspec.Meta(
             gt=0,
             le=1e6,
-            description="Simulated time of a drive without a route, in s, above 0 to 1e6.",
+            description="Simulated time of a drive at most, in s, above 0 to 1e6.",
         ),
     ] = 900.0
+    ends_at_goal: Annotated[
+        bool,
+        msgspec.Meta(
+            description="Whether the drive ends when the robot halts as every goal is reached."
+        ),
+    ] = False
     closures: Annotated[
         list[Closure], msgspec.Meta(description="Streets that are closed for some time.")
     ] = []

@@ -42,7 +42,7 @@ class SteppedSim(Protocol):
 
 class Lockstep:
     """Advances `simulation` by one frame for each command that answers the last one, until the
-    route is complete.
+    drive is over.
     """
 
     def __init__(self, simulation: SteppedSim, repeat_after_s: float) -> None:

@@ -9,13 +9,13 @@ import msgspec
 
 from schemas.base import Message
 from schemas.process import Clock
-from schemas.sensing import MotorCommand, Odometry, Pose, StereoFrame, TruePose, TrueTown
+from schemas.sensing import MotorCommand, Odometry, StereoFrame, TruePose, TrueTown
 from services.sim.config import Config
 from services.sim.layout import towns
 from services.sim.layout.closures import ClosedStreets
-from services.sim.layout.progress import Progress, elapsed
 from services.sim.layout.town import Town
 from services.sim.odometry import WheelOdometry
+from services.sim.progress import Progress
 from services.sim.rendering.camera import StereoCamera, calibration
 from services.sim.world import World
 
@@ -37,10 +37,7 @@ class Simulation:
         self.camera = StereoCamera(self.world, mount)
 
         self._odometry = WheelOdometry(config.noise, config.seed)
-        self._progress: Progress | None = None
-        if isinstance(place, Town):
-            self._progress = Progress(place.line(config.laps))
-
+        self._progress = Progress(config.duration_s, config.ends_at_goal)
         self._pose = self.world.pose()
         self._travelled_m = 0.0
         self._frames = 0
@@ -58,13 +55,13 @@ class Simulation:
         self._pose = self.world.pose()
         self._travelled_m = last.travelled_m
         self.world.collisions = last.collisions
-        if self._progress is not None:
-            self._progress.resume(last.progress)
+        self._progress.resume(last.progress)
         self.now_ns = last.stamp_ns
         self._frames = self.now_ns // self.tick_ns // self.ticks_per_frame
 
     def drive(self, command: MotorCommand) -> None:
         """Set the wheels' speeds."""
+        self._progress.on_command(command)
         self.world.robot.drive(command.left_wheel_rad_s, command.right_wheel_rad_s)
 
     def brake(self) -> None:
@@ -107,12 +104,11 @@ class Simulation:
 
     def truth(self) -> TruePose:
         """The robot's true pose."""
-        pose = self._pose
-        self.progress = self._completed(pose)
+        self.progress = self._progress.at(self.now_ns)
 
         return TruePose(
             stamp_ns=self.now_ns,
-            pose=pose,
+            pose=self._pose,
             travelled_m=self._travelled_m,
             progress=self.progress,
             collisions=self.world.collisions,
@@ -125,13 +121,6 @@ class Simulation:
 
         self.world.close_streets(self.closed_streets.names)
         return self.town()
-
-    def _completed(self, pose: Pose) -> float:
-        """The share of the route or, in a town without one, of the time."""
-        if self._progress is None:
-            return elapsed(self.now_ns, self.config.duration_s)
-
-        return self._progress.advance(pose.x_m, pose.y_m)
 
     def town(self) -> TrueTown:
         """The town as it is now."""

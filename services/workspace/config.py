@@ -6,9 +6,25 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from schemas.base import Unit
+from schemas.base import Finite, Name, Unit
 
 Milliseconds = Annotated[float, msgspec.Meta(gt=0, le=3.6e6)]
+
+
+class GivenGoal(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """A goal that the agent has from its start."""
+
+    name: Annotated[Name, msgspec.Meta(description="What it is called; no two have one name")]
+    object: Annotated[
+        str,
+        msgspec.Meta(description="Label of the object to go to; empty for a position"),
+    ] = ""
+    x_m: Annotated[
+        Finite, msgspec.Meta(description="Position ahead of where the agent starts, m")
+    ] = 0.0
+    y_m: Annotated[
+        Finite, msgspec.Meta(description="Position left of where the agent starts, m")
+    ] = 0.0
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -88,8 +104,8 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         msgspec.Meta(
             ge=1,
             le=1000,
-            description="In lockstep, cycles after which a background codelet's answer is"
-            " committed, whenever it comes",
+            description="In lockstep, cycles after which a background codelet's answer is "
+            "committed",
         ),
     ] = 3
     background_lease_ms: Annotated[
@@ -98,6 +114,24 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             description="In real time, how long a worker may take for a background task, ms"
         ),
     ] = 5000.0
+    goals: Annotated[
+        list[GivenGoal], msgspec.Meta(description="Goals that the agent is given")
+    ] = []
+    goals_after_s: Annotated[
+        float,
+        msgspec.Meta(
+            ge=0,
+            le=1e6,
+            description="Time from which on it has them, in s, 0 to 1e6; 0: from its start",
+        ),
+    ] = 0.0
+    in_order: Annotated[
+        bool,
+        msgspec.Meta(
+            description="Whether each of these goals counts once the one before is reached; false"
+            " where the agent decides their order"
+        ),
+    ] = False
     offering: Annotated[
         list[str],
         msgspec.Meta(

@@ -9,6 +9,7 @@ import msgspec
 
 from cogmap.errors import MessageError
 from cogmap.runtime.codelet import ConfiguredCodelet, CycleContext
+from schemas.array import Array
 from schemas.base import Message
 from schemas.codelets import Offer, Proposal
 from schemas.cognition import Coalitions
@@ -18,8 +19,14 @@ from schemas.sensing import Percepts, RangeScan, SelfMotion
 from services.workspace.commit import Ledger
 from services.workspace.config import Config
 from services.workspace.dispatch import Dispatch
-from services.workspace.entrance import first_operations, percept_operations, recognised
+from services.workspace.entrance import (
+    first_goals,
+    first_operations,
+    percept_operations,
+    recognised,
+)
 from services.workspace.forgetting import Forgetting
+from services.workspace.individuals import as_entered, individuals
 from services.workspace.lane import Lane
 from services.workspace.offers import Offers
 from services.workspace.senses import Scans, SelfMotions
@@ -128,7 +135,7 @@ class Workspace:
 
         for lane in self._lanes:
             if lane.dispatch.answer(proposal):
-                return self._end() if self._is_ending else []
+                return self._continue_if_complete([])
 
         if proposal.task_id not in self._late:
             return []
@@ -180,9 +187,14 @@ class Workspace:
         return self._config.mode == "lockstep"
 
     @property
-    def _is_ending(self) -> bool:
-        """Whether the last phase has ended, and the cycle has not."""
-        return self._phase == len(PHASES)
+    def _awaits_answers(self) -> bool:
+        """Whether the phase waits for answers: in lockstep for those of lanes too, so that these
+        read the graph as it was when their tasks began.
+        """
+        awaited = [self._dispatch]
+        if self._is_lockstep:
+            awaited += self._background()
+        return not all(dispatch.complete for dispatch in awaited)
 
     @property
     def _moved_until_ns(self) -> int:
@@ -223,7 +235,8 @@ class Workspace:
     def _continue_interrupted(self, percepts: Percepts) -> list[Message]:
         graph = self._ledger.graph
         self._waiting = None
-        self._context = self._sensed(percepts, graph.cycle)
+        motions = self._motions_until(percepts.stamp_ns)
+        self._context = self._sensed(as_entered(percepts, graph), motions, graph.cycle)
 
         self._phase = PHASES.index(graph.phase) if graph.phase in PHASES else -1
         return self._next_phase()
@@ -231,26 +244,31 @@ class Workspace:
     def _begin_cycle(self, percepts: Percepts) -> list[Message]:
         graph = self._ledger.graph
         self._waiting = None
+        before_ns = self._begun_ns
         self._begun_ns = percepts.stamp_ns
-        self._context = self._sensed(percepts, graph.cycle + 1)
+        motions = self._motions_until(percepts.stamp_ns)
+        entering_percepts = individuals(percepts, graph, motions)
+        self._context = self._sensed(entering_percepts, motions, graph.cycle + 1)
         self._phase = -1
 
         entering = first_operations(graph, self._config)
+        entering += first_goals(self._config, before_ns, self._begun_ns)
         entering += percept_operations(graph, self._context)
         entering += self._offers.take(self._ledger, self._context.cycle)
         return [self._commit(Phase.PERCEPTS, entering), *self._next_phase()]
 
-    def _sensed(self, percepts: Percepts, cycle: int) -> CycleContext:
-        """All that was sensed for the view of `percepts`: motion since the self node was moved
-        last, and the scan.
-        """
-        stamp_ns = percepts.stamp_ns
+    def _motions_until(self, stamp_ns: int) -> Array:
+        """The motions since the self node was moved last."""
+        return self._motions.rows(self._moved_until_ns, stamp_ns)
+
+    def _sensed(self, percepts: Percepts, motions: Array, cycle: int) -> CycleContext:
+        """All that was sensed for the view of `percepts`, of which the scan is taken now."""
         return CycleContext(
             cycle,
             percepts,
-            self._motions.rows(self._moved_until_ns, stamp_ns),
+            motions,
             self._ledger.graph.version,
-            self._scans.take(stamp_ns),
+            self._scans.take(percepts.stamp_ns),
         )
 
     def _commit(
@@ -268,7 +286,7 @@ class Workspace:
     def _next_phase(self) -> list[Message]:
         """Give out the next phase's tasks; after the last, end the cycle."""
         self._phase += 1
-        if self._context is None or self._is_ending:
+        if self._context is None or self._phase == len(PHASES):
             return self._end()
 
         phase = PHASES[self._phase]
@@ -286,24 +304,16 @@ class Workspace:
                 tasks += codelet.due(context, graph)
 
         published += self._dispatch.begin(tasks, self._now_ns)
-        if tasks:
-            return published
-        return [*published, *self._commit_answers(), *self._next_phase()]
+        return self._continue_if_complete(published)
 
     def _continue_if_complete(self, published: list[Message]) -> list[Message]:
         """`published`, and the next phase where no answer is waited for in this one."""
-        if self._context is None or not self._dispatch.complete:
+        if self._context is None or self._awaits_answers:
             return published
-
-        if self._is_ending:
-            return [*published, *self._end()]
         return [*published, *self._commit_answers(), *self._next_phase()]
 
     def _commit_answers(self) -> list[Message]:
         """Commit the answers of the current phase; unanswered tasks may be answered later."""
-        if self._is_ending:
-            return []
-
         self._reject_failed(self._dispatch.failed)
         answers, unanswered = self._dispatch.collect()
         self._late |= {task.task_id: None for task in unanswered}
@@ -349,12 +359,9 @@ class Workspace:
         return [delta, *proposal.events]
 
     def _end(self) -> list[Message]:
-        """Forget what has decayed and begin the next cycle, unless a lane holds this one up."""
-        self._phase = len(PHASES)
+        """Commit what lanes have answered, forget what has decayed, and begin the next cycle."""
         context = self._context
         if context is None:
-            return []
-        if any(lane.holds_up(context.cycle) for lane in self._lanes):
             return []
 
         published: list[Message] = []

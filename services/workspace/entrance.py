@@ -13,10 +13,12 @@ from schemas.nodes import (
     POSE_COLUMNS,
     ROOT_MAP,
     SELF_ID,
+    Goal,
     LinkKind,
     Map,
     Percept,
     Self,
+    goal_id,
     object_id,
     percept_id,
 )
@@ -25,7 +27,7 @@ from services.workspace.config import Config
 
 
 def first_operations(graph: Graph, config: Config) -> list[Operation]:
-    """The root map, the self node and the rates of decay, as far as the graph lacks them.
+    """The root map, the rates of decay and the self node, as far as the graph lacks them.
 
     The agent's first pose is the origin of its root map, for certain.
     """
@@ -47,6 +49,30 @@ def first_operations(graph: Graph, config: Config) -> list[Operation]:
         samples = Matrix.of(zeros)
         operations.append(Self(id=SELF_ID, activation=1.0, base_level=1.0, samples=samples))
     return operations
+
+
+def first_goals(config: Config, before_ns: int, now_ns: int) -> list[Goal]:
+    """The goals that the agent is given by its settings, in their order, where that is due between
+    the view of the cycle before and this one.
+    """
+    due_ns = round(config.goals_after_s * 1e9)
+    if not before_ns < due_ns <= now_ns:
+        return []
+
+    goals: list[Goal] = []
+    for given in config.goals:
+        is_next = config.in_order and bool(goals)
+        goal = Goal(
+            id=goal_id(given.name),
+            base_level=1.0,
+            object=given.object,
+            x_m=given.x_m,
+            y_m=given.y_m,
+            after=goals[-1].id if is_next else "",
+        )
+        goals.append(goal)
+
+    return goals
 
 
 def recognised(percepts: Percepts, threshold: float) -> Percepts:

@@ -13,8 +13,8 @@ from services.workspace.dispatch import Dispatch
 class Lane:
     """The lane of one background codelet.
 
-    In lockstep its answer is committed at the end of a cycle that is set beforehand, whenever it
-    comes, so that a run depends on its seed alone.
+    In lockstep its answer is committed at the end of a cycle that is set beforehand, so that a run
+    depends on its seed alone.
     """
 
     def __init__(self, codelet: ConfiguredCodelet, config: Config) -> None:
@@ -37,14 +37,6 @@ class Lane:
 
         self._due_cycle = context.cycle + self._cycles
         return self.dispatch.begin(tasks, now_ns)
-
-    def holds_up(self, cycle: int) -> bool:
-        """Whether `cycle` cannot end before the task is answered."""
-        if not self._is_lockstep or self.dispatch.is_idle:
-            return False
-
-        is_due = cycle >= self._due_cycle
-        return is_due and not self.dispatch.complete
 
     def collect(self, cycle: int) -> tuple[list[Proposal], list[str]]:
         """The answer, where it is to be committed at the end of `cycle`, and tasks that failed."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from cogmap.errors import ConfigError
 from cogmap.runtime.codelet import ConfiguredCodelet
 from cogmap.runtime.module import Module
 from schemas import topics
@@ -14,7 +15,10 @@ __all__ = ["Config", "Workspace", "build"]
 
 
 def build(config: Config, instance: str, codelets: Sequence[ConfiguredCodelet]) -> Module:
-    """The module `workspace`, the single writer of the graph, which calls `codelets`."""
+    """The module `workspace`, the single writer of the graph, which calls `codelets`. Raises
+    ConfigError where two goals have one name.
+    """
+    _check(config)
     workspace = Workspace(config, codelets)
 
     published = (
@@ -42,3 +46,12 @@ def build(config: Config, instance: str, codelets: Sequence[ConfiguredCodelet]) 
             backfill=[topics.SELF_MOTION, topics.OFFER],
         )
     )
+
+
+def _check(config: Config) -> None:
+    names = [goal.name for goal in config.goals]
+    for name in names:
+        if names.count(name) > 1:
+            raise ConfigError(
+                f"[workspace] goals: two are named {name!r}: give each a name of its own"
+            )

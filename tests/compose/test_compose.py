@@ -28,15 +28,15 @@ TIMEOUT_S = 90.0
 
 
 class Compose:
-    """One project of `docker compose` with a drive of so many laps, its router published at a port
+    """One project of `docker compose` with a drive of these options, its router published at a port
     of its own.
     """
 
-    def __init__(self, name: str, laps: str) -> None:
+    def __init__(self, name: str, drive: str) -> None:
         self.endpoint = free_endpoint()
         _, _, port = self.endpoint.rpartition(":")
         self._environment = os.environ | {
-            "COGMAP_LAPS": laps,
+            "COGMAP_DRIVE": drive,
             "COGMAP_PORT": port,
             "COMPOSE_PROJECT_NAME": f"cogmap-{name}-{os.getpid()}",
         }
@@ -90,7 +90,7 @@ def there_is_docker() -> bool:
 def image() -> None:
     """The image, built."""
     if there_is_docker():
-        Compose("build", laps="1")("build")
+        Compose("build", drive="")("build")
         return
     missing = "no Docker engine with compose v2"
     if os.environ.get("CI") == "true":
@@ -101,7 +101,7 @@ def image() -> None:
 @pytest.fixture(scope="module")
 def compose(image: None) -> Iterator[Compose]:
     """The running system with two workers, on a long drive."""
-    project = Compose("long", laps="30")
+    project = Compose("long", drive="--laps 30")
     try:
         project("up", "--detach", "--scale", "codelets=2")
         yield project
@@ -197,13 +197,12 @@ def test_when_recording_has_ended_the_doctor_misses_nobody(watch: Watch, compose
 
     findings = json.loads(compose.cogmap("sim", "doctor --json"))
 
-    about = {finding["about"] for finding in findings}
-    missed = about & {"recorder", "observer", *SERVICES}
+    missed = [finding["about"] for finding in findings if "no instance" in finding["wrong"]]
     assert not missed, findings
 
 
 def test_a_drive_ends_every_container_and_leaves_its_files(image: None, tmp_path: Path) -> None:
-    project = Compose("short", laps="0.1")
+    project = Compose("short", drive="--town blocks --explore 5")
     try:
         output = project("up", "--no-color", "--exit-code-from", "drive")
         project("cp", f"drive:{RUN}/.", str(tmp_path))

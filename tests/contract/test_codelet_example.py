@@ -32,7 +32,7 @@ SECTIONS: dict[str, dict[str, Any]] = {
         "awaits": {},
     },
     "workspace": {"mode": "lockstep"},
-    "action": {"mode": "lockstep", "route": [[20.0, 0.0]]},
+    "action": {"mode": "lockstep"},
 }
 CONFIG = """\
 [sim]

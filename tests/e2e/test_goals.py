@@ -50,20 +50,6 @@ def test_a_run_ends_when_the_agent_was_at_every_goal(
     assert 8.0 < summary["distance_m"] < 60.0
 
 
-@pytest.mark.parametrize("killed", [("action",), ("workspace",), ("codelets-1", "action")])
-def test_the_agent_reaches_its_goal_though_processes_are_killed(
-    killed: tuple[str, ...], start: Callable[..., Run], goals_file: Path
-) -> None:
-    goals_file.write_text("45 0\n", "utf-8")
-    repeats = ("--set", "sim.repeat_after_s=1")
-    run = start(*PERCEPTS, *repeats, "--goals", str(goals_file))
-    run.wait_for("its goals")
-    run.kill(*killed)
-
-    assert run.end() == 0, run.output()
-    assert "every goal" in run.summary()["reason"]
-
-
 def test_a_goal_given_to_a_running_system_is_planned(start: Callable[..., Run]) -> None:
     run = start(*PERCEPTS)
     run.wait_for(DRIVING)

@@ -53,7 +53,7 @@ def _check_that_all_is_the_same(
 def test_a_drive_publishes_on_every_topic_of_the_model_and_of_the_truth(first: Published) -> None:
     expected = {topic.name for topic in COMPARED if topic.delivery is not Delivery.ON_REQUEST}
     # No loop closes on so short a path, nobody offers anything, and no street is closed.
-    expected -= {topics.REPLAY.name, topics.ROUTE_REPLAY.name}
+    expected -= {topics.REPLAY.name}
     expected -= {topics.OFFER.name, topics.STREET_CLOSURE.name}
 
     assert set(first) == expected

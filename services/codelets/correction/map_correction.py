@@ -44,6 +44,7 @@ MIN_ROWS = 10
 IMPOSSIBLE_SD = 5.0
 MAX_ROUNDS = 3
 SAME_RAD = 0.05
+SHORT_SEGMENTS = 8
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
@@ -59,7 +60,7 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     if not fresh or len(late) < MIN_AGREEING:
         return []
 
-    if context.stamp_ns < _next_judgement_ns(closures, config):
+    if context.stamp_ns < _next_judgement_ns(closures, graph.count(PathSegment), config):
         return []
 
     task = context.task(CODELET.name, about=fresh)
@@ -114,13 +115,18 @@ def _late(closures: list[LoopClosure], now_ns: int, config: Config) -> list[Loop
     return [closure for closure in closures if closure.to_ns > since_ns]
 
 
-def _next_judgement_ns(closures: list[LoopClosure], config: Config) -> float:
-    """When closures may be judged again, by those judged so far; 0 where none was."""
+def _next_judgement_ns(closures: list[LoopClosure], segments: int, config: Config) -> float:
+    """When closures may be judged again, by those judged so far; 0 where none was.
+
+    Correcting a path of so many segments takes as long as it is, so it is done as much less often:
+    it takes the same share of a long drive as of a short one.
+    """
     judged_ns = [closure.to_ns for closure in closures if closure.accepted is not None]
     if not judged_ns:
         return 0.0
 
-    return max(judged_ns) + config.closure_spacing_s * 1e9
+    spacing_s = config.closure_spacing_s * max(1.0, segments / SHORT_SEGMENTS)
+    return max(judged_ns) + spacing_s * 1e9
 
 
 class _Judgement(NamedTuple):

@@ -15,6 +15,7 @@ from schemas.array import Matrix
 from schemas.codelets import Task
 from schemas.graph import Link, Phase
 from schemas.nodes import (
+    NEVER_NS,
     POSE_COLUMNS,
     SELF_ID,
     LinkKind,
@@ -27,8 +28,6 @@ from schemas.nodes import (
 from schemas.sensing import Percept
 from services.codelets.config import SECTION, Config
 from services.codelets.localization.measurement_model import (
-    has_bearing,
-    has_range,
     is_seen_from_here,
 )
 from services.codelets.localization.motion_model import with_gains
@@ -77,9 +76,9 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     seen now.
 
     A landmark that disagrees in `config.misses` views in a row, or in more than it ever agreed
-    with, stands elsewhere: it starts anew from what is seen. But while it is the agent that may be
-    elsewhere, or stands still and sees the same again, landmarks stay where they are; those that
-    were surveyed always do.
+    with, stands elsewhere: it starts anew from what is seen, once it is certain that the agent is
+    not elsewhere. While the agent stands still and sees the same again, landmarks stay where they
+    are; those that were surveyed always do.
     """
     (percept,) = task.percepts
     agent = graph.agent
@@ -104,7 +103,8 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         return object_answer(task, graph, landmark, after, record)
 
     misses = record.misses + 1
-    if misses < min(config.misses, record.sightings + 1):
+    is_patient = misses < min(config.misses, record.sightings + 1)
+    if is_patient or _may_be_elsewhere(agent, task.stamp_ns):
         record = Record(record.sightings, misses)
         return _kept_answer(task, graph, landmark, record)
 
@@ -157,13 +157,13 @@ def first_positions(
     """
     number = len(selves)
 
-    if has_bearing(percept):
+    if percept.has_bearing:
         seen_rad = rng.normal(percept.bearing_rad, percept.bearing_sd_rad, number)
         direction_rad = selves[:, SelfColumn.HEADING_RAD] + seen_rad
     else:
         direction_rad = rng.uniform(-np.pi, np.pi, number)
 
-    if has_range(percept):
+    if percept.has_range:
         seen_m = rng.normal(percept.range_m, percept.range_sd_m, number).clip(MIN_RANGE_M)
         distance_m = seen_m / (1 + selves[:, SelfColumn.RANGE_GAIN])
     else:
@@ -235,18 +235,27 @@ def _stays(agent: Self, landmark: Object) -> bool:
     return is_seen_from_here(landmark, agent.stationary_since_ns)
 
 
+def _may_be_elsewhere(agent: Self, stamp_ns: int) -> bool:
+    """Whether nothing in view confirms where the agent is, and that it is nowhere else was not
+    found before the view at `stamp_ns`.
+    """
+    if not agent.misfit_count:
+        return False
+    return not NEVER_NS < agent.not_elsewhere_ns < stamp_ns
+
+
 def _mahalanobis2(positions_m: Samples, selves: Samples, percept: Percept) -> Samples:
     """(n,): squared deviations of the percept from what each pair of landmark and self predicts."""
     offset_m = positions_m - selves[:, :2]
     mahalanobis2 = np.zeros(len(offset_m))
 
-    if has_bearing(percept):
+    if percept.has_bearing:
         direction_rad = np.arctan2(offset_m[:, 1], offset_m[:, 0])
         bearing_rad = direction_rad - selves[:, SelfColumn.HEADING_RAD]
         residual_rad = wrap_angle(bearing_rad - percept.bearing_rad)
         mahalanobis2 += (residual_rad / percept.bearing_sd_rad) ** 2
 
-    if has_range(percept):
+    if percept.has_range:
         distance_m = np.hypot(offset_m[:, 0], offset_m[:, 1])
         expected_m = distance_m * (1 + selves[:, SelfColumn.RANGE_GAIN])
         residual_m = expected_m - percept.range_m

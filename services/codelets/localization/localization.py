@@ -7,12 +7,14 @@ view, not with the map.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import msgspec
 import numpy as np
 
 from cogmap.errors import MessageError
+from cogmap.geometry.arrays import Booleans
 from cogmap.geometry.se2 import compose, mean_pose, relative
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
@@ -56,8 +58,10 @@ from services.codelets.mapping.path import odometry_of, variances_of
 
 INFLATION = 1.5
 MAX_INFLATIONS = 6
-ALONE = 3
 SEVERAL = 2
+MOST = 2 / 3
+SURE_M = 1.0
+PATIENCE = 2
 STAGES = 3
 # Headings a radian apart, and those whose mean direction is no longer than that of a spread of one.
 TURNED_RAD = 1.0
@@ -72,7 +76,8 @@ class Estimate:
 
     `first_misfit` names the landmark that did not fit first; `is_lost` states whether another did
     not fit since: then it is the agent that is elsewhere, not the landmark. `was_kidnapped` states
-    that it was found where it cannot have moved to.
+    that it was found where it cannot have moved to, `is_not_elsewhere` that it can be nowhere else
+    on the map: what it sees is new.
     """
 
     samples: Samples
@@ -81,6 +86,7 @@ class Estimate:
     first_misfit: str = ""
     is_lost: bool = False
     was_kidnapped: bool = False
+    is_not_elsewhere: bool = False
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
@@ -123,6 +129,9 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         since = variances - variances_when_placed(graph, seen)
         weights = novelty(moved, seen, since) / config.correlated_views
         found = _correct(found, seen, weights, config, rng)
+        if found.is_lost and found.misfit_count <= MAX_INFLATIONS:
+            limit_m = _path_sd_m(agent, variances)
+            found = _inflated(found, limit_m, rng)
 
     gains = found.samples[:, POSE_COLUMNS:].mean(axis=0)
     odometry = dead_reckon(odometry_of(agent), motions, gains)
@@ -208,7 +217,7 @@ def _correct(
     fitting_of = np.add.reduce(is_fitting, axis=0, dtype=np.uint8)
     fitting = int(fitting_of.max())
     if 2 * fitting < len(seen.labels) or not fitting:
-        return _misfit(past, seen, rng)
+        return _misfit(past, seen, config)
 
     samples = past.samples
     exponent_left = 1.0
@@ -243,21 +252,41 @@ def _is_heading_unknown(headings_rad: Samples) -> bool:
     return bool(mean_length < ALIKE)
 
 
-def _misfit(past: Estimate, seen: Sighting, rng: np.random.Generator) -> Estimate:
-    """Nothing fits: the pose is less certain than it seemed, the more the longer that lasts.
-
-    But one landmark that does not fit may stand elsewhere, or be another.
+def _misfit(past: Estimate, seen: Sighting, config: Config) -> Estimate:
+    """Nothing fits. Where several landmarks do not, the agent is elsewhere; one that does not for
+    long stands elsewhere, or is another.
     """
     count = past.misfit_count + 1
     first = past.first_misfit or seen.labels[0]
     has_other = any(label != first for label in seen.labels)
     is_lost = past.is_lost or has_other
+    is_landmark = not is_lost and count >= config.misfits_to_relocalize
+    return Estimate(past.samples, 0.0, count, first, is_lost, is_not_elsewhere=is_landmark)
 
-    samples = past.samples
-    if is_lost and count <= MAX_INFLATIONS:
-        samples = inflate(samples, INFLATION, rng)
 
-    return Estimate(samples, 0.0, count, first, is_lost)
+def _inflated(lost: Estimate, limit_m: float, rng: np.random.Generator) -> Estimate:
+    """The pose is less certain than it seemed, but no less than by path integration alone."""
+    if _sd_m(lost.samples) >= limit_m:
+        return lost
+
+    samples = inflate(lost.samples, INFLATION, rng)
+    return replace(lost, samples=samples)
+
+
+def _sd_m(samples: Samples) -> float:
+    """The standard deviation of the distance of samples from their mean position."""
+    _, offsets_m = centred(samples[:, :2])
+    variance_m2 = np.square(offsets_m).sum(axis=1).mean()
+    return math.sqrt(variance_m2)
+
+
+def _path_sd_m(agent: Self, variances: Samples) -> float:
+    """The standard deviation of where path integration alone would have the agent, by its
+    `variances` since the start, in m^2 and rad^2.
+    """
+    variance_m2, variance_rad2 = variances.tolist()
+    away_m2 = agent.odometry_x_m**2 + agent.odometry_y_m**2
+    return math.sqrt(variance_m2 + variance_rad2 * away_m2)
 
 
 def _all_seen(in_view: list[Percept], before: list[Percept]) -> list[Percept]:
@@ -281,29 +310,44 @@ def _relocalize(
     """Where several landmarks have not fitted for long, the agent is elsewhere: relocalize by all
     `percepts`.
 
-    That is as soon as this determines where it may be: two landmarks, or, later, one; and at once
-    where its position is less certain than one look at a landmark makes it.
+    That is where most of them fit one pose, together; else, after a while, it is nowhere else. It
+    is at once where its position is less certain than one look at a landmark makes it.
     """
     seen = sightings(percepts, graph, config.largest_landmark_sd_m, NEVER_NS)
     if seen is None:
         return lost
 
-    _, offsets_m = centred(lost.samples[:, :2])
-    variance_m2 = float(np.square(offsets_m).sum(axis=1).mean())
     nearest_m = float(seen.range_m.min())
-    is_unsure = variance_m2 > nearest_m**2
-
-    if is_unsure:
-        enough = SEVERAL
-    elif len(seen.labels) > 1:
-        enough = config.misfits_to_relocalize
-    else:
-        enough = ALONE * config.misfits_to_relocalize
+    is_unsure = _sd_m(lost.samples) > nearest_m
+    enough = SEVERAL if is_unsure else config.misfits_to_relocalize
     if lost.misfit_count < enough:
         return lost
 
     samples = relocalize(lost.samples, seen, config, rng)
-    return Estimate(samples, 0.0, was_kidnapped=not is_unsure)
+    is_fitting = compare(samples, seen).squared < config.gate**2
+    fitting = is_fitting[:, is_fitting.sum(axis=0).argmax()]
+    if _is_convincing(fitting, seen, is_unsure):
+        return Estimate(samples, 0.0, was_kidnapped=not is_unsure)
+
+    if lost.misfit_count >= PATIENCE * enough:
+        return Estimate(lost.samples, 0.0, is_not_elsewhere=True)
+    return lost
+
+
+def _is_convincing(is_fitting: Booleans, seen: Sighting, is_unsure: bool) -> bool:
+    """Whether the agent believes that it is where those of the landmarks (k,) fit.
+
+    That is most of them; and, where it was sure to be elsewhere, SEVERAL at least, of which one
+    whose own place is not sure counts for half: two of those fit somewhere nearly always.
+    """
+    if is_fitting.mean() < MOST:
+        return False
+    if is_unsure:
+        return True
+
+    variance_m2 = np.trace(seen.covariance_m2, axis1=1, axis2=2) / 2
+    weights = np.where(variance_m2 <= SURE_M**2, 1.0, 0.5)
+    return bool(weights[is_fitting].sum() >= SEVERAL)
 
 
 def _self_node(task: Task, agent: Self, found: Estimate) -> Self:
@@ -333,6 +377,7 @@ def _self_node(task: Task, agent: Self, found: Estimate) -> Self:
         is_lost=found.is_lost,
         last_misfit_ns=task.stamp_ns if is_misfit else agent.last_misfit_ns,
         last_fit_ns=agent.last_fit_ns if found.misfit_count else task.stamp_ns,
+        not_elsewhere_ns=task.stamp_ns if found.is_not_elsewhere else agent.not_elsewhere_ns,
         speed_gain=float(mean[SelfColumn.SPEED_GAIN]),
         turn_gain=float(mean[SelfColumn.TURN_GAIN]),
         range_gain=float(mean[SelfColumn.RANGE_GAIN]),

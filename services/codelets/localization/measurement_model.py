@@ -49,16 +49,6 @@ class Sighting(NamedTuple):
         return self.range_sd_m < self.range_m
 
 
-def has_bearing(percept: Percept) -> bool:
-    """Whether the bearing of a percept is known."""
-    return percept.bearing_sd_rad < np.pi
-
-
-def has_range(percept: Percept) -> bool:
-    """Whether the range of a percept is known."""
-    return percept.range_sd_m < percept.range_m
-
-
 class Comparison(NamedTuple):
     """How well n samples of the self explain k landmarks in view, (k, n) each, single precision.
 
@@ -172,7 +162,7 @@ def sightings(
 
 def _is_sharp(landmark: Landmark, percept: Percept, largest_sd_m: float) -> bool:
     limit_m = largest_sd_m
-    if has_range(percept):
+    if percept.has_range:
         limit_m = min(limit_m, MAX_SD_SHARE * percept.range_m)
     variance_m2 = float(landmark.covariance_m2[0, 0] + landmark.covariance_m2[1, 1])
     return variance_m2 <= 2 * limit_m**2

@@ -31,7 +31,6 @@ from schemas.sensing import Percept, PlaceMatch
 from services.codelets.config import SECTION, Config
 from services.codelets.correction.pairwise_consistency import MIN_AGREEING
 from services.codelets.correction.pose_graph import matvec
-from services.codelets.localization.measurement_model import has_bearing, has_range
 from services.codelets.mapping.observations import Sightings
 from services.codelets.mapping.path import ODOMETRY, STAMP, path_grows, rows_of
 from services.codelets.nodes import nodes_of
@@ -184,7 +183,7 @@ def _closure_by_landmark(
     The pass before ended where `newest` began this one, or the landmark was last seen.
     """
     landmark = graph.get(Object, object_id(percept.label))
-    if landmark is None or not (has_bearing(percept) and has_range(percept)):
+    if landmark is None or not (percept.has_bearing and percept.has_range):
         return None
 
     long_ago_ns = _long_ago_ns(task.stamp_ns, config)

@@ -33,7 +33,6 @@ from schemas.nodes import (
 from schemas.sensing import Percept
 from services.codelets.config import SECTION, Config
 from services.codelets.correction.pose_graph import Constraints, diagonal_information
-from services.codelets.localization.measurement_model import has_bearing, has_range
 from services.codelets.mapping.observations import Viewpoint, extended, is_observed_from
 from services.codelets.nodes import nodes_of
 
@@ -285,7 +284,7 @@ def _not_observed(percepts: list[Percept], last: PathSegment, graph: Graph) -> l
 def _observe(percept: Percept, viewpoint: Viewpoint, graph: Graph) -> list[Operation]:
     """The observations of a landmark with one more, where range and bearing are known."""
     before = _observations(graph, viewpoint.number, percept.label)
-    if not (has_range(percept) and has_bearing(percept)):
+    if not (percept.has_range and percept.has_bearing):
         return []
     if is_observed_from(before, viewpoint.stamp_s):
         return []

@@ -13,6 +13,8 @@ from services.codelets.mapping.local_grid import LocalGrid
 
 STEP = 0.5
 MIN_WIDTH_M = 0.3
+# Farther away a ray that grazes a wall may seem to pass through it.
+CLEAR_M = 15.0
 MAX_GAP_M = 1.0
 MAX_GAP_SHARE = 0.05
 # So many points of the road, so far behind what a ray hits, show that nothing stands there.
@@ -63,7 +65,7 @@ def rays_of(scan: Array | None, road_m: Floats, grid: LocalGrid) -> Rays:
         directions=rotate(ahead, grid.pose[2]),
         length=range_m / grid.cell_m,
         is_hit=has_seen & (range_m <= grid.reach_m),
-        clear=clear_m.clip(0.0, grid.reach_m) / grid.cell_m,
+        clear=clear_m.clip(0.0, min(grid.reach_m, CLEAR_M)) / grid.cell_m,
         angle_rad=_angle_between(rays[:, 0]),
     )
 

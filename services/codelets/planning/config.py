@@ -7,7 +7,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from schemas.base import PositiveMetres, PositiveShare, Share
+from schemas.base import PositiveMetres, PositiveSeconds, PositiveShare, Share
 
 Cells = Annotated[int, Meta(ge=1, le=10_000)]
 
@@ -19,7 +19,8 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         Cells, Meta(description="Cycles between two plans of an unchanged goal, 1 to 10000.")
     ] = 5
     explore: Annotated[
-        bool, Meta(description="Whether the agent explores while it has no goal with a route.")
+        bool,
+        Meta(description="Whether the agent explores while it has no goal, or none with a route."),
     ] = False
     reached_m: Annotated[
         PositiveMetres,
@@ -85,6 +86,13 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             "again, in m, above 0 to 10000."
         ),
     ] = 6.0
+    doubt_after_s: Annotated[
+        PositiveSeconds,
+        Meta(
+            description="Time after which road that was seen to be blocked may be free again, in "
+            "s, above 0 to 3600."
+        ),
+    ] = 600.0
     max_doubts: Annotated[
         Cells,
         Meta(
@@ -94,6 +102,10 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     margin_cells: Annotated[
         Cells, Meta(description="Unknown places around the map that are planned over, 1 to 10000.")
     ] = 8
+    beyond_cells: Annotated[
+        Cells,
+        Meta(description="Places outside the map as far as which goals are planned, 1 to 10000."),
+    ] = 100
     keep_route: Annotated[
         float,
         Meta(

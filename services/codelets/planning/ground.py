@@ -8,15 +8,16 @@ more.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from scipy import ndimage
 
-from cogmap.geometry.arrays import Booleans, Floats, Singles
+from cogmap.geometry.arrays import Booleans, Floats, Indices, Singles
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import CUT_BELOW, LINK_OFFSETS, ROAD_FROM, WEIGHT_COLUMNS, Extent
-from schemas.nodes import PathColumn, PathSegment, PlaceColumn, Self
+from schemas.nodes import Goal, PathColumn, PathSegment, PlaceColumn, Self
 from services.codelets.planning.config import Config
 from services.codelets.planning.network import PlaceNetwork
 
@@ -25,6 +26,8 @@ OBSTACLE_FROM = 0.5
 BESIDE_CUT = 0.5
 BLIND_STEP_M = 0.5
 LEFT_START_M = 3.0
+# Where the agent drove so lately it can drive back.
+CAME_S = 60.0
 POSITION = slice(PathColumn.X_M, PathColumn.Y_M + 1)
 SQUARE = np.ones((3, 3), bool)
 
@@ -37,7 +40,8 @@ class Ground(NamedTuple):
     `is_free` (w, h): the robot fits there. `is_known` (w, h): seen as road, or driven over.
     `is_visited` (w, h): beside the path, seen from as near as can be. `network` has links between
     free places, lighter where unknown; `known` has those between known places only. `doubted` has
-    those of `network`, and the lightest where road out of sight is blocked: it may be free again.
+    those of `network`, and the lightest where road is blocked that was not seen from near lately:
+    it may be free again; so is the way by which the agent has come just now.
     """
 
     is_free: Booleans
@@ -48,19 +52,23 @@ class Ground(NamedTuple):
     doubted: PlaceNetwork
 
 
-def ground(graph: Graph, agent: Self, config: Config) -> Ground:
-    """The ground of the agent's map and some unknown places around it.
+def ground(graph: Graph, agent: Self, config: Config, goals: Sequence[Goal] = ()) -> Ground:
+    """The ground of the agent's map and some unknown places around it, as far as to those of
+    `goals` that are positions not too far outside.
 
     The path that the agent took counts as known, and so does the ground ahead that is too near for
     its camera.
     """
     map_id = agent.map
-    extent = _with_margin(graph.places.extent(map_id), config.margin_cells)
+    extent = graph.places.extent(map_id)
+    extent = _with_goals(extent, goals, graph.cell_m(map_id), config.beyond_cells)
+    extent = _with_margin(extent, config.margin_cells)
     window = graph.places.window(map_id, COLUMNS, extent)
     weights = window.weights()
 
     here = Here(window.origin, window.shape, graph.cell_m(map_id))
-    path_m = _path_m(graph)
+    path = _path(graph)
+    path_m = path[:, POSITION]
     driven_m = np.vstack([path_m, _blind_m(agent, config)])
     is_seen = window.column(PlaceColumn.ROAD) >= ROAD_FROM
     is_known = is_seen | here.is_within(config.driven_m, driven_m)
@@ -70,8 +78,11 @@ def ground(graph: Graph, agent: Self, config: Config) -> Ground:
     share = _shares(is_edge)
     optimistic = np.where(is_known, share, share * config.unknown_weight)
 
-    agent_m = np.array([[agent.x_m, agent.y_m]])
-    is_in_doubt = is_known & is_edge & ~here.is_within(config.doubt_from_m, agent_m)
+    lately_m = _lately_m(path, agent, config.doubt_after_s)
+    just_now_m = _lately_m(path, agent, CAME_S)
+    is_seen_lately = here.is_within(config.doubt_from_m, lately_m)
+    is_seen_lately[here.around(just_now_m)] = False
+    is_in_doubt = is_known & is_edge & ~is_seen_lately
     in_doubt = np.where(is_in_doubt, config.doubt_weight, optimistic)
     reopened = _reopened(weights, is_known)
 
@@ -104,6 +115,15 @@ class Here(NamedTuple):
         """Its place network, with links of (4, w, h) weights."""
         return PlaceNetwork(self.origin, self.cell_m, weights)
 
+    def around(self, positions_m: Floats) -> tuple[Indices, Indices]:
+        """The cells of (n, 2) positions and those beside them, as far as they are inside."""
+        steps = np.argwhere(SQUARE) - 1
+        here = np.rint(positions_m / self.cell_m).astype(np.int64) - np.array(self.origin)
+        cells = np.unique((here[:, None] + steps).reshape(-1, 2), axis=0)
+        is_inside = ((cells >= 0) & (cells < self.shape)).all(axis=1)
+        i, j = cells[is_inside].T
+        return i, j
+
     def is_within(self, within_m: float, positions_m: Floats) -> Booleans:
         """(w, h): the cells within a distance of any of (n, 2) positions."""
         cells = np.rint(positions_m / self.cell_m).astype(np.int64) - np.array(self.origin)
@@ -125,15 +145,22 @@ def _blind_m(agent: Self, config: Config) -> Floats:
     return positions_m
 
 
-def _path_m(graph: Graph) -> Floats:
-    """(n, 2): the places of the path, the oldest first."""
+def _path(graph: Graph) -> Floats:
+    """(n, k): the rows of the path, the oldest first."""
     segments = sorted(graph.of_kind(PathSegment), key=lambda segment: segment.number)
-    positions = [np.zeros((0, 2))]
+    rows = [np.zeros((0, len(PathColumn)))]
     for segment in segments:
-        rows = np.asarray(segment.rows.numpy(), np.float64)
-        positions.append(rows[:, POSITION])
+        rows.append(np.asarray(segment.rows.numpy(), np.float64))
 
-    return np.vstack(positions)
+    return np.vstack(rows)
+
+
+def _lately_m(path: Floats, agent: Self, ago_s: float) -> Floats:
+    """(n, 2): where the agent was since so many seconds ago, and is."""
+    since_s = agent.stamp_ns * 1e-9 - ago_s
+    is_late = path[:, PathColumn.STAMP_S] >= since_s
+    here_m = np.array([[agent.x_m, agent.y_m]])
+    return np.vstack([path[is_late, POSITION], here_m])
 
 
 def _since_start_m(path_m: Floats) -> Floats:
@@ -144,6 +171,21 @@ def _since_start_m(path_m: Floats) -> Floats:
     has_left = from_start_m > LEFT_START_M
     since_m: Floats = path_m[has_left.cumsum() > 0]
     return since_m
+
+
+def _with_goals(extent: Extent, goals: Sequence[Goal], cell_m: float, beyond: int) -> Extent:
+    """The smallest rectangle with `extent` and the goals that are positions at most so many cells
+    outside.
+    """
+    lower = np.array(extent.lower)
+    upper = np.array(extent.upper)
+    positions_m = [(goal.x_m, goal.y_m) for goal in goals if not goal.object]
+    cells = np.rint(np.array(positions_m).reshape(-1, 2) / cell_m).astype(np.int64)
+    is_near = ((cells >= lower - beyond) & (cells < upper + beyond)).all(axis=1)
+
+    first_i, first_j = np.vstack([lower, cells[is_near]]).min(axis=0).tolist()
+    last_i, last_j = np.vstack([upper, cells[is_near] + 1]).max(axis=0).tolist()
+    return Extent((first_i, first_j), (last_i, last_j))
 
 
 def _with_margin(extent: Extent, cells: int) -> Extent:

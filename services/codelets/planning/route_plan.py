@@ -19,7 +19,6 @@ from schemas.codelets import Task
 from schemas.cognition import Direction, RouteReplay
 from schemas.graph import DropLink, Link, Operation, Phase
 from schemas.nodes import (
-    NEVER_NS,
     PLAN_ID,
     SELF_ID,
     Goal,
@@ -45,7 +44,15 @@ from services.codelets.planning.routes import (
     route_to,
     visits,
 )
-from services.codelets.planning.targets import Cell, Target, nearest_free, target_of
+from services.codelets.planning.targets import (
+    Cell,
+    Target,
+    has_arrived,
+    nearest_free,
+    open_goals,
+    pending_goals,
+    target_of,
+)
 
 START_M = 6.0
 SECTION = "planning"
@@ -68,24 +75,21 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     if agent is None:
         raise MessageError(f"task {task.task_id}: the graph has no self node")
 
-    where = ground(graph, agent, config)
+    where = ground(graph, agent, config, [*pending_goals(graph).values()])
     now = Situation(task, agent, where, graph.get(Plan, PLAN_ID), config)
     targets = [target_of(goal, graph, where, config) for goal in open_goals(graph)]
-    reached = [target for target in targets if _is_at(target, now)]
-    left = [target for target in targets if target not in reached]
+    reached = [target.goal for target in targets if _is_at(target, now)]
+    at = {goal.id for goal in reached}
+    left = [target_of(goal, graph, where, config) for goal in open_goals(graph, at)]
 
     answer = Answer()
     answer.operations.extend(_links_to_places(left, agent.map, graph))
-    for target in reached:
-        goal = msgspec.structs.replace(target.goal, reached_ns=task.stamp_ns)
-        answer.operations.append(goal)
+    for goal in reached:
+        answer.operations.append(msgspec.structs.replace(goal, reached_ns=task.stamp_ns))
         if now.before is not None and goal.id == _next_goal(now.before):
             answer.events.append(_replay(now.before, Direction.REVERSE, now))
 
-    plan = _plan(left, now)
-    if reached and plan.state is PlanState.NO_GOAL:
-        plan = msgspec.structs.replace(plan, state=PlanState.AT_GOAL)
-
+    plan = _routeless(PlanState.AT_GOAL, now) if has_arrived(graph, at) else _plan(left, now)
     if not _serves(plan, now):
         answer.operations.extend(_written(plan, now.before))
         answer.operations.extend(_doubted(plan, now.before, left))
@@ -123,16 +127,12 @@ CODELET = Codelet(
 )
 
 
-def open_goals(graph: Graph) -> list[Goal]:
-    """The goals that were not reached yet, by id."""
-    return [goal for goal in graph.of_kind(Goal) if goal.reached_ns == NEVER_NS]
-
-
 def _is_done(graph: Graph, config: Config) -> bool:
     """Whether there is nothing to plan for, and no plan that states otherwise."""
     plan = graph.get(Plan, PLAN_ID)
     has_ended = plan is None or plan.state in {PlanState.NO_GOAL, PlanState.AT_GOAL}
-    return has_ended and not config.explore and not open_goals(graph)
+    explores = config.explore and not has_arrived(graph)
+    return has_ended and not explores and not open_goals(graph)
 
 
 def _is_urgent(graph: Graph, agent: Self, config: Config) -> bool:
@@ -186,13 +186,7 @@ def _links_to_places(targets: list[Target], map_id: str, graph: Graph) -> list[O
 
 def _plan(targets: list[Target], now: Situation) -> Plan:
     """A plan for the goals that are left; to explore, where none has a route and that is wanted."""
-    plan = Plan(
-        id=PLAN_ID,
-        base_level=1.0,
-        map=now.agent.map,
-        state=PlanState.NO_GOAL,
-        planned_ns=now.task.stamp_ns,
-    )
+    plan = _routeless(PlanState.NO_GOAL, now)
     start = now.start
     if start is None:
         unreachable = {target.goal.id: PlanState.BLOCKED for target in targets}
@@ -209,6 +203,17 @@ def _plan(targets: list[Target], now: Situation) -> Plan:
         state = next(iter(unreachable.values()))
         plan = msgspec.structs.replace(plan, state=state)
     return plan
+
+
+def _routeless(state: PlanState, now: Situation) -> Plan:
+    """A plan without a route, in this state."""
+    return Plan(
+        id=PLAN_ID,
+        base_level=1.0,
+        map=now.agent.map,
+        state=state,
+        planned_ns=now.task.stamp_ns,
+    )
 
 
 def _reachable(

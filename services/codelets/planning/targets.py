@@ -1,15 +1,16 @@
-"""Where the agent must be for a goal to be reached."""
+"""The goals that count now, and where the agent must be for a goal to be reached."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from typing import NamedTuple
 
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans
 from cogmap.graph.graph import Graph
-from schemas.nodes import Goal, Object, PlanState, object_id
+from schemas.nodes import NEVER_NS, Goal, Object, PlanState, object_id
 from services.codelets.planning.config import Config
 from services.codelets.planning.ground import Ground
 
@@ -22,6 +23,26 @@ class Target(NamedTuple):
     goal: Goal
     cell: Cell | None
     state: PlanState = PlanState.READY
+
+
+def open_goals(graph: Graph, at: Collection[str] = ()) -> list[Goal]:
+    """The goals that were not reached yet, and wait for none that was not, by id; the agent is `at`
+    goals of these ids now.
+    """
+    pending = pending_goals(graph, at)
+    return [goal for goal in pending.values() if goal.after not in pending]
+
+
+def pending_goals(graph: Graph, at: Collection[str] = ()) -> dict[str, Goal]:
+    """The goals that were not reached yet, by id."""
+    goals = [goal for goal in graph.of_kind(Goal) if goal.id not in at]
+    return {goal.id: goal for goal in goals if goal.reached_ns == NEVER_NS}
+
+
+def has_arrived(graph: Graph, at: Collection[str] = ()) -> bool:
+    """Whether there are goals, and all are reached."""
+    has_goals = any(True for _ in graph.of_kind(Goal))
+    return has_goals and not pending_goals(graph, at)
 
 
 def target_of(goal: Goal, graph: Graph, ground: Ground, config: Config) -> Target:

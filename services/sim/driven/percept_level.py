@@ -30,8 +30,8 @@ from services.sim.driven.sensors import Sensors
 from services.sim.driven.surroundings import Surroundings
 from services.sim.layout import towns
 from services.sim.layout.closures import ClosedStreets
-from services.sim.layout.progress import elapsed
 from services.sim.odometry import Noise, WheelOdometry
+from services.sim.progress import Progress
 from services.sim.rendering.camera import calibration
 from services.sim.scripted.places import PlaceSim
 
@@ -41,8 +41,7 @@ Row = tuple[float, float, float, float, float]
 class DrivenPerceptLevelSim:
     """Obeys motor commands, and publishes what sensory memory and EPAM would publish.
 
-    Simulated time starts at 0 and advances by `tick_ns` with every step. `progress` is the share of
-    `duration_s` that has passed.
+    Simulated time starts at 0 and advances by `tick_ns` with every step.
     """
 
     def __init__(self, config: Config) -> None:
@@ -62,7 +61,7 @@ class DrivenPerceptLevelSim:
         self._odometry = WheelOdometry(config.noise, config.seed)
         self._noise = config.noise
 
-        self._duration_s = config.duration_s
+        self._progress = Progress(config.duration_s, config.ends_at_goal)
         self._motions: list[Row] = []
         self._frames = 0
 
@@ -76,11 +75,13 @@ class DrivenPerceptLevelSim:
             return
 
         self._robot.resume(last)
+        self._progress.resume(last.progress)
         self.now_ns = last.stamp_ns
         self._frames = self.now_ns // self.tick_ns // self.ticks_per_frame
 
     def drive(self, command: MotorCommand) -> None:
         """Set the wheels' speeds."""
+        self._progress.on_command(command)
         self._robot.drive(command)
 
     def step(self) -> list[Message]:
@@ -133,7 +134,7 @@ class DrivenPerceptLevelSim:
 
     def truth(self) -> TruePose:
         """The robot's true pose."""
-        self.progress = elapsed(self.now_ns, self._duration_s)
+        self.progress = self._progress.at(self.now_ns)
 
         return TruePose(
             stamp_ns=self.now_ns,

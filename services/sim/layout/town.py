@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from cogmap.geometry.se2 import transform_to
 from schemas.sensing import Pose
 from services.sim.layout.catalogue import CATALOGUE, BuildingType
 from services.sim.layout.furniture import furnish
@@ -28,14 +29,12 @@ STREET_GAP_M = 0.2
 BUILDING_GAP_M = 1.0
 _REACH_M = STREET_WIDTH_M / 2 + PAVEMENT_WIDTH_M
 
-Leg = tuple[float, float]
-
 
 @dataclass(frozen=True)
 class Town(Place):
     """Streets on a rectangular loop with stubs, and what stands along them.
 
-    The route leads from `start` to the `corners` in order, again and again.
+    A lap leads from `start` past the `corners` in order.
     """
 
     corners: tuple[Point, Point, Point, Point]
@@ -48,23 +47,16 @@ class Town(Place):
 
         return sum(lengths_m)
 
-    def route(self, laps: float = 1.0) -> list[Leg]:
-        """The legs (length_m, turn_rad at its end, left positive) of `laps` laps from the start;
-        the last turn is 0.
+    def goals(self, laps: float = 1.0) -> list[Point]:
+        """The corners that are passed in `laps` laps, and the place where they end, in order, in
+        the frame of the start.
         """
-        roads = [Road("", a, b) for a, b in pairwise(self.line(laps))]
-        lengths_m = [road.length_m for road in roads]
-
-        turns_rad = []
-        for before, after in pairwise(roads):
-            turn_rad = after.heading_rad - before.heading_rad
-            turns_rad.append(math.remainder(turn_rad, math.tau))
-
-        turns_rad.append(0.0)
-        return list(zip(lengths_m, turns_rad, strict=True))
+        points = np.array(self.line(laps)[1:])
+        start = np.array([self.start.x_m, self.start.y_m, self.start.heading_rad])
+        return [(x_m, y_m) for x_m, y_m in transform_to(start, points).tolist()]
 
     def line(self, laps: float = 1.0) -> list[Point]:
-        """The points between the route's legs: the start, the corners passed, the end."""
+        """The start, the corners passed, the end."""
         here = (self.start.x_m, self.start.y_m)
         points: list[Point] = [here]
         left_m = laps * self.lap_m

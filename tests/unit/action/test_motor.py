@@ -13,9 +13,9 @@ from schemas.array import Array
 from schemas.sensing import MotorCommand, Pose, RangeScan, SpeedLimit
 from services.action.config import Config
 from services.action.motor import SensoryMotorMemory, obstacle_ahead_m
-from services.action.route import Route
-
-QUARTER = math.pi / 2
+from services.action.near import NearObstacles
+from services.action.route import SMOOTHED_M, Route
+from tests.support.world.plans import Point, places_m
 
 
 def _scan(*obstacles: tuple[float, float]) -> RangeScan:
@@ -30,17 +30,17 @@ def _scan(*obstacles: tuple[float, float]) -> RangeScan:
 def _command(
     pose: Pose,
     clear_m: float = math.inf,
-    legs: tuple[tuple[float, float], ...] = ((50.0, 0.0),),
+    corners: tuple[Point, ...] = ((0.0, 0.0), (50.0, 0.0)),
     age_s: float = 0.0,
 ) -> MotorCommand:
     """The command on a straight drive so far along the route."""
     config = Config()
-    route = Route.of_legs([*legs], config.corner_radius_m, config.overrun_m)
+    route = Route(places_m(*corners))
     for x_m in np.arange(0.0, pose.x_m, 1.0):
         route.advance(x_m, 0.0)
     route.advance(pose.x_m, pose.y_m)
 
-    motor = SensoryMotorMemory(config)
+    motor = SensoryMotorMemory(config, NearObstacles(config.half_width_m))
     return motor.command(7, pose, route, clear_m, round(age_s * 1e9))
 
 
@@ -108,10 +108,10 @@ def test_the_arc_of_pure_pursuit_passes_through_the_point_ahead() -> None:
 
 
 def test_the_robot_slows_down_before_a_bend() -> None:
-    legs = ((50.0, QUARTER), (50.0, 0.0))
-    far_m_s = _driven(_command(_at(10.0), legs=legs))
-    near_m_s = _driven(_command(_at(49.0), legs=legs))
-    in_bend_m_s = math.sqrt(Config().lateral_m_s2 * 3.5)
+    corners = ((0.0, 0.0), (50.0, 0.0), (50.0, 50.0))
+    far_m_s = _driven(_command(_at(10.0), corners=corners))
+    near_m_s = _driven(_command(_at(49.0), corners=corners))
+    in_bend_m_s = math.sqrt(Config().lateral_m_s2 * SMOOTHED_M / (math.pi / 2))
 
     assert far_m_s == Config().cruise_m_s
     assert near_m_s < in_bend_m_s + 0.1
@@ -124,13 +124,15 @@ def _driven(command: MotorCommand) -> float:
 
 
 def test_the_robot_slows_down_before_an_obstacle_and_stops_at_its_clearance() -> None:
-    speeds = [_driven(_command(_at(5.0), clear_m)) for clear_m in (20.0, 4.0, 2.0)]
+    clearance_m = Config().clearance_m
+    clear_m = [clearance_m + free_m for free_m in (18.0, 2.5, 0.5)]
+    speeds = [_driven(_command(_at(5.0), each_m)) for each_m in clear_m]
 
     assert speeds == sorted(speeds, reverse=True)
     assert speeds[0] == Config().cruise_m_s
     assert speeds[2] == pytest.approx(math.sqrt(2 * 2.5 * 0.5))
 
-    stopped = _command(_at(5.0), 1.5)
+    stopped = _command(_at(5.0), clearance_m)
 
     assert (stopped.left_wheel_rad_s, stopped.right_wheel_rad_s, stopped.halted_by) == (
         0.0,

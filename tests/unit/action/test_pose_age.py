@@ -17,11 +17,12 @@ from schemas.nodes import Node
 from schemas.process import Clock
 from schemas.sensing import MotorCommand, SpeedLimit
 from services.action.module import Config, build
+from tests.support.world.plans import joined, plan_along
 from tests.support.world.scenes import agent
 
 TICK_S = 0.05
 CYCLE_TICKS = 8
-ROUTE = [(25.0, math.pi / 2), (25.0, 0.0)]
+PLAN = plan_along((0.0, 0.0), (25.0, 0.0), (25.0, 25.0))
 STREET_HALF_WIDTH_M = 4.0
 
 
@@ -99,9 +100,9 @@ class SlowMachine:
 
 
 def _off_street_m(x_m: float, y_m: float) -> float:
-    """The distance from the nearer of the two legs of ROUTE, the overrun included."""
+    """The distance from the nearer of the two streets that PLAN leads along."""
     along_x_m = min(max(x_m, 0.0), 25.0)
-    along_y_m = min(max(y_m, 0.0), 35.0)
+    along_y_m = min(max(y_m, 0.0), 25.0)
     to_first_m = math.hypot(x_m - along_x_m, y_m)
     to_second_m = math.hypot(x_m - 25.0, y_m - along_y_m)
     return min(to_first_m, to_second_m)
@@ -109,7 +110,8 @@ def _off_street_m(x_m: float, y_m: float) -> float:
 
 def _drive(age_s: float, seconds: float, config: Config) -> SlowMachine:
     machine = SlowMachine(age_s)
-    with InProcessRunner([machine.module, build(config, "action")]) as runner:
+    action = joined(build(config, "action"), PLAN)
+    with InProcessRunner([machine.module, action]) as runner:
         body = runner.shells[0]
         body.publish(machine.module.stamp(machine.broadcast()))
         for _ in range(round(seconds / TICK_S)):
@@ -120,23 +122,23 @@ def _drive(age_s: float, seconds: float, config: Config) -> SlowMachine:
 
 
 def test_with_poses_over_a_second_old_the_robot_keeps_to_its_street() -> None:
-    machine = _drive(1.2, 60.0, Config(route=ROUTE))
+    machine = _drive(1.5, 60.0, Config())
     slowed_by = {command.slowed_by for command in machine.commands}
     oldest_ns = max(command.pose_age_ns for command in machine.commands)
 
     assert machine.farthest_m < STREET_HALF_WIDTH_M / 2
     assert SpeedLimit.POSE_AGE in slowed_by
-    assert oldest_ns == pytest.approx(1.2e9)
+    assert oldest_ns == pytest.approx(1.5e9)
 
 
 def test_at_full_speed_it_would_leave_the_street() -> None:
-    reckless = Config(route=ROUTE, blind_m=1000.0)
+    reckless = Config(blind_m=1000.0)
 
-    assert _drive(1.2, 20.0, reckless).farthest_m > STREET_HALF_WIDTH_M
+    assert _drive(1.5, 20.0, reckless).farthest_m > STREET_HALF_WIDTH_M
 
 
 def test_with_fresh_poses_it_reaches_the_corner_at_full_speed() -> None:
-    machine = _drive(0.1, 12.0, Config(route=ROUTE))
+    machine = _drive(0.1, 12.0, Config())
     slowed_by = {command.slowed_by for command in machine.commands}
 
     assert machine.farthest_m < STREET_HALF_WIDTH_M / 2
@@ -145,7 +147,7 @@ def test_with_fresh_poses_it_reaches_the_corner_at_full_speed() -> None:
 
 
 def test_poses_older_than_the_limit_move_no_wheel() -> None:
-    machine = _drive(2.2, 10.0, Config(route=ROUTE))
+    machine = _drive(2.2, 10.0, Config())
     halted_by = {command.halted_by for command in machine.commands}
 
     assert halted_by == {SpeedLimit.POSE_AGE}

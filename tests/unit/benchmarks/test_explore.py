@@ -93,6 +93,12 @@ def test_the_street_that_is_closed_is_on_the_route_and_leaves_another() -> None:
     assert length_m > 120.0
 
 
+def test_a_street_is_not_closed_where_its_barrier_would_stand_at_the_goal() -> None:
+    route_m = np.column_stack([np.arange(31.0), np.zeros(31)])
+
+    assert street_to_close(np.random.default_rng(1), _town(), route_m, (30.0, 2.5)) is None
+
+
 def test_explored_is_what_the_map_has_as_road() -> None:
     south = _cells(PlaceColumn.ROAD, range(61), range(-2, 3), 1.0)
 

@@ -38,6 +38,40 @@ def test_nodes_ways_and_their_tags_are_read(tmp_path: Path) -> None:
     assert way.tags == {"highway": "residential"}
 
 
+MULTIPOLYGON = """<?xml version="1.0" encoding="UTF-8"?>
+<osm version="0.6">
+  <node id="1" lat="48.40" lon="15.60"/>
+  <node id="2" lat="48.40" lon="15.61"/>
+  <node id="3" lat="48.41" lon="15.61"/>
+  <node id="4" lat="48.41" lon="15.60"/>
+  <way id="7"><nd ref="1"/><nd ref="2"/><nd ref="3"/></way>
+  <way id="8"><nd ref="1"/><nd ref="4"/><nd ref="3"/></way>
+  <relation id="5">
+    <member type="way" ref="7" role="outer"/>
+    <member type="way" ref="8" role="outer"/>
+    <tag k="type" v="multipolygon"/><tag k="building" v="school"/>
+  </relation>
+</osm>
+"""
+
+
+def test_a_building_whose_outline_is_several_ways_is_one(tmp_path: Path) -> None:
+    extract = osm.read(_write(tmp_path / "a.osm", MULTIPOLYGON))
+
+    *_, school = extract.ways
+    assert school.id == 5
+    assert school.tags["building"] == "school"
+    assert school.nodes[0] == school.nodes[-1]
+    assert set(school.nodes) == {1, 2, 3, 4}
+
+
+def test_a_multipolygon_that_is_cut_off_is_left_out(tmp_path: Path) -> None:
+    cut_off = MULTIPOLYGON.replace('<way id="8"><nd ref="1"/><nd ref="4"/><nd ref="3"/></way>', "")
+    extract = osm.read(_write(tmp_path / "a.osm", cut_off))
+
+    assert [way.id for way in extract.ways] == [7]
+
+
 @pytest.mark.parametrize(
     ("suffix", "opener"), [(".xz", lzma.open), (".gz", gzip.open), (".bz2", bz2.open)]
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TypeVar
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -12,7 +13,14 @@ from cogmap.errors import ConfigError, MessageError
 from cogmap.runtime.module import Module
 from schemas.base import Message
 from schemas.process import Clock
-from schemas.sensing import MotorCommand, Odometry, StereoFrame, TruePose, TrueTown
+from schemas.sensing import (
+    MotorCommand,
+    Odometry,
+    SpeedLimit,
+    StereoFrame,
+    TruePose,
+    TrueTown,
+)
 from services.sim.module import Config, build
 from tests.support.messages import of_type
 
@@ -138,7 +146,7 @@ def test_real_time_keeps_its_rates_and_frames_follow_their_odometry() -> None:
     poses = of_type(TruePose, messages)
 
     assert 12.0 < poses[-1].travelled_m < 18.0
-    assert 0.05 < poses[-1].progress < 0.15
+    assert poses[-1].progress == pytest.approx(poses[-1].stamp_ns / 900e9)
 
 
 def test_real_time_falls_behind_rather_than_catch_up_over_0_25_s() -> None:
@@ -272,3 +280,47 @@ def test_a_restarted_world_continues_where_it_was_with_the_robot_at_rest(
     assert start.pose.x_m == pytest.approx(poses[-1].pose.x_m, abs=0.1)
     assert start.travelled_m == pytest.approx(poses[-1].travelled_m, abs=0.1)
     assert start.progress == pytest.approx(poses[-1].progress, abs=0.005)
+
+
+def _at_goal(stamp_ns: int) -> MotorCommand:
+    return msgspec.structs.replace(_command(stamp_ns, 0.0, 0.0), halted_by=SpeedLimit.AT_GOAL)
+
+
+SENSING = [{"sensing": "cameras"}, {"sensing": "percepts", "town": "blocks", "town_size_m": 120.0}]
+
+
+@pytest.mark.parametrize("sensing", SENSING, ids=["cameras", "percepts"])
+def test_a_drive_that_ends_at_its_goal_is_over_once_the_robot_halts_there(
+    sensing: dict[str, str | float],
+) -> None:
+    settings = {"mode": "lockstep", "ends_at_goal": True, **SMALL, **sensing}
+    module = build(msgspec.convert(settings, Config))
+    messages = _start(module)
+    assert of_type(TruePose, messages)[-1].progress < 1.0
+
+    last = module.feed(_at_goal(messages[-1].stamp_ns))
+    assert of_type(TruePose, last)[-1].progress == 1.0
+    assert module.feed(_command(last[-1].stamp_ns)) == []
+
+
+def test_a_drive_that_does_not_end_at_its_goal_goes_on_there() -> None:
+    module = build(Config(mode="lockstep", **SMALL))
+    messages = _start(module)
+    after = module.feed(_at_goal(messages[-1].stamp_ns))
+
+    assert of_type(TruePose, after)[-1].progress < 1.0
+    assert module.feed(_command(after[-1].stamp_ns))
+
+
+def test_a_restarted_simulation_of_a_drive_that_was_over_stays_over() -> None:
+    config = Config(mode="lockstep", ends_at_goal=True, egl=False, **SMALL)
+    before = build(config)
+    messages = _start(before)
+    messages += before.feed(_at_goal(messages[-1].stamp_ns))
+
+    after = build(config)
+    assert after.restore is not None
+    after.restore(of_type(TruePose, messages))
+    again = _start(after)
+
+    assert of_type(TruePose, again)[-1].progress == 1.0

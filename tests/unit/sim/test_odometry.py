@@ -91,10 +91,10 @@ def test_path_integration_alone_ends_a_lap_some_metres_off() -> None:
 def _lap(seed: int) -> list[Pose]:
     """The true poses of a lap of a town, a pace apart, its corners rounded on the spot."""
     turns_rad: list[float] = []
-    for length_m, turn_rad in town.generate(seed).route():
-        turns_rad += [0.0] * round(length_m / PACE_M)
-        if turn_rad:
-            turns_rad += [turn_rad / STEPS_OF_A_CORNER] * STEPS_OF_A_CORNER
+    quarter_rad = math.pi / 2
+    for a, b in itertools.pairwise(town.generate(seed).line()):
+        turns_rad += [0.0] * round(math.dist(a, b) / PACE_M)
+        turns_rad += [quarter_rad / STEPS_OF_A_CORNER] * STEPS_OF_A_CORNER
 
     here = 0j
     heading = 0.0

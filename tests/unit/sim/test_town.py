@@ -1,4 +1,4 @@
-"""Generated towns: streets, buildings, props, and routes through them."""
+"""Generated towns: streets, buildings, props, and laps of them."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from cogmap.bus.codec import encode
+from cogmap.geometry.se2 import transform_from
 from services.sim.layout import town
 from services.sim.layout.catalogue import CATALOGUE, invented
 from services.sim.layout.plan import PAVEMENT_WIDTH_M, STREET_WIDTH_M, overlap
-from services.sim.layout.progress import Progress
 from services.sim.rendering import facade, mesh
 
 SEEDS = range(25)
@@ -94,48 +94,43 @@ def test_every_front_looks_at_a_street_of_the_loop() -> None:
             assert _on_loop(place, x_m, y_m, STREET_WIDTH_M / 2)
 
 
-def test_the_route_of_one_lap_closes_the_loop_along_the_streets() -> None:
-    for place in TOWNS:
-        start = place.start
-        x_m = start.x_m
-        y_m = start.y_m
-        heading = start.heading_rad
-        for length_m, turn_rad in place.route():
-            x_m += length_m * math.cos(heading)
-            y_m += length_m * math.sin(heading)
-            heading += turn_rad
-            assert _on_loop(place, x_m, y_m, 0.01)
+def _goals_in_town(place: town.Town, laps: float) -> list[tuple[float, float]]:
+    """The goals of some laps in the frame of the town."""
+    start = np.array([place.start.x_m, place.start.y_m, place.start.heading_rad])
+    goals_m = transform_from(start, np.array(place.goals(laps)))
+    return [(x_m, y_m) for x_m, y_m in goals_m.tolist()]
 
-        assert x_m == pytest.approx(start.x_m)
-        assert y_m == pytest.approx(start.y_m)
-        assert math.remainder(heading - start.heading_rad, math.tau) == pytest.approx(0)
+
+def test_the_goals_of_a_lap_are_the_corners_in_order_and_the_start() -> None:
+    for place in TOWNS:
+        *corners, end = _goals_in_town(place, 1.0)
+
+        assert np.array(corners) == pytest.approx(np.array(place.corners))
+        assert end == pytest.approx((place.start.x_m, place.start.y_m))
+
+
+def test_the_first_goal_is_straight_ahead_in_the_frame_of_the_start() -> None:
+    for place in TOWNS:
+        x_m, y_m = place.goals()[0]
+
+        assert x_m > 10.0
+        assert y_m == pytest.approx(0.0)
 
 
 @pytest.mark.parametrize("laps", [0.1, 0.5, 1.0, 1.7, 3.0])
-def test_a_route_is_as_long_as_its_laps(laps: float) -> None:
+def test_the_way_past_the_goals_is_as_long_as_the_laps_along_the_streets(laps: float) -> None:
     place = TOWNS[3]
-    route = place.route(laps)
-    lengths_m = [length_m for length_m, _ in route]
-    _, last_turn_rad = route[-1]
+    goals_m = _goals_in_town(place, laps)
+    start_m = (place.start.x_m, place.start.y_m)
+    lengths_m = [math.dist(a, b) for a, b in itertools.pairwise([start_m, *goals_m])]
 
     assert sum(lengths_m) == pytest.approx(laps * place.lap_m)
-    assert last_turn_rad == 0.0
+    assert all(_on_loop(place, x_m, y_m, 0.01) for x_m, y_m in goals_m)
 
 
-def test_progress_reaches_the_end_though_corners_are_cut_and_never_goes_back() -> None:
-    line = np.asarray(TOWNS[0].line(1.5))
-    inward = 1 - 2.0 / np.abs(line).max()
-
-    progress = Progress(TOWNS[0].line(1.5))
-    shares = []
-    for a, b in itertools.pairwise(line):
-        for t in np.linspace(0, 1, 60):
-            x_m, y_m = (a + t * (b - a)) * inward
-            shares.append(progress.advance(float(x_m), float(y_m)))
-
-    assert shares == sorted(shares)
-    assert shares[0] < 0.02
-    assert shares[-1] > 0.98
+@pytest.mark.parametrize(("laps", "goals"), [(0.05, 1), (1.0, 5), (3.0, 13)])
+def test_each_corner_and_the_end_is_a_goal(laps: float, goals: int) -> None:
+    assert len(TOWNS[0].goals(laps)) == goals
 
 
 def _histogram(picture: np.ndarray) -> np.ndarray:

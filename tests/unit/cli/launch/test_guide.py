@@ -46,7 +46,7 @@ class Tour:
     """A guide whose agent knows four buildings and has explored for 10 s."""
 
     def __init__(self, *goals: Goal, explore_s: float = 100.0) -> None:
-        self.guide = Guide(explore_s, goals, closes_street=True)
+        self.guide = Guide(explore_s, goals)
         self.graph = Graph()
         self.graph.change([agent(), *map(_object, PLACES)])
         self._observer = Observer()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -12,8 +13,10 @@ from cli.launch.track import Track
 from cogmap.errors import MessageError
 from schemas.array import Array
 from schemas.cognition import Competition
-from schemas.graph import Delta, DropNode, Phase
+from schemas.graph import Delta, DropNode, Operation, Phase
+from schemas.nodes import Goal
 from schemas.sensing import Odometry, Pose, SelfMotion, TruePose
+from tests.support.world.plans import plan_along
 from tests.support.world.scenes import agent, thing
 
 TICK_NS = 50_000_000
@@ -182,6 +185,78 @@ def test_distance_progress_and_time_are_those_of_the_newest_pose() -> None:
     straight_drive(observer, 20, wheel_speed_m_s=1.0)
 
     assert (observer.travelled_m, observer.progress, observer.elapsed_s) == (1.0, 0.5, 1.0)
+
+
+def given(*operations: Operation) -> Delta:
+    return Delta(version=1, cycle=1, phase=Phase.PERCEPTS, operations=[*operations])
+
+
+def test_progress_is_the_share_of_the_goals_that_were_reached() -> None:
+    observer = Observer()
+    straight_drive(observer, 20, wheel_speed_m_s=1.0)
+    names = ("a", "b", "c", "d")
+    observer.update(given(*(Goal(id=name) for name in names)))
+    assert (observer.progress, observer.goals) == (0.0, 4)
+
+    observer.update(given(Goal(id="a", reached_ns=5), DropNode(id="d")))
+    assert (observer.goals_reached, observer.goals) == (1, 3)
+    assert observer.progress == pytest.approx(1 / 3)
+
+
+def test_progress_grows_on_the_way_to_a_goal_and_is_whole_when_it_is_reached() -> None:
+    plan = msgspec.structs.replace(plan_along((0.0, 0.0), (4.0, 0.0)), length_m=4.0)
+    observer = Observer()
+    observer.update(given(Goal(id="a"), plan))
+    straight_drive(observer, 20, wheel_speed_m_s=1.0)
+    assert observer.progress == pytest.approx(1 / 4)
+
+    observer.update(true_pose(100, 5.0, 0.0))
+    assert 0.8 < observer.progress < 1.0
+
+    observer.update(given(Goal(id="a", reached_ns=5)))
+    assert observer.progress == 1.0
+
+
+def path_to_goal(observer: Observer) -> None:
+    """30 m along x; then, with a goal, back to the middle and 20 m across."""
+    line_m = [(x, 0.0) for x in range(31)]
+    for tick, (x_m, y_m) in enumerate(line_m):
+        observer.update(true_pose(tick, x_m, y_m))
+        observer.update(estimate(tick, x_m, y_m))
+
+    observer.update(given(Goal(id="a")))
+    back_m = [(30.0 - x, 0.0) for x in range(16)]
+    across_m = [(15.0, y) for y in range(1, 21)]
+    for tick, (x_m, y_m) in enumerate([*back_m, *across_m], start=len(line_m)):
+        observer.update(true_pose(tick, x_m, y_m))
+
+
+def test_a_way_to_a_goal_is_a_shortcut_where_the_robot_was_not_before() -> None:
+    observer = Observer()
+    path_to_goal(observer)
+
+    steps_m = observer.shortcuts_m
+    assert np.abs(steps_m[0, 0] - (15.0, 8.0)).max() < 1e-9
+    assert np.abs(steps_m[-1, 1] - (15.0, 20.0)).max() < 1e-9
+    assert len(steps_m) == 12
+
+
+def test_nothing_is_a_shortcut_where_the_goals_were_there_from_the_start() -> None:
+    observer = Observer()
+    observer.update(given(Goal(id="a")))
+    straight_drive(observer, 20, wheel_speed_m_s=1.0)
+
+    assert not len(observer.shortcuts_m)
+
+
+def test_the_drive_has_ended_when_the_simulation_is_over() -> None:
+    observer = Observer()
+    straight_drive(observer, 20, wheel_speed_m_s=1.0)
+    assert not observer.has_ended
+
+    origin = Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)
+    observer.update(TruePose(stamp_ns=9 * 10**9, pose=origin, travelled_m=1.0, progress=1.0))
+    assert observer.has_ended
 
 
 def test_other_messages_and_nodes_change_nothing() -> None:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from cli.goal import parsed
 from cli.launch.plan import (
     OBSERVER,
     RECORDER,
@@ -20,12 +22,14 @@ from cli.launch.plan import (
     to_toml,
 )
 from cli.launch.supervisor import Program
+from cli.run.command import LAP_LIMIT_S
 from cogmap.errors import ConfigError
 from services import registry
+from services.sim.config import Config as SimConfig
 from services.sim.layout.town import generate
 
 
-def configured(choices: Choices, **sections: dict[str, object]) -> dict[str, dict[str, object]]:
+def configured(choices: Choices, **sections: dict[str, object]) -> dict[str, dict[str, Any]]:
     return effective(sections, choices, awaited(choices, observer=True))
 
 
@@ -48,19 +52,76 @@ def test_every_module_gets_its_whole_configuration() -> None:
         assert set(section) == keys - unset
 
 
-def test_the_route_is_that_of_the_town_and_the_laps() -> None:
+def positions_m(sections: dict[str, dict[str, Any]]) -> list[tuple[float, float]]:
+    return [(goal["x_m"], goal["y_m"]) for goal in sections["workspace"]["goals"]]
+
+
+def test_the_goals_of_a_drive_in_the_loop_are_its_corners_lap_by_lap() -> None:
     sections = configured(Choices(seed=3, laps=1.5))
-    route = generate(3).route(1.5)
+    names = [goal["name"] for goal in sections["workspace"]["goals"]]
 
-    assert sections["action"]["route"] == [list(leg) for leg in route]
     assert sections["sim"]["seed"] == 3
-    assert sections["sim"]["laps"] == 1.5
+    assert positions_m(sections) == generate(3).goals(1.5)
+    assert names == [*(f"corner {number}" for number in range(1, 7)), "end"]
+    assert sections["workspace"]["in_order"]
+    assert sections["sim"]["ends_at_goal"]
 
 
-def test_a_route_of_ones_own_stays() -> None:
-    assert configured(Choices(), action={"route": [[12.0, 0.0]]})["action"]["route"] == [
-        (12.0, 0.0)
+def test_a_drive_of_many_laps_has_time_for_them() -> None:
+    of_one = configured(Choices())["sim"]["duration_s"]
+    of_thirty = configured(Choices(laps=30.0))["sim"]["duration_s"]
+
+    assert of_thirty > 30 * LAP_LIMIT_S
+    assert of_one == SimConfig().duration_s
+
+
+def test_the_agent_is_given_the_goals_that_are_chosen_in_any_order() -> None:
+    chosen = parsed(["inn", "3", "-4"])
+    workspace = configured(Choices(goals=chosen))["workspace"]
+
+    assert workspace["goals"] == [
+        {"name": "inn", "object": "inn", "x_m": 0.0, "y_m": 0.0},
+        {"name": "3,-4", "object": "", "x_m": 3.0, "y_m": -4.0},
     ]
+    assert not workspace["in_order"]
+
+
+def test_after_exploring_the_agent_drives_home_or_to_the_goals_that_are_chosen() -> None:
+    home = configured(Choices(town="blocks", explore_s=40.0))
+    inn = configured(Choices(town="blocks", explore_s=40.0, goals=parsed(["inn"])))
+
+    assert home["workspace"]["goals_after_s"] == 40.0
+    assert positions_m(home) == [(0.0, 0.0)]
+    assert home["sim"]["ends_at_goal"]
+    assert 80.0 < home["sim"]["duration_s"] <= 120.0
+    assert [goal["object"] for goal in inn["workspace"]["goals"]] == ["inn"]
+
+
+def test_goals_that_are_set_stay() -> None:
+    given = {"name": "kiosk", "object": "", "x_m": 12.0, "y_m": 0.0}
+    sections = configured(Choices(), workspace={"goals": [given]})
+
+    assert sections["workspace"]["goals"] == [given]
+    assert not sections["workspace"]["in_order"]
+    assert sections["sim"]["ends_at_goal"]
+
+
+@pytest.mark.parametrize(
+    ("choices", "sim"),
+    [
+        (Choices(town="blocks"), {}),
+        (Choices(tour=True), {}),
+        (Choices(), {"trajectory": {"line_m": [[0.0, 0.0], [9.0, 0.0]], "landmarks": []}}),
+    ],
+    ids=["blocks", "tour", "trajectory"],
+)
+def test_elsewhere_the_agent_has_no_goals_at_its_start(
+    choices: Choices, sim: dict[str, object]
+) -> None:
+    sections = configured(choices, sim=sim)
+
+    assert sections["workspace"]["goals"] == []
+    assert not sections["sim"]["ends_at_goal"]
 
 
 def test_lockstep_is_the_mode_of_all_that_have_one() -> None:

@@ -12,11 +12,10 @@ from schemas.sensing import SpeedLimit
 def after(wall_s: float, drive_s: float, moved_m: float = 0.0, **more: object) -> Ending | None:
     """What the watchdog finds when so much has changed since the first look at a drive."""
     watchdog = Watchdog()
-    first = Situation(now_s=100.0, drive_s=10.0, travelled_m=5.0, commands=50)
+    first = Situation(now_s=100.0, drive_s=10.0, place_m=(5.0, 2.0), commands=50)
     facts = {"commands": 60, **more}
-    later = Situation(
-        now_s=100.0 + wall_s, drive_s=10.0 + drive_s, travelled_m=5.0 + moved_m, **facts
-    )
+    there_m = (5.0, 2.0 + moved_m)
+    later = Situation(now_s=100.0 + wall_s, drive_s=10.0 + drive_s, place_m=there_m, **facts)
     assert watchdog.check(first) is None
     return watchdog.check(later)
 
@@ -66,12 +65,33 @@ def test_each_move_begins_the_wait_anew() -> None:
     for step in range(10):
         seconds = step * (STUCK_S - 1.0)
         situation = Situation(
-            now_s=seconds, drive_s=seconds, travelled_m=step * MIN_MOVE_M, commands=step
+            now_s=seconds, drive_s=seconds, place_m=(step * MIN_MOVE_M, 0.0), commands=step
         )
         assert watchdog.check(situation) is None
 
 
-def test_only_a_completed_route_exits_with_0() -> None:
+def test_a_robot_that_backs_away_and_returns_again_and_again_is_stuck() -> None:
+    watchdog = Watchdog()
+    endings = []
+    for second in range(round(STUCK_S) + 1):
+        back_m = 0.6 * MIN_MOVE_M * (second % 2)
+        situation = Situation(
+            now_s=float(second), drive_s=float(second), place_m=(3.0 - back_m, 0.0), commands=second
+        )
+        endings.append(watchdog.check(situation))
+
+    *before, last = endings
+    assert before == [None] * len(before)
+    assert last is not None
+    assert last.outcome is Outcome.STUCK
+
+
+@pytest.mark.parametrize("reason", [SpeedLimit.NO_ROUTE, SpeedLimit.AT_GOAL])
+def test_a_robot_that_waits_for_a_goal_is_not_stuck(reason: SpeedLimit) -> None:
+    assert after(10 * STUCK_S, 10 * STUCK_S, halted_by=reason) is None
+
+
+def test_only_a_drive_to_its_end_exits_with_0() -> None:
     codes = {outcome: outcome.exit_code for outcome in Outcome}
 
     assert codes.pop(Outcome.ROUTE_COMPLETE) == 0

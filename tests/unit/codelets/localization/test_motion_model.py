@@ -45,11 +45,11 @@ def _agent(
     )
 
 
-def _known(*labels: str) -> list[Object]:
+def _known(*labels: str, sd_m: float = 0.01) -> list[Object]:
     rng = np.random.default_rng(4)
     known = []
     for label in labels:
-        samples_m = rng.normal(PLACES[label], 0.01, (200, 2))
+        samples_m = rng.normal(PLACES[label], sd_m, (200, 2))
         known.append(object_node(label, samples_m, sightings=50))
     return known
 
@@ -108,6 +108,56 @@ def test_a_kidnapped_agent_relocalizes_by_landmarks_seen_one_at_a_time() -> None
     loop.close()
 
     assert math.dist(loop.pose[:2], true[:2]) < 2.0
+
+
+def _looking(views: int) -> Self:
+    """An agent that goes straight ahead, and sees two landmarks as from nowhere on the map."""
+    agent = _agent()
+    for number in range(1, views + 1):
+        seen = [percept("mill", 0.5, 5.0), percept("tower", -0.5, 5.0)]
+        agent = _move(agent, number, _known("mill", "tower"), seen, CONFIG)
+
+    return agent
+
+
+@pytest.mark.parametrize(("sd_m", "is_moved"), [(0.01, True), (3.0, False)])
+def test_two_landmarks_carry_the_agent_off_only_where_their_places_are_sure(
+    sd_m: float, is_moved: bool
+) -> None:
+    agent = _agent()
+    true = (-20.0, 30.0, 2.0)
+    known = _known("mill", "tower", sd_m=sd_m)
+    for number in range(1, CONFIG.misfits_to_relocalize + 3):
+        true = _ahead(true)
+        seen = [_seen(true, "mill"), _seen(true, "tower")]
+        agent = _move(agent, number, known, seen, CONFIG)
+
+    was_moved = math.dist((agent.odometry_x_m, agent.odometry_y_m), true[:2]) < 15.0
+    assert was_moved == is_moved
+
+
+def test_landmarks_that_fit_no_pose_together_move_nobody() -> None:
+    agent = _looking(views=40)
+
+    assert _off_m(agent, (40.0, 0.0, 0.0)) < 5.0
+    assert (agent.odometry_x_m, agent.odometry_y_m) == pytest.approx((40.0, 0.0), abs=0.01)
+
+
+def test_an_agent_that_can_be_nowhere_else_says_so_and_is_not_lost() -> None:
+    patience = CONFIG.misfits_to_relocalize
+    assert _looking(views=patience).is_lost
+
+    agent = _looking(views=2 * patience)
+    assert not agent.is_lost
+    assert agent.not_elsewhere_ns == agent.stamp_ns
+
+
+def test_one_landmark_that_does_not_fit_for_long_is_another() -> None:
+    agent = _agent()
+    for number in range(1, CONFIG.misfits_to_relocalize + 1):
+        agent = _move(agent, number, _known("mill"), [percept("mill", 2.0, 60.0)], CONFIG)
+
+    assert agent.not_elsewhere_ns == agent.stamp_ns
 
 
 def test_the_distance_that_an_agent_was_carried_is_a_step_of_its_path() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, CycleContext
-from schemas.array import Array
+from schemas.array import Array, Matrix
 from schemas.codelets import Task
 from schemas.cognition import Direction, RouteReplay
 from schemas.graph import Cells, DropNode, Operation
@@ -22,12 +22,15 @@ from schemas.nodes import (
     LinkKind,
     Map,
     Object,
+    PathColumn,
+    PathSegment,
     PlaceColumn,
     Plan,
     PlanState,
     goal_id,
     object_id,
     place_id,
+    segment_id,
 )
 from services.codelets.planning.config import Config
 from services.codelets.planning.route_plan import due, run
@@ -195,6 +198,40 @@ def test_a_street_that_is_seen_to_be_closed_is_not_in_doubt() -> None:
     assert plan.route.numpy()[:, 1].max() > 35.0
 
 
+def _was_at(stamp_s: float, *x_m: float) -> PathSegment:
+    """A path along x."""
+    rows = np.zeros((len(x_m), len(PathColumn)))
+    rows[:, PathColumn.STAMP_S] = stamp_s
+    rows[:, PathColumn.X_M] = x_m
+    return PathSegment(id=segment_id(0), number=0, rows=Matrix.of(rows))
+
+
+@pytest.mark.parametrize(("ago_s", "is_north"), [(60.0, True), (900.0, False)])
+def test_a_street_that_was_seen_to_be_closed_is_not_in_doubt_for_a_while(
+    ago_s: float, is_north: bool
+) -> None:
+    graph = _loop(_goal("far", 40.0, 0.0), _barrier(20, 0), _barrier(20, 40))
+    graph.change([agent(x_m=3.0, stamp_ns=1_000_000_000_000), _was_at(1000.0 - ago_s, 16.0)])
+    plan = _plan(graph)
+
+    assert plan.doubtful
+    assert plan.route is not None
+    assert (plan.route.numpy()[:, 1].max() > 35.0) == is_north
+
+
+@pytest.mark.parametrize(("ago_s", "state"), [(20.0, PlanState.READY), (200.0, PlanState.NO_ROUTE)])
+def test_between_walls_that_it_sees_the_agent_goes_back_by_the_way_it_has_come(
+    ago_s: float, state: PlanState
+) -> None:
+    graph = _loop(_goal("far", 3.0, 40.0), _barrier(12, 0), _barrier(20, 0))
+    here = agent(x_m=16.0, stamp_ns=1_000_000_000_000)
+    graph.change([here, _was_at(1000.0 - ago_s, *range(3, 17))])
+    plan = _plan(graph)
+
+    assert plan.state is state
+    assert plan.doubtful == (state is PlanState.READY)
+
+
 def test_an_object_is_reached_from_the_street_beside_it() -> None:
     bakery = Object(id=object_id("bakery"), label="bakery", x_m=30.0, y_m=-12.0)
     plan = _plan(_loop(bakery, Goal(id=goal_id("bakery"), object="bakery")))
@@ -261,12 +298,59 @@ def test_a_plan_that_serves_is_not_written_again() -> None:
     assert _answer(graph).operations == []
 
 
-def test_a_goal_reached_already_leaves_no_plan() -> None:
+@pytest.mark.parametrize("explores", [False, True])
+def test_where_every_goal_is_reached_the_plan_states_so_and_has_no_route(explores: bool) -> None:
     goal = msgspec.structs.replace(_goal("b", 40.0, 0.0), reached_ns=1)
-    plan = _plan(_loop(goal))
+    plan = _plan(_loop(goal), Config(explore=explores))
 
-    assert plan.state is PlanState.NO_GOAL
+    assert plan.state is PlanState.AT_GOAL
     assert plan.route is None
+
+
+def _in_order(*goals: Goal) -> list[Goal]:
+    """The goals, each after the one before."""
+    chained = [goals[0]]
+    for goal in goals[1:]:
+        chained.append(msgspec.structs.replace(goal, after=chained[-1].id))
+
+    return chained
+
+
+def test_a_goal_after_another_is_planned_once_that_is_reached() -> None:
+    there = _goal("there", 40.0, 0.0)
+    back = _goal("back", 20.0, 0.0)
+    graph = _loop(*_in_order(there, back))
+
+    assert _plan(graph).goals == [there.id]
+
+    graph.change([agent(x_m=40.0)])
+    assert _plan(graph).goals == [back.id]
+
+
+def test_a_goal_that_is_passed_before_its_turn_is_not_reached() -> None:
+    there = _goal("there", 40.0, 0.0)
+    start = _goal("start", 3.0, 0.0)
+    graph = _loop(*_in_order(there, start))
+    _answer(graph)
+
+    passed = graph.get(Goal, start.id)
+    assert passed is not None
+    assert passed.reached_ns == NEVER_NS
+
+
+def test_a_goal_after_one_that_there_is_none_of_counts_at_once() -> None:
+    goal = msgspec.structs.replace(_goal("b", 40.0, 0.0), after=goal_id("harbour"))
+
+    assert _plan(_loop(goal)).goals == [goal.id]
+
+
+def test_an_agent_that_has_reached_its_goals_does_not_explore() -> None:
+    graph = _loop(_goal("here", 3.0, 0.0))
+    context = CycleContext(cycle=5, percepts=percepts(4), motions=Array.of(np.zeros((0, 5))))
+    config = Config(explore=True)
+
+    assert _plan(graph, config).state is PlanState.AT_GOAL
+    assert due(context, graph, config) == []
 
 
 def test_without_a_goal_the_agent_explores_where_the_road_is_open() -> None:

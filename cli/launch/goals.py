@@ -1,0 +1,64 @@
+"""How far a drive to goals is, by the agent's goals and its plans. Pure."""
+
+from __future__ import annotations
+
+from schemas.graph import Delta, DropNode
+from schemas.nodes import NEVER_NS, Goal, Plan
+
+# A goal is at least so far ahead until it is reached.
+LAST_M = 1.0
+
+
+class GoalProgress:
+    """Follows the goals, and the way to the next of them."""
+
+    def __init__(self) -> None:
+        self._is_reached: dict[str, bool] = {}
+        self._plan: Plan | None = None
+        self._since_m = 0.0
+        self._planned_at_m = 0.0
+
+    def update(self, delta: Delta, travelled_m: float) -> None:
+        """Take account of a delta, the robot having travelled so far."""
+        before = dict(self._is_reached)
+        for operation in delta.operations:
+            match operation:
+                case Goal():
+                    self._is_reached[operation.id] = operation.reached_ns != NEVER_NS
+                case Plan():
+                    self._plan = operation
+                    self._planned_at_m = travelled_m
+                case DropNode():
+                    self._is_reached.pop(operation.id, None)
+
+        if self._is_reached != before:
+            self._since_m = travelled_m
+
+    @property
+    def count(self) -> int:
+        """How many goals the agent has."""
+        return len(self._is_reached)
+
+    @property
+    def reached(self) -> int:
+        """How many of its goals the agent has reached."""
+        return sum(self._is_reached.values())
+
+    def share(self, travelled_m: float) -> float:
+        """The share of its goals that the agent has reached, the next one as far as its way there
+        is behind it by the plan; below 1 while there is a goal to reach, 0 where there is none.
+        """
+        if not self.count:
+            return 0.0
+        return (self.reached + self._share_of_way(travelled_m)) / self.count
+
+    def _share_of_way(self, travelled_m: float) -> float:
+        """How much of the way from the last goal to the next is behind the agent."""
+        plan = self._plan
+        if plan is None or plan.route is None or plan.explores or self.reached == self.count:
+            return 0.0
+
+        behind_m = travelled_m - self._since_m
+        since_plan_m = travelled_m - self._planned_at_m
+        ahead_m = max(LAST_M, plan.length_m - since_plan_m)
+        return behind_m / (behind_m + ahead_m)

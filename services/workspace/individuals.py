@@ -1,0 +1,188 @@
+"""Of which individual object each percept is a sighting.
+
+Perception recognises what an object looks like, and buildings may look alike. A percept far from
+every object of its name is of another one, while something else in view confirms where the agent
+is, or nothing has for so long that it cannot be elsewhere: of the one that was seen of late where
+it is, for two cannot stand in one place, or else of a new one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+
+from cogmap.geometry.arrays import Floats
+from cogmap.geometry.se2 import integrate
+from cogmap.graph.graph import Graph
+from schemas import nodes
+from schemas.array import Array
+from schemas.nodes import NEVER_NS, Object, Self, individual_label, object_id
+from schemas.sensing import Percept, Percepts
+
+# Buildings stand at least so far from one another.
+APART_M = 6.0
+# Beyond so many standard deviations a percept is of another object.
+GATE = 2.0
+# An object that was seen so often stands where it is.
+ESTABLISHED = 3
+MAX_INDIVIDUALS = 64
+NOT_ELSEWHERE_NS = 20_000_000_000
+
+
+class Candidate(NamedTuple):
+    """The individual nearest to a percept: its label, and whether the percept may be of it.
+
+    `unused` is a label that no individual has yet, empty where there are too many. The percept is
+    seen at (x, y) `seen_m`.
+    """
+
+    label: str
+    is_near: bool
+    unused: str
+    seen_m: tuple[float, float]
+
+
+def individuals(percepts: Percepts, graph: Graph, motions: Array) -> Percepts:
+    """`percepts`, each by the label of the individual object that it is of.
+
+    `motions` are those since the self node was moved last.
+    """
+    agent = graph.agent
+    if agent is None:
+        return percepts
+
+    pose = _moved(agent, motions)
+    candidates = [_candidate(percept, pose, agent, graph) for percept in percepts.objects]
+    is_here = _is_not_elsewhere(agent, percepts.stamp_ns) or _is_confirmed(candidates, agent, graph)
+
+    taken = {candidate.label for candidate in candidates if candidate.is_near}
+    objects = []
+    for percept, candidate in zip(percepts.objects, candidates, strict=True):
+        label = candidate.label
+        if is_here and not candidate.is_near and candidate.unused:
+            label = _standing_there(percept, candidate, graph, taken) or candidate.unused
+            taken.add(label)
+        objects.append(msgspec.structs.replace(percept, label=label))
+
+    return msgspec.structs.replace(percepts, objects=objects)
+
+
+def as_entered(percepts: Percepts, graph: Graph) -> Percepts:
+    """`percepts` by the labels with which they entered the graph in this cycle, before the
+    workspace was interrupted.
+    """
+    label_of = {}
+    for node in graph.of_kind(nodes.Percept):
+        if node.cycle == graph.cycle:
+            label_of[node.bearing_rad, node.range_m] = node.label
+
+    objects = []
+    for percept in percepts.objects:
+        label = label_of.get((percept.bearing_rad, percept.range_m), percept.label)
+        objects.append(msgspec.structs.replace(percept, label=label))
+
+    return msgspec.structs.replace(percepts, objects=objects)
+
+
+def _is_not_elsewhere(agent: Self, stamp_ns: int) -> bool:
+    """Whether it was found not long ago that the agent can be nowhere else on the map."""
+    if agent.not_elsewhere_ns == NEVER_NS:
+        return False
+    return stamp_ns - agent.not_elsewhere_ns <= NOT_ELSEWHERE_NS
+
+
+def _is_confirmed(candidates: Iterable[Candidate], agent: Self, graph: Graph) -> bool:
+    """Whether an object is seen where it stands that was so before anything did not fit."""
+    for candidate in candidates:
+        node = graph.get(Object, object_id(candidate.label))
+        if node is None or not candidate.is_near:
+            continue
+        if node.created_ns <= agent.last_fit_ns:
+            return True
+
+    return False
+
+
+def _moved(agent: Self, motions: Array) -> Floats:
+    """(3,): the pose that the agent has moved to."""
+    pose = np.array([agent.x_m, agent.y_m, agent.heading_rad])
+    rows = np.asarray(motions.numpy(), np.float64)
+    if not len(rows):
+        return pose
+
+    speed, turn_rate, duration_s = rows[:, :3].T
+    steps = np.column_stack([speed * duration_s, np.zeros(len(rows)), turn_rate * duration_s])
+    *_, moved = integrate(pose, steps)
+    return np.asarray(moved, np.float64)
+
+
+def _standing_there(
+    percept: Percept, candidate: Candidate, graph: Graph, others: Collection[str]
+) -> str:
+    """The label of the object that a percept can only be of, by where it is: one that was seen of
+    late, and is not among `others`. Empty where there is none.
+    """
+    agent = graph.agent
+    assert agent is not None
+    for seen in graph.of_kind(nodes.Percept):
+        node = graph.get(Object, object_id(seen.label))
+        if node is None or node.sightings < ESTABLISHED or node.label in others:
+            continue
+
+        away_m = math.dist(candidate.seen_m, (node.x_m, node.y_m))
+        near_m = APART_M / 2
+        if away_m <= near_m and GATE * _sd_m(percept, agent, node) <= near_m:
+            return node.label
+
+    return ""
+
+
+def _candidate(percept: Percept, pose: Floats, agent: Self, graph: Graph) -> Candidate:
+    if not (percept.has_bearing and percept.has_range):
+        return Candidate(percept.label, True, "", (math.nan, math.nan))
+
+    x_m, y_m, heading_rad = pose.tolist()
+    direction_rad = heading_rad + percept.bearing_rad
+    seen_m = (
+        x_m + percept.range_m * math.cos(direction_rad),
+        y_m + percept.range_m * math.sin(direction_rad),
+    )
+
+    candidate = Candidate(percept.label, False, "", seen_m)
+    nearest_m = math.inf
+    unused = ""
+    for number in range(1, MAX_INDIVIDUALS + 1):
+        label = individual_label(percept.label, number)
+        node = graph.get(Object, object_id(label))
+        if node is None:
+            unused = unused or label
+            continue
+
+        if node.surveyed:
+            return Candidate(label, True, "", seen_m)
+
+        away_m = math.dist(seen_m, (node.x_m, node.y_m))
+        if away_m < nearest_m:
+            nearest_m = away_m
+            near_m = max(APART_M, GATE * _sd_m(percept, agent, node))
+            candidate = Candidate(label, away_m <= near_m, "", seen_m)
+
+    return candidate._replace(unused=unused)
+
+
+def _sd_m(percept: Percept, agent: Self, node: Object) -> float:
+    """The standard deviation of the distance between where an object is seen and where it is."""
+    bearing_sd_rad = math.hypot(percept.bearing_sd_rad, agent.heading_sd_rad)
+    across_sd_m = percept.range_m * bearing_sd_rad
+    return math.hypot(
+        percept.range_sd_m,
+        across_sd_m,
+        agent.x_sd_m,
+        agent.y_sd_m,
+        node.x_sd_m,
+        node.y_sd_m,
+    )

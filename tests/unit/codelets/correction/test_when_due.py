@@ -1,0 +1,63 @@
+"""When map correction is due: the longer the path, the less often."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cogmap.graph.graph import Graph
+from cogmap.runtime.codelet import CycleContext
+from schemas.array import Array, Matrix
+from schemas.nodes import LoopClosure, PathColumn, PathSegment, segment_id
+from schemas.sensing import Percepts
+from services.codelets.config import Config
+from services.codelets.correction.map_correction import CODELET
+from tests.support.world.scenes import graph_of
+
+CONFIG = Config(closure_spacing_s=2.0, revisit_s=100.0)
+A_SECOND_NS = 1_000_000_000
+NO_POINTS = Array.of(np.zeros((0, 2), np.float32))
+NO_MOTIONS = Array.of(np.zeros((0, 5)))
+
+
+def _segment(number: int) -> PathSegment:
+    rows = Matrix.of(np.zeros((1, len(PathColumn))))
+    return PathSegment(id=segment_id(number), number=number, rows=rows)
+
+
+def _closure(at_s: int, accepted: bool | None) -> LoopClosure:
+    return LoopClosure(
+        id=f"closure:{at_s}",
+        from_ns=0,
+        to_ns=at_s * A_SECOND_NS,
+        cue="inn",
+        ahead_m=1.0,
+        left_m=0.0,
+        range_m=1.0,
+        bearing_rad=0.0,
+        sd_m=1.0,
+        sd_rad=0.0,
+        accepted=accepted,
+    )
+
+
+def _graph(segments: int) -> Graph:
+    """A path whose closures were judged at 10 s, and one that was not, at 11 s."""
+    path = [_segment(number) for number in range(segments)]
+    judged = [_closure(at_s, True) for at_s in (8, 9, 10)]
+    return graph_of(*path, *judged, _closure(11, None))
+
+
+def _is_due(segments: int, at_s: int) -> bool:
+    percepts = Percepts(stamp_ns=at_s * A_SECOND_NS, frame=at_s, objects=[], road_m=NO_POINTS)
+    context = CycleContext(1, percepts, NO_MOTIONS)
+    return bool(CODELET.due(context, _graph(segments), CONFIG))
+
+
+def test_a_short_path_is_corrected_as_often_as_loops_close() -> None:
+    assert not _is_due(segments=8, at_s=11)
+    assert _is_due(segments=8, at_s=12)
+
+
+def test_a_path_ten_times_as_long_is_corrected_a_tenth_as_often() -> None:
+    assert not _is_due(segments=80, at_s=29)
+    assert _is_due(segments=80, at_s=30)
