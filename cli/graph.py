@@ -57,8 +57,8 @@ def to_tree(system: System) -> str:
     lines: list[str] = []
     for process, roles in uses_of(system).items():
         lines += _branch(process, roles)
-    for key in system.foreign_keys():
-        lines.append(f"a key that is no topic's: {key}")
+    for name in system.unknown_topics():
+        lines.append(f"not a topic of this version: {name}")
     return "\n".join(lines)
 
 

@@ -1,23 +1,33 @@
-"""Which process publishes, subscribes and answers what, as the router of a system reports it."""
+"""Which process publishes, subscribes and answers what, as the processes themselves announce it.
+
+Each announces its name and each of its uses by a liveliness token. The router's admin space, which
+would tell the same, is not asked: it answers under the lock of the routing tables, and a query that
+meets a declaration stops the router for good (eclipse-zenoh/zenoh#2619).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from enum import Enum
 
-import msgspec
 import zenoh
 
 from cogmap.bus.interface import Member
+from cogmap.bus.session import ready_key
 from schemas import topics
 from schemas.topics import Topic
 
 ANSWER_TIMEOUT_S = 2.0
+# By default a query's channel has room for 256 tokens, and the next one blocks the session.
+MAX_TOKENS = 65_536
+NO_ZID = ""
+# A topic's name, the last part of a use's key, may have slashes of its own.
+USE_PARTS = 5
 
 
 class Role(Enum):
-    """What a process does on a key, by the router's name for it."""
+    """What a process does on a topic."""
 
     PUBLISHES = "publisher"
     SUBSCRIBES = "subscriber"
@@ -42,9 +52,9 @@ class Process:
 
 @dataclass(frozen=True)
 class Use:
-    """That `process` does `role` on `key`, a key expression."""
+    """That `process` does `role` on the topic of that name."""
 
-    key: str
+    topic_name: str
     role: Role
     process: Process
 
@@ -58,14 +68,10 @@ class System:
     uses: tuple[Use, ...]
 
     def doing(self, role: Role, topic: Topic) -> list[Process]:
-        """The processes with that role on `topic`, by name.
-
-        One whose key expression covers several topics is among those of each.
-        """
-        key = zenoh.KeyExpr(topic.key(self.agent))
+        """The processes with that role on `topic`, by name."""
         found = set()
         for use in self.uses:
-            if use.role is role and key.intersects(zenoh.KeyExpr(use.key)):
+            if use.role is role and use.topic_name == topic.name:
                 found.add(use.process)
         return sorted(found, key=_by_name)
 
@@ -73,21 +79,10 @@ class System:
         """The topics that some process has a role on, in the order of the table."""
         return [topic for topic in topics.ALL if any(self.doing(role, topic) for role in Role)]
 
-    def foreign_keys(self) -> list[str]:
-        """Keys in use that are no topic's: of another version, or another program."""
-        known = [zenoh.KeyExpr(topic.key(self.agent)) for topic in topics.ALL]
-        foreign = []
-        for key in sorted({use.key for use in self.uses}):
-            expression = zenoh.KeyExpr(key)
-            if not any(topic_key.intersects(expression) for topic_key in known):
-                foreign.append(key)
-        return foreign
-
-
-class _Clients(msgspec.Struct):
-    """What the router's admin space holds under a key: the sessions that have the role."""
-
-    clients: list[str]
+    def unknown_topics(self) -> list[str]:
+        """Names in use that are no topic's: of another version."""
+        known = {topic.name for topic in topics.ALL}
+        return sorted({use.topic_name for use in self.uses} - known)
 
 
 def identity_key(agent: str, zid: str, member: Member) -> str:
@@ -95,66 +90,83 @@ def identity_key(agent: str, zid: str, member: Member) -> str:
     return f"cogmap/{agent}/@session/{zid}/{member.module}/{member.instance}"
 
 
+def use_key(agent: str, zid: str, role: str, topic_name: str) -> str:
+    """The key of the liveliness token of what session `zid` does on a topic."""
+    return f"cogmap/{agent}/@use/{zid}/{role}/{topic_name}"
+
+
 def identify(session: zenoh.Session, agent: str, member: Member) -> zenoh.LivelinessToken:
     """Name `session` as `member`'s; it holds until the token is undeclared."""
     return session.liveliness().declare_token(identity_key(agent, str(session.zid()), member))
 
 
+def announce_use(
+    session: zenoh.Session, agent: str, role: Role, topic: Topic
+) -> zenoh.LivelinessToken:
+    """Say what `session` does on `topic`; it holds until the token is undeclared."""
+    key = use_key(agent, str(session.zid()), role.value, topic.name)
+    return session.liveliness().declare_token(key)
+
+
 def discover(session: zenoh.Session, agent: str) -> System:
     """What `agent`'s processes do at this moment."""
-    every_token = identity_key(agent, "*", Member("*", "*"))
-    named = session.liveliness().get(every_token, timeout=ANSWER_TIMEOUT_S)
-    tokens = [str(sample.key_expr) for sample in _samples(named)]
+    every_member = Member("*", "*")
+    return read(
+        agent,
+        named=_tokens(session, identity_key(agent, "*", every_member)),
+        used=_tokens(session, use_key(agent, "*", "*", "**")),
+        ready=_tokens(session, ready_key(agent, every_member)),
+        own_zid=str(session.zid()),
+    )
 
-    admin = session.get("@/*/router/**", timeout=ANSWER_TIMEOUT_S)
-    facts = [(str(sample.key_expr), bytes(sample.payload)) for sample in _samples(admin)]
-    return read(agent, tokens, facts, str(session.zid()))
 
-
-def _samples(replies: Iterable[zenoh.Reply]) -> list[zenoh.Sample]:
-    """The replies that are no errors."""
-    return [reply.ok for reply in replies if reply.ok is not None]
+def _tokens(session: zenoh.Session, expression: str) -> list[str]:
+    channel: zenoh.handlers.FifoChannel[zenoh.Reply] = zenoh.handlers.FifoChannel(MAX_TOKENS)
+    replies = session.liveliness().get(expression, channel, timeout=ANSWER_TIMEOUT_S)
+    return [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
 
 
 def read(
-    agent: str, tokens: Iterable[str], facts: Iterable[tuple[str, bytes]], own_zid: str = ""
+    agent: str,
+    named: Iterable[str] = (),
+    used: Iterable[str] = (),
+    ready: Iterable[str] = (),
+    own_zid: str = NO_ZID,
 ) -> System:
-    """The system that identity tokens and the routers' `facts` (admin key, JSON) describe.
+    """The system that the keys of liveliness tokens describe, without the session `own_zid`.
 
-    The session `own_zid` is left out.
+    A member that is ready and does not name its session, as one in another language may, is a
+    process too.
     """
     members: dict[str, Member] = {}
-    for token in tokens:
+    for token in named:
         *_, zid, module, instance = token.split("/")
         members[zid] = Member(module, instance)
 
-    uses: set[Use] = set()
-    for admin_key, payload in facts:
-        uses |= _uses(agent, members, admin_key, payload)
-    uses = {use for use in uses if use.process.zid != own_zid}
-
+    uses = {use for use in _uses(used, members) if use.process.zid != own_zid}
     processes = {use.process for use in uses}
     for zid, member in members.items():
         if zid != own_zid:
             processes.add(Process(zid, member))
+
+    for token in ready:
+        *_, module, instance = token.split("/")
+        member = Member(module, instance)
+        if member not in members.values():
+            processes.add(Process(NO_ZID, member))
     return System(
         agent,
         tuple(sorted(processes, key=_by_name)),
-        tuple(sorted(uses, key=lambda use: (use.key, use.role.value, use.process.zid))),
+        tuple(sorted(uses, key=lambda use: (use.topic_name, use.role.value, use.process.zid))),
     )
 
 
-def _uses(agent: str, members: dict[str, Member], admin_key: str, payload: bytes) -> set[Use]:
-    """The uses of `agent`'s keys in one fact, such as `@/ZID/router/publisher/KEY`."""
-    path = admin_key.split("/", 3)[-1]
-    word, _, key = path.partition("/")
-    role = _ROLES.get(word)
-    is_ours = key.startswith((f"cogmap/{agent}/", "*"))
-    if role is None or not is_ours:
-        return set()
-
-    zids = msgspec.json.decode(payload, type=_Clients).clients
-    return {Use(key, role, Process(zid, members.get(zid))) for zid in zids}
+def _uses(tokens: Iterable[str], members: dict[str, Member]) -> Iterator[Use]:
+    for token in tokens:
+        *_, zid, word, topic_name = token.split("/", USE_PARTS)
+        role = _ROLES.get(word)
+        if role is not None:
+            yield Use(topic_name, role, Process(zid, members.get(zid)))
 
 
 def _by_name(process: Process) -> tuple[str, str]:

@@ -73,10 +73,10 @@ def open_client(endpoint: str, timeout_s: float = CONNECT_TIMEOUT_S) -> zenoh.Se
 def open_router(endpoint: str) -> zenoh.Session:
     """A router that listens at `endpoint`. Raises PortInUseError where something else does."""
     check_free(endpoint)
-    settings = {
+    settings: dict[str, object] = {
         "listen/endpoints": [endpoint],
-        "adminspace/enabled": True,
-        "adminspace/permissions": {"read": True, "write": False},
+        # Whoever asked it while a session declares would stop the router: see `discovery`.
+        "adminspace/enabled": False,
     }
     return zenoh.open(_config("router", **settings))
 

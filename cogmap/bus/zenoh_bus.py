@@ -12,7 +12,7 @@ import zenoh
 from zenoh import ext
 
 from cogmap.bus.codec import Envelope, decode_envelope, encode
-from cogmap.bus.discovery import identify
+from cogmap.bus.discovery import Role, announce_use, identify
 from cogmap.bus.interface import CACHED_MESSAGES, Answer, Arrival, Job, Member
 from cogmap.bus.session import check_name, open_client, ready_key
 from cogmap.errors import MessageError, NoAnswerError
@@ -64,6 +64,10 @@ class ZenohBus:
                 priority=_priority(topic),
                 express=True,
             )
+        self._announce_use(Role.PUBLISHES, topic)
+
+    def _announce_use(self, role: Role, topic: Topic) -> None:
+        self._declared.append(announce_use(self._session, self._agent, role, topic))
 
     def _caching_publisher(self, key: str, topic: Topic) -> ext.AdvancedPublisher:
         """A publisher from whose cache subscribers recover what a congested link dropped.
@@ -96,6 +100,7 @@ class ZenohBus:
             now_ns = time.time_ns()
             deliver(Arrival(topic, bytes(sample.payload), _envelope(sample), now_ns))
 
+        self._announce_use(Role.SUBSCRIBES, topic)
         key = topic.key(self._agent)
         if topic.delivery is not Delivery.NEVER_DROP:
             self._declared.append(self._session.declare_subscriber(key, receive))
@@ -132,6 +137,7 @@ class ZenohBus:
                     attachment=None if answer.envelope is None else encode(answer.envelope),
                 )
 
+        self._announce_use(Role.ANSWERS, request)
         key = request.key(self._agent)
         self._declared.append(
             self._session.declare_queryable(key, lambda query: enqueue(lambda: respond(query)))

@@ -1,14 +1,13 @@
-"""Who publishes and subscribes what, as the router reports it."""
+"""Who publishes and subscribes what, as the processes announce it."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 
 import pytest
 
 from cli.graph import to_dot, to_json, to_tree
-from cogmap.bus.discovery import Process, Role, System, discover, read
+from cogmap.bus.discovery import Process, Role, System, discover, read, use_key
 from cogmap.bus.interface import Answer, Member
 from cogmap.bus.session import open_client
 from cogmap.runtime.shell import Shell
@@ -61,7 +60,7 @@ def test_every_process_is_found_by_name_with_all_that_it_does(over_zenoh: OverZe
     assert names(system, Role.SUBSCRIBES, topics.VIEW) == []
     assert names(system, Role.ANSWERS, topics.SNAPSHOT_REQUEST) == ["workspace"]
     assert system.topics() == [topics.ODOMETRY, topics.VIEW, topics.SNAPSHOT_REQUEST]
-    assert system.foreign_keys() == []
+    assert system.unknown_topics() == []
 
 
 def test_no_module_subscribes_to_the_truth(over_zenoh: OverZenoh) -> None:
@@ -82,52 +81,56 @@ def test_no_module_subscribes_to_the_truth(over_zenoh: OverZenoh) -> None:
         assert names(system, Role.SUBSCRIBES, topic) == []
 
 
-TOKENS = [
-    "cogmap/agent/@session/aa/sim/sim",
-    "cogmap/agent/@session/bb/recorder/recorder",
+NAMED = ["cogmap/agent/@session/aa/sim/sim", "cogmap/agent/@session/bb/recorder/recorder"]
+USED = [
+    "cogmap/agent/@use/aa/publisher/odometry",
+    "cogmap/agent/@use/cc/publisher/odometry",
+    "cogmap/agent/@use/bb/subscriber/truth/pose",
+    "cogmap/agent/@use/own/subscriber/truth/pose",
+    "cogmap/agent/@use/aa/publisher/odometry_v2",
+    "cogmap/agent/@use/aa/listener/odometry",
 ]
-
-
-def fact(router: str, role: str, key: str, *zids: str) -> tuple[str, bytes]:
-    """What a router's admin space answers of the clients `zids`."""
-    sessions = {"routers": [], "peers": [], "clients": zids}
-    return f"@/{router}/router/{role}/{key}", json.dumps(sessions).encode()
-
-
-FACTS = [
-    ("@/r1/router", b'{"zid": "r1"}'),
-    ("@/r1/router/linkstate/north", b"graph {}"),
-    ("@/r1/router/metrics", b"\x1f\x8b"),
-    fact("r1", "publisher", "cogmap/agent/odometry", "aa"),
-    fact("r2", "publisher", "cogmap/agent/odometry", "cc"),
-    fact("r1", "subscriber", "cogmap/agent/truth/**", "bb", "own"),
-    fact("r1", "subscriber", "cogmap/other/odometry", "dd"),
-    fact("r1", "publisher", "cogmap/agent/odometry_v2", "aa"),
-]
+READY = ["cogmap/agent/@ready/sim/sim", "cogmap/agent/@ready/action/rust"]
 
 
 @pytest.fixture
 def system() -> System:
-    return read("agent", TOKENS, FACTS, "own")
+    return read("agent", NAMED, USED, READY, "own")
 
 
-def test_the_facts_of_several_routers_are_merged_and_unnamed_keep_their_id(
-    system: System,
-) -> None:
+def test_processes_that_are_unnamed_keep_their_id(system: System) -> None:
     unnamed, _ = system.doing(Role.PUBLISHES, topics.ODOMETRY)
 
     assert names(system, Role.PUBLISHES, topics.ODOMETRY) == ["?cc", "sim"]
     assert unnamed == Process("cc")
 
 
-def test_a_wildcard_counts_for_each_topic_and_the_asker_for_none(system: System) -> None:
-    for topic in (topics.TRUE_POSE, topics.TRUE_TOWN):
-        assert names(system, Role.SUBSCRIBES, topic) == ["recorder"]
-    assert names(system, Role.SUBSCRIBES, topics.ODOMETRY) == []
+def test_whoever_is_ready_is_found_without_a_name_for_its_session(system: System) -> None:
+    found = [process.name for process in system.processes]
+
+    assert found == ["?cc", "recorder", "rust", "sim"]
 
 
-def test_keys_that_are_no_topics_are_named(system: System) -> None:
-    assert system.foreign_keys() == ["cogmap/agent/odometry_v2"]
+def test_whoever_asks_is_not_counted(system: System) -> None:
+    assert names(system, Role.SUBSCRIBES, topics.TRUE_POSE) == ["recorder"]
+
+
+def test_topics_of_another_version_are_named_and_its_roles_ignored(system: System) -> None:
+    assert system.unknown_topics() == ["odometry_v2"]
+    assert len(system.uses) == 4
+
+
+def test_more_processes_than_a_channel_holds_by_default_are_found(over_zenoh: OverZenoh) -> None:
+    publisher = over_zenoh.join()
+    tokens = []
+    for number in range(300):
+        key = use_key(over_zenoh.agent, f"z{number}", Role.PUBLISHES.value, topics.ODOMETRY.name)
+        tokens.append(publisher.session.liveliness().declare_token(key))
+    meet(over_zenoh.join(), publisher)
+
+    found = names(discovered(over_zenoh), Role.PUBLISHES, topics.ODOMETRY)
+
+    assert len(found) == len(tokens)
 
 
 @pytest.mark.parametrize("show", [to_tree, to_json, to_dot])
@@ -140,7 +143,7 @@ def test_the_graph_shows_every_process_and_what_it_does(
 
 
 def test_an_empty_graph_is_a_sentence() -> None:
-    empty = read("agent", [], [])
+    empty = read("agent")
 
     assert to_tree(empty) == "no process of 'agent' is on the bus"
 

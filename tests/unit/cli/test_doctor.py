@@ -40,7 +40,7 @@ def health(at_s: float, **changes: object) -> Health:
 
 def system(role: Role = Role.PUBLISHES, topic: Topic = topics.SCAN) -> System:
     process = Process("1", SENSORY)
-    use = Use(topic.key("agent"), role, process)
+    use = Use(topic.name, role, process)
     return System("agent", (process,), (use,))
 
 
