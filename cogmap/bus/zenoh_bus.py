@@ -22,6 +22,10 @@ from schemas.topics import Delivery, Scope, Topic
 # computes.
 SWITCH_S = 5e-5
 RECOVERY_PERIOD = timedelta(seconds=0.5)
+# Answers are sent with the priority of their query. One of its own: where an answer fills its queue
+# and one of the periodic queries above, which have the default, comes in between, Zenoh 1.10 sends
+# neither and closes the link after 5 s.
+ANSWER_PRIORITY = zenoh.Priority.BACKGROUND
 _LARGE_BYTES = 8 * 2**20
 
 
@@ -148,6 +152,7 @@ class ZenohBus:
             request.key(self._agent),
             payload=payload,
             encoding=encoding(request),
+            priority=ANSWER_PRIORITY,
             timeout=timeout_s,
         )
         for reply in replies:

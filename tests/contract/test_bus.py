@@ -9,7 +9,7 @@ from queue import SimpleQueue
 import pytest
 
 from cogmap.bus.codec import Envelope, decode
-from cogmap.bus.interface import Answer, Job, Member
+from cogmap.bus.interface import Answer, Bus, Job, Member
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.errors import NoAnswerError, UsageError
 from schemas import topics
@@ -21,6 +21,7 @@ from tests.support.system.networks import TIMEOUT_S, Network, OverZenoh, Peer, m
 
 MESSAGES = {topics.of(message): message for message in example_messages()}
 TRAVELLING = [topic for topic in topics.ALL if topic.delivery is not Delivery.ON_REQUEST]
+NEVER_DROP = [topic for topic in TRAVELLING if topic.delivery is Delivery.NEVER_DROP]
 SNAPSHOTS = (topics.SNAPSHOT_REQUEST, topics.SNAPSHOT)
 ENVELOPE = Envelope("workspace", 0, 7, 2, 1)
 # How long nothing arrives where nothing should.
@@ -170,6 +171,11 @@ def work(job: Job) -> None:
     threading.Thread(target=job).start()
 
 
+def work_aside(job: Job) -> None:
+    """Do a job as a shell does: on no thread of the bus."""
+    threading.Thread(target=job).start()
+
+
 def test_a_query_is_answered(network: Network) -> None:
     asker = network.join()
     answerer = network.join()
@@ -179,6 +185,31 @@ def test_a_query_is_answered(network: Network) -> None:
     answer = asker.query(topics.SNAPSHOT_REQUEST, b"once", TIMEOUT_S)
 
     assert answer == Answer(b"onceonce", ENVELOPE)
+
+
+def test_a_large_answer_arrives_although_its_sender_asks_for_what_it_missed(
+    over_zenoh: OverZenoh,
+) -> None:
+    asker = over_zenoh.join()
+    answerer = over_zenoh.join()
+    size_bytes = 150_000_000
+    answerer.serve(*SNAPSHOTS, lambda payload: Answer(bytes(size_bytes)), work_aside)
+    publish_never_drop(asker)
+    missed = Peer(answerer, *NEVER_DROP, history=1)
+    missed.wait_for(len(NEVER_DROP))
+    meet(asker, answerer)
+
+    # It asks twice a second: some of these answers are under way then.
+    answers = [asker.query(topics.SNAPSHOT_REQUEST, b"", TIMEOUT_S) for _ in range(6)]
+
+    assert {len(answer.payload) for answer in answers} == {size_bytes}
+
+
+def publish_never_drop(bus: Bus) -> None:
+    """One message on each such topic."""
+    for topic in NEVER_DROP:
+        bus.declare(topic)
+        bus.publish(topic, b"payload", ENVELOPE)
 
 
 def test_an_error_of_the_answerer_comes_back_in_words(network: Network) -> None:
