@@ -35,14 +35,15 @@ def best_frontier(
     """The frontier that promises most from where the agent is; None where all is known.
 
     A frontier promises the unknown places around it, over the effort to get there: its distance,
-    and the turn that it takes. The one beside `near`, where the agent goes already, is kept until
-    another promises clearly more.
+    and the turn that it takes. Where the agent is, there is none. The one beside `near`, where it
+    goes already, is kept until another promises clearly more.
     """
     distance_m = spread(ground.known, np.array([agent.cell])).distance_m
     is_unknown = ground.is_free & ~ground.is_known
     is_reached = ground.is_known & np.isfinite(distance_m)
     is_open = ndimage.binary_dilation(is_unknown, SQUARE) & ~ground.is_visited
-    is_edge = is_open & is_reached
+    is_elsewhere = distance_m > config.reached_m
+    is_edge = is_open & is_reached & is_elsewhere
 
     effort_m = distance_m + config.frontier_offset_m + _turning_m(ground, agent, config)
     promise = _unknown_around(is_unknown, ground, config) / effort_m

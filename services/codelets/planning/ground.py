@@ -23,11 +23,13 @@ from services.codelets.planning.network import PlaceNetwork
 
 COLUMNS = (PlaceColumn.ROAD, PlaceColumn.OBSTACLE, *WEIGHT_COLUMNS)
 OBSTACLE_FROM = 0.5
+SPREAD_FROM = 0.2
 BESIDE_CUT = 0.5
 BLIND_STEP_M = 0.5
 LEFT_START_M = 3.0
-# Where the agent drove so lately it can drive back.
+# Where the agent drove so lately it can drive back, whatever stands there by now.
 CAME_S = 60.0
+ROAD_BEYOND_M = 2.0
 POSITION = slice(PathColumn.X_M, PathColumn.Y_M + 1)
 SQUARE = np.ones((3, 3), bool)
 
@@ -56,8 +58,8 @@ def ground(graph: Graph, agent: Self, config: Config, goals: Sequence[Goal] = ()
     """The ground of the agent's map and some unknown places around it, as far as to those of
     `goals` that are positions not too far outside.
 
-    The path that the agent took counts as known, and so does the ground ahead that is too near for
-    its camera.
+    The path that the agent took counts as known, and so does ground ahead that is too near for its
+    camera, where road begins behind it.
     """
     map_id = agent.map
     extent = graph.places.extent(map_id)
@@ -69,22 +71,25 @@ def ground(graph: Graph, agent: Self, config: Config, goals: Sequence[Goal] = ()
     here = Here(window.origin, window.shape, graph.cell_m(map_id))
     path = _path(graph)
     path_m = path[:, POSITION]
-    driven_m = np.vstack([path_m, _blind_m(agent, config)])
     is_seen = window.column(PlaceColumn.ROAD) >= ROAD_FROM
+    driven_m = path_m
+    if _is_road_ahead(agent, path_m, is_seen, here, config):
+        driven_m = np.vstack([path_m, _ahead_m(agent, 0.0, config.blind_m)])
     is_known = is_seen | here.is_within(config.driven_m, driven_m)
 
-    is_obstacle = window.column(PlaceColumn.OBSTACLE) >= OBSTACLE_FROM
+    is_obstacle = _stands_there(window.column(PlaceColumn.OBSTACLE))
     is_edge = _has_cut(weights) | is_obstacle
+    is_way_back = _way_back(path, agent, is_known & ~is_edge, is_obstacle, here)
+    weights = _opened(weights, is_way_back)
+
     share = _shares(is_edge)
+    share[is_way_back & is_edge] = config.doubt_weight
     optimistic = np.where(is_known, share, share * config.unknown_weight)
 
     lately_m = _lately_m(path, agent, config.doubt_after_s)
-    just_now_m = _lately_m(path, agent, CAME_S)
     is_seen_lately = here.is_within(config.doubt_from_m, lately_m)
-    is_seen_lately[here.around(just_now_m)] = False
     is_in_doubt = is_known & is_edge & ~is_seen_lately
     in_doubt = np.where(is_in_doubt, config.doubt_weight, optimistic)
-    reopened = _reopened(weights, is_known)
 
     return Ground(
         is_free=~is_edge,
@@ -92,8 +97,17 @@ def ground(graph: Graph, agent: Self, config: Config, goals: Sequence[Goal] = ()
         is_visited=here.is_within(config.visited_m, _since_start_m(path_m)),
         network=here.network(_links(weights, optimistic)),
         known=here.network(_links(weights, np.where(is_known, share, 0.0))),
-        doubted=here.network(_links(reopened, in_doubt)),
+        doubted=here.network(_links(_opened(weights, is_known), in_doubt)),
     )
+
+
+def _stands_there(obstacle: Singles) -> Booleans:
+    """(w, h): where something stands. From far it is seen now in a cell, now in the one behind it:
+    all of what was seen there and beside counts, where it would do for a row of three.
+    """
+    around = ndimage.uniform_filter(obstacle, 3, mode="constant") * SQUARE.size
+    is_spread = (obstacle >= SPREAD_FROM) & (around >= 3 * OBSTACLE_FROM)
+    return np.asarray((obstacle >= OBSTACLE_FROM) | is_spread)
 
 
 def _shares(is_edge: Booleans) -> Floats:
@@ -115,34 +129,85 @@ class Here(NamedTuple):
         """Its place network, with links of (4, w, h) weights."""
         return PlaceNetwork(self.origin, self.cell_m, weights)
 
-    def around(self, positions_m: Floats) -> tuple[Indices, Indices]:
-        """The cells of (n, 2) positions and those beside them, as far as they are inside."""
-        steps = np.argwhere(SQUARE) - 1
-        here = np.rint(positions_m / self.cell_m).astype(np.int64) - np.array(self.origin)
-        cells = np.unique((here[:, None] + steps).reshape(-1, 2), axis=0)
-        is_inside = ((cells >= 0) & (cells < self.shape)).all(axis=1)
-        i, j = cells[is_inside].T
-        return i, j
+    def at(self, positions_m: Floats, values: Booleans) -> Booleans:
+        """(n,): the (w, h) values at (n, 2) positions, false outside."""
+        cells, is_inside = self._cells(positions_m)
+        found = np.zeros(len(positions_m), bool)
+        found[is_inside] = values[tuple(cells[is_inside].T)]
+        return found
+
+    def has(self, positions_m: Floats) -> Booleans:
+        """(w, h): the cells of (n, 2) positions."""
+        cells, is_inside = self._cells(positions_m)
+        has = np.zeros(self.shape, bool)
+        has[tuple(cells[is_inside].T)] = True
+        return has
 
     def is_within(self, within_m: float, positions_m: Floats) -> Booleans:
         """(w, h): the cells within a distance of any of (n, 2) positions."""
-        cells = np.rint(positions_m / self.cell_m).astype(np.int64) - np.array(self.origin)
-        is_inside = ((cells >= 0) & (cells < self.shape)).all(axis=1)
-        if not is_inside.any():
-            return np.zeros(self.shape, bool)
+        has = self.has(positions_m)
+        if not has.any():
+            return has
 
-        is_away = np.ones(self.shape, bool)
-        is_away[tuple(cells[is_inside].T)] = False
-        distance_m = ndimage.distance_transform_edt(is_away) * self.cell_m
+        distance_m = ndimage.distance_transform_edt(~has) * self.cell_m
         return np.asarray(distance_m <= within_m)
 
+    def _cells(self, positions_m: Floats) -> tuple[Indices, Booleans]:
+        """(n, 2) and (n,): the indices of positions, and which are inside."""
+        cells = np.rint(positions_m / self.cell_m).astype(np.int64) - np.array(self.origin)
+        return cells, ((cells >= 0) & (cells < self.shape)).all(axis=1)
 
-def _blind_m(agent: Self, config: Config) -> Floats:
-    """(n, 2): positions ahead of the agent that its camera does not see."""
-    ahead_m = np.arange(0.0, config.blind_m, BLIND_STEP_M)
+
+def _ahead_m(agent: Self, first_m: float, last_m: float) -> Floats:
+    """(n, 2): positions ahead of the agent, at distances from `first_m` to before `last_m`."""
+    ahead_m = np.arange(first_m, last_m, BLIND_STEP_M)
     direction = np.array([math.cos(agent.heading_rad), math.sin(agent.heading_rad)])
     positions_m: Floats = np.array([agent.x_m, agent.y_m]) + ahead_m[:, None] * direction
     return positions_m
+
+
+def _is_road_ahead(
+    agent: Self, path_m: Floats, is_road: Booleans, here: Here, config: Config
+) -> bool:
+    """Whether the ground ahead that the agent's camera does not see is taken for road: where road
+    that it sees begins behind it, and where the agent starts. Elsewhere it may be anything.
+    """
+    if not len(_since_start_m(path_m)):
+        return True
+
+    beyond_m = _ahead_m(agent, config.blind_m, config.blind_m + ROAD_BEYOND_M)
+    return bool(here.at(beyond_m, is_road).any())
+
+
+def _way_back(
+    path: Floats, agent: Self, is_ground: Booleans, is_obstacle: Booleans, here: Here
+) -> Booleans:
+    """(w, h): where the agent drove since it left the largest connected part of the ground, and the
+    places beside; none while it is there.
+
+    It drove there, so that it can drive back, over a kerb too. What it sees to stand there was not
+    seen rightly where the agent was there a moment ago.
+    """
+    labels, number = ndimage.label(is_ground, SQUARE)
+    if not number:
+        return np.zeros_like(is_ground)
+
+    sizes = np.bincount(labels.ravel())[1:]
+    is_largest = labels == sizes.argmax() + 1
+    was_there = here.at(path[:, POSITION], is_largest)
+    left = len(was_there) - int(was_there[::-1].argmax()) if was_there.any() else len(was_there)
+    way = path[left:]
+
+    here_m = np.array([[agent.x_m, agent.y_m]])
+    if here.at(here_m, is_largest).any():
+        return np.zeros_like(is_ground)
+
+    lately_s = agent.stamp_ns * 1e-9 - CAME_S
+    is_late = way[:, PathColumn.STAMP_S] >= lately_s
+    whole = here.has(np.vstack([way[:, POSITION], here_m]))
+    late = here.has(np.vstack([way[is_late, POSITION], here_m]))
+    is_way = ndimage.binary_dilation(whole, SQUARE) & ~is_obstacle
+    return np.asarray(is_way | ndimage.binary_dilation(late, SQUARE))
 
 
 def _path(graph: Graph) -> Floats:
@@ -218,15 +283,15 @@ def _has_cut(weights: Singles) -> Booleans:
     return has_cut
 
 
-def _reopened(weights: Singles, is_known: Booleans) -> Singles:
-    """(4, w, h): the weights, with links between known places open."""
-    reopened = weights.copy()
+def _opened(weights: Singles, is_open: Booleans) -> Singles:
+    """(4, w, h): the weights, with links between open places open."""
+    opened = weights.copy()
     for number, offset in enumerate(LINK_OFFSETS.tolist()):
-        here, there = _ends(is_known.shape, offset)
-        of_link = reopened[number][here]
-        of_link[is_known[here] & is_known[there]] = 1.0
+        here, there = _ends(is_open.shape, offset)
+        of_link = opened[number][here]
+        of_link[is_open[here] & is_open[there]] = 1.0
 
-    return reopened
+    return opened
 
 
 def _links(weights: Singles, share: Floats) -> Singles:

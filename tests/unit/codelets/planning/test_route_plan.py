@@ -229,7 +229,6 @@ def test_between_walls_that_it_sees_the_agent_goes_back_by_the_way_it_has_come(
     plan = _plan(graph)
 
     assert plan.state is state
-    assert plan.doubtful == (state is PlanState.READY)
 
 
 def test_an_object_is_reached_from_the_street_beside_it() -> None:
