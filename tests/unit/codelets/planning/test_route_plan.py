@@ -352,6 +352,18 @@ def test_an_agent_that_has_reached_its_goals_does_not_explore() -> None:
     assert due(context, graph, config) == []
 
 
+@pytest.mark.parametrize(("barrier_i", "is_due"), [(20, True), (50, False)])
+def test_a_route_that_is_blocked_is_planned_anew_at_once(barrier_i: int, is_due: bool) -> None:
+    between_plans = CycleContext(cycle=6, percepts=percepts(4), motions=Array.of(np.zeros((0, 5))))
+    graph = _loop(_goal("b", 54.0, 0.0))
+    _answer(graph)
+    assert due(between_plans, graph, Config()) == []
+
+    graph.change([_barrier(barrier_i, 0)])
+
+    assert bool(due(between_plans, graph, Config())) is is_due
+
+
 def test_without_a_goal_the_agent_explores_where_the_road_is_open() -> None:
     i, j = np.mgrid[54:61, 10:44]
     unknown = _column(PlaceColumn.ROAD, np.column_stack([i.ravel(), j.ravel()]), 0.0)
