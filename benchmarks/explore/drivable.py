@@ -73,6 +73,21 @@ class Drivable(NamedTuple):
         lengths_m = np.asarray(dijkstra(links, indices=start), np.float64)
         return lengths_m.reshape(self.is_free.shape)
 
+    def route_m(self, start_m: tuple[float, float], end_m: tuple[float, float]) -> Floats:
+        """(n, 2): the shortest route between two positions, of which one leads to the other."""
+        links = _links(self.is_free)
+        start = self.cell(*start_m)
+        _, before = dijkstra(links, indices=start, return_predecessors=True)
+
+        numbers = [self.cell(*end_m)]
+        while numbers[-1] != start:
+            numbers.append(int(before[numbers[-1]]))
+
+        _, height = self.is_free.shape
+        cells = np.column_stack(np.divmod(numbers[::-1], height))
+        positions_m: Floats = self.corner_m + cells * CELL_M
+        return positions_m
+
     def length_m(self, start_m: tuple[float, float], end_m: tuple[float, float]) -> float:
         """The length of the shortest route between two positions; infinite where none leads."""
         lengths_m = self.lengths_from(*start_m)

@@ -104,6 +104,7 @@ class Experimenter:
             began_travelled_m=pose.travelled_m,
             closes=number % 2 == 1 and self._draws < MAX_DRAWS,
             shortest_m=shortest_m,
+            unwarned_m=shortest_m,
         )
         x_m, y_m = self._on_map(goal_m)
         goal = Goal(id=self._goal_id, base_level=1.0, x_m=x_m, y_m=y_m)
@@ -131,15 +132,14 @@ class Experimenter:
         assert self._start is not None
         assert plan.route is not None
         route_m = transform_from(self._start, np.asarray(plan.route.numpy(), np.float64))
-        found = street_to_close(self._rng, self._town, route_m, trial.goal_m)
-        if found is None:
+        closure = street_to_close(self._rng, self._town, route_m, trial.goal_m)
+        if closure is None:
             drop = DropNode(id=self._goal_id)
             self._draws += 1
             self._trial = None
             return [Offer(cycle=self.graph.cycle, operations=[drop])]
 
-        trial.closed, length_m = found
-        trial.shortest_m = length_m
+        trial.close(closure)
         return [StreetClosure(street=trial.closed, closed=True)]
 
     def _end(self, pose: TruePose, trial: Trial) -> list[Message]:

@@ -27,6 +27,8 @@ FIRST_SEED = 101
 EXPLORE_S = 900.0
 GOALS = 10
 LONGEST_S = 6000.0
+# A plan of these towns takes some 20 ms, a tenth of a cycle.
+PLANNING_CYCLES = 1
 COGNITION = ("workspace", "codelets", "global_workspace", "action")
 SENSES = ("sensory", "epam")
 THRESHOLDS = {
@@ -76,7 +78,7 @@ def sections(seed: int, has_cameras: bool = False) -> Sections:
 
     return {
         "sim": sim,
-        "workspace": {"mode": "lockstep"},
+        "workspace": {"mode": "lockstep", "background_cycles": PLANNING_CYCLES},
         "action": {"mode": "lockstep"},
         "planning": {"explore": True},
     }
@@ -147,6 +149,7 @@ def metrics(towns: list[Town]) -> Metrics:
         "way_over_shortest_open": _mean_over_shortest(
             [each for each in reached if not each.closed]
         ),
+        "unwarned_over_shortest": _mean([each.unwarned_m / each.shortest_m for each in reached]),
         "boundary_precision": float(np.mean([town.boundaries.precision for town in towns])),
         "boundary_recall": float(np.mean([town.boundaries.recall for town in towns])),
         "collisions": float(sum(town.collisions for town in towns)),
@@ -154,5 +157,9 @@ def metrics(towns: list[Town]) -> Metrics:
 
 
 def _mean_over_shortest(trials: list[Trial]) -> float:
-    ratios = [trial.over_shortest for trial in trials]
+    return _mean([trial.over_shortest for trial in trials])
+
+
+def _mean(ratios: list[float]) -> float:
+    """NaN of none."""
     return float(np.mean(ratios)) if ratios else float("nan")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -13,12 +14,15 @@ from cli.launch.guide import streets_ahead
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.polylines import nearest_on_line, resample
 from schemas.sensing import TrueTown
+from services.codelets.config import Config
 
 LINE_STEP_M = 1.0
 MIN_AWAY_M = 40.0
 REACHED_WITHIN_M = 4.0
 SLOWEST_M_S = 1.0
 GRACE_S = 60.0
+SIGHT_M = Config().boundary_reach_m
+"""How far the agent puts on its map what it sees."""
 
 Point = tuple[float, float]
 
@@ -29,7 +33,8 @@ class Trial:
 
     `closes`: whether a street is to be closed once a route is planned; `closed` is that street.
     `driven_m` is None while the goal is not reached; `shortest_m` is the shortest route's length in
-    the town as it is then.
+    the town as it is then. `unwarned_m` is what an agent would drive that knows the town and takes
+    the shortest routes, but sees that a street is closed only where its barrier is within SIGHT_M.
     """
 
     start_m: Point
@@ -38,6 +43,7 @@ class Trial:
     began_travelled_m: float
     closes: bool
     shortest_m: float
+    unwarned_m: float
     closed: str = ""
     driven_m: float | None = None
 
@@ -52,6 +58,20 @@ class Trial:
         """The distance driven over that of the shortest route."""
         assert self.driven_m is not None
         return self.driven_m / self.shortest_m
+
+    def close(self, closure: Closure) -> None:
+        """The street on the way is closed."""
+        self.closed = closure.street
+        self.shortest_m = closure.shortest_m
+        self.unwarned_m = closure.unwarned_m
+
+
+class Closure(NamedTuple):
+    """A street to be closed, and a drive's `shortest_m` and `unwarned_m` then."""
+
+    street: str
+    shortest_m: float
+    unwarned_m: float
 
 
 def centre_lines_m(town: TrueTown) -> Floats:
@@ -92,23 +112,42 @@ def draw_goal(
 
 def street_to_close(
     rng: np.random.Generator, town: TrueTown, route_m: Floats, goal_m: Point
-) -> tuple[str, float] | None:
-    """A street ahead that the (n, 2) route passes, without which the goal can still be reached, and
-    the length of the shortest route then; None where there is none. The goal is not at its barrier,
-    where it could be reached from both sides.
+) -> Closure | None:
+    """A street ahead that the (n, 2) route passes, without which the goal can still be reached;
+    None where there is none. The goal is not at its barrier, where it could be reached from both
+    sides; nor is it a square, which a barrier through its middle does not close.
     """
     start_x_m, start_y_m = route_m[0].tolist()
+    start_m = (start_x_m, start_y_m)
     passed = streets_ahead(town, route_m)
     for number in rng.permutation(len(passed)).tolist():
         street = passed[number].street
+        if math.dist(*street.line_m) < street.width_m:
+            continue
+
         (foot_m,) = nearest_on_line(barrier_m(street), np.array([goal_m])).foot_m
         if math.dist(foot_m, goal_m) < REACHED_WITHIN_M:
             continue
 
-        name = street.name
-        closed = Drivable.of(closed_as(town, name))
-        length_m = closed.length_m((start_x_m, start_y_m), goal_m)
+        closed = Drivable.of(closed_as(town, street.name))
+        length_m = closed.length_m(start_m, goal_m)
         if math.isfinite(length_m):
-            return name, length_m
+            known_m = Drivable.of(town).route_m(start_m, goal_m)
+            return Closure(street.name, length_m, unwarned_m(known_m, barrier_m(street), closed))
 
     return None
+
+
+def unwarned_m(known_m: Floats, barrier_ends_m: Floats, closed: Drivable) -> float:
+    """The length of a drive along (n, 2) `known_m` as far as its barrier (2, 2) is within SIGHT_M,
+    and from there by the shortest route in the town as it is.
+    """
+    feet_m = nearest_on_line(barrier_ends_m, known_m).foot_m
+    is_seen = np.hypot(*(known_m - feet_m).T) <= SIGHT_M
+    seen_at = int(is_seen.argmax()) if is_seen.any() else len(known_m) - 1
+
+    steps_m = np.diff(known_m[: seen_at + 1], axis=0)
+    driven_m = float(np.hypot(*steps_m.T).sum())
+    seen_x_m, seen_y_m = known_m[seen_at].tolist()
+    goal_x_m, goal_y_m = known_m[-1].tolist()
+    return driven_m + closed.length_m((seen_x_m, seen_y_m), (goal_x_m, goal_y_m))

@@ -185,8 +185,8 @@ def _way_back(
     """(w, h): where the agent drove since it left the largest connected part of the ground, and the
     places beside; none while it is there.
 
-    It drove there, so that it can drive back, over a kerb too. What it sees to stand there was not
-    seen rightly where the agent was there a moment ago.
+    It drove there, so that it can drive back, over a kerb too. It does not drive through what has
+    come to stand there; where it was a moment ago nothing stands, whatever it saw.
     """
     labels, number = ndimage.label(is_ground, SQUARE)
     if not number:
@@ -207,7 +207,7 @@ def _way_back(
     whole = here.has(np.vstack([way[:, POSITION], here_m]))
     late = here.has(np.vstack([way[is_late, POSITION], here_m]))
     is_way = ndimage.binary_dilation(whole, SQUARE) & ~is_obstacle
-    return np.asarray(is_way | ndimage.binary_dilation(late, SQUARE))
+    return np.asarray(is_way | late)
 
 
 def _path(graph: Graph) -> Floats:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -11,7 +12,7 @@ from benchmarks.explore.boundaries import BoundaryScore
 from benchmarks.explore.drivable import Drivable
 from benchmarks.explore.judge import explored_share, score_boundaries
 from benchmarks.explore.measure import Town, metrics
-from benchmarks.explore.trials import Trial, closed_as, draw_goal, street_to_close
+from benchmarks.explore.trials import SIGHT_M, Trial, closed_as, draw_goal, street_to_close
 from cogmap.graph.graph import Graph
 from schemas.array import Array
 from schemas.graph import Cells
@@ -51,6 +52,7 @@ def _trial(driven_m: float | None, closed: str = "") -> Trial:
         began_travelled_m=0.0,
         closes=bool(closed),
         shortest_m=50.0,
+        unwarned_m=60.0 if closed else 50.0,
         closed=closed,
         driven_m=driven_m,
     )
@@ -88,15 +90,43 @@ def test_the_street_that_is_closed_is_on_the_route_and_leaves_another() -> None:
     found = street_to_close(np.random.default_rng(1), _town(), route_m, (50.0, 0.0))
 
     assert found is not None
-    name, length_m = found
-    assert name == "south"
-    assert length_m > 120.0
+    assert found.street == "south"
+    assert found.shortest_m > 120.0
+
+
+def test_an_agent_that_sees_only_from_near_that_a_street_is_closed_drives_there_and_back() -> None:
+    route_m = np.column_stack([np.arange(51.0), np.zeros(51)])
+    found = street_to_close(np.random.default_rng(1), _town(), route_m, (50.0, 0.0))
+
+    assert found is not None
+    there_m = 30.0 - SIGHT_M
+    there_and_back_m = 2 * there_m
+    assert found.shortest_m < found.unwarned_m <= found.shortest_m + there_and_back_m
 
 
 def test_a_street_is_not_closed_where_its_barrier_would_stand_at_the_goal() -> None:
     route_m = np.column_stack([np.arange(31.0), np.zeros(31)])
 
     assert street_to_close(np.random.default_rng(1), _town(), route_m, (30.0, 2.5)) is None
+
+
+def test_a_square_is_not_closed() -> None:
+    town = _town()
+    square = Street(name="square", line_m=[(28.0, 0.0), (32.0, 0.0)], width_m=30.0)
+    west = Street(name="south-west", line_m=[(0.0, 0.0), (28.0, 0.0)], width_m=6.0)
+    east = Street(name="south-east", line_m=[(32.0, 0.0), (60.0, 0.0)], width_m=6.0)
+    _, *others = town.streets
+    streets = [square, west, east, *others]
+    route_m = np.column_stack([np.linspace(15.0, 40.0, 26), np.zeros(26)])
+
+    found = street_to_close(
+        np.random.default_rng(1),
+        msgspec.structs.replace(town, streets=streets),
+        route_m,
+        (40.0, 0.0),
+    )
+
+    assert found is None
 
 
 def test_explored_is_what_the_map_has_as_road() -> None:
@@ -124,4 +154,5 @@ def test_goals_that_are_not_reached_count_and_do_not_lengthen_the_way() -> None:
     assert found["goals_reached_share"] == pytest.approx(2 / 3)
     assert found["way_over_shortest"] == pytest.approx(1.15)
     assert found["way_over_shortest_open"] == pytest.approx(1.1)
+    assert found["unwarned_over_shortest"] == pytest.approx(1.1)
     assert found["collisions"] == 1.0
