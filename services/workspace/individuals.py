@@ -3,7 +3,8 @@
 Perception recognises what an object looks like, and buildings may look alike. A percept far from
 every object of its name is of another one, while something else in view confirms where the agent
 is, or nothing has for so long that it cannot be elsewhere: of the one that was seen of late where
-it is, for two cannot stand in one place, or else of a new one.
+it is, for two cannot stand in one place, or else of a new one. So is one that is near an object of
+its name which was hardly seen yet, and may be a mistake.
 """
 
 from __future__ import annotations
@@ -34,7 +35,8 @@ NOT_ELSEWHERE_NS = 20_000_000_000
 
 
 class Candidate(NamedTuple):
-    """The individual nearest to a percept: its label, and whether the percept may be of it.
+    """The individual nearest to a percept: its label, whether the percept may be of it, and whether
+    that is certain, for it was seen often or was given.
 
     `unused` is a label that no individual has yet, empty where there are too many. The percept is
     seen at (x, y) `seen_m`.
@@ -42,6 +44,7 @@ class Candidate(NamedTuple):
 
     label: str
     is_near: bool
+    is_established: bool
     unused: str
     seen_m: tuple[float, float]
 
@@ -63,8 +66,10 @@ def individuals(percepts: Percepts, graph: Graph, motions: Array) -> Percepts:
     objects = []
     for percept, candidate in zip(percepts.objects, candidates, strict=True):
         label = candidate.label
-        if is_here and not candidate.is_near and candidate.unused:
-            label = _standing_there(percept, candidate, graph, taken) or candidate.unused
+        is_certain = candidate.is_near and candidate.is_established
+        if is_here and not is_certain and candidate.unused:
+            other = candidate.label if candidate.is_near else candidate.unused
+            label = _standing_there(percept, candidate, graph, taken) or other
             taken.add(label)
         objects.append(msgspec.structs.replace(percept, label=label))
 
@@ -123,27 +128,30 @@ def _moved(agent: Self, motions: Array) -> Floats:
 def _standing_there(
     percept: Percept, candidate: Candidate, graph: Graph, others: Collection[str]
 ) -> str:
-    """The label of the object that a percept can only be of, by where it is: one that was seen of
-    late, and is not among `others`. Empty where there is none.
+    """The label of the object that a percept can only be of, by where it is: the nearest that was
+    seen of late, and is not among `others`. Empty where there is none.
     """
     agent = graph.agent
     assert agent is not None
+    standing = ""
+    nearest_m = math.inf
     for seen in graph.of_kind(nodes.Percept):
         node = graph.get(Object, object_id(seen.label))
         if node is None or node.sightings < ESTABLISHED or node.label in others:
             continue
 
         away_m = math.dist(candidate.seen_m, (node.x_m, node.y_m))
-        near_m = APART_M / 2
-        if away_m <= near_m and GATE * _sd_m(percept, agent, node) <= near_m:
-            return node.label
+        near_m = min(APART_M, max(APART_M / 2, GATE * _sd_m(percept, agent, node)))
+        if away_m <= near_m and away_m < nearest_m:
+            nearest_m = away_m
+            standing = node.label
 
-    return ""
+    return standing
 
 
 def _candidate(percept: Percept, pose: Floats, agent: Self, graph: Graph) -> Candidate:
     if not (percept.has_bearing and percept.has_range):
-        return Candidate(percept.label, True, "", (math.nan, math.nan))
+        return Candidate(percept.label, True, True, "", (math.nan, math.nan))
 
     x_m, y_m, heading_rad = pose.tolist()
     direction_rad = heading_rad + percept.bearing_rad
@@ -152,7 +160,7 @@ def _candidate(percept: Percept, pose: Floats, agent: Self, graph: Graph) -> Can
         y_m + percept.range_m * math.sin(direction_rad),
     )
 
-    candidate = Candidate(percept.label, False, "", seen_m)
+    candidate = Candidate(percept.label, False, False, "", seen_m)
     nearest_m = math.inf
     unused = ""
     for number in range(1, MAX_INDIVIDUALS + 1):
@@ -163,13 +171,14 @@ def _candidate(percept: Percept, pose: Floats, agent: Self, graph: Graph) -> Can
             continue
 
         if node.surveyed:
-            return Candidate(label, True, "", seen_m)
+            return Candidate(label, True, True, "", seen_m)
 
         away_m = math.dist(seen_m, (node.x_m, node.y_m))
         if away_m < nearest_m:
             nearest_m = away_m
             near_m = max(APART_M, GATE * _sd_m(percept, agent, node))
-            candidate = Candidate(label, away_m <= near_m, "", seen_m)
+            is_established = node.sightings >= ESTABLISHED
+            candidate = Candidate(label, away_m <= near_m, is_established, "", seen_m)
 
     return candidate._replace(unused=unused)
 

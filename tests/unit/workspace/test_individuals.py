@@ -121,6 +121,29 @@ def test_a_percept_in_the_place_of_another_object_is_of_that() -> None:
     assert _labels_where(*seen, percepts_of=["mill"]) == ["inn", "mill"]
 
 
+def test_a_percept_that_is_seen_vaguely_is_of_the_object_that_it_may_be_where_it_is() -> None:
+    known = percept("mill", 0.0, 30.0)
+    vague = percept("inn", NORTH_RAD, 24.0, range_sd_m=2.5)
+    sure = percept("inn", NORTH_RAD, 24.0)
+    far = percept("inn", NORTH_RAD, 27.0, range_sd_m=5.0)
+
+    assert _labels_where(vague, known) == ["barn", "mill"]
+    assert _labels_where(sure, known) == ["inn", "mill"]
+    assert _labels_where(far, known) == ["inn", "mill"]
+
+
+def test_an_object_that_was_hardly_seen_yields_to_the_one_in_its_place() -> None:
+    seen = (percept("inn", NORTH_RAD, 20.5), percept("mill", 0.0, 30.0))
+    known = [_house("mill", 30.0, 0.0), _house("barn", 0.0, 20.0)]
+    of_late = [_seen_of_late(label) for label in ("mill", "barn")]
+
+    for sightings, label in ((1, "barn"), (9, "inn")):
+        same_place = _house("inn", 0.0, 20.5, sightings=sightings)
+        graph = graph_of(agent(), *known, same_place, *of_late)
+        entered = individuals(percepts(0, *seen), graph, STILL)
+        assert [each.label for each in entered.objects] == [label, "mill"]
+
+
 def test_two_percepts_in_one_view_are_of_two_objects() -> None:
     seen = (percept("inn", NORTH_RAD, 21.0), percept("barn", NORTH_RAD, 20.0))
 
