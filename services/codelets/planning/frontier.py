@@ -12,7 +12,8 @@ from scipy import ndimage
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from services.codelets.planning.activation import spread
 from services.codelets.planning.config import Config
-from services.codelets.planning.ground import SQUARE, Ground
+from services.codelets.planning.ground import Ground
+from services.codelets.planning.network import SQUARE
 
 
 class Standpoint(NamedTuple):

@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy import ndimage
 
-from cogmap.geometry.arrays import Booleans, Indices, Singles
+from cogmap.geometry.arrays import Booleans, Floats, Indices, Singles
 from cogmap.graph.window import LINK_OFFSETS
 
 NEIGHBOUR_OFFSETS: Indices = np.concatenate([LINK_OFFSETS, -LINK_OFFSETS])
+SQUARE = np.ones((3, 3), bool)
 Cell = tuple[int, int]
 
 
@@ -44,6 +46,46 @@ class PlaceNetwork(NamedTuple):
         i, j = cell
         first_i, first_j = self.origin
         return i - first_i, j - first_j
+
+
+class Here(NamedTuple):
+    """The rectangle of place nodes that is planned on."""
+
+    origin: tuple[int, int]
+    shape: tuple[int, int]
+    cell_m: float
+
+    def network(self, weights: Singles) -> PlaceNetwork:
+        """Its place network, with links of (4, w, h) weights."""
+        return PlaceNetwork(self.origin, self.cell_m, weights)
+
+    def at(self, positions_m: Floats, values: Booleans) -> Booleans:
+        """(n,): the (w, h) values at (n, 2) positions, false outside."""
+        cells, is_inside = self._cells(positions_m)
+        found = np.zeros(len(positions_m), bool)
+        found[is_inside] = values[tuple(cells[is_inside].T)]
+        return found
+
+    def has(self, positions_m: Floats) -> Booleans:
+        """(w, h): the cells of (n, 2) positions."""
+        cells, is_inside = self._cells(positions_m)
+        has = np.zeros(self.shape, bool)
+        has[tuple(cells[is_inside].T)] = True
+        return has
+
+    def is_within(self, within_m: float, positions_m: Floats) -> Booleans:
+        """(w, h): the cells within a distance of any of (n, 2) positions."""
+        has = self.has(positions_m)
+        if not has.any():
+            return has
+
+        distance_m = ndimage.distance_transform_edt(~has) * self.cell_m
+        return np.asarray(distance_m <= within_m)
+
+    def _cells(self, positions_m: Floats) -> tuple[Indices, Booleans]:
+        """(n, 2) and (n,): the indices of positions, and which are inside."""
+        cells = np.rint(positions_m / self.cell_m).astype(np.int64) - np.array(self.origin)
+        return cells, ((cells >= 0) & (cells < self.shape)).all(axis=1)
 
 
 def grid_network(free: Booleans, cell_m: float = 1.0, origin: Cell = (0, 0)) -> PlaceNetwork:
