@@ -101,8 +101,8 @@ def drive_rows(metrics: DriveMetrics) -> list[tuple[str, str]]:
     if metrics.wheels_alone.is_measured:
         ratios = f"{ratios}, {metrics.error_ratio:.3f} over wheels"
     learned = (
-        f"{metrics.objects} buildings, half of them within {metrics.object_error_median_m:.2f} m; "
-        f"{metrics.road_m2:.0f} m² of street"
+        f"{metrics.objects} buildings, half of those that it knew by name within "
+        f"{metrics.object_error_median_m:.2f} m; {metrics.road_m2:.0f} m² of street"
     )
     cycle = f"{metrics.cycle_p50_ms:.0f} ms, 99 % within {metrics.cycle_p99_ms:.0f} ms"
     return [
