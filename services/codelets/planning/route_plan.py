@@ -26,7 +26,6 @@ from schemas.nodes import (
     Map,
     Object,
     PathSegment,
-    PlaceColumn,
     Plan,
     PlanState,
     Self,
@@ -35,7 +34,7 @@ from schemas.nodes import (
 from services.codelets.planning.config import Config
 from services.codelets.planning.frontier import Standpoint, best_frontier
 from services.codelets.planning.goal_order import goal_order, order_before
-from services.codelets.planning.ground import COLUMNS, OBSTACLE_FROM, Ground, ground
+from services.codelets.planning.ground import COLUMNS, Ground, ground
 from services.codelets.planning.network import PlaceNetwork
 from services.codelets.planning.routes import (
     Route,
@@ -54,9 +53,9 @@ from services.codelets.planning.targets import (
     pending_goals,
     target_of,
 )
+from services.codelets.planning.urgency import is_done, is_urgent
 
 START_M = 6.0
-BLOCKED_M = 30.0
 SECTION = "planning"
 
 
@@ -64,11 +63,11 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     """One task every `replan_cycles`, and at once where a goal is new or the route has ended or is
     blocked.
     """
-    if graph.agent is None or _is_done(graph, config):
+    if graph.agent is None or is_done(graph, config):
         return []
 
     is_time = context.cycle % config.replan_cycles == 0
-    if is_time or _is_urgent(graph, graph.agent, config):
+    if is_time or is_urgent(graph, graph.agent, config):
         return [context.task(CODELET.name, about=[SELF_ID, PLAN_ID])]
     return []
 
@@ -129,51 +128,6 @@ CODELET = Codelet(
     config=Config,
     section=SECTION,
 )
-
-
-def _is_done(graph: Graph, config: Config) -> bool:
-    """Whether there is nothing to plan for, and no plan that states otherwise."""
-    plan = graph.get(Plan, PLAN_ID)
-    has_ended = plan is None or plan.state in {PlanState.NO_GOAL, PlanState.AT_GOAL}
-    explores = config.explore and not has_arrived(graph)
-    return has_ended and not explores and not open_goals(graph)
-
-
-def _is_urgent(graph: Graph, agent: Self, config: Config) -> bool:
-    """Whether there is no plan, a goal is in none, or the agent is at the end of its route, or
-    something stands on it.
-    """
-    plan = graph.get(Plan, PLAN_ID)
-    if plan is None:
-        return True
-
-    planned = {*plan.goals, *plan.unreachable}
-    if any(goal.id not in planned for goal in open_goals(graph)):
-        return True
-    if plan.route is None:
-        return False
-
-    away_m = np.hypot(*(plan.route.numpy() - (agent.x_m, agent.y_m)).T)
-    is_at_end = bool(away_m[-1] <= config.reached_m)
-    return is_at_end or _is_blocked(plan, int(away_m.argmin()), graph)
-
-
-def _is_blocked(plan: Plan, nearest: int, graph: Graph) -> bool:
-    """Whether something stands within BLOCKED_M ahead on a plan's route, at whose place number
-    `nearest` the agent is; not where the plan is to find out whether it does.
-    """
-    if plan.route is None or plan.doubtful:
-        return False
-
-    cell_m = graph.cell_m(plan.map)
-    last = nearest + round(BLOCKED_M / cell_m)
-    ahead = np.rint(plan.route.numpy()[nearest:last] / cell_m).astype(np.int64)
-    for i, j in ahead.tolist():
-        obstacle = graph.places.value(plan.map, i, j, PlaceColumn.OBSTACLE)
-        if obstacle is not None and obstacle >= OBSTACLE_FROM:
-            return True
-
-    return False
 
 
 def _is_at(target: Target, now: Situation) -> bool:

@@ -1,0 +1,58 @@
+"""Whether there is anything to plan, and whether it must be planned at once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cogmap.graph.graph import Graph
+from schemas.nodes import PLAN_ID, PlaceColumn, Plan, PlanState, Self
+from services.codelets.planning.config import Config
+from services.codelets.planning.ground import OBSTACLE_FROM
+from services.codelets.planning.targets import has_arrived, open_goals
+
+BLOCKED_M = 30.0
+
+
+def is_done(graph: Graph, config: Config) -> bool:
+    """Whether there is nothing to plan for, and no plan that states otherwise."""
+    plan = graph.get(Plan, PLAN_ID)
+    has_ended = plan is None or plan.state in {PlanState.NO_GOAL, PlanState.AT_GOAL}
+    explores = config.explore and not has_arrived(graph)
+    return has_ended and not explores and not open_goals(graph)
+
+
+def is_urgent(graph: Graph, agent: Self, config: Config) -> bool:
+    """Whether there is no plan, a goal is in none, or the agent is at the end of its route, or
+    something stands on it.
+    """
+    plan = graph.get(Plan, PLAN_ID)
+    if plan is None:
+        return True
+
+    planned = {*plan.goals, *plan.unreachable}
+    if any(goal.id not in planned for goal in open_goals(graph)):
+        return True
+    if plan.route is None:
+        return False
+
+    away_m = np.hypot(*(plan.route.numpy() - (agent.x_m, agent.y_m)).T)
+    is_at_end = bool(away_m[-1] <= config.reached_m)
+    return is_at_end or _is_blocked(plan, int(away_m.argmin()), graph)
+
+
+def _is_blocked(plan: Plan, nearest: int, graph: Graph) -> bool:
+    """Whether something stands within BLOCKED_M ahead on a plan's route, at whose place number
+    `nearest` the agent is; not where the plan is to find out whether it does.
+    """
+    if plan.route is None or plan.doubtful:
+        return False
+
+    cell_m = graph.cell_m(plan.map)
+    last = nearest + round(BLOCKED_M / cell_m)
+    ahead = np.rint(plan.route.numpy()[nearest:last] / cell_m).astype(np.int64)
+    for i, j in ahead.tolist():
+        obstacle = graph.places.value(plan.map, i, j, PlaceColumn.OBSTACLE)
+        if obstacle is not None and obstacle >= OBSTACLE_FROM:
+            return True
+
+    return False
