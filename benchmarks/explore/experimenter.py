@@ -27,14 +27,15 @@ from schemas.graph import DropNode
 from schemas.nodes import NEVER_NS, PLAN_ID, Goal, Plan, goal_id
 from schemas.sensing import StreetClosure, TruePose, TrueTown
 
-MAX_DRAWS = 60
+MAX_DRAWS = 20
 
 
 class Experimenter:
     """A module that follows the truth and the agent's graph, and offers one goal after another.
 
     The first `explore_s` are the agent's own. Of every two goals, one has a street on the planned
-    route closed, which stays closed.
+    route closed, which stays closed; where of MAX_DRAWS goals none can be closed off from its route
+    and still be reached, the street that has been closed longest is opened again.
     """
 
     def __init__(self, seed: int, explore_s: float, goals: int) -> None:
@@ -51,6 +52,8 @@ class Experimenter:
         self._town: TrueTown | None = None
         self._trial: Trial | None = None
         self._draws = 0
+        self._offered = 0
+        self._closed: list[str] = []
 
     @property
     def is_complete(self) -> bool:
@@ -85,9 +88,17 @@ class Experimenter:
             self.explored_share = explored_share(self.graph, self._town, self._start)
             self.boundaries = score_boundaries(self.graph, self._town, self._start)
 
-        if self._trial is None:
-            return [] if self.is_complete else self._begin(pose)
-        return self._observe(pose, self._trial)
+        if self._trial is not None:
+            return self._observe(pose, self._trial)
+        if self.is_complete:
+            return []
+        return self._begin(pose) if self._draws < MAX_DRAWS or not self._closed else self._reopen()
+
+    def _reopen(self) -> list[Message]:
+        """Open the street that has been closed longest; the next drive waits for the town then."""
+        self._town = None
+        self._draws = 0
+        return [StreetClosure(street=self._closed.pop(0), closed=False)]
 
     def _begin(self, pose: TruePose) -> list[Message]:
         """Offer the next goal."""
@@ -106,6 +117,7 @@ class Experimenter:
             shortest_m=shortest_m,
             unwarned_m=shortest_m,
         )
+        self._offered += 1
         x_m, y_m = self._on_map(goal_m)
         goal = Goal(id=self._goal_id, base_level=1.0, x_m=x_m, y_m=y_m)
         return [Offer(cycle=self.graph.cycle, operations=[goal])]
@@ -140,6 +152,7 @@ class Experimenter:
             return [Offer(cycle=self.graph.cycle, operations=[drop])]
 
         trial.close(closure)
+        self._closed.append(closure.street)
         return [StreetClosure(street=trial.closed, closed=True)]
 
     def _end(self, pose: TruePose, trial: Trial) -> list[Message]:
@@ -156,7 +169,7 @@ class Experimenter:
 
     @property
     def _goal_id(self) -> str:
-        return goal_id(f"{len(self.trials)}-{self._draws}")
+        return goal_id(str(self._offered))
 
     def _on_map(self, point_m: Point) -> Point:
         """A true position in the frame of the agent's map."""
