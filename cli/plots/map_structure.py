@@ -14,7 +14,18 @@ from cli.plots.palette import CUT, GOAL, PLAN, SEVERAL, SHORTCUT
 from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import CUT_BELOW, LINK_OFFSETS, WEIGHT_COLUMNS
-from schemas.nodes import NEVER_NS, PLAN_ID, ROOT_MAP, Goal, LinkKind, Map, Object, Plan, object_id
+from schemas.nodes import (
+    NEVER_NS,
+    PLAN_ID,
+    ROOT_MAP,
+    Goal,
+    LinkKind,
+    Map,
+    Object,
+    Plan,
+    map_number,
+    object_id,
+)
 
 STRAIGHT_LINKS = (0, 2)
 MIN_CORNERS = 3
@@ -61,7 +72,7 @@ def _draw_cuts(axes: Axes, observer: Observer, graph: Graph) -> bool:
 
 def _draw_sub_maps(axes: Axes, observer: Observer, graph: Graph) -> bool:
     """The hull of the objects of each sub-map."""
-    maps = [node for node in graph.of_kind(Map) if node.id != ROOT_MAP]
+    maps = [node for node in graph.of_kind(Map) if map_number(node.id)]
     has_any = False
     for number, sub_map in enumerate(maps):
         members = graph.links.sources(sub_map.id, LinkKind.WITHIN)

@@ -30,6 +30,9 @@ CUT_BELOW = 0.5
 ROAD_FROM = 0.3
 """A place node of at least this share is road."""
 
+OBSTACLE_FROM = 0.5
+"""Something stands at a place node of at least this share."""
+
 
 @dataclass(frozen=True, eq=False)
 class Extent:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 ROOT_MAP = "map:0"
+COARSE_MAP = "map:coarse:"
 SELF_ID = "self"
 CORRECTION_ID = "correction"
 PLAN_ID = "plan"
@@ -33,8 +34,20 @@ def map_id(number: int) -> str:
     return f"map:{number}"
 
 
+def coarse_map_id(level: int) -> str:
+    """The id of a map with the root map's places on a coarser grid, coarser with each level from 1
+    on.
+    """
+    return f"{COARSE_MAP}{level}"
+
+
+def is_coarse_map(identifier: str) -> bool:
+    """Whether a map's id is that of a coarse map."""
+    return identifier.startswith(COARSE_MAP)
+
+
 def map_number(identifier: str) -> int | None:
-    """The number of a map's id; None for any other id."""
+    """The number of a map's id; None for a coarse map's, and any other id."""
     number = identifier.removeprefix("map:")
     if number == identifier or not number.isdecimal():
         return None

@@ -17,6 +17,7 @@ from services.codelets.correction import apply_correction, map_correction
 from services.codelets.localization import landmarks, localization
 from services.codelets.mapping import boundary, loop_detection, object_place, path, road_place
 from services.codelets.planning import route_plan
+from services.codelets.resolution import coarse_places
 from services.codelets.structure import map_structure
 
 CODELETS: tuple[Codelet, ...] = (
@@ -30,6 +31,7 @@ CODELETS: tuple[Codelet, ...] = (
     loop_detection.CODELET,
     map_correction.CODELET,
     map_structure.CODELET,
+    coarse_places.CODELET,
     route_plan.CODELET,
     whereabouts.CODELET,
     novelty.CODELET,

@@ -52,7 +52,7 @@ class Workspace:
         self._lanes: list[Lane] = []
         for codelet in codelets:
             if codelet.codelet.phase is Phase.BACKGROUND:
-                self._lanes.append(Lane(codelet, config))
+                self._lanes.append(Lane(codelet, config, self._background))
 
         lease_ns = int(config.lease_ms * 1e6)
         self._dispatch = Dispatch(lease_ns, config.attempts, self._background)

@@ -138,12 +138,11 @@ class Dispatch:
 
     def load(self) -> Counter[str]:
         """How many open tasks each worker holds."""
-        load: Counter[str] = Counter()
-        for lease in self._leases.values():
-            if lease.is_open and lease.worker:
-                load[lease.worker] += 1
+        return Counter(lease.worker for lease in self._held())
 
-        return load
+    def _held(self) -> list[Lease]:
+        """The open tasks that workers hold."""
+        return [lease for lease in self._leases.values() if lease.is_open and lease.worker]
 
     def _has_failed(self, lease: Lease) -> bool:
         is_waiting = lease.is_open and not lease.worker
@@ -183,11 +182,14 @@ class Dispatch:
         return published
 
     def _load_with_background(self) -> Counter[str]:
-        """How loaded each worker is, where a background task counts as BUSY others."""
+        """How loaded each worker is, where a background task counts as BUSY others: the youngest
+        once, each older one once more, for it may well take longer.
+        """
         load = self.load()
-        for other in self._background():
-            for worker, tasks in other.load().items():
-                load[worker] += BUSY * tasks
+        held = [lease for other in self._background() for lease in other._held()]
+        held.sort(key=lambda lease: -lease.task.cycle)
+        for rank, lease in enumerate(held, start=1):
+            load[lease.worker] += BUSY * rank
 
         return load
 

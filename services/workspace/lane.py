@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from cogmap.runtime.codelet import ConfiguredCodelet, CycleContext
 from schemas.base import Message
 from schemas.codelets import Proposal
@@ -11,16 +13,21 @@ from services.workspace.dispatch import Dispatch
 
 
 class Lane:
-    """The lane of one background codelet.
+    """The lane of one background codelet; `lanes` are the dispatches of all.
 
     In lockstep its answer is committed at the end of a cycle that is set beforehand, so that a run
     depends on its seed alone.
     """
 
-    def __init__(self, codelet: ConfiguredCodelet, config: Config) -> None:
+    def __init__(
+        self,
+        codelet: ConfiguredCodelet,
+        config: Config,
+        lanes: Callable[[], list[Dispatch]],
+    ) -> None:
         self.codelet = codelet
         lease_ns = int(config.background_lease_ms * 1e6)
-        self.dispatch = Dispatch(lease_ns, config.attempts)
+        self.dispatch = Dispatch(lease_ns, config.attempts, lanes)
 
         self._is_lockstep = config.mode == "lockstep"
         self._cycles = config.background_cycles

@@ -30,6 +30,7 @@ from schemas.nodes import (
     Observations,
     PathSegment,
     Self,
+    is_coarse_map,
     nearest_place,
 )
 from services.codelets.config import SECTION, Config
@@ -151,7 +152,7 @@ def _move_maps(graph: Graph, rows: Floats) -> list[Operation]:
     """The frames of the root map's sub-maps move; those of their own sub-maps are in theirs."""
     operations: list[Operation] = []
     for node in graph.of_kind(Map):
-        if node.parent != ROOT_MAP:
+        if node.parent != ROOT_MAP or is_coarse_map(node.id):
             continue
 
         pose = np.array([[node.x_m, node.y_m, node.heading_rad]])

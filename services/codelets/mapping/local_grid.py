@@ -9,10 +9,10 @@ import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices, Singles
 from cogmap.geometry.se2 import transform_from
-from cogmap.graph.window import Extent
-from schemas.array import Array
-from schemas.graph import Cells, Operation
+from cogmap.graph.window import Extent, Window
+from schemas.graph import Operation
 from schemas.nodes import PlaceColumn, Self
+from services.codelets.cells import changed_cells
 from services.codelets.config import Config
 
 MARGIN_CELLS = 2
@@ -106,26 +106,8 @@ class LocalGrid:
         """The operations that write the cells whose value in one of k columns changes, from
         (k, w, h) `before` to `after`; none of a column that does not.
         """
-        column, i, j = np.nonzero(after != before)
-        values = after[column, i, j]
-        cells = np.column_stack([i, j]) + self.extent.lower
-        starts = np.searchsorted(column, np.arange(len(columns) + 1)).tolist()
-
-        operations: list[Operation] = []
-        for number, name in enumerate(columns):
-            of_column = slice(starts[number], starts[number + 1])
-            if len(values[of_column]):
-                operations.append(self._cells(name, cells[of_column], values[of_column]))
-
-        return operations
-
-    def _cells(self, column: PlaceColumn, cells: Indices, values: Singles) -> Cells:
-        return Cells(
-            map=self.map_id,
-            column=column,
-            cells=Array.of(cells, "<i4"),
-            values=Array.of(values, "<f4"),
-        )
+        known = Window(self.extent.lower, tuple(columns), before)
+        return changed_cells(self.map_id, known, after)
 
 
 def _around(position: Floats, reach: float) -> Extent:

@@ -99,6 +99,15 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             description="Routes over road that was blocked that are tried for a goal, 1 to 10000."
         ),
     ] = 3
+    flat_places: Annotated[
+        int,
+        Meta(
+            ge=0,
+            le=2**31,
+            description="Places of a map up to which routes are planned on them at once; on more "
+            "they are planned on coarser maps first, 0 to 2147483648.",
+        ),
+    ] = 250_000
     margin_cells: Annotated[
         Cells, Meta(description="Unknown places around the map that are planned over, 1 to 10000.")
     ] = 8

@@ -15,9 +15,17 @@ from scipy import ndimage
 
 from cogmap.geometry.arrays import Booleans, Floats, Singles
 from cogmap.graph.graph import Graph
-from cogmap.graph.window import CUT_BELOW, LINK_OFFSETS, ROAD_FROM, WEIGHT_COLUMNS, Extent
+from cogmap.graph.window import (
+    CUT_BELOW,
+    LINK_OFFSETS,
+    OBSTACLE_FROM,
+    ROAD_FROM,
+    WEIGHT_COLUMNS,
+    Extent,
+)
 from schemas.nodes import Goal, PlaceColumn, Self
 from services.codelets.planning.config import Config
+from services.codelets.planning.corridor import Corridor
 from services.codelets.planning.driven import (
     POSITION,
     ahead_m,
@@ -27,14 +35,11 @@ from services.codelets.planning.driven import (
     path_of,
     way_back,
 )
-from services.codelets.planning.network import SQUARE, Here, PlaceNetwork
+from services.codelets.planning.network import SQUARE, Here, PlaceNetwork, ends, link_weights
 
 COLUMNS = (PlaceColumn.ROAD, PlaceColumn.OBSTACLE, *WEIGHT_COLUMNS)
-OBSTACLE_FROM = 0.5
 SPREAD_FROM = 0.2
 BESIDE_CUT = 0.5
-
-Slices = tuple[slice, slice]
 
 
 class Ground(NamedTuple):
@@ -56,17 +61,22 @@ class Ground(NamedTuple):
     doubted: PlaceNetwork
 
 
-def ground(graph: Graph, agent: Self, config: Config, goals: Sequence[Goal] = ()) -> Ground:
+def ground(
+    graph: Graph,
+    agent: Self,
+    config: Config,
+    goals: Sequence[Goal] = (),
+    within: Corridor | None = None,
+) -> Ground:
     """The ground of the agent's map and some unknown places around it, as far as to those of
-    `goals` that are positions not too far outside.
+    `goals` that are positions not too far outside; that `within` a corridor alone, where one is
+    given.
 
     The path that the agent took counts as known, and so does ground ahead that is too near for its
     camera, where road begins behind it.
     """
     map_id = agent.map
-    extent = graph.places.extent(map_id)
-    extent = _with_goals(extent, goals, graph.cell_m(map_id), config.beyond_cells)
-    extent = _with_margin(extent, config.margin_cells)
+    extent = _extent(graph, map_id, goals, config) if within is None else within.extent
     window = graph.places.window(map_id, COLUMNS, extent)
     weights = window.weights()
 
@@ -79,13 +89,15 @@ def ground(graph: Graph, agent: Self, config: Config, goals: Sequence[Goal] = ()
         driven_m = np.vstack([path_m, ahead_m(agent, 0.0, config.blind_m)])
     is_known = is_seen | here.is_within(config.driven_m, driven_m)
 
-    is_obstacle = _stands_there(window.column(PlaceColumn.OBSTACLE))
+    is_obstacle = stands_there(window.column(PlaceColumn.OBSTACLE))
     is_edge = _has_cut(weights) | is_obstacle
     is_way_back = way_back(path, agent, is_known & ~is_edge, is_obstacle, here)
     weights = _opened(weights, is_way_back)
 
     share = _shares(is_edge)
     share[is_way_back & is_edge] = config.doubt_weight
+    if within is not None:
+        share[~within.is_inside] = 0.0
     optimistic = np.where(is_known, share, share * config.unknown_weight)
 
     lately_m = driven_lately_m(path, agent, config.doubt_after_s)
@@ -97,13 +109,13 @@ def ground(graph: Graph, agent: Self, config: Config, goals: Sequence[Goal] = ()
         is_free=~is_edge,
         is_known=is_known & ~is_edge,
         is_visited=here.is_within(config.visited_m, driven_since_start_m(path_m)),
-        network=here.network(_links(weights, optimistic)),
-        known=here.network(_links(weights, np.where(is_known, share, 0.0))),
-        doubted=here.network(_links(_opened(weights, is_known), in_doubt)),
+        network=here.network(link_weights(weights, optimistic)),
+        known=here.network(link_weights(weights, np.where(is_known, share, 0.0))),
+        doubted=here.network(link_weights(_opened(weights, is_known), in_doubt)),
     )
 
 
-def _stands_there(obstacle: Singles) -> Booleans:
+def stands_there(obstacle: Singles) -> Booleans:
     """(w, h): where something stands. From far it is seen now in a cell, now in the one behind it:
     all of what was seen there and beside counts, where it would do for a row of three.
     """
@@ -118,6 +130,13 @@ def _shares(is_edge: Booleans) -> Floats:
     share = np.where(is_beside, BESIDE_CUT, 1.0)
     share[is_edge] = 0.0
     return share
+
+
+def _extent(graph: Graph, map_id: str, goals: Sequence[Goal], config: Config) -> Extent:
+    """The rectangle of place nodes that is planned on."""
+    extent = graph.places.extent(map_id)
+    extent = _with_goals(extent, goals, graph.cell_m(map_id), config.beyond_cells)
+    return _with_margin(extent, config.margin_cells)
 
 
 def _with_goals(extent: Extent, goals: Sequence[Goal], cell_m: float, beyond: int) -> Extent:
@@ -141,23 +160,12 @@ def _with_margin(extent: Extent, cells: int) -> Extent:
     return Extent((first_i - cells, first_j - cells), (last_i + cells, last_j + cells))
 
 
-def _ends(shape: tuple[int, int], offset: tuple[int, int]) -> tuple[Slices, Slices]:
-    """The places of a (w, h) grid that have a neighbour at `offset`, and those neighbours."""
-    here = []
-    there = []
-    for size, step in zip(shape, offset, strict=True):
-        here.append(slice(max(0, -step), size - max(0, step)))
-        there.append(slice(max(0, step), size - max(0, -step)))
-
-    return (here[0], here[1]), (there[0], there[1])
-
-
 def _has_cut(weights: Singles) -> Booleans:
     """(w, h): whether any link of a place to its neighbours is cut."""
     _, width, height = weights.shape
     has_cut = np.zeros((width, height), bool)
     for of_link, offset in zip(weights, LINK_OFFSETS.tolist(), strict=True):
-        here, there = _ends((width, height), offset)
+        here, there = ends((width, height), offset)
         is_cut = of_link[here] < CUT_BELOW
         has_cut[here] |= is_cut
         has_cut[there] |= is_cut
@@ -169,20 +177,8 @@ def _opened(weights: Singles, is_open: Booleans) -> Singles:
     """(4, w, h): the weights, with links between open places open."""
     opened = weights.copy()
     for number, offset in enumerate(LINK_OFFSETS.tolist()):
-        here, there = _ends(is_open.shape, offset)
+        here, there = ends(is_open.shape, offset)
         of_link = opened[number][here]
         of_link[is_open[here] & is_open[there]] = 1.0
 
     return opened
-
-
-def _links(weights: Singles, share: Floats) -> Singles:
-    """(4, w, h): the weights of links, by the lower share of the two places each joins."""
-    _, width, height = weights.shape
-    links = np.zeros_like(weights)
-    for number, offset in enumerate(LINK_OFFSETS.tolist()):
-        here, there = _ends((width, height), offset)
-        lower = np.minimum(share[here], share[there])
-        links[number][here] = lower * (weights[number][here] >= CUT_BELOW)
-
-    return links

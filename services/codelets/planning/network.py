@@ -8,11 +8,12 @@ import numpy as np
 from scipy import ndimage
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices, Singles
-from cogmap.graph.window import LINK_OFFSETS
+from cogmap.graph.window import CUT_BELOW, LINK_OFFSETS
 
 NEIGHBOUR_OFFSETS: Indices = np.concatenate([LINK_OFFSETS, -LINK_OFFSETS])
 SQUARE = np.ones((3, 3), bool)
 Cell = tuple[int, int]
+Slices = tuple[slice, slice]
 
 
 class PlaceNetwork(NamedTuple):
@@ -112,3 +113,28 @@ def _shifted(around: Booleans, di: int, dj: int) -> Booleans:
     i = slice(1 + di, width - 1 + di)
     j = slice(1 + dj, height - 1 + dj)
     return around[i, j]
+
+
+def ends(shape: tuple[int, int], offset: tuple[int, int]) -> tuple[Slices, Slices]:
+    """The places of a (w, h) grid that have a neighbour at `offset`, and those neighbours."""
+    here = []
+    there = []
+    for size, step in zip(shape, offset, strict=True):
+        here.append(slice(max(0, -step), size - max(0, step)))
+        there.append(slice(max(0, step), size - max(0, -step)))
+
+    return (here[0], here[1]), (there[0], there[1])
+
+
+def link_weights(weights: Singles, share: Floats) -> Singles:
+    """(4, w, h): the weights of links that are not cut, by the lower share of the two places each
+    joins.
+    """
+    _, width, height = weights.shape
+    links = np.zeros_like(weights)
+    for number, offset in enumerate(LINK_OFFSETS.tolist()):
+        here, there = ends((width, height), offset)
+        lower = np.minimum(share[here], share[there])
+        links[number][here] = lower * (weights[number][here] >= CUT_BELOW)
+
+    return links

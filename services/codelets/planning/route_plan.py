@@ -32,6 +32,7 @@ from schemas.nodes import (
     place_id,
 )
 from services.codelets.planning.config import Config
+from services.codelets.planning.corridor import corridor
 from services.codelets.planning.frontier import Standpoint, best_frontier
 from services.codelets.planning.goal_order import goal_order, order_before
 from services.codelets.planning.ground import COLUMNS, Ground, ground
@@ -47,6 +48,7 @@ from services.codelets.planning.routes import (
 from services.codelets.planning.targets import (
     Cell,
     Target,
+    goals_m,
     has_arrived,
     nearest_free,
     open_goals,
@@ -78,21 +80,39 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     if agent is None:
         raise MessageError(f"task {task.task_id}: the graph has no self node")
 
+    before = graph.get(Plan, PLAN_ID)
+    near = corridor(graph, agent, goals_m(graph), config)
+    if near is not None:
+        where = ground(graph, agent, config, within=near)
+        planned = _planned(Situation(task, agent, where, before, config), graph)
+        if not planned.plan.unreachable:
+            return _answer(planned, graph)
+
     where = ground(graph, agent, config, [*pending_goals(graph).values()])
-    now = Situation(task, agent, where, graph.get(Plan, PLAN_ID), config)
-    targets = [target_of(goal, graph, where, config) for goal in open_goals(graph)]
+    return _answer(_planned(Situation(task, agent, where, before, config), graph), graph)
+
+
+def _planned(now: Situation, graph: Graph) -> Planned:
+    """What is planned on the ground of a situation."""
+    targets = [target_of(goal, graph, now.where, now.config) for goal in open_goals(graph)]
     reached = [target.goal for target in targets if _is_at(target, now)]
     at = {goal.id for goal in reached}
-    left = [target_of(goal, graph, where, config) for goal in open_goals(graph, at)]
+    left = [target_of(goal, graph, now.where, now.config) for goal in open_goals(graph, at)]
 
+    plan = _routeless(PlanState.AT_GOAL, now) if has_arrived(graph, at) else _plan(left, now)
+    return Planned(now, reached, left, plan)
+
+
+def _answer(planned: Planned, graph: Graph) -> Answer:
+    """The plan, where it is another than before, and the goals that are reached."""
+    now, reached, left, plan = planned
     answer = Answer()
-    answer.operations.extend(_links_to_places(left, agent.map, graph))
+    answer.operations.extend(_links_to_places(left, now.agent.map, graph))
     for goal in reached:
-        answer.operations.append(msgspec.structs.replace(goal, reached_ns=task.stamp_ns))
+        answer.operations.append(msgspec.structs.replace(goal, reached_ns=now.task.stamp_ns))
         if now.before is not None and goal.id == _next_goal(now.before):
             answer.events.append(_replay(now.before, Direction.REVERSE, now))
 
-    plan = _routeless(PlanState.AT_GOAL, now) if has_arrived(graph, at) else _plan(left, now)
     if not _serves(plan, now):
         answer.operations.extend(_written(plan, now.before))
         answer.operations.extend(_doubted(plan, now.before, left))
@@ -116,6 +136,15 @@ class Situation(NamedTuple):
         """The free place nearest to the agent."""
         agent = self.agent
         return nearest_free(agent.x_m, agent.y_m, self.where, self.where.is_free, START_M)
+
+
+class Planned(NamedTuple):
+    """In a situation, the goals that are reached, those that are left, and the plan for these."""
+
+    now: Situation
+    reached: list[Goal]
+    left: list[Target]
+    plan: Plan
 
 
 CODELET = Codelet(

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cogmap.geometry.arrays import Booleans
+from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.graph.graph import Graph
 from schemas.nodes import NEVER_NS, Goal, Object, PlanState, object_id
 from services.codelets.planning.config import Config
@@ -37,6 +37,17 @@ def pending_goals(graph: Graph, at: Collection[str] = ()) -> dict[str, Goal]:
     """The goals that were not reached yet, by id."""
     goals = [goal for goal in graph.of_kind(Goal) if goal.id not in at]
     return {goal.id: goal for goal in goals if goal.reached_ns == NEVER_NS}
+
+
+def goals_m(graph: Graph) -> Floats:
+    """(n, 2): where the open goals are, without those that are at objects unknown."""
+    positions_m = []
+    for goal in open_goals(graph):
+        found = graph.get(Object, object_id(goal.object)) if goal.object else goal
+        if found is not None:
+            positions_m.append((found.x_m, found.y_m))
+
+    return np.array(positions_m, np.float64).reshape(-1, 2)
 
 
 def has_arrived(graph: Graph, at: Collection[str] = ()) -> bool:

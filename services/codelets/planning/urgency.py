@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.graph.graph import Graph
+from cogmap.graph.window import Extent
 from schemas.nodes import PLAN_ID, PlaceColumn, Plan, PlanState, Self
 from services.codelets.planning.config import Config
-from services.codelets.planning.ground import OBSTACLE_FROM
+from services.codelets.planning.ground import stands_there
 from services.codelets.planning.targets import has_arrived, open_goals
 
 BLOCKED_M = 30.0
@@ -50,9 +51,10 @@ def _is_blocked(plan: Plan, nearest: int, graph: Graph) -> bool:
     cell_m = graph.cell_m(plan.map)
     last = nearest + round(BLOCKED_M / cell_m)
     ahead = np.rint(plan.route.numpy()[nearest:last] / cell_m).astype(np.int64)
-    for i, j in ahead.tolist():
-        obstacle = graph.places.value(plan.map, i, j, PlaceColumn.OBSTACLE)
-        if obstacle is not None and obstacle >= OBSTACLE_FROM:
-            return True
+    first_i, first_j = (ahead.min(axis=0) - 1).tolist()
+    last_i, last_j = (ahead.max(axis=0) + 2).tolist()
 
-    return False
+    around = Extent((first_i, first_j), (last_i, last_j))
+    window = graph.places.window(plan.map, [PlaceColumn.OBSTACLE], around)
+    is_obstacle = stands_there(window.column(PlaceColumn.OBSTACLE))
+    return bool(is_obstacle[tuple((ahead - around.lower).T)].any())

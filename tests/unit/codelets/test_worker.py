@@ -114,6 +114,7 @@ def _every_task() -> list[Task]:
         task("loop_detection", matches=[PlaceMatch(frame=0, view_ns=0, score=0.9)]),
         task("map_correction"),
         task("map_structure"),
+        task("coarse_places"),
         task("route_plan"),
         task("whereabouts", percepts=house),
         task("novelty", percepts=house),

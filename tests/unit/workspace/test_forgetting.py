@@ -12,13 +12,14 @@ from cogmap.graph.graph import Graph
 from cogmap.graph.places import Place
 from schemas.array import Array
 from schemas.graph import Cells, Decay, Delta, DropNode, Link, Phase
-from schemas.nodes import KINDS, AnyNode, Node, PlaceColumn
+from schemas.nodes import KINDS, AnyNode, Node, PlaceColumn, coarse_map_id
 from services.workspace.forgetting import Forgetting
 from tests.support.messages import of_type
 from tests.support.world.scenes import Desk, agent, percept
 
 RATES = Decay(activation=0.1, base_level=0.0005, place_activation=0.02, forget_below=0.05)
 HERE = (-3, 70)
+COARSE_MAPS = [coarse_map_id(level) for level in (1, 2)]
 
 
 def _node(name: str, activation: float, base_level: float = 0.0) -> Node:
@@ -187,7 +188,8 @@ def test_an_object_that_is_no_longer_seen_stays_and_its_percept_is_forgotten() -
     desk = Desk("w1")
     desk.drive(range(3), percept("a"))
     desk.drive(range(3, 15))
-    expected = {"self", "map:0", "map:1", "path:0", "observations:0:a", "object:a"}
+    maps = {"map:0", "map:1", *COARSE_MAPS}
+    expected = {"self", *maps, "path:0", "observations:0:a", "object:a"}
     assert set(desk.graph.nodes) == expected
 
     dropped = []
@@ -201,7 +203,8 @@ def test_a_replica_decays_as_the_workspace_does() -> None:
     desk.drive(range(2), percept("a"), percept("b", 0.7))
     desk.drive(range(2, 12))
 
-    expected = {"self", "map:0", "path:0", "observations:0:a", "observations:0:b"}
+    maps = {"map:0", *COARSE_MAPS}
+    expected = {"self", *maps, "path:0", "observations:0:a", "observations:0:b"}
 
     assert set(desk.graph.nodes) == expected
     assert desk.graph.digest() == desk.digest

@@ -1,0 +1,34 @@
+"""Place nodes as operations on the graph."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cogmap.geometry.arrays import Singles
+from cogmap.graph.window import Window
+from schemas.array import Array
+from schemas.graph import Cells, Operation
+
+
+def changed_cells(map_id: str, known: Window, after: Singles) -> list[Operation]:
+    """The operations that write those cells of a map whose value in one of the columns of `known`
+    is another in (k, w, h) `after`; none of a column that does not change.
+    """
+    column, i, j = np.nonzero(after != known.values)
+    values = after[column, i, j]
+    cells = np.column_stack([i, j]) + known.origin
+    starts = np.searchsorted(column, np.arange(len(known.columns) + 1)).tolist()
+
+    operations: list[Operation] = []
+    for number, name in enumerate(known.columns):
+        of_column = slice(starts[number], starts[number + 1])
+        if len(values[of_column]):
+            changed = Cells(
+                map=map_id,
+                column=name,
+                cells=Array.of(cells[of_column], "<i4"),
+                values=Array.of(values[of_column], "<f4"),
+            )
+            operations.append(changed)
+
+    return operations

@@ -1,0 +1,114 @@
+"""Routes over large maps: rough on coarse maps, refined within their corridor."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+
+from cogmap.graph.graph import Graph
+from schemas.array import Array
+from schemas.graph import Cells
+from schemas.nodes import PLAN_ID, Goal, PlaceColumn, Plan, PlanState, goal_id
+from services.codelets.planning.config import Config
+from services.codelets.planning.corridor import corridor
+from services.codelets.planning.route_plan import run
+from services.codelets.planning.targets import goals_m
+from services.codelets.resolution import coarse_places
+from tests.support.world.scenes import agent, graph_of, task
+
+SIDE = 240
+EVERY = 40
+WIDTH = 6
+ROUGH = Config(flat_places=1000)
+FLAT = Config()
+FAR = Goal(id=goal_id("far"), base_level=1.0, x_m=203.0, y_m=163.0)
+
+
+def _column(column: PlaceColumn, chosen: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> Cells:
+    cells = np.argwhere(chosen)
+    values = np.ones(len(cells), np.float32)
+    return Cells(column=column, cells=Array.of(cells, "<i4"), values=Array.of(values))
+
+
+def _city(*goals: Goal, wall: slice | None = None) -> Graph:
+    """Streets every 40 m both ways, buildings between them, and coarse maps; a wall across all at
+    some i.
+    """
+    at = np.arange(SIDE) % EVERY <= WIDTH
+    is_road = at[:, None] | at
+    stands = ~is_road
+    if wall is not None:
+        stands[wall] = True
+
+    graph = graph_of(agent(x_m=3.0, y_m=3.0), *goals)
+    graph.change([_column(PlaceColumn.ROAD, is_road), _column(PlaceColumn.OBSTACLE, stands)])
+    config = coarse_places.Config()
+    for number in range(8):
+        asked = msgspec.structs.replace(task("coarse_places"), cycle=number * config.every_cycles)
+        graph.change(coarse_places.run(asked, graph, config).operations)
+    return graph
+
+
+def _plan(graph: Graph, config: Config) -> Plan:
+    graph.change(run(task("route_plan"), graph, config).operations)
+    plan = graph.get(Plan, PLAN_ID)
+    assert plan is not None
+    return plan
+
+
+def test_a_rough_route_is_nearly_as_short_as_one_over_the_whole_map() -> None:
+    rough = _plan(_city(FAR), ROUGH)
+    whole = _plan(_city(FAR), FLAT)
+
+    assert rough.state is PlanState.READY
+    assert whole.length_m <= rough.length_m <= 1.05 * whole.length_m
+
+
+def test_a_corridor_holds_the_plan_and_little_else() -> None:
+    graph = _city(FAR)
+    assert graph.agent is not None
+    found = corridor(graph, graph.agent, goals_m(graph), ROUGH)
+
+    assert found is not None
+    plan = _plan(graph, ROUGH)
+    assert plan.route is not None
+    cells = np.rint(plan.route.numpy()).astype(int) - found.extent.lower
+    assert found.is_inside[tuple(cells.T)].all()
+    assert found.is_inside.sum() < 0.5 * SIDE**2
+
+
+@pytest.mark.parametrize("goals", [[], [Goal(id=goal_id("away"), x_m=9e3, y_m=0.0)]])
+def test_there_is_no_corridor_without_a_goal_on_the_map(goals: list[Goal]) -> None:
+    graph = _city(*goals)
+    assert graph.agent is not None
+
+    assert corridor(graph, graph.agent, goals_m(graph), ROUGH) is None
+
+
+def test_a_small_map_is_planned_on_as_a_whole() -> None:
+    graph = _city(FAR)
+    assert graph.agent is not None
+
+    assert corridor(graph, graph.agent, goals_m(graph), FLAT) is None
+
+
+def test_several_goals_are_ordered_and_the_first_is_driven_to() -> None:
+    near = Goal(id=goal_id("near"), base_level=1.0, x_m=43.0, y_m=3.0)
+    plan = _plan(_city(FAR, near), ROUGH)
+
+    assert plan.goals == [near.id, FAR.id]
+    assert plan.unreachable == {}
+
+
+def test_where_coarse_maps_know_of_no_route_the_whole_map_is_searched() -> None:
+    graph = _city(FAR, wall=slice(100, 101))
+    open_again = np.zeros((SIDE, SIDE), bool)
+    open_again[100, 80 : 80 + WIDTH] = True
+    cells = _column(PlaceColumn.OBSTACLE, open_again)
+    values = np.zeros(cells.values.shape, np.float32)
+    graph.change([msgspec.structs.replace(cells, values=Array.of(values))])
+
+    plan = _plan(graph, ROUGH)
+    assert plan.state is PlanState.READY
+    assert plan.unreachable == {}
