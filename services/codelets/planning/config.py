@@ -96,7 +96,8 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     max_doubts: Annotated[
         Cells,
         Meta(
-            description="Routes over road that was blocked that are tried for a goal, 1 to 10000."
+            description="Routes over road that was blocked that are tried for a goal at first, and "
+            "another each time after `doubt_after_s`, 1 to 10000."
         ),
     ] = 3
     flat_places: Annotated[

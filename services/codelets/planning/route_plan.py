@@ -33,6 +33,7 @@ from schemas.nodes import (
 )
 from services.codelets.planning.config import Config
 from services.codelets.planning.corridor import corridor
+from services.codelets.planning.doubt import doubted, may_doubt
 from services.codelets.planning.frontier import Standpoint, best_frontier
 from services.codelets.planning.goal_order import goal_order, order_before
 from services.codelets.planning.ground import COLUMNS, Ground, ground
@@ -51,6 +52,7 @@ from services.codelets.planning.targets import (
     goals_m,
     has_arrived,
     nearest_free,
+    next_goal,
     open_goals,
     pending_goals,
     target_of,
@@ -110,13 +112,13 @@ def _answer(planned: Planned, graph: Graph) -> Answer:
     answer.operations.extend(_links_to_places(left, now.agent.map, graph))
     for goal in reached:
         answer.operations.append(msgspec.structs.replace(goal, reached_ns=now.task.stamp_ns))
-        if now.before is not None and goal.id == _next_goal(now.before):
+        if now.before is not None and goal.id == next_goal(now.before):
             answer.events.append(_replay(now.before, Direction.REVERSE, now))
 
     if not _serves(plan, now):
         answer.operations.extend(_written(plan, now.before))
-        answer.operations.extend(_doubted(plan, now.before, left))
-        if plan.route is not None and _next_goal(plan) != _next_goal(now.before):
+        answer.operations.extend(doubted(plan, now.before, left))
+        if plan.route is not None and next_goal(plan) != next_goal(now.before):
             answer.events.append(_replay(plan, Direction.FORWARD, now))
 
     return answer
@@ -136,6 +138,10 @@ class Situation(NamedTuple):
         """The free place nearest to the agent."""
         agent = self.agent
         return nearest_free(agent.x_m, agent.y_m, self.where, self.where.is_free, START_M)
+
+    def may_doubt(self, goal: Goal) -> bool:
+        """Whether blocked road may be tried for a goal."""
+        return may_doubt(goal, self.before, self.task.stamp_ns, self.config)
 
 
 class Planned(NamedTuple):
@@ -170,13 +176,6 @@ def _is_at(target: Target, now: Situation) -> bool:
     return away_m <= now.config.reached_m
 
 
-def _next_goal(plan: Plan | None) -> str:
-    """The id of a plan's next goal, empty where it has none."""
-    if plan is None or not plan.goals:
-        return ""
-    return plan.goals[0]
-
-
 def _links_to_places(targets: list[Target], map_id: str, graph: Graph) -> list[Operation]:
     """The links of goals to the place nodes from which they are reached, where these are new."""
     links: list[Operation] = []
@@ -200,7 +199,7 @@ def _plan(targets: list[Target], now: Situation) -> Plan:
         unreachable = {target.goal.id: PlanState.BLOCKED for target in targets}
         return msgspec.structs.replace(plan, state=PlanState.BLOCKED, unreachable=unreachable)
 
-    found, unreachable = _reachable(now.where, start, targets, now.config)
+    found, unreachable = _reachable(start, targets, now)
     plan = msgspec.structs.replace(plan, unreachable=unreachable)
     if found:
         return _to_goals(plan, start, found, now)
@@ -225,18 +224,19 @@ def _routeless(state: PlanState, now: Situation) -> Plan:
 
 
 def _reachable(
-    where: Ground, start: Cell, targets: list[Target], config: Config
+    start: Cell, targets: list[Target], now: Situation
 ) -> tuple[list[Visit], dict[str, PlanState]]:
     """The targets to which routes lead from `start`, and why none leads to the others.
 
     Where a street that was blocked is the only one that is left, it may be free again.
     """
+    where = now.where
     at_start = where.network.index_of(start)
     unreachable = {target.goal.id: target.state for target in targets if target.cell is None}
 
     found = [visit for visit in visits(where.network, targets) if _arrives(visit, at_start)]
     left = _without(targets, found)
-    in_doubt = [target for target in left if target.goal.doubts < config.max_doubts]
+    in_doubt = [target for target in left if now.may_doubt(target.goal)]
     found += [visit for visit in visits(where.doubted, in_doubt) if _arrives(visit, at_start)]
 
     for target in _without(targets, found):
@@ -359,24 +359,14 @@ def _aim(plan: Plan) -> tuple[object, ...]:
 def _written(plan: Plan, before: Plan | None) -> list[Operation]:
     """The plan, and its link to the next goal."""
     operations: list[Operation] = [plan]
-    goal = _next_goal(plan)
-    goal_before = _next_goal(before)
+    goal = next_goal(plan)
+    goal_before = next_goal(before)
     if goal:
         operations.append(Link(source=PLAN_ID, target=goal, kind=LinkKind.TOWARDS))
     elif goal_before:
         operations.append(DropLink(source=PLAN_ID, target=goal_before, kind=LinkKind.TOWARDS))
 
     return operations
-
-
-def _doubted(plan: Plan, before: Plan | None, targets: list[Target]) -> list[Operation]:
-    """The next goal with one doubt more, where the plan begins to lead over blocked road."""
-    goal_before = _next_goal(before) if before is not None and before.doubtful else ""
-    if not plan.doubtful or _next_goal(plan) == goal_before:
-        return []
-
-    goals = [target.goal for target in targets if target.goal.id == _next_goal(plan)]
-    return [msgspec.structs.replace(goal, doubts=goal.doubts + 1) for goal in goals]
 
 
 def _replay(plan: Plan, direction: Direction, now: Situation) -> RouteReplay:
@@ -389,7 +379,7 @@ def _replay(plan: Plan, direction: Direction, now: Situation) -> RouteReplay:
         stamp_ns=now.task.stamp_ns,
         cycle=now.task.cycle,
         direction=direction,
-        goal=_next_goal(plan),
+        goal=next_goal(plan),
         map=plan.map,
         cells=Array.of(cells, "<i4"),
     )

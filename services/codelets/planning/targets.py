@@ -10,7 +10,7 @@ import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.graph.graph import Graph
-from schemas.nodes import NEVER_NS, Goal, Object, PlanState, object_id
+from schemas.nodes import NEVER_NS, Goal, Object, Plan, PlanState, object_id
 from services.codelets.planning.config import Config
 from services.codelets.planning.ground import Ground
 
@@ -48,6 +48,13 @@ def goals_m(graph: Graph) -> Floats:
             positions_m.append((found.x_m, found.y_m))
 
     return np.array(positions_m, np.float64).reshape(-1, 2)
+
+
+def next_goal(plan: Plan | None) -> str:
+    """The id of a plan's next goal, empty where it has none."""
+    if plan is None or not plan.goals:
+        return ""
+    return plan.goals[0]
 
 
 def has_arrived(graph: Graph, at: Collection[str] = ()) -> bool:

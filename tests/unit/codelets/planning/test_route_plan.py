@@ -176,6 +176,25 @@ def test_a_goal_behind_closed_streets_has_no_route() -> None:
     assert plan.unreachable == {goal_id("far"): PlanState.NO_ROUTE}
 
 
+@pytest.mark.parametrize(("later_s", "state"), [(60, PlanState.NO_ROUTE), (900, PlanState.READY)])
+def test_a_goal_without_a_route_is_tried_again_after_a_while(
+    later_s: int, state: PlanState
+) -> None:
+    goal = msgspec.structs.replace(_goal("far", 40.0, 0.0), doubts=Config().max_doubts)
+    graph = _loop(goal, _barrier(20, 0), _barrier(20, 40))
+    assert _plan(graph).state is PlanState.NO_ROUTE
+
+    later_ns = STAMP_NS + later_s * 1_000_000_000
+    later = Task(
+        stamp_ns=later_ns, task_id="9/route_plan", codelet="route_plan", cycle=9, version=0
+    )
+    graph.change(run(later, graph, Config()).operations)
+
+    plan = graph.get(Plan, PLAN_ID)
+    assert plan is not None
+    assert plan.state is state
+
+
 def test_where_all_is_closed_a_street_out_of_sight_may_be_open_again() -> None:
     graph = _loop(_goal("far", 40.0, 0.0), _barrier(20, 0), _barrier(20, 40))
     plan = _plan(graph)
