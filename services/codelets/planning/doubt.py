@@ -13,12 +13,16 @@ from services.codelets.planning.targets import Target, next_goal
 
 
 def may_doubt(goal: Goal, before: Plan | None, stamp_ns: int, config: Config) -> bool:
-    """Whether blocked road may be tried for a goal: a few times, and again where the plan `before`
-    has stated for a while that there is no route.
+    """Whether blocked road may be tried for a goal: a few times, until the plan `before` that does
+    so comes to its end, and again where that has stated for a while that there is no route.
     """
     if goal.doubts < config.max_doubts:
         return True
-    if before is None or goal.id not in before.unreachable:
+    if before is None:
+        return False
+    if before.doubtful and next_goal(before) == goal.id:
+        return True
+    if goal.id not in before.unreachable:
         return False
 
     since_s = (stamp_ns - before.planned_ns) * 1e-9

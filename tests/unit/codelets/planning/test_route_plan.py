@@ -176,6 +176,15 @@ def test_a_goal_behind_closed_streets_has_no_route() -> None:
     assert plan.unreachable == {goal_id("far"): PlanState.NO_ROUTE}
 
 
+def test_the_last_street_that_may_be_open_again_is_tried_to_its_end() -> None:
+    goal = msgspec.structs.replace(_goal("far", 40.0, 0.0), doubts=Config().max_doubts - 1)
+    graph = _loop(goal, _barrier(20, 0), _barrier(20, 40))
+    assert _plan(graph).doubtful
+
+    graph.change([agent(x_m=6.0)])
+    assert _plan(graph).doubtful
+
+
 @pytest.mark.parametrize(("later_s", "state"), [(60, PlanState.NO_ROUTE), (900, PlanState.READY)])
 def test_a_goal_without_a_route_is_tried_again_after_a_while(
     later_s: int, state: PlanState
