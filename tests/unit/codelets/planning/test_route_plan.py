@@ -13,14 +13,12 @@ from cogmap.runtime.codelet import Answer, CycleContext
 from schemas.array import Array, Matrix
 from schemas.codelets import Task
 from schemas.cognition import Direction, RouteReplay
-from schemas.graph import Cells, DropNode, Operation
+from schemas.graph import DropNode
 from schemas.nodes import (
     NEVER_NS,
     PLAN_ID,
-    ROOT_MAP,
     Goal,
     LinkKind,
-    Map,
     Object,
     PathColumn,
     PathSegment,
@@ -35,55 +33,9 @@ from schemas.nodes import (
 from services.codelets.planning.config import Config
 from services.codelets.planning.route_plan import due, run
 from tests.support.world.scenes import agent, percepts
+from tests.support.world.street_loop import barrier, cells_of, loop
 
 STAMP_NS = 7_000_000_000
-SOUTH = (0, 60, -3, 3)
-EAST = (54, 60, -3, 43)
-NORTH = (0, 60, 37, 43)
-WEST = (0, 6, -3, 43)
-
-
-def _road(*streets: tuple[int, int, int, int]) -> Cells:
-    """Streets as rectangles of cells: from and to i, from and to j."""
-    parts = []
-    for i0, i1, j0, j1 in streets:
-        i, j = np.mgrid[i0 : i1 + 1, j0 : j1 + 1]
-        parts.append(np.column_stack([i.ravel(), j.ravel()]))
-
-    cells = np.unique(np.vstack(parts), axis=0)
-    return _column(PlaceColumn.ROAD, cells, 1.0)
-
-
-def _column(
-    column: PlaceColumn, cells: np.ndarray[tuple[int, ...], np.dtype[np.int64]], value: float
-) -> Cells:
-    values = np.full(len(cells), value, np.float32)
-    return Cells(column=column, cells=Array.of(cells, "<i4"), values=Array.of(values))
-
-
-def _barrier(i: int, j: int) -> Cells:
-    """Obstacles across a street that leads along x, at column i around row j."""
-    rows = np.arange(j - 4, j + 5)
-    return _column(PlaceColumn.OBSTACLE, np.column_stack([np.full(len(rows), i), rows]), 1.0)
-
-
-def _walls() -> list[Operation]:
-    """Obstacles everywhere but on the loop of streets."""
-    i, j = np.mgrid[-32:96, -32:96]
-    is_road = np.zeros(i.shape, bool)
-    for i0, i1, j0, j1 in (SOUTH, EAST, NORTH, WEST):
-        is_road |= (i >= i0) & (i <= i1) & (j >= j0) & (j <= j1)
-
-    cells = np.column_stack([i[~is_road], j[~is_road]])
-    return [_column(PlaceColumn.OBSTACLE, cells, 1.0)]
-
-
-def _loop(*more: Operation) -> Graph:
-    """A loop of four streets, 54 m and 40 m long, with the agent in its south-west corner."""
-    graph = Graph()
-    first: list[Operation] = [Map(id=ROOT_MAP, cell_m=1.0), agent(x_m=3.0)]
-    graph.change([*first, _road(SOUTH, EAST, NORTH, WEST), *_walls(), *more])
-    return graph
 
 
 def _goal(name: str, x_m: float, y_m: float) -> Goal:
@@ -113,7 +65,7 @@ def _routes(answer: Answer) -> list[RouteReplay]:
 
 def test_a_goal_is_linked_to_the_place_from_which_it_is_reached() -> None:
     bakery = Object(id=object_id("bakery"), label="bakery", x_m=30.0, y_m=-12.0)
-    graph = _loop(bakery, Goal(id=goal_id("bakery"), object="bakery"))
+    graph = loop(bakery, Goal(id=goal_id("bakery"), object="bakery"))
     plan = _plan(graph)
 
     assert plan.route is not None
@@ -122,7 +74,7 @@ def test_a_goal_is_linked_to_the_place_from_which_it_is_reached() -> None:
 
 
 def test_a_route_leads_along_the_streets_to_the_goal() -> None:
-    plan = _plan(_loop(_goal("corner", 57.0, 40.0)))
+    plan = _plan(loop(_goal("corner", 57.0, 40.0)))
 
     assert plan.state is PlanState.READY
     assert plan.route is not None
@@ -133,9 +85,9 @@ def test_a_route_leads_along_the_streets_to_the_goal() -> None:
 
 
 def test_where_a_street_is_closed_the_plan_takes_the_other() -> None:
-    graph = _loop(_goal("far", 40.0, 0.0))
+    graph = loop(_goal("far", 40.0, 0.0))
     before = _plan(graph)
-    graph.change([_barrier(20, 0)])
+    graph.change([barrier(20, 0)])
     after = _plan(graph)
 
     assert after.length_m > before.length_m + 60.0
@@ -144,7 +96,7 @@ def test_where_a_street_is_closed_the_plan_takes_the_other() -> None:
 
 
 def test_goals_are_visited_from_near_to_far() -> None:
-    plan = _plan(_loop(_goal("a", 57.0, 40.0), _goal("b", 30.0, 0.0), _goal("c", 3.0, 20.0)))
+    plan = _plan(loop(_goal("a", 57.0, 40.0), _goal("b", 30.0, 0.0), _goal("c", 3.0, 20.0)))
 
     assert plan.goals == [goal_id("c"), goal_id("b"), goal_id("a")]
 
@@ -161,7 +113,7 @@ def test_goals_are_visited_from_near_to_far() -> None:
 def test_a_goal_without_a_route_is_in_the_plan_with_the_reason(
     goal: Goal, state: PlanState
 ) -> None:
-    plan = _plan(_loop(goal, _goal("near", 20.0, 0.0)))
+    plan = _plan(loop(goal, _goal("near", 20.0, 0.0)))
 
     assert plan.unreachable == {goal.id: state}
     assert plan.goals == [goal_id("near")]
@@ -169,7 +121,7 @@ def test_a_goal_without_a_route_is_in_the_plan_with_the_reason(
 
 def test_a_goal_behind_closed_streets_has_no_route() -> None:
     goal = msgspec.structs.replace(_goal("far", 40.0, 40.0), doubts=Config().max_doubts)
-    graph = _loop(goal, _barrier(20, 0), _barrier(20, 40))
+    graph = loop(goal, barrier(20, 0), barrier(20, 40))
     plan = _plan(graph)
 
     assert plan.state is PlanState.NO_ROUTE
@@ -178,7 +130,7 @@ def test_a_goal_behind_closed_streets_has_no_route() -> None:
 
 def test_the_last_street_that_may_be_open_again_is_tried_to_its_end() -> None:
     goal = msgspec.structs.replace(_goal("far", 40.0, 0.0), doubts=Config().max_doubts - 1)
-    graph = _loop(goal, _barrier(20, 0), _barrier(20, 40))
+    graph = loop(goal, barrier(20, 0), barrier(20, 40))
     assert _plan(graph).doubtful
 
     graph.change([agent(x_m=6.0)])
@@ -190,7 +142,7 @@ def test_a_goal_without_a_route_is_tried_again_after_a_while(
     later_s: int, state: PlanState
 ) -> None:
     goal = msgspec.structs.replace(_goal("far", 40.0, 0.0), doubts=Config().max_doubts)
-    graph = _loop(goal, _barrier(20, 0), _barrier(20, 40))
+    graph = loop(goal, barrier(20, 0), barrier(20, 40))
     assert _plan(graph).state is PlanState.NO_ROUTE
 
     later_ns = STAMP_NS + later_s * 1_000_000_000
@@ -205,7 +157,7 @@ def test_a_goal_without_a_route_is_tried_again_after_a_while(
 
 
 def test_where_all_is_closed_a_street_out_of_sight_may_be_open_again() -> None:
-    graph = _loop(_goal("far", 40.0, 0.0), _barrier(20, 0), _barrier(20, 40))
+    graph = loop(_goal("far", 40.0, 0.0), barrier(20, 0), barrier(20, 40))
     plan = _plan(graph)
     goal = graph.get(Goal, goal_id("far"))
 
@@ -217,7 +169,7 @@ def test_where_all_is_closed_a_street_out_of_sight_may_be_open_again() -> None:
 
 
 def test_a_street_that_is_seen_to_be_closed_is_not_in_doubt() -> None:
-    graph = _loop(_goal("far", 40.0, 0.0), _barrier(20, 0), _barrier(20, 40))
+    graph = loop(_goal("far", 40.0, 0.0), barrier(20, 0), barrier(20, 40))
     graph.change([agent(x_m=16.0)])
     plan = _plan(graph)
 
@@ -238,7 +190,7 @@ def _was_at(stamp_s: float, *x_m: float) -> PathSegment:
 def test_a_street_that_was_seen_to_be_closed_is_not_in_doubt_for_a_while(
     ago_s: float, is_north: bool
 ) -> None:
-    graph = _loop(_goal("far", 40.0, 0.0), _barrier(20, 0), _barrier(20, 40))
+    graph = loop(_goal("far", 40.0, 0.0), barrier(20, 0), barrier(20, 40))
     graph.change([agent(x_m=3.0, stamp_ns=1_000_000_000_000), _was_at(1000.0 - ago_s, 16.0)])
     plan = _plan(graph)
 
@@ -251,7 +203,7 @@ def test_a_street_that_was_seen_to_be_closed_is_not_in_doubt_for_a_while(
 def test_between_walls_that_it_sees_the_agent_goes_back_by_the_way_it_has_come(
     ago_s: float, state: PlanState
 ) -> None:
-    graph = _loop(_goal("far", 3.0, 40.0), _barrier(12, 0), _barrier(20, 0))
+    graph = loop(_goal("far", 3.0, 40.0), barrier(12, 0), barrier(20, 0))
     here = agent(x_m=16.0, stamp_ns=1_000_000_000_000)
     graph.change([here, _was_at(1000.0 - ago_s, *range(3, 17))])
     plan = _plan(graph)
@@ -261,14 +213,14 @@ def test_between_walls_that_it_sees_the_agent_goes_back_by_the_way_it_has_come(
 
 def test_an_object_is_reached_from_the_street_beside_it() -> None:
     bakery = Object(id=object_id("bakery"), label="bakery", x_m=30.0, y_m=-12.0)
-    plan = _plan(_loop(bakery, Goal(id=goal_id("bakery"), object="bakery")))
+    plan = _plan(loop(bakery, Goal(id=goal_id("bakery"), object="bakery")))
 
     assert plan.route is not None
     assert plan.route.numpy()[-1] == pytest.approx((30.0, -2.0), abs=1.0)
 
 
 def test_a_goal_where_the_agent_is_counts_as_reached_and_is_replayed_backwards() -> None:
-    graph = _loop(_goal("b", 30.0, 0.0))
+    graph = loop(_goal("b", 30.0, 0.0))
     plan = _plan(graph)
     graph.change([agent(x_m=29.0)])
     answer = _answer(graph)
@@ -284,14 +236,14 @@ def test_a_goal_where_the_agent_is_counts_as_reached_and_is_replayed_backwards()
 
 
 def test_a_goal_where_the_agent_starts_leaves_a_plan_that_states_so() -> None:
-    plan = _plan(_loop(_goal("here", 3.0, 0.0)))
+    plan = _plan(loop(_goal("here", 3.0, 0.0)))
 
     assert plan.state is PlanState.AT_GOAL
     assert plan.route is None
 
 
 def test_a_goal_that_was_not_the_next_one_is_not_replayed() -> None:
-    graph = _loop(_goal("b", 30.0, 0.0))
+    graph = loop(_goal("b", 30.0, 0.0))
     _answer(graph)
     graph.change([_goal("a", 10.0, 0.0), agent(x_m=10.0)])
 
@@ -299,7 +251,7 @@ def test_a_goal_that_was_not_the_next_one_is_not_replayed() -> None:
 
 
 def test_where_all_goals_are_reached_nothing_is_planned() -> None:
-    graph = _loop(_goal("here", 3.0, 0.0))
+    graph = loop(_goal("here", 3.0, 0.0))
     context = CycleContext(cycle=5, percepts=percepts(4), motions=Array.of(np.zeros((0, 5))))
     assert due(context, graph, Config())
 
@@ -308,7 +260,7 @@ def test_where_all_goals_are_reached_nothing_is_planned() -> None:
 
 
 def test_a_new_goal_is_replayed_forward_once() -> None:
-    graph = _loop(_goal("b", 30.0, 0.0))
+    graph = loop(_goal("b", 30.0, 0.0))
     first = _answer(graph)
     second = _answer(graph)
 
@@ -318,7 +270,7 @@ def test_a_new_goal_is_replayed_forward_once() -> None:
 
 
 def test_a_plan_that_serves_is_not_written_again() -> None:
-    graph = _loop(_goal("b", 40.0, 0.0))
+    graph = loop(_goal("b", 40.0, 0.0))
     _answer(graph)
     graph.change([agent(x_m=12.0, y_m=0.5)])
 
@@ -328,7 +280,7 @@ def test_a_plan_that_serves_is_not_written_again() -> None:
 @pytest.mark.parametrize("explores", [False, True])
 def test_where_every_goal_is_reached_the_plan_states_so_and_has_no_route(explores: bool) -> None:
     goal = msgspec.structs.replace(_goal("b", 40.0, 0.0), reached_ns=1)
-    plan = _plan(_loop(goal), Config(explore=explores))
+    plan = _plan(loop(goal), Config(explore=explores))
 
     assert plan.state is PlanState.AT_GOAL
     assert plan.route is None
@@ -346,7 +298,7 @@ def _in_order(*goals: Goal) -> list[Goal]:
 def test_a_goal_after_another_is_planned_once_that_is_reached() -> None:
     there = _goal("there", 40.0, 0.0)
     back = _goal("back", 20.0, 0.0)
-    graph = _loop(*_in_order(there, back))
+    graph = loop(*_in_order(there, back))
 
     assert _plan(graph).goals == [there.id]
 
@@ -357,7 +309,7 @@ def test_a_goal_after_another_is_planned_once_that_is_reached() -> None:
 def test_a_goal_that_is_passed_before_its_turn_is_not_reached() -> None:
     there = _goal("there", 40.0, 0.0)
     start = _goal("start", 3.0, 0.0)
-    graph = _loop(*_in_order(there, start))
+    graph = loop(*_in_order(there, start))
     _answer(graph)
 
     passed = graph.get(Goal, start.id)
@@ -368,11 +320,11 @@ def test_a_goal_that_is_passed_before_its_turn_is_not_reached() -> None:
 def test_a_goal_after_one_that_there_is_none_of_counts_at_once() -> None:
     goal = msgspec.structs.replace(_goal("b", 40.0, 0.0), after=goal_id("harbour"))
 
-    assert _plan(_loop(goal)).goals == [goal.id]
+    assert _plan(loop(goal)).goals == [goal.id]
 
 
 def test_an_agent_that_has_reached_its_goals_does_not_explore() -> None:
-    graph = _loop(_goal("here", 3.0, 0.0))
+    graph = loop(_goal("here", 3.0, 0.0))
     context = CycleContext(cycle=5, percepts=percepts(4), motions=Array.of(np.zeros((0, 5))))
     config = Config(explore=True)
 
@@ -383,19 +335,19 @@ def test_an_agent_that_has_reached_its_goals_does_not_explore() -> None:
 @pytest.mark.parametrize(("barrier_i", "is_due"), [(20, True), (50, False)])
 def test_a_route_that_is_blocked_is_planned_anew_at_once(barrier_i: int, is_due: bool) -> None:
     between_plans = CycleContext(cycle=6, percepts=percepts(4), motions=Array.of(np.zeros((0, 5))))
-    graph = _loop(_goal("b", 54.0, 0.0))
+    graph = loop(_goal("b", 54.0, 0.0))
     _answer(graph)
     assert due(between_plans, graph, Config()) == []
 
-    graph.change([_barrier(barrier_i, 0)])
+    graph.change([barrier(barrier_i, 0)])
 
     assert bool(due(between_plans, graph, Config())) is is_due
 
 
 def test_without_a_goal_the_agent_explores_where_the_road_is_open() -> None:
     i, j = np.mgrid[54:61, 10:44]
-    unknown = _column(PlaceColumn.ROAD, np.column_stack([i.ravel(), j.ravel()]), 0.0)
-    plan = _plan(_loop(unknown), Config(explore=True))
+    unknown = cells_of(PlaceColumn.ROAD, np.column_stack([i.ravel(), j.ravel()]), 0.0)
+    plan = _plan(loop(unknown), Config(explore=True))
 
     assert plan.explores
     assert plan.route is not None
@@ -405,14 +357,14 @@ def test_without_a_goal_the_agent_explores_where_the_road_is_open() -> None:
 
 
 def test_where_all_is_known_there_is_nothing_to_explore() -> None:
-    plan = _plan(_loop(), Config(explore=True))
+    plan = _plan(loop(), Config(explore=True))
 
     assert plan.state is PlanState.NO_GOAL
     assert not plan.explores
 
 
 def test_a_goal_that_is_forgotten_is_no_longer_in_the_plan() -> None:
-    graph = _loop(_goal("b", 40.0, 0.0))
+    graph = loop(_goal("b", 40.0, 0.0))
     _answer(graph)
     graph.change([DropNode(id=goal_id("b"))])
     plan = _plan(graph)
