@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cogmap.geometry.arrays import Floats
+from cogmap.graph.graph import Graph
 from schemas.array import Array, Matrix
 from schemas.graph import TILE_SIDE, Decay, Links, PlaceTile, Snapshot
 from schemas.nodes import (
@@ -22,6 +23,7 @@ from schemas.nodes import (
     object_id,
 )
 from services.codelets.config import Config
+from services.codelets.resolution.coarse_places import make_all
 
 SPREAD_M = 0.3
 CELL_M = 1.0
@@ -46,7 +48,7 @@ LARGE = Size(objects=100_000, places=500_000)
 
 def cognitive_map(size: Size, cycle: int = 1000) -> Snapshot:
     """A map as of `cycle`: every object with as many samples as the codelets keep and linked to its
-    place, every place node with all columns.
+    place, every place node with all columns, and the coarse maps.
     """
     rng = np.random.default_rng(SEED)
     objects = _objects(size.objects, cycle, rng)
@@ -56,14 +58,17 @@ def cognitive_map(size: Size, cycle: int = 1000) -> Snapshot:
         weights[node.id] = {place: 1.0}
 
     maps, within = _sub_maps(objects)
-    nodes: list[AnyNode] = [Map(id=ROOT_MAP, cell_m=CELL_M), *maps, *objects]
+    places = Graph()
+    places.change([Map(id=ROOT_MAP, cell_m=CELL_M), *_tiles(size.places, rng)])
+    make_all(places)
+    nodes: list[AnyNode] = [*places.of_kind(Map), *maps, *objects]
     return Snapshot(
         version=1,
         cycle=cycle,
         decay=Decay(),
         nodes=nodes,
         links=[Links(kind=LinkKind.AT, weights=weights), within],
-        tiles=_tiles(size.places, rng),
+        tiles=list(places.places.messages()),
     )
 
 

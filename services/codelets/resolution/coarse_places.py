@@ -91,6 +91,13 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     return answer
 
 
+def make_all(graph: Graph) -> None:
+    """Give a graph all of its coarse maps at once, as they are in one that was long at work."""
+    graph.change(_missing(graph))
+    for block in _blocks(graph.places.extent(ROOT_MAP)):
+        graph.change(_update(graph, block))
+
+
 CODELET = Codelet(
     name="coarse_places",
     phase=Phase.BACKGROUND,
