@@ -23,7 +23,7 @@ from schemas.nodes import (
     Map,
     Object,
     Plan,
-    map_number,
+    is_coarse_map,
     object_id,
 )
 
@@ -72,7 +72,8 @@ def _draw_cuts(axes: Axes, observer: Observer, graph: Graph) -> bool:
 
 def _draw_sub_maps(axes: Axes, observer: Observer, graph: Graph) -> bool:
     """The hull of the objects of each sub-map."""
-    maps = [node for node in graph.of_kind(Map) if map_number(node.id)]
+    others = [node for node in graph.of_kind(Map) if node.id != ROOT_MAP]
+    maps = [node for node in others if not is_coarse_map(node.id)]
     has_any = False
     for number, sub_map in enumerate(maps):
         members = graph.links.sources(sub_map.id, LinkKind.WITHIN)

@@ -48,6 +48,11 @@ class Extent:
         height = max(0, self.upper[1] - self.lower[1])
         return width, height
 
+    def grown(self, cells: int) -> Extent:
+        """The rectangle with so many cells more on each side."""
+        (low_i, low_j), (high_i, high_j) = self.lower, self.upper
+        return Extent((low_i - cells, low_j - cells), (high_i + cells, high_j + cells))
+
 
 @dataclass(frozen=True, eq=False)
 class Window:

@@ -97,7 +97,7 @@ def _levels(graph: Graph) -> list[int]:
 def _coarse(graph: Graph, level: int, within: Corridor | None, config: Config) -> PlaceNetwork:
     """The place network of a coarse map, the whole of it or within a corridor."""
     map_id = coarse_map_id(level)
-    extent = _whole(graph, map_id) if within is None else within.extent
+    extent = graph.places.extent(map_id).grown(MARGIN) if within is None else within.extent
     window = graph.places.window(map_id, COLUMNS, extent)
     is_road = window.column(PlaceColumn.ROAD) >= ROAD_FROM
     share = np.where(is_road, 1.0, config.unknown_weight)
@@ -106,13 +106,6 @@ def _coarse(graph: Graph, level: int, within: Corridor | None, config: Config) -
 
     here = Here(window.origin, window.shape, graph.cell_m(map_id))
     return here.network(link_weights(window.weights(), share))
-
-
-def _whole(graph: Graph, map_id: str) -> Extent:
-    """The cells of a map, and some more."""
-    extent = graph.places.extent(map_id)
-    (low_i, low_j), (high_i, high_j) = extent.lower, extent.upper
-    return Extent((low_i - MARGIN, low_j - MARGIN), (high_i + MARGIN, high_j + MARGIN))
 
 
 class _Routes(NamedTuple):

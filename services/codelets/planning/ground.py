@@ -136,7 +136,7 @@ def _extent(graph: Graph, map_id: str, goals: Sequence[Goal], config: Config) ->
     """The rectangle of place nodes that is planned on."""
     extent = graph.places.extent(map_id)
     extent = _with_goals(extent, goals, graph.cell_m(map_id), config.beyond_cells)
-    return _with_margin(extent, config.margin_cells)
+    return extent.grown(config.margin_cells)
 
 
 def _with_goals(extent: Extent, goals: Sequence[Goal], cell_m: float, beyond: int) -> Extent:
@@ -152,12 +152,6 @@ def _with_goals(extent: Extent, goals: Sequence[Goal], cell_m: float, beyond: in
     first_i, first_j = np.vstack([lower, cells[is_near]]).min(axis=0).tolist()
     last_i, last_j = np.vstack([upper, cells[is_near] + 1]).max(axis=0).tolist()
     return Extent((first_i, first_j), (last_i, last_j))
-
-
-def _with_margin(extent: Extent, cells: int) -> Extent:
-    first_i, first_j = extent.lower
-    last_i, last_j = extent.upper
-    return Extent((first_i - cells, first_j - cells), (last_i + cells, last_j + cells))
 
 
 def _has_cut(weights: Singles) -> Booleans:

@@ -87,7 +87,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     if near is not None:
         where = ground(graph, agent, config, within=near)
         planned = _planned(Situation(task, agent, where, before, config), graph)
-        if not planned.plan.unreachable:
+        if not planned.plan.unreachable and not planned.plan.doubtful:
             return _answer(planned, graph)
 
     where = ground(graph, agent, config, [*pending_goals(graph).values()])

@@ -112,3 +112,20 @@ def test_where_coarse_maps_know_of_no_route_the_whole_map_is_searched() -> None:
     plan = _plan(graph, ROUGH)
     assert plan.state is PlanState.READY
     assert plan.unreachable == {}
+
+
+def test_a_street_just_closed_in_the_corridor_is_driven_round_not_doubted() -> None:
+    graph = _city(FAR)
+    before = _plan(graph, ROUGH)
+    assert before.route is not None
+    half_i, half_j = np.rint(before.route.numpy()[len(before.route.numpy()) // 2]).astype(int)
+    stands = np.zeros((SIDE, SIDE), bool)
+    stands[half_i - 12 : half_i + 13, half_j - 12 : half_j + 13] = True
+    graph.change([_column(PlaceColumn.OBSTACLE, stands)])
+
+    plan = _plan(graph, ROUGH)
+    assert plan.state is PlanState.READY
+    assert not plan.doubtful
+    assert plan.route is not None
+    cells = np.rint(plan.route.numpy()).astype(int)
+    assert not stands[tuple(cells.T)].any()
