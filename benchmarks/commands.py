@@ -12,12 +12,14 @@ from rich.console import Console
 
 from benchmarks import suite
 from benchmarks.bus import measure as bus
+from benchmarks.cognition.command import cognition_command
 from benchmarks.cycle import measure as cycle
 from benchmarks.explore.command import explore_command
 from benchmarks.localization import measure as localization
 from benchmarks.map_correction import measure as map_correction
 from benchmarks.map_size import measure as map_size
 from benchmarks.map_structure import measure as map_structure
+from benchmarks.memory.command import memory_command
 from benchmarks.options import announce, json_option, processes_option, report_metrics
 from benchmarks.perception import measure as perception
 from benchmarks.perception import photographs, stereo
@@ -342,3 +344,5 @@ def spiking_command(seed: int, processes: int, folder: Path | None, json_path: P
 
 benchmarks.add_command(planning_command)
 benchmarks.add_command(explore_command)
+benchmarks.add_command(cognition_command)
+benchmarks.add_command(memory_command)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from benchmarks import paper
 from benchmarks.bus import measure as bus
+from benchmarks.cognition import measure as cognition
 from benchmarks.cycle import measure as cycle
 from benchmarks.explore import measure as explore
 from benchmarks.localization import measure as localization
@@ -19,6 +20,7 @@ from benchmarks.machine import machine_unit_ms
 from benchmarks.map_correction import measure as map_correction
 from benchmarks.map_size import measure as map_size
 from benchmarks.map_structure import measure as map_structure
+from benchmarks.memory import measure as memory
 from benchmarks.perception import measure as perception
 from benchmarks.perception import photographs, stereo
 from benchmarks.place_grid import measure as place_grid
@@ -144,6 +146,16 @@ def _explore(setting: Setting) -> Metrics:
     return explore.measure(setting.processes)
 
 
+def _cognition(setting: Setting) -> Metrics:
+    folder = setting.subfolder("cognition")
+    return cognition.measure(folder, setting.processes, setting.announce)
+
+
+def _memory(setting: Setting) -> Metrics:
+    folder = setting.subfolder("memory")
+    return memory.measure(folder, setting.processes, setting.announce)
+
+
 def _cue_integration(setting: Setting) -> Metrics:
     return paper.measure_cue_integration(setting.processes)
 
@@ -167,6 +179,8 @@ SUITE = (
     Benchmark("planning", grid.THRESHOLDS, _planning),
     Benchmark("tours", tours.THRESHOLDS, _tours),
     Benchmark("explore", explore.THRESHOLDS, _explore),
+    Benchmark("cognition", cognition.THRESHOLDS, _cognition),
+    Benchmark("memory", memory.THRESHOLDS, _memory),
     Benchmark("cue-integration", paper.CUE_INTEGRATION_THRESHOLDS, _cue_integration),
     Benchmark("city-maps", paper.CITY_MAPS_THRESHOLDS, _city_maps),
 )

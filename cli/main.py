@@ -42,6 +42,13 @@ def _experiment() -> click.Command:
     return experiment
 
 
+def _explain() -> click.Command:
+    """Explain a moment of a recorded drive."""
+    from cli.explain.command import explain
+
+    return explain
+
+
 def _goal() -> click.Command:
     """Send the agent somewhere, and print its plan."""
     from cli.goal import goal
@@ -61,6 +68,13 @@ def _log() -> click.Command:
     from cli.log.command import log
 
     return log
+
+
+def _memory() -> click.Command:
+    """Look into long-term memory; check, export, import it."""
+    from cli.memory.command import memory
+
+    return memory
 
 
 def _module() -> click.Command:
@@ -110,9 +124,11 @@ COMMANDS: dict[str, Loader] = {
     "config": _config,
     "doctor": _doctor,
     "experiment": _experiment,
+    "explain": _explain,
     "goal": _goal,
     "graph": _graph,
     "log": _log,
+    "memory": _memory,
     "module": _module,
     "router": _router,
     "run": _run,

@@ -19,6 +19,11 @@ tied_option = click.option("--tied", is_flag=True, help="End when standard input
 @click.option(
     "--state", type=click.Path(path_type=Path), help="A folder for what it must not lose."
 )
+@click.option(
+    "--memory",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="The database of what long-term memory keeps between runs.",
+)
 @tied_option
 @connect_option
 @agent_option
@@ -28,6 +33,7 @@ def module(
     name: str,
     instance: str,
     state: Path | None,
+    memory: Path | None,
     tied: bool,
     connect: str,
     agent: str,
@@ -37,7 +43,7 @@ def module(
     """Run one module as this process."""
     sections = config.load(config_path, settings)
     built = registry.build(name, sections, instance)
-    process.run_module(built, connect, agent, state, process.Stop(tied))
+    process.run_module(built, connect, agent, state, process.Stop(tied), memory=memory)
 
 
 @click.command()

@@ -1,6 +1,6 @@
-"""A module that drives by the range scan alone, in the place of `action`.
+"""A module that drives by the range scan alone, in the place of `motor`.
 
-Run it beside the others: `cogmap run --without action`, and `python examples/wanderer.py`.
+Run it beside the others: `cogmap run --without motor`, and `python examples/wanderer.py`.
 """
 
 from __future__ import annotations
@@ -57,10 +57,10 @@ class Wanderer:
         )
 
 
-def build(config: Config, instance: str = "action") -> Module:
-    """The module `action`, by range scan alone."""
+def build(config: Config, instance: str = "motor") -> Module:
+    """The module `motor`, by range scan alone."""
     wanderer = Wanderer(config)
-    module = Module("action", instance)
+    module = Module("motor", instance)
     return module.on(topics.SCAN, wanderer.on_scan, emits=[topics.MOTOR_COMMAND])
 
 

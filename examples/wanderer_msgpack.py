@@ -1,6 +1,6 @@
 """The wanderer by a msgpack library and Zenoh alone: what a module needs in any language.
 
-Run it beside the others: `cogmap run --without action`, and `python examples/wanderer_msgpack.py`.
+Run it beside the others: `cogmap run --without motor`, and `python examples/wanderer_msgpack.py`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import zenoh
 
 ENDPOINT = "tcp/127.0.0.1:7447"
 AGENT = "agent"
-INSTANCE = "action"
+INSTANCE = "motor"
 STARTED_NS = time.time_ns()
 
 AHEAD_RAD = 0.3
@@ -74,7 +74,7 @@ def run(endpoint: str, agent: str, stop: threading.Event) -> None:
     with zenoh.open(configuration(endpoint)) as session:
         commands = session.declare_publisher(f"cogmap/{agent}/motor/command")
         session.declare_subscriber(f"cogmap/{agent}/sensory/scan", scans.put)
-        ready = session.liveliness().declare_token(f"cogmap/{agent}/@ready/action/{INSTANCE}")
+        ready = session.liveliness().declare_token(f"cogmap/{agent}/@ready/motor/{INSTANCE}")
 
         number = 0
         while not stop.is_set():

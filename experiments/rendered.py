@@ -92,7 +92,7 @@ class SensorLog:
             return next(frames, [])
 
         module = Module("sim")
-        module.on_start(on_start, {"action": 1}, _REPLAYED)
+        module.on_start(on_start, {"motor": 1}, _REPLAYED)
         module.on(topics.MOTOR_COMMAND, on_command, _REPLAYED)
         return module
 

@@ -1,4 +1,6 @@
-"""Messages of the cognitive cycle: replays, coalitions, competitions, broadcasts, actions."""
+"""Messages of the cognitive cycle: replays, coalitions, competitions, broadcasts, behaviours,
+actions.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,7 @@ from typing import Annotated
 import msgspec
 
 from schemas.array import Array
-from schemas.base import Count, Message, Name, Part, Scalar, Unit
+from schemas.base import Count, Finite, Message, Name, Part, Scalar, Unit
 from schemas.graph import Link
 from schemas.nodes import AnyNode
 
@@ -95,6 +97,19 @@ class Trigger(enum.StrEnum):
     NO_NEW_COALITION = "no new coalition for long"
 
 
+class Silence(enum.StrEnum):
+    """Why a competition led to no broadcast; NONE where it led to one.
+
+    NO_COALITION: none competed. REFRACTORY: the last broadcast was too short a time ago.
+    NO_TRIGGER: no trigger's condition was met.
+    """
+
+    NONE = ""
+    NO_COALITION = "no coalition competes"
+    REFRACTORY = "too soon after the last broadcast"
+    NO_TRIGGER = "no trigger fires"
+
+
 class Fate(enum.StrEnum):
     """What one cycle's competition made of a coalition."""
 
@@ -118,11 +133,15 @@ class Contender(Part, kw_only=True, frozen=True):
 
 
 class Competition(Message, kw_only=True, frozen=True):
-    """One cycle's competition for consciousness: every coalition that took part, and its fate."""
+    """One cycle's competition for consciousness: every coalition that took part, and its fate.
+
+    `trigger` is what led to a broadcast, `silence` why there was none.
+    """
 
     cycle: Count
     contenders: list[Contender]
     trigger: Trigger = Trigger.NONE
+    silence: Silence = Silence.NONE
 
 
 class Broadcast(Message, kw_only=True, frozen=True):
@@ -133,31 +152,89 @@ class Broadcast(Message, kw_only=True, frozen=True):
     coalition: Coalition
 
 
+class ActionName(enum.StrEnum):
+    """The actions for which the sensory-motor memory has a motor program.
+
+    FOLLOW_PLAN: drive the route of the plan. TURN: turn on the spot by the parameter `turn_rad`,
+    left positive. DOCK: drive straight and slowly to the parameters `x_m` and `y_m`, on the map of
+    the agent. SEEK: have the goal to be at the object `object` until the need `need` is satisfied,
+    and drive the route of the plan. HALT: stand.
+    """
+
+    FOLLOW_PLAN = "follow_plan"
+    TURN = "turn"
+    DOCK = "dock"
+    SEEK = "seek"
+    HALT = "halt"
+
+
 class Rejection(enum.StrEnum):
-    """Why action selection did not choose a behaviour; NONE for the one that it chose."""
+    """Why a behaviour was not chosen; NONE for one that was, or that may be."""
 
     NONE = ""
     CONTEXT_MISSING = "part of its context is missing"
     NOT_INSTANTIATED = "activation below the instantiation threshold"
     LESS_ACTIVE = "less active than the one chosen"
+    BELOW_THRESHOLD = "activation below the selection threshold"
 
 
 class Behaviour(Part, kw_only=True, frozen=True):
-    """A scheme that action selection considered."""
+    """A scheme, as one broadcast activated it: a behaviour where nothing speaks against it.
+
+    `bindings` are the ids of the nodes that the variables of its patterns stand for; `parameters`
+    are those of `action`. The patterns of `context` have the activation of the node that each is
+    matched by, 0 where none is; those of `adding` have their salience. `reliability` is the share
+    of its `executions` that were `successes`. `gathered` is the part of its activation that came
+    from the behaviour net.
+    """
 
     scheme: Name
     activation: Unit
     rejection: Rejection = Rejection.NONE
+    action: str = ""
+    bindings: dict[Name, Name] = {}
+    parameters: dict[Name, Scalar] = {}
+    context: dict[str, Unit] = {}
+    adding: dict[str, Finite] = {}
+    deleting: list[str] = []
+    reliability: Unit = 0.0
+    executions: Count = 0
+    successes: Count = 0
+    gathered: Finite = 0.0
 
 
-class Action(Message, kw_only=True, frozen=True):
-    """The scheme that action selection chose, and its parameters for the sensory-motor memory.
-
-    `behaviours` are all schemes that were considered, the chosen one included.
+class Behaviours(Message, kw_only=True, frozen=True):
+    """What procedural memory makes of the broadcast of `cycle`: every scheme that it considered,
+    those that are not instantiated included.
     """
 
     cycle: Count
-    scheme: Name
+    behaviours: list[Behaviour]
+
+
+class Action(Message, kw_only=True, frozen=True):
+    """The scheme that action selection chose for the broadcast of `cycle`, and its action for the
+    sensory-motor memory. `scheme` and `action` are empty where no behaviour was active enough: the
+    action before continues.
+
+    `behaviours` are all that were considered, the chosen one included. `threshold` is the
+    activation that the next selection needs.
+    """
+
+    cycle: Count
+    scheme: str
+    action: str = ""
     activation: Unit
     parameters: dict[str, Scalar]
     behaviours: list[Behaviour] = []
+    threshold: Unit = 0.0
+
+
+class MotorProgram(Message, kw_only=True, frozen=True):
+    """The sensory-motor memory begins to execute `action`, chosen in `cycle`, or has new parameters
+    for it.
+    """
+
+    cycle: Count
+    action: Name
+    parameters: dict[str, Scalar]

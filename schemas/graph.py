@@ -14,8 +14,6 @@ from schemas.array import Array
 from schemas.base import Count, Finite, Message, Name, Part, Unit
 from schemas.nodes import ROOT_MAP, AnyNode, LinkKind, PlaceColumn
 
-TILE_SIDE = 32
-
 
 class Phase(enum.StrEnum):
     """The phases of a cognitive cycle in the workspace, in order; each ends with a commit.
@@ -98,13 +96,16 @@ class DropLink(Part, kw_only=True, frozen=True, tag="drop_link"):
 class Decay(Part, kw_only=True, frozen=True, tag="decay"):
     """By how much activation decays in a cycle (linear, as in LIDA's framework).
 
-    A node is forgotten once its total activation is below `forget_below`.
+    A node is forgotten once its total activation is below `forget_below`. A base level that has
+    reached `kept_base_level` does not decay below it: what was learned so well is not forgotten by
+    time alone; 0: every base level decays.
     """
 
     activation: Unit = 0.0
     base_level: Unit = 0.0
     place_activation: Unit = 0.0
     forget_below: Unit = 0.0
+    kept_base_level: Unit = 0.0
 
 
 Operation = AnyNode | Link | Links | PlaceTile | DropNode | DropLink | Cells | Decay

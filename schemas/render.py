@@ -70,7 +70,9 @@ def _fields(struct: msgspec.Struct) -> dict[str, Any]:
         fields[str(config.tag_field)] = config.tag
 
     for name in struct.__struct_fields__:
-        fields[name] = getattr(struct, name)
+        value = getattr(struct, name)
+        if value is not msgspec.UNSET:
+            fields[name] = value
     return fields
 
 

@@ -67,6 +67,16 @@ class SelfMotion(Message, kw_only=True, frozen=True):
     motions: Array
 
 
+class Energy(Message, kw_only=True, frozen=True):
+    """What the body senses of its energy at the stamp of a view: the level, 1 where the battery is
+    full and 0 where the robot is out, and whether it is being charged.
+    """
+
+    frame: Count
+    level: Unit
+    is_charging: bool = False
+
+
 class View(Message, kw_only=True, frozen=True):
     """The rectified left image, uint8 (h, w, 3), and depth along the optical axis, float32 (h, w);
     0 is unknown.
@@ -227,12 +237,16 @@ class StreetClosure(Message, kw_only=True, frozen=True):
 
 
 class TruePose(Message, kw_only=True, frozen=True):
-    """Where the robot really is, and how often it has run into something. Observers only."""
+    """Where the robot really is, and how often it has run into something. Observers only.
+
+    `energy` is the level of its battery, absent where it has none.
+    """
 
     pose: Pose
     travelled_m: Metres
     progress: Unit
     collisions: Count = 0
+    energy: Unit | msgspec.UnsetType = msgspec.UNSET
 
 
 class Street(Part, kw_only=True, frozen=True):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
-from schemas import codelets, cognition, graph, process, sensing
+from schemas import codelets, cognition, graph, memory, process, sensing
 from schemas.base import Message
 
 KIB = 1024
@@ -65,6 +65,7 @@ CLOCK = Topic("clock", process.Clock, 20, _LATEST, sensed=True)
 STEREO = Topic("camera/stereo", sensing.StereoFrame, 5, _LATEST, max_bytes=32 * MIB, sensed=True)
 ODOMETRY = Topic("odometry", sensing.Odometry, 20, _NEVER, sensed=True)
 SELF_MOTION = Topic("sensory/motion", sensing.SelfMotion, 5, _NEVER)
+ENERGY = Topic("body/energy", sensing.Energy, 5, _NEVER, sensed=True)
 VIEW = Topic("sensory/view", sensing.View, 5, _LATEST, max_bytes=64 * MIB)
 SCAN = Topic("sensory/scan", sensing.RangeScan, 5, _LATEST)
 PERCEPTS = Topic("epam/percepts", sensing.Percepts, 5, _NEVER)
@@ -81,7 +82,11 @@ ROUTE_REPLAY = Topic("workspace/route_replay", cognition.RouteReplay, 0, _NEVER)
 COALITIONS = Topic("workspace/coalitions", cognition.Coalitions, 5, _NEVER)
 COMPETITION = Topic("global_workspace/competition", cognition.Competition, 5, _NEVER)
 BROADCAST = Topic("global_workspace/broadcast", cognition.Broadcast, 0, _NEVER)
+STORED = Topic("memory/stored", memory.Stored, 0, _NEVER, max_bytes=64 * MIB)
+RESTORED = Topic("memory/restored", memory.Restored, 0, _NEVER, max_bytes=512 * MIB)
+BEHAVIOURS = Topic("procedural/behaviours", cognition.Behaviours, 0, _NEVER)
 ACTION = Topic("action/selected", cognition.Action, 0, _NEVER)
+MOTOR_PROGRAM = Topic("motor/program", cognition.MotorProgram, 0, _NEVER)
 MOTOR_COMMAND = Topic("motor/command", sensing.MotorCommand, 5, _NEVER)
 STREET_CLOSURE = Topic("sim/street", sensing.StreetClosure, 0, _NEVER)
 TRUE_POSE = Topic("truth/pose", sensing.TruePose, 20, _LATEST, Scope.TRUTH, sensed=True)

@@ -76,11 +76,35 @@ def _global_workspace() -> Entry:
     )
 
 
+def _memory() -> Entry:
+    from services.memory.module import Config, build
+
+    return Entry(
+        Config, lambda sections, name: build(config.typed(sections, "memory", Config), name)
+    )
+
+
+def _procedural() -> Entry:
+    from services.procedural.module import Config, build
+
+    return Entry(
+        Config, lambda sections, name: build(config.typed(sections, "procedural", Config), name)
+    )
+
+
 def _action() -> Entry:
     from services.action.module import Config, build
 
     return Entry(
         Config, lambda sections, name: build(config.typed(sections, "action", Config), name)
+    )
+
+
+def _motor() -> Entry:
+    from services.motor.module import Config, build
+
+    return Entry(
+        Config, lambda sections, name: build(config.typed(sections, "motor", Config), name)
     )
 
 
@@ -91,7 +115,10 @@ _ENTRIES: dict[str, Callable[[], Entry]] = {
     "workspace": _workspace,
     "codelets": _codelets,
     "global_workspace": _global_workspace,
+    "memory": _memory,
+    "procedural": _procedural,
     "action": _action,
+    "motor": _motor,
 }
 
 MODULES = tuple(_ENTRIES)

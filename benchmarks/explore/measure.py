@@ -29,7 +29,7 @@ GOALS = 10
 LONGEST_S = 6000.0
 # A plan of these towns takes some 20 ms, a tenth of a cycle.
 PLANNING_CYCLES = 1
-COGNITION = ("workspace", "codelets", "global_workspace", "action")
+COGNITION = ("workspace", "codelets", "global_workspace", "procedural", "action", "motor")
 SENSES = ("sensory", "epam")
 THRESHOLDS = {
     "explored_share": at_least(0.9),
@@ -79,7 +79,8 @@ def sections(seed: int, has_cameras: bool = False) -> Sections:
     return {
         "sim": sim,
         "workspace": {"mode": "lockstep", "background_cycles": PLANNING_CYCLES},
-        "action": {"mode": "lockstep"},
+        "procedural": {"mode": "lockstep"},
+        "motor": {"mode": "lockstep"},
         "planning": {"explore": True},
     }
 

@@ -38,7 +38,12 @@ Landmarks = dict[str, tuple[float, float]]
 
 def sections(surveyed: bool) -> Sections:
     """The configuration of both modules; no loop is closed on a map that was surveyed."""
-    workspace = {"mode": "lockstep", "awaits_scan": False, "base_level_decay": 0.0}
+    workspace = {
+        "mode": "lockstep",
+        "awaits_scan": False,
+        "awaits_competition": False,
+        "base_level_decay": 0.0,
+    }
 
     codelets = {
         "samples": SAMPLES,

@@ -18,7 +18,7 @@ from schemas import topics
 from schemas.graph import Snapshot
 from services import registry
 
-COGNITION = ("workspace", "codelets", "global_workspace", "action")
+COGNITION = ("workspace", "codelets", "global_workspace", "procedural", "action", "motor")
 MODULES = ("sim", *COGNITION)
 WARM_UP = 10
 CYCLES = 60
@@ -83,7 +83,8 @@ def sections() -> Sections:
     return {
         "sim": sim,
         "workspace": {"mode": "lockstep", "cell_m": CELL_M, "base_level_decay": 0.0},
-        "action": {"mode": "lockstep"},
+        "procedural": {"mode": "lockstep"},
+        "motor": {"mode": "lockstep"},
     }
 
 

@@ -10,9 +10,10 @@ import numpy as np
 from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
 from schemas.array import Array, Matrix
-from schemas.graph import TILE_SIDE, Decay, Links, PlaceTile, Snapshot
+from schemas.graph import Decay, Links, PlaceTile, Snapshot
 from schemas.nodes import (
     ROOT_MAP,
+    TILE_SIDE,
     AnyNode,
     LinkKind,
     Map,

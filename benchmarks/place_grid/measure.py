@@ -17,8 +17,8 @@ from cogmap.graph.graph import Graph
 from schemas import topics
 from schemas.array import Array
 from schemas.codelets import Proposal
-from schemas.graph import TILE_SIDE, Cells, Delta, Operation, Phase, Snapshot
-from schemas.nodes import PlaceColumn
+from schemas.graph import Cells, Delta, Operation, Phase, Snapshot
+from schemas.nodes import TILE_SIDE, PlaceColumn
 from services.workspace.commit import Ledger
 
 THRESHOLDS = {

@@ -228,6 +228,8 @@ def _situation(watch: Watch, missing: list[str]) -> Situation:
         commands=len(tally.cycle_ms),
         halted_by=tally.command.halted_by if tally.command else SpeedLimit.NONE,
         missing=missing,
+        is_charging=tally.energy.is_charging,
+        is_out=tally.energy.is_out,
     )
 
 

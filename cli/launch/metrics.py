@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 
 from cli.launch.observer import Observer
-from cli.launch.tally import Tally
+from cli.launch.tally import EnergyMetrics, Tally
 from cogmap.errors import LogError
 from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
@@ -86,7 +86,9 @@ class DriveMetrics(msgspec.Struct, kw_only=True):
     and `slowed` count the commands that stopped the robot or kept it below cruising, by reason.
     `dropped` answers of codelets are in no delta; `refused` gives the reasons of the last few.
     `forgotten` are the objects that left the map, having been seen too seldom. `gaps`: messages
-    lost for good, by NEVER_DROP topic.
+    lost for good, by NEVER_DROP topic. `energy` is None where the robot's battery does not run
+    down. `recalled` is the map of an earlier run that the agent has recalled, empty where it has
+    none, and `recalled_m` the distance that it had driven by then.
     """
 
     drive_s: float
@@ -122,6 +124,9 @@ class DriveMetrics(msgspec.Struct, kw_only=True):
     superseded: dict[str, int]
     busy: dict[str, float]
     memory_mb: dict[str, float]
+    energy: EnergyMetrics | None = None
+    recalled: str = ""
+    recalled_m: float | None = None
 
 
 class RecordedMetrics(DriveMetrics, kw_only=True):
@@ -240,4 +245,7 @@ def drive_metrics(tally: Tally, gaps: dict[str, int], rejected: dict[str, int]) 
         superseded={name: sum(each.superseded.values()) for name, each in health},
         busy=tally.busy,
         memory_mb={name: each.memory_mb for name, each in health},
+        energy=tally.energy.metrics(),
+        recalled=tally.observer.recalled,
+        recalled_m=tally.observer.recalled_m,
     )

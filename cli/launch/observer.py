@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from cli.launch.frame import MapFrame
 from cli.launch.goals import GoalProgress
 from cli.launch.track import PathIntegrator, Track
 from cogmap.errors import MessageError
@@ -61,7 +63,9 @@ def _ratio(errors_m: Floats, baseline_m: Floats) -> float:
 
 
 class Observer:
-    """Follows a drive from outside. The agent's frame has its origin in the robot's first pose."""
+    """Follows a drive from outside. The agent's frame has its origin in the robot's first pose,
+    until a map is recalled.
+    """
 
     def __init__(self) -> None:
         self.town: TrueTown | None = None
@@ -70,6 +74,8 @@ class Observer:
         self.place_m = (0.0, 0.0)
         self.has_ended = False
         self._share_of_time = 0.0
+        self.recalled_m: float | None = None
+        self._frame = MapFrame()
         self._goals = GoalProgress()
         self._explored_ns = 0
         self._explored_m = 0.0
@@ -139,9 +145,20 @@ class Observer:
             self._explored_ns = self._now_ns
             self._explored_m = self.travelled_m
 
+        self._frame.update(delta)
+        if self.recalled and self.recalled_m is None:
+            self.recalled_m = self.travelled_m
+
         for operation in delta.operations:
             if isinstance(operation, Self):
-                self._estimate.add(delta.stamp_ns, operation.x_m, operation.y_m)
+                position_m = np.array([[operation.x_m, operation.y_m]])
+                ((x_m, y_m),) = self._frame.from_start(position_m).tolist()
+                self._estimate.add(delta.stamp_ns, x_m, y_m)
+
+    @property
+    def recalled(self) -> str:
+        """The name of the map of an earlier run that the agent has recalled, empty where none."""
+        return self._frame.recalled
 
     @property
     def goals(self) -> int:
@@ -174,13 +191,29 @@ class Observer:
         return max(0, elapsed_ns) / 1e9
 
     def to_world(self, points_m: Floats) -> Floats:
-        """Points (n, 2) of the agent's frame in the world's."""
+        """Points (n, 2) of the agent's map in the world's frame."""
+        return self._from_start(self._frame.from_start(points_m))
+
+    def _from_start(self, points_m: Floats) -> Floats:
+        """Points (n, 2) of the frame in which the agent began, in the world's."""
         start = self.start
         if start is None:
             return points_m
 
         pose = np.array([start.x_m, start.y_m, start.heading_rad])
         return se2.transform_from(pose, points_m)
+
+    @property
+    def map_frame(self) -> Pose | None:
+        """The origin of the agent's map in the world's frame; None before the first pose."""
+        start = self.start
+        if start is None:
+            return None
+
+        origin_and_ahead_m = np.array([[0.0, 0.0], [1.0, 0.0]])
+        ((x_m, y_m), (ahead_x_m, ahead_y_m)) = self.to_world(origin_and_ahead_m).tolist()
+        heading_rad = math.atan2(ahead_y_m - y_m, ahead_x_m - x_m)
+        return Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad)
 
     @property
     def true_path_m(self) -> Floats:
@@ -200,19 +233,19 @@ class Observer:
     def estimated_path_m(self) -> Floats:
         """(n, 2): the self node's positions."""
         points_m = self._estimate.points_m
-        return self.to_world(points_m)
+        return self._from_start(points_m)
 
     @property
     def wheels_path_m(self) -> Floats:
         """(n, 2): the wheels' odometry integrated, nothing else."""
         points_m = self._wheels.track.points_m
-        return self.to_world(points_m)
+        return self._from_start(points_m)
 
     @property
     def fused_path_m(self) -> Floats:
         """(n, 2): the fused self-motion (`sensory/motion`) integrated, nothing else."""
         points_m = self._fused.track.points_m
-        return self.to_world(points_m)
+        return self._from_start(points_m)
 
     def errors(self) -> Errors:
         """The errors at the stamp of every estimate that truth, wheels and fused self-motion all
@@ -249,7 +282,7 @@ class Observer:
             return np.zeros(0)
 
         true_m = self._true.at(stamps_ns)
-        believed_m = self.to_world(track.at(stamps_ns))
+        believed_m = self._from_start(track.at(stamps_ns))
 
         x_m, y_m = (believed_m - true_m).T
         distances_m: Floats = np.hypot(x_m, y_m)

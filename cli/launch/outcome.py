@@ -12,7 +12,8 @@ class Outcome(enum.Enum):
     ROUTE_COMPLETE: every goal is reached or, where there was none, the time of the drive is over.
     MODULE_FAILED: a process cannot run, as it dies again and again, or the disk takes no more.
     STALLED: nothing happens any more. STUCK: time passes, and the robot stays where it is.
-    TOO_SLOW: the same, as the machine is too slow for the robot to move safely.
+    TOO_SLOW: the same, as the machine is too slow for the robot to move safely. OUT_OF_ENERGY: the
+    robot's battery is empty.
     """
 
     ROUTE_COMPLETE = "route complete"
@@ -22,6 +23,7 @@ class Outcome(enum.Enum):
     STALLED = "stalled"
     STUCK = "stuck"
     TOO_SLOW = "too slow"
+    OUT_OF_ENERGY = "out of energy"
 
     @property
     def exit_code(self) -> int:

@@ -26,7 +26,10 @@ ROUTER = "router"
 LOG_NAME = "log.mcap"
 CONFIG_NAME = "config.toml"
 STATE_NAME = "state"
+MEMORY_NAME = "memory.db"
 REPLICATED = "codelets"
+MEMORY = "memory"
+MOTOR = "motor"
 TOUR_TOWN_M = 120.0
 TOUR_LIMIT_S = 600.0
 EXPLORE_S = 150.0
@@ -44,8 +47,10 @@ class Choices:
 
     In the loop town the agent is given the corners of `laps` laps as goals, unless it is given
     `goals`. On a `tour` it explores first; it is given `goals` then, or such as it knows. With
-    `explore_s` it explores for so long, and then drives to `goals`, or home. `without` are the
-    modules that somebody else starts. `own_router` is whether the run starts one.
+    `explore_s` it explores for so long, and then drives to `goals`, or home. With `energy` its
+    battery runs down. `without` are the modules that somebody else starts. `own_router` is whether
+    the run starts one. `memory` is the database of what was learned in earlier runs, a new one
+    where it is None.
     """
 
     seed: int | None = None
@@ -59,6 +64,8 @@ class Choices:
     tour: bool = False
     explore_s: float | None = None
     goals: Sequence[Goal] = ()
+    memory: Path | None = None
+    energy: bool = False
 
 
 def effective(base: Sections, choices: Choices, awaits: dict[str, int]) -> Sections:
@@ -82,12 +89,19 @@ def _chosen(base: Sections, choices: Choices, awaits: dict[str, int]) -> Section
             section.setdefault("mode", mode)
         sections[name] = section
 
+    if is_stepped:
+        sections["workspace"].setdefault("offering", [MEMORY, MOTOR])
+        sections[MOTOR].setdefault("makes_offers", True)
+
     sim = sections["sim"]
     sim.setdefault("awaits", awaits)
     if choices.seed is not None:
         sim["seed"] = choices.seed
     if choices.town is not None:
         sim["town"] = choices.town
+    if choices.energy:
+        sim["energy"] = True
+        sections["workspace"]["awaits_energy"] = True
     if choices.tour:
         _set_out(sim)
     if sim.get("sensing") == "percepts":
@@ -202,6 +216,7 @@ def infrastructure(folder: Path, endpoint: str, agent: str, choices: Choices) ->
 def modules(folder: Path, endpoint: str, agent: str, choices: Choices) -> list[Program]:
     """Every module but those that somebody else starts, in the order of the table."""
     options = [*_options(folder, endpoint, agent), "--state", str(folder / STATE_NAME)]
+    options += ["--memory", str(choices.memory or folder / MEMORY_NAME)]
     programs = []
     for name in registry.MODULES:
         if name in choices.without:

@@ -7,6 +7,8 @@ from __future__ import annotations
 from collections import Counter, deque
 from collections.abc import Mapping
 
+import msgspec
+
 from cli.launch.observer import OBSERVED, Observer
 from cogmap.bus.codec import Envelope
 from cogmap.graph.replica import Replica
@@ -16,16 +18,72 @@ from schemas.cognition import Broadcast
 from schemas.graph import Delta, DropNode
 from schemas.nodes import Object
 from schemas.process import Health
-from schemas.sensing import MotorCommand, SpeedLimit
+from schemas.sensing import Energy, MotorCommand, SpeedLimit
 from schemas.topics import Delivery
 
 MAX_REASONS = 8
 FOLLOWED = (
     *OBSERVED,
+    topics.ENERGY,
     topics.MOTOR_COMMAND,
     topics.BROADCAST,
     topics.HEALTH,
 )
+
+
+class EnergyMetrics(msgspec.Struct, kw_only=True):
+    """The level of the robot's battery, 0 to 1, at its lowest and at the end, how often it was
+    charged, and whether the robot ran out of energy.
+    """
+
+    lowest: float
+    final: float
+    charged: int
+    ran_out: bool
+
+
+class EnergyTally:
+    """What the body sensed of its energy, where it sensed any; `charged` is how often the robot was
+    charged.
+    """
+
+    def __init__(self) -> None:
+        self.newest: Energy | None = None
+        self.lowest = 1.0
+        self.charged = 0
+
+    def update(self, energy: Energy) -> None:
+        """Take account of the energy with a view; what is not newer than before is ignored."""
+        before = self.newest
+        if before is not None and energy.stamp_ns <= before.stamp_ns:
+            return
+
+        was_charging = before is not None and before.is_charging
+        self.charged += energy.is_charging and not was_charging
+        self.lowest = min(self.lowest, energy.level)
+        self.newest = energy
+
+    @property
+    def is_charging(self) -> bool:
+        """Whether the robot is being charged."""
+        return self.newest is not None and self.newest.is_charging
+
+    @property
+    def is_out(self) -> bool:
+        """Whether the robot has run out of energy."""
+        return self.lowest <= 0.0
+
+    def metrics(self) -> EnergyMetrics | None:
+        """What it amounts to; None where nothing was sensed."""
+        if self.newest is None:
+            return None
+
+        return EnergyMetrics(
+            lowest=self.lowest,
+            final=self.newest.level,
+            charged=self.charged,
+            ran_out=self.is_out,
+        )
 
 
 class Tally:
@@ -36,7 +94,8 @@ class Tally:
     received; `bus_ms`: the part of it spent in anything but computing. `refused`: why the last few
     answers of codelets were dropped. `forgotten`: the labels of objects that left the map as their
     activation had decayed. `halted` and `slowed`: how many commands stopped the robot or kept it
-    below its cruising speed, by reason; `command` is the newest.
+    below its cruising speed, by reason; `command` is the newest. `energy` is what the body sensed
+    of it.
     """
 
     def __init__(self, replica: Replica) -> None:
@@ -51,6 +110,7 @@ class Tally:
         self.halted: Counter[str] = Counter()
         self.slowed: Counter[str] = Counter()
         self.command: MotorCommand | None = None
+        self.energy = EnergyTally()
         self.health: dict[str, Health] = {}
         self._busy: dict[str, list[float]] = {}
 
@@ -66,6 +126,8 @@ class Tally:
                 self._on_health(message)
             case Broadcast():
                 self.broadcasts += 1
+            case Energy():
+                self.energy.update(message)
             case MotorCommand():
                 self._on_command(message, envelope, received_ns)
 

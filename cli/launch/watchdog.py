@@ -22,7 +22,8 @@ class Situation:
     robot is at `place_m`, (x, y).
 
     `missing` are the modules that are not ready, `halted_by` is the reason of the newest of so many
-    `commands`, NONE where it moves the wheels.
+    `commands`, NONE where it moves the wheels. `is_charging` is whether its battery is charged now,
+    `is_out` whether that is empty.
     """
 
     now_s: float
@@ -31,6 +32,8 @@ class Situation:
     commands: int
     halted_by: SpeedLimit = SpeedLimit.NONE
     missing: Sequence[str] = ()
+    is_charging: bool = False
+    is_out: bool = False
 
 
 class Watchdog:
@@ -45,8 +48,11 @@ class Watchdog:
 
         It is stalled after STALLED_S in which its time stood still, and stuck after STUCK_S of its
         own time in which the robot, though it has a route, stayed within MIN_MOVE_M of a place: one
-        that backs away and returns gets nowhere.
+        that backs away and returns gets nowhere. One that is charged stays where it is for that.
         """
+        if situation.is_out:
+            return Ending(Outcome.OUT_OF_ENERGY, "the robot's battery is empty: see map.png")
+
         ticked = self._ticked
         moved = self._moved
         if ticked is None or moved is None:
@@ -60,7 +66,8 @@ class Watchdog:
             return Ending(Outcome.STALLED, _stalled(situation))
 
         has_moved = math.dist(situation.place_m, moved.place_m) >= MIN_MOVE_M
-        if has_moved or situation.halted_by in WAITS:
+        has_reason = situation.is_charging or situation.halted_by in WAITS
+        if has_moved or has_reason:
             self._moved = situation
         elif situation.drive_s - moved.drive_s >= STUCK_S:
             return _stuck(situation, situation.commands - moved.commands)
@@ -84,7 +91,7 @@ def _stuck(situation: Situation, commands: int) -> Ending:
         names = ", ".join(situation.missing)
         return Ending(Outcome.STALLED, f"{still}: {names} is not ready, see its log")
     if not commands:
-        return Ending(Outcome.STALLED, f"{still}: no motor command arrived, see action's log")
+        return Ending(Outcome.STALLED, f"{still}: no motor command arrived, see motor's log")
     if situation.halted_by is SpeedLimit.POSE_AGE:
         return Ending(
             Outcome.TOO_SLOW,

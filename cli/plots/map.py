@@ -17,7 +17,7 @@ from cli.plots import map_layers as layers
 from cli.plots import palette
 from cli.plots.map_structure import draw_structure
 from cli.plots.palette import ESTIMATE, FAINT, FUSED, INK, PAPER, TRUE, WHEELS
-from cli.plots.town_layer import draw_town
+from cli.plots.town_layer import CHARGING_MARKER, draw_town
 from cogmap.graph.graph import Graph
 
 MARGIN_M = 5.0
@@ -95,7 +95,7 @@ def _dress(
     axes.set_ylabel("y, metres north", color=FAINT)
     _title(axes, metrics)
     axes.legend(
-        handles=[*_legend(), *structure],
+        handles=[*_legend(), *_charging_legend(metrics), *structure],
         loc="upper center",
         bbox_to_anchor=(0.5, -0.06),
         ncols=4,
@@ -140,6 +140,13 @@ def _title(axes: Axes, metrics: RecordedMetrics) -> None:
         va="bottom",
         linespacing=1.5,
     )
+
+
+def _charging_legend(metrics: RecordedMetrics) -> list[Line2D]:
+    """That of charging places, where the robot's battery runs down."""
+    if metrics.energy is None:
+        return []
+    return [Line2D([], [], label="charging place", **CHARGING_MARKER)]
 
 
 def _legend() -> list[Patch | Line2D]:

@@ -12,20 +12,19 @@ from cli.launch.metrics import objects, position_m
 from cli.launch.observer import Observer
 from cli.plots.palette import OBJECT, ROAD, ROAD_OPACITY
 from cogmap.graph.graph import Graph
-from schemas.graph import TILE_SIDE
-from schemas.nodes import ROOT_MAP, Object, PlaceColumn
+from schemas.nodes import ROOT_MAP, TILE_SIDE, Object, PlaceColumn
 from schemas.sensing import Pose
 
 
-def _agent_frame(axes: Axes, start: Pose | None) -> Transform:
-    pose = start or Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)
+def _agent_frame(axes: Axes, frame: Pose | None) -> Transform:
+    pose = frame or Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)
     return Affine2D().rotate(pose.heading_rad).translate(pose.x_m, pose.y_m) + axes.transData
 
 
 def draw_road(axes: Axes, observer: Observer, graph: Graph) -> None:
     """The place nodes' road column, cell by cell."""
     red, green, blue = to_rgb(ROAD)
-    frame = _agent_frame(axes, observer.start)
+    frame = _agent_frame(axes, observer.map_frame)
     cell_m = graph.cell_m()
     side_m = TILE_SIDE * cell_m
     for (_, x, y), tile in graph.places.of_map(ROOT_MAP):

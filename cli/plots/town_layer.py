@@ -14,9 +14,12 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Polygon, Rectangle
 from matplotlib.transforms import Affine2D
 
-from cli.plots.palette import CLOSED, HOUSE, KERB, NAME, SEVERAL, STREET, WALL
+from cli.plots.palette import CHARGING, CLOSED, HOUSE, KERB, NAME, SEVERAL, STREET, WALL
 from schemas.sensing import Building, Obstacle, Street, TrueTown
+from services.sim.layout.furniture import CHARGING_PLACE
 
+# A plus, filled.
+CHARGING_MARKER: dict[str, Any] = {"marker": "P", "ms": 9, "ls": "", "color": CHARGING}
 Colour = tuple[float, float, float]
 Points = npt.NDArray[np.float64]
 
@@ -104,6 +107,10 @@ def _draw_box(
 
 def _draw_obstacle(axes: Axes, obstacle: Obstacle) -> None:
     pose = obstacle.pose
+    if obstacle.kind == CHARGING_PLACE:
+        axes.plot(pose.x_m, pose.y_m, zorder=6, **CHARGING_MARKER)
+        return
+
     style: dict[str, Any] = {"facecolor": WALL, "zorder": 1.5}
     size_m = (obstacle.length_m, obstacle.width_m)
     _draw_box(axes, (pose.x_m, pose.y_m), size_m, pose.heading_rad, style)

@@ -68,6 +68,11 @@ explore_option = click.option(
     metavar="SECONDS",
     help="Explore for so long, then drive to the goals, or home to where it started.",
 )
+energy_option = click.option(
+    "--energy",
+    is_flag=True,
+    help="The robot's battery runs down, and is charged at charging places in the town.",
+)
 laps_option = click.option(
     "--laps",
     type=FiniteRange(0, 1000, min_open=True),
@@ -92,12 +97,19 @@ lockstep_option = click.option(
 @explore_option
 @goals_option
 @laps_option
+@energy_option
 @lockstep_option
 @codelets_option
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
     help="A new folder for its files.  [default: runs/TIME]",
+)
+@click.option(
+    "--memory",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Remember earlier runs, and this one, in the database FILE.  [default: this run alone]",
 )
 @click.option(
     "--record/--no-record", default=True, help="Whether to keep a log of all that travels."
@@ -132,9 +144,11 @@ def run(
     explore_s: float | None,
     goals: Path | None,
     laps: float,
+    energy: bool,
     lockstep: bool,
     codelets: int,
     out: Path | None,
+    memory: Path | None,
     record: bool,
     time_limit: float | None,
     as_json: bool,
@@ -166,6 +180,8 @@ def run(
         tour=tour,
         explore_s=explore_s,
         goals=() if goals is None else read_goals(goals),
+        memory=None if memory is None else memory.resolve(),
+        energy=energy,
     )
     sections = effective(
         config.load(config_path, settings), choices, awaited(choices, observer=True)

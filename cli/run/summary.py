@@ -21,6 +21,7 @@ from cli.launch.metrics import (
 )
 from cli.launch.outcome import Ending, Outcome
 from cli.launch.plan import LOG_NAME
+from cli.launch.tally import EnergyMetrics
 from cli.launch.watch import Watch
 
 SUMMARY_NAME = "summary.json"
@@ -105,7 +106,7 @@ def drive_rows(metrics: DriveMetrics) -> list[tuple[str, str]]:
         f"{metrics.object_error_median_m:.2f} m; {metrics.road_m2:.0f} m² of street"
     )
     cycle = f"{metrics.cycle_p50_ms:.0f} ms, 99 % within {metrics.cycle_p99_ms:.0f} ms"
-    return [
+    rows = [
         ("driven", driven),
         ("position error", _errors(metrics.estimate)),
         ("path integration alone, fused self-motion", _errors(metrics.fused_alone)),
@@ -116,6 +117,20 @@ def drive_rows(metrics: DriveMetrics) -> list[tuple[str, str]]:
         ("cycle", cycle),
         ("slowed or halted", _limits(metrics)),
     ]
+    if metrics.recalled_m is not None:
+        rows.append(("recalled", f"{metrics.recalled}, after {metrics.recalled_m:.1f} m"))
+    if metrics.energy is not None:
+        rows.append(("energy", _energy(metrics.energy)))
+    return rows
+
+
+def _energy(energy: EnergyMetrics) -> str:
+    """How the battery fared."""
+    levels = f"at least {energy.lowest:.0%}, {energy.final:.0%} at the end"
+    charged = f"charged {energy.charged} times"
+    if energy.ran_out:
+        return f"ran out; {charged}"
+    return f"{levels}; {charged}"
 
 
 def _forgotten(metrics: DriveMetrics) -> str:

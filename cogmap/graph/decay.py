@@ -23,12 +23,16 @@ def activation(node: GraphNode, cycle: int, decay: Decay) -> float:
 
 
 def base_level(node: GraphNode, cycle: int, decay: Decay) -> float:
-    """A node's base-level activation in `cycle`."""
+    """A node's base-level activation in `cycle`. One that has reached what is kept decays no
+    further than to that.
+    """
     if KINDS[type(node)].persistent:
         return node.base_level
 
     age = max(0, cycle - node.cycle)
-    return max(0.0, node.base_level - decay.base_level * age)
+    is_kept = node.base_level >= decay.kept_base_level
+    lowest = decay.kept_base_level if is_kept else 0.0
+    return max(lowest, node.base_level - decay.base_level * age)
 
 
 def total_activation(node: GraphNode, cycle: int, decay: Decay) -> float:

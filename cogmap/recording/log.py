@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,9 @@ from schemas import topics as table
 from schemas.base import Message
 from schemas.graph import Delta
 from schemas.topics import Topic
+
+BISECTED_S = 0.5
+"""A span of a log that is read as it is, not bisected any more: about a chunk."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +99,30 @@ class Log:
                 envelope=record.envelope,
             )
 
+    def last(self, topic: str, holds: Callable[[Any], bool]) -> Entry | None:
+        """The last message on `topic` for which `holds` is true; None where it is for none.
+
+        What is true for a message must be true for those before it, as that it is of a cycle or
+        before. It is found by bisection: little of a long log is read. Raises as `messages` does.
+        """
+        found = None
+        begin_s = 0.0
+        end_s = self.duration_s + BISECTED_S
+        while end_s - begin_s > BISECTED_S:
+            middle_s = (begin_s + end_s) / 2
+            entry = next(self.messages(topic, start_s=middle_s, end_s=end_s), None)
+            if entry is not None and holds(entry.message):
+                found = entry
+                begin_s = entry.time_s
+            else:
+                end_s = middle_s
+
+        for entry in self.messages(topic, start_s=begin_s, end_s=end_s):
+            if not holds(entry.message):
+                break
+            found = entry
+        return found
+
     def graph_at(self, time_s: float) -> Graph:
         """The workspace's graph after every delta received up to `time_s` into the log.
 
@@ -123,11 +150,7 @@ class Log:
         if end_s is not None:
             end_ns = self._start_ns + round(end_s * 1e9)
 
-        for record in self._reader.records(chosen):
-            if record.log_time_ns >= end_ns:
-                return
-            if record.log_time_ns >= first_ns:
-                yield record
+        return self._reader.records(chosen, start_ns=first_ns, end_ns=end_ns)
 
     def _message(self, record: Record) -> Message:
         try:

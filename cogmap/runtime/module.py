@@ -49,6 +49,7 @@ class Module:
     restore: Callable[[Iterable[Message]], None] | None = None
     compact: Callable[[], Message] | None = None
     backfill: frozenset[Topic] = frozenset()
+    remembers: bool = False
     graph: Graph | None = None
     on_load: Callable[[], Reply] | None = None
     _next_seq: Counter[Topic] = field(default_factory=Counter)
@@ -120,6 +121,13 @@ class Module:
         self.compact = compact
         self.backfill = frozenset(backfill)
         return self
+
+    def remembering(self, restore: Handler) -> Module:
+        """Keep what it publishes on memory/stored in a database that outlives the run, where it has
+        one: on the disk before it is published. `restore` receives all of that at the start.
+        """
+        self.remembers = True
+        return self.on(topics.RESTORED, restore, [topics.STORED])
 
     def feed(self, message: Message) -> list[Message]:
         """Hand `message` to its handler, and return what that publishes, numbered."""

@@ -17,9 +17,12 @@ from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
 from cogmap.runtime.state.journal import Journal
 from cogmap.runtime.state.published import PublishedCounts
+from cogmap.runtime.state.store import Store
 
 log = logging.getLogger("cogmap")
 IDLE_S = 0.25
+# No command waits for what is remembered: others go first where processors are scarce.
+PATIENT = 10
 ORPHAN_GRACE_S = 10.0
 
 
@@ -70,15 +73,20 @@ def run_module(
     agent: str = DEFAULT_AGENT,
     state: Path | None = None,
     stop: Stop | None = None,
+    *,
+    memory: Path | None = None,
 ) -> None:
     """Run `module` as this process, until `stop` is asked: by default, until a signal to end.
 
     It connects to the router at `endpoint` as one of `agent`'s; what it must keep is in the folder
-    `state`. Raises NoRouterError, StorageError where that folder cannot be written, and UsageError
+    `state`, and what it remembers for later runs in the database `memory`. Raises NoRouterError,
+    StorageError where that folder cannot be written or the database cannot be read, and UsageError
     for an instance's name that cannot be part of a key.
     """
     check_name("--instance", module.instance)
     stop = stop or Stop()
+    if module.remembers:
+        os.nice(PATIENT)
     journal = None
     counts = None
     if state is not None:
@@ -86,7 +94,8 @@ def run_module(
         if module.journal is not None:
             journal = Journal(state / f"{module.instance}.journal")
 
-    shell = Shell(module, ZenohBus(endpoint, agent), journal, counts=counts)
+    store = Store(memory) if memory is not None and module.remembers else None
+    shell = Shell(module, ZenohBus(endpoint, agent), journal, counts=counts, store=store)
     try:
         shell.open()
         log.info("%s is ready", module.instance)

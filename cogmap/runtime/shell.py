@@ -20,6 +20,7 @@ from cogmap.runtime.module import Module, Reply
 from cogmap.runtime.roster import Roster
 from cogmap.runtime.state.journal import Journal
 from cogmap.runtime.state.published import PublishedCounts
+from cogmap.runtime.state.store import Store
 from cogmap.runtime.timers import Due, Timers
 from schemas import topics
 from schemas.base import Message
@@ -36,7 +37,8 @@ TIMER = "@timer"
 class Shell:
     """Runs `module` on `bus`: `open()` it, then `spin_once()` from one thread; `close()` ends it.
 
-    `journal` and `counts` keep on disk what a restart must not lose. `health` is whether it
+    `journal` and `counts` keep on disk what a restart must not lose, and `store` what the next run
+    is to know. `health` is whether it
     publishes its health once a second.
     """
 
@@ -47,14 +49,17 @@ class Shell:
         journal: Journal | None = None,
         health: bool = True,
         counts: PublishedCounts | None = None,
+        *,
+        store: Store | None = None,
     ) -> None:
         self.module = module
         self.bus = bus
         self.inbox = Inbox()
         self.intake = Intake()
         self.meter = Meter(module)
-        self.publisher = Publisher(module, bus, journal, counts)
+        self.publisher = Publisher(module, bus, journal, counts, store)
         self._journal = journal
+        self._store = store
         self._counts = counts
         self._health = health
         self._roster = Roster(module.requires)
@@ -77,6 +82,8 @@ class Shell:
             answer = self._server(request, handler)
             self.bus.serve(request, reply, answer, self.inbox.call)
 
+        if self._store is not None:
+            self.publisher.send_restored(self._store)
         if self._follower is not None:
             self._follower.join()
         self.bus.announce(Member(self.module.name, self.module.instance))
@@ -113,6 +120,8 @@ class Shell:
             self._journal.close()
         if self._counts is not None:
             self._counts.close()
+        if self._store is not None:
+            self._store.close()
 
     @property
     def missing(self) -> dict[str, int]:

@@ -19,7 +19,7 @@ from experiments.city_maps.streets import Points
 from services import registry
 from services.sim.odometry import Noise
 
-COGNITION = ("workspace", "codelets", "global_workspace", "action")
+COGNITION = ("workspace", "codelets", "global_workspace", "procedural", "action", "motor")
 MODULES = ("sim", *COGNITION)
 SENSING = "percept-level sensing"
 SPEED_M_S = 5.0
@@ -59,7 +59,8 @@ def sections(environment: Environment, tour: Tour, noise: Noise, method: str) ->
         "sim": sim,
         "workspace": workspace,
         "codelets": correction["codelets"],
-        "action": {"mode": "lockstep"},
+        "procedural": {"mode": "lockstep"},
+        "motor": {"mode": "lockstep"},
     }
 
 

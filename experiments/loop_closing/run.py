@@ -18,7 +18,7 @@ from services import registry
 from services.sim.config import Config
 from services.sim.odometry import Noise
 
-COGNITION = ("workspace", "codelets", "global_workspace", "action")
+COGNITION = ("workspace", "codelets", "global_workspace", "procedural", "action", "motor")
 MODULES = ("sim", *COGNITION)
 SENSING = "percept-level sensing"
 METHODS = ("positions", "heading")
@@ -102,8 +102,13 @@ def sections(seed: int, method: str) -> Sections:
         "heading_variance_per_rad": NOISE.turn**2 * CORNER_RAD,
     }
 
-    action = {"mode": "lockstep"}
-    return {"sim": sim, "workspace": workspace, "codelets": codelets, "action": action}
+    return {
+        "sim": sim,
+        "workspace": workspace,
+        "codelets": codelets,
+        "procedural": {"mode": "lockstep"},
+        "motor": {"mode": "lockstep"},
+    }
 
 
 def drive(seed: int, method: str) -> Loop:

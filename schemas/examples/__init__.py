@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from schemas.base import Message
-from schemas.examples import codelets, cognition, graph, process, sensing
+from schemas.examples import codelets, cognition, graph, memory, process, sensing
 
 _STAMP_NS = 1_200_000_000
 
@@ -26,6 +26,9 @@ def example_messages() -> list[Message]:
         cognition.replay(),
         sensing.street_closure(),
         cognition.route_replay(),
+        memory.stored(),
+        memory.restored(),
+        sensing.energy(),
     ]
     stamped: list[Message] = []
     for seq, message in enumerate(messages):

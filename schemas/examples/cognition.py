@@ -6,6 +6,7 @@ from schemas.base import Message
 from schemas.cognition import (
     Action,
     Behaviour,
+    Behaviours,
     Broadcast,
     Coalition,
     Coalitions,
@@ -13,9 +14,11 @@ from schemas.cognition import (
     Contender,
     Direction,
     Fate,
+    MotorProgram,
     Rejection,
     Replay,
     RouteReplay,
+    Silence,
     Trigger,
 )
 from schemas.examples import nodes
@@ -24,12 +27,14 @@ from schemas.examples.graph import instance_link
 
 
 def messages() -> list[Message]:
-    """A message of every type but the replays, from coalitions to the selected action."""
+    """A message of every type but the replays, from coalitions to the motor program."""
     return [
         Coalitions(cycle=6, coalitions=[coalition()]),
         _competition(),
         Broadcast(cycle=6, trigger="aggregate", coalition=coalition()),
+        Behaviours(cycle=6, behaviours=_behaviours()),
         _action(),
+        MotorProgram(cycle=6, action="turn", parameters={"turn_rad": 1.5}),
     ]
 
 
@@ -74,22 +79,48 @@ def _competition() -> Competition:
         activation=0.25,
         fate=Fate.WAITING,
     )
-    return Competition(cycle=6, contenders=[won, waiting], trigger=Trigger.AGGREGATE)
+    return Competition(
+        cycle=6,
+        contenders=[won, waiting],
+        trigger=Trigger.AGGREGATE,
+        silence=Silence.NO_TRIGGER,
+    )
 
 
-def _action() -> Action:
-    chosen = Behaviour(scheme="follow-route", activation=0.5)
-    rejected = Behaviour(
+def _behaviours() -> list[Behaviour]:
+    """One that may be chosen, and one whose context is missing."""
+    follow = Behaviour(
+        scheme="follow-route",
+        activation=0.5,
+        action="follow_plan",
+        bindings={"plan": "plan"},
+        context={"self": 1.0, "plan state=ready": 0.5},
+        adding={"self stationary_since_ns=-1": 0.25},
+        deleting=["plan state=no_route"],
+        reliability=0.75,
+        executions=4,
+        successes=3,
+        gathered=-0.125,
+    )
+    halt = Behaviour(
         scheme="halt",
         activation=0.0,
         rejection=Rejection.CONTEXT_MISSING,
+        action="halt",
+        context={"plan state=no_route": 0.0},
     )
+    return [follow, halt]
+
+
+def _action() -> Action:
     return Action(
         cycle=6,
         scheme="follow-route",
+        action="follow_plan",
         activation=0.5,
         parameters={"speed_m_s": 3.0, "turn": "left"},
-        behaviours=[chosen, rejected],
+        behaviours=_behaviours(),
+        threshold=0.5,
     )
 
 

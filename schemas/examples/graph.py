@@ -6,7 +6,6 @@ from schemas.base import Message
 from schemas.examples import nodes
 from schemas.examples.arrays import ramp
 from schemas.graph import (
-    TILE_SIDE,
     Cells,
     Decay,
     Delta,
@@ -20,7 +19,7 @@ from schemas.graph import (
     Snapshot,
     SnapshotRequest,
 )
-from schemas.nodes import LinkKind, PlaceColumn
+from schemas.nodes import TILE_SIDE, LinkKind, PlaceColumn
 
 
 def messages() -> list[Message]:
@@ -91,6 +90,7 @@ def _decay() -> Decay:
         base_level=0.0625,
         place_activation=0.125,
         forget_below=0.25,
+        kept_base_level=0.5,
     )
 
 

@@ -4,26 +4,37 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
+from schemas.array import Matrix
 from schemas.examples.arrays import matrix
 from schemas.nodes import (
     CORRECTION_ID,
     PLAN_ID,
+    RECOLLECTION_ID,
     ROOT_MAP,
     SELF_ID,
+    TILE_CELLS,
     AnyNode,
+    Attention,
     Correction,
     Goal,
     LoopClosure,
     Map,
+    Need,
     Node,
     Object,
     Observations,
     PathSegment,
     Percept,
+    PlaceColumn,
     Plan,
     PlanState,
+    Recollection,
     Self,
+    attention_id,
     goal_id,
+    need_id,
     object_id,
     observations_id,
     percept_id,
@@ -47,6 +58,9 @@ def every_kind() -> list[AnyNode]:
         _map(),
         _goal(),
         _plan(),
+        _recollection(),
+        _need(),
+        _attention(),
     ]
 
 
@@ -175,6 +189,7 @@ def _map() -> Map:
         heading_rad=0.25,
         width_m=120.0,
         height_m=80.0,
+        remembered="remembered:1",
         **_USUAL,
     )
 
@@ -189,6 +204,7 @@ def _goal() -> Goal:
         after=goal_id("school"),
         reached_ns=1_000_000_000,
         doubts=2,
+        need="energy",
         **_USUAL,
     )
 
@@ -205,5 +221,45 @@ def _plan() -> Plan:
         planned_ns=1_000_000_000,
         length_m=42.5,
         route=matrix(3, 2),
+        **_USUAL,
+    )
+
+
+def _recollection() -> Recollection:
+    return Recollection(
+        id=RECOLLECTION_ID,
+        map="remembered:1",
+        x_m=1.5,
+        y_m=-2.5,
+        heading_rad=0.75,
+        labels=["bakery", "tower"],
+        functions=["shop", "home"],
+        matched=["bakery", ""],
+        objects=matrix(2, 7),
+        tiles=[(-1, 2)],
+        columns={PlaceColumn.ROAD: Matrix.of(np.full((1, TILE_CELLS), 0.5), "<f2")},
+        **_USUAL,
+    )
+
+
+def _need() -> Need:
+    return Need(
+        id=need_id("energy"),
+        label="energy",
+        level=0.75,
+        is_eased=True,
+        salience=-0.5,
+        **_USUAL,
+    )
+
+
+def _attention() -> Attention:
+    return Attention(
+        id=attention_id("expectation"),
+        codelet="expectation",
+        brought_cycle=5,
+        conscious_cycle=4,
+        pending={object_id("building-07"): 5},
+        noted={object_id("building-07"): 3},
         **_USUAL,
     )

@@ -7,6 +7,7 @@ from schemas.examples.arrays import ramp
 from schemas.sensing import (
     Building,
     Calibration,
+    Energy,
     Learned,
     LearnedObject,
     MotorCommand,
@@ -30,7 +31,7 @@ from schemas.sensing import (
 
 
 def messages() -> list[Message]:
-    """A message of every type but what was learned, from the cameras' frames to the true town."""
+    """A message of every type but three, from the cameras' frames to the true town."""
     image = ramp(2, 3, 3, dtype="|u1")
     depth = ramp(2, 3, dtype="<f4")
     return [
@@ -41,7 +42,7 @@ def messages() -> list[Message]:
         RangeScan(frame=6, bearing_rad=ramp(5, dtype="<f4"), range_m=ramp(5, dtype="<f4")),
         _percepts(),
         _motor_command(),
-        TruePose(pose=_pose(), travelled_m=12.5, progress=0.25, collisions=2),
+        TruePose(pose=_pose(), travelled_m=12.5, progress=0.25, collisions=2, energy=0.75),
         _town(),
     ]
 
@@ -76,6 +77,11 @@ def percept() -> Percept:
 def street_closure() -> StreetClosure:
     """A street that a person closes."""
     return StreetClosure(street="ring", closed=True)
+
+
+def energy() -> Energy:
+    """The energy that the body senses."""
+    return Energy(frame=6, level=0.75, is_charging=True)
 
 
 def place_match() -> PlaceMatch:

@@ -5,28 +5,36 @@ known here travels as the generic `Node`: a codelet of somebody else's package n
 this table. Positions are in metres in the frame of the map that the node is on, x east, y north.
 """
 
+from schemas.nodes.attention import Attention, Need
 from schemas.nodes.base import NEVER_NS, GraphNode, Node
 from schemas.nodes.columns import (
     POSE_COLUMNS,
+    TILE_CELLS,
+    TILE_SIDE,
     CorrectionColumn,
     ObservationColumn,
     PathColumn,
     PlaceColumn,
+    RecalledColumn,
     RouteColumn,
     SelfColumn,
 )
 from schemas.nodes.ids import (
     CORRECTION_ID,
     PLAN_ID,
+    RECOLLECTION_ID,
     ROOT_MAP,
     SELF_ID,
+    attention_id,
     coarse_map_id,
     goal_id,
     individual_label,
     is_coarse_map,
+    look_of,
     map_id,
     map_number,
     nearest_place,
+    need_id,
     object_id,
     observations_id,
     percept_id,
@@ -37,6 +45,7 @@ from schemas.nodes.ids import (
 from schemas.nodes.links import EXCLUSIVE_LINKS, LinkKind
 from schemas.nodes.path import Correction, LoopClosure, Observations, PathSegment
 from schemas.nodes.planning import Goal, Plan, PlanState
+from schemas.nodes.recollection import Recollection
 from schemas.nodes.rules import KINDS, AnyNode, KindRules, kind_name, kind_of
 from schemas.nodes.situation import Map, Object, Percept, Self
 
@@ -47,9 +56,13 @@ __all__ = [
     "NEVER_NS",
     "PLAN_ID",
     "POSE_COLUMNS",
+    "RECOLLECTION_ID",
     "ROOT_MAP",
     "SELF_ID",
+    "TILE_CELLS",
+    "TILE_SIDE",
     "AnyNode",
+    "Attention",
     "Correction",
     "CorrectionColumn",
     "Goal",
@@ -58,6 +71,7 @@ __all__ = [
     "LinkKind",
     "LoopClosure",
     "Map",
+    "Need",
     "Node",
     "Object",
     "ObservationColumn",
@@ -68,18 +82,23 @@ __all__ = [
     "PlaceColumn",
     "Plan",
     "PlanState",
+    "RecalledColumn",
+    "Recollection",
     "RouteColumn",
     "Self",
     "SelfColumn",
+    "attention_id",
     "coarse_map_id",
     "goal_id",
     "individual_label",
     "is_coarse_map",
     "kind_name",
     "kind_of",
+    "look_of",
     "map_id",
     "map_number",
     "nearest_place",
+    "need_id",
     "object_id",
     "observations_id",
     "percept_id",

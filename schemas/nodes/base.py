@@ -13,6 +13,7 @@ NEVER_NS = -1
 
 Metres = Annotated[float, msgspec.Meta(ge=0, le=1e6)]
 Positive = Annotated[float, msgspec.Meta(gt=0, le=1e9)]
+Salience = Annotated[float, msgspec.Meta(ge=-1, le=1)]
 Spread = Annotated[float, msgspec.Meta(ge=0, le=1e9)]
 Stamp = Annotated[int, msgspec.Meta(ge=NEVER_NS, le=2**62)]
 
@@ -20,12 +21,16 @@ Stamp = Annotated[int, msgspec.Meta(ge=NEVER_NS, le=2**62)]
 class GraphNode(Part, kw_only=True, frozen=True):
     """What every node has. `activation` and `base_level` are as of cognitive cycle `cycle`; their
     values now follow from the graph's decay.
+
+    `salience` is the feeling attached to the node, LIDA's incentive salience: how much it matters
+    now, below 0 where it is bad or is missed.
     """
 
     id: Name
     activation: Unit = 0.0
     base_level: Unit = 0.0
     cycle: Count = 0
+    salience: Salience = 0.0
 
 
 class Node(GraphNode, kw_only=True, frozen=True, tag="node"):

@@ -8,6 +8,8 @@ from schemas.array import Matrix
 
 POSE_COLUMNS = 3
 MAX_ROWS = 100_000
+TILE_SIDE = 32
+TILE_CELLS = TILE_SIDE**2
 
 
 class PlaceColumn(enum.StrEnum):
@@ -83,6 +85,20 @@ class CorrectionColumn(enum.IntEnum):
     NEW_X_M = 4
     NEW_Y_M = 5
     NEW_HEADING_RAD = 6
+
+
+class RecalledColumn(enum.IntEnum):
+    """Columns of the objects of a map in long-term memory: where each stood, how surely, its size,
+    and the number of views that agreed with that.
+    """
+
+    X_M = 0
+    Y_M = 1
+    X_SD_M = 2
+    Y_SD_M = 3
+    WIDTH_M = 4
+    HEIGHT_M = 5
+    SIGHTINGS = 6
 
 
 class RouteColumn(enum.IntEnum):

@@ -7,6 +7,7 @@ COARSE_MAP = "map:coarse:"
 SELF_ID = "self"
 CORRECTION_ID = "correction"
 PLAN_ID = "plan"
+RECOLLECTION_ID = "recollection"
 
 
 def object_id(label: str) -> str:
@@ -19,6 +20,11 @@ def individual_label(look: str, number: int) -> str:
     return look if number == 1 else f"{look}~{number}"
 
 
+def look_of(label: str) -> str:
+    """What perception calls an object, by the label that `individual_label` gave it."""
+    return label.partition("~")[0]
+
+
 def goal_id(name: str) -> str:
     """The id of the goal that a person calls `name`."""
     return f"goal:{name}"
@@ -27,6 +33,16 @@ def goal_id(name: str) -> str:
 def percept_id(label: str) -> str:
     """The id of the percept of the object that perception calls `label`."""
     return f"percept:{label}"
+
+
+def need_id(name: str) -> str:
+    """The id of the need of `name`, such as energy."""
+    return f"need:{name}"
+
+
+def attention_id(codelet: str) -> str:
+    """The id of what attention codelet `codelet` keeps."""
+    return f"attention:{codelet}"
 
 
 def map_id(number: int) -> str:

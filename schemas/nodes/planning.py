@@ -14,7 +14,8 @@ from schemas.nodes.ids import ROOT_MAP
 class PlanState(enum.StrEnum):
     """What a plan came to, or why a goal has no route.
 
-    READY: its route is to be driven. AT_GOAL: the last of its goals is reached. NO_ROUTE: no links
+    READY: its route is to be driven. AT_GOAL: the last of its goals is reached. RESTS: it is at a
+    goal where a need is being satisfied. NO_ROUTE: no links
     lead to the goal. UNKNOWN_GOAL: the map has no object of that name. OUTSIDE: the goal is on no
     map.
     BLOCKED: the goal, or the agent, is at a place node without links. NO_GOAL: there is none, and
@@ -23,6 +24,7 @@ class PlanState(enum.StrEnum):
 
     READY = "ready"
     AT_GOAL = "the agent is at the goal"
+    RESTS = "the agent stays until a need is satisfied"
     NO_ROUTE = "no route leads to the goal"
     UNKNOWN_GOAL = "the map has no object of that name"
     OUTSIDE = "the goal is outside every map"
@@ -35,7 +37,9 @@ class Goal(GraphNode, kw_only=True, frozen=True, tag="goal"):
 
     It counts once the goal whose id is `after` is reached, at once where there is none of that id.
     `reached_ns` is the time of the view in which the agent was there, NEVER_NS before. `doubts`
-    counts the routes to it that were tried over road that was blocked.
+    counts the routes to it that were tried over road that was blocked. One that serves a `need`, by
+    its label, goes before all others; it is reached once that need is satisfied there, and then
+    forgotten.
     """
 
     object: str = ""
@@ -45,6 +49,7 @@ class Goal(GraphNode, kw_only=True, frozen=True, tag="goal"):
     after: str = ""
     reached_ns: Stamp = NEVER_NS
     doubts: Count = 0
+    need: str = ""
 
 
 class Plan(GraphNode, kw_only=True, frozen=True, tag="plan"):

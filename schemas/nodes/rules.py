@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from schemas.nodes.attention import Attention, Need
 from schemas.nodes.base import GraphNode, Node
 from schemas.nodes.path import Correction, LoopClosure, Observations, PathSegment
 from schemas.nodes.planning import Goal, Plan
+from schemas.nodes.recollection import Recollection
 from schemas.nodes.situation import Map, Object, Percept, Self
 
 AnyNode = (
@@ -21,6 +23,9 @@ AnyNode = (
     | Map
     | Goal
     | Plan
+    | Recollection
+    | Need
+    | Attention
 )
 
 
@@ -53,6 +58,9 @@ KINDS: dict[type[GraphNode], KindRules] = {
     Map: KindRules(persistent=True, indexed=True, moves_with_path=True, offered=True),
     Goal: KindRules(persistent=True, indexed=True, offered=True),
     Plan: KindRules(persistent=True, indexed=True),
+    Recollection: KindRules(persistent=True, offered=True),
+    Need: KindRules(persistent=True, indexed=True, offered=True),
+    Attention: KindRules(persistent=True, droppable=False),
 }
 
 

@@ -88,7 +88,6 @@ class Object(GraphNode, kw_only=True, frozen=True, tag="object"):
     last_seen_ns: Stamp = NEVER_NS
     created_ns: Stamp = 0
     surveyed: bool = False
-    salience: Annotated[float, msgspec.Meta(ge=-1, le=1)] = 0.0
     offsets_m: Matrix | None = None
 
     def __post_init__(self) -> None:
@@ -109,7 +108,8 @@ class Map(GraphNode, kw_only=True, frozen=True, tag="map"):
 
     The frame's origin and direction are in the frame of `parent`; the root map has none. A sub-map
     holds what is at most `width_m` / 2 east or west and `height_m` / 2 north or south of its
-    origin; both are 0 of a map without limits.
+    origin; both are 0 of a map without limits. `remembered` is what long-term memory calls the map
+    that was recalled and joined to it, empty where none was.
     """
 
     cell_m: Annotated[float, msgspec.Meta(gt=0, le=1e4)]
@@ -119,3 +119,4 @@ class Map(GraphNode, kw_only=True, frozen=True, tag="map"):
     heading_rad: Finite = 0.0
     width_m: Metres = 0.0
     height_m: Metres = 0.0
+    remembered: str = ""

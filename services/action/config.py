@@ -1,4 +1,4 @@
-"""The settings of action."""
+"""The settings of action selection: LIDA's published defaults."""
 
 from __future__ import annotations
 
@@ -6,89 +6,21 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from schemas.base import (
-    PositiveAcceleration,
-    PositiveMetres,
-    PositiveSeconds,
-    PositiveSpeed,
-    Share,
-)
-
-NEAREST_SCAN_M = 2.6
-"""The range scan has no range below 2.5 m: what it has there may be nearer."""
+from schemas.base import Share
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Procedural memory, action selection and sensory-motor memory."""
+    """How one behaviour is chosen."""
 
-    mode: Annotated[
-        Literal["lockstep", "real_time"],
+    selector: Annotated[
+        Literal["behaviour_net", "most_active"],
         msgspec.Meta(
-            description="lockstep: a command waits for all that it depends on. "
-            "real_time: it does not."
+            description="behaviour_net: behaviours pass activation to each other (Maes 1989), so "
+            "that one is chosen too because it leads to another. most_active: the most active one "
+            "is chosen. The net is the default, being LIDA's: by the built-in schemes the robot "
+            "drives the same with both."
         ),
-    ] = "real_time"
-    cruise_m_s: Annotated[
-        PositiveSpeed, msgspec.Meta(description="Speed on a free straight, in m/s, above 0 to 100.")
-    ] = 4.0
-    lookahead_m: Annotated[
-        PositiveMetres,
-        msgspec.Meta(
-            description="Distance of the point ahead that pure pursuit steers to, "
-            "in m, above 0 to 10000."
-        ),
-    ] = 2.5
-    lateral_m_s2: Annotated[
-        PositiveAcceleration,
-        msgspec.Meta(
-            description="Lateral acceleration in a bend at most, in m/s2, above 0 to 100."
-        ),
-    ] = 1.5
-    braking_m_s2: Annotated[
-        PositiveAcceleration,
-        msgspec.Meta(description="Deceleration when braking, in m/s2, above 0 to 100."),
-    ] = 2.5
-    clearance_m: Annotated[
-        PositiveMetres,
-        msgspec.Meta(
-            description="Distance to an obstacle at which the robot stops, in m, above 0 to 10000."
-        ),
-    ] = NEAREST_SCAN_M
-    half_width_m: Annotated[
-        PositiveMetres,
-        msgspec.Meta(description="Half the width that must be free ahead, in m, above 0 to 10000."),
-    ] = 0.7
-    wheel_radius_m: Annotated[
-        PositiveMetres, msgspec.Meta(description="Radius of driven wheels, in m, above 0 to 10000.")
-    ] = 0.2
-    track_m: Annotated[
-        PositiveMetres,
-        msgspec.Meta(description="Distance between the driven wheels, in m, above 0 to 10000."),
-    ] = 0.8
-    blind_m: Annotated[
-        PositiveMetres,
-        msgspec.Meta(
-            description="Distance that the robot may travel within the age of its pose, in m, "
-            "above 0 to 10000: the older the pose, the lower the speed."
-        ),
-    ] = 1.0
-    max_pose_age_s: Annotated[
-        PositiveSeconds,
-        msgspec.Meta(
-            description="Age of the pose at which the robot stops, in s, above 0 to 3600."
-        ),
-    ] = 2.0
-    stuck_after_s: Annotated[
-        PositiveSeconds,
-        msgspec.Meta(
-            description="Time that a robot may stand although it is commanded to move before it "
-            "counts as stuck, in s, above 0 to 3600."
-        ),
-    ] = 5.0
-    stuck_m_s: Annotated[
-        PositiveSpeed,
-        msgspec.Meta(description="Speed below which the robot stands, in m/s, above 0 to 100."),
-    ] = 0.1
+    ] = "behaviour_net"
     selection_threshold: Annotated[
         Share, msgspec.Meta(description="Activation that a behaviour needs to be chosen, 0 to 1.")
     ] = 0.9
@@ -98,9 +30,38 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             description="Fall of that threshold with each attempt that chooses none, 0 to 1."
         ),
     ] = 0.1
-    instantiation: Annotated[
+    broadcast_excitation: Annotated[
         Share,
         msgspec.Meta(
-            description="Activation at which a scheme becomes a behaviour that competes, 0 to 1."
+            description="Share of the activation of its context that a behaviour gathers from a "
+            "broadcast, 0 to 1."
+        ),
+    ] = 0.05
+    successor_excitation: Annotated[
+        Share,
+        msgspec.Meta(
+            description="Share of its activation that a behaviour passes to those for which its "
+            "results are the missing part of the context, 0 to 1."
+        ),
+    ] = 0.04
+    predecessor_excitation: Annotated[
+        Share,
+        msgspec.Meta(
+            description="Share of its activation that a behaviour whose context is missing passes "
+            "to those that bring it about, 0 to 1."
+        ),
+    ] = 0.1
+    conflictor_inhibition: Annotated[
+        Share,
+        msgspec.Meta(
+            description="Share of its activation by which a behaviour inhibits those that undo its "
+            "context, 0 to 1."
+        ),
+    ] = 0.04
+    net_decay: Annotated[
+        Share,
+        msgspec.Meta(
+            description="What a behaviour loses with each broadcast of the activation that it has "
+            "gathered in the net, 0 to 1: LIDA's linear decay."
         ),
     ] = 0.1

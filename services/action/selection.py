@@ -1,117 +1,122 @@
-"""Procedural memory and action selection: schemes become behaviours, one behaviour is chosen (LIDA;
-Maes 1989).
-"""
+"""Action selection: one behaviour is chosen once it is active enough (LIDA). Pure."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
 
 import msgspec
 
-from schemas.cognition import Behaviour, Rejection
-from schemas.nodes import GraphNode, Self, kind_name, kind_of
-from services.action.config import Config
-
-Context = dict[str, float]
-
-FOLLOW_ROUTE = "follow_route"
-HALT = "halt"
+from schemas.cognition import Action, Behaviour, Rejection
 
 
-@dataclass
-class Scheme:
-    """Percepts that call for an action, and the expected results of the action, by salience."""
+class Level(NamedTuple):
+    """How active a behaviour is. `activation` may be above 1 here, where several are: messages
+    have it from 0 to 1. `gathered` is the part of it that came from other behaviours.
+    """
 
-    name: str
-    context: tuple[str, ...]
-    adding: dict[str, float] = field(default_factory=dict)
+    behaviour: Behaviour
+    activation: float
+    gathered: float = 0.0
 
-    def is_applicable(self, context: Context) -> bool:
-        """Whether every part of the scheme's context is active."""
-        return all(context.get(part, 0.0) > 0.0 for part in self.context)
+    @property
+    def is_executable(self) -> bool:
+        """Whether the scheme is instantiated."""
+        return not self.behaviour.rejection
 
-    def activation(self, context: Context) -> float:
-        """min(1, mean context + mean |adding-list salience|), 0 where it is not applicable."""
-        if not self.is_applicable(context):
-            return 0.0
-
-        activations = [context[part] for part in self.context]
-        mean_context = sum(activations) / len(activations)
-
-        saliences = [abs(salience) for salience in self.adding.values()]
-        mean_adding = sum(saliences) / max(1, len(saliences))
-
-        return min(1.0, mean_context + mean_adding)
+    def as_considered(self) -> Behaviour:
+        """The behaviour with this activation, for the message."""
+        activation = min(1.0, max(0.0, self.activation)) if self.is_executable else 0.0
+        return msgspec.structs.replace(
+            self.behaviour, activation=activation, gathered=self.gathered
+        )
 
 
-def procedural_memory() -> list[Scheme]:
-    """The schemes. Following the route needs a self node; the end of the route calls for a halt."""
-    return [
-        Scheme(FOLLOW_ROUTE, context=(kind_name(Self), "route_ahead"), adding={"further": 0.2}),
-        Scheme(HALT, context=("route_end",), adding={"rest": 0.3}),
-    ]
+class Selector(Protocol):
+    """A rule by which behaviours become active."""
+
+    def levels(self, behaviours: Sequence[Behaviour]) -> list[Level]:
+        """How active each of the behaviours of a broadcast is, in their order."""
+
+    def on_chosen(self, behaviour: Behaviour) -> None:
+        """That one was chosen."""
+
+    def restore(self, behaviours: Sequence[Behaviour]) -> None:
+        """Continue from what was considered last."""
+
+
+class MostActive:
+    """A behaviour is as active as the broadcast has made its scheme."""
+
+    def levels(self, behaviours: Sequence[Behaviour]) -> list[Level]:
+        """How active each of the behaviours of a broadcast is, in their order."""
+        return [Level(each, each.activation) for each in behaviours]
+
+    def on_chosen(self, behaviour: Behaviour) -> None:
+        """Nothing: the next broadcast begins anew."""
+
+    def restore(self, behaviours: Sequence[Behaviour]) -> None:
+        """Nothing, for nothing is kept."""
 
 
 @dataclass(frozen=True)
 class Selection:
-    """The behaviour that was chosen, and all that were considered, the chosen one included."""
+    """The behaviour that was chosen, None where none was active enough, all that were considered,
+    the chosen one included, and the threshold of the next selection.
+    """
 
-    chosen: Behaviour
+    chosen: Behaviour | None
     considered: list[Behaviour]
+    threshold: float
 
 
 class ActionSelection:
     """Chooses the most active behaviour over a threshold, which falls with each attempt that
-    chooses none.
+    chooses none. Of equally active ones it is the most reliable, then the first by name.
     """
 
-    def __init__(self, config: Config) -> None:
-        self._config = config
-        self._schemes = procedural_memory()
-        self._threshold = config.selection_threshold
+    def __init__(self, selector: Selector, threshold: float, fall: float) -> None:
+        self._selector = selector
+        self._first_threshold = threshold
+        self._threshold = threshold
+        self._fall = fall
 
-    def select(self, content: Sequence[GraphNode], route: Context) -> Selection | None:
-        """The behaviour for a broadcast's content and the route's state; None where none is active
-        enough.
-        """
-        context = _context(content, route)
-        considered = [self._behaviour(scheme, context) for scheme in self._schemes]
+    def restore(self, action: Action) -> None:
+        """Continue from the selection that was published last."""
+        self._threshold = action.threshold
+        self._selector.restore(action.behaviours)
 
-        instantiated = [each for each in considered if not each.rejection]
-        best = max(instantiated, key=lambda each: each.activation, default=None)
+    def select(self, behaviours: Sequence[Behaviour]) -> Selection:
+        """The behaviour for a broadcast, by those of it that are instantiated."""
+        levels = self._selector.levels(behaviours)
+        executable = [level for level in levels if level.is_executable]
+        best = min(executable, key=_rank, default=None)
         if best is None or best.activation < self._threshold:
-            self._threshold = max(0.0, self._threshold - self._config.threshold_fall)
-            return None
+            self._threshold = max(0.0, self._threshold - self._fall)
+            return Selection(None, _rejected(levels, Rejection.BELOW_THRESHOLD), self._threshold)
 
-        self._threshold = self._config.selection_threshold
-        return Selection(best, [_compared(each, best) for each in considered])
-
-    def _behaviour(self, scheme: Scheme, context: Context) -> Behaviour:
-        activation = scheme.activation(context)
-        rejection = Rejection.NONE
-
-        if not scheme.is_applicable(context):
-            rejection = Rejection.CONTEXT_MISSING
-        elif activation < self._config.instantiation:
-            rejection = Rejection.NOT_INSTANTIATED
-
-        return Behaviour(scheme=scheme.name, activation=activation, rejection=rejection)
+        self._threshold = self._first_threshold
+        self._selector.on_chosen(best.behaviour)
+        considered = _rejected(levels, Rejection.LESS_ACTIVE, best)
+        return Selection(best.as_considered(), considered, self._threshold)
 
 
-def _compared(behaviour: Behaviour, chosen: Behaviour) -> Behaviour:
-    """A behaviour, rejected where it was instantiated and another was chosen."""
-    if behaviour is chosen or behaviour.rejection:
-        return behaviour
-    return msgspec.structs.replace(behaviour, rejection=Rejection.LESS_ACTIVE)
+def _rank(level: Level) -> tuple[float, float, str]:
+    """The order in which behaviours are chosen."""
+    behaviour = level.behaviour
+    return -level.activation, -behaviour.reliability, behaviour.scheme
 
 
-def _context(content: Sequence[GraphNode], route: Context) -> Context:
-    """The activation of each kind of node, that of its most active node, and the route's state."""
-    context = dict(route)
-    for node in content:
-        activation = min(1.0, node.base_level + node.activation)
-        kind = kind_of(node)
-        context[kind] = max(context.get(kind, 0.0), activation)
+def _rejected(
+    levels: Sequence[Level], reason: Rejection, best: Level | None = None
+) -> list[Behaviour]:
+    """The behaviours, rejected where they were instantiated and are not the best."""
+    considered = []
+    for level in levels:
+        behaviour = level.as_considered()
+        if level.is_executable and level is not best:
+            behaviour = msgspec.structs.replace(behaviour, rejection=reason)
+        considered.append(behaviour)
 
-    return context
+    return considered

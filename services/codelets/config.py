@@ -129,10 +129,6 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             "m, above 0, at most 10000"
         ),
     ] = 50.0
-    attention_base_level: Annotated[
-        Share,
-        Meta(description="base-level activation of the attention codelet's coalitions, 0 to 1"),
-    ] = 1.0
     path_spacing_m: Annotated[
         Metres,
         Meta(description="distance between places of the path, in m, above 0, at most 10000"),

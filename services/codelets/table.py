@@ -12,16 +12,25 @@ from importlib.metadata import EntryPoint, entry_points
 from cogmap.errors import ConfigError
 from cogmap.runtime import config
 from cogmap.runtime.codelet import ENTRY_POINTS, Codelet, ConfiguredCodelet
-from services.codelets.attention import novelty, whereabouts
+from services.codelets.attention import (
+    expectation,
+    goal,
+    need,
+    novelty,
+    place_lost,
+    whereabouts,
+)
 from services.codelets.correction import apply_correction, map_correction
 from services.codelets.localization import landmarks, localization
 from services.codelets.mapping import boundary, loop_detection, object_place, path, road_place
 from services.codelets.planning import route_plan
+from services.codelets.recollection import join_map
 from services.codelets.resolution import coarse_places
 from services.codelets.structure import map_structure
 
 CODELETS: tuple[Codelet, ...] = (
     apply_correction.CODELET,
+    join_map.CODELET,
     localization.CODELET,
     object_place.CODELET,
     landmarks.CODELET,
@@ -35,6 +44,10 @@ CODELETS: tuple[Codelet, ...] = (
     route_plan.CODELET,
     whereabouts.CODELET,
     novelty.CODELET,
+    expectation.CODELET,
+    goal.CODELET,
+    need.CODELET,
+    place_lost.CODELET,
 )
 
 

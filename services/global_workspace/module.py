@@ -19,6 +19,7 @@ from schemas.cognition import (
     Competition,
     Contender,
     Fate,
+    Silence,
     Trigger,
 )
 from services.global_workspace.config import Config
@@ -68,13 +69,15 @@ class GlobalWorkspace:
         self._now_ns = max(self._now_ns, coalitions.stamp_ns)
         losers += self._enter(coalitions)
 
-        trigger = self._trigger()
+        silence = self._silence()
+        trigger = Trigger.NONE if silence else self._trigger()
         winner = self._pop_winner() if trigger else None
         competition = Competition(
             stamp_ns=coalitions.stamp_ns,
             cycle=coalitions.cycle,
             contenders=self._report(winner, losers),
             trigger=trigger,
+            silence=silence if silence or trigger else Silence.NO_TRIGGER,
         )
         if winner is None:
             return [competition]
@@ -122,14 +125,19 @@ class GlobalWorkspace:
 
         return displaced
 
+    def _silence(self) -> Silence:
+        """Why no trigger may fire now; NONE where one may."""
+        if not self._candidates:
+            return Silence.NO_COALITION
+        if self._silent_ticks() < self._config.refractory_ticks:
+            return Silence.REFRACTORY
+        return Silence.NONE
+
     def _trigger(self) -> Trigger:
         """The first trigger whose condition is met."""
         config = self._config
         activations = [candidate.activation for candidate in self._candidates.values()]
         silent_ticks = self._silent_ticks()
-        if not activations or silent_ticks < config.refractory_ticks:
-            return Trigger.NONE
-
         old_ticks = self._ticks(self._now_ns - self._new_ns)
         conditions = {
             Trigger.ONE_COALITION: max(activations) > config.coalition_above,

@@ -8,9 +8,11 @@ import msgspec
 
 from cogmap.errors import ConfigError
 from schemas.base import PositiveSeconds
+from services.sim.battery import Battery
 from services.sim.layout import towns
 from services.sim.layout.catalogue import CATALOGUE
 from services.sim.layout.closures import Closure
+from services.sim.layout.place import Place
 from services.sim.odometry import Noise
 from services.sim.scripted.percepts import PerceptErrors
 from services.sim.scripted.trajectory import Trajectory
@@ -57,6 +59,16 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         PerceptErrors,
         msgspec.Meta(description="Errors of percepts without cameras."),
     ] = PerceptErrors()
+    energy: Annotated[
+        bool,
+        msgspec.Meta(
+            description="Whether the robot has a battery that runs down, and the town charging "
+            "places."
+        ),
+    ] = False
+    battery: Annotated[
+        Battery, msgspec.Meta(description="The battery and its charging, where energy is on.")
+    ] = Battery()
     town: Annotated[
         str,
         msgspec.Meta(
@@ -68,6 +80,14 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         float,
         msgspec.Meta(ge=120, le=500, description="Side of a town of blocks, in m, 120 to 500."),
     ] = 200.0
+    start: Annotated[
+        int,
+        msgspec.Meta(
+            ge=0,
+            le=10**9,
+            description="Number of the start in the town: 0 is the usual one, from 1 on others.",
+        ),
+    ] = 0
     sensing: Annotated[
         Literal["cameras", "percepts"],
         msgspec.Meta(
@@ -123,6 +143,27 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         msgspec.Meta(description="Modules, and instances of each, required before time begins."),
     ] = {}
 
+    @property
+    def supplied_by(self) -> Battery | None:
+        """The robot's battery, where it has one."""
+        return self.battery if self.energy else None
+
+    @property
+    def charging_places(self) -> int:
+        """How many charging places the town has."""
+        return self.battery.places if self.energy else 0
+
+
+def place_of(config: Config) -> Place:
+    """The town that is configured. Raises UsageError where there is none."""
+    return towns.place(
+        config.town,
+        config.seed,
+        config.town_size_m,
+        start=config.start,
+        charging_places=config.charging_places,
+    )
+
 
 def check(config: Config) -> None:
     """Raise ConfigError where the rates do not divide one another, or a trajectory cannot be
@@ -148,10 +189,15 @@ def check(config: Config) -> None:
         )
 
     if config.trajectory is not None:
-        _check_trajectory(config.trajectory, config.mode)
+        _check_trajectory(config.trajectory, config.mode, config.energy)
 
 
-def _check_trajectory(trajectory: Trajectory, mode: str) -> None:
+def _check_trajectory(trajectory: Trajectory, mode: str, energy: bool) -> None:
+    if energy:
+        raise ConfigError(
+            "[sim] a robot that follows a trajectory needs no energy: set energy to false"
+        )
+
     if mode != "lockstep":
         raise ConfigError(
             '[sim] a robot follows a trajectory in lockstep only: set mode to "lockstep"'

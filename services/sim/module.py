@@ -16,8 +16,8 @@ from services.sim.simulation import Simulation
 __all__ = ["Config", "build"]
 
 _ALWAYS = (topics.CLOCK, topics.TRUE_POSE, topics.TRUE_TOWN)
-_CAMERA_LEVEL = (*_ALWAYS, topics.ODOMETRY, topics.STEREO)
-_PERCEPT_LEVEL = (*_ALWAYS, topics.SELF_MOTION, topics.SCAN, topics.PERCEPTS)
+_CAMERA_LEVEL = (*_ALWAYS, topics.ODOMETRY, topics.STEREO, topics.ENERGY)
+_PERCEPT_LEVEL = (*_ALWAYS, topics.SELF_MOTION, topics.SCAN, topics.ENERGY, topics.PERCEPTS)
 
 
 def build(config: Config, instance: str = "sim") -> Module:

@@ -74,7 +74,7 @@ class RealTime:
             messages += self._changed_town()
 
         if is_frame_due:
-            messages.append(self._simulation.frame())
+            messages += self._simulation.view()
 
         return messages
 

@@ -10,8 +10,8 @@ import msgspec
 from schemas.base import Message
 from schemas.process import Clock
 from schemas.sensing import MotorCommand, Odometry, StereoFrame, TruePose, TrueTown
-from services.sim.config import Config
-from services.sim.layout import towns
+from services.sim.battery import PowerSupply
+from services.sim.config import Config, place_of
 from services.sim.layout.closures import ClosedStreets
 from services.sim.layout.town import Town
 from services.sim.odometry import WheelOdometry
@@ -30,13 +30,14 @@ class Simulation:
         self.now_ns = 0
         self.progress = 0.0
 
-        place = towns.place(config.town, config.seed, config.town_size_m)
+        place = place_of(config)
         self.closed_streets = ClosedStreets(place.roads, config.closures)
         self.world = World(place, config.egl, whole=isinstance(place, Town))
         mount = calibration(config.width_px, config.height_px)
         self.camera = StereoCamera(self.world, mount)
 
         self._odometry = WheelOdometry(config.noise, config.seed)
+        self._power = PowerSupply(config.supplied_by, place.charging_places_m)
         self._progress = Progress(config.duration_s, config.ends_at_goal)
         self._pose = self.world.pose()
         self._travelled_m = 0.0
@@ -56,12 +57,16 @@ class Simulation:
         self._travelled_m = last.travelled_m
         self.world.collisions = last.collisions
         self._progress.resume(last.progress)
+        self._power.resume(last.energy)
         self.now_ns = last.stamp_ns
         self._frames = self.now_ns // self.tick_ns // self.ticks_per_frame
 
     def drive(self, command: MotorCommand) -> None:
-        """Set the wheels' speeds."""
+        """Set the wheels' speeds, where there is energy."""
         self._progress.on_command(command)
+        if self._power.is_out:
+            return
+
         self.world.robot.drive(command.left_wheel_rad_s, command.right_wheel_rad_s)
 
     def brake(self) -> None:
@@ -79,7 +84,12 @@ class Simulation:
 
         dx_m = self._pose.x_m - before.x_m
         dy_m = self._pose.y_m - before.y_m
-        self._travelled_m += math.sqrt(dx_m**2 + dy_m**2)
+        moved_m = math.sqrt(dx_m**2 + dy_m**2)
+        self._travelled_m += moved_m
+
+        self._power.advance(self._pose, moved_m, dt_s)
+        if self._power.is_out:
+            self.brake()
 
         odometry = self._odometry.measure(before, self._pose, dt_s)
         return msgspec.structs.replace(odometry, stamp_ns=self.now_ns)
@@ -89,8 +99,9 @@ class Simulation:
         return [self.tick()]
 
     def view(self) -> list[Message]:
-        """As `frame`, in a list."""
-        return [self.frame()]
+        """As `frame`, and the energy that is sensed with it."""
+        frame = self.frame()
+        return [frame, *self._power.sensed(frame.stamp_ns, frame.frame)]
 
     def frame(self) -> StereoFrame:
         """The next stereo frame."""
@@ -112,6 +123,7 @@ class Simulation:
             travelled_m=self._travelled_m,
             progress=self.progress,
             collisions=self.world.collisions,
+            energy=self._power.level,
         )
 
     def changed_town(self) -> TrueTown | None:

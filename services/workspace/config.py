@@ -54,6 +54,20 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             " where nothing publishes scans"
         ),
     ] = True
+    awaits_competition: Annotated[
+        bool,
+        msgspec.Meta(
+            description="In lockstep, whether a cycle waits for the competition of the cycle "
+            "before, to learn from what became conscious; false where no global workspace runs"
+        ),
+    ] = True
+    awaits_energy: Annotated[
+        bool,
+        msgspec.Meta(
+            description="In lockstep, whether a cycle waits for the energy sensed with its view;"
+            " false where no body senses any"
+        ),
+    ] = False
     max_scan_age_ms: Annotated[
         Milliseconds,
         msgspec.Meta(
@@ -93,6 +107,38 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     place_decay: Annotated[
         Unit, msgspec.Meta(description="What a place node's activation loses in a cycle, 0 to 1")
     ] = 0.02
+    learning: Annotated[
+        Literal["linear", "sigmoid"],
+        msgspec.Meta(
+            description="How the base level of what is conscious rises: by as much each time, or"
+            " by less the nearer it is to 0 and 1"
+        ),
+    ] = "linear"
+    learning_rate: Annotated[
+        Unit,
+        msgspec.Meta(
+            description="What a node's base level gains in a broadcast, 0 to 1; a sigmoid gains as"
+            " much at 0.5. Of five views a second with an object, half or more lead to a"
+            " broadcast about it; what is seen once, perhaps by mistake, is conscious once"
+        ),
+    ] = 0.1
+    unlearning_rate: Annotated[
+        Unit,
+        msgspec.Meta(
+            description="What the base level of a node that is broadcast as missing loses, times"
+            " its salience, 0 to 1. What was known best is kept no longer then, and is forgotten"
+            " at once when it is missing three times"
+        ),
+    ] = 0.4
+    kept_base_level: Annotated[
+        Unit,
+        msgspec.Meta(
+            description="A base level that was learned up to this does not decay below it: the"
+            " node is not forgotten by time alone, 0 to 1; 0: every base level decays. With much"
+            " less, objects are kept that were seen in a few views from one side: where these"
+            " are placed badly they mislead localization later"
+        ),
+    ] = 0.9
     forget_below: Annotated[
         Unit,
         msgspec.Meta(

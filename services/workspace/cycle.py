@@ -9,17 +9,17 @@ import msgspec
 
 from cogmap.errors import MessageError
 from cogmap.runtime.codelet import ConfiguredCodelet, CycleContext
-from schemas.array import Array
 from schemas.base import Message
 from schemas.codelets import Offer, Proposal
-from schemas.cognition import Coalitions
+from schemas.cognition import Broadcast, Coalitions, Competition
 from schemas.graph import Delta, Operation, Phase, Snapshot, SnapshotRequest
 from schemas.process import Clock, Presence
-from schemas.sensing import Percepts, RangeScan, SelfMotion
+from schemas.sensing import Energy, Percepts, RangeScan, SelfMotion
 from services.workspace.commit import Ledger
 from services.workspace.config import Config
 from services.workspace.dispatch import Dispatch
 from services.workspace.entrance import (
+    check_percepts,
     first_goals,
     first_operations,
     percept_operations,
@@ -27,9 +27,11 @@ from services.workspace.entrance import (
 )
 from services.workspace.forgetting import Forgetting
 from services.workspace.individuals import as_entered, individuals
-from services.workspace.lane import Lane
+from services.workspace.lane import Lanes
+from services.workspace.learning.base_level import learned_operations
+from services.workspace.learning.consciousness import Consciousness
 from services.workspace.offers import Offers
-from services.workspace.senses import Scans, SelfMotions
+from services.workspace.sensed import Sensed
 
 WORKERS = "codelets"
 MAX_LATE_TASKS = 256
@@ -49,19 +51,16 @@ class Workspace:
 
         writers = {codelet.name: codelet.codelet.may_write for codelet in codelets}
         self._ledger = Ledger(writers)
-        self._lanes: list[Lane] = []
-        for codelet in codelets:
-            if codelet.codelet.phase is Phase.BACKGROUND:
-                self._lanes.append(Lane(codelet, config, self._background))
-
+        self._lanes = Lanes(codelets, config)
         lease_ns = int(config.lease_ms * 1e6)
-        self._dispatch = Dispatch(lease_ns, config.attempts, self._background)
+        self._dispatch = Dispatch(lease_ns, config.attempts, self._lanes.dispatches)
         self._forgetting = Forgetting()
         self._offers = Offers(config.offering if self._is_lockstep else ())
+        self._consciousness = Consciousness(self._is_lockstep and config.awaits_competition)
 
-        self._motions = SelfMotions()
-        self._scans = Scans(config)
+        self._sensed = Sensed(config)
         self._waiting: Percepts | None = None
+        self._is_repeated = False
         self._context: CycleContext | None = None
         self._phase = 0
         self._late: dict[str, None] = {}
@@ -80,6 +79,7 @@ class Workspace:
 
         self._forgetting.restore(self._ledger.graph)
         self._offers.restore(self._ledger.graph.cycle)
+        self._consciousness.restore(self._ledger.graph.cycle)
 
     def snapshot(self, request: SnapshotRequest | None = None) -> Snapshot:
         """The whole graph.
@@ -95,28 +95,43 @@ class Workspace:
 
     def on_motion(self, motion: SelfMotion) -> list[Message]:
         """Keep what moved until a cycle moves the self node by it."""
-        self._motions.put(motion, self._moved_until_ns)
+        self._sensed.put_motion(motion, self._moved_until_ns)
         return self._begin()
 
     def on_scan(self, scan: RangeScan) -> list[Message]:
         """Keep a range scan for the cycle of its view."""
-        self._scans.put(scan)
+        self._sensed.put_scan(scan)
+        return self._begin()
+
+    def on_energy(self, energy: Energy) -> list[Message]:
+        """Keep what the body senses of its energy for the cycle of its view."""
+        self._sensed.put_energy(energy)
         return self._begin()
 
     def on_percepts(self, percepts: Percepts) -> list[Message]:
-        """Begin a cycle with the view's percepts, as soon as the one before has ended."""
-        for name, points_m in (
-            ("road", percepts.road_m),
-            ("boundary", percepts.road_boundary_m),
-        ):
-            if len(points_m.shape) != 2 or points_m.shape[1] != 2:
-                raise MessageError(f"{name} points of shape {points_m.shape}")
+        """Begin a cycle with the view's percepts, as soon as the one before has ended.
 
+        In lockstep percepts that are repeated while they wait begin it without the competition of
+        the cycle before, which was lost with a process that was killed.
+        """
+        check_percepts(percepts)
         is_past = percepts.stamp_ns <= self._begun_ns
         if is_past and not self._is_interrupted(percepts):
             return []
 
+        waiting = self._waiting
+        self._is_repeated = waiting is not None and waiting.stamp_ns == percepts.stamp_ns
         self._waiting = recognised(percepts, self._config.recognition_threshold)
+        return self._begin()
+
+    def on_competition(self, competition: Competition) -> list[Message]:
+        """A competition for consciousness has ended."""
+        self._consciousness.on_competition(competition)
+        return self._begin()
+
+    def on_broadcast(self, broadcast: Broadcast) -> list[Message]:
+        """Keep what is conscious until the next cycle learns from it."""
+        self._consciousness.on_broadcast(broadcast)
         return self._begin()
 
     def on_offer(self, offer: Offer) -> list[Message]:
@@ -130,12 +145,8 @@ class Workspace:
         One that comes after its cycle has ended is committed now if it still applies. Where it does
         not, it is rejected, and the next delta counts it.
         """
-        if self._dispatch.answer(proposal):
+        if self._dispatch.answer(proposal) or self._lanes.answer(proposal):
             return self._continue_if_complete([])
-
-        for lane in self._lanes:
-            if lane.dispatch.answer(proposal):
-                return self._continue_if_complete([])
 
         if proposal.task_id not in self._late:
             return []
@@ -150,11 +161,7 @@ class Workspace:
         worker = presence.instance
         is_alive = presence.alive
         version = self._ledger.graph.version
-        published: list[Message] = []
-        for lane in self._lanes:
-            lane.dispatch.refresh(version)
-            published += lane.dispatch.presence(worker, is_alive, self._now_ns)
-
+        published = self._lanes.presence(worker, is_alive, version, self._now_ns)
         published += self._dispatch.presence(worker, is_alive, self._now_ns)
         return self._continue_if_complete(published)
 
@@ -168,10 +175,7 @@ class Workspace:
         if self._is_lockstep:
             return []
 
-        published: list[Message] = []
-        for lane in self._lanes:
-            lane.dispatch.refresh(self._ledger.graph.version)
-            published += lane.dispatch.expire(self._now_ns)
+        published = self._lanes.expire(self._ledger.graph.version, self._now_ns)
         if self._context is None:
             return published
 
@@ -193,7 +197,7 @@ class Workspace:
         """
         awaited = [self._dispatch]
         if self._is_lockstep:
-            awaited += self._background()
+            awaited += self._lanes.dispatches()
         return not all(dispatch.complete for dispatch in awaited)
 
     @property
@@ -202,9 +206,6 @@ class Workspace:
         if agent is None:
             return -1
         return agent.stamp_ns
-
-    def _background(self) -> list[Dispatch]:
-        return [lane.dispatch for lane in self._lanes]
 
     def _is_interrupted(self, percepts: Percepts) -> bool:
         """Whether those are the percepts of a cycle that ended before its last phase."""
@@ -218,25 +219,25 @@ class Workspace:
         if self._context is not None or percepts is None:
             return []
 
-        stamp_ns = percepts.stamp_ns
-        if not self._has_motion_until(stamp_ns) or not self._scans.has(stamp_ns):
+        if not self._sensed.is_complete(percepts.stamp_ns, self._moved_until_ns):
             return []
 
         if self._is_interrupted(percepts):
             return self._continue_interrupted(percepts)
         if not self._offers.complete(self._ledger.graph.cycle):
             return []
+        is_known = self._consciousness.complete(self._ledger.graph.cycle)
+        if not is_known and not self._is_repeated:
+            return []
         return self._begin_cycle(percepts)
-
-    def _has_motion_until(self, stamp_ns: int) -> bool:
-        newest_ns = self._motions.newest_ns()
-        return max(newest_ns, self._moved_until_ns) >= stamp_ns
 
     def _continue_interrupted(self, percepts: Percepts) -> list[Message]:
         graph = self._ledger.graph
         self._waiting = None
-        motions = self._motions_until(percepts.stamp_ns)
-        self._context = self._sensed(as_entered(percepts, graph), motions, graph.cycle)
+        motions = self._sensed.motions(percepts.stamp_ns, self._moved_until_ns)
+        self._context = self._sensed.context(
+            as_entered(percepts, graph), motions, graph.cycle, graph.version
+        )
 
         self._phase = PHASES.index(graph.phase) if graph.phase in PHASES else -1
         return self._next_phase()
@@ -246,30 +247,22 @@ class Workspace:
         self._waiting = None
         before_ns = self._begun_ns
         self._begun_ns = percepts.stamp_ns
-        motions = self._motions_until(percepts.stamp_ns)
+        motions = self._sensed.motions(percepts.stamp_ns, self._moved_until_ns)
         entering_percepts = individuals(percepts, graph, motions)
-        self._context = self._sensed(entering_percepts, motions, graph.cycle + 1)
+        self._context = self._sensed.context(
+            entering_percepts, motions, graph.cycle + 1, graph.version
+        )
         self._phase = -1
+        self._is_repeated = False
 
         entering = first_operations(graph, self._config)
+        conscious = self._consciousness.take(graph.cycle)
+        entering += learned_operations(conscious, graph, self._context.cycle, self._config)
         entering += first_goals(self._config, before_ns, self._begun_ns)
         entering += percept_operations(graph, self._context)
+        entering += self._sensed.needs(percepts.stamp_ns, self._context.cycle)
         entering += self._offers.take(self._ledger, self._context.cycle)
         return [self._commit(Phase.PERCEPTS, entering), *self._next_phase()]
-
-    def _motions_until(self, stamp_ns: int) -> Array:
-        """The motions since the self node was moved last."""
-        return self._motions.rows(self._moved_until_ns, stamp_ns)
-
-    def _sensed(self, percepts: Percepts, motions: Array, cycle: int) -> CycleContext:
-        """All that was sensed for the view of `percepts`, of which the scan is taken now."""
-        return CycleContext(
-            cycle,
-            percepts,
-            motions,
-            self._ledger.graph.version,
-            self._scans.take(percepts.stamp_ns),
-        )
 
     def _commit(
         self, phase: Phase, operations: list[Operation], tasks: list[str] | None = None
@@ -295,8 +288,7 @@ class Workspace:
         self._context = context
         published: list[Message] = []
         if phase is LANES_BEGIN:
-            for lane in self._lanes:
-                published += lane.begin(context, self._ledger, self._now_ns)
+            published += self._lanes.begin(context, self._ledger, self._now_ns)
 
         tasks = []
         for codelet in self._codelets:
@@ -324,7 +316,11 @@ class Workspace:
         return self._commit_proposals(PHASES[self._phase], answers)
 
     def _commit_proposals(self, phase: Phase, proposals: list[Proposal]) -> list[Message]:
-        """Commit valid proposals, then publish their events; of ATTENTION, their coalitions."""
+        """Commit valid proposals, then publish their events.
+
+        Coalitions, of ATTENTION, are published before the commit, in which their codelets keep that
+        they have brought them: a restart between the two brings them again.
+        """
         if self._context is None:
             return []
 
@@ -334,22 +330,25 @@ class Workspace:
             operations += proposal.operations
 
         published: list[Message] = []
+        if phase is Phase.ATTENTION:
+            published.append(_coalitions(self._context, valid))
         if operations:
             tasks = [proposal.task_id for proposal in valid]
             published.append(self._commit(phase, operations, tasks))
 
         for proposal in valid:
             published += proposal.events
-
-        if phase is Phase.ATTENTION:
-            published.append(_coalitions(self._context, valid))
         return published
 
     def _commit_late(self, proposal: Proposal) -> list[Message]:
+        """Commit an answer that came after its cycle; none that brings coalitions, which are too
+        late, as its codelet would keep that it has brought them.
+        """
         if not self._ledger.validate([proposal]):
             return []
         if proposal.coalitions:
             self._ledger.reject(f"the coalitions of {proposal.task_id} came after its cycle")
+            return []
 
         graph = self._ledger.graph
         delta = self._ledger.commit(
@@ -365,14 +364,13 @@ class Workspace:
             return []
 
         published: list[Message] = []
-        for lane in self._lanes:
-            answers, failed = lane.collect(context.cycle)
+        for answers, failed in self._lanes.collect(context.cycle):
             self._reject_failed(failed)
             published += self._commit_proposals(Phase.BACKGROUND, answers)
 
         forgotten: list[Operation] = [*self._forgetting.due(self._ledger.graph)]
         published.append(self._commit(Phase.END, forgotten))
-        self._motions.discard(self._moved_until_ns)
+        self._sensed.discard(self._moved_until_ns)
         self._context = None
         return [*published, *self._begin()]
 

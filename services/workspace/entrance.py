@@ -5,6 +5,7 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 
+from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import CycleContext
 from schemas.array import Matrix
@@ -37,6 +38,7 @@ def first_operations(graph: Graph, config: Config) -> list[Operation]:
         base_level=config.base_level_decay,
         place_activation=config.place_decay,
         forget_below=config.forget_below,
+        kept_base_level=config.kept_base_level,
     )
     if graph.decay != decay:
         operations.append(decay)
@@ -73,6 +75,13 @@ def first_goals(config: Config, before_ns: int, now_ns: int) -> list[Goal]:
         goals.append(goal)
 
     return goals
+
+
+def check_percepts(percepts: Percepts) -> None:
+    """Raise MessageError where points of the road or its boundary are not (n, 2)."""
+    for name, points_m in (("road", percepts.road_m), ("boundary", percepts.road_boundary_m)):
+        if len(points_m.shape) != 2 or points_m.shape[1] != 2:
+            raise MessageError(f"{name} points of shape {points_m.shape}")
 
 
 def recognised(percepts: Percepts, threshold: float) -> Percepts:

@@ -2,14 +2,64 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 
 from cogmap.runtime.codelet import ConfiguredCodelet, CycleContext
 from schemas.base import Message
 from schemas.codelets import Proposal
+from schemas.graph import Phase
 from services.workspace.commit import Ledger
 from services.workspace.config import Config
 from services.workspace.dispatch import Dispatch
+
+
+class Lanes:
+    """The lanes of all background codelets."""
+
+    def __init__(self, codelets: Iterable[ConfiguredCodelet], config: Config) -> None:
+        self._lanes: list[Lane] = []
+        for codelet in codelets:
+            if codelet.codelet.phase is Phase.BACKGROUND:
+                self._lanes.append(Lane(codelet, config, self.dispatches))
+
+    def dispatches(self) -> list[Dispatch]:
+        """The dispatch of each lane."""
+        return [lane.dispatch for lane in self._lanes]
+
+    def begin(self, context: CycleContext, ledger: Ledger, now_ns: int) -> list[Message]:
+        """Begin a task in each lane where none runs and one is due; what is to be published."""
+        published: list[Message] = []
+        for lane in self._lanes:
+            published += lane.begin(context, ledger, now_ns)
+
+        return published
+
+    def answer(self, proposal: Proposal) -> bool:
+        """Whether a proposal answers a task of a lane."""
+        return any(dispatch.answer(proposal) for dispatch in self.dispatches())
+
+    def presence(self, worker: str, is_alive: bool, version: int, now_ns: int) -> list[Message]:
+        """A worker came or went; what is to be published."""
+        published: list[Message] = []
+        for dispatch in self.dispatches():
+            dispatch.refresh(version)
+            published += dispatch.presence(worker, is_alive, now_ns)
+
+        return published
+
+    def expire(self, version: int, now_ns: int) -> list[Message]:
+        """Revoke leases that have ended; what is to be published."""
+        published: list[Message] = []
+        for dispatch in self.dispatches():
+            dispatch.refresh(version)
+            published += dispatch.expire(now_ns)
+
+        return published
+
+    def collect(self, cycle: int) -> Iterator[tuple[list[Proposal], list[str]]]:
+        """Of each lane, the answer to be committed at the end of `cycle`, and tasks that failed."""
+        for lane in self._lanes:
+            yield lane.collect(cycle)
 
 
 class Lane:

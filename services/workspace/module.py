@@ -33,9 +33,12 @@ def build(config: Config, instance: str, codelets: Sequence[ConfiguredCodelet]) 
         Module("workspace", instance, emits={topics.PRESENCE})
         .on(topics.SELF_MOTION, workspace.on_motion, emits=published)
         .on(topics.SCAN, workspace.on_scan, emits=published)
+        .on(topics.ENERGY, workspace.on_energy, emits=published)
         .on(topics.PERCEPTS, workspace.on_percepts, emits=published)
         .on(topics.PROPOSAL, workspace.on_proposal, emits=published)
         .on(topics.OFFER, workspace.on_offer, emits=published)
+        .on(topics.COMPETITION, workspace.on_competition, emits=published)
+        .on(topics.BROADCAST, workspace.on_broadcast, emits=published)
         .on(topics.PRESENCE, workspace.on_presence, emits=published)
         .on(topics.CLOCK, workspace.on_clock, emits=published)
         .serve(topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, workspace.snapshot)
@@ -43,7 +46,7 @@ def build(config: Config, instance: str, codelets: Sequence[ConfiguredCodelet]) 
             topics.DELTA,
             workspace.restore,
             workspace.snapshot,
-            backfill=[topics.SELF_MOTION, topics.OFFER],
+            backfill=[topics.SELF_MOTION, topics.OFFER, topics.COMPETITION, topics.BROADCAST],
         )
     )
 

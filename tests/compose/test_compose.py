@@ -152,7 +152,7 @@ def test_no_process_in_a_container_is_roots(compose: Compose, service: str) -> N
 
 def test_the_output_names_the_module_of_each_line(compose: Compose) -> None:
     lines = compose("logs", "--no-color").splitlines()
-    for service in ("sensory", "workspace", "action"):
+    for service in ("sensory", "workspace", "action", "motor"):
         own = [line for line in lines if line.startswith(f"{service}-1 ")]
         assert any(f"{service} is ready" in line for line in own)
 
@@ -166,7 +166,7 @@ def test_the_log_has_what_the_workspace_publishes_from_its_first_message_on(
     assert first["message"]["seq"] == 0
 
 
-@pytest.mark.parametrize("service", ["epam", "workspace", "sim", "action"])
+@pytest.mark.parametrize("service", ["epam", "workspace", "sim", "procedural", "action", "motor"])
 def test_a_container_that_is_killed_restarts_and_the_robot_drives_again(
     watch: Watch, compose: Compose, service: str
 ) -> None:
@@ -202,7 +202,7 @@ def test_when_recording_has_ended_the_doctor_misses_nobody(watch: Watch, compose
 
 
 def test_a_drive_ends_every_container_and_leaves_its_files(image: None, tmp_path: Path) -> None:
-    project = Compose("short", drive="--town blocks --explore 5")
+    project = Compose("short", drive="--town blocks --explore 8")
     try:
         output = project("up", "--no-color", "--exit-code-from", "drive")
         project("cp", f"drive:{RUN}/.", str(tmp_path))

@@ -32,7 +32,8 @@ SECTIONS: dict[str, dict[str, Any]] = {
         "awaits": {},
     },
     "workspace": {"mode": "lockstep"},
-    "action": {"mode": "lockstep"},
+    "procedural": {"mode": "lockstep"},
+    "motor": {"mode": "lockstep"},
 }
 CONFIG = """\
 [sim]

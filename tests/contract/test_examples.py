@@ -114,7 +114,7 @@ class Stage:
         self._bus.declare(topics.SCAN)
 
     def _on_change(self, member: Member, alive: bool) -> None:
-        if alive and member == Member("action", "action"):
+        if alive and member == Member("motor", "motor"):
             self._ready.set()
 
     def check_answers(self) -> None:
@@ -127,11 +127,11 @@ class Stage:
             command = decode(topics.MOTOR_COMMAND, arrival.payload)
             assert isinstance(command, MotorCommand)
             assert command.left_wheel_rad_s == (0.0 if seq else 10.0)
-            assert (command.source, command.seq) == ("action", seq)
+            assert (command.source, command.seq) == ("motor", seq)
 
             envelope = arrival.envelope
             assert envelope is not None
-            assert (envelope.source, envelope.seq) == ("action", seq)
+            assert (envelope.source, envelope.seq) == ("motor", seq)
 
 
 def test_a_module_of_msgpack_and_zenoh_alone_answers_scans(over_zenoh: OverZenoh) -> None:

@@ -29,7 +29,17 @@ def test_two_lockstep_drives_of_one_seed_publish_the_same_bytes(
     assert counts["motor/command"] > 10
 
 
-@pytest.mark.parametrize("killed", [("epam",), ("workspace",), ("codelets-1", "action")])
+@pytest.mark.parametrize(
+    "killed",
+    [
+        ("epam",),
+        ("workspace",),
+        ("global_workspace",),
+        ("memory",),
+        ("codelets-1", "motor"),
+        ("procedural", "action"),
+    ],
+)
 def test_the_agent_reaches_its_goals_in_lockstep_though_processes_are_killed(
     killed: tuple[str, ...], start: Callable[..., Run]
 ) -> None:

@@ -117,7 +117,7 @@ def test_nothing_is_left_of_a_launcher_that_is_killed(start: Callable[..., Run])
 
 
 KILLED_TOGETHER = (
-    ("sensory", "epam", "codelets-1", "global_workspace", "action"),
+    ("sensory", "epam", "codelets-1", "global_workspace", "procedural", "action", "motor"),
     ("workspace",),
     ("sim",),
     ("recorder", "router"),
@@ -224,7 +224,7 @@ def test_a_port_in_use_is_one_sentence_and_code_2(start: Callable[..., Run]) -> 
     ("arguments", "words"),
     [
         (["--set", "sim.sed=2"], "unknown key 'sed' in [sim]: did you mean 'seed'?"),
-        (["--set", "action.cruise_m_s=fast"], "[action] Expected `float`, got `str`"),
+        (["--set", "motor.cruise_m_s=fast"], "[motor] Expected `float`, got `str`"),
         (["--config", "nowhere.toml"], "no configuration file nowhere.toml"),
     ],
 )

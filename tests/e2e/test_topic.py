@@ -16,6 +16,7 @@ from cogmap import Client, Module, topics
 from schemas.base import Message
 from schemas.examples import example_messages
 from schemas.sensing import MotorCommand, Odometry
+from services import registry
 from tests.support.system.networks import routed
 
 TIMEOUT_S = 30.0
@@ -188,6 +189,6 @@ def test_doctor_names_what_is_missing_and_what_is_off_its_rate(robot: Robot, end
     output, _ = printed(endpoint, "doctor", "--json", code=1)
 
     about = {finding["about"] for finding in json.loads(output)}
-    assert {"sensory", "epam", "workspace", "codelets", "global_workspace", "action"} <= about
+    assert {*registry.MODULES} - {"sim"} <= about
     assert {"odometry", "sensory/motion"} <= about
     assert "sim" not in about

@@ -25,7 +25,7 @@ from tests.support.system.live import Feeder, Witness
 from tests.support.system.networks import working
 from tests.support.system.processes import AGENT, Process, System, wait_until
 
-MODULES = ("sensory", "epam", "global_workspace", "action")
+MODULES = ("sensory", "epam", "global_workspace", "procedural", "action", "motor")
 CARRIED = tuple(
     topic
     for topic in topics.ALL

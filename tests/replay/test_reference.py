@@ -21,6 +21,8 @@ from tests.support.reference import FRAMES, REFERENCE, compared, drive, in_words
 
 SAME_EVERYWHERE = ("workspace", "global_workspace")
 MAX_BYTES = 1_500_000
+# The first cycle has no broadcast, and the last may end before its own is answered.
+MIN_OUTPUTS = FRAMES - 2
 ON_PURPOSE = "where this is meant to change: python -m tests.support.reference --update"
 
 
@@ -54,7 +56,7 @@ def test_a_module_publishes_the_bytes_of_the_reference(module: str) -> None:
 
     outcome = _replayed(REFERENCE, module)
 
-    assert outcome.same >= FRAMES - 1
+    assert outcome.same >= MIN_OUTPUTS
     assert outcome.missing_inputs == {}
     assert outcome.extra_outputs == 0
     assert outcome.notes == []
@@ -64,7 +66,7 @@ def test_a_module_publishes_the_bytes_of_the_reference(module: str) -> None:
 def test_a_module_publishes_the_bytes_of_a_drive_on_this_machine(fresh: Path, module: str) -> None:
     outcome = _replayed(fresh, module)
 
-    assert outcome.same >= FRAMES - 1
+    assert outcome.same >= MIN_OUTPUTS
 
 
 def test_a_drive_of_today_is_the_reference_on_every_topic(fresh: Path) -> None:
@@ -106,6 +108,6 @@ def test_a_change_is_printed_by_topic_with_the_first_difference_of_each(
 
     printed = in_words(compared(fresh, shorter))
 
-    first = "motor/command number 3 of action (stamp 0.800 s)"
+    first = "motor/command number 3 of motor (stamp 0.800 s)"
     assert f"motor/command: 3 the same, 0 changed, {FRAMES - 3} gone, 0 new" in printed
     assert f"{first} is in fresh.mcap and not in shorter.mcap" in printed

@@ -99,16 +99,24 @@ class LogReader:
         return (last_ns - first_ns) / 1e9
 
     def records(
-        self, topics: Collection[Topic] | None = None, progress: Progress | None = None
+        self,
+        topics: Collection[Topic] | None = None,
+        progress: Progress | None = None,
+        *,
+        start_ns: int = 0,
+        end_ns: int = layout.MAX_TIME_NS + 1,
     ) -> Iterator[Record]:
         """Messages on `topics`, on all known ones where it is None, in order of log time.
 
-        Those of one time come as they were written. `progress` is called with the share of chunks
-        that have been read. Raises LogError.
+        Those of log times from `start_ns` (inclusive) to `end_ns` (exclusive); chunks without any
+        are not read. Those of one time come as they were written. `progress` is called with the
+        share of chunks that have been read. Raises LogError.
         """
         waiting: list[Record] = []
-        for number in range(len(self._chunks)):
-            waiting += self._records_of(number, topics)
+        numbers = self._chunks_between(start_ns, end_ns)
+        for done, number in enumerate(numbers, start=1):
+            found = self._records_of(number, topics)
+            waiting += [record for record in found if start_ns <= record.log_time_ns < end_ns]
             waiting.sort(key=lambda record: record.log_time_ns)
 
             ready = _count_before(waiting, self._start_ns(number + 1))
@@ -116,7 +124,8 @@ class LogReader:
             del waiting[:ready]
 
             if progress is not None:
-                progress((number + 1) / len(self._chunks))
+                progress(done / len(numbers))
+        yield from waiting
 
     def payload(self, record: Record) -> bytes:
         """The bytes of a message, as they travelled.
@@ -139,6 +148,14 @@ class LogReader:
         except msgspec.DecodeError as error:
             topic = record.topic_name
             raise LogError(f"{self.path}: a message of {topic} cannot be read: {error}") from None
+
+    def _chunks_between(self, start_ns: int, end_ns: int) -> list[int]:
+        """The numbers of the chunks that may hold messages of these log times."""
+        numbers = []
+        for number, chunk in enumerate(self._chunks):
+            if chunk.last_ns >= start_ns and chunk.first_ns < end_ns:
+                numbers.append(number)
+        return numbers
 
     def _start_ns(self, number: int) -> int:
         """The first log time in a chunk; later than any where there is no such chunk."""

@@ -7,13 +7,17 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from msgspec.structs import replace
+
 from cogmap.bus.codec import UNKNOWN, Cause, Envelope, encode
 from cogmap.bus.interface import Bus
 from cogmap.runtime.module import Module
 from cogmap.runtime.state.journal import Journal
 from cogmap.runtime.state.published import PublishedCounts
+from cogmap.runtime.state.store import Store
 from schemas import topics
 from schemas.base import Message
+from schemas.memory import Stored
 from schemas.process import Health
 from schemas.topics import Delivery, Topic
 
@@ -38,7 +42,9 @@ class Computation:
 
 
 class Publisher:
-    """Sends messages of `module` on `bus`, to the journal first; `emitted` counts them by topic."""
+    """Sends messages of `module` on `bus`, to the journal or the store first; `emitted` counts them
+    by topic.
+    """
 
     def __init__(
         self,
@@ -46,6 +52,7 @@ class Publisher:
         bus: Bus,
         journal: Journal | None = None,
         counts: PublishedCounts | None = None,
+        store: Store | None = None,
     ) -> None:
         self.incarnation = time.time_ns()
         self.emitted: Counter[str] = Counter()
@@ -53,6 +60,7 @@ class Publisher:
         self._bus = bus
         self._journal = journal
         self._counts = counts
+        self._store = store
         self._causes: list[Cause] = []
         self._traces: dict[int, Envelope] = {}
 
@@ -84,6 +92,16 @@ class Publisher:
             self._send(message, computation)
         self._compact_journal()
 
+    def send_restored(self, store: Store) -> None:
+        """Publish what a store holds as its own, so that a log has what the module began with."""
+        topic = topics.RESTORED
+        restored = replace(store.restored(), source=f"{self._module.instance}.store")
+        now_ns = time.time_ns()
+        envelope = Envelope(restored.source, 0, self.incarnation, now_ns, now_ns)
+
+        self._bus.declare(topic)
+        self._bus.publish(topic, encode(restored), envelope)
+
     def send_health(self, health: Health) -> None:
         """Publish `health`, with the causes that wait for an output where they have become many."""
         topic = topics.HEALTH
@@ -105,6 +123,8 @@ class Publisher:
         payload = encode(message)
         if self._journal is not None and topic is self._module.journal:
             self._journal.append(message, payload)
+        if self._store is not None and isinstance(message, Stored):
+            self._store.save(message)
 
         envelope = self._envelope(topic, message, computation.end_ns)
         envelope.causes = self._take_causes()

@@ -1,6 +1,6 @@
-//! The wanderer in Rust: drives by the range scan alone, in the place of `action`.
+//! The wanderer in Rust: drives by the range scan alone, in the place of `motor`.
 //!
-//! Run it beside the others: `cogmap run --without action`, and `cargo run -- tcp/127.0.0.1:7447`.
+//! Run it beside the others: `cogmap run --without motor`, and `cargo run -- tcp/127.0.0.1:7447`.
 
 use std::error::Error;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use serde_bytes::ByteBuf;
 use zenoh::{Config, Wait};
 
-const INSTANCE: &str = "action";
+const INSTANCE: &str = "motor";
 const AHEAD_RAD: f32 = 0.3;
 const CLEARANCE_M: f32 = 4.0;
 const CRUISE_RAD_S: f64 = 10.0;
@@ -112,7 +112,7 @@ fn run(endpoint: &str, agent: &str) -> Result<(), Box<dyn Error + Send + Sync>> 
         .wait()?;
     let _ready = session
         .liveliness()
-        .declare_token(format!("cogmap/{agent}/@ready/action/{INSTANCE}"))
+        .declare_token(format!("cogmap/{agent}/@ready/motor/{INSTANCE}"))
         .wait()?;
 
     let mut number = 0;

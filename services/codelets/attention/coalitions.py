@@ -2,33 +2,65 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import msgspec
 
 from cogmap.graph.graph import Graph
 from schemas.array import Matrix
 from schemas.cognition import Coalition
 from schemas.graph import Link
-from schemas.nodes import AnyNode, LinkKind, Object, Self, object_id
+from schemas.nodes import AnyNode, Goal, LinkKind, Object, Plan, Self, object_id
 from schemas.sensing import Percept
 from services.codelets.nodes import nodes_of
 
 
-def coalition(codelet: str, nodes: list[AnyNode], graph: Graph, base_level: float) -> Coalition:
-    """A coalition of `nodes`, with their links to places, and the maps they are on.
+def coalition(
+    codelet: str,
+    nodes: list[AnyNode],
+    graph: Graph,
+    base_level: float,
+    links: Iterable[Link] = (),
+) -> Coalition:
+    """A coalition of `nodes`, with their links to places and `links`, and the maps they are on.
 
-    Its activation is base-level x sum(total activation + |incentive salience|) / 2n over its nodes,
-    as in LIDA's framework.
+    Its activation is base-level x sum(total activation + |incentive salience|) / 2n over its n
+    nodes and links, as in LIDA's framework. A link is as active and as salient as the node that it
+    begins at, whose activation it passes on, times its weight.
     """
-    total = sum(graph.total_activation(node) + abs(_salience(node)) for node in nodes)
-    activation = base_level * total / (2 * len(nodes))
+    every_link = [*_links_to_places(nodes, graph), *links]
+    strengths = {node.id: _strength(node, graph) for node in nodes}
+    total = sum(strengths.values())
+    for link in every_link:
+        total += link.weight * strengths.get(link.source, 0.0)
+
+    number = len(nodes) + len(every_link)
+    activation = base_level * total / (2 * number)
 
     return Coalition(
         codelet=codelet,
         activation=min(1.0, activation),
         nodes=[_as_of_now(node, graph) for node in nodes],
-        links=_links_to_places(nodes, graph),
+        links=every_link,
         maps=_maps_of(nodes),
     )
+
+
+def felt(node: AnyNode, salience: float) -> AnyNode:
+    """A node with a feeling attached to it."""
+    return msgspec.structs.replace(node, salience=salience)
+
+
+def objects_in_view(percepts: list[Percept], graph: Graph) -> list[Object]:
+    """The objects of the map that are in view, by label."""
+    labels = sorted(percept.label for percept in percepts)
+    names = [object_id(label) for label in labels]
+    return nodes_of(graph, Object, names)
+
+
+def _strength(node: AnyNode, graph: Graph) -> float:
+    """Total activation + |incentive salience|."""
+    return graph.total_activation(node) + abs(node.salience)
 
 
 def _links_to_places(nodes: list[AnyNode], graph: Graph) -> list[Link]:
@@ -46,28 +78,15 @@ def _maps_of(nodes: list[AnyNode]) -> list[str]:
     """The maps that nodes are on, each once, in the order of the nodes."""
     maps: dict[str, None] = {}
     for node in nodes:
-        if isinstance(node, Self | Object):
+        if isinstance(node, Self | Object | Goal | Plan):
             maps[node.map] = None
 
     return list(maps)
 
 
-def objects_in_view(percepts: list[Percept], graph: Graph) -> list[Object]:
-    """The objects of the map that are in view, by label."""
-    labels = sorted(percept.label for percept in percepts)
-    names = [object_id(label) for label in labels]
-    return nodes_of(graph, Object, names)
-
-
-def _salience(node: AnyNode) -> float:
-    if isinstance(node, Object):
-        return node.salience
-    return 0.0
-
-
 def _as_of_now(node: AnyNode, graph: Graph) -> AnyNode:
-    """The node with its activation in this cycle, and the mean of its samples in place of them all:
-    the global workspace broadcasts no more than that.
+    """The node with its activation in this cycle, the mean of its samples in place of them all, and
+    without a route: the global workspace broadcasts no more than that.
     """
     now = {
         "activation": graph.activation(node),
@@ -76,6 +95,9 @@ def _as_of_now(node: AnyNode, graph: Graph) -> AnyNode:
     }
     if isinstance(node, Object):
         return msgspec.structs.replace(node, offsets_m=None, **now)
+
+    if isinstance(node, Plan):
+        return msgspec.structs.replace(node, route=None, **now)
 
     if isinstance(node, Self):
         mean = Matrix.of([[node.x_m, node.y_m, node.heading_rad]])

@@ -8,53 +8,57 @@ from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.codelets import Task
 from schemas.graph import Phase
-from schemas.nodes import SELF_ID, AnyNode, Object, Self
+from schemas.nodes import SELF_ID, AnyNode, Attention, Object, Self
 from schemas.sensing import Percept
 from services.codelets.attention.coalitions import coalition, objects_in_view
-from services.codelets.config import SECTION, Config
+from services.codelets.attention.config import SECTION, Config, Novelty
+from services.codelets.attention.memory import brought, is_refractory, memory_of
 
-NOVEL_SIGHTINGS = 5
+NAME = "novelty"
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task where an object in view has been seen in few views."""
-    percepts = context.percepts.objects
-    if not novel_objects(percepts, graph):
+    """One task where an object in view has been seen in few views, and it does not wait."""
+    settings = config.novelty
+    if is_refractory(NAME, graph, context.cycle, settings.refractory_cycles):
         return []
 
-    return [context.task(CODELET.name, about=[SELF_ID], percepts=percepts)]
+    percepts = context.percepts.objects
+    if not novel_objects(percepts, graph, settings):
+        return []
+
+    return [context.task(NAME, about=[SELF_ID], percepts=percepts)]
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
     """A coalition of the self and the novel objects in view."""
-    novel = novel_objects(task.percepts, graph)
+    novel = novel_objects(task.percepts, graph, config.novelty)
     if not novel or graph.agent is None:
         return Answer()
 
     nodes: list[AnyNode] = [graph.agent, *novel]
-
-    found = coalition(CODELET.name, nodes, graph, config.attention_base_level)
-    return Answer(coalitions=[found])
+    found = coalition(NAME, nodes, graph, config.novelty.base_level)
+    return brought(memory_of(NAME, graph), found, task.cycle, graph)
 
 
 CODELET = Codelet(
-    name="novelty",
+    name=NAME,
     phase=Phase.ATTENTION,
     due=due,
     run=run,
-    reads=frozenset({Self, Object}),
-    writes=frozenset(),
+    reads=frozenset({Self, Object, Attention}),
+    writes=frozenset({Attention}),
     config=Config,
     section=SECTION,
 )
 
 
-def novel_objects(percepts: list[Percept], graph: Graph) -> list[Object]:
+def novel_objects(percepts: list[Percept], graph: Graph, settings: Novelty) -> list[Object]:
     """The objects in view that were seen in few views, each as salient as it was seen little."""
     found = []
     for node in objects_in_view(percepts, graph):
-        if node.sightings <= NOVEL_SIGHTINGS:
-            salience = 1.0 - node.sightings / (NOVEL_SIGHTINGS + 1)
+        if node.sightings <= settings.novel_sightings:
+            salience = 1.0 - node.sightings / (settings.novel_sightings + 1)
             found.append(msgspec.structs.replace(node, salience=salience))
 
     return found

@@ -1,4 +1,6 @@
-"""An attention codelet: where the agent is among what it sees."""
+"""The default attention codelet: where the agent is among what it sees, the most active content of
+the Current Situational Model.
+"""
 
 from __future__ import annotations
 
@@ -6,16 +8,20 @@ from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.codelets import Task
 from schemas.graph import Phase
-from schemas.nodes import SELF_ID, AnyNode, Object, Self
+from schemas.nodes import SELF_ID, AnyNode, Attention, Object, Self
 from services.codelets.attention.coalitions import coalition, objects_in_view
-from services.codelets.config import SECTION, Config
+from services.codelets.attention.config import SECTION, Config
+from services.codelets.attention.memory import brought, is_refractory, memory_of
+
+NAME = "whereabouts"
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task in each cycle."""
-    percepts = context.percepts.objects
-    task = context.task(CODELET.name, about=[SELF_ID], percepts=percepts)
-    return [task]
+    """One task in each cycle in which it does not wait."""
+    if is_refractory(NAME, graph, context.cycle, config.whereabouts.refractory_cycles):
+        return []
+
+    return [context.task(NAME, about=[SELF_ID], percepts=context.percepts.objects)]
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
@@ -27,17 +33,19 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     if not nodes:
         return Answer()
 
-    found = coalition(CODELET.name, nodes, graph, config.attention_base_level)
-    return Answer(coalitions=[found])
+    found = coalition(NAME, nodes, graph, config.whereabouts.base_level)
+    if not config.whereabouts.refractory_cycles:
+        return Answer(coalitions=[found])
+    return brought(memory_of(NAME, graph), found, task.cycle, graph)
 
 
 CODELET = Codelet(
-    name="whereabouts",
+    name=NAME,
     phase=Phase.ATTENTION,
     due=due,
     run=run,
-    reads=frozenset({Self, Object}),
-    writes=frozenset(),
+    reads=frozenset({Self, Object, Attention}),
+    writes=frozenset({Attention}),
     config=Config,
     section=SECTION,
 )

@@ -60,17 +60,21 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         raise MessageError(f"task {task.task_id}: the correction was applied before")
 
     rows = correction.rows.numpy()
-    path = _corrected_path(graph, rows)
+    if _is_outdated(rows, graph):
+        return Answer([DropNode(id=CORRECTION_ID)])
+    return Answer([DropNode(id=CORRECTION_ID), *moved(graph, rows)])
 
-    operations: list[Operation] = [DropNode(id=CORRECTION_ID)]
-    operations += segments(path)
+
+def moved(graph: Graph, rows: Floats) -> list[Operation]:
+    """Everything on the root map, moved as (n, 7) rows of a correction state."""
+    path = _corrected_path(graph, rows)
+    operations: list[Operation] = [*segments(path)]
     if graph.agent is not None:
         operations += _move_self(graph, graph.agent, rows[-1:])
     operations += _move_objects(graph, rows, path)
     operations += _move_maps(graph, rows)
     operations += move_places(graph, rows[:, OLD], rows[:, NEW])
-
-    return Answer(operations)
+    return operations
 
 
 CODELET = Codelet(
@@ -83,6 +87,16 @@ CODELET = Codelet(
     config=Config,
     section=SECTION,
 )
+
+
+def _is_outdated(rows: Floats, graph: Graph) -> bool:
+    """Whether the path has moved as a whole since the correction was computed: as long as it has
+    not, no correction moves its first place.
+    """
+    path = rows_of(graph.of_kind(PathSegment))
+    if not len(path) or path[0, STAMP] != rows[0, STAMP]:
+        return False
+    return not np.array_equal(path[0, POSE], rows[0, OLD])
 
 
 def _corrected_path(graph: Graph, rows: Floats) -> Floats:

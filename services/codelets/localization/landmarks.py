@@ -41,7 +41,6 @@ from services.codelets.localization.sampling import (
 
 GAP = 3.0
 LOCAL_SHARE = 0.5
-BASE_LEVEL_GAIN = 0.05
 MIN_RANGE_M = 0.1
 
 
@@ -195,14 +194,15 @@ def object_answer(
 
 def _kept_answer(task: Task, graph: Graph, node: Object, record: Record) -> Answer:
     """An object refreshed by the percept of `task`, its position as it is, and its link to the
-    place there.
+    place there. Being seen excites its activation; its base level is learned by consciousness
+    alone.
     """
     (percept,) = task.percepts
     seen = msgspec.structs.replace(
         node,
         function=percept.function or node.function,
         activation=percept.activation,
-        base_level=min(1.0, graph.base_level(node) + BASE_LEVEL_GAIN),
+        base_level=graph.base_level(node),
         cycle=task.cycle,
         width_m=percept.width_m,
         height_m=percept.height_m,

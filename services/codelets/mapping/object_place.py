@@ -21,7 +21,7 @@ from services.codelets.localization.landmarks import (
 from services.codelets.localization.motion_model import with_gains
 from services.codelets.localization.sampling import generator, resample
 
-FIRST_BASE_LEVEL = 0.2
+FIRST_BASE_LEVEL = 0.15
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:

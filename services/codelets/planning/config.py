@@ -26,6 +26,10 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         PositiveMetres,
         Meta(description="Distance at which a goal counts as reached, in m, above 0 to 10000."),
     ] = 2.0
+    satisfied_level: Annotated[
+        Share,
+        Meta(description="Level at which a need counts as satisfied, 0 to 1."),
+    ] = 0.1
     approach_m: Annotated[
         PositiveMetres,
         Meta(

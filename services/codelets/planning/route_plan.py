@@ -24,6 +24,7 @@ from schemas.nodes import (
     Goal,
     LinkKind,
     Map,
+    Need,
     Object,
     PathSegment,
     Plan,
@@ -49,8 +50,12 @@ from services.codelets.planning.routes import (
 from services.codelets.planning.targets import (
     Cell,
     Target,
+    as_reached,
     goals_m,
     has_arrived,
+    is_at,
+    is_satisfied,
+    most_pressing,
     nearest_free,
     next_goal,
     open_goals,
@@ -97,12 +102,24 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
 def _planned(now: Situation, graph: Graph) -> Planned:
     """What is planned on the ground of a situation."""
     targets = [target_of(goal, graph, now.where, now.config) for goal in open_goals(graph)]
-    reached = [target.goal for target in targets if _is_at(target, now)]
+    here = [target.goal for target in targets if is_at(target, now.agent, now.where, now.config)]
+    reached = [goal for goal in here if is_satisfied(goal, graph, now.config)]
     at = {goal.id for goal in reached}
     left = [target_of(goal, graph, now.where, now.config) for goal in open_goals(graph, at)]
+    return Planned(now, reached, left, _plan_for(here, at, left, graph, now))
 
-    plan = _routeless(PlanState.AT_GOAL, now) if has_arrived(graph, at) else _plan(left, now)
-    return Planned(now, reached, left, plan)
+
+def _plan_for(
+    here: list[Goal], at: set[str], left: list[Target], graph: Graph, now: Situation
+) -> Plan:
+    """The plan of an agent that is at some goals, those reached with the ids `at`: it rests where a
+    need is being satisfied.
+    """
+    if len(at) < len(here):
+        return _routeless(PlanState.RESTS, now)
+    if has_arrived(graph, at):
+        return _routeless(PlanState.AT_GOAL, now)
+    return _plan(most_pressing(left), now)
 
 
 def _answer(planned: Planned, graph: Graph) -> Answer:
@@ -111,7 +128,7 @@ def _answer(planned: Planned, graph: Graph) -> Answer:
     answer = Answer()
     answer.operations.extend(_links_to_places(left, now.agent.map, graph))
     for goal in reached:
-        answer.operations.append(msgspec.structs.replace(goal, reached_ns=now.task.stamp_ns))
+        answer.operations.append(as_reached(goal, now.task.stamp_ns))
         if now.before is not None and goal.id == next_goal(now.before):
             answer.events.append(_replay(now.before, Direction.REVERSE, now))
 
@@ -158,22 +175,11 @@ CODELET = Codelet(
     phase=Phase.BACKGROUND,
     due=due,
     run=run,
-    reads=frozenset({Self, Goal, Plan, Object, Map, PathSegment, *COLUMNS}),
+    reads=frozenset({Self, Goal, Need, Plan, Object, Map, PathSegment, *COLUMNS}),
     writes=frozenset({Plan, Goal, LinkKind.TOWARDS, LinkKind.AT}),
     config=Config,
     section=SECTION,
 )
-
-
-def _is_at(target: Target, now: Situation) -> bool:
-    """Whether the agent is at the place of a goal."""
-    if target.cell is None:
-        return False
-
-    i, j = target.cell
-    cell_m = now.where.network.cell_m
-    away_m = math.hypot(i * cell_m - now.agent.x_m, j * cell_m - now.agent.y_m)
-    return away_m <= now.config.reached_m
 
 
 def _links_to_places(targets: list[Target], map_id: str, graph: Graph) -> list[Operation]:

@@ -6,11 +6,23 @@ import math
 from collections.abc import Collection
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.graph.graph import Graph
-from schemas.nodes import NEVER_NS, Goal, Object, Plan, PlanState, object_id
+from schemas.graph import DropNode, Operation
+from schemas.nodes import (
+    NEVER_NS,
+    Goal,
+    Need,
+    Object,
+    Plan,
+    PlanState,
+    Self,
+    need_id,
+    object_id,
+)
 from services.codelets.planning.config import Config
 from services.codelets.planning.ground import Ground
 
@@ -55,6 +67,38 @@ def next_goal(plan: Plan | None) -> str:
     if plan is None or not plan.goals:
         return ""
     return plan.goals[0]
+
+
+def is_at(target: Target, agent: Self, ground: Ground, config: Config) -> bool:
+    """Whether the agent is at the place of a goal."""
+    if target.cell is None:
+        return False
+
+    i, j = target.cell
+    cell_m = ground.network.cell_m
+    away_m = math.hypot(i * cell_m - agent.x_m, j * cell_m - agent.y_m)
+    return away_m <= config.reached_m
+
+
+def as_reached(goal: Goal, stamp_ns: int) -> Operation:
+    """That a goal was reached; one that served a need is forgotten."""
+    if goal.need:
+        return DropNode(id=goal.id)
+    return msgspec.structs.replace(goal, reached_ns=stamp_ns)
+
+
+def is_satisfied(goal: Goal, graph: Graph, config: Config) -> bool:
+    """Whether an agent that is at a goal has what it came for: the need that the goal serves, if
+    any, is low.
+    """
+    need = graph.get(Need, need_id(goal.need)) if goal.need else None
+    return need is None or need.level <= config.satisfied_level
+
+
+def most_pressing(targets: list[Target]) -> list[Target]:
+    """The targets that serve a need, where there are any that have a place; otherwise all."""
+    pressing = [target for target in targets if target.goal.need and target.cell is not None]
+    return pressing or targets
 
 
 def has_arrived(graph: Graph, at: Collection[str] = ()) -> bool:

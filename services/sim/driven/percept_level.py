@@ -24,11 +24,11 @@ from schemas.sensing import (
     TruePose,
     TrueTown,
 )
-from services.sim.config import Config
+from services.sim.battery import PowerSupply
+from services.sim.config import Config, place_of
 from services.sim.driven.robot import KinematicRobot
 from services.sim.driven.sensors import Sensors
 from services.sim.driven.surroundings import Surroundings
-from services.sim.layout import towns
 from services.sim.layout.closures import ClosedStreets
 from services.sim.odometry import Noise, WheelOdometry
 from services.sim.progress import Progress
@@ -50,7 +50,7 @@ class DrivenPerceptLevelSim:
         self.now_ns = 0
         self.progress = 0.0
 
-        self._place = towns.place(config.town, config.seed, config.town_size_m)
+        self._place = place_of(config)
         self.closed_streets = ClosedStreets(self._place.roads, config.closures)
         self._surroundings = Surroundings(self._place)
         self._robot = KinematicRobot(self._place.start, self._surroundings)
@@ -60,6 +60,7 @@ class DrivenPerceptLevelSim:
         self._places = PlaceSim(config.percepts, config.seed)
         self._odometry = WheelOdometry(config.noise, config.seed)
         self._noise = config.noise
+        self._power = PowerSupply(config.supplied_by, self._place.charging_places_m)
 
         self._progress = Progress(config.duration_s, config.ends_at_goal)
         self._motions: list[Row] = []
@@ -76,27 +77,34 @@ class DrivenPerceptLevelSim:
 
         self._robot.resume(last)
         self._progress.resume(last.progress)
+        self._power.resume(last.energy)
         self.now_ns = last.stamp_ns
         self._frames = self.now_ns // self.tick_ns // self.ticks_per_frame
 
     def drive(self, command: MotorCommand) -> None:
-        """Set the wheels' speeds."""
+        """Set the wheels' speeds, where there is energy."""
         self._progress.on_command(command)
-        self._robot.drive(command)
+        if not self._power.is_out:
+            self._robot.drive(command)
 
     def step(self) -> list[Message]:
         """Advance by one tick; the self-motion of it is published with the view."""
         before = self._robot.pose
         dt_s = self.tick_ns / 1e9
+        before_m = self._robot.travelled_m
         self._robot.advance(dt_s)
         self.now_ns += self.tick_ns
+        moved_m = self._robot.travelled_m - before_m
+        self._power.advance(self._robot.pose, moved_m, dt_s)
+        if self._power.is_out:
+            self._robot.brake()
 
         odometry = self._odometry.measure(before, self._robot.pose, dt_s)
         self._motions.append(_row(odometry, self._noise))
         return []
 
     def view(self) -> list[Message]:
-        """Self-motion since the last view, range scan and percepts."""
+        """Self-motion since the last view, range scan, the energy that is sensed, and percepts."""
         pose = self._robot.pose
         near = self._surroundings.near(pose.x_m, pose.y_m)
         seen = self._sensors.look(pose, near)
@@ -118,6 +126,7 @@ class DrivenPerceptLevelSim:
                 bearing_rad=Array.of(seen.bearing_rad),
                 range_m=Array.of(seen.range_m),
             ),
+            *self._power.sensed(stamp_ns, frame),
             Percepts(
                 stamp_ns=stamp_ns,
                 frame=frame,
@@ -142,6 +151,7 @@ class DrivenPerceptLevelSim:
             travelled_m=self._robot.travelled_m,
             progress=self.progress,
             collisions=self._robot.collisions,
+            energy=self._power.level,
         )
 
     def town(self) -> TrueTown:

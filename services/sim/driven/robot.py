@@ -54,6 +54,10 @@ class KinematicRobot:
         right = _within(command.right_wheel_rad_s, MAX_WHEEL_RAD_S)
         self._wanted_rad_s = (left, right)
 
+    def brake(self) -> None:
+        """Stop the wheels."""
+        self._wanted_rad_s = (0.0, 0.0)
+
     def advance(self, dt_s: float) -> None:
         """Move for `dt_s`, as far as nothing is in the way."""
         distance_m, turn_rad = self._step(dt_s)

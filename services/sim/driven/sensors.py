@@ -12,6 +12,7 @@ import numpy as np
 from cogmap.geometry.arrays import Floats, Singles
 from schemas.sensing import Calibration, Percept, Pose
 from services.sim.driven.camera import NEAR_M, NOTHING, Buffer, ColumnCamera, depths_m
+from services.sim.driven.charging_sight import ChargingSight
 from services.sim.driven.ground import Lattice, boundary_points_m, road_points_m, thin
 from services.sim.driven.surroundings import Near
 from services.sim.layout.place import Place
@@ -53,6 +54,7 @@ class Sensors:
         self._corners_m = [np.array(plot.corners) for plot in place.plots]
         landmarks = [_landmark(plot) for plot in place.plots]
         self._percepts = PerceptSim(errors, landmarks, seed)
+        self._charging = ChargingSight(place.charging_places, errors, self._camera, seed)
 
     def look(self, pose: Pose, near: Near) -> View:
         """All that is seen from a pose, of what is near it."""
@@ -64,12 +66,13 @@ class Sensors:
         bearing_rad, range_m = self._scan(depth_m)
         road_m, boundary_m = self._ground(at, depth_m, near)
 
+        buildings = self._objects(pose, at, walls, near)
         return View(
             bearing_rad=bearing_rad,
             range_m=range_m,
             road_m=road_m,
             boundary_m=boundary_m,
-            objects=self._objects(pose, at, walls, near),
+            objects=buildings + self._charging.look(pose, walls.inverse_m),
         )
 
     def _scan(self, depth_m: Floats) -> tuple[Singles, Singles]:

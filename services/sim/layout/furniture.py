@@ -20,6 +20,7 @@ from services.sim.layout.plan import (
 
 Size = tuple[float, float, float]
 
+CHARGING_PLACE = "charging-place"
 _SPACING_M = 5.0
 _SCATTERED = 30
 _AROUND_M = 55.0

@@ -10,8 +10,8 @@ from cogmap.geometry.arrays import Floats
 from schemas.array import Array
 from schemas.sensing import Building, Obstacle, Pose, Street, TrueTown
 from services.sim.layout.boundaries import kerbs, outlines
-from services.sim.layout.furniture import Prop
-from services.sim.layout.plan import Plot, Road
+from services.sim.layout.furniture import CHARGING_PLACE, Prop
+from services.sim.layout.plan import Plot, Point, Road
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,16 @@ class Place:
     def walls_m(self) -> Floats:
         """(n, 4): the outer walls of the buildings, in the order of `plots`."""
         return outlines([plot.corners for plot in self.plots])
+
+    @property
+    def charging_places(self) -> list[Prop]:
+        """The props at which the robot's battery is charged."""
+        return [prop for prop in self.props if prop.kind == CHARGING_PLACE]
+
+    @property
+    def charging_places_m(self) -> list[Point]:
+        """Where these stand."""
+        return [(prop.x_m, prop.y_m) for prop in self.charging_places]
 
     def message(self, closed: Collection[str] = ()) -> TrueTown:
         """The place as it travels, with the streets named in `closed` closed."""

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 from cogmap.errors import ConfigError
 from services.sim.layout.blocks import town as blocks
+from services.sim.layout.charging import with_charging_places
 from services.sim.layout.osm import town as osm
 from services.sim.layout.place import Place
+from services.sim.layout.starts import another_start
 from services.sim.layout.town import generate
 
 LOOP = "loop"
@@ -25,10 +28,23 @@ def check(town: str) -> None:
         )
 
 
-def place(town: str, seed: int, size_m: float) -> Place:
-    """The town of that name: LOOP or BLOCKS, from `seed`, or OSM and the path of an extract;
-    `size_m` is the side of a town of blocks. Raises UsageError where the extract makes no town.
+def place(
+    town: str, seed: int, size_m: float, *, start: int = 0, charging_places: int = 0
+) -> Place:
+    """The town of that name, with so many charging places.
+
+    It is LOOP or BLOCKS, from `seed`, or OSM and the path of an extract; `size_m` is the side of a
+    town of blocks. The robot begins where it usually does, or at another `start`, numbered from 1.
+    Raises UsageError where the extract makes no town, or the town has no room for so many charging
+    places.
     """
+    made = with_charging_places(_bare(town, seed, size_m), seed, charging_places)
+    if not start:
+        return made
+    return dataclasses.replace(made, start=another_start(made, start))
+
+
+def _bare(town: str, seed: int, size_m: float) -> Place:
     if town == LOOP:
         return generate(seed)
     if town.startswith(OSM):

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from services.sim.layout.catalogue import Colour
-from services.sim.layout.furniture import Prop, Size
+from services.sim.layout.furniture import CHARGING_PLACE, Prop, Size
 from services.sim.rendering.mesh import UV, Mesh, Vertex
 from services.sim.rendering.wall import Image, roughen
 
@@ -22,6 +22,7 @@ _ANGLES_RAD: list[float] = np.linspace(0, math.tau, _SIDES + 1).tolist()
 _GRAIN = 0.25
 _DARK: Colour = (40, 42, 46)
 _RED: Colour = (206, 34, 30)
+_MAGENTA: Colour = (214, 24, 178)
 _WHITE: Colour = (240, 238, 232)
 _BOARD_M = 1.0
 _BARK: Colour = (92, 66, 44)
@@ -155,6 +156,22 @@ def _barrier(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
     return _RED, _WHITE
 
 
+def _charging_place(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
+    """A post with a wide head."""
+    long_m, wide_m, tall_m = size_m
+    neck_m = 0.6 * tall_m
+
+    post_low = (-0.3 * long_m, -0.3 * wide_m, 0.0)
+    post_high = (0.3 * long_m, 0.3 * wide_m, neck_m)
+    _box(mesh, post_low, post_high, _FIRST)
+
+    head_low = (-long_m / 2, -wide_m / 2, neck_m)
+    head_high = (long_m / 2, wide_m / 2, tall_m)
+    _box(mesh, head_low, head_high, _SECOND)
+
+    return _WHITE, _MAGENTA
+
+
 _BUILD: dict[str, Callable[[Mesh, Size, np.random.Generator], Colours]] = {
     "tree": _tree,
     "lamp": _lamp,
@@ -163,6 +180,7 @@ _BUILD: dict[str, Callable[[Mesh, Size, np.random.Generator], Colours]] = {
     "kiosk": _kiosk,
     "bin": _bin,
     "barrier": _barrier,
+    CHARGING_PLACE: _charging_place,
 }
 
 

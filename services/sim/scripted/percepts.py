@@ -23,6 +23,7 @@ Metres = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
 NORMAL_MEDIAN = 0.6745
 MIN_RANGE_M = 0.1
 MIN_RANGE_SD_M = 1e-3
+BUILDINGS = 0x9E
 
 
 class Landmark(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -123,13 +124,21 @@ class PerceptErrors(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fi
 
 
 class PerceptSim:
-    """Simulates percepts of `landmarks` from true poses, the same from the same seed."""
+    """Simulates percepts of `landmarks` from true poses, the same from the same seed; those of
+    different `stream`s err apart.
+    """
 
-    def __init__(self, errors: PerceptErrors, landmarks: Sequence[Landmark], seed: int) -> None:
+    def __init__(
+        self,
+        errors: PerceptErrors,
+        landmarks: Sequence[Landmark],
+        seed: int,
+        stream: int = BUILDINGS,
+    ) -> None:
         self._errors = errors
         self._landmarks = landmarks
         self._functions = {each.name: each.function for each in landmarks}
-        self._rng = np.random.default_rng([seed, 0x9E])
+        self._rng = np.random.default_rng([seed, stream])
 
         places = [(each.x_m, each.y_m) for each in landmarks]
         self._places_m = np.array(places, float).reshape(-1, 2)

@@ -124,12 +124,12 @@ def configured(config: WorkerConfig | None = None) -> list[ConfiguredCodelet]:
     return [ConfiguredCodelet(codelet, _settings(codelet, settings)) for codelet in CODELETS]
 
 
-def _settings(codelet: Codelet, settings: WorkerConfig) -> msgspec.Struct:
+def _settings(codelet: Codelet, settings: msgspec.Struct) -> msgspec.Struct:
     """`settings`, or a codelet's defaults where it has others."""
-    return settings if codelet.config is WorkerConfig else codelet.config()
+    return settings if codelet.config is type(settings) else codelet.config()
 
 
-def run(asked: Task, graph: Graph, config: WorkerConfig) -> Answer:
+def run(asked: Task, graph: Graph, config: msgspec.Struct) -> Answer:
     """What the codelet of `asked` answers."""
     (codelet,) = (codelet for codelet in CODELETS if codelet.name == asked.codelet)
     return codelet.run(asked, graph, _settings(codelet, config))
@@ -165,7 +165,7 @@ class Desk:
         **settings: Any,
     ) -> None:
         self._configured = configured(codelets)
-        facts = {"awaits_scan": False} | settings
+        facts = {"awaits_scan": False, "awaits_competition": False} | settings
         config = Config(mode=mode, **facts)  # type: ignore[arg-type]
         self.module: Module = build(config, "workspace", self._configured)
         self.withheld: list[Assignment] = []

@@ -1,250 +1,82 @@
-"""Action as a module: what broadcasts, poses, scans and clocks make of the wheels."""
+"""Action selection as a module: one action for the behaviours of each broadcast."""
 
 from __future__ import annotations
 
-import msgspec
-import numpy as np
 import pytest
 
-from cogmap.errors import MessageError
-from schemas.array import Array, Matrix
-from schemas.cognition import (
-    Action,
-)
-from schemas.graph import Phase
-from schemas.nodes import PLAN_ID, Plan, PlanState
-from schemas.process import Clock
-from schemas.sensing import SpeedLimit
-from services.action.module import Config
-from services.action.selection import FOLLOW_ROUTE, HALT
-from tests.support.world.action import (
-    PERIOD_NS,
-    broadcast_of,
-    command_after,
-    commands_in,
-    competition_of,
-    driving_module,
-    module_ahead,
-    module_without_plan,
-    motion_of,
-    plan_delta,
-    pose_delta,
-    scan_of,
-)
-from tests.support.world.plans import joined, plan_along
-from tests.support.world.scenes import agent
+from cogmap.runtime.module import Module
+from schemas.cognition import Action
+from services.action.module import Config, build
+from tests.support.world.behaviours import behaviour, behaviours_of, lacking
+
+FOLLOW = behaviour("follow", 1.0, action="follow_plan", parameters={"x_m": 2.0})
+WEAK = behaviour("halt", 0.65)
+SELECTORS = ["behaviour_net", "most_active"]
 
 
-def test_before_any_broadcast_the_robot_stands() -> None:
-    command = command_after(module_ahead(), pose_delta())
-
-    assert command.left_wheel_rad_s == 0.0
-    assert command.halted_by is SpeedLimit.NO_ACTION
+def _module(selector: str = "most_active") -> Module:
+    config = Config(selector=selector)  # type: ignore[arg-type]
+    return build(config, "action")
 
 
-def test_a_broadcast_selects_an_action_and_the_next_pose_moves_the_robot() -> None:
-    module = module_ahead()
-    (action,) = module.feed(broadcast_of())
+def _action(module: Module, cycle: int = 1) -> Action:
+    (action,) = module.feed(behaviours_of(WEAK, cycle=cycle))
+    assert isinstance(action, Action)
+    return action
+
+
+@pytest.mark.parametrize("selector", SELECTORS)
+def test_the_behaviours_of_a_broadcast_lead_to_an_action(selector: str) -> None:
+    (action,) = _module(selector).feed(behaviours_of(WEAK, FOLLOW, cycle=7))
 
     assert isinstance(action, Action)
-    assert (action.scheme, action.cycle) == (FOLLOW_ROUTE, 1)
-    assert action.parameters == {"travelled_m": 0.0}
-
-    (command,) = commands_in(module.feed(pose_delta()))
-
-    assert command.left_wheel_rad_s > 0
-    assert command.stamp_ns == PERIOD_NS
+    assert (action.scheme, action.action, action.cycle) == ("follow", "follow_plan", 7)
+    assert action.parameters == {"x_m": 2.0}
+    assert [each.scheme for each in action.behaviours] == ["halt", "follow"]
 
 
-def test_at_the_end_of_the_route_a_broadcast_halts_the_robot() -> None:
-    module = module_ahead(length_m=3.0)
-    module.feed(broadcast_of())
-    for cycle in range(1, 20):
-        module.feed(pose_delta(cycle, 0.5 * cycle))
-
-    (action,) = module.feed(broadcast_of(20))
+@pytest.mark.parametrize("selector", SELECTORS)
+def test_where_none_is_active_enough_that_is_published(selector: str) -> None:
+    (action,) = _module(selector).feed(behaviours_of(lacking("dock", "target")))
 
     assert isinstance(action, Action)
-    assert action.scheme == HALT
-
-    (command,) = commands_in(module.feed(pose_delta(20, 9.0)))
-
-    assert (command.left_wheel_rad_s, command.right_wheel_rad_s, command.halted_by) == (
-        0.0,
-        0.0,
-        "no action",
-    )
+    assert (action.scheme, action.action, action.activation) == ("", "", 0.0)
+    assert action.threshold == pytest.approx(0.8)
 
 
-def test_without_a_plan_the_robot_is_halted_for_want_of_a_route() -> None:
-    module = module_without_plan()
-    module.feed(broadcast_of())
-    command = command_after(module, pose_delta())
-
-    assert command.halted_by is SpeedLimit.NO_ROUTE
-
-
-@pytest.mark.parametrize(
-    ("state", "halted_by"),
-    [
-        (PlanState.AT_GOAL, SpeedLimit.AT_GOAL),
-        (PlanState.NO_GOAL, SpeedLimit.NO_ROUTE),
-        (PlanState.NO_ROUTE, SpeedLimit.NO_ROUTE),
-    ],
-)
-def test_a_plan_without_a_route_halts_the_robot(state: PlanState, halted_by: SpeedLimit) -> None:
-    module = joined(module_without_plan(), Plan(id=PLAN_ID, state=state, planned_ns=1))
-    module.feed(broadcast_of())
-
-    assert command_after(module, pose_delta()).halted_by is halted_by
-
-
-def test_where_the_plan_ends_at_the_agents_own_place_there_is_no_route() -> None:
-    here = Matrix.of(np.zeros((1, 2)))
-    plan = Plan(id=PLAN_ID, state=PlanState.READY, planned_ns=1, route=here)
-    module = joined(module_without_plan(), plan)
-    module.feed(broadcast_of())
-
-    assert command_after(module, pose_delta()).halted_by is SpeedLimit.NO_ROUTE
-
-
-@pytest.mark.parametrize("mode", ["lockstep", "real_time"])
-def test_a_plan_is_driven_from_the_next_pose_on(mode: str) -> None:
-    module = module_ahead(mode)
-    for message in (broadcast_of(0), motion_of(), scan_of()):
-        module.feed(message)
-    ahead = command_after(module, pose_delta(1))
-
-    assert module.feed(plan_delta(2, (0.0, 0.0), (0.0, 20.0))) == []
-    for message in (motion_of(3), scan_of(cycle=3), competition_of(2)):
-        module.feed(message)
-    aside = command_after(module, pose_delta(3))
-
-    assert ahead.left_wheel_rad_s == ahead.right_wheel_rad_s
-    assert aside.left_wheel_rad_s < aside.right_wheel_rad_s
-
-
-def test_an_obstacle_in_the_scan_halts_the_robot_until_it_has_gone() -> None:
-    module = driving_module()
-    module.feed(scan_of((0.0, 1.2), (0.05, 1.2)))
-    before_it = command_after(module, pose_delta(1))
-
-    module.feed(scan_of(cycle=2))
-    afterwards = command_after(module, pose_delta(2))
-
-    assert before_it.halted_by is SpeedLimit.OBSTACLE
-    assert afterwards.halted_by is SpeedLimit.NONE
-
-
-@pytest.mark.parametrize("phase", [Phase.PERCEPTS, Phase.OBJECTS, Phase.END])
-def test_deltas_without_a_new_pose_lead_to_no_command(phase: str) -> None:
-    delta = pose_delta(phase=phase)
-
-    assert module_ahead().feed(delta) == []
-
-
-def test_a_pose_that_is_committed_late_leads_to_a_command_too() -> None:
-    late = pose_delta(phase=Phase.LATE)
-    published = module_ahead().feed(late)
-
-    assert len(commands_in(published)) == 1
-
-
-def test_each_pose_leads_to_one_command() -> None:
-    module = module_ahead("lockstep")
-    answers = [
-        module.feed(message)
-        for message in (
-            motion_of(),
-            scan_of(),
-            pose_delta(1),
-            motion_of(),
-            scan_of(),
-            competition_of(1),
-            competition_of(1),
-        )
-    ]
-
-    assert [len(commands_in(answer)) for answer in answers] == [0, 0, 1, 0, 0, 0, 0]
-
-
-def _clock(at_s: float) -> Clock:
-    return Clock(stamp_ns=round(at_s * 1e9), rate=1.0)
-
-
-def test_a_pose_that_is_old_by_the_clock_moves_the_robot_more_slowly() -> None:
-    fresh = driving_module()
-    slow = driving_module()
-    slow.feed(_clock(0.2 + 1.0))
-    fast_command = command_after(fresh, pose_delta(1))
-    slow_command = command_after(slow, pose_delta(1))
-
-    assert 0 < slow_command.left_wheel_rad_s < fast_command.left_wheel_rad_s
-    assert slow_command.slowed_by is SpeedLimit.POSE_AGE
-    assert slow_command.pose_age_ns == 10**9
-
-
-def test_a_moving_robot_that_gets_no_new_pose_is_halted_once() -> None:
-    module = driving_module()
-    module.feed(pose_delta(1))
-    assert module.feed(_clock(0.2 + 1.0)) == []
-
-    halt = command_after(module, _clock(0.2 + 2.1))
-    assert halt.halted_by is SpeedLimit.POSE_AGE
-    assert module.feed(_clock(0.2 + 2.2)) == []
-
-
-def test_a_robot_that_is_commanded_to_move_and_stands_is_stuck_and_backs_away() -> None:
-    module = driving_module()
-    backs = {}
-    for cycle in range(1, 40):
-        module.feed(motion_of(cycle, speed_m_s=0.02))
-        command = command_after(module, pose_delta(cycle))
-        if command.left_wheel_rad_s < 0.0:
-            backs[cycle] = command.slowed_by
-
-    stuck_cycles = Config().stuck_after_s * 1e9 / PERIOD_NS
-    assert set(backs.values()) <= {SpeedLimit.STUCK, SpeedLimit.OBSTACLE}
-    assert backs[min(backs)] is SpeedLimit.STUCK
-    assert min(backs) == pytest.approx(stuck_cycles + 1, abs=1)
-
-
-def test_a_robot_that_moves_or_is_not_commanded_to_is_not_stuck() -> None:
-    moving = driving_module()
-    idle = module_ahead()
-    for cycle in range(1, 40):
-        moving.feed(motion_of(cycle))
-        idle.feed(motion_of(cycle, speed_m_s=0.0))
-        drive = command_after(moving, pose_delta(cycle))
-        halt = command_after(idle, pose_delta(cycle))
-
-        assert drive.halted_by is SpeedLimit.NONE
-        assert halt.halted_by is SpeedLimit.NO_ACTION
-
-
-def test_a_self_motion_of_another_shape_is_refused_by_name() -> None:
-    three_columns = Array.of(np.zeros((2, 3)))
-    motion = msgspec.structs.replace(motion_of(), motions=three_columns)
-
-    with pytest.raises(MessageError, match="rows of 5 columns"):
-        module_ahead().feed(motion)
-
-
-def test_a_restarted_action_module_continues_along_its_route() -> None:
-    before = module_ahead(length_m=40.0)
-    plan = plan_along((0.0, 0.0), (40.0, 0.0))
-    after = joined(module_without_plan(), plan, agent(x_m=24.0))
-    messages = before.feed(broadcast_of())
-    for cycle in range(1, 13):
-        messages += before.feed(pose_delta(cycle, 2.0 * cycle))
-
-    messages += before.feed(broadcast_of(12))
-
-    assert before.compact is not None
+@pytest.mark.parametrize("selector", SELECTORS)
+def test_a_restarted_module_continues_as_if_it_had_not_been(selector: str) -> None:
+    before = _module(selector)
+    after = _module(selector)
+    past = [_action(before, cycle) for cycle in (1, 2)]
     assert after.restore is not None
-    assert before.compact() == msgspec.structs.replace(messages[-1], seq=0, source="")
+    after.restore(past)
 
-    after.restore([message for message in messages if isinstance(message, Action)])
-    (command,) = commands_in(after.feed(pose_delta(13, 25.0)))
+    continued = _action(before, 3)
+    restarted = _action(after, 3)
 
-    assert command.left_wheel_rad_s == command.right_wheel_rad_s > 0
+    assert restarted.behaviours == continued.behaviours
+    assert (restarted.scheme, restarted.threshold) == (continued.scheme, continued.threshold)
+
+
+def test_a_restarted_module_answers_nothing_twice() -> None:
+    before = _module()
+    after = _module()
+    past = [_action(before, cycle) for cycle in (1, 2)]
+    assert after.restore is not None
+    after.restore(past)
+
+    assert after.feed(behaviours_of(WEAK, cycle=2)) == []
+    assert len(after.feed(behaviours_of(WEAK, cycle=3))) == 1
+    assert len(after.feed(behaviours_of(WEAK, cycle=1))) == 1  # a workspace that begins anew
+
+
+def test_one_action_stands_for_all_that_were_published() -> None:
+    module = _module()
+    actions = [_action(module, cycle) for cycle in (1, 2)]
+
+    assert module.compact is not None
+    compacted = module.compact()
+
+    assert isinstance(compacted, Action)
+    assert (compacted.cycle, compacted.threshold) == (2, actions[-1].threshold)

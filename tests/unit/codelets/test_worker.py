@@ -16,14 +16,18 @@ from schemas.codelets import Assignment, Leases, Proposal, Task
 from schemas.graph import Cells, Delta, Link, Phase
 from schemas.nodes import (
     CORRECTION_ID,
+    RECOLLECTION_ID,
     Correction,
     Goal,
     LoopClosure,
+    Need,
     Node,
     Object,
     PathSegment,
+    Recollection,
     Self,
     goal_id,
+    need_id,
 )
 from schemas.sensing import PlaceMatch
 from services.codelets.config import Config
@@ -89,10 +93,26 @@ def _correction() -> Correction:
     return Correction(id=CORRECTION_ID, rows=Matrix.of(rows))
 
 
+def _recollection() -> Recollection:
+    return Recollection(
+        id=RECOLLECTION_ID,
+        map="remembered:1",
+        x_m=5.0,
+        y_m=0.0,
+        heading_rad=0.5,
+        labels=["house"],
+        functions=["home"],
+        matched=["house"],
+        objects=Matrix.of([[15.0, 0.0, 0.5, 0.5, 8.0, 6.0, 20.0]]),
+    )
+
+
 def _graph() -> Graph:
     """What every codelet finds something to do with."""
     goal = Goal(id=goal_id("house"), object="house")
-    return graph_of(_self(), _house(), _path(), _closure(), _correction(), goal)
+    need = Need(id=need_id("energy"), label="energy", level=0.9)
+    known = (_self(), _house(), _path(), _closure(), _correction(), _recollection())
+    return graph_of(*known, goal, need)
 
 
 _KERB_M = Array.of(np.array([[4.0, 1.6], [4.6, 1.6]], np.float32))
@@ -105,6 +125,7 @@ def _every_task() -> list[Task]:
     house = [percept("house", 0.0, 8.0)]
     return [
         task("apply_correction"),
+        task("join_map"),
         task("localization", motions=motions, percepts=house),
         task("object_place", percepts=[percept("tower")]),
         task("landmark", percepts=house),
@@ -118,6 +139,10 @@ def _every_task() -> list[Task]:
         task("route_plan"),
         task("whereabouts", percepts=house),
         task("novelty", percepts=house),
+        task("expectation", percepts=house, scan=_RAYS),
+        task("goal"),
+        task("need"),
+        task("place_lost"),
     ]
 
 
@@ -239,7 +264,10 @@ def test_an_unknown_codelet_is_a_failure_that_names_the_known_ones() -> None:
     worker = _worker()
     proposal = _proposal(_answers(worker, task("dreaming")))
 
-    assert "no codelet dreaming: there are apply_correction, localization" in proposal.failure
+    assert (
+        "no codelet dreaming: there are apply_correction, join_map, localization"
+        in proposal.failure
+    )
     assert proposal.operations == []
 
 

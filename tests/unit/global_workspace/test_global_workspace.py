@@ -67,7 +67,7 @@ class Arena:
         return self.compete(at_tick, **activations)[0].trigger
 
 
-def test_the_defaults_are_lidas_with_decay_per_cycle_of_forty_ticks() -> None:
+def test_the_defaults_are_lidas_but_neutral_content_is_enough_and_decay_is_per_cycle() -> None:
     config = Config()
 
     assert (config.no_broadcast_ticks, config.no_new_coalition_ticks, config.refractory_ticks) == (
@@ -75,7 +75,7 @@ def test_the_defaults_are_lidas_with_decay_per_cycle_of_forty_ticks() -> None:
         50,
         40,
     )
-    assert (config.aggregate_above, config.coalition_above, config.decay) == (0.8, 0.5, 0.1)
+    assert (config.aggregate_above, config.coalition_above, config.decay) == (0.8, 0.45, 0.1)
 
 
 def test_the_first_coalition_ever_is_broadcast() -> None:

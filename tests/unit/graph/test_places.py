@@ -8,8 +8,8 @@ import pytest
 from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
 from schemas.array import Array
-from schemas.graph import TILE_SIDE, Cells, Decay, Operation, PlaceTile
-from schemas.nodes import ROOT_MAP, Map, PlaceColumn
+from schemas.graph import Cells, Decay, Operation, PlaceTile
+from schemas.nodes import ROOT_MAP, TILE_SIDE, Map, PlaceColumn
 
 
 def _cells(

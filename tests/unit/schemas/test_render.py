@@ -70,6 +70,7 @@ def test_text_is_yaml_with_a_line_a_field() -> None:
         "  activation: 0.0",
         "  base_level: 0.0",
         "  cycle: 0",
+        "  salience: 0.0",
         "  kind: thing",
         "  attributes:",
         "    x_m: 1.5",

@@ -11,7 +11,6 @@ from cogmap.graph.graph import Graph
 from schemas.array import Array
 from schemas.codelets import Proposal
 from schemas.graph import (
-    TILE_SIDE,
     Cells,
     Decay,
     DropLink,
@@ -22,7 +21,7 @@ from schemas.graph import (
     Phase,
     PlaceTile,
 )
-from schemas.nodes import ROOT_MAP, Map, Node, PlaceColumn, object_id
+from schemas.nodes import ROOT_MAP, TILE_SIDE, Map, Node, PlaceColumn, object_id
 from services.workspace.commit import Ledger
 from tests.support.world.scenes import Desk, agent, answer, landmark, percept, task, thing
 
@@ -269,8 +268,8 @@ def test_a_refused_answer_lets_the_cycle_continue() -> None:
     phases = [delta.phase for delta in desk.deltas]
     rejected = [delta.rejected for delta in desk.deltas]
 
-    assert phases == ["percepts", "objects", "end"]
-    assert rejected == [0, 1, 0]
+    assert phases == ["percepts", "objects", "attention", "end"]
+    assert rejected == [0, 1, 0, 0]
 
 
 def test_what_was_written_before_a_restart_still_counts_as_written() -> None:

@@ -13,10 +13,8 @@ from cogmap.errors import MessageError
 from schemas import topics
 from schemas.array import Array
 from schemas.codelets import Leases, Task
-from schemas.cognition import Coalitions
 from schemas.graph import Delta, SnapshotRequest
 from schemas.nodes import LinkKind, Self, object_id, percept_id
-from tests.support.messages import of_type
 from tests.support.world.scenes import (
     Desk,
     agent,
@@ -60,14 +58,18 @@ def test_self_motion_alone_begins_no_cycle() -> None:
         assert desk.feed(motion(frame)) == []
 
 
-def test_a_cycle_commits_percepts_then_the_pose_then_objects_and_an_end() -> None:
+def test_a_cycle_commits_percepts_the_pose_objects_what_attention_keeps_and_an_end() -> None:
     desk = Desk("w1")
     desk.drive(range(2), percept("house"))
     phases = [delta.phase for delta in desk.deltas]
     cycles = [delta.cycle for delta in desk.deltas]
 
-    assert phases == ["percepts", "localization", "objects", "end"] * 2
-    assert cycles == [1] * 4 + [2] * 4
+    # In the second cycle novelty waits, and there is nothing to keep.
+    assert phases == [
+        *["percepts", "localization", "objects", "attention", "end"],
+        *["percepts", "localization", "objects", "end"],
+    ]
+    assert cycles == [1] * 5 + [2] * 4
 
 
 def test_a_phase_begins_when_every_task_of_the_one_before_is_answered() -> None:
@@ -258,20 +260,3 @@ def test_a_snapshot_of_a_version_that_is_not_committed_yet_is_refused() -> None:
     assert handler(SnapshotRequest(at_least=newest)).version == newest
     with pytest.raises(MessageError, match="not committed yet"):
         handler(SnapshotRequest(at_least=newest + 1))
-
-
-def test_coalitions_are_published_once_after_the_phase_with_an_id_each() -> None:
-    desk = Desk("w1")
-    desk.drive(range(2), percept("a"))
-
-    first, second = of_type(Coalitions, desk.published)
-    whereabouts, novelty = second.coalitions
-    nodes = [node.id for node in whereabouts.nodes]
-    sources = {link.source for link in whereabouts.links}
-
-    assert (first.cycle, second.cycle) == (1, 2)
-    assert whereabouts.id == "2/whereabouts/0"
-    assert novelty.id == "2/novelty/0"
-    assert nodes == ["self", "object:a"]
-    assert sources == {"self", "object:a"}
-    assert whereabouts.maps == ["map:0"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import get_args
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -189,7 +190,8 @@ def test_an_object_that_is_no_longer_seen_stays_and_its_percept_is_forgotten() -
     desk.drive(range(3), percept("a"))
     desk.drive(range(3, 15))
     maps = {"map:0", "map:1", *COARSE_MAPS}
-    expected = {"self", *maps, "path:0", "observations:0:a", "object:a"}
+    kept = {"attention:novelty", "self", *maps}
+    expected = kept | {"path:0", "observations:0:a", "object:a"}
     assert set(desk.graph.nodes) == expected
 
     dropped = []
@@ -204,7 +206,8 @@ def test_a_replica_decays_as_the_workspace_does() -> None:
     desk.drive(range(2, 12))
 
     maps = {"map:0", *COARSE_MAPS}
-    expected = {"self", *maps, "path:0", "observations:0:a", "observations:0:b"}
+    kept = {"attention:novelty", "self", *maps}
+    expected = kept | {"path:0", "observations:0:a", "observations:0:b"}
 
     assert set(desk.graph.nodes) == expected
     assert desk.graph.digest() == desk.digest
@@ -215,3 +218,15 @@ def test_every_kind_has_rules() -> None:
 
     assert kinds
     assert kinds <= set(KINDS)
+
+
+def test_a_base_level_that_was_learned_well_is_kept_and_no_other() -> None:
+    rates = msgspec.structs.replace(RATES, base_level=0.1, kept_base_level=0.5)
+    run = _Run(
+        _node("well", 0.0, 0.8), _node("just", 0.0, 0.5), _node("less", 0.0, 0.45), rates=rates
+    )
+    forgotten = run.end_cycles(100)
+
+    assert forgotten == ["less"]
+    assert run.graph.base_level(run.graph.nodes["well"]) == 0.5
+    assert run.graph.base_level(run.graph.nodes["just"]) == 0.5

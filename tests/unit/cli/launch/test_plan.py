@@ -127,8 +127,13 @@ def test_elsewhere_the_agent_has_no_goals_at_its_start(
 def test_lockstep_is_the_mode_of_all_that_have_one() -> None:
     sections = configured(Choices(lockstep=True))
 
-    for name in ("sim", "workspace", "action"):
+    for name in ("sim", "workspace", "procedural", "motor"):
         assert sections[name]["mode"] == "lockstep"
+
+
+def test_energy_is_off_unless_it_is_chosen() -> None:
+    assert not configured(Choices())["sim"]["energy"]
+    assert configured(Choices(energy=True))["sim"]["energy"]
 
 
 def test_the_drive_waits_for_every_module_every_worker_and_whoever_watches() -> None:
@@ -140,7 +145,10 @@ def test_the_drive_waits_for_every_module_every_worker_and_whoever_watches() -> 
         "workspace": 1,
         "codelets": 3,
         "global_workspace": 1,
+        "memory": 1,
+        "procedural": 1,
         "action": 1,
+        "motor": 1,
         RECORDER: 1,
         OBSERVER: 1,
     }

@@ -19,7 +19,15 @@ from schemas.base import Message
 from schemas.graph import Cells, Delta, DropNode, Phase
 from schemas.nodes import PlaceColumn
 from schemas.process import Health
-from schemas.sensing import MotorCommand, Odometry, Pose, SelfMotion, SpeedLimit, TruePose
+from schemas.sensing import (
+    Energy,
+    MotorCommand,
+    Odometry,
+    Pose,
+    SelfMotion,
+    SpeedLimit,
+    TruePose,
+)
 from services.sim.layout.town import generate
 from tests.support.world.scenes import agent, landmark
 
@@ -174,7 +182,7 @@ def command(seq: int = 0, speed_rad_s: float = 0.0, **limits: SpeedLimit) -> Mot
 
 def test_a_cycle_is_timed_from_the_frame_to_the_command(watch: Watch, publisher: Publisher) -> None:
     halt = command(halted_by=SpeedLimit.OBSTACLE)
-    stages = [("sensory", 20 * MS, 5 * MS), ("action", 10 * MS, 5 * MS)]
+    stages = [("sensory", 20 * MS, 5 * MS), ("motor", 10 * MS, 5 * MS)]
     publisher.publish(halt, sent_ns=40 * MS, stages=stages)
     metrics = metrics_of(watch)
 
@@ -194,6 +202,29 @@ def test_what_slowed_or_halted_the_robot_is_counted_by_reason(
 
     assert metrics_of(watch).slowed == {"pose age": 1, "bend": 1}
     assert slow_share == pytest.approx(1 / 3)
+
+
+def test_the_energy_is_that_at_its_lowest_and_each_charging_counts_once(
+    watch: Watch, publisher: Publisher
+) -> None:
+    levels = [(0.6, False), (0.3, False), (0.4, True), (0.5, True), (0.45, False), (0.5, True)]
+    for number, (level, is_charging) in enumerate(levels):
+        stamp_ns = number * STEP_NS
+        energy = Energy(
+            seq=number, stamp_ns=stamp_ns, frame=number, level=level, is_charging=is_charging
+        )
+        publisher.publish(energy)
+
+    energy_metrics = metrics_of(watch).energy
+    assert energy_metrics is not None
+    assert energy_metrics.lowest == 0.3
+    assert energy_metrics.final == 0.5
+    assert energy_metrics.charged == 2
+    assert not energy_metrics.ran_out
+
+
+def test_a_drive_without_energy_has_no_metrics_of_it(watch: Watch) -> None:
+    assert metrics_of(watch).energy is None
 
 
 def test_gaps_are_those_of_whoever_missed_most(watch: Watch, publisher: Publisher) -> None:

@@ -91,6 +91,19 @@ def test_a_robot_that_waits_for_a_goal_is_not_stuck(reason: SpeedLimit) -> None:
     assert after(10 * STUCK_S, 10 * STUCK_S, halted_by=reason) is None
 
 
+def test_a_robot_that_is_charged_is_not_stuck() -> None:
+    assert after(10 * STUCK_S, 10 * STUCK_S, is_charging=True) is None
+
+
+def test_a_robot_that_is_out_of_energy_ends_the_drive() -> None:
+    watchdog = Watchdog()
+    ending = watchdog.check(Situation(0.0, 10.0, (5.0, 2.0), commands=50, is_out=True))
+
+    assert ending is not None
+    assert ending.outcome is Outcome.OUT_OF_ENERGY
+    assert ending.outcome.exit_code == 1
+
+
 def test_only_a_drive_to_its_end_exits_with_0() -> None:
     codes = {outcome: outcome.exit_code for outcome in Outcome}
 

@@ -9,7 +9,8 @@ from matplotlib.patches import Polygon
 
 from cli.plots.palette import CLOSED
 from cli.plots.town_layer import MAX_NAMES, draw_town
-from schemas.sensing import Building, Pose, Street, TrueTown
+from schemas.sensing import Building, Obstacle, Pose, Street, TrueTown
+from services.sim.layout.furniture import CHARGING_PLACE
 
 LINE_M = [(0.0, 0.0), (40.0, 0.0)]
 
@@ -45,6 +46,16 @@ def test_the_buildings_of_a_district_share_a_tint() -> None:
 def test_a_closed_street_has_a_barrier() -> None:
     assert to_rgb(CLOSED) not in _colours(_drawn([]))
     assert to_rgb(CLOSED) in _colours(_drawn([], closed=True))
+
+
+def test_a_charging_place_has_a_marker_where_it_stands() -> None:
+    pose = Pose(x_m=12.0, y_m=4.5, heading_rad=0.0)
+    post = Obstacle(kind=CHARGING_PLACE, pose=pose, length_m=0.6, width_m=0.6, height_m=2.6)
+    axes = Figure().add_subplot()
+    draw_town(axes, TrueTown(seed=1, streets=[], buildings=[], obstacles=[post]))
+
+    (marker,) = axes.lines
+    assert marker.get_xydata().tolist() == [[12.0, 4.5]]
 
 
 def test_a_building_that_is_no_rectangle_has_its_outline() -> None:

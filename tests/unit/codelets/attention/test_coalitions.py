@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import pytest
 
+from schemas.array import Matrix
 from schemas.graph import Link
-from schemas.nodes import AnyNode, Node, Object, Self
+from schemas.nodes import AnyNode, Node, Object, Plan, PlanState, Self
 from services.codelets.attention.coalitions import coalition
-from services.codelets.attention.novelty import NOVEL_SIGHTINGS
-from services.codelets.config import Config
+from services.codelets.attention.config import Config
 from tests.support.world.scenes import agent, graph_of, landmark, percept, run, task
 
 CONFIG = Config()
+NOVEL_SIGHTINGS = CONFIG.novelty.novel_sightings
 
 
 def _content(*activations: float, salience: float = 0.0) -> list[AnyNode]:
@@ -32,6 +33,27 @@ def test_a_coalitions_activation_is_lidas_formula() -> None:
     assert _activation(neutral) == pytest.approx((0.4 + 0.8) / 4)
     assert _activation(neutral, base_level=0.5) == pytest.approx(0.5 * (0.4 + 0.8) / 4)
     assert _activation(salient) == pytest.approx((0.4 + 0.8 + 1.2) / 4)
+
+
+def test_a_link_is_as_active_and_salient_as_the_node_that_it_begins_at() -> None:
+    (node,) = _content(0.4, salience=0.6)
+    at = Link(source=node.id, target="place:map:0:0:0")
+    near = Link(source=node.id, target="b", kind="near", weight=0.5)
+    placed = graph_of(node, at)
+    linked = coalition("test", [node], placed, 1.0, [near])
+
+    assert coalition("test", [node], placed, 1.0).activation == pytest.approx(1.0 / 2)
+    assert linked.links == [at, near]
+    assert linked.activation == pytest.approx((1.0 + 1.0 + 0.5) / 6)
+
+
+def test_a_coalition_leaves_the_route_of_a_plan_behind() -> None:
+    route = Matrix.of([[0.0, 0.0], [1.0, 0.0]])
+    plan = Plan(id="plan", state=PlanState.READY, length_m=1.0, route=route)
+    (brought,) = coalition("test", [plan], graph_of(plan), 1.0).nodes
+
+    assert isinstance(brought, Plan)
+    assert (brought.route, brought.length_m) == (None, 1.0)
 
 
 def test_total_activation_is_base_level_plus_current_at_most_one() -> None:

@@ -1,0 +1,27 @@
+"""`python -m benchmarks cognition`."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import click
+
+from benchmarks.cognition import measure as cognition
+from benchmarks.options import announce, json_option, processes_option, report_metrics
+
+
+@click.command(name="cognition")
+@processes_option
+@json_option
+def cognition_command(processes: int, json_path: Path | None) -> None:
+    """How fast something is conscious and acted on, and whether the agent keeps its energy.
+
+    Drives a lap of the demo's town in real time, every module a process. Then an agent lives in ten
+    towns for ten minutes, with percept-level sensing and a battery that lasts for some five, and
+    one beside it that acts at random. Takes a quarter of an hour on two cores.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        metrics = cognition.measure(Path(folder), processes, announce)
+
+    report_metrics("cognition", cognition.THRESHOLDS, metrics, json_path)

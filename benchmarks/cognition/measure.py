@@ -1,0 +1,78 @@
+"""The metrics of cognition: how fast something is conscious and acted on, and whether the agent
+lives by it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.cognition.latency import latencies
+from benchmarks.cognition.life import Life, live
+from benchmarks.cognition.random_actions import RandomActions
+from benchmarks.drive import drive
+from benchmarks.report import Metrics
+from benchmarks.threshold import at_least, at_most, within
+from cli.launch.plan import LOG_NAME
+from cogmap.parallel import parallel_map
+
+TOWNS = 10
+FIRST_SEED = 101
+LIFE_S = 600.0
+THRESHOLDS = {
+    "cycle_ms_p50": at_most(130),
+    "broadcasts_per_s": within(3, 10),
+    "conscious_latency_ms_p50": at_most(200),
+    "survived_share": at_least(1),
+}
+
+
+@dataclass(frozen=True)
+class Stay:
+    """A life in a town, by its seed, acting at random or not."""
+
+    seed: int
+    at_random: bool
+
+
+def measure(
+    folder: Path, processes: int, announce: Callable[[str], None], towns: int = TOWNS
+) -> Metrics:
+    """The metrics of THRESHOLDS, and `random_survived_share` of an agent that acts at random;
+    `folder` holds a drive's log.
+    """
+    announce("driving one lap in real time")
+    drive(folder)
+    metrics = latencies(folder / LOG_NAME)
+
+    announce(f"living in {towns} towns for {LIFE_S:g} s each, twice")
+    return metrics | survival(processes, towns)
+
+
+def survival(processes: int, towns: int = TOWNS) -> Metrics:
+    """The shares of towns in which an agent's energy is never out."""
+    stays = []
+    for seed in range(FIRST_SEED, FIRST_SEED + towns):
+        stays += [Stay(seed, at_random=False), Stay(seed, at_random=True)]
+
+    lives = parallel_map(lived, stays, processes)
+    return {
+        "survived_share": _survived(lives[::2]),
+        "random_survived_share": _survived(lives[1::2]),
+        "lowest_energy": min(life.lowest for life in lives[::2]),
+        "charged_mean": float(np.mean([life.charged for life in lives[::2]])),
+    }
+
+
+def lived(stay: Stay) -> Life:
+    """A life in a town."""
+    if stay.at_random:
+        return live(stay.seed, LIFE_S, acting=RandomActions(stay.seed).module())
+    return live(stay.seed, LIFE_S)
+
+
+def _survived(lives: list[Life]) -> float:
+    return float(np.mean([not life.ran_out for life in lives]))

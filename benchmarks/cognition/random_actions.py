@@ -1,0 +1,55 @@
+"""An agent that acts at random: what survival is worth beside."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cogmap.runtime.module import Module
+from schemas import topics
+from schemas.base import Scalar
+from schemas.cognition import Action, ActionName, Behaviour, Behaviours
+
+TURNS_RAD = (-math.pi / 2, math.pi / 2)
+
+
+class RandomActions:
+    """In the place of action selection: each broadcast is answered with any action that the agent
+    is able to take then, be it called for or not.
+    """
+
+    def __init__(self, seed: int) -> None:
+        self._rng = np.random.default_rng([seed, 0xAC])
+
+    def module(self) -> Module:
+        """The module to run in the place of `action`."""
+        return Module("action").on(topics.BEHAVIOURS, self.on_behaviours, emits=[topics.ACTION])
+
+    def on_behaviours(self, behaviours: Behaviours) -> Action:
+        """An action, each as likely as any other."""
+        able = _able(behaviours.behaviours)
+        action, parameters = able[int(self._rng.integers(len(able)))]
+        return Action(
+            stamp_ns=behaviours.stamp_ns,
+            cycle=behaviours.cycle,
+            scheme=action,
+            action=action,
+            activation=1.0,
+            parameters=parameters,
+            behaviours=behaviours.behaviours,
+        )
+
+
+def _able(behaviours: list[Behaviour]) -> list[tuple[str, dict[str, Scalar]]]:
+    """The actions that can be taken, with their parameters: to halt and to turn always, and those
+    of the behaviours.
+    """
+    able: list[tuple[str, dict[str, Scalar]]] = [(ActionName.HALT, {})]
+    for turn_rad in TURNS_RAD:
+        able.append((ActionName.TURN, {"turn_rad": turn_rad}))
+    for behaviour in behaviours:
+        if not behaviour.rejection and behaviour.action != ActionName.HALT:
+            able.append((behaviour.action, behaviour.parameters))
+
+    return able

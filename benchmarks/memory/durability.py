@@ -1,0 +1,182 @@
+"""What the database loses: to kills of the process that writes it, and to damage of its file."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from collections.abc import Iterable
+from contextlib import closing
+from pathlib import Path
+from random import Random
+from typing import NamedTuple
+
+from benchmarks.memory.writer import record_of
+from cli.log.progress import bar
+from cogmap.errors import StorageError
+from cogmap.runtime.state.database import Database, write_new
+from cogmap.runtime.state.record import Record, digest_of
+
+SEED = 11
+MAX_TRANSACTIONS = 20
+MAX_DELAY_S = 0.1
+STORED = 300
+REMOVED = range(50, 80)
+MAX_FLIPS = 8
+_REPOSITORY = Path(__file__).parents[2]
+
+
+class Killed(NamedTuple):
+    """What kills have cost: how many records were acknowledged, and of these lost; and how many
+    kills have left a transaction that is rolled back.
+    """
+
+    acknowledged: int
+    lost: int
+    rolled_back: int
+
+
+class Damaged(NamedTuple):
+    """What became of damaged copies: how many opened with other records, opened with the same, and
+    were refused.
+    """
+
+    changed: int
+    same: int
+    refused: int
+
+
+def lost_after_kill(folder: Path, kills: int = 50) -> int:
+    """How many acknowledged records are missing or different after any of `kills` kills -9.
+
+    A database in `folder` is continued over all of them.
+    """
+    return kill_writers(folder, kills).lost
+
+
+def damaged_store_opened(folder: Path, stores: int = 200) -> int:
+    """How many of `stores` damaged copies in `folder` open with other records than were stored."""
+    return open_damaged(folder, stores).changed
+
+
+def kill_writers(folder: Path, kills: int) -> Killed:
+    """Kill a writer `kills` times, and look for what it acknowledged after each.
+
+    Each kill comes after a random number of transactions and a random delay. Raises StorageError
+    where the database does not open.
+    """
+    path = folder / "killed.db"
+    random = Random(SEED)
+    acknowledged: dict[str, bytes] = {}
+    lost: set[str] = set()
+    rolled_back = 0
+
+    with bar("killing writers") as progress:
+        for kill in range(kills):
+            for number in _written_until_killed(path, len(acknowledged), random):
+                record = record_of(number)
+                acknowledged[record.key] = digest_of(record, sequence=0)
+
+            rolled_back += has_hot_journal(path)
+            lost |= _missing(path, acknowledged)
+            progress((kill + 1) / kills)
+
+    return Killed(len(acknowledged), len(lost), rolled_back)
+
+
+def open_damaged(folder: Path, stores: int) -> Damaged:
+    """Open `stores` copies of a database: of one half bytes are flipped, the other half is cut."""
+    path = folder / "whole.db"
+    write_new(path, map(record_of, range(STORED)))
+    stored = _thinned(path)
+    whole = path.read_bytes()
+
+    random = Random(SEED)
+    outcomes = []
+    with bar("opening damaged databases") as progress:
+        for store in range(stores):
+            copy = folder / f"damaged-{store}.db"
+            copy.write_bytes(_flipped(whole, random) if store % 2 else _cut(whole, random))
+            outcomes.append(_is_same(copy, stored))
+            copy.unlink()
+            progress((store + 1) / stores)
+
+    return Damaged(outcomes.count(False), outcomes.count(True), outcomes.count(None))
+
+
+def has_hot_journal(path: Path) -> bool:
+    """Whether pages of an unfinished transaction may be in the database at `path`.
+
+    So it is where its journal's head does not begin with zero (sqlite.org/fileformat2, section 3).
+    """
+    journal = path.with_name(f"{path.name}-journal")
+    if not journal.exists():
+        return False
+
+    with journal.open("rb") as file:
+        return file.read(1) not in (b"", b"\0")
+
+
+def _written_until_killed(path: Path, first: int, random: Random) -> list[int]:
+    """The numbers that a writer acknowledged, before a kill at a random moment and in its pipe."""
+    program = [sys.executable, "-m", "benchmarks.memory.writer", str(path.absolute()), str(first)]
+    with subprocess.Popen(program, stdout=subprocess.PIPE, text=True, cwd=_REPOSITORY) as writer:
+        assert writer.stdout is not None
+        transactions = random.randint(1, MAX_TRANSACTIONS)
+        lines = [writer.stdout.readline() for _ in range(transactions)]
+        time.sleep(random.uniform(0.0, MAX_DELAY_S))
+
+        writer.kill()
+        lines += writer.stdout.readlines()
+
+    return _numbers(lines)
+
+
+def _numbers(lines: Iterable[str]) -> list[int]:
+    """The numbers in whole lines: the last may have been cut short by the kill."""
+    numbers = []
+    for line in lines:
+        if line.endswith("\n"):
+            numbers += [int(word) for word in line.split()]
+
+    return numbers
+
+
+def _missing(path: Path, acknowledged: dict[str, bytes]) -> set[str]:
+    """The keys of records that the database does not have as they were acknowledged."""
+    missing = set(acknowledged)
+    with closing(Database(path)) as database:
+        for record in database.records():
+            if acknowledged.get(record.key) == digest_of(record, sequence=0):
+                missing.remove(record.key)
+
+    return missing
+
+
+def _thinned(path: Path) -> list[Record]:
+    """Remove some records, so that the file has unused pages; the others."""
+    removed = [record_of(number).key for number in REMOVED]
+    with closing(Database(path)) as database:
+        database.remove(removed)
+        return list(database.records())
+
+
+def _flipped(whole: bytes, random: Random) -> bytes:
+    damaged = bytearray(whole)
+    for _ in range(random.randint(1, MAX_FLIPS)):
+        damaged[random.randrange(len(whole))] ^= random.randint(1, 255)
+
+    return bytes(damaged)
+
+
+def _cut(whole: bytes, random: Random) -> bytes:
+    return whole[: random.randrange(len(whole))]
+
+
+def _is_same(path: Path, stored: list[Record]) -> bool | None:
+    """Whether a database has the records that were stored; None where it is refused."""
+    try:
+        with closing(Database(path)) as database:
+            return list(database.records()) == stored
+    except StorageError:
+        return None

@@ -1,0 +1,74 @@
+"""How fast a sparse distributed memory is read, against a plain loop over its hard locations."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from cogmap.geometry.arrays import Bytes
+from services.memory.sparse.config import SparseConfig
+from services.memory.sparse.memory import SparseMemory, hard_addresses
+from services.memory.sparse.vectors import VALUES, nearest_phases, random_vectors
+
+MASK = np.uint8(VALUES - 1)
+WRITTEN = 50
+LOOP_READS = 10
+MEMORY_READS = 100
+
+
+class NumpyLoop:
+    """The read of a memory one hard location after the other, on vectors a byte a dimension."""
+
+    def __init__(self, config: SparseConfig, memory: SparseMemory) -> None:
+        self._addresses = hard_addresses(config)
+        self._counters = memory.counters
+        self._mean = memory.counters.mean(axis=0)
+        self._radius = memory.radius
+
+    def read_once(self, cue: Bytes) -> Bytes:
+        """What `SparseMemory.read_once` reads."""
+        sums = np.zeros_like(self._mean)
+        weights = 0
+
+        for address, counters in zip(self._addresses, self._counters, strict=True):
+            forwards = (address - cue) & MASK
+            backwards = (cue - address) & MASK
+            distance = int(np.minimum(forwards, backwards).sum())
+            if distance <= self._radius:
+                weight = self._radius + 1 - distance
+                sums += weight * counters.astype(np.float64)
+                weights += weight
+
+        return nearest_phases(sums - weights * self._mean, cue)
+
+
+def reads_vs_numpy_loop(seed: int) -> float:
+    """Single reads a second of a memory with the default settings, over those of the loop.
+
+    Both are the least CPU time of several reads, of all threads together, so that other load on the
+    machine hardly counts.
+    """
+    config = SparseConfig(seed=seed)
+    memory = SparseMemory(config)
+    rng = np.random.default_rng([seed, 0])
+    for vector in random_vectors(rng, WRITTEN, config.dimensions):
+        memory.write(vector, vector)
+
+    (cue,) = random_vectors(rng, 1, config.dimensions)
+    loop = NumpyLoop(config, memory)
+    loop_s = _least_s(LOOP_READS, lambda: loop.read_once(cue))
+    memory_s = _least_s(MEMORY_READS, lambda: memory.read_once(cue))
+    return loop_s / memory_s
+
+
+def _least_s(reads: int, read: Callable[[], object]) -> float:
+    """The least CPU time of a read, in seconds."""
+    times_s = []
+    for _ in range(reads):
+        began_s = time.process_time()
+        read()
+        times_s.append(time.process_time() - began_s)
+
+    return min(times_s)

@@ -1,0 +1,60 @@
+"""A moment as other programs read it: the messages as they were published, and what follows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from cli.explain import reasons
+from cli.explain.moment import Moment
+from cli.explain.reading import Logged
+from schemas.base import Message
+from schemas.graph import Delta
+from schemas.render import to_jsonable
+
+_IN_FULL = ("percepts", "competition", "broadcast", "earlier_broadcast", "action", "earlier_action")
+
+
+def facts(moment: Moment) -> dict[str, Any]:
+    """Every field of what was perceived, competed, broadcast, selected and commanded; None for what
+    the log lacks.
+
+    Each message has beside it `after_ms`, how long after the view it was sent. Of deltas there are
+    the numbers of operations, of arrays the shapes. `entered` has the cycle of each coalition.
+    """
+    entered = {name: each.cycle for name, each in moment.entered.items()}
+    found: dict[str, Any] = {
+        "log": str(moment.path),
+        "cycle": moment.cycle,
+        "at_s": moment.at_s,
+        "stamp_ns": moment.stamp_ns,
+    }
+    for name in _IN_FULL:
+        found[name] = _in_full(getattr(moment, name))
+
+    found["command"] = _in_full(moment.command)
+    found["workspace"] = [_commit(delta) for delta in moment.deltas]
+    found["winner"] = moment.winner or None
+    found["entered"] = entered
+    found["why_conscious"] = reasons.of_competition(moment)
+    found["why_action"] = reasons.of_action(moment)
+    return found
+
+
+def _in_full(logged: Logged[Any] | None) -> dict[str, Any] | None:
+    if logged is None:
+        return None
+
+    message: Message = logged.message
+    return {"after_ms": logged.after_ms, "message": to_jsonable(message)}
+
+
+def _commit(delta: Logged[Delta]) -> dict[str, Any]:
+    message = delta.message
+    return {
+        "after_ms": delta.after_ms,
+        "phase": message.phase.value,
+        "tasks": message.tasks,
+        "operations": len(message.operations),
+        "rejected": message.rejected,
+        "reasons": message.reasons,
+    }

@@ -1,0 +1,186 @@
+"""Nodes, percepts and commands in words."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable
+
+from schemas.cognition import Coalition
+from schemas.graph import Delta
+from schemas.nodes import (
+    Goal,
+    GraphNode,
+    Map,
+    Object,
+    Plan,
+    PlanState,
+    Self,
+    goal_id,
+    is_coarse_map,
+    kind_of,
+    map_number,
+)
+from schemas.nodes import Percept as PerceptNode
+from schemas.sensing import MotorCommand, Percept, SpeedLimit
+
+NAMED = 6
+STRAIGHT = 0.02
+AHEAD_RAD = math.radians(0.5)
+
+
+def spoken(name: str) -> str:
+    """A label, a kind or the name of a scheme as people write it."""
+    return name.replace("_", " ").replace("~", " ")
+
+
+def of_node(node: GraphNode) -> str:
+    """A node: the agent's pose, an object's label, a goal's name, what a plan comes to."""
+    match node:
+        case Self():
+            return f"the agent at {_position(node.x_m, node.y_m)}, {_heading(node.heading_rad)}"
+        case Object() | PerceptNode():
+            return spoken(node.label)
+        case Goal():
+            return _goal(node)
+        case Plan():
+            return _plan(node)
+        case Map():
+            return _map(node.id)
+    return spoken(f"{kind_of(node)} {node.id}")
+
+
+def content(coalition: Coalition) -> str:
+    """What a coalition is about: its nodes, in their order."""
+    words = [of_node(node) for node in coalition.nodes]
+    return ", ".join(words) or "nothing"
+
+
+def brief(coalition: Coalition) -> str:
+    """What a coalition is about, in a few words: its first nodes."""
+    words = []
+    for node in coalition.nodes[:NAMED]:
+        match node:
+            case Self():
+                words.append("the agent")
+            case Plan():
+                words.append("the plan")
+            case _:
+                words.append(of_node(node))
+
+    others = len(coalition.nodes) - NAMED
+    if others > 0:
+        words.append(f"and {others} more")
+    return ", ".join(words) or "nothing"
+
+
+def of_percept(percept: Percept) -> str:
+    """Where an object is seen, as far as that is known."""
+    parts = []
+    if percept.has_range:
+        parts.append(f"{percept.range_m:.1f} m")
+    if percept.has_bearing:
+        parts.append(bearing(percept.bearing_rad))
+    return ", ".join(parts)
+
+
+def bearing(bearing_rad: float) -> str:
+    """A direction as seen from the agent, whose left is positive."""
+    if abs(bearing_rad) < AHEAD_RAD:
+        return "ahead"
+    side = "left" if bearing_rad > 0 else "right"
+    return f"{math.degrees(abs(bearing_rad)):.0f}° {side}"
+
+
+def of_command(command: MotorCommand) -> str:
+    """How a command moves the robot, and what limits it."""
+    motion = _motion(command.left_wheel_rad_s, command.right_wheel_rad_s)
+    limits = []
+    if command.halted_by is not SpeedLimit.NONE:
+        limits.append(f"halted by {command.halted_by.value}")
+    if command.slowed_by is not SpeedLimit.NONE:
+        limits.append(f"slowed by {command.slowed_by.value}")
+    return ", ".join([motion, *limits])
+
+
+def codelets(delta: Delta) -> str:
+    """The codelets whose answers a delta commits, each with the number of its answers."""
+    numbers = Counter(_codelet(task) for task in delta.tasks)
+    return counted(numbers.elements())
+
+
+def counted(names: Iterable[str]) -> str:
+    """Names, each once, with how often it occurs where that is more than once."""
+    words = []
+    for name, number in Counter(names).items():
+        times = f" ({number})" if number > 1 else ""
+        words.append(f"{spoken(name)}{times}")
+    return ", ".join(words)
+
+
+def _codelet(task: str) -> str:
+    """The codelet of a task's id, which is its cycle, the codelet, and perhaps its subject."""
+    _, _, rest = task.partition("/")
+    name, _, _ = rest.partition("/")
+    return name or task
+
+
+def _goal(goal: Goal) -> str:
+    if goal.object:
+        return f"the goal {spoken(goal.object)}"
+
+    place = _position(goal.x_m, goal.y_m)
+    if goal.id == goal_id(f"{goal.x_m:g},{goal.y_m:g}"):
+        return f"the goal at {place}"
+    name = goal.id.removeprefix(goal_id(""))
+    return f"the goal {spoken(name)} at {place}"
+
+
+def _plan(plan: Plan) -> str:
+    if plan.state is not PlanState.READY:
+        return f"the plan: {plan.state.value}"
+
+    length = f"{plan.length_m:.0f} m"
+    doubt = ", over doubtful road" if plan.doubtful else ""
+    if plan.explores or not plan.goals:
+        return f"the plan to explore, {length}{doubt}"
+    name = spoken(plan.goals[0].removeprefix(goal_id("")))
+    return f"the plan to go to {name}, {length}{doubt}"
+
+
+def _map(identifier: str) -> str:
+    number = map_number(identifier)
+    if number is not None:
+        return "the root map" if number == 0 else f"map {number}"
+    if is_coarse_map(identifier):
+        return f"coarse map {identifier.rpartition(':')[2]}"
+    return identifier
+
+
+def _position(x_m: float, y_m: float) -> str:
+    return f"({_number(x_m)}, {_number(y_m)}) m"
+
+
+def _heading(heading_rad: float) -> str:
+    degrees = round(math.degrees(math.remainder(heading_rad, math.tau)))
+    return f"heading {degrees}°"
+
+
+def _number(value: float) -> str:
+    """With one decimal, and never as minus zero."""
+    rounded = round(value, 1) + 0.0
+    return f"{rounded:.1f}"
+
+
+def _motion(left_rad_s: float, right_rad_s: float) -> str:
+    fastest = max(abs(left_rad_s), abs(right_rad_s))
+    if fastest == 0.0:
+        return "stand still"
+
+    side = "left" if right_rad_s > left_rad_s else "right"
+    if left_rad_s * right_rad_s < 0:
+        return f"turn {side} on the spot"
+    way = "ahead" if left_rad_s + right_rad_s > 0 else "back"
+    if abs(right_rad_s - left_rad_s) <= STRAIGHT * fastest:
+        return f"drive straight {way}"
+    return f"drive {way}, bending {side}"

@@ -1,0 +1,191 @@
+"""Why one coalition became conscious, or none; why one action was chosen, or none: in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from cli.explain.moment import Moment
+from cli.explain.names import spoken
+from schemas.cognition import Action, Behaviour, Competition, Contender, Fate, Rejection, Trigger
+from services.global_workspace.config import Config
+
+OUT_OF_IT = frozenset({Fate.DISPLACED, Fate.DECAYED})
+
+
+def of_competition(moment: Moment) -> list[str]:
+    """Why the competition ended as it did."""
+    if moment.competition is None and moment.broadcast is not None:
+        trigger = moment.broadcast.message.trigger
+        return [f"The broadcast was triggered by: {trigger}; the log does not hold who competed."]
+    if moment.competition is None:
+        return [
+            "The log holds no competition of this cycle: its attention codelets had not answered "
+            "by its end, or it was not recorded."
+        ]
+
+    competition = moment.competition.message
+    winner = won(competition)
+    if winner is None or not competition.trigger:
+        return [_why_none(moment, competition)]
+    return [_why_most_active(competition, winner), _why_now(moment, competition)]
+
+
+def of_action(moment: Moment) -> list[str]:
+    """Why the action was chosen; where none was, what goes on."""
+    if moment.action is not None:
+        return _why_chosen(moment.action.message)
+    if moment.broadcast is None:
+        return [f"Without a broadcast nothing is chosen: {_what_goes_on(moment)}."]
+    return [
+        "The broadcast led to no action: no behaviour was active enough, or the log ends before "
+        f"it; {_what_goes_on(moment)}."
+    ]
+
+
+def won(competition: Competition) -> Contender | None:
+    """The contender that was broadcast, if one was."""
+    for contender in competition.contenders:
+        if contender.fate is Fate.WON:
+            return contender
+    return None
+
+
+def ranked_contenders(competition: Competition) -> list[Contender]:
+    """The winner first, then the others by activation."""
+    return sorted(
+        competition.contenders, key=lambda each: (each.fate is not Fate.WON, -each.activation)
+    )
+
+
+def ranked_behaviours(action: Action) -> list[Behaviour]:
+    """The chosen one first, then the others by activation."""
+    return sorted(
+        action.behaviours,
+        key=lambda each: (each.rejection is not Rejection.NONE, -each.activation),
+    )
+
+
+def next_best(action: Action) -> Behaviour | None:
+    """The most active behaviour that was not chosen, if there is one."""
+    others = [each for each in action.behaviours if each.rejection is not Rejection.NONE]
+    return max(others, key=lambda each: each.activation, default=None)
+
+
+def chosen(behaviour: Behaviour) -> str:
+    """What became of a behaviour."""
+    if behaviour.rejection is Rejection.NONE:
+        return "chosen"
+    return f"rejected: {behaviour.rejection.value}"
+
+
+def _why_most_active(competition: Competition, winner: Contender) -> str:
+    name = _beginning(winner.codelet)
+    others = [each for each in _competing(competition) if each.id != winner.id]
+    rival = max(others, key=lambda each: each.activation, default=None)
+    if rival is None:
+        return f"{name} won, as nothing else competed."
+
+    rival_name = spoken(rival.codelet)
+    margin = winner.activation - rival.activation
+    if margin > 0:
+        return f"{name} won as the most active, {margin:.2f} ahead of {rival_name}."
+    if margin == 0:
+        return f"{name} won, as active as {rival_name}: of equals the first by name wins."
+    return f"{name} won, though {rival_name} was more active by {-margin:.2f}."
+
+
+def _why_now(moment: Moment, competition: Competition) -> str:
+    """What triggered the broadcast, with the figures where the trigger is one known here."""
+    settings = moment.settings
+    activations = _activations(competition)
+    strongest = max(activations)
+    silent_s = _silent_s(moment)
+    figures = ""
+    match competition.trigger:
+        case Trigger.ONE_COALITION:
+            figures = f", {strongest:.2f} over {settings.coalition_above:.2f}"
+        case Trigger.AGGREGATE:
+            figures = f", {sum(activations):.2f} over {settings.aggregate_above:.2f}"
+        case Trigger.NO_BROADCAST if silent_s is not None:
+            figures = f", {silent_s:.2f} s where {_no_broadcast_s(settings):.2f} s suffice"
+    return f"The broadcast was triggered by: {competition.trigger.value}{figures}."
+
+
+def _why_none(moment: Moment, competition: Competition) -> str:
+    """Why a competition triggered no broadcast, by the settings of the global workspace."""
+    if competition.trigger:
+        return f"A broadcast was triggered by: {competition.trigger.value}; the log has no winner."
+
+    activations = _activations(competition)
+    if not activations:
+        return "It triggered no broadcast: no coalition was left to compete."
+
+    settings = moment.settings
+    silent_s = _silent_s(moment)
+    refractory_s = _seconds(settings, settings.refractory_ticks)
+    if silent_s is not None and silent_s < refractory_s:
+        return (
+            f"It triggered no broadcast, being refractory: the last was {silent_s:.2f} s before, "
+            f"and {refractory_s:.2f} s must pass."
+        )
+
+    needs = [
+        f"the strongest coalition had {max(activations):.2f} and needed more than "
+        f"{settings.coalition_above:.2f}",
+        f"all together had {sum(activations):.2f} and needed more than "
+        f"{settings.aggregate_above:.2f}",
+    ]
+    if silent_s is not None:
+        limit_s = _no_broadcast_s(settings)
+        needs.append(f"the last broadcast was {silent_s:.2f} s before, short of {limit_s:.2f} s")
+    return f"It triggered no broadcast: {'; '.join(needs)}."
+
+
+def _why_chosen(action: Action) -> list[str]:
+    name = _beginning(action.scheme)
+    rival = next_best(action)
+    if rival is None:
+        return [f"{name} was chosen, the only behaviour considered."]
+
+    rival_name = spoken(rival.scheme)
+    return [
+        f"{name} was chosen with {action.activation:.2f}.",
+        f"The next best, {rival_name}, had {rival.activation:.2f}: {rival.rejection.value}.",
+    ]
+
+
+def _beginning(name: str) -> str:
+    """A name at the beginning of a sentence."""
+    words = spoken(name)
+    return words[:1].upper() + words[1:]
+
+
+def _what_goes_on(moment: Moment) -> str:
+    if moment.earlier_action is None:
+        return "there is no action yet"
+    action = moment.earlier_action.message
+    return f"{spoken(action.scheme)}, chosen in cycle {action.cycle}, goes on"
+
+
+def _competing(competition: Competition) -> list[Contender]:
+    """The contenders that were there when the broadcast was triggered."""
+    return [each for each in competition.contenders if each.fate not in OUT_OF_IT]
+
+
+def _activations(competition: Competition) -> Sequence[float]:
+    return [each.activation for each in _competing(competition)]
+
+
+def _silent_s(moment: Moment) -> float | None:
+    """How long before this cycle the last broadcast was; None where there was none."""
+    if moment.earlier_broadcast is None:
+        return None
+    return (moment.stamp_ns - moment.earlier_broadcast.message.stamp_ns) / 1e9
+
+
+def _no_broadcast_s(settings: Config) -> float:
+    return _seconds(settings, settings.no_broadcast_ticks)
+
+
+def _seconds(settings: Config, ticks: int) -> float:
+    return ticks * settings.tick_ms / 1e3

@@ -1,0 +1,69 @@
+"""Prints a moment on the screen."""
+
+from __future__ import annotations
+
+from rich.console import Console, Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from cli.explain.moment import Moment
+from cli.explain.text import Row, Stage, delay, headline, stages
+
+PIPED_WIDTH = 120
+TITLE = "bold"
+FAINT = "dim"
+CHOSEN = "bold green"
+
+
+def print_moment(moment: Moment) -> None:
+    """Print the stages of a moment, one below the other."""
+    console = Console(highlight=False)
+    if not console.is_terminal:
+        console.width = PIPED_WIDTH
+
+    title = Text(headline(moment), TITLE)
+    title.append(f"  {moment.path}", FAINT)
+    console.print(title)
+    console.print()
+    console.print(_table(stages(moment)))
+
+
+def _table(shown: list[Stage]) -> Table:
+    """A row a stage: its title and when it was done, and beside these what was in it."""
+    table = Table.grid(padding=(0, 2))
+    table.add_column(style=TITLE, no_wrap=True)
+    table.add_column(style=FAINT, justify="right", no_wrap=True)
+    table.add_column()
+    for stage in shown:
+        table.add_row(stage.title, delay(stage.after_ms), _inside(stage))
+        if stage is not shown[-1]:
+            table.add_row()
+    return table
+
+
+def _inside(stage: Stage) -> Group:
+    """The rows of a stage, and below them why."""
+    parts: list[RenderableType] = []
+    together: list[Row] = []
+    for row in stage.rows:
+        if together and len(together[0].cells) != len(row.cells):
+            parts.append(_columns(together))
+            together = []
+        together.append(row)
+
+    if together:
+        parts.append(_columns(together))
+    for sentence in stage.why:
+        parts.append(Text(sentence, "italic"))
+    return Group(*parts)
+
+
+def _columns(rows: list[Row]) -> Table:
+    """Rows of as many cells, of which the last may take several lines."""
+    table = Table.grid(padding=(0, 2))
+    last = len(rows[0].cells) - 1
+    for number in range(last + 1):
+        table.add_column(no_wrap=number < last)
+    for row in rows:
+        table.add_row(*row.cells, style=CHOSEN if row.is_chosen else "")
+    return table

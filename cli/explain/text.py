@@ -1,0 +1,225 @@
+"""A moment as people read it: its stages in order, each with what was in it, and why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from cli.explain import names, reasons
+from cli.explain.moment import Moment
+from cli.explain.reading import Logged
+from schemas.cognition import Contender, Fate, Rejection
+from schemas.graph import Delta, Phase
+from schemas.sensing import Percepts
+
+BAR_CELLS = 10
+EIGHTHS = " ▏▎▍▌▋▊▉█"
+NOT_IN_LOG = "not in the log"
+
+
+@dataclass(frozen=True)
+class Row:
+    """A line of a stage in columns; `is_chosen` where it is what won or was done."""
+
+    cells: tuple[str, ...]
+    is_chosen: bool = False
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A stage of the cycle: when it was done, what was in it, and why it came out so."""
+
+    title: str
+    after_ms: float | None
+    rows: list[Row] = field(default_factory=list)
+    why: list[str] = field(default_factory=list)
+
+
+def headline(moment: Moment) -> str:
+    """Which moment it is."""
+    return f"cycle {moment.cycle}, {moment.at_s:.3f} s into the drive"
+
+
+def stages(moment: Moment) -> list[Stage]:
+    """The stages of the cycle, in order."""
+    return [
+        _perceived(moment),
+        _workspace(moment),
+        _competition(moment),
+        _conscious(moment),
+        _action(moment),
+        _command(moment),
+    ]
+
+
+def delay(after_ms: float | None) -> str:
+    """How long after the view; empty where that is not known."""
+    return "" if after_ms is None else f"+{after_ms:.0f} ms"
+
+
+def bar(share: float) -> str:
+    """A bar of BAR_CELLS characters, full for 1."""
+    eighths = round(min(1.0, max(0.0, share)) * BAR_CELLS * 8)
+    whole, rest = divmod(eighths, 8)
+    last = EIGHTHS[rest] if rest else ""
+    return f"{'█' * whole}{last}".ljust(BAR_CELLS)
+
+
+def recognised(percepts: Percepts) -> str:
+    """What there is in percepts, in a few words."""
+    number = len(percepts.objects)
+    plural = "" if number == 1 else "s"
+    words = [f"{number or 'no'} object{plural}"]
+    if percepts.road_m.shape[0]:
+        words.append("road")
+    for match in percepts.matches:
+        words.append(f"a place seen before, in frame {match.frame} ({match.score:.2f})")
+    return ", ".join(words)
+
+
+def committed(delta: Delta) -> str:
+    """What a delta commits: whose answers, or how many operations."""
+    number = len(delta.operations)
+    operations = f"{number} operation{'' if number == 1 else 's'}"
+    who = names.codelets(delta)
+    return f"{who}: {operations}" if who else operations
+
+
+def since(moment: Moment, name: str) -> str:
+    """In which cycle the coalition with that id entered; empty where the log does not say."""
+    entered = moment.entered.get(name)
+    if entered is None:
+        return ""
+    if entered.cycle == moment.cycle:
+        return "new"
+    return f"since cycle {entered.cycle}"
+
+
+def phases(moment: Moment) -> list[tuple[float | None, str, str]]:
+    """What the workspace did, in order: when, in which phase, whose answers it committed."""
+    rows = []
+    for delta in moment.deltas:
+        if delta.message.operations or delta.message.tasks:
+            rows.append((delta.after_ms, delta.message.phase.value, committed(delta.message)))
+
+    found = moment.coalitions
+    if found is not None:
+        makers = [coalition.codelet for coalition in found.message.coalitions]
+        what = f"{names.counted(makers)}: {_coalitions(len(makers))}" if makers else "no coalition"
+        row = (found.after_ms, Phase.ATTENTION.value, what)
+        rows.insert(_place_of(found.time_s, moment.deltas, len(rows)), row)
+    return rows
+
+
+def conscious_before(moment: Moment) -> str:
+    """What was broadcast last before this cycle, and when."""
+    earlier = moment.earlier_broadcast
+    if earlier is None:
+        return "nothing was conscious before"
+
+    message = earlier.message
+    ago_s = (moment.stamp_ns - message.stamp_ns) / 1e9
+    name = names.spoken(message.coalition.codelet)
+    words = names.content(message.coalition)
+    return f"last, in cycle {message.cycle}, {ago_s:.2f} s before: {name}: {words}"
+
+
+def _coalitions(number: int) -> str:
+    return f"{number} coalition{'' if number == 1 else 's'}"
+
+
+def _place_of(time_s: float, deltas: list[Logged[Delta]], end: int) -> int:
+    """Before which of the deltas that are shown something received at `time_s` belongs."""
+    shown = [each for each in deltas if each.message.operations or each.message.tasks]
+    for number, delta in enumerate(shown):
+        if delta.time_s > time_s:
+            return number
+    return end
+
+
+def _perceived(moment: Moment) -> Stage:
+    if moment.percepts is None:
+        return Stage("perceived", None, [Row((NOT_IN_LOG,))])
+
+    percepts = moment.percepts.message
+    rows = [Row((f"frame {percepts.frame}: {recognised(percepts)}",))]
+    for percept in sorted(percepts.objects, key=lambda each: -each.activation):
+        label = names.spoken(percept.label)
+        cells = (*_measured(percept.activation), label, names.of_percept(percept))
+        rows.append(Row(cells))
+    return Stage("perceived", moment.percepts.after_ms, rows)
+
+
+def _workspace(moment: Moment) -> Stage:
+    rows = [Row((delay(after_ms), phase, what)) for after_ms, phase, what in phases(moment)]
+    after_ms = moment.deltas[-1].after_ms if moment.deltas else None
+    why = []
+    for delta in moment.deltas:
+        if delta.message.rejected:
+            given = "; ".join(delta.message.reasons)
+            why.append(f"Rejected answers: {delta.message.rejected}, as {given}.")
+    return Stage("workspace", after_ms, rows or [Row((NOT_IN_LOG,))], why)
+
+
+def _competition(moment: Moment) -> Stage:
+    why = reasons.of_competition(moment)
+    if moment.competition is None:
+        return Stage("competition", None, why=why)
+
+    ordered = reasons.ranked_contenders(moment.competition.message)
+    rows = [_contender(moment, each) for each in ordered]
+    return Stage("competition", moment.competition.after_ms, rows, why)
+
+
+def _contender(moment: Moment, contender: Contender) -> Row:
+    entered = moment.entered.get(contender.id)
+    about = "" if entered is None else names.brief(entered.coalition)
+    cells = (
+        *_measured(contender.activation),
+        names.spoken(contender.codelet),
+        contender.fate.value,
+        since(moment, contender.id),
+        about,
+    )
+    return Row(cells, contender.fate is Fate.WON)
+
+
+def _conscious(moment: Moment) -> Stage:
+    if moment.broadcast is None:
+        return Stage("conscious", None, [Row((f"nothing new; {conscious_before(moment)}",))])
+
+    coalition = moment.broadcast.message.coalition
+    rows = [Row((names.content(coalition),), is_chosen=True)]
+    entered = moment.entered.get(moment.winner)
+    cycle = "a cycle that is not in the log" if entered is None else f"cycle {entered.cycle}"
+    why = [f"It is coalition {moment.winner} of {names.spoken(coalition.codelet)}, from {cycle}."]
+    return Stage("conscious", moment.broadcast.after_ms, rows, why)
+
+
+def _action(moment: Moment) -> Stage:
+    why = reasons.of_action(moment)
+    if moment.action is None:
+        return Stage("action", None, why=why)
+
+    rows = []
+    for behaviour in reasons.ranked_behaviours(moment.action.message):
+        name = names.spoken(behaviour.scheme)
+        cells = (*_measured(behaviour.activation), name, reasons.chosen(behaviour))
+        rows.append(Row(cells, behaviour.rejection is Rejection.NONE))
+    return Stage("action", moment.action.after_ms, rows, why)
+
+
+def _command(moment: Moment) -> Stage:
+    if moment.command is None:
+        return Stage("command", None, [Row(("none that followed is in the log",))])
+
+    command = moment.command.message
+    wheels = f"{command.left_wheel_rad_s:.1f} and {command.right_wheel_rad_s:.1f} rad/s"
+    rows = [Row((names.of_command(command), wheels), is_chosen=True)]
+    why = []
+    if command.stamp_ns != moment.stamp_ns:
+        why.append(f"It answers the next view, that of {command.stamp_ns / 1e9:.3f} s.")
+    return Stage("command", moment.command.after_ms, rows, why)
+
+
+def _measured(activation: float) -> tuple[str, str]:
+    return bar(activation), f"{activation:.2f}"

@@ -1,0 +1,41 @@
+"""The frame of the agent's map in that of its start: another one once a map was recalled. Pure."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cogmap.geometry import se2
+from cogmap.geometry.arrays import Floats
+from schemas.graph import Delta
+from schemas.nodes import ROOT_MAP, Map, Recollection
+
+NOWHERE = np.zeros(3)
+
+
+class MapFrame:
+    """Follows deltas. The agent begins in a frame of its own; all that it knows moves into the
+    frame of a map that it recalls. `recalled` is that map's name, empty before.
+    """
+
+    def __init__(self) -> None:
+        self.recalled = ""
+        self._offered = NOWHERE
+        self._start = NOWHERE
+
+    def update(self, delta: Delta) -> None:
+        """Take account of one delta, before what it has of the agent."""
+        for operation in delta.operations:
+            if isinstance(operation, Recollection):
+                pose = (operation.x_m, operation.y_m, operation.heading_rad)
+                self._offered = np.array(pose)
+            elif isinstance(operation, Map) and operation.id == ROOT_MAP:
+                self._on_root(operation)
+
+    def from_start(self, points_m: Floats) -> Floats:
+        """Points (n, 2) of the map in the frame in which the agent began."""
+        return se2.transform_to(self._start, points_m)
+
+    def _on_root(self, root: Map) -> None:
+        if root.remembered and not self.recalled:
+            self.recalled = root.remembered
+            self._start = self._offered

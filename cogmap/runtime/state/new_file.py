@@ -1,0 +1,45 @@
+"""A file that appears whole, or not at all."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from cogmap.errors import StorageError
+
+
+@contextmanager
+def new_file(path: Path) -> Iterator[Path]:
+    """Where to write a file that is to be at `path`, in a folder of its own beside it.
+
+    Once the block has ended it is at `path`, whole and on the disk; nothing is there where the
+    block raises or the process is killed. Raises StorageError where there is a file already, which
+    stays, and where the disk refuses.
+    """
+    if path.exists():
+        raise StorageError(f"{path} exists already: move it away, or name another file")
+
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
+            made = Path(folder) / path.name
+            yield made
+            _sync(made)
+            os.link(made, path)
+        _sync(path.parent)
+    except OSError as error:
+        raise StorageError(
+            f"cannot write {path} ({error.strerror}): make room on its disk, or name another folder"
+        ) from None
+
+
+def _sync(path: Path) -> None:
+    """Put a file, or the names in a folder, on the disk."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,83 @@
+"""What long-term memory stores: the cognitive maps that were broadcast, as records."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+
+from schemas.array import Matrix
+from schemas.base import Count, Message, Name, Part
+from schemas.nodes import TILE_CELLS, PlaceColumn, RecalledColumn
+from schemas.nodes.columns import check_matrix
+from schemas.nodes.recollection import TileNumber
+
+
+class StoredObjects(Part, kw_only=True, frozen=True, tag="objects"):
+    """The objects of a map: their labels and functions, and their positions and sizes in `objects`,
+    float64 (n, 7), see RecalledColumn, in the map's own frame.
+    """
+
+    map: Name
+    cell_m: Annotated[float, msgspec.Meta(gt=0, le=1e4)]
+    labels: list[Name]
+    functions: list[str]
+    objects: Matrix
+
+    def __post_init__(self) -> None:
+        check_matrix(self.map, self.objects, "<f8", (len(RecalledColumn),))
+        count, _ = self.objects.shape
+        if len(self.labels) != count or len(self.functions) != count:
+            raise ValueError(f"{self.map}: {count} objects, and other numbers of their names")
+
+    @property
+    def key(self) -> str:
+        """The key of the record that it replaces."""
+        return f"{self.map}/objects"
+
+
+class StoredTile(Part, kw_only=True, frozen=True, tag="tile"):
+    """A square of a map's place nodes: columns of float16 (1, TILE_CELLS) each, row-major."""
+
+    map: Name
+    x: TileNumber
+    y: TileNumber
+    columns: dict[PlaceColumn, Matrix]
+
+    def __post_init__(self) -> None:
+        for name, values in self.columns.items():
+            if values.dtype != "<f2" or values.shape != (1, TILE_CELLS):
+                raise ValueError(f"{self.map}: {name} of shape {values.shape}")
+
+    @property
+    def key(self) -> str:
+        """The key of the record that it replaces."""
+        return tile_key(self.map, self.x, self.y)
+
+
+StoredRecord = StoredObjects | StoredTile
+"""One record of long-term memory; it replaces the one of its key."""
+
+
+class Stored(Message, kw_only=True, frozen=True):
+    """Records that are in the database from here on, and the keys of those that no longer are."""
+
+    cycle: Count
+    records: list[StoredRecord]
+    forgotten: list[Name] = []
+
+
+class Restored(Message, kw_only=True, frozen=True):
+    """What the database held when its process started."""
+
+    records: list[StoredRecord]
+
+
+def tile_key(map_name: str, x: int, y: int) -> str:
+    """The key of the record of a square of a map's place nodes."""
+    return f"{map_name}/tile/{x}/{y}"
+
+
+def kind_of_record(record: StoredRecord) -> str:
+    """The name of a record's kind, as it travels."""
+    return str(type(record).__struct_config__.tag)

@@ -1,0 +1,118 @@
+"""Objects that should be in view and are not: a prediction of the map that fails."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from cogmap.geometry.arrays import Floats
+from cogmap.geometry.se2 import wrap_angle
+from cogmap.graph.graph import Graph
+from schemas.codelets import Task
+from schemas.nodes import LinkKind, Object, Self, object_id, place_id
+from services.codelets.attention.config import Expectation
+from services.codelets.nodes import nodes_of
+
+# The scan hits the front of a building, whose position is its middle: a ray that goes beyond
+# passes.
+BEYOND_M = 1.5
+BEYOND_SHARE = 0.05
+# Rays near the middle of an object, as a share of its apparent half width, do not graze it.
+MIDDLE_SHARE = 0.6
+MIN_RAYS = 2
+# Of more objects than this, only those at place nodes in view are visited.
+MANY_OBJECTS = 300
+
+
+def missing_objects(task: Task, agent: Self, graph: Graph, settings: Expectation) -> list[str]:
+    """The ids of established objects where `agent` should see them in the view of `task`, and where
+    it sees that nothing stands; none while its position is uncertain.
+    """
+    if task.scan is None or not _is_certain(agent, settings):
+        return []
+
+    rays = np.asarray(task.scan.numpy(), np.float64)
+    in_view = {object_id(percept.label) for percept in task.percepts}
+    missing = []
+    for node in _ahead(agent, graph, settings):
+        if node.id not in in_view and _is_passed(node, agent, rays, settings):
+            missing.append(node.id)
+
+    return sorted(missing)
+
+
+def _ahead(agent: Self, graph: Graph, settings: Expectation) -> Iterator[Object]:
+    """The established objects of the agent's map that stand well inside its view."""
+    if graph.count(Object) <= MANY_OBJECTS:
+        around = graph.of_kind(Object)
+    else:
+        around = iter(nodes_of(graph, Object, _at_places_ahead(agent, graph, settings)))
+
+    for node in around:
+        if _is_expected(node, agent, settings):
+            yield node
+
+
+def _at_places_ahead(agent: Self, graph: Graph, settings: Expectation) -> Iterator[str]:
+    """The ids of what is linked to a place node inside the view, or a cell beside it."""
+    cell_m = graph.cell_m(agent.map)
+    here = np.array([agent.x_m, agent.y_m])
+    reach = math.ceil(settings.farthest_m / cell_m) + 1
+    steps = np.arange(-reach, reach + 1)
+    around = np.stack(np.meshgrid(steps, steps, indexing="ij"), -1).reshape(-1, 2)
+    cells = around + np.rint(here / cell_m).astype(np.int64)
+
+    offset_m = cells * cell_m - here
+    away_m = np.hypot(offset_m[:, 0], offset_m[:, 1])
+    aside_rad = np.abs(_bearing_rad(offset_m, agent))
+    slack_rad = np.arctan2(cell_m, np.maximum(away_m, cell_m))
+    is_inside = aside_rad <= settings.field_of_view_rad / 2 + slack_rad
+    is_near = away_m <= settings.farthest_m + cell_m
+
+    for i, j in cells[is_inside & is_near].tolist():
+        yield from graph.links.sources(place_id(i, j, agent.map), LinkKind.AT)
+
+
+def _is_expected(node: Object, agent: Self, settings: Expectation) -> bool:
+    is_known = node.sightings >= settings.established_sightings and not node.misses
+    is_certain = math.hypot(node.x_sd_m, node.y_sd_m) <= settings.largest_sd_m
+    if node.map != agent.map or not is_known or not is_certain:
+        return False
+
+    away_m = math.dist((node.x_m, node.y_m), (agent.x_m, agent.y_m))
+    is_near = settings.nearest_m <= away_m <= settings.farthest_m
+    return is_near and abs(_bearing_of(node, agent)) <= settings.field_of_view_rad / 2
+
+
+def _is_passed(node: Object, agent: Self, rays: Floats, settings: Expectation) -> bool:
+    """Whether the rays (n, 2), bearing and range each, pass where an object stood. What one hits
+    before hides the object, what it hits there may be the object.
+    """
+    away_m = math.dist((node.x_m, node.y_m), (agent.x_m, agent.y_m))
+    half_rad = math.atan2(MIDDLE_SHARE * node.width_m / 2, away_m)
+    aside_rad = wrap_angle(rays[:, 0] - _bearing_of(node, agent))
+    ranges_m = rays[np.abs(aside_rad) <= half_rad, 1]
+    if len(ranges_m) < MIN_RAYS:
+        return False
+
+    beyond_m = away_m * (1 + BEYOND_SHARE) + BEYOND_M
+    has_passed = (ranges_m == 0) | (ranges_m > beyond_m)
+    return float(has_passed.mean()) >= settings.passed_share
+
+
+def _is_certain(agent: Self, settings: Expectation) -> bool:
+    return math.hypot(agent.x_sd_m, agent.y_sd_m) <= settings.largest_sd_m
+
+
+def _bearing_of(node: Object, agent: Self) -> float:
+    direction_rad = math.atan2(node.y_m - agent.y_m, node.x_m - agent.x_m)
+    return math.remainder(direction_rad - agent.heading_rad, math.tau)
+
+
+def _bearing_rad(offset_m: Floats, agent: Self) -> Floats:
+    """(n,): the bearings from the agent of (n, 2) offsets."""
+    direction_rad = np.arctan2(offset_m[:, 1], offset_m[:, 0])
+    bearing_rad: Floats = wrap_angle(direction_rad - agent.heading_rad)
+    return bearing_rad

@@ -1,0 +1,167 @@
+"""An attention codelet: what was expected and is not so. A building of the map is gone, or a street
+of the plan is closed.
+"""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+
+from cogmap.graph.graph import Graph
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from schemas.codelets import Task
+from schemas.graph import Link, Phase
+from schemas.nodes import (
+    PLAN_ID,
+    SELF_ID,
+    AnyNode,
+    Attention,
+    LinkKind,
+    Object,
+    PlaceColumn,
+    Plan,
+    Self,
+    object_id,
+    place_cell,
+)
+from services.codelets.attention.closure import SAME_CYCLES, closed_place, is_known
+from services.codelets.attention.coalitions import coalition, felt
+from services.codelets.attention.config import SECTION, Config, Expectation
+from services.codelets.attention.disappearance import missing_objects
+from services.codelets.attention.memory import (
+    brought,
+    is_refractory,
+    kept,
+    memory_of,
+    with_pending,
+    without_conscious,
+)
+from services.codelets.nodes import nodes_of
+
+NAME = "expectation"
+SURPRISE = -1.0
+# Views are counted anew once the agent was so many times as far away as it can see them.
+AWAY = 2.0
+
+
+def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
+    """One task in each cycle in which the agent knows where it is and sees how far it is free."""
+    agent = graph.agent
+    if agent is None or agent.is_lost or context.scan is None:
+        return []
+
+    percepts = context.percepts.objects
+    return [context.task(NAME, about=[SELF_ID, PLAN_ID], percepts=percepts, with_scan=True)]
+
+
+def run(task: Task, graph: Graph, config: Config) -> Answer:
+    """A coalition of the self and what is not as expected, until it was conscious."""
+    agent = graph.agent
+    settings = config.expectation
+    if agent is None:
+        return Answer()
+
+    memory = without_conscious(memory_of(NAME, graph))
+    memory = _with_missing(memory, task, agent, graph, settings)
+    memory = _with_closed(memory, task, agent, graph)
+    if is_refractory(NAME, graph, task.cycle, settings.refractory_cycles):
+        return kept(memory, graph)
+
+    content = _surprising(memory, graph)
+    if not content:
+        return kept(memory, graph)
+
+    links = _links_to_closed(memory, content)
+    found = coalition(NAME, [agent, *content], graph, settings.base_level, links)
+    return brought(memory, found, task.cycle, graph)
+
+
+CODELET = Codelet(
+    name=NAME,
+    phase=Phase.ATTENTION,
+    due=due,
+    run=run,
+    reads=frozenset({Self, Object, Plan, Attention, PlaceColumn.OBSTACLE, PlaceColumn.ROAD}),
+    writes=frozenset({Attention}),
+    config=Config,
+    section=SECTION,
+)
+
+
+def _with_missing(
+    memory: Attention, task: Task, agent: Self, graph: Graph, settings: Expectation
+) -> Attention:
+    """`memory`, with the number of views in which each object was missing since it was seen last,
+    or the agent was far from it. Those are pending that reach the number that is a surprise.
+    """
+    in_view = {object_id(percept.label) for percept in task.percepts}
+    missing = missing_objects(task, agent, graph, settings)
+    noted = {}
+    for name, number in memory.noted.items():
+        node = graph.get(Object, name)
+        is_missing = name not in in_view and _is_near(node, agent, settings)
+        if place_cell(name) is not None or is_missing:
+            noted[name] = number
+
+    gone = []
+    for name in missing:
+        number = memory.noted.get(name, 0) + 1
+        noted[name] = min(number, settings.views)
+        if number == settings.views:
+            gone.append(name)
+
+    pending = {}
+    for name, cycle in memory.pending.items():
+        if name in noted:
+            pending[name] = cycle
+
+    counted = msgspec.structs.replace(memory, noted=noted, pending=pending)
+    return with_pending(counted, gone)
+
+
+def _is_near(node: Object | None, agent: Self, settings: Expectation) -> bool:
+    """Whether an object still is where the agent may see that it is gone."""
+    if node is None:
+        return False
+
+    away_m = math.dist((node.x_m, node.y_m), (agent.x_m, agent.y_m))
+    return away_m <= AWAY * settings.farthest_m
+
+
+def _with_closed(memory: Attention, task: Task, agent: Self, graph: Graph) -> Attention:
+    """`memory`, in which a closed place of the route is noted with its cycle, and pending, where no
+    closure near it is known already.
+    """
+    noted = {}
+    for name, number in memory.noted.items():
+        is_old = place_cell(name) is not None and task.cycle - number > SAME_CYCLES
+        if not is_old:
+            noted[name] = number
+
+    closed = closed_place(agent, graph)
+    if not closed or is_known(closed, noted, task.cycle, graph.cell_m(agent.map)):
+        return msgspec.structs.replace(memory, noted=noted)
+
+    noted[closed] = task.cycle
+    return with_pending(msgspec.structs.replace(memory, noted=noted), [closed])
+
+
+def _surprising(memory: Attention, graph: Graph) -> list[AnyNode]:
+    """What is pending: the objects that are gone, and the plan where its road is closed."""
+    content: list[AnyNode] = [*nodes_of(graph, Object, sorted(memory.pending))]
+    plan = graph.get(Plan, PLAN_ID)
+    if plan is not None and any(place_cell(name) is not None for name in memory.pending):
+        content.append(plan)
+
+    return [felt(node, SURPRISE) for node in content]
+
+
+def _links_to_closed(memory: Attention, content: list[AnyNode]) -> list[Link]:
+    """The links of the plan to the places where its road is closed."""
+    names = {node.id for node in content}
+    if PLAN_ID not in names:
+        return []
+
+    places = [name for name in sorted(memory.pending) if place_cell(name) is not None]
+    return [Link(source=PLAN_ID, target=place, kind=LinkKind.BLOCKED) for place in places]

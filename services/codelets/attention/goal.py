@@ -1,0 +1,136 @@
+"""An attention codelet: the open goals and the plan towards them, all the more where these have
+changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import msgspec
+
+from cogmap.graph.graph import Graph
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from schemas import nodes
+from schemas.codelets import Task
+from schemas.graph import Link, Phase
+from schemas.nodes import (
+    NEVER_NS,
+    PLAN_ID,
+    SELF_ID,
+    AnyNode,
+    Attention,
+    LinkKind,
+    Plan,
+    PlanState,
+    Self,
+)
+from services.codelets.attention.coalitions import coalition, felt
+from services.codelets.attention.config import SECTION, Config
+from services.codelets.attention.memory import (
+    brought,
+    is_refractory,
+    kept,
+    memory_of,
+    with_pending,
+    without_conscious,
+)
+from services.codelets.nodes import nodes_of
+
+NAME = "goal"
+
+
+def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
+    """One task where there is a route to a goal or frontier, or a plan or goal has changed, and it
+    does not wait.
+    """
+    if is_refractory(NAME, graph, context.cycle, config.goal.refractory_cycles):
+        return []
+
+    plan = graph.get(Plan, PLAN_ID)
+    is_under_way = plan is not None and plan.state is PlanState.READY
+    memory = memory_of(NAME, graph)
+    if not is_under_way and not memory.pending and _state(graph) == memory.noted:
+        return []
+
+    return [context.task(NAME, about=[SELF_ID, PLAN_ID])]
+
+
+def run(task: Task, graph: Graph, config: Config) -> Answer:
+    """A coalition of the self, the plan and its next goal, and the goals that were reached."""
+    agent = graph.agent
+    plan = graph.get(Plan, PLAN_ID)
+    memory = _with_changes(without_conscious(memory_of(NAME, graph)), graph)
+    if agent is None:
+        return Answer()
+
+    content: list[AnyNode] = [agent]
+    is_told = plan is not None and (plan.state is PlanState.READY or PLAN_ID in memory.pending)
+    if plan is not None and is_told:
+        content.append(plan)
+        content += nodes_of(graph, nodes.Goal, plan.goals[:1])
+
+    named = {node.id for node in content}
+    reached = [name for name in memory.pending if name not in named]
+    content += nodes_of(graph, nodes.Goal, reached)
+    if len(content) == 1:
+        return kept(memory, graph)
+
+    salient = _with_feelings(content, memory.pending, config.goal.change_salience)
+    links = _links_towards(content, graph)
+    found = coalition(NAME, salient, graph, config.goal.base_level, links)
+    return brought(memory, found, task.cycle, graph)
+
+
+CODELET = Codelet(
+    name=NAME,
+    phase=Phase.ATTENTION,
+    due=due,
+    run=run,
+    reads=frozenset({Self, nodes.Goal, Plan, Attention, LinkKind.TOWARDS}),
+    writes=frozenset({Attention}),
+    config=Config,
+    section=SECTION,
+)
+
+
+def _state(graph: Graph) -> dict[str, int]:
+    """When the plan was made, and when each goal was reached, by id."""
+    state = {}
+    plan = graph.get(Plan, PLAN_ID)
+    if plan is not None:
+        state[PLAN_ID] = max(0, plan.planned_ns)
+
+    for goal in graph.of_kind(nodes.Goal):
+        if goal.reached_ns != NEVER_NS:
+            state[goal.id] = goal.reached_ns
+
+    return state
+
+
+def _with_changes(memory: Attention, graph: Graph) -> Attention:
+    """`memory`, in which what has changed since it was noted is pending, and what is no more is
+    not.
+    """
+    state = _state(graph)
+    changed = [name for name in state if memory.noted.get(name) != state[name]]
+    pending = {name: cycle for name, cycle in memory.pending.items() if name in state}
+    noted = msgspec.structs.replace(memory, noted=state, pending=pending)
+    return with_pending(noted, changed)
+
+
+def _with_feelings(
+    content: Iterable[AnyNode], changed: Iterable[str], salience: float
+) -> list[AnyNode]:
+    """The nodes, with a feeling attached to those that changed."""
+    names = set(changed)
+    return [felt(node, salience) if node.id in names else node for node in content]
+
+
+def _links_towards(content: Iterable[AnyNode], graph: Graph) -> list[Link]:
+    """The link of the plan to its next goal, where both are in `content`."""
+    names = {node.id for node in content}
+    target = graph.links.target(PLAN_ID, LinkKind.TOWARDS)
+    if target is None or not {PLAN_ID, target} <= names:
+        return []
+
+    return [Link(source=PLAN_ID, target=target, kind=LinkKind.TOWARDS)]

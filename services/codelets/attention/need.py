@@ -1,0 +1,85 @@
+"""An attention codelet: a need that is high, and what is known to satisfy it."""
+
+from __future__ import annotations
+
+import math
+
+from cogmap.graph.graph import Graph
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from schemas import nodes
+from schemas.codelets import Task
+from schemas.graph import Phase
+from schemas.nodes import SELF_ID, AnyNode, Attention, Object, Self
+from services.codelets.attention.coalitions import coalition, felt
+from services.codelets.attention.config import SECTION, Config, Need
+from services.codelets.attention.memory import brought, is_refractory, memory_of
+
+NAME = "need"
+
+SATISFIED_BY = {"energy": "charge"}
+"""The function of the objects that satisfy a need, by its label."""
+
+
+def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
+    """One task where a need is high, and it does not wait."""
+    settings = config.need
+    if is_refractory(NAME, graph, context.cycle, settings.refractory_cycles):
+        return []
+
+    high = high_needs(graph, settings)
+    if not high:
+        return []
+
+    about = [SELF_ID, *(node.id for node in high)]
+    return [context.task(NAME, about=about)]
+
+
+def run(task: Task, graph: Graph, config: Config) -> Answer:
+    """A coalition of the self, the needs that are high, each as bad as its level where it has no
+    salience of its own, and the nearest object that satisfies each.
+    """
+    high = high_needs(graph, config.need)
+    agent = graph.agent
+    if not high or agent is None:
+        return Answer()
+
+    content: list[AnyNode] = [agent]
+    for node in high:
+        content.append(felt(node, node.salience or -node.level))
+        satisfying = nearest_that_satisfies(node, agent, graph)
+        if satisfying is not None:
+            content.append(felt(satisfying, node.level))
+
+    found = coalition(NAME, content, graph, config.need.base_level)
+    return brought(memory_of(NAME, graph), found, task.cycle, graph)
+
+
+CODELET = Codelet(
+    name=NAME,
+    phase=Phase.ATTENTION,
+    due=due,
+    run=run,
+    reads=frozenset({Self, Object, nodes.Need, Attention}),
+    writes=frozenset({Attention}),
+    config=Config,
+    section=SECTION,
+)
+
+
+def high_needs(graph: Graph, settings: Need) -> list[nodes.Need]:
+    """The needs that are high, by id."""
+    return [node for node in graph.of_kind(nodes.Need) if node.level >= settings.high_level]
+
+
+def nearest_that_satisfies(need: nodes.Need, agent: Self, graph: Graph) -> Object | None:
+    """The object of the agent's map that satisfies a need, as far as is known, and is the nearest;
+    None where none is known.
+    """
+    function = SATISFIED_BY.get(need.label)
+    found = [node for node in graph.of_kind(Object) if node.function == function]
+
+    def order(node: Object) -> tuple[float, str]:
+        return math.dist((node.x_m, node.y_m), (agent.x_m, agent.y_m)), node.id
+
+    here = [node for node in found if node.map == agent.map]
+    return min(here, key=order, default=None)

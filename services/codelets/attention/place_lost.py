@@ -1,0 +1,71 @@
+"""An attention codelet: the agent does not know where it is, or knows it again."""
+
+from __future__ import annotations
+
+import msgspec
+
+from cogmap.graph.graph import Graph
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from schemas.codelets import Task
+from schemas.graph import Phase
+from schemas.nodes import SELF_ID, Attention, Self
+from services.codelets.attention.coalitions import coalition, felt
+from services.codelets.attention.config import SECTION, Config
+from services.codelets.attention.memory import (
+    brought,
+    is_refractory,
+    kept,
+    memory_of,
+    with_pending,
+    without_conscious,
+)
+
+NAME = "place_lost"
+LOST = "lost"
+
+
+def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
+    """One task while the agent is lost, and until consciousness has it that it is found again."""
+    agent = graph.agent
+    if agent is None:
+        return []
+    if is_refractory(NAME, graph, context.cycle, config.place_lost.refractory_cycles):
+        return []
+
+    memory = memory_of(NAME, graph)
+    is_known = (LOST in memory.noted) == agent.is_lost and not memory.pending
+    if is_known and not agent.is_lost:
+        return []
+
+    return [context.task(NAME, about=[SELF_ID])]
+
+
+def run(task: Task, graph: Graph, config: Config) -> Answer:
+    """A coalition of the self alone: it is bad to be lost, and good to be found."""
+    agent = graph.agent
+    if agent is None:
+        return Answer()
+
+    memory = without_conscious(memory_of(NAME, graph))
+    was_lost = LOST in memory.noted
+    if was_lost != agent.is_lost:
+        noted = {LOST: task.cycle} if agent.is_lost else {}
+        memory = with_pending(msgspec.structs.replace(memory, noted=noted), [SELF_ID])
+    if not memory.pending and not agent.is_lost:
+        return kept(memory, graph)
+
+    salience = -1.0 if agent.is_lost else 1.0
+    found = coalition(NAME, [felt(agent, salience)], graph, config.place_lost.base_level)
+    return brought(memory, found, task.cycle, graph)
+
+
+CODELET = Codelet(
+    name=NAME,
+    phase=Phase.ATTENTION,
+    due=due,
+    run=run,
+    reads=frozenset({Self, Attention}),
+    writes=frozenset({Attention}),
+    config=Config,
+    section=SECTION,
+)

@@ -1,0 +1,99 @@
+"""The settings of long-term memory."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import msgspec
+
+from schemas.base import PositiveMetres, PositiveShare
+from services.memory.sparse.config import SparseConfig
+
+Cycles = Annotated[int, msgspec.Meta(ge=1, le=100_000)]
+
+
+class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """What is stored and when, and when a stored map is taken for the town around."""
+
+    mode: Annotated[
+        Literal["lockstep", "real_time"],
+        msgspec.Meta(
+            description="lockstep: an offer is made in each cycle, which the next one waits for. "
+            "real_time: an offer is made where something is recalled."
+        ),
+    ] = "real_time"
+    store_cycles: Annotated[
+        Cycles,
+        msgspec.Meta(
+            description="Cycles between two times at which what has changed on a map that was "
+            "broadcast is stored, 1 to 100000."
+        ),
+    ] = 25
+    recall_cycles: Annotated[
+        Cycles,
+        msgspec.Meta(
+            description="Cycles between two attempts to recall the map around, 1 to 100000."
+        ),
+    ] = 5
+    min_sightings: Annotated[
+        int,
+        msgspec.Meta(
+            ge=1,
+            le=1000,
+            description="Views that must agree with an object's position before it is stored, or "
+            "cues a recall, 1 to 1000.",
+        ),
+    ] = 3
+    min_matches: Annotated[
+        int,
+        msgspec.Meta(
+            ge=3,
+            le=1000,
+            description="Objects that must stand as on a stored map for it to be recalled, 3 to "
+            "1000.",
+        ),
+    ] = 6
+    min_looks: Annotated[
+        int,
+        msgspec.Meta(
+            ge=1,
+            le=100,
+            description="Looks that these objects must have among them, 1 to 100: rows of equal "
+            "houses are alike in every town.",
+        ),
+    ] = 3
+    min_lead: Annotated[
+        int,
+        msgspec.Meta(
+            ge=1,
+            le=100,
+            description="By how many matches the best position on all stored maps must lead any "
+            "other, 1 to 100.",
+        ),
+    ] = 3
+    min_share: Annotated[
+        PositiveShare,
+        msgspec.Meta(
+            description="Share of the objects known here that must stand as on the stored map, of "
+            "those where that map is known, above 0 to 1."
+        ),
+    ] = 0.75
+    compared_maps: Annotated[
+        int,
+        msgspec.Meta(
+            ge=1,
+            le=1000,
+            description="Stored maps that are compared with the objects around, 1 to 1000: where "
+            "there are more, those that sparse distributed memory is reminded of.",
+        ),
+    ] = 5
+    sparse: Annotated[SparseConfig, msgspec.Meta(description="The sparse distributed memory.")] = (
+        SparseConfig()
+    )
+    match_within_m: Annotated[
+        PositiveMetres,
+        msgspec.Meta(
+            description="Distance within which an object stands as on a stored map, in m, above 0 "
+            "to 1e4."
+        ),
+    ] = 2.5

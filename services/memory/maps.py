@@ -1,0 +1,88 @@
+"""The cognitive maps in long-term memory, and the records that they are stored in. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cogmap.geometry.arrays import Floats
+from schemas.array import Matrix
+from schemas.memory import StoredObjects, StoredRecord, StoredTile, tile_key
+from schemas.nodes import PlaceColumn, RecalledColumn, look_of
+
+NUMBERED = "remembered:"
+POSITION = slice(RecalledColumn.X_M, RecalledColumn.Y_M + 1)
+
+
+@dataclass
+class RememberedMap:
+    """A map that was learned: its objects, and the squares of place nodes by their position."""
+
+    name: str
+    known: StoredObjects | None = None
+    tiles: dict[tuple[int, int], dict[PlaceColumn, Matrix]] = field(default_factory=dict)
+
+    @property
+    def keys(self) -> list[str]:
+        """The keys of its records."""
+        keys = [tile_key(self.name, x, y) for x, y in sorted(self.tiles)]
+        return keys if self.known is None else [self.known.key, *keys]
+
+    @property
+    def looks(self) -> list[str]:
+        """What each of its objects looks like."""
+        return [] if self.known is None else [look_of(label) for label in self.known.labels]
+
+    @property
+    def at_m(self) -> Floats:
+        """(n, 2): where its objects stand."""
+        if self.known is None:
+            return np.zeros((0, 2))
+
+        rows = np.asarray(self.known.objects.numpy(), np.float64)
+        return rows[:, POSITION]
+
+
+class RememberedMaps:
+    """All maps in long-term memory, by name."""
+
+    def __init__(self) -> None:
+        self._maps: dict[str, RememberedMap] = {}
+
+    def put(self, records: Iterable[StoredRecord]) -> None:
+        """Take in records, each in place of the one of its key."""
+        for record in records:
+            remembered = self._maps.setdefault(record.map, RememberedMap(record.map))
+            if isinstance(record, StoredTile):
+                remembered.tiles[record.x, record.y] = record.columns
+            else:
+                remembered.known = record
+
+    def forget(self, name: str) -> list[str]:
+        """Remove a map, where there is one of that name; the keys of its records."""
+        forgotten = self._maps.pop(name, None)
+        return [] if forgotten is None else forgotten.keys
+
+    def get(self, name: str) -> RememberedMap:
+        """The map of that name. Raises KeyError where there is none."""
+        return self._maps[name]
+
+    def others(self, name: str) -> list[RememberedMap]:
+        """The maps with objects but for one, by name."""
+        found = []
+        for other in sorted(self._maps):
+            remembered = self._maps[other]
+            if other != name and remembered.known is not None:
+                found.append(remembered)
+
+        return found
+
+    def next_name(self) -> str:
+        """A name that no map has, by the next number."""
+        number = 1
+        while f"{NUMBERED}{number}" in self._maps:
+            number += 1
+
+        return f"{NUMBERED}{number}"

@@ -1,0 +1,180 @@
+"""Where the objects known here stand on a map that was learned before: the relative position of the
+two. Pure.
+
+A hypothesis is a pose of this map's frame in the other one, from two objects here and two there
+that look alike and are as far apart. It is as good as the number of objects that it places where
+one of the same look stands.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cogmap.geometry.arrays import Booleans, Floats, Indices
+from cogmap.geometry.se2 import rotate, transform_from, wrap_angle
+
+NEAREST_PAIR_M = 6.0
+FARTHEST_PAIR_M = 80.0
+MAX_HYPOTHESES = 4000
+REFINEMENTS = 3
+SAME_POSE_M = 5.0
+SAME_POSE_RAD = 0.26
+NOWHERE = -1
+
+
+class Landmarks(NamedTuple):
+    """Objects by what they look like, (n,) numbers, and where they are, (n, 2)."""
+
+    looks: Indices
+    at_m: Floats
+
+
+class Match(NamedTuple):
+    """The `pose` (3,) of this map's frame in the other, and to which landmark there each landmark
+    here belongs, (n,), NOWHERE where to none.
+    """
+
+    pose: Floats
+    there: Indices
+
+    @property
+    def matched(self) -> int:
+        """How many landmarks here stand where one there does."""
+        return int((self.there != NOWHERE).sum())
+
+
+def best_matches(here: Landmarks, there: Landmarks, within_m: float) -> tuple[Match, int] | None:
+    """The match of most landmarks, and how many the best one at any other pose has; None where no
+    two landmarks of each are alike.
+    """
+    poses = _hypotheses(here, there, within_m)
+    if not len(poses):
+        return None
+
+    counts = _counts(poses, here, there, within_m)
+    best = _refined(poses[counts.argmax()], here, there, within_m)
+
+    is_other = _are_apart(poses, best.pose, here)
+    return best, int(counts[is_other].max(initial=0))
+
+
+def _hypotheses(here: Landmarks, there: Landmarks, within_m: float) -> Floats:
+    """(h, 3): poses by which two landmarks here come to stand where two alike do there."""
+    looks = 1 + max(here.looks.max(initial=0), there.looks.max(initial=0))
+    pairs_here, apart_here_m = _pairs(here)
+    pairs_there, apart_there_m = _pairs(there)
+
+    one, other = np.nonzero(
+        _codes(here, pairs_here, looks)[:, None] == _codes(there, pairs_there, looks)
+    )
+    is_as_far = np.abs(apart_here_m[one] - apart_there_m[other]) <= within_m
+    one, other = one[is_as_far], other[is_as_far]
+    if len(one) > MAX_HYPOTHESES:
+        farthest = np.argsort(-apart_here_m[one], kind="stable")[:MAX_HYPOTHESES]
+        one, other = one[farthest], other[farthest]
+
+    return _poses(here.at_m[pairs_here[one]], there.at_m[pairs_there[other]])
+
+
+def _codes(landmarks: Landmarks, pairs: Indices, looks: int) -> Indices:
+    """(p,): a number for the looks of each of (p, 2) pairs."""
+    first, second = landmarks.looks[pairs].T
+    codes: Indices = first * looks + second
+    return codes
+
+
+def _pairs(landmarks: Landmarks) -> tuple[Indices, Floats]:
+    """(p, 2) landmarks neither too near each other nor too far apart, in both orders, and the
+    distance between them, (p,).
+    """
+    offsets_m = landmarks.at_m[:, None] - landmarks.at_m
+    apart_m = np.hypot(offsets_m[..., 0], offsets_m[..., 1])
+    is_pair = (apart_m >= NEAREST_PAIR_M) & (apart_m <= FARTHEST_PAIR_M)
+    return np.argwhere(is_pair), apart_m[is_pair]
+
+
+def _poses(here_m: Floats, there_m: Floats) -> Floats:
+    """(h, 3): poses that move the middles of (h, 2, 2) pairs onto each other, and turn them to one
+    direction.
+    """
+    along_here_m = here_m[:, 1] - here_m[:, 0]
+    along_there_m = there_m[:, 1] - there_m[:, 0]
+    turn_rad = _direction(along_there_m) - _direction(along_here_m)
+
+    turned_m = rotate(here_m.mean(axis=1), turn_rad)
+    shift_m = there_m.mean(axis=1) - turned_m
+    return np.column_stack([shift_m, wrap_angle(turn_rad)])
+
+
+def _direction(vectors: Floats) -> Floats:
+    return np.arctan2(vectors[:, 1], vectors[:, 0])
+
+
+def _counts(poses: Floats, here: Landmarks, there: Landmarks, within_m: float) -> Indices:
+    """(h,): how many landmarks here each pose places where one alike stands."""
+    counts = np.zeros(len(poses), np.int64)
+    for look, at_m in zip(here.looks.tolist(), here.at_m, strict=True):
+        alike_m = there.at_m[there.looks == look]
+        if not len(alike_m):
+            continue
+
+        moved_m = rotate(np.broadcast_to(at_m, (len(poses), 2)), poses[:, 2]) + poses[:, :2]
+        offsets_m = moved_m[:, None] - alike_m
+        nearest_m = np.hypot(offsets_m[..., 0], offsets_m[..., 1]).min(axis=1)
+        counts += nearest_m <= within_m
+
+    return counts
+
+
+def _refined(pose: Floats, here: Landmarks, there: Landmarks, within_m: float) -> Match:
+    """The match near a pose, which is moved to where all that belong together fit best."""
+    match = Match(pose, _belonging(pose, here, there, within_m))
+    for _ in range(REFINEMENTS):
+        is_matched = match.there != NOWHERE
+        if is_matched.sum() < 2:
+            break
+
+        fitted = _fitted(here.at_m[is_matched], there.at_m[match.there[is_matched]])
+        match = Match(fitted, _belonging(fitted, here, there, within_m))
+
+    return match
+
+
+def _belonging(pose: Floats, here: Landmarks, there: Landmarks, within_m: float) -> Indices:
+    """(n,): the landmark there that each landmark here belongs to by a pose, no two to one."""
+    moved_m = transform_from(pose, here.at_m)
+    offsets_m = moved_m[:, None] - there.at_m
+    away_m = np.hypot(offsets_m[..., 0], offsets_m[..., 1])
+    away_m[here.looks[:, None] != there.looks] = np.inf
+
+    belongs = np.full(len(here.looks), NOWHERE)
+    for number in np.argsort(away_m.min(axis=1, initial=np.inf), kind="stable").tolist():
+        nearest = int(away_m[number].argmin())
+        if away_m[number, nearest] <= within_m:
+            belongs[number] = nearest
+            away_m[:, nearest] = np.inf
+
+    return belongs
+
+
+def _fitted(here_m: Floats, there_m: Floats) -> Floats:
+    """(3,): the pose that moves (k, 2) points onto others with the least squares (Umeyama 1991)."""
+    middle_here_m = here_m.mean(axis=0)
+    middle_there_m = there_m.mean(axis=0)
+    x, y = (here_m - middle_here_m).T
+    u, v = (there_m - middle_there_m).T
+
+    turn_rad = np.arctan2((x * v - y * u).sum(), (x * u + y * v).sum())
+    shift_m = middle_there_m - rotate(middle_here_m[None], turn_rad)[0]
+    return np.array([*shift_m, turn_rad])
+
+
+def _are_apart(poses: Floats, pose: Floats, here: Landmarks) -> Booleans:
+    """(h,): which poses place the middle of what is here elsewhere than `pose`, or turn it."""
+    middle_m = here.at_m.mean(axis=0)
+    moved_m = rotate(np.broadcast_to(middle_m, (len(poses), 2)), poses[:, 2]) + poses[:, :2]
+    away_m = np.hypot(*(moved_m - transform_from(pose, middle_m[None])).T)
+    turned_rad = np.abs(wrap_angle(poses[:, 2] - pose[2]))
+    return np.asarray((away_m > SAME_POSE_M) | (turned_rad > SAME_POSE_RAD))

@@ -1,0 +1,139 @@
+"""Long-term memory as a module."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from cogmap.graph.graph import Graph
+from cogmap.runtime.module import Module
+from schemas import topics
+from schemas.base import Message
+from schemas.codelets import Offer
+from schemas.cognition import Broadcast, Competition
+from schemas.graph import Delta, Phase
+from schemas.memory import Restored, Stored
+from schemas.nodes import NEVER_NS, ROOT_MAP
+from schemas.sensing import RangeScan
+from services.memory.config import Config
+from services.memory.gate import LockstepGate
+from services.memory.spatial import SpatialMemory
+
+__all__ = ["Config", "LongTermMemory", "build"]
+
+
+class LongTermMemory:
+    """At the end of a cycle it stores what has changed on the map, if that was broadcast, and
+    offers a map that it recalls.
+    """
+
+    def __init__(self, config: Config, graph: Graph) -> None:
+        self._config = config
+        self._graph = graph
+        self._is_lockstep = config.mode == "lockstep"
+        self._gate = LockstepGate()
+        self._spatial = SpatialMemory(config, graph)
+
+        self._broadcast_in: list[int] = []
+        self._stored_cycle = 0
+        self._ended_ns: int | None = None
+        self._scan_ns = NEVER_NS
+
+    def on_restored(self, restored: Restored) -> None:
+        """Know what the database holds."""
+        self._spatial.restore(restored)
+
+    def resume(self, past: Iterable[Message]) -> None:
+        """Continue with the map of this run after a restart."""
+        self._spatial.resume(message for message in past if isinstance(message, Stored))
+
+    def learned(self) -> Stored:
+        """What stands for all that this run has stored."""
+        return self._spatial.learned()
+
+    def on_broadcast(self, broadcast: Broadcast) -> list[Message]:
+        """The map that is conscious is to be learned."""
+        self._gate.on_broadcast(broadcast)
+        if ROOT_MAP in broadcast.coalition.maps:
+            self._broadcast_in.append(broadcast.cycle)
+        return self._replies()
+
+    def on_competition(self, competition: Competition) -> list[Message]:
+        """A cycle's competition has ended."""
+        self._gate.on_competition(competition)
+        return self._replies()
+
+    def on_scan(self, scan: RangeScan) -> list[Message]:
+        """A scan that is repeated shows that everything waits, as after a restart of another
+        module: then no broadcast will come.
+        """
+        is_repeated = scan.stamp_ns == self._scan_ns
+        self._scan_ns = scan.stamp_ns
+        return self._replies(at_once=is_repeated)
+
+    def on_delta(self, delta: Delta) -> list[Message]:
+        """Note what changes; the end of a cycle is the time to store and to recall."""
+        self._spatial.note(delta)
+        if delta.phase is not Phase.END:
+            return []
+
+        self._ended_ns = delta.stamp_ns
+        return self._replies()
+
+    def on_load(self) -> list[Message]:
+        """Take up a graph that was loaded as a whole, which may have ended a cycle."""
+        self._spatial.note_all()
+        if self._graph.phase is not Phase.END:
+            return []
+
+        agent = self._graph.agent
+        self._ended_ns = 0 if agent is None else max(0, agent.stamp_ns)
+        return self._replies(at_once=True)
+
+    def _replies(self, at_once: bool = False) -> list[Message]:
+        """What the end of the newest cycle leads to, once that is settled."""
+        stamp_ns = self._ended_ns
+        cycle = self._graph.cycle
+        is_open = at_once or not self._is_lockstep or self._gate.is_open(cycle)
+        if stamp_ns is None or not is_open:
+            return []
+
+        self._ended_ns = None
+        return [*self._store(cycle, stamp_ns), *self._recall(cycle, stamp_ns)]
+
+    def _store(self, cycle: int, stamp_ns: int) -> list[Message]:
+        """What is new on the map, where that was broadcast before this cycle and not stored since.
+
+        What is broadcast in this cycle may come sooner or later: it counts in the next.
+        """
+        was_broadcast = any(each < cycle for each in self._broadcast_in)
+        if not was_broadcast or cycle - self._stored_cycle < self._config.store_cycles:
+            return []
+
+        self._stored_cycle = cycle
+        self._broadcast_in = [each for each in self._broadcast_in if each >= cycle]
+        stored = self._spatial.store(cycle, stamp_ns)
+        return [] if stored is None else [stored]
+
+    def _recall(self, cycle: int, stamp_ns: int) -> list[Message]:
+        """An offer of the map that is recalled; in lockstep, of nothing where none is."""
+        is_time = cycle % self._config.recall_cycles == 0
+        found = self._spatial.recall() if is_time else None
+        if found is not None:
+            return [Offer(stamp_ns=stamp_ns, cycle=cycle, operations=[found])]
+        return [Offer(stamp_ns=stamp_ns, cycle=cycle, operations=[])] if self._is_lockstep else []
+
+
+def build(config: Config, instance: str) -> Module:
+    """The module `memory`."""
+    graph = Graph()
+    memory = LongTermMemory(config, graph)
+    published = (topics.STORED, topics.OFFER)
+    return (
+        Module("memory", instance)
+        .remembering(memory.on_restored)
+        .journaling(topics.STORED, memory.resume, memory.learned)
+        .on(topics.SCAN, memory.on_scan, emits=published)
+        .following(graph, memory.on_delta, emits=published, on_load=memory.on_load)
+        .on(topics.COMPETITION, memory.on_competition, emits=published)
+        .on(topics.BROADCAST, memory.on_broadcast, emits=published)
+    )

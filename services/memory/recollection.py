@@ -1,0 +1,48 @@
+"""A recalled map as a node of the Workspace. Pure."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from schemas.array import Matrix
+from schemas.nodes import RECOLLECTION_ID, TILE_CELLS, PlaceColumn, Recollection
+from services.memory.maps import RememberedMap
+from services.memory.recall import Recalled
+from services.memory.storing import COLUMNS
+
+
+def recollection(found: Recalled) -> Recollection:
+    """The node that a recalled map is offered as."""
+    remembered = found.remembered
+    assert remembered.known is not None
+    x_m, y_m, heading_rad = found.pose.tolist()
+
+    return Recollection(
+        id=RECOLLECTION_ID,
+        base_level=1.0,
+        map=remembered.name,
+        x_m=x_m,
+        y_m=y_m,
+        heading_rad=heading_rad,
+        labels=remembered.known.labels,
+        functions=remembered.known.functions,
+        matched=found.matched,
+        objects=remembered.known.objects,
+        tiles=sorted(remembered.tiles),
+        columns=_columns(remembered),
+    )
+
+
+def _columns(remembered: RememberedMap) -> dict[PlaceColumn, Matrix]:
+    """The columns of a map's tiles, a row each; those that no tile has are left out."""
+    columns = {}
+    for column in COLUMNS:
+        rows = []
+        for position in sorted(remembered.tiles):
+            values = remembered.tiles[position].get(column)
+            rows.append(np.zeros((1, TILE_CELLS)) if values is None else values.numpy())
+
+        if any(row.any() for row in rows):
+            columns[column] = Matrix.of(np.vstack(rows), "<f2")
+
+    return columns

@@ -1,0 +1,136 @@
+"""Spatial Memory: it learns the root map where that is conscious, and recalls maps that it learned
+before (beyond the paper, which leaves long-term memory open).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from cogmap.graph.graph import Graph
+from schemas.graph import Delta
+from schemas.memory import Restored, Stored, StoredRecord
+from schemas.nodes import RECOLLECTION_ID, ROOT_MAP, Map, Object, Recollection, look_of
+from services.memory.associations import Associations
+from services.memory.config import Config
+from services.memory.maps import RememberedMap, RememberedMaps
+from services.memory.recall import cues, recalled
+from services.memory.recollection import recollection
+from services.memory.storing import ChangedPlaces, stored_objects
+
+
+class SpatialMemory:
+    """The maps that were learned, and the name under which the root map of `graph` is.
+
+    Once a recalled map is joined to the root map, the two are one, and stored as the recalled one.
+    """
+
+    def __init__(self, config: Config, graph: Graph) -> None:
+        self._config = config
+        self._graph = graph
+        self._maps = RememberedMaps()
+        self._name = ""
+        self._changed = ChangedPlaces()
+        self._objects: list[StoredRecord] = []
+        self._cued: set[str] = set()
+        self._associations: Associations | None = None
+
+    def restore(self, restored: Restored) -> None:
+        """Know the maps that the database holds."""
+        self._maps.put(restored.records)
+        self._cued = set()
+        self._associations = None
+
+    def resume(self, past: Iterable[Stored]) -> None:
+        """Continue to learn the map that was stored in this run."""
+        for stored in past:
+            self._maps.put(stored.records)
+            for record in stored.records:
+                self._name = record.map
+
+    def learned(self) -> Stored:
+        """What stands for all that was stored in this run: the objects of the map."""
+        return Stored(cycle=self._graph.cycle, records=self._objects)
+
+    def note(self, delta: Delta) -> None:
+        """Note what a delta has changed."""
+        self._changed.note(delta.operations)
+
+    def note_all(self) -> None:
+        """Take all of the graph for changed."""
+        self._changed.note_all(self._graph)
+
+    def store(self, cycle: int, stamp_ns: int) -> Stored | None:
+        """What has changed on the root map since it was stored; None where nothing has."""
+        forgotten = self._rename()
+        records: list[StoredRecord] = [*self._changed.take(self._name, self._graph)]
+        objects = stored_objects(self._name, self._learned(), self._graph)
+        if objects != self._objects:
+            self._objects = objects
+            records += objects
+
+        if not records and not forgotten:
+            return None
+
+        self._maps.put(records)
+        return Stored(stamp_ns=stamp_ns, cycle=cycle, records=records, forgotten=forgotten)
+
+    def recall(self) -> Recollection | None:
+        """The stored map that the agent is on, where other objects than before show that now."""
+        agent = self._graph.agent
+        if agent is None or self._joined or RECOLLECTION_ID in self._graph.nodes:
+            return None
+
+        here = cues(self._learned(), (agent.x_m, agent.y_m))
+        labels = {node.label for node in here}
+        if labels == self._cued:
+            return None
+
+        self._cued = labels
+        others = self._compared(here)
+        found = recalled(here, others, self._graph.cell_m(ROOT_MAP), self._config)
+        return None if found is None else recollection(found)
+
+    def _compared(self, here: list[Object]) -> list[RememberedMap]:
+        """The stored maps to compare: all, or of many those that objects `here` remind of."""
+        others = self._maps.others(self._name)
+        if len(others) <= self._config.compared_maps:
+            return others
+
+        if self._associations is None:
+            self._associations = Associations(self._config.sparse)
+            for remembered in others:
+                self._associations.learn(remembered.name, remembered.looks, remembered.at_m)
+
+        looks = [look_of(node.label) for node in here]
+        at_m = np.array([(node.x_m, node.y_m) for node in here]).reshape(-1, 2)
+        names = self._associations.reminded_of(looks, at_m)[: self._config.compared_maps]
+        return [remembered for remembered in others if remembered.name in names]
+
+    def _rename(self) -> list[str]:
+        """Call the root map what it has turned out to be, or give it a name where it has none. The
+        keys of the records under a name that no longer holds.
+        """
+        before = self._name
+        self._name = self._joined or before or self._maps.next_name()
+        if not before or self._name == before:
+            return []
+
+        self.note_all()
+        return self._maps.forget(before)
+
+    @property
+    def _joined(self) -> str:
+        """The name of the map that was joined to the root map; empty where none was."""
+        root = self._graph.get(Map, ROOT_MAP)
+        return "" if root is None else root.remembered
+
+    def _learned(self) -> list[Object]:
+        """The objects of the root map that were seen often enough to be learned."""
+        learned = []
+        for node in self._graph.of_kind(Object):
+            if node.map == ROOT_MAP and node.sightings >= self._config.min_sightings:
+                learned.append(node)
+
+        return learned

@@ -1,0 +1,93 @@
+"""What has changed on the root map since it was stored last, as records. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from cogmap.graph.graph import Graph
+from cogmap.graph.places import Tile
+from cogmap.graph.tiles import tiles_of
+from cogmap.graph.window import EVIDENCE_COLUMNS
+from schemas.array import Matrix
+from schemas.graph import Cells, Operation
+from schemas.memory import StoredObjects, StoredRecord, StoredTile
+from schemas.nodes import ROOT_MAP, TILE_CELLS, Object, PlaceColumn
+
+COLUMNS = (PlaceColumn.ROAD, PlaceColumn.OBSTACLE, *EVIDENCE_COLUMNS)
+"""Of place nodes; the weights of links follow from their evidence."""
+
+Position = tuple[int, int]
+
+
+class ChangedPlaces:
+    """The squares of the root map that were written since they were stored."""
+
+    def __init__(self) -> None:
+        self._changed: set[Position] = set()
+
+    def note(self, operations: Iterable[Operation]) -> None:
+        """Note which squares operations write."""
+        for operation in operations:
+            if not isinstance(operation, Cells) or operation.map != ROOT_MAP:
+                continue
+            if operation.column in COLUMNS:
+                cells = np.asarray(operation.cells.numpy(), np.int64)
+                self._changed.update(tiles_of(cells))
+
+    def note_all(self, graph: Graph) -> None:
+        """Note all squares of a graph."""
+        for (_, x, y), _tile in graph.places.of_map(ROOT_MAP):
+            self._changed.add((x, y))
+
+    def take(self, name: str, graph: Graph) -> list[StoredTile]:
+        """The records of the squares that have changed, of the map that is called `name`."""
+        records = []
+        for x, y in sorted(self._changed):
+            tile = graph.places.tiles.get((ROOT_MAP, x, y))
+            if tile is not None:
+                records.append(StoredTile(map=name, x=x, y=y, columns=_columns(tile)))
+
+        self._changed.clear()
+        return records
+
+
+def _columns(tile: Tile) -> dict[PlaceColumn, Matrix]:
+    """The columns of a tile that were written."""
+    columns = {}
+    for column in COLUMNS:
+        values = tile.columns.get(column)
+        if values is not None:
+            columns[column] = Matrix.of(values.reshape(1, TILE_CELLS), "<f2")
+
+    return columns
+
+
+def stored_objects(name: str, objects: Iterable[Object], graph: Graph) -> list[StoredRecord]:
+    """The record of the objects of the map that is called `name`; none where there are none."""
+    known = sorted(objects, key=lambda node: node.id)
+    if not known:
+        return []
+
+    rows = []
+    for node in known:
+        row = (
+            node.x_m,
+            node.y_m,
+            node.x_sd_m,
+            node.y_sd_m,
+            node.width_m,
+            node.height_m,
+            float(node.sightings),
+        )
+        rows.append(row)
+
+    record = StoredObjects(
+        map=name,
+        cell_m=graph.cell_m(ROOT_MAP),
+        labels=[node.label for node in known],
+        functions=[node.function for node in known],
+        objects=Matrix.of(rows),
+    )
+    return [record]

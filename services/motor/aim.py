@@ -1,0 +1,37 @@
+"""What a motor program wants of the wheels, before the reactive layers have their say."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from schemas.sensing import Pose, SpeedLimit
+
+
+class Speed(NamedTuple):
+    """A speed, and what keeps it below cruising speed."""
+
+    m_s: float
+    limit: SpeedLimit = SpeedLimit.NONE
+
+
+class Aim(NamedTuple):
+    """The point that the robot steers to, its bearing, left positive, and its distance, and the
+    speed at which. With `on_the_spot` it only turns there.
+    """
+
+    bearing_rad: float
+    distance_m: float
+    speed: Speed
+    on_the_spot: bool = False
+
+
+def bearing_of(x_m: float, y_m: float, pose: Pose) -> float:
+    """The bearing of a position as seen from a pose, in rad, left positive."""
+    direction_rad = math.atan2(y_m - pose.y_m, x_m - pose.x_m)
+    return math.remainder(direction_rad - pose.heading_rad, math.tau)
+
+
+def slowest(*speeds: Speed) -> Speed:
+    """The lowest of speeds, of equals the first."""
+    return min(speeds, key=lambda speed: speed.m_s)

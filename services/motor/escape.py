@@ -1,0 +1,53 @@
+"""Backs away from what a robot stands before, so that it can take another way. Pure."""
+
+from __future__ import annotations
+
+import msgspec
+
+from schemas.sensing import MotorCommand, SpeedLimit
+from services.motor.config import Config
+
+PATIENCE_S = 2.0
+BACK_S = 2.0
+BACK_M_S = 0.4
+
+
+class Escape:
+    """Lets the robot back away for BACK_S where it is stuck, or was halted by an obstacle for
+    PATIENCE_S.
+
+    It came from there, so that the ground behind it is free; a new plan leads round what the scan
+    has put on the map meanwhile.
+    """
+
+    def __init__(self, config: Config) -> None:
+        self._wheel_rad_s = -BACK_M_S / config.wheel_radius_m
+        self._halted_since_ns: int | None = None
+        self._until_ns = -1
+
+    def command(self, wanted: MotorCommand, is_stuck: bool) -> MotorCommand:
+        """The command instead of the one that is wanted."""
+        now_ns = wanted.stamp_ns
+        if wanted.halted_by is not SpeedLimit.OBSTACLE:
+            self._halted_since_ns = None
+        elif self._halted_since_ns is None:
+            self._halted_since_ns = now_ns
+
+        since_ns = self._halted_since_ns
+        has_waited = since_ns is not None and now_ns - since_ns >= PATIENCE_S * 1e9
+        if is_stuck or has_waited:
+            self._until_ns = now_ns + round(BACK_S * 1e9)
+            self._halted_since_ns = None
+
+        if now_ns >= self._until_ns:
+            return wanted
+        return self._back(wanted, SpeedLimit.STUCK if is_stuck else SpeedLimit.OBSTACLE)
+
+    def _back(self, wanted: MotorCommand, limit: SpeedLimit) -> MotorCommand:
+        return msgspec.structs.replace(
+            wanted,
+            left_wheel_rad_s=self._wheel_rad_s,
+            right_wheel_rad_s=self._wheel_rad_s,
+            halted_by=SpeedLimit.NONE,
+            slowed_by=limit,
+        )

@@ -1,0 +1,86 @@
+"""Which motor program is executed, and from when on. Pure."""
+
+from __future__ import annotations
+
+from cogmap.errors import MessageError
+from schemas.cognition import Action, MotorProgram
+from schemas.nodes import Plan, Self
+from schemas.sensing import Pose, SpeedLimit
+from services.motor.aim import Aim
+from services.motor.config import Config
+from services.motor.programs import FollowPlan, Halt, Program, program_of
+
+
+class Execution:
+    """Actions start motor programs; before the first one the robot stands.
+
+    In lockstep an action counts after the command of its own cycle, whichever comes first, and
+    before that of the next.
+    """
+
+    def __init__(self, config: Config) -> None:
+        self._config = config
+        self._is_lockstep = config.mode == "lockstep"
+        self._follow = FollowPlan(config)
+        self._program: Program = Halt(self._follow)
+        self._executed: MotorProgram | None = None
+        self._actions: list[Action] = []
+
+    @property
+    def executed(self) -> MotorProgram:
+        """The program that was started last. Raises MessageError where none was."""
+        if self._executed is None:
+            raise MessageError("no motor program was started yet")
+        return self._executed
+
+    def start(self, program: MotorProgram) -> None:
+        """Execute a program, from its beginning. Raises MessageError where there is none."""
+        parameters = program.parameters
+        self._program = program_of(program.action, parameters, self._follow, self._config)
+        self._executed = program
+
+    def put(self, action: Action) -> None:
+        """Keep an action until it counts. Raises MessageError where it has no motor program."""
+        if action.scheme:
+            program_of(action.action, action.parameters, self._follow, self._config)
+        self._actions.append(action)
+
+    def started(self, answered_cycle: int, waiting_cycle: int | None) -> list[MotorProgram]:
+        """The programs that start now, after the command of `answered_cycle`, with a pose of
+        `waiting_cycle` to answer next, None where none has come.
+        """
+        started = []
+        waiting = []
+        for action in self._actions:
+            is_next = waiting_cycle is not None and action.cycle < waiting_cycle
+            if self._is_lockstep and action.cycle > answered_cycle and not is_next:
+                waiting.append(action)
+            elif action.scheme and not self._is_executed(action):
+                started.append(self._start(action))
+
+        self._actions = waiting
+        return started
+
+    def take(self, plan: Plan | None, agent: Pose | Self | None) -> None:
+        """The plan is this one now, where it is new."""
+        self._follow.take(plan, agent)
+
+    def aim(self, pose: Pose) -> Aim | SpeedLimit:
+        """Where the program steers to from a pose, or why it halts."""
+        return self._program.aim(pose)
+
+    def _is_executed(self, action: Action) -> bool:
+        executed = self._executed
+        if executed is None:
+            return False
+        return (executed.action, executed.parameters) == (action.action, action.parameters)
+
+    def _start(self, action: Action) -> MotorProgram:
+        program = MotorProgram(
+            stamp_ns=action.stamp_ns,
+            cycle=action.cycle,
+            action=action.action,
+            parameters=action.parameters,
+        )
+        self.start(program)
+        return program

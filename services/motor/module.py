@@ -1,0 +1,277 @@
+"""Sensory-motor memory as a module: motor programs of the chosen action, and reactive layers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from cogmap.graph.graph import Graph
+from cogmap.runtime.module import Module
+from schemas import topics
+from schemas.base import Message
+from schemas.codelets import Offer
+from schemas.cognition import Action, Competition, MotorProgram
+from schemas.graph import Delta, Operation, Phase
+from schemas.nodes import PLAN_ID, Goal, Plan, Self
+from schemas.process import Clock
+from schemas.sensing import MotorCommand, Pose, RangeScan, SelfMotion, SpeedLimit
+from services.motor.aim import Aim
+from services.motor.config import Config
+from services.motor.escape import Escape
+from services.motor.execution import Execution
+from services.motor.gate import LockstepGate
+from services.motor.motor import SensoryMotorMemory, halted, obstacle_ahead_m
+from services.motor.near import NearObstacles
+from services.motor.seeking import sought_by
+from services.motor.stuck import StuckDetector
+
+__all__ = ["Config", "MotorModule", "build"]
+
+POSE_PHASES = frozenset({Phase.LOCALIZATION, Phase.LATE})
+
+
+class Estimate(NamedTuple):
+    """A committed pose of the self node, the stamp of its view, its cycle, and the plan then."""
+
+    stamp_ns: int
+    cycle: int
+    pose: Pose
+    plan: Plan | None
+
+
+class MotorModule:
+    """An action starts a motor program; each new pose of the self node leads to a motor command.
+
+    The plan is that of the graph, as it is when the pose is committed. In lockstep a command waits
+    for what `LockstepGate` names. A pose that is published again, as the simulator publishes a
+    frame again that nobody answered, is answered at once.
+    """
+
+    def __init__(self, config: Config, graph: Graph) -> None:
+        self._config = config
+        self._is_lockstep = config.mode == "lockstep"
+        self._gate = LockstepGate()
+        self._stuck = StuckDetector(config.stuck_m_s, config.stuck_after_s)
+        self._escape = Escape(config)
+        self._near = NearObstacles(config.half_width_m)
+        self._motor = SensoryMotorMemory(config, self._near)
+
+        self._graph = graph
+        self._execution = Execution(config)
+        self._is_resumed = False
+        self._clear_m = math.inf
+        self._newest_ns = 0
+        self._waiting: Estimate | None = None
+        self._answered: MotorCommand | None = None
+        self._answered_cycle = 0
+        self._sought: Goal | None = None
+        self._makes_offers = self._is_lockstep and config.makes_offers
+
+    def restore(self, past: Iterable[Message]) -> None:
+        """Resume the program that was executed last. A turn begins anew."""
+        for message in past:
+            if isinstance(message, MotorProgram):
+                self._execution.start(message)
+                self._is_resumed = True
+
+    def executed(self) -> MotorProgram:
+        """The program that is executed. Raises MessageError where none was yet."""
+        return self._execution.executed
+
+    def on_clock(self, clock: Clock) -> MotorCommand | None:
+        """Stop the robot, once, when its newest pose has become too old."""
+        self._newest_ns = max(self._newest_ns, clock.stamp_ns)
+        last = self._answered
+        if last is None or last.halted_by or self._waiting is not None:
+            return None
+
+        age_ns = self._age_ns(last.stamp_ns)
+        if age_ns <= self._config.max_pose_age_s * 1e9:
+            return None
+
+        return self._remember(halted(last.stamp_ns, SpeedLimit.POSE_AGE, age_ns))
+
+    def on_motion(self, motion: SelfMotion) -> list[Message]:
+        """Compare the motion with the commands before it."""
+        self._stuck.on_motion(motion)
+        if motion.stamp_ns > self._gate.motion_ns:
+            self._near.on_motion(motion)
+        self._gate.motion_ns = motion.stamp_ns
+        self._newest_ns = max(self._newest_ns, motion.stamp_ns)
+
+        return self._replies()
+
+    def on_scan(self, scan: RangeScan) -> list[Message]:
+        """Measure how far it is free ahead.
+
+        In lockstep a repeated scan is answered at once: by the command for the pose that waits, or
+        by a halt where no pose has come since a restart.
+        """
+        self._clear_m = obstacle_ahead_m(scan, self._config.half_width_m)
+        is_repeated = scan.stamp_ns == self._gate.scan_ns
+        if not is_repeated:
+            self._near.on_scan(scan)
+
+        self._gate.scan_ns = scan.stamp_ns
+        self._newest_ns = max(self._newest_ns, scan.stamp_ns)
+
+        if is_repeated and self._is_lockstep and self._has_no_pose:
+            command = self._remember(halted(scan.stamp_ns, SpeedLimit.NO_POSE))
+            return [*self._offers(command), command]
+        return self._replies(at_once=is_repeated)
+
+    def on_delta(self, delta: Delta) -> list[Message]:
+        """Command the wheels for a new pose of the self node; repeat the command for a repeated
+        pose.
+        """
+        pose = _self_pose(delta)
+        if pose is None:
+            return []
+
+        if self._answered is not None and self._is_lockstep and self._is_answered(delta):
+            return [self._answered]
+
+        is_repeated = self._waiting is not None and self._waiting.stamp_ns == delta.stamp_ns
+        plan = self._graph.get(Plan, PLAN_ID)
+        self._waiting = Estimate(delta.stamp_ns, delta.cycle, pose, plan)
+        if self._is_resumed:
+            self._gate.resume(delta.cycle)
+            self._is_resumed = False
+
+        return self._replies(at_once=is_repeated and delta.phase is Phase.LOCALIZATION)
+
+    def on_load(self) -> None:
+        """Take up the plan of a graph that was loaded as a whole."""
+        self._execution.take(self._graph.get(Plan, PLAN_ID), self._graph.agent)
+
+    def on_competition(self, competition: Competition) -> list[Message]:
+        """A cycle's competition has ended."""
+        self._gate.on_competition(competition)
+        return self._replies()
+
+    def on_action(self, action: Action) -> list[Message]:
+        """Start the motor program of an action. Raises MessageError where there is none.
+
+        After a restart, actions come again that were executed already.
+        """
+        if self._is_resumed and action.cycle <= self._execution.executed.cycle:
+            return []
+
+        self._execution.put(action)
+        self._gate.on_action(action.cycle)
+        return self._replies()
+
+    def _replies(self, at_once: bool = False) -> list[Message]:
+        """The programs that start, and the command for the newest pose."""
+        replies: list[Message] = [*self._programs()]
+        command = self._command(at_once)
+        if command is not None:
+            replies += [*self._offers(command), command, *self._programs()]
+        return replies
+
+    def _programs(self) -> list[MotorProgram]:
+        """The programs that start; what they seek is offered with the next command."""
+        waiting_cycle = None if self._waiting is None else self._waiting.cycle
+        started = self._execution.started(self._answered_cycle, waiting_cycle)
+        for program in started:
+            goal = sought_by(program)
+            if goal is not None:
+                self._sought = goal
+
+        return started
+
+    def _offers(self, command: MotorCommand) -> list[Message]:
+        """The goal that is sought, where the agent has none of that name; where offers are made in
+        each cycle, perhaps none.
+        """
+        goal = self._sought
+        self._sought = None
+        operations: list[Operation] = []
+        if goal is not None and self._graph.get(Goal, goal.id) is None:
+            operations.append(goal)
+
+        if not operations and not self._makes_offers:
+            return []
+        cycle = self._graph.cycle
+        return [Offer(stamp_ns=command.stamp_ns, cycle=cycle, operations=operations)]
+
+    def _command(self, at_once: bool = False) -> MotorCommand | None:
+        """The command for the newest pose, if there is one that waits for nothing any longer."""
+        estimate = self._waiting
+        if estimate is None:
+            return None
+
+        is_open = at_once or self._gate.is_open(estimate.stamp_ns, estimate.cycle)
+        if self._is_lockstep and not is_open:
+            return None
+
+        if at_once:
+            self._gate.resume(estimate.cycle)
+        self._waiting = None
+        self._answered_cycle = estimate.cycle
+
+        return self._remember(self._answer(estimate))
+
+    def _answer(self, estimate: Estimate) -> MotorCommand:
+        stamp_ns = estimate.stamp_ns
+        age_ns = self._age_ns(stamp_ns)
+
+        self._execution.take(estimate.plan, estimate.pose)
+        aim = self._execution.aim(estimate.pose)
+        if not isinstance(aim, Aim):
+            return halted(stamp_ns, aim, age_ns)
+
+        command = self._motor.command(stamp_ns, aim, self._clear_m, age_ns)
+        return self._escape.command(command, self._stuck.is_stuck)
+
+    def _remember(self, command: MotorCommand) -> MotorCommand:
+        wheels_rad_s = (command.left_wheel_rad_s + command.right_wheel_rad_s) / 2
+        self._stuck.on_command(wheels_rad_s * self._config.wheel_radius_m)
+        self._answered = command
+
+        return command
+
+    def _age_ns(self, stamp_ns: int) -> int:
+        """How much older than the newest message a stamp is; 0 in lockstep, where time waits."""
+        return 0 if self._is_lockstep else max(0, self._newest_ns - stamp_ns)
+
+    @property
+    def _has_no_pose(self) -> bool:
+        """Whether none has come since the start: a restart loses the last one."""
+        return self._answered is None and self._waiting is None
+
+    def _is_answered(self, delta: Delta) -> bool:
+        last = self._answered
+        is_pose_of_view = delta.phase is Phase.LOCALIZATION
+        return is_pose_of_view and last is not None and last.stamp_ns == delta.stamp_ns
+
+
+def _self_pose(delta: Delta) -> Pose | None:
+    """The pose of the self node in a delta that moves it, otherwise None."""
+    agents = [item for item in delta.operations if isinstance(item, Self)]
+    if delta.phase not in POSE_PHASES or not agents:
+        return None
+
+    agent = agents[-1]
+    return Pose(x_m=agent.x_m, y_m=agent.y_m, heading_rad=agent.heading_rad)
+
+
+def build(config: Config, instance: str) -> Module:
+    """The module `motor`."""
+    graph = Graph()
+    motor = MotorModule(config, graph)
+    replies = (topics.MOTOR_PROGRAM, topics.MOTOR_COMMAND, topics.OFFER)
+    module = (
+        Module("motor", instance)
+        .on(topics.SELF_MOTION, motor.on_motion, emits=replies)
+        .on(topics.SCAN, motor.on_scan, emits=replies)
+        .following(graph, motor.on_delta, emits=replies, on_load=motor.on_load)
+        .on(topics.COMPETITION, motor.on_competition, emits=replies)
+        .on(topics.ACTION, motor.on_action, emits=replies)
+        .journaling(topics.MOTOR_PROGRAM, motor.restore, motor.executed, backfill=[topics.ACTION])
+    )
+    if config.mode == "real_time":
+        module.on(topics.CLOCK, motor.on_clock, emits=replies)
+
+    return module

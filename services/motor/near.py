@@ -1,0 +1,161 @@
+"""What the robot passed a moment ago and does not see any longer, in its own frame. Pure.
+
+A camera looks ahead: what stands beside the robot was seen before, and is remembered by the
+self-motion since. An arc that leads into it is replaced by one beside it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cogmap.geometry.arrays import Booleans, Floats
+from cogmap.geometry.se2 import compose, transform_to
+from schemas.sensing import RangeScan, SelfMotion
+from services.motor.config import NEAREST_SCAN_M
+
+REMEMBERED_M = 6.0
+REMEMBERED_S = 20.0
+FARTHEST_M = 12.0
+# A hit counts where others were within so far of it, in so many scans as these altogether.
+SAME_M = 0.5
+MIN_SCANS = 3
+BEHIND_M = 1.0
+ARC_M = 2.0
+STEP_M = 0.25
+CURVATURES_PER_M = np.linspace(-1.0, 1.0, 21)
+
+
+class NearObstacles:
+    """Hits of the range scan, moved with the robot until they are far behind.
+
+    Each is forgotten where a later scan sees farther in its direction. The robot is a disc that
+    keeps `clearance_m` between its middle and them.
+    """
+
+    def __init__(self, clearance_m: float) -> None:
+        self._clearance_m = clearance_m
+        self._points_m = np.zeros((0, 2))
+        self._stamps_ns = np.zeros(0, np.int64)
+        self._moved_ns = -1
+        self._early: RangeScan | None = None
+
+    def on_motion(self, motion: SelfMotion) -> None:
+        """Move what is remembered to where it is from the robot now; then comes the scan of the
+        same view, also where it arrived earlier.
+        """
+        self._moved_ns = motion.stamp_ns
+        if len(self._points_m):
+            self._move(motion)
+
+        early = self._early
+        if early is not None and early.stamp_ns <= self._moved_ns:
+            self._early = None
+            self._add(early)
+
+    def on_scan(self, scan: RangeScan) -> None:
+        """Remember what is seen, and forget what is not there."""
+        if scan.stamp_ns <= self._moved_ns:
+            self._add(scan)
+        else:
+            self._early = scan
+
+    def _move(self, motion: SelfMotion) -> None:
+        rows = np.asarray(motion.motions.numpy(), np.float64)
+        pose = np.zeros(3)
+        for speed_m_s, turn_rad_s, duration_s in rows[:, :3].tolist():
+            step = np.array([speed_m_s * duration_s, 0.0, turn_rad_s * duration_s])
+            pose = compose(pose, step)
+
+        moved_m = transform_to(pose, self._points_m)
+        age_ns = motion.stamp_ns - self._stamps_ns
+        is_near = np.hypot(*moved_m.T) <= FARTHEST_M
+        is_beside = moved_m[:, 0] >= -REMEMBERED_M
+        self._keep(moved_m, is_near & is_beside & (age_ns <= REMEMBERED_S * 1e9))
+
+    def _add(self, scan: RangeScan) -> None:
+        bearing_rad = np.asarray(scan.bearing_rad.numpy(), np.float64)
+        range_m = np.asarray(scan.range_m.numpy(), np.float64)
+        self._keep(self._points_m, ~self._is_seen_through(bearing_rad, range_m))
+
+        is_hit = (range_m >= NEAREST_SCAN_M) & (range_m <= FARTHEST_M)
+        ahead = np.column_stack([np.cos(bearing_rad), np.sin(bearing_rad)])
+        hits_m = range_m[is_hit, None] * ahead[is_hit]
+        stamps_ns = np.full(len(hits_m), scan.stamp_ns, np.int64)
+
+        self._points_m = np.concatenate([self._points_m, hits_m])
+        self._stamps_ns = np.concatenate([self._stamps_ns, stamps_ns])
+
+    def clear_curvature(self, wanted_per_m: float) -> float | None:
+        """The curvature nearest to the one that is wanted whose arc leads past all that is near;
+        None where none does.
+        """
+        near_m = self._certain_m()
+        if not len(near_m):
+            return wanted_per_m
+
+        per_m = np.append(CURVATURES_PER_M, wanted_per_m)
+        away_m = _least_distances_m(per_m, near_m)
+        enough_m = min(self._clearance_m, float(np.hypot(*near_m.T).min()))
+        is_clear = away_m >= enough_m - 1e-9
+        if is_clear[-1]:
+            return wanted_per_m
+        if not is_clear.any():
+            return None
+
+        change_per_m = np.where(is_clear, np.abs(per_m - wanted_per_m), np.inf)
+        return float(per_m[change_per_m.argmin()])
+
+    def _certain_m(self) -> Floats:
+        """(n, 2): what is near enough to matter, and was seen in MIN_SCANS scans."""
+        reach_m = ARC_M + self._clearance_m
+        is_near = np.hypot(*self._points_m.T) <= reach_m + SAME_M
+        points_m = self._points_m[is_near]
+        stamps_ns = self._stamps_ns[is_near]
+        away_m = np.hypot(*(points_m[:, None] - points_m).transpose(2, 0, 1))
+        is_same = away_m <= SAME_M
+
+        scans = np.zeros(len(points_m), np.int64)
+        for stamp_ns in np.unique(stamps_ns).tolist():
+            scans += is_same[:, stamps_ns == stamp_ns].any(axis=1)
+
+        certain_m: Floats = points_m[scans >= MIN_SCANS]
+        return certain_m
+
+    def _is_seen_through(self, bearing_rad: Floats, range_m: Floats) -> Booleans:
+        """(n,): which remembered points lie before what a scan sees in their direction."""
+        x_m, y_m = self._points_m.T
+        if len(bearing_rad) < 2:
+            return np.zeros(len(x_m), bool)
+
+        order = np.argsort(bearing_rad)
+        ascending_rad = bearing_rad[order]
+        half_rad = float(np.diff(ascending_rad).mean()) / 2
+
+        direction_rad = np.arctan2(y_m, x_m)
+        borders_rad = ascending_rad[:-1] + half_rad
+        sector = order[np.searchsorted(borders_rad, direction_rad)]
+        is_in_view = np.abs(direction_rad - bearing_rad[sector]) <= half_rad
+
+        distance_m = np.hypot(x_m, y_m)
+        sees_farther = range_m[sector] > distance_m + BEHIND_M
+        is_through = is_in_view & sees_farther & (distance_m >= NEAREST_SCAN_M)
+        return np.asarray(is_through, np.bool_)
+
+    def _keep(self, points_m: Floats, is_kept: Booleans) -> None:
+        self._points_m = points_m[is_kept]
+        self._stamps_ns = self._stamps_ns[is_kept]
+
+
+def _least_distances_m(per_m: Floats, points_m: Floats) -> Floats:
+    """(k,): how near arcs of (k,) curvatures lead past (n, 2) points."""
+    along_m = np.arange(STEP_M, ARC_M + STEP_M / 2, STEP_M)
+    turned_rad = per_m[:, None] * along_m
+    is_straight = np.abs(per_m) < 1e-6
+    safe_per_m = np.where(is_straight, 1e-6, per_m)[:, None]
+
+    x_m = np.sin(turned_rad) / safe_per_m
+    y_m = (1 - np.cos(turned_rad)) / safe_per_m
+    x_m = np.where(is_straight[:, None], along_m, x_m)
+    away_m = np.hypot(x_m[..., None] - points_m[:, 0], y_m[..., None] - points_m[:, 1])
+    least_m: Floats = away_m.min(axis=(1, 2))
+    return least_m

@@ -1,0 +1,210 @@
+"""Reads schemes from TOML, and refuses what no broadcast could ever match."""
+
+from __future__ import annotations
+
+import difflib
+import re
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from cogmap.errors import ConfigError
+from schemas.base import Name, PositiveSeconds, Scalar, Share
+from schemas.cognition import ActionName
+from services.procedural.kinds import NodeKinds
+from services.procedural.patterns import Condition, Pattern
+from services.procedural.schemes import Reference, Result, Scheme
+from services.procedural.source import Source
+
+BUILT_IN = Path(__file__).with_name("schemes.toml")
+KIND = "kind"
+VARIABLE = "as"
+SALIENCE = "salience"
+BOUNDS = ("at_least", "at_most")
+
+
+class SchemeTable(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
+    """A scheme as it is written."""
+
+    name: Name
+    action: str
+    context: list[dict[str, Any]]
+    adding: list[dict[str, Any]] = []
+    deleting: list[dict[str, Any]] = []
+    parameters: dict[str, Scalar] = {}
+    base_level: Share = 0.5
+    within_s: PositiveSeconds = 5.0
+
+
+class SchemeFile(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
+    """A file of schemes. `generic_kinds` are kinds of nodes that other packages' codelets write,
+    `own_actions` those that a motor module of somebody's own executes.
+    """
+
+    scheme: list[SchemeTable]
+    generic_kinds: list[Name] = []
+    own_actions: list[Name] = []
+
+
+def load(path: Path) -> list[Scheme]:
+    """The schemes of a file. Raises ConfigError that names the file, and the line of what is wrong
+    in it.
+    """
+    text = _read(path)
+    source = Source(path, text)
+    try:
+        file = msgspec.convert(tomllib.loads(text), SchemeFile)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"cannot read {path} as TOML: {error}") from None
+    except msgspec.ValidationError as error:
+        raise _located(source, str(error)) from None
+
+    kinds = NodeKinds(file.generic_kinds)
+    actions = [*ActionName, *file.own_actions]
+    schemes: list[Scheme] = []
+    for number, table in enumerate(file.scheme):
+        scheme = _Reader(source, number, table, kinds).scheme(actions)
+        if scheme.name in [each.name for each in schemes]:
+            raise source.error(number, scheme.name, f"two schemes are named {scheme.name!r}")
+        schemes.append(scheme)
+
+    return schemes
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text()
+    except FileNotFoundError:
+        raise ConfigError(
+            f"no file of schemes {path}: name one that exists, or leave procedural.schemes out"
+        ) from None
+    except (UnicodeDecodeError, OSError) as error:
+        raise ConfigError(f"cannot read {path} as TOML: {error}") from None
+
+
+def _located(source: Source, error: str) -> ConfigError:
+    """An error of the decoder, which names where it is by a path such as $.scheme[1].name."""
+    number = re.search(r"\$\.scheme\[(\d+)\]", error)
+    words = re.findall(r"\w+", error.rpartition("$")[2]) or [""]
+    unknown = re.search(r"unknown field `(\w+)`", error)
+    word = unknown[1] if unknown else words[-1]
+    return source.error(int(number[1]) if number else None, word, error)
+
+
+class _Reader:
+    """Makes a scheme out of its table."""
+
+    def __init__(self, source: Source, number: int, table: SchemeTable, kinds: NodeKinds) -> None:
+        self._source = source
+        self._number = number
+        self._table = table
+        self._kinds = kinds
+        self._kind_of: dict[str, str] = {}
+        self._near: list[str] = []
+
+    def scheme(self, actions: Sequence[str]) -> Scheme:
+        """The scheme, whose action is one of `actions`. Raises ConfigError."""
+        table = self._table
+        if not table.context:
+            raise self._error("context", "has no context: name a pattern at least")
+        if table.action not in actions:
+            raise self._unknown("action", table.action, actions)
+
+        context = tuple(self._pattern(each) for each in table.context)
+        self._kind_of = {each.variable: each.kind for each in context if each.variable}
+        return Scheme(
+            name=table.name,
+            action=table.action,
+            context=context,
+            adding=tuple(self._result(each) for each in table.adding),
+            deleting=tuple(self._bound(self._pattern(each)) for each in table.deleting),
+            parameters={
+                name: self._parameter(name, value) for name, value in table.parameters.items()
+            },
+            base_level=table.base_level,
+            within_s=table.within_s,
+        )
+
+    def _result(self, table: dict[str, Any]) -> Result:
+        fields = dict(table)
+        salience = fields.pop(SALIENCE, 0.0)
+        pattern = self._pattern(fields)
+        self._near.append(SALIENCE)
+        is_number = isinstance(salience, int | float) and not isinstance(salience, bool)
+        if not is_number or not -1.0 <= salience <= 1.0:
+            raise self._error(SALIENCE, f"has the salience {salience!r}: write one from -1 to 1")
+        return Result(self._bound(pattern), float(salience))
+
+    def _bound(self, pattern: Pattern) -> Pattern:
+        """A result whose variable, if it has one, is one of the context."""
+        if pattern.variable and pattern.variable not in self._kind_of:
+            raise self._unknown("variable", pattern.variable, list(self._kind_of))
+        return pattern
+
+    def _pattern(self, table: dict[str, Any]) -> Pattern:
+        self._near = [str(word) for item in table.items() for word in item]
+        kind = table.get(KIND)
+        if not isinstance(kind, str):
+            word = next(iter(table), "")
+            raise self._error(word, f"has a pattern without a kind: {table}")
+        if kind not in self._kinds.names:
+            raise self._unknown("node kind", kind, self._kinds.names)
+
+        variable = table.get(VARIABLE, "")
+        if not isinstance(variable, str):
+            raise self._error(VARIABLE, f"has a variable that is no word: {variable!r}")
+        conditions = []
+        for field, value in table.items():
+            if field not in (KIND, VARIABLE):
+                conditions.append(self._condition(kind, field, value))
+        return Pattern(kind, tuple(conditions), variable)
+
+    def _condition(self, kind: str, field: str, value: Any) -> Condition:
+        self._check_field(kind, field)
+        if isinstance(value, dict):
+            return self._range(field, value)
+
+        values = value if isinstance(value, list) else [value]
+        try:
+            typed = tuple(self._kinds.value(kind, field, each) for each in values)
+        except ValueError as error:
+            word = next((each for each in values if isinstance(each, str)), field)
+            raise self._error(word, f"has a wrong value of {kind}.{field}: {error}") from None
+        return Condition(field, typed)
+
+    def _range(self, field: str, bounds: dict[str, Any]) -> Condition:
+        for name, bound in bounds.items():
+            if name not in BOUNDS:
+                raise self._unknown("bound", name, BOUNDS)
+            if isinstance(bound, bool) or not isinstance(bound, int | float):
+                raise self._error(name, f"has the bound {bound!r}, which is no number")
+        return Condition(field, **bounds)
+
+    def _parameter(self, name: str, value: Scalar) -> Scalar | Reference:
+        """A parameter as it is, or "$VARIABLE.FIELD" of a node of the context."""
+        self._near = [name]
+        if not isinstance(value, str) or not value.startswith("$"):
+            return value
+
+        variable, _, field = value[1:].partition(".")
+        if variable not in self._kind_of:
+            raise self._unknown("variable", variable, list(self._kind_of))
+        self._check_field(self._kind_of[variable], field)
+        return Reference(variable, field)
+
+    def _check_field(self, kind: str, field: str) -> None:
+        fields = self._kinds.fields(kind)
+        if fields is not None and field not in fields:
+            raise self._unknown(f"field of {kind}", field, fields)
+
+    def _unknown(self, what: str, word: str, known: Sequence[str]) -> ConfigError:
+        close = difflib.get_close_matches(word, known, 1)
+        remedy = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(known)}"
+        return self._error(word, f"names the unknown {what} {word!r}: {remedy}")
+
+    def _error(self, word: str, text: str) -> ConfigError:
+        text = f"scheme {self._table.name!r} {text}"
+        return self._source.error(self._number, word, text, self._near)

@@ -1,0 +1,131 @@
+"""Procedural memory as a module: each broadcast brings to mind what could be done about it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from cogmap.errors import MessageError
+from cogmap.graph.graph import Graph
+from cogmap.runtime.module import Module
+from schemas import topics
+from schemas.base import Message
+from schemas.cognition import Action, Behaviours, Broadcast
+from schemas.graph import Delta
+from services.procedural.config import Config
+from services.procedural.learning import Reliability
+from services.procedural.loading import BUILT_IN, load
+from services.procedural.situations import Situations
+
+__all__ = ["Config", "ProceduralMemory", "build"]
+
+GIVEN_UP_CYCLES = 2
+
+
+class ProceduralMemory:
+    """Answers each broadcast with the behaviours that schemes become by it.
+
+    In lockstep a broadcast waits for the pose of its cycle, and for the action that was selected
+    for the broadcast before it, by which schemes learn. The next cycle but one does not begin
+    before that action was published: where a broadcast of it comes, the action was lost.
+    """
+
+    def __init__(self, config: Config, graph: Graph) -> None:
+        self._config = config
+        self._is_lockstep = config.mode == "lockstep"
+        self._graph = graph
+        self._schemes = load(Path(config.schemes) if config.schemes else BUILT_IN)
+        self._reliability = Reliability(self._schemes)
+        self._situations = Situations(config.graph_kinds, config.unconscious_share)
+        self._waiting: list[Broadcast] = []
+        self._unanswered_cycle: int | None = None
+        self._last: Behaviours | None = None
+        self._resumed_cycle = -1
+
+    def restore(self, past: Iterable[Message]) -> None:
+        """Continue with the reliability of schemes as it was published last."""
+        for message in past:
+            if isinstance(message, Behaviours):
+                self._last = message
+
+        if self._last is not None:
+            self._reliability.restore(self._last.behaviours)
+            self._resumed_cycle = self._last.cycle
+
+    def last(self) -> Behaviours:
+        """What was published last. Raises MessageError where nothing was."""
+        if self._last is None:
+            raise MessageError("there was no broadcast yet")
+        return self._last
+
+    def on_delta(self, delta: Delta) -> list[Behaviours]:
+        """The graph has changed."""
+        self._situations.on_graph(self._graph, delta.phase)
+        return self._due()
+
+    def on_load(self) -> list[Behaviours]:
+        """The graph was loaded as a whole."""
+        self._situations.on_load(self._graph)
+        return self._due()
+
+    def on_broadcast(self, broadcast: Broadcast) -> list[Behaviours]:
+        """Bring behaviours to mind, as soon as all is there. After a restart, broadcasts come
+        again that were answered already.
+        """
+        if broadcast.cycle <= self._resumed_cycle:
+            return []
+
+        self._resumed_cycle = -1
+        self._waiting.append(broadcast)
+        return self._due()
+
+    def on_action(self, action: Action) -> list[Behaviours]:
+        """A scheme is executed, or none was active enough."""
+        self._reliability.on_action(action)
+        if self._unanswered_cycle is not None and action.cycle >= self._unanswered_cycle:
+            self._unanswered_cycle = None
+        return self._due()
+
+    def _due(self) -> list[Behaviours]:
+        published = []
+        while self._waiting and self._is_ready(self._waiting[0]):
+            published.append(self._behaviours(self._waiting.pop(0)))
+        return published
+
+    def _is_ready(self, broadcast: Broadcast) -> bool:
+        if not self._is_lockstep:
+            return True
+
+        newest_cycle = self._waiting[-1].cycle
+        is_lost = newest_cycle >= broadcast.cycle + GIVEN_UP_CYCLES
+        is_answered = self._unanswered_cycle is None
+        return self._situations.is_settled(broadcast.cycle) and (is_answered or is_lost)
+
+    def _behaviours(self, broadcast: Broadcast) -> Behaviours:
+        nodes = self._situations.of(broadcast)
+        self._reliability.judge(nodes, broadcast.stamp_ns)
+
+        considered = []
+        for scheme in self._schemes:
+            behaviour = scheme.considered(nodes, self._config.instantiation)
+            considered.append(self._reliability.noted(behaviour))
+
+        self._unanswered_cycle = broadcast.cycle
+        self._last = Behaviours(
+            stamp_ns=broadcast.stamp_ns, cycle=broadcast.cycle, behaviours=considered
+        )
+        return self._last
+
+
+def build(config: Config, instance: str) -> Module:
+    """The module `procedural`. Raises ConfigError where its schemes cannot be used."""
+    graph = Graph()
+    memory = ProceduralMemory(config, graph)
+    published = [topics.BEHAVIOURS]
+    return (
+        Module("procedural", instance)
+        .following(graph, memory.on_delta, emits=published, on_load=memory.on_load)
+        .on(topics.BROADCAST, memory.on_broadcast, emits=published)
+        .on(topics.ACTION, memory.on_action, emits=published)
+        .journaling(topics.BEHAVIOURS, memory.restore, memory.last, backfill=[topics.BROADCAST])
+    )

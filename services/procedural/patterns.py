@@ -1,0 +1,109 @@
+"""Patterns of nodes: what a scheme's context and its results are made of. Pure."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from schemas.base import Scalar
+from schemas.nodes import GraphNode, Node, kind_of
+
+Bindings = Mapping[str, str]
+
+
+class Active(NamedTuple):
+    """A node, and its total activation."""
+
+    node: GraphNode
+    activation: float
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What a field of a node must be: one of `values` where there are any, and a number from
+    `at_least` to `at_most` where these are given.
+    """
+
+    field: str
+    values: tuple[Scalar, ...] = ()
+    at_least: float | None = None
+    at_most: float | None = None
+
+    def holds(self, node: GraphNode) -> bool:
+        """Whether it is so of a node. Of one without the field it is not."""
+        value = value_of(node, self.field)
+        if value is None:
+            return False
+        if self.values and value not in self.values:
+            return False
+        return self._is_within(value)
+
+    def _is_within(self, value: Scalar) -> bool:
+        if self.at_least is None and self.at_most is None:
+            return True
+        if not isinstance(value, int | float):
+            return False
+
+        is_enough = self.at_least is None or value >= self.at_least
+        is_little = self.at_most is None or value <= self.at_most
+        return is_enough and is_little
+
+    def __str__(self) -> str:
+        text = "" if not self.values else "=" + "|".join(_spelled(value) for value in self.values)
+        if self.at_least is not None:
+            text += f">={self.at_least:g}"
+        if self.at_most is not None:
+            text += f"<={self.at_most:g}"
+        return self.field + text
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """Nodes of a kind of which conditions hold. Where it has a `variable`, that stands for the id
+    of the node that matches, in all patterns of a scheme.
+    """
+
+    kind: str
+    conditions: tuple[Condition, ...] = ()
+    variable: str = ""
+
+    def match(self, nodes: Iterable[Active], bindings: Bindings) -> Active | None:
+        """The most active node that matches, of equals the first by id; None where none does."""
+        wanted = bindings.get(self.variable)
+        found = [each for each in nodes if self._matches(each.node)]
+        if wanted is not None:
+            found = [each for each in found if each.node.id == wanted]
+        return min(found, key=lambda each: (-each.activation, each.node.id), default=None)
+
+    def spelled(self, bindings: Bindings) -> str:
+        """The pattern in words, with the id of the node that its variable stands for."""
+        words = [self.kind]
+        bound = bindings.get(self.variable)
+        if bound is not None:
+            words.append(f"id={bound}")
+        words += [str(condition) for condition in self.conditions]
+        return " ".join(words)
+
+    def _matches(self, node: GraphNode) -> bool:
+        if kind_of(node) != self.kind:
+            return False
+        return all(condition.holds(node) for condition in self.conditions)
+
+
+def value_of(node: GraphNode, field: str) -> Scalar | None:
+    """A field of a node, or an attribute of a node of a kind that is not known here; None where it
+    has none that is a scalar.
+    """
+    if isinstance(node, Node) and field in node.attributes:
+        return node.attributes[field]
+
+    value = getattr(node, field, None)
+    return value if isinstance(value, bool | int | float | str) else None
+
+
+def _spelled(value: Scalar) -> str:
+    if isinstance(value, enum.Enum):
+        return value.name.lower()
+    return str(value)

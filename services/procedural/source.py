@@ -1,0 +1,53 @@
+"""Where in a TOML file something stands, for the errors that name it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+from cogmap.errors import ConfigError
+
+_HEADER = re.compile(r"^\s*\[\[\s*scheme\s*\]\]")
+
+
+class Source:
+    """The text of a file of schemes.
+
+    TOML's reader gives no line numbers, so a word is searched for among the lines of its scheme: of
+    those that have it, the first with most of the words that stand `near` it. Where none has it,
+    the scheme's first line is named.
+    """
+
+    def __init__(self, path: Path, text: str) -> None:
+        self._path = path
+        self._lines = text.splitlines()
+        self._headers = [number for number, line in enumerate(self._lines) if _HEADER.match(line)]
+
+    def error(
+        self, scheme: int | None, word: str, text: str, near: Iterable[str] = ()
+    ) -> ConfigError:
+        """An error about a word in the scheme of that number, from 0; None where it is in none."""
+        first, end = self._block(scheme)
+        found = [number for number in range(first, end) if self._has(number, word)]
+        words = [*near]
+
+        def share(number: int) -> int:
+            return sum(self._has(number, each) for each in words)
+
+        number = max(found, key=share, default=first)
+        return ConfigError(f"{self._path}:{number + 1}: {text}")
+
+    def _block(self, scheme: int | None) -> tuple[int, int]:
+        """The first line of a scheme, and the one after its last."""
+        bounds = [*self._headers, len(self._lines)]
+        if scheme is None:
+            return 0, bounds[0]
+        if scheme >= len(self._headers):
+            return 0, len(self._lines)
+        return bounds[scheme], bounds[scheme + 1]
+
+    def _has(self, number: int, word: str) -> bool:
+        """Whether a line has a word, outside comments."""
+        code = self._lines[number].partition("#")[0]
+        return re.search(rf"(?<![\w-]){re.escape(word)}(?![\w-])", code) is not None

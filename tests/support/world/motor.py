@@ -1,0 +1,111 @@
+"""The motor module, and the messages that it is fed with."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cogmap.runtime.module import Module
+from schemas.array import Array
+from schemas.base import Message
+from schemas.cognition import Action, ActionName, Competition, Trigger
+from schemas.graph import Delta, Phase
+from schemas.sensing import MotorCommand, RangeScan, SelfMotion
+from services.motor.module import Config, build
+from tests.support.messages import of_type
+from tests.support.world.plans import Point, joined, plan_along
+from tests.support.world.scenes import agent
+
+PERIOD_NS = 200_000_000
+
+
+def scan_of(*obstacles: tuple[float, float], cycle: int = 1) -> RangeScan:
+    """A range scan with obstacles at these bearings and ranges."""
+    bearing_rad, range_m = np.array(obstacles, np.float32).reshape(-1, 2).T
+    return RangeScan(
+        stamp_ns=cycle * PERIOD_NS,
+        frame=cycle,
+        bearing_rad=Array.of(bearing_rad),
+        range_m=Array.of(range_m),
+    )
+
+
+def module_ahead(mode: str = "real_time", length_m: float = 20.0) -> Module:
+    """A module whose plan leads straight ahead."""
+    module = module_without_plan(mode)
+    return joined(module, plan_along((0.0, 0.0), (length_m, 0.0)))
+
+
+def module_without_plan(mode: str = "real_time") -> Module:
+    """A module whose graph has no plan."""
+    config = Config(mode=mode)  # type: ignore[arg-type]
+    return build(config, "motor")
+
+
+def pose_delta(cycle: int = 1, x_m: float = 0.0, phase: Phase = Phase.LOCALIZATION) -> Delta:
+    """A delta that commits a pose of the self node."""
+    me = agent(x_m=x_m, stamp_ns=cycle * PERIOD_NS)
+    return Delta(
+        stamp_ns=cycle * PERIOD_NS,
+        version=cycle,
+        cycle=cycle,
+        phase=phase,
+        tasks=[],
+        operations=[me],
+    )
+
+
+def action_of(cycle: int = 1, action: str = ActionName.FOLLOW_PLAN, **parameters: float) -> Action:
+    """The action that was selected for the broadcast of a cycle."""
+    return Action(
+        stamp_ns=cycle * PERIOD_NS,
+        cycle=cycle,
+        scheme=f"scheme of {action}",
+        action=action,
+        activation=1.0,
+        parameters={**parameters},
+    )
+
+
+def no_action_of(cycle: int = 1) -> Action:
+    """That none was active enough for the broadcast of a cycle."""
+    return Action(stamp_ns=cycle * PERIOD_NS, cycle=cycle, scheme="", activation=0.0, parameters={})
+
+
+def competition_of(cycle: int = 1, trigger: Trigger = Trigger.NONE) -> Competition:
+    """The competition of a cycle."""
+    return Competition(stamp_ns=cycle * PERIOD_NS, cycle=cycle, contenders=[], trigger=trigger)
+
+
+def motion_of(cycle: int = 1, speed_m_s: float = 2.0) -> SelfMotion:
+    """The self-motion to the view of a cycle."""
+    rows = np.array([[speed_m_s, 0.0, PERIOD_NS / 1e9, 0.0, 0.0]])
+    return SelfMotion(
+        stamp_ns=cycle * PERIOD_NS,
+        frame=cycle,
+        since_ns=(cycle - 1) * PERIOD_NS,
+        motions=Array.of(rows),
+    )
+
+
+def driving_module() -> Module:
+    """A module that follows its route."""
+    module = module_ahead()
+    module.feed(action_of())
+    return module
+
+
+def commands_in(messages: list[Message]) -> list[MotorCommand]:
+    """The motor commands among messages."""
+    return of_type(MotorCommand, messages)
+
+
+def command_after(module: Module, message: Message) -> MotorCommand:
+    """The only command that follows a message."""
+    (command,) = commands_in(module.feed(message))
+    return command
+
+
+def plan_delta(version: int, *corners: Point) -> Delta:
+    """A delta at the end of a cycle with a plan."""
+    plan = plan_along(*corners, planned_ns=version)
+    return Delta(version=version, cycle=version, phase=Phase.END, tasks=[], operations=[plan])

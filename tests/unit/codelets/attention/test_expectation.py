@@ -1,0 +1,235 @@
+"""A building of the map that is gone is a surprise, and a street of the plan that is closed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+
+from cogmap.graph.graph import Graph
+from schemas.array import Array, Matrix
+from schemas.codelets import Task
+from schemas.cognition import Coalition
+from schemas.graph import Cells, Delta, Link, Operation, Phase
+from schemas.nodes import (
+    PLAN_ID,
+    AnyNode,
+    Attention,
+    LinkKind,
+    PlaceColumn,
+    Plan,
+    PlanState,
+    attention_id,
+)
+from services.codelets.attention.config import Config, Expectation
+from services.codelets.attention.disappearance import MANY_OBJECTS
+from tests.support.world.scenes import agent, graph_of, landmark, percept, run, task
+
+VIEWS = 3
+CONFIG = Config(expectation=Expectation(views=VIEWS, refractory_cycles=1))
+HOUSE_M = 20.0
+BEARINGS_RAD = np.linspace(-0.5, 0.5, 21)
+
+
+def _house(**facts: Any) -> AnyNode:
+    usual = {"sightings": 50, "width_m": 8.0, "base_level": 1.0, "activation": 0.0}
+    return landmark("house", [(HOUSE_M, 0.0)], **(usual | facts))
+
+
+def _scan(range_m: float) -> Array:
+    ranges_m = np.full(len(BEARINGS_RAD), range_m)
+    return Array.of(np.column_stack([BEARINGS_RAD, ranges_m]), "<f4")
+
+
+FREE = _scan(HOUSE_M + 15.0)
+NOTHING = _scan(0.0)
+WALL = _scan(HOUSE_M - 3.0)
+
+
+class Story:
+    """An agent that looks east to where a house stood, cycle by cycle."""
+
+    def __init__(self, *operations: Operation) -> None:
+        self.graph: Graph = graph_of(agent(), *operations)
+
+    def look(self, scan: Array = FREE, *labels: str, **facts: Any) -> list[Coalition]:
+        """What is brought in the next cycle."""
+        cycle = self.graph.cycle + 1
+        self.commit(Phase.LOCALIZATION, [agent(**facts)], cycle)
+        percepts = [percept(label, 0.0, HOUSE_M) for label in labels]
+        asked: Task = task("expectation", cycle=cycle, percepts=percepts, scan=scan)
+        answer = run(asked, self.graph, CONFIG)
+        self.commit(Phase.ATTENTION, answer.operations, cycle)
+        return answer.coalitions
+
+    def looks(self, number: int, scan: Array = FREE, **facts: Any) -> list[Coalition]:
+        """What is brought in so many cycles."""
+        found = []
+        for _ in range(number):
+            found += self.look(scan, **facts)
+        return found
+
+    def broadcast(self) -> None:
+        """What was brought last becomes conscious."""
+        memory = self.graph.get(Attention, attention_id("expectation"))
+        assert memory is not None
+        conscious = msgspec.structs.replace(memory, conscious_cycle=self.graph.cycle)
+        self.commit(Phase.PERCEPTS, [conscious], self.graph.cycle)
+
+    def commit(self, phase: Phase, operations: list[Operation], cycle: int) -> None:
+        """Change the graph."""
+        delta = Delta(
+            version=self.graph.version + 1, cycle=cycle, phase=phase, operations=operations
+        )
+        assert self.graph.apply(delta)
+
+
+@pytest.mark.parametrize("scan", [FREE, NOTHING], ids=["beyond", "nothing"])
+def test_a_house_that_is_missing_in_several_views_is_a_surprise(scan: Array) -> None:
+    story = Story(_house())
+
+    assert story.looks(VIEWS - 1, scan) == []
+    (found,) = story.look(scan)
+    assert [node.id for node in found.nodes] == ["self", "object:house"]
+    assert found.nodes[1].salience == -1.0
+    assert found.activation > 0.5
+
+
+def test_a_surprise_is_brought_again_until_it_is_conscious() -> None:
+    story = Story(_house())
+    brought = story.looks(VIEWS + 4)
+    story.broadcast()
+
+    assert len(brought) == 3
+    assert story.looks(10) == []
+
+
+def test_a_house_that_is_seen_again_is_none() -> None:
+    story = Story(_house())
+    story.looks(VIEWS - 1)
+    story.look(FREE, "house")
+
+    assert story.looks(VIEWS - 1) == []
+
+
+def test_a_house_that_was_seen_to_be_gone_is_a_surprise_again_after_a_while_away() -> None:
+    story = Story(_house())
+    story.looks(VIEWS)
+    story.broadcast()
+    story.look(x_m=-500.0)
+
+    assert len(story.looks(VIEWS)) == 1
+
+
+@pytest.mark.parametrize(
+    "facts",
+    [
+        {"sightings": 3},
+        {"misses": 1},
+        {"x_sd_m": 5.0},
+        {"map": "map:1"},
+        {"width_m": 0.5},
+    ],
+    ids=lambda facts: next(iter(facts)),
+)
+def test_what_is_not_known_well_or_too_narrow_is_not_expected(facts: dict[str, Any]) -> None:
+    assert Story(_house(**facts)).looks(2 * VIEWS) == []
+
+
+@pytest.mark.parametrize("at_m", [(4.0, 0.0), (80.0, 0.0), (0.0, 20.0), (-20.0, 0.0)])
+def test_what_is_too_near_or_far_or_aside_is_not_expected(at_m: tuple[float, float]) -> None:
+    house = landmark("house", [at_m], sightings=50, width_m=8.0)
+
+    assert Story(house).looks(2 * VIEWS, NOTHING) == []
+
+
+def test_a_house_behind_what_the_scan_hits_is_hidden() -> None:
+    assert Story(_house()).looks(2 * VIEWS, WALL) == []
+
+
+def test_views_in_which_a_house_is_hidden_do_not_count() -> None:
+    story = Story(_house())
+    story.looks(VIEWS - 1)
+
+    assert story.looks(3, WALL) == []
+    assert len(story.look()) == 1
+
+
+def test_an_agent_that_does_not_know_where_it_is_expects_nothing() -> None:
+    assert Story(_house()).looks(2 * VIEWS, x_sd_m=4.0) == []
+
+
+def test_on_a_map_of_many_objects_the_same_is_expected() -> None:
+    crowd = []
+    for number in range(MANY_OBJECTS + 1):
+        crowd.append(landmark(f"far-{number}", [(1000.0, number)], sightings=50))
+    house = _house()
+    at = _at_its_place(house)
+
+    assert len(Story(house, at, *crowd).looks(VIEWS)) == 1
+
+
+def _at_its_place(house: AnyNode) -> Operation:
+    """The link of the house to its place."""
+    return Link(source=house.id, target=f"place:map:0:{round(HOUSE_M)}:0", kind=LinkKind.AT)
+
+
+def _cells(column: PlaceColumn, cells: list[tuple[int, int]]) -> Cells:
+    values = np.ones(len(cells), np.float32)
+    return Cells(column=column, cells=Array.of(np.array(cells, np.int32)), values=Array.of(values))
+
+
+ROUTE_M = [(float(i), 0.0) for i in range(60)]
+ROAD = _cells(PlaceColumn.ROAD, [(i, j) for i in range(60) for j in range(-3, 4)])
+BARRIER = _cells(PlaceColumn.OBSTACLE, [(20, j) for j in range(-3, 4)])
+
+
+def _plan(**facts: Any) -> Plan:
+    route = Matrix.of(np.array(ROUTE_M))
+    return Plan(id=PLAN_ID, base_level=1.0, state=PlanState.READY, route=route, **facts)
+
+
+def test_a_street_of_the_plan_that_is_closed_is_a_surprise_at_once() -> None:
+    (found,) = Story(_plan(), ROAD, BARRIER).look()
+    blocked = [link for link in found.links if link.kind == LinkKind.BLOCKED]
+
+    assert [node.id for node in found.nodes] == ["self", "plan"]
+    assert [link.target for link in blocked] == ["place:map:0:20:0"]
+    assert found.nodes[1].salience == -1.0
+    assert found.activation > 0.5
+
+
+def test_a_closure_is_one_surprise() -> None:
+    story = Story(_plan(), ROAD, BARRIER)
+    story.look()
+    story.broadcast()
+
+    assert story.looks(10) == []
+
+
+def test_a_closure_is_brought_until_it_is_conscious_though_the_plan_is_another_by_then() -> None:
+    story = Story(_plan(), ROAD, BARRIER)
+    story.look()
+    story.commit(Phase.BACKGROUND, [_plan(doubtful=True)], story.graph.cycle)
+
+    assert len(story.looks(2)) == 1
+
+
+@pytest.mark.parametrize(
+    "operations",
+    [
+        (_plan(), ROAD),
+        (_plan(), BARRIER),
+        (_plan(doubtful=True), ROAD, BARRIER),
+        (Plan(id=PLAN_ID, state=PlanState.NO_ROUTE), ROAD, BARRIER),
+    ],
+    ids=["nothing stands there", "never road", "in doubt", "no route"],
+)
+def test_what_the_plan_did_not_count_on_is_no_surprise(operations: tuple[Operation, ...]) -> None:
+    assert Story(*operations).looks(3) == []
+
+
+def test_a_closure_behind_the_agent_is_no_surprise() -> None:
+    assert Story(_plan(), ROAD, BARRIER).looks(3, x_m=30.0) == []

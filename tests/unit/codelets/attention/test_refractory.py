@@ -1,0 +1,92 @@
+"""An attention codelet that has brought a coalition waits, and the graph keeps that it has."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+
+from cogmap.graph.graph import Graph
+from cogmap.runtime.codelet import CycleContext
+from schemas.array import Array
+from schemas.graph import Delta, Phase
+from schemas.nodes import Attention, Need, attention_id, need_id
+from services.codelets.attention import need, novelty, whereabouts
+from services.codelets.attention.config import Config, Novelty, Whereabouts
+from services.codelets.attention.memory import without_conscious
+from tests.support.world.scenes import agent, graph_of, landmark, percept, percepts, run, task
+
+PATIENT = Config(novelty=Novelty(refractory_cycles=2))
+NO_MOTION = Array.of(np.zeros((0, 5)))
+
+
+def _scene() -> Graph:
+    energy = Need(id=need_id("energy"), label="energy", level=0.9, activation=1.0)
+    return graph_of(agent(), landmark("house", sightings=1), energy)
+
+
+def _context(cycle: int) -> CycleContext:
+    return CycleContext(cycle, percepts(cycle, percept("house")), NO_MOTION)
+
+
+def _after(graph: Graph, codelet: str, config: Config) -> Graph:
+    """The graph after `codelet` has brought a coalition in cycle 1."""
+    asked = task(codelet, percepts=[percept("house")])
+    answer = run(asked, graph, config)
+    assert len(answer.coalitions) == 1
+
+    delta = Delta(version=2, cycle=1, phase=Phase.ATTENTION, operations=answer.operations)
+    assert graph.apply(delta)
+    return graph
+
+
+@pytest.mark.parametrize(("waits", "cycles"), [(0, [2, 3, 4]), (1, [3, 4]), (2, [4])])
+def test_a_codelet_waits_for_its_refractory_period(waits: int, cycles: list[int]) -> None:
+    config = Config(novelty=Novelty(refractory_cycles=waits))
+    graph = _after(_scene(), "novelty", config)
+
+    ready = [cycle for cycle in (2, 3, 4) if novelty.due(_context(cycle), graph, config)]
+    assert ready == cycles
+
+
+def test_the_default_codelet_brings_what_is_in_view_in_each_cycle_and_keeps_nothing() -> None:
+    answer = run(task("whereabouts", percepts=[percept("house")]), _scene(), Config())
+
+    assert len(answer.coalitions) == 1
+    assert answer.operations == []
+
+
+def test_the_default_codelet_waits_too_where_it_is_configured_so() -> None:
+    config = Config(whereabouts=Whereabouts(refractory_cycles=1))
+    graph = _after(_scene(), "whereabouts", config)
+
+    assert whereabouts.due(_context(2), graph, config) == []
+    assert len(whereabouts.due(_context(3), graph, config)) == 1
+
+
+def test_codelets_wait_for_themselves_alone() -> None:
+    graph = _after(_scene(), "novelty", PATIENT)
+
+    assert len(need.due(_context(2), graph, PATIENT)) == 1
+
+
+def test_a_restored_graph_keeps_codelets_waiting() -> None:
+    restored = Graph()
+    restored.load(_after(_scene(), "novelty", PATIENT).snapshot())
+
+    assert novelty.due(_context(3), restored, PATIENT) == []
+    assert len(novelty.due(_context(4), restored, PATIENT)) == 1
+
+
+@pytest.mark.parametrize(("conscious", "pending"), [(0, 2), (6, 2), (7, 1), (9, 0)])
+def test_what_was_brought_is_pending_until_a_broadcast_since(conscious: int, pending: int) -> None:
+    memory = Attention(
+        id=attention_id("a"),
+        codelet="a",
+        conscious_cycle=conscious,
+        pending={"first": 7, "second": 8},
+    )
+
+    assert len(without_conscious(memory).pending) == pending
+    never_brought = msgspec.structs.replace(memory, pending={"new": 0})
+    assert without_conscious(never_brought).pending == {"new": 0}

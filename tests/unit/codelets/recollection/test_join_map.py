@@ -1,0 +1,185 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from cogmap.graph.graph import Graph
+from cogmap.runtime.codelet import CycleContext
+from schemas.array import Array, Matrix
+from schemas.graph import Delta, Operation, Phase
+from schemas.nodes import (
+    CORRECTION_ID,
+    PLAN_ID,
+    RECOLLECTION_ID,
+    ROOT_MAP,
+    TILE_CELLS,
+    Correction,
+    Goal,
+    LinkKind,
+    Map,
+    Object,
+    PathSegment,
+    PlaceColumn,
+    Plan,
+    PlanState,
+    Recollection,
+    goal_id,
+    object_id,
+)
+from services.codelets.config import Config
+from services.codelets.recollection import join_map
+from tests.support.world.scenes import agent, graph_of, landmark, percepts, run, task
+
+QUARTER_RAD = math.pi / 2
+CONFIG = Config()
+
+
+def recollection() -> Recollection:
+    """A map on which this one lies 100 m to the east, turned to the left by a quarter."""
+    road = np.zeros((1, TILE_CELLS))
+    road[0, 3 * 32 + 4] = 0.75
+    evidence = np.zeros((1, TILE_CELLS))
+    evidence[0, 3 * 32 + 4] = -2.5
+    objects = [[100.0, 10.0, 0.5, 0.5, 8.0, 6.0, 20.0], [60.0, 60.0, 0.5, 0.5, 9.0, 5.0, 12.0]]
+    return Recollection(
+        id=RECOLLECTION_ID,
+        map="remembered:1",
+        x_m=100.0,
+        y_m=0.0,
+        heading_rad=QUARTER_RAD,
+        labels=["house", "house~2"],
+        functions=["home", "home"],
+        matched=["house", ""],
+        objects=Matrix.of(objects),
+        tiles=[(2, -1)],
+        columns={
+            PlaceColumn.ROAD: Matrix.of(road, "<f2"),
+            PlaceColumn.EVIDENCE_E: Matrix.of(evidence, "<f2"),
+        },
+    )
+
+
+def joined(*operations: Operation) -> Graph:
+    """A graph with these and a recollection, after the map was joined."""
+    graph = graph_of(agent(x_m=0.0), recollection(), *operations)
+    answer = run(task("join_map", stamp_ns=10**9), graph, CONFIG)
+    delta = Delta(version=2, cycle=1, phase=Phase.CORRECTION, operations=answer.operations)
+    assert graph.apply(delta)
+    return graph
+
+
+def node(graph: Graph, label: str) -> Object:
+    """An object that is there."""
+    found = graph.get(Object, object_id(label))
+    assert found is not None
+    return found
+
+
+def test_the_root_map_knows_what_it_is_and_the_recollection_is_gone() -> None:
+    graph = joined()
+    root = graph.get(Map, ROOT_MAP)
+
+    assert root is not None
+    assert root.remembered == "remembered:1"
+    assert RECOLLECTION_ID not in graph.nodes
+
+
+def test_the_agent_stands_where_it_is_on_the_recalled_map() -> None:
+    graph = joined()
+
+    assert graph.agent is not None
+    assert (graph.agent.x_m, graph.agent.y_m) == pytest.approx((100.0, 0.0))
+    assert graph.agent.heading_rad == pytest.approx(QUARTER_RAD)
+
+
+def test_an_object_known_here_is_the_recalled_one_and_was_seen_as_often_as_both() -> None:
+    house = node(joined(landmark("house", sightings=5)), "house")
+
+    assert (house.x_m, house.y_m) == (100.0, 10.0)
+    assert house.sightings == 25
+    assert house.function == "home"
+
+
+def test_a_recalled_object_that_is_not_known_here_gets_a_label_that_is_free() -> None:
+    other = landmark("house~2", [(-30.0, 5.0)], sightings=4)
+    graph = joined(landmark("house", sightings=5), other)
+
+    recalled = node(graph, "house~3")
+    assert (recalled.x_m, recalled.y_m) == (60.0, 60.0)
+    assert graph.links.target(recalled.id, LinkKind.AT) == "place:map:0:60:60"
+    kept = node(graph, "house~2")
+    assert (kept.x_m, kept.y_m) == pytest.approx((95.0, -30.0))
+
+
+def test_an_unmatched_object_that_stands_where_one_of_its_look_was_is_the_same() -> None:
+    there = landmark("house~2", [(58.5, 40.5)], sightings=1)
+    graph = joined(landmark("house", sightings=5), there)
+
+    assert node(graph, "house~2").sightings == 13
+    assert object_id("house~3") not in graph.nodes
+
+
+def test_place_nodes_are_as_they_were_learned_with_weights_by_their_evidence() -> None:
+    places = joined().places
+
+    assert places.value(ROOT_MAP, 67, -28, PlaceColumn.ROAD) == 0.75
+    assert places.value(ROOT_MAP, 67, -28, PlaceColumn.EVIDENCE_E) == -2.5
+    assert places.value(ROOT_MAP, 67, -28, PlaceColumn.WEIGHT_E) == 0.0
+
+
+def test_path_goals_and_the_plan_move_with_the_agent() -> None:
+    rows = np.zeros((2, 9))
+    rows[1, :2] = (1.0, 5.0)
+    graph = joined(
+        PathSegment(id="path:0", number=0, rows=Matrix.of(rows)),
+        Goal(id=goal_id("there"), x_m=20.0, y_m=0.0),
+        Plan(
+            id=PLAN_ID,
+            state=PlanState.READY,
+            planned_ns=5,
+            route=Matrix.of([[0.0, 0.0], [20.0, 0.0]]),
+        ),
+    )
+
+    segment = graph.get(PathSegment, "path:0")
+    goal = graph.get(Goal, goal_id("there"))
+    plan = graph.get(Plan, PLAN_ID)
+    assert segment is not None
+    assert goal is not None
+    assert plan is not None
+    assert plan.route is not None
+    assert segment.rows.numpy()[1, 1:4] == pytest.approx((100.0, 5.0, QUARTER_RAD))
+    assert (goal.x_m, goal.y_m) == pytest.approx((100.0, 20.0))
+    assert plan.route.numpy()[1] == pytest.approx((100.0, 20.0))
+    assert plan.planned_ns == 10**9 - 1
+
+
+def test_a_correction_that_waits_is_applied_first() -> None:
+    rows = np.zeros((1, 7))
+    graph = graph_of(agent(), recollection())
+    waiting = graph_of(agent(), recollection(), Correction(id=CORRECTION_ID, rows=Matrix.of(rows)))
+    context = CycleContext(1, percepts(0), Array.of(np.zeros((0, 5))), 1, None)
+
+    assert len(join_map.due(context, graph, CONFIG)) == 1
+    assert join_map.due(context, waiting, CONFIG) == []
+
+
+def test_a_correction_that_was_computed_before_the_map_was_joined_changes_nothing() -> None:
+    path = np.zeros((3, 9))
+    path[:, 0] = np.arange(3)
+    path[:, 1] = 50.0 + np.arange(3)
+    rows = np.zeros((3, 7))
+    rows[:, 0] = np.arange(3)
+    rows[:, 1] = np.arange(3)
+    rows[:, 4] = np.arange(3) + 1.0
+    graph = graph_of(
+        agent(),
+        PathSegment(id="path:0", number=0, rows=Matrix.of(path)),
+        Correction(id=CORRECTION_ID, rows=Matrix.of(rows)),
+    )
+
+    (dropped,) = run(task("apply_correction"), graph, CONFIG).operations
+
+    assert getattr(dropped, "id", "") == CORRECTION_ID

@@ -1,0 +1,160 @@
+"""What the robot passed a moment ago: arcs that lead into it are replaced."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from schemas.array import Array
+from schemas.sensing import RangeScan, SelfMotion
+from services.motor.near import NearObstacles
+
+CLEARANCE_M = 0.7
+STEP_NS = 200_000_000
+BEARINGS_RAD = np.linspace(0.6, -0.6, 33).astype(np.float32)
+POST_M = (6.0, 1.2)
+
+
+class Robot:
+    """A robot that drives along x from the origin, past a post that its scan sees while it is
+    ahead.
+    """
+
+    def __init__(self, post_m: tuple[float, float] | None = POST_M) -> None:
+        self.near = NearObstacles(CLEARANCE_M)
+        self._post_m = post_m
+        self._x_m = 0.0
+        self._now_ns = 0
+
+    def drive(self, steps: int, step_m: float = 0.5, scan_first: bool = False) -> None:
+        for _ in range(steps):
+            self._x_m += step_m
+            self._now_ns += STEP_NS
+            if scan_first:
+                self.near.on_scan(self._scan())
+                self.near.on_motion(self._motion(step_m))
+            else:
+                self.near.on_motion(self._motion(step_m))
+                self.near.on_scan(self._scan())
+
+    def remove_post(self, behind_m: float) -> None:
+        """From now on a wall that far ahead is seen where the post was."""
+        self._post_m = (self._x_m + behind_m, self._post_m[1] if self._post_m else 0.0)
+
+    def _motion(self, step_m: float) -> SelfMotion:
+        row = [step_m / 0.2, 0.0, 0.2, 0.0, 0.0]
+        return SelfMotion(
+            stamp_ns=self._now_ns,
+            frame=self._now_ns // STEP_NS,
+            since_ns=self._now_ns - STEP_NS,
+            motions=Array.of(np.array([row])),
+        )
+
+    def _scan(self) -> RangeScan:
+        range_m = np.zeros(len(BEARINGS_RAD), np.float32)
+        if self._post_m is not None:
+            ahead_m = self._post_m[0] - self._x_m
+            bearing_rad = math.atan2(self._post_m[1], ahead_m)
+            sector = int(np.abs(BEARINGS_RAD - bearing_rad).argmin())
+            if abs(BEARINGS_RAD[sector] - bearing_rad) < 0.03:
+                range_m[sector] = math.hypot(ahead_m, self._post_m[1])
+
+        return RangeScan(
+            stamp_ns=self._now_ns,
+            frame=self._now_ns // STEP_NS,
+            bearing_rad=Array.of(BEARINGS_RAD),
+            range_m=Array.of(range_m),
+        )
+
+
+def _standing(scan: RangeScan) -> SelfMotion:
+    """No motion until the view of a scan."""
+    return SelfMotion(
+        stamp_ns=scan.stamp_ns,
+        frame=scan.frame,
+        since_ns=scan.stamp_ns - STEP_NS,
+        motions=Array.of(np.zeros((0, 5))),
+    )
+
+
+def _turn(near: NearObstacles, per_m: float) -> float:
+    curvature_per_m = near.clear_curvature(per_m)
+    assert curvature_per_m is not None
+    return curvature_per_m
+
+
+def test_where_nothing_is_near_the_robot_turns_as_it_wants() -> None:
+    assert _turn(Robot().near, 0.8) == 0.8
+
+
+def test_the_robot_does_not_turn_into_what_it_does_not_see_any_longer() -> None:
+    robot = Robot()
+    robot.drive(10)
+
+    assert _turn(robot.near, 0.9) < 0.6
+    assert _turn(robot.near, 0.0) == 0.0
+    assert _turn(robot.near, -0.9) == -0.9
+
+
+def test_a_scan_may_come_before_the_motion_to_its_view() -> None:
+    one = Robot()
+    one.drive(10)
+    other = Robot()
+    other.drive(10, scan_first=True)
+
+    assert _turn(other.near, 0.9) == _turn(one.near, 0.9)
+
+
+def test_what_is_behind_the_robot_is_forgotten() -> None:
+    robot = Robot()
+    robot.drive(11)
+    robot.drive(20)
+
+    assert _turn(robot.near, 0.9) == 0.9
+
+
+def test_a_hit_of_one_scan_alone_is_noise() -> None:
+    robot = Robot()
+    robot.drive(1, step_m=3.0)
+    robot._post_m = None
+    robot.drive(5)
+
+    assert _turn(robot.near, 0.9) == 0.9
+
+
+def test_what_a_later_scan_sees_through_is_forgotten() -> None:
+    robot = Robot((6.0, 0.0))
+    robot.drive(5)
+    robot.remove_post(behind_m=9.0)
+    robot.drive(2, step_m=0.1)
+    robot._post_m = None
+    robot.drive(4)
+
+    assert _turn(robot.near, 0.0) == 0.0
+
+
+def test_between_obstacles_on_all_sides_no_arc_is_clear() -> None:
+    near = NearObstacles(clearance_m=2.0)
+    for number in range(4):
+        bearings_rad = np.linspace(2.5, -2.5, 60).astype(np.float32)
+        scan = RangeScan(
+            stamp_ns=(number + 1) * STEP_NS,
+            frame=number,
+            bearing_rad=Array.of(bearings_rad),
+            range_m=Array.of(np.full(60, 2.65, np.float32)),
+        )
+        near.on_motion(_standing(scan))
+        near.on_scan(scan)
+
+    assert near.clear_curvature(0.0) is None
+
+
+@pytest.mark.parametrize("per_m", [0.5, -0.5])
+def test_the_arc_that_is_taken_is_the_nearest_to_the_one_wanted(per_m: float) -> None:
+    robot = Robot((6.0, math.copysign(1.0, per_m)))
+    robot.drive(10)
+    taken_per_m = _turn(robot.near, per_m)
+
+    assert 0 <= taken_per_m / per_m < 1.0

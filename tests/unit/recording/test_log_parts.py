@@ -1,0 +1,103 @@
+"""A part of a log, read without the rest of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from cogmap.bus.codec import encode
+from cogmap.errors import LogError
+from cogmap.recording import open_log
+from cogmap.recording.storage.format import topics_to_record
+from cogmap.recording.storage.index import read_index
+from cogmap.recording.storage.reader import LogReader
+from cogmap.recording.storage.writer import LogWriter
+from schemas import topics
+from schemas.base import Message
+from tests.support.logs import ABOUT, SECOND_NS, odometry
+
+CHUNKS = 40
+IN_A_CHUNK = 5
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """A chunk a second, with five messages each; the stamp of each message is its number."""
+    written = tmp_path / "log.mcap"
+    writer = LogWriter(written, topics_to_record(), ABOUT)
+    for number in range(CHUNKS * IN_A_CHUNK):
+        at_ns = SECOND_NS + number * SECOND_NS // IN_A_CHUNK
+        writer.write(topics.ODOMETRY, encode(odometry(number, stamp_ns=number)), None, at_ns)
+        if number % IN_A_CHUNK == IN_A_CHUNK - 1:
+            writer.flush()
+    writer.close()
+    return written
+
+
+def damage(path: Path, chunk: int) -> None:
+    """Change a byte of a chunk, which is noticed when that chunk is read."""
+    begin = read_index(path).chunks[chunk].offset
+    content = bytearray(path.read_bytes())
+    content[begin + 100] ^= 0xFF
+    path.write_bytes(content)
+
+
+def numbers(path: Path, start_s: float, end_s: float) -> list[int]:
+    entries = open_log(path).messages("odometry", start_s=start_s, end_s=end_s)
+    return [entry.message.seq for entry in entries]
+
+
+def test_a_time_is_read_to_the_message(path: Path) -> None:
+    assert numbers(path, 2.0, 3.0) == [10, 11, 12, 13, 14]
+    assert numbers(path, 2.3, 2.7) == [12, 13]
+    assert numbers(path, 2.9, 3.1) == [15]
+    assert numbers(path, 50.0, 60.0) == []
+
+
+def test_records_of_a_time_are_those_among_all(path: Path) -> None:
+    reader = LogReader(path)
+    start_ns = 3 * SECOND_NS + 1
+    end_ns = 9 * SECOND_NS
+    among_all = [each for each in reader.records() if start_ns <= each.log_time_ns < end_ns]
+
+    assert list(reader.records(start_ns=start_ns, end_ns=end_ns)) == among_all
+
+
+def test_progress_counts_the_chunks_that_are_read(path: Path) -> None:
+    shares: list[float] = []
+    list(LogReader(path).records(None, shares.append, end_ns=5 * SECOND_NS))
+
+    assert shares == [0.25, 0.5, 0.75, 1.0]
+
+
+def test_damage_elsewhere_is_not_met(path: Path) -> None:
+    damage(path, 20)
+
+    assert numbers(path, 2.0, 3.0) == [10, 11, 12, 13, 14]
+    with pytest.raises(LogError, match="is damaged"):
+        numbers(path, 0.0, 40.0)
+
+
+@pytest.mark.parametrize("limit", [0, 1, 77, 100, 198, 199, 500])
+def test_the_last_message_that_fits_is_found(path: Path, limit: int) -> None:
+    entry = open_log(path).last("odometry", lambda message: message.stamp_ns <= limit)
+
+    assert entry is not None
+    assert entry.message.seq == min(limit, CHUNKS * IN_A_CHUNK - 1)
+
+
+def test_where_none_fits_there_is_no_last(path: Path) -> None:
+    assert open_log(path).last("odometry", lambda _message: False) is None
+    assert open_log(path).last("motor/command", lambda _message: True) is None
+
+
+def test_few_messages_are_looked_at_to_find_the_last(path: Path) -> None:
+    looked_at: list[int] = []
+
+    def is_early(message: Message) -> bool:
+        looked_at.append(message.stamp_ns)
+        return message.stamp_ns <= 123
+
+    assert open_log(path).last("odometry", is_early) is not None
+    assert len(looked_at) < 15
