@@ -224,12 +224,14 @@ class Workspace:
 
         if self._is_interrupted(percepts):
             return self._continue_interrupted(percepts)
+
+        ended = self._end_interrupted()
         if not self._offers.complete(self._ledger.graph.cycle):
-            return []
+            return ended
         is_known = self._consciousness.complete(self._ledger.graph.cycle)
         if not is_known and not self._is_repeated:
-            return []
-        return self._begin_cycle(percepts)
+            return ended
+        return [*ended, *self._begin_cycle(percepts)]
 
     def _continue_interrupted(self, percepts: Percepts) -> list[Message]:
         graph = self._ledger.graph
@@ -241,6 +243,15 @@ class Workspace:
 
         self._phase = PHASES.index(graph.phase) if graph.phase in PHASES else -1
         return self._next_phase()
+
+    def _end_interrupted(self) -> list[Message]:
+        """End a cycle that a kill interrupted after its command was given: its percepts will not
+        come again, and others wait for its end.
+        """
+        graph = self._ledger.graph
+        if graph.phase is Phase.END:
+            return []
+        return [self._ledger.commit(max(0, self._begun_ns), graph.cycle, Phase.END, [])]
 
     def _begin_cycle(self, percepts: Percepts) -> list[Message]:
         graph = self._ledger.graph

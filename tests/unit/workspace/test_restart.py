@@ -8,6 +8,7 @@ import pytest
 
 from schemas.base import Message
 from schemas.codelets import Offer
+from schemas.graph import Phase
 from schemas.nodes import Node
 from tests.support.messages import of_type
 from tests.support.world.scenes import Desk, percept, thing
@@ -76,6 +77,23 @@ def test_an_interrupted_cycle_continues_from_its_last_commit(committed: int) -> 
     versions = [delta.version for delta in again.deltas]
     assert again.digest == whole.digest
     assert versions == [delta.version for delta in whole.deltas[end:]]
+
+
+def test_a_cycle_whose_view_does_not_come_again_ends_when_the_next_view_comes() -> None:
+    whole = Desk("w1")
+    whole.drive(range(3), percept("a"))
+    interrupted = whole.deltas[:-2]
+
+    again = Desk("w1", offering=("memory",))
+    assert again.module.restore is not None
+    again.module.restore(list(interrupted))
+    cycle = interrupted[-1].cycle
+
+    again.see(3, percept("a"))
+    assert [(delta.cycle, delta.phase) for delta in again.deltas] == [(cycle, Phase.END)]
+
+    again.feed(Offer(cycle=cycle, operations=[], source="memory"))
+    assert again.deltas[-1].cycle == cycle + 1
 
 
 def test_an_offer_made_before_a_restart_is_not_committed_again() -> None:
