@@ -182,19 +182,25 @@ class MotorModule:
         return started
 
     def _offers(self, command: MotorCommand) -> list[Message]:
-        """The goal that is sought, where the agent has none of that name; where offers are made in
-        each cycle, perhaps none.
+        """The goal that is sought, where the agent has none of that name that can be reached; where
+        offers are made in each cycle, perhaps none.
         """
         goal = self._sought
         self._sought = None
         operations: list[Operation] = []
-        if goal is not None and self._graph.get(Goal, goal.id) is None:
+        if goal is not None and self._is_open(goal):
             operations.append(goal)
 
         if not operations and not self._makes_offers:
             return []
         cycle = self._graph.cycle
         return [Offer(stamp_ns=command.stamp_ns, cycle=cycle, operations=operations)]
+
+    def _is_open(self, goal: Goal) -> bool:
+        """Whether the agent has no goal of that name, or the plan has no route to it."""
+        plan = self._graph.get(Plan, PLAN_ID)
+        is_in_vain = plan is not None and goal.id in plan.unreachable
+        return is_in_vain or self._graph.get(Goal, goal.id) is None
 
     def _command(self, at_once: bool = False) -> MotorCommand | None:
         """The command for the newest pose, if there is one that waits for nothing any longer."""

@@ -9,7 +9,18 @@ from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas import nodes
 from schemas.codelets import Task
 from schemas.graph import Phase
-from schemas.nodes import SELF_ID, AnyNode, Attention, Object, Self
+from schemas.nodes import (
+    PLAN_ID,
+    SELF_ID,
+    AnyNode,
+    Attention,
+    Goal,
+    Object,
+    Plan,
+    Self,
+    goal_id,
+    object_id,
+)
 from services.codelets.attention.coalitions import coalition, felt
 from services.codelets.attention.config import SECTION, Config, Need
 from services.codelets.attention.memory import brought, is_refractory, memory_of
@@ -30,7 +41,7 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     if not high:
         return []
 
-    about = [SELF_ID, *(node.id for node in high)]
+    about = [SELF_ID, PLAN_ID, *(node.id for node in high)]
     return [context.task(NAME, about=about)]
 
 
@@ -59,7 +70,7 @@ CODELET = Codelet(
     phase=Phase.ATTENTION,
     due=due,
     run=run,
-    reads=frozenset({Self, Object, nodes.Need, Attention}),
+    reads=frozenset({Self, Object, nodes.Need, Goal, Plan, Attention}),
     writes=frozenset({Attention}),
     config=Config,
     section=SECTION,
@@ -72,14 +83,24 @@ def high_needs(graph: Graph, settings: Need) -> list[nodes.Need]:
 
 
 def nearest_that_satisfies(need: nodes.Need, agent: Self, graph: Graph) -> Object | None:
-    """The object of the agent's map that satisfies a need, as far as is known, and is the nearest;
-    None where none is known.
+    """The object of the agent's map that satisfies a need, as far as is known, and is the nearest
+    but for one that the plan has found no route to; None where none is known.
     """
     function = SATISFIED_BY.get(need.label)
     found = [node for node in graph.of_kind(Object) if node.function == function]
+    unreachable = _sought_in_vain(need, graph)
 
     def order(node: Object) -> tuple[float, str]:
         return math.dist((node.x_m, node.y_m), (agent.x_m, agent.y_m)), node.id
 
-    here = [node for node in found if node.map == agent.map]
+    here = [node for node in found if node.map == agent.map and node.id != unreachable]
     return min(here, key=order, default=None)
+
+
+def _sought_in_vain(need: nodes.Need, graph: Graph) -> str:
+    """The object that is the goal for a need and has no route; empty where there is none."""
+    plan = graph.get(Plan, PLAN_ID)
+    goal = graph.get(Goal, goal_id(need.label))
+    if plan is None or goal is None or goal.id not in plan.unreachable:
+        return ""
+    return object_id(goal.object)

@@ -5,7 +5,17 @@ from __future__ import annotations
 import pytest
 
 from schemas.cognition import Coalition
-from schemas.nodes import Need, Object, need_id, object_id
+from schemas.nodes import (
+    PLAN_ID,
+    Goal,
+    Need,
+    Object,
+    Plan,
+    PlanState,
+    goal_id,
+    need_id,
+    object_id,
+)
 from services.codelets.attention.config import Config
 from tests.support.world.scenes import agent, graph_of, run, task
 
@@ -57,6 +67,17 @@ def test_the_nearest_object_that_satisfies_the_need_is_brought_with_it() -> None
 
     assert [node.id for node in found.nodes] == ["self", "need:energy", near.id]
     assert found.nodes[2].salience == 0.75
+
+
+def test_the_next_object_is_brought_where_the_nearest_cannot_be_reached() -> None:
+    near = _charging_place("charging-place", 20.0)
+    far = _charging_place("charging-place~2", -50.0)
+    goal = Goal(id=goal_id("energy"), object=near.label, need="energy")
+    plan = Plan(id=PLAN_ID, state=PlanState.NO_ROUTE, unreachable={goal.id: PlanState.NO_ROUTE})
+    graph = graph_of(agent(), _need(0.75), near, far, goal, plan)
+    (found,) = run(task("need"), graph, CONFIG).coalitions
+
+    assert found.nodes[-1].id == far.id
 
 
 def test_where_nothing_is_known_that_satisfies_it_the_need_is_brought_alone() -> None:
