@@ -99,14 +99,17 @@ class RangeScan(Message, kw_only=True, frozen=True):
 class Percept(Part, kw_only=True, frozen=True):
     """One recognised object: a PAM node over threshold, and where it stands as seen from the robot.
 
-    Bearing (left positive) and range point to the object's estimated centre; `whole` says that
-    neither image border nor another object cuts it. `box_px` is left, top, width, height in the
-    view; `outline_px` are the corners, column and row, of a polygon around what is seen of it.
+    `activation` is the total activation of the PAM node; `evidence` is how likely the view alone
+    makes it, whatever was expected. Bearing (left positive) and range point to the object's
+    estimated centre; `whole` says that neither image border nor another object cuts it. `box_px` is
+    left, top, width, height in the view; `outline_px` are the corners, column and row, of a polygon
+    around what is seen of it.
     `function` is what it is used for, as far as what it was recognised as implies that.
     """
 
     label: Name
     activation: Unit
+    evidence: Unit
     bearing_rad: Finite
     range_m: Annotated[float, msgspec.Meta(gt=0, le=1e4)]
     bearing_sd_rad: Annotated[float, msgspec.Meta(gt=0, le=7)]
@@ -178,12 +181,32 @@ class RememberedView(Part, kw_only=True, frozen=True):
     code: Array
 
 
+class Associations(Part, kw_only=True, frozen=True):
+    """The PAM nodes of perceptual associative memory, and the links between them.
+
+    `base_levels` and `activations`, float64 (n,), are those of `names` after the broadcast of
+    `updated_ns`. Link k leads from name `sources`[k] to name `targets`[k], int32 (m,), with
+    `weights`[k], float64 (m,), 0 to 1.
+    """
+
+    updated_ns: Count
+    names: list[Name]
+    base_levels: Array
+    activations: Array
+    sources: Array
+    targets: Array
+    weights: Array
+
+
 class Learned(Message, kw_only=True, frozen=True):
-    """What perception learned from one view, or, after a restart, from all before."""
+    """What perception learned from one view and the broadcasts before it, or, after a restart, from
+    all before. `associations` are None where they were not published anew.
+    """
 
     frame: Count
     objects: list[LearnedObject] = []
     views: list[RememberedView] = []
+    associations: Associations | None = None
 
 
 class SpeedLimit(enum.StrEnum):

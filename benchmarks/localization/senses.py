@@ -44,6 +44,7 @@ def seen(label: str, bearing_rad: float, range_m: float) -> Percept:
     return Percept(
         label=label,
         activation=1.0,
+        evidence=1.0,
         bearing_rad=bearing_rad,
         range_m=range_m,
         bearing_sd_rad=BEARING_SD_RAD,

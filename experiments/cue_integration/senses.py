@@ -74,6 +74,7 @@ def _percept(
     return Percept(
         label=label,
         activation=1.0,
+        evidence=1.0,
         bearing_rad=bearing_rad,
         range_m=range_m,
         bearing_sd_rad=bearing_sd_rad,

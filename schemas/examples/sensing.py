@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from schemas.array import Array
 from schemas.base import Message
 from schemas.examples.arrays import ramp
 from schemas.sensing import (
+    Associations,
     Building,
     Calibration,
     Energy,
@@ -48,11 +50,21 @@ def messages() -> list[Message]:
 
 
 def learned() -> Learned:
-    """An object learned, and a view remembered."""
+    """An object learned, a view remembered, and two PAM nodes that were conscious together."""
+    associations = Associations(
+        updated_ns=800_000_000,
+        names=["object:building-07", "category:shop"],
+        base_levels=Array.of([0.25, 0.5]),
+        activations=Array.of([1.0, 0.5]),
+        sources=Array.of([0, 1], "<i4"),
+        targets=Array.of([1, 0], "<i4"),
+        weights=Array.of([0.25, 0.125]),
+    )
     return Learned(
         frame=6,
         objects=[LearnedObject(label="building-08", embedding=ramp(4, dtype="<f4"))],
         views=[RememberedView(frame=2, view_ns=400_000_000, code=ramp(4, dtype="|u1"))],
+        associations=associations,
     )
 
 
@@ -61,6 +73,7 @@ def percept() -> Percept:
     return Percept(
         label="building-07",
         activation=0.875,
+        evidence=0.75,
         bearing_rad=-0.25,
         range_m=18.5,
         bearing_sd_rad=0.01,

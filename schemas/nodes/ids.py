@@ -15,6 +15,11 @@ def object_id(label: str) -> str:
     return f"object:{label}"
 
 
+def category_id(function: str) -> str:
+    """The id of the category of all objects with a function, such as shop."""
+    return f"category:{function}"
+
+
 def individual_label(look: str, number: int) -> str:
     """The label of one of the objects that perception calls `look`, numbered from 1."""
     return look if number == 1 else f"{look}~{number}"

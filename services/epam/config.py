@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 
@@ -13,14 +13,64 @@ Pixels = Annotated[int, msgspec.Meta(ge=4, le=1000)]
 Deviations = Annotated[float, msgspec.Meta(gt=0, le=100)]
 
 
+class Priming(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """How what was conscious makes perception expect what it goes with."""
+
+    share: Annotated[
+        Share,
+        msgspec.Meta(
+            description="largest share of the prior of a building's name that comes from what was "
+            "conscious just before, 0 to 1; at 0 nothing is primed"
+        ),
+    ] = 0.5
+    half_life_s: Annotated[
+        float,
+        msgspec.Meta(
+            gt=0,
+            le=3600,
+            description="the activation of a PAM node halves in so many seconds after it was "
+            "conscious, over 0, at most 3600",
+        ),
+    ] = 3.0
+    learning_rate: Annotated[
+        PositiveShare,
+        msgspec.Meta(
+            description="how far one broadcast moves base levels and weights of links towards what "
+            "was conscious, over 0, at most 1"
+        ),
+    ] = 0.1
+    kept_broadcasts: Annotated[
+        int,
+        msgspec.Meta(
+            ge=1,
+            le=10_000,
+            description="broadcasts between two times at which the graph is published, to be kept, "
+            "1 to 10000",
+        ),
+    ] = 16
+
+
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Weights, thresholds of percepts and of learning, and limits of a footprint's fit.
+    """Weights, thresholds of percepts and of learning, limits of a footprint's fit, and priming.
 
     A segment that shows a building with a probability over `percept_threshold` is a percept,
     labelled as the likeliest PAM node, with the total activation of that node: base level and
     current activation.
     """
 
+    mode: Annotated[
+        Literal["lockstep", "real_time"],
+        msgspec.Meta(
+            description="lockstep: a view waits for the competition that it is primed by. "
+            "real_time: it does not."
+        ),
+    ] = "real_time"
+    priming: Annotated[
+        Priming,
+        msgspec.Meta(
+            description="how what was conscious makes perception expect what goes with it"
+        ),
+    ] = Priming()
     segments_weights: Annotated[
         WeightsPath,
         msgspec.Meta(description="ONNX file of the segmentation network; empty: the built-in one"),

@@ -12,7 +12,9 @@ from cogmap.runtime.module import Module
 from schemas import topics
 from schemas.array import Array
 from schemas.base import Message
+from schemas.cognition import Broadcast, Competition
 from schemas.sensing import Learned, Percepts, View
+from services.epam.association.memory import Primer
 from services.epam.config import Config
 from services.epam.layout import road
 from services.epam.pam import ExtendedPam
@@ -25,28 +27,58 @@ __all__ = ["Config", "build"]
 
 class Perception:
     """Turns each view into percepts. Between views it keeps what it learned: nodes of new
-    buildings, and views to recognize places by.
+    buildings, views to recognize places by, and what goes with what.
     """
 
-    def __init__(self, pam: ExtendedPam, places: PlaceRecognizer) -> None:
+    def __init__(
+        self, pam: ExtendedPam, places: PlaceRecognizer, primer: Primer, in_lockstep: bool
+    ) -> None:
         self._pam = pam
         self._places = places
+        self._primer = primer
+        self._in_lockstep = in_lockstep
+        self._waiting: View | None = None
         self._last_percepts: Percepts | None = None
         self._last_learned: Learned | None = None
 
     def on_view(self, view: View) -> list[Message]:
         """Return the percepts of `view`, perhaps empty ones, after what was learned from it.
 
-        The last view may be published again, after another module or this one was restarted: its
-        percepts are returned again, and nothing is learned from it twice. Raises MessageError if
+        In lockstep a view waits for the competition that it is primed by. The last view may be
+        published again, after another module or this one was restarted: its percepts are returned
+        again, nothing is learned from it twice, and it waits for nothing. Raises MessageError if
         image, depth and calibration do not fit each other.
         """
+        is_repeated = self._waiting is not None and _same_view(view, self._waiting)
+        self._waiting = None
+        if self._in_lockstep and not self._primer.is_ready and not is_repeated:
+            self._waiting = view
+            return []
+        return self._perceived(view)
+
+    def on_competition(self, competition: Competition) -> list[Message]:
+        """Return the percepts of a view that has waited for this."""
+        self._primer.on_competition(competition.stamp_ns)
+        view = self._waiting
+        if view is None or not self._primer.is_ready:
+            return []
+
+        self._waiting = None
+        return self._perceived(view)
+
+    def on_broadcast(self, broadcast: Broadcast) -> None:
+        """What was conscious primes a later view."""
+        self._primer.on_broadcast(broadcast)
+
+    def _perceived(self, view: View) -> list[Message]:
         arrays = view_arrays(view)
         if self._last_percepts is not None and _same_view(view, self._last_percepts):
             return [msgspec.structs.replace(self._last_percepts)]
 
         learning = self._last_learned is None or not _same_view(view, self._last_learned)
-        perceived = self._pam.perceive(arrays, view.calibration, learning)
+        associations = self._primer.begin(view.stamp_ns)
+        prior = self._primer.prior(view.stamp_ns)
+        perceived = self._pam.perceive(arrays, view.calibration, learning, prior)
         matches, remembered = self._places.observe(
             view.frame, view.stamp_ns, arrays.image, arrays.depth_m, learning
         )
@@ -59,7 +91,7 @@ class Perception:
             matches=matches,
         )
         self._last_percepts = percepts
-        if not perceived.learned and not remembered:
+        if not perceived.learned and not remembered and associations is None:
             return [percepts]
 
         self._last_learned = Learned(
@@ -67,6 +99,7 @@ class Perception:
             frame=view.frame,
             objects=perceived.learned,
             views=remembered,
+            associations=associations,
         )
         return [self._last_learned, percepts]
 
@@ -77,6 +110,8 @@ class Perception:
                 self._last_learned = message
                 self._pam.restore(message.objects)
                 self._places.restore(message.views)
+                if message.associations is not None:
+                    self._primer.restore(message.associations)
 
     def snapshot(self) -> Learned:
         """Return all that was learned, as one message with the stamp of the last."""
@@ -86,6 +121,7 @@ class Perception:
             frame=last.frame,
             objects=self._pam.learned,
             views=list(self._places.all),
+            associations=self._primer.published(),
         )
 
 
@@ -101,14 +137,22 @@ def build(config: Config, instance: str) -> Module:
         objects.load(objects_path),
         road.load(road_path),
     )
-    perception = Perception(pam, PlaceRecognizer())
+    primer = Primer(config.priming)
+    perception = Perception(pam, PlaceRecognizer(), primer, config.mode == "lockstep")
 
-    module = Module("epam", instance)
-    module.on(topics.VIEW, perception.on_view, emits=(topics.PERCEPTS, topics.LEARNED))
-    return module.journaling(topics.LEARNED, perception.restore, perception.snapshot)
+    published = (topics.PERCEPTS, topics.LEARNED)
+    return (
+        Module("epam", instance)
+        .on(topics.VIEW, perception.on_view, emits=published)
+        .on(topics.COMPETITION, perception.on_competition, emits=published)
+        .on(topics.BROADCAST, perception.on_broadcast)
+        .journaling(
+            topics.LEARNED, perception.restore, perception.snapshot, backfill=[topics.BROADCAST]
+        )
+    )
 
 
-def _same_view(view: View, message: Percepts | Learned) -> bool:
+def _same_view(view: View, message: View | Percepts | Learned) -> bool:
     return (view.stamp_ns, view.frame) == (message.stamp_ns, message.frame)
 
 

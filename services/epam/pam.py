@@ -14,6 +14,7 @@ import numpy as np
 from cogmap.geometry.arrays import Singles
 from schemas.array import Array
 from schemas.sensing import Calibration, LearnedObject, Percept
+from services.epam.association.prior import NOTHING_EXPECTED, Prior
 from services.epam.config import Config
 from services.epam.layout.footprint_fit import ObjectPose, Silhouette, locate
 from services.epam.layout.ground import project
@@ -62,10 +63,18 @@ class ExtendedPam:
         self._recognizer = recognizer
         self._road_segmenter = road_segmenter
 
-    def perceive(self, view: ViewArrays, camera: Calibration, learning: bool = True) -> Perceived:
-        """Return what is recognized in `view`; with `learning`, new buildings get nodes."""
+    def perceive(
+        self,
+        view: ViewArrays,
+        camera: Calibration,
+        learning: bool = True,
+        prior: Prior = NOTHING_EXPECTED,
+    ) -> Perceived:
+        """Return what is recognized in `view`, where `prior` was expected; with `learning`, new
+        buildings get nodes.
+        """
         candidates = self.candidates(view, camera)
-        found, learned = self._labelled(candidates, view, learning)
+        found, learned = self._labelled(candidates, view, learning, prior)
         objects = self._percepts(found, camera)
 
         likelihood = self._road_segmenter.likelihood(view.image)
@@ -122,7 +131,7 @@ class ExtendedPam:
         return nodes
 
     def _labelled(
-        self, candidates: list[Candidate], view: ViewArrays, learning: bool
+        self, candidates: list[Candidate], view: ViewArrays, learning: bool, prior: Prior
     ) -> tuple[list[Candidate], list[LearnedObject]]:
         """The percepts, at most one of each label, from left to right, and what was learned.
 
@@ -133,15 +142,15 @@ class ExtendedPam:
         learned: list[LearnedObject] = []
 
         for first in sorted(candidates, key=_activation, reverse=True):
-            recognized = self._recognized(first)
-            candidate = self._in_one_place(recognized, pieces)
+            recognized = self._recognized(first, prior)
+            candidate = self._in_one_place(recognized, pieces, prior)
             recognition = candidate.recognition
             if 1 - recognition.background <= self._config.percept_threshold:
                 continue
 
             if learning and self._is_new(candidate):
                 learned.append(self._learn(self._next_label(), recognition.appearance))
-                candidate = self._recognized(candidate)
+                candidate = self._recognized(candidate, prior)
             elif learning and recognition.label not in pieces and self._looks_new(recognition):
                 learned.append(self._learn(recognition.label, recognition.appearance))
 
@@ -151,13 +160,17 @@ class ExtendedPam:
         found.sort(key=lambda candidate: candidate.walls.left)
         return found, learned
 
-    def _recognized(self, candidate: Candidate, excluded: Container[str] = ()) -> Candidate:
+    def _recognized(
+        self, candidate: Candidate, prior: Prior, excluded: Container[str] = ()
+    ) -> Candidate:
         """`candidate` recognized by all that is known by now, except by labels `excluded`."""
-        recognition = self._recognizer.recognize(candidate.recognition.appearance, excluded)
+        log_prior = prior.log_ratio(self._recognizer.labels)
+        appearance = candidate.recognition.appearance
+        recognition = self._recognizer.recognize(appearance, excluded, log_prior)
         return replace(candidate, recognition=recognition)
 
     def _in_one_place(
-        self, candidate: Candidate, pieces: Mapping[str, list[Candidate]]
+        self, candidate: Candidate, pieces: Mapping[str, list[Candidate]], prior: Prior
     ) -> Candidate:
         """`candidate`, recognized as nothing that is elsewhere in the same view: no object is in
         two places.
@@ -166,7 +179,7 @@ class ExtendedPam:
         if same is None or is_beside(same[0], candidate):
             return candidate
 
-        return self._recognized(candidate, excluded=pieces)
+        return self._recognized(candidate, prior, excluded=pieces)
 
     def _is_new(self, candidate: Candidate) -> bool:
         """Whether it is well visible, and likelier an unknown building than anything else."""
@@ -183,7 +196,7 @@ class ExtendedPam:
     def _looks_new(self, recognition: Recognition) -> bool:
         """Whether it is surely a learned building, in an appearance that was not learned."""
         whole = recognition.appearance.whole
-        certainty = min(recognition.activation, whole)
+        certainty = min(recognition.evidence, whole)
         if certainty <= self._config.sure:
             return False
         return self._recognizer.is_new_appearance(recognition)
@@ -238,6 +251,7 @@ class ExtendedPam:
         return Percept(
             label=recognition.label,
             activation=min(1.0, self._config.base_level + recognition.activation),
+            evidence=recognition.evidence,
             bearing_rad=pose.bearing_rad,
             range_m=pose.range_m,
             bearing_sd_rad=pose.bearing_sd_rad,

@@ -95,7 +95,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     recognition_threshold: Annotated[
         Unit,
         msgspec.Meta(
-            description="A percept enters the workspace where its activation is above this, 0 to 1"
+            description="A percept enters the workspace where its evidence is above this, 0 to 1"
         ),
     ] = 0.7
     decay: Annotated[

@@ -20,6 +20,7 @@ from services.workspace.config import Config
 from services.workspace.dispatch import Dispatch
 from services.workspace.entrance import (
     check_percepts,
+    expected_operations,
     first_goals,
     first_operations,
     percept_operations,
@@ -121,7 +122,7 @@ class Workspace:
 
         waiting = self._waiting
         self._is_repeated = waiting is not None and waiting.stamp_ns == percepts.stamp_ns
-        self._waiting = recognised(percepts, self._config.recognition_threshold)
+        self._waiting = percepts
         return self._begin()
 
     def on_competition(self, competition: Competition) -> list[Message]:
@@ -226,28 +227,27 @@ class Workspace:
             return self._continue_interrupted(percepts)
 
         ended = self._end_interrupted()
-        if not self._offers.complete(self._ledger.graph.cycle):
-            return ended
-        is_known = self._consciousness.complete(self._ledger.graph.cycle)
-        if not is_known and not self._is_repeated:
+        cycle = self._ledger.graph.cycle
+        is_known = self._is_repeated or self._consciousness.complete(cycle)
+        if not is_known or not self._offers.complete(cycle):
             return ended
         return [*ended, *self._begin_cycle(percepts)]
+
+    def _certain(self, percepts: Percepts) -> Percepts:
+        return recognised(percepts, self._config.recognition_threshold)
 
     def _continue_interrupted(self, percepts: Percepts) -> list[Message]:
         graph = self._ledger.graph
         self._waiting = None
         motions = self._sensed.motions(percepts.stamp_ns, self._moved_until_ns)
-        self._context = self._sensed.context(
-            as_entered(percepts, graph), motions, graph.cycle, graph.version
-        )
+        entered = as_entered(self._certain(percepts), graph)
+        self._context = self._sensed.context(entered, motions, graph.cycle, graph.version)
 
         self._phase = PHASES.index(graph.phase) if graph.phase in PHASES else -1
         return self._next_phase()
 
     def _end_interrupted(self) -> list[Message]:
-        """End a cycle that a kill interrupted after its command was given: its percepts will not
-        come again, and others wait for its end.
-        """
+        """End a cycle that a kill interrupted, whose view will not come again."""
         graph = self._ledger.graph
         if graph.phase is Phase.END:
             return []
@@ -259,10 +259,8 @@ class Workspace:
         before_ns = self._begun_ns
         self._begun_ns = percepts.stamp_ns
         motions = self._sensed.motions(percepts.stamp_ns, self._moved_until_ns)
-        entering_percepts = individuals(percepts, graph, motions)
-        self._context = self._sensed.context(
-            entering_percepts, motions, graph.cycle + 1, graph.version
-        )
+        entered = individuals(self._certain(percepts), graph, motions)
+        self._context = self._sensed.context(entered, motions, graph.cycle + 1, graph.version)
         self._phase = -1
         self._is_repeated = False
 
@@ -271,6 +269,7 @@ class Workspace:
         entering += learned_operations(conscious, graph, self._context.cycle, self._config)
         entering += first_goals(self._config, before_ns, self._begun_ns)
         entering += percept_operations(graph, self._context)
+        entering = expected_operations(graph, percepts, entering, self._context.cycle, self._config)
         entering += self._sensed.needs(percepts.stamp_ns, self._context.cycle)
         entering += self._offers.take(self._ledger, self._context.cycle)
         return [self._commit(Phase.PERCEPTS, entering), *self._next_phase()]
@@ -386,10 +385,9 @@ class Workspace:
         return [*published, *self._begin()]
 
     def _reject_failed(self, tasks: list[str]) -> None:
+        attempts = self._config.attempts
         for name in tasks:
-            self._ledger.reject(
-                f"task {name} was given to {self._config.attempts} workers and lost each time"
-            )
+            self._ledger.reject(f"task {name} was given to {attempts} workers and lost each time")
 
 
 def _coalitions(context: CycleContext, proposals: list[Proposal]) -> Coalitions:

@@ -6,6 +6,7 @@ import msgspec
 import numpy as np
 
 from cogmap.errors import MessageError
+from cogmap.graph import decay
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import CycleContext
 from schemas.array import Matrix
@@ -17,6 +18,7 @@ from schemas.nodes import (
     Goal,
     LinkKind,
     Map,
+    Object,
     Percept,
     Self,
     goal_id,
@@ -33,15 +35,15 @@ def first_operations(graph: Graph, config: Config) -> list[Operation]:
     The agent's first pose is the origin of its root map, for certain.
     """
     operations: list[Operation] = []
-    decay = Decay(
+    rates = Decay(
         activation=config.decay,
         base_level=config.base_level_decay,
         place_activation=config.place_decay,
         forget_below=config.forget_below,
         kept_base_level=config.kept_base_level,
     )
-    if graph.decay != decay:
-        operations.append(decay)
+    if graph.decay != rates:
+        operations.append(rates)
 
     if graph.get(Map, ROOT_MAP) is None:
         operations.append(Map(id=ROOT_MAP, cell_m=config.cell_m))
@@ -85,13 +87,43 @@ def check_percepts(percepts: Percepts) -> None:
 
 
 def recognised(percepts: Percepts, threshold: float) -> Percepts:
-    """`percepts` without the objects whose activation is not above `threshold`: what they are is
-    too uncertain to map by.
+    """`percepts` without the objects for which the view's evidence is not above `threshold`: what
+    they are is too uncertain to map by, however much they were expected.
     """
-    objects = [percept for percept in percepts.objects if percept.activation > threshold]
+    objects = [percept for percept in percepts.objects if percept.evidence > threshold]
     if len(objects) == len(percepts.objects):
         return percepts
     return msgspec.structs.replace(percepts, objects=objects)
+
+
+def expected_operations(
+    graph: Graph, percepts: Percepts, entering: list[Operation], cycle: int, config: Config
+) -> list[Operation]:
+    """`entering`, with the objects of the map that were recognised with the help of what was
+    conscious before: they are as active as their percepts, and are not placed anew.
+    """
+    threshold = config.recognition_threshold
+    excited: dict[str, Object] = {}
+    for percept in percepts.objects:
+        node = graph.get(Object, object_id(percept.label))
+        is_primed = percept.evidence <= threshold < percept.activation
+        if node is not None and is_primed:
+            excited[node.id] = msgspec.structs.replace(
+                node,
+                activation=max(percept.activation, decay.activation(node, cycle, graph.decay)),
+                base_level=decay.base_level(node, cycle, graph.decay),
+                cycle=cycle,
+            )
+
+    operations: list[Operation] = []
+    for operation in entering:
+        known = excited.pop(operation.id, None) if isinstance(operation, Object) else None
+        if known is None:
+            operations.append(operation)
+        else:
+            operations.append(msgspec.structs.replace(operation, activation=known.activation))
+
+    return [*operations, *excited.values()]
 
 
 def percept_operations(graph: Graph, context: CycleContext) -> list[Operation]:

@@ -84,6 +84,7 @@ def percept(label: str) -> Percept:
     return Percept(
         label=label,
         activation=0.9,
+        evidence=0.9,
         bearing_rad=0.5,
         range_m=12.0,
         bearing_sd_rad=0.02,

@@ -70,6 +70,7 @@ def _percept(label: str, forwards_m: float, left_m: float, sd_m: float) -> Perce
     return Percept(
         label=label,
         activation=1.0,
+        evidence=1.0,
         bearing_rad=math.atan2(left_m, forwards_m),
         range_m=range_m,
         bearing_sd_rad=min(sd_m / range_m, math.pi),

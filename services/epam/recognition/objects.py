@@ -73,13 +73,16 @@ class Appearance:
 
 @dataclass(frozen=True, eq=False)
 class Recognition:
-    """The likeliest `label` with its posterior `activation`, and the probabilities of an `unknown`
-    building and of `background`. `size_m` is None unless the label was taught and is likelier than
-    those two.
+    """The likeliest `label` with its posterior `activation`.
+
+    As far as the view alone goes, `evidence` is the posterior of the label, beside the
+    probabilities of an `unknown` building and of `background`. `size_m` is None unless the label
+    was taught and has more evidence than those two.
     """
 
     label: str
     activation: float
+    evidence: float
     unknown: float
     background: float
     appearance: Appearance
@@ -87,8 +90,10 @@ class Recognition:
 
     @property
     def known(self) -> bool:
-        """Whether the label is likelier than an unknown building and background together."""
-        return self.activation > self.unknown + self.background
+        """Whether the label is likelier than an unknown building and background together, as far as
+        the view alone goes.
+        """
+        return self.evidence > self.unknown + self.background
 
 
 class ObjectRecognizer:
@@ -133,30 +138,44 @@ class ObjectRecognizer:
 
         return appearances
 
-    def recognize(self, appearance: Appearance, excluded: Container[str] = ()) -> Recognition:
-        """Return what appears so, which is none of the labels `excluded`, perhaps nothing known."""
-        novel = list(dict.fromkeys(self._labels))
-        taught = self._prototypes.names
-        labels = [*taught, *novel]
-        is_excluded = np.array([label in excluded for label in labels])
+    @property
+    def labels(self) -> list[str]:
+        """What a segment may be recognized as: every label taught, then every one learned."""
+        return [*self._prototypes.names, *dict.fromkeys(self._labels)]
 
-        *posterior, unknown, background = posteriors(
+    def recognize(
+        self,
+        appearance: Appearance,
+        excluded: Container[str] = (),
+        log_prior: Floats | float = 0.0,
+    ) -> Recognition:
+        """Return what appears so, which is none of the labels `excluded`, perhaps nothing known.
+
+        `log_prior`: how much likelier each of `labels` was before the view, as a logarithm.
+        """
+        labels = self.labels
+        taught = len(self._prototypes.names)
+        is_excluded = np.array([label in excluded for label in labels])
+        log_odds = _log_odds(
             self._directions @ appearance.embedding,
-            self._novel_cosines(appearance, novel),
-            appearance.building,
+            self._novel_cosines(appearance, labels[taught:]),
             self._prototypes,
-            is_excluded,
-        ).tolist()
-        best = int(np.argmax(posterior))
-        activation = min(posterior[best], 1.0)
+        )
+        possible: Floats = np.where(is_excluded, -np.inf, log_odds)
+
+        *seen, unknown, background = _posteriors(possible, appearance.building).tolist()
+        expected = _posteriors(possible + log_prior, appearance.building)
+        best = int(np.argmax(expected[: len(labels)]))
+        evidence = min(seen[best], 1.0)
 
         size_m = None
-        if activation > unknown + background and best < len(taught):
+        if evidence > unknown + background and best < taught:
             size_m = self._prototypes.size_m[best]
 
         return Recognition(
             label=labels[best],
-            activation=activation,
+            activation=min(float(expected[best]), 1.0),
+            evidence=evidence,
             unknown=unknown,
             background=background,
             appearance=appearance,
@@ -249,9 +268,14 @@ def posteriors(
     probability of a building; labels `excluded` (n + m,) have a posterior of 0.
     """
     log_odds = _log_odds(taught, novel, prototypes)
-    possible = np.where(excluded, -np.inf, log_odds)
+    return _posteriors(np.where(excluded, -np.inf, log_odds), building)
 
-    *leading, _ = taught.shape
+
+def _posteriors(possible: Floats, building: npt.ArrayLike) -> Floats:
+    """The posterior (..., n + 2) of each label, an unknown building and background, from the log
+    odds (..., n) of each label over an unknown building.
+    """
+    *leading, _ = possible.shape
     unknown = np.zeros((*leading, 1))
     log_weights = np.concatenate([possible, unknown], axis=-1)
     weights = _scaled_weights(log_weights)

@@ -228,6 +228,7 @@ class PerceptSim:
         return Percept(
             label=label,
             activation=errors.right_name,
+            evidence=errors.right_name,
             bearing_rad=math.remainder(noisy_bearing_rad, math.tau),
             range_m=max(MIN_RANGE_M, noisy_range_m),
             bearing_sd_rad=errors.bearing_sd_rad,

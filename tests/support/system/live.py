@@ -87,6 +87,7 @@ class Feeder:
         return Percept(
             label="building-01",
             activation=0.9,
+            evidence=0.9,
             bearing_rad=float(np.arctan2(y_m, x_m)),
             range_m=float(np.hypot(x_m, y_m)),
             bearing_sd_rad=0.5,

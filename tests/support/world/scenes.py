@@ -53,6 +53,7 @@ def percept(
     """One building, seen well."""
     usual: dict[str, Any] = {
         "activation": 0.9,
+        "evidence": facts.get("activation", 0.9),
         "bearing_sd_rad": 0.02,
         "range_sd_m": 0.3,
         "width_m": 8.0,

@@ -21,10 +21,9 @@ BOUNDED = [
 
 @pytest.mark.parametrize("config", [Config, PlaceConfig])
 def test_every_setting_has_a_description(config: type[msgspec.Struct]) -> None:
-    (schema,) = msgspec.json.schema(config)["$defs"].values()
-
-    for name, setting in schema["properties"].items():
-        assert setting.get("description"), name
+    for schema in msgspec.json.schema(config)["$defs"].values():
+        for name, setting in schema["properties"].items():
+            assert setting.get("description"), name
 
 
 @pytest.mark.parametrize("key", BOUNDED)

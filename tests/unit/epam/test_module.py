@@ -18,6 +18,8 @@ from cogmap.runtime.state.journal import Journal
 from schemas import topics
 from schemas.array import Array
 from schemas.base import Message
+from schemas.cognition import Broadcast, Coalition, Competition, Trigger
+from schemas.nodes import Object, object_id
 from schemas.sensing import Learned, Percepts, View
 from services.epam.module import Config, build
 from tests.support.messages import of_type
@@ -290,3 +292,55 @@ def test_missing_weights_are_named_with_the_remedy(weights: str, tmp_path: Path)
 
     with pytest.raises(ConfigError, match=r"nowhere\.onnx.*cogmap train"):
         build(config, "epam")
+
+
+def _broadcast(stamp_ns: int, *labels: str) -> Broadcast:
+    nodes = [Object(id=object_id(label), label=label, x_m=0.0, y_m=0.0) for label in labels]
+    coalition = Coalition(codelet="whereabouts", activation=0.5, nodes=nodes)
+    return Broadcast(stamp_ns=stamp_ns, cycle=1, trigger=Trigger.ONE_COALITION, coalition=coalition)
+
+
+def _competition(stamp_ns: int) -> Competition:
+    return Competition(stamp_ns=stamp_ns, cycle=1, contenders=[], trigger=Trigger.NONE)
+
+
+def test_in_lockstep_a_view_waits_for_the_competition_that_primes_it(views: list[View]) -> None:
+    module = build(Config(mode="lockstep"), "epam")
+    for view in views[:2]:
+        assert of_type(Percepts, module.feed(view))
+
+    assert module.feed(views[2]) == []
+    (percepts,) = of_type(Percepts, module.feed(_competition(views[0].stamp_ns)))
+    assert percepts.stamp_ns == views[2].stamp_ns
+
+
+def test_in_lockstep_a_view_that_comes_again_waits_for_nothing(views: list[View]) -> None:
+    module = build(Config(mode="lockstep"), "epam")
+    for view in views[:3]:
+        module.feed(view)
+
+    assert of_type(Percepts, module.feed(views[2]))
+
+
+def test_what_was_conscious_raises_the_activation_of_what_goes_with_it_and_no_evidence(
+    views: list[View],
+) -> None:
+    bare = build(Config(), "epam")
+    before = [_percepts(bare, view) for view in views]
+    conscious = [percept.label for percepts in before for percept in percepts.objects]
+
+    primed = build(Config(), "epam")
+    for _ in range(20):
+        primed.feed(_broadcast(views[0].stamp_ns, *sorted({*conscious})))
+    after = [_percepts(primed, view) for view in views]
+
+    gains = []
+    for without, with_it in zip(before[2:], after[2:], strict=True):
+        expected = {percept.label: percept for percept in with_it.objects}
+        for percept in without.objects:
+            found = expected.get(percept.label)
+            if found is not None and not percept.label.startswith("new-"):
+                assert found.evidence == percept.evidence
+                gains.append(found.activation - percept.activation)
+
+    assert max(gains) > 0.0

@@ -65,6 +65,7 @@ def test_an_outline_holds_its_corners_and_what_is_between_them() -> None:
     percept = Percept(
         label="bakery",
         activation=0.9,
+        evidence=0.9,
         bearing_rad=0.0,
         range_m=10.0,
         bearing_sd_rad=0.1,

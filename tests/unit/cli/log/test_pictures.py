@@ -53,6 +53,7 @@ def percept(number: int) -> Percept:
     return Percept(
         label=f"town_hall_{number}",
         activation=0.9,
+        evidence=0.9,
         bearing_rad=0.3 - 0.5 * number,
         range_m=12.0,
         bearing_sd_rad=0.02,

@@ -1,0 +1,140 @@
+"""Perceptual associative memory as a graph: what was conscious together gets linked, and what is
+conscious primes what it is linked to (LIDA's PAM; paper §5.1).
+
+A weight estimates how likely its target is conscious soon before or after its source. Pure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from cogmap.errors import MessageError
+from cogmap.geometry.arrays import Floats
+from schemas.array import Array
+from schemas.sensing import Associations
+from services.epam.config import Priming
+
+MAX_NODES = 256
+FAINT = 0.01
+"""Weaker links are not published, and prime nothing."""
+
+
+class AssociativeGraph:
+    """PAM nodes with a base level and a current activation, and weighted links between them.
+
+    The activation of a node is 1 at a broadcast of it and halves every `half_life_s`.
+    """
+
+    def __init__(self, config: Priming) -> None:
+        self._config = config
+        self._updated_ns = 0
+        self._index: dict[str, int] = {}
+        self._base_levels: Floats = np.zeros(0)
+        self._activations: Floats = np.zeros(0)
+        self._weights: Floats = np.zeros((0, 0))
+
+    @property
+    def updated_ns(self) -> int:
+        """The stamp of the broadcast from which was learned last, 0 before the first."""
+        return self._updated_ns
+
+    def learn(self, names: list[str], stamp_ns: int) -> None:
+        """Learn from a broadcast of the nodes `names`.
+
+        Base levels rise. Each weight moves towards the activation of its target, by a rate times
+        that of its source: a node that has long been silent keeps its links.
+        """
+        self._decay(stamp_ns)
+        for name in names:
+            self._add(name)
+        conscious = [self._index[name] for name in names if name in self._index]
+        self._activations[conscious] = 1.0
+
+        rate = self._config.learning_rate
+        levels = self._base_levels.copy()
+        levels[conscious] += rate * (1 - levels[conscious])
+        self._base_levels = levels
+        sources = self._activations[:, None]
+        missing = self._activations[None, :] - self._weights
+        self._weights += rate * sources * missing
+        np.fill_diagonal(self._weights, 0.0)
+
+    def primed(self, stamp_ns: int) -> Mapping[str, float]:
+        """The nodes that activation has spread to by `stamp_ns`, each with what came over its best
+        link.
+        """
+        if not self._index:
+            return {}
+
+        sources = self._activations * self._left(stamp_ns)
+        spread = (sources[:, None] * self._weights).max(axis=0)
+        names = list(self._index)
+        return {names[row]: float(spread[row]) for row in np.flatnonzero(spread >= FAINT)}
+
+    def published(self) -> Associations:
+        """The graph as a message, without what is FAINT."""
+        sources, targets = np.nonzero(self._weights >= FAINT)
+        return Associations(
+            updated_ns=self._updated_ns,
+            names=list(self._index),
+            base_levels=Array.of(self._base_levels),
+            activations=Array.of(self._activations),
+            sources=Array.of(sources, "<i4"),
+            targets=Array.of(targets, "<i4"),
+            weights=Array.of(self._weights[sources, targets]),
+        )
+
+    def restore(self, kept: Associations) -> None:
+        """Replace the graph by one that was published. Raises MessageError where its parts do not
+        fit together.
+        """
+        count = len(kept.names)
+        sources = np.asarray(kept.sources.numpy(), np.int64)
+        targets = np.asarray(kept.targets.numpy(), np.int64)
+        values = np.asarray(kept.weights.numpy(), np.float64)
+        of_nodes = (kept.base_levels.shape, kept.activations.shape)
+        is_whole = of_nodes == ((count,), (count,)) and len({*kept.names}) == count
+        if not is_whole or not sources.shape == targets.shape == values.shape:
+            raise MessageError(f"associations of {count} names: arrays of other lengths")
+
+        ends = np.concatenate([sources, targets])
+        if ends.size and not 0 <= ends.min() <= ends.max() < count:
+            raise MessageError(f"associations of {count} names: a link leads to none of them")
+
+        self._updated_ns = kept.updated_ns
+        self._index = {name: row for row, name in enumerate(kept.names)}
+        self._base_levels = np.array(kept.base_levels.numpy(), np.float64)
+        self._activations = np.array(kept.activations.numpy(), np.float64)
+        self._weights = np.zeros((count, count))
+        self._weights[sources, targets] = values
+
+    def _left(self, stamp_ns: int) -> float:
+        """The share of activation that is left at `stamp_ns`."""
+        passed_s = max(0, stamp_ns - self._updated_ns) / 1e9
+        return float(0.5 ** (passed_s / self._config.half_life_s))
+
+    def _decay(self, stamp_ns: int) -> None:
+        self._activations = self._activations * self._left(stamp_ns)
+        self._updated_ns = max(self._updated_ns, stamp_ns)
+
+    def _add(self, name: str) -> None:
+        """Add a node, in a full graph in the place of the one that was conscious least."""
+        if name in self._index:
+            return
+        if len(self._index) < MAX_NODES:
+            self._index[name] = len(self._index)
+            self._base_levels = np.append(self._base_levels, 0.0)
+            self._activations = np.append(self._activations, 0.0)
+            self._weights = np.pad(self._weights, (0, 1))
+            return
+
+        row = int(self._base_levels.argmin())
+        names = list(self._index)
+        names[row] = name
+        self._index = {each: number for number, each in enumerate(names)}
+        self._base_levels[row] = 0.0
+        self._activations[row] = 0.0
+        self._weights[row, :] = 0.0
+        self._weights[:, row] = 0.0

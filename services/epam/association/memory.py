@@ -1,0 +1,87 @@
+"""What perception learns from broadcasts, and what of it primes the next view. Pure."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from schemas.cognition import Broadcast
+from schemas.nodes import Object, category_id, look_of, object_id
+from schemas.sensing import Associations
+from services.epam.association.graph import AssociativeGraph
+from services.epam.association.prior import Prior
+from services.epam.config import Priming
+
+BEHIND = 2
+"""A view is primed by what was conscious up to so many views before it."""
+
+
+class Primer:
+    """The associative graph, and the broadcasts that it has not learned from yet.
+
+    A view is primed by broadcasts up to the view BEHIND it. Those are there when it comes, as the
+    robot has obeyed a command since that waited for them: in lockstep `is_ready` makes sure.
+    """
+
+    def __init__(self, config: Priming) -> None:
+        self._config = config
+        self._graph = AssociativeGraph(config)
+        self._waiting: list[Broadcast] = []
+        self._views_ns: deque[int] = deque(maxlen=BEHIND)
+        self._competition_ns = -1
+        self._broadcasts = 0
+
+    def on_competition(self, stamp_ns: int) -> None:
+        """The competition for a view has ended."""
+        self._competition_ns = max(self._competition_ns, stamp_ns)
+
+    def on_broadcast(self, broadcast: Broadcast) -> None:
+        """Keep a broadcast until a view comes that it may prime."""
+        if broadcast.stamp_ns > self._graph.updated_ns:
+            self._waiting.append(broadcast)
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether all is known that the next view is primed by."""
+        return len(self._views_ns) < BEHIND or self._competition_ns >= self._views_ns[0]
+
+    def begin(self, view_ns: int) -> Associations | None:
+        """Learn from the broadcasts that a view is primed by; the graph, from time to time."""
+        until_ns = self._views_ns[0] if len(self._views_ns) == BEHIND else -1
+        self._views_ns.append(view_ns)
+
+        due = [broadcast for broadcast in self._waiting if broadcast.stamp_ns <= until_ns]
+        self._waiting = [each for each in self._waiting if each.stamp_ns > until_ns]
+        is_due = False
+        for broadcast in sorted(due, key=lambda each: each.stamp_ns):
+            self._graph.learn(nodes_of(broadcast), broadcast.stamp_ns)
+            self._broadcasts += 1
+            is_due |= self._broadcasts % self._config.kept_broadcasts == 0
+
+        return self._graph.published() if is_due else None
+
+    def prior(self, view_ns: int) -> Prior:
+        """What is expected of a view."""
+        return Prior(self._graph.primed(view_ns), self._config.share)
+
+    def published(self) -> Associations:
+        """The graph as it is now."""
+        return self._graph.published()
+
+    def restore(self, kept: Associations) -> None:
+        """Continue with a graph that was published. Raises MessageError where it is not whole."""
+        self._graph.restore(kept)
+
+
+def nodes_of(broadcast: Broadcast) -> list[str]:
+    """The PAM nodes that are conscious in a broadcast: objects, by their look, that are not brought
+    as missing, and the categories of those.
+    """
+    names: dict[str, None] = {}
+    for node in broadcast.coalition.nodes:
+        if not isinstance(node, Object) or node.salience < 0:
+            continue
+        names[object_id(look_of(node.label))] = None
+        if node.function:
+            names[category_id(node.function)] = None
+
+    return list(names)
