@@ -15,6 +15,7 @@ from benchmarks.bus import measure as bus
 from benchmarks.cognition import measure as cognition
 from benchmarks.cycle import measure as cycle
 from benchmarks.explore import measure as explore
+from benchmarks.learning import measure as learning
 from benchmarks.localization import measure as localization
 from benchmarks.machine import machine_unit_ms
 from benchmarks.map_correction import measure as map_correction
@@ -151,6 +152,10 @@ def _cognition(setting: Setting) -> Metrics:
     return cognition.measure(folder, setting.processes, setting.announce)
 
 
+def _learning(setting: Setting) -> Metrics:
+    return learning.measure(setting.processes, setting.announce)
+
+
 def _memory(setting: Setting) -> Metrics:
     folder = setting.subfolder("memory")
     return memory.measure(folder, setting.processes, setting.announce)
@@ -181,6 +186,7 @@ SUITE = (
     Benchmark("explore", explore.THRESHOLDS, _explore),
     Benchmark("cognition", cognition.THRESHOLDS, _cognition),
     Benchmark("memory", memory.THRESHOLDS, _memory),
+    Benchmark("learning", learning.THRESHOLDS, _learning),
     Benchmark("cue-integration", paper.CUE_INTEGRATION_THRESHOLDS, _cue_integration),
     Benchmark("city-maps", paper.CITY_MAPS_THRESHOLDS, _city_maps),
 )

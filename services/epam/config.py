@@ -19,8 +19,8 @@ class Priming(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=T
     share: Annotated[
         Share,
         msgspec.Meta(
-            description="largest share of the prior of a building's name that comes from what was "
-            "conscious just before, 0 to 1; at 0 nothing is primed"
+            description="how much likelier all names together are, at most, for what was conscious "
+            "just before, as a share of 1, 0 to 1; at 0 nothing is primed"
         ),
     ] = 0.5
     half_life_s: Annotated[

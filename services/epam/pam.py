@@ -191,7 +191,7 @@ class ExtendedPam:
         recognition = candidate.recognition
         if recognition.appearance.whole <= self._config.percept_threshold:
             return False
-        return recognition.unknown > LIKELIER_THAN_NOT
+        return recognition.novelty > LIKELIER_THAN_NOT
 
     def _looks_new(self, recognition: Recognition) -> bool:
         """Whether it is surely a learned building, in an appearance that was not learned."""

@@ -13,6 +13,7 @@ from services.sim.layout import towns
 from services.sim.layout.catalogue import CATALOGUE
 from services.sim.layout.closures import Closure
 from services.sim.layout.place import Place
+from services.sim.layout.removals import Removal
 from services.sim.odometry import Noise
 from services.sim.scripted.percepts import PerceptErrors
 from services.sim.scripted.trajectory import Trajectory
@@ -113,6 +114,13 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     closures: Annotated[
         list[Closure], msgspec.Meta(description="Streets that are closed for some time.")
     ] = []
+    removals: Annotated[
+        list[Removal],
+        msgspec.Meta(
+            description="Buildings that are torn down while the robot drives; in a town that is "
+            "sensed by percepts."
+        ),
+    ] = []
     trajectory: Annotated[
         Trajectory | None,
         msgspec.Meta(description="Line that the robot follows in lockstep, instead of a town."),
@@ -166,8 +174,8 @@ def place_of(config: Config) -> Place:
 
 
 def check(config: Config) -> None:
-    """Raise ConfigError where the rates do not divide one another, or a trajectory cannot be
-    followed as it is set up.
+    """Raise ConfigError where the rates do not divide one another, or a trajectory, or the removal
+    of buildings, is not possible as it is set up.
     """
     if config.odometry_hz % config.frame_hz:
         raise ConfigError(
@@ -186,6 +194,11 @@ def check(config: Config) -> None:
     if config.sensing == "percepts" and config.mode != "lockstep":
         raise ConfigError(
             '[sim] a town is sensed by percepts in lockstep only: set mode to "lockstep"'
+        )
+
+    if config.removals and config.sensing != "percepts":
+        raise ConfigError(
+            '[sim] removals: cameras cannot see that a building is gone: set sensing to "percepts"'
         )
 
     if config.trajectory is not None:

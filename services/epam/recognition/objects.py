@@ -73,7 +73,8 @@ class Appearance:
 
 @dataclass(frozen=True, eq=False)
 class Recognition:
-    """The likeliest `label` with its posterior `activation`.
+    """The likeliest `label` with its posterior `activation`, and that of an unknown building,
+    `novelty`, both with the prior.
 
     As far as the view alone goes, `evidence` is the posterior of the label, beside the
     probabilities of an `unknown` building and of `background`. `size_m` is None unless the label
@@ -82,6 +83,7 @@ class Recognition:
 
     label: str
     activation: float
+    novelty: float
     evidence: float
     unknown: float
     background: float
@@ -175,6 +177,7 @@ class ObjectRecognizer:
         return Recognition(
             label=labels[best],
             activation=min(float(expected[best]), 1.0),
+            novelty=float(expected[-2]),
             evidence=evidence,
             unknown=unknown,
             background=background,

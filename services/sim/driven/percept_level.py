@@ -30,6 +30,7 @@ from services.sim.driven.robot import KinematicRobot
 from services.sim.driven.sensors import Sensors
 from services.sim.driven.surroundings import Surroundings
 from services.sim.layout.closures import ClosedStreets
+from services.sim.layout.removals import RemovedBuildings
 from services.sim.odometry import Noise, WheelOdometry
 from services.sim.progress import Progress
 from services.sim.rendering.camera import calibration
@@ -52,6 +53,7 @@ class DrivenPerceptLevelSim:
 
         self._place = place_of(config)
         self.closed_streets = ClosedStreets(self._place.roads, config.closures)
+        self._removed = RemovedBuildings(len(self._place.plots), config.removals)
         self._surroundings = Surroundings(self._place)
         self._robot = KinematicRobot(self._place.start, self._surroundings)
 
@@ -156,16 +158,22 @@ class DrivenPerceptLevelSim:
 
     def town(self) -> TrueTown:
         """The town as it is now."""
-        message = self._place.message(self.closed_streets.names)
+        message = self._place.message(self.closed_streets.names, self._removed.numbers)
         return msgspec.structs.replace(message, stamp_ns=self.now_ns)
 
     def changed_town(self) -> TrueTown | None:
-        """The town, where a street was closed or opened since the last call."""
-        if not self.closed_streets.advance(self.now_ns):
-            return None
+        """The town, where a street was closed or opened, or a building torn down, since the last
+        call.
+        """
+        has_streets_changed = self.closed_streets.advance(self.now_ns)
+        if has_streets_changed:
+            self._surroundings.close(self.closed_streets.names)
 
-        self._surroundings.close(self.closed_streets.names)
-        return self.town()
+        has_lost_buildings = self._removed.advance(self.now_ns)
+        if has_lost_buildings:
+            self._surroundings.remove(self._removed.numbers)
+
+        return self.town() if has_streets_changed or has_lost_buildings else None
 
     def _moved(self) -> Floats:
         """(n, 5): the rows of self-motion since the last view."""

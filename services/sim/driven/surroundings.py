@@ -43,6 +43,7 @@ class Surroundings:
         walls = [len(plot.corners) for plot in place.plots]
         numbers = np.arange(len(walls))
         self._plots = np.repeat(numbers, walls)
+        self._is_standing = np.ones(len(self._plots), bool)
 
         seen = [prop.seen for prop in place.props]
         solid = [prop.solid for prop in place.props]
@@ -63,6 +64,11 @@ class Surroundings:
         self._closing_m = outlines(closing)
         self._middle_m = None
 
+    def remove(self, buildings: Collection[int]) -> None:
+        """Let these buildings be gone, and no others."""
+        self._is_standing = ~np.isin(self._plots, sorted(buildings))
+        self._middle_m = None
+
     def near(self, x_m: float, y_m: float) -> Near:
         """What is within REACH_M of a place, and of the ground within GROUND_REACH_M."""
         middle_m = self._middle_m
@@ -75,15 +81,16 @@ class Surroundings:
     def _search(self, x_m: float, y_m: float) -> Near:
         reach_m = REACH_M + MOVED_M
         seen_m = np.vstack([self._seen_props_m, self._closing_m])
-        is_wall = _within(self._walls_m, x_m, y_m, reach_m)
+        walls_m = self._walls_m[self._is_standing]
+        is_wall = _within(walls_m, x_m, y_m, reach_m)
         is_seen = _within(seen_m, x_m, y_m, reach_m)
 
-        solid_m = np.vstack([self._walls_m, self._solid_props_m, self._closing_m])
+        solid_m = np.vstack([walls_m, self._solid_props_m, self._closing_m])
         is_solid = _within(solid_m, x_m, y_m, BODY_REACH_M + MOVED_M)
 
         return Near(
-            walls_m=self._walls_m[is_wall],
-            plot=self._plots[is_wall],
+            walls_m=walls_m[is_wall],
+            plot=self._plots[self._is_standing][is_wall],
             obstacles_m=seen_m[is_seen],
             solid_m=solid_m[is_solid],
             kerbs_m=self._near_kerbs_m(x_m, y_m),

@@ -44,8 +44,11 @@ class Place:
         """Where these stand."""
         return [(prop.x_m, prop.y_m) for prop in self.charging_places]
 
-    def message(self, closed: Collection[str] = ()) -> TrueTown:
-        """The place as it travels, with the streets named in `closed` closed."""
+    def message(self, closed: Collection[str] = (), gone: Collection[int] = ()) -> TrueTown:
+        """The place as it travels, with the streets named in `closed` closed, and without the
+        buildings numbered in `gone`.
+        """
+        standing = [plot for number, plot in enumerate(self.plots) if number not in gone]
         streets = []
         for road in self.roads:
             streets.append(_street(road, road.name in closed))
@@ -53,10 +56,10 @@ class Place:
         return TrueTown(
             seed=self.seed,
             streets=streets,
-            buildings=[_building(plot) for plot in self.plots],
+            buildings=[_building(plot) for plot in standing],
             obstacles=[_obstacle(prop) for prop in self.props],
             kerbs_m=Array.of(self.kerbs_m, "<f4"),
-            walls_m=Array.of(self.walls_m, "<f4"),
+            walls_m=Array.of(outlines([plot.corners for plot in standing]), "<f4"),
         )
 
 

@@ -149,12 +149,19 @@ def test_the_graph_is_published_after_so_many_broadcasts() -> None:
     assert published == [False, False, False, True, False, True, False]
 
 
-def test_a_prior_makes_what_is_primed_likelier_and_the_rest_less_likely() -> None:
+def test_a_prior_makes_what_is_primed_likelier_and_the_rest_no_less_likely() -> None:
     prior = Prior({object_id("bakery"): 0.4}, share=0.5)
     bakery, clinic = prior.log_ratio(["bakery", "clinic"]).tolist()
 
-    assert bakery > 0 > clinic
-    assert np.exp([bakery, clinic]).mean() == pytest.approx(1.0)
+    assert bakery > clinic == 0.0
+
+
+def test_however_much_is_primed_it_has_no_more_than_its_share() -> None:
+    labels = ["bakery", "clinic", "school"]
+    primed = {object_id(label): 0.9 for label in labels}
+    ratios = np.exp(Prior(primed, share=0.5).log_ratio(labels))
+
+    assert ratios.mean() == pytest.approx(1.5)
 
 
 def test_where_nothing_is_primed_all_is_as_likely_as_without() -> None:

@@ -82,7 +82,7 @@ def _candidates(*blocks: tuple[int, int, float]) -> tuple[list[Candidate], np.nd
         disparity_px[60:100, left : left + wide] = away_px
 
     appearance = Appearance(np.zeros(64, np.float32), 1, 1)
-    recognition = Recognition("bakery", 0.9, 0.9, 0.0, 0.1, appearance)
+    recognition = Recognition("bakery", 0.9, 0.0, 0.9, 0.0, 0.1, appearance)
     found = []
     for left, wide, _ in blocks:
         segment, _ = _filled((left, 60, wide, 40))
