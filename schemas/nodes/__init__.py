@@ -19,6 +19,7 @@ from schemas.nodes.columns import (
     RouteColumn,
     SelfColumn,
 )
+from schemas.nodes.episode import Episode, Remembered
 from schemas.nodes.ids import (
     CORRECTION_ID,
     PLAN_ID,
@@ -27,6 +28,7 @@ from schemas.nodes.ids import (
     SELF_ID,
     attention_id,
     coarse_map_id,
+    episode_id,
     goal_id,
     individual_label,
     is_coarse_map,
@@ -65,6 +67,7 @@ __all__ = [
     "Attention",
     "Correction",
     "CorrectionColumn",
+    "Episode",
     "Goal",
     "GraphNode",
     "KindRules",
@@ -84,11 +87,13 @@ __all__ = [
     "PlanState",
     "RecalledColumn",
     "Recollection",
+    "Remembered",
     "RouteColumn",
     "Self",
     "SelfColumn",
     "attention_id",
     "coarse_map_id",
+    "episode_id",
     "goal_id",
     "individual_label",
     "is_coarse_map",
