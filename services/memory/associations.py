@@ -16,7 +16,7 @@ from services.memory.sparse.build import build
 from services.memory.sparse.clean_up import CleanUpMemory
 from services.memory.sparse.config import SparseConfig
 from services.memory.sparse.structures import ItemMemory
-from services.memory.sparse.vectors import bind, bundle
+from services.memory.sparse.vectors import bundle
 
 NEIGHBOURS = 6
 APART_STEP_M = 5.0
@@ -31,9 +31,7 @@ class Associations:
     def __init__(self, config: SparseConfig) -> None:
         self._memory = build(config)
         self._items = ItemMemory(config.seed, self._memory.dimensions, self._memory.values)
-        self._objects: CleanUpMemory[tuple[str, int]] = CleanUpMemory(
-            self._memory.dimensions, self._memory.values
-        )
+        self._objects: CleanUpMemory[tuple[str, int]] = CleanUpMemory(self._memory.values)
 
     def learn(self, name: str, looks: Sequence[str], at_m: Floats) -> None:
         """Store the objects of the map `name`, (n, 2), each at itself."""
@@ -68,13 +66,10 @@ class Associations:
 
         vectors = []
         for number, look in enumerate(looks):
-            parts = [self._bound(LOOK, look)]
+            parts = [self._items.filled(LOOK, look)]
             for neighbour in nearest[number].tolist():
                 steps = round(apart_m[number, neighbour] / APART_STEP_M)
-                parts.append(self._bound(str(steps), looks[neighbour]))
+                parts.append(self._items.filled(str(steps), looks[neighbour]))
             vectors.append(bundle(np.stack(parts), self._memory.values))
 
         return vectors
-
-    def _bound(self, role: str, look: str) -> Bytes:
-        return bind(self._items.role(role), self._items.item(look), self._memory.values)

@@ -34,9 +34,7 @@ class EpisodicCues:
         self._place_m = place_m
         self._memory = build(config)
         self._items = ItemMemory(config.seed, self._memory.dimensions, self._memory.values)
-        self._stored: CleanUpMemory[int] = CleanUpMemory(
-            self._memory.dimensions, self._memory.values
-        )
+        self._stored: CleanUpMemory[int] = CleanUpMemory(self._memory.values)
 
     def hold(self, episodes: Mapping[int, StoredEpisode]) -> None:
         """Learn the next of `episodes` that are not stored yet, and recall no others.

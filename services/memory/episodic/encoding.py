@@ -52,10 +52,7 @@ def _cell(at_m: tuple[float, float], place_m: float) -> str:
 
 
 def _content(episode: StoredEpisode, items: ItemMemory, place_m: float) -> Bytes:
-    parts = []
-    for node in episode.content[:MAX_CONTENT]:
-        parts.append(bind(items.role(node.kind), items.item(node.label), items.values))
-
+    parts = [items.filled(node.kind, node.label) for node in episode.content[:MAX_CONTENT]]
     parts.append(items.role(WHERE))
     if episode.path:
         path = [_cell(at_m, place_m) for at_m in episode.path]

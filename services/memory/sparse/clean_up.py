@@ -8,16 +8,15 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from cogmap.geometry.arrays import Bytes
-from services.memory.sparse.vectors import VALUES, contained_below, distances
+from services.memory.sparse.vectors import VALUES, contains, distances
 
 Key = TypeVar("Key", bound=Hashable)
 
 
 class CleanUpMemory(Generic[Key]):
-    """Vectors of `dimensions` values by their keys."""
+    """Vectors of `values` values by their keys."""
 
-    def __init__(self, dimensions: int, values: int = VALUES) -> None:
-        self._dimensions = dimensions
+    def __init__(self, values: int = VALUES) -> None:
         self._values = values
         self._vectors: dict[Key, Bytes] = {}
 
@@ -49,7 +48,5 @@ class CleanUpMemory(Generic[Key]):
             return None
 
         rows = np.stack([self._vectors[key] for key in keys])
-        apart = distances(rows, vector, self._values)
-        nearest = int(apart.argmin())
-        is_related = apart[nearest] < contained_below(self._dimensions, self._values)
-        return keys[nearest] if is_related else None
+        nearest = int(distances(rows, vector, self._values).argmin())
+        return keys[nearest] if contains(rows[nearest], vector, self._values) else None
