@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from schemas.cognition import Broadcast
 from schemas.memory import TransientEpisode
-from schemas.nodes import AnyNode, Goal, Need, Node, Object, Remembered, kind_of, look_of
+from schemas.nodes import AnyNode, Goal, Need, Node, Object, Remembered, goal_id, kind_of, look_of
 
 Name = tuple[str, str]
 Position = tuple[float, float]
@@ -95,7 +95,7 @@ def name_of(node: AnyNode) -> Name | None:
         case Need(label=label):
             return kind_of(node), label
         case Goal(object=label):
-            return kind_of(node), label or node.id
+            return kind_of(node), label or node.id.removeprefix(goal_id(""))
         case Node():
             return node.kind, node.id
         case _:

@@ -205,5 +205,5 @@ def test_a_graph_that_is_loaded_as_a_whole_has_its_plan() -> None:
 
 
 def test_a_kind_that_the_graph_does_not_find_by_kind_is_refused() -> None:
-    with pytest.raises(ConfigError, match="graph_kinds names 'self': there are goal, loop_closure"):
+    with pytest.raises(ConfigError, match="graph_kinds names 'self': there are episode, goal"):
         Memory(graph_kinds=["plan", "self"])
