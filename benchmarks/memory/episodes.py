@@ -19,8 +19,8 @@ from services.memory.sparse.config import SparseConfig
 
 CUES = 200
 LOOKS = 20
-CONTENT = 6
-REPLACED = 2
+CONTENT = (3, 10)
+REPLACED = 1 / 3
 TOWN_M = 600.0
 BESIDE_M = 3.0
 PATH = 3
@@ -55,7 +55,8 @@ def _episodes(count: int, rng: np.random.Generator) -> dict[int, TransientEpisod
     path: list[tuple[float, float]] = []
     for number in range(1, 1 + count):
         x_m, y_m = rng.uniform(0.0, TOWN_M, 2).tolist()
-        looks = rng.choice(LOOKS, CONTENT, replace=False).tolist()
+        number_here = rng.integers(*CONTENT, endpoint=True)
+        looks = rng.choice(LOOKS, number_here, replace=False).tolist()
         episodes[number] = TransientEpisode(
             number=number,
             run=1,
@@ -76,8 +77,9 @@ def _episodes(count: int, rng: np.random.Generator) -> dict[int, TransientEpisod
 
 def _cue(episode: TransientEpisode, rng: np.random.Generator) -> TransientEpisode:
     beside_m = rng.normal(0.0, BESIDE_M, 2).tolist()
-    others = rng.choice(LOOKS, REPLACED, replace=False).tolist()
-    content = [*episode.content[REPLACED:], *(_object(look) for look in others)]
+    replaced = round(REPLACED * len(episode.content))
+    others = rng.choice(LOOKS, replaced, replace=False).tolist()
+    content = [*episode.content[replaced:], *(_object(look) for look in others)]
     return msgspec.structs.replace(
         episode, x_m=episode.x_m + beside_m[0], y_m=episode.y_m + beside_m[1], content=content
     )

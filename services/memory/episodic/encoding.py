@@ -11,11 +11,6 @@ from schemas.memory import StoredEpisode
 from services.memory.sparse.structures import ItemMemory, encode_sequence
 from services.memory.sparse.vectors import bind, bundle
 
-MAX_CONTENT = 6
-"""So many nodes of an episode, the most salient ones, are encoded beside its place and path: with
-ten parts a vector of bits is full.
-"""
-
 WHERE = "where"
 PATH = "path"
 CELLS = 2.0
@@ -52,7 +47,7 @@ def _cell(at_m: tuple[float, float], place_m: float) -> str:
 
 
 def _content(episode: StoredEpisode, items: ItemMemory, place_m: float) -> Bytes:
-    parts = [items.filled(node.kind, node.label) for node in episode.content[:MAX_CONTENT]]
+    parts = [items.filled(node.kind, node.label) for node in episode.content]
     parts.append(items.role(WHERE))
     if episode.path:
         path = [_cell(at_m, place_m) for at_m in episode.path]

@@ -16,7 +16,7 @@ from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_from
 from cogmap.graph.graph import Graph
 from schemas import nodes
-from schemas.cognition import Broadcast
+from schemas.cognition import Broadcast, Coalition
 from schemas.graph import Delta
 from schemas.memory import Stored, StoredRecord
 from schemas.nodes import RECOLLECTION_ID, ROOT_MAP, Map, Recollection, Self, episode_id
@@ -164,11 +164,11 @@ class EpisodicMemory:
             if isinstance(node, nodes.Episode):
                 self._episodes.reinforce(node.number, amount, broadcast.stamp_ns)
 
-        agents = [node for node in coalition.nodes if isinstance(node, Self)]
-        if not agents or agents[0].map != ROOT_MAP:
+        agent = _agent_in(coalition)
+        if agent is None or agent.map != ROOT_MAP or agent.is_lost:
             return
 
-        at_m = (agents[0].x_m, agents[0].y_m)
+        at_m = (agent.x_m, agent.y_m)
         if self._visits and self._visits[-1].goes_on(at_m, self._config.place_m):
             self._visits[-1].reinforce(amount)
         else:
@@ -217,6 +217,12 @@ class EpisodicMemory:
         for visit in self._visits:
             assert pose is not None
             visit.at_m, *visit.path = _moved(pose, [visit.at_m, *visit.path])
+
+
+def _agent_in(coalition: Coalition) -> Self | None:
+    """The agent as a coalition has it."""
+    agents = (node for node in coalition.nodes if isinstance(node, Self))
+    return next(agents, None)
 
 
 def _moved(pose: Floats, places_m: list[Position]) -> list[Position]:

@@ -11,7 +11,8 @@ from schemas.nodes import AnyNode, Goal, Need, Node, Object, Remembered, goal_id
 
 Name = tuple[str, str]
 Position = tuple[float, float]
-MAX_CONTENT = 12
+MAX_CONTENT = 10
+"""So many nodes an episode has at most: its vector has room for them beside place and path."""
 
 
 @dataclass

@@ -88,7 +88,9 @@ class Mind:
         )
         self.published += self.module.feed(delta)
 
-    def live(self, at_m: tuple[float, float], *nodes: AnyNode, cycles: int = 1) -> None:
+    def live(
+        self, at_m: tuple[float, float], *nodes: AnyNode, cycles: int = 1, is_lost: bool = False
+    ) -> None:
         """Cycles in which the agent is there, and conscious of these nodes."""
         for _ in range(cycles):
             self.cycle += 1
@@ -101,7 +103,7 @@ class Mind:
                 coalition=Coalition(
                     codelet="whereabouts",
                     activation=0.5,
-                    nodes=[agent(x_m=x_m, y_m=y_m), *nodes],
+                    nodes=[agent(x_m=x_m, y_m=y_m, is_lost=is_lost), *nodes],
                     maps=[ROOT_MAP],
                 ),
             )
@@ -186,6 +188,14 @@ def test_of_its_content_an_episode_has_looks_the_most_salient_first() -> None:
         Remembered(kind="object", label="tower", salience=0.5),
         Remembered(kind="object", label="house"),
     ]
+
+
+def test_an_agent_that_is_lost_or_conscious_of_nothing_has_no_episode() -> None:
+    mind = Mind()
+    mind.live((3.0, 4.0), cycles=3)
+    mind.live((3.0, 4.0), *seen("bakery"), cycles=3, is_lost=True)
+
+    assert mind.episodes() == []
 
 
 def test_what_lasts_longer_is_the_more_active_episode() -> None:
