@@ -210,7 +210,10 @@ class EpisodicMemory:
             return msgspec.structs.replace(episode, map=name, x_m=at_m[0], y_m=at_m[1], path=path)
 
         self._map = name
-        self._cues = None
+        if self._cues is not None:
+            known = self._episodes.known.values()
+            self._cues.hold({each.number: each for each in known if each.run != self._run})
+
         self._episodes.relocate(self._run, moved)
         if pose is None:
             self._visits = []

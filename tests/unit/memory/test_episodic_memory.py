@@ -310,10 +310,12 @@ def test_a_restart_continues_the_run_and_consolidates_nothing() -> None:
     again.module.restore(of_type(Stored, before.published))
     again.module.feed(Restored(records=list(before.records().values())))
 
+    again.cycle = before.cycle
     again.live((60.0, 0.0), *seen("hall"), cycles=3)
+    again.live((3.0, 4.0), *seen(*LOOKS), cycles=3)
 
-    (episode,) = again.episodes()
-    assert (episode.number, episode.run) == (2, 1)
+    assert [(episode.number, episode.run) for episode in again.episodes()] == [(2, 1), (3, 1)]
+    assert [episode.number for episode in again.recalled()] == [1]
 
 
 def test_the_episodes_of_a_run_move_into_the_frame_of_the_map_that_it_recalls() -> None:
@@ -329,6 +331,9 @@ def test_the_episodes_of_a_run_move_into_the_frame_of_the_map_that_it_recalls() 
     assert (moved.x_m, moved.y_m) == pytest.approx((97.0, 46.0))
     assert (second.x_m, second.y_m) == pytest.approx((80.0, 46.0))
     assert second.path[0] == pytest.approx((97.0, 46.0))
+
+    mind.live((97.0, 46.0), *seen(*LOOKS), cycles=3)
+    assert [(each.x_m, each.y_m) for each in mind.recalled()] == [(moved.x_m, moved.y_m)]
 
 
 def test_episodes_of_a_frame_that_nobody_knows_any_more_are_forgotten() -> None:
