@@ -1,4 +1,4 @@
-"""What long-term memory stores: the cognitive maps that were broadcast, as records."""
+"""What long-term memory stores, as records: cognitive maps that were broadcast, and episodes."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Annotated
 import msgspec
 
 from schemas.array import Matrix
-from schemas.base import Count, Message, Name, Part
-from schemas.nodes import TILE_CELLS, PlaceColumn, RecalledColumn
+from schemas.base import Count, Finite, Message, Name, Part, Unit
+from schemas.nodes import TILE_CELLS, PlaceColumn, RecalledColumn, Remembered
 from schemas.nodes.columns import check_matrix
 from schemas.nodes.recollection import TileNumber
 
@@ -55,7 +55,42 @@ class StoredTile(Part, kw_only=True, frozen=True, tag="tile"):
         return tile_key(self.map, self.x, self.y)
 
 
-StoredRecord = StoredObjects | StoredTile
+class StoredEpisode(Part, kw_only=True, frozen=True):
+    """What, where and when: the nodes that were conscious at a place, from `from_ns` to `until_ns`
+    of the run `run`, the first being 1.
+
+    The place is (`x_m`, `y_m`) of the map `map`, in its own frame; `path` has the places of the
+    episodes before it, the last one first. Episodes are numbered from 1.
+    """
+
+    number: Count
+    run: Count
+    map: Name
+    x_m: Finite
+    y_m: Finite
+    from_ns: Count
+    until_ns: Count
+    content: list[Remembered]
+    path: list[tuple[Finite, Finite]] = []
+
+    @property
+    def key(self) -> str:
+        """The key of the record that it replaces."""
+        return f"episode/{self.number}"
+
+
+class TransientEpisode(StoredEpisode, kw_only=True, frozen=True, tag="transient"):
+    """An episode in Transient Episodic Memory: its activation, which decays, as of `active_ns`."""
+
+    activation: Unit
+    active_ns: Count
+
+
+class DeclarativeEpisode(StoredEpisode, kw_only=True, frozen=True, tag="declarative"):
+    """An episode that was consolidated to Declarative Memory, where it does not decay."""
+
+
+StoredRecord = StoredObjects | StoredTile | TransientEpisode | DeclarativeEpisode
 """One record of long-term memory; it replaces the one of its key."""
 
 

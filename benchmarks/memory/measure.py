@@ -1,5 +1,5 @@
-"""The metrics of memory: recall from corrupted cues, its speed, a second run in a town, and what
-kills and damage do to the database.
+"""The metrics of memory: recall from corrupted cues, its speed, recall of episodes, a second run in
+a town, and what kills and damage do to the database.
 """
 
 from __future__ import annotations
@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks.memory import durability, recall, second_run, speed
+from benchmarks.memory import durability, episodes, recall, second_run, speed
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most
 
@@ -15,6 +15,8 @@ SEED = 1
 THRESHOLDS = {
     "recall_corrupted_30": at_least(0.99),
     "reads_vs_numpy_loop": at_least(20),
+    "episodes_recalled": at_least(0.9),
+    "wrong_episodes": at_most(0.05),
     "second_run_share": at_most(0.2),
     "wrong_recalls": at_most(0),
     "lost_after_kill": at_most(0),
@@ -31,6 +33,9 @@ def measure(folder: Path, processes: int, announce: Callable[[str], None]) -> Me
         "recall_corrupted_30": recall.recall_corrupted(SEED),
         "reads_vs_numpy_loop": speed.reads_vs_numpy_loop(SEED),
     }
+
+    announce("recall of episodes")
+    metrics |= episodes.measure(SEED)
 
     announce("databases that are cut or flipped, and writers that are killed")
     metrics["damaged_store_refused"] = float(durability.damaged_store_opened(folder))

@@ -16,8 +16,8 @@ from cogmap.geometry.arrays import Bytes
 from services.memory.sparse.build import build
 from services.memory.sparse.config import SparseConfig
 from services.memory.sparse.interface import AssociativeMemory
-from services.memory.sparse.structures import ItemMemory, encode_record
-from services.memory.sparse.vectors import contained_below, distances, random_vectors
+from services.memory.sparse.structures import ItemMemory
+from services.memory.sparse.vectors import bundle, contained_below, distances, random_vectors
 
 MAPS = 1000
 CUES = 500
@@ -120,7 +120,8 @@ def _map(items: ItemMemory, rng: np.random.Generator) -> Bytes:
     for place, kind in zip(places.tolist(), kinds.tolist(), strict=True):
         fillers[f"place {place}"] = f"object {kind}"
 
-    return encode_record(items, fillers)
+    parts = [items.filled(place, kind) for place, kind in sorted(fillers.items())]
+    return bundle(np.stack(parts), items.values)
 
 
 def _outcome(

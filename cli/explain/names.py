@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from schemas.cognition import Coalition
 from schemas.graph import Delta
 from schemas.nodes import (
+    Episode,
     Goal,
     GraphNode,
     Map,
@@ -38,16 +39,20 @@ def of_node(node: GraphNode) -> str:
     """A node: the agent's pose, an object's label, a goal's name, what a plan comes to."""
     match node:
         case Self():
-            return f"the agent at {_position(node.x_m, node.y_m)}, {_heading(node.heading_rad)}"
+            words = f"the agent at {_position(node.x_m, node.y_m)}, {_heading(node.heading_rad)}"
         case Object() | PerceptNode():
-            return spoken(node.label)
+            words = spoken(node.label)
         case Goal():
-            return _goal(node)
+            words = _goal(node)
         case Plan():
-            return _plan(node)
+            words = _plan(node)
         case Map():
-            return _map(node.id)
-    return spoken(f"{kind_of(node)} {node.id}")
+            words = _map(node.id)
+        case Episode():
+            words = _episode(node)
+        case _:
+            words = spoken(f"{kind_of(node)} {node.id}")
+    return words
 
 
 def content(coalition: Coalition) -> str:
@@ -146,6 +151,12 @@ def _plan(plan: Plan) -> str:
         return f"the plan to explore, {length}{doubt}"
     name = spoken(plan.goals[0].removeprefix(goal_id("")))
     return f"the plan to go to {name}, {length}{doubt}"
+
+
+def _episode(episode: Episode) -> str:
+    labels = [spoken(node.label) for node in episode.content[:NAMED]]
+    place = _position(episode.x_m, episode.y_m)
+    return f"the episode at {place} in run {episode.run}: {', '.join(labels)}"
 
 
 def _map(identifier: str) -> str:

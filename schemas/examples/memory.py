@@ -6,20 +6,32 @@ import numpy as np
 
 from schemas.array import Matrix
 from schemas.examples.arrays import matrix
-from schemas.memory import Restored, Stored, StoredObjects, StoredTile
-from schemas.nodes import TILE_CELLS, PlaceColumn
+from schemas.memory import (
+    DeclarativeEpisode,
+    Restored,
+    Stored,
+    StoredObjects,
+    StoredRecord,
+    StoredTile,
+    TransientEpisode,
+)
+from schemas.nodes import TILE_CELLS, PlaceColumn, Remembered
 
 MAP = "remembered:1"
 
 
 def stored() -> Stored:
     """Objects of a map that were stored, and a tile; another was forgotten."""
-    return Stored(cycle=7, records=[_objects(), _tile()], forgotten=["remembered:2/objects"])
+    return Stored(cycle=7, records=_records(), forgotten=["remembered:2/objects"])
 
 
 def restored() -> Restored:
     """The same, after a restart."""
-    return Restored(records=[_objects(), _tile()])
+    return Restored(records=_records())
+
+
+def _records() -> list[StoredRecord]:
+    return [_objects(), _tile(), _transient(), _declarative()]
 
 
 def _objects() -> StoredObjects:
@@ -35,3 +47,33 @@ def _objects() -> StoredObjects:
 def _tile() -> StoredTile:
     road = Matrix.of(np.full((1, TILE_CELLS), 0.5), "<f2")
     return StoredTile(map=MAP, x=-1, y=2, columns={PlaceColumn.ROAD: road})
+
+
+def _transient() -> TransientEpisode:
+    return TransientEpisode(
+        number=8,
+        run=2,
+        map=MAP,
+        x_m=12.5,
+        y_m=-3.25,
+        from_ns=1_000_000_000,
+        until_ns=1_200_000_000,
+        content=[Remembered(kind="object", label="bakery", salience=-0.5)],
+        path=[(2.5, -3.25)],
+        activation=0.75,
+        active_ns=1_200_000_000,
+    )
+
+
+def _declarative() -> DeclarativeEpisode:
+    return DeclarativeEpisode(
+        number=3,
+        run=1,
+        map=MAP,
+        x_m=2.5,
+        y_m=-3.25,
+        from_ns=400_000_000,
+        until_ns=800_000_000,
+        content=[Remembered(kind="need", label="energy", salience=-0.25)],
+        path=[(-7.5, -3.25)],
+    )

@@ -18,6 +18,7 @@ from schemas.nodes import (
     AnyNode,
     Attention,
     Correction,
+    Episode,
     Goal,
     LoopClosure,
     Map,
@@ -31,8 +32,10 @@ from schemas.nodes import (
     Plan,
     PlanState,
     Recollection,
+    Remembered,
     Self,
     attention_id,
+    episode_id,
     goal_id,
     need_id,
     object_id,
@@ -59,6 +62,7 @@ def every_kind() -> list[AnyNode]:
         _goal(),
         _plan(),
         _recollection(),
+        _episode(),
         _need(),
         _attention(),
     ]
@@ -238,6 +242,22 @@ def _recollection() -> Recollection:
         objects=matrix(2, 7),
         tiles=[(-1, 2)],
         columns={PlaceColumn.ROAD: Matrix.of(np.full((1, TILE_CELLS), 0.5), "<f2")},
+        **_USUAL,
+    )
+
+
+def _episode() -> Episode:
+    return Episode(
+        id=episode_id(3),
+        number=3,
+        run=1,
+        map="map:1",
+        x_m=2.5,
+        y_m=-3.25,
+        from_ns=400_000_000,
+        until_ns=800_000_000,
+        content=[Remembered(kind="object", label="bakery", salience=0.25)],
+        salience=0.25,
         **_USUAL,
     )
 

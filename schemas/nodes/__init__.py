@@ -19,6 +19,7 @@ from schemas.nodes.columns import (
     RouteColumn,
     SelfColumn,
 )
+from schemas.nodes.episode import Episode, Remembered
 from schemas.nodes.ids import (
     CORRECTION_ID,
     PLAN_ID,
@@ -28,6 +29,7 @@ from schemas.nodes.ids import (
     attention_id,
     category_id,
     coarse_map_id,
+    episode_id,
     goal_id,
     individual_label,
     is_coarse_map,
@@ -66,6 +68,7 @@ __all__ = [
     "Attention",
     "Correction",
     "CorrectionColumn",
+    "Episode",
     "Goal",
     "GraphNode",
     "KindRules",
@@ -85,12 +88,14 @@ __all__ = [
     "PlanState",
     "RecalledColumn",
     "Recollection",
+    "Remembered",
     "RouteColumn",
     "Self",
     "SelfColumn",
     "attention_id",
     "category_id",
     "coarse_map_id",
+    "episode_id",
     "goal_id",
     "individual_label",
     "is_coarse_map",

@@ -45,6 +45,11 @@ def need_id(name: str) -> str:
     return f"need:{name}"
 
 
+def episode_id(number: int) -> str:
+    """The id of the episode that long-term memory has under `number`."""
+    return f"episode:{number}"
+
+
 def attention_id(codelet: str) -> str:
     """The id of what attention codelet `codelet` keeps."""
     return f"attention:{codelet}"

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from schemas.nodes.attention import Attention, Need
 from schemas.nodes.base import GraphNode, Node
+from schemas.nodes.episode import Episode
 from schemas.nodes.path import Correction, LoopClosure, Observations, PathSegment
 from schemas.nodes.planning import Goal, Plan
 from schemas.nodes.recollection import Recollection
@@ -24,6 +25,7 @@ AnyNode = (
     | Goal
     | Plan
     | Recollection
+    | Episode
     | Need
     | Attention
 )
@@ -59,6 +61,7 @@ KINDS: dict[type[GraphNode], KindRules] = {
     Goal: KindRules(persistent=True, indexed=True, offered=True),
     Plan: KindRules(persistent=True, indexed=True),
     Recollection: KindRules(persistent=True, offered=True),
+    Episode: KindRules(indexed=True, offered=True),
     Need: KindRules(persistent=True, indexed=True, offered=True),
     Attention: KindRules(persistent=True, droppable=False),
 }

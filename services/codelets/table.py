@@ -13,6 +13,7 @@ from cogmap.errors import ConfigError
 from cogmap.runtime import config
 from cogmap.runtime.codelet import ENTRY_POINTS, Codelet, ConfiguredCodelet
 from services.codelets.attention import (
+    episode,
     expectation,
     goal,
     need,
@@ -48,6 +49,7 @@ CODELETS: tuple[Codelet, ...] = (
     goal.CODELET,
     need.CODELET,
     place_lost.CODELET,
+    episode.CODELET,
 )
 
 

@@ -13,9 +13,10 @@ import numpy as np
 
 from cogmap.geometry.arrays import Bytes, Floats
 from services.memory.sparse.build import build
+from services.memory.sparse.clean_up import CleanUpMemory
 from services.memory.sparse.config import SparseConfig
 from services.memory.sparse.structures import ItemMemory
-from services.memory.sparse.vectors import bind, bundle, contained_below, distances
+from services.memory.sparse.vectors import bundle
 
 NEIGHBOURS = 6
 APART_STEP_M = 5.0
@@ -30,15 +31,13 @@ class Associations:
     def __init__(self, config: SparseConfig) -> None:
         self._memory = build(config)
         self._items = ItemMemory(config.seed, self._memory.dimensions, self._memory.values)
-        self._vectors: list[Bytes] = []
-        self._names: list[str] = []
+        self._objects: CleanUpMemory[tuple[str, int]] = CleanUpMemory(self._memory.values)
 
     def learn(self, name: str, looks: Sequence[str], at_m: Floats) -> None:
         """Store the objects of the map `name`, (n, 2), each at itself."""
-        for vector in self._encoded(looks, at_m):
+        for number, vector in enumerate(self._encoded(looks, at_m)):
             self._memory.write(vector, vector)
-            self._vectors.append(vector)
-            self._names.append(name)
+            self._objects.put((name, number), vector)
 
     def reminded_of(self, looks: Sequence[str], at_m: Floats) -> list[str]:
         """The maps that objects here, (n, 2), remind of, by how many of them do."""
@@ -53,14 +52,11 @@ class Associations:
     def _map_of(self, cue: Bytes) -> str | None:
         """The map of the stored object that a cue recalls; None where it recalls none."""
         recall = self._memory.read(cue)
-        if recall is None or not self._vectors:
+        if recall is None:
             return None
 
-        values = self._memory.values
-        apart = distances(np.stack(self._vectors), recall.vector, values)
-        nearest = int(apart.argmin())
-        is_known = apart[nearest] < contained_below(self._memory.dimensions, values)
-        return self._names[nearest] if is_known else None
+        nearest = self._objects.nearest(recall.vector)
+        return None if nearest is None else nearest[0]
 
     def _encoded(self, looks: Sequence[str], at_m: Floats) -> list[Bytes]:
         """A vector for each object."""
@@ -70,13 +66,10 @@ class Associations:
 
         vectors = []
         for number, look in enumerate(looks):
-            parts = [self._bound(LOOK, look)]
+            parts = [self._items.filled(LOOK, look)]
             for neighbour in nearest[number].tolist():
                 steps = round(apart_m[number, neighbour] / APART_STEP_M)
-                parts.append(self._bound(str(steps), looks[neighbour]))
+                parts.append(self._items.filled(str(steps), looks[neighbour]))
             vectors.append(bundle(np.stack(parts), self._memory.values))
 
         return vectors
-
-    def _bound(self, role: str, look: str) -> Bytes:
-        return bind(self._items.role(role), self._items.item(look), self._memory.values)

@@ -7,13 +7,14 @@ from typing import Annotated, Literal
 import msgspec
 
 from schemas.base import PositiveMetres, PositiveShare
+from services.memory.episodic.config import EpisodicConfig
 from services.memory.sparse.config import SparseConfig
 
 Cycles = Annotated[int, msgspec.Meta(ge=1, le=100_000)]
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """What is stored and when, and when a stored map is taken for the town around."""
+    """What is stored and when, when a stored map is taken for the town around, and episodes."""
 
     mode: Annotated[
         Literal["lockstep", "real_time"],
@@ -32,7 +33,8 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     recall_cycles: Annotated[
         Cycles,
         msgspec.Meta(
-            description="Cycles between two attempts to recall the map around, 1 to 100000."
+            description="Cycles between two attempts to recall the map around, and an episode, 1 "
+            "to 100000."
         ),
     ] = 5
     min_sightings: Annotated[
@@ -89,6 +91,9 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     ] = 5
     sparse: Annotated[SparseConfig, msgspec.Meta(description="The sparse distributed memory.")] = (
         SparseConfig()
+    )
+    episodic: Annotated[EpisodicConfig, msgspec.Meta(description="Episodic memory.")] = (
+        EpisodicConfig()
     )
     match_within_m: Annotated[
         PositiveMetres,

@@ -52,12 +52,14 @@ class RememberedMaps:
         self._maps: dict[str, RememberedMap] = {}
 
     def put(self, records: Iterable[StoredRecord]) -> None:
-        """Take in records, each in place of the one of its key."""
+        """Take in records, each in place of the one of its key; an episode has a map by its name
+        alone.
+        """
         for record in records:
             remembered = self._maps.setdefault(record.map, RememberedMap(record.map))
             if isinstance(record, StoredTile):
                 remembered.tiles[record.x, record.y] = record.columns
-            else:
+            elif isinstance(record, StoredObjects):
                 remembered.known = record
 
     def forget(self, name: str) -> list[str]:

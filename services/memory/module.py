@@ -10,11 +10,12 @@ from schemas import topics
 from schemas.base import Message
 from schemas.codelets import Offer
 from schemas.cognition import Broadcast, Competition
-from schemas.graph import Delta, Phase
+from schemas.graph import Delta, Operation, Phase
 from schemas.memory import Restored, Stored
 from schemas.nodes import NEVER_NS, ROOT_MAP
 from schemas.sensing import RangeScan
 from services.memory.config import Config
+from services.memory.episodic.memory import EpisodicMemory
 from services.memory.gate import LockstepGate
 from services.memory.spatial import SpatialMemory
 
@@ -22,8 +23,8 @@ __all__ = ["Config", "LongTermMemory", "build"]
 
 
 class LongTermMemory:
-    """At the end of a cycle it stores what has changed on the map, if that was broadcast, and
-    offers a map that it recalls.
+    """At the end of a cycle it stores what has changed on the map, if that was broadcast, with the
+    episodes, and offers a map and an episode that it recalls.
     """
 
     def __init__(self, config: Config, graph: Graph) -> None:
@@ -32,6 +33,7 @@ class LongTermMemory:
         self._is_lockstep = config.mode == "lockstep"
         self._gate = LockstepGate()
         self._spatial = SpatialMemory(config, graph)
+        self._episodic = EpisodicMemory(config, graph)
 
         self._broadcast_in: list[int] = []
         self._stored_cycle = 0
@@ -40,19 +42,24 @@ class LongTermMemory:
 
     def on_restored(self, restored: Restored) -> None:
         """Know what the database holds."""
-        self._spatial.restore(restored)
+        self._spatial.restore(restored.records)
+        self._episodic.restore(restored.records)
 
     def resume(self, past: Iterable[Message]) -> None:
-        """Continue with the map of this run after a restart."""
-        self._spatial.resume(message for message in past if isinstance(message, Stored))
+        """Continue with the map and the episodes of this run after a restart."""
+        stored = [message for message in past if isinstance(message, Stored)]
+        self._spatial.resume(stored)
+        self._episodic.resume(stored)
 
     def learned(self) -> Stored:
         """What stands for all that this run has stored."""
-        return self._spatial.learned()
+        records = [*self._spatial.learned(), *self._episodic.learned()]
+        return Stored(cycle=self._graph.cycle, records=records)
 
     def on_broadcast(self, broadcast: Broadcast) -> list[Message]:
-        """The map that is conscious is to be learned."""
+        """What is conscious is to be learned."""
         self._gate.on_broadcast(broadcast)
+        self._episodic.on_broadcast(broadcast)
         if ROOT_MAP in broadcast.coalition.maps:
             self._broadcast_in.append(broadcast.cycle)
         return self._replies()
@@ -73,6 +80,7 @@ class LongTermMemory:
     def on_delta(self, delta: Delta) -> list[Message]:
         """Note what changes; the end of a cycle is the time to store and to recall."""
         self._spatial.note(delta)
+        self._episodic.note(delta)
         if delta.phase is not Phase.END:
             return []
 
@@ -82,6 +90,7 @@ class LongTermMemory:
     def on_load(self) -> list[Message]:
         """Take up a graph that was loaded as a whole, which may have ended a cycle."""
         self._spatial.note_all()
+        self._episodic.note_all()
         if self._graph.phase is not Phase.END:
             return []
 
@@ -98,10 +107,12 @@ class LongTermMemory:
             return []
 
         self._ended_ns = None
+        self._episodic.experience(cycle)
         return [*self._store(cycle, stamp_ns), *self._recall(cycle, stamp_ns)]
 
     def _store(self, cycle: int, stamp_ns: int) -> list[Message]:
-        """What is new on the map, where that was broadcast before this cycle and not stored since.
+        """What is new on the map and in episodes, where the map was broadcast before this cycle and
+        not stored since.
 
         What is broadcast in this cycle may come sooner or later: it counts in the next.
         """
@@ -111,16 +122,28 @@ class LongTermMemory:
 
         self._stored_cycle = cycle
         self._broadcast_in = [each for each in self._broadcast_in if each >= cycle]
-        stored = self._spatial.store(cycle, stamp_ns)
-        return [] if stored is None else [stored]
+        places = self._spatial.changes()
+        episodes = self._episodic.changes(self._spatial.name, stamp_ns)
+        records = [*places.records, *episodes.records]
+        forgotten = [*places.forgotten, *episodes.forgotten]
+        if not records and not forgotten:
+            return []
+
+        return [Stored(stamp_ns=stamp_ns, cycle=cycle, records=records, forgotten=forgotten)]
 
     def _recall(self, cycle: int, stamp_ns: int) -> list[Message]:
-        """An offer of the map that is recalled; in lockstep, of nothing where none is."""
-        is_time = cycle % self._config.recall_cycles == 0
-        found = self._spatial.recall() if is_time else None
-        if found is not None:
-            return [Offer(stamp_ns=stamp_ns, cycle=cycle, operations=[found])]
-        return [Offer(stamp_ns=stamp_ns, cycle=cycle, operations=[])] if self._is_lockstep else []
+        """An offer of the map and the episode that are recalled; in lockstep, of nothing where none
+        is.
+        """
+        operations: list[Operation] = []
+        if cycle % self._config.recall_cycles == 0:
+            recollection = self._spatial.recall()
+            episode = self._episodic.recall(cycle, stamp_ns)
+            operations = [each for each in (recollection, episode) if each is not None]
+        if not operations and not self._is_lockstep:
+            return []
+
+        return [Offer(stamp_ns=stamp_ns, cycle=cycle, operations=operations)]
 
 
 def build(config: Config, instance: str) -> Module:

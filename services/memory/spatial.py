@@ -10,9 +10,10 @@ import numpy as np
 
 from cogmap.graph.graph import Graph
 from schemas.graph import Delta
-from schemas.memory import Restored, Stored, StoredRecord
+from schemas.memory import Stored, StoredObjects, StoredRecord, StoredTile
 from schemas.nodes import RECOLLECTION_ID, ROOT_MAP, Map, Object, Recollection, look_of
 from services.memory.associations import Associations
+from services.memory.changes import Changes
 from services.memory.config import Config
 from services.memory.maps import RememberedMap, RememberedMaps
 from services.memory.recall import cues, recalled
@@ -36,9 +37,14 @@ class SpatialMemory:
         self._cued: set[str] = set()
         self._associations: Associations | None = None
 
-    def restore(self, restored: Restored) -> None:
+    @property
+    def name(self) -> str:
+        """What the root map was stored as; empty before it is."""
+        return self._name
+
+    def restore(self, records: Iterable[StoredRecord]) -> None:
         """Know the maps that the database holds."""
-        self._maps.put(restored.records)
+        self._maps.put(records)
         self._cued = set()
         self._associations = None
 
@@ -47,11 +53,12 @@ class SpatialMemory:
         for stored in past:
             self._maps.put(stored.records)
             for record in stored.records:
-                self._name = record.map
+                if isinstance(record, StoredObjects | StoredTile):
+                    self._name = record.map
 
-    def learned(self) -> Stored:
+    def learned(self) -> list[StoredRecord]:
         """What stands for all that was stored in this run: the objects of the map."""
-        return Stored(cycle=self._graph.cycle, records=self._objects)
+        return self._objects
 
     def note(self, delta: Delta) -> None:
         """Note what a delta has changed."""
@@ -61,8 +68,8 @@ class SpatialMemory:
         """Take all of the graph for changed."""
         self._changed.note_all(self._graph)
 
-    def store(self, cycle: int, stamp_ns: int) -> Stored | None:
-        """What has changed on the root map since it was stored; None where nothing has."""
+    def changes(self) -> Changes:
+        """What has changed on the root map since it was stored."""
         forgotten = self._rename()
         records: list[StoredRecord] = [*self._changed.take(self._name, self._graph)]
         objects = stored_objects(self._name, self._learned(), self._graph)
@@ -70,11 +77,8 @@ class SpatialMemory:
             self._objects = objects
             records += objects
 
-        if not records and not forgotten:
-            return None
-
         self._maps.put(records)
-        return Stored(stamp_ns=stamp_ns, cycle=cycle, records=records, forgotten=forgotten)
+        return Changes(records, forgotten)
 
     def recall(self) -> Recollection | None:
         """The stored map that the agent is on, where other objects than before show that now."""

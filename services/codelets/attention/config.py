@@ -119,6 +119,13 @@ class PlaceLost(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields
     refractory_cycles: Refractory = 1
 
 
+class Episode(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """An episode decays within two seconds: it is brought once."""
+
+    base_level: BaseLevel = 1.0
+    refractory_cycles: Refractory = 10
+
+
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """The attention codelets, each by its name.
 
@@ -141,3 +148,6 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     place_lost: Annotated[PlaceLost, Meta(description="The agent is lost, or was found again.")] = (
         PlaceLost()
     )
+    episode: Annotated[
+        Episode, Meta(description="An episode that long-term memory was reminded of.")
+    ] = Episode()

@@ -15,6 +15,7 @@ from schemas.graph import Phase
 from schemas.nodes import (
     PLAN_ID,
     ROOT_MAP,
+    Episode,
     Goal,
     GraphNode,
     Map,
@@ -22,6 +23,8 @@ from schemas.nodes import (
     Object,
     Plan,
     PlanState,
+    Remembered,
+    episode_id,
     goal_id,
     map_id,
 )
@@ -47,6 +50,22 @@ NODES: list[tuple[GraphNode, str]] = [
     (Plan(id=PLAN_ID, state=PlanState.NO_ROUTE), "the plan: no route leads to the goal"),
     (Map(id=ROOT_MAP, cell_m=1.0), "the root map"),
     (Map(id=map_id(3), cell_m=1.0), "map 3"),
+    (
+        Episode(
+            id=episode_id(3),
+            number=3,
+            run=2,
+            x_m=3.0,
+            y_m=-1.0,
+            from_ns=0,
+            until_ns=10**9,
+            content=[
+                Remembered(kind="object", label="town_hall"),
+                Remembered(kind="need", label="energy"),
+            ],
+        ),
+        "the episode at (3.0, -1.0) m in run 2: town hall, energy",
+    ),
     (Node(id="event:7", kind="remembered_event"), "remembered event event:7"),
 ]
 

@@ -143,6 +143,7 @@ def _every_task() -> list[Task]:
         task("goal"),
         task("need"),
         task("place_lost"),
+        task("episode"),
     ]
 
 

@@ -11,7 +11,16 @@ from cogmap.runtime.module import Module
 from schemas.base import Message
 from schemas.cognition import Action, Behaviour, Behaviours, Broadcast, Coalition, Rejection
 from schemas.graph import Delta, Operation, Phase
-from schemas.nodes import NEVER_NS, PLAN_ID, AnyNode, Plan, PlanState
+from schemas.nodes import (
+    NEVER_NS,
+    PLAN_ID,
+    AnyNode,
+    Episode,
+    Plan,
+    PlanState,
+    Remembered,
+    episode_id,
+)
 from services.procedural.module import Config, build
 from tests.support.world.scenes import PERIOD_NS, agent
 
@@ -92,6 +101,29 @@ def test_following_the_route_needs_an_agent_that_knows_where_it_is() -> None:
 
     assert found["follow_route"].rejection is Rejection.CONTEXT_MISSING
     assert found["follow_route"].context == {"self": 0.0, "plan state=ready": 1.0}
+
+
+def test_a_recalled_episode_beside_the_agent_calls_for_nothing_else() -> None:
+    bakery = Remembered(kind="object", label="bakery", salience=-1.0)
+    recalled = Episode(
+        id=episode_id(1),
+        activation=0.5,
+        salience=-0.5,
+        number=1,
+        run=1,
+        x_m=0.0,
+        y_m=0.0,
+        from_ns=0,
+        until_ns=1,
+        content=[bakery],
+    )
+    with_it = _memory()
+    with_it.pose(1)
+    without = _memory()
+    without.pose(1)
+
+    found = _by_scheme(with_it.broadcast(1, agent(stationary_since_ns=NEVER_NS), recalled))
+    assert found == _by_scheme(without.broadcast(1))
 
 
 def test_the_end_of_the_route_calls_for_a_halt() -> None:
@@ -205,5 +237,5 @@ def test_a_graph_that_is_loaded_as_a_whole_has_its_plan() -> None:
 
 
 def test_a_kind_that_the_graph_does_not_find_by_kind_is_refused() -> None:
-    with pytest.raises(ConfigError, match="graph_kinds names 'self': there are goal, loop_closure"):
+    with pytest.raises(ConfigError, match="graph_kinds names 'self': there are episode, goal"):
         Memory(graph_kinds=["plan", "self"])

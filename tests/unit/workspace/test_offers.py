@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from schemas.codelets import Offer
 from schemas.graph import Phase
-from schemas.nodes import Node
+from schemas.nodes import Episode, Node, Remembered, episode_id
 from tests.support.messages import of_type
 from tests.support.world.scenes import Desk, agent, thing
 
@@ -62,3 +62,29 @@ def test_an_offered_node_is_as_active_as_it_states_when_it_enters() -> None:
     node = graph.nodes["goal"]
 
     assert graph.activation(node) == 1.0
+
+
+def test_an_offered_episode_is_forgotten_once_it_has_decayed() -> None:
+    desk = Desk("w1")
+    desk.drive(range(1))
+    desk.feed(Offer(cycle=1, operations=[_episode()], source="memory"))
+    desk.drive(range(1, 2))
+    assert episode_id(3) in desk.graph.nodes
+
+    desk.drive(range(2, 9))
+    assert episode_id(3) not in desk.graph.nodes
+    assert not any(delta.rejected for delta in desk.deltas)
+
+
+def _episode() -> Episode:
+    return Episode(
+        id=episode_id(3),
+        activation=0.5,
+        number=3,
+        run=1,
+        x_m=1.0,
+        y_m=2.0,
+        from_ns=0,
+        until_ns=10**9,
+        content=[Remembered(kind="object", label="bakery")],
+    )

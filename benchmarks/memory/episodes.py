@@ -1,0 +1,89 @@
+"""How many episodes are recalled from a part of what was conscious, near to where that was.
+
+A town has buildings of few looks, so that most episodes share content with many others. A cue has
+two thirds of the content of one, something else in the place of the rest, and a position that is
+some metres beside it.
+"""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+
+from benchmarks.report import Metrics
+from schemas.memory import TransientEpisode
+from schemas.nodes import Remembered
+from services.memory.episodic.config import EpisodicConfig
+from services.memory.episodic.cues import MAX_LEARNED, EpisodicCues
+from services.memory.sparse.config import SparseConfig
+
+CUES = 200
+LOOKS = 20
+CONTENT = (3, 10)
+REPLACED = 1 / 3
+TOWN_M = 600.0
+BESIDE_M = 3.0
+PATH = 3
+
+
+def measure(seed: int) -> Metrics:
+    """Of cues to as many episodes as Declarative Memory may hold, the share that recalls its own,
+    and that which recalls another one, each above the match from which on one is offered.
+    """
+    config = EpisodicConfig()
+    rng = np.random.default_rng(seed)
+    episodes = _episodes(config.max_declarative, rng)
+    cues = EpisodicCues(SparseConfig(seed=seed), config.place_m)
+    for _ in range(0, len(episodes), MAX_LEARNED):
+        cues.hold(episodes)
+
+    right = 0
+    wrong = 0
+    for number in rng.choice(sorted(episodes), CUES, replace=False).tolist():
+        cue = _cue(episodes[number], rng)
+        found = cues.recalled(cue, lambda _: True)
+        if found is not None and found.match >= config.min_match:
+            right += found.number == number
+            wrong += found.number != number
+
+    return {"episodes_recalled": right / CUES, "wrong_episodes": wrong / CUES}
+
+
+def _episodes(count: int, rng: np.random.Generator) -> dict[int, TransientEpisode]:
+    """Episodes at random places of a town, by number."""
+    episodes = {}
+    path: list[tuple[float, float]] = []
+    for number in range(1, 1 + count):
+        x_m, y_m = rng.uniform(0.0, TOWN_M, 2).tolist()
+        number_here = rng.integers(*CONTENT, endpoint=True)
+        looks = rng.choice(LOOKS, number_here, replace=False).tolist()
+        episodes[number] = TransientEpisode(
+            number=number,
+            run=1,
+            map="town",
+            x_m=x_m,
+            y_m=y_m,
+            from_ns=0,
+            until_ns=0,
+            content=[_object(look) for look in looks],
+            path=path,
+            activation=0.5,
+            active_ns=0,
+        )
+        path = [(x_m, y_m), *path][:PATH]
+
+    return episodes
+
+
+def _cue(episode: TransientEpisode, rng: np.random.Generator) -> TransientEpisode:
+    beside_m = rng.normal(0.0, BESIDE_M, 2).tolist()
+    replaced = round(REPLACED * len(episode.content))
+    others = rng.choice(LOOKS, replaced, replace=False).tolist()
+    content = [*episode.content[replaced:], *(_object(look) for look in others)]
+    return msgspec.structs.replace(
+        episode, x_m=episode.x_m + beside_m[0], y_m=episode.y_m + beside_m[1], content=content
+    )
+
+
+def _object(look: int) -> Remembered:
+    return Remembered(kind="object", label=f"look {look}")

@@ -1,0 +1,56 @@
+"""An attention codelet: an episode that long-term memory was reminded of here."""
+
+from __future__ import annotations
+
+from cogmap.graph.graph import Graph
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from schemas import nodes
+from schemas.codelets import Task
+from schemas.graph import Phase
+from schemas.nodes import SELF_ID, Attention, Self
+from services.codelets.attention.coalitions import coalition
+from services.codelets.attention.config import SECTION, Config
+from services.codelets.attention.memory import brought, is_refractory, memory_of
+
+NAME = "episode"
+
+
+def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
+    """One task where an episode was recalled just now, and it does not wait."""
+    if is_refractory(NAME, graph, context.cycle, config.episode.refractory_cycles):
+        return []
+
+    recalled = recalled_episodes(graph)
+    if not recalled:
+        return []
+
+    return [context.task(NAME, about=[SELF_ID, *(node.id for node in recalled)])]
+
+
+def run(task: Task, graph: Graph, config: Config) -> Answer:
+    """A coalition of the self and the most active episode, as salient as that is."""
+    agent = graph.agent
+    recalled = recalled_episodes(graph)
+    if agent is None or not recalled:
+        return Answer()
+
+    best = max(recalled, key=lambda node: (graph.activation(node), node.number))
+    found = coalition(NAME, [agent, best], graph, config.episode.base_level)
+    return brought(memory_of(NAME, graph), found, task.cycle, graph)
+
+
+CODELET = Codelet(
+    name=NAME,
+    phase=Phase.ATTENTION,
+    due=due,
+    run=run,
+    reads=frozenset({Self, nodes.Episode, Attention}),
+    writes=frozenset({Attention}),
+    config=Config,
+    section=SECTION,
+)
+
+
+def recalled_episodes(graph: Graph) -> list[nodes.Episode]:
+    """The episodes whose activation has not decayed since they were recalled, by id."""
+    return [node for node in graph.of_kind(nodes.Episode) if graph.activation(node) > 0.0]

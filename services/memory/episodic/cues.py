@@ -1,0 +1,72 @@
+"""Which episode a cue recalls: episodes as vectors in sparse distributed memory. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+from cogmap.geometry.arrays import Bytes
+from schemas.memory import StoredEpisode
+from services.memory.episodic.encoding import cues, encoded
+from services.memory.sparse.build import build
+from services.memory.sparse.clean_up import CleanUpMemory
+from services.memory.sparse.config import SparseConfig
+from services.memory.sparse.structures import ItemMemory
+from services.memory.sparse.vectors import distance, mean_distance
+
+MAX_LEARNED = 50
+"""So many episodes are learned at once, in a quarter of a second, where many were restored."""
+
+
+class Found(NamedTuple):
+    """The number of a recalled episode, and how well it matches the cue, from 0, unrelated, to 1,
+    the same.
+    """
+
+    number: int
+    match: float
+
+
+class EpisodicCues:
+    """Episodes, each stored at itself."""
+
+    def __init__(self, config: SparseConfig, place_m: float) -> None:
+        self._place_m = place_m
+        self._memory = build(config)
+        self._items = ItemMemory(config.seed, self._memory.dimensions, self._memory.values)
+        self._stored: CleanUpMemory[int] = CleanUpMemory(self._memory.values)
+
+    def hold(self, episodes: Mapping[int, StoredEpisode]) -> None:
+        """Learn the next of `episodes` that are not stored yet, and recall no others.
+
+        What sparse distributed memory holds of the others stays there as interference.
+        """
+        for number in sorted(self._stored.keys - set(episodes)):
+            self._stored.forget(number)
+
+        lacking = sorted(set(episodes) - self._stored.keys)
+        for number in lacking[:MAX_LEARNED]:
+            vector = encoded(episodes[number], self._items, self._place_m)
+            self._memory.write(vector, vector)
+            self._stored.put(number, vector)
+
+    def recalled(self, cue: StoredEpisode, is_wanted: Callable[[int], bool]) -> Found | None:
+        """The best match, of the episodes that are wanted, that a cue completes to at its place or
+        one beside it; None where it is none.
+        """
+        found = []
+        for vector in cues(cue, self._items, self._place_m):
+            recall = self._memory.read(vector)
+            if recall is None:
+                continue
+
+            number = self._stored.nearest(recall.vector, is_wanted)
+            if number is not None:
+                found.append(Found(number, self._match(number, vector)))
+
+        return max(found, key=lambda each: (each.match, each.number), default=None)
+
+    def _match(self, number: int, vector: Bytes) -> float:
+        apart = distance(self._stored.get(number), vector, self._memory.values)
+        match = 1.0 - apart / mean_distance(self._memory.dimensions, self._memory.values)
+        return min(1.0, max(0.0, match))

@@ -1,0 +1,133 @@
+"""The episodes in Transient Episodic Memory and in Declarative Memory. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
+from typing import TypeGuard
+
+import msgspec
+
+from schemas.memory import DeclarativeEpisode, StoredRecord, TransientEpisode
+from services.memory.changes import Changes
+from services.memory.episodic.config import EpisodicConfig
+
+HOUR_NS = 3_600_000_000_000
+
+KeptEpisode = TransientEpisode | DeclarativeEpisode
+
+
+class Episodes:
+    """The episodes by their numbers, and which of them are not stored as they are."""
+
+    def __init__(self, config: EpisodicConfig) -> None:
+        self._config = config
+        self._known: dict[int, KeptEpisode] = {}
+        self._changed: set[int] = set()
+        self._forgotten: list[str] = []
+        self._newest = 0
+
+    @property
+    def known(self) -> Mapping[int, KeptEpisode]:
+        """All episodes by their numbers."""
+        return MappingProxyType(self._known)
+
+    def restore(self, records: Iterable[StoredRecord]) -> None:
+        """Know episodes that are stored."""
+        for record in records:
+            if is_episode(record):
+                self._known[record.number] = record
+                self._newest = max(self._newest, record.number)
+
+    def next_number(self) -> int:
+        """A number that no episode has had since the start."""
+        self._newest += 1
+        return self._newest
+
+    def put(self, episode: KeptEpisode) -> None:
+        """Keep an episode, in place of the one of its number."""
+        if self._known.get(episode.number) != episode:
+            self._known[episode.number] = episode
+            self._changed.add(episode.number)
+
+    def forget(self, number: int) -> None:
+        """Forget the episode of a number, where there is one."""
+        forgotten = self._known.pop(number, None)
+        self._changed.discard(number)
+        if forgotten is not None:
+            self._forgotten.append(forgotten.key)
+
+    def reinforce(self, number: int, amount: float, now_ns: int) -> None:
+        """Raise the activation of an episode in Transient Episodic Memory that was conscious."""
+        episode = self._known.get(number)
+        if isinstance(episode, TransientEpisode):
+            level = min(1.0, self._activation(episode, now_ns) + amount)
+            self.put(msgspec.structs.replace(episode, activation=level, active_ns=now_ns))
+
+    def consolidate(self, run: int, now_ns: int) -> None:
+        """Move what has lasted from Transient Episodic Memory to Declarative Memory, and forget
+        what has decayed.
+
+        How much time passed between two runs is not known: an earlier run's episodes are as active
+        as when its last one ended, and none stays transient.
+        """
+        ends_ns = {run: now_ns}
+        transient = [each for each in self._known.values() if isinstance(each, TransientEpisode)]
+        for episode in transient:
+            if episode.run != run:
+                end_ns = ends_ns.get(episode.run, 0)
+                ends_ns[episode.run] = max(end_ns, episode.until_ns)
+
+        for episode in transient:
+            level = self._activation(episode, ends_ns[episode.run])
+            age_ns = now_ns - episode.until_ns
+            is_over = episode.run != run or age_ns >= self._config.consolidation_h * HOUR_NS
+            if is_over and level >= self._config.consolidation_threshold:
+                self.put(_declarative(episode))
+            elif episode.run != run or level <= 0.0:
+                self.forget(episode.number)
+
+        self._forget_oldest()
+
+    def relocate(self, run: int, moved: Callable[[KeptEpisode], KeptEpisode | None]) -> None:
+        """Put those of a run elsewhere, or forget them where that is None."""
+        for episode in [each for each in self._known.values() if each.run == run]:
+            after = moved(episode)
+            if after is None:
+                self.forget(episode.number)
+            else:
+                self.put(after)
+
+    def take_changes(self) -> Changes:
+        """What is not stored yet as it is: after this, all is."""
+        records: list[StoredRecord] = [self._known[number] for number in sorted(self._changed)]
+        changes = Changes(records, self._forgotten)
+        self._changed = set()
+        self._forgotten = []
+        return changes
+
+    def _forget_oldest(self) -> None:
+        """Keep no more in Declarative Memory than it may hold."""
+        numbers = sorted(
+            number
+            for number, episode in self._known.items()
+            if isinstance(episode, DeclarativeEpisode)
+        )
+        for number in numbers[: -self._config.max_declarative]:
+            self.forget(number)
+
+    def _activation(self, episode: TransientEpisode, now_ns: int) -> float:
+        """Linear decay, as in LIDA's framework."""
+        hours = max(0, now_ns - episode.active_ns) / HOUR_NS
+        return max(0.0, episode.activation - self._config.decay_per_h * hours)
+
+
+def is_episode(record: StoredRecord) -> TypeGuard[KeptEpisode]:
+    """Whether a record is of an episode, in either memory."""
+    return isinstance(record, KeptEpisode)
+
+
+def _declarative(episode: TransientEpisode) -> DeclarativeEpisode:
+    """The same episode, which decays no more."""
+    names = DeclarativeEpisode.__struct_fields__
+    return DeclarativeEpisode(**{name: getattr(episode, name) for name in names})
