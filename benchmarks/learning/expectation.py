@@ -193,7 +193,7 @@ class _Judge:
 
         for link in broadcast.coalition.links:
             cell = place_cell(link.target)
-            if link.kind is LinkKind.BLOCKED and cell is not None:
+            if link.kind == LinkKind.BLOCKED and cell is not None:
                 self._note_closed(cell, broadcast.stamp_ns)
 
     def _begin(self) -> None:
@@ -220,10 +220,10 @@ class _Judge:
         return ""
 
     def _note(self, stamp_ns: int, at: Floats) -> None:
-        seen = self._eyes.buildings(at)
         for number, surprise in self._buildings.items():
             away_m = math.dist(surprise.at_m, (at[0], at[1]))
-            surprise.note(stamp_ns, number in seen and away_m <= NOTICEABLE_M)
+            is_near = away_m <= NOTICEABLE_M
+            surprise.note(stamp_ns, is_near and self._eyes.sees_building(at, number))
 
         for name, surprise in self._streets.items():
             surprise.note(stamp_ns, self._eyes.sees_barrier(at, name, NOTICEABLE_M))

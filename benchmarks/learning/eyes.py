@@ -4,6 +4,8 @@ stood there, and with barriers.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from cogmap.geometry.arrays import Floats
@@ -20,19 +22,31 @@ class Eyes:
     """A camera in the town as it was built."""
 
     def __init__(self, place: Place) -> None:
+        self._plots = place.plots
         self._camera = ColumnCamera(calibration())
         self._surroundings = Surroundings(place)
         self._barriers_m = {}
         for name, barrier in barriers(place.roads).items():
             self._barriers_m[name] = outlines([barrier.solid])
 
-    def buildings(self, at: Floats) -> set[int]:
-        """The buildings that no other hides, by their places in the town, from x, y, heading."""
+    def sees_building(self, at: Floats, number: int) -> bool:
+        """Whether at least half of a building would be seen from x, y, heading: its middle is in
+        the image, and others hide no more than half of it.
+        """
+        plot = self._plots[number]
+        direction_rad = math.atan2(plot.y_m - at[1], plot.x_m - at[0])
+        bearing_rad = math.remainder(direction_rad - at[2], math.tau)
+        if abs(bearing_rad) > self._camera.half_field_of_view_rad:
+            return False
+
         near = self._surroundings.near(float(at[0]), float(at[1]))
-        walls = self._camera.nearest(at, near.walls_m)
-        shown = near.plot[walls.segment[walls.segment != NOTHING]]
-        columns = np.bincount(shown, minlength=1)
-        return {*np.flatnonzero(columns >= MIN_COLUMNS).tolist()}
+        walls = self._camera.nearest(at, near.walls_m).segment
+        shown = near.plot[walls[walls != NOTHING]]
+        columns = int((shown == number).sum())
+
+        alone = self._camera.nearest(at, near.walls_m[near.plot == number]).segment
+        needed = max(MIN_COLUMNS, int((alone != NOTHING).sum()) / 2)
+        return columns >= needed
 
     def sees_barrier(self, at: Floats, street: str, reach_m: float) -> bool:
         """Whether a barrier would be seen that closes a street, within so many metres."""

@@ -46,8 +46,9 @@ class Novelty(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=T
 class Expectation(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """Which objects are expected in view, and when it is a surprise that they are not.
 
-    They are to stand well inside the image and nearer than perception reaches, and the rays of the
-    range scan must pass where they stood, so that what is hidden is no surprise.
+    They are to stand inside the image and nearer than perception reaches, and either the rays of
+    the range scan pass where they stood, or nothing that is known hides them: what is hidden is no
+    surprise.
     """
 
     base_level: BaseLevel = 1.0
@@ -75,7 +76,7 @@ class Expectation(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fiel
     field_of_view_rad: Annotated[
         PositiveRadians,
         Meta(description="Angle within which objects are expected, in rad, above 0 to 6.28."),
-    ] = 0.9
+    ] = 1.2
     largest_sd_m: Annotated[
         PositiveMetres,
         Meta(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -22,37 +22,40 @@ BEYOND_SHARE = 0.05
 # Rays near the middle of an object, as a share of its apparent half width, do not graze it.
 MIDDLE_SHARE = 0.6
 MIN_RAYS = 2
+# What hides an object less far than so from its middle leaves most of it in sight.
+SEEN_SHARE = 0.3
+# An object hides what is behind it in as much as this of its width, as it may be deeper than wide.
+HIDING_SHARE = 1.15
 # Of more objects than this, only those at place nodes in view are visited.
 MANY_OBJECTS = 300
 
 
 def missing_objects(task: Task, agent: Self, graph: Graph, settings: Expectation) -> list[str]:
-    """The ids of established objects where `agent` should see them in the view of `task`, and where
-    it sees that nothing stands; none while its position is uncertain.
+    """The ids of established objects that `agent` should see in the view of `task` and does not:
+    the range scan passes where they stood, or nothing that is known hides them. None while its
+    position is uncertain.
     """
     if task.scan is None or not _is_certain(agent, settings):
         return []
 
     rays = np.asarray(task.scan.numpy(), np.float64)
     in_view = {object_id(percept.label) for percept in task.percepts}
+    around = _around(agent, graph, settings)
     missing = []
-    for node in _ahead(agent, graph, settings):
-        if node.id not in in_view and _is_passed(node, agent, rays, settings):
+    for node in around:
+        if node.id in in_view or not _is_expected(node, agent, settings):
+            continue
+        if _is_gone(node, agent, rays, around, settings):
             missing.append(node.id)
 
     return sorted(missing)
 
 
-def _ahead(agent: Self, graph: Graph, settings: Expectation) -> Iterator[Object]:
-    """The established objects of the agent's map that stand well inside its view."""
-    if graph.count(Object) <= MANY_OBJECTS:
-        around = graph.of_kind(Object)
-    else:
-        around = iter(nodes_of(graph, Object, _at_places_ahead(agent, graph, settings)))
-
-    for node in around:
-        if _is_expected(node, agent, settings):
-            yield node
+def _around(agent: Self, graph: Graph, settings: Expectation) -> list[Object]:
+    """The objects of the agent's map, where there are many those that stand inside its view."""
+    if graph.count(Object) > MANY_OBJECTS:
+        return nodes_of(graph, Object, _at_places_ahead(agent, graph, settings))
+    return [node for node in graph.of_kind(Object) if node.map == agent.map]
 
 
 def _at_places_ahead(agent: Self, graph: Graph, settings: Expectation) -> Iterator[str]:
@@ -86,9 +89,12 @@ def _is_expected(node: Object, agent: Self, settings: Expectation) -> bool:
     return is_near and abs(_bearing_of(node, agent)) <= settings.field_of_view_rad / 2
 
 
-def _is_passed(node: Object, agent: Self, rays: Floats, settings: Expectation) -> bool:
-    """Whether the rays (n, 2), bearing and range each, pass where an object stood. What one hits
-    before hides the object, what it hits there may be the object.
+def _is_gone(
+    node: Object, agent: Self, rays: Floats, around: Iterable[Object], settings: Expectation
+) -> bool:
+    """Whether the rays (n, 2), bearing and range each, pass where an object stood, or end well
+    before it where nothing that is known hides it: what is low stops rays and hides no building.
+    What they hit there may be the object.
     """
     away_m = math.dist((node.x_m, node.y_m), (agent.x_m, agent.y_m))
     half_rad = math.atan2(MIDDLE_SHARE * node.width_m / 2, away_m)
@@ -99,7 +105,30 @@ def _is_passed(node: Object, agent: Self, rays: Floats, settings: Expectation) -
 
     beyond_m = away_m * (1 + BEYOND_SHARE) + BEYOND_M
     has_passed = (ranges_m == 0) | (ranges_m > beyond_m)
-    return float(has_passed.mean()) >= settings.passed_share
+    if float(has_passed.mean()) >= settings.passed_share:
+        return True
+
+    before_m = away_m - HIDING_SHARE * node.width_m / 2 - BEYOND_M
+    has_ended = ~has_passed & (ranges_m < before_m)
+    is_clear = float((has_passed | has_ended).mean()) >= settings.passed_share
+    return is_clear and _is_in_sight(node, agent, around)
+
+
+def _is_in_sight(node: Object, agent: Self, around: Iterable[Object]) -> bool:
+    """Whether nothing on the map hides the middle of an object."""
+    away_m = math.dist((node.x_m, node.y_m), (agent.x_m, agent.y_m))
+    middle_rad = math.atan2(SEEN_SHARE * node.width_m / 2, away_m)
+    for other in around:
+        other_m = math.dist((other.x_m, other.y_m), (agent.x_m, agent.y_m))
+        if other.id == node.id or other_m >= away_m:
+            continue
+
+        half_rad = math.atan2(HIDING_SHARE * other.width_m / 2, other_m)
+        aside_rad = math.remainder(_bearing_of(other, agent) - _bearing_of(node, agent), math.tau)
+        if abs(aside_rad) <= half_rad + middle_rad:
+            return False
+
+    return True
 
 
 def _is_certain(agent: Self, settings: Expectation) -> bool:

@@ -46,6 +46,7 @@ def _scan(range_m: float) -> Array:
 FREE = _scan(HOUSE_M + 15.0)
 NOTHING = _scan(0.0)
 WALL = _scan(HOUSE_M - 3.0)
+FENCE = _scan(HOUSE_M / 4)
 
 
 class Story:
@@ -147,6 +148,19 @@ def test_what_is_too_near_or_far_or_aside_is_not_expected(at_m: tuple[float, flo
 
 def test_a_house_behind_what_the_scan_hits_is_hidden() -> None:
     assert Story(_house()).looks(2 * VIEWS, WALL) == []
+
+
+def test_what_is_low_and_stops_the_scan_hides_no_house() -> None:
+    assert len(Story(_house()).looks(VIEWS, FENCE)) == 1
+
+
+@pytest.mark.parametrize(("aside_m", "number"), [(0.0, 0), (3.0, 0), (8.0, 1)])
+def test_a_house_that_is_known_to_stand_before_another_hides_it(
+    aside_m: float, number: int
+) -> None:
+    before = landmark("before", [(HOUSE_M / 2, aside_m)], width_m=8.0)
+
+    assert len(Story(_house(), before).looks(VIEWS, FENCE)) == number
 
 
 def test_views_in_which_a_house_is_hidden_do_not_count() -> None:
