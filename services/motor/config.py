@@ -105,3 +105,10 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             "above 0 to 10000."
         ),
     ] = 0.5
+    guided_m: Annotated[
+        PositiveMetres,
+        msgspec.Meta(
+            description="Distance from the end of a guidance scheme's path at which the robot "
+            "stops, in m, above 0 to 10000."
+        ),
+    ] = 0.5
