@@ -10,6 +10,7 @@ from schemas.base import (
     PositiveAcceleration,
     PositiveMetres,
     PositiveSeconds,
+    PositiveShare,
     PositiveSpeed,
 )
 
@@ -112,3 +113,10 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             "stops, in m, above 0 to 10000."
         ),
     ] = 0.5
+    guided_share: Annotated[
+        PositiveShare,
+        msgspec.Meta(
+            description="Share of what lies between the path of a guidance scheme and that of the "
+            "one before by which the robot corrects its path, above 0 to 1: less is smoother."
+        ),
+    ] = 0.3

@@ -8,7 +8,9 @@ from schemas.nodes import Plan, Self
 from schemas.sensing import Pose, SpeedLimit
 from services.motor.aim import Aim
 from services.motor.config import Config
-from services.motor.programs import FollowPlan, Halt, Parameters, Program, Track, program_of
+from services.motor.guide import Guide, Track
+from services.motor.parameters import Parameters
+from services.motor.programs import FollowPlan, Halt, Program, program_of
 
 
 class Execution:
@@ -36,7 +38,10 @@ class Execution:
 
     def start(self, program: MotorProgram) -> None:
         """Execute a program, from its beginning. Raises MessageError where there is none."""
+        before = self._program
         self._program = self._program_of(program.action, program.parameters)
+        if isinstance(self._program, Guide) and isinstance(before, Guide):
+            self._program.continue_from(before)
         self._executed = program
 
     def put(self, action: Action) -> None:

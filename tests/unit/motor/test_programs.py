@@ -13,7 +13,8 @@ from schemas.nodes import PLAN_ID, Plan, PlanState
 from schemas.sensing import Pose, SpeedLimit
 from services.motor.aim import Aim
 from services.motor.config import Config
-from services.motor.programs import FollowPlan, Program, Track, program_of
+from services.motor.guide import Track
+from services.motor.programs import FollowPlan, Program, program_of
 from tests.support.world.motor import action_of, command_after, module_ahead, pose_delta, scan_of
 from tests.support.world.plans import plan_along
 
