@@ -16,7 +16,7 @@ from services.motor.parameters import Parameters, number, stamp
 from services.motor.route import Route, pursuit
 
 TRACKED_POSES = 64
-SHORT_M = 1.0
+SHORT_M = 2.0
 TURNED_RAD = 1.0
 
 

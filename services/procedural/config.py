@@ -57,11 +57,11 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         int,
         msgspec.Meta(
             ge=1,
-            le=100_000,
-            description="Guidance schemes that are kept of those learned, 1 to 100000; the oldest "
+            le=1000,
+            description="Guidance schemes that are kept of those learned, 1 to 1000; the oldest "
             "are forgotten.",
         ),
-    ] = 2000
+    ] = 1000
     graph_kinds: Annotated[
         list[str],
         msgspec.Meta(

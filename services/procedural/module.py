@@ -123,7 +123,7 @@ class ProceduralMemory:
         learned = self._guidance.on_broadcast(broadcast)
 
         threshold = self._config.instantiation
-        considered = self._guidance.behaviours(broadcast, nodes, threshold)
+        considered = self._guidance.behaviours(broadcast, nodes)
         for scheme in self._schemes:
             behaviour = scheme.considered(nodes, threshold)
             considered.append(self._reliability.noted(behaviour))

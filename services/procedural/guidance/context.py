@@ -66,9 +66,6 @@ def fit(
         return None
 
     motion, agreeing = found
-    if len(agreeing) < min(2, len(scheme.landmarks)):
-        return None
-
     names = list(relations)
     closeness = _closeness(motion)
     context = {_spelled(landmark): 0.0 for landmark in scheme.landmarks}

@@ -17,6 +17,7 @@ MAX_LANDMARKS = 6
 MARKED_M = 2.0
 MAX_MARKS = 40
 ENOUGH_LANDMARKS = 2
+BLIND_SHARE = 0.25
 
 
 class Place(NamedTuple):
@@ -119,7 +120,7 @@ class Lessons:
         last = self._last
         since_m = self._driven_m if last is None else self._driven_m - last.driven_m
         is_far = last is None or since_m >= self._step_m or _has_turned(last.place, place)
-        is_blind = last is None or since_m >= self._ahead_m
+        is_blind = last is None or since_m >= BLIND_SHARE * self._ahead_m
         if not is_far or len(nearest) < (1 if is_blind else ENOUGH_LANDMARKS):
             return
 

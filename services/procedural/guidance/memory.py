@@ -15,6 +15,7 @@ from services.procedural.guidance.lessons import Lesson, Lessons, Place
 from services.procedural.patterns import Active
 
 REMEMBERED_PLACES = 64
+MIN_FIT = 0.25
 DRIVING = frozenset({ActionName.FOLLOW_PLAN, ActionName.SEEK})
 NAME = "guide_{}"
 _NUMBERED = re.compile(r"guide_(\d+)")
@@ -79,11 +80,9 @@ class GuidanceMemory:
             self._keep(scheme)
         return changed
 
-    def behaviours(
-        self, broadcast: Broadcast, nodes: Sequence[Active], threshold: float
-    ) -> list[Behaviour]:
-        """That of the scheme that fits best, where it does at least as well as `threshold`; none
-        where the agent has a goal.
+    def behaviours(self, broadcast: Broadcast, nodes: Sequence[Active]) -> list[Behaviour]:
+        """That of the scheme that fits best, where that is at least MIN_FIT; none where the agent
+        has a goal.
         """
         agent = _agent_of(broadcast)
         relations = broadcast.coalition.relations
@@ -92,7 +91,7 @@ class GuidanceMemory:
 
         activations = {active.node.id: active.activation for active in nodes}
         fits = [fit(scheme, relations, activations) for scheme in self._given.values()]
-        found = [each for each in fits if each is not None and each.activation >= threshold]
+        found = [each for each in fits if each is not None and each.activation >= MIN_FIT]
         if not found:
             return []
 
