@@ -15,6 +15,7 @@ HALF_TURNED_RAD = 0.5
 UNTRIED = 0.5
 SALIENCE = 0.3
 ENOUGH = 3
+SEEN_NS = "seen_ns"
 RESULT = "self at the end of the path"
 
 
@@ -27,22 +28,23 @@ def reliability(scheme: GuidanceScheme) -> float:
 
 class Fit(NamedTuple):
     """A scheme in a situation: how active each of its landmarks is, in words, how active they are
-    together, and its path as seen from where the agent is now, metres ahead + metres left x i.
+    together, and the motion that brings its landmarks and its path to where they are now.
     """
 
     scheme: GuidanceScheme
     context: Mapping[str, float]
     activation: float
-    path_m: Sequence[complex]
+    motion: Motion
 
     def behaviour(self, seen_ns: int) -> Behaviour:
         """What the scheme becomes by a view of that stamp."""
         scheme = self.scheme
+        path_m = [self.motion.moved(complex(*place_m)) for place_m in scheme.path_m]
         return Behaviour(
             scheme=scheme.name,
             activation=min(1.0, self.activation + SALIENCE),
             action=ActionName.GUIDE,
-            parameters=parameters_of(self.path_m, seen_ns),
+            parameters=_parameters(path_m, seen_ns),
             context=dict(self.context),
             adding={RESULT: SALIENCE},
             reliability=reliability(scheme),
@@ -71,27 +73,29 @@ def fit(
     context = {_spelled(landmark): 0.0 for landmark in scheme.landmarks}
     for pair in agreeing:
         landmark = scheme.landmarks[pair.number]
-        context[_spelled(landmark)] = closeness * activations[names[pair.seen]]
+        context[_spelled(landmark)] = closeness * activations.get(names[pair.seen], 0.0)
 
     activation = sum(context.values()) / max(ENOUGH, len(scheme.landmarks))
-    path_m = [motion.moved(complex(*place_m)) for place_m in scheme.path_m]
-    return Fit(scheme, context, activation, path_m)
+    return Fit(scheme, context, activation, motion)
 
 
-def parameters_of(path_m: Sequence[complex], seen_ns: int) -> dict[str, Scalar]:
+def _parameters(path_m: Sequence[complex], seen_ns: int) -> dict[str, Scalar]:
     """The parameters of the action that drives a path, of which the agent is at the start."""
-    parameters: dict[str, Scalar] = {"seen_ns": seen_ns}
+    parameters: dict[str, Scalar] = {SEEN_NS: seen_ns}
     for number, place_m in enumerate(path_m, start=1):
         parameters[f"ahead_{number}_m"] = place_m.real
         parameters[f"left_{number}_m"] = place_m.imag
     return parameters
 
 
-def end_of(parameters: Mapping[str, Scalar]) -> tuple[complex, int]:
-    """The last place of the path that parameters have, and the stamp of their view."""
+def end_of(parameters: Mapping[str, Scalar]) -> complex | None:
+    """The last place of the path that parameters have; None where they have no path."""
     last = len(parameters) // 2
-    ahead_m, left_m = parameters[f"ahead_{last}_m"], parameters[f"left_{last}_m"]
-    return complex(float(ahead_m), float(left_m)), int(parameters["seen_ns"])
+    ahead_m = parameters.get(f"ahead_{last}_m")
+    left_m = parameters.get(f"left_{last}_m")
+    if not isinstance(ahead_m, int | float) or not isinstance(left_m, int | float):
+        return None
+    return complex(ahead_m, left_m)
 
 
 def _closeness(motion: Motion) -> float:

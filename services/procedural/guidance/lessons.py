@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from schemas.cognition import Relation
-from schemas.nodes import Self
+from schemas.nodes import NEVER_NS, Self
 
 TURNED_RAD = 0.3
 STOP_NS = 5_000_000_000
@@ -72,6 +72,7 @@ class Lessons:
         self._ahead_m = ahead_m
         self._begun: deque[_Begun] = deque()
         self._last: _Begun | None = None
+        self._seen_ns = NEVER_NS
         self._place: Place | None = None
         self._driven_m = 0.0
         self._marked_m = 0.0
@@ -79,8 +80,12 @@ class Lessons:
 
     def on_view(self, agent: Self, relations: Iterable[Relation], drives: bool) -> list[Lesson]:
         """The lessons that end with what is conscious; `drives`: whether the agent does something
-        of its own to get anywhere.
+        of its own to get anywhere. None of a view that became conscious after a later one.
         """
+        if agent.stamp_ns <= self._seen_ns:
+            return []
+
+        self._seen_ns = agent.stamp_ns
         place = Place.of(agent)
         if self._place is not None:
             self._driven_m += abs(place.at_m - self._place.at_m)

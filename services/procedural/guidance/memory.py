@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from schemas.cognition import Action, ActionName, Behaviour, Broadcast, GuidanceScheme
 from schemas.nodes import Plan, PlanState, Self
 from services.procedural.guidance.arrivals import Arrivals
-from services.procedural.guidance.context import Fit, end_of, fit, reliability
+from services.procedural.guidance.context import SEEN_NS, Fit, end_of, fit, reliability
 from services.procedural.guidance.lessons import Lesson, Lessons, Place
 from services.procedural.patterns import Active
 
@@ -107,9 +107,10 @@ class GuidanceMemory:
 
     def _expect(self, action: Action) -> None:
         """Await the agent where a scheme leads, as seen from where it was."""
-        end_m, seen_ns = end_of(action.parameters)
-        place = self._places.get(seen_ns)
-        if place is not None:
+        end_m = end_of(action.parameters)
+        seen_ns = action.parameters.get(SEEN_NS)
+        place = self._places.get(seen_ns) if isinstance(seen_ns, int) else None
+        if place is not None and end_m is not None:
             self._arrivals.expect(action.scheme, place.out(end_m), action.stamp_ns)
 
     def _new(self, lesson: Lesson) -> GuidanceScheme:

@@ -95,3 +95,13 @@ def test_an_agent_that_does_not_drive_learns_nothing() -> None:
     drive.stand(3 * STOP_CYCLES)
 
     assert drive.learned == []
+
+
+def test_a_view_that_becomes_conscious_late_is_no_step_back() -> None:
+    drive = Drive()
+    drive.on(8)
+    late = driven(5 + 0j, cycle=5)
+
+    assert drive.lessons.on_view(late, relations(5 + 0j).values(), True) == []
+    drive.on(6)
+    assert drive.learned[0].path_m[-1] == pytest.approx(10 + 0j)

@@ -141,3 +141,11 @@ def test_what_was_published_is_known_again_and_numbers_go_on() -> None:
 
     assert memory.kept == learned
     assert _drive(memory, 14)[0].name == f"guide_{len(learned) + 1}"
+
+
+def test_an_action_without_a_path_is_not_judged() -> None:
+    memory = _memory(guidance())
+    _behaviours(memory)
+    memory.on_action(selected(1, ActionName.GUIDE, "guide_1", {"seen_ns": "late"}))
+
+    assert memory.on_broadcast(broadcast(LONG_AFTER, driven(), {})) == []
