@@ -216,7 +216,9 @@ def test_guidance_that_was_learned_is_journaled_and_known_after_a_restart() -> N
     memory.module.feed(selected(1))
     for cycle in range(1, 60):
         at_m = complex(cycle)
-        published += memory.module.feed(broadcast(cycle, driven(at_m), relations(at_m)))
+        published += memory.module.feed(
+            broadcast(cycle, driven(at_m, cycle=cycle), relations(at_m))
+        )
 
     learned = [
         scheme for each in published if isinstance(each, Behaviours) for scheme in each.learned

@@ -40,7 +40,7 @@ def _drive(memory: GuidanceMemory, metres: int) -> list[GuidanceScheme]:
     learned = []
     for cycle in range(1, metres + 1):
         at_m = complex(cycle)
-        learned += memory.on_broadcast(broadcast(cycle, driven(at_m), relations(at_m)))
+        learned += memory.on_broadcast(broadcast(cycle, driven(at_m, cycle=cycle), relations(at_m)))
     return learned
 
 
@@ -107,7 +107,7 @@ def test_an_agent_that_is_guided_learns_nothing_new() -> None:
 
     for cycle in range(2, 30):
         at_m = complex(cycle)
-        memory.on_broadcast(broadcast(cycle, driven(at_m), relations(at_m)))
+        memory.on_broadcast(broadcast(cycle, driven(at_m, cycle=cycle), relations(at_m)))
 
     assert [scheme.name for scheme in memory.kept] == ["guide_1"]
 
