@@ -98,6 +98,13 @@ def _run() -> click.Command:
     return run
 
 
+def _schemes() -> click.Command:
+    """Write the guidance schemes that a drive has taught."""
+    from cli.schemes import schemes
+
+    return schemes
+
+
 def _street() -> click.Command:
     """Close streets of the simulated town, and open them."""
     from cli.street import street
@@ -132,6 +139,7 @@ COMMANDS: dict[str, Loader] = {
     "module": _module,
     "router": _router,
     "run": _run,
+    "schemes": _schemes,
     "street": _street,
     "topic": _topic,
     "train": _train,

@@ -65,11 +65,23 @@ Event = Replay | RouteReplay
 """What a codelet publishes once its operations are committed."""
 
 
+class Relation(Part, kw_only=True, frozen=True):
+    """Where an object stands as seen from the agent: egocentric, left positive.
+
+    `look` is what perception calls it.
+    """
+
+    look: Name
+    range_m: Annotated[float, msgspec.Meta(gt=0, le=1e4)]
+    bearing_rad: Finite
+
+
 class Coalition(Part, kw_only=True, frozen=True):
     """Content that an attention codelet brings to the global workspace.
 
     `id` is unique in a run; the workspace gives it when it commits the codelet's answer. `maps` are
-    ids of cognitive maps.
+    ids of cognitive maps. `relations` are those of its objects, by their ids, to the agent, as they
+    were perceived in the view that it is about.
     """
 
     id: str = ""
@@ -78,6 +90,7 @@ class Coalition(Part, kw_only=True, frozen=True):
     nodes: list[AnyNode]
     links: list[Link] = []
     maps: list[Name] = []
+    relations: dict[Name, Relation] = {}
 
 
 class Coalitions(Message, kw_only=True, frozen=True):
@@ -158,13 +171,15 @@ class ActionName(enum.StrEnum):
     FOLLOW_PLAN: drive the route of the plan. TURN: turn on the spot by the parameter `turn_rad`,
     left positive. DOCK: drive straight and slowly to the parameters `x_m` and `y_m`, on the map of
     the agent. SEEK: have the goal to be at the object `object` until the need `need` is satisfied,
-    and drive the route of the plan. HALT: stand.
+    and drive the route of the plan. GUIDE: drive through the places `ahead_1_m` and `left_1_m`,
+    `ahead_2_m` and so on, as seen from where the agent was at the stamp `seen_ns`. HALT: stand.
     """
 
     FOLLOW_PLAN = "follow_plan"
     TURN = "turn"
     DOCK = "dock"
     SEEK = "seek"
+    GUIDE = "guide"
     HALT = "halt"
 
 
@@ -203,13 +218,33 @@ class Behaviour(Part, kw_only=True, frozen=True):
     gathered: Finite = 0.0
 
 
+class GuidanceScheme(Part, kw_only=True, frozen=True):
+    """A scheme that associates landmarks, as they stand relative to the agent, with what it did
+    there (guidance, Madl et al. 2016): it drove through the places of `path_m`, metres ahead and to
+    the left of where it was.
+
+    It was executed and judged `executions` times, of which the agent came to the last place
+    `successes` times.
+    """
+
+    name: Name
+    landmarks: Annotated[list[Relation], msgspec.Meta(min_length=1, max_length=16)]
+    path_m: Annotated[list[tuple[Finite, Finite]], msgspec.Meta(min_length=1, max_length=64)]
+    executions: Count = 0
+    successes: Count = 0
+
+
 class Behaviours(Message, kw_only=True, frozen=True):
     """What procedural memory makes of the broadcast of `cycle`: every scheme that it considered,
-    those that are not instantiated included.
+    those that are not instantiated included, of guidance schemes only some that are.
+
+    `learned` are the guidance schemes that it has learned since the last message, and those that
+    were judged; in a journal it may be all of them.
     """
 
     cycle: Count
     behaviours: list[Behaviour]
+    learned: list[GuidanceScheme] = []
 
 
 class Action(Message, kw_only=True, frozen=True):

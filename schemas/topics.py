@@ -84,7 +84,7 @@ COMPETITION = Topic("global_workspace/competition", cognition.Competition, 5, _N
 BROADCAST = Topic("global_workspace/broadcast", cognition.Broadcast, 0, _NEVER)
 STORED = Topic("memory/stored", memory.Stored, 0, _NEVER, max_bytes=64 * MIB)
 RESTORED = Topic("memory/restored", memory.Restored, 0, _NEVER, max_bytes=512 * MIB)
-BEHAVIOURS = Topic("procedural/behaviours", cognition.Behaviours, 0, _NEVER)
+BEHAVIOURS = Topic("procedural/behaviours", cognition.Behaviours, 0, _NEVER, max_bytes=16 * MIB)
 ACTION = Topic("action/selected", cognition.Action, 0, _NEVER)
 MOTOR_PROGRAM = Topic("motor/program", cognition.MotorProgram, 0, _NEVER)
 MOTOR_COMMAND = Topic("motor/command", sensing.MotorCommand, 5, _NEVER)

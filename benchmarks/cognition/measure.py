@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.cognition.guided import ROUTES, guidance
 from benchmarks.cognition.latency import latencies
 from benchmarks.cognition.life import Life, live
 from benchmarks.cognition.random_actions import RandomActions
@@ -27,6 +28,7 @@ THRESHOLDS = {
     "broadcasts_per_s": within(3, 10),
     "conscious_latency_ms_p50": at_most(200),
     "survived_share": at_least(1),
+    "guided_share": at_least(0.9),
 }
 
 
@@ -41,15 +43,18 @@ class Stay:
 def measure(
     folder: Path, processes: int, announce: Callable[[str], None], towns: int = TOWNS
 ) -> Metrics:
-    """The metrics of THRESHOLDS, and `random_survived_share` of an agent that acts at random;
-    `folder` holds a drive's log.
+    """The metrics of THRESHOLDS, `random_survived_share` of an agent that acts at random, and more
+    of guidance; `folder` holds a drive's log.
     """
     announce("driving one lap in real time")
     drive(folder)
     metrics = latencies(folder / LOG_NAME)
 
     announce(f"living in {towns} towns for {LIFE_S:g} s each, twice")
-    return metrics | survival(processes, towns)
+    metrics |= survival(processes, towns)
+
+    announce(f"driving {ROUTES} routes twice, the second time by guidance")
+    return metrics | guidance(processes)
 
 
 def survival(processes: int, towns: int = TOWNS) -> Metrics:

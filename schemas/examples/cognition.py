@@ -14,8 +14,10 @@ from schemas.cognition import (
     Contender,
     Direction,
     Fate,
+    GuidanceScheme,
     MotorProgram,
     Rejection,
+    Relation,
     Replay,
     RouteReplay,
     Silence,
@@ -32,7 +34,7 @@ def messages() -> list[Message]:
         Coalitions(cycle=6, coalitions=[coalition()]),
         _competition(),
         Broadcast(cycle=6, trigger="aggregate", coalition=coalition()),
-        Behaviours(cycle=6, behaviours=_behaviours()),
+        Behaviours(cycle=6, behaviours=_behaviours(), learned=[_guidance()]),
         _action(),
         MotorProgram(cycle=6, action="turn", parameters={"turn_rad": 1.5}),
     ]
@@ -47,6 +49,7 @@ def coalition() -> Coalition:
         nodes=[nodes.self_node(), nodes.object_node()],
         links=[instance_link(weight=1.0)],
         maps=["map:1"],
+        relations={nodes.object_node().id: _relation()},
     )
 
 
@@ -110,6 +113,20 @@ def _behaviours() -> list[Behaviour]:
         context={"plan state=no_route": 0.0},
     )
     return [follow, halt]
+
+
+def _relation() -> Relation:
+    return Relation(look="bakery", range_m=12.5, bearing_rad=-0.25)
+
+
+def _guidance() -> GuidanceScheme:
+    return GuidanceScheme(
+        name="guide_1",
+        landmarks=[_relation()],
+        path_m=[(0.0, 0.0), (2.0, 0.5)],
+        executions=2,
+        successes=1,
+    )
 
 
 def _action() -> Action:

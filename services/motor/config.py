@@ -10,6 +10,7 @@ from schemas.base import (
     PositiveAcceleration,
     PositiveMetres,
     PositiveSeconds,
+    PositiveShare,
     PositiveSpeed,
 )
 
@@ -105,3 +106,17 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             "above 0 to 10000."
         ),
     ] = 0.5
+    guided_m: Annotated[
+        PositiveMetres,
+        msgspec.Meta(
+            description="Distance from the end of a guidance scheme's path at which the robot "
+            "stops, in m, above 0 to 10000."
+        ),
+    ] = 0.5
+    guided_share: Annotated[
+        PositiveShare,
+        msgspec.Meta(
+            description="Share of what lies between the path of a guidance scheme and that of the "
+            "one before by which the robot corrects its path, above 0 to 1: less is smoother."
+        ),
+    ] = 0.3

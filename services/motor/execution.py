@@ -8,6 +8,8 @@ from schemas.nodes import Plan, Self
 from schemas.sensing import Pose, SpeedLimit
 from services.motor.aim import Aim
 from services.motor.config import Config
+from services.motor.guide import Guide, Track
+from services.motor.parameters import Parameters
 from services.motor.programs import FollowPlan, Halt, Program, program_of
 
 
@@ -22,6 +24,7 @@ class Execution:
         self._config = config
         self._is_lockstep = config.mode == "lockstep"
         self._follow = FollowPlan(config)
+        self._track = Track()
         self._program: Program = Halt(self._follow)
         self._executed: MotorProgram | None = None
         self._actions: list[Action] = []
@@ -35,14 +38,16 @@ class Execution:
 
     def start(self, program: MotorProgram) -> None:
         """Execute a program, from its beginning. Raises MessageError where there is none."""
-        parameters = program.parameters
-        self._program = program_of(program.action, parameters, self._follow, self._config)
+        before = self._program
+        self._program = self._program_of(program.action, program.parameters)
+        if isinstance(self._program, Guide) and isinstance(before, Guide):
+            self._program.continue_from(before)
         self._executed = program
 
     def put(self, action: Action) -> None:
         """Keep an action until it counts. Raises MessageError where it has no motor program."""
         if action.scheme:
-            program_of(action.action, action.parameters, self._follow, self._config)
+            self._program_of(action.action, action.parameters)
         self._actions.append(action)
 
     def started(self, answered_cycle: int, waiting_cycle: int | None) -> list[MotorProgram]:
@@ -65,9 +70,13 @@ class Execution:
         """The plan is this one now, where it is new."""
         self._follow.take(plan, agent)
 
-    def aim(self, pose: Pose) -> Aim | SpeedLimit:
-        """Where the program steers to from a pose, or why it halts."""
+    def aim(self, stamp_ns: int, pose: Pose) -> Aim | SpeedLimit:
+        """Where the program steers to from the pose at a time, or why it halts."""
+        self._track.put(stamp_ns, pose)
         return self._program.aim(pose)
+
+    def _program_of(self, action: str, parameters: Parameters) -> Program:
+        return program_of(action, parameters, self._follow, self._config, self._track)
 
     def _is_executed(self, action: Action) -> bool:
         executed = self._executed

@@ -224,7 +224,7 @@ class MotorModule:
         age_ns = self._age_ns(stamp_ns)
 
         self._execution.take(estimate.plan, estimate.pose)
-        aim = self._execution.aim(estimate.pose)
+        aim = self._execution.aim(stamp_ns, estimate.pose)
         if not isinstance(aim, Aim):
             return halted(stamp_ns, aim, age_ns)
 

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
 
 from cogmap.errors import MessageError
-from schemas.base import Scalar
 from schemas.cognition import ActionName
 from schemas.nodes import NEVER_NS, Plan, PlanState, Self
 from schemas.sensing import Pose, SpeedLimit
-from services.motor.aim import Aim, Speed, bearing_of, slowest
+from services.motor.aim import Aim, Speed, bearing_of
 from services.motor.config import Config
-from services.motor.route import Route
+from services.motor.guide import Guide, Track
+from services.motor.parameters import Parameters, number
+from services.motor.route import Route, pursuit
 
 TURNED_RAD = 0.05
-Parameters = Mapping[str, Scalar]
 
 
 class Program(Protocol):
@@ -63,25 +62,7 @@ class FollowPlan:
         if route is None:
             return self._without_route
 
-        route.advance(pose.x_m, pose.y_m)
-        lookahead_m = self._config.lookahead_m
-        x_m, y_m = route.ahead(lookahead_m)
-        away_m = math.hypot(x_m - pose.x_m, y_m - pose.y_m)
-        distance_m = max(lookahead_m / 2, away_m)
-        return Aim(bearing_of(x_m, y_m, pose), distance_m, self._speed(route))
-
-    def _speed(self, route: Route) -> Speed:
-        """The highest speed that the bend ahead and the end of the route allow."""
-        config = self._config
-        braking_distance_m = config.cruise_m_s**2 / (2 * config.braking_m_s2)
-        bend_per_m = route.sharpest(braking_distance_m)
-        in_bend_m_s = math.sqrt(config.lateral_m_s2 / max(bend_per_m, 1e-6))
-        to_end_m_s = math.sqrt(2 * config.braking_m_s2 * route.left_m)
-        return slowest(
-            Speed(config.cruise_m_s),
-            Speed(in_bend_m_s, SpeedLimit.BEND),
-            Speed(to_end_m_s, SpeedLimit.ROUTE_END),
-        )
+        return pursuit(route, pose, self._config)
 
 
 class Halt:
@@ -139,7 +120,9 @@ class Dock:
         return Aim(bearing_rad, away_m, Speed(self._config.dock_m_s))
 
 
-def program_of(action: str, parameters: Parameters, follow: FollowPlan, config: Config) -> Program:
+def program_of(
+    action: str, parameters: Parameters, follow: FollowPlan, config: Config, track: Track
+) -> Program:
     """The motor program of an action. Raises MessageError where there is none, or where it lacks a
     parameter.
     """
@@ -154,12 +137,6 @@ def program_of(action: str, parameters: Parameters, follow: FollowPlan, config: 
             return Turn(parameters)
         case ActionName.DOCK:
             return Dock(parameters, config)
+        case ActionName.GUIDE:
+            return Guide(parameters, config, track)
     raise MessageError(f"no motor program for {action!r}: there are {', '.join(ActionName)}")
-
-
-def number(parameters: Parameters, name: str) -> float:
-    """A parameter that is a number. Raises MessageError where it is none."""
-    value = parameters.get(name)
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise MessageError(f"motor program: parameter {name!r} is {value!r}, not a number")
-    return float(value)

@@ -1,11 +1,16 @@
-"""A plan's route as a line in the plane, smoothed. Pure."""
+"""A route as a line in the plane, smoothed, and how it is driven. Pure."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.polylines import resample
+from schemas.sensing import Pose, SpeedLimit
+from services.motor.aim import Aim, Speed, bearing_of, slowest
+from services.motor.config import Config
 
 STEP_M = 0.25
 SEARCH_M = 6.0
@@ -43,6 +48,14 @@ class Route:
         """Begin at the point of the whole line that is nearest to the agent."""
         self._index = _nearest(self.points_m, x_m, y_m)
 
+    @property
+    def pose(self) -> Floats:
+        """(3,): the point of the line where the agent is, and the direction there."""
+        first = max(0, min(self._index, self._last - 1))
+        ahead_x_m, ahead_y_m = (self.points_m[first + 1] - self.points_m[first]).tolist()
+        x_m, y_m = self.points_m[self._index].tolist()
+        return np.array([x_m, y_m, math.atan2(ahead_y_m, ahead_x_m)])
+
     def ahead(self, distance_m: float) -> tuple[float, float]:
         """The point of the line `distance_m` ahead of the agent, at most its end."""
         steps = round(distance_m / STEP_M)
@@ -61,6 +74,29 @@ class Route:
     @property
     def _last(self) -> int:
         return len(self.points_m) - 1
+
+
+def pursuit(route: Route, pose: Pose, config: Config) -> Aim:
+    """The point of a route that pure pursuit steers to from a pose, slower in bends."""
+    route.advance(pose.x_m, pose.y_m)
+    lookahead_m = config.lookahead_m
+    x_m, y_m = route.ahead(lookahead_m)
+    away_m = math.hypot(x_m - pose.x_m, y_m - pose.y_m)
+    distance_m = max(lookahead_m / 2, away_m)
+    return Aim(bearing_of(x_m, y_m, pose), distance_m, _speed(route, config))
+
+
+def _speed(route: Route, config: Config) -> Speed:
+    """The highest speed that the bend ahead and the end of the route allow."""
+    braking_distance_m = config.cruise_m_s**2 / (2 * config.braking_m_s2)
+    bend_per_m = route.sharpest(braking_distance_m)
+    in_bend_m_s = math.sqrt(config.lateral_m_s2 / max(bend_per_m, 1e-6))
+    to_end_m_s = math.sqrt(2 * config.braking_m_s2 * route.left_m)
+    return slowest(
+        Speed(config.cruise_m_s),
+        Speed(in_bend_m_s, SpeedLimit.BEND),
+        Speed(to_end_m_s, SpeedLimit.ROUTE_END),
+    )
 
 
 def _nearest(points_m: Floats, x_m: float, y_m: float) -> int:

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from schemas.base import Share
+from schemas.base import PositiveMetres, Share
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -39,6 +39,29 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             "graph and not in the broadcast, 0 to 1: what is conscious comes first."
         ),
     ] = 0.5
+    guidance_step_m: Annotated[
+        PositiveMetres,
+        msgspec.Meta(
+            description="Distance between the places of a drive from which guidance schemes are "
+            "learned, in m, above 0 to 10000."
+        ),
+    ] = 1.5
+    guidance_ahead_m: Annotated[
+        PositiveMetres,
+        msgspec.Meta(
+            description="Length of the path of a guidance scheme, in m, above 0 to 10000: as much "
+            "is driven without landmarks."
+        ),
+    ] = 25.0
+    max_guidance_schemes: Annotated[
+        int,
+        msgspec.Meta(
+            ge=1,
+            le=1000,
+            description="Guidance schemes that are kept of those learned, 1 to 1000; the oldest "
+            "are forgotten.",
+        ),
+    ] = 1000
     graph_kinds: Annotated[
         list[str],
         msgspec.Meta(

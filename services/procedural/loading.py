@@ -12,12 +12,12 @@ from typing import Any
 import msgspec
 
 from cogmap.errors import ConfigError
-from schemas.base import Name, PositiveSeconds, Scalar, Share
-from schemas.cognition import ActionName
+from schemas.base import Count, Finite, Name, PositiveSeconds, Scalar, Share
+from schemas.cognition import ActionName, GuidanceScheme, Relation
 from services.procedural.kinds import NodeKinds
 from services.procedural.patterns import Condition, Pattern
 from services.procedural.schemes import Reference, Result, Scheme
-from services.procedural.source import Source
+from services.procedural.source import GUIDANCE, Source
 
 BUILT_IN = Path(__file__).with_name("schemes.toml")
 KIND = "kind"
@@ -39,12 +39,27 @@ class SchemeTable(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     within_s: PositiveSeconds = 5.0
 
 
+class LandmarkTable(Relation, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """A landmark as it is written."""
+
+
+class GuidanceTable(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
+    """A guidance scheme as it is written."""
+
+    name: Name
+    landmarks: list[LandmarkTable]
+    path_m: list[tuple[Finite, Finite]]
+    executions: Count = 0
+    successes: Count = 0
+
+
 class SchemeFile(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     """A file of schemes. `generic_kinds` are kinds of nodes that other packages' codelets write,
     `own_actions` those that a motor module of somebody's own executes.
     """
 
-    scheme: list[SchemeTable]
+    scheme: list[SchemeTable] = []
+    guidance: list[GuidanceTable] = []
     generic_kinds: list[Name] = []
     own_actions: list[Name] = []
 
@@ -53,15 +68,7 @@ def load(path: Path) -> list[Scheme]:
     """The schemes of a file. Raises ConfigError that names the file, and the line of what is wrong
     in it.
     """
-    text = _read(path)
-    source = Source(path, text)
-    try:
-        file = msgspec.convert(tomllib.loads(text), SchemeFile)
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"cannot read {path} as TOML: {error}") from None
-    except msgspec.ValidationError as error:
-        raise _located(source, str(error)) from None
-
+    source, file = _decoded(path)
     kinds = NodeKinds(file.generic_kinds)
     actions = [*ActionName, *file.own_actions]
     schemes: list[Scheme] = []
@@ -72,6 +79,40 @@ def load(path: Path) -> list[Scheme]:
         schemes.append(scheme)
 
     return schemes
+
+
+def load_guidance(path: Path) -> list[GuidanceScheme]:
+    """The guidance schemes of a file. Raises ConfigError as `load` does."""
+    source, file = _decoded(path)
+    names = {table.name for table in file.scheme}
+    schemes = []
+    for number, table in enumerate(file.guidance):
+        if table.name in names:
+            text = f"two schemes are named {table.name!r}"
+            raise source.error(number, table.name, text, table=GUIDANCE)
+        if table.successes > table.executions:
+            text = f"scheme {table.name!r} has more successes than executions"
+            raise source.error(number, "successes", text, table=GUIDANCE)
+
+        names.add(table.name)
+        try:
+            schemes.append(msgspec.convert(msgspec.to_builtins(table), GuidanceScheme))
+        except msgspec.ValidationError as error:
+            word = str(error).rpartition("$.")[2].rstrip("`")
+            raise source.error(number, word, str(error), table=GUIDANCE) from None
+
+    return schemes
+
+
+def _decoded(path: Path) -> tuple[Source, SchemeFile]:
+    text = _read(path)
+    source = Source(path, text)
+    try:
+        return source, msgspec.convert(tomllib.loads(text), SchemeFile)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"cannot read {path} as TOML: {error}") from None
+    except msgspec.ValidationError as error:
+        raise _located(source, str(error)) from None
 
 
 def _read(path: Path) -> str:
@@ -87,11 +128,13 @@ def _read(path: Path) -> str:
 
 def _located(source: Source, error: str) -> ConfigError:
     """An error of the decoder, which names where it is by a path such as $.scheme[1].name."""
-    number = re.search(r"\$\.scheme\[(\d+)\]", error)
+    place = re.search(r"\$\.(\w+)\[(\d+)\]", error)
     words = re.findall(r"\w+", error.rpartition("$")[2]) or [""]
     unknown = re.search(r"unknown field `(\w+)`", error)
     word = unknown[1] if unknown else words[-1]
-    return source.error(int(number[1]) if number else None, word, error)
+    if place is None:
+        return source.error(None, word, error)
+    return source.error(int(place[2]), word, error, table=place[1])
 
 
 class _Reader:

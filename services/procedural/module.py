@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
+from msgspec.structs import replace
+
 from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
 from cogmap.runtime.module import Module
@@ -13,8 +15,9 @@ from schemas.base import Message
 from schemas.cognition import Action, Behaviours, Broadcast
 from schemas.graph import Delta
 from services.procedural.config import Config
+from services.procedural.guidance.memory import GuidanceMemory
 from services.procedural.learning import Reliability
-from services.procedural.loading import BUILT_IN, load
+from services.procedural.loading import BUILT_IN, load, load_guidance
 from services.procedural.situations import Situations
 
 __all__ = ["Config", "ProceduralMemory", "build"]
@@ -34,7 +37,14 @@ class ProceduralMemory:
         self._config = config
         self._is_lockstep = config.mode == "lockstep"
         self._graph = graph
-        self._schemes = load(Path(config.schemes) if config.schemes else BUILT_IN)
+        path = Path(config.schemes) if config.schemes else BUILT_IN
+        self._schemes = load(path)
+        self._guidance = GuidanceMemory(
+            load_guidance(path),
+            config.max_guidance_schemes,
+            config.guidance_step_m,
+            config.guidance_ahead_m,
+        )
         self._reliability = Reliability(self._schemes)
         self._situations = Situations(config.graph_kinds, config.unconscious_share)
         self._waiting: list[Broadcast] = []
@@ -43,20 +53,25 @@ class ProceduralMemory:
         self._resumed_cycle = -1
 
     def restore(self, past: Iterable[Message]) -> None:
-        """Continue with the reliability of schemes as it was published last."""
+        """Continue with the reliability of schemes as it was published last, and with all guidance
+        schemes. What was being learned begins anew.
+        """
         for message in past:
             if isinstance(message, Behaviours):
                 self._last = message
+                self._guidance.restore(message.learned)
 
         if self._last is not None:
             self._reliability.restore(self._last.behaviours)
             self._resumed_cycle = self._last.cycle
 
     def last(self) -> Behaviours:
-        """What was published last. Raises MessageError where nothing was."""
+        """What was published last, with all that was learned before. Raises MessageError where
+        nothing was.
+        """
         if self._last is None:
             raise MessageError("there was no broadcast yet")
-        return self._last
+        return replace(self._last, learned=self._guidance.kept)
 
     def on_delta(self, delta: Delta) -> list[Behaviours]:
         """The graph has changed."""
@@ -82,6 +97,7 @@ class ProceduralMemory:
     def on_action(self, action: Action) -> list[Behaviours]:
         """A scheme is executed, or none was active enough."""
         self._reliability.on_action(action)
+        self._guidance.on_action(action)
         if self._unanswered_cycle is not None and action.cycle >= self._unanswered_cycle:
             self._unanswered_cycle = None
         return self._due()
@@ -104,15 +120,20 @@ class ProceduralMemory:
     def _behaviours(self, broadcast: Broadcast) -> Behaviours:
         nodes = self._situations.of(broadcast)
         self._reliability.judge(nodes, broadcast.stamp_ns)
+        learned = self._guidance.on_broadcast(broadcast)
 
-        considered = []
+        threshold = self._config.instantiation
+        considered = self._guidance.behaviours(broadcast, nodes)
         for scheme in self._schemes:
-            behaviour = scheme.considered(nodes, self._config.instantiation)
+            behaviour = scheme.considered(nodes, threshold)
             considered.append(self._reliability.noted(behaviour))
 
         self._unanswered_cycle = broadcast.cycle
         self._last = Behaviours(
-            stamp_ns=broadcast.stamp_ns, cycle=broadcast.cycle, behaviours=considered
+            stamp_ns=broadcast.stamp_ns,
+            cycle=broadcast.cycle,
+            behaviours=considered,
+            learned=learned,
         )
         return self._last
 

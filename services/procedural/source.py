@@ -8,7 +8,9 @@ from pathlib import Path
 
 from cogmap.errors import ConfigError
 
-_HEADER = re.compile(r"^\s*\[\[\s*scheme\s*\]\]")
+SCHEME = "scheme"
+GUIDANCE = "guidance"
+_HEADER = re.compile(rf"^\s*\[\[\s*({SCHEME}|{GUIDANCE})\s*\]\]")
 
 
 class Source:
@@ -22,13 +24,26 @@ class Source:
     def __init__(self, path: Path, text: str) -> None:
         self._path = path
         self._lines = text.splitlines()
-        self._headers = [number for number, line in enumerate(self._lines) if _HEADER.match(line)]
+        self._headers: list[int] = []
+        self._of_table: dict[str, list[int]] = {SCHEME: [], GUIDANCE: []}
+        for number, line in enumerate(self._lines):
+            header = _HEADER.match(line)
+            if header is not None:
+                self._headers.append(number)
+                self._of_table[header[1]].append(number)
 
     def error(
-        self, scheme: int | None, word: str, text: str, near: Iterable[str] = ()
+        self,
+        scheme: int | None,
+        word: str,
+        text: str,
+        near: Iterable[str] = (),
+        table: str = SCHEME,
     ) -> ConfigError:
-        """An error about a word in the scheme of that number, from 0; None where it is in none."""
-        first, end = self._block(scheme)
+        """An error about a word in the scheme of that number, from 0, among those of a table of
+        TOML; None where it is in none.
+        """
+        first, end = self._block(scheme, table)
         found = [number for number in range(first, end) if self._has(number, word)]
         words = [*near]
 
@@ -38,14 +53,16 @@ class Source:
         number = max(found, key=share, default=first)
         return ConfigError(f"{self._path}:{number + 1}: {text}")
 
-    def _block(self, scheme: int | None) -> tuple[int, int]:
+    def _block(self, scheme: int | None, table: str) -> tuple[int, int]:
         """The first line of a scheme, and the one after its last."""
         bounds = [*self._headers, len(self._lines)]
         if scheme is None:
             return 0, bounds[0]
-        if scheme >= len(self._headers):
+        headers = self._of_table.get(table, [])
+        if scheme >= len(headers):
             return 0, len(self._lines)
-        return bounds[scheme], bounds[scheme + 1]
+        number = self._headers.index(headers[scheme])
+        return bounds[number], bounds[number + 1]
 
     def _has(self, number: int, word: str) -> bool:
         """Whether a line has a word, outside comments."""

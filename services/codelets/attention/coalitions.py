@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 
 import msgspec
 
 from cogmap.graph.graph import Graph
 from schemas.array import Matrix
-from schemas.cognition import Coalition
+from schemas.cognition import Coalition, Relation
 from schemas.graph import Link
-from schemas.nodes import AnyNode, Goal, LinkKind, Object, Plan, Self, object_id
+from schemas.nodes import AnyNode, Goal, LinkKind, Object, Plan, Self, look_of, object_id
 from schemas.sensing import Percept
 from services.codelets.nodes import nodes_of
 
@@ -21,8 +21,11 @@ def coalition(
     graph: Graph,
     base_level: float,
     links: Iterable[Link] = (),
+    *,
+    percepts: Iterable[Percept] = (),
 ) -> Coalition:
-    """A coalition of `nodes`, with their links to places and `links`, and the maps they are on.
+    """A coalition of `nodes`, with their links to places and `links`, the maps they are on, and how
+    those among `percepts` stand to the agent.
 
     Its activation is base-level x sum(total activation + |incentive salience|) / 2n over its n
     nodes and links, as in LIDA's framework. A link is as active and as salient as the node that it
@@ -43,6 +46,7 @@ def coalition(
         nodes=[_as_of_now(node, graph) for node in nodes],
         links=every_link,
         maps=_maps_of(nodes),
+        relations=_relations(percepts, strengths),
     )
 
 
@@ -56,6 +60,21 @@ def objects_in_view(percepts: list[Percept], graph: Graph) -> list[Object]:
     labels = sorted(percept.label for percept in percepts)
     names = [object_id(label) for label in labels]
     return nodes_of(graph, Object, names)
+
+
+def _relations(percepts: Iterable[Percept], names: Container[str]) -> dict[str, Relation]:
+    """The relations of the objects `names` to the agent, as far as they were perceived."""
+    relations = {}
+    for percept in percepts:
+        name = object_id(percept.label)
+        if name in names and percept.has_bearing and percept.has_range:
+            relations[name] = Relation(
+                look=look_of(percept.label),
+                range_m=percept.range_m,
+                bearing_rad=percept.bearing_rad,
+            )
+
+    return relations
 
 
 def _strength(node: AnyNode, graph: Graph) -> float:

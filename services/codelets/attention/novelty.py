@@ -37,7 +37,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         return Answer()
 
     nodes: list[AnyNode] = [graph.agent, *novel]
-    found = coalition(NAME, nodes, graph, config.novelty.base_level)
+    found = coalition(NAME, nodes, graph, config.novelty.base_level, percepts=task.percepts)
     return brought(memory_of(NAME, graph), found, task.cycle, graph)
 
 

@@ -33,7 +33,8 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     if not nodes:
         return Answer()
 
-    found = coalition(NAME, nodes, graph, config.whereabouts.base_level)
+    base_level = config.whereabouts.base_level
+    found = coalition(NAME, nodes, graph, base_level, percepts=task.percepts)
     if not config.whereabouts.refractory_cycles:
         return Answer(coalitions=[found])
     return brought(memory_of(NAME, graph), found, task.cycle, graph)

@@ -13,6 +13,7 @@ from schemas.nodes import PLAN_ID, Plan, PlanState
 from schemas.sensing import Pose, SpeedLimit
 from services.motor.aim import Aim
 from services.motor.config import Config
+from services.motor.guide import Track
 from services.motor.programs import FollowPlan, Program, program_of
 from tests.support.world.motor import action_of, command_after, module_ahead, pose_delta, scan_of
 from tests.support.world.plans import plan_along
@@ -22,7 +23,7 @@ def _program(action: str, **parameters: float) -> Program:
     config = Config()
     follow = FollowPlan(config)
     follow.take(plan_along((0.0, 0.0), (50.0, 0.0)), None)
-    return program_of(action, parameters, follow, config)
+    return program_of(action, parameters, follow, config, Track())
 
 
 def _at(x_m: float = 0.0, y_m: float = 0.0, heading_rad: float = 0.0) -> Pose:
@@ -99,12 +100,12 @@ def test_other_parameters_start_a_program_anew() -> None:
 @pytest.mark.parametrize("parameters", [{}, {"turn_rad": True}, {"turn_rad": "left"}])
 def test_a_turn_by_no_number_is_refused(parameters: dict[str, bool | str]) -> None:
     with pytest.raises(MessageError, match=r"parameter 'turn_rad' is .*, not a number"):
-        program_of(ActionName.TURN, parameters, FollowPlan(Config()), Config())
+        program_of(ActionName.TURN, parameters, FollowPlan(Config()), Config(), Track())
 
 
 def test_a_halt_at_the_goal_states_that_it_is_there() -> None:
     follow = FollowPlan(Config())
-    halt = program_of(ActionName.HALT, {}, follow, Config())
+    halt = program_of(ActionName.HALT, {}, follow, Config(), Track())
     before = halt.aim(_at())
     follow.take(Plan(id=PLAN_ID, state=PlanState.AT_GOAL, planned_ns=1), None)
 

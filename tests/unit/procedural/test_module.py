@@ -22,6 +22,7 @@ from schemas.nodes import (
     episode_id,
 )
 from services.procedural.module import Config, build
+from tests.support.world.guidance import broadcast, driven, relations, selected
 from tests.support.world.scenes import PERIOD_NS, agent
 
 READY = Plan(id=PLAN_ID, state=PlanState.READY, base_level=1.0)
@@ -239,3 +240,27 @@ def test_a_graph_that_is_loaded_as_a_whole_has_its_plan() -> None:
 def test_a_kind_that_the_graph_does_not_find_by_kind_is_refused() -> None:
     with pytest.raises(ConfigError, match="graph_kinds names 'self': there are episode, goal"):
         Memory(graph_kinds=["plan", "self"])
+
+
+def test_guidance_that_was_learned_is_journaled_and_known_after_a_restart() -> None:
+    memory = _memory("real_time")
+    published: list[Message] = []
+    memory.module.feed(selected(1))
+    for cycle in range(1, 60):
+        at_m = complex(cycle)
+        published += memory.module.feed(
+            broadcast(cycle, driven(at_m, cycle=cycle), relations(at_m))
+        )
+
+    learned = [
+        scheme for each in published if isinstance(each, Behaviours) for scheme in each.learned
+    ]
+    after = _memory("real_time")
+    assert after.module.restore is not None
+    assert after.module.compact is not None
+    after.module.restore(published)
+    compact = after.module.compact()
+
+    assert len(learned) > 10
+    assert isinstance(compact, Behaviours)
+    assert compact.learned == learned

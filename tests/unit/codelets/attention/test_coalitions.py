@@ -122,3 +122,28 @@ def test_coalitions_leave_samples_behind_and_keep_links_and_maps() -> None:
     assert house.offsets_m is None
     assert found.links == [at]
     assert found.maps == ["map:0"]
+
+
+def test_a_coalition_has_how_its_objects_were_perceived_to_stand_to_the_agent() -> None:
+    graph = graph_of(agent(), landmark("house"), landmark("house~2"))
+    seen = [
+        percept("house~2", bearing_rad=0.2, range_m=12.0),
+        percept("house", range_sd_m=99.0),
+        percept("shop"),
+    ]
+
+    (brought,) = run(task("whereabouts", percepts=seen), graph, CONFIG).coalitions
+
+    ((name, relation),) = brought.relations.items()
+    assert name == "object:house~2"
+    assert (relation.look, relation.range_m, relation.bearing_rad) == ("house", 12.0, 0.2)
+
+
+def test_relations_make_a_coalition_no_more_active() -> None:
+    graph = graph_of(agent(), landmark("house"))
+    nodes: list[AnyNode] = [agent(), landmark("house")]
+
+    related = coalition("test", nodes, graph, 1.0, percepts=[percept("house")])
+
+    assert related.relations
+    assert related.activation == coalition("test", nodes, graph, 1.0).activation

@@ -1,0 +1,61 @@
+"""`cogmap schemes`: the guidance schemes that an agent learned on a recorded drive."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from cli.launch.plan import LOG_NAME
+from cogmap.errors import LogError
+from cogmap.recording.log import open_log
+from cogmap.runtime.state.new_file import new_file
+from schemas import topics
+from schemas.cognition import Behaviours, GuidanceScheme
+from services.procedural.guidance.toml import written
+
+_EPILOG = """\b
+Examples:
+  cogmap schemes runs/latest                     as they are written in a file of schemes
+  cogmap schemes runs/latest --out route.toml    into a new file
+  cogmap run --town blocks --set planning.explore=false --set procedural.schemes=route.toml
+"""
+
+
+@click.command(epilog=_EPILOG)
+@click.argument("log", type=click.Path(path_type=Path))
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="Write them into FILE, a new one.  [default: print them]",
+)
+def schemes(log: Path, out: Path | None) -> None:
+    """Write the guidance schemes learned on the drive in LOG, which may be a run's folder.
+
+    Each has what stood where as seen by the agent, and the path that it drove from there. An agent
+    that is given them in a file of schemes, and no goal, drives where the other one drove, from
+    where that one began.
+    """
+    path = log / LOG_NAME if log.is_dir() else log
+    found = learned(path)
+    if not found:
+        raise LogError(f"{path} holds no guidance schemes: record a drive to a goal past buildings")
+
+    text = written(found)
+    if out is None:
+        click.echo(text, nl=False)
+        return
+    with new_file(out) as made:
+        made.write_text(text, "utf-8")
+    click.echo(f"{out}: {len(found)} guidance schemes")
+
+
+def learned(path: Path) -> list[GuidanceScheme]:
+    """The guidance schemes of a log, as they were published last. Raises LogError."""
+    found: dict[str, GuidanceScheme] = {}
+    for entry in open_log(path).messages(topics.BEHAVIOURS.name):
+        assert isinstance(entry.message, Behaviours)
+        found |= {scheme.name: scheme for scheme in entry.message.learned}
+
+    return list(found.values())

@@ -1,0 +1,26 @@
+"""The parameters of motor programs. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from cogmap.errors import MessageError
+from schemas.base import Scalar
+
+Parameters = Mapping[str, Scalar]
+
+
+def number(parameters: Parameters, name: str) -> float:
+    """A parameter that is a number. Raises MessageError where it is none."""
+    value = parameters.get(name)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise MessageError(f"motor program: parameter {name!r} is {value!r}, not a number")
+    return float(value)
+
+
+def stamp(parameters: Parameters, name: str) -> int:
+    """A parameter that is a time in ns. Raises MessageError where it is none."""
+    value = parameters.get(name)
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise MessageError(f"motor program: parameter {name!r} is {value!r}, not a time in ns")
+    return value

@@ -1,0 +1,110 @@
+"""How well a guidance scheme fits what is conscious, and the behaviour that it becomes. Pure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from schemas.base import Scalar
+from schemas.cognition import ActionName, Behaviour, GuidanceScheme, Relation
+from services.procedural.guidance.alignment import Motion, aligned, pairs_of
+
+HALF_AWAY_M = 4.0
+HALF_TURNED_RAD = 0.5
+UNTRIED = 0.5
+SALIENCE = 0.3
+ENOUGH = 3
+SEEN_NS = "seen_ns"
+RESULT = "self at the end of the path"
+
+
+def reliability(scheme: GuidanceScheme) -> float:
+    """The share of its executions that were successes, UNTRIED before the first."""
+    if not scheme.executions:
+        return UNTRIED
+    return scheme.successes / scheme.executions
+
+
+class Fit(NamedTuple):
+    """A scheme in a situation: how active each of its landmarks is, in words, how active they are
+    together, and the motion that brings its landmarks and its path to where they are now.
+    """
+
+    scheme: GuidanceScheme
+    context: Mapping[str, float]
+    activation: float
+    motion: Motion
+
+    def behaviour(self, seen_ns: int) -> Behaviour:
+        """What the scheme becomes by a view of that stamp."""
+        scheme = self.scheme
+        path_m = [self.motion.moved(complex(*place_m)) for place_m in scheme.path_m]
+        return Behaviour(
+            scheme=scheme.name,
+            activation=min(1.0, self.activation + SALIENCE),
+            action=ActionName.GUIDE,
+            parameters=_parameters(path_m, seen_ns),
+            context=dict(self.context),
+            adding={RESULT: SALIENCE},
+            reliability=reliability(scheme),
+            executions=scheme.executions,
+            successes=scheme.successes,
+        )
+
+
+def fit(
+    scheme: GuidanceScheme, relations: Mapping[str, Relation], activations: Mapping[str, float]
+) -> Fit | None:
+    """How a scheme fits the `relations` to objects, by their ids; None where it does not.
+
+    Each landmark is as active as its object, the less the farther the agent is from where it
+    learned the scheme: half as much at HALF_AWAY_M, or HALF_TURNED_RAD. One that is missing is not
+    active, and fewer than ENOUGH are taken for ENOUGH of which the others are missing.
+    """
+    pairs = pairs_of(scheme.landmarks, list(relations.values()))
+    found = aligned(pairs)
+    if found is None:
+        return None
+
+    motion, agreeing = found
+    names = list(relations)
+    closeness = _closeness(motion)
+    context = {_spelled(landmark): 0.0 for landmark in scheme.landmarks}
+    for pair in agreeing:
+        landmark = scheme.landmarks[pair.number]
+        context[_spelled(landmark)] = closeness * activations.get(names[pair.seen], 0.0)
+
+    activation = sum(context.values()) / max(ENOUGH, len(scheme.landmarks))
+    return Fit(scheme, context, activation, motion)
+
+
+def _parameters(path_m: Sequence[complex], seen_ns: int) -> dict[str, Scalar]:
+    """The parameters of the action that drives a path, of which the agent is at the start."""
+    parameters: dict[str, Scalar] = {SEEN_NS: seen_ns}
+    for number, place_m in enumerate(path_m, start=1):
+        parameters[f"ahead_{number}_m"] = place_m.real
+        parameters[f"left_{number}_m"] = place_m.imag
+    return parameters
+
+
+def end_of(parameters: Mapping[str, Scalar]) -> complex | None:
+    """The last place of the path that parameters have; None where they have no path."""
+    last = len(parameters) // 2
+    ahead_m = parameters.get(f"ahead_{last}_m")
+    left_m = parameters.get(f"left_{last}_m")
+    if not isinstance(ahead_m, int | float) or not isinstance(left_m, int | float):
+        return None
+    return complex(ahead_m, left_m)
+
+
+def _closeness(motion: Motion) -> float:
+    away = abs(motion.origin_before()) / HALF_AWAY_M
+    turned = motion.turn_rad / HALF_TURNED_RAD
+    return 1.0 / (1.0 + away**2 + turned**2)
+
+
+def _spelled(landmark: Relation) -> str:
+    """A landmark in words."""
+    degrees = math.degrees(landmark.bearing_rad)
+    return f"{landmark.look} at {landmark.range_m:.0f} m, {degrees:+.0f} degrees"

@@ -1,0 +1,154 @@
+"""Learns guidance schemes: what stood where, and where the agent drove from there. Pure."""
+
+from __future__ import annotations
+
+import cmath
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from schemas.cognition import Relation
+from schemas.nodes import NEVER_NS, Self
+
+TURNED_RAD = 0.3
+STOP_NS = 5_000_000_000
+MAX_LANDMARKS = 6
+MARKED_M = 2.0
+MAX_MARKS = 40
+ENOUGH_LANDMARKS = 2
+BLIND_SHARE = 0.25
+
+
+class Place(NamedTuple):
+    """Where the agent is by path integration, a complex number in metres, and its heading."""
+
+    at_m: complex
+    heading_rad: float
+
+    @staticmethod
+    def of(agent: Self) -> Place:
+        """That of a self node."""
+        at_m = complex(agent.odometry_x_m, agent.odometry_y_m)
+        return Place(at_m, agent.odometry_heading_rad)
+
+    def to(self, other_m: complex) -> complex:
+        """Another position, metres ahead + metres left x i as seen from here."""
+        return (other_m - self.at_m) * cmath.rect(1.0, -self.heading_rad)
+
+    def out(self, seen_m: complex) -> complex:
+        """The position of what is seen there."""
+        return self.at_m + seen_m * cmath.rect(1.0, self.heading_rad)
+
+
+class Lesson(NamedTuple):
+    """Landmarks, and the path from there, metres ahead + metres left x i."""
+
+    landmarks: list[Relation]
+    path_m: list[complex]
+
+
+@dataclass
+class _Begun:
+    """A lesson that goes on: from which place and how far along the drive it began, and the path
+    since.
+    """
+
+    landmarks: list[Relation]
+    place: Place
+    driven_m: float
+    path_m: list[complex]
+
+
+class Lessons:
+    """Begins a lesson every `step_m` of a drive, and each time that the agent has turned.
+
+    A lesson ends `ahead_m` further on, or later where no landmarks are seen meanwhile; and where
+    the agent stays for STOP_NS. A shorter stop is part of the drive.
+    """
+
+    def __init__(self, step_m: float, ahead_m: float) -> None:
+        self._step_m = step_m
+        self._ahead_m = ahead_m
+        self._begun: deque[_Begun] = deque()
+        self._last: _Begun | None = None
+        self._seen_ns = NEVER_NS
+        self._place: Place | None = None
+        self._driven_m = 0.0
+        self._marked_m = 0.0
+        self._stopped_ns: int | None = None
+
+    def on_view(self, agent: Self, relations: Iterable[Relation], drives: bool) -> list[Lesson]:
+        """The lessons that end with what is conscious; `drives`: whether the agent does something
+        of its own to get anywhere. None of a view that became conscious after a later one.
+        """
+        if agent.stamp_ns <= self._seen_ns:
+            return []
+
+        self._seen_ns = agent.stamp_ns
+        place = Place.of(agent)
+        if self._place is not None:
+            self._driven_m += abs(place.at_m - self._place.at_m)
+        self._place = place
+        self._mark(place)
+
+        if not drives:
+            return self._ended_by_stop(agent.stamp_ns, place)
+
+        self._stopped_ns = None
+        self._begin(place, relations)
+        return self._ended(place)
+
+    def _mark(self, place: Place) -> None:
+        """Note where the path of all lessons leads."""
+        if self._driven_m - self._marked_m < MARKED_M:
+            return
+
+        self._marked_m = self._driven_m
+        for begun in self._begun:
+            if len(begun.path_m) < MAX_MARKS:
+                begun.path_m.append(begun.place.to(place.at_m))
+
+    def _ended_by_stop(self, stamp_ns: int, place: Place) -> list[Lesson]:
+        if self._stopped_ns is None:
+            self._stopped_ns = stamp_ns
+        if stamp_ns - self._stopped_ns < STOP_NS:
+            return []
+
+        ended = [_lesson(begun, place) for begun in self._begun]
+        self._begun.clear()
+        self._last = None
+        return ended
+
+    def _begin(self, place: Place, relations: Iterable[Relation]) -> None:
+        nearest = sorted(relations, key=lambda each: (each.range_m, each.look))[:MAX_LANDMARKS]
+        last = self._last
+        since_m = self._driven_m if last is None else self._driven_m - last.driven_m
+        is_far = last is None or since_m >= self._step_m or _has_turned(last.place, place)
+        is_blind = last is None or since_m >= BLIND_SHARE * self._ahead_m
+        if not is_far or len(nearest) < (1 if is_blind else ENOUGH_LANDMARKS):
+            return
+
+        self._last = _Begun(nearest, place, self._driven_m, [0j])
+        self._begun.append(self._last)
+
+    def _ended(self, place: Place) -> list[Lesson]:
+        ended = []
+        while self._begun and self._is_over(self._begun[0]):
+            ended.append(_lesson(self._begun.popleft(), place))
+        return ended
+
+    def _is_over(self, begun: _Begun) -> bool:
+        """Whether the agent is far enough on, and has begun another lesson on the way."""
+        assert self._last is not None
+        is_far = self._driven_m - begun.driven_m >= self._ahead_m
+        return is_far and self._last.driven_m - begun.driven_m >= self._ahead_m / 2
+
+
+def _has_turned(before: Place, now: Place) -> bool:
+    turn = cmath.rect(1.0, now.heading_rad - before.heading_rad)
+    return abs(cmath.phase(turn)) >= TURNED_RAD
+
+
+def _lesson(begun: _Begun, place: Place) -> Lesson:
+    return Lesson(begun.landmarks, [*begun.path_m, begun.place.to(place.at_m)])

@@ -1,0 +1,164 @@
+"""The part of procedural memory that holds guidance schemes: learns, recalls and judges them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+
+from msgspec.structs import replace
+
+from schemas.cognition import Action, ActionName, Behaviour, Broadcast, GuidanceScheme
+from schemas.nodes import Plan, PlanState, Self
+from services.procedural.guidance.arrivals import Arrivals
+from services.procedural.guidance.context import SEEN_NS, Fit, end_of, fit, reliability
+from services.procedural.guidance.lessons import Lesson, Lessons, Place
+from services.procedural.patterns import Active
+
+REMEMBERED_PLACES = 64
+MIN_FIT = 0.25
+DRIVING = frozenset({ActionName.FOLLOW_PLAN, ActionName.SEEK})
+NAME = "guide_{}"
+_NUMBERED = re.compile(r"guide_(\d+)")
+
+
+class GuidanceMemory:
+    """Those schemes that it was given compete; those that it learns do once they are given to it,
+    for an agent without a goal stands.
+
+    Of more than `limit` that were learned or judged, it forgets the oldest.
+    """
+
+    def __init__(
+        self, given: Sequence[GuidanceScheme], limit: int, step_m: float, ahead_m: float
+    ) -> None:
+        self._given = {scheme.name: scheme for scheme in given}
+        self._kept: dict[str, GuidanceScheme] = {}
+        self._limit = limit
+        self._lessons = Lessons(step_m, ahead_m)
+        self._arrivals = Arrivals()
+        self._learned = _number_after(given)
+        self._drives = False
+        self._places: dict[int, Place] = {}
+
+    @property
+    def kept(self) -> list[GuidanceScheme]:
+        """All that were learned or judged."""
+        return list(self._kept.values())
+
+    def restore(self, schemes: Iterable[GuidanceScheme]) -> None:
+        """Continue with what was published before."""
+        for scheme in schemes:
+            self._keep(scheme)
+        self._learned = max(self._learned, _number_after(self.kept))
+
+    def on_action(self, action: Action) -> None:
+        """An action is executed, or the one before goes on."""
+        if not action.scheme:
+            return
+
+        self._drives = action.action in DRIVING
+        if action.action == ActionName.GUIDE and action.scheme in self._given:
+            self._expect(action)
+
+    def on_broadcast(self, broadcast: Broadcast) -> list[GuidanceScheme]:
+        """The schemes that a broadcast completes, or lets be judged."""
+        agent = _agent_of(broadcast)
+        if agent is None:
+            return []
+
+        place = self._remember(agent)
+        changed = []
+        judged = self._arrivals.judged(place.at_m, broadcast.stamp_ns)
+        for name, is_success in judged.items():
+            changed.append(self._judged(name, is_success))
+
+        relations = broadcast.coalition.relations.values()
+        for lesson in self._lessons.on_view(agent, relations, self._drives):
+            changed.append(self._new(lesson))
+
+        for scheme in changed:
+            self._keep(scheme)
+        return changed
+
+    def behaviours(self, broadcast: Broadcast, nodes: Sequence[Active]) -> list[Behaviour]:
+        """That of the scheme that fits best, where that is at least MIN_FIT; none where the agent
+        has a goal.
+        """
+        agent = _agent_of(broadcast)
+        relations = broadcast.coalition.relations
+        if agent is None or not relations or _has_goal(nodes):
+            return []
+
+        activations = {active.node.id: active.activation for active in nodes}
+        fits = [fit(scheme, relations, activations) for scheme in self._given.values()]
+        found = [each for each in fits if each is not None and each.activation >= MIN_FIT]
+        if not found:
+            return []
+
+        best = min(found, key=_rank)
+        return [best.behaviour(agent.stamp_ns)]
+
+    def _remember(self, agent: Self) -> Place:
+        place = Place.of(agent)
+        self._places[agent.stamp_ns] = place
+        while len(self._places) > REMEMBERED_PLACES:
+            del self._places[next(iter(self._places))]
+        return place
+
+    def _expect(self, action: Action) -> None:
+        """Await the agent where a scheme leads, as seen from where it was."""
+        end_m = end_of(action.parameters)
+        seen_ns = action.parameters.get(SEEN_NS)
+        place = self._places.get(seen_ns) if isinstance(seen_ns, int) else None
+        if place is not None and end_m is not None:
+            self._arrivals.expect(action.scheme, place.out(end_m), action.stamp_ns)
+
+    def _new(self, lesson: Lesson) -> GuidanceScheme:
+        name = NAME.format(self._learned)
+        self._learned += 1
+        return GuidanceScheme(
+            name=name,
+            landmarks=lesson.landmarks,
+            path_m=[(place_m.real, place_m.imag) for place_m in lesson.path_m],
+        )
+
+    def _judged(self, name: str, is_success: bool) -> GuidanceScheme:
+        scheme = self._given[name]
+        return replace(
+            scheme,
+            executions=scheme.executions + 1,
+            successes=scheme.successes + is_success,
+        )
+
+    def _keep(self, scheme: GuidanceScheme) -> None:
+        if scheme.name in self._given:
+            self._given[scheme.name] = scheme
+        self._kept[scheme.name] = scheme
+        while len(self._kept) > self._limit:
+            del self._kept[next(iter(self._kept))]
+
+
+def _agent_of(broadcast: Broadcast) -> Self | None:
+    agents = [node for node in broadcast.coalition.nodes if isinstance(node, Self)]
+    return agents[0] if agents else None
+
+
+def _rank(each: Fit) -> tuple[float, float, str]:
+    """The order in which schemes come to mind."""
+    return -each.activation, -reliability(each.scheme), each.scheme.name
+
+
+def _has_goal(nodes: Iterable[Active]) -> bool:
+    """Whether the agent plans for a goal, or explores."""
+    plans = [active.node for active in nodes if isinstance(active.node, Plan)]
+    return any(plan.state is not PlanState.NO_GOAL for plan in plans)
+
+
+def _number_after(schemes: Iterable[GuidanceScheme]) -> int:
+    """The first number from 1 that no scheme has in its name, nor one before it."""
+    numbers = [0]
+    for scheme in schemes:
+        match = _NUMBERED.fullmatch(scheme.name)
+        if match is not None:
+            numbers.append(int(match[1]))
+    return max(numbers) + 1
