@@ -52,7 +52,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             description="Length of the path of a guidance scheme, in m, above 0 to 10000: as much "
             "is driven without landmarks."
         ),
-    ] = 25.0
+    ] = 40.0
     max_guidance_schemes: Annotated[
         int,
         msgspec.Meta(
