@@ -18,13 +18,13 @@ from schemas.process import Clock
 from schemas.sensing import MotorCommand, Pose, RangeScan, SelfMotion, SpeedLimit
 from services.motor.aim import Aim
 from services.motor.config import Config
-from services.motor.escape import Escape
 from services.motor.execution import Execution
 from services.motor.gate import LockstepGate
 from services.motor.motor import SensoryMotorMemory, halted, obstacle_ahead_m
-from services.motor.near import NearObstacles
+from services.motor.reactive.escape import Escape
+from services.motor.reactive.near import NearObstacles
+from services.motor.reactive.stuck import StuckDetector
 from services.motor.seeking import sought_by
-from services.motor.stuck import StuckDetector
 
 __all__ = ["Config", "MotorModule", "build"]
 

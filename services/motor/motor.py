@@ -12,7 +12,7 @@ from cogmap.errors import MessageError
 from schemas.sensing import MotorCommand, RangeScan, SpeedLimit
 from services.motor.aim import Aim, Speed, slowest
 from services.motor.config import Config
-from services.motor.near import NearObstacles
+from services.motor.reactive.near import NearObstacles
 
 MAX_BEARING_RAD = math.pi / 3
 TURNING_SPEED_M_S = 0.5

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from schemas.sensing import MotorCommand, SpeedLimit
 from services.motor.config import Config
-from services.motor.escape import BACK_S, PATIENCE_S, Escape
 from services.motor.motor import halted
+from services.motor.reactive.escape import BACK_S, PATIENCE_S, Escape
 
 
 def _forward(seconds: float) -> MotorCommand:

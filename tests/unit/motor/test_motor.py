@@ -14,8 +14,8 @@ from schemas.sensing import MotorCommand, Pose, RangeScan, SpeedLimit
 from services.motor.aim import Aim
 from services.motor.config import Config
 from services.motor.motor import SensoryMotorMemory, obstacle_ahead_m
-from services.motor.near import NearObstacles
 from services.motor.programs import FollowPlan
+from services.motor.reactive.near import NearObstacles
 from services.motor.route import SMOOTHED_M
 from tests.support.world.plans import Point, plan_along
 

@@ -9,7 +9,7 @@ import pytest
 
 from schemas.array import Array
 from schemas.sensing import RangeScan, SelfMotion
-from services.motor.near import NearObstacles
+from services.motor.reactive.near import NearObstacles
 
 CLEARANCE_M = 0.7
 STEP_NS = 200_000_000

@@ -1,0 +1,1 @@
+"""Reactive layers under the motor programs: what is near, being stuck, backing away."""
