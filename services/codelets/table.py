@@ -23,7 +23,14 @@ from services.codelets.attention import (
 )
 from services.codelets.correction import apply_correction, map_correction
 from services.codelets.localization import landmarks, localization
-from services.codelets.mapping import boundary, loop_detection, object_place, path, road_place
+from services.codelets.mapping import (
+    boundary,
+    charging_place,
+    loop_detection,
+    object_place,
+    path,
+    road_place,
+)
 from services.codelets.planning import route_plan
 from services.codelets.recollection import join_map
 from services.codelets.resolution import coarse_places
@@ -34,6 +41,7 @@ CODELETS: tuple[Codelet, ...] = (
     join_map.CODELET,
     localization.CODELET,
     object_place.CODELET,
+    charging_place.CODELET,
     landmarks.CODELET,
     road_place.CODELET,
     boundary.CODELET,

@@ -44,7 +44,7 @@ class Battery(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=T
             description="Distance from a charging place at most, of a robot that is charged as it "
             "stands, in m, above 0 to 10000."
         ),
-    ] = 5.0
+    ] = 7.0
     places: Annotated[
         int, msgspec.Meta(ge=1, le=100, description="Charging places in the town, 1 to 100.")
     ] = 4

@@ -4,6 +4,7 @@ Pure.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from cogmap.errors import ConfigError
 from cogmap.geometry.arrays import Booleans, Floats
+from cogmap.geometry.se2 import transform_to
 from services.sim.layout.boundaries import clearance_m, surfaces
 from services.sim.layout.furniture import CHARGING_PLACE, Prop
 from services.sim.layout.place import Place
@@ -27,14 +29,18 @@ PROP_M = 3.5
 POST_M = 15.0
 CANDIDATES = 1000
 DRAWS = 200
+# From where the robot starts, less than the distance at which it is charged.
+HOME_M = 6.5
+HOME_OFFSETS_M = (0.0, -1.5, 1.5, -3.0, 3.0, -4.5, 4.5)
 _HALF_M = SIZE_M[1] / 2
 
 
 def with_charging_places(place: Place, seed: int, count: int) -> Place:
     """`place` with `count` charging places more, the same from the same seed.
 
-    They are spread so that none of its streets is far from one, and clear of every street, building
-    and prop. Raises ConfigError where there is no room for so many.
+    One is where the robot starts, if there is room. The others are spread so that none of its
+    streets is far from one, and clear of every street, building and prop. Raises ConfigError where
+    there is no room for so many.
     """
     if not count:
         return place
@@ -42,14 +48,20 @@ def with_charging_places(place: Place, seed: int, count: int) -> Place:
     rng = np.random.default_rng([seed, 0xC4A6])
     candidates = _candidates(rng, place.roads)
     free = _free(candidates, place)
-    chosen = _spread(rng, _middles_m(free), _middles_m(candidates), count)
-    if not chosen:
+    home = _free(_beside_start(place), place)[:1]
+    if home:
+        apart = _is_apart(_middles_m(free), [(home[0].x_m, home[0].y_m)], POST_M)
+        free = [post for post, is_apart in zip(free, apart.tolist(), strict=True) if is_apart]
+
+    others = count - len(home)
+    chosen = _spread(rng, _middles_m(free), _middles_m(candidates), others) if others else []
+    if len(chosen) < others:
         raise ConfigError(
             f"[sim] the town has no room for {count} charging places: lower battery.places or set "
             "energy to false"
         )
 
-    posts = [free[number] for number in chosen]
+    posts = [*home, *(free[number] for number in chosen)]
     return replace(place, props=(*place.props, *posts))
 
 
@@ -67,6 +79,26 @@ def _candidates(rng: np.random.Generator, roads: Sequence[Road]) -> list[Prop]:
         posts.append(_post(roads[number], along_m, side))
 
     return posts
+
+
+def _beside_start(place: Place) -> list[Prop]:
+    """Posts at the kerbs of the streets that the robot starts on, from which it is charged there,
+    the nearest first.
+    """
+    posts = []
+    start = np.array([[place.start.x_m, place.start.y_m]])
+    for road in place.roads:
+        ((along_m, left_m),) = transform_to(np.array([*road.start, road.heading_rad]), start)
+        if not 0.0 <= along_m <= road.length_m or abs(left_m) > road.width_m / 2:
+            continue
+        for offset_m in HOME_OFFSETS_M:
+            for side in (-1.0, 1.0):
+                posts.append(_post(road, float(along_m) + offset_m, side))
+
+    def away_m(post: Prop) -> float:
+        return math.dist((post.x_m, post.y_m), (place.start.x_m, place.start.y_m))
+
+    return sorted((post for post in posts if away_m(post) <= HOME_M), key=away_m)
 
 
 def _post(road: Road, along_m: float, side: float) -> Prop:
