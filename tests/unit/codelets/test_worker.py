@@ -110,7 +110,7 @@ def _recollection() -> Recollection:
 def _graph() -> Graph:
     """What every codelet finds something to do with."""
     goal = Goal(id=goal_id("house"), object="house")
-    need = Need(id=need_id("energy"), label="energy", level=0.9)
+    need = Need(id=need_id("energy"), label="energy", level=0.9, is_eased=True)
     known = (_self(), _house(), _path(), _closure(), _correction(), _recollection())
     return graph_of(*known, goal, need)
 
@@ -128,6 +128,7 @@ def _every_task() -> list[Task]:
         task("join_map"),
         task("localization", motions=motions, percepts=house),
         task("object_place", percepts=[percept("tower")]),
+        task("charging_place"),
         task("landmark", percepts=house),
         task("road_place", road_m=road_m),
         task("boundary", road_m=road_m, road_boundary_m=_KERB_M, scan=_RAYS),
