@@ -13,6 +13,10 @@ from schemas.sensing import Energy
 from services import registry
 
 MOTOR = "motor"
+CAPACITY_S = 500.0
+"""How long a full battery lasts at rest: for less than a life, so that to stand still is no way to
+live.
+"""
 
 
 @dataclass(frozen=True)
@@ -46,7 +50,11 @@ def live(seed: int, longest_s: float, acting: Module | None = None) -> Life:
     are over; `acting` selects actions in the place of the module `action`.
     """
     configured = sections(seed)
-    configured["sim"] = configured["sim"] | {"energy": True, "duration_s": longest_s}
+    configured["sim"] = configured["sim"] | {
+        "energy": True,
+        "battery": {"capacity_s": CAPACITY_S},
+        "duration_s": longest_s,
+    }
     configured["workspace"] |= {"awaits_energy": True, "offering": [MOTOR]}
     configured[MOTOR] |= {"makes_offers": True}
 

@@ -6,6 +6,8 @@ self-motion since. An arc that leads into it is replaced by one beside it.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats
@@ -77,9 +79,7 @@ class NearObstacles:
         range_m = np.asarray(scan.range_m.numpy(), np.float64)
         self._keep(self._points_m, ~self._is_seen_through(bearing_rad, range_m))
 
-        is_hit = (range_m >= NEAREST_SCAN_M) & (range_m <= FARTHEST_M)
-        ahead = np.column_stack([np.cos(bearing_rad), np.sin(bearing_rad)])
-        hits_m = range_m[is_hit, None] * ahead[is_hit]
+        hits_m = _hits_m(bearing_rad, range_m)
         stamps_ns = np.full(len(hits_m), scan.stamp_ns, np.int64)
 
         self._points_m = np.concatenate([self._points_m, hits_m])
@@ -122,7 +122,10 @@ class NearObstacles:
         return certain_m
 
     def _is_seen_through(self, bearing_rad: Floats, range_m: Floats) -> Booleans:
-        """(n,): which remembered points lie before what a scan sees in their direction."""
+        """(n,): which remembered points lie before what a scan sees in their direction and to both
+        sides of it: the edge of something is a little aside of where it was, by what odometry and
+        the width of a ray amount to.
+        """
         x_m, y_m = self._points_m.T
         if len(bearing_rad) < 2:
             return np.zeros(len(x_m), bool)
@@ -133,17 +136,76 @@ class NearObstacles:
 
         direction_rad = np.arctan2(y_m, x_m)
         borders_rad = ascending_rad[:-1] + half_rad
-        sector = order[np.searchsorted(borders_rad, direction_rad)]
+        place = np.searchsorted(borders_rad, direction_rad)
+        sector = order[place]
         is_in_view = np.abs(direction_rad - bearing_rad[sector]) <= half_rad
 
         distance_m = np.hypot(x_m, y_m)
-        sees_farther = range_m[sector] > distance_m + BEHIND_M
+        seen_m = np.minimum(range_m[sector], _least_beside_m(range_m[order])[place])
+        sees_farther = seen_m > distance_m + BEHIND_M
         is_through = is_in_view & sees_farther & (distance_m >= NEAREST_SCAN_M)
         return np.asarray(is_through, np.bool_)
 
     def _keep(self, points_m: Floats, is_kept: Booleans) -> None:
         self._points_m = points_m[is_kept]
         self._stamps_ns = self._stamps_ns[is_kept]
+
+
+def _hits_m(bearing_rad: Floats, range_m: Floats) -> Floats:
+    """(n, 2): what a scan hits, and where the surfaces that it hits end at the farthest."""
+    order = np.argsort(bearing_rad)
+    ascending_rad = bearing_rad[order]
+    seen_m = range_m[order]
+    seen_m = np.where(seen_m >= NEAREST_SCAN_M, seen_m, np.inf)
+
+    is_hit = seen_m <= FARTHEST_M
+    hits_m = _points_m(ascending_rad[is_hit], seen_m[is_hit])
+    if len(bearing_rad) < 2:
+        return hits_m
+
+    left_m = _ends_m(ascending_rad, seen_m)
+    right_m = _ends_m(-ascending_rad[::-1], seen_m[::-1]) * (1, -1)
+    return np.concatenate([hits_m, left_m, right_m])
+
+
+def _ends_m(bearing_rad: Floats, range_m: Floats) -> Floats:
+    """(n, 2): where a surface meets the first ray that passes it on the left, SAME_M from its last
+    hit at the farthest.
+
+    Rays of (k,) ascending bearings sample a surface: it ends somewhere between two of them, which
+    is far along it at a small angle of incidence. What leaves the view goes on as well.
+    """
+    step_rad = float(np.diff(bearing_rad).mean())
+    after_m = np.append(range_m[1:], np.inf)
+    is_end = (range_m <= FARTHEST_M) & (after_m > range_m + BEHIND_M)
+
+    last_rad = bearing_rad[is_end]
+    last_m = range_m[is_end]
+    before_m = np.append(np.inf, range_m[:-1])[is_end]
+    is_surface = np.abs(before_m - last_m) <= BEHIND_M
+    before_m = np.where(is_surface, before_m, last_m)
+
+    # Along a straight line the inverse range is a sinusoid of the bearing.
+    inverse_per_m = 2 * math.cos(step_rad) / last_m - 1 / before_m
+    next_m = 1 / np.maximum(inverse_per_m, 1 / FARTHEST_M)
+
+    hits_m = _points_m(last_rad, last_m)
+    along_m = _points_m(last_rad + step_rad, next_m) - hits_m
+    share = np.minimum(1.0, SAME_M / np.hypot(*along_m.T))
+    ends_m: Floats = hits_m + share[:, None] * along_m
+    return ends_m
+
+
+def _points_m(bearing_rad: Floats, range_m: Floats) -> Floats:
+    return np.column_stack([range_m * np.cos(bearing_rad), range_m * np.sin(bearing_rad)])
+
+
+def _least_beside_m(range_m: Floats) -> Floats:
+    """(n,): the least of the ranges to both sides of each; infinite where nothing was seen."""
+    known_m = np.where(range_m > 0, range_m, np.inf)
+    padded_m = np.pad(known_m, 1, constant_values=np.inf)
+    least_m: Floats = np.minimum(padded_m[:-2], padded_m[2:])
+    return least_m
 
 
 def _least_distances_m(per_m: Floats, points_m: Floats) -> Floats:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from cogmap.geometry.arrays import Floats
 from schemas.array import Array
 from schemas.sensing import RangeScan, SelfMotion
 from services.motor.reactive.near import NearObstacles
@@ -25,6 +26,7 @@ class Robot:
     def __init__(self, post_m: tuple[float, float] | None = POST_M) -> None:
         self.near = NearObstacles(CLEARANCE_M)
         self._post_m = post_m
+        self._wall_m: float | None = None
         self._x_m = 0.0
         self._now_ns = 0
 
@@ -40,8 +42,9 @@ class Robot:
                 self.near.on_scan(self._scan())
 
     def remove_post(self, behind_m: float) -> None:
-        """From now on a wall that far ahead is seen where the post was."""
-        self._post_m = (self._x_m + behind_m, self._post_m[1] if self._post_m else 0.0)
+        """From now on a wall across the way, that far ahead, is seen where the post was."""
+        self._post_m = None
+        self._wall_m = self._x_m + behind_m
 
     def _motion(self, step_m: float) -> SelfMotion:
         row = [step_m / 0.2, 0.0, 0.2, 0.0, 0.0]
@@ -54,6 +57,9 @@ class Robot:
 
     def _scan(self) -> RangeScan:
         range_m = np.zeros(len(BEARINGS_RAD), np.float32)
+        if self._wall_m is not None:
+            range_m = (self._wall_m - self._x_m) / np.cos(BEARINGS_RAD)
+
         if self._post_m is not None:
             ahead_m = self._post_m[0] - self._x_m
             bearing_rad = math.atan2(self._post_m[1], ahead_m)
@@ -128,9 +134,7 @@ def test_what_a_later_scan_sees_through_is_forgotten() -> None:
     robot = Robot((6.0, 0.0))
     robot.drive(5)
     robot.remove_post(behind_m=9.0)
-    robot.drive(2, step_m=0.1)
-    robot._post_m = None
-    robot.drive(4)
+    robot.drive(6, step_m=0.1)
 
     assert _turn(robot.near, 0.0) == 0.0
 
@@ -158,3 +162,74 @@ def test_the_arc_that_is_taken_is_the_nearest_to_the_one_wanted(per_m: float) ->
     taken_per_m = _turn(robot.near, per_m)
 
     assert 0 <= taken_per_m / per_m < 1.0
+
+
+class Wall:
+    """A wall on the left of a robot, along its way, and a view of it."""
+
+    def __init__(self, left_m: float, ends_m: float) -> None:
+        with np.errstate(divide="ignore"):
+            on_wall_m = np.where(BEARINGS_RAD > 0, left_m / np.sin(BEARINGS_RAD), np.inf)
+
+        is_hit = on_wall_m * np.cos(BEARINGS_RAD) <= ends_m
+        self.range_m = np.where(is_hit, on_wall_m, 30.0).astype(np.float32)
+        self.last_hit_m = float((self.range_m * np.cos(BEARINGS_RAD))[is_hit].max())
+        self._end_m = np.array([ends_m, left_m])
+
+    def distance_m(self, from_m: float, per_m: float) -> float:
+        """How near to the wall's end an arc leads."""
+        along_m = np.linspace(0.0, 2.0, 50)
+        x_m = from_m + np.sin(per_m * along_m) / per_m
+        y_m = (1 - np.cos(per_m * along_m)) / per_m
+        return float(np.hypot(x_m - self._end_m[0], y_m - self._end_m[1]).min())
+
+
+def _show(near: NearObstacles, range_m: Floats, first: int, scans: int) -> None:
+    for number in range(first, first + scans):
+        scan = RangeScan(
+            stamp_ns=(number + 1) * STEP_NS,
+            frame=number,
+            bearing_rad=Array.of(BEARINGS_RAD),
+            range_m=Array.of(range_m.astype(np.float32)),
+        )
+        near.on_motion(_standing(scan))
+        near.on_scan(scan)
+
+
+def _drive_on(near: NearObstacles, number: int, forward_m: float) -> None:
+    row = [forward_m / 0.2, 0.0, 0.2, 0.0, 0.0]
+    motion = SelfMotion(
+        stamp_ns=(number + 1) * STEP_NS,
+        frame=number,
+        since_ns=number * STEP_NS,
+        motions=Array.of(np.array([row])),
+    )
+    near.on_motion(motion)
+
+
+def test_a_surface_may_reach_to_the_ray_that_passes_it() -> None:
+    near = NearObstacles(CLEARANCE_M)
+    wall = Wall(left_m=2.0, ends_m=4.55)
+    assert wall.last_hit_m < 4.2
+    _show(near, wall.range_m, first=0, scans=3)
+    _drive_on(near, 3, forward_m=3.5)
+
+    widest_per_m = _turn(near, 1.0)
+    assert wall.distance_m(3.5, widest_per_m) >= CLEARANCE_M - 0.05
+
+
+@pytest.mark.parametrize(("seen_from", "is_kept"), [(17, True), (19, False)])
+def test_what_was_seen_is_forgotten_where_rays_pass_it_on_both_sides(
+    seen_from: int, is_kept: bool
+) -> None:
+    near = NearObstacles(CLEARANCE_M)
+    post_m = np.full(len(BEARINGS_RAD), 20.0)
+    post_m[16] = 4.0
+    _show(near, post_m, first=0, scans=3)
+
+    passed_m = np.full(len(BEARINGS_RAD), 20.0)
+    passed_m[seen_from:] = 4.0
+    _show(near, passed_m, first=3, scans=1)
+    _drive_on(near, 4, forward_m=2.0)
+    is_left_clear = _turn(near, 0.15) == 0.15
+    assert is_left_clear is not is_kept
