@@ -12,10 +12,10 @@ from cogmap.graph.window import ROAD_FROM, Extent
 from schemas.nodes import PLAN_ID, PlaceColumn, Plan, Self, place_cell, place_id
 from services.codelets.planning.ground import stands_there
 
-# What stands so far ahead on a route is seen.
-AHEAD_M = 30.0
+# The range scan reaches no farther ahead.
+AHEAD_M = 60.0
 # What is found so near to where a street was closed is the same closure, for as many cycles.
-SAME_M = 25.0
+SAME_M = 12.0
 SAME_CYCLES = 3000
 
 

@@ -46,7 +46,7 @@ class Novelty(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=T
 class Expectation(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """Which objects are expected in view, and when it is a surprise that they are not.
 
-    They are to stand inside the image and nearer than perception reaches, and either the rays of
+    They are to stand inside the view and nearer than perception reaches, and either the rays of
     the range scan pass where they stood, or nothing that is known hides them: what is hidden is no
     surprise.
     """
@@ -57,7 +57,8 @@ class Expectation(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fiel
         Count,
         Meta(
             description="Views in which an object is missing, since it was seen last, before "
-            "that is a surprise, 1 to 10000: perception misses one of twenty."
+            "that is a surprise, 1 to 10000: perception misses one of twenty. Half as many do in "
+            "which the rays of the range scan pass where it stood."
         ),
     ] = 4
     established_sightings: Annotated[
@@ -75,8 +76,11 @@ class Expectation(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fiel
     ] = 35.0
     field_of_view_rad: Annotated[
         PositiveRadians,
-        Meta(description="Angle within which objects are expected, in rad, above 0 to 6.28."),
-    ] = 1.2
+        Meta(
+            description="Angle within which perception sees an object whole, in rad, above 0 to "
+            "6.28. Aside of it only rays that pass where an object stood say that it is gone."
+        ),
+    ] = 1.28
     largest_sd_m: Annotated[
         PositiveMetres,
         Meta(

@@ -105,10 +105,10 @@ def _with_missing(
             noted[name] = number
 
     gone = []
-    for name in missing:
-        number = memory.noted.get(name, 0) + 1
-        noted[name] = min(number, settings.views)
-        if number == settings.views:
+    for name, counts in missing.items():
+        before = memory.noted.get(name, 0)
+        noted[name] = min(before + counts, settings.views)
+        if before < settings.views == noted[name]:
             gone.append(name)
 
     pending = {}

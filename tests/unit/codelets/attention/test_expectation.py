@@ -28,7 +28,8 @@ from services.codelets.attention.disappearance import MANY_OBJECTS
 from tests.support.world.scenes import agent, graph_of, landmark, percept, run, task
 
 VIEWS = 3
-CONFIG = Config(expectation=Expectation(views=VIEWS, refractory_cycles=1))
+"""So many in which rays pass where a house stood are a surprise; twice as many without."""
+CONFIG = Config(expectation=Expectation(views=2 * VIEWS, refractory_cycles=1))
 HOUSE_M = 20.0
 BEARINGS_RAD = np.linspace(-0.5, 0.5, 21)
 
@@ -150,8 +151,22 @@ def test_a_house_behind_what_the_scan_hits_is_hidden() -> None:
     assert Story(_house()).looks(2 * VIEWS, WALL) == []
 
 
+@pytest.mark.parametrize(("range_m", "number"), [(HOUSE_M + 15.0, 1), (HOUSE_M / 4, 0)])
+def test_aside_where_perception_is_weak_rays_that_pass_say_that_a_house_is_gone(
+    range_m: float, number: int
+) -> None:
+    house = landmark("house", [(14.0, 14.0)], sightings=50, width_m=8.0)
+    bearings_rad = np.linspace(-0.9, 0.9, 37)
+    scan = Array.of(np.column_stack([bearings_rad, np.full(37, range_m)]), "<f4")
+
+    assert len(Story(house).looks(VIEWS, scan)) == number
+
+
 def test_what_is_low_and_stops_the_scan_hides_no_house() -> None:
-    assert len(Story(_house()).looks(VIEWS, FENCE)) == 1
+    story = Story(_house())
+
+    assert story.looks(2 * VIEWS - 1, FENCE) == []
+    assert len(story.looks(1, FENCE)) == 1
 
 
 @pytest.mark.parametrize(("aside_m", "number"), [(0.0, 0), (3.0, 0), (8.0, 1)])
@@ -160,7 +175,7 @@ def test_a_house_that_is_known_to_stand_before_another_hides_it(
 ) -> None:
     before = landmark("before", [(HOUSE_M / 2, aside_m)], width_m=8.0)
 
-    assert len(Story(_house(), before).looks(VIEWS, FENCE)) == number
+    assert len(Story(_house(), before).looks(2 * VIEWS, FENCE)) == number
 
 
 def test_views_in_which_a_house_is_hidden_do_not_count() -> None:
