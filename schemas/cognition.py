@@ -11,6 +11,7 @@ import msgspec
 
 from schemas.array import Array
 from schemas.base import Count, Finite, Message, Name, Part, Scalar, Unit
+from schemas.feelings import Feeling
 from schemas.graph import Link
 from schemas.nodes import AnyNode
 
@@ -81,7 +82,8 @@ class Coalition(Part, kw_only=True, frozen=True):
 
     `id` is unique in a run; the workspace gives it when it commits the codelet's answer. `maps` are
     ids of cognitive maps. `relations` are those of its objects, by their ids, to the agent, as they
-    were perceived in the view that it is about.
+    were perceived in the view that it is about. `feeling` is what the agent feels about it: nodes
+    with a salience below 0 are missing, or not as expected, where that is SURPRISE.
     """
 
     id: str = ""
@@ -91,6 +93,7 @@ class Coalition(Part, kw_only=True, frozen=True):
     links: list[Link] = []
     maps: list[Name] = []
     relations: dict[Name, Relation] = {}
+    feeling: Feeling = Feeling.NONE
 
 
 class Coalitions(Message, kw_only=True, frozen=True):

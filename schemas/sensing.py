@@ -11,6 +11,7 @@ import numpy as np
 
 from schemas.array import Array
 from schemas.base import Count, Finite, Message, Name, Part, Unit
+from schemas.feelings import Feeling, salience_of
 
 Metres = Annotated[float, msgspec.Meta(ge=0, le=1e6)]
 
@@ -104,7 +105,8 @@ class Percept(Part, kw_only=True, frozen=True):
     estimated centre; `whole` says that neither image border nor another object cuts it. `box_px` is
     left, top, width, height in the view; `outline_px` are the corners, column and row, of a polygon
     around what is seen of it.
-    `function` is what it is used for, as far as what it was recognised as implies that.
+    `function` is what it is used for, as far as what it was recognised as implies that. `feelings`
+    are those that the PAM node activates, each with its activation.
     """
 
     label: Name
@@ -120,6 +122,12 @@ class Percept(Part, kw_only=True, frozen=True):
     box_px: tuple[int, int, int, int]
     outline_px: list[tuple[int, int]] = []
     function: str = ""
+    feelings: dict[Feeling, Unit] = {}
+
+    @property
+    def salience(self) -> float:
+        """How much its feelings make it matter, -1 to 1."""
+        return salience_of(self.feelings)
 
     @property
     def has_bearing(self) -> bool:

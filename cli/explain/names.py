@@ -89,6 +89,11 @@ def of_percept(percept: Percept) -> str:
     return ", ".join(parts)
 
 
+def of_feelings(percept: Percept) -> str:
+    """What is felt about an object, and how strongly."""
+    return ", ".join(f"{name} {share:.2f}" for name, share in percept.feelings.items())
+
+
 def bearing(bearing_rad: float) -> str:
     """A direction as seen from the agent, whose left is positive."""
     if abs(bearing_rad) < AHEAD_RAD:

@@ -144,7 +144,8 @@ def _perceived(moment: Moment) -> Stage:
     rows = [Row((f"frame {percepts.frame}: {recognised(percepts)}",))]
     for percept in sorted(percepts.objects, key=lambda each: -each.activation):
         label = names.spoken(percept.label)
-        cells = (*_measured(percept.activation), label, names.of_percept(percept))
+        where = names.of_percept(percept)
+        cells = (*_measured(percept.activation), label, where, names.of_feelings(percept))
         rows.append(Row(cells))
     return Stage("perceived", moment.percepts.after_ms, rows)
 
@@ -192,6 +193,8 @@ def _conscious(moment: Moment) -> Stage:
     entered = moment.entered.get(moment.winner)
     cycle = "a cycle that is not in the log" if entered is None else f"cycle {entered.cycle}"
     why = [f"It is coalition {moment.winner} of {names.spoken(coalition.codelet)}, from {cycle}."]
+    if coalition.feeling:
+        why.append(f"It is felt as {coalition.feeling}.")
     return Stage("conscious", moment.broadcast.after_ms, rows, why)
 
 

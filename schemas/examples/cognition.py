@@ -26,6 +26,7 @@ from schemas.cognition import (
 from schemas.examples import nodes
 from schemas.examples.arrays import ramp
 from schemas.examples.graph import instance_link
+from schemas.feelings import Feeling
 
 
 def messages() -> list[Message]:
@@ -50,6 +51,7 @@ def coalition() -> Coalition:
         links=[instance_link(weight=1.0)],
         maps=["map:1"],
         relations={nodes.object_node().id: _relation()},
+        feeling=Feeling.NOVELTY,
     )
 
 

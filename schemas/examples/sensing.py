@@ -5,6 +5,7 @@ from __future__ import annotations
 from schemas.array import Array
 from schemas.base import Message
 from schemas.examples.arrays import ramp
+from schemas.feelings import Feeling
 from schemas.sensing import (
     Associations,
     Building,
@@ -50,15 +51,15 @@ def messages() -> list[Message]:
 
 
 def learned() -> Learned:
-    """An object learned, a view remembered, and two PAM nodes that were conscious together."""
+    """An object learned, a view remembered, and PAM nodes that were conscious together."""
     associations = Associations(
         updated_ns=800_000_000,
-        names=["object:building-07", "category:shop"],
-        base_levels=Array.of([0.25, 0.5]),
-        activations=Array.of([1.0, 0.5]),
-        sources=Array.of([0, 1], "<i4"),
-        targets=Array.of([1, 0], "<i4"),
-        weights=Array.of([0.25, 0.125]),
+        names=["object:building-07", "category:shop", "feeling:danger"],
+        base_levels=Array.of([0.25, 0.5, 0.125]),
+        activations=Array.of([1.0, 0.5, 0.25]),
+        sources=Array.of([0, 1, 0], "<i4"),
+        targets=Array.of([1, 0, 2], "<i4"),
+        weights=Array.of([0.25, 0.125, 0.25]),
     )
     return Learned(
         frame=6,
@@ -84,6 +85,7 @@ def percept() -> Percept:
         box_px=(12, 34, 56, 78),
         outline_px=[(12, 34), (68, 34), (68, 112)],
         function="shop",
+        feelings={Feeling.DANGER: 0.25},
     )
 
 

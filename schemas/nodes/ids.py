@@ -35,6 +35,11 @@ def goal_id(name: str) -> str:
     return f"goal:{name}"
 
 
+def feeling_id(name: str) -> str:
+    """The id of the feeling `name`, such as danger."""
+    return f"feeling:{name}"
+
+
 def percept_id(label: str) -> str:
     """The id of the percept of the object that perception calls `label`."""
     return f"percept:{label}"

@@ -13,6 +13,7 @@ from cogmap.errors import ConfigError
 from cogmap.runtime import config
 from cogmap.runtime.codelet import ENTRY_POINTS, Codelet, ConfiguredCodelet
 from services.codelets.attention import (
+    danger,
     episode,
     expectation,
     goal,
@@ -56,6 +57,7 @@ CODELETS: tuple[Codelet, ...] = (
     expectation.CODELET,
     goal.CODELET,
     need.CODELET,
+    danger.CODELET,
     place_lost.CODELET,
     episode.CODELET,
 )

@@ -14,7 +14,7 @@ Deviations = Annotated[float, msgspec.Meta(gt=0, le=100)]
 
 
 class Priming(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """How what was conscious makes perception expect what it goes with."""
+    """How what was conscious makes perception expect what it goes with, and feel about it."""
 
     share: Annotated[
         Share,
@@ -39,6 +39,29 @@ class Priming(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=T
             "was conscious, over 0, at most 1"
         ),
     ] = 0.1
+    feeling_rate: Annotated[
+        PositiveShare,
+        msgspec.Meta(
+            description="how far one broadcast moves the link from a PAM node to what is felt with "
+            "it towards 1, over 0, at most 1: a danger is known after one encounter; LIDA gives no "
+            "rate"
+        ),
+    ] = 0.5
+    feeling_unlearning_rate: Annotated[
+        Share,
+        msgspec.Meta(
+            description="how far one broadcast of a PAM node moves its links to other feelings "
+            "than novelty that are not felt with it towards 0, 0 to 1: fear is extinguished more "
+            "slowly than it is learned"
+        ),
+    ] = 0.02
+    feeling_threshold: Annotated[
+        Share,
+        msgspec.Meta(
+            description="a percept has the feelings that its PAM node activates more than so much, "
+            "0 to 1"
+        ),
+    ] = 0.3
     kept_broadcasts: Annotated[
         int,
         msgspec.Meta(

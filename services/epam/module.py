@@ -85,7 +85,7 @@ class Perception:
         percepts = Percepts(
             stamp_ns=view.stamp_ns,
             frame=view.frame,
-            objects=perceived.objects,
+            objects=[self._primer.felt(percept) for percept in perceived.objects],
             road_m=Array.of(perceived.road_m),
             road_boundary_m=Array.of(perceived.road_boundary_m),
             matches=matches,

@@ -135,6 +135,7 @@ def percept_operations(graph: Graph, context: CycleContext) -> list[Operation]:
             id=percept_id(percept.label),
             activation=percept.activation,
             cycle=context.cycle,
+            salience=percept.salience,
             label=percept.label,
             bearing_rad=percept.bearing_rad,
             range_m=percept.range_m,

@@ -61,7 +61,10 @@ def percepts(moment: Moment) -> Box:
 
 def _percept(percept: Percept, colour: str, width_in: float) -> list[Block]:
     label = heading(names.spoken(percept.label), "", width_in)
-    where = Words([names.of_percept(percept)], SMALL, FAINT)
+    lines = [names.of_percept(percept)]
+    if percept.feelings:
+        lines += wrapped(names.of_feelings(percept), inner_in(width_in), SMALL, 2)
+    where = Words(lines, SMALL, FAINT)
     return [label, Bar(percept.activation, colour), where, BETWEEN]
 
 

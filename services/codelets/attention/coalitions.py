@@ -9,6 +9,7 @@ import msgspec
 from cogmap.graph.graph import Graph
 from schemas.array import Matrix
 from schemas.cognition import Coalition, Relation
+from schemas.feelings import Feeling
 from schemas.graph import Link
 from schemas.nodes import AnyNode, Goal, LinkKind, Object, Plan, Self, look_of, object_id
 from schemas.sensing import Percept
@@ -23,9 +24,10 @@ def coalition(
     links: Iterable[Link] = (),
     *,
     percepts: Iterable[Percept] = (),
+    feeling: Feeling = Feeling.NONE,
 ) -> Coalition:
-    """A coalition of `nodes`, with their links to places and `links`, the maps they are on, and how
-    those among `percepts` stand to the agent.
+    """A coalition of `nodes`, with their links to places and `links`, the maps they are on, how
+    those among `percepts` stand to the agent, and the `feeling` about it.
 
     Its activation is base-level x sum(total activation + |incentive salience|) / 2n over its n
     nodes and links, as in LIDA's framework. A link is as active and as salient as the node that it
@@ -47,6 +49,7 @@ def coalition(
         links=every_link,
         maps=_maps_of(nodes),
         relations=_relations(percepts, strengths),
+        feeling=feeling,
     )
 
 
@@ -56,10 +59,16 @@ def felt(node: AnyNode, salience: float) -> AnyNode:
 
 
 def objects_in_view(percepts: list[Percept], graph: Graph) -> list[Object]:
-    """The objects of the map that are in view, by label."""
-    labels = sorted(percept.label for percept in percepts)
-    names = [object_id(label) for label in labels]
-    return nodes_of(graph, Object, names)
+    """The objects of the map that are in view, by label, each as salient as its percept where that
+    is more than what is felt about it in the graph.
+    """
+    saliences = {object_id(percept.label): percept.salience for percept in percepts}
+    objects = []
+    for node in nodes_of(graph, Object, sorted(saliences)):
+        salience = max(node.salience, saliences[node.id], key=abs)
+        objects.append(msgspec.structs.replace(node, salience=salience))
+
+    return objects
 
 
 def _relations(percepts: Iterable[Percept], names: Container[str]) -> dict[str, Relation]:

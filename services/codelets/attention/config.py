@@ -117,6 +117,31 @@ class Need(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True
     ] = 0.5
 
 
+class Danger(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """What stands so near ahead that the agent may run into it."""
+
+    base_level: BaseLevel = 1.0
+    refractory_cycles: Refractory = 1
+    nearest_m: Annotated[
+        PositiveMetres,
+        Meta(
+            description="Distance within which something ahead is a danger, in m, above 0 to "
+            "10000: little more than motor.clearance_m, at which the robot is stopped."
+        ),
+    ] = 3.0
+    half_width_m: Annotated[
+        PositiveMetres,
+        Meta(description="Half the width of the lane ahead, in m, above 0 to 10000."),
+    ] = 0.7
+    same_cycles: Annotated[
+        Count,
+        Meta(
+            description="Cycles without a danger after which one is another, and brought again, "
+            "1 to 10000."
+        ),
+    ] = 25
+
+
 class PlaceLost(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """Whether the agent knows where it is."""
 
@@ -150,6 +175,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         Goal()
     )
     need: Annotated[Need, Meta(description="A need that is high.")] = Need()
+    danger: Annotated[Danger, Meta(description="What stands near ahead.")] = Danger()
     place_lost: Annotated[PlaceLost, Meta(description="The agent is lost, or was found again.")] = (
         PlaceLost()
     )

@@ -11,6 +11,7 @@ import msgspec
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.codelets import Task
+from schemas.feelings import Feeling
 from schemas.graph import Link, Phase
 from schemas.nodes import (
     PLAN_ID,
@@ -73,7 +74,9 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         return kept(memory, graph)
 
     links = _links_to_closed(memory, content)
-    found = coalition(NAME, [agent, *content], graph, settings.base_level, links)
+    found = coalition(
+        NAME, [agent, *content], graph, settings.base_level, links, feeling=Feeling.SURPRISE
+    )
     return brought(memory, found, task.cycle, graph)
 
 

@@ -8,6 +8,7 @@ from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas import nodes
 from schemas.codelets import Task
+from schemas.feelings import Feeling
 from schemas.graph import Phase
 from schemas.nodes import (
     PLAN_ID,
@@ -61,7 +62,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         if satisfying is not None:
             content.append(felt(satisfying, node.level))
 
-    found = coalition(NAME, content, graph, config.need.base_level)
+    found = coalition(NAME, content, graph, config.need.base_level, feeling=Feeling.NEED)
     return brought(memory_of(NAME, graph), found, task.cycle, graph)
 
 

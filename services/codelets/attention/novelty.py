@@ -7,6 +7,7 @@ import msgspec
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.codelets import Task
+from schemas.feelings import Feeling
 from schemas.graph import Phase
 from schemas.nodes import SELF_ID, AnyNode, Attention, Object, Self
 from schemas.sensing import Percept
@@ -37,7 +38,10 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         return Answer()
 
     nodes: list[AnyNode] = [graph.agent, *novel]
-    found = coalition(NAME, nodes, graph, config.novelty.base_level, percepts=task.percepts)
+    base_level = config.novelty.base_level
+    found = coalition(
+        NAME, nodes, graph, base_level, percepts=task.percepts, feeling=Feeling.NOVELTY
+    )
     return brought(memory_of(NAME, graph), found, task.cycle, graph)
 
 

@@ -7,8 +7,9 @@ import msgspec
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.codelets import Task
+from schemas.feelings import Feeling
 from schemas.graph import Phase
-from schemas.nodes import SELF_ID, Attention, Self
+from schemas.nodes import SELF_ID, AnyNode, Attention, Object, Self, object_id
 from services.codelets.attention.coalitions import coalition, felt
 from services.codelets.attention.config import SECTION, Config
 from services.codelets.attention.memory import (
@@ -19,6 +20,7 @@ from services.codelets.attention.memory import (
     with_pending,
     without_conscious,
 )
+from services.codelets.nodes import nodes_of
 
 NAME = "place_lost"
 LOST = "lost"
@@ -41,7 +43,9 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
-    """A coalition of the self alone: it is bad to be lost, and good to be found."""
+    """A coalition of the self, and of the landmark that did not fit first while it is lost: it is
+    bad to be lost, and good to be found.
+    """
     agent = graph.agent
     if agent is None:
         return Answer()
@@ -54,9 +58,19 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     if not memory.pending and not agent.is_lost:
         return kept(memory, graph)
 
-    salience = -1.0 if agent.is_lost else 1.0
-    found = coalition(NAME, [felt(agent, salience)], graph, config.place_lost.base_level)
+    base_level = config.place_lost.base_level
+    if agent.is_lost:
+        content: list[AnyNode] = [agent, *_misfits(agent, graph)]
+        bad = [felt(node, -1.0) for node in content]
+        found = coalition(NAME, bad, graph, base_level, feeling=Feeling.LOST)
+    else:
+        found = coalition(NAME, [felt(agent, 1.0)], graph, base_level)
     return brought(memory, found, task.cycle, graph)
+
+
+def _misfits(agent: Self, graph: Graph) -> list[Object]:
+    """The landmark that did not fit first, where the map has it."""
+    return nodes_of(graph, Object, [object_id(agent.first_misfit)])
 
 
 CODELET = Codelet(
@@ -64,7 +78,7 @@ CODELET = Codelet(
     phase=Phase.ATTENTION,
     due=due,
     run=run,
-    reads=frozenset({Self, Attention}),
+    reads=frozenset({Self, Object, Attention}),
     writes=frozenset({Attention}),
     config=Config,
     section=SECTION,

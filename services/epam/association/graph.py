@@ -11,20 +11,27 @@ from collections.abc import Mapping
 import numpy as np
 
 from cogmap.errors import MessageError
-from cogmap.geometry.arrays import Floats
+from cogmap.geometry.arrays import Booleans, Floats
 from schemas.array import Array
+from schemas.feelings import Feeling
+from schemas.nodes import feeling_id
 from schemas.sensing import Associations
 from services.epam.config import Priming
 
 MAX_NODES = 256
 FAINT = 0.01
 """Weaker links are not published, and prime nothing."""
+FEELINGS = {feeling_id(feeling): feeling for feeling in Feeling if feeling}
+"""The PAM nodes that are feelings, by name."""
 
 
 class AssociativeGraph:
     """PAM nodes with a base level and a current activation, and weighted links between them.
 
     The activation of a node is 1 at a broadcast of it and halves every `half_life_s`.
+
+    Feelings are nodes too. To one lead links from what was conscious in the same broadcast, none
+    lead from it: what is felt tells nothing of what is there.
     """
 
     def __init__(self, config: Priming) -> None:
@@ -44,7 +51,8 @@ class AssociativeGraph:
         """Learn from a broadcast of the nodes `names`.
 
         Base levels rise. Each weight moves towards the activation of its target, by a rate times
-        that of its source: a node that has long been silent keeps its links.
+        that of its source: a node that has long been silent keeps its links. Those to feelings
+        change by rates of their own.
         """
         self._decay(stamp_ns)
         for name in names:
@@ -56,10 +64,8 @@ class AssociativeGraph:
         levels = self._base_levels.copy()
         levels[conscious] += rate * (1 - levels[conscious])
         self._base_levels = levels
-        sources = self._activations[:, None]
-        missing = self._activations[None, :] - self._weights
-        self._weights += rate * sources * missing
-        np.fill_diagonal(self._weights, 0.0)
+        self._associate(~self._is_feeling())
+        self._attach(conscious)
 
     def primed(self, stamp_ns: int) -> Mapping[str, float]:
         """The nodes that activation has spread to by `stamp_ns`, each with what came over its best
@@ -72,6 +78,28 @@ class AssociativeGraph:
         spread = (sources[:, None] * self._weights).max(axis=0)
         names = list(self._index)
         return {names[row]: float(spread[row]) for row in np.flatnonzero(spread >= FAINT)}
+
+    def feelings(self, name: str, activation: float) -> dict[Feeling, float]:
+        """The feelings that a node activates over its links above their threshold, where it has
+        that activation itself; none where it is not known.
+        """
+        threshold = self._config.feeling_threshold
+        row = self._index.get(name)
+        if row is None:
+            return {}
+
+        felt = {}
+        for feeling_name, feeling in FEELINGS.items():
+            column = self._index.get(feeling_name)
+            passed = 0.0 if column is None else activation * float(self._weights[row, column])
+            if passed > threshold:
+                felt[feeling] = passed
+
+        return felt
+
+    def __contains__(self, name: str) -> bool:
+        """Whether there is a PAM node of that name."""
+        return name in self._index
 
     def published(self) -> Associations:
         """The graph as a message, without what is FAINT."""
@@ -110,6 +138,36 @@ class AssociativeGraph:
         self._weights = np.zeros((count, count))
         self._weights[sources, targets] = values
 
+    def _associate(self, is_linked: Booleans) -> None:
+        """Change the weights between the nodes that are linked with one another, (n,)."""
+        between = np.ix_(is_linked, is_linked)
+        activations = self._activations[is_linked]
+        weights = self._weights[between]
+
+        missing = activations[None, :] - weights
+        changed = weights + self._config.learning_rate * activations[:, None] * missing
+        np.fill_diagonal(changed, 0.0)
+        self._weights[between] = changed
+
+    def _attach(self, conscious: list[int]) -> None:
+        """Change the weights of the links to feelings from what is conscious, by row: towards 1 to
+        what is felt now, towards 0 to the others.
+        """
+        columns = {self._index[name]: name for name in FEELINGS if name in self._index}
+        rows = [row for row in conscious if row not in columns]
+        for column, name in columns.items():
+            is_felt = column in conscious
+            weights = self._weights[rows, column]
+            missing = float(is_felt) - weights
+            rate = self._attachment_rate(FEELINGS[name], is_felt)
+            self._weights[rows, column] = weights + rate * missing
+
+    def _attachment_rate(self, feeling: Feeling, is_felt: bool) -> float:
+        """Novelty wears off as fast as it comes."""
+        if is_felt or feeling is Feeling.NOVELTY:
+            return self._config.feeling_rate
+        return self._config.feeling_unlearning_rate
+
     def _left(self, stamp_ns: int) -> float:
         """The share of activation that is left at `stamp_ns`."""
         passed_s = max(0, stamp_ns - self._updated_ns) / 1e9
@@ -119,8 +177,14 @@ class AssociativeGraph:
         self._activations = self._activations * self._left(stamp_ns)
         self._updated_ns = max(self._updated_ns, stamp_ns)
 
+    def _is_feeling(self) -> Booleans:
+        """(n,): which nodes are feelings."""
+        return np.array([name in FEELINGS for name in self._index], np.bool_)
+
     def _add(self, name: str) -> None:
-        """Add a node, in a full graph in the place of the one that was conscious least."""
+        """Add a node, in a full graph in the place of the one that was conscious least and is no
+        feeling.
+        """
         if name in self._index:
             return
         if len(self._index) < MAX_NODES:
@@ -130,7 +194,7 @@ class AssociativeGraph:
             self._weights = np.pad(self._weights, (0, 1))
             return
 
-        row = int(self._base_levels.argmin())
+        row = int(np.where(self._is_feeling(), np.inf, self._base_levels).argmin())
         names = list(self._index)
         names[row] = name
         self._index = {each: number for number, each in enumerate(names)}

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections import deque
 
+import msgspec
+
 from schemas.cognition import Broadcast
-from schemas.nodes import Object, category_id, look_of, object_id
-from schemas.sensing import Associations
+from schemas.feelings import Feeling
+from schemas.nodes import Object, category_id, feeling_id, look_of, object_id
+from schemas.sensing import Associations, Percept
 from services.epam.association.graph import AssociativeGraph
 from services.epam.association.prior import Prior
 from services.epam.config import Priming
@@ -63,6 +66,17 @@ class Primer:
         """What is expected of a view."""
         return Prior(self._graph.primed(view_ns), self._config.share)
 
+    def felt(self, percept: Percept) -> Percept:
+        """`percept` with the feelings that its PAM node activates; where the object was never
+        conscious, those of its category.
+        """
+        name = object_id(look_of(percept.label))
+        if name not in self._graph:
+            name = category_id(percept.function)
+
+        feelings = self._graph.feelings(name, percept.activation)
+        return msgspec.structs.replace(percept, feelings=feelings)
+
     def published(self) -> Associations:
         """The graph as it is now."""
         return self._graph.published()
@@ -74,14 +88,19 @@ class Primer:
 
 def nodes_of(broadcast: Broadcast) -> list[str]:
     """The PAM nodes that are conscious in a broadcast: objects, by their look, that are not brought
-    as missing, and the categories of those.
+    as missing, the categories of those, and what is felt.
     """
+    coalition = broadcast.coalition
+    is_surprise = coalition.feeling is Feeling.SURPRISE
     names: dict[str, None] = {}
-    for node in broadcast.coalition.nodes:
-        if not isinstance(node, Object) or node.salience < 0:
+    for node in coalition.nodes:
+        is_missing = is_surprise and node.salience < 0
+        if not isinstance(node, Object) or is_missing:
             continue
         names[object_id(look_of(node.label))] = None
         if node.function:
             names[category_id(node.function)] = None
 
+    if coalition.feeling:
+        names[feeling_id(coalition.feeling)] = None
     return list(names)

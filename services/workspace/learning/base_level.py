@@ -1,6 +1,6 @@
 """Conscious learning: the base level of what was broadcast rises (LIDA's framework).
 
-What was broadcast as missing, with a salience below 0, is unlearned instead.
+What was broadcast as missing, a surprise with a salience below 0, is unlearned instead.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import msgspec
 from cogmap.graph import decay
 from cogmap.graph.graph import Graph
 from schemas.cognition import Broadcast, Coalition
+from schemas.feelings import Feeling
 from schemas.graph import Operation
 from schemas.nodes import KINDS, AnyNode, Attention, attention_id
 from services.workspace.config import Config
@@ -30,10 +31,12 @@ def learned_operations(
     """
     learned: dict[str, AnyNode] = {}
     for broadcast in broadcasts:
+        is_surprise = broadcast.coalition.feeling is Feeling.SURPRISE
         for told in broadcast.coalition.nodes:
+            missing = -min(0.0, told.salience) if is_surprise else 0.0
             node = learned.get(told.id) or graph.nodes.get(told.id)
             if node is not None and not KINDS[type(node)].persistent:
-                learned[node.id] = _learned(node, told.salience, graph, cycle, config)
+                learned[node.id] = _learned(node, missing, graph, cycle, config)
 
         memory = _reinforced(broadcast, broadcast.coalition, graph)
         if memory is not None:
@@ -52,11 +55,11 @@ def risen(level: float, config: Config) -> float:
     return max(level, 1 / (1 + math.exp(-excitation)))
 
 
-def _learned(node: AnyNode, salience: float, graph: Graph, cycle: int, config: Config) -> AnyNode:
-    """A node as of `cycle`, after a broadcast in which it had that salience."""
+def _learned(node: AnyNode, missing: float, graph: Graph, cycle: int, config: Config) -> AnyNode:
+    """A node as of `cycle`, after a broadcast of it: as `missing`, 0 to 1, where it is above 0."""
     level = decay.base_level(node, cycle, graph.decay)
-    if salience < 0:
-        after = max(0.0, level + config.unlearning_rate * salience)
+    if missing > 0:
+        after = max(0.0, level - config.unlearning_rate * missing)
     else:
         after = risen(level, config)
 

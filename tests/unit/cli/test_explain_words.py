@@ -11,6 +11,7 @@ from cli.explain import choice, names, reasons, text
 from cli.explain.moment import Moment, moment
 from cogmap.recording.log import open_log
 from schemas.cognition import Behaviour, Rejection
+from schemas.feelings import Feeling
 from schemas.graph import Phase
 from schemas.nodes import (
     PLAN_ID,
@@ -110,6 +111,13 @@ def test_a_percept_is_placed_as_far_as_it_is_known() -> None:
     assert names.of_percept(without_bearing) == "12.0 m"
     assert names.bearing(0.001) == "ahead"
     assert names.bearing(-0.5) == "29° right"
+
+
+def test_what_is_felt_about_an_object_is_named_with_its_strength() -> None:
+    felt = structs.replace(percept("library"), feelings={Feeling.DANGER: 0.5, Feeling.NEED: 0.25})
+
+    assert names.of_feelings(felt) == "danger 0.50, need 0.25"
+    assert names.of_feelings(percept("library")) == ""
 
 
 def test_a_commit_names_each_codelet_with_the_number_of_its_answers() -> None:

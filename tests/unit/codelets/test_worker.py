@@ -117,6 +117,7 @@ def _graph() -> Graph:
 
 _KERB_M = Array.of(np.array([[4.0, 1.6], [4.6, 1.6]], np.float32))
 _RAYS = Array.of(np.array([[0.1, 6.0], [0.0, 6.0]], np.float32))
+_NEAR_RAYS = Array.of(np.array([[0.1, 2.0], [0.0, 2.0]], np.float32))
 
 
 def _every_task() -> list[Task]:
@@ -143,6 +144,7 @@ def _every_task() -> list[Task]:
         task("expectation", percepts=house, scan=_RAYS),
         task("goal"),
         task("need"),
+        task("danger", percepts=house, scan=_NEAR_RAYS),
         task("place_lost"),
         task("episode"),
     ]

@@ -8,6 +8,7 @@ import pytest
 
 from cogmap.errors import MessageError
 from schemas.cognition import Broadcast, Coalition, Trigger
+from schemas.feelings import Feeling
 from schemas.nodes import Object, category_id, object_id
 from schemas.sensing import Associations
 from services.epam.association.graph import MAX_NODES, AssociativeGraph
@@ -25,8 +26,8 @@ def _object(label: str, function: str = "", salience: float = 0.0) -> Object:
     )
 
 
-def _broadcast(second: int, *nodes: Object) -> Broadcast:
-    coalition = Coalition(codelet="whereabouts", activation=0.5, nodes=list(nodes))
+def _broadcast(second: int, *nodes: Object, feeling: Feeling = Feeling.NONE) -> Broadcast:
+    coalition = Coalition(codelet="test", activation=0.5, nodes=list(nodes), feeling=feeling)
     return Broadcast(
         stamp_ns=second * SECOND_NS,
         cycle=second,
@@ -108,7 +109,10 @@ def test_what_is_conscious_are_objects_by_their_look_and_their_categories() -> N
 
 
 def test_an_object_that_is_missed_is_not_learned() -> None:
-    assert nodes_of(_broadcast(1, _object("bakery", salience=-1.0))) == []
+    gone = _object("bakery", salience=-1.0)
+
+    assert object_id("bakery") not in nodes_of(_broadcast(1, gone, feeling=Feeling.SURPRISE))
+    assert object_id("bakery") in nodes_of(_broadcast(1, gone, feeling=Feeling.DANGER))
 
 
 def test_a_view_is_not_primed_by_what_came_after_the_view_before_the_last() -> None:

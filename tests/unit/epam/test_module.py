@@ -19,6 +19,7 @@ from schemas import topics
 from schemas.array import Array
 from schemas.base import Message
 from schemas.cognition import Broadcast, Coalition, Competition, Trigger
+from schemas.feelings import Feeling
 from schemas.nodes import Object, object_id
 from schemas.sensing import Learned, Percepts, View
 from services.epam.module import Config, build
@@ -294,9 +295,9 @@ def test_missing_weights_are_named_with_the_remedy(weights: str, tmp_path: Path)
         build(config, "epam")
 
 
-def _broadcast(stamp_ns: int, *labels: str) -> Broadcast:
+def _broadcast(stamp_ns: int, *labels: str, feeling: Feeling = Feeling.NONE) -> Broadcast:
     nodes = [Object(id=object_id(label), label=label, x_m=0.0, y_m=0.0) for label in labels]
-    coalition = Coalition(codelet="whereabouts", activation=0.5, nodes=nodes)
+    coalition = Coalition(codelet="whereabouts", activation=0.5, nodes=nodes, feeling=feeling)
     return Broadcast(stamp_ns=stamp_ns, cycle=1, trigger=Trigger.ONE_COALITION, coalition=coalition)
 
 
@@ -344,3 +345,30 @@ def test_what_was_conscious_raises_the_activation_of_what_goes_with_it_and_no_ev
                 gains.append(found.activation - percept.activation)
 
     assert max(gains) > 0.0
+
+
+def test_what_was_conscious_with_danger_is_perceived_with_it_and_also_after_a_restart(
+    views: list[View],
+) -> None:
+    last = views[3]
+    calm = build(Config(), "epam")
+    for view in views[:3]:
+        calm.feed(view)
+    labels = [percept.label for percept in _percepts(calm, last).objects]
+    module = build(Config(), "epam")
+    for view in views[:3]:
+        module.feed(view)
+    module.feed(_broadcast(views[0].stamp_ns, labels[0], feeling=Feeling.DANGER))
+    (percepts,) = of_type(Percepts, module.feed(last))
+
+    again = build(Config(), "epam")
+    assert again.restore is not None
+    assert module.compact is not None
+    again.restore([module.compact()])
+    (restarted,) = of_type(Percepts, again.feed(last))
+
+    felt = {percept.label: percept.salience for percept in percepts.objects}
+    assert felt[labels[0]] < 0.0
+    assert {felt[label] for label in labels[1:]} == {0.0}
+    again_felt = {percept.label: percept.salience for percept in restarted.objects}
+    assert again_felt == pytest.approx(felt, abs=0.01)

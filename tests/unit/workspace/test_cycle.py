@@ -10,9 +10,10 @@ import pytest
 
 from cogmap.bus.codec import encode
 from cogmap.errors import MessageError
-from schemas import topics
+from schemas import nodes, topics
 from schemas.array import Array
 from schemas.codelets import Leases, Task
+from schemas.feelings import Feeling
 from schemas.graph import Delta, SnapshotRequest
 from schemas.nodes import LinkKind, Self, object_id, percept_id
 from tests.support.world.scenes import (
@@ -203,6 +204,17 @@ def test_a_percept_becomes_a_node_linked_to_the_object_it_is_of() -> None:
     links = desk.graph.links
     assert links.target(percept_id("a"), LinkKind.INSTANCE) == object_id("a")
     assert links.sources(object_id("a"), LinkKind.INSTANCE) == (percept_id("a"),)
+
+
+def test_a_percepts_node_is_as_salient_as_what_is_felt_about_it() -> None:
+    desk = Desk("w1")
+    desk.drive(range(1), percept("a", feelings={Feeling.DANGER: 0.5}), percept("b"))
+    feared = desk.graph.get(nodes.Percept, percept_id("a"))
+    plain = desk.graph.get(nodes.Percept, percept_id("b"))
+
+    assert feared is not None
+    assert plain is not None
+    assert (feared.salience, plain.salience) == (-0.5, 0.0)
 
 
 def test_a_task_names_what_it_is_about_and_the_version_to_read() -> None:

@@ -6,6 +6,7 @@ import msgspec
 import pytest
 
 from schemas.cognition import Broadcast, Coalition, Competition, Trigger
+from schemas.feelings import Feeling
 from schemas.graph import Decay, Phase
 from schemas.nodes import (
     AnyNode,
@@ -23,8 +24,10 @@ LINEAR = Config(learning_rate=0.1, unlearning_rate=0.4)
 SIGMOID = Config(learning_rate=0.1, learning="sigmoid")
 
 
-def _broadcast(*nodes: AnyNode, cycle: int = 1, codelet: str = "test") -> Broadcast:
-    coalition = Coalition(codelet=codelet, activation=0.5, nodes=list(nodes))
+def _broadcast(
+    *nodes: AnyNode, cycle: int = 1, codelet: str = "test", feeling: Feeling = Feeling.NONE
+) -> Broadcast:
+    coalition = Coalition(codelet=codelet, activation=0.5, nodes=list(nodes), feeling=feeling)
     return Broadcast(cycle=cycle, trigger=Trigger.ONE_COALITION, coalition=coalition)
 
 
@@ -69,10 +72,22 @@ def test_activation_decays_as_it_would_have() -> None:
 def test_what_is_broadcast_as_missing_is_unlearned() -> None:
     house = landmark("house", base_level=0.9)
     missing = msgspec.structs.replace(house, salience=-1.0)
-    (learned,) = _learned(house, missing)
+    told = _broadcast(missing, feeling=Feeling.SURPRISE)
+    (learned,) = learned_operations([told], graph_of(house), 1, LINEAR)
 
+    assert isinstance(learned, Object)
     assert learned.base_level == pytest.approx(0.5)
     assert learned.salience == 0.0
+
+
+def test_what_is_dangerous_is_learned_as_what_is_not() -> None:
+    house = landmark("house", base_level=0.2)
+    dangerous = msgspec.structs.replace(house, salience=-1.0)
+    told = _broadcast(dangerous, feeling=Feeling.DANGER)
+    (learned,) = learned_operations([told], graph_of(house), 1, LINEAR)
+
+    assert isinstance(learned, Object)
+    assert learned.base_level == pytest.approx(0.3)
 
 
 def test_a_sigmoid_learns_most_in_the_middle_and_never_reaches_one() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from schemas.array import Matrix
+from schemas.feelings import Feeling
 from schemas.graph import Link
 from schemas.nodes import AnyNode, Node, Object, Plan, PlanState, Self
 from services.codelets.attention.coalitions import coalition
@@ -147,3 +148,16 @@ def test_relations_make_a_coalition_no_more_active() -> None:
 
     assert related.relations
     assert related.activation == coalition("test", nodes, graph, 1.0).activation
+
+
+def test_what_was_felt_about_a_percept_makes_its_object_salient() -> None:
+    graph = graph_of(agent(), landmark("bridge"), landmark("tower"))
+    calm = [percept("bridge"), percept("tower")]
+    afraid = [percept("bridge", feelings={Feeling.DANGER: 0.5}), percept("tower")]
+
+    (before,) = run(task("whereabouts", percepts=calm), graph, CONFIG).coalitions
+    (after,) = run(task("whereabouts", percepts=afraid), graph, CONFIG).coalitions
+
+    assert [node.salience for node in before.nodes] == [0.0, 0.0, 0.0]
+    assert [node.salience for node in after.nodes] == [0.0, -0.5, 0.0]
+    assert after.activation > before.activation

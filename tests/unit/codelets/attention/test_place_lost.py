@@ -8,11 +8,12 @@ import numpy as np
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, CycleContext
 from schemas.array import Array
+from schemas.feelings import Feeling
 from schemas.graph import Delta, Operation, Phase
 from schemas.nodes import Attention, attention_id
 from services.codelets.attention import place_lost
 from services.codelets.attention.config import Config
-from tests.support.world.scenes import agent, graph_of, percepts, run, task
+from tests.support.world.scenes import agent, graph_of, landmark, percepts, run, task
 
 CONFIG = Config()
 MEMORY = attention_id("place_lost")
@@ -80,6 +81,15 @@ def test_that_it_was_found_is_brought_until_it_is_conscious() -> None:
     _saliences(story, True, True)
 
     assert _saliences(story, False, False, False, False) == [1.0, 1.0]
+
+
+def test_what_did_not_fit_is_brought_with_that_the_agent_is_lost() -> None:
+    lost = agent(is_lost=True, first_misfit="tower")
+    known = graph_of(lost, landmark("tower"), landmark("house"))
+    (found,) = run(task("place_lost"), known, CONFIG).coalitions
+
+    assert [node.id for node in found.nodes] == ["self", "object:tower"]
+    assert found.feeling is Feeling.LOST
 
 
 def test_nothing_is_asked_without_a_self_node() -> None:

@@ -1,0 +1,121 @@
+"""An attention codelet: what stands so near ahead that the agent may run into it."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import numpy as np
+
+from cogmap.graph.graph import Graph
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from schemas.codelets import Task
+from schemas.feelings import Feeling
+from schemas.graph import Phase
+from schemas.nodes import SELF_ID, AnyNode, Attention, Object, Self, object_id
+from schemas.sensing import Percept
+from services.codelets.attention.coalitions import coalition, felt
+from services.codelets.attention.config import SECTION, Config, Danger
+from services.codelets.attention.memory import (
+    brought,
+    is_refractory,
+    kept,
+    memory_of,
+    with_pending,
+    without_conscious,
+)
+
+NAME = "danger"
+AHEAD = "ahead"
+BAD = -1.0
+
+
+def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
+    """One task where something stands near ahead, and until consciousness has had it."""
+    settings = config.danger
+    if graph.agent is None or context.scan is None:
+        return []
+    if is_refractory(NAME, graph, context.cycle, settings.refractory_cycles):
+        return []
+
+    percepts = context.percepts.objects
+    task = context.task(NAME, about=[SELF_ID], percepts=percepts, with_scan=True)
+    is_due = bool(memory_of(NAME, graph).pending) or is_blocked(task, settings)
+    return [task] if is_due else []
+
+
+def run(task: Task, graph: Graph, config: Config) -> Answer:
+    """A coalition of the self and the nearest object in view, by which the place is known again."""
+    agent = graph.agent
+    settings = config.danger
+    if agent is None:
+        return Answer()
+
+    memory = without_conscious(memory_of(NAME, graph))
+    if is_blocked(task, settings):
+        memory = _noted(memory, task.cycle, settings)
+    if not memory.pending:
+        return kept(memory, graph)
+
+    content: list[AnyNode] = [felt(agent, BAD)]
+    nearest = _nearest_object(task.percepts, graph)
+    if nearest is not None:
+        content.append(felt(nearest, BAD))
+
+    found = coalition(
+        NAME,
+        content,
+        graph,
+        settings.base_level,
+        percepts=task.percepts,
+        feeling=Feeling.DANGER,
+    )
+    return brought(memory, found, task.cycle, graph)
+
+
+CODELET = Codelet(
+    name=NAME,
+    phase=Phase.ATTENTION,
+    due=due,
+    run=run,
+    reads=frozenset({Self, Object, Attention}),
+    writes=frozenset({Attention}),
+    config=Config,
+    section=SECTION,
+)
+
+
+def is_blocked(task: Task, settings: Danger) -> bool:
+    """Whether the range scan has something near in the lane ahead, in two of its rays: one alone
+    may be noise.
+    """
+    if task.scan is None:
+        return False
+
+    bearing_rad, range_m = np.asarray(task.scan.numpy(), np.float64).T
+    ahead_m = range_m * np.cos(bearing_rad)
+    is_in_lane = np.abs(range_m * np.sin(bearing_rad)) < settings.half_width_m
+    is_near = (range_m > 0) & (ahead_m > 0) & (ahead_m <= settings.nearest_m)
+    return int((is_in_lane & is_near).sum()) > 1
+
+
+def _noted(memory: Attention, cycle: int, settings: Danger) -> Attention:
+    """`memory` after a cycle with something ahead: pending where nothing was there for long."""
+    last = memory.noted.get(AHEAD)
+    noted = msgspec.structs.replace(memory, noted={AHEAD: cycle})
+    if last is not None and cycle - last <= settings.same_cycles:
+        return noted
+    return with_pending(noted, [AHEAD])
+
+
+def _nearest_object(percepts: list[Percept], graph: Graph) -> Object | None:
+    """The object of the map that is perceived the nearest; None where there is none."""
+    nearest = None
+    nearest_m = math.inf
+    for percept in sorted(percepts, key=lambda each: each.label):
+        node = graph.get(Object, object_id(percept.label))
+        if node is not None and percept.has_range and percept.range_m < nearest_m:
+            nearest = node
+            nearest_m = percept.range_m
+
+    return nearest
