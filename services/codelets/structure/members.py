@@ -70,6 +70,11 @@ def positions_of(objects: Iterable[Object]) -> Floats:
     return np.array(positions_m, np.float64).reshape(-1, 2)
 
 
+def pose_of(node: Map) -> Floats:
+    """(3,): the pose of a sub-map's frame in that of its parent."""
+    return np.array([node.x_m, node.y_m, node.heading_rad])
+
+
 def _boxes(maps: Sequence[Map]) -> tuple[Floats, Floats]:
     """(k, 2) lower and upper corners of sub-maps."""
     centres_m = np.array([(node.x_m, node.y_m) for node in maps])
