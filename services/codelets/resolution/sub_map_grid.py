@@ -15,9 +15,9 @@ from schemas.nodes import ROOT_MAP, Map
 from services.codelets.cells import changed_cells
 from services.codelets.resolution.resampling import COLUMNS, Grid, cells_below, resampled
 from services.codelets.structure.extents import COARSEST
-from services.codelets.structure.members import pose_of, sub_maps_of
+from services.codelets.structure.members import is_sub_map, pose_of, sub_maps_of
 
-BLOCK = 64
+BLOCK = 48
 """The cells of the root map along the side of a block."""
 
 
@@ -29,15 +29,21 @@ def with_places(graph: Graph, cycle: int) -> list[Map]:
     """The sub-maps that have place nodes in a cycle, by number: those whose frame has settled and
     whose cells are neither smaller than the root map's nor larger than a sub-map's ever are.
     """
-    smallest_m = graph.cell_m()
-    largest_m = smallest_m * 2**COARSEST
-    maps = []
-    for node in sub_maps_of(graph):
-        is_settled = cycle - node.cycle >= SETTLED_CYCLES
-        if is_settled and smallest_m <= node.cell_m <= largest_m:
-            maps.append(node)
+    root_cell_m = graph.cell_m()
+    return [node for node in sub_maps_of(graph) if _has_places(node, root_cell_m, cycle)]
 
-    return maps
+
+def any_with_places(graph: Graph, cycle: int) -> bool:
+    """Whether any sub-map has place nodes in a cycle, found without visiting all."""
+    root_cell_m = graph.cell_m()
+    return any(
+        is_sub_map(node) and _has_places(node, root_cell_m, cycle) for node in graph.of_kind(Map)
+    )
+
+
+def _has_places(node: Map, root_cell_m: float, cycle: int) -> bool:
+    is_settled = cycle - node.cycle >= SETTLED_CYCLES
+    return is_settled and root_cell_m <= node.cell_m <= root_cell_m * 2**COARSEST
 
 
 def area_of(node: Map) -> Extent:

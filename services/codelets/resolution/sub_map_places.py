@@ -25,6 +25,7 @@ from schemas.nodes import ROOT_MAP, SELF_ID, Map, Self
 from services.codelets.resolution.resampling import COLUMNS
 from services.codelets.resolution.sub_map_grid import (
     SETTLED_CYCLES,
+    any_with_places,
     block,
     block_count,
     cells_around,
@@ -63,7 +64,7 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     """One task every `every_cycles`, where sub-maps have settled."""
     # Coarse maps have their turn in other cycles: a worker that is long at work gets no more.
     is_time = context.cycle % config.every_cycles == config.every_cycles // 3
-    if graph.agent is None or not is_time or not with_places(graph, context.cycle):
+    if graph.agent is None or not is_time or not any_with_places(graph, context.cycle):
         return []
     return [context.task(CODELET.name, about=[SELF_ID])]
 

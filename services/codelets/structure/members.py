@@ -14,12 +14,13 @@ from services.codelets.nodes import nodes_of
 
 def sub_maps_of(graph: Graph) -> list[Map]:
     """The sub-maps of the root map, by number."""
-    maps = []
-    for node in graph.of_kind(Map):
-        if node.parent == ROOT_MAP and map_number(node.id) is not None:
-            maps.append(node)
-
+    maps = filter(is_sub_map, graph.of_kind(Map))
     return sorted(maps, key=number_of)
+
+
+def is_sub_map(node: Map) -> bool:
+    """Whether a map is a sub-map of the root map."""
+    return node.parent == ROOT_MAP and map_number(node.id) is not None
 
 
 def number_of(node: Map) -> int:
