@@ -80,9 +80,15 @@ class Cells(Part, kw_only=True, frozen=True, tag="cells"):
 
 
 class DropNode(Part, kw_only=True, frozen=True, tag="drop_node"):
-    """Forget a node and all its links."""
+    """Forget a node and all its links; of a map its place nodes too."""
 
     id: Name
+
+
+class DropPlaces(Part, kw_only=True, frozen=True, tag="drop_places"):
+    """Forget all place nodes of a map, as where its frame is another than they were made in."""
+
+    map: Name
 
 
 class DropLink(Part, kw_only=True, frozen=True, tag="drop_link"):
@@ -108,7 +114,7 @@ class Decay(Part, kw_only=True, frozen=True, tag="decay"):
     kept_base_level: Unit = 0.0
 
 
-Operation = AnyNode | Link | Links | PlaceTile | DropNode | DropLink | Cells | Decay
+Operation = AnyNode | Link | Links | PlaceTile | DropNode | DropPlaces | DropLink | Cells | Decay
 
 
 class Delta(Message, kw_only=True, frozen=True):

@@ -24,7 +24,7 @@ from schemas.nodes import (
     object_id,
 )
 from services.codelets.config import Config
-from services.codelets.resolution.coarse_places import make_all
+from services.codelets.resolution import coarse_places, sub_map_places
 
 SPREAD_M = 0.3
 CELL_M = 1.0
@@ -49,7 +49,7 @@ LARGE = Size(objects=100_000, places=500_000)
 
 def cognitive_map(size: Size, cycle: int = 1000) -> Snapshot:
     """A map as of `cycle`: every object with as many samples as the codelets keep and linked to its
-    place, every place node with all columns, and the coarse maps.
+    place, every place node with all columns, the coarse maps, and the places of sub-maps.
     """
     rng = np.random.default_rng(SEED)
     objects = _objects(size.objects, cycle, rng)
@@ -60,9 +60,10 @@ def cognitive_map(size: Size, cycle: int = 1000) -> Snapshot:
 
     maps, within = _sub_maps(objects)
     places = Graph()
-    places.change([Map(id=ROOT_MAP, cell_m=CELL_M), *_tiles(size.places, rng)])
-    make_all(places)
-    nodes: list[AnyNode] = [*places.of_kind(Map), *maps, *objects]
+    places.change([Map(id=ROOT_MAP, cell_m=CELL_M), *maps, *_tiles(size.places, rng)])
+    coarse_places.make_all(places)
+    sub_map_places.make_all(places, cycle)
+    nodes: list[AnyNode] = [*places.of_kind(Map), *objects]
     return Snapshot(
         version=1,
         cycle=cycle,

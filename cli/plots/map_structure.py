@@ -12,8 +12,9 @@ from scipy.spatial import ConvexHull, QhullError
 from cli.launch.observer import Observer
 from cli.plots.palette import CUT, GOAL, PLAN, SEVERAL, SHORTCUT
 from cogmap.geometry.arrays import Floats
+from cogmap.geometry.se2 import transform_from
 from cogmap.graph.graph import Graph
-from cogmap.graph.window import CUT_BELOW, LINK_OFFSETS, WEIGHT_COLUMNS
+from cogmap.graph.window import CUT_BELOW, LINK_OFFSETS, ROAD_FROM, WEIGHT_COLUMNS
 from schemas.nodes import (
     NEVER_NS,
     PLAN_ID,
@@ -22,6 +23,7 @@ from schemas.nodes import (
     LinkKind,
     Map,
     Object,
+    PlaceColumn,
     Plan,
     is_coarse_map,
     object_id,
@@ -37,7 +39,8 @@ def draw_structure(axes: Axes, observer: Observer, graph: Graph) -> list[Line2D]
     if _draw_cuts(axes, observer, graph):
         legend.append(Line2D([], [], color=CUT, lw=1.4, label="links cut"))
     if _draw_sub_maps(axes, observer, graph):
-        legend.append(Line2D([], [], color=SEVERAL[1], lw=6, alpha=0.3, label="sub-maps"))
+        label = "sub-maps, and the road on their own grids"
+        legend.append(Line2D([], [], color=SEVERAL[1], marker=".", lw=6, alpha=0.3, label=label))
     if _draw_goals(axes, observer, graph):
         legend.append(Line2D([], [], color=GOAL, marker="*", ms=11, ls="", label="goals"))
     if _draw_plan(axes, observer, graph):
@@ -71,7 +74,7 @@ def _draw_cuts(axes: Axes, observer: Observer, graph: Graph) -> bool:
 
 
 def _draw_sub_maps(axes: Axes, observer: Observer, graph: Graph) -> bool:
-    """The hull of the objects of each sub-map."""
+    """The hull of the objects of each sub-map, and those of its place nodes that are road."""
     others = [node for node in graph.of_kind(Map) if node.id != ROOT_MAP]
     maps = [node for node in others if not is_coarse_map(node.id)]
     has_any = False
@@ -83,11 +86,21 @@ def _draw_sub_maps(axes: Axes, observer: Observer, graph: Graph) -> bool:
             continue
 
         colour = SEVERAL[number % len(SEVERAL)]
+        road_m = observer.to_world(_road_m(sub_map, graph))
+        axes.plot(*road_m.T, ".", color=colour, ms=2.0, alpha=0.8, zorder=3.2)
         where_m = observer.to_world(corners_m)
         axes.add_patch(Polygon(where_m, fc=colour, ec=colour, alpha=0.16, lw=2, zorder=1.5))
         has_any = True
 
     return has_any
+
+
+def _road_m(sub_map: Map, graph: Graph) -> Floats:
+    """(n, 2): where on the root map the place nodes of a sub-map are that are road."""
+    cells, shares = graph.places.written_cells(sub_map.id, PlaceColumn.ROAD)
+    pose = np.array([sub_map.x_m, sub_map.y_m, sub_map.heading_rad])
+    road = cells[shares >= ROAD_FROM].astype(np.float64)
+    return transform_from(pose, sub_map.cell_m * road)
 
 
 def _hull_m(points_m: Floats) -> Floats | None:

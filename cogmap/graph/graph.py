@@ -17,6 +17,7 @@ from schemas.graph import (
     Delta,
     DropLink,
     DropNode,
+    DropPlaces,
     Link,
     Links,
     Operation,
@@ -64,6 +65,7 @@ class Graph:
             Links: self.links.put_all,
             PlaceTile: self.places.put_tile,
             DropNode: self._drop_node,
+            DropPlaces: self._drop_places,
             DropLink: self._drop_link,
             Cells: self.places.put_cells,
             Decay: self._put_decay,
@@ -212,6 +214,11 @@ class Graph:
 
         self._by_kind[type(node)].pop(drop.id, None)
         self.links.drop_node(drop.id)
+        if isinstance(node, Map):
+            self.places.drop_map(drop.id)
+
+    def _drop_places(self, drop: DropPlaces) -> None:
+        self.places.drop_map(drop.map)
 
     def _put_decay(self, rates: Decay) -> None:
         self.decay = rates

@@ -257,6 +257,11 @@ class PlaceGrid:
                 there = place_id(i - di, j - dj, map_id)
                 yield Link(source=here, target=there, kind=LinkKind.NEXT, weight=back)
 
+    def drop_map(self, map_id: str) -> None:
+        """Remove all place nodes of a map."""
+        for key in [key for key in self.tiles if key[0] == map_id]:
+            del self.tiles[key]
+
     def clear(self) -> None:
         """Remove all place nodes."""
         self.tiles.clear()

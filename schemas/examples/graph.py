@@ -11,6 +11,7 @@ from schemas.graph import (
     Delta,
     DropLink,
     DropNode,
+    DropPlaces,
     Link,
     Links,
     Operation,
@@ -38,6 +39,7 @@ def operations() -> list[Operation]:
             weights={"percept:07": {"building-07": 1.0, "building-08": 0.25}},
         ),
         DropNode(id="building-03"),
+        DropPlaces(map="map:1"),
         DropLink(source="self", target="place:map:1:2:-4", kind=LinkKind.INSTANCE),
         Cells(
             map="map:1",

@@ -34,7 +34,7 @@ from services.codelets.mapping import (
 )
 from services.codelets.planning import route_plan
 from services.codelets.recollection import join_map
-from services.codelets.resolution import coarse_places
+from services.codelets.resolution import coarse_places, sub_map_places
 from services.codelets.structure import map_structure
 
 CODELETS: tuple[Codelet, ...] = (
@@ -51,6 +51,7 @@ CODELETS: tuple[Codelet, ...] = (
     map_correction.CODELET,
     map_structure.CODELET,
     coarse_places.CODELET,
+    sub_map_places.CODELET,
     route_plan.CODELET,
     whereabouts.CODELET,
     novelty.CODELET,

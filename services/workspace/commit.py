@@ -8,7 +8,7 @@ from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
 from schemas.codelets import Offer, Proposal
 from schemas.graph import Cells, Delta, Operation, Phase, Snapshot
-from schemas.nodes import GraphNode
+from schemas.nodes import ROOT_MAP, GraphNode
 from services.workspace.rules import Key, Writer, check_operation, written_by
 
 MAX_REASONS = 8
@@ -118,6 +118,7 @@ class Ledger:
             keys = list(written_by(operation))
             self._check_late(name, keys, proposal.base_version)
             if isinstance(operation, Cells):
+                self._check_late(name, _frame_of(operation), proposal.base_version)
                 columns.update(keys)
 
         return columns
@@ -155,6 +156,13 @@ def _check_apart(proposal: Proposal, shared: set[Key]) -> None:
         raise MessageError(
             f"proposal {proposal.task_id}: {_in_words(first)} is written by another in this phase"
         )
+
+
+def _frame_of(cells: Cells) -> list[Key]:
+    """The map whose frame cells are in: where that has changed, they are elsewhere. The root map's
+    never does.
+    """
+    return [] if cells.map == ROOT_MAP else [cells.map]
 
 
 def _in_words(key: Key) -> str:

@@ -15,6 +15,7 @@ from schemas.graph import (
     Decay,
     DropLink,
     DropNode,
+    DropPlaces,
     Link,
     Links,
     Operation,
@@ -62,6 +63,8 @@ def written_by(operation: Operation) -> Iterable[Key]:
             yield operation.map, x, y, operation.column
     elif isinstance(operation, (GraphNode, DropNode)):
         yield operation.id
+    elif isinstance(operation, DropPlaces):
+        yield operation.map
 
 
 def check_operation(name: str, operation: Operation, graph: Graph, writer: Writer) -> None:
@@ -76,6 +79,8 @@ def check_operation(name: str, operation: Operation, graph: Graph, writer: Write
         _check_cells(name, operation, graph, writer)
     elif isinstance(operation, DropNode):
         _check_drop(name, operation, graph, writer)
+    elif isinstance(operation, DropPlaces):
+        _check_drop_places(name, operation, graph, writer)
     else:
         _check_node(name, operation, graph, writer)
 
@@ -136,6 +141,15 @@ def _check_drop(name: str, drop: DropNode, graph: Graph, writer: Writer) -> None
         raise MessageError(f"{name}: {drop.id} is never forgotten")
     if not writer(kind):
         raise MessageError(f"{name} may not forget nodes of kind {kind_name(kind)}")
+
+
+def _check_drop_places(name: str, drop: DropPlaces, graph: Graph, writer: Writer) -> None:
+    """Who may give a map another frame may drop the places that are in the one before."""
+    _check_map(name, drop.map, graph)
+    if drop.map == ROOT_MAP:
+        raise MessageError(f"{name}: the places of {ROOT_MAP} are never forgotten")
+    if not writer(Map):
+        raise MessageError(f"{name} may not forget the places of {drop.map}")
 
 
 def _check_cells(name: str, operation: Cells, graph: Graph, writer: Writer) -> None:

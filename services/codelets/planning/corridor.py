@@ -11,34 +11,27 @@ from scipy import ndimage
 
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.graph.graph import Graph
-from cogmap.graph.window import ROAD_FROM, WEIGHT_COLUMNS, Extent
+from cogmap.graph.window import Extent
 from schemas.nodes import (
     PLAN_ID,
     ROOT_MAP,
     Map,
-    PlaceColumn,
     Plan,
     Self,
     coarse_map_id,
 )
-from services.codelets.planning.activation import climb, spread_over
 from services.codelets.planning.config import Config
-from services.codelets.planning.network import (
-    SQUARE,
-    Cell,
-    Here,
-    PlaceNetwork,
-    link_weights,
-)
-from services.codelets.planning.search.links import Links
+from services.codelets.planning.held import held_routes
+from services.codelets.planning.network import SQUARE, Here, PlaceNetwork
+from services.codelets.planning.rough import Routes, rough_network, routes_between
 from services.codelets.resolution.coarsening import FACTOR
 
-COLUMNS = (PlaceColumn.ROAD, *WEIGHT_COLUMNS)
 MARGIN = 2
-SNAP = 2
-"""In cells of a coarse map: unknown places planned over around it, and how far from a position the
-place may be from which it is reached.
-"""
+"""In cells of a coarse map, unknown places planned over around it."""
+
+BESIDE_CELLS = 1.5
+BESIDE_M = 4.0
+"""How far from a route within a sub-map places are planned on: so many of its cells and metres."""
 
 
 class Corridor(NamedTuple):
@@ -51,24 +44,43 @@ class Corridor(NamedTuple):
 def corridor(graph: Graph, agent: Self, goals_m: Floats, config: Config) -> Corridor | None:
     """The places beside routes between the agent and (n, 2) goals, and beside the route of the plan
     before; None where the map is small, or coarser maps have no such routes.
+
+    The routes are those within a sub-map that holds all, where none that leaves it can be shorter.
     """
     width, height = graph.places.extent(ROOT_MAP).shape
     if agent.map != ROOT_MAP or width * height <= config.flat_places or not len(goals_m):
         return None
 
     ends_m = np.vstack([[agent.x_m, agent.y_m], goals_m])
-    within: Corridor | None = None
-    for level in _levels(graph):
-        routes = _routes(_coarse(graph, level, within, config), ends_m)
-        if routes is None:
-            return None
-        within = _refined(routes)
-
+    within = _over_sub_map(graph, ends_m, config) or _over_coarse_maps(graph, ends_m, config)
     if within is None:
         return None
 
     near_m = np.vstack([ends_m, _route_left_m(graph, agent)])
     return _with(within, near_m, graph.cell_m(ROOT_MAP), config)
+
+
+def _over_sub_map(graph: Graph, ends_m: Floats, config: Config) -> Corridor | None:
+    """The places beside routes within one sub-map; None where those do not serve."""
+    held = held_routes(graph, ends_m, config)
+    if held is None:
+        return None
+
+    cell_m = graph.cell_m(ROOT_MAP)
+    reach_m = BESIDE_CELLS * held.cell_m + BESIDE_M
+    return _around(held.passed_m, reach_m, cell_m)
+
+
+def _over_coarse_maps(graph: Graph, ends_m: Floats, config: Config) -> Corridor | None:
+    """The places beside routes over the coarse maps; None where these have no such routes."""
+    within: Corridor | None = None
+    for level in _levels(graph):
+        routes = routes_between(_coarse(graph, level, within, config), ends_m)
+        if routes is None:
+            return None
+        within = _refined(routes)
+
+    return within
 
 
 def _route_left_m(graph: Graph, agent: Self) -> Floats:
@@ -97,60 +109,14 @@ def _levels(graph: Graph) -> list[int]:
 def _coarse(graph: Graph, level: int, within: Corridor | None, config: Config) -> PlaceNetwork:
     """The place network of a coarse map, the whole of it or within a corridor."""
     map_id = coarse_map_id(level)
-    extent = graph.places.extent(map_id).grown(MARGIN) if within is None else within.extent
-    window = graph.places.window(map_id, COLUMNS, extent)
-    is_road = window.column(PlaceColumn.ROAD) >= ROAD_FROM
-    share = np.where(is_road, 1.0, config.unknown_weight)
     if within is not None:
-        share[~within.is_inside] = 0.0
+        return rough_network(graph, map_id, within.extent, config, within.is_inside)
 
-    here = Here(window.origin, window.shape, graph.cell_m(map_id))
-    return here.network(link_weights(window.weights(), share))
-
-
-class _Routes(NamedTuple):
-    """A rectangle of a coarse map, and the cells of it that routes lead through, (w, h)."""
-
-    lower: tuple[int, int]
-    is_passed: Booleans
+    extent = graph.places.extent(map_id).grown(MARGIN)
+    return rough_network(graph, map_id, extent, config)
 
 
-def _routes(network: PlaceNetwork, ends_m: Floats) -> _Routes | None:
-    """The routes between each two of (n, 2) positions; None where one is outside, or not
-    connected.
-    """
-    links = Links(network)
-    cells: list[Cell] = []
-    is_passed = np.zeros(network.shape, bool)
-    for end_m in ends_m:
-        goal = _linked(network, links, end_m)
-        if goal is None:
-            return None
-
-        field = spread_over(links, np.array([goal]))
-        for start in cells:
-            route = climb(network, field, start)
-            if route is None:
-                return None
-            is_passed[tuple((route - network.origin).T)] = True
-        cells.append(goal)
-
-    return _Routes(network.origin, is_passed)
-
-
-def _linked(network: PlaceNetwork, links: Links, position_m: Floats) -> Cell | None:
-    """The cell nearest to a position that a link leads to, within SNAP."""
-    middle = np.rint(position_m / network.cell_m).astype(np.int64)
-    around = np.argwhere(np.ones((2 * SNAP + 1, 2 * SNAP + 1))) - SNAP
-    cells = middle + around[np.hypot(*around.T).argsort(kind="stable")]
-    for i, j in cells.tolist():
-        if links.contain((i, j)) and links.is_linked[links.node((i, j))]:
-            return i, j
-
-    return None
-
-
-def _refined(routes: _Routes) -> Corridor:
+def _refined(routes: Routes) -> Corridor:
     """The finer cells of those that routes lead through, and of those beside."""
     is_near = ndimage.binary_dilation(np.pad(routes.is_passed, 1), SQUARE)
     i, j = np.nonzero(is_near)
@@ -164,19 +130,28 @@ def _refined(routes: _Routes) -> Corridor:
     return Corridor(Extent((first_i, first_j), (first_i + width, first_j + height)), is_inside)
 
 
-def _with(within: Corridor, near_m: Floats, cell_m: float, config: Config) -> Corridor:
-    """The corridor, and all places within `approach_m` of (n, 2) positions."""
-    margin = int(np.ceil(config.approach_m / cell_m)) + 1
+def _around(near_m: Floats, reach_m: float, cell_m: float) -> Corridor:
+    """All places within reach of (n, 2) positions."""
+    margin = int(np.ceil(reach_m / cell_m)) + 1
     cells = np.rint(near_m / cell_m).astype(np.int64)
-    lower = np.minimum(within.extent.lower, cells.min(axis=0) - margin)
-    upper = np.maximum(within.extent.upper, cells.max(axis=0) + margin + 1)
-    first_i, first_j = lower.tolist()
-    last_i, last_j = upper.tolist()
+    first_i, first_j = (cells.min(axis=0) - margin).tolist()
+    last_i, last_j = (cells.max(axis=0) + margin + 1).tolist()
 
     extent = Extent((first_i, first_j), (last_i, last_j))
     here = Here(extent.lower, extent.shape, cell_m)
-    is_inside = here.is_within(config.approach_m, near_m)
-    i, j = np.array(within.extent.lower) - lower
-    width, height = within.extent.shape
-    is_inside[i : i + width, j : j + height] |= within.is_inside
+    return Corridor(extent, here.is_within(reach_m, near_m))
+
+
+def _with(within: Corridor, near_m: Floats, cell_m: float, config: Config) -> Corridor:
+    """The corridor, and all places within `approach_m` of (n, 2) positions."""
+    near = _around(near_m, config.approach_m, cell_m)
+    first_i, first_j = np.minimum(within.extent.lower, near.extent.lower).tolist()
+    last_i, last_j = np.maximum(within.extent.upper, near.extent.upper).tolist()
+
+    extent = Extent((first_i, first_j), (last_i, last_j))
+    is_inside = np.zeros(extent.shape, bool)
+    for part in (within, near):
+        i, j = np.subtract(part.extent.lower, extent.lower).tolist()
+        width, height = part.extent.shape
+        is_inside[i : i + width, j : j + height] |= part.is_inside
     return Corridor(extent, is_inside)

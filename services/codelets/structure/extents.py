@@ -13,10 +13,9 @@ from services.codelets.structure.config import Config
 from services.codelets.structure.members import positions_of
 
 MIN_SIDE_M = 1.0
-FINEST = 2
 COARSEST = 4
-"""The cells of a sub-map are at most 2^FINEST times finer than the root map's, and 2^COARSEST times
-coarser.
+"""The cells of a sub-map are at most 2^COARSEST times coarser than the root map's; finer ones would
+know no more than those.
 """
 
 
@@ -65,7 +64,7 @@ def sub_map_node(number: int, extent: Extent, graph: Graph, config: Config) -> M
 
     # Powers of two, so that a grid stays as it is while its sub-map grows a little.
     steps = round(math.log2(wanted_m / root_cell_m))
-    cell_m = root_cell_m * 2.0 ** min(max(steps, -FINEST), COARSEST)
+    cell_m = root_cell_m * 2.0 ** min(max(steps, 0), COARSEST)
     return Map(
         id=map_id(number),
         base_level=1.0,

@@ -15,7 +15,7 @@ from cogmap.graph.graph import Graph
 from cogmap.graph.window import WEIGHT_COLUMNS
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.codelets import Task
-from schemas.graph import DropNode, Links, Operation, Phase
+from schemas.graph import DropNode, DropPlaces, Links, Operation, Phase
 from schemas.nodes import ROOT_MAP, LinkKind, Map, Object, map_id, object_id
 from services.codelets.nodes import nodes_of
 from services.codelets.structure.config import SECTION, Config
@@ -180,7 +180,7 @@ def _codes(objects: list[Object]) -> tuple[Indices, int]:
 
 
 def _map_nodes(scope: _Scope, numbers: Indices, graph: Graph, config: Config) -> list[Operation]:
-    """The sub-maps that are new or cover another area than before."""
+    """The sub-maps that are new or cover another area than before, and so have another frame."""
     positions_m = positions_of(scope.objects)
     written: list[Operation] = []
     for number in np.unique(numbers).tolist():
@@ -188,6 +188,8 @@ def _map_nodes(scope: _Scope, numbers: Indices, graph: Graph, config: Config) ->
         before = graph.get(Map, map_id(number))
         if before is None or extent.differs_from(before, config.moved_m):
             written.append(sub_map_node(number, extent, graph, config))
+            if before is not None:
+                written.append(DropPlaces(map=before.id))
 
     return written
 

@@ -14,12 +14,13 @@ from services.codelets.nodes import nodes_of
 
 def sub_maps_of(graph: Graph) -> list[Map]:
     """The sub-maps of the root map, by number."""
-    maps = []
-    for node in graph.of_kind(Map):
-        if node.parent == ROOT_MAP and map_number(node.id) is not None:
-            maps.append(node)
-
+    maps = filter(is_sub_map, graph.of_kind(Map))
     return sorted(maps, key=number_of)
+
+
+def is_sub_map(node: Map) -> bool:
+    """Whether a map is a sub-map of the root map."""
+    return node.parent == ROOT_MAP and map_number(node.id) is not None
 
 
 def number_of(node: Map) -> int:
@@ -68,6 +69,11 @@ def positions_of(objects: Iterable[Object]) -> Floats:
     """(n, 2): where objects are."""
     positions_m = [(node.x_m, node.y_m) for node in objects]
     return np.array(positions_m, np.float64).reshape(-1, 2)
+
+
+def pose_of(node: Map) -> Floats:
+    """(3,): the pose of a sub-map's frame in that of its parent."""
+    return np.array([node.x_m, node.y_m, node.heading_rad])
 
 
 def _boxes(maps: Sequence[Map]) -> tuple[Floats, Floats]:

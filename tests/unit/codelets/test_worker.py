@@ -138,6 +138,7 @@ def _every_task() -> list[Task]:
         task("map_correction"),
         task("map_structure"),
         task("coarse_places"),
+        task("sub_map_places"),
         task("route_plan"),
         task("whereabouts", percepts=house),
         task("novelty", percepts=house),

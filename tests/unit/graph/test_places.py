@@ -8,7 +8,7 @@ import pytest
 from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
 from schemas.array import Array
-from schemas.graph import Cells, Decay, Operation, PlaceTile
+from schemas.graph import Cells, Decay, DropNode, DropPlaces, Operation, PlaceTile
 from schemas.nodes import ROOT_MAP, TILE_SIDE, Map, PlaceColumn
 
 
@@ -52,6 +52,17 @@ def test_maps_have_place_nodes_of_their_own() -> None:
     assert place is not None
     assert (place.id, place.x_m, place.y_m) == ("place:map:1:2:3", 8.0, 12.0)
     assert graph.place(2, 3) is None
+
+
+@pytest.mark.parametrize("drop", [DropNode(id="map:1"), DropPlaces(map="map:1")])
+def test_place_nodes_of_a_map_are_forgotten_with_it_or_alone(drop: Operation) -> None:
+    coarse = Map(id="map:1", cell_m=4.0, parent=ROOT_MAP)
+    own = _cells(PlaceColumn.ROAD, {(2, 3): 1.0}, "map:1")
+    graph = _graph(coarse, own, _cells(PlaceColumn.ROAD, {(2, 3): 1.0}), drop)
+
+    assert graph.place(2, 3, "map:1") is None
+    assert graph.place(2, 3) is not None
+    assert (graph.get(Map, "map:1") is None) == isinstance(drop, DropNode)
 
 
 def test_a_snapshot_keeps_the_place_nodes_of_each_map_apart() -> None:

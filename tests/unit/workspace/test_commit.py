@@ -15,6 +15,7 @@ from schemas.graph import (
     Decay,
     DropLink,
     DropNode,
+    DropPlaces,
     Link,
     Links,
     Operation,
@@ -80,6 +81,9 @@ SENSELESS: dict[str, Operation] = {
     ),
     "self is never forgotten": DropNode(id="self"),
     "map:0 is never forgotten": DropNode(id="map:0"),
+    "the places of map:0 are never forgotten": DropPlaces(map=ROOT_MAP),
+    "there is no map map:8": DropPlaces(map="map:8"),
+    "may not forget the places of map:1": DropPlaces(map="map:1"),
     "may not forget nodes of kind object": DropNode(id=object_id("a")),
 }
 
@@ -95,7 +99,8 @@ def test_an_invalid_proposal_is_rejected_and_the_next_delta_counts_it(
 ) -> None:
     ledger = _ledger()
     root = Map(id=ROOT_MAP, cell_m=1.0)
-    ledger.commit(0, 1, Phase.OBJECTS, [root, agent(), landmark("a")])
+    part = Map(id="map:1", cell_m=1.0, parent=ROOT_MAP)
+    ledger.commit(0, 1, Phase.OBJECTS, [root, part, agent(), landmark("a")])
     proposal = _proposal(thing("new"), SENSELESS[reason], base_version=4)
 
     with pytest.raises(MessageError) as refusal:
@@ -248,6 +253,23 @@ def test_cells_of_another_map_are_never_late() -> None:
     ledger.commit(0, 1, Phase.OBJECTS, [_cells(map="map:hall")])
     with pytest.raises(MessageError, match="late: map:hall 0 0 road"):
         ledger.check(_proposal(_cells(map="map:hall"), base_version=5))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [Map(id="map:1", cell_m=0.5, parent=ROOT_MAP, x_m=9.0), DropPlaces(map="map:1")],
+)
+def test_cells_are_late_where_the_frame_that_they_are_in_has_changed_since(
+    change: Operation,
+) -> None:
+    ledger = _ledger()
+    ledger.commit(0, 1, Phase.OBJECTS, [Map(id="map:1", cell_m=0.5, parent=ROOT_MAP)])
+    proposal = _proposal(_cells(map="map:1"), base_version=4)
+    ledger.check(proposal)
+
+    ledger.commit(0, 1, Phase.OBJECTS, [change])
+    with pytest.raises(MessageError, match="late: map:1 has changed since 4"):
+        ledger.check(proposal)
 
 
 def test_one_proposal_that_is_refused_keeps_no_other_from_being_committed() -> None:

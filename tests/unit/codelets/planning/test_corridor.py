@@ -8,13 +8,25 @@ import pytest
 
 from cogmap.graph.graph import Graph
 from schemas.array import Array
-from schemas.graph import Cells
-from schemas.nodes import PLAN_ID, Goal, PlaceColumn, Plan, PlanState, goal_id
+from schemas.graph import Cells, DropNode, DropPlaces
+from schemas.nodes import (
+    PLAN_ID,
+    ROOT_MAP,
+    Goal,
+    Map,
+    PlaceColumn,
+    Plan,
+    PlanState,
+    goal_id,
+    map_id,
+)
 from services.codelets.planning.config import Config
 from services.codelets.planning.corridor import corridor
+from services.codelets.planning.held import held_routes
 from services.codelets.planning.route_plan import run
 from services.codelets.planning.targets import goals_m
-from services.codelets.resolution import coarse_places
+from services.codelets.resolution import coarse_places, sub_map_places
+from services.codelets.resolution.sub_map_grid import SETTLED_CYCLES
 from tests.support.world.scenes import agent, graph_of, task
 
 SIDE = 240
@@ -129,3 +141,79 @@ def test_a_street_just_closed_in_the_corridor_is_driven_round_not_doubted() -> N
     assert plan.route is not None
     cells = np.rint(plan.route.numpy()).astype(int)
     assert not stands[tuple(cells.T)].any()
+
+
+def _quarter(graph: Graph, heading_rad: float = 0.0) -> Graph:
+    """The city with a sub-map of 160 m around (120, 120), and the places of that alone."""
+    node = Map(
+        id=map_id(1),
+        parent=ROOT_MAP,
+        cell_m=2.0,
+        x_m=120.5,
+        y_m=119.5,
+        heading_rad=heading_rad,
+        width_m=160.0,
+        height_m=160.0,
+    )
+    graph.change([node])
+    graph.cycle = SETTLED_CYCLES
+    sub_map_places.make_all(graph, graph.cycle)
+    return graph
+
+
+def _from_to(graph: Graph, start_m: tuple[float, float], goal_m: tuple[float, float]) -> Graph:
+    x_m, y_m = start_m
+    goal = Goal(id=goal_id("there"), base_level=1.0, x_m=goal_m[0], y_m=goal_m[1])
+    graph.change([agent(x_m=x_m, y_m=y_m), goal])
+    return graph
+
+
+@pytest.mark.parametrize("heading_rad", [0.0, 0.3])
+def test_a_route_within_a_sub_map_is_found_on_its_grid(heading_rad: float) -> None:
+    ends = (83.0, 110.0), (140.0, 123.0)
+    graph = _from_to(_quarter(_city(), heading_rad), *ends)
+    held = held_routes(graph, np.array(ends), ROUGH)
+    assert held is not None
+    assert graph.agent is not None
+    found = corridor(graph, graph.agent, goals_m(graph), ROUGH)
+    assert found is not None
+
+    cells = np.rint(held.passed_m).astype(int) - found.extent.lower
+    assert found.is_inside[tuple(cells.T)].all()
+    whole = _plan(_from_to(_city(), *ends), FLAT)
+    assert whole.length_m <= _plan(graph, ROUGH).length_m <= 1.05 * whole.length_m
+
+
+def test_a_sub_map_does_without_the_coarse_maps() -> None:
+    graph = _from_to(_quarter(_city()), (83.0, 110.0), (140.0, 123.0))
+    for name in [node.id for node in graph.of_kind(Map) if node.id not in (ROOT_MAP, map_id(1))]:
+        graph.change([DropNode(id=name)])
+    assert graph.agent is not None
+
+    assert corridor(graph, graph.agent, goals_m(graph), ROUGH) is not None
+
+
+@pytest.mark.parametrize(
+    ("start_m", "goal_m"),
+    [
+        # Outside the sub-map; and at its border, where a route beyond might be shorter.
+        ((3.0, 3.0), (140.0, 123.0)),
+        ((43.0, 100.0), (63.0, 163.0)),
+    ],
+)
+def test_where_a_route_may_lead_outside_a_sub_map_the_coarse_maps_are_searched(
+    start_m: tuple[float, float], goal_m: tuple[float, float]
+) -> None:
+    graph = _from_to(_quarter(_city()), start_m, goal_m)
+    assert held_routes(graph, np.array([start_m, goal_m]), ROUGH) is None
+
+    assert graph.agent is not None
+    assert corridor(graph, graph.agent, goals_m(graph), ROUGH) is not None
+
+
+def test_a_sub_map_of_which_no_place_is_known_yet_is_not_planned_on() -> None:
+    ends = (83.0, 110.0), (140.0, 123.0)
+    graph = _quarter(_city())
+    graph.change([DropPlaces(map=map_id(1))])
+
+    assert held_routes(graph, np.array(ends), ROUGH) is None

@@ -118,7 +118,7 @@ def test_objects_of_other_functions_get_a_sub_map_of_their_own():
     assert len({map_of(graph, node) for node in shops}) == 1
 
 
-def test_a_large_sub_map_has_a_coarser_grid_than_a_small_one():
+def test_a_small_sub_map_is_as_fine_as_the_root_map_and_a_large_one_coarser():
     small = row_of("small", 6)
     large = [
         landmark(f"large-{i}-{j}", [(1000 + 40.0 * i, 40.0 * j)], sightings=3)
@@ -130,7 +130,7 @@ def test_a_large_sub_map_has_a_coarser_grid_than_a_small_one():
     structured(graph)
 
     cells_m = {graph.cell_m(map_of(graph, node)) for node in (small[0], large[0])}
-    assert graph.cell_m(map_of(graph, small[0])) == min(cells_m) < 1.0
+    assert graph.cell_m(map_of(graph, small[0])) == min(cells_m) == 1.0
     assert graph.cell_m(map_of(graph, large[0])) == max(cells_m) > 1.0
 
 
@@ -257,3 +257,41 @@ def test_objects_of_another_map_are_left_alone():
 
     assert structured(graph) == []
     assert all(isinstance(node, Object) for node in elsewhere)
+
+
+def with_places(graph, node):
+    """Place nodes of the sub-map of an object."""
+    cells = Array.of(np.array([[0, 0]]), "<i4")
+    values = Array.of(np.ones(1, np.float32))
+    own = Cells(map=map_of(graph, node), column=PlaceColumn.ROAD, cells=cells, values=values)
+    commit(graph, [own])
+    return own.map
+
+
+def test_a_sub_map_that_gets_another_frame_loses_the_places_that_were_in_the_one_before():
+    objects = row_of("house", 12)
+    graph = graph_of(*objects)
+    structured(graph)
+    number = with_places(graph, objects[0])
+
+    new = landmark("new", [(72.0, 0.0)], sightings=3, width_m=6.0)
+    commit(graph, [new])
+    structured(graph, [new.id])
+
+    assert map_of(graph, new) == number
+    assert graph.get(Map, number).x_m > 30.0
+    assert graph.place(0, 0, number) is None
+
+
+def test_a_sub_map_whose_frame_stays_keeps_its_places():
+    objects = row_of("house", 12)
+    graph = graph_of(*objects)
+    structured(graph)
+    number = with_places(graph, objects[0])
+
+    new = landmark("new", [(18.0, 6.0)], sightings=3, width_m=6.0)
+    commit(graph, [new])
+    structured(graph, [new.id])
+
+    assert map_of(graph, new) == number
+    assert graph.place(0, 0, number) is not None
