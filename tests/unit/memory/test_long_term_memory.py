@@ -10,15 +10,17 @@ from schemas.array import Array
 from schemas.base import Message
 from schemas.codelets import Offer
 from schemas.cognition import Broadcast, Coalition, Competition, Trigger
-from schemas.graph import Cells, Delta, Operation, Phase
-from schemas.memory import Restored, Stored, StoredObjects, StoredTile
+from schemas.graph import Cells, Delta, Link, Operation, Phase
+from schemas.memory import Restored, Stored, StoredObjects, StoredTile, StoredTree
 from schemas.nodes import (
     RECOLLECTION_ID,
     ROOT_MAP,
+    LinkKind,
     Map,
     Object,
     PlaceColumn,
     Recollection,
+    map_id,
     object_id,
 )
 from schemas.sensing import RangeScan
@@ -50,6 +52,16 @@ def road(cell: tuple[int, int] = (3, 4)) -> Cells:
         cells=Array.of(np.array([cell]), "<i4"),
         values=Array.of(np.array([0.75]), "<f4"),
     )
+
+
+def district(*labels: str) -> list[Operation]:
+    """A sub-map with some of the buildings in it."""
+    links: list[Operation] = []
+    for label in labels:
+        link = Link(source=object_id(label), target=map_id(4), kind=LinkKind.WITHIN)
+        links.append(link)
+
+    return [Map(id=map_id(4), parent=ROOT_MAP, cell_m=0.5, width_m=30.0, height_m=20.0), *links]
 
 
 class Mind:
@@ -126,6 +138,34 @@ def test_a_map_that_was_conscious_is_stored_with_its_objects_and_places() -> Non
     assert sorted(objects.labels)[:2] == ["bakery", "bakery~2"]
     assert objects.objects.shape == (12, 7)
     assert tile.columns[PlaceColumn.ROAD].numpy()[0, 3 * 32 + 4] == 0.75
+
+
+def test_the_sub_maps_of_a_map_are_stored_with_their_objects_and_recalled_with_it() -> None:
+    first = Mind(*buildings(AT_M), *district("bakery", "tower"))
+    records = stored_in(first.live(3)).records
+    (tree,) = of_type(StoredTree, records)
+    assert [(each.number, each.parent) for each in tree.sub_maps] == [(4, 0)]
+    assert tree.sub_maps[0].members == ["bakery", "tower"]
+
+    second = Mind(*buildings(transform_to(POSE, AT_M)))
+    second.module.feed(Restored(records=records))
+
+    (recalled,) = recollections(second.end(1) + second.compete(1))
+    assert recalled.sub_maps == tree.sub_maps
+
+
+def test_sub_maps_are_stored_again_where_an_object_has_changed_its_own() -> None:
+    mind = Mind(*buildings(AT_M), *district("bakery", "tower"))
+    mind.live(3)
+    mind.commit(4, *district("school"))
+
+    published: list[Message] = []
+    for cycle in range(4, 8):
+        published += mind.end(cycle) + mind.compete(cycle)
+
+    (tree,) = stored_in(published).records
+    assert isinstance(tree, StoredTree)
+    assert tree.sub_maps[0].members == ["bakery", "school", "tower"]
 
 
 def test_a_map_that_was_never_conscious_is_not_stored() -> None:
