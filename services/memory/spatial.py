@@ -16,6 +16,7 @@ from services.memory.associations import Associations
 from services.memory.changes import Changes
 from services.memory.config import Config
 from services.memory.maps import RememberedMap, RememberedMaps
+from services.memory.passing import way_of
 from services.memory.recall import cues, recalled
 from services.memory.recollection import recollection
 from services.memory.storing import ChangedPlaces, stored_objects, stored_tree
@@ -93,14 +94,16 @@ class SpatialMemory:
         if agent is None or self._joined or RECOLLECTION_ID in self._graph.nodes:
             return None
 
-        here = cues(self._learned(), (agent.x_m, agent.y_m))
+        learned = self._learned()
+        here = cues(learned, (agent.x_m, agent.y_m))
         labels = {node.label for node in here}
         if labels == self._cued:
             return None
 
         self._cued = labels
         others = self._compared(here)
-        found = recalled(here, others, self._graph.cell_m(ROOT_MAP), self._config)
+        way = way_of(self._graph, learned)
+        found = recalled(here, way, others, self._graph.cell_m(ROOT_MAP), self._config)
         return None if found is None else recollection(found)
 
     def _compared(self, here: list[Object]) -> list[RememberedMap]:

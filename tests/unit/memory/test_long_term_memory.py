@@ -6,7 +6,7 @@ import pytest
 
 from cogmap.geometry.se2 import transform_to
 from cogmap.runtime.module import Module
-from schemas.array import Array
+from schemas.array import Array, Matrix
 from schemas.base import Message
 from schemas.codelets import Offer
 from schemas.cognition import Broadcast, Coalition, Competition, Trigger
@@ -18,10 +18,14 @@ from schemas.nodes import (
     LinkKind,
     Map,
     Object,
+    PathColumn,
+    PathSegment,
     PlaceColumn,
     Recollection,
+    individual_label,
     map_id,
     object_id,
+    segment_id,
 )
 from schemas.sensing import RangeScan
 from services.memory.module import Config, build
@@ -39,6 +43,17 @@ def buildings(at_m: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> list[O
     nodes: list[Operation] = []
     for number, (x_m, y_m) in enumerate(at_m.tolist()):
         label = LOOKS[number % 4] if number < 4 else f"{LOOKS[number % 4]}~{1 + number // 4}"
+        nodes.append(Object(id=object_id(label), label=label, x_m=x_m, y_m=y_m, sightings=9))
+
+    return nodes
+
+
+def houses() -> list[Operation]:
+    """Houses of two looks on both sides of a street along x."""
+    nodes: list[Operation] = []
+    for number, x_m in enumerate((8.0, 17.0, 31.0, 38.0, 52.0, 63.0, 74.0, 88.0), start=1):
+        label = individual_label("works" if number in (3, 5) else "house", number)
+        y_m = 9.0 * (-1.0) ** number
         nodes.append(Object(id=object_id(label), label=label, x_m=x_m, y_m=y_m, sightings=9))
 
     return nodes
@@ -211,6 +226,22 @@ def test_a_town_is_recalled_in_a_frame_of_its_own_with_the_relative_position() -
     assert (recalled.x_m, recalled.y_m, recalled.heading_rad) == pytest.approx(tuple(POSE))
     assert recalled.matched == recalled.labels
     assert recalled.tiles == [(0, 0)]
+
+
+def test_a_street_of_two_looks_is_recalled_once_it_was_driven() -> None:
+    path = np.zeros((100, len(PathColumn)))
+    path[:, PathColumn.X_M] = np.arange(100.0)
+    driven = PathSegment(id=segment_id(0), number=0, rows=Matrix.of(path))
+    known = Restored(records=stored_in(Mind(*houses()).live(3)).records)
+
+    passing = Mind(*houses(), driven)
+    passing.module.feed(known)
+    standing = Mind(*houses())
+    standing.module.feed(known)
+
+    (recalled,) = recollections(passing.end(1) + passing.compete(1))
+    assert (recalled.x_m, recalled.y_m, recalled.heading_rad) == pytest.approx((0.0, 0.0, 0.0))
+    assert recollections(standing.end(1) + standing.compete(1)) == []
 
 
 def test_another_town_is_not_taken_for_the_one_that_is_known() -> None:
