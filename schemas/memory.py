@@ -8,9 +8,9 @@ import msgspec
 
 from schemas.array import Matrix
 from schemas.base import Count, Finite, Message, Name, Part, Unit
-from schemas.nodes import TILE_CELLS, PlaceColumn, RecalledColumn, Remembered
+from schemas.nodes import TILE_CELLS, PlaceColumn, RecalledColumn, Remembered, SubMap
 from schemas.nodes.columns import check_matrix
-from schemas.nodes.recollection import TileNumber
+from schemas.nodes.recollection import TileNumber, check_tree
 
 
 class StoredObjects(Part, kw_only=True, frozen=True, tag="objects"):
@@ -55,6 +55,21 @@ class StoredTile(Part, kw_only=True, frozen=True, tag="tile"):
         return tile_key(self.map, self.x, self.y)
 
 
+class StoredTree(Part, kw_only=True, frozen=True, tag="tree"):
+    """The tree of a map's sub-maps, each after its parent, with the labels of the objects in it."""
+
+    map: Name
+    sub_maps: list[SubMap]
+
+    def __post_init__(self) -> None:
+        check_tree(self.map, self.sub_maps)
+
+    @property
+    def key(self) -> str:
+        """The key of the record that it replaces."""
+        return f"{self.map}/tree"
+
+
 class StoredEpisode(Part, kw_only=True, frozen=True):
     """What, where and when: the nodes that were conscious at a place, from `from_ns` to `until_ns`
     of the run `run`, the first being 1.
@@ -90,7 +105,7 @@ class DeclarativeEpisode(StoredEpisode, kw_only=True, frozen=True, tag="declarat
     """An episode that was consolidated to Declarative Memory, where it does not decay."""
 
 
-StoredRecord = StoredObjects | StoredTile | TransientEpisode | DeclarativeEpisode
+StoredRecord = StoredObjects | StoredTile | StoredTree | TransientEpisode | DeclarativeEpisode
 """One record of long-term memory; it replaces the one of its key."""
 
 

@@ -18,10 +18,11 @@ def memory_command(processes: int, json_path: Path | None) -> None:
     """Long-term memory: recall from corrupted cues, a second run in a town, kills and damage.
 
     Sparse distributed memory is read with 30 % of each cue's dimensions at random, and timed beside
-    a loop over its locations; episodes are recalled from a part of them. In ten towns a robot
-    explores, and begins anew elsewhere with the map in memory, and with those of the nine other
-    towns. Writers are killed, and databases cut short or flipped: `damaged_store_refused` counts
-    those that were not refused. Takes a quarter of an hour on two cores.
+    a loop over its locations; episodes are recalled from a part of them, and maps between equal
+    houses by what was passed. In ten towns a robot explores, and begins anew elsewhere with the map
+    in memory, and with those of the nine other towns. Writers are killed, and databases cut short
+    or flipped: `damaged_store_refused` counts those that were not refused. Takes a quarter of an
+    hour on two cores.
     """
     with tempfile.TemporaryDirectory() as folder:
         metrics = memory.measure(Path(folder), processes, announce)

@@ -1,5 +1,5 @@
-"""The metrics of memory: recall from corrupted cues, its speed, recall of episodes, a second run in
-a town, and what kills and damage do to the database.
+"""The metrics of memory: recall from corrupted cues, its speed, recall of episodes, and of maps
+between equal houses, a second run in a town, and what kills and damage do to the database.
 """
 
 from __future__ import annotations
@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks.memory import durability, episodes, recall, second_run, speed
+from benchmarks.memory import durability, episodes, equal_houses, recall, second_run, speed
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most
 
@@ -17,6 +17,7 @@ THRESHOLDS = {
     "reads_vs_numpy_loop": at_least(20),
     "episodes_recalled": at_least(0.9),
     "wrong_episodes": at_most(0.05),
+    "equal_houses_wrong": at_most(0),
     "second_run_share": at_most(0.2),
     "wrong_recalls": at_most(0),
     "lost_after_kill": at_most(0),
@@ -36,6 +37,9 @@ def measure(folder: Path, processes: int, announce: Callable[[str], None]) -> Me
 
     announce("recall of episodes")
     metrics |= episodes.measure(SEED)
+
+    announce("recall of maps between equal houses")
+    metrics |= equal_houses.measure(SEED)
 
     announce("databases that are cut or flipped, and writers that are killed")
     metrics["damaged_store_refused"] = float(durability.damaged_store_opened(folder))

@@ -13,9 +13,10 @@ from schemas.memory import (
     StoredObjects,
     StoredRecord,
     StoredTile,
+    StoredTree,
     TransientEpisode,
 )
-from schemas.nodes import TILE_CELLS, PlaceColumn, Remembered
+from schemas.nodes import TILE_CELLS, PlaceColumn, Remembered, SubMap
 
 MAP = "remembered:1"
 
@@ -31,7 +32,7 @@ def restored() -> Restored:
 
 
 def _records() -> list[StoredRecord]:
-    return [_objects(), _tile(), _transient(), _declarative()]
+    return [_objects(), _tile(), _tree(), _transient(), _declarative()]
 
 
 def _objects() -> StoredObjects:
@@ -47,6 +48,19 @@ def _objects() -> StoredObjects:
 def _tile() -> StoredTile:
     road = Matrix.of(np.full((1, TILE_CELLS), 0.5), "<f2")
     return StoredTile(map=MAP, x=-1, y=2, columns={PlaceColumn.ROAD: road})
+
+
+def _tree() -> StoredTree:
+    district = SubMap(
+        number=3,
+        cell_m=0.75,
+        x_m=10.5,
+        y_m=-4.25,
+        width_m=40.0,
+        height_m=25.5,
+        members=["bakery", "bakery~2"],
+    )
+    return StoredTree(map=MAP, sub_maps=[district])
 
 
 def _transient() -> TransientEpisode:

@@ -34,6 +34,7 @@ from schemas.nodes import (
     Recollection,
     Remembered,
     Self,
+    SubMap,
     attention_id,
     episode_id,
     goal_id,
@@ -242,7 +243,20 @@ def _recollection() -> Recollection:
         objects=matrix(2, 7),
         tiles=[(-1, 2)],
         columns={PlaceColumn.ROAD: Matrix.of(np.full((1, TILE_CELLS), 0.5), "<f2")},
+        sub_maps=[_sub_map()],
         **_USUAL,
+    )
+
+
+def _sub_map() -> SubMap:
+    return SubMap(
+        number=2,
+        cell_m=0.75,
+        x_m=10.5,
+        y_m=-4.25,
+        width_m=40.0,
+        height_m=25.5,
+        members=["bakery", "tower"],
     )
 
 

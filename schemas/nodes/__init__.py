@@ -49,7 +49,7 @@ from schemas.nodes.ids import (
 from schemas.nodes.links import EXCLUSIVE_LINKS, LinkKind
 from schemas.nodes.path import Correction, LoopClosure, Observations, PathSegment
 from schemas.nodes.planning import Goal, Plan, PlanState
-from schemas.nodes.recollection import Recollection
+from schemas.nodes.recollection import Recollection, SubMap
 from schemas.nodes.rules import KINDS, AnyNode, KindRules, kind_name, kind_of
 from schemas.nodes.situation import Map, Object, Percept, Self
 
@@ -93,6 +93,7 @@ __all__ = [
     "RouteColumn",
     "Self",
     "SelfColumn",
+    "SubMap",
     "attention_id",
     "category_id",
     "coarse_map_id",

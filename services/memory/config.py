@@ -64,6 +64,24 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             "houses are alike in every town.",
         ),
     ] = 3
+    min_looks_passed: Annotated[
+        int,
+        msgspec.Meta(
+            ge=1,
+            le=100,
+            description="Looks that are enough where the stored map has along the way what was "
+            "passed, 1 to 100.",
+        ),
+    ] = 2
+    min_passed: Annotated[
+        int,
+        msgspec.Meta(
+            ge=1,
+            le=1000,
+            description="Objects that a stored map must have along the way for that, 1 to 1000: "
+            "min_share of them must be known here.",
+        ),
+    ] = 4
     min_lead: Annotated[
         int,
         msgspec.Meta(

@@ -9,7 +9,7 @@ import numpy as np
 
 from cogmap.geometry.arrays import Floats
 from schemas.array import Matrix
-from schemas.memory import StoredObjects, StoredRecord, StoredTile, tile_key
+from schemas.memory import StoredObjects, StoredRecord, StoredTile, StoredTree, tile_key
 from schemas.nodes import PlaceColumn, RecalledColumn, look_of
 
 NUMBERED = "remembered:"
@@ -18,17 +18,20 @@ POSITION = slice(RecalledColumn.X_M, RecalledColumn.Y_M + 1)
 
 @dataclass
 class RememberedMap:
-    """A map that was learned: its objects, and the squares of place nodes by their position."""
+    """A map that was learned: its objects, its sub-maps, and the squares of place nodes by their
+    position.
+    """
 
     name: str
     known: StoredObjects | None = None
+    tree: StoredTree | None = None
     tiles: dict[tuple[int, int], dict[PlaceColumn, Matrix]] = field(default_factory=dict)
 
     @property
     def keys(self) -> list[str]:
         """The keys of its records."""
-        keys = [tile_key(self.name, x, y) for x, y in sorted(self.tiles)]
-        return keys if self.known is None else [self.known.key, *keys]
+        whole = [each.key for each in (self.known, self.tree) if each is not None]
+        return whole + [tile_key(self.name, x, y) for x, y in sorted(self.tiles)]
 
     @property
     def looks(self) -> list[str]:
@@ -61,6 +64,8 @@ class RememberedMaps:
                 remembered.tiles[record.x, record.y] = record.columns
             elif isinstance(record, StoredObjects):
                 remembered.known = record
+            elif isinstance(record, StoredTree):
+                remembered.tree = record
 
     def forget(self, name: str) -> list[str]:
         """Remove a map, where there is one of that name; the keys of its records."""

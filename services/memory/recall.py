@@ -14,6 +14,7 @@ from schemas.nodes import TILE_SIDE, Object, look_of
 from services.memory.config import Config
 from services.memory.maps import RememberedMap
 from services.memory.matching import NOWHERE, Landmarks, Match, best_matches
+from services.memory.passing import Way, is_as_passed
 
 MAX_CUES = 24
 """So many objects, the nearest to the agent, cue a recall."""
@@ -47,9 +48,15 @@ def cues(learned: Iterable[Object], agent_m: tuple[float, float]) -> list[Object
 
 
 def recalled(
-    here: Sequence[Object], stored: Sequence[RememberedMap], cell_m: float, config: Config
+    here: Sequence[Object],
+    way: Way,
+    stored: Sequence[RememberedMap],
+    cell_m: float,
+    config: Config,
 ) -> Recalled | None:
-    """The one of some stored maps that objects `here` are on; None where that is not sure."""
+    """The one of some stored maps that objects `here`, at the end of a way, are on; None where that
+    is not sure.
+    """
     if len(here) < config.min_matches:
         return None
 
@@ -64,7 +71,8 @@ def recalled(
     compared.sort(key=lambda each: -each.match.matched)
     best, *others = compared
     runner_up = max([best.runner_up, *(other.match.matched for other in others)])
-    if not _is_sure(here, best, runner_up, cell_m, config):
+    is_sure = _is_sure(here, best, runner_up, cell_m, config)
+    if not is_sure or not _is_distinctive(here, way, best, config):
         return None
 
     return Recalled(best.remembered, best.match.pose, _labels(here, best))
@@ -93,21 +101,30 @@ def _compared(
 def _is_sure(
     here: Sequence[Object], best: _Compared, runner_up: int, cell_m: float, config: Config
 ) -> bool:
-    """Whether the best match is of enough objects, of those that it could be of, with several looks
-    among them, and leads any other.
+    """Whether the best match is of enough objects, of those that it could be of, and leads any
+    other.
     """
     count = best.match.matched
     if count < config.min_matches or count - runner_up < config.min_lead:
         return False
 
     is_matched = best.match.there != NOWHERE
-    looks = {look_of(here[number].label) for number in np.flatnonzero(is_matched).tolist()}
-    if len(looks) < config.min_looks:
-        return False
-
     at_m = transform_from(best.match.pose, np.array([(node.x_m, node.y_m) for node in here]))
     could_match = is_matched | _is_known(best.remembered, at_m, cell_m)
     return bool(count >= config.min_share * could_match.sum())
+
+
+def _is_distinctive(here: Sequence[Object], way: Way, best: _Compared, config: Config) -> bool:
+    """Whether the objects that match have several looks among them, or few, and the stored map has
+    along the way what was passed.
+    """
+    matched = np.flatnonzero(best.match.there != NOWHERE).tolist()
+    looks = {look_of(here[number].label) for number in matched}
+    if len(looks) >= config.min_looks:
+        return True
+    if len(looks) < config.min_looks_passed:
+        return False
+    return is_as_passed(way, best.remembered, best.match.pose, config)
 
 
 def _is_known(remembered: RememberedMap, at_m: Floats, cell_m: float) -> Booleans:

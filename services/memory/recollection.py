@@ -30,6 +30,7 @@ def recollection(found: Recalled) -> Recollection:
         objects=remembered.known.objects,
         tiles=sorted(remembered.tiles),
         columns=_columns(remembered),
+        sub_maps=[] if remembered.tree is None else remembered.tree.sub_maps,
     )
 
 

@@ -16,9 +16,10 @@ from services.memory.associations import Associations
 from services.memory.changes import Changes
 from services.memory.config import Config
 from services.memory.maps import RememberedMap, RememberedMaps
+from services.memory.passing import way_of
 from services.memory.recall import cues, recalled
 from services.memory.recollection import recollection
-from services.memory.storing import ChangedPlaces, stored_objects
+from services.memory.storing import ChangedPlaces, stored_objects, stored_tree
 
 
 class SpatialMemory:
@@ -34,6 +35,7 @@ class SpatialMemory:
         self._name = ""
         self._changed = ChangedPlaces()
         self._objects: list[StoredRecord] = []
+        self._tree: list[StoredRecord] = []
         self._cued: set[str] = set()
         self._associations: Associations | None = None
 
@@ -57,8 +59,8 @@ class SpatialMemory:
                     self._name = record.map
 
     def learned(self) -> list[StoredRecord]:
-        """What stands for all that was stored in this run: the objects of the map."""
-        return self._objects
+        """What stands for all that was stored in this run: the map without its places."""
+        return [*self._objects, *self._tree]
 
     def note(self, delta: Delta) -> None:
         """Note what a delta has changed."""
@@ -72,10 +74,16 @@ class SpatialMemory:
         """What has changed on the root map since it was stored."""
         forgotten = self._rename()
         records: list[StoredRecord] = [*self._changed.take(self._name, self._graph)]
-        objects = stored_objects(self._name, self._learned(), self._graph)
+        learned = self._learned()
+        objects = stored_objects(self._name, learned, self._graph)
         if objects != self._objects:
             self._objects = objects
             records += objects
+
+        tree = stored_tree(self._name, learned, self._graph)
+        if tree != self._tree:
+            self._tree = tree
+            records += tree
 
         self._maps.put(records)
         return Changes(records, forgotten)
@@ -86,14 +94,16 @@ class SpatialMemory:
         if agent is None or self._joined or RECOLLECTION_ID in self._graph.nodes:
             return None
 
-        here = cues(self._learned(), (agent.x_m, agent.y_m))
+        learned = self._learned()
+        here = cues(learned, (agent.x_m, agent.y_m))
         labels = {node.label for node in here}
         if labels == self._cued:
             return None
 
         self._cued = labels
         others = self._compared(here)
-        found = recalled(here, others, self._graph.cell_m(ROOT_MAP), self._config)
+        way = way_of(self._graph, learned)
+        found = recalled(here, way, others, self._graph.cell_m(ROOT_MAP), self._config)
         return None if found is None else recollection(found)
 
     def _compared(self, here: list[Object]) -> list[RememberedMap]:

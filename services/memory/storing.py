@@ -12,8 +12,18 @@ from cogmap.graph.tiles import tiles_of
 from cogmap.graph.window import EVIDENCE_COLUMNS
 from schemas.array import Matrix
 from schemas.graph import Cells, Operation
-from schemas.memory import StoredObjects, StoredRecord, StoredTile
-from schemas.nodes import ROOT_MAP, TILE_CELLS, Object, PlaceColumn
+from schemas.memory import StoredObjects, StoredRecord, StoredTile, StoredTree
+from schemas.nodes import (
+    ROOT_MAP,
+    TILE_CELLS,
+    LinkKind,
+    Map,
+    Object,
+    PlaceColumn,
+    SubMap,
+    map_number,
+    object_id,
+)
 
 COLUMNS = (PlaceColumn.ROAD, PlaceColumn.OBSTACLE, *EVIDENCE_COLUMNS)
 """Of place nodes; the weights of links follow from their evidence."""
@@ -91,3 +101,37 @@ def stored_objects(name: str, objects: Iterable[Object], graph: Graph) -> list[S
         objects=Matrix.of(rows),
     )
     return [record]
+
+
+def stored_tree(name: str, objects: Iterable[Object], graph: Graph) -> list[StoredRecord]:
+    """The record of the sub-maps that have some of the objects of the map that is called `name`;
+    none where there are none.
+    """
+    members: dict[str, list[str]] = {}
+    for label in sorted(node.label for node in objects):
+        target = graph.links.target(object_id(label), LinkKind.WITHIN)
+        if target is not None:
+            members.setdefault(target, []).append(label)
+
+    sub_maps = []
+    for identifier, labels in members.items():
+        number = map_number(identifier)
+        node = graph.get(Map, identifier)
+        if number and node is not None and node.parent == ROOT_MAP:
+            sub_maps.append(_sub_map(number, node, labels))
+
+    sub_maps.sort(key=lambda each: each.number)
+    return [StoredTree(map=name, sub_maps=sub_maps)] if sub_maps else []
+
+
+def _sub_map(number: int, node: Map, members: list[str]) -> SubMap:
+    return SubMap(
+        number=number,
+        cell_m=node.cell_m,
+        x_m=node.x_m,
+        y_m=node.y_m,
+        heading_rad=node.heading_rad,
+        width_m=node.width_m,
+        height_m=node.height_m,
+        members=members,
+    )

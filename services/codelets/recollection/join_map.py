@@ -40,6 +40,7 @@ from services.codelets.correction.apply_correction import moved
 from services.codelets.correction.place_columns import MOVED_COLUMNS
 from services.codelets.recollection.places import recalled_places
 from services.codelets.recollection.recalled_objects import recalled_objects
+from services.codelets.recollection.sub_maps import recalled_sub_maps
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
@@ -62,7 +63,10 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     operations += moved(graph, _as_correction(pose))
     operations += _moved_goals(graph, pose)
     operations += _moved_plan(graph, pose, task.stamp_ns)
-    operations += recalled_objects(recalled, graph, pose)
+    known = recalled_objects(recalled, graph, pose)
+    operations += known
+    objects = [each for each in known if isinstance(each, Object)]
+    operations += recalled_sub_maps(recalled, objects, graph, pose)
     operations += recalled_places(recalled)
     return Answer(operations)
 
@@ -74,8 +78,8 @@ CODELET = Codelet(
     phase=Phase.CORRECTION,
     due=due,
     run=run,
-    reads=frozenset({*MOVED, Recollection, Observations, *MOVED_COLUMNS}),
-    writes=frozenset({*MOVED, Recollection, LinkKind.AT, *MOVED_COLUMNS}),
+    reads=frozenset({*MOVED, Recollection, Observations, LinkKind.WITHIN, *MOVED_COLUMNS}),
+    writes=frozenset({*MOVED, Recollection, LinkKind.AT, LinkKind.WITHIN, *MOVED_COLUMNS}),
     config=Config,
     section=SECTION,
 )

@@ -116,7 +116,9 @@ def _new_in_view(context: CycleContext, graph: Graph, config: Config) -> list[st
 
 
 def _is_new(node: Object, graph: Graph) -> bool:
-    return node.map == ROOT_MAP and graph.links.target(node.id, LinkKind.WITHIN) is None
+    sub_map = graph.links.target(node.id, LinkKind.WITHIN)
+    is_in_none = sub_map is None or graph.get(Map, sub_map) is None
+    return node.map == ROOT_MAP and is_in_none
 
 
 def _scope(task: Task, graph: Graph, config: Config) -> _Scope:

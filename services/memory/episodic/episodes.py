@@ -89,14 +89,23 @@ class Episodes:
 
         self._forget_oldest()
 
-    def relocate(self, run: int, moved: Callable[[KeptEpisode], KeptEpisode | None]) -> None:
-        """Put those of a run elsewhere, or forget them where that is None."""
-        for episode in [each for each in self._known.values() if each.run == run]:
+    def relocate(self, moved: Callable[[KeptEpisode], KeptEpisode | None]) -> set[int]:
+        """Put episodes elsewhere, or forget them where that is None. The numbers of those that are
+        not where they were.
+        """
+        relocated = set()
+        for episode in list(self._known.values()):
             after = moved(episode)
+            if after == episode:
+                continue
+
+            relocated.add(episode.number)
             if after is None:
                 self.forget(episode.number)
             else:
                 self.put(after)
+
+        return relocated
 
     def take_changes(self) -> Changes:
         """What is not stored yet as it is: after this, all is."""

@@ -7,7 +7,7 @@ Declarative Memory has those that were still active by then. Both are cued by wh
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import msgspec
 import numpy as np
@@ -22,6 +22,7 @@ from schemas.memory import Stored, StoredRecord
 from schemas.nodes import RECOLLECTION_ID, ROOT_MAP, Map, Recollection, Self, episode_id
 from services.memory.changes import Changes
 from services.memory.config import Config
+from services.memory.episodic.corrections import Corrections, corrected
 from services.memory.episodic.cues import EpisodicCues
 from services.memory.episodic.episodes import Episodes, KeptEpisode, is_episode
 from services.memory.episodic.visit import Position, Visit
@@ -44,6 +45,7 @@ class EpisodicMemory:
         self._has_begun = False
         self._map = ""
         self._recollection: Recollection | None = None
+        self._corrections = Corrections()
         self._broadcasts: list[Broadcast] = []
         self._visits: list[Visit] = []
         self._cued_ns = 0
@@ -73,13 +75,15 @@ class EpisodicMemory:
         return [each for each in self._episodes.known.values() if each.run == self._run]
 
     def note(self, delta: Delta) -> None:
-        """Note a recalled map, into whose frame the root map may be moved."""
+        """Note a recalled map, into whose frame the root map may be moved, and corrections."""
+        self._corrections.note(delta.operations)
         for operation in delta.operations:
             if isinstance(operation, Recollection):
                 self._recollection = operation
 
     def note_all(self) -> None:
-        """Note a recalled map in a graph that was loaded as a whole."""
+        """Note a recalled map and a correction in a graph that was loaded as a whole."""
+        self._corrections.note_all(self._graph)
         found = self._graph.get(Recollection, RECOLLECTION_ID)
         self._recollection = found or self._recollection
 
@@ -88,11 +92,16 @@ class EpisodicMemory:
         self._broadcasts.append(broadcast)
 
     def experience(self, cycle: int) -> None:
-        """Take in what was broadcast before `cycle`, and follow the root map into another frame."""
+        """Take in what was broadcast before `cycle`, and follow the root map where it was corrected
+        and into another frame.
+        """
         due = [each for each in self._broadcasts if each.cycle < cycle]
         self._broadcasts = [each for each in self._broadcasts if each.cycle >= cycle]
         for broadcast in due:
             self._take(broadcast)
+
+        for rows in self._corrections.take():
+            self._correct(rows)
 
         root = self._graph.get(Map, ROOT_MAP)
         if root is not None and root.remembered and root.remembered != self._map:
@@ -191,6 +200,27 @@ class EpisodicMemory:
         )
         self._visits.append(visit)
 
+    def _correct(self, rows: Floats) -> None:
+        """Move the places of the root map's episodes as a correction, (n, 7), states."""
+
+        def moved(episode: KeptEpisode) -> KeptEpisode:
+            if episode.map != self._map:
+                return episode
+
+            at_m, *path = corrected(rows, [(episode.x_m, episode.y_m), *episode.path])
+            return msgspec.structs.replace(episode, x_m=at_m[0], y_m=at_m[1], path=path)
+
+        self._relocate(moved)
+        for visit in self._visits:
+            visit.at_m, *visit.path = corrected(rows, [visit.at_m, *visit.path])
+
+    def _relocate(self, moved: Callable[[KeptEpisode], KeptEpisode | None]) -> None:
+        """Put episodes elsewhere, or forget them, and recall them where they are then."""
+        relocated = self._episodes.relocate(moved)
+        if self._cues is not None:
+            known = self._episodes.known.values()
+            self._cues.hold({each.number: each for each in known if each.number not in relocated})
+
     def _join(self, name: str) -> None:
         """Move what happened in this run into the frame of the map `name`, which was joined to the
         root map. Where it is not known how that lies, what happened before is forgotten.
@@ -201,7 +231,7 @@ class EpisodicMemory:
             pose = np.array([recollection.x_m, recollection.y_m, recollection.heading_rad])
 
         def moved(episode: KeptEpisode) -> KeptEpisode | None:
-            if episode.map == name:
+            if episode.map == name or episode.run != self._run:
                 return episode
             if pose is None:
                 return None
@@ -210,11 +240,7 @@ class EpisodicMemory:
             return msgspec.structs.replace(episode, map=name, x_m=at_m[0], y_m=at_m[1], path=path)
 
         self._map = name
-        if self._cues is not None:
-            known = self._episodes.known.values()
-            self._cues.hold({each.number: each for each in known if each.run != self._run})
-
-        self._episodes.relocate(self._run, moved)
+        self._relocate(moved)
         if pose is None:
             self._visits = []
         for visit in self._visits:

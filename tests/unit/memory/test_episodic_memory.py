@@ -16,7 +16,7 @@ from schemas.array import Matrix
 from schemas.base import Message
 from schemas.codelets import Offer
 from schemas.cognition import Broadcast, Coalition, Competition, Trigger
-from schemas.graph import Delta, Operation, Phase
+from schemas.graph import Delta, DropNode, Operation, Phase
 from schemas.memory import (
     DeclarativeEpisode,
     Restored,
@@ -27,17 +27,22 @@ from schemas.memory import (
     TransientEpisode,
 )
 from schemas.nodes import (
+    CORRECTION_ID,
     RECOLLECTION_ID,
     ROOT_MAP,
     AnyNode,
+    Correction,
     Episode,
     Map,
     Need,
     Object,
+    PathColumn,
+    PathSegment,
     Recollection,
     Remembered,
     need_id,
     object_id,
+    segment_id,
 )
 from services.memory.episodic.config import EpisodicConfig
 from services.memory.module import Config, build
@@ -334,6 +339,37 @@ def test_the_episodes_of_a_run_move_into_the_frame_of_the_map_that_it_recalls() 
 
     mind.live((97.0, 46.0), *seen(*LOOKS), cycles=3)
     assert [(each.x_m, each.y_m) for each in mind.recalled()] == [(moved.x_m, moved.y_m)]
+
+
+def test_a_correction_of_the_map_moves_episodes_with_the_path_nearest_to_them() -> None:
+    mind = Mind()
+    mind.live((3.0, 4.0), *seen(*LOOKS), cycles=3)
+    mind.live((43.0, 4.0), *seen("hall"), cycles=3)
+    rows = [[0.2, 3.0, 3.0, 0.0, 5.0, 9.0, np.pi / 2], [0.8, 40.0, 4.0, 0.0, 40.0, 4.0, 0.0]]
+    mind.commit(Correction(id=CORRECTION_ID, rows=Matrix.of(rows)))
+    path = PathSegment(id=segment_id(0), number=0, rows=Matrix.of(np.zeros((1, len(PathColumn)))))
+    mind.commit(DropNode(id=CORRECTION_ID), path, phase=Phase.CORRECTION)
+    mind.live((43.0, 4.0), *seen("hall"), cycles=3)
+
+    first, second = mind.episodes()
+    assert (first.x_m, first.y_m) == pytest.approx((4.0, 9.0))
+    assert (second.x_m, second.y_m) == pytest.approx((43.0, 4.0))
+    assert second.path[0] == pytest.approx((4.0, 9.0))
+
+    mind.live((4.0, 9.0), *seen(*LOOKS), cycles=3)
+    assert [each.number for each in mind.recalled()] == [first.number]
+
+
+def test_a_correction_that_is_outdated_moves_no_episode() -> None:
+    mind = Mind()
+    mind.live((3.0, 4.0), *seen(*LOOKS), cycles=3)
+    rows = [[0.2, 3.0, 3.0, 0.0, 5.0, 9.0, 0.0]]
+    mind.commit(Correction(id=CORRECTION_ID, rows=Matrix.of(rows)))
+    mind.commit(DropNode(id=CORRECTION_ID), phase=Phase.CORRECTION)
+    mind.live((3.0, 4.0), *seen(*LOOKS), cycles=3)
+
+    (episode,) = mind.episodes()
+    assert (episode.x_m, episode.y_m) == (3.0, 4.0)
 
 
 def test_episodes_of_a_frame_that_nobody_knows_any_more_are_forgotten() -> None:

@@ -6,20 +6,26 @@ import pytest
 
 from cogmap.geometry.se2 import transform_to
 from cogmap.runtime.module import Module
-from schemas.array import Array
+from schemas.array import Array, Matrix
 from schemas.base import Message
 from schemas.codelets import Offer
 from schemas.cognition import Broadcast, Coalition, Competition, Trigger
-from schemas.graph import Cells, Delta, Operation, Phase
-from schemas.memory import Restored, Stored, StoredObjects, StoredTile
+from schemas.graph import Cells, Delta, Link, Operation, Phase
+from schemas.memory import Restored, Stored, StoredObjects, StoredTile, StoredTree
 from schemas.nodes import (
     RECOLLECTION_ID,
     ROOT_MAP,
+    LinkKind,
     Map,
     Object,
+    PathColumn,
+    PathSegment,
     PlaceColumn,
     Recollection,
+    individual_label,
+    map_id,
     object_id,
+    segment_id,
 )
 from schemas.sensing import RangeScan
 from services.memory.module import Config, build
@@ -42,6 +48,17 @@ def buildings(at_m: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> list[O
     return nodes
 
 
+def houses() -> list[Operation]:
+    """Houses of two looks on both sides of a street along x."""
+    nodes: list[Operation] = []
+    for number, x_m in enumerate((8.0, 17.0, 31.0, 38.0, 52.0, 63.0, 74.0, 88.0), start=1):
+        label = individual_label("works" if number in (3, 5) else "house", number)
+        y_m = 9.0 * (-1.0) ** number
+        nodes.append(Object(id=object_id(label), label=label, x_m=x_m, y_m=y_m, sightings=9))
+
+    return nodes
+
+
 def road(cell: tuple[int, int] = (3, 4)) -> Cells:
     """A place node that is road."""
     return Cells(
@@ -50,6 +67,16 @@ def road(cell: tuple[int, int] = (3, 4)) -> Cells:
         cells=Array.of(np.array([cell]), "<i4"),
         values=Array.of(np.array([0.75]), "<f4"),
     )
+
+
+def district(*labels: str) -> list[Operation]:
+    """A sub-map with some of the buildings in it."""
+    links: list[Operation] = []
+    for label in labels:
+        link = Link(source=object_id(label), target=map_id(4), kind=LinkKind.WITHIN)
+        links.append(link)
+
+    return [Map(id=map_id(4), parent=ROOT_MAP, cell_m=0.5, width_m=30.0, height_m=20.0), *links]
 
 
 class Mind:
@@ -128,6 +155,34 @@ def test_a_map_that_was_conscious_is_stored_with_its_objects_and_places() -> Non
     assert tile.columns[PlaceColumn.ROAD].numpy()[0, 3 * 32 + 4] == 0.75
 
 
+def test_the_sub_maps_of_a_map_are_stored_with_their_objects_and_recalled_with_it() -> None:
+    first = Mind(*buildings(AT_M), *district("bakery", "tower"))
+    records = stored_in(first.live(3)).records
+    (tree,) = of_type(StoredTree, records)
+    assert [(each.number, each.parent) for each in tree.sub_maps] == [(4, 0)]
+    assert tree.sub_maps[0].members == ["bakery", "tower"]
+
+    second = Mind(*buildings(transform_to(POSE, AT_M)))
+    second.module.feed(Restored(records=records))
+
+    (recalled,) = recollections(second.end(1) + second.compete(1))
+    assert recalled.sub_maps == tree.sub_maps
+
+
+def test_sub_maps_are_stored_again_where_an_object_has_changed_its_own() -> None:
+    mind = Mind(*buildings(AT_M), *district("bakery", "tower"))
+    mind.live(3)
+    mind.commit(4, *district("school"))
+
+    published: list[Message] = []
+    for cycle in range(4, 8):
+        published += mind.end(cycle) + mind.compete(cycle)
+
+    (tree,) = stored_in(published).records
+    assert isinstance(tree, StoredTree)
+    assert tree.sub_maps[0].members == ["bakery", "school", "tower"]
+
+
 def test_a_map_that_was_never_conscious_is_not_stored() -> None:
     mind = Mind(*buildings(AT_M))
 
@@ -171,6 +226,22 @@ def test_a_town_is_recalled_in_a_frame_of_its_own_with_the_relative_position() -
     assert (recalled.x_m, recalled.y_m, recalled.heading_rad) == pytest.approx(tuple(POSE))
     assert recalled.matched == recalled.labels
     assert recalled.tiles == [(0, 0)]
+
+
+def test_a_street_of_two_looks_is_recalled_once_it_was_driven() -> None:
+    path = np.zeros((100, len(PathColumn)))
+    path[:, PathColumn.X_M] = np.arange(100.0)
+    driven = PathSegment(id=segment_id(0), number=0, rows=Matrix.of(path))
+    known = Restored(records=stored_in(Mind(*houses()).live(3)).records)
+
+    passing = Mind(*houses(), driven)
+    passing.module.feed(known)
+    standing = Mind(*houses())
+    standing.module.feed(known)
+
+    (recalled,) = recollections(passing.end(1) + passing.compete(1))
+    assert (recalled.x_m, recalled.y_m, recalled.heading_rad) == pytest.approx((0.0, 0.0, 0.0))
+    assert recollections(standing.end(1) + standing.compete(1)) == []
 
 
 def test_another_town_is_not_taken_for_the_one_that_is_known() -> None:

@@ -2,13 +2,14 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import numpy as np
 import pytest
 
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import CycleContext
 from schemas.array import Array, Matrix
-from schemas.graph import Delta, Operation, Phase
+from schemas.graph import Delta, Link, Operation, Phase
 from schemas.nodes import (
     CORRECTION_ID,
     PLAN_ID,
@@ -25,7 +26,9 @@ from schemas.nodes import (
     Plan,
     PlanState,
     Recollection,
+    SubMap,
     goal_id,
+    map_id,
     object_id,
 )
 from services.codelets.config import Config
@@ -62,7 +65,9 @@ def recollection() -> Recollection:
 
 
 def joined(*operations: Operation) -> Graph:
-    """A graph with these and a recollection, after the map was joined."""
+    """A graph with these and a recollection, this one if there is no other, after the map was
+    joined.
+    """
     graph = graph_of(agent(x_m=0.0), recollection(), *operations)
     answer = run(task("join_map", stamp_ns=10**9), graph, CONFIG)
     delta = Delta(version=2, cycle=1, phase=Phase.CORRECTION, operations=answer.operations)
@@ -183,3 +188,88 @@ def test_a_correction_that_was_computed_before_the_map_was_joined_changes_nothin
     (dropped,) = run(task("apply_correction"), graph, CONFIG).operations
 
     assert getattr(dropped, "id", "") == CORRECTION_ID
+
+
+def districts(*sub_maps: SubMap) -> Recollection:
+    """The same recollection, with a tree."""
+    return msgspec.structs.replace(recollection(), sub_maps=list(sub_maps))
+
+
+def district(number: int, *members: str) -> SubMap:
+    """A sub-map of the recalled map."""
+    return SubMap(
+        number=number, cell_m=0.5, x_m=80, y_m=35, width_m=40, height_m=50, members=list(members)
+    )
+
+
+def test_recalled_objects_are_in_the_sub_maps_that_they_were_in() -> None:
+    graph = joined(districts(district(7, "house", "house~2")), landmark("house"))
+
+    found = graph.get(Map, map_id(7))
+    assert found is not None
+    assert (found.parent, found.x_m, found.y_m, found.width_m) == (ROOT_MAP, 80, 35, 40)
+    for label in ("house", "house~2"):
+        assert graph.links.target(object_id(label), LinkKind.WITHIN) == map_id(7)
+
+
+def test_sub_maps_of_this_run_make_way_and_keep_what_was_not_recalled() -> None:
+    own = Map(id=map_id(7), parent=ROOT_MAP, cell_m=1.0, x_m=10.0, y_m=5.0, width_m=9, height_m=9)
+    links = [
+        Link(source=object_id(label), target=map_id(7), kind=LinkKind.WITHIN)
+        for label in ("house", "bakery")
+    ]
+    graph = joined(
+        districts(district(7, "house", "house~2")),
+        landmark("house"),
+        landmark("bakery"),
+        own,
+        *links,
+    )
+
+    assert graph.links.sources(map_id(7), LinkKind.WITHIN) == ("object:house", "object:house~2")
+    assert graph.links.sources(map_id(8), LinkKind.WITHIN) == ("object:bakery",)
+    kept = graph.get(Map, map_id(8))
+    assert kept is not None
+    assert (kept.x_m, kept.y_m) == pytest.approx((95.0, 10.0))
+
+
+def test_a_sub_map_whose_objects_were_all_recalled_is_another_or_gone() -> None:
+    own = Map(id=map_id(3), parent=ROOT_MAP, cell_m=1.0)
+    link = Link(source=object_id("house"), target=map_id(3), kind=LinkKind.WITHIN)
+    graph = joined(districts(district(7, "house", "house~2")), landmark("house"), own, link)
+
+    assert graph.get(Map, map_id(3)) is None
+    assert graph.links.target(object_id("house"), LinkKind.WITHIN) == map_id(7)
+
+
+def test_recalled_sub_maps_keep_their_numbers_when_their_objects_are_sorted_anew() -> None:
+    rows = []
+    members: dict[int, list[str]] = {5: [], 2: []}
+    for number, names in members.items():
+        for place in range(12):
+            at_m = (1000.0 * number + 12.0 * (place // 2), 12.0 * (place % 2))
+            rows.append([*at_m, 0.5, 0.5, 6.0, 5.0, 9.0])
+            names.append(f"house-{number}-{place}")
+
+    labels = members[5] + members[2]
+    recalled = Recollection(
+        id=RECOLLECTION_ID,
+        map="remembered:1",
+        x_m=0.0,
+        y_m=0.0,
+        heading_rad=0.0,
+        labels=labels,
+        functions=[""] * len(labels),
+        matched=[""] * len(labels),
+        objects=Matrix.of(rows),
+        sub_maps=[district(number, *members[number]) for number in members],
+    )
+    graph = joined(recalled)
+
+    outdated = [map_id(5), map_id(2)]
+    answer = run(task("map_structure", about=outdated), graph, CONFIG)
+    graph.change(answer.operations)
+
+    for number, names in members.items():
+        within = {graph.links.target(object_id(name), LinkKind.WITHIN) for name in names}
+        assert within == {map_id(number)}

@@ -149,6 +149,15 @@ def test_an_object_in_view_that_is_in_no_sub_map_is_what_a_task_is_about():
     assert not due(context(graph, "house-003", "late"), graph, CONFIG)
 
 
+def test_an_object_whose_sub_map_is_gone_is_in_none():
+    node = landmark("house", sightings=3)
+    graph = graph_of(node, Links(kind=LinkKind.WITHIN, weights={node.id: {map_id(4): 1.0}}))
+
+    (found,) = due(context(graph, "house"), graph, CONFIG)
+
+    assert found.about == [node.id]
+
+
 def test_an_object_seen_only_once_waits():
     graph = graph_of(landmark("house", [(0.0, 0.0)], sightings=1))
 
