@@ -13,6 +13,7 @@ from types import FrameType
 
 from cogmap.bus.session import DEFAULT_AGENT, DEFAULT_ENDPOINT, check_name, open_router
 from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.runtime.heap import keep_freed_memory
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
 from cogmap.runtime.state.journal import Journal
@@ -84,6 +85,7 @@ def run_module(
     for an instance's name that cannot be part of a key.
     """
     check_name("--instance", module.instance)
+    keep_freed_memory()
     stop = stop or Stop()
     if module.remembers:
         os.nice(PATIENT)
