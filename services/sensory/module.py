@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+
 import cv2
 import numpy as np
 
@@ -28,8 +30,8 @@ class SensoryMemory:
 
     A frame waits until the odometry up to its stamp has come, whichever of the two comes first, so
     the output does not depend on how they interleave. A newer frame replaces a waiting one; the
-    motion then covers both, so none is lost. The last frame, published again, gets the same answer
-    again.
+    motion then covers both, so none is lost. The view comes first: perception begins with it while
+    the motion is still being measured. The last frame, published again, gets the same answer again.
     """
 
     def __init__(self, config: Config) -> None:
@@ -47,7 +49,7 @@ class SensoryMemory:
         self._last_ns: int | None = None
         self._answer: list[Message] = []
 
-    def on_frame(self, frame: StereoFrame) -> list[Message]:
+    def on_frame(self, frame: StereoFrame) -> Iterable[Message]:
         """Receive a frame. Raises MessageError where its images do not fit its calibration."""
         colour_image(frame.left, frame.calibration, "left")
         colour_image(frame.right, frame.calibration, "right")
@@ -62,7 +64,7 @@ class SensoryMemory:
 
         return self._emit()
 
-    def on_odometry(self, odometry: Odometry) -> list[Message]:
+    def on_odometry(self, odometry: Odometry) -> Iterable[Message]:
         """Receive odometry. Raises MessageError where no wheels turn so fast or its stamp is far
         ahead.
         """
@@ -73,16 +75,19 @@ class SensoryMemory:
         """The answer to the last frame; none to an older one."""
         return self._answer if frame.stamp_ns == self._last_ns else []
 
-    def _emit(self) -> list[Message]:
+    def _emit(self) -> Iterator[Message]:
         frame = self._waiting
         if frame is None or not self._odometry.covers(frame.stamp_ns):
-            return []
+            return
 
         self._waiting = None
         ranges, view = self._views(frame)
-        self._answer = [self._self_motion(frame, view), ranges, view]
+        yield view
+        yield ranges
 
-        return self._answer
+        motion = self._self_motion(frame, view)
+        self._answer = [view, ranges, motion]
+        yield motion
 
     def _self_motion(self, frame: StereoFrame, view: View) -> SelfMotion:
         began_ns, rows = self._odometry.take(frame.stamp_ns)
