@@ -22,7 +22,6 @@ from cogmap.runtime.state.store import Store
 
 log = logging.getLogger("cogmap")
 IDLE_S = 0.25
-# No command waits for what is remembered: others go first where processors are scarce.
 PATIENT = 10
 ORPHAN_GRACE_S = 10.0
 
@@ -68,6 +67,13 @@ class Stop:
         os._exit(1)  # it hangs, and nobody is left to end it
 
 
+def give_way() -> None:
+    """Let other processes go first where processors are scarce: no command waits for what this
+    thread does, and those that it starts from now on.
+    """
+    os.nice(PATIENT)
+
+
 def run_module(
     module: Module,
     endpoint: str = DEFAULT_ENDPOINT,
@@ -88,7 +94,7 @@ def run_module(
     keep_freed_memory()
     stop = stop or Stop()
     if module.remembers:
-        os.nice(PATIENT)
+        give_way()
     journal = None
     counts = None
     if state is not None:
