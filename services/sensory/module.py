@@ -81,8 +81,10 @@ class SensoryMemory:
             return
 
         self._waiting = None
-        ranges, view = self._views(frame)
+        view = self._view(frame)
         yield view
+
+        ranges = self._ranges(view)
         yield ranges
 
         motion = self._self_motion(frame, view)
@@ -114,7 +116,7 @@ class SensoryMemory:
 
         return fuse(rows, motion, wheels)
 
-    def _views(self, frame: StereoFrame) -> tuple[RangeScan, View]:
+    def _view(self, frame: StereoFrame) -> View:
         rectified = rectification(frame.calibration)
         calibration = rectified.calibration
         left, right = rectified.apply(
@@ -123,14 +125,7 @@ class SensoryMemory:
         )
 
         depth_m = self._matcher(calibration).depth_m(left, right)
-        bearing_rad, range_m = scan(depth_m, calibration, self._config.scan_sectors)
-        ranges = RangeScan(
-            stamp_ns=frame.stamp_ns,
-            frame=frame.frame,
-            bearing_rad=Array.of(bearing_rad),
-            range_m=Array.of(range_m),
-        )
-        view = View(
+        return View(
             stamp_ns=frame.stamp_ns,
             frame=frame.frame,
             image=Array.of(left),
@@ -138,7 +133,15 @@ class SensoryMemory:
             calibration=calibration,
         )
 
-        return ranges, view
+    def _ranges(self, view: View) -> RangeScan:
+        depth_m = view.depth_m.numpy().astype(np.float32, copy=False)
+        bearing_rad, range_m = scan(depth_m, view.calibration, self._config.scan_sectors)
+        return RangeScan(
+            stamp_ns=view.stamp_ns,
+            frame=view.frame,
+            bearing_rad=Array.of(bearing_rad),
+            range_m=Array.of(range_m),
+        )
 
     def _matcher(self, calibration: Calibration) -> DepthFromStereo:
         if self._depth is None or self._depth[0] != calibration:
