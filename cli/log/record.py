@@ -21,7 +21,7 @@ from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.errors import LogError
 from cogmap.recording import recorder, selection
 from cogmap.runtime import config
-from cogmap.runtime.process import Stop
+from cogmap.runtime.process import Stop, give_way
 
 _EPILOG = """\b
 Examples:
@@ -97,6 +97,8 @@ def record(
         bus.close()
         raise
 
+    if tied:
+        give_way()
     summary = recorder.run(recording, lambda: stop.asked, max_duration)
     if as_json:
         formatting.print_json(summary)

@@ -206,9 +206,11 @@ def encoding(topic: Topic) -> zenoh.Encoding:
 
 
 def _priority(topic: Topic) -> zenoh.Priority:
-    """Images and facts about processes give way to what the cycle waits for."""
-    is_image = topic.max_bytes > _LARGE_BYTES and topic.delivery is Delivery.LATEST_WINS
-    if is_image or topic.scope is not Scope.MODEL:
+    """Images, health and the truth give way to what the cycle waits for."""
+    is_large = topic.max_bytes > _LARGE_BYTES
+    is_health = topic.scope is Scope.PROCESS
+    can_be_replaced = topic.delivery is Delivery.LATEST_WINS
+    if topic.scope is Scope.TRUTH or (can_be_replaced and (is_large or is_health)):
         return zenoh.Priority.DATA_LOW
     return zenoh.Priority.DATA_HIGH
 

@@ -46,10 +46,11 @@ class Graph:
 
     `phase` is that of the newest commit that was not late, in cognitive cycle `cycle`. Nodes are
     shared and never changed: a commit replaces them. All nodes of an indexed kind are found without
-    a search.
+    a search. A replica that needs no place nodes, the bulk of what changes, leaves them out by
+    `with_places`.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, with_places: bool = True) -> None:
         self.version = 0
         self.cycle = 0
         self.phase = Phase.END
@@ -63,11 +64,11 @@ class Graph:
         self._appliers: dict[type, Callable[[Any], None]] = {
             Link: self._put_link,
             Links: self.links.put_all,
-            PlaceTile: self.places.put_tile,
+            PlaceTile: self.places.put_tile if with_places else _leave_out,
             DropNode: self._drop_node,
             DropPlaces: self._drop_places,
             DropLink: self._drop_link,
-            Cells: self.places.put_cells,
+            Cells: self.places.put_cells if with_places else _leave_out,
             Decay: self._put_decay,
         }
 
@@ -222,3 +223,7 @@ class Graph:
 
     def _put_decay(self, rates: Decay) -> None:
         self.decay = rates
+
+
+def _leave_out(operation: Operation) -> None:
+    """The applier of what a graph does not hold."""

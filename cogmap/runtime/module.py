@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -33,8 +33,9 @@ class Module:
     """Messages in, messages out.
 
     It has no clock, no bus, no thread and no file: the shell around it has. `name` is what it is,
-    `instance` which one of them. A handler returns what to publish: None, a message, or several. A
-    message without sense makes it raise MessageError, before it has changed anything.
+    `instance` which one of them. A handler returns what to publish: None, a message, or several; of
+    an iterator each message is published before the next is asked for. A message without sense
+    makes it raise MessageError, before it has changed anything.
     """
 
     name: str
@@ -131,9 +132,17 @@ class Module:
 
     def feed(self, message: Message) -> list[Message]:
         """Hand `message` to its handler, and return what that publishes, numbered."""
+        return list(self.answers(message))
+
+    def answers(self, message: Message) -> Iterator[Message]:
+        """As `feed`, each message as soon as it is known."""
         if self.graph is not None and isinstance(message, Delta):
             self.graph.apply(message)
-        return self.stamp(self.handlers[topics.of(message)](message))
+
+        reply = self.handlers[topics.of(message)](message)
+        parts = reply if isinstance(reply, Iterator) else [reply]
+        for part in parts:
+            yield from self.stamp(part)
 
     def loaded(self) -> list[Message]:
         """Call `on_load`, and return what that publishes, numbered."""

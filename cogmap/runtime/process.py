@@ -13,6 +13,7 @@ from types import FrameType
 
 from cogmap.bus.session import DEFAULT_AGENT, DEFAULT_ENDPOINT, check_name, open_router
 from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.runtime.heap import keep_freed_memory
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
 from cogmap.runtime.state.journal import Journal
@@ -21,7 +22,6 @@ from cogmap.runtime.state.store import Store
 
 log = logging.getLogger("cogmap")
 IDLE_S = 0.25
-# No command waits for what is remembered: others go first where processors are scarce.
 PATIENT = 10
 ORPHAN_GRACE_S = 10.0
 
@@ -67,6 +67,13 @@ class Stop:
         os._exit(1)  # it hangs, and nobody is left to end it
 
 
+def give_way() -> None:
+    """Let other processes go first where processors are scarce: no command waits for what this
+    thread does, and those that it starts from now on.
+    """
+    os.nice(PATIENT)
+
+
 def run_module(
     module: Module,
     endpoint: str = DEFAULT_ENDPOINT,
@@ -84,9 +91,10 @@ def run_module(
     for an instance's name that cannot be part of a key.
     """
     check_name("--instance", module.instance)
+    keep_freed_memory()
     stop = stop or Stop()
     if module.remembers:
-        os.nice(PATIENT)
+        give_way()
     journal = None
     counts = None
     if state is not None:

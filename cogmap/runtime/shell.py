@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from cogmap.bus.codec import Cause, Envelope, decode, encode
@@ -110,8 +110,10 @@ class Shell:
 
     def publish(self, messages: Iterable[Message]) -> None:
         """Publish numbered messages of the module's own accord."""
-        now_ns = time.time_ns()
-        self.publisher.send(messages, Computation(now_ns))
+        computation = Computation(time.time_ns())
+        for message in messages:
+            self.publisher.send(message, computation)
+        self.publisher.compact_journal()
 
     def close(self) -> None:
         """Leave the bus, and close the files."""
@@ -179,7 +181,7 @@ class Shell:
 
         self.publisher.trace(message.stamp_ns, envelope)
         cause = (arrival.topic.name, envelope.source, envelope.seq)
-        self._invoke(lambda: self.module.feed(message), cause, True, received_ns)
+        self._invoke(lambda: self.module.answers(message), cause, True, received_ns)
 
     def _follow(self, message: Message, envelope: Envelope) -> bool:
         """Apply a delta to the module's graph. Returns whether the module may receive `message`."""
@@ -189,31 +191,48 @@ class Shell:
 
     def _invoke(
         self,
-        handler: Callable[[], list[Message]],
+        handler: Callable[[], Iterable[Message]],
         cause: Cause,
         answers: bool = False,
         received_ns: int | None = None,
     ) -> None:
-        """Call the module and publish what it returns.
+        """Call the module and publish what it returns, each message as soon as it is known.
 
-        Where it raises, nothing but a count changes. `answers` is whether `cause` is a received
-        message.
+        Where it raises before the first, nothing but a count changes. `answers` is whether `cause`
+        is a received message.
         """
         start_ns = time.time_ns()
+        resumed_ns = start_ns
+        compute_ns = 0
+        is_accepted = False
+        for message in self._guarded(handler, cause[0]):
+            compute_ns += time.time_ns() - resumed_ns
+            if not is_accepted:
+                self.publisher.add_cause(cause)
+            is_accepted = True
+            if message is not None:
+                computation = Computation(start_ns, compute_ns, answers)
+                self.publisher.send(message, computation)
+            resumed_ns = time.time_ns()
+
+        if is_accepted:
+            self.publisher.compact_journal()
+            self.meter.add(compute_ns, time.time_ns() - (received_ns or start_ns))
+
+    def _guarded(
+        self, handler: Callable[[], Iterable[Message]], topic: str
+    ) -> Iterator[Message | None]:
+        """What `handler` returns, then None; nothing more once it raises, which is counted."""
         try:
-            messages = handler()
+            yield from handler()
         except MessageError as error:
-            self.intake.reject(cause[0], str(error))
+            self.intake.reject(topic, str(error))
             return
         except Exception as error:
-            self._count_fault(cause[0], error)
+            self._count_fault(topic, error)
             return
 
-        compute_ns = time.time_ns() - start_ns
-        self.publisher.add_cause(cause)
-        if messages:
-            self.publisher.send(messages, Computation(start_ns, compute_ns, answers))
-        self.meter.add(compute_ns, time.time_ns() - (received_ns or start_ns))
+        yield None
 
     def _count_fault(self, topic: str, error: Exception) -> None:
         kind = type(error).__name__

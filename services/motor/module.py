@@ -265,7 +265,7 @@ def _self_pose(delta: Delta) -> Pose | None:
 
 def build(config: Config, instance: str) -> Module:
     """The module `motor`."""
-    graph = Graph()
+    graph = Graph(with_places=False)
     motor = MotorModule(config, graph)
     replies = (topics.MOTOR_PROGRAM, topics.MOTOR_COMMAND, topics.OFFER)
     module = (

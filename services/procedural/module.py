@@ -140,7 +140,7 @@ class ProceduralMemory:
 
 def build(config: Config, instance: str) -> Module:
     """The module `procedural`. Raises ConfigError where its schemes cannot be used."""
-    graph = Graph()
+    graph = Graph(with_places=False)
     memory = ProceduralMemory(config, graph)
     published = [topics.BEHAVIOURS]
     return (

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+
 import cv2
 import numpy as np
 
@@ -28,8 +30,8 @@ class SensoryMemory:
 
     A frame waits until the odometry up to its stamp has come, whichever of the two comes first, so
     the output does not depend on how they interleave. A newer frame replaces a waiting one; the
-    motion then covers both, so none is lost. The last frame, published again, gets the same answer
-    again.
+    motion then covers both, so none is lost. The view comes first: perception begins with it while
+    the motion is still being measured. The last frame, published again, gets the same answer again.
     """
 
     def __init__(self, config: Config) -> None:
@@ -47,7 +49,7 @@ class SensoryMemory:
         self._last_ns: int | None = None
         self._answer: list[Message] = []
 
-    def on_frame(self, frame: StereoFrame) -> list[Message]:
+    def on_frame(self, frame: StereoFrame) -> Iterable[Message]:
         """Receive a frame. Raises MessageError where its images do not fit its calibration."""
         colour_image(frame.left, frame.calibration, "left")
         colour_image(frame.right, frame.calibration, "right")
@@ -62,7 +64,7 @@ class SensoryMemory:
 
         return self._emit()
 
-    def on_odometry(self, odometry: Odometry) -> list[Message]:
+    def on_odometry(self, odometry: Odometry) -> Iterable[Message]:
         """Receive odometry. Raises MessageError where no wheels turn so fast or its stamp is far
         ahead.
         """
@@ -73,16 +75,21 @@ class SensoryMemory:
         """The answer to the last frame; none to an older one."""
         return self._answer if frame.stamp_ns == self._last_ns else []
 
-    def _emit(self) -> list[Message]:
+    def _emit(self) -> Iterator[Message]:
         frame = self._waiting
         if frame is None or not self._odometry.covers(frame.stamp_ns):
-            return []
+            return
 
         self._waiting = None
-        ranges, view = self._views(frame)
-        self._answer = [self._self_motion(frame, view), ranges, view]
+        view = self._view(frame)
+        yield view
 
-        return self._answer
+        ranges = self._ranges(view)
+        yield ranges
+
+        motion = self._self_motion(frame, view)
+        self._answer = [view, ranges, motion]
+        yield motion
 
     def _self_motion(self, frame: StereoFrame, view: View) -> SelfMotion:
         began_ns, rows = self._odometry.take(frame.stamp_ns)
@@ -109,7 +116,7 @@ class SensoryMemory:
 
         return fuse(rows, motion, wheels)
 
-    def _views(self, frame: StereoFrame) -> tuple[RangeScan, View]:
+    def _view(self, frame: StereoFrame) -> View:
         rectified = rectification(frame.calibration)
         calibration = rectified.calibration
         left, right = rectified.apply(
@@ -118,14 +125,7 @@ class SensoryMemory:
         )
 
         depth_m = self._matcher(calibration).depth_m(left, right)
-        bearing_rad, range_m = scan(depth_m, calibration, self._config.scan_sectors)
-        ranges = RangeScan(
-            stamp_ns=frame.stamp_ns,
-            frame=frame.frame,
-            bearing_rad=Array.of(bearing_rad),
-            range_m=Array.of(range_m),
-        )
-        view = View(
+        return View(
             stamp_ns=frame.stamp_ns,
             frame=frame.frame,
             image=Array.of(left),
@@ -133,7 +133,15 @@ class SensoryMemory:
             calibration=calibration,
         )
 
-        return ranges, view
+    def _ranges(self, view: View) -> RangeScan:
+        depth_m = view.depth_m.numpy().astype(np.float32, copy=False)
+        bearing_rad, range_m = scan(depth_m, view.calibration, self._config.scan_sectors)
+        return RangeScan(
+            stamp_ns=view.stamp_ns,
+            frame=view.frame,
+            bearing_rad=Array.of(bearing_rad),
+            range_m=Array.of(range_m),
+        )
 
     def _matcher(self, calibration: Calibration) -> DepthFromStereo:
         if self._depth is None or self._depth[0] != calibration:

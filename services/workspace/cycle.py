@@ -37,7 +37,7 @@ from services.workspace.sensed import Sensed
 WORKERS = "codelets"
 MAX_LATE_TASKS = 256
 PHASES = (Phase.CORRECTION, Phase.LOCALIZATION, Phase.OBJECTS, Phase.ATTENTION)
-LANES_BEGIN = Phase.OBJECTS
+LANES_BEGIN = Phase.ATTENTION
 
 
 class Workspace:
@@ -182,7 +182,9 @@ class Workspace:
 
         deadline_ns = self._context.stamp_ns + self._config.deadline_ms * 1e6
         if self._now_ns > deadline_ns:
-            return [*published, *self._commit_answers(), *self._end()]
+            published += self._commit_answers()
+            published += self._lanes.begin(self._context, self._ledger, self._now_ns)
+            return [*published, *self._end()]
 
         published += self._dispatch.expire(self._now_ns)
         return self._continue_if_complete(published)
@@ -296,17 +298,17 @@ class Workspace:
         graph = self._ledger.graph
         context = replace(self._context, version=graph.version)
         self._context = context
-        published: list[Message] = []
+        beside: list[Message] = []
         if phase is LANES_BEGIN:
-            published += self._lanes.begin(context, self._ledger, self._now_ns)
+            beside = self._lanes.begin(context, self._ledger, self._now_ns)
 
         tasks = []
         for codelet in self._codelets:
             if codelet.codelet.phase is phase:
                 tasks += codelet.due(context, graph)
 
-        published += self._dispatch.begin(tasks, self._now_ns)
-        return self._continue_if_complete(published)
+        published = self._dispatch.begin(tasks, self._now_ns)
+        return self._continue_if_complete([*published, *beside])
 
     def _continue_if_complete(self, published: list[Message]) -> list[Message]:
         """`published`, and the next phase where no answer is waited for in this one."""
@@ -320,8 +322,7 @@ class Workspace:
         answers, unanswered = self._dispatch.collect()
         self._late |= {task.task_id: None for task in unanswered}
         while len(self._late) > MAX_LATE_TASKS:
-            oldest = next(iter(self._late))
-            del self._late[oldest]
+            del self._late[next(iter(self._late))]
 
         return self._commit_proposals(PHASES[self._phase], answers)
 
@@ -378,8 +379,7 @@ class Workspace:
             self._reject_failed(failed)
             published += self._commit_proposals(Phase.BACKGROUND, answers)
 
-        forgotten: list[Operation] = [*self._forgetting.due(self._ledger.graph)]
-        published.append(self._commit(Phase.END, forgotten))
+        published.append(self._commit(Phase.END, [*self._forgetting.due(self._ledger.graph)]))
         self._sensed.discard(self._moved_until_ns)
         self._context = None
         return [*published, *self._begin()]

@@ -157,12 +157,14 @@ class Dispatch:
                 lease.attempt += 1
 
     def _assign(self, now_ns: int) -> list[Message]:
-        """Assign open tasks: each task, then one message of all leases."""
+        """Assign open tasks: one message of all leases, then each task, so that a worker begins
+        with the first while the others are on their way.
+        """
         if not self._workers:
             return []
 
         load = self._load_with_background()
-        published: list[Message] = []
+        tasks: list[Task] = []
         assignments: list[Assignment] = []
         for lease in self._leases.values():
             is_waiting = lease.is_open and not lease.worker
@@ -173,13 +175,13 @@ class Dispatch:
             load[worker] += 1
             lease.worker = worker
             lease.until_ns = now_ns + self._lease_ns
-            published.append(lease.task)
+            tasks.append(lease.task)
             assignments.append(_assignment(lease))
 
-        if assignments:
-            stamp_ns = max(task.stamp_ns for task in published)
-            published.append(Leases(stamp_ns=stamp_ns, assignments=assignments))
-        return published
+        if not tasks:
+            return []
+        stamp_ns = max(task.stamp_ns for task in tasks)
+        return [Leases(stamp_ns=stamp_ns, assignments=assignments), *tasks]
 
     def _load_with_background(self) -> Counter[str]:
         """How loaded each worker is, where a background task counts as BUSY others: the youngest

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 from msgspec.structs import replace
@@ -86,11 +85,33 @@ class Publisher:
         if self._module.emits:
             self._causes.append(cause)
 
-    def send(self, messages: Iterable[Message], computation: Computation) -> None:
-        """Publish numbered messages. Raises StorageError where the state cannot be written."""
-        for message in messages:
-            self._send(message, computation)
-        self._compact_journal()
+    def send(self, message: Message, computation: Computation) -> None:
+        """Publish a numbered message. Raises StorageError where the state cannot be written."""
+        topic = topics.of(message)
+        payload = encode(message)
+        if self._journal is not None and topic is self._module.journal:
+            self._journal.append(message, payload)
+        if self._store is not None and isinstance(message, Stored):
+            self._store.save(message)
+
+        envelope = self._envelope(topic, message, computation.end_ns)
+        envelope.causes = self._take_causes()
+        if computation.answers and not topic.sensed:
+            self._continue_trace(envelope, message, computation)
+
+        self._bus.publish(topic, payload, envelope)
+        self.emitted[topic.name] += 1
+
+    def compact_journal(self) -> None:
+        """Shorten a journal that has become long. Not between the messages of one reply: what the
+        module restores would be ahead of them.
+        """
+        journal = self._journal
+        compact = self._module.compact
+        if journal is None or compact is None:
+            return
+        if journal.is_long:
+            journal.compact(compact())
 
     def send_restored(self, store: Store) -> None:
         """Publish what a store holds as its own, so that a log has what the module began with."""
@@ -118,22 +139,6 @@ class Publisher:
         now_ns = time.time_ns()
         return Envelope(self._module.instance, 0, self.incarnation, now_ns, now_ns)
 
-    def _send(self, message: Message, computation: Computation) -> None:
-        topic = topics.of(message)
-        payload = encode(message)
-        if self._journal is not None and topic is self._module.journal:
-            self._journal.append(message, payload)
-        if self._store is not None and isinstance(message, Stored):
-            self._store.save(message)
-
-        envelope = self._envelope(topic, message, computation.end_ns)
-        envelope.causes = self._take_causes()
-        if computation.answers and not topic.sensed:
-            self._continue_trace(envelope, message, computation)
-
-        self._bus.publish(topic, payload, envelope)
-        self.emitted[topic.name] += 1
-
     def _continue_trace(
         self, envelope: Envelope, message: Message, computation: Computation
     ) -> None:
@@ -160,11 +165,3 @@ class Publisher:
         causes = self._causes
         self._causes = []
         return causes
-
-    def _compact_journal(self) -> None:
-        journal = self._journal
-        compact = self._module.compact
-        if journal is None or compact is None:
-            return
-        if journal.is_long:
-            journal.compact(compact())

@@ -8,7 +8,7 @@ import pytest
 
 from cogmap.bus.codec import decode, encode
 from cogmap.errors import MessageError, NoAnswerError
-from cogmap.runtime.module import Module
+from cogmap.runtime.module import Module, Reply
 from cogmap.runtime.shell import Shell
 from schemas import topics
 from schemas.graph import Decay, Snapshot, SnapshotRequest
@@ -24,7 +24,7 @@ from tests.support.system.networks import (
     working,
 )
 
-Handler = Callable[[Odometry], MotorCommand | None]
+Handler = Callable[[Odometry], Reply]
 EMPTY = Snapshot(version=0, cycle=0, decay=Decay(), nodes=[], links=[], tiles=[])
 
 
@@ -89,6 +89,46 @@ def test_the_causes_and_the_latency_of_a_message_travel_with_it(network: Network
         ((name, compute_ns, rest_ns),) = envelope.stages
         assert name == "action"
         assert compute_ns + rest_ns == envelope.sent_ns - envelope.born_ns
+    acting.shell.close()
+
+
+def test_a_message_is_published_before_the_next_one_is_computed(network: Network) -> None:
+    published: list[int] = []
+
+    def handle_in_steps(message: Odometry) -> Iterator[MotorCommand]:
+        yield command(message)
+        published.append(acting.shell.publisher.emitted["motor/command"])
+        yield command(message)
+
+    acting = Acting(network, handle_in_steps)
+    acting.move(1)
+    acting.await_commands(2)
+
+    assert published == [1]
+    first, second = acting.peer.take(2)
+    assert first.envelope is not None
+    assert second.envelope is not None
+    assert first.envelope.causes == [("odometry", "sim", 0)]
+    assert second.envelope.causes == []
+    acting.shell.close()
+
+
+def test_what_was_published_before_a_handler_raised_stays(network: Network) -> None:
+    def handle_in_steps(message: Odometry) -> Iterator[MotorCommand]:
+        yield command(message)
+        if message.seq == 0:
+            raise ZeroDivisionError("division by zero")
+
+    acting = Acting(network, handle_in_steps)
+    acting.move(2)
+    acting.await_commands(2)
+
+    causes = []
+    for arrival in acting.peer.take(2):
+        assert arrival.envelope is not None
+        causes += arrival.envelope.causes
+    assert causes == [("odometry", "sim", 0), ("odometry", "sim", 1)]
+    assert acting.shell.meter.faults == 1
     acting.shell.close()
 
 

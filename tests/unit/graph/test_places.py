@@ -44,6 +44,21 @@ def test_a_tile_comes_into_being_with_its_first_cell() -> None:
     assert (written.road, beside.road) == (0.5, 0.0)
 
 
+def test_a_graph_without_place_nodes_follows_all_else() -> None:
+    whole = _graph(
+        Map(id=ROOT_MAP, cell_m=2.0),
+        _cells(PlaceColumn.ROAD, {(2, 3): 1.0}),
+        _cells(PlaceColumn.OBSTACLE, {(0, 0): 1.0}),
+    )
+    without = Graph(with_places=False)
+    without.load(whole.snapshot())
+    without.change([_cells(PlaceColumn.ROAD, {(2, 4): 1.0})])
+
+    assert whole.place(2, 3) is not None
+    assert not without.places.tiles
+    assert without.cell_m() == 2.0
+
+
 def test_maps_have_place_nodes_of_their_own() -> None:
     coarse = Map(id="map:1", cell_m=4.0, parent=ROOT_MAP)
     graph = _graph(coarse, _cells(PlaceColumn.ROAD, {(2, 3): 1.0}, "map:1"))

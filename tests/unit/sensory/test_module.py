@@ -68,7 +68,7 @@ def test_a_frame_waits_for_the_odometry_up_to_its_stamp() -> None:
     messages = module.feed(_odometry(2))
     types = [type(message) for message in messages]
     stamps_ns = {message.stamp_ns for message in messages}
-    assert types == [SelfMotion, RangeScan, View]
+    assert types == [View, RangeScan, SelfMotion]
     assert stamps_ns == {2 * STEP_NS}
 
 
@@ -118,7 +118,7 @@ def test_a_newer_frame_replaces_a_waiting_one_and_no_motion_is_lost() -> None:
 
 
 def test_the_first_frame_without_earlier_odometry_has_no_motion() -> None:
-    motion, *_ = _published([_frame(0, 4), _odometry(5)])
+    *_, motion = _published([_frame(0, 4), _odometry(5)])
 
     assert isinstance(motion, SelfMotion)
     assert motion.since_ns == 4 * STEP_NS
@@ -200,7 +200,7 @@ def test_odometry_that_makes_no_sense_is_refused_and_changes_nothing(row: Odomet
         module.feed(row)
 
     module.feed(_odometry(2))
-    motion = module.feed(_frame(0, 2))[0]
+    *_, motion = module.feed(_frame(0, 2))
 
     assert isinstance(motion, SelfMotion)
     assert motion.motions.shape == (2, 5)

@@ -49,7 +49,7 @@ def test_percepts_wait_for_the_self_motion_up_to_them() -> None:
     assert desk.feed(motion(0)) == []
 
     published = desk.feed(motion(1))
-    assert [type(message) for message in published] == [Delta, Task, Leases]
+    assert [type(message) for message in published] == [Delta, Leases, Task]
 
 
 def test_self_motion_alone_begins_no_cycle() -> None:

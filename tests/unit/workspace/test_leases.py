@@ -9,6 +9,7 @@ import pytest
 from schemas.codelets import Task
 from schemas.nodes import Self
 from schemas.process import Presence
+from services.codelets.resolution.coarse_places import Config as CoarsePlacesConfig
 from tests.support.messages import of_type
 from tests.support.world.scenes import (
     PERIOD_NS,
@@ -253,6 +254,27 @@ def _missed_deadline() -> tuple[Desk, Task]:
     desk, asked = _real_time("w1", "w2")
     desk.clock(_after(0, 181))
     return desk, asked
+
+
+def test_background_work_is_given_out_after_what_the_broadcast_waits_for() -> None:
+    desk = Desk("w1")
+    desk.drive(range(CoarsePlacesConfig().every_cycles))
+
+    published = of_type(Task, desk.published)
+    background = [task.codelet for task in published].index("coarse_places")
+    before = published[background - 1]
+    assert (before.codelet, before.cycle) == ("whereabouts", published[background].cycle)
+
+
+def test_background_work_begins_in_a_cycle_that_ends_at_its_deadline_too() -> None:
+    desk = Desk("w1", mode="real_time", deadline_ms=180.0)
+    every = CoarsePlacesConfig().every_cycles
+    desk.drive(range(every - 1))
+
+    desk.see(every - 1)
+    assert "coarse_places" not in {task.codelet for task in desk.take()}
+    desk.clock(_after(every - 1, 181))
+    assert "coarse_places" in {task.codelet for task in desk.take()}
 
 
 def test_a_late_answer_is_committed_in_the_next_cycle_if_it_still_applies() -> None:

@@ -140,7 +140,6 @@ def test_what_the_agent_writes_during_a_correction_is_kept() -> None:
     drive = round_once(LoopDrive(background_cycles=4))
     desk = drive.desk
     drive.meet(3)
-    drive.go(1, {})
     length = len(_rows(desk))
 
     drive.go(4, {"inn": (60.0, -4.0)})
