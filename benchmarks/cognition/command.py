@@ -20,8 +20,9 @@ def cognition_command(processes: int, json_path: Path | None) -> None:
 
     Drives a lap of the demo's town in real time, every module a process. Then an agent lives in ten
     towns for ten minutes, with percept-level sensing and a battery that lasts for three as it
-    drives, and one beside it that acts at random. Ten routes in other towns are driven once, and
-    again by the guidance schemes that were learned. Takes a quarter of an hour on two cores.
+    drives, and one beside it that acts at random; in the first town also with cameras, which is
+    reported beside. Ten routes in other towns are driven once, and again by the guidance schemes
+    that were learned. Takes half an hour on two cores.
     """
     with tempfile.TemporaryDirectory() as folder:
         metrics = cognition.measure(Path(folder), processes, announce)

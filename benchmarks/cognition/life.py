@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from benchmarks.explore.measure import COGNITION, sections
+from benchmarks.explore.measure import mind, sections
 from cli.launch.tally import EnergyTally
 from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
@@ -45,11 +45,13 @@ class _Observer:
         self.now_s = energy.stamp_ns / 1e9
 
 
-def live(seed: int, longest_s: float, acting: Module | None = None) -> Life:
+def live(
+    seed: int, longest_s: float, *, has_cameras: bool = False, acting: Module | None = None
+) -> Life:
     """Explore the town of a seed with a battery that runs down, until it is empty or `longest_s`
     are over; `acting` selects actions in the place of the module `action`.
     """
-    configured = sections(seed)
+    configured = sections(seed, has_cameras)
     configured["sim"] = configured["sim"] | {
         "energy": True,
         "battery": {"capacity_s": CAPACITY_S},
@@ -60,7 +62,7 @@ def live(seed: int, longest_s: float, acting: Module | None = None) -> Life:
 
     observer = _Observer()
     watching = Module("observer").on(topics.ENERGY, observer.on_energy)
-    modules = [registry.build(name, configured) for name in ("sim", *COGNITION)]
+    modules = [registry.build(name, configured) for name in ("sim", *mind(has_cameras))]
     if acting is not None:
         modules = [acting if module.name == acting.name else module for module in modules]
 

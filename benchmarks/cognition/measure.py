@@ -34,10 +34,13 @@ THRESHOLDS = {
 
 @dataclass(frozen=True)
 class Stay:
-    """A life in a town, by its seed, acting at random or not."""
+    """A life in a town, by its seed, acting at random or not, with cameras or at the level of
+    percepts.
+    """
 
     seed: int
-    at_random: bool
+    at_random: bool = False
+    has_cameras: bool = False
 
 
 def measure(
@@ -58,17 +61,23 @@ def measure(
 
 
 def survival(processes: int, towns: int = TOWNS) -> Metrics:
-    """The shares of towns in which an agent's energy is never out."""
-    stays = []
+    """The shares of towns in which an agent's energy is never out, and how it went in the first one
+    with cameras.
+    """
+    stays = [Stay(FIRST_SEED, has_cameras=True)]
     for seed in range(FIRST_SEED, FIRST_SEED + towns):
-        stays += [Stay(seed, at_random=False), Stay(seed, at_random=True)]
+        stays += [Stay(seed), Stay(seed, at_random=True)]
 
-    lives = parallel_map(lived, stays, processes)
+    with_cameras, *lives = parallel_map(lived, stays, processes)
+    own = lives[::2]
     return {
-        "survived_share": _survived(lives[::2]),
+        "survived_share": _survived(own),
         "random_survived_share": _survived(lives[1::2]),
-        "lowest_energy": min(life.lowest for life in lives[::2]),
-        "charged_mean": float(np.mean([life.charged for life in lives[::2]])),
+        "lowest_energy": min(life.lowest for life in own),
+        "charged_mean": float(np.mean([life.charged for life in own])),
+        "cameras_lived_s": with_cameras.lived_s,
+        "cameras_lowest_energy": with_cameras.lowest,
+        "cameras_charged": float(with_cameras.charged),
     }
 
 
@@ -76,7 +85,7 @@ def lived(stay: Stay) -> Life:
     """A life in a town."""
     if stay.at_random:
         return live(stay.seed, LIFE_S, acting=RandomActions(stay.seed).module())
-    return live(stay.seed, LIFE_S)
+    return live(stay.seed, LIFE_S, has_cameras=stay.has_cameras)
 
 
 def _survived(lives: list[Life]) -> float:

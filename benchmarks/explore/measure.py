@@ -71,7 +71,7 @@ def sections(seed: int, has_cameras: bool = False) -> Sections:
         "town": "blocks",
         "sensing": "cameras" if has_cameras else "percepts",
         "duration_s": LONGEST_S,
-        "awaits": dict.fromkeys(_mind(has_cameras), 1),
+        "awaits": dict.fromkeys(mind(has_cameras), 1),
     }
     if not has_cameras:
         sim["noise"] = msgspec.to_builtins(FUSED)
@@ -81,11 +81,12 @@ def sections(seed: int, has_cameras: bool = False) -> Sections:
         "workspace": {"mode": "lockstep", "background_cycles": PLANNING_CYCLES},
         "procedural": {"mode": "lockstep"},
         "motor": {"mode": "lockstep"},
+        "epam": {"mode": "lockstep"},
         "planning": {"explore": True},
     }
 
 
-def _mind(has_cameras: bool) -> tuple[str, ...]:
+def mind(has_cameras: bool) -> tuple[str, ...]:
     """The modules that the simulator waits for."""
     if has_cameras:
         return (*SENSES, *COGNITION)
@@ -98,7 +99,7 @@ def visit(chosen: Visit) -> Town:
     """
     configured = sections(chosen.seed, chosen.has_cameras)
     experimenter = Experimenter(chosen.seed, chosen.explore_s, chosen.goals)
-    names = ("sim", *_mind(chosen.has_cameras))
+    names = ("sim", *mind(chosen.has_cameras))
     modules = [registry.build(name, configured) for name in names]
     with InProcessRunner([*modules, experimenter.module()]) as runner:
         runner.run(lambda: experimenter.is_complete)
