@@ -81,6 +81,7 @@ class SensoryMemory:
             return
 
         self._waiting = None
+        self._answer = []
         view = self._view(frame)
         yield view
 

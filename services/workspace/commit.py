@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import msgspec
+
 from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
+from cogmap.runtime.codelet import CycleContext
 from schemas.codelets import Offer, Proposal
-from schemas.graph import Cells, Delta, Operation, Phase, Snapshot
-from schemas.nodes import ROOT_MAP, GraphNode
+from schemas.cognition import Coalitions
+from schemas.graph import Cells, Delta, Links, Operation, Phase, Snapshot
+from schemas.nodes import ROOT_MAP, GraphNode, LinkKind, Map
 from services.workspace.rules import Key, Writer, check_operation, written_by
 
 MAX_REASONS = 8
@@ -117,8 +121,8 @@ class Ledger:
             check_operation(name, operation, self.graph, writer)
             keys = list(written_by(operation))
             self._check_late(name, keys, proposal.base_version)
+            self._check_late(name, _frames_of(operation), proposal.base_version)
             if isinstance(operation, Cells):
-                self._check_late(name, _frame_of(operation), proposal.base_version)
                 columns.update(keys)
 
         return columns
@@ -149,6 +153,16 @@ class Ledger:
                 written[key] = version
 
 
+def coalitions_of(context: CycleContext, proposals: list[Proposal]) -> Coalitions:
+    """What all attention codelets have found in a cycle, perhaps nothing."""
+    found = []
+    for proposal in proposals:
+        for number, coalition in enumerate(proposal.coalitions):
+            name = f"{proposal.task_id}/{number}"
+            found.append(msgspec.structs.replace(coalition, id=name))
+    return Coalitions(stamp_ns=context.stamp_ns, cycle=context.cycle, coalitions=found)
+
+
 def _check_apart(proposal: Proposal, shared: set[Key]) -> None:
     """Raise MessageError where a proposal writes columns of tiles that another one writes too."""
     if shared:
@@ -158,11 +172,17 @@ def _check_apart(proposal: Proposal, shared: set[Key]) -> None:
         )
 
 
-def _frame_of(cells: Cells) -> list[Key]:
-    """The map whose frame cells are in: where that has changed, they are elsewhere. The root map's
-    never does.
+def _frames_of(operation: Operation) -> list[Key]:
+    """The maps in whose frames an operation writes: where one has changed, an answer is late. Cells
+    of the root map are written as they are.
     """
-    return [] if cells.map == ROOT_MAP else [cells.map]
+    if isinstance(operation, Cells) and operation.map != ROOT_MAP:
+        return [operation.map]
+    if isinstance(operation, Map) and operation.parent:
+        return [operation.parent]
+    if isinstance(operation, Links) and operation.kind == LinkKind.WITHIN:
+        return sorted({target for targets in operation.weights.values() for target in targets})
+    return []
 
 
 def _in_words(key: Key) -> str:

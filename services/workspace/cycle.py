@@ -11,11 +11,11 @@ from cogmap.errors import MessageError
 from cogmap.runtime.codelet import ConfiguredCodelet, CycleContext
 from schemas.base import Message
 from schemas.codelets import Offer, Proposal
-from schemas.cognition import Broadcast, Coalitions, Competition
+from schemas.cognition import Broadcast, Competition
 from schemas.graph import Delta, Operation, Phase, Snapshot, SnapshotRequest
 from schemas.process import Clock, Presence
 from schemas.sensing import Energy, Percepts, RangeScan, SelfMotion
-from services.workspace.commit import Ledger
+from services.workspace.commit import Ledger, coalitions_of
 from services.workspace.config import Config
 from services.workspace.dispatch import Dispatch
 from services.workspace.entrance import (
@@ -38,6 +38,10 @@ WORKERS = "codelets"
 MAX_LATE_TASKS = 256
 PHASES = (Phase.CORRECTION, Phase.LOCALIZATION, Phase.OBJECTS, Phase.ATTENTION)
 LANES_BEGIN = Phase.ATTENTION
+# Where a cycle goes on after a commit of each phase; lanes are committed after the last one.
+PLACE_OF = {phase: place for place, phase in enumerate(PHASES)} | {
+    Phase.BACKGROUND: len(PHASES) - 1
+}
 
 
 class Workspace:
@@ -245,7 +249,7 @@ class Workspace:
         entered = as_entered(self._certain(percepts), graph)
         self._context = self._sensed.context(entered, motions, graph.cycle, graph.version)
 
-        self._phase = PHASES.index(graph.phase) if graph.phase in PHASES else -1
+        self._phase = PLACE_OF.get(graph.phase, -1)
         return self._next_phase()
 
     def _end_interrupted(self) -> list[Message]:
@@ -342,7 +346,7 @@ class Workspace:
 
         published: list[Message] = []
         if phase is Phase.ATTENTION:
-            published.append(_coalitions(self._context, valid))
+            published.append(coalitions_of(self._context, valid))
         if operations:
             tasks = [proposal.task_id for proposal in valid]
             published.append(self._commit(phase, operations, tasks))
@@ -388,13 +392,3 @@ class Workspace:
         attempts = self._config.attempts
         for name in tasks:
             self._ledger.reject(f"task {name} was given to {attempts} workers and lost each time")
-
-
-def _coalitions(context: CycleContext, proposals: list[Proposal]) -> Coalitions:
-    """What all attention codelets have found in a cycle, perhaps nothing."""
-    found = []
-    for proposal in proposals:
-        for number, coalition in enumerate(proposal.coalitions):
-            name = f"{proposal.task_id}/{number}"
-            found.append(msgspec.structs.replace(coalition, id=name))
-    return Coalitions(stamp_ns=context.stamp_ns, cycle=context.cycle, coalitions=found)

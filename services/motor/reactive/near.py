@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from cogmap.geometry.arrays import Booleans, Floats
+from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.geometry.se2 import compose, transform_to
 from schemas.sensing import RangeScan, SelfMotion
 from services.motor.config import NEAREST_SCAN_M
@@ -21,6 +21,10 @@ FARTHEST_M = 12.0
 # A hit counts where others were within so far of it, in so many scans as these altogether.
 SAME_M = 0.5
 MIN_SCANS = 3
+# While the robot stands it sees the same again: so many scans of a place are enough.
+STILL_M = 0.01
+STILL_RAD = 0.01
+STILL_SCANS = 2 * MIN_SCANS
 BEHIND_M = 1.0
 ARC_M = 2.0
 STEP_M = 0.25
@@ -38,16 +42,24 @@ class NearObstacles:
         self._clearance_m = clearance_m
         self._points_m = np.zeros((0, 2))
         self._stamps_ns = np.zeros(0, np.int64)
+        self._is_still = False
         self._moved_ns = -1
         self._early: RangeScan | None = None
+
+    @property
+    def size(self) -> int:
+        """How many hits are remembered."""
+        return len(self._points_m)
 
     def on_motion(self, motion: SelfMotion) -> None:
         """Move what is remembered to where it is from the robot now; then comes the scan of the
         same view, also where it arrived earlier.
         """
         self._moved_ns = motion.stamp_ns
+        pose = _moved(motion)
+        self._is_still = bool(np.hypot(pose[0], pose[1]) <= STILL_M and abs(pose[2]) <= STILL_RAD)
         if len(self._points_m):
-            self._move(motion)
+            self._move(pose, motion.stamp_ns)
 
         early = self._early
         if early is not None and early.stamp_ns <= self._moved_ns:
@@ -61,15 +73,9 @@ class NearObstacles:
         else:
             self._early = scan
 
-    def _move(self, motion: SelfMotion) -> None:
-        rows = np.asarray(motion.motions.numpy(), np.float64)
-        pose = np.zeros(3)
-        for speed_m_s, turn_rad_s, duration_s in rows[:, :3].tolist():
-            step = np.array([speed_m_s * duration_s, 0.0, turn_rad_s * duration_s])
-            pose = compose(pose, step)
-
+    def _move(self, pose: Floats, stamp_ns: int) -> None:
         moved_m = transform_to(pose, self._points_m)
-        age_ns = motion.stamp_ns - self._stamps_ns
+        age_ns = stamp_ns - self._stamps_ns
         is_near = np.hypot(*moved_m.T) <= FARTHEST_M
         is_beside = moved_m[:, 0] >= -REMEMBERED_M
         self._keep(moved_m, is_near & is_beside & (age_ns <= REMEMBERED_S * 1e9))
@@ -80,6 +86,9 @@ class NearObstacles:
         self._keep(self._points_m, ~self._is_seen_through(bearing_rad, range_m))
 
         hits_m = _hits_m(bearing_rad, range_m)
+        if self._is_still:
+            scans = _scans_near(hits_m, self._points_m, self._stamps_ns)
+            hits_m = hits_m[scans < STILL_SCANS]
         stamps_ns = np.full(len(hits_m), scan.stamp_ns, np.int64)
 
         self._points_m = np.concatenate([self._points_m, hits_m])
@@ -111,12 +120,7 @@ class NearObstacles:
         is_near = np.hypot(*self._points_m.T) <= reach_m + SAME_M
         points_m = self._points_m[is_near]
         stamps_ns = self._stamps_ns[is_near]
-        away_m = np.hypot(*(points_m[:, None] - points_m).transpose(2, 0, 1))
-        is_same = away_m <= SAME_M
-
-        scans = np.zeros(len(points_m), np.int64)
-        for stamp_ns in np.unique(stamps_ns).tolist():
-            scans += is_same[:, stamps_ns == stamp_ns].any(axis=1)
+        scans = _scans_near(points_m, points_m, stamps_ns)
 
         certain_m: Floats = points_m[scans >= MIN_SCANS]
         return certain_m
@@ -149,6 +153,30 @@ class NearObstacles:
     def _keep(self, points_m: Floats, is_kept: Booleans) -> None:
         self._points_m = points_m[is_kept]
         self._stamps_ns = self._stamps_ns[is_kept]
+
+
+def _scans_near(points_m: Floats, hits_m: Floats, stamps_ns: Indices) -> Indices:
+    """(n,): how many scans have one of (k, 2) hits, by their (k,) stamps, within SAME_M of each of
+    (n, 2) points.
+    """
+    away_m = np.hypot(*(points_m[:, None] - hits_m).transpose(2, 0, 1))
+    is_same = away_m <= SAME_M
+    scans = np.zeros(len(points_m), np.int64)
+    for stamp_ns in np.unique(stamps_ns).tolist():
+        scans += is_same[:, stamps_ns == stamp_ns].any(axis=1)
+
+    return scans
+
+
+def _moved(motion: SelfMotion) -> Floats:
+    """(3,): the pose that a motion leads to, from where it began."""
+    pose = np.zeros(3)
+    rows = np.asarray(motion.motions.numpy(), np.float64)
+    for speed_m_s, turn_rad_s, duration_s in rows[:, :3].tolist():
+        step = np.array([speed_m_s * duration_s, 0.0, turn_rad_s * duration_s])
+        pose = compose(pose, step)
+
+    return pose
 
 
 def _hits_m(bearing_rad: Floats, range_m: Floats) -> Floats:

@@ -233,3 +233,26 @@ def test_what_was_seen_is_forgotten_where_rays_pass_it_on_both_sides(
     _drive_on(near, 4, forward_m=2.0)
     is_left_clear = _turn(near, 0.15) == 0.15
     assert is_left_clear is not is_kept
+
+
+def test_a_robot_that_stands_notices_what_appears_and_keeps_what_is_there() -> None:
+    near = NearObstacles(CLEARANCE_M)
+    free_m = np.full(len(BEARINGS_RAD), 20.0)
+    _show(near, free_m, first=0, scans=30)
+    post_m = free_m.copy()
+    post_m[16] = 3.0
+    _show(near, post_m, first=30, scans=3)
+    _show(near, np.zeros(len(BEARINGS_RAD)), first=33, scans=4)
+    _drive_on(near, 37, forward_m=1.5)
+
+    assert _turn(near, 0.0) != 0.0
+
+
+def test_a_robot_that_stands_for_long_remembers_a_few_scans() -> None:
+    near = NearObstacles(CLEARANCE_M)
+    wall_m = np.full(len(BEARINGS_RAD), 4.0)
+    _show(near, wall_m, first=0, scans=10)
+    after_ten = near.size
+    _show(near, wall_m, first=10, scans=50)
+
+    assert near.size == after_ten

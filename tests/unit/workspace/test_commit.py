@@ -22,7 +22,7 @@ from schemas.graph import (
     Phase,
     PlaceTile,
 )
-from schemas.nodes import ROOT_MAP, TILE_SIDE, Map, Node, PlaceColumn, object_id
+from schemas.nodes import ROOT_MAP, TILE_SIDE, LinkKind, Map, Node, PlaceColumn, object_id
 from services.workspace.commit import Ledger
 from tests.support.world.scenes import Desk, agent, answer, landmark, percept, task, thing
 
@@ -270,6 +270,23 @@ def test_cells_are_late_where_the_frame_that_they_are_in_has_changed_since(
     ledger.commit(0, 1, Phase.OBJECTS, [change])
     with pytest.raises(MessageError, match="late: map:1 has changed since 4"):
         ledger.check(proposal)
+
+
+def test_sub_maps_are_late_where_the_frame_that_they_are_in_has_changed_since() -> None:
+    ledger = _permissive()
+    root = Map(id=ROOT_MAP, cell_m=1.0)
+    sub_map = Map(id="map:1", cell_m=0.5, parent=ROOT_MAP)
+    ledger.commit(0, 1, Phase.OBJECTS, [root, sub_map, thing("a")])
+    within = Links(kind=LinkKind.WITHIN, weights={"a": {"map:1": 1.0}})
+    another = Map(id="map:2", cell_m=0.5, parent=ROOT_MAP)
+    ledger.check(_proposal(within, base_version=1))
+    ledger.check(_proposal(another, base_version=1))
+
+    ledger.commit(0, 1, Phase.CORRECTION, [root, sub_map])
+    with pytest.raises(MessageError, match="late: map:1 has changed since 1"):
+        ledger.check(_proposal(within, base_version=1))
+    with pytest.raises(MessageError, match="late: map:0 has changed since 1"):
+        ledger.check(_proposal(another, base_version=1))
 
 
 def test_one_proposal_that_is_refused_keeps_no_other_from_being_committed() -> None:

@@ -79,6 +79,22 @@ def test_an_interrupted_cycle_continues_from_its_last_commit(committed: int) -> 
     assert versions == [delta.version for delta in whole.deltas[end:]]
 
 
+def test_a_cycle_that_was_interrupted_after_background_work_only_ends() -> None:
+    whole = Desk("w1")
+    scene = [percept("a", 0.3), percept("b", -0.4, 14.0), percept("c", 0.0, 12.0)]
+    whole.drive(range(6), *scene)
+    phases = [delta.phase for delta in whole.deltas]
+    cut = len(phases) - phases[::-1].index(Phase.BACKGROUND)
+    frame = whole.deltas[cut - 1].cycle - 1
+
+    again = _restored(whole.deltas[:cut])
+    again.drive(range(frame, frame + 1), *scene)
+
+    end = whole.deltas[cut]
+    assert end.phase is Phase.END
+    assert [(delta.phase, delta.version) for delta in again.deltas] == [(end.phase, end.version)]
+
+
 def test_a_cycle_whose_view_does_not_come_again_ends_when_the_next_view_comes() -> None:
     whole = Desk("w1")
     whole.drive(range(3), percept("a"))
