@@ -20,7 +20,9 @@ class Priming(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=T
         Share,
         msgspec.Meta(
             description="how much likelier all names together are, at most, for what was conscious "
-            "just before, as a share of 1, 0 to 1; at 0 nothing is primed"
+            "just before, as a share of 1, 0 to 1; at 0 nothing is primed. LIDA: 0.9 of a node's "
+            "activation is passed on (upscale; downscale 0.5), and added; here it changes the "
+            "prior of names, because activation is the probability of a name"
         ),
     ] = 0.5
     half_life_s: Annotated[
@@ -29,14 +31,16 @@ class Priming(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=T
             gt=0,
             le=3600,
             description="the activation of a PAM node halves in so many seconds after it was "
-            "conscious, over 0, at most 3600",
+            "conscious, over 0, at most 3600. LIDA: falls by 0.05 a tick, to 0 in 100 ms; here "
+            "halves in 3 s, because a view is primed by what was conscious two views, 400 ms, "
+            "before it",
         ),
     ] = 3.0
     learning_rate: Annotated[
         PositiveShare,
         msgspec.Meta(
             description="how far one broadcast moves base levels and weights of links towards what "
-            "was conscious, over 0, at most 1"
+            "was conscious, over 0, at most 1. LIDA: no published rate that we know"
         ),
     ] = 0.1
     feeling_rate: Annotated[
@@ -59,7 +63,8 @@ class Priming(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=T
         Share,
         msgspec.Meta(
             description="a percept has the feelings that its PAM node activates more than so much, "
-            "0 to 1"
+            "0 to 1. LIDA: 0.7, PAM's threshold of percepts; here 0.3, because one encounter is to "
+            "be enough, after which the link to a feeling has a weight of 0.5 (`feeling_rate`)"
         ),
     ] = 0.3
     kept_broadcasts: Annotated[
@@ -113,14 +118,16 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         Share,
         msgspec.Meta(
             description="base-level activation added to the current activation of every percept, "
-            "0 to 1"
+            "0 to 1. LIDA: that which the PAM node has learned; here 0 for all, because activation "
+            "is the probability of a name, and learned base levels count in the workspace"
         ),
     ] = 0.0
     percept_threshold: Annotated[
         Share,
         msgspec.Meta(
             description="a segment is a percept if it shows a building with a higher probability, "
-            "0 to 1"
+            "0 to 1. LIDA: 0.7 of total activation; here of that probability, because which "
+            "building it is, is decided by its evidence (`workspace.recognition_threshold`)"
         ),
     ] = 0.7
     learned_share: Annotated[

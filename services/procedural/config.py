@@ -36,7 +36,9 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         Share,
         msgspec.Meta(
             description="Share of their activation with which such nodes count that are in the "
-            "graph and not in the broadcast, 0 to 1: what is conscious comes first."
+            "graph and not in the broadcast, 0 to 1: what is conscious comes first. LIDA: 0, "
+            "schemes are activated by the broadcast alone; here 0.5, because a broadcast has the "
+            "content of one codelet: the plan that an action follows is seldom in it."
         ),
     ] = 0.5
     guidance_step_m: Annotated[
@@ -66,6 +68,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         list[str],
         msgspec.Meta(
             description="Kinds of nodes that belong to every situation, as they are in the graph, "
-            "also where the broadcast has none of them."
+            "also where the broadcast has none of them. LIDA: none; here goals and plans, because "
+            "they are brought once a second, and an action is chosen after each broadcast."
         ),
     ] = msgspec.field(default_factory=lambda: ["goal", "plan"])

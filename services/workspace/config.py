@@ -95,17 +95,34 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     recognition_threshold: Annotated[
         Unit,
         msgspec.Meta(
-            description="A percept enters the workspace where its evidence is above this, 0 to 1"
+            description="A percept enters the workspace where its evidence is above this, 0 to 1."
+            " LIDA: 0.7 of total activation; here of evidence, because the map is to be learned"
+            " from what a view says, and not from what was expected of it"
         ),
     ] = 0.7
     decay: Annotated[
-        Unit, msgspec.Meta(description="What a node's activation loses in a cycle, 0 to 1")
+        Unit,
+        msgspec.Meta(
+            description="What a node's activation loses in a cycle, 0 to 1. LIDA: 0.1 in a tick;"
+            " here in a cycle of 40, because percepts and codelets excite nodes once in each: by"
+            " the tick nothing would last from one view to the next"
+        ),
     ] = 0.1
     base_level_decay: Annotated[
-        Unit, msgspec.Meta(description="What a node's base level loses in a cycle, 0 to 1")
+        Unit,
+        msgspec.Meta(
+            description="What a node's base level loses in a cycle, 0 to 1. LIDA: 0.1 in a tick, of"
+            " current activation; here so little, because a base level is memory: what one"
+            " broadcast adds lasts for 40 s"
+        ),
     ] = 0.0005
     place_decay: Annotated[
-        Unit, msgspec.Meta(description="What a place node's activation loses in a cycle, 0 to 1")
+        Unit,
+        msgspec.Meta(
+            description="What a place node's activation loses in a cycle, 0 to 1. LIDA: 0.1 in a"
+            " tick; here 0.02 in a cycle, because a place is excited only while the agent is at"
+            " it: those of the last ten seconds stay active"
+        ),
     ] = 0.02
     learning: Annotated[
         Literal["linear", "sigmoid"],
@@ -119,7 +136,8 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         msgspec.Meta(
             description="What a node's base level gains in a broadcast, 0 to 1; a sigmoid gains as"
             " much at 0.5. Of five views a second with an object, half or more lead to a"
-            " broadcast about it; what is seen once, perhaps by mistake, is conscious once"
+            " broadcast about it; what is seen once, perhaps by mistake, is conscious once. LIDA:"
+            " no published rate that we know"
         ),
     ] = 0.1
     unlearning_rate: Annotated[

@@ -18,7 +18,8 @@ Refractory = Annotated[
         ge=0,
         le=10_000,
         description="Refractory period: cycles that it waits after it has brought a coalition, "
-        "0 to 10000.",
+        "0 to 10000. LIDA: 50 ticks; here 1 cycle, because codelets run once in each, and 50 ticks "
+        "of 5 ms end within the second.",
     ),
 ]
 Count = Annotated[int, Meta(ge=1, le=10_000)]
@@ -30,7 +31,14 @@ class Whereabouts(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fiel
     """
 
     base_level: BaseLevel = 1.0
-    refractory_cycles: Refractory = 0
+    refractory_cycles: Annotated[
+        Refractory,
+        Meta(
+            description="Refractory period: cycles that it waits after it has brought a coalition, "
+            "0 to 10000. LIDA: 50 ticks; here 0, because it is the default: without it nothing is "
+            "conscious where nothing happens."
+        ),
+    ] = 0
 
 
 class Novelty(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -101,7 +109,14 @@ class Goal(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True
     """Goals and plans last for minutes: once a second is enough for what has not changed."""
 
     base_level: BaseLevel = 1.0
-    refractory_cycles: Refractory = 4
+    refractory_cycles: Annotated[
+        Refractory,
+        Meta(
+            description="Refractory period: cycles that it waits after it has brought a coalition, "
+            "0 to 10000. LIDA: 50 ticks; here 4 cycles, because goals and plans last for minutes: "
+            "once a second is enough."
+        ),
+    ] = 4
     change_salience: Annotated[
         Share, Meta(description="Salience of a plan that is new and of a goal reached, 0 to 1.")
     ] = 0.5
@@ -111,7 +126,14 @@ class Need(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True
     """A need lasts for minutes too."""
 
     base_level: BaseLevel = 1.0
-    refractory_cycles: Refractory = 4
+    refractory_cycles: Annotated[
+        Refractory,
+        Meta(
+            description="Refractory period: cycles that it waits after it has brought a coalition, "
+            "0 to 10000. LIDA: 50 ticks; here 4 cycles, because a need lasts for minutes: once a "
+            "second is enough."
+        ),
+    ] = 4
     high_level: Annotated[
         PositiveShare, Meta(description="Level from which on a need is high, above 0 to 1.")
     ] = 0.5
@@ -153,7 +175,14 @@ class Episode(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=T
     """An episode decays within two seconds: it is brought once."""
 
     base_level: BaseLevel = 1.0
-    refractory_cycles: Refractory = 10
+    refractory_cycles: Annotated[
+        Refractory,
+        Meta(
+            description="Refractory period: cycles that it waits after it has brought a coalition, "
+            "0 to 10000. LIDA: 50 ticks; here 10 cycles, because the node of an episode decays "
+            "within as many: it is brought once."
+        ),
+    ] = 10
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):

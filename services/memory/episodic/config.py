@@ -33,7 +33,8 @@ class EpisodicConfig(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_f
         Share,
         Meta(
             description="What an episode in Transient Episodic Memory loses of its activation in "
-            "an hour, 0 to 1. LIDA's last for hours, up to a day."
+            "an hour, 0 to 1. LIDA: they last for hours, up to a day, by no published rate that "
+            "we know; here 0.1, because what was fully active then lasts for 10 h."
         ),
     ] = 0.1
     consolidation_h: Annotated[

@@ -16,7 +16,8 @@ class SparseConfig(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fie
         Literal["modular", "binary"],
         msgspec.Meta(
             description="modular: vectors of `dimensions` values, 0 to 15. binary: LIDA's "
-            "published memory, of vectors of 1000 bits."
+            "published memory, of vectors of 1000 bits. LIDA: binary; here modular, because of 50 "
+            "episodes binary memory recalls 40 %, and modular memory of 500 recalls 96 %."
         ),
     ] = "modular"
     hard_locations: Annotated[
@@ -37,7 +38,9 @@ class SparseConfig(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fie
             ge=0.01,
             le=0.5,
             description="Share of a modular memory's hard locations that a cue activates, 0.01 to "
-            "0.5.",
+            "0.5. LIDA: 0.001, by a radius of 451 of 1000 bits; here 0.07, because the nearest of "
+            "them count most: of 500 maps, each stored once, cues with 30 % of their dimensions "
+            "corrupted recall all, and with 0.01 89 %.",
         ),
     ] = 0.07
     max_reads: Annotated[

@@ -14,6 +14,55 @@ from cli.config import commented_toml, file_schema, print_config
 from cli.launch.plan import Choices, awaited, effective
 from services import registry
 
+TICKS_PER_CYCLE = 40
+CYCLES_PER_S = 5
+# LIDA's published defaults in the unit of our settings: what is by the tick there is by the cycle,
+# or by the broadcast, here.
+LIDA = {
+    "global_workspace.no_broadcast_ticks": 100,
+    "global_workspace.no_new_coalition_ticks": 50,
+    "global_workspace.aggregate_above": 0.8,
+    "global_workspace.coalition_above": 0.5,
+    "global_workspace.refractory_ticks": 40,
+    "global_workspace.decay": 0.1,
+    "global_workspace.ticks_per_decay": 1,
+    "attention.whereabouts.refractory_cycles": 50 / TICKS_PER_CYCLE,
+    "attention.novelty.refractory_cycles": 50 / TICKS_PER_CYCLE,
+    "attention.expectation.refractory_cycles": 50 / TICKS_PER_CYCLE,
+    "attention.goal.refractory_cycles": 50 / TICKS_PER_CYCLE,
+    "attention.need.refractory_cycles": 50 / TICKS_PER_CYCLE,
+    "attention.danger.refractory_cycles": 50 / TICKS_PER_CYCLE,
+    "attention.place_lost.refractory_cycles": 50 / TICKS_PER_CYCLE,
+    "attention.episode.refractory_cycles": 50 / TICKS_PER_CYCLE,
+    "workspace.decay": 0.1 * TICKS_PER_CYCLE,
+    "workspace.base_level_decay": 0.1 * TICKS_PER_CYCLE,
+    "workspace.place_decay": 0.1 * TICKS_PER_CYCLE,
+    "workspace.learning": "linear",
+    "workspace.recognition_threshold": "0.7 of total activation",
+    "epam.percept_threshold": "0.7 of total activation",
+    "epam.base_level": "learned",
+    "epam.priming.share": 0.9,
+    "epam.priming.half_life_s": 0.5 / 0.05 / TICKS_PER_CYCLE / CYCLES_PER_S,
+    "epam.priming.feeling_threshold": 0.7,
+    "procedural.instantiation": 0.1,
+    "procedural.unconscious_share": 0.0,
+    "procedural.graph_kinds": [],
+    "action.selector": "behaviour_net",
+    "action.selection_threshold": 0.9,
+    "action.threshold_fall": 0.1,
+    "action.broadcast_excitation": 0.05,
+    "action.successor_excitation": 0.04,
+    "action.predecessor_excitation": 0.1,
+    "action.conflictor_inhibition": 0.04,
+    "action.net_decay": 0.1 * TICKS_PER_CYCLE,
+    "memory.sparse.kind": "binary",
+    "memory.sparse.hard_locations": 10_000,
+    "memory.sparse.dimensions": 1024,
+    "memory.sparse.activated_share": 0.001,
+    "memory.sparse.max_reads": 19,
+    "memory.episodic.decay_per_h": "hours, up to a day",
+}
+
 TRAJECTORY = {
     "line_m": [[0.0, 0.0], [60.0, 0.0]],
     "landmarks": [{"name": "bakery", "x_m": 40.0, "y_m": 14.0}],
@@ -24,6 +73,28 @@ def printed(*arguments: str) -> str:
     result = CliRunner().invoke(print_config, arguments, catch_exceptions=False)
     assert result.exit_code == 0
     return result.output
+
+
+def default(path: str) -> Any:
+    """The default of the setting at `path`."""
+    section, *keys = path.split(".")
+    value: Any = registry.config_type(section)()
+    for key in keys:
+        value = getattr(value, key)
+
+    return value
+
+
+def description(path: str) -> str:
+    """The description of the setting at `path`, as it is printed."""
+    whole = file_schema()
+    section, *keys = path.split(".")
+    schema = whole["properties"][section]
+    for key in keys:
+        kind = schema["$ref"].rpartition("/")[2]
+        schema = whole["$defs"][kind]["properties"][key]
+
+    return str(schema["description"])
 
 
 def sections(**given: dict[str, Any]) -> dict[str, dict[str, Any]]:
@@ -103,3 +174,12 @@ def test_every_number_among_the_settings_is_bounded() -> None:
                     unbounded.append(f"{kind}.{key}")
 
     assert unbounded == []
+
+
+@pytest.mark.parametrize("path", LIDA)
+def test_a_changed_default_of_lida_is_named_with_its_reason(path: str) -> None:
+    if default(path) == LIDA[path]:
+        return
+
+    before, names, reason = description(path).partition("LIDA: ")
+    assert before and names and "; here " in reason and "because" in reason
