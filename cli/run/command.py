@@ -76,9 +76,7 @@ energy_option = click.option(
 laps_option = click.option(
     "--laps",
     type=FiniteRange(0, 1000, min_open=True),
-    default=1.0,
-    show_default="1",
-    help="Goals in the loop of streets: its corners, in order, so many times round.",
+    help="Goals in the loop of streets: its corners, in order, so many times round.  [default: 1]",
 )
 codelets_option = click.option(
     "--codelets", type=click.IntRange(1, 64), default=1, show_default=True, help="How many workers."
@@ -143,7 +141,7 @@ def run(
     tour: bool,
     explore_s: float | None,
     goals: Path | None,
-    laps: float,
+    laps: float | None,
     energy: bool,
     lockstep: bool,
     codelets: int,
@@ -216,7 +214,7 @@ def default_limit_s(sim: dict[str, Any], choices: Choices) -> float:
     """
     has_laps = not (choices.tour or choices.goals or choices.explore_s)
     if sim["town"] == LOOP and has_laps:
-        return LAP_LIMIT_S * max(1.0, choices.laps)
+        return LAP_LIMIT_S * max(1.0, choices.laps or 1.0)
 
     return float(sim["duration_s"]) + AROUND_S
 
