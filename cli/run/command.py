@@ -18,6 +18,7 @@ from cli.launch.drive import Drive
 from cli.launch.plan import CONFIG_NAME, Choices, awaited, effective
 from cli.options import FiniteRange, agent_option, config_option, connect_option, set_option
 from cli.run import summary
+from cli.run.checks import check_inputs
 from cli.run.display import Display, display_on
 from cogmap.bus.session import check_free
 from cogmap.errors import ConfigError, StorageError
@@ -184,6 +185,7 @@ def run(
     sections = effective(
         config.load(config_path, settings), choices, awaited(choices, observer=True)
     )
+    check_inputs(sections, choices)
     if router is None:
         check_free(connect)
 
