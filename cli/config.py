@@ -42,7 +42,7 @@ Schema = dict[str, Any]
 @set_option
 def print_config(
     seed: int | None,
-    laps: float,
+    laps: float | None,
     lockstep: bool,
     codelets: int,
     record: bool,

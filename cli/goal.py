@@ -12,6 +12,7 @@ from pathlib import Path
 import click
 import msgspec
 
+from cli.launch.goals import name_of, nearest_label, routeless
 from cli.options import FiniteRange, agent_option, connect_option, json_option
 from cogmap.errors import NoAnswerError, UsageError
 from cogmap.graph.graph import Graph
@@ -154,7 +155,8 @@ def goal(
 
     plan = person.plan
     assert plan is not None
-    click.echo(msgspec.json.encode(_summary(plan)) if as_json else _shown(plan))
+    shown = plan_json(plan, person.graph) if as_json else plan_text(plan, person.graph)
+    click.echo(shown)
     if plan.unreachable:
         sys.exit(1)
 
@@ -194,7 +196,9 @@ def _number(word: str) -> float | None:
 
 
 def read_goals(path: Path) -> list[Goal]:
-    """The goals of a file, one a line. Raises UsageError, which names the line."""
+    """The goals of a file, one a line. Raises UsageError, which names the line, and where there is
+    none.
+    """
     goals = []
     for number, line in enumerate(path.read_text("utf-8").splitlines(), start=1):
         try:
@@ -202,32 +206,39 @@ def read_goals(path: Path) -> list[Goal]:
         except UsageError as error:
             raise UsageError(f"{path}, line {number}: {error}") from None
 
+    if not goals:
+        raise UsageError(f"{path} has no goals: write one a line, a name or x and y")
     return goals
 
 
-def _summary(plan: Plan) -> dict[str, object]:
-    return {
+def plan_json(plan: Plan, graph: Graph) -> bytes:
+    """The plan as JSON, with what may have been meant by goals that are not on the map."""
+    nearest = {}
+    for goal, state in plan.unreachable.items():
+        label = nearest_label(goal, state, graph)
+        if label:
+            nearest[name_of(goal)] = label
+
+    summary = {
         "state": plan.state,
-        "goals": [_name(goal) for goal in plan.goals],
+        "goals": [name_of(goal) for goal in plan.goals],
         "length_m": plan.length_m,
-        "unreachable": {_name(goal): state for goal, state in plan.unreachable.items()},
+        "unreachable": {name_of(goal): state for goal, state in plan.unreachable.items()},
+        "nearest": nearest,
     }
+    return msgspec.json.encode(summary)
 
 
-def _shown(plan: Plan) -> str:
+def plan_text(plan: Plan, graph: Graph) -> str:
     """The plan as a person reads it."""
     lines = []
     for number, name in enumerate(plan.goals, start=1):
         distance = f", {plan.length_m:.0f} m" if number == 1 else ""
-        lines.append(f"{number}. {_name(name)}{distance}")
+        lines.append(f"{number}. {name_of(name)}{distance}")
 
     for name, state in plan.unreachable.items():
-        lines.append(f"{_name(name)}: {state.value}")
+        lines.append(f"{name_of(name)}: {routeless(name, state, graph)}")
 
     if not lines:
         lines.append(PlanState.NO_GOAL.value if plan.explores else plan.state.value)
     return "\n".join(lines)
-
-
-def _name(identifier: str) -> str:
-    return identifier.removeprefix(goal_id(""))

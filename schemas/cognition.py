@@ -186,6 +186,25 @@ class ActionName(enum.StrEnum):
     HALT = "halt"
 
 
+PARAMETERS: dict[str, dict[str, type]] = {
+    ActionName.FOLLOW_PLAN: {},
+    ActionName.TURN: {"turn_rad": float},
+    ActionName.DOCK: {"x_m": float, "y_m": float},
+    ActionName.SEEK: {"need": str, "object": str},
+    ActionName.GUIDE: {
+        "seen_ns": int,
+        "ahead_1_m": float,
+        "left_1_m": float,
+        "ahead_2_m": float,
+        "left_2_m": float,
+    },
+    ActionName.HALT: {},
+}
+"""The parameters that the motor program of each action needs, and their types. GUIDE takes more
+places, numbered on.
+"""
+
+
 class Rejection(enum.StrEnum):
     """Why a behaviour was not chosen; NONE for one that was, or that may be."""
 

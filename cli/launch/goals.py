@@ -1,9 +1,11 @@
-"""How far a drive to goals is, by the agent's goals and its plans. Pure."""
+"""How far a drive to goals is, and why a goal was not reached, by goals and plans. Pure."""
 
 from __future__ import annotations
 
+from cogmap.graph.graph import Graph
+from cogmap.hints import nearest
 from schemas.graph import Delta, DropNode
-from schemas.nodes import NEVER_NS, Goal, Plan
+from schemas.nodes import NEVER_NS, PLAN_ID, Goal, Object, Plan, PlanState, goal_id
 
 # A goal is at least so far ahead until it is reached.
 LAST_M = 1.0
@@ -62,3 +64,50 @@ class GoalProgress:
         since_plan_m = travelled_m - self._planned_at_m
         ahead_m = max(LAST_M, plan.length_m - since_plan_m)
         return behind_m / (behind_m + ahead_m)
+
+
+def name_of(goal: str) -> str:
+    """What a goal is called, by its id."""
+    return goal.removeprefix(goal_id(""))
+
+
+def unreached(graph: Graph) -> dict[str, str]:
+    """Why each goal that the agent has was not reached, by its name: why it has no route, or what
+    was still to be done.
+    """
+    plan = graph.get(Plan, PLAN_ID)
+    reasons = {}
+    for goal in graph.of_kind(Goal):
+        if goal.reached_ns == NEVER_NS:
+            reasons[name_of(goal.id)] = _reason(goal, plan, graph)
+
+    return reasons
+
+
+def routeless(goal: str, state: PlanState, graph: Graph) -> str:
+    """Why a goal has no route, and what may have been meant by one that is not on the map."""
+    meant = nearest_label(goal, state, graph)
+    return f"{state.value}: did you mean {meant!r}?" if meant else state.value
+
+
+def nearest_label(goal: str, state: PlanState, graph: Graph) -> str:
+    """The label on the map that is most like that of a goal of this id that is not on it; empty
+    where none is like it, or the goal has no route for another reason.
+    """
+    if state is not PlanState.UNKNOWN_GOAL:
+        return ""
+    node = graph.get(Goal, goal)
+    label = node.object if node is not None else name_of(goal)
+    return nearest(label, [each.label for each in graph.of_kind(Object)])
+
+
+def _reason(goal: Goal, plan: Plan | None, graph: Graph) -> str:
+    if plan is not None and goal.id in plan.unreachable:
+        return routeless(goal.id, plan.unreachable[goal.id], graph)
+
+    before = graph.get(Goal, goal.after) if goal.after else None
+    if before is not None and before.reached_ns == NEVER_NS:
+        return f"it comes after {name_of(before.id)}"
+    if plan is not None and goal.id in plan.goals:
+        return "a route leads there, which was not driven to its end"
+    return "nothing was planned for it"

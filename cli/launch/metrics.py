@@ -8,6 +8,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from cli.launch.goals import unreached
 from cli.launch.observer import Observer
 from cli.launch.tally import EnergyMetrics, Tally
 from cogmap.errors import LogError
@@ -75,8 +76,8 @@ class Recording(msgspec.Struct, kw_only=True):
 class DriveMetrics(msgspec.Struct, kw_only=True):
     """What the messages of a drive show. `drive_s` is the drive's own time; `progress` the share of
     its `goals` that were reached, the way to the next one included, of that time where there is
-    none. `shortcut_m` of the way to goals led through streets that the robot had not been in before
-    it had any.
+    none. `unreached` has the reason for each goal that was not. `shortcut_m` of the way to goals
+    led through streets that the robot had not been in before it had any.
 
     `estimate` has the errors of the estimated position, `wheels_alone` and `fused_alone` those of
     path integration alone: of the wheels' odometry, and of the self-motion that sensory memory
@@ -96,6 +97,7 @@ class DriveMetrics(msgspec.Struct, kw_only=True):
     progress: float
     goals: int
     goals_reached: int
+    unreached: dict[str, str]
     shortcut_m: float
     estimate: ErrorMetrics
     wheels_alone: ErrorMetrics
@@ -217,6 +219,7 @@ def drive_metrics(tally: Tally, gaps: dict[str, int], rejected: dict[str, int]) 
         progress=observer.progress,
         goals=observer.goals,
         goals_reached=observer.goals_reached,
+        unreached=unreached(graph),
         shortcut_m=_length_m(observer.shortcuts_m),
         estimate=ErrorMetrics.of(errors.estimate_m),
         wheels_alone=ErrorMetrics.of(errors.wheels_m),

@@ -11,6 +11,7 @@ import msgspec
 import tomli_w
 
 from cli.launch.supervisor import Program, cogmap_command
+from cogmap.errors import ConfigError
 from cogmap.runtime import config
 from cogmap.runtime.config import Sections
 from schemas.nodes import Goal, goal_id
@@ -45,17 +46,17 @@ LAP_UNKNOWN_WEIGHT = 0.5
 class Choices:
     """What the user chooses about a drive; None leaves it to the configuration.
 
-    In the loop town the agent is given the corners of `laps` laps as goals, unless it is given
-    `goals`. On a `tour` it explores first; it is given `goals` then, or such as it knows. With
-    `explore_s` it explores for so long, and then drives to `goals`, or home. With `energy` its
-    battery runs down. `without` are the modules that somebody else starts. `own_router` is whether
-    the run starts one. `memory` is the database of what was learned in earlier runs, a new one
-    where it is None.
+    In the loop town the agent is given the corners of `laps` laps as goals, of one lap where that
+    is None, unless it is given `goals`. On a `tour` it explores first; it is given `goals` then, or
+    such as it knows. With `explore_s` it explores for so long, and then drives to `goals`, or home.
+    With `energy` its battery runs down. `without` are the modules that somebody else starts.
+    `own_router` is whether the run starts one. `memory` is the database of what was learned in
+    earlier runs, a new one where it is None.
     """
 
     seed: int | None = None
     town: str | None = None
-    laps: float = 1.0
+    laps: float | None = None
     lockstep: bool = False
     codelets: int = 1
     record: bool = True
@@ -73,8 +74,21 @@ def effective(base: Sections, choices: Choices, awaits: dict[str, int]) -> Secti
     the default of every other key. Raises ConfigError.
     """
     config.check_sections(base, registry.sections())
+    if choices.laps is not None and not _has_laps(base, choices):
+        raise ConfigError(
+            "--laps is of the loop town, and of a drive without goals of its own: leave it out"
+        )
+
     chosen = _chosen(base, choices, awaits)
     return {name: _complete(chosen, name) for name in registry.sections()}
+
+
+def _has_laps(base: Sections, choices: Choices) -> bool:
+    """Whether the agent's goals are the corners of the loop."""
+    sim = base.get("sim", {})
+    has_goals = choices.goals or choices.explore_s is not None or choices.tour
+    is_given = has_goals or "goals" in base.get("workspace", {}) or "trajectory" in sim
+    return not is_given and (choices.town or sim.get("town", LOOP)) == LOOP
 
 
 def _chosen(base: Sections, choices: Choices, awaits: dict[str, int]) -> Sections:
@@ -130,10 +144,11 @@ def _give_goals(sections: Sections, choices: Choices) -> None:
     if goals:
         workspace["goals"] = [_given(goal) for goal in goals]
     elif "goals" not in workspace and sim.get("town", LOOP) == LOOP:
-        workspace["goals"] = _of_laps(sim.get("seed", SimConfig().seed), choices.laps)
+        laps = choices.laps or 1.0
+        workspace["goals"] = _of_laps(sim.get("seed", SimConfig().seed), laps)
         workspace["in_order"] = True
         sections["planning"].setdefault("unknown_weight", LAP_UNKNOWN_WEIGHT)
-        sim.setdefault("duration_s", max(SimConfig().duration_s, LAP_S * choices.laps))
+        sim.setdefault("duration_s", max(SimConfig().duration_s, LAP_S * laps))
 
     if workspace.get("goals"):
         sim.setdefault("ends_at_goal", True)

@@ -18,6 +18,7 @@ from cli.launch.drive import Drive
 from cli.launch.plan import CONFIG_NAME, Choices, awaited, effective
 from cli.options import FiniteRange, agent_option, config_option, connect_option, set_option
 from cli.run import summary
+from cli.run.checks import check_inputs
 from cli.run.display import Display, display_on
 from cogmap.bus.session import check_free
 from cogmap.errors import ConfigError, StorageError
@@ -76,9 +77,7 @@ energy_option = click.option(
 laps_option = click.option(
     "--laps",
     type=FiniteRange(0, 1000, min_open=True),
-    default=1.0,
-    show_default="1",
-    help="Goals in the loop of streets: its corners, in order, so many times round.",
+    help="Goals in the loop of streets: its corners, in order, so many times round.  [default: 1]",
 )
 codelets_option = click.option(
     "--codelets", type=click.IntRange(1, 64), default=1, show_default=True, help="How many workers."
@@ -143,7 +142,7 @@ def run(
     tour: bool,
     explore_s: float | None,
     goals: Path | None,
-    laps: float,
+    laps: float | None,
     energy: bool,
     lockstep: bool,
     codelets: int,
@@ -186,6 +185,7 @@ def run(
     sections = effective(
         config.load(config_path, settings), choices, awaited(choices, observer=True)
     )
+    check_inputs(sections, choices)
     if router is None:
         check_free(connect)
 
@@ -216,7 +216,7 @@ def default_limit_s(sim: dict[str, Any], choices: Choices) -> float:
     """
     has_laps = not (choices.tour or choices.goals or choices.explore_s)
     if sim["town"] == LOOP and has_laps:
-        return LAP_LIMIT_S * max(1.0, choices.laps)
+        return LAP_LIMIT_S * max(1.0, choices.laps or 1.0)
 
     return float(sim["duration_s"]) + AROUND_S
 

@@ -8,6 +8,7 @@ from collections import Counter
 from pathlib import Path
 
 import msgspec
+from rich.markup import escape
 from rich.table import Table
 
 from cli.launch.drive import Drive
@@ -108,6 +109,7 @@ def drive_rows(metrics: DriveMetrics) -> list[tuple[str, str]]:
     cycle = f"{metrics.cycle_p50_ms:.0f} ms, 99 % within {metrics.cycle_p99_ms:.0f} ms"
     rows = [
         ("driven", driven),
+        *_unreached_rows(metrics),
         ("position error", _errors(metrics.estimate)),
         ("path integration alone, fused self-motion", _errors(metrics.fused_alone)),
         ("path integration alone, wheels", _errors(metrics.wheels_alone)),
@@ -122,6 +124,19 @@ def drive_rows(metrics: DriveMetrics) -> list[tuple[str, str]]:
     if metrics.energy is not None:
         rows.append(("energy", _energy(metrics.energy)))
     return rows
+
+
+def _unreached_rows(metrics: DriveMetrics) -> list[tuple[str, str]]:
+    """Why the first goals that were not reached were not, and how many others were not."""
+    sentences = [escape(f"{name}: {reason}") for name, reason in metrics.unreached.items()]
+    if not sentences:
+        return []
+
+    others = len(sentences) - NAMED
+    shown = sentences[:NAMED]
+    if others > 0:
+        shown.append(f"and {others} more")
+    return [("not reached", "\n".join(shown))]
 
 
 def _energy(energy: EnergyMetrics) -> str:

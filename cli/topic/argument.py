@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
-
 import click
 
 from cogmap.errors import UsageError
+from cogmap.hints import did_you_mean
 from schemas import topics
 from schemas.topics import Delivery, Topic
 
@@ -17,8 +16,7 @@ def topic_named(name: str) -> Topic:
     if found is not None:
         return found
 
-    close = difflib.get_close_matches(name, topics.BY_NAME, 1)
-    hint = f"did you mean {close[0]!r}?" if close else "see `cogmap topic list`"
+    hint = did_you_mean(name, topics.BY_NAME, "see `cogmap topic list`")
     raise UsageError(f"no topic {name!r}: {hint}")
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import difflib
 from collections.abc import Iterator
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 import yaml
 
 from cogmap.errors import UsageError
+from cogmap.hints import did_you_mean
 from schemas.array import DTYPES
 from schemas.base import Message
 from schemas.topics import Topic
@@ -91,6 +91,5 @@ def _parts(given: Any, parsed: Any, where: str) -> Iterator[tuple[Any, Any, str]
 
 def _no_field(key: str, fields: list[str], where: str) -> str:
     place = where.lstrip(".") or "the top"
-    close = difflib.get_close_matches(key, fields, 1)
-    hint = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(fields)}"
+    hint = did_you_mean(key, fields, f"there are {', '.join(fields)}")
     return f"no field {key!r} at {place}: {hint}"

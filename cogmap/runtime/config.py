@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -12,6 +11,7 @@ from typing import Any, TypeVar
 import msgspec
 
 from cogmap.errors import ConfigError
+from cogmap.hints import did_you_mean
 
 C = TypeVar("C", bound=msgspec.Struct)
 Sections = dict[str, dict[str, Any]]
@@ -100,7 +100,5 @@ def _check_finite(path: str, value: Any) -> None:
 
 def _nearest(word: str, words: list[str]) -> str:
     """The end of a sentence about an unknown `word`: what was meant, or what there is."""
-    close = difflib.get_close_matches(word, words, 1)
-    if close:
-        return f": did you mean {close[0]!r}?"
-    return f": it has {', '.join(words) or 'none'}"
+    hint = did_you_mean(word, words, f"it has {', '.join(words) or 'none'}")
+    return f": {hint}"

@@ -5,7 +5,7 @@ known here travels as the generic `Node`: a codelet of somebody else's package n
 this table. Positions are in metres in the frame of the map that the node is on, x east, y north.
 """
 
-from schemas.nodes.attention import Attention, Need
+from schemas.nodes.attention import ENERGY, SATISFIED_BY, Attention, Need
 from schemas.nodes.base import NEVER_NS, GraphNode, Node
 from schemas.nodes.columns import (
     POSE_COLUMNS,
@@ -51,17 +51,20 @@ from schemas.nodes.path import Correction, LoopClosure, Observations, PathSegmen
 from schemas.nodes.planning import Goal, Plan, PlanState
 from schemas.nodes.recollection import Recollection, SubMap
 from schemas.nodes.rules import KINDS, AnyNode, KindRules, kind_name, kind_of
-from schemas.nodes.situation import Map, Object, Percept, Self
+from schemas.nodes.situation import FUNCTIONS, Map, Object, Percept, Self
 
 __all__ = [
     "CORRECTION_ID",
+    "ENERGY",
     "EXCLUSIVE_LINKS",
+    "FUNCTIONS",
     "KINDS",
     "NEVER_NS",
     "PLAN_ID",
     "POSE_COLUMNS",
     "RECOLLECTION_ID",
     "ROOT_MAP",
+    "SATISFIED_BY",
     "SELF_ID",
     "TILE_CELLS",
     "TILE_SIDE",

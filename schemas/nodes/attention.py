@@ -5,6 +5,12 @@ from __future__ import annotations
 from schemas.base import Count, Name, Unit
 from schemas.nodes.base import GraphNode
 
+ENERGY = "energy"
+"""The label of the need of a body that has a battery."""
+
+SATISFIED_BY = {ENERGY: "charge"}
+"""The function of the objects that satisfy a need, by its label."""
+
 
 class Need(GraphNode, kw_only=True, frozen=True, tag="need"):
     """A feeling of the body, such as the need of energy: `level` is how strong the need is, from 0,

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from schemas.array import Matrix
 from schemas.base import Count, Finite, Name, Unit
+from schemas.nodes.attention import SATISFIED_BY
 from schemas.nodes.base import NEVER_NS, GraphNode, Metres, Positive, Spread, Stamp
 from schemas.nodes.columns import POSE_COLUMNS, SelfColumn, check_matrix
 from schemas.nodes.ids import ROOT_MAP
@@ -62,6 +63,10 @@ class Percept(GraphNode, kw_only=True, frozen=True, tag="percept"):
     label: Name
     bearing_rad: Finite
     range_m: Positive
+
+
+FUNCTIONS = ("shop", "home", "school", "office", "works", *SATISFIED_BY.values())
+"""What objects are used for, as far as perception knows."""
 
 
 class Object(GraphNode, kw_only=True, frozen=True, tag="object"):

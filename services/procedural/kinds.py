@@ -9,15 +9,32 @@ from typing import Any
 import msgspec
 
 from schemas.base import Scalar
-from schemas.nodes import KINDS, GraphNode, Node, kind_name
+from schemas.nodes import FUNCTIONS, KINDS, SATISFIED_BY, GraphNode, Node, kind_name
+
+NEED = "need"
+FUNCTION = "function"
+_MEANING = {("need", "label"): NEED, ("goal", "need"): NEED, ("object", "function"): FUNCTION}
+_SCALARS: dict[type[msgspec.inspect.Type], type] = {
+    msgspec.inspect.BoolType: bool,
+    msgspec.inspect.FloatType: float,
+    msgspec.inspect.IntType: int,
+    msgspec.inspect.StrType: str,
+    msgspec.inspect.EnumType: str,
+}
 
 
 class NodeKinds:
     """The kinds that this version knows, and others that somebody's codelets write as generic
-    nodes.
+    nodes; the needs and the functions that it knows, and others of somebody's body and perception.
     """
 
-    def __init__(self, generic: Iterable[str] = ()) -> None:
+    def __init__(
+        self,
+        generic: Iterable[str] = (),
+        needs: Iterable[str] = (),
+        functions: Iterable[str] = (),
+    ) -> None:
+        self._known = {NEED: [*SATISFIED_BY, *needs], FUNCTION: [*FUNCTIONS, *functions]}
         self._types: dict[str, type[GraphNode]] = {}
         for kind in KINDS:
             if kind is not Node:
@@ -35,6 +52,24 @@ class NodeKinds:
         if self._types[kind] is Node:
             return None
         return [field.encode_name for field in msgspec.structs.fields(self._types[kind])]
+
+    def known(self, meaning: str) -> list[str]:
+        """The words that there are for NEED or FUNCTION."""
+        return self._known[meaning]
+
+    def meaning(self, kind: str, field: str) -> str:
+        """What the words of a field stand for, NEED or FUNCTION; empty where they may be any."""
+        return _MEANING.get((kind, field), "")
+
+    def scalar(self, kind: str, field: str) -> type | None:
+        """The type of a field, of an enumeration that of its values; None where it is no scalar, or
+        may be any.
+        """
+        if self.fields(kind) is None:
+            return None
+        types = {each.encode_name: each.type for each in msgspec.structs.fields(self._types[kind])}
+        found = msgspec.inspect.type_info(types[field])
+        return _SCALARS.get(type(found))
 
     def value(self, kind: str, field: str, value: Any) -> Scalar:
         """A value of a field, of its type: of an enumeration also by the name of a member.

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
 from cogmap.errors import ConfigError
+from cogmap.hints import did_you_mean
 from schemas.base import Count, Finite, Name, PositiveSeconds, Scalar, Share
-from schemas.cognition import ActionName, GuidanceScheme, Relation
-from services.procedural.kinds import NodeKinds
+from schemas.cognition import PARAMETERS, ActionName, GuidanceScheme, Relation
+from schemas.feelings import Feeling
+from services.procedural.kinds import NEED, NodeKinds
 from services.procedural.patterns import Condition, Pattern
 from services.procedural.schemes import Reference, Result, Scheme
 from services.procedural.source import GUIDANCE, Source
@@ -22,8 +23,12 @@ from services.procedural.source import GUIDANCE, Source
 BUILT_IN = Path(__file__).with_name("schemes.toml")
 KIND = "kind"
 VARIABLE = "as"
+FEELING = "feeling"
+FEELINGS = tuple(feeling.value for feeling in Feeling if feeling)
 SALIENCE = "salience"
 BOUNDS = ("at_least", "at_most")
+TYPES = {float: "number", int: "whole number", str: "word"}
+_NUMBER = re.compile(r"(?<=_)[1-9]\d*(?=_)")
 
 
 class SchemeTable(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
@@ -55,13 +60,16 @@ class GuidanceTable(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
 
 class SchemeFile(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     """A file of schemes. `generic_kinds` are kinds of nodes that other packages' codelets write,
-    `own_actions` those that a motor module of somebody's own executes.
+    `own_actions` those that a motor module of somebody's own executes, `own_needs` and
+    `own_functions` those of a body and of objects that somebody's own modules sense.
     """
 
     scheme: list[SchemeTable] = []
     guidance: list[GuidanceTable] = []
     generic_kinds: list[Name] = []
     own_actions: list[Name] = []
+    own_needs: list[Name] = []
+    own_functions: list[Name] = []
 
 
 def load(path: Path) -> list[Scheme]:
@@ -69,7 +77,7 @@ def load(path: Path) -> list[Scheme]:
     in it.
     """
     source, file = _decoded(path)
-    kinds = NodeKinds(file.generic_kinds)
+    kinds = NodeKinds(file.generic_kinds, file.own_needs, file.own_functions)
     actions = [*ActionName, *file.own_actions]
     schemes: list[Scheme] = []
     for number, table in enumerate(file.scheme):
@@ -164,9 +172,7 @@ class _Reader:
             context=context,
             adding=tuple(self._result(each) for each in table.adding),
             deleting=tuple(self._bound(self._pattern(each)) for each in table.deleting),
-            parameters={
-                name: self._parameter(name, value) for name, value in table.parameters.items()
-            },
+            parameters=self._parameters(),
             base_level=table.base_level,
             within_s=table.within_s,
         )
@@ -183,6 +189,9 @@ class _Reader:
 
     def _bound(self, pattern: Pattern) -> Pattern:
         """A result whose variable, if it has one, is one of the context."""
+        if pattern.feelings:
+            text = "has a feeling among its results: it is a condition of the context alone"
+            raise self._error(FEELING, text)
         if pattern.variable and pattern.variable not in self._kind_of:
             raise self._unknown("variable", pattern.variable, list(self._kind_of))
         return pattern
@@ -201,9 +210,17 @@ class _Reader:
             raise self._error(VARIABLE, f"has a variable that is no word: {variable!r}")
         conditions = []
         for field, value in table.items():
-            if field not in (KIND, VARIABLE):
+            if field not in (KIND, VARIABLE, FEELING):
                 conditions.append(self._condition(kind, field, value))
-        return Pattern(kind, tuple(conditions), variable)
+        return Pattern(kind, tuple(conditions), variable, self._feelings(table.get(FEELING, [])))
+
+    def _feelings(self, value: Any) -> tuple[Feeling, ...]:
+        """The feelings that are named, one or several."""
+        names = value if isinstance(value, list) else [value]
+        for name in names:
+            if name not in FEELINGS:
+                raise self._unknown(FEELING, str(name), FEELINGS)
+        return tuple(Feeling(name) for name in names)
 
     def _condition(self, kind: str, field: str, value: Any) -> Condition:
         self._check_field(kind, field)
@@ -216,7 +233,15 @@ class _Reader:
         except ValueError as error:
             word = next((each for each in values if isinstance(each, str)), field)
             raise self._error(word, f"has a wrong value of {kind}.{field}: {error}") from None
+
+        for each in typed:
+            self._check_word(self._kinds.meaning(kind, field), each)
         return Condition(field, typed)
+
+    def _check_word(self, meaning: str, word: Scalar) -> None:
+        """Refuse a word for a need or a function that there is none of; empty, it is of none."""
+        if meaning and word and word not in self._kinds.known(meaning):
+            raise self._unknown(meaning, str(word), self._kinds.known(meaning))
 
     def _range(self, field: str, bounds: dict[str, Any]) -> Condition:
         for name, bound in bounds.items():
@@ -225,6 +250,47 @@ class _Reader:
             if isinstance(bound, bool) or not isinstance(bound, int | float):
                 raise self._error(name, f"has the bound {bound!r}, which is no number")
         return Condition(field, **bounds)
+
+    def _parameters(self) -> dict[str, Scalar | Reference]:
+        """The parameters, which are those of the motor program, where that is one of ours."""
+        action = self._table.action
+        given = self._table.parameters
+        parameters = {name: self._parameter(name, value) for name, value in given.items()}
+        needed = PARAMETERS.get(action)
+        if needed is None:
+            return parameters
+
+        for name, parameter in parameters.items():
+            self._near = [name, str(given[name])]
+            self._check_parameter(name, parameter, needed)
+        for name in needed:
+            if name not in parameters:
+                raise self._error("parameters", f"lacks the parameter {name!r} of {action}")
+        return parameters
+
+    def _check_parameter(
+        self, name: str, parameter: Scalar | Reference, needed: Mapping[str, type]
+    ) -> None:
+        """Refuse a parameter that the motor program does not take, or not as a value such as this.
+        Those that are numbered are numbered on.
+        """
+        wanted = needed.get(name) or needed.get(_NUMBER.sub("1", name))
+        if wanted is None:
+            raise self._unknown(f"parameter of {self._table.action}", name, [*needed])
+
+        if isinstance(parameter, Reference):
+            kind = self._kind_of[parameter.variable]
+            if self._kinds.fields(kind) is None:
+                return
+            found = self._kinds.scalar(kind, parameter.field)
+        else:
+            found = type(parameter)
+            self._check_word(NEED if name == NEED else "", parameter)
+
+        if found is not wanted and (found, wanted) != (int, float):
+            value = self._table.parameters[name]
+            text = f"has the parameter {name} {value!r}, which is no {TYPES[wanted]}"
+            raise self._error(name, text)
 
     def _parameter(self, name: str, value: Scalar) -> Scalar | Reference:
         """A parameter as it is, or "$VARIABLE.FIELD" of a node of the context."""
@@ -244,8 +310,7 @@ class _Reader:
             raise self._unknown(f"field of {kind}", field, fields)
 
     def _unknown(self, what: str, word: str, known: Sequence[str]) -> ConfigError:
-        close = difflib.get_close_matches(word, known, 1)
-        remedy = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(known)}"
+        remedy = did_you_mean(word, known, f"there are {', '.join(known) or 'none'}")
         return self._error(word, f"names the unknown {what} {word!r}: {remedy}")
 
     def _error(self, word: str, text: str) -> ConfigError:

@@ -8,16 +8,18 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from schemas.base import Scalar
+from schemas.feelings import Feeling
 from schemas.nodes import GraphNode, Node, kind_of
 
 Bindings = Mapping[str, str]
 
 
 class Active(NamedTuple):
-    """A node, and its total activation."""
+    """A node, its total activation, and what is felt about it, where it is conscious."""
 
     node: GraphNode
     activation: float
+    feeling: Feeling = Feeling.NONE
 
 
 @dataclass(frozen=True)
@@ -62,17 +64,19 @@ class Condition:
 @dataclass(frozen=True)
 class Pattern:
     """Nodes of a kind of which conditions hold. Where it has a `variable`, that stands for the id
-    of the node that matches, in all patterns of a scheme.
+    of the node that matches, in all patterns of a scheme. Where it has `feelings`, the node is
+    broadcast with one of them.
     """
 
     kind: str
     conditions: tuple[Condition, ...] = ()
     variable: str = ""
+    feelings: tuple[Feeling, ...] = ()
 
     def match(self, nodes: Iterable[Active], bindings: Bindings) -> Active | None:
         """The most active node that matches, of equals the first by id; None where none does."""
         wanted = bindings.get(self.variable)
-        found = [each for each in nodes if self._matches(each.node)]
+        found = [each for each in nodes if self._matches(each)]
         if wanted is not None:
             found = [each for each in found if each.node.id == wanted]
         return min(found, key=lambda each: (-each.activation, each.node.id), default=None)
@@ -84,12 +88,16 @@ class Pattern:
         if bound is not None:
             words.append(f"id={bound}")
         words += [str(condition) for condition in self.conditions]
+        if self.feelings:
+            words.append(str(Condition("feeling", self.feelings)))
         return " ".join(words)
 
-    def _matches(self, node: GraphNode) -> bool:
-        if kind_of(node) != self.kind:
+    def _matches(self, active: Active) -> bool:
+        if kind_of(active.node) != self.kind:
             return False
-        return all(condition.holds(node) for condition in self.conditions)
+        if self.feelings and active.feeling not in self.feelings:
+            return False
+        return all(condition.holds(active.node) for condition in self.conditions)
 
 
 def value_of(node: GraphNode, field: str) -> Scalar | None:

@@ -67,7 +67,7 @@ class Situations:
         nodes = []
         for node in broadcast.coalition.nodes:
             activation = min(1.0, node.base_level + node.activation)
-            nodes.append(Active(node, activation))
+            nodes.append(Active(node, activation, broadcast.coalition.feeling))
 
         known = {active.node.id for active in nodes}
         nodes += [each for each in self._at(broadcast.cycle) if each.node.id not in known]

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from schemas.nodes import Need, need_id
+from schemas.nodes import ENERGY, Need, need_id
 from schemas.sensing import Energy
 from services.workspace.config import Config
 
 MAX_KEPT = 16
-ENERGY = "energy"
 
 
 class Body:

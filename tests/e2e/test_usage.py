@@ -90,6 +90,13 @@ def endpoint() -> Iterator[str]:
         ),
         (["router", "--connect", "tcp/127.0.0.1:99999"], "99999", "a port of at most 65535"),
         (["run", "--out", "/dev/null/x", "--connect", FREE], "/dev/null/x", "another with --out"),
+        (["run", "--town", "blocks", "--laps", "2"], "--laps", "leave it out"),
+        (
+            ["run", "--set", "procedural.schemes=nowhere.toml", "--connect", FREE],
+            "nowhere.toml",
+            "name one that exists",
+        ),
+        (["run", "--memory", "/etc/passwd", "--connect", FREE], "/etc/passwd", "move it away"),
         (["topic", "list", "--agent", "a/b"], "'a/b'", "use letters, digits"),
         (["module", "sim", "--agent", "a/b"], "'a/b'", "use letters, digits"),
         (["topic", "echo", "clok"], "'clok'", "did you mean 'clock'?"),

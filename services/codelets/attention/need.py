@@ -12,6 +12,7 @@ from schemas.feelings import Feeling
 from schemas.graph import Phase
 from schemas.nodes import (
     PLAN_ID,
+    SATISFIED_BY,
     SELF_ID,
     AnyNode,
     Attention,
@@ -27,9 +28,6 @@ from services.codelets.attention.config import SECTION, Config, Need
 from services.codelets.attention.memory import brought, is_refractory, memory_of
 
 NAME = "need"
-
-SATISFIED_BY = {"energy": "charge"}
-"""The function of the objects that satisfy a need, by its label."""
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:

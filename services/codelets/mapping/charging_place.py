@@ -12,6 +12,7 @@ from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.codelets import Task
 from schemas.graph import Link, Phase
 from schemas.nodes import (
+    SATISFIED_BY,
     SELF_ID,
     LinkKind,
     Need,
@@ -21,7 +22,6 @@ from schemas.nodes import (
     nearest_place,
     object_id,
 )
-from services.codelets.attention.need import SATISFIED_BY
 from services.codelets.config import SECTION, Config
 
 LOOK = "charging-place"

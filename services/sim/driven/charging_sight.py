@@ -9,12 +9,13 @@ import msgspec
 import numpy as np
 
 from cogmap.geometry.arrays import Floats
+from schemas.nodes import ENERGY, SATISFIED_BY
 from schemas.sensing import Percept, Pose
 from services.sim.driven.camera import NEAR_M, ColumnCamera
 from services.sim.layout.furniture import Prop
 from services.sim.scripted.percepts import Landmark, PerceptErrors, PerceptSim
 
-FUNCTION = "charge"
+FUNCTION = SATISFIED_BY[ENERGY]
 NEAREST_M = 2.2
 FARTHEST_M = 30.0
 # So much of a post must be seen past the walls, and so much of a whole one.

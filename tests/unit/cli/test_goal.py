@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import msgspec
 import pytest
 
-from cli.goal import parsed, read_goals
+from cli.goal import parsed, plan_json, plan_text, read_goals
 from cogmap.errors import UsageError
-from schemas.nodes import goal_id
+from schemas.nodes import PLAN_ID, Object, Plan, PlanState, goal_id, object_id
+from tests.support.world.scenes import graph_of
 
 
 def test_two_numbers_are_a_position_and_other_words_names() -> None:
@@ -38,9 +40,31 @@ def test_a_file_has_a_goal_a_line(tmp_path: Path) -> None:
     assert [goal.id for goal in read_goals(path)] == [goal_id("bakery"), goal_id("3,4")]
 
 
+def test_a_file_without_goals_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "goals.txt"
+    path.write_text("\n \n", "utf-8")
+
+    with pytest.raises(UsageError, match=r"goals\.txt has no goals: write one a line"):
+        read_goals(path)
+
+
 def test_the_line_that_is_wrong_is_named(tmp_path: Path) -> None:
     path = tmp_path / "goals.txt"
     path.write_text("bakery\n3\n", "utf-8")
 
     with pytest.raises(UsageError, match="line 2"):
         read_goals(path)
+
+
+def test_for_a_goal_that_is_not_on_the_map_the_nearest_object_is_suggested() -> None:
+    unknown = PlanState.UNKNOWN_GOAL
+    plan = Plan(id=PLAN_ID, state=unknown, unreachable={goal_id("bakry"): unknown})
+    bakery = Object(id=object_id("bakery"), label="bakery", x_m=1.0, y_m=2.0)
+    graph = graph_of(plan, bakery)
+
+    text = plan_text(plan, graph)
+    summary = msgspec.json.decode(plan_json(plan, graph))
+
+    assert text == "bakry: the map has no object of that name: did you mean 'bakery'?"
+    assert summary["unreachable"] == {"bakry": unknown.value}
+    assert summary["nearest"] == {"bakry": "bakery"}

@@ -8,13 +8,15 @@ import pytest
 
 from cogmap.errors import MessageError
 from cogmap.runtime.module import Module
-from schemas.cognition import ActionName
+from schemas.base import Scalar
+from schemas.cognition import PARAMETERS, ActionName, MotorProgram
 from schemas.nodes import PLAN_ID, Plan, PlanState
 from schemas.sensing import Pose, SpeedLimit
 from services.motor.aim import Aim
 from services.motor.config import Config
 from services.motor.guide import Track
 from services.motor.programs import FollowPlan, Program, program_of
+from services.motor.seeking import sought_by
 from tests.support.world.motor import action_of, command_after, module_ahead, pose_delta, scan_of
 from tests.support.world.plans import plan_along
 
@@ -101,6 +103,23 @@ def test_other_parameters_start_a_program_anew() -> None:
 def test_a_turn_by_no_number_is_refused(parameters: dict[str, bool | str]) -> None:
     with pytest.raises(MessageError, match=r"parameter 'turn_rad' is .*, not a number"):
         program_of(ActionName.TURN, parameters, FollowPlan(Config()), Config(), Track())
+
+
+@pytest.mark.parametrize("action", ActionName)
+def test_a_program_needs_all_the_parameters_that_schemes_are_checked_for(action: str) -> None:
+    given: dict[str, Scalar] = {name: kind(1) for name, kind in PARAMETERS[action].items()}
+    _begin(action, given)
+
+    for name in given:
+        others = {each: value for each, value in given.items() if each != name}
+        with pytest.raises(MessageError, match=f"parameter {name!r} is None"):
+            _begin(action, others)
+
+
+def _begin(action: str, parameters: dict[str, Scalar]) -> None:
+    """Begin a motor program, and seek what it seeks. Raises MessageError."""
+    program_of(action, parameters, FollowPlan(Config()), Config(), Track())
+    sought_by(MotorProgram(cycle=1, action=action, parameters=parameters))
 
 
 def test_a_halt_at_the_goal_states_that_it_is_there() -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from cogmap.errors import ConfigError
 from schemas.cognition import ActionName
+from schemas.feelings import Feeling
 from schemas.nodes import PlanState
 from services.procedural.loading import BUILT_IN, load
 from tests.support.world.schemes import FOLLOW, HEADER, written
@@ -57,6 +58,7 @@ def test_a_plan_is_driven_in_one_state_and_calls_for_a_halt_in_all_others() -> N
     [
         ('"goal", as = "target" },', '"gaol", as = "target" },', "node kind 'gaol': did you mean"),
         ('action = "dock"', 'action = "fly"', "action 'fly': there are follow_plan, turn, dock"),
+        ('action = "dock"', 'action = "dok"', r"action 'dok': did you mean 'dock'\?"),
         ('kind = "self" }', 'kind = "self", moood = 1 }', "field of self 'moood'"),
         ('kind = "self" }', 'kind = "self", map = 1 }', r"wrong value of self\.map: 1: Expected"),
         ('kind = "self" }', 'kind = "plan", state = "redy" }', "'redy' is none of ready, at_goal"),
@@ -66,6 +68,16 @@ def test_a_plan_is_driven_in_one_state_and_calls_for_a_halt_in_all_others() -> N
         ('"$target.y_m"', '"$target.z_m"', "field of goal 'z_m'"),
         ('"$target.y_m"', '"$aim.y_m"', "variable 'aim': there are target"),
         ('as = "target", salience', 'as = "goal", salience', "variable 'goal': there are target"),
+        ("y_m = ", "ym = ", r"unknown parameter of dock 'ym': did you mean 'y_m'\?"),
+        ('"$target.y_m"', '"left"', "parameter y_m 'left', which is no number"),
+        ('"$target.y_m"', "true", "parameter y_m True, which is no number"),
+        ('"$target.y_m"', '"$target.object"', r"y_m '\$target.object', which is no number"),
+        (', y_m = "$target.y_m"', "", "lacks the parameter 'y_m' of dock"),
+        ('kind = "self" }', 'kind = "need", label = "enregy" }', r"need 'enregy': did .* 'energy'"),
+        ('kind = "self" }', 'kind = "goal", need = "enegry" }', r"need 'enegry': did .* 'energy'"),
+        ('kind = "self" }', 'kind = "object", function = "chrage" }', r"did you mean 'charge'\?"),
+        ('kind = "self" }', 'kind = "self", feeling = "dagner" }', r"did you mean 'danger'\?"),
+        ("salience = 0.5", 'feeling = "need", salience = 0.5', "a feeling among its results"),
         ("salience = 0.5", "salience = 1.5", r"salience 1\.5: write one from -1 to 1"),
         ("parameters =", "params =", "unknown field `params`"),
         ("parameters =", "within_s = 0.0\nparameters =", "> 0.0"),
@@ -91,6 +103,68 @@ def test_a_scheme_without_a_context_is_refused(tmp_path: Path) -> None:
 
     with pytest.raises(ConfigError, match=r":4: scheme 'a' has no context"):
         load(written(tmp_path, text))
+
+
+SEEK = """
+[[scheme]]
+name = "seek"
+action = "seek"
+context = [
+    { kind = "need", label = "water", as = "thirst" },
+    { kind = "object", function = "well", as = "well" },
+]
+parameters = { need = "water", object = "$well.label" }
+"""
+
+
+def test_a_need_and_a_function_of_ones_own_are_known_once_they_are_declared(
+    tmp_path: Path,
+) -> None:
+    needs = 'own_needs = ["water"]\n'
+    functions = 'own_functions = ["well"]\n'
+
+    (scheme,) = load(written(tmp_path, needs + functions + SEEK))
+
+    assert scheme.parameters["need"] == "water"
+    with pytest.raises(ConfigError, match="unknown need 'water'"):
+        load(written(tmp_path, functions + SEEK))
+    with pytest.raises(ConfigError, match="unknown function 'well'"):
+        load(written(tmp_path, needs + SEEK))
+
+
+def test_the_need_that_is_sought_for_is_one_that_there_is(tmp_path: Path) -> None:
+    text = SEEK.replace('"water", as', '"energy", as').replace('"well", as', '"charge", as')
+
+    with pytest.raises(ConfigError, match="unknown need 'water'"):
+        load(written(tmp_path, text))
+
+
+def test_a_goal_that_serves_no_need_may_be_named(tmp_path: Path) -> None:
+    (scheme,) = load(
+        written(tmp_path, HEADER + FOLLOW.replace("ready", 'ready" }, {kind="goal", need="'))
+    )
+
+    assert str(scheme.context[1].conditions[0]) == "need="
+
+
+def test_the_places_of_a_path_are_numbered_on(tmp_path: Path) -> None:
+    names = [f"{name}_{number}_m = 1.0" for number in (1, 2, 3) for name in ("ahead", "left")]
+    places = ", ".join(names)
+    text = HEADER + FOLLOW.replace("follow_plan", "guide")
+
+    (scheme,) = load(written(tmp_path, f"{text}parameters = {{ seen_ns = 5, {places} }}\n"))
+
+    assert len(scheme.parameters) == 7
+    with pytest.raises(ConfigError, match=r"seen_ns 5\.5, which is no whole number"):
+        load(written(tmp_path, f"{text}parameters = {{ seen_ns = 5.5, {places} }}\n"))
+
+
+def test_feelings_are_conditions_of_the_context(tmp_path: Path) -> None:
+    text = FOLLOW.replace('state = "ready"', 'state = "ready", feeling = ["lost", "danger"]')
+    (scheme,) = load(written(tmp_path, HEADER + text))
+
+    assert scheme.context[0].feelings == (Feeling.LOST, Feeling.DANGER)
+    assert scheme.context[0].spelled({}) == "plan state=ready feeling=lost|danger"
 
 
 def test_a_generic_kind_has_any_field_once_it_is_declared(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -10,6 +11,7 @@ from cogmap.errors import ConfigError
 from cogmap.runtime.module import Module
 from schemas.base import Message
 from schemas.cognition import Action, Behaviour, Behaviours, Broadcast, Coalition, Rejection
+from schemas.feelings import Feeling
 from schemas.graph import Delta, Operation, Phase
 from schemas.nodes import (
     NEVER_NS,
@@ -24,6 +26,7 @@ from schemas.nodes import (
 from services.procedural.module import Config, build
 from tests.support.world.guidance import broadcast, driven, relations, selected
 from tests.support.world.scenes import PERIOD_NS, agent
+from tests.support.world.schemes import FOLLOW, HEADER, written
 
 READY = Plan(id=PLAN_ID, state=PlanState.READY, base_level=1.0)
 AT_GOAL = Plan(id=PLAN_ID, state=PlanState.AT_GOAL, base_level=1.0)
@@ -47,10 +50,12 @@ class Memory:
         before = self.commit(cycle, Phase.PERCEPTS)
         return [*before, *self.commit(cycle, Phase.LOCALIZATION, agent())]
 
-    def broadcast(self, cycle: int, *nodes: AnyNode) -> list[Message]:
+    def broadcast(
+        self, cycle: int, *nodes: AnyNode, feeling: Feeling = Feeling.NONE
+    ) -> list[Message]:
         """A broadcast of the agent, or of these nodes."""
         content = [*nodes] or [agent(stationary_since_ns=NEVER_NS)]
-        coalition = Coalition(codelet="whereabouts", activation=0.5, nodes=content)
+        coalition = Coalition(codelet="whereabouts", activation=0.5, nodes=content, feeling=feeling)
         stamp_ns = cycle * PERIOD_NS
         return self.module.feed(
             Broadcast(stamp_ns=stamp_ns, cycle=cycle, trigger="t", coalition=coalition)
@@ -142,6 +147,17 @@ def test_a_plan_that_is_broadcast_goes_before_that_of_the_graph() -> None:
     memory.pose(1)
 
     assert not _by_scheme(memory.broadcast(1, AT_GOAL))["halt"].rejection
+
+
+def test_a_scheme_may_depend_on_what_is_felt_about_the_broadcast(tmp_path: Path) -> None:
+    text = FOLLOW.replace('"plan", state = "ready"', '"self", feeling = "danger"')
+    memory = Memory("real_time", schemes=str(written(tmp_path, HEADER + text)))
+
+    fearful = _by_scheme(memory.broadcast(1, feeling=Feeling.DANGER))
+    calm = _by_scheme(memory.broadcast(2))
+
+    assert fearful["follow"].context == {"self feeling=danger": 1.0}
+    assert calm["follow"].rejection is Rejection.CONTEXT_MISSING
 
 
 def test_in_lockstep_a_broadcast_waits_for_the_pose_of_its_cycle() -> None:

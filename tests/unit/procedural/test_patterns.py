@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from schemas.feelings import Feeling
 from schemas.nodes import PLAN_ID, Goal, Plan, PlanState
-from services.procedural.patterns import Condition, Pattern
+from services.procedural.patterns import Active, Condition, Pattern
 from tests.support.world.schemes import active, sign
 
 READY = Plan(id=PLAN_ID, state=PlanState.READY, base_level=1.0)
@@ -54,6 +55,16 @@ def test_the_most_active_node_matches_of_equals_the_first_by_id() -> None:
 
     assert found is not None
     assert found.node.id == "sign:b"
+
+
+def test_a_pattern_with_feelings_matches_what_is_broadcast_with_one_of_them() -> None:
+    pattern = Pattern("sign", feelings=(Feeling.NEED, Feeling.NOVELTY))
+    needed = Active(sign("a"), 1.0, Feeling.NEED)
+    dangerous = Active(sign("b"), 1.0, Feeling.DANGER)
+    unconscious = Active(sign("c"), 1.0)
+
+    assert pattern.match([dangerous, needed, unconscious], {}) == needed
+    assert pattern.match([dangerous, unconscious], {}) is None
 
 
 def test_a_variable_that_stands_for_a_node_matches_it_alone() -> None:

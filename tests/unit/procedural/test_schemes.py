@@ -18,7 +18,7 @@ action = "dock"
 context = [{ kind = "sign", as = "it", colour = "green" }, { kind = "sign", as = "it" }]
 adding = [{ kind = "sign", as = "it", reached = true, salience = -0.3 }]
 deleting = [{ kind = "sign", as = "it", colour = "green" }]
-parameters = { x_m = "$it.x_m", y_m = 2.0, hue = "$it.colour" }
+parameters = { x_m = "$it.x_m", y_m = 2.0 }
 """
 PATTERNS = (Pattern("a"), Pattern("b"))
 
@@ -48,7 +48,7 @@ def test_a_scheme_becomes_a_behaviour_with_the_nodes_that_match(tmp_path: Path) 
     assert not behaviour.rejection
     assert behaviour.activation == pytest.approx(0.6 + 0.3)
     assert behaviour.bindings == {"it": "sign:b"}
-    assert behaviour.parameters == {"x_m": 4.0, "y_m": 2.0, "hue": "green"}
+    assert behaviour.parameters == {"x_m": 4.0, "y_m": 2.0}
     assert behaviour.context == {"sign id=sign:b colour=green": 0.6, "sign id=sign:b": 0.6}
     assert behaviour.adding == {"sign id=sign:b reached=True": -0.3}
     assert behaviour.deleting == ["sign id=sign:b colour=green"]

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from cogmap.bus.codec import encode
+from schemas import nodes
 from services.sim.layout.blocks import streets
 from services.sim.layout.blocks.districts import FUNCTIONS
 from services.sim.layout.blocks.town import BlocksTown, generate
@@ -101,6 +102,10 @@ def test_districts_share_a_function_and_a_style() -> None:
             invented = [plot.kind for plot in plots if "-" in plot.kind.name]
             assert len({kind.roof for kind in invented}) == 1
             assert len({kind.pattern for kind in invented}) <= 2
+
+
+def test_every_function_is_one_that_schemes_may_name() -> None:
+    assert FUNCTIONS.keys() <= {*nodes.FUNCTIONS}
 
 
 def test_no_kind_of_building_is_built_twice() -> None:

@@ -155,6 +155,24 @@ def test_the_drive_waits_for_every_module_every_worker_and_whoever_watches() -> 
     assert awaited(Choices(record=False), observer=False).keys().isdisjoint({RECORDER, OBSERVER})
 
 
+@pytest.mark.parametrize(
+    ("choices", "sections"),
+    [
+        (Choices(laps=2.0, town="blocks"), {}),
+        (Choices(laps=2.0), {"sim": {"town": "blocks"}}),
+        (Choices(laps=2.0, tour=True), {}),
+        (Choices(laps=2.0, explore_s=40.0), {}),
+        (Choices(laps=2.0, goals=parsed(["inn"])), {}),
+        (Choices(laps=2.0), {"workspace": {"goals": [{"name": "inn", "object": "inn"}]}}),
+    ],
+)
+def test_laps_that_are_not_driven_are_refused(
+    choices: Choices, sections: dict[str, dict[str, object]]
+) -> None:
+    with pytest.raises(ConfigError, match="--laps is of the loop town"):
+        configured(choices, **sections)
+
+
 def test_a_section_of_no_module_is_named() -> None:
     with pytest.raises(ConfigError, match=r"unknown section \[acton\]: did you mean 'action'\?"):
         configured(Choices(), acton={})

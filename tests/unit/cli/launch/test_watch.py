@@ -7,10 +7,12 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
+from rich.text import Text
 
 from cli.launch.metrics import DriveMetrics, RunMetrics, drive_metrics
 from cli.launch.watch import Watch
 from cli.plots import map as plot
+from cli.run.summary import drive_rows
 from cogmap.bus.codec import Envelope, encode
 from cogmap.bus.memory import MemoryBus, MemoryNetwork
 from schemas import topics
@@ -295,6 +297,17 @@ def test_the_map_of_a_drive_and_of_none_is_drawn(
         drive(publisher)
 
     assert (tmp_path / "none.png").stat().st_size < (tmp_path / "drive.png").stat().st_size
+
+
+def test_the_summary_names_the_first_goals_that_were_not_reached(watch: Watch) -> None:
+    unreached = {f"goal {number}": "no [route]" for number in range(10)}
+    metrics = msgspec.structs.replace(metrics_of(watch), unreached=unreached)
+    lines = dict(drive_rows(metrics))["not reached"].splitlines()
+
+    assert len(lines) == 9
+    assert Text.from_markup(lines[0]).plain == "goal 0: no [route]"
+    assert lines[-1] == "and 2 more"
+    assert "not reached" not in dict(drive_rows(metrics_of(watch)))
 
 
 def run_metrics(watch: Watch) -> RunMetrics:

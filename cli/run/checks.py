@@ -1,0 +1,43 @@
+"""What a drive cannot begin with, found before any process is started."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from cli.launch.plan import MEMORY, Choices
+from cli.memory.source import checked
+from cogmap.runtime import config
+from cogmap.runtime.config import Sections
+from services import registry
+from services.sim.config import Config, check
+from services.sim.layout import towns
+
+PROCEDURAL = "procedural"
+SIM = "sim"
+
+
+def check_inputs(sections: Sections, choices: Choices) -> None:
+    """Raise the CogmapError with which a module of the drive would end as it starts: of a file of
+    schemes, of the settings of the simulation or the extract of its town, of the database of
+    long-term memory. What belongs to a module that somebody else starts is not checked.
+    """
+    if PROCEDURAL not in choices.without:
+        registry.build(PROCEDURAL, sections)
+    if SIM not in choices.without:
+        _check_town(config.typed(sections, SIM, Config))
+    if MEMORY not in choices.without and choices.memory is not None:
+        _check_memory(choices.memory)
+
+
+def _check_town(settings: Config) -> None:
+    """A town from a seed is made by the simulation alone: a large one takes seconds."""
+    check(settings)
+    if settings.town.startswith(towns.OSM):
+        towns.place(settings.town, settings.seed, settings.town_size_m)
+
+
+def _check_memory(path: Path) -> None:
+    """Check all of a database that there is."""
+    if path.exists():
+        with checked(path):
+            return
