@@ -327,6 +327,17 @@ def test_a_memory_that_was_restarted_still_has_what_was_forgotten() -> None:
     assert again.stored == {"inn": 20.0, "mill": 40.0}
 
 
+def test_a_journal_that_is_shortened_right_after_a_restart_keeps_what_was_forgotten() -> None:
+    mind = Mind(*TOWN, **FAR)
+    mind.forget("inn")
+    mind.live()
+    again = mind.restarted()
+    assert again.module.compact is not None
+    again.published = [again.module.compact()]
+
+    assert again.stored == {"inn": 20.0, "mill": 40.0}
+
+
 def test_a_memory_that_was_restarted_has_nothing_of_what_was_missing() -> None:
     mind = Mind(*TOWN)
     mind.live()
