@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from schemas.base import PositiveMetres, PositiveShare
+from schemas.base import PositiveMetres, PositiveShare, Share
 from services.memory.episodic.config import EpisodicConfig
 from services.memory.sparse.config import SparseConfig
 
@@ -46,6 +46,32 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             "cues a recall, 1 to 1000.",
         ),
     ] = 3
+    learned_base_level: Annotated[
+        Share,
+        msgspec.Meta(
+            description="Base level from which on an object that the workspace forgets by time "
+            "alone was learned, and is kept here, 0 to 1. What is new begins at 0.15, and has "
+            "reached the default when it was conscious twice; with less, what is placed badly "
+            "would come back too."
+        ),
+    ] = 0.3
+    cue_within_m: Annotated[
+        PositiveMetres,
+        msgspec.Meta(
+            description="Distance from the agent, or from an object that is conscious, within "
+            "which an object that was forgotten comes back, in m, above 0 to 1e4: somewhat "
+            "farther than it is seen from."
+        ),
+    ] = 50.0
+    max_returned: Annotated[
+        int,
+        msgspec.Meta(
+            ge=1,
+            le=1000,
+            description="Objects that come back in one recall at most, the nearest first, 1 to "
+            "1000.",
+        ),
+    ] = 4
     min_matches: Annotated[
         int,
         msgspec.Meta(

@@ -72,9 +72,9 @@ class RememberedMaps:
         forgotten = self._maps.pop(name, None)
         return [] if forgotten is None else forgotten.keys
 
-    def get(self, name: str) -> RememberedMap:
-        """The map of that name. Raises KeyError where there is none."""
-        return self._maps[name]
+    def get(self, name: str) -> RememberedMap | None:
+        """The map of that name; None where there is none."""
+        return self._maps.get(name)
 
     def others(self, name: str) -> list[RememberedMap]:
         """The maps with objects but for one, by name."""

@@ -24,7 +24,7 @@ __all__ = ["Config", "LongTermMemory", "build"]
 
 class LongTermMemory:
     """At the end of a cycle it stores what has changed on the map, if that was broadcast, with the
-    episodes, and offers a map and an episode that it recalls.
+    episodes, and offers a map, an episode and forgotten objects that it recalls.
     """
 
     def __init__(self, config: Config, graph: Graph) -> None:
@@ -59,6 +59,7 @@ class LongTermMemory:
     def on_broadcast(self, broadcast: Broadcast) -> list[Message]:
         """What is conscious is to be learned."""
         self._gate.on_broadcast(broadcast)
+        self._spatial.on_broadcast(broadcast)
         self._episodic.on_broadcast(broadcast)
         if ROOT_MAP in broadcast.coalition.maps:
             self._broadcast_in.append(broadcast.cycle)
@@ -132,14 +133,16 @@ class LongTermMemory:
         return [Stored(stamp_ns=stamp_ns, cycle=cycle, records=records, forgotten=forgotten)]
 
     def _recall(self, cycle: int, stamp_ns: int) -> list[Message]:
-        """An offer of the map and the episode that are recalled; in lockstep, of nothing where none
-        is.
+        """An offer of the map, the episode and the objects that are recalled; in lockstep, of
+        nothing where none is.
         """
         operations: list[Operation] = []
         if cycle % self._config.recall_cycles == 0:
             recollection = self._spatial.recall()
             episode = self._episodic.recall(cycle, stamp_ns)
             operations = [each for each in (recollection, episode) if each is not None]
+            if recollection is None:
+                operations += self._spatial.returning(cycle)
         if not operations and not self._is_lockstep:
             return []
 

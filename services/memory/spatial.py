@@ -9,6 +9,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from cogmap.graph.graph import Graph
+from schemas.cognition import Broadcast
 from schemas.graph import Delta
 from schemas.memory import Stored, StoredObjects, StoredRecord, StoredTile
 from schemas.nodes import RECOLLECTION_ID, ROOT_MAP, Map, Object, Recollection, look_of
@@ -16,6 +17,8 @@ from services.memory.associations import Associations
 from services.memory.changes import Changes
 from services.memory.config import Config
 from services.memory.maps import RememberedMap, RememberedMaps
+from services.memory.objects.cueing import ObjectCues
+from services.memory.objects.forgotten import ForgottenObjects
 from services.memory.passing import way_of
 from services.memory.recall import cues, recalled
 from services.memory.recollection import recollection
@@ -34,6 +37,8 @@ class SpatialMemory:
         self._maps = RememberedMaps()
         self._name = ""
         self._changed = ChangedPlaces()
+        self._forgotten = ForgottenObjects(config, graph)
+        self._cues = ObjectCues(config, graph)
         self._objects: list[StoredRecord] = []
         self._tree: list[StoredRecord] = []
         self._cued: set[str] = set()
@@ -60,22 +65,33 @@ class SpatialMemory:
 
     def learned(self) -> list[StoredRecord]:
         """What stands for all that was stored in this run: the map without its places."""
-        return [*self._objects, *self._tree]
+        remembered = self._maps.get(self._name)
+        if remembered is None:
+            return []
+        return [each for each in (remembered.known, remembered.tree) if each is not None]
 
     def note(self, delta: Delta) -> None:
         """Note what a delta has changed."""
         self._changed.note(delta.operations)
+        self._forgotten.note(delta)
 
     def note_all(self) -> None:
-        """Take all of the graph for changed."""
+        """Take all of a graph that was loaded as a whole for changed."""
         self._changed.note_all(self._graph)
+        remembered = self._maps.get(self._joined or self._name)
+        self._forgotten.note_all(None if remembered is None else remembered.known)
+
+    def on_broadcast(self, broadcast: Broadcast) -> None:
+        """What is conscious cues what stood near it."""
+        self._cues.on_broadcast(broadcast)
 
     def changes(self) -> Changes:
         """What has changed on the root map since it was stored."""
         forgotten = self._rename()
         records: list[StoredRecord] = [*self._changed.take(self._name, self._graph)]
         learned = self._learned()
-        objects = stored_objects(self._name, learned, self._graph)
+        kept = [*learned, *self._forgotten.known]
+        objects = stored_objects(self._name, kept, self._graph)
         if objects != self._objects:
             self._objects = objects
             records += objects
@@ -106,6 +122,12 @@ class SpatialMemory:
         found = recalled(here, way, others, self._graph.cell_m(ROOT_MAP), self._config)
         return None if found is None else recollection(found)
 
+    def returning(self, cycle: int) -> list[Object]:
+        """The objects that were forgotten and come back, cued by what was conscious before `cycle`
+        and by where the agent is.
+        """
+        return self._cues.cued(cycle, self._forgotten.known)
+
     def _compared(self, here: list[Object]) -> list[RememberedMap]:
         """The stored maps to compare: all, or of many those that objects `here` remind of."""
         others = self._maps.others(self._name)
@@ -131,7 +153,7 @@ class SpatialMemory:
         if not before or self._name == before:
             return []
 
-        self.note_all()
+        self._changed.note_all(self._graph)
         return self._maps.forget(before)
 
     @property

@@ -277,7 +277,7 @@ class Workspace:
         entering += percept_operations(graph, self._context)
         entering = expected_operations(graph, percepts, entering, self._context.cycle, self._config)
         entering += self._sensed.needs(percepts.stamp_ns, self._context.cycle)
-        entering += self._offers.take(self._ledger, self._context.cycle)
+        entering += self._offers.take(self._ledger, entering, self._context.cycle)
         return [self._commit(Phase.PERCEPTS, entering), *self._next_phase()]
 
     def _commit(

@@ -19,13 +19,12 @@ import numpy as np
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import integrate
 from cogmap.graph.graph import Graph
+from cogmap.graph.individuals import APART_M
 from schemas import nodes
 from schemas.array import Array
 from schemas.nodes import NEVER_NS, Object, Self, individual_label, object_id
 from schemas.sensing import Percept, Percepts
 
-# Buildings stand at least so far from one another.
-APART_M = 6.0
 # Beyond so many standard deviations a percept is of another object.
 GATE = 2.0
 # An object that was seen so often stands where it is.

@@ -7,9 +7,10 @@ from collections.abc import Iterable
 import msgspec
 
 from cogmap.errors import MessageError
+from cogmap.graph.individuals import is_among
 from schemas.codelets import Offer
-from schemas.graph import Operation
-from schemas.nodes import GraphNode
+from schemas.graph import Link, Operation
+from schemas.nodes import GraphNode, LinkKind, Object, nearest_place, percept_id
 from services.workspace.commit import Ledger
 from services.workspace.rules import may_offer
 
@@ -47,10 +48,11 @@ class Offers:
 
         return True
 
-    def take(self, ledger: Ledger, cycle: int) -> list[Operation]:
-        """The operations of all valid offers, in order of source and number, as of `cycle`.
+    def take(self, ledger: Ledger, entering: list[Operation], cycle: int) -> list[Operation]:
+        """The operations of all valid offers, in order of source and number, as of `cycle`, in
+        which `entering` is written before them.
 
-        The ledger rejects the others.
+        The ledger rejects the others, and objects that are on the map already.
         """
         waiting = sorted(self._waiting, key=lambda offer: (offer.source, offer.seq))
         self._waiting = []
@@ -64,7 +66,39 @@ class Offers:
             else:
                 operations += [_as_of(operation, cycle) for operation in offer.operations]
 
-        return operations
+        return _with_objects(operations, ledger, entering)
+
+
+def _with_objects(
+    operations: list[Operation], ledger: Ledger, entering: list[Operation]
+) -> list[Operation]:
+    """`operations`, with each object at its place node, without those that are on the map already:
+    their label is taken, perhaps by what is seen right now, or one of their look stands there.
+    """
+    graph = ledger.graph
+    taken = {each.id for each in entering if isinstance(each, GraphNode)} | graph.nodes.keys()
+    present: list[Object] | None = None
+    accepted: list[Operation] = []
+    for operation in operations:
+        if not isinstance(operation, Object):
+            accepted.append(operation)
+            continue
+
+        if present is None:
+            present = list(graph.of_kind(Object))
+        has_label = {operation.id, percept_id(operation.label)} & taken
+        if has_label or is_among(operation, present):
+            ledger.reject(f"an offer of {operation.id}: it is on the map already")
+            continue
+
+        taken.add(operation.id)
+        present.append(operation)
+        place = nearest_place(
+            operation.x_m, operation.y_m, graph.cell_m(operation.map), operation.map
+        )
+        accepted += [operation, Link(source=operation.id, target=place, kind=LinkKind.AT)]
+
+    return accepted
 
 
 def _as_of(operation: Operation, cycle: int) -> Operation:

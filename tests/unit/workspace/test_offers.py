@@ -4,9 +4,18 @@ from __future__ import annotations
 
 from schemas.codelets import Offer
 from schemas.graph import Phase
-from schemas.nodes import Episode, Node, Remembered, episode_id
+from schemas.nodes import (
+    Episode,
+    LinkKind,
+    Node,
+    Object,
+    Remembered,
+    episode_id,
+    object_id,
+    place_id,
+)
 from tests.support.messages import of_type
-from tests.support.world.scenes import Desk, agent, thing
+from tests.support.world.scenes import Desk, agent, percept, thing
 
 
 def _offer(name: str, cycle: int = 0, source: str = "goal", seq: int = 0) -> Offer:
@@ -88,3 +97,46 @@ def _episode() -> Episode:
         until_ns=10**9,
         content=[Remembered(kind="object", label="bakery")],
     )
+
+
+def _recalled(label: str, x_m: float) -> Offer:
+    node = Object(id=object_id(label), label=label, base_level=0.5, x_m=x_m, y_m=60.0, sightings=9)
+    return Offer(cycle=0, operations=[thing("beside"), node], source="memory")
+
+
+def test_an_object_that_memory_recalls_is_on_the_map_at_its_place() -> None:
+    desk = Desk("w1")
+    desk.drive(range(1))
+    desk.feed(_recalled("inn", 30.2))
+    desk.drive(range(1, 2))
+    graph = desk.graph
+    inn = graph.get(Object, object_id("inn"))
+
+    assert inn is not None
+    assert (inn.label, graph.base_level(inn), inn.sightings) == ("inn", 0.5, 9)
+    assert graph.links.target(inn.id, LinkKind.AT) == place_id(30, 60)
+
+
+def test_an_object_that_is_on_the_map_already_is_not_accepted_and_the_rest_of_its_offer_is() -> (
+    None
+):
+    desk = Desk("w1")
+    desk.drive(range(1))
+    for offer in (_recalled("inn", 30.0), _recalled("inn", 90.0), _recalled("inn~2", 34.0)):
+        desk.feed(offer)
+    desk.drive(range(1, 2))
+    objects = {node.label: node.x_m for node in desk.graph.of_kind(Object)}
+
+    assert objects == {"inn": 30.0}
+    assert "beside" in desk.graph.nodes
+    assert sum(delta.rejected for delta in desk.deltas) == 2
+
+
+def test_an_object_by_whose_label_another_is_seen_right_now_is_not_accepted() -> None:
+    desk = Desk("w1")
+    desk.drive(range(1))
+    desk.feed(_recalled("inn", 30.0))
+    desk.drive(range(1, 2), percept("inn"))
+    (inn,) = desk.graph.of_kind(Object)
+
+    assert inn.x_m < 20.0
