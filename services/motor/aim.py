@@ -6,6 +6,7 @@ import math
 from typing import NamedTuple
 
 from schemas.sensing import Pose, SpeedLimit
+from services.motor.config import Config
 
 
 class Speed(NamedTuple):
@@ -35,3 +36,9 @@ def bearing_of(x_m: float, y_m: float, pose: Pose) -> float:
 def slowest(*speeds: Speed) -> Speed:
     """The lowest of speeds, of equals the first."""
     return min(speeds, key=lambda speed: speed.m_s)
+
+
+def in_bend(curvature_per_m: float, config: Config) -> Speed:
+    """The highest speed on an arc of that curvature, to either side."""
+    bend_per_m = max(abs(curvature_per_m), 1e-6)
+    return Speed(math.sqrt(config.lateral_m_s2 / bend_per_m), SpeedLimit.BEND)

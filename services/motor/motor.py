@@ -10,7 +10,7 @@ import numpy as np
 
 from cogmap.errors import MessageError
 from schemas.sensing import MotorCommand, RangeScan, SpeedLimit
-from services.motor.aim import Aim, Speed, slowest
+from services.motor.aim import Aim, Speed, in_bend, slowest
 from services.motor.config import Config
 from services.motor.reactive.near import NearObstacles
 
@@ -86,6 +86,7 @@ class SensoryMotorMemory:
         if curvature_per_m is None:
             return halted(stamp_ns, SpeedLimit.OBSTACLE, pose_age_ns)
 
+        speed = slowest(speed, in_bend(curvature_per_m, self._config))
         half_turn_m_s = speed.m_s * curvature_per_m * self._config.track_m / 2
         left_m_s = speed.m_s - half_turn_m_s
         right_m_s = speed.m_s + half_turn_m_s

@@ -9,7 +9,7 @@ import numpy as np
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.polylines import resample
 from schemas.sensing import Pose, SpeedLimit
-from services.motor.aim import Aim, Speed, bearing_of, slowest
+from services.motor.aim import Aim, Speed, bearing_of, in_bend, slowest
 from services.motor.config import Config
 
 STEP_M = 0.25
@@ -90,11 +90,10 @@ def _speed(route: Route, config: Config) -> Speed:
     """The highest speed that the bend ahead and the end of the route allow."""
     braking_distance_m = config.cruise_m_s**2 / (2 * config.braking_m_s2)
     bend_per_m = route.sharpest(braking_distance_m)
-    in_bend_m_s = math.sqrt(config.lateral_m_s2 / max(bend_per_m, 1e-6))
     to_end_m_s = math.sqrt(2 * config.braking_m_s2 * route.left_m)
     return slowest(
         Speed(config.cruise_m_s),
-        Speed(in_bend_m_s, SpeedLimit.BEND),
+        in_bend(bend_per_m, config),
         Speed(to_end_m_s, SpeedLimit.ROUTE_END),
     )
 

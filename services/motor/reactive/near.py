@@ -25,6 +25,9 @@ MIN_SCANS = 3
 STILL_M = 0.01
 STILL_RAD = 0.01
 STILL_SCANS = 2 * MIN_SCANS
+# What is nearer than the scan has ranges for, and was not seen before, may be at any of these.
+TOO_NEAR_M = np.array([1.2, 1.8, 2.4])
+SAME_RAD = 0.15
 BEHIND_M = 1.0
 ARC_M = 2.0
 STEP_M = 0.25
@@ -42,6 +45,7 @@ class NearObstacles:
         self._clearance_m = clearance_m
         self._points_m = np.zeros((0, 2))
         self._stamps_ns = np.zeros(0, np.int64)
+        self._is_sure = np.zeros(0, np.bool_)
         self._is_still = False
         self._moved_ns = -1
         self._early: RangeScan | None = None
@@ -89,10 +93,34 @@ class NearObstacles:
         if self._is_still:
             scans = _scans_near(hits_m, self._points_m, self._stamps_ns)
             hits_m = hits_m[scans < STILL_SCANS]
-        stamps_ns = np.full(len(hits_m), scan.stamp_ns, np.int64)
 
-        self._points_m = np.concatenate([self._points_m, hits_m])
-        self._stamps_ns = np.concatenate([self._stamps_ns, stamps_ns])
+        sudden_m = self._sudden_m(bearing_rad, range_m)
+        self._remember(hits_m, scan.stamp_ns, is_sure=False)
+        self._remember(sudden_m, scan.stamp_ns, is_sure=True)
+
+    def _remember(self, points_m: Floats, stamp_ns: int, is_sure: bool) -> None:
+        number = len(points_m)
+        self._points_m = np.concatenate([self._points_m, points_m])
+        self._stamps_ns = np.concatenate([self._stamps_ns, np.full(number, stamp_ns, np.int64)])
+        self._is_sure = np.concatenate([self._is_sure, np.full(number, is_sure)])
+
+    def _sudden_m(self, bearing_rad: Floats, range_m: Floats) -> Floats:
+        """(n, 2): where that may be which two neighbouring rays hit too near for a range, and which
+        was not seen from farther away before.
+        """
+        order = np.argsort(bearing_rad)
+        ascending_rad = bearing_rad[order]
+        is_too_near = ((range_m > 0) & (range_m < NEAREST_SCAN_M))[order]
+        beside = np.pad(is_too_near, 1)
+        sudden_rad = ascending_rad[is_too_near & (beside[:-2] | beside[2:])]
+
+        is_close = np.hypot(*self._points_m.T) <= NEAREST_SCAN_M + SAME_M
+        known_rad = np.arctan2(self._points_m[is_close, 1], self._points_m[is_close, 0])
+        aside_rad = np.abs(sudden_rad[:, None] - known_rad)
+        new_rad = sudden_rad[(aside_rad > SAME_RAD).all(axis=1)]
+
+        each_rad = np.repeat(new_rad, len(TOO_NEAR_M))
+        return _points_m(each_rad, np.tile(TOO_NEAR_M, len(new_rad)))
 
     def clear_curvature(self, wanted_per_m: float) -> float | None:
         """The curvature nearest to the one that is wanted whose arc leads past all that is near;
@@ -115,14 +143,14 @@ class NearObstacles:
         return float(per_m[change_per_m.argmin()])
 
     def _certain_m(self) -> Floats:
-        """(n, 2): what is near enough to matter, and was seen in MIN_SCANS scans."""
+        """(n, 2): what is near enough to matter, and was seen in MIN_SCANS scans or suddenly."""
         reach_m = ARC_M + self._clearance_m
         is_near = np.hypot(*self._points_m.T) <= reach_m + SAME_M
         points_m = self._points_m[is_near]
         stamps_ns = self._stamps_ns[is_near]
         scans = _scans_near(points_m, points_m, stamps_ns)
 
-        certain_m: Floats = points_m[scans >= MIN_SCANS]
+        certain_m: Floats = points_m[(scans >= MIN_SCANS) | self._is_sure[is_near]]
         return certain_m
 
     def _is_seen_through(self, bearing_rad: Floats, range_m: Floats) -> Booleans:
@@ -153,6 +181,7 @@ class NearObstacles:
     def _keep(self, points_m: Floats, is_kept: Booleans) -> None:
         self._points_m = points_m[is_kept]
         self._stamps_ns = self._stamps_ns[is_kept]
+        self._is_sure = self._is_sure[is_kept]
 
 
 def _scans_near(points_m: Floats, hits_m: Floats, stamps_ns: Indices) -> Indices:

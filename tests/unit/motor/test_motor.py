@@ -121,6 +121,16 @@ def test_the_robot_slows_down_before_a_bend() -> None:
     assert near_m_s < in_bend_m_s + 0.1
 
 
+def test_the_robot_slows_down_on_an_arc_that_leads_it_back_to_a_straight_route() -> None:
+    config = Config()
+    command = _command(_at(10.0, 1.0))
+    sides_rad_s = command.right_wheel_rad_s - command.left_wheel_rad_s
+    turn_rad_s = abs(sides_rad_s) * config.wheel_radius_m / config.track_m
+
+    assert command.slowed_by == SpeedLimit.BEND
+    assert _driven(command) * turn_rad_s == pytest.approx(config.lateral_m_s2)
+
+
 def _driven(command: MotorCommand) -> float:
     """The speed of the robot by a command, in m/s."""
     mean_rad_s = (command.left_wheel_rad_s + command.right_wheel_rad_s) / 2

@@ -256,3 +256,30 @@ def test_a_robot_that_stands_for_long_remembers_a_few_scans() -> None:
     _show(near, wall_m, first=10, scans=50)
 
     assert near.size == after_ten
+
+
+@pytest.mark.parametrize(("rays", "is_avoided"), [(2, True), (1, False)])
+def test_what_is_first_seen_too_near_for_a_range_is_avoided_at_once(
+    rays: int, is_avoided: bool
+) -> None:
+    near = NearObstacles(CLEARANCE_M)
+    beside_m = np.full(len(BEARINGS_RAD), 20.0)
+    beside_m[:rays] = 2.5
+    _show(near, beside_m, first=0, scans=1)
+
+    assert (_turn(near, 0.6) < 0.4) is is_avoided
+    assert _turn(near, -0.3) == -0.3
+
+
+def test_what_was_seen_from_farther_is_where_it_was_seen() -> None:
+    near = NearObstacles(CLEARANCE_M)
+    ahead_m = np.full(len(BEARINGS_RAD), 20.0)
+    ahead_m[3:6] = 4.0
+    _show(near, ahead_m, first=0, scans=3)
+    _drive_on(near, 3, forward_m=1.7)
+    size = near.size
+
+    close_m = np.full(len(BEARINGS_RAD), 20.0)
+    close_m[:3] = 2.5
+    _show(near, close_m, first=4, scans=1)
+    assert near.size == size

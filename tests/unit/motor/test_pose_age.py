@@ -125,7 +125,7 @@ def test_with_poses_over_a_second_old_the_robot_keeps_to_its_street() -> None:
 
 
 def test_at_full_speed_it_would_leave_the_street() -> None:
-    reckless = Config(blind_m=1000.0)
+    reckless = Config(blind_m=1000.0, lateral_m_s2=100.0)
 
     assert _drive(1.5, 20.0, reckless).farthest_m > STREET_HALF_WIDTH_M
 
