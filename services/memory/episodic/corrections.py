@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import move_with
@@ -51,11 +52,19 @@ class Corrections:
         return applied
 
 
-def corrected(rows: Floats, places_m: list[Position]) -> list[Position]:
-    """Places, each moved with the place of the path that was nearest to it."""
-    at_m = np.array(places_m)
-    offsets_m = at_m[:, None] - rows[:, OLD][:, :2]
-    nearest = np.hypot(offsets_m[..., 0], offsets_m[..., 1]).argmin(axis=1)
+class Shift:
+    """A correction of the map, of (n, 7) rows: each place moves with the place of the path that was
+    nearest to it.
+    """
 
-    moved_m = move_with(at_m, rows[nearest, OLD], rows[nearest, NEW])
-    return [(x_m, y_m) for x_m, y_m in moved_m.tolist()]
+    def __init__(self, rows: Floats) -> None:
+        self._old = rows[:, OLD]
+        self._new = rows[:, NEW]
+        self._nearest = cKDTree(self._old[:, :2])
+
+    def __call__(self, places_m: list[Position]) -> list[Position]:
+        """Where places are after the correction."""
+        at_m = np.array(places_m)
+        _, nearest = self._nearest.query(at_m)
+        moved_m = move_with(at_m, self._old[nearest], self._new[nearest])
+        return [(x_m, y_m) for x_m, y_m in moved_m.tolist()]

@@ -39,6 +39,12 @@ def cues(episode: StoredEpisode, items: ItemMemory, place_m: float) -> list[Byte
     return [bind(content, _place(here, episode, items), items.values) for here in cells]
 
 
+def squares(episode: StoredEpisode, place_m: float) -> list[str]:
+    """The squares that stand for its places in the vector of an episode, on its map."""
+    places_m = [(episode.x_m, episode.y_m), *episode.path]
+    return [episode.map, *(_cell(at_m, place_m) for at_m in places_m)]
+
+
 def _cell(at_m: tuple[float, float], place_m: float) -> str:
     """The name of the square that stands for the places in it."""
     x_m, y_m = at_m

@@ -11,6 +11,7 @@ import msgspec
 from schemas.memory import DeclarativeEpisode, StoredRecord, TransientEpisode
 from services.memory.changes import Changes
 from services.memory.episodic.config import EpisodicConfig
+from services.memory.episodic.encoding import squares
 
 HOUR_NS = 3_600_000_000_000
 
@@ -90,20 +91,24 @@ class Episodes:
         self._forget_oldest()
 
     def relocate(self, moved: Callable[[KeptEpisode], KeptEpisode | None]) -> set[int]:
-        """Put episodes elsewhere, or forget them where that is None. The numbers of those that are
-        not where they were.
+        """Put episodes elsewhere, or forget them where that is None. The numbers of those whose
+        vectors are others now.
         """
+        place_m = self._config.place_m
         relocated = set()
         for episode in list(self._known.values()):
             after = moved(episode)
             if after == episode:
                 continue
 
-            relocated.add(episode.number)
             if after is None:
                 self.forget(episode.number)
-            else:
-                self.put(after)
+                relocated.add(episode.number)
+                continue
+
+            self.put(after)
+            if squares(after, place_m) != squares(episode, place_m):
+                relocated.add(episode.number)
 
         return relocated
 

@@ -22,7 +22,7 @@ from schemas.memory import Stored, StoredRecord
 from schemas.nodes import RECOLLECTION_ID, ROOT_MAP, Map, Recollection, Self, episode_id
 from services.memory.changes import Changes
 from services.memory.config import Config
-from services.memory.episodic.corrections import Corrections, corrected
+from services.memory.episodic.corrections import Corrections, Shift
 from services.memory.episodic.cues import EpisodicCues
 from services.memory.episodic.episodes import Episodes, KeptEpisode, is_episode
 from services.memory.episodic.visit import Position, Visit
@@ -202,17 +202,18 @@ class EpisodicMemory:
 
     def _correct(self, rows: Floats) -> None:
         """Move the places of the root map's episodes as a correction, (n, 7), states."""
+        shift = Shift(rows)
 
         def moved(episode: KeptEpisode) -> KeptEpisode:
             if episode.map != self._map:
                 return episode
 
-            at_m, *path = corrected(rows, [(episode.x_m, episode.y_m), *episode.path])
+            at_m, *path = shift([(episode.x_m, episode.y_m), *episode.path])
             return msgspec.structs.replace(episode, x_m=at_m[0], y_m=at_m[1], path=path)
 
         self._relocate(moved)
         for visit in self._visits:
-            visit.at_m, *visit.path = corrected(rows, [visit.at_m, *visit.path])
+            visit.at_m, *visit.path = shift([visit.at_m, *visit.path])
 
     def _relocate(self, moved: Callable[[KeptEpisode], KeptEpisode | None]) -> None:
         """Put episodes elsewhere, or forget them, and recall them where they are then."""

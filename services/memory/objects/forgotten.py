@@ -31,7 +31,7 @@ from schemas.nodes import (
     object_id,
 )
 from services.memory.config import Config
-from services.memory.episodic.corrections import Corrections, corrected
+from services.memory.episodic.corrections import Corrections, Shift
 
 ROUNDING = 1e-9
 
@@ -164,7 +164,7 @@ class ForgottenObjects:
         """Move them as a correction, (n, 7), states."""
         if self._forgotten:
             places_m = [(node.x_m, node.y_m) for node in self._forgotten.values()]
-            self._move(corrected(rows, places_m))
+            self._move(Shift(rows)(places_m))
 
     def _enter(self, frame: str) -> None:
         """Follow the root map into the frame of the recalled map of that name, which was joined to

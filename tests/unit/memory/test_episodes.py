@@ -114,3 +114,18 @@ def test_a_number_is_not_given_again_once_its_episode_is_forgotten() -> None:
     memories.forget(7)
 
     assert memories.next_number() == 8
+
+
+@pytest.mark.parametrize(("moved_m", "learned_anew"), [(0.01, set()), (500.0, {1})])
+def test_an_episode_that_moved_within_its_square_is_stored_but_not_learned_anew(
+    moved_m: float, learned_anew: set[int]
+) -> None:
+    memories = known(transient())
+    relocated = memories.relocate(
+        lambda episode: msgspec.structs.replace(episode, x_m=episode.x_m + moved_m)
+    )
+
+    ((record,), _) = memories.take_changes()
+    assert relocated == learned_anew
+    assert isinstance(record, TransientEpisode)
+    assert record.x_m == 1.0 + moved_m
