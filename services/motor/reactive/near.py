@@ -50,11 +50,6 @@ class NearObstacles:
         self._moved_ns = -1
         self._early: RangeScan | None = None
 
-    @property
-    def size(self) -> int:
-        """How many hits are remembered."""
-        return len(self._points_m)
-
     def on_motion(self, motion: SelfMotion) -> None:
         """Move what is remembered to where it is from the robot now; then comes the scan of the
         same view, also where it arrived earlier.

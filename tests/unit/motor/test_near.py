@@ -252,10 +252,10 @@ def test_a_robot_that_stands_for_long_remembers_a_few_scans() -> None:
     near = NearObstacles(CLEARANCE_M)
     wall_m = np.full(len(BEARINGS_RAD), 4.0)
     _show(near, wall_m, first=0, scans=10)
-    after_ten = near.size
+    after_ten = len(near._points_m)
     _show(near, wall_m, first=10, scans=50)
 
-    assert near.size == after_ten
+    assert len(near._points_m) == after_ten
 
 
 @pytest.mark.parametrize(("rays", "is_avoided"), [(2, True), (1, False)])
@@ -277,9 +277,9 @@ def test_what_was_seen_from_farther_is_where_it_was_seen() -> None:
     ahead_m[3:6] = 4.0
     _show(near, ahead_m, first=0, scans=3)
     _drive_on(near, 3, forward_m=1.7)
-    size = near.size
+    size = len(near._points_m)
 
     close_m = np.full(len(BEARINGS_RAD), 20.0)
     close_m[:3] = 2.5
     _show(near, close_m, first=4, scans=1)
-    assert near.size == size
+    assert len(near._points_m) == size

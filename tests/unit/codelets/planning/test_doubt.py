@@ -1,0 +1,147 @@
+"""Streets that were closed and may be open again: which are tried, and for how long."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+
+from schemas.array import Matrix
+from schemas.codelets import Task
+from schemas.nodes import (
+    PLAN_ID,
+    Goal,
+    PathColumn,
+    PathSegment,
+    Plan,
+    PlanState,
+    goal_id,
+    segment_id,
+)
+from services.codelets.planning.config import Config
+from services.codelets.planning.route_plan import run
+from tests.support.world.route_planning import STAMP_NS, goal_at, planned
+from tests.support.world.scenes import agent
+from tests.support.world.street_loop import barrier, loop
+
+
+def test_the_last_street_that_may_be_open_again_is_tried_to_its_end() -> None:
+    goal = msgspec.structs.replace(goal_at("far", 40.0, 0.0), doubts=Config().max_doubts - 1)
+    graph = loop(goal, barrier(20, 0), barrier(20, 40))
+    assert planned(graph).doubtful
+
+    graph.change([agent(x_m=6.0)])
+    assert planned(graph).doubtful
+
+
+@pytest.mark.parametrize(("later_s", "state"), [(60, PlanState.NO_ROUTE), (900, PlanState.READY)])
+def test_a_goal_without_a_route_is_tried_again_after_a_while(
+    later_s: int, state: PlanState
+) -> None:
+    goal = msgspec.structs.replace(goal_at("far", 40.0, 0.0), doubts=Config().max_doubts)
+    graph = loop(goal, barrier(20, 0), barrier(20, 40))
+    assert planned(graph).state is PlanState.NO_ROUTE
+
+    later_ns = STAMP_NS + later_s * 1_000_000_000
+    later = Task(
+        stamp_ns=later_ns, task_id="9/route_plan", codelet="route_plan", cycle=9, version=0
+    )
+    graph.change(run(later, graph, Config()).operations)
+
+    plan = graph.get(Plan, PLAN_ID)
+    assert plan is not None
+    assert plan.state is state
+
+
+def test_where_all_is_closed_a_street_out_of_sight_may_be_open_again() -> None:
+    graph = loop(goal_at("far", 40.0, 0.0), barrier(20, 0), barrier(20, 40))
+    plan = planned(graph)
+    goal = graph.get(Goal, goal_id("far"))
+
+    assert plan.doubtful
+    assert plan.route is not None
+    assert np.abs(plan.route.numpy()[:, 1]).max() <= 3.0
+    assert goal is not None
+    assert goal.doubts == 1
+
+
+def test_a_street_that_is_seen_to_be_closed_is_not_in_doubt() -> None:
+    graph = loop(goal_at("far", 40.0, 0.0), barrier(20, 0), barrier(20, 40))
+    graph.change([agent(x_m=16.0)])
+    plan = planned(graph)
+
+    assert plan.doubtful
+    assert plan.route is not None
+    assert plan.route.numpy()[:, 1].max() > 35.0
+
+
+TRIES = Config(reopened_share=0.9, doubt_weight=0.2, blocked_from_m=10.0)
+
+
+@pytest.mark.parametrize(
+    ("config", "is_tried"),
+    [
+        (TRIES, True),
+        (msgspec.structs.replace(TRIES, reopened_share=0.1), False),
+        (msgspec.structs.replace(TRIES, blocked_from_m=30.0), False),
+    ],
+    ids=["likely", "unlikely", "in sight"],
+)
+def test_a_street_that_is_likely_open_again_is_tried_where_the_way_round_is_long(
+    config: Config, is_tried: bool
+) -> None:
+    graph = loop(goal_at("far", 40.0, 0.0), barrier(20, 0))
+    plan = planned(graph, config)
+
+    assert plan.doubtful is is_tried
+    assert plan.route is not None
+    assert bool(plan.route.numpy()[:, 1].max() < 5.0) is is_tried
+
+
+def test_a_street_that_is_tried_is_tried_until_the_agent_is_near() -> None:
+    graph = loop(goal_at("far", 40.0, 0.0), barrier(20, 0))
+    assert planned(graph, TRIES).doubtful
+    graph.change([agent(x_m=12.0)])
+    assert planned(graph, TRIES).doubtful
+
+    graph.change([agent(x_m=16.0)])
+    assert not planned(graph, TRIES).doubtful
+
+
+def test_where_the_way_round_is_short_no_street_is_tried() -> None:
+    graph = loop(goal_at("corner", 40.0, 40.0), barrier(20, 0))
+
+    assert not planned(graph, TRIES).doubtful
+
+
+def _was_at(stamp_s: float, *x_m: float) -> PathSegment:
+    """A path along x."""
+    rows = np.zeros((len(x_m), len(PathColumn)))
+    rows[:, PathColumn.STAMP_S] = stamp_s
+    rows[:, PathColumn.X_M] = x_m
+    return PathSegment(id=segment_id(0), number=0, rows=Matrix.of(rows))
+
+
+@pytest.mark.parametrize(("ago_s", "is_north"), [(60.0, True), (900.0, False)])
+def test_a_street_that_was_seen_to_be_closed_is_not_in_doubt_for_a_while(
+    ago_s: float, is_north: bool
+) -> None:
+    graph = loop(goal_at("far", 40.0, 0.0), barrier(20, 0), barrier(20, 40))
+    graph.change([agent(x_m=3.0, stamp_ns=1_000_000_000_000), _was_at(1000.0 - ago_s, 16.0)])
+    plan = planned(graph)
+
+    assert plan.doubtful
+    assert plan.route is not None
+    assert (plan.route.numpy()[:, 1].max() > 35.0) == is_north
+
+
+@pytest.mark.parametrize(("ago_s", "state"), [(20.0, PlanState.READY), (200.0, PlanState.NO_ROUTE)])
+def test_between_walls_that_it_sees_the_agent_goes_back_by_the_way_it_has_come(
+    ago_s: float, state: PlanState
+) -> None:
+    graph = loop(goal_at("far", 3.0, 40.0), barrier(12, 0), barrier(20, 0))
+    here = agent(x_m=16.0, stamp_ns=1_000_000_000_000)
+    graph.change([here, _was_at(1000.0 - ago_s, *range(3, 17))])
+    plan = planned(graph)
+
+    assert plan.state is state
