@@ -34,6 +34,8 @@ class Person:
         self.graph = Graph()
         self.has_joined = threading.Event()
         self.has_plan = threading.Event()
+        self.plan: Plan | None = None
+        self.reached: list[str] = []
         self._goals = goals
         self._clears = clears
         self._offered_version: int | None = None
@@ -46,19 +48,20 @@ class Person:
             on_load=self._on_load,
         )
 
-    @property
-    def plan(self) -> Plan | None:
-        """The plan as it is now."""
-        return self.graph.get(Plan, PLAN_ID)
-
     def _on_load(self) -> list[Message]:
         return self._offer()
 
     def _on_delta(self, delta: Delta) -> list[Message]:
         """Offer once; look for the plan in what follows."""
         published = self._offer()
-        if not published and self._is_planned(delta):
+        if published or self.has_plan.is_set():
+            return published
+
+        plan = self._plan_of(delta)
+        if plan is not None:
+            self.plan = plan
             self.has_plan.set()
+
         return published
 
     def _offer(self) -> list[Message]:
@@ -76,23 +79,33 @@ class Person:
 
         return [Offer(cycle=self.graph.cycle, operations=[*operations, *self._goals])]
 
-    def _is_planned(self, delta: Delta) -> bool:
-        """Whether the plan, committed since the offer, has all goals that were given."""
-        plan = self.plan
+    def _plan_of(self, delta: Delta) -> Plan | None:
+        """The plan, committed since the offer, once each given goal is in it or reached.
+
+        Where the agent passes a goal before it is planned, no plan ever has it.
+        """
+        plan = self.graph.get(Plan, PLAN_ID)
         if plan is None or not any(isinstance(item, Plan | Goal) for item in delta.operations):
-            return False
+            return None
 
         planned = {*plan.goals, *plan.unreachable}
+        reached = []
         for goal in self._goals:
+            if goal.id in planned:
+                continue
+
             kept = self.graph.get(Goal, goal.id)
-            is_reached = kept is not None and kept.reached_ns != NEVER_NS
-            if goal.id not in planned and not is_reached:
-                return False
+            if kept is None or kept.reached_ns == NEVER_NS:
+                return None
 
-        return True
+            reached.append(goal.id)
+
+        self.reached = reached
+        return plan
 
 
-@click.command()
+# Without this, a position's minus sign begins an option.
+@click.command(context_settings={"ignore_unknown_options": True})
 @click.argument("places", nargs=-1, metavar="[NAME | X Y]...")
 @click.option(
     "--file",
@@ -155,7 +168,8 @@ def goal(
 
     plan = person.plan
     assert plan is not None
-    shown = plan_json(plan, person.graph) if as_json else plan_text(plan, person.graph)
+    text_of = plan_json if as_json else plan_text
+    shown = text_of(plan, person.graph, person.reached)
     click.echo(shown)
     if plan.unreachable:
         sys.exit(1)
@@ -164,7 +178,8 @@ def goal(
 def parsed(words: Iterable[str]) -> list[Goal]:
     """The goals that words give: two numbers in a row are a position, any other word a name.
 
-    Raises UsageError where a number stands alone or is absurd.
+    Raises UsageError where a number stands alone or is absurd, and where a word is an option that
+    there is not.
     """
     goals = []
     left = list(words)
@@ -172,6 +187,9 @@ def parsed(words: Iterable[str]) -> list[Goal]:
         word = left.pop(0)
         x_m = _number(word)
         if x_m is None:
+            if word.startswith("-"):
+                raise UsageError(f"there is no option {word}: see `cogmap goal --help`")
+
             goals.append(Goal(id=goal_id(word), base_level=1.0, object=word))
             continue
 
@@ -211,8 +229,10 @@ def read_goals(path: Path) -> list[Goal]:
     return goals
 
 
-def plan_json(plan: Plan, graph: Graph) -> bytes:
-    """The plan as JSON, with what may have been meant by goals that are not on the map."""
+def plan_json(plan: Plan, graph: Graph, reached: Iterable[str] = ()) -> bytes:
+    """The plan as JSON, with the goals reached before they were planned, and what may have been
+    meant by goals that are not on the map.
+    """
     nearest = {}
     for goal, state in plan.unreachable.items():
         label = nearest_label(goal, state, graph)
@@ -223,15 +243,16 @@ def plan_json(plan: Plan, graph: Graph) -> bytes:
         "state": plan.state,
         "goals": [name_of(goal) for goal in plan.goals],
         "length_m": plan.length_m,
+        "reached": [name_of(goal) for goal in reached],
         "unreachable": {name_of(goal): state for goal, state in plan.unreachable.items()},
         "nearest": nearest,
     }
     return msgspec.json.encode(summary)
 
 
-def plan_text(plan: Plan, graph: Graph) -> str:
-    """The plan as a person reads it."""
-    lines = []
+def plan_text(plan: Plan, graph: Graph, reached: Iterable[str] = ()) -> str:
+    """The plan as a person reads it, and the goals reached before they were planned."""
+    lines = [f"{name_of(goal)}: reached" for goal in reached]
     for number, name in enumerate(plan.goals, start=1):
         distance = f", {plan.length_m:.0f} m" if number == 1 else ""
         lines.append(f"{number}. {name_of(name)}{distance}")

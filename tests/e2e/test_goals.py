@@ -53,11 +53,11 @@ def test_a_run_ends_when_the_agent_was_at_every_goal(
 def test_a_goal_given_to_a_running_system_is_planned(start: Callable[..., Run]) -> None:
     run = start(*PERCEPTS)
     run.wait_for(DRIVING)
-    given = _goal(run.endpoint, "15", "0", "--json", "--wait", "30")
+    given = _goal(run.endpoint, "-25", "0", "--json", "--wait", "30")
 
     assert given.returncode == 0, given.stderr
     plan = json.loads(given.stdout)
-    assert plan["goals"] == ["15,0"]
+    assert plan["goals"] == ["-25,0"]
     assert plan["length_m"] > 0.0
 
 

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from click.testing import CliRunner
 
-from cli.goal import parsed, plan_json, plan_text, read_goals
+from cli.goal import goal, parsed, plan_json, plan_text, read_goals
 from cogmap.errors import UsageError
 from schemas.nodes import PLAN_ID, Object, Plan, PlanState, goal_id, object_id
 from tests.support.world.scenes import graph_of
@@ -31,6 +32,28 @@ def test_a_number_alone_is_refused(words: list[str]) -> None:
 def test_an_absurd_position_is_refused(word: str) -> None:
     with pytest.raises(UsageError, match="is no position"):
         parsed([word, "0"])
+
+
+def test_a_word_like_an_option_is_no_name() -> None:
+    with pytest.raises(UsageError, match="there is no option --clera"):
+        parsed(["--clera", "bakery"])
+
+
+def test_a_position_may_be_negative_on_the_command_line() -> None:
+    result = CliRunner().invoke(goal, ["-25"])
+
+    assert str(result.exception) == "-25 is a number alone: a position is X and Y, in metres"
+
+
+def test_a_goal_reached_before_it_was_planned_is_said() -> None:
+    plan = Plan(id=PLAN_ID, state=PlanState.AT_GOAL)
+    reached = [goal_id("12,0")]
+
+    text = plan_text(plan, graph_of(plan), reached)
+    summary = msgspec.json.decode(plan_json(plan, graph_of(plan), reached))
+
+    assert text == "12,0: reached"
+    assert summary["reached"] == ["12,0"]
 
 
 def test_a_file_has_a_goal_a_line(tmp_path: Path) -> None:
