@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
 
 from benchmarks.explore.boundaries import BoundaryScore
-from benchmarks.explore.drivable import Drivable
+from benchmarks.explore.drivable import Drivable, barrier_m
 from benchmarks.explore.judge import explored_share, score_boundaries
 from benchmarks.explore.trials import (
     REACHED_WITHIN_M,
+    SIGHT_M,
     Point,
     Trial,
+    believed_m,
+    closed_as,
     draw_goal,
     street_to_close,
 )
 from cogmap.geometry.arrays import Floats
+from cogmap.geometry.polylines import nearest_on_line
 from cogmap.geometry.se2 import transform_from, transform_to
 from cogmap.graph.graph import Graph
 from cogmap.runtime.module import Module
@@ -54,6 +59,7 @@ class Experimenter:
         self._draws = 0
         self._offered = 0
         self._closed: list[str] = []
+        self._opened: set[str] = set()
 
     @property
     def is_complete(self) -> bool:
@@ -82,6 +88,7 @@ class Experimenter:
             self._start = here
 
         self.collisions = pose.collisions
+        self._see_opened(here[:2])
         if pose.stamp_ns < self._explore_ns or self._town is None:
             return []
         if math.isnan(self.explored_share):
@@ -98,7 +105,26 @@ class Experimenter:
         """Open the street that has been closed longest; the next drive waits for the town then."""
         self._town = None
         self._draws = 0
-        return [StreetClosure(street=self._closed.pop(0), closed=False)]
+        street = self._closed.pop(0)
+        self._opened.add(street)
+        return [StreetClosure(street=street, closed=False)]
+
+    def _see_opened(self, here_m: Floats) -> None:
+        """Of a street that is open again, an agent knows once its barrier would be in reach."""
+        if self._town is None or not self._opened:
+            return
+
+        for street in self._town.streets:
+            if street.name not in self._opened:
+                continue
+
+            (foot_m,) = nearest_on_line(barrier_m(street), here_m[None]).foot_m
+            if math.dist(foot_m, here_m) <= SIGHT_M:
+                self._opened.discard(street.name)
+
+    def _believed(self, town: TrueTown) -> TrueTown:
+        """The town with the streets closed of which an agent cannot know that they are open."""
+        return functools.reduce(closed_as, sorted(self._opened), town)
 
     def _begin(self, pose: TruePose) -> list[Message]:
         """Offer the next goal."""
@@ -115,7 +141,7 @@ class Experimenter:
             began_travelled_m=pose.travelled_m,
             closes=number % 2 == 1 and self._draws < MAX_DRAWS,
             shortest_m=shortest_m,
-            unwarned_m=shortest_m,
+            unwarned_m=believed_m(self._town, self._believed(self._town), here_m, goal_m),
         )
         self._offered += 1
         x_m, y_m = self._on_map(goal_m)
@@ -144,7 +170,8 @@ class Experimenter:
         assert self._start is not None
         assert plan.route is not None
         route_m = transform_from(self._start, np.asarray(plan.route.numpy(), np.float64))
-        closure = street_to_close(self._rng, self._town, route_m, trial.goal_m)
+        believed = self._believed(self._town)
+        closure = street_to_close(self._rng, self._town, route_m, trial.goal_m, believed)
         if closure is None:
             drop = DropNode(id=self._goal_id)
             self._draws += 1
@@ -153,6 +180,7 @@ class Experimenter:
 
         trial.close(closure)
         self._closed.append(closure.street)
+        self._opened.discard(closure.street)
         return [StreetClosure(street=trial.closed, closed=True)]
 
     def _end(self, pose: TruePose, trial: Trial) -> list[Message]:

@@ -34,7 +34,8 @@ class Trial:
     `closes`: whether a street is to be closed once a route is planned; `closed` is that street.
     `driven_m` is None while the goal is not reached; `shortest_m` is the shortest route's length in
     the town as it is then. `unwarned_m` is what an agent would drive that knows the town and takes
-    the shortest routes, but sees that a street is closed only where its barrier is within SIGHT_M.
+    the shortest routes, but sees that a street is closed, or open again, only where its barrier is
+    within SIGHT_M.
     """
 
     start_m: Point
@@ -110,12 +111,25 @@ def draw_goal(
     raise ValueError(f"no goal is {MIN_AWAY_M} m from {here_m}")
 
 
+def believed_m(town: TrueTown, believed: TrueTown, start_m: Point, goal_m: Point) -> float:
+    """The length of the shortest route in the town as an agent believes it to be; where that has
+    none, in the town as it is.
+    """
+    length_m = Drivable.of(believed).length_m(start_m, goal_m)
+    return length_m if math.isfinite(length_m) else Drivable.of(town).length_m(start_m, goal_m)
+
+
 def street_to_close(
-    rng: np.random.Generator, town: TrueTown, route_m: Floats, goal_m: Point
+    rng: np.random.Generator,
+    town: TrueTown,
+    route_m: Floats,
+    goal_m: Point,
+    believed: TrueTown | None = None,
 ) -> Closure | None:
     """A street ahead that the (n, 2) route passes, without which the goal can still be reached;
     None where there is none. The goal is not at its barrier, where it could be reached from both
-    sides; nor is it a square, which a barrier through its middle does not close.
+    sides; nor is it a square, which a barrier through its middle does not close. What an unwarned
+    agent drives is by the town as it is `believed` to be, if not as it is.
     """
     start_x_m, start_y_m = route_m[0].tolist()
     start_m = (start_x_m, start_y_m)
@@ -129,18 +143,28 @@ def street_to_close(
         if math.dist(foot_m, goal_m) < REACHED_WITHIN_M:
             continue
 
-        closed = Drivable.of(closed_as(town, street.name))
-        length_m = closed.length_m(start_m, goal_m)
-        if math.isfinite(length_m):
-            known_m = Drivable.of(town).route_m(start_m, goal_m)
-            return Closure(street.name, length_m, unwarned_m(known_m, barrier_m(street), closed))
+        closed = closed_as(town, street.name)
+        length_m = Drivable.of(closed).length_m(start_m, goal_m)
+        if not math.isfinite(length_m):
+            continue
+
+        known = town if believed is None else believed
+        if math.isinf(Drivable.of(known).length_m(start_m, goal_m)):
+            known = town
+
+        known_m = Drivable.of(known).route_m(start_m, goal_m)
+        seen_as = closed_as(known, street.name)
+        driven_m = unwarned_m(known_m, barrier_m(street), closed, seen_as)
+        return Closure(street.name, length_m, driven_m)
 
     return None
 
 
-def unwarned_m(known_m: Floats, barrier_ends_m: Floats, closed: Drivable) -> float:
+def unwarned_m(
+    known_m: Floats, barrier_ends_m: Floats, closed: TrueTown, believed: TrueTown
+) -> float:
     """The length of a drive along (n, 2) `known_m` as far as its barrier (2, 2) is within SIGHT_M,
-    and from there by the shortest route in the town as it is.
+    and from there as `believed_m` of the town as it is, with that street closed.
     """
     feet_m = nearest_on_line(barrier_ends_m, known_m).foot_m
     is_seen = np.hypot(*(known_m - feet_m).T) <= SIGHT_M
@@ -150,4 +174,5 @@ def unwarned_m(known_m: Floats, barrier_ends_m: Floats, closed: Drivable) -> flo
     driven_m = float(np.hypot(*steps_m.T).sum())
     seen_x_m, seen_y_m = known_m[seen_at].tolist()
     goal_x_m, goal_y_m = known_m[-1].tolist()
-    return driven_m + closed.length_m((seen_x_m, seen_y_m), (goal_x_m, goal_y_m))
+    seen_m = (seen_x_m, seen_y_m)
+    return driven_m + believed_m(closed, believed, seen_m, (goal_x_m, goal_y_m))

@@ -12,7 +12,14 @@ from benchmarks.explore.boundaries import BoundaryScore
 from benchmarks.explore.drivable import Drivable
 from benchmarks.explore.judge import explored_share, score_boundaries
 from benchmarks.explore.measure import Town, metrics
-from benchmarks.explore.trials import SIGHT_M, Trial, closed_as, draw_goal, street_to_close
+from benchmarks.explore.trials import (
+    SIGHT_M,
+    Trial,
+    believed_m,
+    closed_as,
+    draw_goal,
+    street_to_close,
+)
 from cogmap.graph.graph import Graph
 from schemas.array import Array
 from schemas.graph import Cells
@@ -102,6 +109,17 @@ def test_an_agent_that_sees_only_from_near_that_a_street_is_closed_drives_there_
     there_m = 30.0 - SIGHT_M
     there_and_back_m = 2 * there_m
     assert found.shortest_m < found.unwarned_m <= found.shortest_m + there_and_back_m
+
+
+def test_an_agent_that_nobody_tells_that_a_street_is_open_again_drives_round_it() -> None:
+    believed = closed_as(_town(), "south")
+    shut_off = closed_as(believed, "north")
+
+    round_m = believed_m(_town(), believed, (0.0, 0.0), (50.0, 0.0))
+    assert round_m == Drivable.of(believed).length_m((0.0, 0.0), (50.0, 0.0))
+
+    tried_m = believed_m(_town(), shut_off, (0.0, 0.0), (50.0, 0.0))
+    assert tried_m == Drivable.of(_town()).length_m((0.0, 0.0), (50.0, 0.0))
 
 
 def test_a_street_is_not_closed_where_its_barrier_would_stand_at_the_goal() -> None:
