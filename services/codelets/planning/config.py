@@ -97,21 +97,6 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             "s, above 0 to 3600."
         ),
     ] = 600.0
-    blocked_from_m: Annotated[
-        PositiveMetres,
-        Meta(
-            description="Distance from which the agent sees that road is blocked, in m, above 0 to "
-            "10000. Where it was as near within `doubt_after_s`, it knows."
-        ),
-    ] = 30.0
-    reopened_share: Annotated[
-        PositiveShare,
-        Meta(
-            description="Share of the blocked road that is free again when it was not in sight for "
-            "`doubt_after_s`, above 0 to 1. It is tried where that is the shorter way on average, "
-            "with the way back where it is blocked still."
-        ),
-    ] = 0.25
     max_doubts: Annotated[
         Cells,
         Meta(

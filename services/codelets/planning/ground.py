@@ -39,9 +39,7 @@ from services.codelets.planning.network import SQUARE, Here, PlaceNetwork, ends,
 
 COLUMNS = (PlaceColumn.ROAD, PlaceColumn.OBSTACLE, *WEIGHT_COLUMNS)
 SPREAD_FROM = 0.2
-BESIDE_CUT = 0.5
-# Links are cut around what stands on road, up to so far.
-BARRIER_CELLS = 2
+BESIDE_CUT = 0.8
 
 
 class Ground(NamedTuple):
@@ -51,9 +49,8 @@ class Ground(NamedTuple):
     `is_visited` (w, h): beside the path, seen from as near as can be. `network` has links between
     free places, lighter where unknown; `known` has those between known places only. `doubted` has
     those of `network`, and the lightest where road is blocked that was not seen from near lately:
-    it may be free again; `reopened` has the lightest where something stands on road that was not in
-    sight lately. All have the lightest links along the way back, where the agent has left all other
-    ground.
+    it may be free again. All three have the lightest links along the way back, where the agent has
+    left all other ground.
     """
 
     is_free: Booleans
@@ -62,7 +59,6 @@ class Ground(NamedTuple):
     network: PlaceNetwork
     known: PlaceNetwork
     doubted: PlaceNetwork
-    reopened: PlaceNetwork
 
 
 def ground(
@@ -70,13 +66,11 @@ def ground(
     agent: Self,
     config: Config,
     goals: Sequence[Goal] = (),
-    *,
     within: Corridor | None = None,
-    tries: bool = False,
 ) -> Ground:
     """The ground of the agent's map and some unknown places around it, as far as to those of
     `goals` that are positions not too far outside; that `within` a corridor alone, where one is
-    given. An agent that `tries` whether blocked road is free again does so until it is near.
+    given.
 
     The path that the agent took counts as known, and so does ground ahead that is too near for its
     camera, where road begins behind it.
@@ -111,11 +105,6 @@ def ground(
     is_in_doubt = is_known & is_edge & ~is_seen_lately
     in_doubt = np.where(is_in_doubt, config.doubt_weight, optimistic)
 
-    is_barred = is_known & ndimage.binary_dilation(is_obstacle, SQUARE, BARRIER_CELLS)
-    is_in_sight = is_seen_lately if tries else here.is_within(config.blocked_from_m, lately_m)
-    may_be_open = is_barred & is_edge & ~is_in_sight
-    reopened = np.where(may_be_open, config.doubt_weight, optimistic)
-
     return Ground(
         is_free=~is_edge,
         is_known=is_known & ~is_edge,
@@ -123,7 +112,6 @@ def ground(
         network=here.network(link_weights(weights, optimistic)),
         known=here.network(link_weights(weights, np.where(is_known, share, 0.0))),
         doubted=here.network(link_weights(_opened(weights, is_known), in_doubt)),
-        reopened=here.network(link_weights(_opened(weights, is_barred), reopened)),
     )
 
 

@@ -34,7 +34,7 @@ from schemas.nodes import (
 )
 from services.codelets.planning.config import Config
 from services.codelets.planning.corridor import corridor
-from services.codelets.planning.doubt import doubted, may_doubt, or_reopened
+from services.codelets.planning.doubt import doubted, may_doubt
 from services.codelets.planning.frontier import Standpoint, best_frontier
 from services.codelets.planning.goal_order import goal_order, order_before
 from services.codelets.planning.ground import COLUMNS, Ground, ground
@@ -88,15 +88,14 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         raise MessageError(f"task {task.task_id}: the graph has no self node")
 
     before = graph.get(Plan, PLAN_ID)
-    tries = before is not None and before.doubtful
     near = corridor(graph, agent, goals_m(graph), config)
     if near is not None:
-        where = ground(graph, agent, config, within=near, tries=tries)
+        where = ground(graph, agent, config, within=near)
         planned = _planned(Situation(task, agent, where, before, config), graph)
         if not planned.plan.unreachable and not planned.plan.doubtful:
             return _answer(planned, graph)
 
-    where = ground(graph, agent, config, [*pending_goals(graph).values()], tries=tries)
+    where = ground(graph, agent, config, [*pending_goals(graph).values()])
     return _answer(_planned(Situation(task, agent, where, before, config), graph), graph)
 
 
@@ -235,8 +234,7 @@ def _reachable(
 ) -> tuple[list[Visit], dict[str, PlanState]]:
     """The targets to which routes lead from `start`, and why none leads to the others.
 
-    Where a street that was blocked is the only one that is left, or by far the shortest, it may be
-    free again.
+    Where a street that was blocked is the only one that is left, it may be free again.
     """
     where = now.where
     at_start = where.network.index_of(start)
@@ -244,10 +242,6 @@ def _reachable(
 
     found = [visit for visit in visits(where.network, targets) if _arrives(visit, at_start)]
     left = _without(targets, found)
-    for number, visit in enumerate(found):
-        if now.may_doubt(visit.target.goal):
-            found[number] = or_reopened(visit, start, where, now.config)
-
     in_doubt = [target for target in left if now.may_doubt(target.goal)]
     found += [visit for visit in visits(where.doubted, in_doubt) if _arrives(visit, at_start)]
 
@@ -283,7 +277,7 @@ def _to_goals(plan: Plan, start: Cell, found: list[Visit], now: Situation) -> Pl
     route = route_to(start, ordered[0])
     assert route is not None
     goals = [visit.target.goal.id for visit in ordered]
-    is_doubtful = ordered[0].network is not now.where.network
+    is_doubtful = ordered[0].network is now.where.doubted
     plan = msgspec.structs.replace(plan, goals=goals, doubtful=is_doubtful)
     return _with_route(plan, route, now.where)
 

@@ -75,45 +75,6 @@ def test_a_street_that_is_seen_to_be_closed_is_not_in_doubt() -> None:
     assert plan.route.numpy()[:, 1].max() > 35.0
 
 
-TRIES = Config(reopened_share=0.9, doubt_weight=0.2, blocked_from_m=10.0)
-
-
-@pytest.mark.parametrize(
-    ("config", "is_tried"),
-    [
-        (TRIES, True),
-        (msgspec.structs.replace(TRIES, reopened_share=0.1), False),
-        (msgspec.structs.replace(TRIES, blocked_from_m=30.0), False),
-    ],
-    ids=["likely", "unlikely", "in sight"],
-)
-def test_a_street_that_is_likely_open_again_is_tried_where_the_way_round_is_long(
-    config: Config, is_tried: bool
-) -> None:
-    graph = loop(goal_at("far", 40.0, 0.0), barrier(20, 0))
-    plan = planned(graph, config)
-
-    assert plan.doubtful is is_tried
-    assert plan.route is not None
-    assert bool(plan.route.numpy()[:, 1].max() < 5.0) is is_tried
-
-
-def test_a_street_that_is_tried_is_tried_until_the_agent_is_near() -> None:
-    graph = loop(goal_at("far", 40.0, 0.0), barrier(20, 0))
-    assert planned(graph, TRIES).doubtful
-    graph.change([agent(x_m=12.0)])
-    assert planned(graph, TRIES).doubtful
-
-    graph.change([agent(x_m=16.0)])
-    assert not planned(graph, TRIES).doubtful
-
-
-def test_where_the_way_round_is_short_no_street_is_tried() -> None:
-    graph = loop(goal_at("corner", 40.0, 40.0), barrier(20, 0))
-
-    assert not planned(graph, TRIES).doubtful
-
-
 def _was_at(stamp_s: float, *x_m: float) -> PathSegment:
     """A path along x."""
     rows = np.zeros((len(x_m), len(PathColumn)))
