@@ -18,8 +18,6 @@ from cogmap.geometry.se2 import compose, relative
 
 SEEDS = (0, 1)
 ORIGIN = (0.0, 0.0, 0.0)
-KIDNAPPED_S = (300.0, 360.0)
-FOUND_M = 0.5
 STAMP_COLUMN = 0
 POSE_COLUMNS = slice(1, 4)
 ODOMETRY_COLUMNS = slice(4, 7)
@@ -97,8 +95,7 @@ def evaluate(robot: Robot, landmarks: dict[int, tuple[float, float]]) -> Metrics
         "known_map_rmse_m": float(np.mean([truth.rmse_m(path) for path in known])),
         "known_map_rmse_even_m": float(np.mean([even.rmse_m(path) for path in known])),
     }
-    metrics |= _mapping_errors(log, truth)
-    return metrics | {"recovery_s": recovery_s(robot, landmarks)}
+    return metrics | _mapping_errors(log, truth)
 
 
 def _mapping_errors(log: Sequence[Moment], truth: Truth) -> Metrics:
@@ -115,39 +112,6 @@ def _mapping_errors(log: Sequence[Moment], truth: Truth) -> Metrics:
         "path_integration_rmse_m": truth.aligned_error_m(drives[0].odometry),
         "smoother_rmse_m": truth.aligned_error_m(smoothed),
     }
-
-
-def recovery_s(robot: Robot, landmarks: dict[int, tuple[float, float]]) -> float:
-    """How long a kidnapped robot takes to localize within FOUND_M for good, on a known map.
-
-    A minute of its log never reaches it: neither that it moved nor what it saw. Counted from its
-    next observation on.
-    """
-    begin_s = float(robot.odometry[0, 0])
-    _, released_s = KIDNAPPED_S
-    end_s = begin_s + 2 * released_s
-    log = [moment for moment in moments(robot, KIDNAPPED_S) if moment.stamp_s < end_s]
-    stamps_s = _stamps_s(log)
-    truth = Truth.at(robot, stamps_s)
-    online = follow(log, landmarks, _start(robot), 0).online
-
-    is_after = stamps_s > begin_s + released_s
-    observes = np.array([bool(moment.percepts) for moment in log])
-    after = truth.only(is_after & observes)
-    return _lost_s(stamps_s[after.is_known], after.errors_m(online))
-
-
-def _lost_s(stamps_s: Floats, errors_m: Floats) -> float:
-    """How long after the first of (n,) stamps no error is over FOUND_M any more.
-
-    Up to the last one where there is no such time; 0 where there are no stamps.
-    """
-    lost = np.flatnonzero(errors_m > FOUND_M)
-    if not len(lost):
-        return 0.0
-
-    found = min(int(lost[-1]) + 1, len(stamps_s) - 1)
-    return float(stamps_s[found] - stamps_s[0])
 
 
 def _stamps_s(log: Sequence[Moment]) -> Floats:

@@ -11,6 +11,7 @@ import numpy as np
 from benchmarks import optional
 from benchmarks.localization import speed
 from benchmarks.localization.drives import evaluate
+from benchmarks.localization.recovery import evaluate_recovery
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_most
 from cli.log.progress import bar
@@ -23,6 +24,8 @@ THRESHOLDS = {
     "slam_vs_smoother": at_most(1.5),
     "update_ms_p99": at_most(2.0),
     "map_size_ratio": at_most(1.2),
+    "recovery_s": at_most(15.0),
+    "recovery_worst_s": at_most(40.0),
 }
 OF_EACH_ROBOT = ("known_map_rmse_m", "slam_rmse_m", "smoother_rmse_m")
 
@@ -46,7 +49,19 @@ def measure(folder: Path, processes: int) -> Metrics:
         metrics[key] = float(np.mean(of_robots))
 
     metrics["slam_vs_smoother"] = metrics["slam_rmse_m"] / metrics["smoother_rmse_m"]
+    metrics |= _recovery(recording, processes)
     return metrics | timings | _of_each_robot(recording, rows) | _counts(recording)
+
+
+def _recovery(recording: Recording, processes: int) -> Metrics:
+    """The means over the robots, and the worst of all."""
+    with bar("recoveries") as progress:
+        work = partial(evaluate_recovery, landmarks=recording.landmarks)
+        rows = parallel_map(work, recording.robots, processes, progress)
+
+    worst_s = max(row["recovery_worst_s"] for row in rows)
+    means = {key: float(np.mean([row[key] for row in rows])) for key in rows[0]}
+    return means | {"recovery_worst_s": worst_s}
 
 
 def _of_each_robot(recording: Recording, rows: Sequence[Metrics]) -> Metrics:
