@@ -16,6 +16,7 @@ from benchmarks.cognition.command import cognition_command
 from benchmarks.cycle import measure as cycle
 from benchmarks.explore.command import explore_command
 from benchmarks.learning.command import learning_command
+from benchmarks.lifelong.command import lifelong_command
 from benchmarks.localization import measure as localization
 from benchmarks.map_correction import measure as map_correction
 from benchmarks.map_size import measure as map_size
@@ -348,3 +349,4 @@ benchmarks.add_command(explore_command)
 benchmarks.add_command(cognition_command)
 benchmarks.add_command(memory_command)
 benchmarks.add_command(learning_command)
+benchmarks.add_command(lifelong_command)

@@ -16,6 +16,7 @@ from benchmarks.cognition import measure as cognition
 from benchmarks.cycle import measure as cycle
 from benchmarks.explore import measure as explore
 from benchmarks.learning import measure as learning
+from benchmarks.lifelong import measure as lifelong
 from benchmarks.localization import measure as localization
 from benchmarks.machine import machine_unit_ms
 from benchmarks.map_correction import measure as map_correction
@@ -156,6 +157,10 @@ def _learning(setting: Setting) -> Metrics:
     return learning.measure(setting.processes, setting.announce)
 
 
+def _lifelong(setting: Setting) -> Metrics:
+    return lifelong.measure()
+
+
 def _memory(setting: Setting) -> Metrics:
     folder = setting.subfolder("memory")
     return memory.measure(folder, setting.processes, setting.announce)
@@ -187,6 +192,7 @@ SUITE = (
     Benchmark("cognition", cognition.THRESHOLDS, _cognition),
     Benchmark("memory", memory.THRESHOLDS, _memory),
     Benchmark("learning", learning.THRESHOLDS, _learning),
+    Benchmark("lifelong", lifelong.THRESHOLDS, _lifelong),
     Benchmark("cue-integration", paper.CUE_INTEGRATION_THRESHOLDS, _cue_integration),
     Benchmark("city-maps", paper.CITY_MAPS_THRESHOLDS, _city_maps),
 )
