@@ -39,7 +39,7 @@ from services.codelets.planning.network import SQUARE, Here, PlaceNetwork, ends,
 
 COLUMNS = (PlaceColumn.ROAD, PlaceColumn.OBSTACLE, *WEIGHT_COLUMNS)
 SPREAD_FROM = 0.2
-BESIDE_CUT = 0.8
+BESIDE_CUT = 0.5
 
 
 class Ground(NamedTuple):
