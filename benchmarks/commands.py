@@ -78,7 +78,7 @@ def all_command(
     """Every benchmark and experiment that has a threshold, in one table.
 
     Ends with code 1 where a threshold is missed. A benchmark that fails is a row with its reason,
-    and counts as missed. Takes about an hour on two cores.
+    and counts as missed. Takes more than two hours on two cores.
     """
     chosen = suite.selected(only, skip)
     with tempfile.TemporaryDirectory() as folder:

@@ -116,7 +116,10 @@ def believed_m(town: TrueTown, believed: TrueTown, start_m: Point, goal_m: Point
     none, in the town as it is.
     """
     length_m = Drivable.of(believed).length_m(start_m, goal_m)
-    return length_m if math.isfinite(length_m) else Drivable.of(town).length_m(start_m, goal_m)
+    if math.isfinite(length_m):
+        return length_m
+
+    return Drivable.of(town).length_m(start_m, goal_m)
 
 
 def street_to_close(
