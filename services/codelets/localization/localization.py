@@ -14,7 +14,6 @@ import msgspec
 import numpy as np
 
 from cogmap.errors import MessageError
-from cogmap.geometry.arrays import Booleans
 from cogmap.geometry.se2 import compose, mean_pose, relative
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
@@ -44,12 +43,19 @@ from services.codelets.localization.measurement_model import (
 )
 from services.codelets.localization.motion_model import dead_reckon, move, with_gains
 from services.codelets.localization.novelty import novelty, variances_when_placed
-from services.codelets.localization.recovery import relocalize, relocalize_heading, seen_before
+from services.codelets.localization.recovery import (
+    SEVERAL,
+    believed_of,
+    relocalize,
+    relocalize_heading,
+    seen_before,
+)
 from services.codelets.localization.sampling import (
     Samples,
     centred,
     generator,
     inflate,
+    position_sd_m,
     rejection_resample,
     resample,
     tempering_exponent,
@@ -58,9 +64,6 @@ from services.codelets.mapping.path import odometry_of, variances_of
 
 INFLATION = 1.5
 MAX_INFLATIONS = 6
-SEVERAL = 2
-MOST = 2 / 3
-SURE_M = 1.0
 PATIENCE = 2
 STAGES = 3
 # Headings a radian apart, and those whose mean direction is no longer than that of a spread of one.
@@ -214,9 +217,9 @@ def _correct(
 
     compared = compare(past.samples, seen)
     is_fitting = compared.squared < config.gate**2
-    fitting_of = np.add.reduce(is_fitting, axis=0, dtype=np.uint8)
-    fitting = int(fitting_of.max())
-    if 2 * fitting < len(seen.labels) or not fitting:
+    counts = seen.weights.astype(np.float32)
+    fitting = (counts @ is_fitting).max()
+    if 2 * fitting < counts.sum():
         return _misfit(past, seen, config)
 
     samples = past.samples
@@ -266,18 +269,11 @@ def _misfit(past: Estimate, seen: Sighting, config: Config) -> Estimate:
 
 def _inflated(lost: Estimate, limit_m: float, rng: np.random.Generator) -> Estimate:
     """The pose is less certain than it seemed, but no less than by path integration alone."""
-    if _sd_m(lost.samples) >= limit_m:
+    if position_sd_m(lost.samples) >= limit_m:
         return lost
 
     samples = inflate(lost.samples, INFLATION, rng)
     return replace(lost, samples=samples)
-
-
-def _sd_m(samples: Samples) -> float:
-    """The standard deviation of the distance of samples from their mean position."""
-    _, offsets_m = centred(samples[:, :2])
-    variance_m2 = np.square(offsets_m).sum(axis=1).mean()
-    return math.sqrt(variance_m2)
 
 
 def _path_sd_m(agent: Self, variances: Samples) -> float:
@@ -318,36 +314,20 @@ def _relocalize(
         return lost
 
     nearest_m = float(seen.range_m.min())
-    is_unsure = _sd_m(lost.samples) > nearest_m
+    is_unsure = position_sd_m(lost.samples) > nearest_m
     enough = SEVERAL if is_unsure else config.misfits_to_relocalize
     if lost.misfit_count < enough:
         return lost
 
     samples = relocalize(lost.samples, seen, config, rng)
-    is_fitting = compare(samples, seen).squared < config.gate**2
-    fitting = is_fitting[:, is_fitting.sum(axis=0).argmax()]
-    if _is_convincing(fitting, seen, is_unsure):
-        return Estimate(samples, 0.0, was_kidnapped=not is_unsure)
+    believed = believed_of(samples, seen, is_unsure, config)
+    if believed is not None:
+        found = resample(believed, len(samples), 0.0, rng)
+        return Estimate(found, 0.0, was_kidnapped=not is_unsure)
 
     if lost.misfit_count >= PATIENCE * enough:
         return Estimate(lost.samples, 0.0, is_not_elsewhere=True)
     return lost
-
-
-def _is_convincing(is_fitting: Booleans, seen: Sighting, is_unsure: bool) -> bool:
-    """Whether the agent believes that it is where those of the landmarks (k,) fit.
-
-    That is most of them; and, where it was sure to be elsewhere, SEVERAL at least, of which one
-    whose own place is not sure counts for half: two of those fit somewhere nearly always.
-    """
-    if is_fitting.mean() < MOST:
-        return False
-    if is_unsure:
-        return True
-
-    variance_m2 = np.trace(seen.covariance_m2, axis1=1, axis2=2) / 2
-    weights = np.where(variance_m2 <= SURE_M**2, 1.0, 0.5)
-    return bool(weights[is_fitting].sum() >= SEVERAL)
 
 
 def _self_node(task: Task, agent: Self, found: Estimate) -> Self:

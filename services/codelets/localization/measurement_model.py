@@ -17,6 +17,8 @@ from services.codelets.localization.motion_model import RANGE
 
 MAX_SD_SHARE = 0.5
 MIN_SIGHTINGS = 2
+# The evidence of a name that is as good as sure.
+SURE_EVIDENCE = 0.9
 FULL_TURN_RAD = np.float32(2 * np.pi)
 # Beyond this squared distance densities would be denormal numbers, with which everything is slow.
 MAX_MAHALANOBIS2 = np.float32(150.0)
@@ -26,8 +28,9 @@ class Sighting(NamedTuple):
     """k known landmarks in view: where each is believed to be and where it is seen.
 
     `mean_m` (k, 2) and `covariance_m2` (k, 2, 2) are of the landmark on the map; the rest, (k,)
-    each, of the percept. A bearing is unknown where its standard deviation is at least a half turn,
-    a range where it is at least the range.
+    each, of the percept; `evidence` is how likely its name is, by the view alone. A bearing is
+    unknown where its standard deviation is at least a half turn, a range where it is at least the
+    range.
     """
 
     labels: tuple[str, ...]
@@ -37,6 +40,16 @@ class Sighting(NamedTuple):
     range_m: Floats
     bearing_sd_rad: Floats
     range_sd_m: Floats
+    evidence: Floats
+
+    @property
+    def weights(self) -> Floats:
+        """(k,), 0 to 1: how much each counts for or against a pose that it fits or does not: the
+        logarithm of how likely its name is wrong, over that of a sure one.
+        """
+        doubts = 1 - self.evidence.clip(0.0, SURE_EVIDENCE)
+        weights: Floats = np.log(doubts) / np.log(1 - SURE_EVIDENCE)
+        return weights
 
     @property
     def has_bearing(self) -> Booleans:
@@ -179,6 +192,7 @@ def _sighting(chosen: list[tuple[Percept, Landmark]]) -> Sighting:
         range_m=np.array([percept.range_m for percept in percepts]),
         bearing_sd_rad=np.array([percept.bearing_sd_rad for percept in percepts]),
         range_sd_m=np.array([percept.range_sd_m for percept in percepts]),
+        evidence=np.array([percept.evidence for percept in percepts]),
     )
 
 

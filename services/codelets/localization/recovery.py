@@ -11,13 +11,21 @@ from cogmap.geometry.se2 import compose, relative
 from cogmap.graph.graph import Graph
 from schemas.sensing import Percept
 from services.codelets.config import Config
-from services.codelets.localization.measurement_model import Sighting, compare, log_likelihood
+from services.codelets.localization.measurement_model import (
+    MAX_SD_SHARE,
+    Sighting,
+    compare,
+    log_likelihood,
+)
 from services.codelets.localization.motion_model import COLUMNS, RANGE
-from services.codelets.localization.sampling import Samples
+from services.codelets.localization.sampling import Samples, position_sd_m
 from services.codelets.mapping.observations import Sightings
 from services.codelets.mapping.path import ODOMETRY, STAMP, objects_along
 
 CANDIDATES = 16
+SEVERAL = 2
+MOST = 2 / 3
+SURE_M = 1.0
 # The error of path integration since a landmark was seen, as a share of the distance.
 DRIFT_SHARE = 0.05
 
@@ -115,6 +123,36 @@ def relocalize(gains: Samples, seen: Sighting, config: Config, rng: np.random.Ge
     density = compare(candidates, seen).density
     density[which, np.arange(number)] = 1.0  # it was drawn by that one
     return _drawn(candidates, density, len(gains), config, rng)
+
+
+def believed_of(
+    samples: Samples, seen: Sighting, is_unsure: bool, config: Config
+) -> Samples | None:
+    """Those of relocalization's (n, 7) samples that the agent believes to be where it is; None
+    where it believes none.
+
+    It believes them where most landmarks fit one of them together, each by how certain its name is.
+    Where it was sure to be elsewhere, it believes only those that the most fit, if they are in one
+    place, and SEVERAL landmarks at least do: one whose own place is not sure counts for half, for
+    two of those fit somewhere nearly always.
+    """
+    weights = seen.weights
+    is_fitting = compare(samples, seen).squared < config.gate**2
+    fitting = weights @ is_fitting
+    best = fitting.argmax()
+    if fitting[best] < MOST * weights.sum():
+        return None
+    if is_unsure:
+        return samples
+
+    variance_m2 = np.trace(seen.covariance_m2, axis1=1, axis2=2) / 2
+    weights *= np.where(variance_m2 <= SURE_M**2, 1.0, 0.5)
+    if weights[is_fitting[:, best]].sum() < SEVERAL:
+        return None
+
+    there = samples[np.isclose(fitting, fitting[best])]
+    limit_m = MAX_SD_SHARE * float(seen.range_m.min())
+    return there if position_sd_m(there) <= limit_m else None
 
 
 def relocalize_heading(

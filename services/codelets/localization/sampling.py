@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 
 import numpy as np
 
@@ -52,6 +53,15 @@ def spread(samples: Samples, mean: Samples) -> Samples:
     if samples.shape[1] == 3:
         deviations[:, 2] = wrap_angle(deviations[:, 2])
     return np.asarray(np.sqrt((deviations**2).mean(axis=0)))
+
+
+def position_sd_m(samples: Samples) -> float:
+    """The standard deviation of the distance of (n, d) samples from their mean position, which is
+    in the first two columns.
+    """
+    _, offsets_m = centred(samples[:, :2])
+    variance_m2 = np.square(offsets_m).sum(axis=1).mean()
+    return math.sqrt(variance_m2)
 
 
 def rejection_mask(log_likelihood: Samples, rng: np.random.Generator) -> Booleans:

@@ -136,6 +136,36 @@ def test_two_landmarks_carry_the_agent_off_only_where_their_places_are_sure(
     assert was_moved == is_moved
 
 
+def _carried(distrusted: dict[str, float]) -> Self:
+    """An agent that was carried off, and sees two landmarks, of each of which it distrusts
+    something.
+    """
+    agent = _agent()
+    true = (-40.0, 10.0, 2.0)
+    for number in range(1, CONFIG.misfits_to_relocalize + 3):
+        true = _ahead(true)
+        seen = [_seen(true, "mill", **distrusted), _seen(true, "tower", **distrusted)]
+        agent = _move(agent, number, _known("mill", "tower"), seen, CONFIG)
+
+    return agent
+
+
+@pytest.mark.parametrize(("evidence", "is_moved"), [(0.95, True), (0.75, False)])
+def test_two_landmarks_carry_the_agent_off_only_where_their_names_are_sure(
+    evidence: float, is_moved: bool
+) -> None:
+    agent = _carried({"evidence": evidence})
+
+    was_moved = agent.odometry_x_m < 0.0
+    assert was_moved == is_moved
+
+
+def test_two_ranges_which_fit_two_places_carry_the_agent_to_neither() -> None:
+    agent = _carried(UNKNOWN_BEARING)
+
+    assert agent.odometry_y_m == pytest.approx(0.0, abs=0.1)
+
+
 def test_landmarks_that_fit_no_pose_together_move_nobody() -> None:
     agent = _looking(views=40)
 
