@@ -8,20 +8,19 @@ import math
 import numpy as np
 
 from benchmarks.explore.boundaries import BoundaryScore
-from benchmarks.explore.drivable import Drivable, barrier_m
+from benchmarks.explore.drivable import Drivable
 from benchmarks.explore.judge import explored_share, score_boundaries
 from benchmarks.explore.trials import (
     REACHED_WITHIN_M,
-    SIGHT_M,
     Point,
     Trial,
     believed_m,
     closed_as,
     draw_goal,
+    sees_barrier,
     street_to_close,
 )
 from cogmap.geometry.arrays import Floats
-from cogmap.geometry.polylines import nearest_on_line
 from cogmap.geometry.se2 import transform_from, transform_to
 from cogmap.graph.graph import Graph
 from cogmap.runtime.module import Module
@@ -115,11 +114,7 @@ class Experimenter:
             return
 
         for street in self._town.streets:
-            if street.name not in self._opened:
-                continue
-
-            (foot_m,) = nearest_on_line(barrier_m(street), here_m[None]).foot_m
-            if math.dist(foot_m, here_m) <= SIGHT_M:
+            if street.name in self._opened and sees_barrier(street, here_m):
                 self._opened.discard(street.name)
 
     def _believed(self, town: TrueTown) -> TrueTown:

@@ -13,7 +13,7 @@ from benchmarks.explore.drivable import Drivable, barrier_m
 from cli.launch.guide import streets_ahead
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.polylines import nearest_on_line, resample
-from schemas.sensing import TrueTown
+from schemas.sensing import Street, TrueTown
 from services.codelets.config import Config
 
 LINE_STEP_M = 1.0
@@ -120,6 +120,12 @@ def believed_m(town: TrueTown, believed: TrueTown, start_m: Point, goal_m: Point
         return length_m
 
     return Drivable.of(town).length_m(start_m, goal_m)
+
+
+def sees_barrier(street: Street, here_m: Floats) -> bool:
+    """Whether an agent at (2,) `here_m` sees if a barrier closes a street: it is within SIGHT_M."""
+    (foot_m,) = nearest_on_line(barrier_m(street), here_m[None]).foot_m
+    return math.dist(foot_m, here_m) <= SIGHT_M
 
 
 def street_to_close(

@@ -18,6 +18,7 @@ from benchmarks.explore.trials import (
     believed_m,
     closed_as,
     draw_goal,
+    sees_barrier,
     street_to_close,
 )
 from cogmap.graph.graph import Graph
@@ -120,6 +121,14 @@ def test_an_agent_that_nobody_tells_that_a_street_is_open_again_drives_round_it(
 
     tried_m = believed_m(_town(), shut_off, (0.0, 0.0), (50.0, 0.0))
     assert tried_m == Drivable.of(_town()).length_m((0.0, 0.0), (50.0, 0.0))
+
+
+@pytest.mark.parametrize(("away_m", "is_seen"), [(SIGHT_M - 0.5, True), (SIGHT_M + 0.5, False)])
+def test_whether_a_street_is_closed_is_seen_from_near(away_m: float, is_seen: bool) -> None:
+    street = Street(name="south", line_m=[(0.0, 0.0), (60.0, 0.0)], width_m=6.0)
+    here_m = np.array([30.0 + away_m, 0.0])
+
+    assert sees_barrier(street, here_m) == is_seen
 
 
 def test_a_street_is_not_closed_where_its_barrier_would_stand_at_the_goal() -> None:
