@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from typing import cast
 
 import numpy as np
 
@@ -14,10 +14,11 @@ from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
 from cogmap.runtime.config import Sections
 from cogmap.runtime.in_process import InProcessRunner
-from cogmap.runtime.module import Module, Reply
+from cogmap.runtime.module import Handler, Module
 from schemas import topics
 from schemas.array import Array
-from schemas.codelets import Leases
+from schemas.base import Message
+from schemas.codelets import Proposal
 from schemas.graph import Delta
 from schemas.sensing import Percepts, SelfMotion
 from services import registry
@@ -139,8 +140,8 @@ class LocalizationLoop:
     def _worker(self, configured: Sections) -> Module:
         """The codelets' module, whose tasks are timed."""
         worker = registry.build("codelets", configured)
-        on_leases = worker.handlers[topics.LEASES]
-        worker.handlers[topics.LEASES] = self._timed(on_leases)
+        for topic in (topics.TASK, topics.LEASES):  # it begins with whichever comes later
+            worker.handlers[topic] = self._timed(worker.handlers[topic])
         return worker
 
     def _messages(self, moment: Moment) -> list[SelfMotion | Percepts]:
@@ -165,15 +166,14 @@ class LocalizationLoop:
     def _on_delta(self, delta: Delta) -> None:
         self._dropped += delta.reasons
 
-    def _timed(self, handler: Callable[[Leases], Reply]) -> Callable[[Leases], Reply]:
-        def on_leases(leases: Leases) -> Reply:
+    def _timed(self, handler: Handler) -> Handler:
+        def on_message(message: Message) -> list[Proposal]:
             began_s = time.process_time()
-            reply = handler(leases)
+            proposals = cast(list[Proposal], handler(message))
             took_s = time.process_time() - began_s
 
-            first = leases.assignments[0]
-            _, codelet, *_ = first.task_id.split("/")
-            self.task_s.append((codelet, took_s))
-            return reply
+            if proposals:
+                self.task_s.append((proposals[0].codelet, took_s))
+            return proposals
 
-        return on_leases
+        return on_message
