@@ -40,6 +40,8 @@ from services.codelets.planning.network import SQUARE, Here, PlaceNetwork, ends,
 COLUMNS = (PlaceColumn.ROAD, PlaceColumn.OBSTACLE, *WEIGHT_COLUMNS)
 SPREAD_FROM = 0.2
 BESIDE_CUT = 0.5
+# So far beside its path the agent is as wide as it drove.
+BESIDE_PATH_M = 1.0
 
 
 class Ground(NamedTuple):
@@ -72,8 +74,9 @@ def ground(
     `goals` that are positions not too far outside; that `within` a corridor alone, where one is
     given.
 
-    The path that the agent took counts as known, and so does ground ahead that is too near for its
-    camera, where road begins behind it.
+    The path that the agent took counts as known, and as free where nothing stands there by now: an
+    edge that is mapped across it is a mistake. Ground ahead that is too near for its camera counts
+    as known where road begins behind it.
     """
     map_id = agent.map
     extent = _extent(graph, map_id, goals, config) if within is None else within.extent
@@ -90,9 +93,10 @@ def ground(
     is_known = is_seen | here.is_within(config.driven_m, driven_m)
 
     is_obstacle = stands_there(window.column(PlaceColumn.OBSTACLE))
-    is_edge = _has_cut(weights) | is_obstacle
+    is_driven = here.is_within(BESIDE_PATH_M, path_m) & ~_without_gaps(is_obstacle)
+    is_edge = (_has_cut(weights) & ~is_driven) | is_obstacle
     is_way_back = way_back(path, agent, is_known & ~is_edge, is_obstacle, here)
-    weights = _opened(weights, is_way_back)
+    weights = _opened(weights, is_way_back | is_driven)
 
     share = _shares(is_edge)
     share[is_way_back & is_edge] = config.doubt_weight
@@ -122,6 +126,11 @@ def stands_there(obstacle: Singles) -> Booleans:
     around = ndimage.uniform_filter(obstacle, 3, mode="constant") * SQUARE.size
     is_spread = (obstacle >= SPREAD_FROM) & (around >= 3 * OBSTACLE_FROM)
     return np.asarray((obstacle >= OBSTACLE_FROM) | is_spread)
+
+
+def _without_gaps(is_obstacle: Booleans) -> Booleans:
+    """(w, h): the obstacles, and the gaps between them that are no wider than a place."""
+    return np.asarray(ndimage.binary_closing(is_obstacle, SQUARE) | is_obstacle)
 
 
 def _shares(is_edge: Booleans) -> Floats:

@@ -1,0 +1,71 @@
+"""Ground that the agent has driven over: free, whatever edge is mapped there since."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cogmap.graph.graph import Graph
+from cogmap.graph.window import WEIGHT_COLUMNS
+from schemas.array import Array, Matrix
+from schemas.graph import Cells
+from schemas.nodes import ROOT_MAP, Map, PathColumn, PathSegment, PlaceColumn, segment_id
+from services.codelets.planning.config import Config
+from services.codelets.planning.ground import Ground, ground
+from tests.support.world.scenes import agent
+
+LENGTH_M = 20
+EDGE_I = 10
+
+
+def _cells(column: PlaceColumn, i: range, j: range, value: float) -> Cells:
+    grid = np.meshgrid(np.arange(i.start, i.stop), np.arange(j.start, j.stop), indexing="ij")
+    cells = np.column_stack([axis.ravel() for axis in grid])
+    values = np.full(len(cells), value, np.float32)
+    return Cells(column=column, cells=Array.of(cells, "<i4"), values=Array.of(values))
+
+
+def _driven_street() -> Graph:
+    """A street along x, on whose middle the agent drove; an edge is mapped across it."""
+    graph = Graph()
+    rows = np.zeros((LENGTH_M, len(PathColumn)))
+    rows[:, PathColumn.X_M] = np.arange(LENGTH_M)
+    path = PathSegment(id=segment_id(0), number=0, rows=Matrix.of(rows))
+    graph.change([Map(id=ROOT_MAP, cell_m=1.0), agent(x_m=LENGTH_M - 1.0), path])
+
+    graph.change([_cells(PlaceColumn.ROAD, range(LENGTH_M), range(-3, 4), 1.0)])
+    for column in WEIGHT_COLUMNS:
+        graph.change([_cells(column, range(EDGE_I, EDGE_I + 1), range(-4, 5), 0.0)])
+    return graph
+
+
+def _ground(graph: Graph) -> Ground:
+    assert graph.agent is not None
+    return ground(graph, graph.agent, Config())
+
+
+def _is_free(around: Ground, i: int, j: int) -> bool:
+    return bool(around.is_free[around.network.index_of((i, j))])
+
+
+def test_what_the_agent_drove_over_is_free_though_an_edge_is_mapped_across_it() -> None:
+    around = _ground(_driven_street())
+
+    assert _is_free(around, EDGE_I, 0)
+    assert not _is_free(around, EDGE_I, 3)
+
+
+@pytest.mark.parametrize("beside", [range(0, 1), range(-1, 2)])
+def test_it_is_not_free_where_something_stands_there_by_now(beside: range) -> None:
+    graph = _driven_street()
+    graph.change([_cells(PlaceColumn.OBSTACLE, range(EDGE_I, EDGE_I + 1), beside, 1.0)])
+
+    assert not _is_free(_ground(graph), EDGE_I, 0)
+
+
+def test_a_narrow_gap_between_what_stands_there_by_now_is_not_free() -> None:
+    graph = _driven_street()
+    for side in (range(-3, 0), range(1, 4)):
+        graph.change([_cells(PlaceColumn.OBSTACLE, range(EDGE_I, EDGE_I + 1), side, 1.0)])
+
+    assert not _is_free(_ground(graph), EDGE_I, 0)
