@@ -22,6 +22,7 @@ from schemas.codelets import Proposal
 from schemas.graph import Delta
 from schemas.sensing import Percepts, SelfMotion
 from services import registry
+from services.codelets.localization import landmarks, localization
 
 # A robot whose senses nobody has calibrated, among landmarks no thicker than a finger: its gains
 # may err by what sensory memory takes for the wheels' noise and the paper for that of distances.
@@ -33,7 +34,8 @@ SPACING_M = 0.3
 SAMPLES = 1000
 NEVER_S = 1e9
 CYCLES_A_SEED = 1_000_000
-LOCALIZATION = "localization"
+LOCALIZATION = localization.CODELET.name
+LANDMARK = landmarks.CODELET.name
 Landmarks = dict[str, tuple[float, float]]
 
 
@@ -74,8 +76,7 @@ def sections(surveyed: bool) -> Sections:
 class LocalizationLoop:
     """Runs both modules on the in-memory bus, one cognitive cycle for each moment of a log.
 
-    `task_s` has the CPU time that the worker took for each phase's tasks of the last cycle, by the
-    codelet of the first.
+    `task_s` has each task of the last cycle: its codelet, and the CPU time that the worker took.
     """
 
     def __init__(

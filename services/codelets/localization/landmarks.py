@@ -1,4 +1,4 @@
-"""The landmark codelet: where each landmark in view is (paper §5.4, eq. 4)."""
+"""The landmark codelet: where the landmarks in view are (paper §5.4, eq. 4)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.array import Matrix
 from schemas.codelets import Task
-from schemas.graph import Link, Phase
+from schemas.graph import Link, Operation, Phase
 from schemas.nodes import (
     NEVER_NS,
     POSE_COLUMNS,
@@ -56,22 +56,28 @@ class Record(NamedTuple):
 FIRST = Record(1, 0)
 
 
-def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task for each object in view that the map has."""
-    tasks = []
-    for percept in sorted(context.percepts.objects, key=lambda percept: percept.label):
-        name = object_id(percept.label)
-        if name not in graph.nodes:
-            continue
+class Seen(NamedTuple):
+    """A percept, and the object that it is of."""
 
-        about = [SELF_ID, name]
-        task = context.task(CODELET.name, about, subject=percept.label, percepts=[percept])
-        tasks.append(task)
-    return tasks
+    percept: Percept
+    node: Object
+
+
+def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
+    """One task for all objects in view that the map has."""
+    known = []
+    for percept in sorted(context.percepts.objects, key=lambda percept: percept.label):
+        if object_id(percept.label) in graph.nodes:
+            known.append(percept)
+
+    if not known:
+        return []
+    about = [SELF_ID, *(object_id(percept.label) for percept in known)]
+    return [context.task(CODELET.name, about, percepts=known)]
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
-    """Eq. 4 for the one landmark and percept of `task`: keep the samples that agree with what is
+    """Eq. 4 for each percept of `task` and its landmark: keep the samples that agree with what is
     seen now.
 
     A landmark that disagrees in `config.misses` views in a row, or in more than it ever agreed
@@ -79,37 +85,20 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     not elsewhere. While the agent stands still and sees the same again, landmarks stay where they
     are; those that were surveyed always do.
     """
-    (percept,) = task.percepts
     agent = graph.agent
-    landmark = graph.get(Object, object_id(percept.label))
-    if agent is None or landmark is None:
-        raise MessageError(f"task {task.task_id}: the graph lacks the self or the landmark")
+    if agent is None:
+        raise MessageError(f"task {task.task_id}: the graph has no self node")
 
-    before = landmark.positions_m()
-    record = Record(landmark.sightings, landmark.misses)
-    if _stays(agent, landmark):
-        return _kept_answer(task, graph, landmark, record)
+    answer = Answer()
+    for percept in task.percepts:
+        landmark = graph.get(Object, object_id(percept.label))
+        if landmark is None:
+            raise MessageError(f"task {task.task_id}: the graph lacks {percept.label}")
 
-    rng = generator(task.task_id)
-    selves = nearby_selves(with_gains(agent.samples.numpy(), config, rng), config)
-    selves = rng.permutation(resample(selves, len(before), 0.0, rng))
-    mahalanobis2 = _mahalanobis2(before, selves, percept)
-    if mahalanobis2.min() < config.gate**2:
-        log_likelihood = -mahalanobis2 / 2 / config.correlated_views
-        kept = before[rejection_mask(log_likelihood, rng)]
-        after = resample(kept, len(before), _jitter_m(kept, config), rng)
-        record = Record(record.sightings + 1, 0)
-        return object_answer(task, graph, landmark, after, record)
+        seen = Seen(percept, landmark)
+        answer.operations.extend(_updated(seen, agent, task, graph, config))
 
-    misses = record.misses + 1
-    is_patient = misses < min(config.misses, record.sightings + 1)
-    if is_patient or _may_be_elsewhere(agent, task.stamp_ns):
-        record = Record(record.sightings, misses)
-        return _kept_answer(task, graph, landmark, record)
-
-    anew = msgspec.structs.replace(landmark, created_ns=task.stamp_ns)
-    positions_m = first_positions(selves, percept, config, rng)
-    return object_answer(task, graph, anew, positions_m, FIRST)
+    return answer
 
 
 CODELET = Codelet(
@@ -122,6 +111,36 @@ CODELET = Codelet(
     config=Config,
     section=SECTION,
 )
+
+
+def _updated(seen: Seen, agent: Self, task: Task, graph: Graph, config: Config) -> list[Operation]:
+    """A landmark after the view of `task`, and its link to the place there."""
+    percept, landmark = seen
+    before = landmark.positions_m()
+    record = Record(landmark.sightings, landmark.misses)
+    if _stays(agent, landmark):
+        return _refreshed(seen, task, graph, record)
+
+    rng = generator(f"{task.task_id}/{percept.label}")
+    selves = nearby_selves(with_gains(agent.samples.numpy(), config, rng), config)
+    selves = rng.permutation(resample(selves, len(before), 0.0, rng))
+    mahalanobis2 = _mahalanobis2(before, selves, percept)
+    if mahalanobis2.min() < config.gate**2:
+        log_likelihood = -mahalanobis2 / 2 / config.correlated_views
+        kept = before[rejection_mask(log_likelihood, rng)]
+        after = resample(kept, len(before), _jitter_m(kept, config), rng)
+        record = Record(record.sightings + 1, 0)
+        return located(seen, task, graph, after, record)
+
+    misses = record.misses + 1
+    is_patient = misses < min(config.misses, record.sightings + 1)
+    if is_patient or _may_be_elsewhere(agent, task.stamp_ns):
+        record = Record(record.sightings, misses)
+        return _refreshed(seen, task, graph, record)
+
+    anew = msgspec.structs.replace(landmark, created_ns=task.stamp_ns)
+    positions_m = first_positions(selves, percept, config, rng)
+    return located(Seen(percept, anew), task, graph, positions_m, FIRST)
 
 
 def nearby_selves(selves: Samples, config: Config) -> Samples:
@@ -173,32 +192,32 @@ def first_positions(
     return positions_m
 
 
-def object_answer(
-    task: Task, graph: Graph, node: Object, positions_m: Samples, record: Record
-) -> Answer:
-    """An object with new samples, refreshed by the percept of `task`, and its link to the place of
-    their mean.
+def located(
+    seen: Seen, task: Task, graph: Graph, positions_m: Samples, record: Record
+) -> list[Operation]:
+    """The object with new samples, refreshed by the percept in the view of `task`, and its link to
+    the place of their mean.
     """
     mean = positions_m.mean(axis=0)
     sd = spread(positions_m, mean)
-    located = msgspec.structs.replace(
-        node,
+    moved = msgspec.structs.replace(
+        seen.node,
         x_m=float(mean[0]),
         y_m=float(mean[1]),
         x_sd_m=float(sd[0]),
         y_sd_m=float(sd[1]),
         offsets_m=Matrix.of(positions_m - mean, "<f2"),
     )
-    return _kept_answer(task, graph, located, record)
+    return _refreshed(Seen(seen.percept, moved), task, graph, record)
 
 
-def _kept_answer(task: Task, graph: Graph, node: Object, record: Record) -> Answer:
-    """An object refreshed by the percept of `task`, its position as it is, and its link to the
-    place there. Being seen excites its activation; its base level is learned by consciousness
-    alone.
+def _refreshed(seen: Seen, task: Task, graph: Graph, record: Record) -> list[Operation]:
+    """The object refreshed by the percept in the view of `task`, its position as it is, and its
+    link to the place there. Being seen excites its activation; its base level is learned by
+    consciousness alone.
     """
-    (percept,) = task.percepts
-    seen = msgspec.structs.replace(
+    percept, node = seen
+    refreshed = msgspec.structs.replace(
         node,
         function=percept.function or node.function,
         activation=percept.activation,
@@ -211,9 +230,8 @@ def _kept_answer(task: Task, graph: Graph, node: Object, record: Record) -> Answ
         last_seen_ns=task.stamp_ns,
     )
     cell_m = graph.cell_m(node.map)
-    place = nearest_place(seen.x_m, seen.y_m, cell_m, node.map)
-    link = Link(source=seen.id, target=place, kind=LinkKind.AT)
-    return Answer([seen, link])
+    place = nearest_place(node.x_m, node.y_m, cell_m, node.map)
+    return [refreshed, Link(source=node.id, target=place, kind=LinkKind.AT)]
 
 
 def _jitter_m(kept: Samples, config: Config) -> Samples:

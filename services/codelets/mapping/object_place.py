@@ -14,9 +14,10 @@ from schemas.sensing import Percept
 from services.codelets.config import SECTION, Config
 from services.codelets.localization.landmarks import (
     FIRST,
+    Seen,
     first_positions,
+    located,
     nearby_selves,
-    object_answer,
 )
 from services.codelets.localization.motion_model import with_gains
 from services.codelets.localization.sampling import generator, resample
@@ -62,7 +63,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
 
     node = _new(percept, agent, task)
     positions_m = first_positions(selves, percept, config, rng)
-    return object_answer(task, graph, node, positions_m, FIRST)
+    return Answer(located(Seen(percept, node), task, graph, positions_m, FIRST))
 
 
 CODELET = Codelet(

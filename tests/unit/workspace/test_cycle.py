@@ -189,7 +189,7 @@ def test_a_known_object_is_located_and_an_unknown_one_is_placed() -> None:
 
     assert _names(_localized(desk)) == [
         "2/object_place/b",
-        "2/landmark/a",
+        "2/landmark",
         "2/road_place",
         "2/path",
     ]

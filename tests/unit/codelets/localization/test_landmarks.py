@@ -21,7 +21,7 @@ def _seen(
 ) -> Object:
     """The landmark after it was seen from the origin."""
     seen = percept("house", bearing_rad, range_m, bearing_sd_rad=0.02, range_sd_m=0.4)
-    asked = task("landmark", identifier=f"{number}/landmark/house", percepts=[seen])
+    asked = task("landmark", identifier=f"{number}/landmark", percepts=[seen])
     found, _ = run(asked, graph_of(agent(), known), config).operations
     assert isinstance(found, Object)
     return found
