@@ -12,8 +12,8 @@ class LinkKind(enum.StrEnum):
     to the object that it is a sighting of. OBSERVES and ALONG: from observations to the object
     observed, and to the path segment that they were made along. NEXT: between neighbouring place
     nodes; these are kept in the tiles' columns. TOWARDS: from a plan to its next goal. WITHIN: from
-    an object to the sub-map that holds it. BLOCKED: from a plan to a place node where what stands
-    there closes the road of its route.
+    an object to the sub-map that holds it. BLOCKED: to a place node where what stands there closes
+    a road, from the plan whose route leads there, or from the self, which drove there before.
     """
 
     AT = "at"

@@ -1,5 +1,5 @@
 """An attention codelet: what was expected and is not so. A building of the map is gone, or a street
-of the plan is closed.
+is closed that the plan counts on or the agent drove along.
 """
 
 from __future__ import annotations
@@ -20,13 +20,19 @@ from schemas.nodes import (
     Attention,
     LinkKind,
     Object,
+    PathSegment,
     PlaceColumn,
     Plan,
     Self,
     object_id,
     place_cell,
 )
-from services.codelets.attention.closure import SAME_CYCLES, closed_place, is_known
+from services.codelets.attention.closure import (
+    SAME_CYCLES,
+    closed_places,
+    expected_by,
+    is_known,
+)
 from services.codelets.attention.coalitions import coalition, felt
 from services.codelets.attention.config import SECTION, Config, Expectation
 from services.codelets.attention.disappearance import missing_objects
@@ -69,14 +75,13 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     if is_refractory(NAME, graph, task.cycle, settings.refractory_cycles):
         return kept(memory, graph)
 
-    content = _surprising(memory, graph)
+    links = _links_to_closed(memory, graph)
+    content = _surprising(memory, agent, links, graph)
     if not content:
         return kept(memory, graph)
 
-    links = _links_to_closed(memory, content)
-    found = coalition(
-        NAME, [agent, *content], graph, settings.base_level, links, feeling=Feeling.SURPRISE
-    )
+    nodes = content if content[0].id == SELF_ID else [agent, *content]
+    found = coalition(NAME, nodes, graph, settings.base_level, links, feeling=Feeling.SURPRISE)
     return brought(memory, found, task.cycle, graph)
 
 
@@ -85,7 +90,9 @@ CODELET = Codelet(
     phase=Phase.ATTENTION,
     due=due,
     run=run,
-    reads=frozenset({Self, Object, Plan, Attention, PlaceColumn.OBSTACLE, PlaceColumn.ROAD}),
+    reads=frozenset(
+        {Self, Object, Plan, PathSegment, Attention, PlaceColumn.OBSTACLE, PlaceColumn.ROAD}
+    ),
     writes=frozenset({Attention}),
     config=Config,
     section=SECTION,
@@ -133,7 +140,7 @@ def _is_near(node: Object | None, agent: Self, settings: Expectation) -> bool:
 
 
 def _with_closed(memory: Attention, task: Task, agent: Self, graph: Graph) -> Attention:
-    """`memory`, in which a closed place of the route is noted with its cycle, and pending, where no
+    """`memory`, in which closed places are noted with their cycle, and pending, each where no
     closure near it is known already.
     """
     noted = {}
@@ -142,29 +149,35 @@ def _with_closed(memory: Attention, task: Task, agent: Self, graph: Graph) -> At
         if not is_old:
             noted[name] = number
 
-    closed = closed_place(agent, graph)
-    if not closed or is_known(closed, noted, task.cycle, graph.cell_m(agent.map)):
-        return msgspec.structs.replace(memory, noted=noted)
+    new = []
+    for closed in closed_places(agent, graph):
+        if not is_known(closed, noted, task.cycle, graph.cell_m(agent.map)):
+            noted[closed] = task.cycle
+            new.append(closed)
 
-    noted[closed] = task.cycle
-    return with_pending(msgspec.structs.replace(memory, noted=noted), [closed])
+    return with_pending(msgspec.structs.replace(memory, noted=noted), new)
 
 
-def _surprising(memory: Attention, graph: Graph) -> list[AnyNode]:
-    """What is pending: the objects that are gone, and the plan where its road is closed."""
-    content: list[AnyNode] = [*nodes_of(graph, Object, sorted(memory.pending))]
+def _links_to_closed(memory: Attention, graph: Graph) -> list[Link]:
+    """The links to the places where road is closed, from what counted on it."""
+    links = []
+    for name in sorted(memory.pending):
+        if place_cell(name) is not None:
+            source = expected_by(name, graph)
+            links.append(Link(source=source, target=name, kind=LinkKind.BLOCKED))
+
+    return links
+
+
+def _surprising(memory: Attention, agent: Self, links: list[Link], graph: Graph) -> list[AnyNode]:
+    """What is pending: the objects that are gone, and the agent or the plan where road is closed
+    that it counted on.
+    """
+    misled = {link.source for link in links}
+    content: list[AnyNode] = [agent] if SELF_ID in misled else []
+    content += nodes_of(graph, Object, sorted(memory.pending))
     plan = graph.get(Plan, PLAN_ID)
-    if plan is not None and any(place_cell(name) is not None for name in memory.pending):
+    if plan is not None and PLAN_ID in misled:
         content.append(plan)
 
     return [felt(node, SURPRISE) for node in content]
-
-
-def _links_to_closed(memory: Attention, content: list[AnyNode]) -> list[Link]:
-    """The links of the plan to the places where its road is closed."""
-    names = {node.id for node in content}
-    if PLAN_ID not in names:
-        return []
-
-    places = [name for name in sorted(memory.pending) if place_cell(name) is not None]
-    return [Link(source=PLAN_ID, target=place, kind=LinkKind.BLOCKED) for place in places]

@@ -1,7 +1,8 @@
-"""A building of the map that is gone is a surprise, and a street of the plan that is closed."""
+"""A building of the map that is gone is a surprise, and a street that is closed."""
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import msgspec
@@ -18,10 +19,13 @@ from schemas.nodes import (
     AnyNode,
     Attention,
     LinkKind,
+    PathColumn,
+    PathSegment,
     PlaceColumn,
     Plan,
     PlanState,
     attention_id,
+    segment_id,
 )
 from services.codelets.attention.config import Config, Expectation
 from services.codelets.attention.disappearance import MANY_OBJECTS
@@ -244,6 +248,39 @@ def test_a_closure_is_brought_until_it_is_conscious_though_the_plan_is_another_b
     story.commit(Phase.BACKGROUND, [_plan(doubtful=True)], story.graph.cycle)
 
     assert len(story.looks(2)) == 1
+
+
+def _driven(heading_rad: float = 0.0) -> PathSegment:
+    """A path along the middle of the road, where the agent came or that it crossed."""
+    rows = np.zeros((40, len(PathColumn)))
+    rows[:, PathColumn.X_M] = np.arange(40)
+    rows[:, PathColumn.HEADING_RAD] = heading_rad
+    return PathSegment(id=segment_id(0), number=0, rows=Matrix.of(rows))
+
+
+def test_a_street_that_the_agent_drove_along_is_a_surprise_off_its_route_where_it_is_closed() -> (
+    None
+):
+    (found,) = Story(_driven(), ROAD, BARRIER).look()
+    blocked = [link for link in found.links if link.kind == LinkKind.BLOCKED]
+
+    assert [node.id for node in found.nodes] == ["self"]
+    assert [(link.source, link.target) for link in blocked] == [("self", "place:map:0:20:0")]
+    assert found.nodes[0].salience == -1.0
+
+
+def test_what_stands_beside_where_the_agent_drove_closes_nothing() -> None:
+    beside = _cells(PlaceColumn.OBSTACLE, [(20, j) for j in range(-3, 2)])
+
+    assert Story(_driven(), ROAD, beside).looks(3) == []
+
+
+def test_a_street_that_is_closed_far_away_is_not_seen_to_be() -> None:
+    assert Story(_driven(), ROAD, BARRIER).looks(3, x_m=-15.0) == []
+
+
+def test_what_stands_along_where_the_agent_drove_closes_nothing() -> None:
+    assert Story(_driven(math.pi / 2), ROAD, BARRIER).looks(3) == []
 
 
 @pytest.mark.parametrize(
