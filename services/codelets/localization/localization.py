@@ -65,6 +65,9 @@ from services.codelets.mapping.path import odometry_of, variances_of
 INFLATION = 1.5
 MAX_INFLATIONS = 6
 PATIENCE = 2
+# Of so many landmarks no two mistakes would agree: so few views that fit nothing are enough then.
+MANY = 3
+EARLY_MISFITS = 3
 STAGES = 3
 # Headings a radian apart, and those whose mean direction is no longer than that of a spread of one.
 TURNED_RAD = 1.0
@@ -306,8 +309,9 @@ def _relocalize(
     """Where several landmarks have not fitted for long, the agent is elsewhere: relocalize by all
     `percepts`.
 
-    That is where most of them fit one pose, together; else, after a while, it is nowhere else. It
-    is at once where its position is less certain than one look at a landmark makes it.
+    That is where most of them fit one pose, together, all the sooner where they are MANY; else,
+    after a while, it is nowhere else. It is at once where its position is less certain than one
+    look at a landmark makes it.
     """
     seen = sightings(percepts, graph, config.largest_landmark_sd_m, NEVER_NS)
     if seen is None:
@@ -316,11 +320,12 @@ def _relocalize(
     nearest_m = float(seen.range_m.min())
     is_unsure = position_sd_m(lost.samples) > nearest_m
     enough = SEVERAL if is_unsure else config.misfits_to_relocalize
-    if lost.misfit_count < enough:
+    if lost.misfit_count < min(enough, EARLY_MISFITS):
         return lost
 
     samples = relocalize(lost.samples, seen, config, rng)
-    believed = believed_of(samples, seen, is_unsure, config)
+    several = SEVERAL if lost.misfit_count >= enough else MANY
+    believed = believed_of(samples, seen, is_unsure, several, config)
     if believed is not None:
         found = resample(believed, len(samples), 0.0, rng)
         return Estimate(found, 0.0, was_kidnapped=not is_unsure)

@@ -126,14 +126,14 @@ def relocalize(gains: Samples, seen: Sighting, config: Config, rng: np.random.Ge
 
 
 def believed_of(
-    samples: Samples, seen: Sighting, is_unsure: bool, config: Config
+    samples: Samples, seen: Sighting, is_unsure: bool, several: int, config: Config
 ) -> Samples | None:
     """Those of relocalization's (n, 7) samples that the agent believes to be where it is; None
     where it believes none.
 
     It believes them where most landmarks fit one of them together, each by how certain its name is.
     Where it was sure to be elsewhere, it believes only those that the most fit, if they are in one
-    place, and SEVERAL landmarks at least do: one whose own place is not sure counts for half, for
+    place, and `several` landmarks at least do: one whose own place is not sure counts for half, for
     two of those fit somewhere nearly always.
     """
     weights = seen.weights
@@ -147,7 +147,7 @@ def believed_of(
 
     variance_m2 = np.trace(seen.covariance_m2, axis1=1, axis2=2) / 2
     weights *= np.where(variance_m2 <= SURE_M**2, 1.0, 0.5)
-    if weights[is_fitting[:, best]].sum() < SEVERAL:
+    if weights[is_fitting[:, best]].sum() < several:
         return None
 
     there = samples[np.isclose(fitting, fitting[best])]

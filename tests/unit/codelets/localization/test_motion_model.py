@@ -23,6 +23,7 @@ Pose = tuple[float, float, float]
 UNKNOWN_BEARING = {"bearing_sd_rad": 2 * math.pi}
 CONFIG = Config(correlated_views=1.0)
 A_METRE = np.array([[1.0, 0.0, 1.0, 0.1, 0.0]])
+TWO = ("mill", "tower")
 THREE = ("mill", "tower", "church")
 UNKNOWN_RANGE = {"range_sd_m": 1e3}
 
@@ -120,16 +121,19 @@ def _looking(views: int) -> Self:
     return agent
 
 
-def _carried(sd_m: float = 0.01, **facts: float) -> Self:
-    """An agent that was carried off, and sees two landmarks so, whose own places are known to
-    `sd_m`.
-    """
+def _carried(
+    sd_m: float = 0.01,
+    labels: tuple[str, ...] = TWO,
+    views: int = CONFIG.misfits_to_relocalize + 2,
+    **facts: float,
+) -> Self:
+    """An agent that was carried off, and sees landmarks whose own places are known to `sd_m`."""
     agent = _agent()
     true = (-40.0, 10.0, 2.0)
-    known = _known("mill", "tower", sd_m=sd_m)
-    for number in range(1, CONFIG.misfits_to_relocalize + 3):
+    known = _known(*labels, sd_m=sd_m)
+    for number in range(1, views + 1):
         true = _ahead(true)
-        seen = [_seen(true, "mill", **facts), _seen(true, "tower", **facts)]
+        seen = [_seen(true, label, **facts) for label in labels]
         agent = _move(agent, number, known, seen, CONFIG)
 
     return agent
@@ -148,6 +152,18 @@ def test_two_landmarks_carry_the_agent_off_only_where_their_names_are_sure(
     evidence: float, is_moved: bool
 ) -> None:
     was_moved = _carried(evidence=evidence).odometry_x_m < 0.0
+    assert was_moved == is_moved
+
+
+@pytest.mark.parametrize(
+    ("labels", "evidence", "is_moved"),
+    [(THREE, 0.95, True), (THREE, 0.75, False), (TWO, 0.95, False)],
+    ids=["three", "three unsure names", "two"],
+)
+def test_a_few_views_are_enough_where_three_landmarks_agree(
+    labels: tuple[str, ...], evidence: float, is_moved: bool
+) -> None:
+    was_moved = _carried(labels=labels, views=4, evidence=evidence).odometry_x_m < 0.0
     assert was_moved == is_moved
 
 
