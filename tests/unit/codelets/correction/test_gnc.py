@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+from benchmarks.map_correction.false_groups import false_closures
 from services.codelets.correction.gnc import inliers
 from services.codelets.correction.least_squares import optimize
 from tests.support.world.laps import CLOSURE_SD, error_m, laps, one_between
@@ -29,6 +31,17 @@ def test_false_closures_are_outliers_and_true_ones_inliers(
     kept = optimize(measured.with_closures(closures.select(hold)))
     best = optimize(measured.with_closures(closures.select(measured.is_true)))
     assert error_m(kept, measured.truth) < 1.2 * error_m(best, measured.truth) + 0.05
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_false_closures_that_agree_with_one_another_count_once(seed: int) -> None:
+    measured = laps(seed=seed)
+    own = measured.graph.closures
+    false = false_closures(measured.graph, 10, 5, np.random.default_rng(seed))
+
+    hold = inliers(measured.with_closures(own + false), FALSE_CLOSURE)
+    assert not hold[len(own) :].any()
+    assert hold[: len(own)].mean() > 0.9
 
 
 @pytest.mark.parametrize(("error_x_m", "holds"), [(0.0, True), (60.0, False)])
