@@ -84,7 +84,13 @@ def _kept(setting: Setting, graph: PoseGraph) -> tuple[Booleans, Floats]:
     rng = np.random.default_rng([SEED, count, size])
     closures = graph.closures + false_closures(graph, count, size, rng)
 
-    is_kept = inliers(graph.with_closures(closures), Config().false_closure)
+    # As they come to light on the way: the graph's own are not the first.
+    ends = np.maximum(closures.i, closures.j)
+    order = np.lexsort((closures.i, ends))
+    in_order = graph.with_closures(closures.select(order))
+
+    is_kept = np.zeros(len(closures), bool)
+    is_kept[order] = inliers(in_order, Config().false_closure)
     poses = optimize(graph.with_closures(closures.select(is_kept)))
     return is_kept, poses
 

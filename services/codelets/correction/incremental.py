@@ -66,6 +66,11 @@ class IncrementalSolver:
         """Optimize and factor with all closures so far: for when there is time."""
         self._relinearize(self.graph)
 
+    @property
+    def cost(self) -> float:
+        """The cost of the path, after `add` as linear updates predict it."""
+        return self._cost
+
     def chi_square(self, closure: Constraints) -> float:
         """The squared Mahalanobis distance of one closure from what the others predict of it."""
         return self._update(closure).chi_square
