@@ -102,6 +102,20 @@ def test_a_path_that_fits_better_than_stated_forgives_closures_less(seed: int) -
     assert true.all()
 
 
+@pytest.mark.parametrize("seed", [2, 5])
+def test_where_most_closures_are_false_those_hold_that_state_one_thing(seed: int) -> None:
+    measured = laps(2, seed)
+    rng = np.random.default_rng([seed, 30])
+    first = np.arange(12)
+    street = between(first, first + LAP, rng.normal(0.0, 1.0, (12, 3)) * CLOSURE_SD, CLOSURE_SD)
+    uncertain = measured.graph.steps.weighted(np.full(len(measured.graph.steps), 1 / 16))
+    graph = PoseGraph(measured.graph.poses, uncertain, street)
+
+    true, of_false = _judged(replace(measured, graph=graph), false_closures(graph, 30, 3, rng))
+    assert true.all()
+    assert not of_false.any()
+
+
 def _exact(measured: Laps) -> Laps:
     """The same without noise in its steps and closures."""
     graph = measured.graph
