@@ -11,6 +11,7 @@ from benchmarks.map_correction.false_groups import false_closures
 from cogmap.geometry.arrays import Booleans
 from cogmap.geometry.se2 import relative
 from services.codelets.correction.gnc import inliers
+from services.codelets.correction.hypotheses import Hypotheses
 from services.codelets.correction.least_squares import optimize
 from services.codelets.correction.pose_graph import Constraints, PoseGraph
 from tests.support.world.laps import (
@@ -122,6 +123,21 @@ def _exact(measured: Laps) -> Laps:
     steps = replace(graph.steps, measurement=relative(measured.truth[:-1], measured.truth[1:]))
     closures = replace(graph.closures, measurement=np.zeros_like(graph.closures.measurement))
     return replace(measured, graph=PoseGraph(measured.truth, steps, closures))
+
+
+def test_what_most_closures_state_is_believed_first_where_nothing_is_yet() -> None:
+    exact = _exact(laps(2))
+    few = np.array([5, 6, 7])
+    mistaken = between(few, few + LAP, np.tile([3.0, 0.0, 0.0], (3, 1)), CLOSURE_SD)
+    many = np.arange(20, 32)
+    street = between(many, many + LAP, np.zeros((12, 3)), CLOSURE_SD)
+
+    hypotheses = Hypotheses(exact.with_closures(mistaken + street), FALSE_CLOSURE)
+    holds = hypotheses.settled(np.zeros(15, bool))
+    assert holds.tolist() == [False] * 3 + [True] * 12
+
+    alone = Hypotheses(exact.with_closures(mistaken), FALSE_CLOSURE)
+    assert alone.settled(np.zeros(3, bool)).all()
 
 
 def test_closures_along_one_street_do_not_tell_how_far_the_path_drifts_elsewhere() -> None:
