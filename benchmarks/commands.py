@@ -18,6 +18,7 @@ from benchmarks.explore.command import explore_command
 from benchmarks.learning.command import learning_command
 from benchmarks.lifelong.command import lifelong_command
 from benchmarks.localization import measure as localization
+from benchmarks.map_correction import false_groups
 from benchmarks.map_correction import measure as map_correction
 from benchmarks.map_size import measure as map_size
 from benchmarks.map_structure import measure as map_structure
@@ -293,15 +294,34 @@ def localization_command(folder: Path, processes: int, json_path: Path | None) -
     metavar="FILE",
     help="Its true poses, a line each: x, y and heading, with an index before them or not.",
 )
+@click.option(
+    "--false-groups",
+    "has_false_groups",
+    is_flag=True,
+    help="Add false closures, alone and in groups that agree, and tell which are believed.",
+)
+@processes_option
 @json_option
 def map_correction_command(
-    graph_path: Path, truth_path: Path | None, json_path: Path | None
+    graph_path: Path,
+    truth_path: Path | None,
+    has_false_groups: bool,
+    processes: int,
+    json_path: Path | None,
 ) -> None:
     """How well and how fast loops are closed, on a pose graph that was recorded elsewhere.
 
     By the paper's rule, for positions only, against exact least squares; with headings too, against
     gtsam, which `make bench-setup` installs; and one closure at a time. Takes up to half a minute.
+    With --false-groups instead: 10, 50 and 100 false closures, alone and in groups of 3 and 5; the
+    errors that they cause are measured where there is a --truth. Takes some minutes.
     """
+    if has_false_groups:
+        with bar("judging false closures") as progress:
+            metrics = false_groups.measure(graph_path, truth_path, processes, progress)
+        report_metrics("false closures", false_groups.THRESHOLDS, metrics, json_path)
+        return
+
     metrics = map_correction.measure(graph_path, truth_path)
     report_metrics("map correction", map_correction.THRESHOLDS, metrics, json_path)
 

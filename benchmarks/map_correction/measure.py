@@ -46,7 +46,7 @@ def measure(graph_path: Path, truth_path: Path | None) -> Metrics:
     Raises UsageError where a file cannot be read, or gtsam or evo is not installed.
     """
     graph = read_graph(graph_path)
-    truth_m = _truth(truth_path, graph_path, len(graph.poses))
+    truth_m = read_truth(truth_path, graph_path, len(graph.poses))
     peer = Gtsam(graph.poses, graph.constraints)
 
     metrics = {
@@ -99,7 +99,7 @@ def read_graph(path: Path) -> PoseGraph:
         raise UsageError(f"{path}: {error}") from None
 
 
-def _truth(path: Path | None, graph_path: Path, count: int) -> Floats | None:
+def read_truth(path: Path | None, graph_path: Path, count: int) -> Floats | None:
     if path is None:
         return None
 

@@ -3,27 +3,27 @@ the map (beyond the paper).
 
 Yang et al. 2020 (doi 10.1109/LRA.2020.2965893) on truncated least squares: at first every closure
 has its full weight, and the weight of those that fit badly falls round by round, until each closure
-is an inlier or an outlier. Outliers are then compared with all inliers.
+is an inlier or an outlier.
+
+Closures that state the same pull as one. What the weights lead to is then settled by hypotheses.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import chdtri
 
 from cogmap.geometry.arrays import Booleans, Floats
-from services.codelets.correction.incremental import IncrementalSolver
+from services.codelets.correction.hypotheses import Hypotheses
 from services.codelets.correction.least_squares import optimize
-from services.codelets.correction.pose_graph import (
-    Constraints,
-    PoseGraph,
-    mahalanobis2,
-    residuals,
-)
+from services.codelets.correction.pose_graph import PoseGraph, mahalanobis2, residuals
 
 CONVEXITY_FACTOR = 1.4
 MAX_ROUNDS = 60
 MIN_WEIGHT = 1e-6
+# A round need not converge: the next one goes on with other weights.
+ITERATIONS_PER_ROUND = 20
+# Where weights leave fewer, most closures contradict one another, and who fell first says little.
+RELIABLE_SHARE = 0.5
 
 
 def inliers(graph: PoseGraph, false_closure: float) -> Booleans:
@@ -31,31 +31,25 @@ def inliers(graph: PoseGraph, false_closure: float) -> Booleans:
     if not len(graph.closures):
         return np.zeros(0, bool)
 
-    threshold = thresholds(graph.closures, false_closure)
-    accepted = _by_weights(graph, threshold)
-    return _readmit(graph, accepted, threshold)
+    hypotheses = Hypotheses(graph, false_closure)
+    weighty = _by_weights(graph, hypotheses)
+    settled = hypotheses.settled(weighty)
+    if weighty.mean() >= RELIABLE_SHARE or not weighty.any():
+        return settled
+
+    nothing = np.zeros_like(weighty)
+    by_path_alone = hypotheses.settled(nothing)
+    anew = hypotheses.settled(by_path_alone)
+    return min(settled, anew, key=hypotheses.truncated_cost)
 
 
-def thresholds(closures: Constraints, false_closure: float) -> Floats:
-    """(m,): the squared Mahalanobis distance that a true closure exceeds with probability
-    `false_closure`; its degrees of freedom are the rank of its information.
-    """
-    eigenvalues = np.linalg.eigvalsh(closures.information)
-    largest = eigenvalues[:, -1:]
-    is_measured = eigenvalues > 1e-9 * largest
-
-    degrees = is_measured.sum(axis=1)
-    threshold: Floats = chdtri(degrees, false_closure)
-    return threshold
-
-
-def _by_weights(graph: PoseGraph, threshold: Floats) -> Booleans:
+def _by_weights(graph: PoseGraph, hypotheses: Hypotheses) -> Booleans:
     """(m,): which closures keep their weight."""
     weights = np.ones(len(graph.closures))
     convexity = 0.0
 
     for _ in range(MAX_ROUNDS):
-        excess = _excess(graph, weights, threshold)
+        excess = _excess(graph, weights * hypotheses.shares, hypotheses.threshold)
         if not convexity:
             worst = excess.max()
             if worst <= 1:
@@ -75,7 +69,7 @@ def _excess(graph: PoseGraph, weights: Floats, threshold: Floats) -> Floats:
     """(m,): each closure's misfit of the path that so weighted ones lead to, over its threshold."""
     closures = graph.closures
     weighted = graph.with_closures(closures.weighted(weights))
-    poses = optimize(weighted)
+    poses = optimize(weighted, ITERATIONS_PER_ROUND)
 
     residual = residuals(poses, closures)
     return mahalanobis2(residual, closures.information) / threshold
@@ -86,20 +80,3 @@ def _weights(excess: Floats, convexity: float) -> Floats:
     squared = convexity * (convexity + 1) / excess.clip(1e-12)
     surrogate = np.sqrt(squared) - convexity
     return surrogate.clip(MIN_WEIGHT, 1.0)
-
-
-def _readmit(graph: PoseGraph, accepted: Booleans, threshold: Floats) -> Booleans:
-    """Accept outliers that agree with all inliers: the path between the two may be long and
-    uncertain.
-    """
-    closures = graph.closures
-    solver = IncrementalSolver(graph.with_closures(closures.select(accepted)))
-
-    result = accepted.copy()
-    for index in np.flatnonzero(~accepted):
-        closure = closures.select(np.array([index]))
-        if solver.chi_square(closure) <= threshold[index]:
-            solver.add(closure)
-            result[index] = True
-
-    return result

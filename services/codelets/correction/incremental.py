@@ -19,6 +19,7 @@ from services.codelets.correction.pose_graph import (
     PoseGraph,
     cost,
     jacobians,
+    matvec,
     residuals,
     sqrt_information,
 )
@@ -65,9 +66,33 @@ class IncrementalSolver:
         """Optimize and factor with all closures so far: for when there is time."""
         self._relinearize(self.graph)
 
+    @property
+    def cost(self) -> float:
+        """The cost of the path, after `add` as linear updates predict it."""
+        return self._cost
+
     def chi_square(self, closure: Constraints) -> float:
         """The squared Mahalanobis distance of one closure from what the others predict of it."""
         return self._update(closure).chi_square
+
+    def chi_square_without(self, closures: Constraints) -> float:
+        """The squared Mahalanobis distance of closures that are in, together, from what all others
+        predict of them.
+        """
+        roots = sqrt_information(closures.information)
+        columns = []
+        for number, root in enumerate(roots):
+            of_closure, _ = self._columns(closures.select(np.array([number])), root)
+            columns.append(of_closure)
+
+        joined = np.hstack(columns)
+        everywhere = np.arange(len(joined))
+        leverage = joined.T @ self._solve(joined, everywhere)
+
+        residual = residuals(self.graph.poses, closures)
+        whitened = matvec(roots.mT, residual).reshape(-1)
+        is_free = np.eye(len(whitened)) - leverage
+        return float(whitened @ np.linalg.solve(is_free, whitened))
 
     def add(self, closure: Constraints) -> Floats:
         """Take in one more closure. Returns the (n, 3) poses after it."""

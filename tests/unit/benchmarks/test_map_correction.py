@@ -8,12 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.map_correction import reference
+from benchmarks.map_correction import false_groups, reference
+from benchmarks.map_correction.false_groups import MIN_APART, false_closures
 from benchmarks.map_correction.measure import measure, read_graph
 from benchmarks.trajectory import trajectory_error_m
 from cogmap.errors import UsageError
+from cogmap.geometry.se2 import compose, integrate, relative
 from services.codelets.correction.pose_graph import cost
 from services.codelets.correction.reverse_replay import close_loops, displacements, position_cost
+from tests.support.world.laps import laps
 
 SQUARE = """VERTEX_SE2 0 0 0 0
 VERTEX_SE2 1 1 0 1.5
@@ -109,3 +112,21 @@ def test_a_truth_of_another_length_is_refused(tmp_path: Path) -> None:
 
     with pytest.raises(UsageError, match="has 1 poses"):
         measure(_square(tmp_path), truth)
+
+
+def test_the_false_closures_of_a_group_agree_with_one_another() -> None:
+    graph = laps(4).graph
+    false = false_closures(graph, 9, 3, np.random.default_rng(1))
+    path = integrate(np.zeros(3), graph.steps.measurement)
+
+    round_trip = relative(
+        compose(relative(path[false.i[0]], path[false.i[1]]), false.measurement[1]),
+        compose(false.measurement[0], relative(path[false.j[0]], path[false.j[1]])),
+    )
+    assert round_trip == pytest.approx(np.zeros(3), abs=1e-9)
+    assert (np.abs(false.j - false.i) >= MIN_APART).all()
+
+
+def test_a_path_too_short_for_false_closures_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="5 poses"):
+        false_groups.measure(_square(tmp_path), None, 1, lambda share: None)

@@ -23,7 +23,7 @@ from schemas.nodes import (
 )
 from services.codelets.mapping.path import ODOMETRY, POSE, STAMP, rows_of
 from tests.support.paths import mean_distance_m, steps_m
-from tests.support.world.loop_drive import LAP, QUIET, SLIP, TOWER, LoopDrive, round_once
+from tests.support.world.loop_drive import HOUSE, LAP, QUIET, SLIP, TOWER, LoopDrive, round_once
 from tests.support.world.scenes import Desk, stamp_ns
 
 
@@ -278,12 +278,20 @@ def test_closures_that_agree_beyond_possible_drift_are_rejected() -> None:
     assert CORRECTION_ID not in drive.desk.graph.nodes
 
 
-def test_accepted_closures_are_undone_when_later_ones_contradict_them() -> None:
+def _house_error_m(drive: LoopDrive) -> float:
+    house = _object(drive.desk, "house")
+    x_m, y_m = HOUSE["house"]
+    return math.hypot(house.x_m - x_m, house.y_m - y_m)
+
+
+def test_a_corrected_map_that_the_next_drive_contradicts_is_taken_back() -> None:
     drive = round_once(LoopDrive())
     # Sixteen metres off: not more than path integration may have been wrong by.
     drive.meet(3, late=8)
     drive.go(5, {})
     wrong_m = drive.error_m()
+    wrong_path_m = _path_error_m(drive)
+    wrong_house_m = _house_error_m(drive)
 
     assert _accepted(drive.desk) == [True] * 3
 
@@ -293,3 +301,5 @@ def test_accepted_closures_are_undone_when_later_ones_contradict_them() -> None:
 
     assert [closure.accepted for closure in closures] == [False] * 3 + [True] * 10
     assert drive.error_m() < 0.5 * wrong_m
+    assert _path_error_m(drive) < 0.5 * wrong_path_m
+    assert _house_error_m(drive) < 0.5 * wrong_house_m

@@ -1,0 +1,137 @@
+"""False loop closures, alone and in groups that agree with one another, and what they do to a map.
+
+A group is what two streets that look alike give: closures from successive places to successive
+places, each the one that path integration makes of the first.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.map_correction.measure import read_graph, read_truth
+from benchmarks.report import Metrics
+from benchmarks.threshold import at_least, at_most
+from benchmarks.trajectory import trajectory_error_m
+from cogmap.errors import UsageError
+from cogmap.geometry.arrays import Booleans, Floats
+from cogmap.geometry.se2 import compose, integrate, relative
+from cogmap.parallel import parallel_map
+from cogmap.recording.storage.reader import Progress
+from services.codelets.config import Config
+from services.codelets.correction.gnc import inliers
+from services.codelets.correction.least_squares import optimize
+from services.codelets.correction.pose_graph import Constraints, PoseGraph
+
+THRESHOLDS = {
+    "ate_ratio": at_most(1.1),
+    "true_kept": at_least(0.95),
+}
+COUNTS = (10, 50, 100)
+SIZES = (1, 3, 5)
+MIN_APART = 100
+POSITION_M = 1.0
+HEADING_SD_RAD = 0.05
+SEED = 7
+Setting = tuple[int, int]
+
+
+def measure(
+    graph_path: Path, truth_path: Path | None, processes: int, progress: Progress
+) -> Metrics:
+    """The worst of each over all counts of false closures and sizes of groups, and each one's.
+
+    Errors are only measured where there is a truth. Raises UsageError where a file cannot be read,
+    or evo is not installed.
+    """
+    graph = read_graph(graph_path)
+    if len(graph.poses) < 2 * MIN_APART:
+        raise UsageError(f"{graph_path} has {len(graph.poses)} poses: give one of {2 * MIN_APART}")
+
+    truth_m = read_truth(truth_path, graph_path, len(graph.poses))
+    without = optimize(graph)
+
+    settings = list(product(COUNTS, SIZES))
+    work = partial(_kept, graph=graph)
+    kept = parallel_map(work, settings, processes, progress)
+
+    metrics: Metrics = {}
+    ratios = []
+    true_shares = []
+    for (count, size), (is_kept, poses) in zip(settings, kept, strict=True):
+        of_true, of_false = np.split(is_kept, [len(graph.closures)])
+        name = f"{count}_by_{size}"
+        true_shares.append(float(of_true.mean()))
+        metrics[f"true_kept_{name}"] = true_shares[-1]
+        metrics[f"false_kept_{name}"] = float(of_false.sum())
+
+        if truth_m is not None:
+            error_m = trajectory_error_m(poses[:, :2], truth_m)
+            ratios.append(error_m / trajectory_error_m(without[:, :2], truth_m))
+            metrics[f"ate_ratio_{name}"] = ratios[-1]
+
+    if ratios:
+        metrics["ate_ratio"] = max(ratios)
+    return metrics | {"true_kept": min(true_shares)}
+
+
+def _kept(setting: Setting, graph: PoseGraph) -> tuple[Booleans, Floats]:
+    """Which closures are inliers, the graph's own before the false ones, and the path by those."""
+    count, size = setting
+    rng = np.random.default_rng([SEED, count, size])
+    closures = graph.closures + false_closures(graph, count, size, rng)
+
+    # As they come to light on the way: the graph's own are not the first.
+    ends = np.maximum(closures.i, closures.j)
+    order = np.lexsort((closures.i, ends))
+    in_order = graph.with_closures(closures.select(order))
+
+    is_kept = np.zeros(len(closures), bool)
+    is_kept[order] = inliers(in_order, Config().false_closure)
+    poses = optimize(graph.with_closures(closures.select(is_kept)))
+    return is_kept, poses
+
+
+def false_closures(
+    graph: PoseGraph, count: int, size: int, rng: np.random.Generator
+) -> Constraints:
+    """`count` false closures in groups of `size` that agree, as certain as those of the graph."""
+    path = integrate(np.zeros(3), graph.steps.measurement)
+    rows: list[tuple[int, int, Floats]] = []
+    while len(rows) < count:
+        first, later = sorted(rng.integers(0, len(path) - size, 2).tolist())
+        if later - first < MIN_APART:
+            continue
+
+        group = _group(path, (first, later), size, rng)
+        rows += group[: count - len(rows)]
+
+    i, j, measurement = zip(*rows, strict=True)
+    typical = np.median(graph.closures.information, axis=0)
+    return Constraints(
+        i=np.array(i),
+        j=np.array(j),
+        measurement=np.array(measurement),
+        information=np.repeat(typical[None], count, axis=0),
+    )
+
+
+def _group(
+    path: Floats, places: tuple[int, int], size: int, rng: np.random.Generator
+) -> list[tuple[int, int, Floats]]:
+    """From where to where each closure of a group leads, and what it measures, (3,)."""
+    first, later = places
+    turned_rad = rng.choice([0.0, np.pi]) + rng.normal(0.0, HEADING_SD_RAD)
+    seen = np.array([*rng.uniform(-POSITION_M, POSITION_M, 2), turned_rad])
+
+    group = []
+    for step in range(size):
+        since_first = relative(path[first], path[first + step])
+        since_later = relative(path[later], path[later + step])
+        measured = relative(since_first, compose(seen, since_later))
+        group.append((first + step, later + step, measured))
+
+    return group
