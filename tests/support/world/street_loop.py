@@ -35,6 +35,12 @@ def cells_of(
     return Cells(column=column, cells=Array.of(cells, "<i4"), values=Array.of(values))
 
 
+def block_of(column: PlaceColumn, i: range, j: range, value: float) -> Cells:
+    """One value in a column of a rectangle of cells."""
+    grid = np.meshgrid(np.arange(i.start, i.stop), np.arange(j.start, j.stop), indexing="ij")
+    return cells_of(column, np.column_stack([axis.ravel() for axis in grid]), value)
+
+
 def barrier(i: int, j: int) -> Cells:
     """Obstacles across a street that leads along x, at column i around row j."""
     rows = np.arange(j - 4, j + 5)

@@ -7,22 +7,15 @@ import pytest
 
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import WEIGHT_COLUMNS
-from schemas.array import Array, Matrix
-from schemas.graph import Cells
+from schemas.array import Matrix
 from schemas.nodes import ROOT_MAP, Map, PathColumn, PathSegment, PlaceColumn, segment_id
 from services.codelets.planning.config import Config
 from services.codelets.planning.ground import Ground, ground
 from tests.support.world.scenes import agent
+from tests.support.world.street_loop import block_of
 
 LENGTH_M = 20
 EDGE_I = 10
-
-
-def _cells(column: PlaceColumn, i: range, j: range, value: float) -> Cells:
-    grid = np.meshgrid(np.arange(i.start, i.stop), np.arange(j.start, j.stop), indexing="ij")
-    cells = np.column_stack([axis.ravel() for axis in grid])
-    values = np.full(len(cells), value, np.float32)
-    return Cells(column=column, cells=Array.of(cells, "<i4"), values=Array.of(values))
 
 
 def _driven_street() -> Graph:
@@ -33,9 +26,9 @@ def _driven_street() -> Graph:
     path = PathSegment(id=segment_id(0), number=0, rows=Matrix.of(rows))
     graph.change([Map(id=ROOT_MAP, cell_m=1.0), agent(x_m=LENGTH_M - 1.0), path])
 
-    graph.change([_cells(PlaceColumn.ROAD, range(LENGTH_M), range(-3, 4), 1.0)])
+    graph.change([block_of(PlaceColumn.ROAD, range(LENGTH_M), range(-3, 4), 1.0)])
     for column in WEIGHT_COLUMNS:
-        graph.change([_cells(column, range(EDGE_I, EDGE_I + 1), range(-4, 5), 0.0)])
+        graph.change([block_of(column, range(EDGE_I, EDGE_I + 1), range(-4, 5), 0.0)])
     return graph
 
 
@@ -58,7 +51,7 @@ def test_what_the_agent_drove_over_is_free_though_an_edge_is_mapped_across_it() 
 @pytest.mark.parametrize("beside", [range(0, 1), range(-1, 2)])
 def test_it_is_not_free_where_something_stands_there_by_now(beside: range) -> None:
     graph = _driven_street()
-    graph.change([_cells(PlaceColumn.OBSTACLE, range(EDGE_I, EDGE_I + 1), beside, 1.0)])
+    graph.change([block_of(PlaceColumn.OBSTACLE, range(EDGE_I, EDGE_I + 1), beside, 1.0)])
 
     assert not _is_free(_ground(graph), EDGE_I, 0)
 
@@ -66,6 +59,6 @@ def test_it_is_not_free_where_something_stands_there_by_now(beside: range) -> No
 def test_a_narrow_gap_between_what_stands_there_by_now_is_not_free() -> None:
     graph = _driven_street()
     for side in (range(-3, 0), range(1, 4)):
-        graph.change([_cells(PlaceColumn.OBSTACLE, range(EDGE_I, EDGE_I + 1), side, 1.0)])
+        graph.change([block_of(PlaceColumn.OBSTACLE, range(EDGE_I, EDGE_I + 1), side, 1.0)])
 
     assert not _is_free(_ground(graph), EDGE_I, 0)

@@ -9,9 +9,8 @@ import pytest
 
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import WEIGHT_COLUMNS
-from schemas.array import Array, Matrix
+from schemas.array import Matrix
 from schemas.codelets import Task
-from schemas.graph import Cells
 from schemas.nodes import (
     PLAN_ID,
     ROOT_MAP,
@@ -28,28 +27,22 @@ from services.codelets.planning.config import Config
 from services.codelets.planning.ground import ground
 from services.codelets.planning.route_plan import run
 from tests.support.world.scenes import agent
+from tests.support.world.street_loop import block_of
 
 NOW_S = 1000.0
 LONG_AGO_S = NOW_S - 200.0
 EAST_END = 40
 
 
-def _cells(column: PlaceColumn, i: range, j: range, value: float) -> Cells:
-    grid = np.meshgrid(np.arange(i.start, i.stop), np.arange(j.start, j.stop), indexing="ij")
-    cells = np.column_stack([axis.ravel() for axis in grid])
-    values = np.full(len(cells), value, np.float32)
-    return Cells(column=column, cells=Array.of(cells, "<i4"), values=Array.of(values))
-
-
 def _street() -> Graph:
     """A street along x with kerbs on both sides and at its west end; its east end is open."""
     graph = Graph()
     graph.change([Map(id=ROOT_MAP, cell_m=1.0)])
-    graph.change([_cells(PlaceColumn.ROAD, range(EAST_END + 1), range(-3, 4), 1.0)])
+    graph.change([block_of(PlaceColumn.ROAD, range(EAST_END + 1), range(-3, 4), 1.0)])
     for column in WEIGHT_COLUMNS:
         for side in (range(-5, -3), range(4, 6)):
-            graph.change([_cells(column, range(-2, EAST_END + 1), side, 0.0)])
-        graph.change([_cells(column, range(-2, 0), range(-5, 6), 0.0)])
+            graph.change([block_of(column, range(-2, EAST_END + 1), side, 0.0)])
+        graph.change([block_of(column, range(-2, 0), range(-5, 6), 0.0)])
     return graph
 
 
@@ -98,7 +91,7 @@ def test_an_agent_that_left_the_road_goes_back_to_explore() -> None:
 def test_it_does_not_go_back_through_what_stands_there_now() -> None:
     graph = _street()
     _came_from_the_street(graph)
-    graph.change([_cells(PlaceColumn.OBSTACLE, range(15, 26), range(7, 9), 1.0)])
+    graph.change([block_of(PlaceColumn.OBSTACLE, range(15, 26), range(7, 9), 1.0)])
 
     assert _plan(graph).state is PlanState.NO_GOAL
 
@@ -107,7 +100,7 @@ def test_ground_too_near_for_the_camera_is_known_where_the_agent_starts() -> Non
     graph = Graph()
     here = _heading_north(0.0, 0.0)
     graph.change([Map(id=ROOT_MAP, cell_m=1.0), here])
-    graph.change([_cells(PlaceColumn.ROAD, range(-3, 4), range(-20, -10), 1.0)])
+    graph.change([block_of(PlaceColumn.ROAD, range(-3, 4), range(-20, -10), 1.0)])
 
     around = ground(graph, here, Config())
 
@@ -123,7 +116,7 @@ def test_ground_too_near_for_the_camera_is_known_where_road_begins_behind_it(
     here = _heading_north(0.0, 0.0)
     graph.change([Map(id=ROOT_MAP, cell_m=1.0), here, _path(-5.0)])
     for j in (range(-20, -10), range(road_from_j, 60)):
-        graph.change([_cells(PlaceColumn.ROAD, range(-3, 4), j, 1.0)])
+        graph.change([block_of(PlaceColumn.ROAD, range(-3, 4), j, 1.0)])
 
     around = ground(graph, here, Config())
 
