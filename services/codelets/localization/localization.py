@@ -65,7 +65,7 @@ from services.codelets.mapping.path import odometry_of, variances_of
 INFLATION = 1.5
 MAX_INFLATIONS = 6
 PATIENCE = 2
-# Of so many landmarks no two mistakes would agree: so few views that fit nothing are enough then.
+# So many landmarks do not agree by mistake: so few views that fit nothing are enough then.
 MANY = 3
 EARLY_MISFITS = 3
 STAGES = 3

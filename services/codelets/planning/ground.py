@@ -40,7 +40,7 @@ from services.codelets.planning.network import SQUARE, Here, PlaceNetwork, ends,
 COLUMNS = (PlaceColumn.ROAD, PlaceColumn.OBSTACLE, *WEIGHT_COLUMNS)
 SPREAD_FROM = 0.2
 BESIDE_CUT = 0.5
-# So far beside its path the agent is as wide as it drove.
+# So far to each side of its path the agent has driven over the ground.
 BESIDE_PATH_M = 1.0
 
 
