@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import cv2
@@ -31,7 +32,7 @@ IMAGES = 960
 
 
 def train_on_photographs(
-    folder: Path, out: Path, *, seed: int, epochs: int | None = None, images: int = IMAGES
+    folder: Path, out: Path, *, seed: int, epochs: int | None = None, images: int | None = None
 ) -> None:
     """Train on `folder`/train with the labels in `folder`/trainannot, and write the network to
     `out`. An epoch has this number of augmented `images`.
@@ -39,11 +40,23 @@ def train_on_photographs(
     Raises UsageError if the photographs cannot be read.
     """
     read = photographs(folder / "train", folder / "trainannot")
-    known = [_labelled(photograph) for photograph in read]
+    train_on(read, out, seed=seed, epochs=epochs, images=images)
+
+
+def train_on(
+    shown: Iterable[Photograph],
+    out: Path,
+    *,
+    seed: int,
+    epochs: int | None = None,
+    images: int | None = None,
+) -> None:
+    """Train on photographs that were read, otherwise like `train_on_photographs`."""
+    known = [_labelled(photograph) for photograph in shown]
 
     schedule = Schedule(
         epochs=epochs or EPOCHS,
-        images=images,
+        images=images or IMAGES,
         seed=seed,
         augmentation=STRONG,
     )
