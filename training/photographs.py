@@ -65,12 +65,13 @@ def photographs(images: Path, labels: Path) -> Iterator[Photograph]:
     """
     for folder in (images, labels):
         if not folder.is_dir():
-            raise UsageError(f"there is no folder {folder}: name the one that holds the PNG files")
+            raise UsageError(f"there is no folder {folder}: name the one that holds the images")
 
     paths = [path for path in sorted(images.iterdir()) if path.suffix in IMAGE_SUFFIXES]
     if not paths:
         raise UsageError(
-            f"no *.png in {images}: put street photographs there, and their labels in {labels}"
+            f"no *.png or *.jpg in {images}: put street photographs there, and their labels in "
+            f"{labels}"
         )
 
     has_road = False
