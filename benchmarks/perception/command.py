@@ -85,7 +85,7 @@ def perception_command(
 
     Draws them, with light, noise and clutter, and looks at them with the modules of the running
     system, in two processes. Takes four to five minutes on two cores; leave both to it. --camvid
-    takes about five minutes, with --by-drive that for each drive.
+    trains first, for some minutes; with --by-drive for each drive.
     """
     belonging = (
         ("--scale", scale is not None, "--stereo", bool(pair)),
