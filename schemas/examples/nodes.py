@@ -55,7 +55,7 @@ def every_kind() -> list[AnyNode]:
         self_node(),
         _percept(),
         object_node(),
-        PathSegment(id=segment_id(1), number=1, rows=matrix(2, 9), **_USUAL),
+        PathSegment(id=segment_id(1), number=1, rows=matrix(2, 11), **_USUAL),
         _observations(),
         _closure(),
         Correction(id=CORRECTION_ID, rows=matrix(2, 7), **_USUAL),

@@ -13,7 +13,7 @@ from services.codelets.config import Config
 from services.codelets.correction.map_correction import CODELET
 from tests.support.world.scenes import graph_of
 
-CONFIG = Config(closure_spacing_s=2.0, revisit_s=100.0)
+CONFIG = Config(closure_spacing_s=2.0, revisit_s=100.0, waiting_share=0.0)
 A_SECOND_NS = 1_000_000_000
 NO_POINTS = Array.of(np.zeros((0, 2), np.float32))
 NO_MOTIONS = Array.of(np.zeros((0, 5)))

@@ -1,0 +1,40 @@
+"""Loop closures that the path explains already: a correction by these would change nothing, and
+waits (beyond the paper).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import chdtri
+
+from cogmap.geometry.arrays import Floats
+from schemas.nodes import LoopClosure
+from services.codelets.config import Config
+from services.codelets.correction.pose_graph import mahalanobis2, residuals
+from services.codelets.mapping.path import POSE
+from services.codelets.mapping.views import constraints_of, views_of
+
+
+def unexplained_share(closures: list[LoopClosure], rows: Floats, config: Config) -> float:
+    """The share of closures that misfit the path `rows`, as it is believed, by more than
+    `waiting_misfit`; of none 0.
+    """
+    if not closures:
+        return 0.0
+
+    misfit = _misfit(closures, rows, config)
+    return float(np.mean(misfit > config.waiting_misfit))
+
+
+def _misfit(closures: list[LoopClosure], rows: Floats, config: Config) -> Floats:
+    """(m,): each closure's squared Mahalanobis distance from what the path states, over that which
+    a true one exceeds with probability `false_closure`.
+    """
+    poses = rows[:, POSE]
+    views = views_of(closures, rows)
+    constraints = constraints_of(views, poses)
+    squared = mahalanobis2(residuals(poses, constraints), constraints.information)
+
+    degrees = np.where(views.has_heading, 3, 2)
+    misfit: Floats = squared / chdtri(degrees, config.false_closure)
+    return misfit
