@@ -50,15 +50,16 @@ SHORT_SEGMENTS = 8
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task where there are closures not judged yet that the path does not explain, and enough
-    of late to agree; unless some were judged just now, or a correction waits to be applied.
+    """One task where closures of the present pass were not judged yet that the path does not
+    explain, and enough of it are there to agree; unless some were judged just now, or a correction
+    waits to be applied.
     """
     if CORRECTION_ID in graph.nodes:
         return []
 
     closures = list(graph.of_kind(LoopClosure))
-    fresh = [closure for closure in closures if closure.accepted is None]
     late = _late(closures, context.stamp_ns, config)
+    fresh = [closure for closure in late if closure.accepted is None]
     if not fresh or len(late) < MIN_AGREEING:
         return []
 

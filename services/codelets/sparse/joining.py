@@ -31,6 +31,13 @@ class Joining(NamedTuple):
     places: Floats
     into: Indices
 
+    def preceded(self, rows: Floats) -> Joining:
+        """The same with (m, COLUMNS) places before, which stay."""
+        stay = np.full(len(rows), STAYS)
+        return self._replace(
+            places=np.vstack([rows, self.places]), into=np.concatenate([stay, self.into])
+        )
+
     @property
     def stays(self) -> Booleans:
         """(n,): which places stay."""

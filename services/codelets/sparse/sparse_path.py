@@ -86,7 +86,8 @@ def _path_left(
     """
     rows, count_after = left(joined)
     operations = _visited(path[:number], joined)
-    operations.append(_sparse(path[number], rows, joins(joined, config)))
+    preceded = joined.preceded(rows_of(path[:number])[-1:])
+    operations.append(_sparse(path[number], rows, joins(preceded, config)))
 
     if count_after:
         following = path[number + 1].rows.numpy().copy()

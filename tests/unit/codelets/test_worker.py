@@ -275,8 +275,7 @@ def test_an_unknown_codelet_is_a_failure_that_names_the_known_ones() -> None:
     proposal = _proposal(_answers(worker, task("dreaming")))
 
     assert (
-        "no codelet dreaming: there are apply_correction, join_map, sparse_path"
-        in proposal.failure
+        "no codelet dreaming: there are apply_correction, join_map, sparse_path" in proposal.failure
     )
     assert proposal.operations == []
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
+import pytest
 
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import CycleContext
@@ -47,17 +49,35 @@ def _graph(segments: int) -> Graph:
     return graph_of(*path, *judged, _closure(11, None))
 
 
-def _is_due(segments: int, at_s: int) -> bool:
+def _is_due(graph: Graph, at_s: int, config: Config = CONFIG) -> bool:
     percepts = Percepts(stamp_ns=at_s * A_SECOND_NS, frame=at_s, objects=[], road_m=NO_POINTS)
     context = CycleContext(1, percepts, NO_MOTIONS)
-    return bool(CODELET.due(context, _graph(segments), CONFIG))
+    return bool(CODELET.due(context, graph, config))
 
 
 def test_a_short_path_is_corrected_as_often_as_loops_close() -> None:
-    assert not _is_due(segments=8, at_s=11)
-    assert _is_due(segments=8, at_s=12)
+    assert not _is_due(_graph(8), at_s=11)
+    assert _is_due(_graph(8), at_s=12)
 
 
 def test_a_path_ten_times_as_long_is_corrected_a_tenth_as_often() -> None:
-    assert not _is_due(segments=80, at_s=29)
-    assert _is_due(segments=80, at_s=30)
+    assert not _is_due(_graph(80), at_s=29)
+    assert _is_due(_graph(80), at_s=30)
+
+
+@pytest.mark.parametrize(("off_m", "is_due"), [(0.5, False), (3.0, True)])
+def test_closures_that_the_path_explains_wait(off_m: float, is_due: bool) -> None:
+    fresh = msgspec.structs.replace(_closure(11, None), range_m=1.0 + off_m)
+    graph = _graph(8)
+    graph.change([fresh])
+
+    assert _is_due(graph, 12, Config(revisit_s=100.0)) is is_due
+
+
+def test_a_few_closures_that_the_path_does_not_explain_wait() -> None:
+    graph = _graph(8)
+    graph.change([_closure(at_s, None) for at_s in range(11, 22)])
+    graph.change([msgspec.structs.replace(_closure(22, None), range_m=9.0)])
+
+    assert not _is_due(graph, 23, Config(revisit_s=100.0, waiting_share=0.2))
+    assert _is_due(graph, 23, Config(revisit_s=100.0, waiting_share=0.05))
