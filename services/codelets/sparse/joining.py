@@ -12,6 +12,7 @@ import numpy as np
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.geometry.se2 import compose, relative, wrap_angle
 from services.codelets.config import Config
+from services.codelets.correction.pose_graph import residuals
 from services.codelets.mapping.path import JOINED, LAST, POSE, STAMP, steps_of
 
 SAME_M = 2.0
@@ -19,6 +20,7 @@ SAME_RAD = np.pi / 8
 # By how much the pose that is believed of a place may be wrong, seen from the one it is joined to.
 JOIN_SD_M = 0.2
 JOIN_SD_RAD = 0.02
+IMPOSSIBLE_SD = 5.0
 STAYS = -1
 
 
@@ -129,6 +131,20 @@ def joins(joined: Joining, config: Config) -> Floats:
     rows = np.column_stack([stamps_s[:-1], stamps_s[1:], led, variance_m2, variance_rad2])
 
     stays = joined.stays
+    is_between = stays[:-1] != stays[1:]
     is_successive = joined.places[1:, JOINED] == 0
-    chosen: Floats = rows[(stays[:-1] != stays[1:]) & is_successive]
+    error = residuals(joined.places[:, POSE], steps)
+    is_believed = _is_possible(error, variance_m2, variance_rad2)
+    chosen: Floats = rows[is_between & is_successive & is_believed]
     return chosen
+
+
+def _is_possible(error: Floats, variance_m2: Floats, variance_rad2: Floats) -> Booleans:
+    """(m,): whether path integration may have led from one place to the next as is believed, but
+    for (m, 3) errors. Where the agent was lost it was not at the place that it is joined into.
+    """
+    squared_m2 = (error[:, :2] ** 2).sum(axis=1)
+    squared = squared_m2 / variance_m2 + error[:, 2] ** 2 / variance_rad2
+
+    is_possible: Booleans = squared <= IMPOSSIBLE_SD**2
+    return is_possible

@@ -283,3 +283,12 @@ def test_a_correction_leaves_each_place_in_its_segment() -> None:
     assert {segment.number: len(segment.rows.numpy()) for segment in graph.path} == before
     assert rows_of(graph.path)[:, POSE] == pytest.approx(higher)
     assert all(segment.is_sparse for segment in graph.path[:-1])
+
+
+def test_a_place_where_the_agent_was_lost_is_not_where_it_came_from() -> None:
+    street = _along(np.arange(5.0), AGAIN_S)
+    street[:, ODOMETRY] += (40.0, 0.0, 0.0)
+    elsewhere = _along(np.arange(4.0, 8.0), AGAIN_S + 5.0, y_m=5.0)
+    graph = _joined(_graph(np.vstack([street, elsewhere])))
+
+    assert len(joins_of(graph.path, rows_of(graph.path)[:, STAMP])) == 0
