@@ -84,43 +84,48 @@ def _path_left(
     """The segments of `path` that change where places of that `number` are joined into those of the
     ones before.
     """
+    before = path[:number]
     rows, count_after = left(joined)
-    operations = _visited(path[:number], joined)
-    preceded = joined.preceded(rows_of(path[:number])[-1:])
-    operations.append(_sparse(path[number], rows, joins(preceded, config)))
+    led = joins(joined.preceded(rows_of(before)[-1:]), config)
+
+    after = _visited(before, joined)
+    if len(rows):
+        kept = msgspec.structs.replace(path[number], rows=Matrix.of(rows), is_sparse=True)
+        after.append(_with_joins(kept, led))
+    else:
+        after[-1] = _with_joins(after[-1], led)
 
     if count_after:
         following = path[number + 1].rows.numpy().copy()
         following[0, JOINED] += count_after
-        operations.append(with_rows(path[number + 1], following))
+        after.append(with_rows(path[number + 1], following))
+
+    operations: list[Operation] = [segment for segment in after if segment not in path]
+    if not len(rows):
+        operations.append(DropNode(id=path[number].id))
     return operations
 
 
-def _sparse(segment: PathSegment, rows: Floats, joins_of: Floats) -> Operation:
-    """The segment with the (n, COLUMNS) rows that stay; it is dropped where there are none."""
+def _with_joins(segment: PathSegment, rows: Floats) -> PathSegment:
+    """The segment with (m, 7) joins more."""
     if not len(rows):
-        return DropNode(id=segment.id)
-
-    return msgspec.structs.replace(
-        segment,
-        rows=Matrix.of(rows),
-        is_sparse=True,
-        joins=Matrix.of(joins_of) if len(joins_of) else None,
-    )
+        return segment
+    if segment.joins is not None:
+        rows = np.vstack([segment.joins.numpy(), rows])
+    return msgspec.structs.replace(segment, joins=Matrix.of(rows))
 
 
-def _visited(known: list[PathSegment], joined: Joining) -> list[Operation]:
-    """The known segments with places that others are joined into: there the agent was later."""
+def _visited(known: list[PathSegment], joined: Joining) -> list[PathSegment]:
+    """The known segments, with the time when the agent was at each place last."""
     after = visited(joined)
-    operations: list[Operation] = []
+    segments = []
     start = 0
     for segment in known:
         end = start + len(segment.rows.numpy())
-        if not np.array_equal(joined.known[start:end], after[start:end]):
-            operations.append(with_rows(segment, after[start:end]))
+        segments.append(with_rows(segment, after[start:end]))
         start = end
 
-    return operations
+    return segments
 
 
 def _numbers(path: list[PathSegment]) -> Indices:

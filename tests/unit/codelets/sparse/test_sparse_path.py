@@ -292,3 +292,18 @@ def test_a_place_where_the_agent_was_lost_is_not_where_it_came_from() -> None:
     graph = _joined(_graph(np.vstack([street, elsewhere])))
 
     assert len(joins_of(graph.path, rows_of(graph.path)[:, STAMP])) == 0
+
+
+def test_a_segment_of_which_nothing_stays_leaves_its_join_to_the_one_before() -> None:
+    elsewhere = _along(np.arange(3.0), AGAIN_S - 3.0, y_m=3.0)
+    graph = graph_of(
+        _segment(0, _along(np.arange(20.0), 0.0), is_sparse=True),
+        _segment(1, elsewhere, is_sparse=True),
+        _segment(2, _along(np.arange(5.0), AGAIN_S)),
+        _segment(3, _along(np.arange(5.0), LATER_S, y_m=90.0)),
+    )
+    graph.change(run(task("sparse_path", about=[segment_id(2)]), graph, CONFIG).operations)
+    joins = joins_of(graph.path, rows_of(graph.path)[:, STAMP])
+
+    assert [segment.number for segment in graph.path] == [0, 1, 3]
+    assert (joins.i.tolist(), joins.j.tolist()) == ([22], [0])
