@@ -251,9 +251,9 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     waiting_share: Annotated[
         Share,
         Meta(
-            description="share of the new loop closures that the path does not explain, from "
-            "which on it is corrected; below, a correction would change little, and waits, 0 to "
-            "1; 0: none waits"
+            description="share of the new loop closures that the path does not explain, three at "
+            "least, from which on it is corrected; below, a correction would change little, and "
+            "waits, 0 to 1; 0: none waits"
         ),
     ] = 0.1
     synapse_decay_per_m: Annotated[

@@ -37,7 +37,7 @@ from services.codelets.correction.pose_graph import (
 )
 from services.codelets.correction.reverse_replay import close_loops
 from services.codelets.correction.synapses import replay_of
-from services.codelets.correction.waiting import unexplained_share
+from services.codelets.correction.waiting import may_wait
 from services.codelets.mapping.observations import Sightings
 from services.codelets.mapping.path import POSE, STAMP, joins_of, rows_of, steps_of
 from services.codelets.mapping.views import constraints_of, views_of
@@ -67,7 +67,7 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
         return []
 
     rows = rows_of(graph.of_kind(PathSegment))
-    if unexplained_share(fresh, rows, config) < config.waiting_share:
+    if may_wait(fresh, rows, config):
         return []
 
     task = context.task(CODELET.name, about=[closure.id for closure in fresh])

@@ -10,20 +10,22 @@ from scipy.special import chdtri
 from cogmap.geometry.arrays import Floats
 from schemas.nodes import LoopClosure
 from services.codelets.config import Config
+from services.codelets.correction.pairwise_consistency import MIN_AGREEING
 from services.codelets.correction.pose_graph import mahalanobis2, residuals
 from services.codelets.mapping.path import POSE
 from services.codelets.mapping.views import constraints_of, views_of
 
 
-def unexplained_share(closures: list[LoopClosure], rows: Floats, config: Config) -> float:
-    """The share of closures that misfit the path `rows`, as it is believed, by more than
-    `waiting_misfit`; of none 0.
+def may_wait(closures: list[LoopClosure], rows: Floats, config: Config) -> bool:
+    """Whether the path `rows`, as it is believed, explains all but a share of the closures, or all
+    but so few that they close no loop: it is misfitted by at most `waiting_misfit`.
     """
-    if not closures:
-        return 0.0
+    if not config.waiting_share:
+        return False
 
     misfit = _misfit(closures, rows, config)
-    return float(np.mean(misfit > config.waiting_misfit))
+    unexplained = int((misfit > config.waiting_misfit).sum())
+    return unexplained < max(MIN_AGREEING, config.waiting_share * len(closures))
 
 
 def _misfit(closures: list[LoopClosure], rows: Floats, config: Config) -> Floats:

@@ -65,19 +65,33 @@ def test_a_path_ten_times_as_long_is_corrected_a_tenth_as_often() -> None:
     assert _is_due(_graph(80), at_s=30)
 
 
-@pytest.mark.parametrize(("off_m", "is_due"), [(0.5, False), (3.0, True)])
-def test_closures_that_the_path_explains_wait(off_m: float, is_due: bool) -> None:
-    fresh = msgspec.structs.replace(_closure(11, None), range_m=1.0 + off_m)
+def _with_fresh(*range_m: float) -> Graph:
+    """Closures that were not judged yet, from 11 s on, of what stood 1 m ahead."""
     graph = _graph(8)
-    graph.change([fresh])
+    for number, seen_m in enumerate(range_m):
+        closure = _closure(11 + number, None)
+        graph.change([msgspec.structs.replace(closure, range_m=seen_m)])
+    return graph
 
-    assert _is_due(graph, 12, Config(revisit_s=100.0)) is is_due
+
+@pytest.mark.parametrize(
+    ("range_m", "is_due"),
+    [
+        ((1.5, 1.5, 1.5), False),
+        ((4.0, 4.0, 4.0), True),
+        ((4.0, 4.0, 1.0), False),
+    ],
+    ids=["explained", "unexplained", "too few"],
+)
+def test_closures_that_the_path_explains_wait(range_m: tuple[float, ...], is_due: bool) -> None:
+    assert _is_due(_with_fresh(*range_m), 14, Config(revisit_s=100.0)) is is_due
 
 
-def test_a_few_closures_that_the_path_does_not_explain_wait() -> None:
-    graph = _graph(8)
-    graph.change([_closure(at_s, None) for at_s in range(11, 22)])
-    graph.change([msgspec.structs.replace(_closure(22, None), range_m=9.0)])
+@pytest.mark.parametrize(("share", "is_due"), [(0.2, True), (0.5, False)])
+def test_a_share_of_closures_that_the_path_does_not_explain_waits(
+    share: float, is_due: bool
+) -> None:
+    graph = _with_fresh(*[1.0] * 7, *[4.0] * 4)
+    config = Config(revisit_s=100.0, waiting_share=share)
 
-    assert not _is_due(graph, 23, Config(revisit_s=100.0, waiting_share=0.2))
-    assert _is_due(graph, 23, Config(revisit_s=100.0, waiting_share=0.05))
+    assert _is_due(graph, 23, config) is is_due
