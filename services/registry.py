@@ -1,18 +1,21 @@
 """The one table of modules: what there is to run, in the order of the cognitive cycle.
 
-A module's package is imported when it is asked for: its process has no use for the others.
+A module is imported when it is built: its process has no use for the others, and whoever configures
+them has use for none.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import entry_points
 
 import msgspec
 
 from cogmap.errors import UsageError
 from cogmap.runtime import config
-from cogmap.runtime.codelet import Codelet
+from cogmap.runtime.codelet import ENTRY_POINTS, Codelet
 from cogmap.runtime.module import Module
 
 Build = Callable[[config.Sections, str], Module]
@@ -27,30 +30,45 @@ class Entry:
 
 
 def _sim() -> Entry:
-    from services.sim.module import Config, build
+    from services.sim.config import Config
 
-    return Entry(Config, lambda sections, name: build(config.typed(sections, "sim", Config), name))
+    def built(sections: config.Sections, name: str) -> Module:
+        from services.sim.module import build
+
+        return build(config.typed(sections, "sim", Config), name)
+
+    return Entry(Config, built)
 
 
 def _sensory() -> Entry:
-    from services.sensory.module import Config, build
+    from services.sensory.config import Config
 
-    return Entry(
-        Config, lambda sections, name: build(config.typed(sections, "sensory", Config), name)
-    )
+    def built(sections: config.Sections, name: str) -> Module:
+        from services.sensory.module import build
+
+        return build(config.typed(sections, "sensory", Config), name)
+
+    return Entry(Config, built)
 
 
 def _epam() -> Entry:
-    from services.epam.module import Config, build
+    from services.epam.config import Config
 
-    return Entry(Config, lambda sections, name: build(config.typed(sections, "epam", Config), name))
+    def built(sections: config.Sections, name: str) -> Module:
+        from services.epam.module import build
+
+        return build(config.typed(sections, "epam", Config), name)
+
+    return Entry(Config, built)
 
 
 def _workspace() -> Entry:
-    from services.codelets.table import all_codelets, configured
-    from services.workspace.module import Config, build
+    from services.workspace.config import Config
 
     def built(sections: config.Sections, name: str) -> Module:
+        from services.codelets.table import all_codelets, configured
+        from services.workspace.module import build
+
         codelets = configured(sections, all_codelets())
         return build(config.typed(sections, "workspace", Config), name, codelets)
 
@@ -58,54 +76,70 @@ def _workspace() -> Entry:
 
 
 def _codelets() -> Entry:
-    from services.codelets.module import Config, build
-    from services.codelets.table import all_codelets, configured
+    from services.codelets.config import Config
 
     def built(sections: config.Sections, name: str) -> Module:
+        from services.codelets.module import build
+        from services.codelets.table import all_codelets, configured
+
         return build(name, configured(sections, all_codelets()))
 
     return Entry(Config, built)
 
 
 def _global_workspace() -> Entry:
-    from services.global_workspace.module import Config, build
+    from services.global_workspace.config import Config
 
-    return Entry(
-        Config,
-        lambda sections, name: build(config.typed(sections, "global_workspace", Config), name),
-    )
+    def built(sections: config.Sections, name: str) -> Module:
+        from services.global_workspace.module import build
+
+        return build(config.typed(sections, "global_workspace", Config), name)
+
+    return Entry(Config, built)
 
 
 def _memory() -> Entry:
-    from services.memory.module import Config, build
+    from services.memory.config import Config
 
-    return Entry(
-        Config, lambda sections, name: build(config.typed(sections, "memory", Config), name)
-    )
+    def built(sections: config.Sections, name: str) -> Module:
+        from services.memory.module import build
+
+        return build(config.typed(sections, "memory", Config), name)
+
+    return Entry(Config, built)
 
 
 def _procedural() -> Entry:
-    from services.procedural.module import Config, build
+    from services.procedural.config import Config
 
-    return Entry(
-        Config, lambda sections, name: build(config.typed(sections, "procedural", Config), name)
-    )
+    def built(sections: config.Sections, name: str) -> Module:
+        from services.procedural.module import build
+
+        return build(config.typed(sections, "procedural", Config), name)
+
+    return Entry(Config, built)
 
 
 def _action() -> Entry:
-    from services.action.module import Config, build
+    from services.action.config import Config
 
-    return Entry(
-        Config, lambda sections, name: build(config.typed(sections, "action", Config), name)
-    )
+    def built(sections: config.Sections, name: str) -> Module:
+        from services.action.module import build
+
+        return build(config.typed(sections, "action", Config), name)
+
+    return Entry(Config, built)
 
 
 def _motor() -> Entry:
-    from services.motor.module import Config, build
+    from services.motor.config import Config
 
-    return Entry(
-        Config, lambda sections, name: build(config.typed(sections, "motor", Config), name)
-    )
+    def built(sections: config.Sections, name: str) -> Module:
+        from services.motor.module import build
+
+        return build(config.typed(sections, "motor", Config), name)
+
+    return Entry(Config, built)
 
 
 _ENTRIES: dict[str, Callable[[], Entry]] = {
@@ -131,6 +165,17 @@ def codelets() -> tuple[Codelet, ...]:
     return all_codelets()
 
 
+@cache
+def _settings_of_codelets() -> dict[str, type[msgspec.Struct]]:
+    """The types of the codelets' settings by section. Raises ConfigError."""
+    if entry_points(group=ENTRY_POINTS):
+        return {codelet.section: codelet.config for codelet in codelets()}
+
+    from services.codelets.sections import SECTIONS
+
+    return SECTIONS
+
+
 def config_type(name: str) -> type[msgspec.Struct]:
     """The configuration struct of a section: a module's, or that of another package's codelet.
 
@@ -138,15 +183,15 @@ def config_type(name: str) -> type[msgspec.Struct]:
     """
     if name in _ENTRIES:
         return _ENTRIES[name]().config
-    for codelet in codelets():
-        if codelet.section == name:
-            return codelet.config
+    found = _settings_of_codelets().get(name)
+    if found is not None:
+        return found
     raise UsageError(f"no module {name!r}: there are {', '.join(MODULES)}")
 
 
 def sections() -> tuple[str, ...]:
     """The sections that a configuration may have: modules, and codelets of other packages."""
-    others = {codelet.section for codelet in codelets()} - set(MODULES)
+    others = _settings_of_codelets().keys() - set(MODULES)
     return (*MODULES, *sorted(others))
 
 
