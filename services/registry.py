@@ -6,19 +6,23 @@ them has use for none.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
+from importlib import import_module
 from importlib.metadata import entry_points
+from typing import TYPE_CHECKING
 
 import msgspec
 
 from cogmap.errors import UsageError
 from cogmap.runtime import config
-from cogmap.runtime.codelet import ENTRY_POINTS, Codelet
-from cogmap.runtime.module import Module
 
-Build = Callable[[config.Sections, str], Module]
+if TYPE_CHECKING:
+    from cogmap.runtime.codelet import Codelet
+    from cogmap.runtime.module import Module
+
+    Build = Callable[[config.Sections, str], Module]
 
 
 @dataclass(frozen=True)
@@ -157,6 +161,14 @@ _ENTRIES: dict[str, Callable[[], Entry]] = {
 
 MODULES = tuple(_ENTRIES)
 
+_OF_CODELETS = (
+    "scipy.ndimage",
+    "scipy.sparse.csgraph",
+    "scipy.spatial",
+    "scipy.optimize",
+    "services.codelets.table",
+)
+
 
 def codelets() -> tuple[Codelet, ...]:
     """All codelets that there are to run: ours, and those of other packages. Raises ConfigError."""
@@ -168,6 +180,8 @@ def codelets() -> tuple[Codelet, ...]:
 @cache
 def _settings_of_codelets() -> dict[str, type[msgspec.Struct]]:
     """The types of the codelets' settings by section. Raises ConfigError."""
+    from cogmap.runtime.codelet import ENTRY_POINTS
+
     if entry_points(group=ENTRY_POINTS):
         return {codelet.section: codelet.config for codelet in codelets()}
 
@@ -193,6 +207,30 @@ def sections() -> tuple[str, ...]:
     """The sections that a configuration may have: modules, and codelets of other packages."""
     others = _settings_of_codelets().keys() - set(MODULES)
     return (*MODULES, *sorted(others))
+
+
+def runs_codelets(name: str) -> bool:
+    """Whether module `name` has the codelets in it."""
+    return name in {"workspace", "codelets"}
+
+
+def prepare(name: str) -> Iterator[None]:
+    """Import what module `name` consists of, and begin what it waits for when it is built: in
+    steps, so that something else can be done between them. Raises what an import raises.
+    """
+    if name == "sim":
+        from services.sim.rendering import egl
+
+        egl.trial()
+        yield
+
+    if runs_codelets(name):
+        for part in _OF_CODELETS:
+            import_module(part)
+            yield
+
+    import_module(f"services.{name}.module")
+    yield
 
 
 def build(name: str, settings: config.Sections, instance: str = "") -> Module:
