@@ -28,7 +28,8 @@ class Attention(GraphNode, kw_only=True, frozen=True, tag="attention"):
     `brought_cycle` is the cycle in which it brought its last coalition, `conscious_cycle` that in
     which one of its coalitions was broadcast last, both 0 before. `pending` has what it is still to
     make conscious, by id, with the cycle in which it was brought last, 0 before. `noted` is what it
-    has counted or seen already, by id; what the numbers mean is the codelet's own.
+    has counted or seen already, by id; what the numbers mean is the codelet's own. `glimpsed` is
+    what it has seen once and is to see again before it counts, by id, with the cycle.
     """
 
     codelet: Name
@@ -36,3 +37,4 @@ class Attention(GraphNode, kw_only=True, frozen=True, tag="attention"):
     conscious_cycle: Count = 0
     pending: dict[Name, Count] = {}
     noted: dict[Name, Count] = {}
+    glimpsed: dict[Name, Count] = {}

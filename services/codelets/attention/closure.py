@@ -1,48 +1,53 @@
 """Road that the plan counted on, or that the agent drove over, and that is closed now: a prediction
-that fails.
+that fails. The rays of the range scan along it should pass, and end across it.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
-from cogmap.geometry.arrays import Indices
+from cogmap.geometry.arrays import Booleans, Floats
+from cogmap.geometry.se2 import transform_from, wrap_angle
 from cogmap.graph.graph import Graph
-from cogmap.graph.window import ROAD_FROM, Extent
-from schemas.nodes import (
-    PLAN_ID,
-    SELF_ID,
-    PathColumn,
-    PlaceColumn,
-    Plan,
-    Self,
-    place_cell,
-    place_id,
-)
-from services.codelets.planning.driven import POSITION, path_of
-from services.codelets.planning.ground import stands_there
+from schemas.array import Array
+from schemas.nodes import PLAN_ID, SELF_ID, Plan, Self, place_cell, place_id
+from services.codelets.attention.lanes import Lane, lanes
 
-# The range scan reaches no farther ahead.
-AHEAD_M = 60.0
-# Farther away, where the agent drove and what stands there are less sure than a street is wide.
-DRIVEN_M = 30.0
-# What stands beside a path that is a metre off does not reach so far across it.
-ACROSS_M = np.arange(-2.0, 3.0)
-# What is found so near to where a street was closed is the same closure, for as many cycles.
+# Farther away, rays are farther apart than a lane is wide; nearer, what stands there was seen
+# before.
+FARTHEST_M = 35.0
+NEAREST_M = 4.0
+# Nobody sees whether a lane is closed that lies aslant.
+LARGEST_SLANT_RAD = math.pi / 4
+# Rays count that pass within so far of the middle of the lane. What they hit may be seen as far
+# from the place before and behind it, and on both sides reaches at least so far across.
+HALF_WIDTH_M = 2.5
+ALONG_M = 1.0
+ALONG_SHARE = 0.04
+SPAN_M = 1.5
+MIN_RAYS = 2
+ENDING_SHARE = 0.75
+# What is found so near to where a street was closed is the same closure.
 SAME_M = 12.0
-SAME_CYCLES = 3000
 
 
-def closed_places(agent: Self, graph: Graph) -> list[str]:
-    """The ids of place nodes where something stands now: the first ahead on the plan's route that
-    was road, unless the plan is to find out whether there is any; and the nearest that the agent
-    drove over, where what stands there reaches across its path.
+def closed_places(scan: Array, agent: Self, graph: Graph) -> list[str]:
+    """The ids of the place nodes at which rays of a scan end across a lane that the agent counts
+    on: the nearest of the plan's route, and the nearest of where it drove.
     """
-    ahead = _first_closed(_route_ahead(agent, graph), agent.map, graph, ROAD_FROM)
-    driven = _first_closed(_driven_across(agent, graph), agent.map, graph)
-    return [place for place in (ahead, driven) if place]
+    rays = np.asarray(scan.numpy(), np.float64)
+    cell_m = graph.cell_m(agent.map)
+    closed = []
+    for lane in lanes(agent, graph):
+        near = _in_sight(lane, agent)
+        places_m = near.position_m[_is_closed(near, rays, agent)]
+        for x_m, y_m in places_m[:1].tolist():
+            closed.append(place_id(round(x_m / cell_m), round(y_m / cell_m), agent.map))
+
+    return closed
 
 
 def expected_by(place: str, graph: Graph) -> str:
@@ -59,73 +64,81 @@ def expected_by(place: str, graph: Graph) -> str:
     return PLAN_ID if float(away_m.min()) <= SAME_M else SELF_ID
 
 
-def _first_closed(cells: Indices, map_id: str, graph: Graph, road_from: float = 0.0) -> str:
-    """The id of the middle place node of the first of (n, k, 2) cells abreast on all of which
-    something stands, and road was seen `road_from` at least; empty where there are none.
-    """
-    if not cells.size:
-        return ""
-
-    flat = cells.reshape(-1, 2)
-    lower_i, lower_j = (flat.min(axis=0) - 2).tolist()
-    upper_i, upper_j = (flat.max(axis=0) + 3).tolist()
-    around = Extent((lower_i, lower_j), (upper_i, upper_j))
-    window = graph.places.window(map_id, [PlaceColumn.OBSTACLE, PlaceColumn.ROAD], around)
-
-    is_closed = stands_there(window.column(PlaceColumn.OBSTACLE))
-    is_closed &= window.column(PlaceColumn.ROAD) >= road_from
-    i, j = (flat - around.lower).T
-    is_across = is_closed[i, j].reshape(cells.shape[:2]).all(axis=1)
-    closed = np.flatnonzero(is_across)
-    if not len(closed):
-        return ""
-
-    middle_i, middle_j = cells[closed[0], cells.shape[1] // 2].tolist()
-    return place_id(middle_i, middle_j, map_id)
-
-
-def is_known(place: str, noted: dict[str, int], cycle: int, cell_m: float) -> bool:
-    """Whether a place node is near one that was noted, by its id, in a cycle not long ago."""
-    for known, noted_cycle in noted.items():
-        away_m = _away_m(place, known, cell_m)
-        if cycle - noted_cycle <= SAME_CYCLES and away_m <= SAME_M:
+def is_known(place: str, noted: Mapping[str, int], since_cycle: int, cell_m: float) -> bool:
+    """Whether a place node is near one that was noted, by its id, in `since_cycle` or later."""
+    for known, cycle in noted.items():
+        if cycle >= since_cycle and _away_m(place, known, cell_m) <= SAME_M:
             return True
 
     return False
 
 
-def _route_ahead(agent: Self, graph: Graph) -> Indices:
-    """(n, 1, 2): the cells of the plan's route from the one nearest to the agent to AHEAD_M
-    further; none of a plan that is to find out whether a street is closed.
+def _in_sight(lane: Lane, agent: Self) -> Lane:
+    """The places of a lane, the nearest first, that the agent looks along from not too far."""
+    away_m, slant_rad, _ = _as_seen(lane, agent)
+    is_in_sight = (away_m >= NEAREST_M) & (away_m <= FARTHEST_M) & (slant_rad <= LARGEST_SLANT_RAD)
+
+    seen = lane.where(is_in_sight)
+    order = np.argsort(away_m[is_in_sight], kind="stable")
+    return Lane(seen.position_m[order], seen.heading_rad[order])
+
+
+def _is_closed(lane: Lane, rays: Floats, agent: Self) -> Booleans:
+    """(n,): the places at which most of the rays (k, 2), bearing and range each, that lead there
+    end, across the lane.
     """
-    plan = graph.get(Plan, PLAN_ID)
-    if plan is None or plan.route is None or plan.doubtful or plan.map != agent.map:
-        return np.zeros((0, 1, 2), np.int64)
+    leads_there = _leads_there(lane, rays, agent)
+    along_m, across_m = _in_lane(_ends_m(rays, agent), lane)
+    away_m, _, _ = _as_seen(lane, agent)
 
-    cell_m = graph.cell_m(plan.map)
-    route_m = np.asarray(plan.route.numpy(), np.float64)
-    away_m = np.hypot(*(route_m - (agent.x_m, agent.y_m)).T)
-    nearest = int(away_m.argmin())
-    last = nearest + round(AHEAD_M / cell_m) + 1
+    is_near = np.abs(along_m) <= (ALONG_M + ALONG_SHARE * away_m)[:, None]
+    has_ended = rays[:, 1] > 0
+    ends_there = leads_there & has_ended & is_near & (np.abs(across_m) <= HALF_WIDTH_M)
 
-    cells: Indices = np.rint(route_m[nearest:last] / cell_m).astype(np.int64)
-    return cells[:, None]
+    number = ends_there.sum(axis=1)
+    is_most = number >= np.maximum(MIN_RAYS, ENDING_SHARE * leads_there.sum(axis=1))
+    leftmost_m = np.where(ends_there, across_m, -np.inf).max(axis=1, initial=-np.inf)
+    rightmost_m = np.where(ends_there, across_m, np.inf).min(axis=1, initial=np.inf)
+    is_closed: Booleans = is_most & (leftmost_m - rightmost_m >= SPAN_M)
+    return is_closed
 
 
-def _driven_across(agent: Self, graph: Graph) -> Indices:
-    """(n, k, 2): the cells across the path where the agent drove not far from here, the nearest
-    first.
+def _as_seen(lane: Lane, agent: Self) -> tuple[Floats, Floats, Floats]:
+    """(n,) each: how far away the places of a lane are, by how much the lane there is aslant to the
+    line of sight, and their bearings.
     """
-    path = path_of(graph)
-    away_m = np.hypot(*(path[:, POSITION] - (agent.x_m, agent.y_m)).T)
-    nearest = np.argsort(away_m, kind="stable")
-    near = path[nearest[: int((away_m <= DRIVEN_M).sum())]]
+    offset_m = lane.position_m - (agent.x_m, agent.y_m)
+    direction_rad = np.arctan2(offset_m[:, 1], offset_m[:, 0])
+    slant_rad = np.arccos(np.abs(np.cos(direction_rad - lane.heading_rad)))
+    return np.hypot(*offset_m.T), slant_rad, direction_rad - agent.heading_rad
 
-    heading_rad = near[:, PathColumn.HEADING_RAD]
-    leftwards = np.stack([-np.sin(heading_rad), np.cos(heading_rad)], axis=-1)
-    across_m = near[:, None, POSITION] + ACROSS_M[:, None] * leftwards[:, None]
-    cells: Indices = np.rint(across_m / graph.cell_m(agent.map)).astype(np.int64)
-    return cells
+
+def _leads_there(lane: Lane, rays: Floats, agent: Self) -> Booleans:
+    """(n, k): which of the rays lead to each place of a lane."""
+    away_m, slant_rad, bearing_rad = _as_seen(lane, agent)
+    half_rad = np.arctan2(HALF_WIDTH_M * np.cos(slant_rad), away_m)
+    aside_rad = wrap_angle(rays[:, 0] - bearing_rad[:, None])
+    leads_there: Booleans = np.abs(aside_rad) <= half_rad[:, None]
+    return leads_there
+
+
+def _ends_m(rays: Floats, agent: Self) -> Floats:
+    """(k, 2): where rays end on the map."""
+    bearing_rad, range_m = rays.T
+    ahead = np.stack([np.cos(bearing_rad), np.sin(bearing_rad)], axis=-1)
+    eye = np.array([agent.x_m, agent.y_m, agent.heading_rad])
+    return transform_from(eye, range_m[:, None] * ahead)
+
+
+def _in_lane(points_m: Floats, lane: Lane) -> tuple[Floats, Floats]:
+    """(n, k) each: how far along and across a lane from each of its n places (k, 2) points are."""
+    offset_m = points_m - lane.position_m[:, None]
+    cos = np.cos(lane.heading_rad)[:, None]
+    sin = np.sin(lane.heading_rad)[:, None]
+
+    along_m = offset_m[..., 0] * cos + offset_m[..., 1] * sin
+    across_m = offset_m[..., 1] * cos - offset_m[..., 0] * sin
+    return along_m, across_m
 
 
 def _away_m(place: str, other: str, cell_m: float) -> float:

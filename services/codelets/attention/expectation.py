@@ -8,6 +8,7 @@ import math
 
 import msgspec
 
+from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.codelets import Task
@@ -27,12 +28,7 @@ from schemas.nodes import (
     object_id,
     place_cell,
 )
-from services.codelets.attention.closure import (
-    SAME_CYCLES,
-    closed_places,
-    expected_by,
-    is_known,
-)
+from services.codelets.attention.closure import closed_places, expected_by, is_known
 from services.codelets.attention.coalitions import coalition, felt
 from services.codelets.attention.config import SECTION, Config, Expectation
 from services.codelets.attention.disappearance import missing_objects
@@ -50,6 +46,10 @@ NAME = "expectation"
 SURPRISE = -1.0
 # Views are counted anew once the agent was so many times as far away as it can see them.
 AWAY = 2.0
+# What is found near where a street was closed is the same closure for so many cycles. It counts
+# once it was seen in two views that are no farther apart.
+SAME_CYCLES = 3000
+GLIMPSE_CYCLES = 3
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
@@ -90,9 +90,7 @@ CODELET = Codelet(
     phase=Phase.ATTENTION,
     due=due,
     run=run,
-    reads=frozenset(
-        {Self, Object, Plan, PathSegment, Attention, PlaceColumn.OBSTACLE, PlaceColumn.ROAD}
-    ),
+    reads=frozenset({Self, Object, Plan, PathSegment, Attention, PlaceColumn.ROAD}),
     writes=frozenset({Attention}),
     config=Config,
     section=SECTION,
@@ -140,8 +138,8 @@ def _is_near(node: Object | None, agent: Self, settings: Expectation) -> bool:
 
 
 def _with_closed(memory: Attention, task: Task, agent: Self, graph: Graph) -> Attention:
-    """`memory`, in which closed places are noted with their cycle, and pending, each where no
-    closure near it is known already.
+    """`memory`, in which places that two views in short order show closed are noted with their
+    cycle, and pending, each where no closure near it is known already.
     """
     noted = {}
     for name, number in memory.noted.items():
@@ -149,13 +147,26 @@ def _with_closed(memory: Attention, task: Task, agent: Self, graph: Graph) -> At
         if not is_old:
             noted[name] = number
 
+    glimpsed = {}
+    for name, cycle in memory.glimpsed.items():
+        if task.cycle - cycle <= GLIMPSE_CYCLES:
+            glimpsed[name] = cycle
+
+    if task.scan is None:
+        raise MessageError(f"task {task.task_id}: no range scan")
+
     new = []
-    for closed in closed_places(agent, graph):
-        if not is_known(closed, noted, task.cycle, graph.cell_m(agent.map)):
+    cell_m = graph.cell_m(agent.map)
+    for closed in closed_places(task.scan, agent, graph):
+        if is_known(closed, noted, task.cycle - SAME_CYCLES, cell_m):
+            continue
+        if is_known(closed, memory.glimpsed, task.cycle - GLIMPSE_CYCLES, cell_m):
             noted[closed] = task.cycle
             new.append(closed)
+        glimpsed[closed] = task.cycle
 
-    return with_pending(msgspec.structs.replace(memory, noted=noted), new)
+    after = msgspec.structs.replace(memory, noted=noted, glimpsed=glimpsed)
+    return with_pending(after, new)
 
 
 def _links_to_closed(memory: Attention, graph: Graph) -> list[Link]:

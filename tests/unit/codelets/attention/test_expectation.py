@@ -25,6 +25,7 @@ from schemas.nodes import (
     Plan,
     PlanState,
     attention_id,
+    place_cell,
     segment_id,
 )
 from services.codelets.attention.config import Config, Expectation
@@ -216,38 +217,23 @@ def _cells(column: PlaceColumn, cells: list[tuple[int, int]]) -> Cells:
 
 ROUTE_M = [(float(i), 0.0) for i in range(60)]
 ROAD = _cells(PlaceColumn.ROAD, [(i, j) for i in range(60) for j in range(-3, 4)])
-BARRIER = _cells(PlaceColumn.OBSTACLE, [(20, j) for j in range(-3, 4)])
+BARRIER_M = 20.0
 
 
-def _plan(**facts: Any) -> Plan:
-    route = Matrix.of(np.array(ROUTE_M))
+def _barrier(at_m: float = BARRIER_M, rightmost_m: float = -3.0, leftmost_m: float = 3.0) -> Array:
+    """A scan that ends at a barrier across a street to the east, and goes on beside it."""
+    across_m = at_m * np.tan(BEARINGS_RAD)
+    is_hit = (across_m >= rightmost_m) & (across_m <= leftmost_m)
+    ranges_m = np.where(is_hit, at_m / np.cos(BEARINGS_RAD), at_m + 20.0)
+    return Array.of(np.column_stack([BEARINGS_RAD, ranges_m]), "<f4")
+
+
+BARRIER = _barrier()
+
+
+def _plan(route_m: list[tuple[float, float]] = ROUTE_M, **facts: Any) -> Plan:
+    route = Matrix.of(np.array(route_m))
     return Plan(id=PLAN_ID, base_level=1.0, state=PlanState.READY, route=route, **facts)
-
-
-def test_a_street_of_the_plan_that_is_closed_is_a_surprise_at_once() -> None:
-    (found,) = Story(_plan(), ROAD, BARRIER).look()
-    blocked = [link for link in found.links if link.kind == LinkKind.BLOCKED]
-
-    assert [node.id for node in found.nodes] == ["self", "plan"]
-    assert [link.target for link in blocked] == ["place:map:0:20:0"]
-    assert found.nodes[1].salience == -1.0
-    assert found.activation > 0.5
-
-
-def test_a_closure_is_one_surprise() -> None:
-    story = Story(_plan(), ROAD, BARRIER)
-    story.look()
-    story.broadcast()
-
-    assert story.looks(10) == []
-
-
-def test_a_closure_is_brought_until_it_is_conscious_though_the_plan_is_another_by_then() -> None:
-    story = Story(_plan(), ROAD, BARRIER)
-    story.look()
-    story.commit(Phase.BACKGROUND, [_plan(doubtful=True)], story.graph.cycle)
-
-    assert len(story.looks(2)) == 1
 
 
 def _driven(heading_rad: float = 0.0) -> PathSegment:
@@ -258,44 +244,98 @@ def _driven(heading_rad: float = 0.0) -> PathSegment:
     return PathSegment(id=segment_id(0), number=0, rows=Matrix.of(rows))
 
 
+def test_a_street_of_the_plan_that_is_closed_in_two_views_is_a_surprise() -> None:
+    story = Story(_plan(), ROAD)
+
+    assert story.look(BARRIER) == []
+    (found,) = story.look(BARRIER)
+    (blocked,) = [link for link in found.links if link.kind == LinkKind.BLOCKED]
+    assert [node.id for node in found.nodes] == ["self", "plan"]
+    assert (blocked.source, _metres_away(blocked.target)) == ("plan", pytest.approx(20.0, abs=2))
+    assert found.nodes[1].salience == -1.0
+    assert found.activation > 0.5
+
+
+def _metres_away(place: str) -> float:
+    cell = place_cell(place)
+    assert cell is not None
+    return math.hypot(*cell[1:])
+
+
+def test_a_street_that_seems_closed_in_one_view_and_much_later_in_another_is_none() -> None:
+    story = Story(_plan(), ROAD)
+    story.look(BARRIER)
+    story.looks(10)
+
+    assert story.look(BARRIER) == []
+
+
+def test_a_closure_is_one_surprise() -> None:
+    story = Story(_plan(), ROAD)
+    story.looks(2, BARRIER)
+    story.broadcast()
+
+    assert story.looks(10, BARRIER) == []
+
+
+def test_a_closure_is_brought_until_it_is_conscious_though_the_plan_is_another_by_then() -> None:
+    story = Story(_plan(), ROAD)
+    story.looks(2, BARRIER)
+    story.commit(Phase.BACKGROUND, [_plan(doubtful=True)], story.graph.cycle)
+
+    assert len(story.looks(2)) == 1
+
+
 def test_a_street_that_the_agent_drove_along_is_a_surprise_off_its_route_where_it_is_closed() -> (
     None
 ):
-    (found,) = Story(_driven(), ROAD, BARRIER).look()
+    (found,) = Story(_driven(), ROAD).looks(2, BARRIER)
     blocked = [link for link in found.links if link.kind == LinkKind.BLOCKED]
 
     assert [node.id for node in found.nodes] == ["self"]
-    assert [(link.source, link.target) for link in blocked] == [("self", "place:map:0:20:0")]
+    assert [link.source for link in blocked] == ["self"]
     assert found.nodes[0].salience == -1.0
 
 
-def test_what_stands_beside_where_the_agent_drove_closes_nothing() -> None:
-    beside = _cells(PlaceColumn.OBSTACLE, [(20, j) for j in range(-3, 2)])
-
-    assert Story(_driven(), ROAD, beside).looks(3) == []
-
-
-def test_a_street_that_is_closed_far_away_is_not_seen_to_be() -> None:
-    assert Story(_driven(), ROAD, BARRIER).looks(3, x_m=-15.0) == []
+@pytest.mark.parametrize(
+    "scan",
+    [
+        _barrier(rightmost_m=0.0, leftmost_m=8.0),
+        _barrier(rightmost_m=2.8, leftmost_m=20.0),
+        _barrier(at_m=2.5),
+        _barrier(at_m=50.0),
+        NOTHING,
+        _scan(60.0),
+    ],
+    ids=["on one side", "beside", "too near", "too far", "nothing seen", "free"],
+)
+def test_what_does_not_stand_across_where_the_agent_drove_closes_nothing(scan: Array) -> None:
+    assert Story(_driven(), ROAD).looks(3, scan) == []
 
 
 def test_what_stands_along_where_the_agent_drove_closes_nothing() -> None:
-    assert Story(_driven(math.pi / 2), ROAD, BARRIER).looks(3) == []
+    assert Story(_driven(math.pi / 2), ROAD).looks(3, BARRIER) == []
+
+
+def test_a_wall_behind_a_bend_closes_nothing() -> None:
+    bend_m = [(float(i), 0.0) for i in range(20)] + [(20.0, float(j)) for j in range(20)]
+    road = _cells(PlaceColumn.ROAD, [(round(i), round(j)) for i, j in bend_m])
+
+    assert Story(_plan(bend_m), road).looks(3, _barrier(at_m=21.0)) == []
 
 
 @pytest.mark.parametrize(
     "operations",
     [
-        (_plan(), ROAD),
-        (_plan(), BARRIER),
-        (_plan(doubtful=True), ROAD, BARRIER),
-        (Plan(id=PLAN_ID, state=PlanState.NO_ROUTE), ROAD, BARRIER),
+        (_plan(),),
+        (_plan(doubtful=True), ROAD),
+        (Plan(id=PLAN_ID, state=PlanState.NO_ROUTE), ROAD),
     ],
-    ids=["nothing stands there", "never road", "in doubt", "no route"],
+    ids=["never road", "in doubt", "no route"],
 )
 def test_what_the_plan_did_not_count_on_is_no_surprise(operations: tuple[Operation, ...]) -> None:
-    assert Story(*operations).looks(3) == []
+    assert Story(*operations).looks(3, BARRIER) == []
 
 
 def test_a_closure_behind_the_agent_is_no_surprise() -> None:
-    assert Story(_plan(), ROAD, BARRIER).looks(3, x_m=30.0) == []
+    assert Story(_plan(), ROAD).looks(3, BARRIER, x_m=30.0, heading_rad=math.pi) == []

@@ -1,0 +1,103 @@
+"""Lanes that the agent counts on: where it drove, and where its plan leads along road."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cogmap.geometry.arrays import Booleans, Floats
+from cogmap.geometry.se2 import wrap_angle
+from cogmap.graph.graph import Graph
+from cogmap.graph.window import ROAD_FROM, Extent
+from schemas.nodes import PLAN_ID, PathColumn, PlaceColumn, Plan, Self
+from services.codelets.planning.driven import POSITION, path_of
+
+# A lane is straight that turns by no more so far before and behind. Where it bends, what stands
+# beyond the bend seems to stand across it.
+STRAIGHT_M = (4.0, 8.0)
+LARGEST_TURN_RAD = 0.4
+# The direction of a route is that from as many places before to as many after.
+ROUTE_PLACES = 3
+# Beyond the reach of the scan.
+ROUTE_AHEAD_M = 60.0
+
+
+class Lane(NamedTuple):
+    """Places of a lane, (n, 2), and its direction at each, (n,)."""
+
+    position_m: Floats
+    heading_rad: Floats
+
+    def where(self, is_kept: Booleans) -> Lane:
+        """Those of the places for which that is so, (n,)."""
+        return Lane(self.position_m[is_kept], self.heading_rad[is_kept])
+
+
+def lanes(agent: Self, graph: Graph) -> list[Lane]:
+    """The straight parts of the plan's route ahead and of the path that the agent drove."""
+    return [_route_ahead(agent, graph), _driven(graph)]
+
+
+def _driven(graph: Graph) -> Lane:
+    path = path_of(graph)
+    lane = Lane(path[:, POSITION], path[:, PathColumn.HEADING_RAD])
+    return lane.where(_is_straight(lane))
+
+
+def _route_ahead(agent: Self, graph: Graph) -> Lane:
+    """The plan's route from the place nearest to the agent on, where it was seen to be road; none
+    of a plan that is to find out whether a street is closed.
+    """
+    plan = graph.get(Plan, PLAN_ID)
+    if plan is None or plan.route is None or plan.doubtful or plan.map != agent.map:
+        return Lane(np.zeros((0, 2)), np.zeros(0))
+
+    route_m = np.asarray(plan.route.numpy(), np.float64)
+    away_m = np.hypot(*(route_m - (agent.x_m, agent.y_m)).T)
+    nearest = int(away_m.argmin())
+    last = nearest + round(ROUTE_AHEAD_M / graph.cell_m(plan.map)) + 1
+
+    ahead_m = route_m[nearest:last]
+    lane = Lane(ahead_m, _directions_rad(ahead_m))
+    return lane.where(_is_straight(lane) & _is_road(ahead_m, plan.map, graph))
+
+
+def _directions_rad(positions_m: Floats) -> Floats:
+    """(n,): the direction of a line at each of its (n, 2) points."""
+    number = np.arange(len(positions_m))
+    last = len(positions_m) - 1
+    before_m = positions_m[(number - ROUTE_PLACES).clip(0)]
+    after_m = positions_m[(number + ROUTE_PLACES).clip(max=last)]
+
+    forwards_m, leftwards_m = (after_m - before_m).T
+    direction_rad: Floats = np.arctan2(leftwards_m, forwards_m)
+    return direction_rad
+
+
+def _is_road(positions_m: Floats, map_id: str, graph: Graph) -> Booleans:
+    """(n,): whether road was seen at (n, 2) positions."""
+    cells = np.rint(positions_m / graph.cell_m(map_id)).astype(np.int64)
+    lower = cells.min(axis=0)
+    upper = cells.max(axis=0) + 1
+    around = Extent(tuple(lower.tolist()), tuple(upper.tolist()))
+
+    window = graph.places.window(map_id, [PlaceColumn.ROAD], around)
+    i, j = (cells - lower).T
+    is_road: Booleans = window.column(PlaceColumn.ROAD)[i, j] >= ROAD_FROM
+    return is_road
+
+
+def _is_straight(lane: Lane) -> Booleans:
+    """(n,): where a lane is straight."""
+    steps_m = np.hypot(*np.diff(lane.position_m, axis=0).T)
+    along_m = np.concatenate([np.zeros(min(len(lane.position_m), 1)), steps_m.cumsum()])
+    is_straight = np.ones(len(along_m), bool)
+    for away_m in STRAIGHT_M:
+        first = np.searchsorted(along_m, along_m - away_m)
+        last = np.searchsorted(along_m, along_m + away_m, side="right") - 1
+        for there in (first, last):
+            turned_rad = np.abs(wrap_angle(lane.heading_rad[there] - lane.heading_rad))
+            is_straight &= turned_rad <= LARGEST_TURN_RAD
+
+    return is_straight
