@@ -247,7 +247,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             "squared distance, in variances, over that at which a closure is rejected, above 0, "
             "at most 100"
         ),
-    ] = 0.05
+    ] = 0.1
     waiting_share: Annotated[
         Share,
         Meta(

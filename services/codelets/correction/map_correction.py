@@ -67,7 +67,8 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
         return []
 
     rows = rows_of(graph.of_kind(PathSegment))
-    if may_wait(fresh, rows, config):
+    is_corrected = any(closure.accepted for closure in closures)
+    if is_corrected and may_wait(fresh, rows, config):
         return []
 
     task = context.task(CODELET.name, about=[closure.id for closure in fresh])

@@ -95,3 +95,10 @@ def test_a_share_of_closures_that_the_path_does_not_explain_waits(
     config = Config(revisit_s=100.0, waiting_share=share)
 
     assert _is_due(graph, 23, config) is is_due
+
+
+def test_the_first_closures_of_a_path_do_not_wait() -> None:
+    path = [_segment(number) for number in range(8)]
+    graph = graph_of(*path, *[_closure(at_s, None) for at_s in (11, 12, 13)])
+
+    assert _is_due(graph, 14, Config(revisit_s=100.0))
