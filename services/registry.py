@@ -6,6 +6,7 @@ them has use for none.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -177,9 +178,14 @@ def codelets() -> tuple[Codelet, ...]:
     return all_codelets()
 
 
-@cache
 def _settings_of_codelets() -> dict[str, type[msgspec.Struct]]:
     """The types of the codelets' settings by section. Raises ConfigError."""
+    return _settings_found_on(tuple(sys.path))
+
+
+@cache
+def _settings_found_on(path: tuple[str, ...]) -> dict[str, type[msgspec.Struct]]:
+    """The same, where packages are found on that `path`."""
     from cogmap.runtime.codelet import ENTRY_POINTS
 
     if entry_points(group=ENTRY_POINTS):
