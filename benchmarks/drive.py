@@ -10,6 +10,7 @@ import msgspec
 from rich.console import Console
 
 from cli.launch.drive import Drive
+from cli.launch.forking.client import fork_server
 from cli.launch.metrics import RunMetrics
 from cli.launch.observer import Errors, Observer
 from cli.launch.outcome import Outcome
@@ -22,6 +23,7 @@ from cogmap.errors import CogmapError
 from cogmap.recording.recorder import Summary
 from cogmap.recording.storage.format import SUMMARY
 from cogmap.recording.storage.reader import LogReader
+from cogmap.runtime.config import Sections
 from cogmap.runtime.process import Stop
 
 TIMEOUT_S = 180.0
@@ -69,24 +71,30 @@ class TimedStop(Stop):
         self.release()
 
 
-def drive(folder: Path, laps: float = 1.0, seconds: float = TIMEOUT_S) -> tuple[RunMetrics, Watch]:
-    """Drive `laps`, at most `seconds`, leaving the files of `cogmap run` in `folder`.
+def drive(
+    folder: Path,
+    laps: float = 1.0,
+    seconds: float = TIMEOUT_S,
+    settings: Sections | None = None,
+) -> tuple[RunMetrics, Watch]:
+    """Drive `laps`, at most `seconds`, leaving the files of `cogmap run` in `folder`; `settings`
+    are those that are not the default's.
 
     Ctrl-C ends the process. Raises CogmapError where the robot never moved.
     """
     began_s = time.monotonic()
-    choices = Choices(laps=laps)
-    members = awaited(choices, observer=True)
-    sections = effective({}, choices, members)
-
     display = display_on(Console(stderr=True))
     stop = TimedStop(display, seconds)
-    run = Drive(folder, free_endpoint(), "agent", choices, sections, began_s)
 
-    try:
-        watch, ending = run.run(began_s + TIMEOUT_S, stop, stop)
-    finally:
-        stop.close()
+    with fork_server() as server:
+        choices = Choices(laps=laps)
+        members = awaited(choices, observer=True)
+        sections = effective(settings or {}, choices, members)
+        run = Drive(folder, free_endpoint(), "agent", choices, sections, began_s, server)
+        try:
+            watch, ending = run.run(began_s + TIMEOUT_S, stop, stop)
+        finally:
+            stop.close()
 
     if ending.outcome is Outcome.INTERRUPTED and stop.interrupted:
         sys.exit(130)

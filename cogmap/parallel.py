@@ -9,9 +9,6 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-from joblib import Parallel, delayed
-from joblib.externals.loky import get_reusable_executor
-
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 POLL_S = 0.5
@@ -29,6 +26,9 @@ def parallel_map(
     `work` and the jobs are pickled, arrays of any size too. One process, or one job, runs in the
     calling process.
     """
+    # As long to import as a command is to start that has nothing to spread.
+    from joblib import Parallel, delayed
+
     count = max(1, min(processes, len(jobs)))
     pool = Parallel(
         n_jobs=count,
@@ -52,6 +52,8 @@ def end_workers() -> None:
 
     A process that a pool has started cannot exit before.
     """
+    from joblib.externals.loky import get_reusable_executor
+
     get_reusable_executor(reuse=True).shutdown(wait=True)
 
 

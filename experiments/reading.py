@@ -37,7 +37,7 @@ def self_pose(graph: Graph) -> Pose:
 
 
 def path_rows(graph: Graph) -> Floats:
-    """(n, 9) rows of the path, the oldest first: see STAMP, POSE and ODOMETRY."""
+    """(n, 11) rows of the path, the oldest first: see STAMP, POSE and ODOMETRY."""
     return rows_of(graph.of_kind(PathSegment))
 
 

@@ -1,21 +1,29 @@
 """The one table of modules: what there is to run, in the order of the cognitive cycle.
 
-A module's package is imported when it is asked for: its process has no use for the others.
+A module is imported when it is built: its process has no use for the others, and whoever configures
+them has use for none.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from importlib.metadata import entry_points
+from typing import TYPE_CHECKING
 
 import msgspec
 
 from cogmap.errors import UsageError
 from cogmap.runtime import config
-from cogmap.runtime.codelet import Codelet
-from cogmap.runtime.module import Module
 
-Build = Callable[[config.Sections, str], Module]
+if TYPE_CHECKING:
+    from cogmap.runtime.codelet import Codelet
+    from cogmap.runtime.module import Module
+
+    Build = Callable[[config.Sections, str], Module]
 
 
 @dataclass(frozen=True)
@@ -27,30 +35,45 @@ class Entry:
 
 
 def _sim() -> Entry:
-    from services.sim.module import Config, build
+    from services.sim.config import Config
 
-    return Entry(Config, lambda sections, name: build(config.typed(sections, "sim", Config), name))
+    def built(sections: config.Sections, name: str) -> Module:
+        from services.sim.module import build
+
+        return build(config.typed(sections, "sim", Config), name)
+
+    return Entry(Config, built)
 
 
 def _sensory() -> Entry:
-    from services.sensory.module import Config, build
+    from services.sensory.config import Config
 
-    return Entry(
-        Config, lambda sections, name: build(config.typed(sections, "sensory", Config), name)
-    )
+    def built(sections: config.Sections, name: str) -> Module:
+        from services.sensory.module import build
+
+        return build(config.typed(sections, "sensory", Config), name)
+
+    return Entry(Config, built)
 
 
 def _epam() -> Entry:
-    from services.epam.module import Config, build
+    from services.epam.config import Config
 
-    return Entry(Config, lambda sections, name: build(config.typed(sections, "epam", Config), name))
+    def built(sections: config.Sections, name: str) -> Module:
+        from services.epam.module import build
+
+        return build(config.typed(sections, "epam", Config), name)
+
+    return Entry(Config, built)
 
 
 def _workspace() -> Entry:
-    from services.codelets.table import all_codelets, configured
-    from services.workspace.module import Config, build
+    from services.workspace.config import Config
 
     def built(sections: config.Sections, name: str) -> Module:
+        from services.codelets.table import all_codelets, configured
+        from services.workspace.module import build
+
         codelets = configured(sections, all_codelets())
         return build(config.typed(sections, "workspace", Config), name, codelets)
 
@@ -58,54 +81,70 @@ def _workspace() -> Entry:
 
 
 def _codelets() -> Entry:
-    from services.codelets.module import Config, build
-    from services.codelets.table import all_codelets, configured
+    from services.codelets.config import Config
 
     def built(sections: config.Sections, name: str) -> Module:
+        from services.codelets.module import build
+        from services.codelets.table import all_codelets, configured
+
         return build(name, configured(sections, all_codelets()))
 
     return Entry(Config, built)
 
 
 def _global_workspace() -> Entry:
-    from services.global_workspace.module import Config, build
+    from services.global_workspace.config import Config
 
-    return Entry(
-        Config,
-        lambda sections, name: build(config.typed(sections, "global_workspace", Config), name),
-    )
+    def built(sections: config.Sections, name: str) -> Module:
+        from services.global_workspace.module import build
+
+        return build(config.typed(sections, "global_workspace", Config), name)
+
+    return Entry(Config, built)
 
 
 def _memory() -> Entry:
-    from services.memory.module import Config, build
+    from services.memory.config import Config
 
-    return Entry(
-        Config, lambda sections, name: build(config.typed(sections, "memory", Config), name)
-    )
+    def built(sections: config.Sections, name: str) -> Module:
+        from services.memory.module import build
+
+        return build(config.typed(sections, "memory", Config), name)
+
+    return Entry(Config, built)
 
 
 def _procedural() -> Entry:
-    from services.procedural.module import Config, build
+    from services.procedural.config import Config
 
-    return Entry(
-        Config, lambda sections, name: build(config.typed(sections, "procedural", Config), name)
-    )
+    def built(sections: config.Sections, name: str) -> Module:
+        from services.procedural.module import build
+
+        return build(config.typed(sections, "procedural", Config), name)
+
+    return Entry(Config, built)
 
 
 def _action() -> Entry:
-    from services.action.module import Config, build
+    from services.action.config import Config
 
-    return Entry(
-        Config, lambda sections, name: build(config.typed(sections, "action", Config), name)
-    )
+    def built(sections: config.Sections, name: str) -> Module:
+        from services.action.module import build
+
+        return build(config.typed(sections, "action", Config), name)
+
+    return Entry(Config, built)
 
 
 def _motor() -> Entry:
-    from services.motor.module import Config, build
+    from services.motor.config import Config
 
-    return Entry(
-        Config, lambda sections, name: build(config.typed(sections, "motor", Config), name)
-    )
+    def built(sections: config.Sections, name: str) -> Module:
+        from services.motor.module import build
+
+        return build(config.typed(sections, "motor", Config), name)
+
+    return Entry(Config, built)
 
 
 _ENTRIES: dict[str, Callable[[], Entry]] = {
@@ -123,12 +162,38 @@ _ENTRIES: dict[str, Callable[[], Entry]] = {
 
 MODULES = tuple(_ENTRIES)
 
+_OF_CODELETS = (
+    "scipy.ndimage",
+    "scipy.sparse.csgraph",
+    "scipy.spatial",
+    "scipy.optimize",
+    "services.codelets.table",
+)
+
 
 def codelets() -> tuple[Codelet, ...]:
     """All codelets that there are to run: ours, and those of other packages. Raises ConfigError."""
     from services.codelets.table import all_codelets
 
     return all_codelets()
+
+
+def _settings_of_codelets() -> dict[str, type[msgspec.Struct]]:
+    """The types of the codelets' settings by section. Raises ConfigError."""
+    return _settings_found_on(tuple(sys.path))
+
+
+@cache
+def _settings_found_on(path: tuple[str, ...]) -> dict[str, type[msgspec.Struct]]:
+    """The same, where packages are found on that `path`."""
+    from cogmap.runtime.codelet import ENTRY_POINTS
+
+    if entry_points(group=ENTRY_POINTS):
+        return {codelet.section: codelet.config for codelet in codelets()}
+
+    from services.codelets.sections import SECTIONS
+
+    return SECTIONS
 
 
 def config_type(name: str) -> type[msgspec.Struct]:
@@ -138,16 +203,40 @@ def config_type(name: str) -> type[msgspec.Struct]:
     """
     if name in _ENTRIES:
         return _ENTRIES[name]().config
-    for codelet in codelets():
-        if codelet.section == name:
-            return codelet.config
+    found = _settings_of_codelets().get(name)
+    if found is not None:
+        return found
     raise UsageError(f"no module {name!r}: there are {', '.join(MODULES)}")
 
 
 def sections() -> tuple[str, ...]:
     """The sections that a configuration may have: modules, and codelets of other packages."""
-    others = {codelet.section for codelet in codelets()} - set(MODULES)
+    others = _settings_of_codelets().keys() - set(MODULES)
     return (*MODULES, *sorted(others))
+
+
+def runs_codelets(name: str) -> bool:
+    """Whether module `name` has the codelets in it."""
+    return name in {"workspace", "codelets"}
+
+
+def prepare(name: str) -> Iterator[None]:
+    """Import what module `name` consists of, and begin what it waits for when it is built: in
+    steps, so that something else can be done between them. Raises what an import raises.
+    """
+    if name == "sim":
+        from services.sim.rendering import egl
+
+        egl.trial()
+        yield
+
+    if runs_codelets(name):
+        for part in _OF_CODELETS:
+            import_module(part)
+            yield
+
+    import_module(f"services.{name}.module")
+    yield
 
 
 def build(name: str, settings: config.Sections, instance: str = "") -> Module:

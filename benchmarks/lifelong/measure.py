@@ -33,7 +33,7 @@ SPAN = 1_000
 EARLY_AT = 3_000
 CYCLES_PER_S = 5
 MIN_LAPS = 2
-OBSERVED = (topics.TRUE_TOWN, topics.TRUE_POSE, topics.ODOMETRY, topics.SELF_MOTION, topics.DELTA)
+OBSERVED = (topics.TRUE_TOWN, topics.TRUE_POSE, topics.DELTA)
 
 THRESHOLDS = {
     "cycle_ratio": at_most(1.3),

@@ -65,6 +65,9 @@ def sections(surveyed: bool) -> Sections:
         "path_variance_per_m": SPEED**2,
         "heading_variance_per_m": DRIFT_RAD_PER_M**2,
         "heading_variance_per_rad": TURN**2,
+        # The whole path is evaluated.
+        "sparse_after_s": NEVER_S,
+        "waiting_share": 0.0,
     }
 
     if surveyed:
@@ -135,7 +138,7 @@ class LocalizationLoop:
 
     @property
     def path(self) -> Floats:
-        """(n, 7) rows of the path on the map now: stamp_s, pose, and path integration's."""
+        """(n, 11) rows of the path on the map now, see PathColumn."""
         return nodes.path(self._graph)
 
     def _worker(self, configured: Sections) -> Module:

@@ -96,7 +96,7 @@ def odometry(graph: Graph) -> Floats:
 
 
 def path(graph: Graph) -> Floats:
-    """(n, 9) rows of the path as it is on the map now, see PathColumn."""
+    """(n, 11) rows of the path as it is on the map now, see PathColumn."""
     segments = graph.of_kind(PathSegment)
     return rows_of(segments)
 

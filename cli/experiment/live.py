@@ -8,8 +8,9 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
+from cli.launch.command_line import cogmap_command
 from cli.launch.plan import CONFIG_NAME, ROUTER, to_toml
-from cli.launch.supervisor import Program, Supervisor, cogmap_command
+from cli.launch.supervisor import Program, Supervisor
 from cogmap.bus.session import free_endpoint
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.errors import CogmapError

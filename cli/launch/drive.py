@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from cli.launch.forking.client import ForkServer
 from cli.launch.guide import Guide, Stage
 from cli.launch.observer import Observer
 from cli.launch.outcome import Ending, Outcome
@@ -43,7 +44,7 @@ MAX_NAMES = 8
 @dataclass
 class Drive:
     """A run in `folder`, which holds its files, of the modules as configured in `sections`, at the
-    router `endpoint`.
+    router `endpoint`. Where there is a `server`, it forks them.
     """
 
     folder: Path
@@ -52,10 +53,11 @@ class Drive:
     choices: Choices
     sections: Sections
     began_s: float
+    server: ForkServer | None = None
     start_s: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.supervisor = Supervisor(self.folder)
+        self.supervisor = Supervisor(self.folder, self.server)
         self._watchdog = Watchdog()
         self.guide: Guide | None = None
         if self.choices.tour:

@@ -10,7 +10,8 @@ from typing import Any
 import msgspec
 import tomli_w
 
-from cli.launch.supervisor import Program, cogmap_command
+from cli.launch.command_line import cogmap_command
+from cli.launch.supervisor import Program
 from cogmap.errors import ConfigError
 from cogmap.runtime import config
 from cogmap.runtime.config import Sections

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
-import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO, Protocol
 
+from cli.launch.command_line import arguments_of, environment
+from cli.launch.forking.client import ForkServer
 from cogmap.errors import ProcessFailedError
 
 MIN_BACKOFF_S = 0.2
@@ -18,7 +19,7 @@ MAX_BACKOFF_S = 5.0
 STEADY_S = 10.0
 MAX_QUICK_DEATHS = 4
 USAGE_EXIT = 2
-_SOURCES = Path(__file__).parents[2]
+KILLED_S = 10.0
 
 
 @dataclass(frozen=True)
@@ -33,25 +34,22 @@ class Program:
     command: Callable[[int], Sequence[str]]
 
 
-def cogmap_command(*arguments: str) -> list[str]:
-    """The command line of `cogmap` itself, with the Python and the sources of this process."""
-    return [sys.executable, "-P", "-m", "cli.main", *arguments]
+class Process(Protocol):
+    """What a supervisor needs of subprocess.Popen."""
 
+    @property
+    def pid(self) -> int: ...
 
-def _environment() -> dict[str, str]:
-    """This process's, with one thread a process for linear algebra: there are more processes than
-    cores.
-    """
-    environment = dict(os.environ)
-    environment["OPENBLAS_NUM_THREADS"] = "1"
-    environment["OMP_NUM_THREADS"] = "1"
+    @property
+    def stdin(self) -> IO[bytes] | None: ...
 
-    paths = [str(_SOURCES)]
-    inherited = environment.get("PYTHONPATH")
-    if inherited:
-        paths.append(inherited)
-    environment["PYTHONPATH"] = os.pathsep.join(paths)
-    return environment
+    def poll(self) -> int | None: ...
+
+    def wait(self, timeout: float) -> int: ...
+
+    def terminate(self) -> None: ...
+
+    def kill(self) -> None: ...
 
 
 class Child:
@@ -59,10 +57,11 @@ class Child:
     whatever the cause.
     """
 
-    def __init__(self, program: Program, folder: Path) -> None:
+    def __init__(self, program: Program, folder: Path, server: ForkServer | None = None) -> None:
         self.program = program
         self.starts = 0
         self._log = folder / f"{program.instance}.log"
+        self._server = server
         self._backoff_s = MIN_BACKOFF_S
         self._quick_deaths = 0
         self._due_s: float | None = None
@@ -71,17 +70,25 @@ class Child:
     def start(self) -> None:
         """Start it, in a session of its own so that a Ctrl-C here does not reach it."""
         with self._log.open("ab") as log:
-            self._process = subprocess.Popen(
-                self.program.command(self.starts),
-                stdin=subprocess.PIPE,
-                stdout=log,
-                stderr=subprocess.STDOUT,
-                env=_environment(),
-                start_new_session=True,
-            )
+            self._process = self._launched(self.program.command(self.starts), log)
         self.starts += 1
         self._started_s = time.monotonic()
         self._due_s = None
+
+    def _launched(self, command: Sequence[str], log: IO[bytes]) -> Process:
+        """Forked, where there is a server for that and it has what the command needs."""
+        arguments = arguments_of(command)
+        if arguments is not None and self._server is not None and self._server.is_alive:
+            return self._server.fork(arguments, log.fileno())
+
+        return subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=log,
+            stderr=subprocess.STDOUT,
+            env=environment(),
+            start_new_session=True,
+        )
 
     @property
     def pid(self) -> int:
@@ -146,7 +153,7 @@ class Child:
             by_itself = True
         except subprocess.TimeoutExpired:
             self._process.kill()
-            self._process.wait()
+            self._process.wait(KILLED_S)
             by_itself = False
 
         self._close_pipe()
@@ -158,17 +165,21 @@ class Child:
 
 
 class Supervisor:
-    """The children of one run, whose logs are in `folder`; `check` it often, `end` them all."""
+    """The children of one run, whose logs are in `folder`; `check` it often, `end` them all.
 
-    def __init__(self, folder: Path) -> None:
+    A `server` forks those that are processes of `cogmap`; without one, each is a new Python.
+    """
+
+    def __init__(self, folder: Path, server: ForkServer | None = None) -> None:
         self._folder = folder
+        self._server = server
         self.children: dict[str, Child] = {}
         self.restarts: Counter[str] = Counter()
         self.killed: list[str] = []
 
     def start(self, program: Program) -> None:
         """Start `program`."""
-        self.children[program.instance] = Child(program, self._folder)
+        self.children[program.instance] = Child(program, self._folder, self._server)
 
     def check(self) -> None:
         """Restart what has died. Raises ProcessFailedError where that would not help."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.geometry.polylines import interpolate
@@ -80,6 +79,9 @@ class Track:
         steps_m = np.stack([points_m[:-1], points_m[1:]], axis=1)[max(0, count - 1) :]
         if not count or not len(steps_m):
             return np.zeros((0, 2, 2))
+
+        # Whoever watches a drive would wait for its import at the start.
+        from scipy.spatial import cKDTree
 
         from_known_m, _ = cKDTree(points_m[:count]).query(steps_m.mean(axis=1))
         new_m: Floats = steps_m[from_known_m > away_m]

@@ -7,11 +7,14 @@ from __future__ import annotations
 import json
 import re
 import socket
+from typing import TYPE_CHECKING
 
 import zenoh
 
-from cogmap.bus.interface import Member
 from cogmap.errors import NoRouterError, PortInUseError, UsageError
+
+if TYPE_CHECKING:
+    from cogmap.bus.interface import Member
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 DEFAULT_AGENT = "agent"

@@ -27,6 +27,10 @@ RECOVERY_PERIOD = timedelta(seconds=0.5)
 # neither and closes the link after 5 s.
 ANSWER_PRIORITY = zenoh.Priority.BACKGROUND
 _LARGE_BYTES = 8 * 2**20
+# An image travels in batches, through the router and two threads in each process. On two cores it
+# takes twice as long while the thread that has published it computes on.
+BATCHED_BYTES = 2**17
+TRANSIT_S = 0.002
 
 
 class _Closable(Protocol):
@@ -92,6 +96,8 @@ class ZenohBus:
 
     def publish(self, topic: Topic, payload: bytes, envelope: Envelope) -> None:
         self._publishers[topic].put(payload, attachment=encode(envelope))
+        if len(payload) > BATCHED_BYTES:
+            time.sleep(TRANSIT_S)
 
     def subscribe(
         self,

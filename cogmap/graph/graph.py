@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections import defaultdict
 from collections.abc import Callable, Iterator
+from operator import attrgetter
 from typing import Any, TypeVar
 
 from cogmap.bus.codec import encode
@@ -34,7 +35,6 @@ from schemas.nodes import (
     Map,
     PathSegment,
     Self,
-    segment_id,
 )
 
 K = TypeVar("K", bound=GraphNode)
@@ -125,10 +125,14 @@ class Graph:
         return len(self._by_kind[kind])
 
     @property
+    def path(self) -> list[PathSegment]:
+        """The segments of the path, the oldest first."""
+        return sorted(self.of_kind(PathSegment), key=attrgetter("number"))
+
+    @property
     def last_segment(self) -> PathSegment | None:
         """The newest segment of the path."""
-        number = self.count(PathSegment) - 1
-        return self.get(PathSegment, segment_id(number))
+        return max(self.of_kind(PathSegment), key=attrgetter("number"), default=None)
 
     def cell_m(self, map_id: str = ROOT_MAP) -> float:
         """The distance between neighbouring place nodes of a map."""

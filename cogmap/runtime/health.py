@@ -14,12 +14,11 @@ from cogmap.runtime.module import Module
 from schemas.process import Health
 
 _RECENT = 512
-_process = psutil.Process()
 
 
 def memory_mb() -> float:
     """This process's resident memory, in 10^6 bytes."""
-    return _process.memory_info().rss / 1e6
+    return psutil.Process().memory_info().rss / 1e6
 
 
 class Meter:

@@ -21,6 +21,9 @@ def settings(method: str, step_m: float) -> Sections:
         # The percepts of points err independently, and alike from all sides.
         "landmark_sides": 1,
         "correlated_sightings": 1.0,
+        # The whole path is evaluated.
+        "sparse_after_s": NEVER_S,
+        "waiting_share": 0.0,
     }
 
     if method == "none":

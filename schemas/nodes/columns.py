@@ -47,6 +47,9 @@ class SelfColumn(enum.IntEnum):
 class PathColumn(enum.IntEnum):
     """Columns of a path segment: when, the pose believed, the pose by path integration alone, and
     the variance of the latter since the start, of the distance and of the heading.
+
+    `LAST_S` is when the agent was there last, and `JOINED` how many places between this one and the
+    one before were joined into older ones.
     """
 
     STAMP_S = 0
@@ -58,6 +61,22 @@ class PathColumn(enum.IntEnum):
     ODOMETRY_HEADING_RAD = 6
     VARIANCE_M2 = 7
     VARIANCE_RAD2 = 8
+    LAST_S = 9
+    JOINED = 10
+
+
+class JoinColumn(enum.IntEnum):
+    """Columns of the joins of a path segment: the times of the two places, the pose of the second
+    in the frame of the first, and its variances, by either axis and of the heading.
+    """
+
+    FROM_S = 0
+    TO_S = 1
+    X_M = 2
+    Y_M = 3
+    HEADING_RAD = 4
+    VARIANCE_M2 = 5
+    VARIANCE_RAD2 = 6
 
 
 class ObservationColumn(enum.IntEnum):

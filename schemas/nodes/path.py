@@ -5,20 +5,32 @@ from __future__ import annotations
 from schemas.array import Matrix
 from schemas.base import Count, Finite, Name
 from schemas.nodes.base import GraphNode, Metres, Spread, Stamp
-from schemas.nodes.columns import CorrectionColumn, ObservationColumn, PathColumn, check_matrix
+from schemas.nodes.columns import (
+    CorrectionColumn,
+    JoinColumn,
+    ObservationColumn,
+    PathColumn,
+    check_matrix,
+)
 
 
 class PathSegment(GraphNode, kw_only=True, frozen=True, tag="path_segment"):
-    """Places of the agent's path in a row, `rows`: float64 (n, 9), see PathColumn.
+    """Places of the agent's path in a row, `rows`: float64 (n, 11), see PathColumn.
 
-    Segments are numbered from 0.
+    Segments are numbered from 0; one whose places were all joined into older ones is no more. Once
+    it `is_sparse`, no more of its places are joined. `joins`: float64 (m, 7), see JoinColumn, are
+    the steps between its places and those that others were joined into.
     """
 
     number: Count
     rows: Matrix
+    is_sparse: bool = False
+    joins: Matrix | None = None
 
     def __post_init__(self) -> None:
         check_matrix(self.id, self.rows, "<f8", (len(PathColumn),))
+        if self.joins is not None:
+            check_matrix(self.id, self.joins, "<f8", (len(JoinColumn),))
 
 
 class Observations(GraphNode, kw_only=True, frozen=True, tag="observations"):

@@ -232,6 +232,30 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             lt=1,
         ),
     ] = 1e-3
+    sparse_after_s: Annotated[
+        Seconds,
+        Meta(
+            description="age from which on a place of the path is joined into an older one that "
+            "stood there already, in s, above 0, at most 1e9; until then a mistaken loop closure "
+            "can be taken back"
+        ),
+    ] = 300.0
+    waiting_misfit: Annotated[
+        Positive,
+        Meta(
+            description="misfit of a new loop closure up to which the path explains it: its "
+            "squared distance, in variances, over that at which a closure is rejected, above 0, "
+            "at most 100"
+        ),
+    ] = 0.1
+    waiting_share: Annotated[
+        Share,
+        Meta(
+            description="share of the new loop closures that the path does not explain, three at "
+            "least, from which on it is corrected; below, a correction would change little, and "
+            "waits, 0 to 1; 0: none waits"
+        ),
+    ] = 0.1
     synapse_decay_per_m: Annotated[
         Positive,
         Meta(

@@ -35,11 +35,13 @@ from services.codelets.mapping import (
 from services.codelets.planning import route_plan
 from services.codelets.recollection import join_map
 from services.codelets.resolution import coarse_places, sub_map_places
+from services.codelets.sparse import sparse_path
 from services.codelets.structure import map_structure
 
 CODELETS: tuple[Codelet, ...] = (
     apply_correction.CODELET,
     join_map.CODELET,
+    sparse_path.CODELET,
     localization.CODELET,
     object_place.CODELET,
     charging_place.CODELET,

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import onnxruntime
 
 from cogmap.errors import ConfigError
 from cogmap.geometry.arrays import Singles
+
+if TYPE_CHECKING:
+    import onnxruntime
 
 WEIGHTS = Path(__file__).with_name("weights")
 Shape = tuple[int, ...]
@@ -45,6 +48,9 @@ class Network:
 def _session(path: Path) -> onnxruntime.InferenceSession:
     if not path.is_file():
         raise ConfigError(f"no weights {path}: train them with cogmap train")
+
+    # It starts a thread as it is imported, which a forked process would lack and wait for.
+    import onnxruntime
 
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1

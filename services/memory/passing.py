@@ -14,7 +14,7 @@ import numpy as np
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import transform_from
 from cogmap.graph.graph import Graph
-from schemas.nodes import Object, PathColumn, PathSegment, look_of, segment_id
+from schemas.nodes import Object, PathColumn, look_of
 from services.memory.config import Config
 from services.memory.maps import RememberedMap
 
@@ -40,11 +40,8 @@ class Way(NamedTuple):
 def way_of(graph: Graph, learned: Sequence[Object]) -> Way:
     """The agent's way, as far back as the last segments of its path."""
     rows = [np.zeros((0, len(PathColumn)))]
-    last = graph.count(PathSegment)
-    for number in range(last - SEGMENTS, last):
-        segment = graph.get(PathSegment, segment_id(number))
-        if segment is not None:
-            rows.append(np.asarray(segment.rows.numpy(), np.float64))
+    for segment in graph.path[-SEGMENTS:]:
+        rows.append(np.asarray(segment.rows.numpy(), np.float64))
 
     return Way(np.vstack(rows)[:, POSITION], learned)
 

@@ -17,7 +17,9 @@ from services.sim.layout.removals import Removal
 from services.sim.odometry import Noise
 from services.sim.scripted.percepts import PerceptErrors
 from services.sim.scripted.trajectory import Trajectory
-from services.sim.world import STEP_S
+
+STEP_S = 1 / 240
+"""A step of the physics."""
 
 Rate = Annotated[int, msgspec.Meta(ge=1, le=240)]
 Side = Annotated[int, msgspec.Meta(ge=64, le=1024)]

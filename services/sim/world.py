@@ -12,6 +12,7 @@ import numpy as np
 
 from cogmap.geometry.arrays import Singles
 from schemas.sensing import Pose
+from services.sim.config import STEP_S
 from services.sim.layout.barriers import barriers
 from services.sim.layout.furniture import Prop
 from services.sim.layout.place import Place
@@ -26,7 +27,6 @@ from services.sim.scene.builder import Builder
 from services.sim.scene.nearby import Nearby, Piece
 from services.sim.stdio import pybullet, quiet
 
-STEP_S = 1 / 240
 _GRAVITY_M_S2 = -9.81
 _CONTACT_BODY = 2
 # A collision is over where the robot has moved so far from it.

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 import threading
+import time
 from queue import SimpleQueue
 
 import pytest
 
 from cogmap.bus.codec import Envelope, decode
 from cogmap.bus.interface import Answer, Bus, Job, Member
-from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.bus.zenoh_bus import BATCHED_BYTES, TRANSIT_S, ZenohBus
 from cogmap.errors import NoAnswerError, UsageError
 from schemas import topics
 from schemas.examples import example_messages
@@ -312,3 +313,13 @@ def test_an_instance_that_cannot_be_in_a_key_names_itself(over_zenoh: OverZenoh)
 
     with pytest.raises(UsageError, match=r"--instance 'a/b': use letters, digits"):
         bus.announce(Member("codelets", "a/b"))
+
+
+def test_whoever_publishes_an_image_waits_while_it_is_on_its_way(over_zenoh: OverZenoh) -> None:
+    publisher = over_zenoh.join()
+    publisher.declare(topics.VIEW)
+    began_s = time.monotonic()
+
+    publisher.publish(topics.VIEW, bytes(BATCHED_BYTES + 1), ENVELOPE)
+
+    assert time.monotonic() - began_s >= TRANSIT_S

@@ -36,7 +36,7 @@ from schemas.nodes import (
 from services.codelets.config import SECTION, Config
 from services.codelets.correction.place_columns import MOVED_COLUMNS, move_places
 from services.codelets.mapping.observations import Sightings
-from services.codelets.mapping.path import POSE, STAMP, rows_of, segments
+from services.codelets.mapping.path import POSE, STAMP, rows_of, with_rows
 
 OLD = slice(CorrectionColumn.OLD_X_M, CorrectionColumn.OLD_HEADING_RAD + 1)
 NEW = slice(CorrectionColumn.NEW_X_M, CorrectionColumn.NEW_HEADING_RAD + 1)
@@ -68,7 +68,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
 def moved(graph: Graph, rows: Floats) -> list[Operation]:
     """Everything on the root map, moved as (n, 7) rows of a correction state."""
     path = _corrected_path(graph, rows)
-    operations: list[Operation] = [*segments(path)]
+    operations = _move_path(graph, path)
     if graph.agent is not None:
         operations += _move_self(graph, graph.agent, rows[-1:])
     operations += _move_objects(graph, rows, path)
@@ -110,6 +110,20 @@ def _corrected_path(graph: Graph, rows: Floats) -> Floats:
 
     path[:, POSE] = _moved_poses(path[:, POSE], corrections)
     return path
+
+
+def _move_path(graph: Graph, path: Floats) -> list[Operation]:
+    """The segments of the path of which places move, `path` being all its corrected rows."""
+    operations: list[Operation] = []
+    start = 0
+    for segment in graph.path:
+        before = segment.rows.numpy()
+        after = path[start : start + len(before)]
+        start += len(before)
+        if not np.array_equal(before, after):
+            operations.append(with_rows(segment, after))
+
+    return operations
 
 
 def _moved_poses(poses: Floats, rows: Floats) -> Floats:

@@ -102,7 +102,7 @@ class IncrementalSolver:
 
         poses = self._normal.moved(graph.poses, -update.step)
         closures = graph.closures + closure
-        self.graph = PoseGraph(poses, graph.steps, closures)
+        self.graph = replace(graph, poses=poses, closures=closures)
 
         self._cost += update.chi_square
         if self._is_inaccurate():

@@ -27,6 +27,7 @@ from services.codelets.correction.joint import optimize_jointly
 from services.codelets.correction.least_squares import optimize
 from services.codelets.correction.pairwise_consistency import MIN_AGREEING, Views, consistent
 from services.codelets.correction.pose_graph import (
+    NO_CONSTRAINTS,
     Constraints,
     PoseGraph,
     diagonal_information,
@@ -36,8 +37,9 @@ from services.codelets.correction.pose_graph import (
 )
 from services.codelets.correction.reverse_replay import close_loops
 from services.codelets.correction.synapses import replay_of
+from services.codelets.correction.waiting import may_wait
 from services.codelets.mapping.observations import Sightings
-from services.codelets.mapping.path import POSE, STAMP, rows_of, steps_of
+from services.codelets.mapping.path import POSE, STAMP, joins_of, rows_of, steps_of
 from services.codelets.mapping.views import constraints_of, views_of
 
 MIN_ROWS = 10
@@ -48,22 +50,28 @@ SHORT_SEGMENTS = 8
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task where there are closures not judged yet, and enough of late to agree; unless some
-    were judged just now, or a correction waits to be applied.
+    """One task where closures of the present pass were not judged yet that the path does not
+    explain, and enough of it are there to agree; unless some were judged just now, or a correction
+    waits to be applied.
     """
     if CORRECTION_ID in graph.nodes:
         return []
 
     closures = list(graph.of_kind(LoopClosure))
-    fresh = [closure.id for closure in closures if closure.accepted is None]
     late = _late(closures, context.stamp_ns, config)
+    fresh = [closure for closure in late if closure.accepted is None]
     if not fresh or len(late) < MIN_AGREEING:
         return []
 
     if context.stamp_ns < _next_judgement_ns(closures, graph.count(PathSegment), config):
         return []
 
-    task = context.task(CODELET.name, about=fresh)
+    rows = rows_of(graph.of_kind(PathSegment))
+    is_corrected = any(closure.accepted for closure in closures)
+    if is_corrected and may_wait(fresh, rows, config):
+        return []
+
+    task = context.task(CODELET.name, about=[closure.id for closure in fresh])
     return [task]
 
 
@@ -74,7 +82,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     if not closures or len(rows) < 2:
         return Answer()
 
-    judgement = _judge(closures, rows, config)
+    judgement = _judge(closures, graph.path, config)
     operations = _judged(closures, judgement)
     closed_before = {closure.id for closure in closures if closure.accepted}
     closed = set(_ids(closures, judgement.is_accepted))
@@ -139,19 +147,41 @@ class _Judgement(NamedTuple):
     path: PoseGraph
 
 
-def _judge(closures: list[LoopClosure], rows: Floats, config: Config) -> _Judgement:
-    """Which of the closures of path `rows` are consistent, and of these accepted."""
+def _judge(closures: list[LoopClosure], path: list[PathSegment], config: Config) -> _Judgement:
+    """Which of the closures of a path are consistent, and of these accepted.
+
+    Those that were consistent before the path became sparse are: others, with which they agreed,
+    are no more.
+    """
+    rows = rows_of(path)
     steps = steps_of(rows, config)
     views = views_of(closures, rows)
     is_consistent = consistent(views, steps, config.false_closure)
     is_consistent &= views.j - views.i >= MIN_ROWS
+    is_consistent |= _settled(closures, path)
 
-    start = _start(rows[:, POSE], steps)
-    path, holds = _accepted(start, steps, views.select(is_consistent), config)
+    start = PoseGraph(
+        poses=_start(rows[:, POSE], steps),
+        steps=steps,
+        closures=NO_CONSTRAINTS,
+        joins=joins_of(path, rows[:, STAMP]),
+    )
+    corrected_path, holds = _accepted(start, views.select(is_consistent), config)
 
     is_accepted = np.zeros(len(closures), bool)
     is_accepted[is_consistent] = holds
-    return _Judgement(is_consistent, is_accepted, path)
+    return _Judgement(is_consistent, is_accepted, corrected_path)
+
+
+def _settled(closures: list[LoopClosure], path: list[PathSegment]) -> Booleans:
+    """(m,): which closures are of the sparse part of the path, and were consistent."""
+    sparse = [segment for segment in path if segment.is_sparse]
+    if not sparse:
+        return np.zeros(len(closures), bool)
+
+    until_ns = sparse[-1].rows.numpy()[-1, STAMP] * 1e9
+    settled = [bool(closure.consistent) and closure.to_ns <= until_ns for closure in closures]
+    return np.array(settled)
 
 
 def _start(poses: Floats, steps: Constraints) -> Floats:
@@ -184,18 +214,17 @@ def _possible_steps(poses: Floats, steps: Constraints) -> Floats:
     return possible
 
 
-def _accepted(
-    poses: Floats, steps: Constraints, views: Views, config: Config
-) -> tuple[PoseGraph, Booleans]:
-    """The path with the loops that are accepted, and which of `views` those are.
+def _accepted(start: PoseGraph, views: Views, config: Config) -> tuple[PoseGraph, Booleans]:
+    """The path with the loops that are accepted, and which of `views` those are. It has none at the
+    `start`.
 
     A landmark's constraint depends on the agent's heading: it is computed again where the
     optimization changes that.
     """
-    loops = constraints_of(views, poses)
+    loops = constraints_of(views, start.poses)
     for _ in range(MAX_ROUNDS):
-        holds = inliers(PoseGraph(poses, steps, loops), config.false_closure)
-        graph = PoseGraph(poses, steps, loops.select(holds))
+        holds = inliers(start.with_closures(loops), config.false_closure)
+        graph = start.with_closures(loops.select(holds))
         again = constraints_of(views, optimize(graph))
 
         if _turned_rad(loops, again) < SAME_RAD:
@@ -236,13 +265,13 @@ def _positions_only(graph: PoseGraph) -> PoseGraph:
     A turn of variance h somewhere on a loop of length L moves its end by a variance of h L^2 / 3 on
     the mean. Where a landmark is seen from, the headings of all the loop turn.
     """
-    if not len(graph.closures):
+    loops = graph.closures + graph.joins
+    if not len(loops):
         return graph
 
-    steps = _weakened_steps(graph.steps, graph.closures)
-    weights = _weights(graph.steps, graph.closures)
-    closures = graph.closures.weighted(weights)
-    return replace(graph, steps=steps, closures=closures)
+    steps = _weakened_steps(graph.steps, loops)
+    weights = _weights(graph.steps, loops)
+    return PoseGraph(graph.poses, steps, loops.weighted(weights))
 
 
 def _weakened_steps(steps: Constraints, loops: Constraints) -> Constraints:

@@ -65,15 +65,24 @@ class Constraints:
         )
 
 
+NO_CONSTRAINTS = Constraints(
+    i=np.zeros(0, np.int64),
+    j=np.zeros(0, np.int64),
+    measurement=np.zeros((0, 3)),
+    information=np.zeros((0, 3, 3)),
+)
+
+
 @dataclass(frozen=True)
 class PoseGraph:
-    """`poses` (n, 3) along a path, `steps` from each pose to the next, and `closures` between any
-    two.
+    """`poses` (n, 3) along a path, `steps` from each pose to the next, and between any two
+    `closures`, which may be mistaken, and `joins`, which are not.
     """
 
     poses: Floats
     steps: Constraints
     closures: Constraints
+    joins: Constraints = NO_CONSTRAINTS
 
     @classmethod
     def of(cls, poses: Floats, constraints: Constraints) -> PoseGraph:
@@ -104,7 +113,7 @@ class PoseGraph:
     @property
     def constraints(self) -> Constraints:
         """All constraints, the steps first."""
-        return self.steps + self.closures
+        return self.steps + self.joins + self.closures
 
 
 def _first_steps(constraints: Constraints) -> Indices:

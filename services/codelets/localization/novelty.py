@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 import struct
 from bisect import bisect_right
-from functools import partial
+from collections.abc import Sequence
 
 import numpy as np
 
 from cogmap.graph.graph import Graph
-from schemas.nodes import NEVER_NS, Object, PathColumn, PathSegment, object_id, segment_id
+from schemas.nodes import NEVER_NS, Object, PathColumn, PathSegment, object_id
 from services.codelets.localization.measurement_model import Sighting
 from services.codelets.localization.sampling import Samples, centred
 
@@ -40,37 +40,32 @@ def novelty(samples: Samples, seen: Sighting, since: Samples) -> Samples:
 
 def variances_when_placed(graph: Graph, seen: Sighting) -> Samples:
     """(k, 2): path integration's variances at which each landmark in view was placed."""
+    path = graph.path
     variances = []
     for label in seen.labels:
         landmark = graph.get(Object, object_id(label))
         created_ns = NEVER_NS if landmark is None else landmark.created_ns
-        variances.append(variances_at(graph, created_ns))
+        variances.append(variances_at(path, created_ns))
 
     return np.array(variances)
 
 
-def variances_at(graph: Graph, stamp_ns: int) -> tuple[float, float]:
-    """Path integration's variances, in m^2 and rad^2, at the path's place of `stamp_ns`, or the
-    next before it; -inf each before the path begins.
+def variances_at(path: Sequence[PathSegment], stamp_ns: int) -> tuple[float, float]:
+    """Path integration's variances, in m^2 and rad^2, at the place of a `path`, its oldest segment
+    first, at `stamp_ns`, or the next before it; -inf each before the path begins.
     """
     stamp_s = stamp_ns * 1e-9
-    numbers = range(graph.count(PathSegment))
-    number = bisect_right(numbers, stamp_s, key=partial(_begin_s, graph)) - 1
-    segment = graph.get(PathSegment, segment_id(number))
-    if segment is None:
+    index = bisect_right(path, stamp_s, key=_begin_s) - 1
+    if index < 0:
         return -math.inf, -math.inf
 
-    rows = segment.rows.numpy()
+    rows = path[index].rows.numpy()
     following = int(rows[:, PathColumn.STAMP_S].searchsorted(stamp_s, side="right"))
     variance_m2, variance_rad2 = rows[following - 1, VARIANCES].tolist()
     return variance_m2, variance_rad2
 
 
-def _begin_s(graph: Graph, number: int) -> float:
-    """The stamp of a path segment's first place; infinity where there is no such segment."""
-    segment = graph.get(PathSegment, segment_id(number))
-    if segment is None:
-        return math.inf
-
+def _begin_s(segment: PathSegment) -> float:
+    """The stamp of a path segment's first place."""
     (begin_s,) = STAMP_FORMAT.unpack_from(segment.rows.data, STAMP_OFFSET)
     return float(begin_s)

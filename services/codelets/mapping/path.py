@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+import msgspec
 import numpy as np
 
 from cogmap.errors import MessageError
@@ -20,6 +21,7 @@ from schemas.codelets import Task
 from schemas.graph import Link, Operation, Phase
 from schemas.nodes import (
     SELF_ID,
+    JoinColumn,
     LinkKind,
     Object,
     Observations,
@@ -39,8 +41,11 @@ from services.codelets.nodes import nodes_of
 ROWS = 64
 COLUMNS = len(PathColumn)
 STAMP = PathColumn.STAMP_S
+LAST = PathColumn.LAST_S
+JOINED = PathColumn.JOINED
 POSE = slice(PathColumn.X_M, PathColumn.HEADING_RAD + 1)
 ODOMETRY = slice(PathColumn.ODOMETRY_X_M, PathColumn.ODOMETRY_HEADING_RAD + 1)
+JOIN_STEP = slice(JoinColumn.X_M, JoinColumn.HEADING_RAD + 1)
 VARIANCES = slice(PathColumn.VARIANCE_M2, PathColumn.VARIANCE_RAD2 + 1)
 
 
@@ -122,6 +127,11 @@ def rows_of(path: Iterable[PathSegment]) -> Floats:
     return np.vstack(rows)
 
 
+def with_rows(segment: PathSegment, rows: Floats) -> PathSegment:
+    """A path segment with other (n, COLUMNS) rows."""
+    return msgspec.structs.replace(segment, rows=Matrix.of(rows))
+
+
 def segments(rows: Floats, first: int = 0) -> list[PathSegment]:
     """The path segments of (n, COLUMNS) `rows`, numbered from `first`."""
     parts = []
@@ -166,33 +176,57 @@ def steps_of(rows: Floats, config: Config) -> Constraints:
 
     variances = rows[:, VARIANCES]
     stated = np.diff(variances, axis=0)
+    joined_m = rows[1:, JOINED] * config.path_spacing_m
     return Constraints(
         i=places,
         j=places + 1,
         measurement=steps,
-        information=_step_information(steps, stated, config),
+        information=_step_information(steps, stated, joined_m, config),
     )
 
 
-def _step_information(steps: Floats, stated: Floats, config: Config) -> Floats:
+def joins_of(path: Iterable[PathSegment], stamps_s: Floats) -> Constraints:
+    """The joins of path segments, between the places of the whole path, at `stamps_s` (n,)."""
+    rows = [np.zeros((0, len(JoinColumn)))]
+    for segment in path:
+        if segment.joins is not None:
+            rows.append(segment.joins.numpy())
+
+    joins = np.vstack(rows)
+    return Constraints(
+        i=stamps_s.searchsorted(joins[:, JoinColumn.FROM_S]),
+        j=stamps_s.searchsorted(joins[:, JoinColumn.TO_S]),
+        measurement=joins[:, JOIN_STEP],
+        information=diagonal_information(
+            position=1 / joins[:, JoinColumn.VARIANCE_M2],
+            heading=1 / joins[:, JoinColumn.VARIANCE_RAD2],
+        ),
+    )
+
+
+def _step_information(steps: Floats, stated: Floats, joined_m: Floats, config: Config) -> Floats:
     """(m, 3, 3): the information of (m, 3) steps, by the variances that are `stated` of position
     and heading, (m, 2), or the least ones.
+
+    Where a step led over `joined_m` (m,) of places that were joined into others, its turns on the
+    way there move its end.
     """
     stated_m2, stated_rad2 = stated.T
-    least_m2, least_rad2 = _least_variances(steps, config)
+    least_m2, least_rad2 = _least_variances(steps, joined_m, config)
 
-    variance_m2 = np.maximum(least_m2, stated_m2)
     variance_rad2 = np.maximum(least_rad2, stated_rad2)
+    by_turns_m2 = variance_rad2 * joined_m**2 / 3
+    variance_m2 = np.maximum(least_m2, stated_m2) + by_turns_m2
     return diagonal_information(
         position=1 / variance_m2,
         heading=1 / variance_rad2,
     )
 
 
-def _least_variances(steps: Floats, config: Config) -> tuple[Floats, Floats]:
+def _least_variances(steps: Floats, joined_m: Floats, config: Config) -> tuple[Floats, Floats]:
     """(m,) each: the least variance of (m, 3) steps, of the position and of the heading."""
     moved_m = np.hypot(steps[:, 0], steps[:, 1])
-    length_m = moved_m.clip(config.path_spacing_m / 2)
+    length_m = moved_m.clip(config.path_spacing_m / 2) + joined_m
     turned_rad = np.abs(steps[:, 2])
 
     variance_m2 = config.path_variance_per_m * length_m
@@ -236,7 +270,7 @@ def _row(stamp_ns: int, agent: Self) -> Floats:
     odometry = odometry_of(agent)
     variances = variances_of(agent)
 
-    row = np.concatenate([[stamp_s], pose, odometry, variances])
+    row = np.concatenate([[stamp_s], pose, odometry, variances, [stamp_s, 0.0]])
     return row[None]
 
 
@@ -293,11 +327,11 @@ def _observe(percept: Percept, viewpoint: Viewpoint, graph: Graph) -> list[Opera
     if before is not None:
         return [after]
 
-    return [after, *_links_of(after)]
+    return [after, *links_of(after)]
 
 
-def _links_of(observations: Observations) -> list[Link]:
-    """From new observations to the landmark and to the path segment."""
+def links_of(observations: Observations) -> list[Link]:
+    """The links from new observations to the landmark and to the path segment."""
     landmark = object_id(observations.landmark)
     segment = segment_id(observations.number)
 

@@ -34,11 +34,14 @@ def _places_of(closures: list[LoopClosure], rows: Floats) -> Indices:
     """(m, 2): the rows nearest in time to where each closure leads from, and to."""
     from_to_ns = [[closure.from_ns, closure.to_ns] for closure in closures]
     stamps_ns = np.array(from_to_ns).reshape(-1, 2)
-    stamps_s = stamps_ns[..., None] * 1e-9
+    stamps_s = stamps_ns * 1e-9
 
-    away_s = np.abs(rows[:, STAMP] - stamps_s)
-    places: Indices = away_s.argmin(axis=2)
-    return places
+    path_s = rows[:, STAMP]
+    after = path_s.searchsorted(stamps_s).clip(max=len(rows) - 1)
+    before = (after - 1).clip(0)
+
+    is_before = stamps_s - path_s[before] <= path_s[after] - stamps_s
+    return np.where(is_before, before, after)
 
 
 def _there_m(closures: list[LoopClosure]) -> Floats:

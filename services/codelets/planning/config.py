@@ -9,6 +9,8 @@ from msgspec import Meta
 
 from schemas.base import PositiveMetres, PositiveSeconds, PositiveShare, Share
 
+SECTION = "planning"
+
 Cells = Annotated[int, Meta(ge=1, le=10_000)]
 
 

@@ -9,7 +9,7 @@ from scipy import ndimage
 
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.graph.graph import Graph
-from schemas.nodes import PathColumn, PathSegment, Self
+from schemas.nodes import PathColumn, Self
 from services.codelets.planning.config import Config
 from services.codelets.planning.network import SQUARE, Here
 
@@ -23,9 +23,8 @@ POSITION = slice(PathColumn.X_M, PathColumn.Y_M + 1)
 
 def path_of(graph: Graph) -> Floats:
     """(n, k): the rows of the path, the oldest first."""
-    segments = sorted(graph.of_kind(PathSegment), key=lambda segment: segment.number)
     rows = [np.zeros((0, len(PathColumn)))]
-    for segment in segments:
+    for segment in graph.path:
         rows.append(np.asarray(segment.rows.numpy(), np.float64))
 
     return np.vstack(rows)
@@ -34,7 +33,7 @@ def path_of(graph: Graph) -> Floats:
 def driven_lately_m(path: Floats, agent: Self, ago_s: float) -> Floats:
     """(n, 2): where the agent was since so many seconds ago, and is."""
     since_s = agent.stamp_ns * 1e-9 - ago_s
-    is_late = path[:, PathColumn.STAMP_S] >= since_s
+    is_late = path[:, PathColumn.LAST_S] >= since_s
     here_m = np.array([[agent.x_m, agent.y_m]])
     return np.vstack([path[is_late, POSITION], here_m])
 

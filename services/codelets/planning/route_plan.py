@@ -32,7 +32,7 @@ from schemas.nodes import (
     Self,
     place_id,
 )
-from services.codelets.planning.config import Config
+from services.codelets.planning.config import SECTION, Config
 from services.codelets.planning.corridor import corridor
 from services.codelets.planning.doubt import doubted, may_doubt
 from services.codelets.planning.frontier import Standpoint, best_frontier
@@ -65,7 +65,6 @@ from services.codelets.planning.targets import (
 from services.codelets.planning.urgency import is_done, is_urgent
 
 START_M = 6.0
-SECTION = "planning"
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:

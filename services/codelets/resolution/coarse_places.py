@@ -8,9 +8,7 @@ map, another each time: what a corrected map moved is up to date again after a w
 from __future__ import annotations
 
 import math
-from typing import Annotated
 
-import msgspec
 import numpy as np
 
 from cogmap.errors import MessageError
@@ -28,8 +26,9 @@ from services.codelets.resolution.coarsening import (
     coarser,
     places_of,
 )
+from services.codelets.resolution.config import COARSE_PLACES
+from services.codelets.resolution.config import CoarsePlacesConfig as Config
 
-SECTION = "coarse_places"
 LEVELS = 2
 CELLS = FACTOR**LEVELS
 """The cells of the root map along the side of the coarsest map's cell."""
@@ -39,28 +38,6 @@ BLOCK = 16
 
 COARSE = (PlaceColumn.ROAD, *WEIGHT_COLUMNS)
 COLUMNS = (*COARSE, PlaceColumn.OBSTACLE)
-
-
-class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """When the coarse maps are made anew."""
-
-    every_cycles: Annotated[
-        int,
-        msgspec.Meta(
-            ge=1,
-            le=10_000,
-            description="Cycles between two updates of the coarse maps, 1 to 10000.",
-        ),
-    ] = 5
-    reach_m: Annotated[
-        float,
-        msgspec.Meta(
-            gt=0,
-            le=100,
-            description="Distance from the agent within which the root map changes as it looks "
-            "around, in m, above 0 to 100.",
-        ),
-    ] = 30.0
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
@@ -106,7 +83,7 @@ CODELET = Codelet(
     reads=frozenset({Self, Map, *COLUMNS}),
     writes=frozenset({Map, *COARSE}),
     config=Config,
-    section=SECTION,
+    section=COARSE_PLACES,
 )
 
 

@@ -10,11 +10,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Annotated
 
-import msgspec
 import numpy as np
-from msgspec import Meta
 
 from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
@@ -22,6 +19,8 @@ from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.codelets import Task
 from schemas.graph import Operation, Phase
 from schemas.nodes import ROOT_MAP, SELF_ID, Map, Self
+from services.codelets.resolution.config import SUB_MAP_PLACES
+from services.codelets.resolution.config import SubMapPlacesConfig as Config
 from services.codelets.resolution.resampling import COLUMNS
 from services.codelets.resolution.sub_map_grid import (
     SETTLED_CYCLES,
@@ -33,31 +32,8 @@ from services.codelets.resolution.sub_map_grid import (
     with_places,
 )
 
-SECTION = "sub_map_places"
 NEW_TURNS = 8
 """For so many turns sub-maps that have settled count as new."""
-
-
-class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """When the place nodes of sub-maps are made anew."""
-
-    every_cycles: Annotated[
-        int,
-        Meta(
-            ge=1,
-            le=10_000,
-            description="Cycles between two updates of the places of sub-maps, 1 to 10000.",
-        ),
-    ] = 10
-    reach_m: Annotated[
-        float,
-        Meta(
-            gt=0,
-            le=100,
-            description="Distance from the agent within which the root map changes as it looks "
-            "around, in m, above 0 to 100.",
-        ),
-    ] = 30.0
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
@@ -107,7 +83,7 @@ CODELET = Codelet(
     reads=frozenset({Self, Map, *COLUMNS}),
     writes=frozenset(COLUMNS),
     config=Config,
-    section=SECTION,
+    section=SUB_MAP_PLACES,
 )
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import minimum_filter1d
+from numpy.lib.stride_tricks import sliding_window_view
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices, Singles
 from cogmap.geometry.se2 import rotate
@@ -126,7 +126,8 @@ def _is_inside(column: Floats, width: int, border: float = 0.0) -> Booleans:
 
 def _least_around(depth_m: Floats) -> Floats:
     """(width,): the least depth within BESIDE_PX columns of each."""
-    least_m: Floats = minimum_filter1d(depth_m, 2 * BESIDE_PX + 1, mode="nearest")
+    padded_m = np.pad(depth_m, BESIDE_PX, mode="edge")
+    least_m: Floats = sliding_window_view(padded_m, 2 * BESIDE_PX + 1).min(axis=1)
     return least_m
 
 

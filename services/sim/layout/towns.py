@@ -8,7 +8,6 @@ from pathlib import Path
 from cogmap.errors import ConfigError
 from services.sim.layout.blocks import town as blocks
 from services.sim.layout.charging import with_charging_places
-from services.sim.layout.osm import town as osm
 from services.sim.layout.place import Place
 from services.sim.layout.starts import another_start
 from services.sim.layout.town import generate
@@ -48,6 +47,9 @@ def _bare(town: str, seed: int, size_m: float) -> Place:
     if town == LOOP:
         return generate(seed)
     if town.startswith(OSM):
+        # It takes as long to import as all the rest, and few drive there.
+        from services.sim.layout.osm import town as osm
+
         return osm.read(Path(town.removeprefix(OSM)))
 
     return blocks.generate(seed, size_m)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import shutil
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
@@ -42,8 +42,9 @@ class Bodies:
         self._client = client
         self._models = 0
         self._textures = 0
-        self._folder = Path(tempfile.mkdtemp(prefix="cogmap-"))
-        self._folder.rmdir()
+        # No other client has files of this name: pybullet remembers those of all clients.
+        self._prefix = Path(tempfile.mkdtemp(prefix="cogmap-"))
+        self._prefix.rmdir()
 
     def model(self, surface: Mesh, picture: Image) -> Model:
         """A shape with a picture on it, to be added."""
@@ -57,14 +58,10 @@ class Bodies:
     def texture(self, picture: Image) -> int:
         """A picture, loaded."""
         bgr = np.ascontiguousarray(picture[..., ::-1])
-        path = self._folder / f"{self._textures}.bmp"
+        _, bmp = cv2.imencode(".bmp", bgr)
         self._textures += 1
-        self._folder.mkdir()
-        try:
-            cv2.imwrite(str(path), bgr)
-            return int(pybullet.loadTexture(str(path), physicsClientId=self._client))
-        finally:
-            shutil.rmtree(self._folder)
+        with self._file(f"{self._textures}.bmp", bmp.tobytes()) as path:
+            return int(pybullet.loadTexture(path, physicsClientId=self._client))
 
     def box(self, half_m: tuple[float, float, float], middle_m: float) -> int:
         """A box that nothing passes, its middle at height `middle_m`, for `add`."""
@@ -122,20 +119,26 @@ class Bodies:
         return int(body)
 
     def _visual(self, model: Model) -> int:
-        path = self._folder / f"{model.number}.obj"
-        self._folder.mkdir()
-        try:
-            path.write_text(model.obj)
+        with self._file(f"{model.number}.obj", model.obj.encode()) as path:
             return int(
                 pybullet.createVisualShape(
                     pybullet.GEOM_MESH,
-                    fileName=str(path),
+                    fileName=path,
                     specularColor=[0, 0, 0],
                     physicsClientId=self._client,
                 )
             )
+
+    @contextmanager
+    def _file(self, name: str, content: bytes) -> Iterator[str]:
+        """The path of a file with `content`, which is removed afterwards."""
+        path = self._prefix.with_name(f"{self._prefix.name}-{name}")
+        try:
+            with path.open("xb") as file:
+                file.write(content)
+            yield str(path)
         finally:
-            shutil.rmtree(self._folder)
+            path.unlink()
 
     def move(self, body: int, x_m: float, y_m: float) -> None:
         """Put a body there, upright."""

@@ -10,20 +10,24 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from msgspec.structs import replace
 
 from benchmarks import machine, suite
 from benchmarks.bus import deltas
 from benchmarks.bus import measure as bus
 from benchmarks.commands import benchmarks
 from benchmarks.cycle import measure as cycle
+from benchmarks.cycle.ten_hertz import superseded_share
 from benchmarks.report import Metrics, Outcome, report
 from benchmarks.suite import Benchmark, Setting
 from benchmarks.threshold import Threshold, at_least, at_most, more_than, within
 from cogmap.bus.codec import encode
 from cogmap.errors import UsageError
 from cogmap.parallel import parallel_map
+from schemas.examples import example_messages
 from schemas.graph import Links
 from schemas.nodes import GraphNode
+from schemas.process import Health
 from services.workspace.commit import Ledger
 
 
@@ -34,6 +38,9 @@ def test_the_thresholds_are_those_of_the_keys_promised() -> None:
         "cycle_p50_ms": "≤ 100",
         "cycle_p99_ms": "≤ 260",
         "bus_share": "≤ 0.25",
+        "start_s": "≤ 3",
+        "cycle_p50_ms_10hz": "≤ 60",
+        "superseded_share": "≤ 0.01",
         "replay_speed": "≥ 5",
         "error_ratio": "≤ 0.33",
         "error_over_fused": "≤ 0.6",
@@ -247,3 +254,21 @@ def test_a_folder_that_is_not_there_is_named_before_anything_is_measured(
 
     assert result.exit_code == 2
     assert "there is no folder" in result.output
+
+
+def _health(
+    instance: str, emitted: dict[str, int], superseded: dict[str, int] | None = None
+) -> Health:
+    (example,) = [message for message in example_messages() if isinstance(message, Health)]
+    return replace(example, instance=instance, emitted=emitted, superseded=superseded or {})
+
+
+def test_frames_and_views_count_as_superseded_and_scans_do_not() -> None:
+    health = {
+        "sim": _health("sim", {"camera/stereo": 200}),
+        "sensory": _health("sensory", {"sensory/view": 199}, {"camera/stereo": 1}),
+        "epam": _health("epam", {}, {"sensory/view": 3}),
+        "motor": _health("motor", {}, {"sensory/scan": 50}),
+    }
+
+    assert superseded_share(health) == pytest.approx(0.02)

@@ -9,6 +9,7 @@ import pytest
 from cogmap.errors import ConfigError
 from cogmap.runtime.codelet import ENTRY_POINTS
 from services.codelets import table
+from services.codelets.sections import SECTIONS
 
 
 def _installed(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
@@ -44,3 +45,9 @@ def test_two_codelets_of_one_name_are_refused(monkeypatch: pytest.MonkeyPatch) -
 
     with pytest.raises(ConfigError, match="there is a codelet 'path'"):
         table.all_codelets()
+
+
+def test_the_sections_are_those_of_our_codelets() -> None:
+    of_codelets = {codelet.section: codelet.config for codelet in table.CODELETS}
+
+    assert of_codelets == SECTIONS

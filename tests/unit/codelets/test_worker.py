@@ -68,8 +68,12 @@ def _along_x(columns: int) -> np.ndarray:
     return rows
 
 
-def _path() -> PathSegment:
-    return PathSegment(id="path:0", number=0, rows=Matrix.of(_along_x(9)))
+def _path() -> list[PathSegment]:
+    rows = _along_x(11)
+    return [
+        PathSegment(id="path:0", number=0, rows=Matrix.of(rows[:15])),
+        PathSegment(id="path:1", number=1, rows=Matrix.of(rows[15:])),
+    ]
 
 
 def _closure() -> LoopClosure:
@@ -111,7 +115,7 @@ def _graph() -> Graph:
     """What every codelet finds something to do with."""
     goal = Goal(id=goal_id("house"), object="house")
     need = Need(id=need_id("energy"), label="energy", level=0.9, is_eased=True)
-    known = (_self(), _house(), _path(), _closure(), _correction(), _recollection())
+    known = (_self(), _house(), *_path(), _closure(), _correction(), _recollection())
     return graph_of(*known, goal, need)
 
 
@@ -127,6 +131,7 @@ def _every_task() -> list[Task]:
     return [
         task("apply_correction"),
         task("join_map"),
+        task("sparse_path", about=["path:0"]),
         task("localization", motions=motions, percepts=house),
         task("object_place", percepts=[percept("tower")]),
         task("charging_place"),
@@ -270,8 +275,7 @@ def test_an_unknown_codelet_is_a_failure_that_names_the_known_ones() -> None:
     proposal = _proposal(_answers(worker, task("dreaming")))
 
     assert (
-        "no codelet dreaming: there are apply_correction, join_map, localization"
-        in proposal.failure
+        "no codelet dreaming: there are apply_correction, join_map, sparse_path" in proposal.failure
     )
     assert proposal.operations == []
 

@@ -124,7 +124,8 @@ def test_a_stopped_child_is_ended_all_the_same(supervisor: Supervisor, tmp_path:
 
 LAUNCHER = """
 import pathlib, sys
-from cli.launch.supervisor import Supervisor, Program, cogmap_command
+from cli.launch.command_line import cogmap_command
+from cli.launch.supervisor import Supervisor, Program
 supervisor = Supervisor(pathlib.Path(sys.argv[1]))
 for name, port in (("one", sys.argv[2]), ("two", sys.argv[3])):
     command = cogmap_command("router", "--tied", "--connect", f"tcp/127.0.0.1:{port}")

@@ -27,8 +27,8 @@ def _rows() -> np.ndarray:
     again = once + np.array([-35.0, 22.0, 0.0])
     poses = np.vstack([once, between, again])
     stamps = np.arange(len(poses), dtype=float)
-    variances = np.zeros((len(poses), 2))
-    return np.column_stack([stamps, poses, poses, variances])
+    others = np.zeros((len(poses), 4))
+    return np.column_stack([stamps, poses, poses, others])
 
 
 def _views(*pairs: tuple[int, int], off_m: float = 0.0) -> Views:

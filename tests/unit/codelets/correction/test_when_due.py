@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
+import pytest
 
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import CycleContext
@@ -13,7 +15,7 @@ from services.codelets.config import Config
 from services.codelets.correction.map_correction import CODELET
 from tests.support.world.scenes import graph_of
 
-CONFIG = Config(closure_spacing_s=2.0, revisit_s=100.0)
+CONFIG = Config(closure_spacing_s=2.0, revisit_s=100.0, waiting_share=0.0)
 A_SECOND_NS = 1_000_000_000
 NO_POINTS = Array.of(np.zeros((0, 2), np.float32))
 NO_MOTIONS = Array.of(np.zeros((0, 5)))
@@ -47,17 +49,56 @@ def _graph(segments: int) -> Graph:
     return graph_of(*path, *judged, _closure(11, None))
 
 
-def _is_due(segments: int, at_s: int) -> bool:
+def _is_due(graph: Graph, at_s: int, config: Config = CONFIG) -> bool:
     percepts = Percepts(stamp_ns=at_s * A_SECOND_NS, frame=at_s, objects=[], road_m=NO_POINTS)
     context = CycleContext(1, percepts, NO_MOTIONS)
-    return bool(CODELET.due(context, _graph(segments), CONFIG))
+    return bool(CODELET.due(context, graph, config))
 
 
 def test_a_short_path_is_corrected_as_often_as_loops_close() -> None:
-    assert not _is_due(segments=8, at_s=11)
-    assert _is_due(segments=8, at_s=12)
+    assert not _is_due(_graph(8), at_s=11)
+    assert _is_due(_graph(8), at_s=12)
 
 
 def test_a_path_ten_times_as_long_is_corrected_a_tenth_as_often() -> None:
-    assert not _is_due(segments=80, at_s=29)
-    assert _is_due(segments=80, at_s=30)
+    assert not _is_due(_graph(80), at_s=29)
+    assert _is_due(_graph(80), at_s=30)
+
+
+def _with_fresh(*range_m: float) -> Graph:
+    """Closures that were not judged yet, from 11 s on, of what stood 1 m ahead."""
+    graph = _graph(8)
+    for number, seen_m in enumerate(range_m):
+        closure = _closure(11 + number, None)
+        graph.change([msgspec.structs.replace(closure, range_m=seen_m)])
+    return graph
+
+
+@pytest.mark.parametrize(
+    ("range_m", "is_due"),
+    [
+        ((1.5, 1.5, 1.5), False),
+        ((4.0, 4.0, 4.0), True),
+        ((4.0, 4.0, 1.0), False),
+    ],
+    ids=["explained", "unexplained", "too few"],
+)
+def test_closures_that_the_path_explains_wait(range_m: tuple[float, ...], is_due: bool) -> None:
+    assert _is_due(_with_fresh(*range_m), 14, Config(revisit_s=100.0)) is is_due
+
+
+@pytest.mark.parametrize(("share", "is_due"), [(0.2, True), (0.5, False)])
+def test_a_share_of_closures_that_the_path_does_not_explain_waits(
+    share: float, is_due: bool
+) -> None:
+    graph = _with_fresh(*[1.0] * 7, *[4.0] * 4)
+    config = Config(revisit_s=100.0, waiting_share=share)
+
+    assert _is_due(graph, 23, config) is is_due
+
+
+def test_the_first_closures_of_a_path_do_not_wait() -> None:
+    path = [_segment(number) for number in range(8)]
+    graph = graph_of(*path, *[_closure(at_s, None) for at_s in (11, 12, 13)])
+
+    assert _is_due(graph, 14, Config(revisit_s=100.0))

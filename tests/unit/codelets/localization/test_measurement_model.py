@@ -62,15 +62,15 @@ def test_a_landmark_informs_by_the_uncertainty_since_it_was_placed(
 
 
 def test_the_variance_when_a_landmark_was_placed_is_that_of_the_path() -> None:
-    rows = np.zeros((100, 9))
+    rows = np.zeros((100, 11))
     rows[:, 0] = np.arange(1.0, 101.0)
     rows[:, 7] = np.arange(100.0)
-    graph = graph_of(*segments(rows))
+    path = segments(rows)
 
-    between = variances_at(graph, 70_500_000_000)
-    after = variances_at(graph, 500_000_000_000)
-    before = variances_at(graph, 500_000_000)
-    without_path = variances_at(graph_of(), 1)
+    between = variances_at(path, 70_500_000_000)
+    after = variances_at(path, 500_000_000_000)
+    before = variances_at(path, 500_000_000)
+    without_path = variances_at([], 1)
 
     assert between == (69.0, 0.0)
     assert after == (99.0, 0.0)

@@ -79,6 +79,7 @@ def _was_at(stamp_s: float, *x_m: float) -> PathSegment:
     """A path along x."""
     rows = np.zeros((len(x_m), len(PathColumn)))
     rows[:, PathColumn.STAMP_S] = stamp_s
+    rows[:, PathColumn.LAST_S] = stamp_s
     rows[:, PathColumn.X_M] = x_m
     return PathSegment(id=segment_id(0), number=0, rows=Matrix.of(rows))
 

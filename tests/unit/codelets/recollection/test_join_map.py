@@ -135,7 +135,7 @@ def test_place_nodes_are_as_they_were_learned_with_weights_by_their_evidence() -
 
 
 def test_path_goals_and_the_plan_move_with_the_agent() -> None:
-    rows = np.zeros((2, 9))
+    rows = np.zeros((2, 11))
     rows[1, :2] = (1.0, 5.0)
     graph = joined(
         PathSegment(id="path:0", number=0, rows=Matrix.of(rows)),
@@ -172,7 +172,7 @@ def test_a_correction_that_waits_is_applied_first() -> None:
 
 
 def test_a_correction_that_was_computed_before_the_map_was_joined_changes_nothing() -> None:
-    path = np.zeros((3, 9))
+    path = np.zeros((3, 11))
     path[:, 0] = np.arange(3)
     path[:, 1] = 50.0 + np.arange(3)
     rows = np.zeros((3, 7))

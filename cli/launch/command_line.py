@@ -1,0 +1,38 @@
+"""How processes of `cogmap` are started."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+_SOURCES = Path(__file__).parents[2]
+_COGMAP = (sys.executable, "-P", "-m", "cli.main")
+
+
+def cogmap_command(*arguments: str) -> list[str]:
+    """The command line of `cogmap` itself, with the Python and the sources of this process."""
+    return [*_COGMAP, *arguments]
+
+
+def arguments_of(command: Sequence[str]) -> list[str] | None:
+    """The arguments of a command line that `cogmap_command` made; None of any other."""
+    if tuple(command[: len(_COGMAP)]) != _COGMAP:
+        return None
+    return list(command[len(_COGMAP) :])
+
+
+def environment() -> dict[str, str]:
+    """This process's, with one thread a process for linear algebra: there are more processes than
+    cores.
+    """
+    inherited = dict(os.environ)
+    inherited["OPENBLAS_NUM_THREADS"] = "1"
+    inherited["OMP_NUM_THREADS"] = "1"
+
+    paths = [str(_SOURCES)]
+    if inherited.get("PYTHONPATH"):
+        paths.append(inherited["PYTHONPATH"])
+    inherited["PYTHONPATH"] = os.pathsep.join(paths)
+    return inherited

@@ -1,0 +1,169 @@
+"""Processes that a fork server starts for a supervisor."""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext, suppress
+from types import TracebackType
+from typing import IO
+
+import msgspec
+
+from cli.launch.command_line import environment
+from cli.launch.forking.protocol import MAX_BYTES, Request, report_decoder
+
+# Room for the command lines of those that are forked: see `title`.
+_ROOM = " " * 4096
+_SERVER = (sys.executable, "-P", "-m", "cli.launch.forking.server")
+
+
+class Forked:
+    """A process that a fork server was asked for, with the interface of subprocess.Popen.
+
+    Its standard input is the pipe `stdin`.
+    """
+
+    def __init__(self, server: ForkServer, stdin: IO[bytes]) -> None:
+        self.stdin: IO[bytes] = stdin
+        self.started: int | None = None
+        self.code: int | None = None
+        self._server = server
+
+    @property
+    def pid(self) -> int:
+        """The process id; 0 where it was never started, as the server has ended."""
+        while self.started is None and self.code is None:
+            self._server.receive(None)
+        return self.started or 0
+
+    def poll(self) -> int | None:
+        """The exit code; None while it runs."""
+        self._server.receive(0.0)
+        return self.code
+
+    def wait(self, timeout: float) -> int:
+        """Wait for its end. Returns the exit code; raises TimeoutExpired."""
+        deadline_s = time.monotonic() + timeout
+        while self.code is None:
+            left_s = deadline_s - time.monotonic()
+            self._server.receive(max(0.0, left_s))
+            if left_s <= 0 and self.code is None:
+                raise subprocess.TimeoutExpired("cogmap", timeout)
+        return self.code
+
+    def terminate(self) -> None:
+        """Send SIGTERM."""
+        self._send(signal.SIGTERM, self.pid)
+
+    def kill(self) -> None:
+        """Send SIGKILL."""
+        self._send(signal.SIGKILL, self.pid)
+
+    def lose(self) -> None:
+        """End it: nobody would report its end."""
+        self.stdin.close()
+        self._send(signal.SIGKILL, self.started)
+        self.code = -signal.SIGKILL
+
+    def _send(self, number: signal.Signals, pid: int | None) -> None:
+        if self.code is None and pid:
+            with suppress(ProcessLookupError):
+                os.kill(pid, number)
+
+
+class ForkServer:
+    """A fork server in a process of its own, which ends with this one. Linux only.
+
+    Where it has died, all that it had started is ended too, and `is_alive` is False.
+    """
+
+    def __init__(self) -> None:
+        self._channel, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._forked: list[Forked] = []
+        self.is_alive = True
+        with theirs:
+            self._process = subprocess.Popen(
+                [*_SERVER, str(theirs.fileno()), _ROOM],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                env=environment(),
+                pass_fds=[theirs.fileno()],
+                start_new_session=True,
+            )
+
+    @property
+    def pid(self) -> int:
+        """The server's own process id."""
+        return self._process.pid
+
+    def fork(self, arguments: Sequence[str], output: int) -> Forked:
+        """Start `cogmap` with `arguments`, printing to the file descriptor `output`, in a session
+        of its own.
+        """
+        source, sink = os.pipe()
+        forked = Forked(self, os.fdopen(sink, "wb"))
+        request = Request(len(self._forked), list(arguments))
+        self._forked.append(forked)
+
+        try:
+            socket.send_fds(self._channel, [msgspec.msgpack.encode(request)], [source, output])
+        except OSError:
+            self._lose()
+        finally:
+            os.close(source)
+        return forked
+
+    def receive(self, timeout_s: float | None) -> None:
+        """Take account of what the server reports, waiting so long for the first."""
+        while self.is_alive and _is_ready(self._channel, timeout_s):
+            payload = self._channel.recv(MAX_BYTES)
+            if not payload:
+                self._lose()
+                return
+
+            report = report_decoder.decode(payload)
+            forked = self._forked[report.number]
+            forked.started = report.pid
+            forked.code = report.code
+            timeout_s = 0.0
+
+    def close(self) -> None:
+        """End the server, and what it started and has not ended."""
+        self._lose()
+
+    def __enter__(self) -> ForkServer:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _lose(self) -> None:
+        self.is_alive = False
+        self._channel.close()
+        self._process.kill()
+        self._process.wait()
+        for forked in self._forked:
+            if forked.code is None:
+                forked.lose()
+
+
+def fork_server() -> AbstractContextManager[ForkServer | None]:
+    """A fork server, None where forking is not safe: libraries of macOS start threads."""
+    return ForkServer() if sys.platform == "linux" else nullcontext()
+
+
+def _is_ready(channel: socket.socket, timeout_s: float | None) -> bool:
+    ready, _, _ = select.select([channel], [], [], timeout_s)
+    return bool(ready)

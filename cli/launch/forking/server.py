@@ -1,0 +1,139 @@
+"""A fork server: imports what the programs of a run need, once, and forks a process for each.
+
+It has one thread, no session and no device, of which a fork would have a part only.
+"""
+
+from __future__ import annotations
+
+import gc
+import importlib
+import os
+import select
+import socket
+import sys
+from collections import deque
+from collections.abc import Iterator
+from contextlib import suppress
+
+import msgspec
+
+from cli.launch.command_line import cogmap_command
+from cli.launch.forking.protocol import MAX_BYTES, Report, request_decoder
+from cli.launch.forking.title import show_command_line
+from services import registry
+
+COMMON = ("cli.main", "cli.processes", "cli.log.command", "cli.log.record")
+
+
+class Server:
+    """Forks a process for each request on `channel`."""
+
+    def __init__(self, channel: socket.socket) -> None:
+        self._channel = channel
+        self._running: dict[int, Report] = {}
+        self._steps = preparation()
+        self._is_prepared = False
+
+    def serve(self) -> list[str] | None:
+        """Fork as requested until `channel` ends: then None, and in each forked process what it was
+        requested to be, the arguments of `cogmap`.
+
+        Where no request waits, it imports what later ones may need.
+        """
+        gc.disable()
+        channel = self._channel.fileno()
+        while True:
+            waits_s = None if self._is_prepared else 0.0
+            ready, _, _ = select.select([channel, *self._running], [], [], waits_s)
+            if not ready:
+                self._is_prepared = next(self._steps, self) is self
+
+            for ended in self._running.keys() & set(ready):
+                self._reap(ended)
+            if channel not in ready:
+                continue
+
+            payload, descriptors, _, _ = socket.recv_fds(self._channel, MAX_BYTES, 2)
+            if not payload:
+                return None
+            request = request_decoder.decode(payload)
+            if self._fork(request.number, request.arguments, descriptors):
+                return request.arguments
+
+    def _fork(self, number: int, arguments: list[str], descriptors: list[int]) -> bool:
+        """Fork a process. Returns whether this is the new one."""
+        match arguments:
+            case ["module", name, *_]:
+                with suppress(Exception):
+                    deque(registry.prepare(name), maxlen=0)
+
+        # What is there by now is no garbage: the new process need not search it.
+        gc.freeze()
+        pid = os.fork()
+        if pid == 0:
+            self._become(arguments, descriptors)
+            return True
+
+        for descriptor in descriptors:
+            os.close(descriptor)
+        report = Report(number, pid)
+        self._running[os.pidfd_open(pid)] = report
+        self._send(report)
+        return False
+
+    def _become(self, arguments: list[str], descriptors: list[int]) -> None:
+        """Let the new process be as if it had been started by itself."""
+        source, sink = descriptors
+        os.setsid()
+        os.dup2(source, 0)
+        os.dup2(sink, 1)
+        os.dup2(sink, 2)
+
+        self._channel.close()
+        for descriptor in (source, sink, *self._running):
+            os.close(descriptor)
+
+        show_command_line(cogmap_command(*arguments))
+        gc.enable()
+
+    def _reap(self, descriptor: int) -> None:
+        """Report the end of a process."""
+        report = self._running.pop(descriptor)
+        os.close(descriptor)
+        _, status = os.waitpid(report.pid, 0)
+        report.code = os.waitstatus_to_exitcode(status)
+        self._send(report)
+
+    def _send(self, report: Report) -> None:
+        with suppress(OSError):  # nobody is left to receive it, as is noticed when reading next
+            self._channel.send(msgspec.msgpack.encode(report))
+
+
+def preparation() -> Iterator[None]:
+    """Import all that may be forked, in steps, last what takes longest. Where that fails, the
+    process that needs it names the reason.
+    """
+    for name in COMMON:
+        importlib.import_module(name)
+        yield
+
+    for name in sorted(registry.MODULES, key=registry.runs_codelets):
+        with suppress(Exception):
+            yield from registry.prepare(name)
+
+
+def main() -> None:
+    """Serve on the socket whose file descriptor is the first argument."""
+    with socket.socket(fileno=int(sys.argv[1])) as channel:
+        arguments = Server(channel).serve()
+    if arguments is None:
+        return
+
+    sys.argv = ["cogmap", *arguments]
+    from cli.main import main as cogmap
+
+    cogmap()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,22 @@
+"""The settings of our codelets by section, for those that configure and need not run them: to
+import the codelets takes longer.
+"""
+
+from __future__ import annotations
+
+import msgspec
+
+from services.codelets import config as common
+from services.codelets.attention import config as attention
+from services.codelets.planning import config as planning
+from services.codelets.resolution import config as resolution
+from services.codelets.structure import config as structure
+
+SECTIONS: dict[str, type[msgspec.Struct]] = {
+    common.SECTION: common.Config,
+    attention.SECTION: attention.Config,
+    resolution.COARSE_PLACES: resolution.CoarsePlacesConfig,
+    structure.SECTION: structure.Config,
+    planning.SECTION: planning.Config,
+    resolution.SUB_MAP_PLACES: resolution.SubMapPlacesConfig,
+}

@@ -1,0 +1,137 @@
+"""Processes that a fork server starts: real ones."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from cli.launch.command_line import cogmap_command, environment
+from cli.launch.forking.client import Forked, ForkServer
+from cli.launch.supervisor import Program, Supervisor
+from cogmap.bus.session import free_endpoint
+from tests.support.system.processes import wait_until
+
+TIMEOUT_S = 30.0
+
+Fork = Callable[..., Forked]
+
+
+@pytest.fixture
+def server() -> Iterator[ForkServer]:
+    with ForkServer() as server:
+        yield server
+
+
+@pytest.fixture
+def fork(server: ForkServer, tmp_path: Path) -> Fork:
+    """Forks a process that prints to the file `log`."""
+
+    def fork(*arguments: str) -> Forked:
+        with (tmp_path / "log").open("ab") as log:
+            return server.fork(arguments, log.fileno())
+
+    return fork
+
+
+def router(endpoint: str) -> list[str]:
+    return ["router", "--tied", "--connect", endpoint]
+
+
+def listens(log: Path, times: int = 1) -> bool:
+    return log.exists() and log.read_text().count("router listens") == times
+
+
+def is_running(pid: int) -> bool:
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except FileNotFoundError:
+        return False
+    return state != "Z"
+
+
+def test_a_forked_process_has_its_own_log_and_exit_code(fork: Fork, tmp_path: Path) -> None:
+    code = fork("module", "nothing").wait(TIMEOUT_S)
+
+    assert code == 2
+    assert (tmp_path / "log").read_text().startswith("cogmap: no module 'nothing'")
+
+
+def test_a_forked_process_shows_the_command_line_it_stands_for(fork: Fork, tmp_path: Path) -> None:
+    arguments = router(free_endpoint())
+    forked = fork(*arguments)
+    wait_until(lambda: listens(tmp_path / "log"), "the router is up")
+    shown = Path(f"/proc/{forked.pid}/cmdline").read_text().rstrip("\0 ")
+
+    assert shown.split("\0") == cogmap_command(*arguments)
+    assert os.getsid(forked.pid) == forked.pid
+
+
+def test_the_signal_that_ended_a_forked_process_is_its_code(fork: Fork, tmp_path: Path) -> None:
+    killed = fork(*router(free_endpoint()))
+    asked = fork(*router(free_endpoint()))
+    wait_until(lambda: listens(tmp_path / "log", times=2), "both are up")
+
+    killed.kill()
+    asked.terminate()
+
+    assert killed.wait(TIMEOUT_S) == -signal.SIGKILL
+    assert asked.wait(TIMEOUT_S) == 0
+
+
+def test_a_tied_process_ends_with_its_standard_input(fork: Fork, tmp_path: Path) -> None:
+    forked = fork(*router(free_endpoint()))
+    wait_until(lambda: listens(tmp_path / "log"), "the router is up")
+
+    forked.stdin.close()
+
+    assert forked.wait(TIMEOUT_S) == 0
+
+
+def test_what_a_fork_server_had_forked_ends_with_it(fork: Fork, server: ForkServer) -> None:
+    pid = fork(*router(free_endpoint())).pid
+
+    server.close()
+
+    wait_until(lambda: not is_running(pid), "it ends")
+
+
+def test_a_supervisor_goes_on_without_a_fork_server_that_was_killed(
+    server: ForkServer, tmp_path: Path
+) -> None:
+    command = cogmap_command(*router(free_endpoint()))
+    log = tmp_path / "router.log"
+    supervisor = Supervisor(tmp_path, server)
+    supervisor.start(Program("router", lambda starts: command))
+    wait_until(lambda: listens(log), "the router is up")
+    first = supervisor.children["router"].pid
+
+    os.kill(server.pid, signal.SIGKILL)
+
+    def is_back() -> bool:
+        supervisor.check()
+        return listens(log, times=2)
+
+    wait_until(is_back, "another router is up")
+    assert not is_running(first)
+    assert supervisor.restarts == {"router": 1}
+    supervisor.end(["router"], TIMEOUT_S)
+    assert supervisor.killed == []
+
+
+def test_nothing_that_is_imported_before_a_fork_starts_a_thread() -> None:
+    script = (
+        "import os\n"
+        "from cli.launch.forking.server import preparation\n"
+        "for _ in preparation(): pass\n"
+        "print(len(os.listdir('/proc/self/task')))\n"
+    )
+    command = [sys.executable, "-c", script]
+    run = subprocess.run(command, env=environment(), capture_output=True, text=True, check=True)
+
+    assert run.stdout == "1\n"
