@@ -24,17 +24,13 @@ from benchmarks.map_size import measure as map_size
 from benchmarks.map_structure import measure as map_structure
 from benchmarks.memory.command import memory_command
 from benchmarks.options import announce, json_option, processes_option, report_metrics
-from benchmarks.perception import measure as perception
-from benchmarks.perception import photographs, stereo
+from benchmarks.perception.command import perception_command
 from benchmarks.place_grid import measure as place_grid
 from benchmarks.planning.command import planning_command
-from benchmarks.report import Metrics, Outcome, summary, write
+from benchmarks.report import Outcome, summary, write
 from benchmarks.spiking import measure as spiking
 from cli.experiment.outcome import save_figure
 from cli.log.progress import bar
-from cli.options import FiniteRange
-from services.epam.layout.road import DEFAULT_PATH as ROAD_WEIGHTS
-from training.photographs import camvid_iou
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -192,70 +188,6 @@ def bus_command(pairs: int, number: int, json_path: Path | None) -> None:
     report_metrics("bus", bus.THRESHOLDS, metrics, json_path)
 
 
-@benchmarks.command(name="perception")
-@click.option(
-    "--stereo",
-    "pair",
-    nargs=3,
-    type=click.Path(path_type=Path),
-    metavar="LEFT RIGHT DISPARITY",
-    help="Measure only the stereo matching, on a rectified pair of yours: its images, and the true "
-    "disparities of the left one, as an image of --scale times the pixels, 0 where unknown.",
-)
-@click.option(
-    "--scale",
-    type=FiniteRange(0, min_open=True),
-    metavar="N",
-    help="Of --stereo; 1 if not given.",
-)
-@click.option(
-    "--camvid-test",
-    nargs=2,
-    type=click.Path(path_type=Path),
-    metavar="IMAGES LABELS",
-    help="Measure only how well road is found in street photographs: two folders of PNG files with "
-    "the same names, labelled as CamVid's 12 classes are.",
-)
-@click.option(
-    "--road-weights",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="Of --camvid-test: the road network, as cogmap train road --camvid wrote it; "
-    "that of the running system if not given.",
-)
-@json_option
-def perception_command(
-    pair: tuple[Path, Path, Path] | None,
-    scale: float | None,
-    camvid_test: tuple[Path, Path] | None,
-    road_weights: Path | None,
-    json_path: Path | None,
-) -> None:
-    """What perception makes of towns that it never saw: names, new buildings, roads, depth, places,
-    and how fast.
-
-    Draws them, with light, noise and clutter, and looks at them with the modules of the running
-    system, in two processes. Takes four to five minutes on two cores; leave both to it.
-    """
-    if scale is not None and not pair:
-        raise click.BadParameter("it belongs to --stereo: give that too", param_hint="--scale")
-    if road_weights is not None and not camvid_test:
-        raise click.BadParameter(
-            "it belongs to --camvid-test: give that too", param_hint="--road-weights"
-        )
-
-    metrics: Metrics = {}
-    if pair:
-        metrics |= stereo.measure(*pair, scale or 1.0)
-    if camvid_test:
-        metrics["camvid_iou"] = camvid_iou(road_weights or ROAD_WEIGHTS, *camvid_test)
-    if not pair and not camvid_test:
-        metrics = perception.measure()
-
-    thresholds = perception.THRESHOLDS | stereo.THRESHOLDS | photographs.THRESHOLDS
-    report_metrics("perception", thresholds, metrics, json_path)
-
-
 @benchmarks.command(name="localization")
 @click.option(
     "--mrclam",
@@ -364,6 +296,7 @@ def spiking_command(seed: int, processes: int, folder: Path | None, json_path: P
         announce(str(path))
 
 
+benchmarks.add_command(perception_command)
 benchmarks.add_command(planning_command)
 benchmarks.add_command(explore_command)
 benchmarks.add_command(cognition_command)

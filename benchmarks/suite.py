@@ -101,6 +101,12 @@ def _camvid(setting: Setting) -> Metrics:
     return photographs.measure(camvid, folder)
 
 
+def _camvid_drives(setting: Setting) -> Metrics:
+    camvid = setting.set_of("camvid")
+    folder = setting.subfolder("camvid-drives")
+    return photographs.measure_by_drive(camvid, folder, setting.announce)
+
+
 def _spiking(setting: Setting) -> Metrics:
     scenes = spiking.measure(spiking.SEED, setting.processes)
     return spiking.metrics(scenes)
@@ -180,6 +186,7 @@ SUITE = (
     Benchmark("perception", perception.THRESHOLDS, _perception),
     Benchmark("cones", stereo.THRESHOLDS, _cones),
     Benchmark("camvid", photographs.THRESHOLDS, _camvid),
+    Benchmark("camvid-drives", photographs.BY_DRIVE_THRESHOLDS, _camvid_drives),
     Benchmark("spiking", spiking.THRESHOLDS, _spiking),
     Benchmark("localization", localization.THRESHOLDS, _localization),
     Benchmark("map_correction", map_correction.THRESHOLDS, _map_correction),

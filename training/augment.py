@@ -18,6 +18,10 @@ class Augmentation:
     `cast` and `gamma` are factors about 1, given as natural logarithms; `noise` and `brightness`
     are in grey levels of 255; a shadow and a blur are given to shares of the images.
 
+    `slope` is how far the corners of the image are moved at most, as a share of its size, half as
+    far up and down; `saturation` is the largest share of its colour that is taken or added;
+    `backlit_share` is that of images whose lower part gets another light than the upper.
+
     The defaults vary little, for renderings, which have much of this variation themselves.
     """
 
@@ -31,6 +35,9 @@ class Augmentation:
     noise: float = 4.0
     shadow_share: float = 0.15
     blur_share: float = 0.1
+    slope: float = 0.0
+    saturation: float = 0.0
+    backlit_share: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +55,9 @@ def augmented(
     labelled: LabelledImage, how: Augmentation, rng: np.random.Generator
 ) -> LabelledImage:
     """Return a variation of `labelled`, HEIGHT_PX by WIDTH_PX."""
+    if how.slope:
+        labelled = _sloped(labelled, how.slope, rng)
+
     original_size = labelled.image.shape[:2]
     matrix = _affine(original_size, how, rng)
     size = (WIDTH_PX, HEIGHT_PX)
@@ -82,6 +92,25 @@ def _resized(image: Bytes) -> Bytes:
     size = (WIDTH_PX, HEIGHT_PX)
     small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
     return small.astype(np.uint8, copy=False)
+
+
+def _sloped(labelled: LabelledImage, slope: float, rng: np.random.Generator) -> LabelledImage:
+    """`labelled` as a camera sees it that is turned, or on a road that rises or falls."""
+    height, width = labelled.image.shape[:2]
+    corners_px = np.array([[0, 0], [width, 0], [width, height], [0, height]], np.float32)
+    moved = rng.uniform(-slope, slope, (4, 2)) * (width, height / 2)
+    moved_px = (corners_px + moved).astype(np.float32)
+
+    matrix = cv2.getPerspectiveTransform(corners_px, moved_px)
+    size = (width, height)
+    image = cv2.warpPerspective(labelled.image, matrix, size, borderMode=cv2.BORDER_REPLICATE)
+    road = cv2.warpPerspective(labelled.road, matrix, size)
+    known = cv2.warpPerspective(labelled.known, matrix, size)
+    return LabelledImage(
+        image=image.astype(np.uint8, copy=False),
+        road=road.astype(np.uint8, copy=False),
+        known=known.astype(np.uint8, copy=False),
+    )
 
 
 def _affine(size: tuple[int, ...], how: Augmentation, rng: np.random.Generator) -> Floats:
@@ -133,6 +162,12 @@ def _relit(image: Singles, how: Augmentation, rng: np.random.Generator) -> Bytes
         blurred = cv2.GaussianBlur(image, (3, 3), rng.uniform(0.4, 1.0))
         image = blurred.astype(np.float32, copy=False)
 
+    if how.saturation:
+        image = _saturated(image, rng.uniform(-how.saturation, how.saturation))
+
+    if how.backlit_share and rng.random() < how.backlit_share:
+        image *= _backlight(rng)
+
     if rng.random() < how.shadow_share:
         image *= _shadow(rng)
 
@@ -146,6 +181,27 @@ def _relit(image: Singles, how: Augmentation, rng: np.random.Generator) -> Bytes
 
     limited = np.clip(image, 0, 255)
     return limited.astype(np.uint8)
+
+
+def _saturated(image: Singles, added: float) -> Singles:
+    """`image` with this share of its colour `added`, or taken where it is below 0."""
+    grey = image.mean(axis=2, keepdims=True)
+    saturated = image + (image - grey) * np.float32(added)
+    return np.asarray(saturated, np.float32)
+
+
+def _backlight(rng: np.random.Generator) -> Singles:
+    """The share of light that each row has, (HEIGHT_PX, 1, 1): the ground is darker than the sky,
+    seldom brighter.
+    """
+    rows = np.arange(HEIGHT_PX) / HEIGHT_PX
+    horizon = rng.uniform(0.2, 0.55)
+    softness = rng.uniform(0.03, 0.4)
+    below = np.clip((rows - horizon) / softness, 0, 1)
+
+    log_light = rng.uniform(-1.3, 0.5)
+    light = np.exp(log_light * below)
+    return np.asarray(light, np.float32)[:, None, None]
 
 
 def _response(how: Augmentation, rng: np.random.Generator) -> Singles:

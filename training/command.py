@@ -163,8 +163,8 @@ def road(
     """Train the network that finds the road; prints its IoU in held-out towns.
 
     Takes about ten minutes on one thread. With --camvid it is trained on photographs instead:
-    DIR/train/*.png, with label images of the same names in DIR/trainannot, where 3 is road and 11
-    unlabelled, as in CamVid.
+    DIR/train, PNG or JPEG, with label images of the same names in DIR/trainannot, where 3 is road
+    and 11 unlabelled, as in CamVid.
 
     \b
     cogmap train road --camvid DIR

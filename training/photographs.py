@@ -4,7 +4,7 @@ road network's IoU on them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,10 @@ from services.epam.layout.road import load
 
 ROAD = 3
 UNLABELLED = 11
+IMAGE_SUFFIXES = (".png", ".jpg")
+# Of folders with CamVid's training photographs, that which is used where several are there.
+TRAINING_FOLDERS = ("train_320", "train")
+LABEL_SUFFIXES = ("annot", "_annot")
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,24 +37,64 @@ class Photograph:
     known: Booleans
 
 
-def photographs(images: Path, labels: Path) -> Iterator[Photograph]:
-    """Return each PNG in the folder `images` with the label image of the same name in `labels`, by
-    name.
+def training_folders(camvid: Path) -> tuple[Path, Path]:
+    """The folders of training photographs and of their labels in `camvid`: one of TRAINING_FOLDERS,
+    or `camvid` itself; labels are in the folder beside it whose name ends in LABEL_SUFFIXES.
 
-    Raises UsageError if a folder or file is missing, is no image, or has another size than its
-    label.
+    Raises UsageError where there are no such folders.
+    """
+    candidates = [camvid / name for name in TRAINING_FOLDERS]
+    for images in (*candidates, camvid.absolute()):
+        for suffix in LABEL_SUFFIXES:
+            labels = images.with_name(images.name + suffix)
+            if images.is_dir() and labels.is_dir():
+                return images, labels
+
+    raise UsageError(
+        f"there is no folder of photographs in {camvid} with labels beside it: put the images in "
+        f"{camvid / 'train'} and their label images in {camvid / 'trainannot'}"
+    )
+
+
+def photographs(images: Path, labels: Path) -> Iterator[Photograph]:
+    """Return each image in the folder `images` with the label image of the same name in `labels`,
+    a PNG, by name.
+
+    Raises UsageError if a folder or file is missing, is no image, has another size than its label,
+    or if no label has any road.
     """
     for folder in (images, labels):
         if not folder.is_dir():
-            raise UsageError(f"there is no folder {folder}: name the one that holds the PNG files")
+            raise UsageError(f"there is no folder {folder}: name the one that holds the images")
 
-    paths = sorted(images.glob("*.png"))
+    paths = [path for path in sorted(images.iterdir()) if path.suffix in IMAGE_SUFFIXES]
     if not paths:
         raise UsageError(
-            f"no *.png in {images}: put street photographs there, and their labels in {labels}"
+            f"no *.png or *.jpg in {images}: put street photographs there, and their labels in "
+            f"{labels}"
         )
+
+    has_road = False
     for path in paths:
-        yield _photograph(path, labels / path.name)
+        photograph = _photograph(path, labels / f"{path.stem}.png")
+        has_road |= bool(photograph.road.any())
+        yield photograph
+
+    if not has_road:
+        raise UsageError(
+            f"no pixel in {labels} is labelled {ROAD}, road: are these CamVid's labels in 12 "
+            "classes?"
+        )
+
+
+def by_drive(shown: Iterable[Photograph]) -> dict[str, list[Photograph]]:
+    """The photographs of each drive, whose name is what stands before the first _ of theirs."""
+    drives: dict[str, list[Photograph]] = {}
+    for photograph in shown:
+        name, _, _ = photograph.name.partition("_")
+        drives.setdefault(name, []).append(photograph)
+
+    return drives
 
 
 def _photograph(path: Path, label_path: Path) -> Photograph:
@@ -83,19 +127,21 @@ def camvid_iou(weights: Path, images: Path, labels: Path) -> float:
     `weights` hold no road network.
     """
     segmenter = load(weights)
-    both = 0
-    either = 0
-    for photograph in photographs(images, labels):
-        found = segmenter.mask(photograph.image)
-        both += int(np.count_nonzero(found & photograph.road & photograph.known))
-        either += int(np.count_nonzero((found | photograph.road) & photograph.known))
+    return road_iou(segmenter.mask, photographs(images, labels))
 
-    if not either:
-        raise UsageError(
-            f"no pixel in {labels} is labelled {ROAD}, road: are these CamVid's labels in 12 "
-            "classes?"
-        )
-    return both / either
+
+def road_iou(found_in: Callable[[Bytes], Booleans], shown: Iterable[Photograph]) -> float:
+    """Return the intersection over union of road, as `found_in` an image (h, w, 3) and as labelled,
+    over all labelled pixels.
+    """
+    both_px = 0
+    either_px = 0
+    for photograph in shown:
+        found = found_in(photograph.image)
+        both_px += int(np.count_nonzero(found & photograph.road & photograph.known))
+        either_px += int(np.count_nonzero((found | photograph.road) & photograph.known))
+
+    return both_px / max(either_px, 1)
 
 
 def _read(path: Path, flags: int) -> npt.NDArray[Any]:

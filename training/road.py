@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import torch
 from rich.progress import Progress, track
-from torch import Tensor
+from torch import Tensor, nn
 from torch.nn import functional
 
 from cogmap.geometry.arrays import Bytes, Singles
@@ -67,7 +67,7 @@ def train_on_renderings(
         seed=seed,
         augmentation=Augmentation(),
     )
-    net = train(images, schedule)
+    net = train(images, schedule, lambda: UNet(CHANNELS, 1, WIDTHS))
     write(net, out)
     return {"road_iou": _iou(folder, out, len(held_out))}
 
@@ -83,10 +83,14 @@ def _images(folder: Path) -> list[LabelledImage]:
     return images
 
 
-def train(images: Sequence[LabelledImage], schedule: Schedule) -> UNet:
-    """Return a road network trained on augmented `images`."""
+def train(
+    images: Sequence[LabelledImage], schedule: Schedule, make_net: Callable[[], nn.Module]
+) -> nn.Module:
+    """Return the network of `make_net`, whose input and output are those of the road network,
+    trained on augmented `images`.
+    """
     seed_torch(schedule.seed)
-    net = UNet(CHANNELS, 1, WIDTHS).to(memory_format=torch.channels_last)
+    net = make_net().to(memory_format=torch.channels_last)
 
     steps = max(1, schedule.epochs * schedule.images // BATCH)
     optimizer = Optimizer(net.parameters(), steps, MAX_RATE, WEIGHT_DECAY, WARM_UP)
@@ -103,7 +107,7 @@ def train(images: Sequence[LabelledImage], schedule: Schedule) -> UNet:
     return net.eval()
 
 
-def loss(net: UNet, values: Tensor, road: Tensor, known: Tensor) -> Tensor:
+def loss(net: nn.Module, values: Tensor, road: Tensor, known: Tensor) -> Tensor:
     """Return the mean cross entropy of the network's output for `values`, over the pixels that are
     `known` (n, h, w), where `road` (n, h, w) is right; both are shares of a pixel.
     """
@@ -118,7 +122,7 @@ def loss(net: UNet, values: Tensor, road: Tensor, known: Tensor) -> Tensor:
     return total / count
 
 
-def write(net: UNet, path: Path) -> None:
+def write(net: nn.Module, path: Path) -> None:
     """Write `net` to `path`, as `services.epam.layout.road` reads it."""
     export(net, path, "image", INPUT_SHAPE, OUTPUT_SHAPES)
 

@@ -109,7 +109,7 @@ def _no_road(images: Path, labels: Path) -> None:
         ),
         (_no_image, r"images/1\.png is no image"),
         (_an_empty_file, r"labels/1\.png is no image"),
-        (_no_images, r"no \*\.png in .*images"),
+        (_no_images, r"no \*\.png or \*\.jpg in .*images"),
         (_no_folder, r"no folder .*labels"),
         (_no_road, r"no pixel in .*labels is labelled 3"),
     ],

@@ -100,6 +100,8 @@ def test_disparities_without_sense_are_refused(tmp_path: Path) -> None:
     [
         (["--scale", "4"], "belongs to --stereo"),
         (["--road-weights", "road.onnx"], "belongs to --camvid-test"),
+        (["--by-drive"], "belongs to --camvid"),
+        (["--camvid", "a", "--camvid-test", "b", "c"], "not both"),
         (["--stereo", "a", "b", "c", "--scale", "0"], "--scale"),
         (["--stereo", "a", "b"], "--stereo"),
         (["--json", "nowhere/figures.json"], "there is no folder"),

@@ -1,0 +1,120 @@
+"""The command `python -m benchmarks perception`."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import click
+
+from benchmarks.options import announce, json_option, report_metrics
+from benchmarks.perception import measure as perception
+from benchmarks.perception import photographs, stereo
+from benchmarks.report import Metrics
+from cli.options import FiniteRange
+from services.epam.layout.road import DEFAULT_PATH as ROAD_WEIGHTS
+from training.photographs import camvid_iou
+
+THRESHOLDS = (
+    perception.THRESHOLDS
+    | stereo.THRESHOLDS
+    | photographs.THRESHOLDS
+    | photographs.BY_DRIVE_THRESHOLDS
+)
+
+
+@click.command(name="perception")
+@click.option(
+    "--stereo",
+    "pair",
+    nargs=3,
+    type=click.Path(path_type=Path),
+    metavar="LEFT RIGHT DISPARITY",
+    help="Measure only the stereo matching, on a rectified pair of yours: its images, and the true "
+    "disparities of the left one, as an image of --scale times the pixels, 0 where unknown.",
+)
+@click.option(
+    "--scale",
+    type=FiniteRange(0, min_open=True),
+    metavar="N",
+    help="Of --stereo; 1 if not given.",
+)
+@click.option(
+    "--camvid",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Measure only how well road is found in street photographs after training on others: DIR "
+    "has CamVid's folders train, trainannot, val and valannot.",
+)
+@click.option(
+    "--by-drive",
+    "is_by_drive",
+    is_flag=True,
+    help="Of --camvid: each drive of DIR/train_320 and train_320_annot, else of DIR/train and "
+    "trainannot, is left out of the training once, and measured on. A drive is what stands before "
+    "the first _ of a file's name.",
+)
+@click.option(
+    "--camvid-test",
+    nargs=2,
+    type=click.Path(path_type=Path),
+    metavar="IMAGES LABELS",
+    help="Measure only how well road is found in street photographs: two folders of PNG files with "
+    "the same names, labelled as CamVid's 12 classes are.",
+)
+@click.option(
+    "--road-weights",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Of --camvid-test: the road network, as cogmap train road --camvid wrote it; "
+    "that of the running system if not given.",
+)
+@json_option
+def perception_command(
+    *,
+    pair: tuple[Path, Path, Path] | None,
+    scale: float | None,
+    camvid: Path | None,
+    is_by_drive: bool,
+    camvid_test: tuple[Path, Path] | None,
+    road_weights: Path | None,
+    json_path: Path | None,
+) -> None:
+    """What perception makes of towns that it never saw: names, new buildings, roads, depth, places,
+    and how fast.
+
+    Draws them, with light, noise and clutter, and looks at them with the modules of the running
+    system, in two processes. Takes four to five minutes on two cores; leave both to it. --camvid
+    trains first, for some minutes; with --by-drive for each drive.
+    """
+    belonging = (
+        ("--scale", scale is not None, "--stereo", bool(pair)),
+        ("--road-weights", road_weights is not None, "--camvid-test", bool(camvid_test)),
+        ("--by-drive", is_by_drive, "--camvid", camvid is not None),
+    )
+    for option, is_given, owner, has_owner in belonging:
+        if is_given and not has_owner:
+            raise click.BadParameter(f"it belongs to {owner}: give that too", param_hint=option)
+    if camvid is not None and camvid_test:
+        raise click.BadParameter("give it or --camvid-test, not both", param_hint="--camvid")
+
+    metrics: Metrics = {}
+    if pair:
+        metrics |= stereo.measure(*pair, scale or 1.0)
+    if camvid_test:
+        metrics["camvid_iou"] = camvid_iou(road_weights or ROAD_WEIGHTS, *camvid_test)
+    if camvid is not None:
+        metrics |= _trained_on(camvid, is_by_drive)
+    if not metrics:
+        metrics = perception.measure()
+
+    report_metrics("perception", THRESHOLDS, metrics, json_path)
+
+
+def _trained_on(camvid: Path, is_by_drive: bool) -> Metrics:
+    """What networks that were trained on photographs find in others."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        if is_by_drive:
+            return photographs.measure_by_drive(camvid, folder, announce)
+        return photographs.measure(camvid, folder)
