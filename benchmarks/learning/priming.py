@@ -19,7 +19,7 @@ from cogmap.geometry.arrays import Bytes
 from cogmap.parallel import parallel_map
 from cogmap.runtime.module import Module
 from schemas.array import Array
-from schemas.cognition import Broadcast, Coalition, Trigger
+from schemas.cognition import Broadcast, Coalition, Relation, Trigger
 from schemas.nodes import Object, object_id
 from schemas.sensing import Calibration, Odometry, Percept, Percepts, Pose, StereoFrame, View
 from services import registry
@@ -123,7 +123,7 @@ class _Pair:
         bare = _percepts(self._bare, view)
         primed = _percepts(self._primed, view)
 
-        conscious = [percept.label for percept in bare if percept.evidence > SURE]
+        conscious = [percept for percept in bare if percept.evidence > SURE]
         if conscious:
             self._primed.feed(_broadcast(view, conscious))
         return bare, primed
@@ -148,18 +148,24 @@ def _percepts(epam: Module, view: View) -> list[Percept]:
     return found.objects
 
 
-def _broadcast(view: View, labels: Sequence[str]) -> Broadcast:
+def _broadcast(view: View, conscious: Sequence[Percept]) -> Broadcast:
     nodes = []
-    for label in labels:
-        nodes.append(
-            Object(id=object_id(label), label=label, x_m=0.0, y_m=0.0, function=function_of(label))
+    relations = {}
+    for percept in conscious:
+        label = percept.label
+        name = object_id(label)
+        nodes.append(Object(id=name, label=label, x_m=0.0, y_m=0.0, function=function_of(label)))
+        relations[name] = Relation(
+            look=label, range_m=percept.range_m, bearing_rad=percept.bearing_rad
         )
 
     return Broadcast(
         stamp_ns=view.stamp_ns,
         cycle=view.frame,
         trigger=Trigger.ONE_COALITION,
-        coalition=Coalition(codelet="whereabouts", activation=0.5, nodes=list(nodes)),
+        coalition=Coalition(
+            codelet="whereabouts", activation=0.5, nodes=list(nodes), relations=relations
+        ),
     )
 
 

@@ -27,6 +27,7 @@ from schemas.nodes.ids import (
     RECOLLECTION_ID,
     ROOT_MAP,
     SELF_ID,
+    Side,
     attention_id,
     category_id,
     coarse_map_id,
@@ -35,6 +36,7 @@ from schemas.nodes.ids import (
     goal_id,
     individual_label,
     is_coarse_map,
+    is_relation,
     look_of,
     map_id,
     map_number,
@@ -45,6 +47,7 @@ from schemas.nodes.ids import (
     percept_id,
     place_cell,
     place_id,
+    relation_id,
     segment_id,
 )
 from schemas.nodes.links import EXCLUSIVE_LINKS, LinkKind
@@ -98,6 +101,7 @@ __all__ = [
     "RouteColumn",
     "Self",
     "SelfColumn",
+    "Side",
     "SubMap",
     "attention_id",
     "category_id",
@@ -107,6 +111,7 @@ __all__ = [
     "goal_id",
     "individual_label",
     "is_coarse_map",
+    "is_relation",
     "kind_name",
     "kind_of",
     "look_of",
@@ -119,5 +124,6 @@ __all__ = [
     "percept_id",
     "place_cell",
     "place_id",
+    "relation_id",
     "segment_id",
 ]

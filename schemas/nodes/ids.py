@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+import enum
+
 ROOT_MAP = "map:0"
 COARSE_MAP = "map:coarse:"
 SELF_ID = "self"
 CORRECTION_ID = "correction"
 PLAN_ID = "plan"
 RECOLLECTION_ID = "recollection"
+RELATION = "relation:"
+
+
+class Side(enum.StrEnum):
+    """On which side of an object another stands, as seen by the agent."""
+
+    LEFT_OF = "left_of"
+    RIGHT_OF = "right_of"
 
 
 def object_id(label: str) -> str:
@@ -38,6 +48,16 @@ def goal_id(name: str) -> str:
 def feeling_id(name: str) -> str:
     """The id of the feeling `name`, such as danger."""
     return f"feeling:{name}"
+
+
+def relation_id(side: Side, look: str) -> str:
+    """The id of the relation of standing next to what perception calls `look`, on that side."""
+    return f"{RELATION}{side}:{look}"
+
+
+def is_relation(identifier: str) -> bool:
+    """Whether an id is that of a relation."""
+    return identifier.startswith(RELATION)
 
 
 def percept_id(label: str) -> str:

@@ -15,6 +15,7 @@ from cogmap.geometry.arrays import Singles
 from schemas.array import Array
 from schemas.sensing import Calibration, LearnedObject, Percept
 from services.epam.association.prior import NOTHING_EXPECTED, Prior
+from services.epam.association.relations import Seen, beside
 from services.epam.config import Config
 from services.epam.layout.footprint_fit import ObjectPose, Silhouette, locate
 from services.epam.layout.ground import project
@@ -142,15 +143,16 @@ class ExtendedPam:
         learned: list[LearnedObject] = []
 
         for first in sorted(candidates, key=_activation, reverse=True):
-            recognized = self._recognized(first, prior)
-            candidate = self._in_one_place(recognized, pieces, prior)
+            expected = prior.where(_relations(first, pieces))
+            recognized = self._recognized(first, expected)
+            candidate = self._in_one_place(recognized, pieces, expected)
             recognition = candidate.recognition
             if 1 - recognition.background <= self._config.percept_threshold:
                 continue
 
             if learning and self._is_new(candidate):
                 learned.append(self._learn(self._next_label(), recognition.appearance))
-                candidate = self._recognized(candidate, prior)
+                candidate = self._recognized(candidate, expected)
             elif learning and recognition.label not in pieces and self._looks_new(recognition):
                 learned.append(self._learn(recognition.label, recognition.appearance))
 
@@ -277,6 +279,23 @@ def _width_and_height_m(candidate: Candidate, camera: Calibration) -> tuple[floa
 
 def _activation(candidate: Candidate) -> float:
     return candidate.recognition.activation
+
+
+def _relations(candidate: Candidate, pieces: Mapping[str, list[Candidate]]) -> dict[str, float]:
+    """The relations in which a candidate stands to those that have a label, with the activation
+    that these relations have by the evidence of the view.
+    """
+    named = {}
+    for label, same in pieces.items():
+        first = same[0]
+        named[label] = Seen(_column(first), first.recognition.evidence)
+
+    return beside(_column(candidate), named)
+
+
+def _column(candidate: Candidate) -> float:
+    """The middle column of what is seen of it."""
+    return (candidate.walls.left + candidate.walls.right) / 2
 
 
 def _silhouette(candidate: Candidate) -> Silhouette | None:

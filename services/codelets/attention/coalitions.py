@@ -47,7 +47,7 @@ def coalition(
         activation=min(1.0, activation),
         nodes=[_as_of_now(node, graph) for node in nodes],
         links=every_link,
-        maps=_maps_of(nodes),
+        maps=_maps_of(nodes, graph),
         relations=_relations(percepts, strengths),
         feeling=feeling,
     )
@@ -102,12 +102,17 @@ def _links_to_places(nodes: list[AnyNode], graph: Graph) -> list[Link]:
     return links
 
 
-def _maps_of(nodes: list[AnyNode]) -> list[str]:
-    """The maps that nodes are on, each once, in the order of the nodes."""
+def _maps_of(nodes: list[AnyNode], graph: Graph) -> list[str]:
+    """The maps that nodes are on, and the sub-maps that they are in, each once, in the order of the
+    nodes.
+    """
     maps: dict[str, None] = {}
     for node in nodes:
         if isinstance(node, Self | Object | Goal | Plan):
             maps[node.map] = None
+        sub_map = graph.links.target(node.id, LinkKind.WITHIN)
+        if sub_map is not None:
+            maps[sub_map] = None
 
     return list(maps)
 

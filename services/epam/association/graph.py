@@ -1,12 +1,13 @@
 """Perceptual associative memory as a graph: what was conscious together gets linked, and what is
 conscious primes what it is linked to (LIDA's PAM; paper §5.1).
 
-A weight estimates how likely its target is conscious soon before or after its source. Pure.
+A weight estimates how likely its target is conscious soon before or after its source; that of a
+link from a relation, how likely its target stands in that relation. Pure.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -14,11 +15,11 @@ from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Booleans, Floats
 from schemas.array import Array
 from schemas.feelings import Feeling
-from schemas.nodes import feeling_id
+from schemas.nodes import feeling_id, is_relation
 from schemas.sensing import Associations
 from services.epam.config import Priming
 
-MAX_NODES = 256
+MAX_NODES = 512
 FAINT = 0.01
 """Weaker links are not published, and prime nothing."""
 FEELINGS = {feeling_id(feeling): feeling for feeling in Feeling if feeling}
@@ -31,7 +32,9 @@ class AssociativeGraph:
     The activation of a node is 1 at a broadcast of it and halves every `half_life_s`.
 
     Feelings are nodes too. To one lead links from what was conscious in the same broadcast, none
-    lead from it: what is felt tells nothing of what is there.
+    lead from it: what is felt tells nothing of what is there. Relations, such as to stand left of
+    the bakery, are nodes of which links lead to what stood in them, and none back: what is seen
+    beside something else activates them, no broadcast.
     """
 
     def __init__(self, config: Priming) -> None:
@@ -47,25 +50,43 @@ class AssociativeGraph:
         """The stamp of the broadcast from which was learned last, 0 before the first."""
         return self._updated_ns
 
-    def learn(self, names: list[str], stamp_ns: int) -> None:
-        """Learn from a broadcast of the nodes `names`.
+    def learn(
+        self, names: list[str], stamp_ns: int, related: Mapping[str, str] | None = None
+    ) -> None:
+        """Learn from a broadcast of the nodes `names`, and of relations with the name that stood in
+        each.
 
         Base levels rise. Each weight moves towards the activation of its target, by a rate times
         that of its source: a node that has long been silent keeps its links. Those to feelings
-        change by rates of their own.
+        change by rates of their own, those from a relation where it is conscious.
         """
         self._decay(stamp_ns)
-        for name in names:
+        stood = related or {}
+        for name in (*names, *stood):
             self._add(name)
-        conscious = [self._index[name] for name in names if name in self._index]
+        conscious = self._rows(names)
         self._activations[conscious] = 1.0
 
         rate = self._config.learning_rate
+        raised = conscious + self._rows(stood)
         levels = self._base_levels.copy()
-        levels[conscious] += rate * (1 - levels[conscious])
+        levels[raised] += rate * (1 - levels[raised])
         self._base_levels = levels
-        self._associate(~self._is_feeling())
+        self._associate(self._is_associated())
         self._attach(conscious)
+        self._relate(stood)
+
+    def related(self) -> dict[str, dict[str, float]]:
+        """What stands in each relation, with the weight of the link to it."""
+        names = list(self._index)
+        standing = {}
+        for name, row in self._index.items():
+            if is_relation(name):
+                weights = self._weights[row]
+                targets = np.flatnonzero(weights >= FAINT)
+                standing[name] = {names[target]: float(weights[target]) for target in targets}
+
+        return standing
 
     def primed(self, stamp_ns: int) -> Mapping[str, float]:
         """The nodes that activation has spread to by `stamp_ns`, each with what came over its best
@@ -162,6 +183,18 @@ class AssociativeGraph:
             rate = self._attachment_rate(FEELINGS[name], is_felt)
             self._weights[rows, column] = weights + rate * missing
 
+    def _relate(self, stood: Mapping[str, str]) -> None:
+        """Change the weights of the links from relations: towards 1 to the name that stands in one
+        now, towards 0 to the others.
+        """
+        is_target = self._is_associated()
+        for relation, name in stood.items():
+            if relation not in self._index or name not in self._index:
+                continue
+            weights = self._weights[self._index[relation]]
+            weights[is_target] *= 1 - self._config.learning_rate
+            weights[self._index[name]] += self._config.learning_rate
+
     def _attachment_rate(self, feeling: Feeling, is_felt: bool) -> float:
         """Novelty wears off as fast as it comes."""
         if is_felt or feeling is Feeling.NOVELTY:
@@ -177,9 +210,19 @@ class AssociativeGraph:
         self._activations = self._activations * self._left(stamp_ns)
         self._updated_ns = max(self._updated_ns, stamp_ns)
 
+    def _rows(self, names: Iterable[str]) -> list[int]:
+        """The rows of those names that have one."""
+        return [self._index[name] for name in names if name in self._index]
+
     def _is_feeling(self) -> Booleans:
         """(n,): which nodes are feelings."""
         return np.array([name in FEELINGS for name in self._index], np.bool_)
+
+    def _is_associated(self) -> Booleans:
+        """(n,): which nodes are linked with one another, being no feelings and no relations."""
+        is_relative = np.array([is_relation(name) for name in self._index], np.bool_)
+        associated: Booleans = ~self._is_feeling() & ~is_relative
+        return associated
 
     def _add(self, name: str) -> None:
         """Add a node, in a full graph in the place of the one that was conscious least and is no

@@ -8,10 +8,11 @@ import msgspec
 
 from schemas.cognition import Broadcast
 from schemas.feelings import Feeling
-from schemas.nodes import Object, category_id, feeling_id, look_of, object_id
+from schemas.nodes import Object, category_id, feeling_id, look_of, map_number, object_id
 from schemas.sensing import Associations, Percept
 from services.epam.association.graph import AssociativeGraph
 from services.epam.association.prior import Prior
+from services.epam.association.relations import related
 from services.epam.config import Priming
 
 BEHIND = 2
@@ -28,6 +29,7 @@ class Primer:
     def __init__(self, config: Priming) -> None:
         self._config = config
         self._graph = AssociativeGraph(config)
+        self._related: dict[str, dict[str, float]] = {}
         self._waiting: list[Broadcast] = []
         self._views_ns: deque[int] = deque(maxlen=BEHIND)
         self._competition_ns = -1
@@ -56,15 +58,18 @@ class Primer:
         self._waiting = [each for each in self._waiting if each.stamp_ns > until_ns]
         is_due = False
         for broadcast in sorted(due, key=lambda each: each.stamp_ns):
-            self._graph.learn(nodes_of(broadcast), broadcast.stamp_ns)
+            stood = related(broadcast.coalition.relations.values())
+            self._graph.learn(nodes_of(broadcast), broadcast.stamp_ns, stood)
             self._broadcasts += 1
             is_due |= self._broadcasts % self._config.kept_broadcasts == 0
 
+        if due:
+            self._related = self._graph.related()
         return self._graph.published() if is_due else None
 
     def prior(self, view_ns: int) -> Prior:
         """What is expected of a view."""
-        return Prior(self._graph.primed(view_ns), self._config.share)
+        return Prior(self._graph.primed(view_ns), self._config.share, self._related)
 
     def felt(self, percept: Percept) -> Percept:
         """`percept` with the feelings that its PAM node activates; where the object was never
@@ -84,11 +89,12 @@ class Primer:
     def restore(self, kept: Associations) -> None:
         """Continue with a graph that was published. Raises MessageError where it is not whole."""
         self._graph.restore(kept)
+        self._related = self._graph.related()
 
 
 def nodes_of(broadcast: Broadcast) -> list[str]:
     """The PAM nodes that are conscious in a broadcast: objects, by their look, that are not brought
-    as missing, the categories of those, and what is felt.
+    as missing, the categories of those, the sub-maps that these are in, and what is felt.
     """
     coalition = broadcast.coalition
     is_surprise = coalition.feeling is Feeling.SURPRISE
@@ -101,6 +107,9 @@ def nodes_of(broadcast: Broadcast) -> list[str]:
         if node.function:
             names[category_id(node.function)] = None
 
+    for name in coalition.maps:
+        if map_number(name):
+            names[name] = None
     if coalition.feeling:
         names[feeling_id(coalition.feeling)] = None
     return list(names)

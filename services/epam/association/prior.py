@@ -1,9 +1,9 @@
-"""What is expected of a view before it is seen, by what was conscious. Pure."""
+"""What is expected of a view by what was conscious, and by what else is seen in it. Pure."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,11 +17,24 @@ class Prior:
 
     `primed` has the activation that has spread to PAM nodes. Where it is 1 in all, or more, those
     have a mass of `share`, beside 1 of all labels together. Where the town is familiar, an unknown
-    building is so much less likely.
+    building is so much less likely. `related` has the PAM nodes to which links lead from each
+    relation, with their weights.
     """
 
     primed: Mapping[str, float] = field(default_factory=dict)
     share: float = 0.0
+    related: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+    def where(self, relations: Mapping[str, float]) -> Prior:
+        """The prior of what stands in `relations`, each with its activation: over the links from
+        them it is primed too.
+        """
+        primed = dict(self.primed)
+        for relation, activation in relations.items():
+            for name, weight in self.related.get(relation, {}).items():
+                primed[name] = max(primed.get(name, 0.0), activation * weight)
+
+        return replace(self, primed=primed)
 
     def log_ratio(self, labels: Iterable[str]) -> Floats:
         """How much likelier each label is than if none were primed, as a logarithm, (n,)."""

@@ -7,7 +7,17 @@ import pytest
 from schemas.array import Matrix
 from schemas.feelings import Feeling
 from schemas.graph import Link
-from schemas.nodes import AnyNode, Node, Object, Plan, PlanState, Self
+from schemas.nodes import (
+    ROOT_MAP,
+    AnyNode,
+    LinkKind,
+    Node,
+    Object,
+    Plan,
+    PlanState,
+    Self,
+    map_id,
+)
 from services.codelets.attention.coalitions import coalition
 from services.codelets.attention.config import Config
 from tests.support.world.scenes import agent, graph_of, landmark, percept, run, task
@@ -46,6 +56,14 @@ def test_a_link_is_as_active_and_salient_as_the_node_that_it_begins_at() -> None
     assert coalition("test", [node], placed, 1.0).activation == pytest.approx(1.0 / 2)
     assert linked.links == [at, near]
     assert linked.activation == pytest.approx((1.0 + 1.0 + 0.5) / 6)
+
+
+def test_a_coalition_is_of_the_maps_and_the_sub_maps_that_its_objects_are_on() -> None:
+    one, other = _content(0.4, 0.8)
+    within = Link(source=one.id, target=map_id(2), kind=LinkKind.WITHIN)
+    graph = graph_of(one, other, within)
+
+    assert coalition("test", [one, other], graph, 1.0).maps == [ROOT_MAP, map_id(2)]
 
 
 def test_a_coalition_leaves_the_route_of_a_plan_behind() -> None:

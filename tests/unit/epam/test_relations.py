@@ -1,0 +1,160 @@
+"""Relations are nodes of perceptual associative memory: what stood in one is expected in it."""
+
+from __future__ import annotations
+
+import msgspec
+import pytest
+
+from schemas.cognition import Broadcast, Coalition, Relation, Trigger
+from schemas.nodes import ROOT_MAP, Object, Side, category_id, map_id, object_id, relation_id
+from schemas.sensing import Associations
+from services.epam.association.memory import BEHIND, Primer, nodes_of
+from services.epam.association.prior import Prior
+from services.epam.association.relations import Seen, beside, related
+from services.epam.config import Priming
+
+SECOND_NS = 1_000_000_000
+CONFIG = Priming(kept_broadcasts=1)
+LEFT_OF_BAKERY = relation_id(Side.LEFT_OF, "bakery")
+RIGHT_OF_BAKERY = relation_id(Side.RIGHT_OF, "bakery")
+
+
+def _seen_so(*looks: str) -> dict[str, Relation]:
+    """The relations to the agent of what stands before it from left to right."""
+    relations = {}
+    for number, look in enumerate(looks):
+        relations[object_id(look)] = Relation(look=look, range_m=10.0, bearing_rad=-0.2 * number)
+    return relations
+
+
+def _broadcast(second: int, *looks: str, maps: tuple[str, ...] = ()) -> Broadcast:
+    nodes = [Object(id=object_id(look), label=look, x_m=0.0, y_m=0.0) for look in looks]
+    coalition = Coalition(
+        codelet="test",
+        activation=0.5,
+        nodes=list(nodes),
+        maps=list(maps),
+        relations=_seen_so(*looks),
+    )
+    return Broadcast(
+        stamp_ns=second * SECOND_NS,
+        cycle=second,
+        trigger=Trigger.ONE_COALITION,
+        coalition=coalition,
+    )
+
+
+def _taught(*rounds: tuple[str, ...]) -> tuple[Primer, Associations]:
+    """A PAM that has learned from a broadcast a second of what stood from left to right."""
+    primer = Primer(CONFIG)
+    published = None
+    for second, looks in enumerate(rounds, start=1):
+        primer.on_broadcast(_broadcast(second, *looks))
+        published = primer.begin(second * SECOND_NS) or published
+    for second in range(len(rounds) + 1, len(rounds) + 1 + BEHIND):
+        published = primer.begin(second * SECOND_NS) or published
+
+    assert published is not None
+    return primer, published
+
+
+def _expected(primer: Primer, relation: str) -> dict[str, float]:
+    """What is primed where that relation is active, long after the last broadcast."""
+    prior = primer.prior(3600 * SECOND_NS)
+    return dict(prior.where({relation: 1.0}).primed)
+
+
+def test_neighbours_in_a_broadcast_stand_left_and_right_of_each_other() -> None:
+    assert related(_seen_so("school", "bakery", "clinic").values()) == {
+        relation_id(Side.RIGHT_OF, "school"): object_id("bakery"),
+        LEFT_OF_BAKERY: object_id("school"),
+        RIGHT_OF_BAKERY: object_id("clinic"),
+        relation_id(Side.LEFT_OF, "clinic"): object_id("bakery"),
+    }
+
+
+def test_what_stood_left_of_a_building_is_expected_there_and_not_on_its_right() -> None:
+    primer, _ = _taught(*[("school", "bakery")] * 10)
+
+    assert _expected(primer, LEFT_OF_BAKERY)[object_id("school")] > 0.5
+    assert _expected(primer, RIGHT_OF_BAKERY) == {}
+
+
+def test_of_two_that_stood_there_the_one_of_late_is_expected_more() -> None:
+    primer, _ = _taught(*[("school", "bakery")] * 10, *[("clinic", "bakery")] * 10)
+    expected = _expected(primer, LEFT_OF_BAKERY)
+
+    assert expected[object_id("clinic")] > expected[object_id("school")] > 0.0
+
+
+def test_a_relation_is_not_unlearned_while_it_is_out_of_view() -> None:
+    seen, _ = _taught(*[("school", "bakery")] * 10)
+    later, _ = _taught(*[("school", "bakery")] * 10, *[("clinic", "tower")] * 30)
+
+    assert _expected(later, LEFT_OF_BAKERY) == pytest.approx(_expected(seen, LEFT_OF_BAKERY))
+
+
+def test_a_relation_is_a_node_that_is_published_and_restored_with_its_links() -> None:
+    primer, published = _taught(*[("school", "bakery")] * 10)
+    again = Primer(CONFIG)
+    again.restore(msgspec.msgpack.decode(msgspec.msgpack.encode(published), type=Associations))
+
+    assert LEFT_OF_BAKERY in published.names
+    assert _expected(again, LEFT_OF_BAKERY) == pytest.approx(_expected(primer, LEFT_OF_BAKERY))
+
+
+def test_a_broadcast_alone_primes_nothing_over_a_relation() -> None:
+    primer, _ = _taught(*[("school", "bakery")] * 10)
+    by_time = Prior(primer.prior(12 * SECOND_NS).primed, CONFIG.share)
+
+    assert by_time.primed
+    assert all(not name.startswith("relation:") for name in by_time.primed)
+
+
+def test_something_seen_stands_beside_the_nearest_that_are_named() -> None:
+    named = {
+        "tower": Seen(column=10.0, evidence=0.9),
+        "school": Seen(column=80.0, evidence=0.8),
+        "bakery": Seen(column=200.0, evidence=0.7),
+    }
+
+    assert beside(120.0, named) == {
+        relation_id(Side.RIGHT_OF, "school"): 0.8,
+        LEFT_OF_BAKERY: 0.7,
+    }
+    assert beside(300.0, named) == {RIGHT_OF_BAKERY: 0.7}
+    assert beside(300.0, {}) == {}
+
+
+def test_the_less_evidence_there_is_of_a_building_the_less_is_expected_beside_it() -> None:
+    prior = Prior(share=0.5, related={LEFT_OF_BAKERY: {object_id("school"): 0.8}})
+    sure = prior.where({LEFT_OF_BAKERY: 1.0}).log_ratio(["school", "clinic"])
+    unsure = prior.where({LEFT_OF_BAKERY: 0.1}).log_ratio(["school", "clinic"])
+
+    assert sure[0] > unsure[0] > 0.0
+    assert sure[1] == unsure[1] == 0.0
+
+
+def test_a_sub_map_that_is_conscious_is_a_node_which_its_buildings_are_linked_with() -> None:
+    primer = Primer(CONFIG)
+    district = map_id(3)
+    told = _broadcast(1, "bakery", maps=(ROOT_MAP, district))
+
+    assert nodes_of(told) == [object_id("bakery"), district]
+    primer.on_broadcast(told)
+    primer.on_broadcast(_broadcast(2, maps=(ROOT_MAP, district)))
+    for second in range(1, 4 + BEHIND):
+        primer.begin(second * SECOND_NS)
+    assert object_id("bakery") in primer.prior(4 * SECOND_NS).primed
+
+
+def test_categories_are_conscious_with_the_districts_of_what_has_them() -> None:
+    node = Object(id=object_id("bakery"), label="bakery", x_m=0.0, y_m=0.0, function="shop")
+    told = _broadcast(1, maps=(map_id(1),))
+    coalition = msgspec.structs.replace(told.coalition, nodes=[node])
+
+    assert nodes_of(msgspec.structs.replace(told, coalition=coalition)) == [
+        object_id("bakery"),
+        category_id("shop"),
+        map_id(1),
+    ]
