@@ -1,8 +1,9 @@
-"""ONNX networks, run by ONNX Runtime on one thread; running them needs no torch."""
+"""ONNX networks, run by ONNX Runtime, a pass on one thread; running them needs no torch."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,6 +28,7 @@ class Network:
 
     def __init__(self, path: Path, input_shape: Shape, output_shapes: Mapping[str, Shape]) -> None:
         self._session = _session(path)
+        self._beside = ThreadPoolExecutor(1)
         self._input_shape = input_shape
         self._output_names = list(output_shapes)
 
@@ -36,6 +38,12 @@ class Network:
 
         shapes = {output.name: tuple(output.shape) for output in self._session.get_outputs()}
         _check(path, "gives", shapes, output_shapes)
+
+    def begin(self, values: Singles) -> Future[list[Singles]]:
+        """Begin a pass that is computed beside what the caller does meanwhile; its outputs are
+        those of `self(values)`.
+        """
+        return self._beside.submit(self, values)
 
     def __call__(self, values: Singles) -> list[Singles]:
         """Return the outputs for `values`, in the order of their names."""

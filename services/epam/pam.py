@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,7 +30,12 @@ from services.epam.recognition.candidate import (
     outline_px,
 )
 from services.epam.recognition.functions import function_of
-from services.epam.recognition.objects import Appearance, ObjectRecognizer, Recognition
+from services.epam.recognition.objects import (
+    Appearance,
+    EmbeddingPass,
+    ObjectRecognizer,
+    Recognition,
+)
 from services.epam.recognition.segments import Segment, Segmenter
 from services.epam.view import ViewArrays
 
@@ -47,6 +53,16 @@ class Perceived:
     road_m: Singles
     road_boundary_m: Singles
     learned: list[LearnedObject]
+
+
+class Standing(NamedTuple):
+    """Segments of a view that may be buildings, the walls of each, and their embedding, which is
+    being computed.
+    """
+
+    segments: list[Segment]
+    walls: list[Walls]
+    embedding: list[EmbeddingPass]
 
 
 class ExtendedPam:
@@ -74,12 +90,15 @@ class ExtendedPam:
         """Return what is recognized in `view`, where `prior` was expected; with `learning`, new
         buildings get nodes.
         """
-        candidates = self.candidates(view, camera)
+        road = self._road_segmenter.begin(view.image)
+        standing = self._standing(view, camera)
+
+        likelihood = road.likelihood()
+        road_m, road_boundary_m = project(likelihood, view.depth_m, camera)
+
+        candidates = self._recognizable(standing)
         found, learned = self._labelled(candidates, view, learning, prior)
         objects = self._percepts(found, camera)
-
-        likelihood = self._road_segmenter.likelihood(view.image)
-        road_m, road_boundary_m = project(likelihood, view.depth_m, camera)
         return Perceived(
             objects=objects,
             road_m=road_m,
@@ -91,20 +110,12 @@ class ExtendedPam:
         """Return every segment that is wide enough and has known depth, whatever its activation,
         from left to right.
         """
-        segments, standing = self._standing(view, camera)
-        appearances = self._recognizer.appearances(view.image, view.depth_m, segments, camera)
+        return self._recognizable(self._standing(view, camera))
 
-        candidates = []
-        for segment, of_segment, appearance in zip(segments, standing, appearances, strict=True):
-            recognition = self._recognizer.recognize(appearance)
-            candidates.append(Candidate(segment, of_segment, recognition))
-
-        return candidates
-
-    def _standing(self, view: ViewArrays, camera: Calibration) -> tuple[list[Segment], list[Walls]]:
-        """The segments that are wide enough and have known depth, and their walls."""
+    def _standing(self, view: ViewArrays, camera: Calibration) -> Standing:
+        """The segments that are wide enough and have known depth."""
         segments = []
-        standing = []
+        of_segments = []
         narrowest_px = self._config.narrowest_px
 
         for segment in self._segmenter.segments(view.image, view.depth_m, camera):
@@ -112,9 +123,23 @@ class ExtendedPam:
             of_segment = walls(segment, view.disparity_px)
             if of_segment is not None and width >= narrowest_px:
                 segments.append(segment)
-                standing.append(of_segment)
+                of_segments.append(of_segment)
 
-        return segments, standing
+        embedding = self._recognizer.begin(view.image, view.depth_m, segments, camera)
+        return Standing(segments, of_segments, embedding)
+
+    def _recognizable(self, standing: Standing) -> list[Candidate]:
+        """What stands there, recognized without a prior."""
+        appearances = self._recognizer.appearances(standing.embedding)
+
+        candidates = []
+        for segment, of_segment, appearance in zip(
+            standing.segments, standing.walls, appearances, strict=True
+        ):
+            recognition = self._recognizer.recognize(appearance)
+            candidates.append(Candidate(segment, of_segment, recognition))
+
+        return candidates
 
     def restore(self, objects: Iterable[LearnedObject]) -> None:
         """Recognize these nodes again."""

@@ -24,6 +24,10 @@ from services.sensory.wheels import WheelNoise, fuse
 
 __all__ = ["Config", "SensoryMemory", "build"]
 
+# OpenCV divides an image in the same way for any number of threads, so results do not depend on it.
+# While a view is made, all other modules wait for it.
+THREADS = 2
+
 
 class SensoryMemory:
     """Turns stereo frames and odometry into self-motion, range scans and views, in step.
@@ -35,7 +39,7 @@ class SensoryMemory:
     """
 
     def __init__(self, config: Config) -> None:
-        cv2.setNumThreads(1)
+        cv2.setNumThreads(THREADS)
         self._config = config
         self._odometry = OdometryBuffer(config.longest_gap_s)
         self._noise = WheelNoise(

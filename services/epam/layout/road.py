@@ -4,7 +4,9 @@ pixel is, the spatial prior of the paper (section 5.1).
 
 from __future__ import annotations
 
+from concurrent.futures import Future
 from pathlib import Path
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -38,29 +40,53 @@ class RoadSegmenter:
     def __init__(self, network: Network) -> None:
         self._network = network
 
-    def likelihood(self, image: Bytes) -> Singles:
-        """Return the probability of road of each pixel of an RGB image (h, w, 3), float32 (h, w),
-        denoised.
-
-        A pixel is road if it is at least 0.5. An image without any contrast has none.
+    def begin(self, image: Bytes) -> RoadPass:
+        """Begin to find the road in an RGB image (h, w, 3), beside what the caller does
+        meanwhile.
         """
         height, width, _ = image.shape
         small_size = (WIDTH_PX, HEIGHT_PX)
         resized = cv2.resize(image, small_size, interpolation=cv2.INTER_AREA)
         small = resized.astype(np.uint8, copy=False)
         if small.std() < MIN_CONTRAST:
-            return np.zeros((height, width), np.float32)
+            return RoadPass(height, width, None)
 
-        (output,) = self._network(network_input(small[None]))
-        unpadded = output[0, 0, PADDING_PX:-PADDING_PX]
-        log_odds = cv2.resize(unpadded, (width, height), interpolation=cv2.INTER_LINEAR)
+        outputs = self._network.begin(network_input(small[None]))
+        return RoadPass(height, width, outputs)
 
-        likelihood = _probability(np.asarray(log_odds, np.float32))
-        return _denoised(likelihood)
+    def likelihood(self, image: Bytes) -> Singles:
+        """Return the likelihood of road in an RGB image (h, w, 3), see RoadPass."""
+        return self.begin(image).likelihood()
 
     def mask(self, image: Bytes) -> Booleans:
         """Return which pixels of an RGB image (h, w, 3) show road, (h, w)."""
         return np.asarray(self.likelihood(image) >= 0.5)
+
+
+class RoadPass(NamedTuple):
+    """Road that is being found in an image of that size; `outputs` are those of the network, None
+    where the image has no contrast.
+    """
+
+    height_px: int
+    width_px: int
+    outputs: Future[list[Singles]] | None
+
+    def likelihood(self) -> Singles:
+        """Return the probability of road of each pixel, float32 (h, w), denoised, once it is found.
+
+        A pixel is road if it is at least 0.5. An image without any contrast has none.
+        """
+        if self.outputs is None:
+            return np.zeros((self.height_px, self.width_px), np.float32)
+
+        (output,) = self.outputs.result()
+        unpadded = output[0, 0, PADDING_PX:-PADDING_PX]
+        size = (self.width_px, self.height_px)
+        log_odds = cv2.resize(unpadded, size, interpolation=cv2.INTER_LINEAR)
+
+        likelihood = _probability(np.asarray(log_odds, np.float32))
+        return _denoised(likelihood)
 
 
 def load(path: Path = DEFAULT_PATH) -> RoadSegmenter:

@@ -10,9 +10,11 @@ shows a building at all.
 
 from __future__ import annotations
 
-from collections.abc import Container
+from collections.abc import Container, Iterable
+from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -71,6 +73,13 @@ class Appearance:
     whole: float
 
 
+class EmbeddingPass(NamedTuple):
+    """So many segments, at most BATCH, that are being embedded, and the network's outputs."""
+
+    number: int
+    outputs: Future[list[Singles]]
+
+
 @dataclass(frozen=True, eq=False)
 class Recognition:
     """The likeliest `label` with its posterior `activation`, and that of an unknown building,
@@ -109,34 +118,32 @@ class ObjectRecognizer:
         self._labels: list[str] = []
         self._embeddings = np.empty((0, DIMENSIONS), np.float32)
 
-    def appearances(
+    def begin(
         self, image: Bytes, depth_m: Singles, segments: list[Segment], camera: Calibration
-    ) -> list[Appearance]:
-        """Return the appearance of each of `segments` in a view."""
+    ) -> list[EmbeddingPass]:
+        """Begin to embed `segments` of a view, beside what the caller does meanwhile."""
         around = surroundings(image, depth_m, camera)
-        crops = [crop(image, depth_m, each, around, camera.fx_px) for each in segments]
 
-        appearances: list[Appearance] = []
-        for first in range(0, len(crops), BATCH):
+        passes = []
+        for first in range(0, len(segments), BATCH):
             end = first + BATCH
-            some = crops[first:end]
-            appearances += self._embed(some)
+            some = segments[first:end]
+            batch = np.zeros(INPUT_SHAPE, np.float32)
+            for row, segment in enumerate(some):
+                batch[row] = crop(image, depth_m, segment, around, camera.fx_px)
+            passes.append(EmbeddingPass(len(some), self._network.begin(batch)))
 
-        return appearances
+        return passes
 
-    def _embed(self, crops: list[Singles]) -> list[Appearance]:
-        """Of at most BATCH crops."""
-        count = len(crops)
-        batch = np.zeros(INPUT_SHAPE, np.float32)
-        batch[:count] = crops
-
-        embeddings, log_odds = self._network(batch)
-        probabilities = probability(log_odds, self._prototypes)
-
+    def appearances(self, passes: Iterable[EmbeddingPass]) -> list[Appearance]:
+        """Return the appearance of each segment, once all are embedded."""
         appearances = []
-        for row in range(count):
-            building, whole = probabilities[row].tolist()
-            appearances.append(Appearance(embeddings[row], building, whole))
+        for each in passes:
+            embeddings, log_odds = each.outputs.result()
+            probabilities = probability(log_odds, self._prototypes)
+            for row in range(each.number):
+                building, whole = probabilities[row].tolist()
+                appearances.append(Appearance(embeddings[row], building, whole))
 
         return appearances
 

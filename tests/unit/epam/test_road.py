@@ -94,6 +94,19 @@ def test_road_in_a_town_never_seen_is_found_and_its_ends_are_placed(
     assert road_edge_error_m(missed_m) < 0.5
 
 
+def test_passes_of_a_network_that_run_beside_one_another_have_the_outputs_of_single_ones() -> None:
+    network = Network(DEFAULT_PATH, INPUT_SHAPE, OUTPUT_SHAPES)
+    rng = np.random.default_rng(6)
+    images = rng.normal(size=(4, *INPUT_SHAPE)).astype(np.float32)
+
+    begun = [network.begin(image) for image in images]
+    alone = [network(image) for image in images]
+
+    for beside, (expected,) in zip(begun, alone, strict=True):
+        (output,) = beside.result()
+        assert (output == expected).all()
+
+
 @pytest.mark.parametrize("content", [None, b"no network"], ids=["missing", "broken"])
 def test_unusable_weights_are_named_with_the_remedy(tmp_path: Path, content: bytes | None) -> None:
     weights = tmp_path / "mine.onnx"

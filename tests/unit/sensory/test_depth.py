@@ -87,6 +87,24 @@ def _depth_m(left: Image, right: Image) -> npt.NDArray[np.float32]:
     return DepthFromStereo(CALIBRATION, 2.5).depth_m(left, right)
 
 
+def test_depth_does_not_depend_on_the_number_of_opencvs_threads() -> None:
+    left, right = _wall(12.0, turn_rad=(0.0, 0.02, 0.0))
+    depth = DepthFromStereo(CALIBRATION, nearest_m=2.0)
+    threads = cv2.getNumThreads()
+
+    found = []
+    try:
+        for number in (1, 2, 5):
+            cv2.setNumThreads(number)
+            found.append(depth.depth_m(left, right))
+    finally:
+        cv2.setNumThreads(threads)
+
+    alone, *others = found
+    assert (alone > 0).any()
+    assert all((other == alone).all() for other in others)
+
+
 @pytest.mark.parametrize(
     ("depth_m", "bar"), [(3.0, 0.01), (8.3, 0.015), (12.0, 0.02), (29.0, 0.04)]
 )
