@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from collections import defaultdict
 from collections.abc import Callable, Iterator
 from operator import attrgetter
 from typing import Any, TypeVar
@@ -59,7 +58,7 @@ class Graph:
         self.nodes: dict[str, AnyNode] = {}
         self.links = LinkIndex(self._name_of)
         self.places = PlaceGrid()
-        self._by_kind: defaultdict[type[GraphNode], dict[str, None]] = defaultdict(dict)
+        self._by_kind: dict[type, dict[str, None]] = {kind: {} for kind in _INDEXED}
 
         self._appliers: dict[type, Callable[[Any], None]] = {
             Link: self._put_link,
@@ -90,15 +89,19 @@ class Graph:
     def change(self, operations: list[Operation]) -> None:
         """Carry out operations, in order."""
         nodes = self.nodes
+        by_kind = self._by_kind
         appliers = self._appliers
         for operation in operations:
             kind = type(operation)
-            if kind in appliers:
-                appliers[kind](operation)
-            else:
-                nodes[operation.id] = operation  # type: ignore[union-attr, assignment]
-                if kind in _INDEXED:
-                    self._by_kind[kind][operation.id] = None  # type: ignore[union-attr]
+            apply = appliers.get(kind)
+            if apply is not None:
+                apply(operation)
+                continue
+
+            identifier = operation.id  # type: ignore[union-attr]
+            nodes[identifier] = operation  # type: ignore[assignment]
+            if kind in by_kind:
+                by_kind[kind][identifier] = None
 
     @property
     def agent(self) -> Self | None:
@@ -113,7 +116,7 @@ class Graph:
 
     def of_kind(self, kind: type[K]) -> Iterator[K]:
         """All nodes of a kind, by id. Of a kind that is not indexed it searches every node."""
-        names = self._by_kind[kind] if kind in _INDEXED else self.nodes
+        names = self._by_kind.get(kind, self.nodes)
 
         for name in sorted(names):
             node = self.nodes[name]
@@ -189,7 +192,8 @@ class Graph:
         self.nodes.clear()
         self.links.clear()
         self.places.clear()
-        self._by_kind.clear()
+        for names in self._by_kind.values():
+            names.clear()
 
         self.change([snapshot.decay, *snapshot.nodes, *snapshot.links, *snapshot.tiles])
         self.version = snapshot.version
@@ -217,7 +221,8 @@ class Graph:
         if node is None:
             return
 
-        self._by_kind[type(node)].pop(drop.id, None)
+        if type(node) in self._by_kind:
+            self._by_kind[type(node)].pop(drop.id, None)
         self.links.drop_node(drop.id)
         if isinstance(node, Map):
             self.places.drop_map(drop.id)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator
+from itertools import islice
 
 from schemas.graph import Links
 from schemas.nodes import EXCLUSIVE_LINKS
@@ -53,11 +54,15 @@ class LinkIndex:
             if not weights:
                 continue
 
-            known = targets.setdefault(source, {})
-            for target in weights:
-                if target not in known:
-                    self._add_source(links.kind, target, source)
+            known = targets.get(source)
+            if known is None:
+                known = targets[source] = {}
+
+            before = len(known)
             known.update(weights)
+            if len(known) > before:
+                for target in _newest(known, len(known) - before):
+                    self._add_source(links.kind, target, source)
 
     def drop(self, kind: str, source: str, target: str) -> None:
         """Remove a link, if it exists."""
@@ -174,3 +179,10 @@ class LinkIndex:
             sources[target] = rest
         else:
             del sources[target]
+
+
+def _newest(weights: Weights, number: int) -> list[str]:
+    """The targets that were added last, in order: a dict keeps the order in which it was made."""
+    newest = list(islice(reversed(weights), number))
+    newest.reverse()
+    return newest

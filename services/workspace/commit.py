@@ -12,7 +12,7 @@ from cogmap.runtime.codelet import CycleContext
 from schemas.codelets import Offer, Proposal
 from schemas.cognition import Coalitions
 from schemas.graph import Cells, Delta, Links, Operation, Phase, Snapshot
-from schemas.nodes import ROOT_MAP, GraphNode, LinkKind, Map
+from schemas.nodes import KINDS, ROOT_MAP, LinkKind, Map
 from services.workspace.rules import Key, Writer, check_operation, written_by
 
 MAX_REASONS = 8
@@ -145,8 +145,8 @@ class Ledger:
         written = self._written
         version = delta.version
         for operation in delta.operations:
-            if isinstance(operation, GraphNode):
-                written[operation.id] = version
+            if type(operation) in KINDS:
+                written[operation.id] = version  # type: ignore[union-attr]
                 continue
 
             for key in written_by(operation):

@@ -32,6 +32,19 @@ def test_links_in_bulk_are_the_links_that_they_list() -> None:
     assert written == Links(kind=NEAR, weights={"a": {"b": 1.0, "c": 0.25}, "b": of_b})
 
 
+def test_links_in_bulk_note_the_source_of_those_that_are_new_alone() -> None:
+    graph = _graph(
+        Links(kind=NEAR, weights={"a": {"b": 1.0, "c": 1.0}}),
+        Links(kind=NEAR, weights={"z": {"d": 1.0, "e": 1.0}}),
+        Links(kind=NEAR, weights={"a": {"d": 1.0, "b": 0.5, "e": 1.0}}),
+    )
+
+    assert graph.links.targets("a", NEAR) == {"b": 0.5, "c": 1.0, "d": 1.0, "e": 1.0}
+    assert graph.links.sources("b", NEAR) == ("a",)
+    assert graph.links.sources("d", NEAR) == ("z", "a")
+    assert graph.links.sources("e", NEAR) == ("z", "a")
+
+
 def test_links_in_bulk_leave_other_links_of_their_source() -> None:
     graph = _graph(
         _link("a", "here", 0.5),
