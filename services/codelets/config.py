@@ -252,8 +252,8 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         Share,
         Meta(
             description="share of the new loop closures that the path does not explain, three at "
-            "least, from which on it is corrected; below, a correction would change little, and "
-            "waits, 0 to 1; 0: none waits"
+            "least, from which on it is corrected, once part of it is sparse; below, a correction "
+            "would change little, and waits, 0 to 1; 0: none waits"
         ),
     ] = 0.1
     synapse_decay_per_m: Annotated[

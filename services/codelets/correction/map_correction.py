@@ -50,9 +50,9 @@ SHORT_SEGMENTS = 8
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task where closures of the present pass were not judged yet that the path does not
-    explain, and enough of it are there to agree; unless some were judged just now, or a correction
-    waits to be applied.
+    """One task where closures of the present pass were not judged yet, and enough of it are there
+    to agree; unless some were judged just now, a correction waits to be applied, or the path, part
+    of which is sparse, explains them.
     """
     if CORRECTION_ID in graph.nodes:
         return []
@@ -66,9 +66,10 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     if context.stamp_ns < _next_judgement_ns(closures, graph.count(PathSegment), config):
         return []
 
-    rows = rows_of(graph.of_kind(PathSegment))
+    path = graph.path
     is_corrected = any(closure.accepted for closure in closures)
-    if is_corrected and may_wait(fresh, rows, config):
+    is_long = any(segment.is_sparse for segment in path)
+    if is_corrected and is_long and may_wait(fresh, rows_of(path), config):
         return []
 
     task = context.task(CODELET.name, about=[closure.id for closure in fresh])

@@ -65,9 +65,10 @@ def test_a_path_ten_times_as_long_is_corrected_a_tenth_as_often() -> None:
     assert _is_due(_graph(80), at_s=30)
 
 
-def _with_fresh(*range_m: float) -> Graph:
+def _with_fresh(*range_m: float, is_sparse: bool = True) -> Graph:
     """Closures that were not judged yet, from 11 s on, of what stood 1 m ahead."""
     graph = _graph(8)
+    graph.change([msgspec.structs.replace(_segment(0), is_sparse=is_sparse)])
     for number, seen_m in enumerate(range_m):
         closure = _closure(11 + number, None)
         graph.change([msgspec.structs.replace(closure, range_m=seen_m)])
@@ -100,5 +101,11 @@ def test_a_share_of_closures_that_the_path_does_not_explain_waits(
 def test_the_first_closures_of_a_path_do_not_wait() -> None:
     path = [_segment(number) for number in range(8)]
     graph = graph_of(*path, *[_closure(at_s, None) for at_s in (11, 12, 13)])
+
+    assert _is_due(graph, 14, Config(revisit_s=100.0))
+
+
+def test_no_closure_waits_while_no_part_of_the_path_is_sparse() -> None:
+    graph = _with_fresh(1.5, 1.5, 1.5, is_sparse=False)
 
     assert _is_due(graph, 14, Config(revisit_s=100.0))
