@@ -169,6 +169,33 @@ def test_a_failed_import_fails_again_after_all_was_prepared(broken_library: str)
     assert run.stderr.splitlines()[-1] == f"ImportError: {broken_library}"
 
 
+def test_a_held_module_joins_only_after_a_line(fork: Fork, tmp_path: Path) -> None:
+    endpoint = free_endpoint()
+    fork(*router(endpoint))
+    options = ("--tied", "--connect", endpoint)
+
+    def are_ready(*names: str) -> bool:
+        log = (tmp_path / "log").read_text()
+        ready = {name for name in ("action", "motor") if f"{name} is ready" in log}
+        return ready == set(names)
+
+    held = fork("module", "action", "--held", *options)
+    fork("module", "motor", *options)
+    wait_until(lambda: are_ready("motor"), "only the other is ready")
+
+    os.write(held.stdin.fileno(), b"\n")
+
+    wait_until(lambda: are_ready("action", "motor"), "both are ready")
+
+
+def test_a_held_module_ends_with_its_standard_input(fork: Fork) -> None:
+    held = fork("module", "action", "--held", "--tied", "--connect", free_endpoint())
+
+    held.stdin.close()
+
+    assert held.wait(TIMEOUT_S) == 0
+
+
 def test_nothing_that_is_imported_before_a_fork_starts_a_thread() -> None:
     script = (
         "import os\n"
