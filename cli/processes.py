@@ -24,6 +24,7 @@ tied_option = click.option("--tied", is_flag=True, help="End when standard input
     type=click.Path(dir_okay=False, path_type=Path),
     help="The database of what long-term memory keeps between runs.",
 )
+@click.option("--held", is_flag=True, help="Join the others only after a line on standard input.")
 @tied_option
 @connect_option
 @agent_option
@@ -34,6 +35,7 @@ def module(
     instance: str,
     state: Path | None,
     memory: Path | None,
+    held: bool,
     tied: bool,
     connect: str,
     agent: str,
@@ -43,6 +45,8 @@ def module(
     """Run one module as this process."""
     sections = config.load(config_path, settings)
     built = registry.build(name, sections, instance)
+    if held and not process.await_line():
+        return
     process.run_module(built, connect, agent, state, process.Stop(tied), memory=memory)
 
 

@@ -225,9 +225,9 @@ def prepare(name: str) -> Iterator[None]:
     steps, so that something else can be done between them. Raises what an import raises.
     """
     if name == "sim":
-        from services.sim.rendering import egl
+        from services.sim.rendering import egl_trial
 
-        egl.trial()
+        egl_trial.trial()
         yield
 
     if runs_codelets(name):

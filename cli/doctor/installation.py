@@ -98,11 +98,11 @@ def _dependency(name: str, version: str) -> Iterator[Finding]:
 def renderer() -> Iterator[Finding]:
     """Whether the simulator can render with EGL."""
     try:
-        from services.sim.rendering import egl
+        from services.sim.rendering import egl_trial
     except (ImportError, UsageError):  # the missing dependency is a finding of its own
         return
 
-    if not egl.works():
+    if not egl_trial.works():
         yield Finding(
             "EGL",
             "it does not load, so TinyRenderer renders the camera images, several times slower",

@@ -8,6 +8,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 _SOURCES = Path(__file__).parents[2]
+ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+"""One thread a process for linear algebra: there are more processes than cores."""
+
 _COGMAP = (sys.executable, "-P", "-m", "cli.main")
 
 
@@ -24,12 +27,8 @@ def arguments_of(command: Sequence[str]) -> list[str] | None:
 
 
 def environment() -> dict[str, str]:
-    """This process's, with one thread a process for linear algebra: there are more processes than
-    cores.
-    """
-    inherited = dict(os.environ)
-    inherited["OPENBLAS_NUM_THREADS"] = "1"
-    inherited["OMP_NUM_THREADS"] = "1"
+    """This process's, with ONE_THREAD."""
+    inherited = os.environ | ONE_THREAD
 
     paths = [str(_SOURCES)]
     if inherited.get("PYTHONPATH"):

@@ -19,8 +19,7 @@ from cli.launch.plan import (
     ROUTER,
     STATE_NAME,
     Choices,
-    infrastructure,
-    modules,
+    programs,
     to_toml,
 )
 from cli.launch.supervisor import Supervisor
@@ -80,8 +79,9 @@ class Drive:
         (self.folder / CONFIG_NAME).write_text(config, encoding="utf-8")
         watch: Watch | None = None
         try:
-            for program in infrastructure(self.folder, self.endpoint, self.agent, self.choices):
+            for program in programs(self.folder, self.endpoint, self.agent, self.choices):
                 self.supervisor.start(program)
+            self._note("processes started")
             watch = Watch(ZenohBus(self.endpoint, self.agent))
             ending = self._drive(watch, until_s, stop, display)
         finally:
@@ -92,9 +92,7 @@ class Drive:
         try:
             ending = self._await_recorder(watch, until_s, stop)
             if ending is None:
-                for program in modules(self.folder, self.endpoint, self.agent, self.choices):
-                    self.supervisor.start(program)
-                self._note("processes started")
+                self.supervisor.release()
                 ending = self._follow(watch, until_s, stop, display)
         except ProcessFailedError as error:
             if watch.tally.observer.start is None:

@@ -25,6 +25,7 @@ from services.sim.odometry import FUSED
 OBSERVER = "observer"
 RECORDER = "recorder"
 ROUTER = "router"
+START_FIRST = (ROUTER, "sim", RECORDER)
 LOG_NAME = "log.mcap"
 CONFIG_NAME = "config.toml"
 STATE_NAME = "state"
@@ -210,7 +211,21 @@ def to_toml(sections: Sections) -> str:
     return tomli_w.dumps(sections)
 
 
-def infrastructure(folder: Path, endpoint: str, agent: str, choices: Choices) -> list[Program]:
+def programs(folder: Path, endpoint: str, agent: str, choices: Choices) -> list[Program]:
+    """All processes of a run, in the order in which they are to be started: early what the others
+    wait for, the simulation too, whose world takes long to build.
+    """
+    started = _infrastructure(folder, endpoint, agent, choices)
+    started += _modules(folder, endpoint, agent, choices)
+    return sorted(started, key=_start_order)
+
+
+def _start_order(program: Program) -> int:
+    instance = program.instance
+    return START_FIRST.index(instance) if instance in START_FIRST else len(START_FIRST)
+
+
+def _infrastructure(folder: Path, endpoint: str, agent: str, choices: Choices) -> list[Program]:
     """What carries and what records the messages."""
     programs = []
     if choices.own_router:
@@ -229,8 +244,10 @@ def infrastructure(folder: Path, endpoint: str, agent: str, choices: Choices) ->
     return programs
 
 
-def modules(folder: Path, endpoint: str, agent: str, choices: Choices) -> list[Program]:
-    """Every module but those that somebody else starts, in the order of the table."""
+def _modules(folder: Path, endpoint: str, agent: str, choices: Choices) -> list[Program]:
+    """Every module but those that somebody else starts, in the order of the table; they are held
+    until what records them is there.
+    """
     options = [*_options(folder, endpoint, agent), "--state", str(folder / STATE_NAME)]
     options += ["--memory", str(choices.memory or folder / MEMORY_NAME)]
     programs = []
@@ -256,5 +273,5 @@ def _instances(name: str, choices: Choices) -> list[str]:
 
 
 def _module(name: str, instance: str, options: Sequence[str]) -> Program:
-    command = cogmap_command("module", name, "--instance", instance, *options)
-    return Program(instance, lambda starts: command)
+    command = cogmap_command("module", name, "--instance", instance, "--held", *options)
+    return Program(instance, lambda starts: command, is_held=True)

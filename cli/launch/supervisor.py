@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Protocol
@@ -27,11 +29,13 @@ class Program:
     """A process to run: the name of its instance, which names its log file too, and its command
     line.
 
-    `command` receives how often it has been started before.
+    `command` receives how often it has been started before. One that is held waits for a line on
+    its standard input before it joins the others.
     """
 
     instance: str
     command: Callable[[int], Sequence[str]]
+    is_held: bool = False
 
 
 class Process(Protocol):
@@ -65,6 +69,7 @@ class Child:
         self._backoff_s = MIN_BACKOFF_S
         self._quick_deaths = 0
         self._due_s: float | None = None
+        self._is_held = program.is_held
         self.start()
 
     def start(self) -> None:
@@ -74,6 +79,20 @@ class Child:
         self.starts += 1
         self._started_s = time.monotonic()
         self._due_s = None
+        if self.program.is_held and not self._is_held:
+            self._send_line()
+
+    def release(self) -> None:
+        """Hold it no longer, nor when it is started again."""
+        if self._is_held:
+            self._is_held = False
+            self._send_line()
+
+    def _send_line(self) -> None:
+        pipe = self._process.stdin
+        assert pipe is not None
+        with suppress(BrokenPipeError):  # it has died, which is noticed when it is checked
+            os.write(pipe.fileno(), b"\n")
 
     def _launched(self, command: Sequence[str], log: IO[bytes]) -> Process:
         """Forked, where there is a server for that and it has what the command needs."""
@@ -180,6 +199,11 @@ class Supervisor:
     def start(self, program: Program) -> None:
         """Start `program`."""
         self.children[program.instance] = Child(program, self._folder, self._server)
+
+    def release(self) -> None:
+        """Let those that are held join the others."""
+        for child in self.children.values():
+            child.release()
 
     def check(self) -> None:
         """Restart what has died. Raises ProcessFailedError where that would not help."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from cli.launch.command_line import ONE_THREAD
 from cli.launch.forking.client import fork_server
 from cli.options import FiniteRange, agent_option, config_option, connect_option, set_option
 from cogmap.runtime import config
@@ -154,6 +156,8 @@ def run(
     """
     with fork_server() as server:
         # While the server imports what it is to fork, this process imports what it needs itself.
+        # Threads of linear algebra would wait for work in a loop, on the server's processor.
+        os.environ.update(ONE_THREAD)
         from cli.goal import read_goals
         from cli.launch.plan import Choices
         from cli.run.drive import Start, run_drive

@@ -67,6 +67,15 @@ class Stop:
         os._exit(1)  # it hangs, and nobody is left to end it
 
 
+def await_line() -> bool:
+    """Wait for a line on standard input. False where that ended before."""
+    # Not sys.stdin, which would read ahead.
+    while byte := os.read(sys.stdin.fileno(), 1):
+        if byte == b"\n":
+            return True
+    return False
+
+
 def give_way() -> None:
     """Let other processes go first where processors are scarce: no command waits for what this
     thread does, and those that it starts from now on.

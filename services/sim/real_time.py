@@ -84,14 +84,24 @@ class RealTime:
         return [] if changed is None else [changed]
 
     def _fall_behind(self, wall_ns: int) -> None:
-        """Add the wall's time since the last call to what is behind; the first call adds a tick."""
+        """Add the wall's time since the last call to what is behind.
+
+        The first call adds the time up to the first frame: the robot stands until then, as nobody
+        can command it without a view.
+        """
         if self._wall_ns is None:
-            self._behind_ns = self._simulation.tick_ns
+            self._behind_ns = min(self._to_frame_ns(), CATCH_UP_NS)
         else:
             passed_ns = wall_ns - self._wall_ns
             self._behind_ns = min(self._behind_ns + passed_ns, CATCH_UP_NS)
 
         self._wall_ns = wall_ns
+
+    def _to_frame_ns(self) -> int:
+        """The simulated time up to the next frame."""
+        simulation = self._simulation
+        period_ns = simulation.ticks_per_frame * simulation.tick_ns
+        return period_ns - simulation.now_ns % period_ns
 
     def _tick(self) -> list[Message]:
         """Advance by one tick: its odometry, after the town where that is due."""

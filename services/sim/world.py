@@ -19,7 +19,7 @@ from services.sim.layout.place import Place
 from services.sim.layout.plan import Plot, Point, Road
 from services.sim.rendering import scenery
 from services.sim.rendering.egl import Egl
-from services.sim.rendering.egl import works as egl_works
+from services.sim.rendering.egl_trial import works as egl_works
 from services.sim.rendering.light import relief
 from services.sim.robot import Robot
 from services.sim.scene.bodies import Bodies

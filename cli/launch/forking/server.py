@@ -12,7 +12,7 @@ import select
 import socket
 import sys
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 
 import msgspec
@@ -22,7 +22,8 @@ from cli.launch.forking.protocol import MAX_BYTES, Report, request_decoder
 from cli.launch.forking.title import show_command_line
 from services import registry
 
-COMMON = ("cli.main", "cli.processes", "cli.log.command", "cli.log.record")
+COMMON = ("cli.main", "cli.processes")
+RECORDING = ("cli.log.command", "cli.log.record")
 
 
 class Server:
@@ -41,6 +42,7 @@ class Server:
         Where no request waits, it imports what later ones may need.
         """
         gc.disable()
+        next(self._steps)
         channel = self._channel.fileno()
         while True:
             waits_s = None if self._is_prepared else 0.0
@@ -62,10 +64,8 @@ class Server:
 
     def _fork(self, number: int, arguments: list[str], descriptors: list[int]) -> bool:
         """Fork a process. Returns whether this is the new one."""
-        match arguments:
-            case ["module", name, *_]:
-                with suppress(Exception):
-                    deque(registry.prepare(name), maxlen=0)
+        with suppress(Exception):
+            deque(needed(arguments), maxlen=0)
 
         # What is there by now is no garbage: the new process need not search it.
         gc.freeze()
@@ -109,13 +109,34 @@ class Server:
             self._channel.send(msgspec.msgpack.encode(report))
 
 
+def needed(arguments: Sequence[str]) -> Iterator[None]:
+    """Import what `cogmap` with these `arguments` consists of, in steps. Raises what an import
+    raises.
+    """
+    yield from _imports(COMMON)
+    match arguments:
+        case ["log", *_]:
+            yield from _imports(RECORDING)
+        case ["module", name, *_]:
+            yield from registry.prepare(name)
+
+
+def _imports(names: Sequence[str]) -> Iterator[None]:
+    for name in names:
+        importlib.import_module(name)
+        yield
+
+
 def preparation() -> Iterator[None]:
     """Import all that may be forked, in steps, last what takes longest. Where that fails, the
     process that needs it names the reason.
     """
-    for name in COMMON:
-        importlib.import_module(name)
-        yield
+    # It tries the EGL plugin in another process, meanwhile.
+    with suppress(Exception):
+        yield next(registry.prepare("sim"))
+
+    with suppress(Exception):
+        yield from needed(["log"])
 
     for name in sorted(registry.MODULES, key=registry.runs_codelets):
         with suppress(Exception):

@@ -124,6 +124,18 @@ def test_real_time_publishes_nothing_before_it_is_started() -> None:
     assert _real_time(module, 1)
 
 
+def test_real_time_begins_with_the_first_frame() -> None:
+    module = build(Config(**SMALL))
+    _start(module)
+
+    messages = _real_time(module, 1)
+
+    (frame,) = of_type(StereoFrame, messages)
+    assert frame.frame == 0
+    assert frame.stamp_ns == 4 * TICK_NS
+    _check_that_frames_follow_their_odometry(messages)
+
+
 def test_real_time_keeps_its_rates_and_frames_follow_their_odometry() -> None:
     module = build(Config(**SMALL))
     _start(module)
@@ -135,7 +147,7 @@ def test_real_time_keeps_its_rates_and_frames_follow_their_odometry() -> None:
 
     assert counts == {
         "Clock": 120,
-        "Odometry": 120,
+        "Odometry": 123,
         "TruePose": 120,
         "StereoFrame": 30,
         "TrueTown": 2,

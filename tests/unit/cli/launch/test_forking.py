@@ -124,6 +124,78 @@ def test_a_supervisor_goes_on_without_a_fork_server_that_was_killed(
     assert supervisor.killed == []
 
 
+@pytest.fixture
+def broken_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """The reason for which no process can import OpenCV; a part of the modules needs it."""
+    reason = "no pictures on this machine"
+    (tmp_path / "cv2.py").write_text(f"raise ImportError({reason!r})\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    return reason
+
+
+def test_a_module_that_cannot_be_imported_names_the_reason(
+    broken_library: str, fork: Fork, tmp_path: Path
+) -> None:
+    code = fork("module", "sensory").wait(TIMEOUT_S)
+
+    assert code == 1
+    last_line = (tmp_path / "log").read_text().splitlines()[-1]
+    assert last_line == f"ImportError: {broken_library}"
+
+
+def test_what_one_module_cannot_import_keeps_no_other_from_its_start(
+    broken_library: str, fork: Fork, tmp_path: Path
+) -> None:
+    fork("module", "sensory").wait(TIMEOUT_S)
+    endpoint = free_endpoint()
+    fork(*router(endpoint))
+
+    fork("module", "motor", "--tied", "--connect", endpoint)
+
+    wait_until(lambda: "motor is ready" in (tmp_path / "log").read_text(), "it is ready")
+
+
+def test_a_failed_import_fails_again_after_all_was_prepared(broken_library: str) -> None:
+    script = (
+        "from cli.launch.forking.server import preparation\n"
+        "from services import registry\n"
+        "for _ in preparation(): pass\n"
+        "import services.motor.module\n"
+        "registry.build('sensory', {})\n"
+    )
+    command = [sys.executable, "-c", script]
+    run = subprocess.run(command, env=environment(), capture_output=True, text=True, check=False)
+
+    assert run.stderr.splitlines()[-1] == f"ImportError: {broken_library}"
+
+
+def test_a_held_module_joins_only_after_a_line(fork: Fork, tmp_path: Path) -> None:
+    endpoint = free_endpoint()
+    fork(*router(endpoint))
+    options = ("--tied", "--connect", endpoint)
+
+    def are_ready(*names: str) -> bool:
+        log = (tmp_path / "log").read_text()
+        ready = {name for name in ("action", "motor") if f"{name} is ready" in log}
+        return ready == set(names)
+
+    held = fork("module", "action", "--held", *options)
+    fork("module", "motor", *options)
+    wait_until(lambda: are_ready("motor"), "only the other is ready")
+
+    os.write(held.stdin.fileno(), b"\n")
+
+    wait_until(lambda: are_ready("action", "motor"), "both are ready")
+
+
+def test_a_held_module_ends_with_its_standard_input(fork: Fork) -> None:
+    held = fork("module", "action", "--held", "--tied", "--connect", free_endpoint())
+
+    held.stdin.close()
+
+    assert held.wait(TIMEOUT_S) == 0
+
+
 def test_nothing_that_is_imported_before_a_fork_starts_a_thread() -> None:
     script = (
         "import os\n"

@@ -17,8 +17,7 @@ from cli.launch.plan import (
     Choices,
     awaited,
     effective,
-    infrastructure,
-    modules,
+    programs,
     to_toml,
 )
 from cli.launch.supervisor import Program
@@ -179,8 +178,7 @@ def test_a_section_of_no_module_is_named() -> None:
 
 
 def started(folder: Path, choices: Choices) -> list[Program]:
-    where = (folder, "tcp/127.0.0.1:1", "agent", choices)
-    return [*infrastructure(*where), *modules(*where)]
+    return programs(folder, "tcp/127.0.0.1:1", "agent", choices)
 
 
 def instances(folder: Path, choices: Choices) -> set[str]:
@@ -194,6 +192,19 @@ def test_each_module_is_a_process_and_each_worker_one_more(tmp_path: Path) -> No
 
     assert router == ROUTER
     assert sorted(names) == sorted(modules | workers | {RECORDER})
+
+
+def test_router_simulation_and_recorder_are_started_first(tmp_path: Path) -> None:
+    names = [program.instance for program in started(tmp_path, Choices())]
+
+    assert names[:3] == [ROUTER, "sim", RECORDER]
+
+
+def test_no_module_joins_before_it_is_recorded(tmp_path: Path) -> None:
+    every = started(tmp_path, Choices())
+    free = {program.instance for program in every if not program.is_held}
+
+    assert free == {ROUTER, RECORDER}
 
 
 def test_modules_of_ones_own_are_not_started_and_waited_for(tmp_path: Path) -> None:

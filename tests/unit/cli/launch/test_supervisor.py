@@ -122,6 +122,45 @@ def test_a_stopped_child_is_ended_all_the_same(supervisor: Supervisor, tmp_path:
     assert not is_running(pid)
 
 
+def held(instance: str) -> Program:
+    """Prints `here` once it has read a line."""
+    code = "import sys; sys.stdin.readline(); print('here', flush=True); sys.stdin.read()"
+    command = [sys.executable, "-c", code]
+    return Program(instance, lambda starts: command, is_held=True)
+
+
+def test_a_child_that_died_while_held_is_held_again(supervisor: Supervisor, tmp_path: Path) -> None:
+    supervisor.start(held("mind"))
+    os.kill(supervisor.children["mind"].pid, signal.SIGKILL)
+
+    def is_back() -> bool:
+        supervisor.check()
+        return supervisor.restarts["mind"] == 1
+
+    wait_until(is_back)
+    assert said(tmp_path, "mind") == []
+
+    supervisor.release()
+
+    wait_until(lambda: said(tmp_path, "mind") == ["here"])
+
+
+def test_a_child_that_was_released_is_not_held_again(
+    supervisor: Supervisor, tmp_path: Path
+) -> None:
+    supervisor.start(held("mind"))
+    supervisor.release()
+    wait_until(lambda: said(tmp_path, "mind") == ["here"])
+
+    os.kill(supervisor.children["mind"].pid, signal.SIGKILL)
+
+    def is_back() -> bool:
+        supervisor.check()
+        return said(tmp_path, "mind") == ["here", "here"]
+
+    wait_until(is_back)
+
+
 LAUNCHER = """
 import pathlib, sys
 from cli.launch.command_line import cogmap_command
