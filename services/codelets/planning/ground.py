@@ -35,6 +35,7 @@ from services.codelets.planning.driven import (
     path_of,
     way_back,
 )
+from services.codelets.planning.looks import looked_ago_s
 from services.codelets.planning.network import SQUARE, Here, PlaceNetwork, ends, link_weights
 
 COLUMNS = (PlaceColumn.ROAD, PlaceColumn.OBSTACLE, *WEIGHT_COLUMNS)
@@ -42,6 +43,7 @@ SPREAD_FROM = 0.2
 # Over a kerb the robot may reach, not over an obstacle.
 BESIDE_KERB = 0.9
 BESIDE_OBSTACLE = 0.5
+LEAST_DOUBT = 0.05
 # So far to each side of its path the agent has driven over the ground.
 BESIDE_PATH_M = 1.0
 
@@ -53,8 +55,9 @@ class Ground(NamedTuple):
     free; `is_clear` (w, h): that, and nothing stands beside it. `is_visited` (w, h): beside the
     path, seen from as near as can be. `network` has links between free places, lighter where
     unknown; `known` has those between known places only. `doubted` has those of `network`, and the
-    lightest where road is blocked that was not seen from near lately: it may be free again. All
-    three have the lightest links along the way back, where the agent has left all other ground.
+    lightest where road is blocked that was not seen from near lately: it may be free again, the
+    less likely the more lately it was looked at from farther away. All three have the lightest
+    links along the way back, where the agent has left all other ground.
     """
 
     is_free: Booleans
@@ -111,7 +114,9 @@ def ground(
     lately_m = driven_lately_m(path, agent, config.doubt_after_s)
     is_seen_lately = here.is_within(config.doubt_from_m, lately_m)
     is_in_doubt = is_known & is_edge & ~is_seen_lately
-    in_doubt = np.where(is_in_doubt, config.doubt_weight, optimistic)
+    ago_s = looked_ago_s(path, agent, config.doubt_after_s, here)
+    doubt = (ago_s / config.doubt_after_s).clip(LEAST_DOUBT, 1.0)
+    in_doubt = np.where(is_in_doubt, config.doubt_weight * doubt, optimistic)
 
     return Ground(
         is_free=~is_edge,
