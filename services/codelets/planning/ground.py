@@ -35,11 +35,15 @@ from services.codelets.planning.driven import (
     path_of,
     way_back,
 )
+from services.codelets.planning.looks import looked_ago_s
 from services.codelets.planning.network import SQUARE, Here, PlaceNetwork, ends, link_weights
 
 COLUMNS = (PlaceColumn.ROAD, PlaceColumn.OBSTACLE, *WEIGHT_COLUMNS)
 SPREAD_FROM = 0.2
-BESIDE_CUT = 0.5
+# Over a kerb the robot may reach, not over an obstacle.
+BESIDE_KERB = 0.9
+BESIDE_OBSTACLE = 0.5
+LEAST_DOUBT = 0.05
 # So far to each side of its path the agent has driven over the ground.
 BESIDE_PATH_M = 1.0
 
@@ -47,16 +51,18 @@ BESIDE_PATH_M = 1.0
 class Ground(NamedTuple):
     """The place nodes of one map within a rectangle.
 
-    `is_free` (w, h): the robot fits there. `is_known` (w, h): seen as road, or driven over.
-    `is_visited` (w, h): beside the path, seen from as near as can be. `network` has links between
-    free places, lighter where unknown; `known` has those between known places only. `doubted` has
-    those of `network`, and the lightest where road is blocked that was not seen from near lately:
-    it may be free again. All three have the lightest links along the way back, where the agent has
-    left all other ground.
+    `is_free` (w, h): the robot fits there. `is_known` (w, h): seen as road, or driven over, and
+    free; `is_clear` (w, h): that, and nothing stands beside it. `is_visited` (w, h): beside the
+    path, seen from as near as can be. `network` has links between free places, lighter where
+    unknown; `known` has those between known places only. `doubted` has those of `network`, and the
+    lightest where road is blocked that was not seen from near lately: it may be free again, the
+    less likely the more lately it was looked at from farther away. All three have the lightest
+    links along the way back, where the agent has left all other ground.
     """
 
     is_free: Booleans
     is_known: Booleans
+    is_clear: Booleans
     is_visited: Booleans
     network: PlaceNetwork
     known: PlaceNetwork
@@ -98,7 +104,8 @@ def ground(
     is_way_back = way_back(path, agent, is_known & ~is_edge, is_obstacle, here)
     weights = _opened(weights, is_way_back | is_driven)
 
-    share = _shares(is_edge)
+    is_beside = ndimage.binary_dilation(is_obstacle, SQUARE)
+    share = _shares(is_edge, is_beside)
     share[is_way_back & is_edge] = config.doubt_weight
     if within is not None:
         share[~within.is_inside] = 0.0
@@ -107,11 +114,14 @@ def ground(
     lately_m = driven_lately_m(path, agent, config.doubt_after_s)
     is_seen_lately = here.is_within(config.doubt_from_m, lately_m)
     is_in_doubt = is_known & is_edge & ~is_seen_lately
-    in_doubt = np.where(is_in_doubt, config.doubt_weight, optimistic)
+    ago_s = looked_ago_s(path, agent, config.doubt_after_s, here)
+    doubt = (ago_s / config.doubt_after_s).clip(LEAST_DOUBT, 1.0)
+    in_doubt = np.where(is_in_doubt, config.doubt_weight * doubt, optimistic)
 
     return Ground(
         is_free=~is_edge,
         is_known=is_known & ~is_edge,
+        is_clear=is_known & ~is_edge & ~is_beside & (share > 0),
         is_visited=here.is_within(config.visited_m, driven_since_start_m(path_m)),
         network=here.network(link_weights(weights, optimistic)),
         known=here.network(link_weights(weights, np.where(is_known, share, 0.0))),
@@ -133,10 +143,13 @@ def _without_gaps(is_obstacle: Booleans) -> Booleans:
     return np.asarray(ndimage.binary_closing(is_obstacle, SQUARE) | is_obstacle)
 
 
-def _shares(is_edge: Booleans) -> Floats:
-    """(w, h): how well each place can be driven over: not at an edge, less beside one."""
-    is_beside = ndimage.binary_dilation(is_edge, SQUARE)
-    share = np.where(is_beside, BESIDE_CUT, 1.0)
+def _shares(is_edge: Booleans, is_beside: Booleans) -> Floats:
+    """(w, h): how well each place can be driven over: not at an edge, less beside one, and least
+    beside an obstacle.
+    """
+    is_beside_edge = ndimage.binary_dilation(is_edge, SQUARE)
+    share = np.where(is_beside_edge, BESIDE_KERB, 1.0)
+    share[is_beside] = BESIDE_OBSTACLE
     share[is_edge] = 0.0
     return share
 

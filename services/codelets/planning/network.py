@@ -74,6 +74,15 @@ class Here(NamedTuple):
         has[tuple(cells[is_inside].T)] = True
         return has
 
+    def least(self, positions_m: Floats, values: Floats) -> Floats:
+        """(w, h): the least of the (n,) values at (n, 2) positions in each cell, infinite where
+        there is none.
+        """
+        cells, is_inside = self._cells(positions_m)
+        least = np.full(self.shape, np.inf)
+        np.minimum.at(least, tuple(cells[is_inside].T), values[is_inside])
+        return least
+
     def is_within(self, within_m: float, positions_m: Floats) -> Booleans:
         """(w, h): the cells within a distance of any of (n, 2) positions."""
         has = self.has(positions_m)

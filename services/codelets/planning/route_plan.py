@@ -62,6 +62,7 @@ from services.codelets.planning.targets import (
     pending_goals,
     target_of,
 )
+from services.codelets.planning.taut import taut
 from services.codelets.planning.urgency import is_done, is_urgent
 
 START_M = 6.0
@@ -308,12 +309,13 @@ def _frontier_before(now: Situation) -> Cell | None:
 
 
 def _with_route(plan: Plan, route: Route, where: Ground) -> Plan:
-    """The plan, ready to be driven along `route`."""
-    positions_m = route.cells * where.network.cell_m
+    """The plan, ready to be driven along `route`, drawn taut."""
+    cells = taut(route.cells, where.network.origin, where.is_clear)
+    positions_m = cells * where.network.cell_m
     return msgspec.structs.replace(
         plan,
         state=PlanState.READY,
-        length_m=route.length_m,
+        length_m=cost_m(_network_of(plan, where), cells),
         route=Matrix.of(positions_m.astype(np.float64)),
     )
 

@@ -13,6 +13,7 @@ from schemas.nodes import (
     Goal,
     PathColumn,
     PathSegment,
+    PlaceColumn,
     Plan,
     PlanState,
     goal_id,
@@ -22,7 +23,7 @@ from services.codelets.planning.config import Config
 from services.codelets.planning.route_plan import run
 from tests.support.world.route_planning import STAMP_NS, goal_at, planned
 from tests.support.world.scenes import agent
-from tests.support.world.street_loop import barrier, loop
+from tests.support.world.street_loop import barrier, block_of, loop
 
 
 def test_the_last_street_that_may_be_open_again_is_tried_to_its_end() -> None:
@@ -95,6 +96,30 @@ def test_a_street_that_was_seen_to_be_closed_is_not_in_doubt_for_a_while(
     assert plan.doubtful
     assert plan.route is not None
     assert (plan.route.numpy()[:, 1].max() > 35.0) == is_north
+
+
+@pytest.mark.parametrize(("ago_s", "is_north"), [(60.0, True), (900.0, False)])
+def test_a_street_that_was_seen_to_be_closed_from_afar_is_tried_later(
+    ago_s: float, is_north: bool
+) -> None:
+    graph = loop(goal_at("far", 40.0, 0.0), barrier(20, 0), barrier(20, 40))
+    graph.change([agent(x_m=3.0, stamp_ns=1_000_000_000_000), _was_at(1000.0 - ago_s, 5.0)])
+    plan = planned(graph)
+
+    assert plan.doubtful
+    assert plan.route is not None
+    assert (plan.route.numpy()[:, 1].max() > 35.0) == is_north
+
+
+def test_a_street_that_was_seen_to_be_closed_from_afar_is_tried_in_the_end() -> None:
+    wall = block_of(PlaceColumn.ROAD, range(19, 22), range(36, 45), 0.0)
+    graph = loop(goal_at("far", 40.0, 0.0), barrier(20, 0), barrier(20, 40), wall)
+    graph.change([agent(x_m=3.0, stamp_ns=1_000_000_000_000), _was_at(940.0, 5.0)])
+    plan = planned(graph)
+
+    assert plan.doubtful
+    assert plan.route is not None
+    assert plan.route.numpy()[:, 1].max() <= 3.0
 
 
 @pytest.mark.parametrize(("ago_s", "state"), [(20.0, PlanState.READY), (200.0, PlanState.NO_ROUTE)])
