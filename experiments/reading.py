@@ -9,6 +9,7 @@ import numpy as np
 from cogmap.errors import CogmapError
 from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
+from cogmap.graph.path import rows_of
 from schemas.nodes import (
     ROOT_MAP,
     Object,
@@ -18,7 +19,6 @@ from schemas.nodes import (
     object_id,
 )
 from services.codelets.mapping.observations import Sightings
-from services.codelets.mapping.path import rows_of
 
 STAMP = 0
 POSE = slice(1, 4)

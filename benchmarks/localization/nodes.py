@@ -9,6 +9,7 @@ import numpy as np
 from cogmap.errors import CogmapError
 from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
+from cogmap.graph.path import rows_of
 from schemas.array import Matrix
 from schemas.graph import Decay, Snapshot
 from schemas.nodes import (
@@ -21,7 +22,6 @@ from schemas.nodes import (
     Self,
     object_id,
 )
-from services.codelets.mapping.path import rows_of
 
 CERTAIN_M = 1e-3
 LANDMARK_SAMPLES = 50

@@ -9,9 +9,10 @@ import numpy as np
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.geometry.se2 import wrap_angle
 from cogmap.graph.graph import Graph
+from cogmap.graph.path import rows_of
 from cogmap.graph.window import ROAD_FROM, Extent
 from schemas.nodes import PLAN_ID, PathColumn, PlaceColumn, Plan, Self
-from services.codelets.planning.driven import POSITION, path_of
+from services.codelets.planning.driven import POSITION
 
 # A lane is straight that turns by no more so far before and behind. Where it bends, what stands
 # beyond the bend seems to stand across it.
@@ -40,7 +41,7 @@ def lanes(agent: Self, graph: Graph) -> list[Lane]:
 
 
 def _driven(graph: Graph) -> Lane:
-    path = path_of(graph)
+    path = rows_of(graph.path)
     lane = Lane(path[:, POSITION], path[:, PathColumn.HEADING_RAD])
     return lane.where(_is_straight(lane))
 

@@ -14,6 +14,7 @@ from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import mean_pose, move_with, wrap_angle
 from cogmap.graph.graph import Graph
+from cogmap.graph.path import rows_of
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.array import Matrix
 from schemas.codelets import Task
@@ -36,7 +37,7 @@ from schemas.nodes import (
 from services.codelets.config import SECTION, Config
 from services.codelets.correction.place_columns import MOVED_COLUMNS, move_places
 from services.codelets.mapping.observations import Sightings
-from services.codelets.mapping.path import POSE, STAMP, rows_of, with_rows
+from services.codelets.mapping.path import POSE, STAMP, with_rows
 
 OLD = slice(CorrectionColumn.OLD_X_M, CorrectionColumn.OLD_HEADING_RAD + 1)
 NEW = slice(CorrectionColumn.NEW_X_M, CorrectionColumn.NEW_HEADING_RAD + 1)

@@ -16,6 +16,7 @@ import numpy as np
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.geometry.se2 import cumulative, rotation_matrices, wrap_angle
 from cogmap.graph.graph import Graph
+from cogmap.graph.path import rows_of
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.array import Matrix
 from schemas.codelets import Task
@@ -39,7 +40,7 @@ from services.codelets.correction.reverse_replay import close_loops
 from services.codelets.correction.synapses import replay_of
 from services.codelets.correction.waiting import may_wait
 from services.codelets.mapping.observations import Sightings
-from services.codelets.mapping.path import POSE, STAMP, joins_of, rows_of, steps_of
+from services.codelets.mapping.path import POSE, STAMP, joins_of, steps_of
 from services.codelets.mapping.views import constraints_of, views_of
 
 MIN_ROWS = 10

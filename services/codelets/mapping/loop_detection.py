@@ -14,6 +14,7 @@ from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.geometry.se2 import rotation_matrices
 from cogmap.graph.graph import Graph
+from cogmap.graph.path import rows_of
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.codelets import Task
 from schemas.graph import Operation, Phase
@@ -32,7 +33,7 @@ from services.codelets.config import SECTION, Config
 from services.codelets.correction.pairwise_consistency import MIN_AGREEING
 from services.codelets.correction.pose_graph import matvec
 from services.codelets.mapping.observations import Sightings
-from services.codelets.mapping.path import ODOMETRY, STAMP, path_grows, rows_of
+from services.codelets.mapping.path import ODOMETRY, STAMP, path_grows
 from services.codelets.nodes import nodes_of
 
 SAME_M = 6.0

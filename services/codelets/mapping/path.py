@@ -117,16 +117,6 @@ def path_grows(graph: Graph, config: Config) -> bool:
     return _is_apart(rows, agent, config.path_spacing_m)
 
 
-def rows_of(path: Iterable[PathSegment]) -> Floats:
-    """(n, COLUMNS): the rows of path segments, the oldest first."""
-    ordered = sorted(path, key=lambda segment: segment.number)
-
-    rows = [np.zeros((0, COLUMNS))]
-    for segment in ordered:
-        rows.append(segment.rows.numpy())
-    return np.vstack(rows)
-
-
 def with_rows(segment: PathSegment, rows: Floats) -> PathSegment:
     """A path segment with other (n, COLUMNS) rows."""
     return msgspec.structs.replace(segment, rows=Matrix.of(rows))

@@ -8,7 +8,6 @@ import numpy as np
 from scipy import ndimage
 
 from cogmap.geometry.arrays import Booleans, Floats
-from cogmap.graph.graph import Graph
 from schemas.nodes import PathColumn, Self
 from services.codelets.planning.config import Config
 from services.codelets.planning.network import SQUARE, Here
@@ -19,15 +18,6 @@ LEFT_START_M = 3.0
 CAME_S = 60.0
 ROAD_BEYOND_M = 2.0
 POSITION = slice(PathColumn.X_M, PathColumn.Y_M + 1)
-
-
-def path_of(graph: Graph) -> Floats:
-    """(n, k): the rows of the path, the oldest first."""
-    rows = [np.zeros((0, len(PathColumn)))]
-    for segment in graph.path:
-        rows.append(np.asarray(segment.rows.numpy(), np.float64))
-
-    return np.vstack(rows)
 
 
 def driven_lately_m(path: Floats, agent: Self, ago_s: float) -> Floats:

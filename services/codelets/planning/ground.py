@@ -15,6 +15,7 @@ from scipy import ndimage
 
 from cogmap.geometry.arrays import Booleans, Floats, Singles
 from cogmap.graph.graph import Graph
+from cogmap.graph.path import rows_of
 from cogmap.graph.window import (
     CUT_BELOW,
     LINK_OFFSETS,
@@ -32,7 +33,6 @@ from services.codelets.planning.driven import (
     driven_lately_m,
     driven_since_start_m,
     is_road_ahead,
-    path_of,
     way_back,
 )
 from services.codelets.planning.looks import looked_ago_s
@@ -90,7 +90,7 @@ def ground(
     weights = window.weights()
 
     here = Here(window.origin, window.shape, graph.cell_m(map_id))
-    path = path_of(graph)
+    path = rows_of(graph.path)
     path_m = path[:, POSITION]
     is_seen = window.column(PlaceColumn.ROAD) >= ROAD_FROM
     driven_m = path_m

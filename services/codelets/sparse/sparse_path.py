@@ -13,6 +13,7 @@ import numpy as np
 from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.graph.graph import Graph
+from cogmap.graph.path import rows_of
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.array import Matrix
 from schemas.codelets import Task
@@ -26,7 +27,7 @@ from schemas.nodes import (
     PathSegment,
 )
 from services.codelets.config import SECTION, Config
-from services.codelets.mapping.path import JOINED, STAMP, rows_of, with_rows
+from services.codelets.mapping.path import JOINED, STAMP, with_rows
 from services.codelets.mapping.views import views_of
 from services.codelets.sparse.joining import Joining, joining, joins, left, visited
 from services.codelets.sparse.remains import closures_left, observations_left

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from cogmap.geometry.arrays import Floats
+from cogmap.graph.path import rows_of
 from schemas.graph import Phase
 from schemas.nodes import (
     CORRECTION_ID,
@@ -21,7 +22,7 @@ from schemas.nodes import (
     nearest_place,
     object_id,
 )
-from services.codelets.mapping.path import ODOMETRY, POSE, STAMP, rows_of
+from services.codelets.mapping.path import ODOMETRY, POSE, STAMP
 from tests.support.paths import mean_distance_m, steps_m
 from tests.support.world.loop_drive import HOUSE, LAP, QUIET, SLIP, TOWER, LoopDrive, round_once
 from tests.support.world.scenes import Desk, stamp_ns

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from cogmap.geometry.arrays import Floats
+from cogmap.graph.path import rows_of
 from schemas.nodes import LoopClosure, PathSegment
-from services.codelets.mapping.path import POSE, rows_of
+from services.codelets.mapping.path import POSE
 from tests.support.world.loop_drive import LAP, QUIET, LoopDrive, round_once
 
 NEVER_S = 1e9

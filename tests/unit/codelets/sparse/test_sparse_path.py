@@ -8,6 +8,7 @@ import pytest
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import compose, transform_from
 from cogmap.graph.graph import Graph
+from cogmap.graph.path import rows_of
 from cogmap.runtime.codelet import CycleContext
 from schemas.array import Array, Matrix
 from schemas.graph import Link
@@ -34,7 +35,6 @@ from services.codelets.mapping.path import (
     STAMP,
     joins_of,
     links_of,
-    rows_of,
     steps_of,
 )
 from services.codelets.sparse.sparse_path import CODELET
