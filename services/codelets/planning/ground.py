@@ -40,9 +40,7 @@ from services.codelets.planning.network import SQUARE, Here, PlaceNetwork, ends,
 
 COLUMNS = (PlaceColumn.ROAD, PlaceColumn.OBSTACLE, *WEIGHT_COLUMNS)
 SPREAD_FROM = 0.2
-# Over a kerb the robot may reach, not over an obstacle.
-BESIDE_KERB = 0.9
-BESIDE_OBSTACLE = 0.5
+BESIDE_CUT = 0.5
 LEAST_DOUBT = 0.05
 # So far to each side of its path the agent has driven over the ground.
 BESIDE_PATH_M = 1.0
@@ -105,7 +103,7 @@ def ground(
     weights = _opened(weights, is_way_back | is_driven)
 
     is_beside = ndimage.binary_dilation(is_obstacle, SQUARE)
-    share = _shares(is_edge, is_beside)
+    share = _shares(is_edge)
     share[is_way_back & is_edge] = config.doubt_weight
     if within is not None:
         share[~within.is_inside] = 0.0
@@ -143,13 +141,10 @@ def _without_gaps(is_obstacle: Booleans) -> Booleans:
     return np.asarray(ndimage.binary_closing(is_obstacle, SQUARE) | is_obstacle)
 
 
-def _shares(is_edge: Booleans, is_beside: Booleans) -> Floats:
-    """(w, h): how well each place can be driven over: not at an edge, less beside one, and least
-    beside an obstacle.
-    """
-    is_beside_edge = ndimage.binary_dilation(is_edge, SQUARE)
-    share = np.where(is_beside_edge, BESIDE_KERB, 1.0)
-    share[is_beside] = BESIDE_OBSTACLE
+def _shares(is_edge: Booleans) -> Floats:
+    """(w, h): how well each place can be driven over: not at an edge, less beside one."""
+    is_beside = ndimage.binary_dilation(is_edge, SQUARE)
+    share = np.where(is_beside, BESIDE_CUT, 1.0)
     share[is_edge] = 0.0
     return share
 

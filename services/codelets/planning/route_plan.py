@@ -310,14 +310,12 @@ def _frontier_before(now: Situation) -> Cell | None:
 
 def _with_route(plan: Plan, route: Route, where: Ground) -> Plan:
     """The plan, ready to be driven along `route`, drawn taut."""
-    cells = taut(route.cells, where.network.origin, where.is_clear)
-    positions_m = cells * where.network.cell_m
-    return msgspec.structs.replace(
-        plan,
-        state=PlanState.READY,
-        length_m=cost_m(_network_of(plan, where), cells),
-        route=Matrix.of(positions_m.astype(np.float64)),
+    line = taut(route.cells, where.network.origin, where.is_clear)
+    ready = msgspec.structs.replace(
+        plan, state=PlanState.READY, route=Matrix.of(line * where.network.cell_m)
     )
+    length_m = cost_m(_network_of(plan, where), _cells(ready, where))
+    return msgspec.structs.replace(ready, length_m=length_m)
 
 
 def _cells(plan: Plan, where: Ground) -> Indices:
