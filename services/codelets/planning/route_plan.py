@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 
 from cogmap.errors import MessageError
-from cogmap.geometry.arrays import Indices
+from cogmap.geometry.arrays import Floats, Indices
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.array import Array, Matrix
@@ -40,7 +40,6 @@ from services.codelets.planning.goal_order import goal_order, order_before
 from services.codelets.planning.ground import COLUMNS, Ground, ground
 from services.codelets.planning.network import PlaceNetwork
 from services.codelets.planning.routes import (
-    Route,
     Visit,
     cost_m,
     lengths_m,
@@ -279,7 +278,13 @@ def _to_goals(plan: Plan, start: Cell, found: list[Visit], now: Situation) -> Pl
     goals = [visit.target.goal.id for visit in ordered]
     is_doubtful = ordered[0].network is now.where.doubted
     plan = msgspec.structs.replace(plan, goals=goals, doubtful=is_doubtful)
-    return _with_route(plan, route, now.where)
+    where = now.where
+    # Near what stands beside a street the agent is slower, and a need does not wait.
+    if ordered[0].target.goal.need:
+        return _with_route(plan, route.cells, where)
+
+    line = taut(route.cells, where.network.origin, where.is_clear)
+    return _with_route(plan, line, where)
 
 
 def _to_frontier(plan: Plan, start: Cell, now: Situation) -> Plan:
@@ -295,7 +300,7 @@ def _to_frontier(plan: Plan, start: Cell, now: Situation) -> Plan:
     route = route_to(start, visit)
     if route is None:
         return plan
-    return _with_route(msgspec.structs.replace(plan, explores=True), route, where)
+    return _with_route(msgspec.structs.replace(plan, explores=True), route.cells, where)
 
 
 def _frontier_before(now: Situation) -> Cell | None:
@@ -308,11 +313,11 @@ def _frontier_before(now: Situation) -> Cell | None:
     return i, j
 
 
-def _with_route(plan: Plan, route: Route, where: Ground) -> Plan:
-    """The plan, ready to be driven along `route`, drawn taut."""
-    line = taut(route.cells, where.network.origin, where.is_clear)
+def _with_route(plan: Plan, cells: Indices | Floats, where: Ground) -> Plan:
+    """The plan, ready to be driven along a route, (n, 2) in cells."""
+    positions_m = cells * where.network.cell_m
     ready = msgspec.structs.replace(
-        plan, state=PlanState.READY, route=Matrix.of(line * where.network.cell_m)
+        plan, state=PlanState.READY, route=Matrix.of(positions_m.astype(np.float64))
     )
     length_m = cost_m(_network_of(plan, where), _cells(ready, where))
     return msgspec.structs.replace(ready, length_m=length_m)
