@@ -279,7 +279,7 @@ def _to_goals(plan: Plan, start: Cell, found: list[Visit], now: Situation) -> Pl
     is_doubtful = ordered[0].network is now.where.doubted
     plan = msgspec.structs.replace(plan, goals=goals, doubtful=is_doubtful)
     where = now.where
-    # Near what stands beside a street the agent is slower, and a need does not wait.
+    # Agents kept less energy where such routes were taut: these lead nearer to kerbs.
     if ordered[0].target.goal.need:
         return _with_route(plan, route.cells, where)
 
