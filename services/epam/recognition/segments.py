@@ -3,7 +3,9 @@
 A fully-convolutional network receives colour, depth and height. For each pixel it predicts whether
 it shows a building, how likely the centre of one is there, and the offset to the centre of its own
 building; each pixel then belongs to the centre that it points to (as in Cheng et al. 2020,
-Panoptic-DeepLab). It is class-agnostic: any building is a candidate.
+Panoptic-DeepLab). Of a building that fills much of the view several centres may be found: pieces
+whose pixels point to the same place where they meet are one. It is class-agnostic: any building is
+a candidate.
 """
 
 from __future__ import annotations
@@ -32,6 +34,9 @@ MIN_BUILDING = 0.5
 PEAK_PX = 9
 MIN_PIXELS = 12
 MIN_CONTRAST = 3.0
+# Pieces of one building: where they meet, both point to places nearer to each other than this
+# share of the square root of their area.
+SAME_CENTRE = 0.04
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +179,50 @@ def _instances(output: Singles) -> npt.NDArray[np.intp]:
     pointed_at = np.stack([pointed_row, pointed_column], 1)
 
     numbers[building] = _nearest(pointed_at, centres)
-    return numbers
+    pointed = np.zeros((*log_odds.shape, 2))
+    pointed[building] = pointed_at
+    return _joined(numbers, pointed)
+
+
+def _joined(numbers: npt.NDArray[np.intp], pointed_at: Floats) -> npt.NDArray[np.intp]:
+    """`numbers` (h, w) of objects, in which pieces of one object have the same number: those that
+    point to the same row and column, `pointed_at` (h, w, 2), where they meet.
+    """
+    area_px = np.bincount(numbers[numbers >= 0])
+    count = len(area_px)
+    pair, apart_px = _borders(numbers, pointed_at, count)
+
+    joined = np.arange(count)
+    for each in np.unique(pair).tolist():
+        one, other = divmod(each, count)
+        size_px = np.sqrt(area_px[one] + area_px[other])
+        median_px = np.median(apart_px[pair == each])
+        if median_px < SAME_CENTRE * size_px:
+            joined[joined == joined[other]] = joined[one]
+
+    return np.where(numbers >= 0, joined[numbers], numbers)
+
+
+def _borders(
+    numbers: npt.NDArray[np.intp], pointed_at: Floats, count: int
+) -> tuple[npt.NDArray[np.intp], Floats]:
+    """Where two of `count` objects meet: the lower number times `count` plus the higher (n,), and
+    the distance in pixels between what the pixels on both sides point to (n,).
+    """
+    pairs = []
+    apart_px = []
+    beside = ((numbers[:, :-1], numbers[:, 1:], 1), (numbers[:-1], numbers[1:], 0))
+
+    for one, other, axis in beside:
+        is_border = (one != other) & (one >= 0) & (other >= 0)
+        lower = np.minimum(one, other)[is_border]
+        higher = np.maximum(one, other)[is_border]
+        pairs.append(lower * count + higher)
+
+        difference_px = np.diff(pointed_at, axis=axis)[is_border]
+        apart_px.append(np.hypot(*difference_px.T))
+
+    return np.concatenate(pairs), np.concatenate(apart_px)
 
 
 def _nearest(points_px: Floats, centres_px: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:

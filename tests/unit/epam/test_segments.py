@@ -65,6 +65,29 @@ def test_both_sides_of_what_a_lamp_hides_are_one_segment() -> None:
     assert whole.box_px == pytest.approx((40, 40, 80, 80), abs=1)
 
 
+def test_a_building_with_two_centres_is_one_segment_where_its_pixels_point_to_one_place() -> None:
+    wide_box = (20, 20, 140, 100)
+    shown = _answer(wide_box, peaks=[(60, 60)])
+    shown[1, 60, 100] = 0.9
+    columns = np.arange(20, 140)
+    # From left to right, its pixels point to places ever more to the right, from one centre to the
+    # other.
+    pointed = 60 + (columns - 20) / 3
+    shown[2, 20:100, 20:140] = (pointed - columns) / OFFSET_PX
+    (whole,) = _divided(shown)
+
+    assert whole.box_px == pytest.approx((40, 40, 240, 160), abs=1)
+
+
+def test_buildings_that_touch_are_two_segments_where_their_pixels_point_apart() -> None:
+    left_box = (20, 20, 80, 100)
+    right_box = (80, 20, 140, 100)
+    left, right = _divided(_answer(left_box, right_box, peaks=[(76, 60), (84, 60)]))
+
+    assert left.box_px[2] == pytest.approx(120, abs=1)
+    assert right.box_px[2] == pytest.approx(120, abs=1)
+
+
 def test_neither_a_speck_nor_a_building_without_a_centre_is_a_segment() -> None:
     speck = _answer((20, 20, 23, 23), peaks=[(21, 21)])
     assert _divided(speck) == []
