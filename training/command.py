@@ -119,8 +119,8 @@ def objects(*, data_dir: Path, out: Path | None, seed: int, epochs: int | None) 
     """Train the network that recognizes what a segment shows, and calibrate it.
 
     Its segments are those of the segmentation network: train that first. The prototypes are written
-    to a .json file beside the weights. Prints metrics in held-out towns. Takes about a quarter of
-    an hour on one thread.
+    to a .json file beside the weights. Prints metrics in held-out towns. Takes about 40 minutes on
+    one thread.
     """
     from services.epam.recognition.objects import DEFAULT_PATH
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+import cv2
 import msgspec
 import numpy as np
 import numpy.typing as npt
@@ -37,13 +38,15 @@ from training.rendering.reader import INVENTED, files, read
 
 WIDTHS = (32, 64, 128, 160)
 BATCH = 64
-EPOCHS = 22
+EPOCHS = 18
 MAX_RATE = 2e-3
 WEIGHT_DECAY = 5e-4
 SHARPNESS = 16.0
 MARGIN = 0.15
 INITIAL_LENGTH = 0.03
 HIDDEN_SHARE = 0.35
+FAR_SHARE = 0.4
+MIN_SIDE_PX = 10
 EMBEDDED_AT_ONCE = 256
 
 
@@ -97,12 +100,13 @@ class Fitted:
 
 
 def augmented(values: npt.NDArray[np.float16], rng: np.random.Generator) -> Singles:
-    """Return crops (n, ...) in another light, partly hidden, shifted. They are never mirrored: a
-    building's mirror image is another building.
+    """Return crops (n, ...) in another light, partly hidden, from farther away, shifted. They are
+    never mirrored: a building's mirror image is another building.
     """
     varied = values.astype(np.float32)
     _relight(varied, rng)
     _hide_parts(varied, rng)
+    _remove_details(varied, rng)
 
     shifts = rng.integers(-3, 4, (len(varied), 2))
     for crop, shift in zip(varied, shifts, strict=True):
@@ -167,6 +171,19 @@ def _hide_parts(values: Singles, rng: np.random.Generator) -> None:
         rows = slice(top, top + height)
         columns = slice(left, left + width)
         values[number, :4, rows, columns] = 0.0
+
+
+def _remove_details(values: Singles, rng: np.random.Generator) -> None:
+    """Show some of the segments with the details of a smaller image, as from farther away, in
+    place.
+    """
+    is_far = rng.random(len(values)) < FAR_SHARE
+
+    for number in np.flatnonzero(is_far):
+        side_px = int(rng.integers(MIN_SIDE_PX, SIDE_PX))
+        for channel in values[number, :5]:
+            small = cv2.resize(channel, (side_px, side_px), interpolation=cv2.INTER_AREA)
+            channel[:] = cv2.resize(small, (SIDE_PX, SIDE_PX), interpolation=cv2.INTER_LINEAR)
 
 
 def train_on_renderings(

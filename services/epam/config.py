@@ -136,14 +136,22 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             description="smallest share of the view's pixels, 0 to 1, that an unknown building "
             "covers when it gets a PAM node"
         ),
-    ] = 0.03
+    ] = 0.15
+    familiar: Annotated[
+        Share,
+        msgspec.Meta(
+            description="a building that is well visible gets a PAM node unless it is recognized "
+            "with a higher activation, 0 to 1: a stranger that is like a known one has a name of "
+            "its own, too"
+        ),
+    ] = 0.85
     sure: Annotated[
         Share,
         msgspec.Meta(
             description="a learned object gets another appearance if it is recognized with a "
             "higher activation, 0 to 1"
         ),
-    ] = 0.95
+    ] = 0.65
     narrowest_px: Annotated[
         Pixels,
         msgspec.Meta(description="narrowest segment that is recognized, in pixels, 4 to 1000"),

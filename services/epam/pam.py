@@ -40,7 +40,6 @@ from services.epam.recognition.segments import Segment, Segmenter
 from services.epam.view import ViewArrays
 
 NEW_LABEL = "new-building-{}"
-LIKELIER_THAN_NOT = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,7 +208,7 @@ class ExtendedPam:
         return self._recognized(candidate, prior, excluded=pieces)
 
     def _is_new(self, candidate: Candidate) -> bool:
-        """Whether it is well visible, and likelier an unknown building than anything else."""
+        """Whether it is well visible, and like nothing known."""
         segment = candidate.segment
         min_area_px = self._config.learned_share * segment.mask.size
         if segment.area_px < min_area_px:
@@ -218,7 +217,7 @@ class ExtendedPam:
         recognition = candidate.recognition
         if recognition.appearance.whole <= self._config.percept_threshold:
             return False
-        return recognition.novelty > LIKELIER_THAN_NOT
+        return recognition.activation <= self._config.familiar
 
     def _looks_new(self, recognition: Recognition) -> bool:
         """Whether it is surely a learned building, in an appearance that was not learned."""

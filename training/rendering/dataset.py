@@ -39,7 +39,7 @@ class Split:
 
 SPLITS = (
     Split("train", 1001, 84, 110),
-    Split("unlabelled", 5001, 140, 45, (30,)),
+    Split("unlabelled", 5001, 280, 45, (30,)),
     Split("val", 2001, 6, 90),
     Split("test", 3001, 6, 90),
 )

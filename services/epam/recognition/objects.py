@@ -82,8 +82,7 @@ class EmbeddingPass(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Recognition:
-    """The likeliest `label` with its posterior `activation`, and that of an unknown building,
-    `novelty`, both with the prior.
+    """The likeliest `label` with its posterior `activation`, which is with the prior.
 
     As far as the view alone goes, `evidence` is the posterior of the label, beside the
     probabilities of an `unknown` building and of `background`. `size_m` is None unless the label
@@ -92,7 +91,6 @@ class Recognition:
 
     label: str
     activation: float
-    novelty: float
     evidence: float
     unknown: float
     background: float
@@ -184,7 +182,6 @@ class ObjectRecognizer:
         return Recognition(
             label=labels[best],
             activation=min(float(expected[best]), 1.0),
-            novelty=float(expected[-2]),
             evidence=evidence,
             unknown=unknown,
             background=background,

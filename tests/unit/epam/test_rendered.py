@@ -134,7 +134,7 @@ def _offset(percept: Percept, building: Building, pose: np.ndarray) -> tuple[flo
 
 
 def test_unlabelled_buildings_get_nodes_and_are_recognized_again() -> None:
-    views = render_town(4004, 20, 28)
+    views = render_town(4004, 30, 28)
     answers = _answers(views)
     learned = [known.label for answer in of_type(Learned, answers) for known in answer.objects]
     nodes = list(dict.fromkeys(learned))
