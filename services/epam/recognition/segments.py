@@ -179,6 +179,9 @@ def _instances(output: Singles) -> npt.NDArray[np.intp]:
     pointed_at = np.stack([pointed_row, pointed_column], 1)
 
     numbers[building] = _nearest(pointed_at, centres)
+    if len(centres) == 1:
+        return numbers
+
     pointed = np.zeros((*log_odds.shape, 2))
     pointed[building] = pointed_at
     return _joined(numbers, pointed)
@@ -211,15 +214,20 @@ def _borders(
     """
     pairs = []
     apart_px = []
-    beside = ((numbers[:, :-1], numbers[:, 1:], 1), (numbers[:-1], numbers[1:], 0))
+    left, right = numbers[:, :-1], numbers[:, 1:]
+    upper, lower = numbers[:-1], numbers[1:]
+    beside = (
+        (left, right, pointed_at[:, :-1], pointed_at[:, 1:]),
+        (upper, lower, pointed_at[:-1], pointed_at[1:]),
+    )
 
-    for one, other, axis in beside:
+    for one, other, to_one, to_other in beside:
         is_border = (one != other) & (one >= 0) & (other >= 0)
-        lower = np.minimum(one, other)[is_border]
-        higher = np.maximum(one, other)[is_border]
-        pairs.append(lower * count + higher)
+        numbers_there = np.stack([one[is_border], other[is_border]])
+        lower_number, higher_number = np.sort(numbers_there, axis=0)
+        pairs.append(lower_number * count + higher_number)
 
-        difference_px = np.diff(pointed_at, axis=axis)[is_border]
+        difference_px = to_one[is_border] - to_other[is_border]
         apart_px.append(np.hypot(*difference_px.T))
 
     return np.concatenate(pairs), np.concatenate(apart_px)
@@ -227,11 +235,11 @@ def _borders(
 
 def _nearest(points_px: Floats, centres_px: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
     """The number of the centre (k, 2) nearest to each point (n, 2)."""
-    away_px = points_px[:, None] - centres_px[None]
-    squared_px2 = away_px**2
+    # The squared distance, less what is the same for all centres.
+    squared_px2 = (centres_px**2).sum(1)
+    compared_px2 = squared_px2 - 2 * (points_px @ centres_px.T)
 
-    distance_px2 = squared_px2.sum(2)
-    nearest: npt.NDArray[np.intp] = distance_px2.argmin(1)
+    nearest: npt.NDArray[np.intp] = compared_px2.argmin(1)
     return nearest
 
 
