@@ -16,14 +16,14 @@ from services import registry
 
 REPLAYED = ("sensory", "epam", "workspace", "codelets")
 THRESHOLDS = {
-    "cycle_p50_ms": at_most(100),
-    "cycle_p99_ms": at_most(260),
+    "cycle_p50_ms": at_most(60),
+    "cycle_p99_ms": at_most(130),
     "bus_share": at_most(0.25),
     "start_s": at_most(3),
     "cycle_p50_ms_10hz": at_most(60),
     "superseded_share": at_most(0.01),
-    "replay_speed": at_least(5),
-    "error_ratio": at_most(0.33),
+    "replay_speed": at_least(8),
+    "error_ratio": at_most(0.15),
     "error_over_fused": at_most(0.6),
 }
 

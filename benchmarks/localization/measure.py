@@ -19,10 +19,12 @@ from cogmap.data.mrclam import Recording, read
 from cogmap.parallel import parallel_map
 
 THRESHOLDS = {
-    "known_map_rmse_m": at_most(0.15),
+    "known_map_rmse_m": at_most(0.13),
     "slam_rmse_m": at_most(0.25),
+    "slam_online_rmse_m": at_most(0.22),
     "slam_vs_smoother": at_most(1.5),
-    "update_ms_p99": at_most(2.0),
+    "update_ms_p99": at_most(1.5),
+    "update_and_landmarks_ms_p99": at_most(4.0),
     "map_size_ratio": at_most(1.2),
     "recovery_s": at_most(15.0),
     "recovery_worst_s": at_most(40.0),

@@ -35,14 +35,14 @@ def test_the_thresholds_are_those_of_the_keys_promised() -> None:
     thresholds = {key: str(limit) for key, limit in (cycle.THRESHOLDS | bus.THRESHOLDS).items()}
 
     assert thresholds == {
-        "cycle_p50_ms": "≤ 100",
-        "cycle_p99_ms": "≤ 260",
+        "cycle_p50_ms": "≤ 60",
+        "cycle_p99_ms": "≤ 130",
         "bus_share": "≤ 0.25",
         "start_s": "≤ 3",
         "cycle_p50_ms_10hz": "≤ 60",
         "superseded_share": "≤ 0.01",
-        "replay_speed": "≥ 5",
-        "error_ratio": "≤ 0.33",
+        "replay_speed": "≥ 8",
+        "error_ratio": "≤ 0.15",
         "error_over_fused": "≤ 0.6",
         "delta_rate_ratio": "≥ 0.5",
         "never_drop_lost": "≤ 0",
