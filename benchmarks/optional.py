@@ -34,6 +34,16 @@ def scikit_learn() -> Any:
     return sklearn
 
 
+def threadpoolctl() -> Any:
+    """The package threadpoolctl, which has no types. Raises UsageError where it is missing."""
+    try:
+        import threadpoolctl
+    except ImportError:
+        raise UsageError(f"threadpoolctl {REMEDY}") from None
+
+    return threadpoolctl
+
+
 def gtsam_poses(values: Any, keys: Iterable[int]) -> Floats:
     """(n, 3) poses in the plane, of gtsam's `values` at `keys`: x_m, y_m, heading_rad."""
     poses = []

@@ -39,7 +39,9 @@ def measure(folder: Path, processes: int) -> Metrics:
     """
     optional.gtsam()
     recording = read(folder)
-    timings = speed.measure()
+    # As processes of the system have it.
+    with optional.threadpoolctl().threadpool_limits(1):
+        timings = speed.measure()
 
     with bar("robots' logs") as progress:
         work = partial(evaluate, landmarks=recording.landmarks)
