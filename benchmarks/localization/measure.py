@@ -39,9 +39,7 @@ def measure(folder: Path, processes: int) -> Metrics:
     """
     optional.gtsam()
     recording = read(folder)
-    # As processes of the system have it.
-    with optional.threadpoolctl().threadpool_limits(1):
-        timings = speed.measure()
+    timings = speed.measure()
 
     with bar("robots' logs") as progress:
         work = partial(evaluate, landmarks=recording.landmarks)
