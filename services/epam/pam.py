@@ -208,7 +208,7 @@ class ExtendedPam:
         return self._recognized(candidate, prior, excluded=pieces)
 
     def _is_new(self, candidate: Candidate) -> bool:
-        """Whether it is well visible, and like nothing known."""
+        """Whether it is well visible, and recognized as nothing with enough activation."""
         segment = candidate.segment
         min_area_px = self._config.learned_share * segment.mask.size
         if segment.area_px < min_area_px:
@@ -220,7 +220,7 @@ class ExtendedPam:
         return recognition.activation <= self._config.familiar
 
     def _looks_new(self, recognition: Recognition) -> bool:
-        """Whether it is surely a learned building, in an appearance that was not learned."""
+        """Whether it is likely a learned building, in an appearance that was not learned."""
         whole = recognition.appearance.whole
         certainty = min(recognition.evidence, whole)
         if certainty <= self._config.sure:

@@ -214,18 +214,16 @@ def _borders(
     """
     pairs = []
     apart_px = []
-    left, right = numbers[:, :-1], numbers[:, 1:]
-    upper, lower = numbers[:-1], numbers[1:]
     beside = (
-        (left, right, pointed_at[:, :-1], pointed_at[:, 1:]),
-        (upper, lower, pointed_at[:-1], pointed_at[1:]),
+        (numbers[:, :-1], numbers[:, 1:], pointed_at[:, :-1], pointed_at[:, 1:]),
+        (numbers[:-1], numbers[1:], pointed_at[:-1], pointed_at[1:]),
     )
 
     for one, other, to_one, to_other in beside:
         is_border = (one != other) & (one >= 0) & (other >= 0)
-        numbers_there = np.stack([one[is_border], other[is_border]])
-        lower_number, higher_number = np.sort(numbers_there, axis=0)
-        pairs.append(lower_number * count + higher_number)
+        both = np.stack([one[is_border], other[is_border]])
+        lower, higher = np.sort(both, axis=0)
+        pairs.append(lower * count + higher)
 
         difference_px = to_one[is_border] - to_other[is_border]
         apart_px.append(np.hypot(*difference_px.T))
