@@ -28,6 +28,7 @@ from schemas.nodes import (
 from schemas.sensing import Percept
 from services.codelets.config import SECTION, Config
 from services.codelets.localization.measurement_model import (
+    MIN_SIGHTINGS,
     is_seen_from_here,
 )
 from services.codelets.localization.motion_model import with_gains
@@ -42,6 +43,7 @@ from services.codelets.localization.sampling import (
 GAP = 3.0
 LOCAL_SHARE = 0.5
 MIN_RANGE_M = 0.1
+CONFIRMED_BASE_LEVEL = 0.15
 
 
 class Record(NamedTuple):
@@ -221,7 +223,7 @@ def _refreshed(seen: Seen, task: Task, graph: Graph, record: Record) -> list[Ope
         node,
         function=percept.function or node.function,
         activation=percept.activation,
-        base_level=graph.base_level(node),
+        base_level=_base_level(node, record, graph),
         cycle=task.cycle,
         width_m=percept.width_m,
         height_m=percept.height_m,
@@ -232,6 +234,18 @@ def _refreshed(seen: Seen, task: Task, graph: Graph, record: Record) -> list[Ope
     cell_m = graph.cell_m(node.map)
     place = nearest_place(node.x_m, node.y_m, cell_m, node.map)
     return [refreshed, Link(source=node.id, target=place, kind=LinkKind.AT)]
+
+
+def _base_level(node: Object, record: Record, graph: Graph) -> float:
+    """The base level of an object now, which rises where a second view confirms the first.
+
+    Until then the object may be a mistake, and is forgotten as soon as it is neither in view nor
+    conscious.
+    """
+    level = graph.base_level(node)
+    if node.sightings < MIN_SIGHTINGS <= record.sightings:
+        return min(1.0, level + CONFIRMED_BASE_LEVEL)
+    return level
 
 
 def _jitter_m(kept: Samples, config: Config) -> Samples:

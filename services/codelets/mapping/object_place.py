@@ -22,8 +22,6 @@ from services.codelets.localization.landmarks import (
 from services.codelets.localization.motion_model import with_gains
 from services.codelets.localization.sampling import generator, resample
 
-FIRST_BASE_LEVEL = 0.15
-
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     """One task for each object in view that the map lacks."""
@@ -82,7 +80,6 @@ def _new(percept: Percept, agent: Self, task: Task) -> Object:
     """An object that the map lacks, on the map where the agent is."""
     return Object(
         id=object_id(percept.label),
-        base_level=FIRST_BASE_LEVEL,
         cycle=task.cycle,
         label=percept.label,
         function=percept.function,

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from schemas.graph import Link
-from schemas.nodes import Object
+from schemas.nodes import Object, object_id
 from services.codelets.config import Config
-from tests.support.world.scenes import agent, graph_of, percept, run, task
+from tests.support.world.scenes import Desk, agent, graph_of, percept, run, task
 
 CONFIG = Config(landmark_samples=40)
 
@@ -41,3 +41,25 @@ def test_an_unsure_heading_spreads_a_far_object_across_the_line_of_sight() -> No
     assert isinstance(found, Object)
     assert found.y_sd_m == pytest.approx(3.0, rel=0.1)
     assert found.x_sd_m < 0.5
+
+
+def _drives_on_after(views: int) -> Object | None:
+    """What the map has of a house that was seen in so many views, 30 views later."""
+    desk = Desk("w1")
+    for frame in range(views + 30):
+        in_view = [percept("house", 0.0, 10.0)] if frame < views else []
+        desk.see(frame, *in_view)
+        desk.work()
+
+    return desk.graph.get(Object, object_id("house"))
+
+
+def test_what_was_seen_in_one_view_alone_is_forgotten_soon() -> None:
+    assert _drives_on_after(views=1) is None
+
+
+def test_what_a_second_view_confirmed_is_remembered() -> None:
+    found = _drives_on_after(views=2)
+
+    assert found is not None
+    assert found.sightings == 2
