@@ -61,6 +61,7 @@ def sections(surveyed: bool) -> Sections:
         "drift_rad_per_m": DRIFT_RAD_PER_M,
         "range_gain_sd": RANGE,
         "correct": "heading",
+        "anchor": "map",
         "path_spacing_m": SPACING_M,
         "path_variance_per_m": SPEED**2,
         "heading_variance_per_m": DRIFT_RAD_PER_M**2,

@@ -188,6 +188,15 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             "(eq. 9), or headings too, by nonlinear least squares"
         ),
     ] = "heading"
+    anchor: Annotated[
+        Literal["start", "map"],
+        Meta(
+            description="what stays in place when the map is corrected. start: where the path "
+            "begins, for goals and maps that are given relative to it. map: the path that was "
+            "corrected before, as a whole, so that an agent whose heading at the start is little "
+            "known does not have all its map turned by what it learns of that"
+        ),
+    ] = "start"
     landmark_sides: Annotated[
         int,
         Meta(

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from cogmap.geometry.se2 import rotate, transform_from, wrap_angle
+from cogmap.geometry.se2 import motion_onto, rotate, transform_from, wrap_angle
 
 NEAREST_PAIR_M = 6.0
 FARTHEST_PAIR_M = 80.0
@@ -136,7 +136,7 @@ def _refined(pose: Floats, here: Landmarks, there: Landmarks, within_m: float) -
         if is_matched.sum() < 2:
             break
 
-        fitted = _fitted(here.at_m[is_matched], there.at_m[match.there[is_matched]])
+        fitted = motion_onto(here.at_m[is_matched], there.at_m[match.there[is_matched]])
         match = Match(fitted, _belonging(fitted, here, there, within_m))
 
     return match
@@ -157,18 +157,6 @@ def _belonging(pose: Floats, here: Landmarks, there: Landmarks, within_m: float)
             away_m[:, nearest] = np.inf
 
     return belongs
-
-
-def _fitted(here_m: Floats, there_m: Floats) -> Floats:
-    """(3,): the pose that moves (k, 2) points onto others with the least squares (Umeyama 1991)."""
-    middle_here_m = here_m.mean(axis=0)
-    middle_there_m = there_m.mean(axis=0)
-    x, y = (here_m - middle_here_m).T
-    u, v = (there_m - middle_there_m).T
-
-    turn_rad = np.arctan2((x * v - y * u).sum(), (x * u + y * v).sum())
-    shift_m = middle_there_m - rotate(middle_here_m[None], turn_rad)[0]
-    return np.array([*shift_m, turn_rad])
 
 
 def _are_apart(poses: Floats, pose: Floats, here: Landmarks) -> Booleans:

@@ -14,14 +14,27 @@ import msgspec
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats
-from cogmap.geometry.se2 import cumulative, rotation_matrices, wrap_angle
+from cogmap.geometry.se2 import (
+    cumulative,
+    motion_onto,
+    rotation_matrices,
+    transform_from,
+    wrap_angle,
+)
 from cogmap.graph.graph import Graph
 from cogmap.graph.path import rows_of
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from schemas.array import Matrix
 from schemas.codelets import Task
 from schemas.graph import Operation, Phase
-from schemas.nodes import CORRECTION_ID, Correction, LoopClosure, Observations, PathSegment
+from schemas.nodes import (
+    CORRECTION_ID,
+    NEVER_NS,
+    Correction,
+    LoopClosure,
+    Observations,
+    PathSegment,
+)
 from services.codelets.config import SECTION, Config
 from services.codelets.correction.gnc import inliers
 from services.codelets.correction.joint import optimize_jointly
@@ -93,6 +106,8 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
 
     seen = Sightings.of(graph.of_kind(Observations), rows[:, STAMP])
     poses, replays = corrected(judgement.path, seen, config)
+    if config.anchor == "map":
+        poses = _in_place(poses, rows, closures)
     operations.append(_correction(rows, poses))
 
     loops = judgement.path.closures
@@ -259,6 +274,22 @@ def corrected(graph: PoseGraph, seen: Sightings, config: Config) -> tuple[Floats
         return poses, found.replays
 
     return optimize_jointly(graph, seen, config)
+
+
+def _in_place(poses: Floats, rows: Floats, closures: list[LoopClosure]) -> Floats:
+    """(n, 3) corrected poses of path `rows`, moved as one to where the path was believed to be as
+    far as earlier corrections reach, or all of it where there was none.
+    """
+    corrected_until_ns = max((each.to_ns for each in closures if each.accepted), default=NEVER_NS)
+    is_settled = rows[:, STAMP] * 1e9 <= corrected_until_ns
+    if not is_settled.any():
+        is_settled[:] = True
+
+    before = rows[:, POSE]
+    motion = motion_onto(poses[is_settled, :2], before[is_settled, :2])
+    positions_m = transform_from(motion, poses[:, :2])
+    headings_rad = wrap_angle(poses[:, 2] + motion[2])
+    return np.column_stack([positions_m, headings_rad])
 
 
 def _positions_only(graph: PoseGraph) -> PoseGraph:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from cogmap.geometry.arrays import Floats
+from cogmap.geometry.se2 import motion_onto, relative
 from cogmap.graph.path import rows_of
 from schemas.graph import Phase
 from schemas.nodes import (
@@ -121,6 +122,32 @@ def _heading_error_rad(correct: str) -> float:
 
 def test_headings_are_corrected_only_where_configured() -> None:
     assert _heading_error_rad("heading") < 0.8 * _heading_error_rad("positions")
+
+
+def _moved(anchor: str) -> tuple[Floats, Floats]:
+    """How the first place of the path, and how the path as a whole, (3,) each, were moved by a loop
+    that is closed on a path that turns too far.
+    """
+    config = msgspec.structs.replace(QUIET, anchor=anchor)
+    drive = round_once(LoopDrive(config, bias_rad=0.004))
+    before = _rows(drive.desk)[:, POSE]
+    drive.meet(3)
+    drive.go(5, {})
+
+    after = _rows(drive.desk)[: len(before), POSE]
+    first = relative(before[0], after[0])
+    return first, motion_onto(before[:, :2], after[:, :2])
+
+
+def test_a_correction_leaves_the_start_where_it_is_or_the_map_as_a_whole() -> None:
+    first, turned = _moved("start")
+    assert first == pytest.approx(np.zeros(3))
+
+    # The path has grown a little before the correction was applied.
+    first, left = _moved("map")
+    assert np.abs(first).max() > 0.1
+    assert np.hypot(*left[:2]) < 0.2 * np.hypot(*turned[:2])
+    assert abs(left[2]) < 0.3 * abs(turned[2])
 
 
 def test_road_moves_with_the_path_that_it_lies_along() -> None:
