@@ -141,10 +141,18 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         Share,
         msgspec.Meta(
             description="a building that is well visible gets a PAM node unless it is recognized "
-            "with a higher activation, 0 to 1: a stranger that is like a known one has a name of "
-            "its own, too"
+            "as one that was taught with a higher activation, 0 to 1: a stranger that is like that "
+            "has a name of its own, too"
         ),
     ] = 0.85
+    familiar_learned: Annotated[
+        Share,
+        msgspec.Meta(
+            description="the same activation for one that was learned, 0 to 1; higher, because one "
+            "encounter tells less of a building than teaching, and a second node for it does less "
+            "harm than one node for two buildings"
+        ),
+    ] = 0.97
     sure: Annotated[
         Share,
         msgspec.Meta(

@@ -217,7 +217,9 @@ class ExtendedPam:
         recognition = candidate.recognition
         if recognition.appearance.whole <= self._config.percept_threshold:
             return False
-        return recognition.activation <= self._config.familiar
+        is_taught = self._recognizer.is_taught(recognition.label)
+        familiar = self._config.familiar if is_taught else self._config.familiar_learned
+        return recognition.activation <= familiar
 
     def _looks_new(self, recognition: Recognition) -> bool:
         """Whether it is likely a learned building, in an appearance that was not learned."""

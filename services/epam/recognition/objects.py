@@ -150,6 +150,10 @@ class ObjectRecognizer:
         """What a segment may be recognized as: every label taught, then every one learned."""
         return [*self._prototypes.names, *dict.fromkeys(self._labels)]
 
+    def is_taught(self, label: str) -> bool:
+        """Return whether the label was taught, not learned since."""
+        return label in self._prototypes.names
+
     def recognize(
         self,
         appearance: Appearance,

@@ -12,6 +12,8 @@ BOUNDED = [
     "base_level",
     "percept_threshold",
     "learned_share",
+    "familiar",
+    "familiar_learned",
     "sure",
     "narrowest_px",
     "worst_misfit",

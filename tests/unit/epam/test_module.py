@@ -238,6 +238,26 @@ def test_a_first_view_at_time_0_is_learned_from(views: list[View]) -> None:
     assert isinstance(learned, Learned)
 
 
+def _named(config: Config, views: list[View]) -> int:
+    """How many buildings have a name of their own after these views."""
+    module = build(config, "epam")
+    labels = set()
+    for view in views:
+        for learned in _learned(module, view):
+            labels.update(known.label for known in learned.objects)
+
+    return len(labels)
+
+
+def test_what_is_like_a_learned_building_has_a_name_of_its_own_below_a_setting(
+    views: list[View],
+) -> None:
+    all_alike = Config(familiar_learned=0.0)
+    all_strangers = Config(familiar_learned=1.0)
+
+    assert 0 < _named(all_alike, views) < _named(all_strangers, views)
+
+
 def test_one_message_stands_for_all_that_was_learned(views: list[View]) -> None:
     module = build(Config(), "epam")
     objects = [
