@@ -38,6 +38,7 @@ from services.codelets.config import SECTION, Config
 from services.codelets.localization.measurement_model import (
     Sighting,
     compare,
+    cost_of_mistake,
     log_likelihood,
     sightings,
 )
@@ -73,6 +74,7 @@ STAGES = 3
 TURNED_RAD = 1.0
 ALIKE = 0.6
 FORGOTTEN_NS = 20_000_000_000
+LATELY_NS = 10_000_000_000
 
 
 @dataclass(frozen=True)
@@ -142,8 +144,13 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     gains = found.samples[:, POSE_COLUMNS:].mean(axis=0)
     odometry = dead_reckon(odometry_of(agent), motions, gains)
     if seen is not None and found.is_lost:
-        percepts = _all_seen(task.percepts, seen_before(graph, odometry))
+        since_fit = seen_before(graph, odometry, agent.last_fit_ns)
+        percepts = _all_seen(task.percepts, since_fit)
         found = _relocalize(found, percepts, graph, config, rng)
+    elif seen is not None and found.misfit_count:
+        lately = seen_before(graph, odometry, task.stamp_ns - LATELY_NS)
+        percepts = _all_seen(task.percepts, lately)
+        found = _reconsidered(found, percepts, graph, config, rng)
 
     if found.was_kidnapped:
         # Self-motion did not measure the kidnapping: the step there counts as one that was driven,
@@ -333,6 +340,43 @@ def _relocalize(
     if lost.misfit_count >= PATIENCE * enough:
         return Estimate(lost.samples, 0.0, is_not_elsewhere=True)
     return lost
+
+
+def _reconsidered(
+    doubtful: Estimate,
+    percepts: list[Percept],
+    graph: Graph,
+    config: Config,
+    rng: np.random.Generator,
+) -> Estimate:
+    """Where a landmark does not fit: the pose that explains all `percepts` so much better that more
+    than one of them would have to be mistaken for the agent to be where it is believed.
+
+    Others may fit there nevertheless, as landmarks in a row do from several places.
+    """
+    seen = sightings(percepts, graph, config.largest_landmark_sd_m, NEVER_NS)
+    if seen is None or len(seen.labels) < MANY:
+        return doubtful
+
+    here = _best_log_likelihood(doubtful.samples, seen, config)
+    enough = here + cost_of_mistake(config.outlier_share)
+    if enough >= 0:
+        return doubtful
+
+    samples = relocalize(doubtful.samples, seen, config, rng)
+    believed = believed_of(samples, seen, False, MANY, config)
+    if believed is None or _best_log_likelihood(believed, seen, config) <= enough:
+        return doubtful
+
+    found = resample(believed, len(samples), 0.0, rng)
+    return Estimate(found, 0.0, was_kidnapped=True)
+
+
+def _best_log_likelihood(samples: Samples, seen: Sighting, config: Config) -> float:
+    """That of what is seen at the one of (n, 7) samples which explains it best, at most 0."""
+    density = compare(samples, seen).density
+    scores = log_likelihood(density, config.outlier_share, seen.weights)
+    return float(scores.max())
 
 
 def _self_node(task: Task, agent: Self, found: Estimate) -> Self:

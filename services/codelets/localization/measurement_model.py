@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -143,6 +144,12 @@ def log_likelihood(density: Singles, outlier: float, weights: Floats | None = No
     if weights is not None:
         terms *= _single(weights)[:, None]
     return np.asarray(terms.sum(axis=0), np.float64)
+
+
+def cost_of_mistake(outlier: float) -> float:
+    """By how much one landmark that is taken for another lowers `log_likelihood` at most."""
+    least = float(np.exp(-MAX_MAHALANOBIS2 / 2))
+    return -math.log(max(outlier, least))
 
 
 class Landmark(NamedTuple):

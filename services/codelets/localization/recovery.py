@@ -30,9 +30,9 @@ SURE_M = 1.0
 DRIFT_SHARE = 0.05
 
 
-def seen_before(graph: Graph, odometry: Samples) -> list[Percept]:
-    """Landmarks that were seen since anything last fitted, as they would be in view now, each as it
-    was seen last.
+def seen_before(graph: Graph, odometry: Samples, since_ns: float) -> list[Percept]:
+    """Landmarks that were seen after `since_ns`, as they would be in view now, each as it was seen
+    last.
 
     Path integration alone has the agent at `odometry` (3,).
     """
@@ -42,8 +42,7 @@ def seen_before(graph: Graph, odometry: Samples) -> list[Percept]:
         return []
 
     rows = last.rows.numpy()
-    last_fit_s = agent.last_fit_ns * 1e-9
-    rows = rows[rows[:, STAMP] > last_fit_s]
+    rows = rows[rows[:, STAMP] > since_ns * 1e-9]
     observations = [each for each, _ in objects_along(graph, last)]
     seen = Sightings.of(observations, rows[:, STAMP])
 
