@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from itertools import islice
 
 from schemas.graph import Links
@@ -44,9 +44,7 @@ class LinkIndex:
     def put_all(self, links: Links) -> None:
         """Set the weights of many links of one kind."""
         if links.kind in EXCLUSIVE_LINKS:
-            for source, weights in links.weights.items():
-                for target, weight in weights.items():
-                    self._put_exclusive(links.kind, source, target, weight)
+            self._put_all_exclusive(links)
             return
 
         targets = self._targets[links.kind]
@@ -73,7 +71,7 @@ class LinkIndex:
         weights = self._targets[kind].get(source, {})
         if target in weights:
             del weights[target]
-            self._remove_source(kind, target, source)
+            self._remove_sources(kind, target, {source})
 
         if not weights:
             self._targets[kind].pop(source, None)
@@ -143,17 +141,51 @@ class LinkIndex:
         if before is None:
             self._add_source(kind, pair[0], source)
         elif before[0] != target:
-            self._remove_source(kind, before[0], source)
+            self._remove_sources(kind, before[0], {source})
             self._add_source(kind, pair[0], source)
 
         self._target[kind][source] = pair
+
+    def _put_all_exclusive(self, links: Links) -> None:
+        """Set many links, and the sources of each target once: one by one, a map with a hundred
+        thousand objects would have them copied as often.
+        """
+        kind = links.kind
+        target_of = self._target[kind]
+        pairs: dict[tuple[str, float], tuple[str, float]] = {}
+        added: defaultdict[str, list[str]] = defaultdict(list)
+        removed: defaultdict[str, set[str]] = defaultdict(set)
+
+        for name, weights in links.weights.items():
+            if not weights:
+                continue
+
+            *_, link = weights.items()
+            pair = pairs.get(link)
+            if pair is None:
+                pair = pairs[link] = self._pair(kind, *link)
+
+            source = self._name_of(name)
+            before = target_of.get(source)
+            target_of[source] = pair
+            if before is None:
+                added[pair[0]].append(source)
+            elif before[0] != pair[0]:
+                removed[before[0]].add(source)
+                added[pair[0]].append(source)
+
+        for target, sources in removed.items():
+            self._remove_sources(kind, target, sources)
+        for target, new in added.items():
+            before_these = self._sources[kind].get(target, ())
+            self._sources[kind][target] = (*before_these, *new)
 
     def _pair(self, kind: str, target: str, weight: float) -> tuple[str, float]:
         """A target and a weight: those of another link where they are the same."""
         sources = self._sources[kind].get(target, ())
         if sources:
             pair = self._target[kind][sources[0]]
-            if pair[1] == weight:
+            if pair == (target, weight):
                 return pair
 
         return self._name_of(target), weight
@@ -164,16 +196,16 @@ class LinkIndex:
             return
 
         del self._target[kind][source]
-        self._remove_source(kind, target, source)
+        self._remove_sources(kind, target, {source})
 
     def _add_source(self, kind: str, target: str, source: str) -> None:
         sources = self._sources[kind]
         before = sources.get(target, ())
         sources[target] = (*before, source)
 
-    def _remove_source(self, kind: str, target: str, source: str) -> None:
+    def _remove_sources(self, kind: str, target: str, removed: Collection[str]) -> None:
         sources = self._sources[kind]
-        rest = tuple(other for other in sources[target] if other != source)
+        rest = tuple(source for source in sources[target] if source not in removed)
 
         if rest:
             sources[target] = rest

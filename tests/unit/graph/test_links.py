@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from cogmap.bus.codec import encode
 from cogmap.graph.graph import Graph
 from schemas.graph import DropLink, DropNode, Link, Links, Operation
@@ -76,6 +78,26 @@ def test_a_node_has_one_link_of_an_exclusive_kind() -> None:
     assert links.target("a", LinkKind.AT) == "there"
     assert links.sources("here", LinkKind.AT) == ("b",)
     assert links.sources("there", LinkKind.AT) == ("a",)
+
+
+def test_links_of_an_exclusive_kind_are_in_bulk_what_they_are_one_by_one() -> None:
+    rng = np.random.default_rng(3)
+    one_by_one = _graph()
+    in_bulk = _graph()
+    for _ in range(30):
+        weights = {}
+        for source in rng.permutation(12)[: rng.integers(1, 12)].tolist():
+            weights[f"s{source}"] = {f"t{rng.integers(4)}": float(rng.choice([0.5, 1.0]))}
+
+        in_bulk.change([Links(kind=LinkKind.AT, weights=weights)])
+        for source, targets in weights.items():
+            for target, weight in targets.items():
+                one_by_one.change([_link(source, target, weight, LinkKind.AT)])
+
+        assert in_bulk.snapshot().links == one_by_one.snapshot().links
+        for target in ("t0", "t1", "t2", "t3"):
+            found = in_bulk.links.sources(target, LinkKind.AT)
+            assert found == one_by_one.links.sources(target, LinkKind.AT)
 
 
 def test_dropping_a_link_that_is_not_there_changes_nothing() -> None:
