@@ -160,7 +160,7 @@ class LinkIndex:
             if not weights:
                 continue
 
-            *_, link = weights.items()
+            link = next(reversed(weights.items()))
             pair = pairs.get(link)
             if pair is None:
                 pair = pairs[link] = self._pair(kind, *link)
@@ -177,8 +177,8 @@ class LinkIndex:
         for target, sources in removed.items():
             self._remove_sources(kind, target, sources)
         for target, new in added.items():
-            before_these = self._sources[kind].get(target, ())
-            self._sources[kind][target] = (*before_these, *new)
+            known = self._sources[kind].get(target, ())
+            self._sources[kind][target] = (*known, *new)
 
     def _pair(self, kind: str, target: str, weight: float) -> tuple[str, float]:
         """A target and a weight: those of another link where they are the same."""

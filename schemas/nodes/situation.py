@@ -23,8 +23,8 @@ class Self(GraphNode, kw_only=True, frozen=True, tag="self"):
     share of the samples that rejection kept. `misfit_count` is the number of views in a row in
     which nothing fitted, `first_misfit` the landmark that did not fit first, and `is_lost` whether
     another did not fit since. `not_elsewhere_ns` is the stamp at which what did not fit was found
-    to fit nowhere else on the map together either. `stationary_since_ns` is NEVER_NS while the
-    agent moves.
+    to fit nowhere else on the map together either, `found_ns` that at which the agent was found
+    where it cannot have moved to. `stationary_since_ns` is NEVER_NS while the agent moves.
     """
 
     map: Name = ROOT_MAP
@@ -42,6 +42,7 @@ class Self(GraphNode, kw_only=True, frozen=True, tag="self"):
     last_misfit_ns: Stamp = 0
     last_fit_ns: Stamp = 0
     not_elsewhere_ns: Stamp = NEVER_NS
+    found_ns: Stamp = NEVER_NS
     stationary_since_ns: Stamp = NEVER_NS
     speed_gain: Finite = 0.0
     turn_gain: Finite = 0.0

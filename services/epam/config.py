@@ -148,16 +148,16 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     familiar_learned: Annotated[
         Share,
         msgspec.Meta(
-            description="the same activation for one that was learned, 0 to 1; higher, because one "
-            "encounter tells less of a building than teaching, and a second node for it does less "
-            "harm than one node for two buildings"
+            description="the activation for one that was learned, in the place of `familiar`, 0 to "
+            "1; higher, because one encounter tells less of a building than teaching, and a second "
+            "node for it does less harm than one node for two buildings"
         ),
     ] = 0.97
     sure: Annotated[
         Share,
         msgspec.Meta(
             description="a learned object gets another appearance if it is recognized with a "
-            "higher activation, 0 to 1"
+            "higher activation, 0 to 1, in a view that does not make it a node of its own"
         ),
     ] = 0.65
     narrowest_px: Annotated[

@@ -50,9 +50,9 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         Share,
         msgspec.Meta(
             description="Base level from which on an object that the workspace forgets by time "
-            "alone was learned, and is kept here, 0 to 1. What is new begins at 0.15, and has "
-            "reached the default when it was conscious twice; with less, what is placed badly "
-            "would come back too."
+            "alone was learned, and is kept here, 0 to 1. The second view gives 0.15, and two "
+            "broadcasts the rest to the default; with less, what is placed badly would come back "
+            "too."
         ),
     ] = 0.3
     cue_within_m: Annotated[

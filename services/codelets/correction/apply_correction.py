@@ -91,8 +91,8 @@ CODELET = Codelet(
 
 
 def _is_outdated(rows: Floats, graph: Graph) -> bool:
-    """Whether the path has moved as a whole since the correction was computed: as long as it has
-    not, no correction moves its first place.
+    """Whether the path has moved as a whole since the correction was computed: no other correction
+    is under way meanwhile, so nothing else moves its first place.
     """
     path = rows_of(graph.of_kind(PathSegment))
     if not len(path) or path[0, STAMP] != rows[0, STAMP]:

@@ -107,7 +107,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     seen = Sightings.of(graph.of_kind(Observations), rows[:, STAMP])
     poses, replays = corrected(judgement.path, seen, config)
     if config.anchor == "map":
-        poses = _in_place(poses, rows, closures)
+        poses = _in_place(poses, judgement.path.poses, rows, closures)
     operations.append(_correction(rows, poses))
 
     loops = judgement.path.closures
@@ -276,16 +276,17 @@ def corrected(graph: PoseGraph, seen: Sightings, config: Config) -> tuple[Floats
     return optimize_jointly(graph, seen, config)
 
 
-def _in_place(poses: Floats, rows: Floats, closures: list[LoopClosure]) -> Floats:
+def _in_place(poses: Floats, start: Floats, rows: Floats, closures: list[LoopClosure]) -> Floats:
     """(n, 3) corrected poses of path `rows`, moved as one to where the path was believed to be as
-    far as earlier corrections reach, or all of it where there was none.
+    far as earlier corrections reach; to where it was corrected from, its `start`, where none was.
     """
     corrected_until_ns = max((each.to_ns for each in closures if each.accepted), default=NEVER_NS)
     is_settled = rows[:, STAMP] * 1e9 <= corrected_until_ns
+    before = rows[:, POSE]
     if not is_settled.any():
         is_settled[:] = True
+        before = start
 
-    before = rows[:, POSE]
     motion = motion_onto(poses[is_settled, :2], before[is_settled, :2])
     positions_m = transform_from(motion, poses[:, :2])
     headings_rad = wrap_angle(poses[:, 2] + motion[2])

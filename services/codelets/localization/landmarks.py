@@ -215,8 +215,8 @@ def located(
 
 def _refreshed(seen: Seen, task: Task, graph: Graph, record: Record) -> list[Operation]:
     """The object refreshed by the percept in the view of `task`, its position as it is, and its
-    link to the place there. Being seen excites its activation; its base level is learned by
-    consciousness alone.
+    link to the place there. Being seen excites its activation; but for the second view, its base
+    level is learned by consciousness alone.
     """
     percept, node = seen
     refreshed = msgspec.structs.replace(
@@ -239,12 +239,13 @@ def _refreshed(seen: Seen, task: Task, graph: Graph, record: Record) -> list[Ope
 def _base_level(node: Object, record: Record, graph: Graph) -> float:
     """The base level of an object now, which rises where a second view confirms the first.
 
-    Until then the object may be a mistake, and is forgotten as soon as it is neither in view nor
+    Until then a new object may be a mistake, and is forgotten as soon as it is neither in view nor
     conscious.
     """
     level = graph.base_level(node)
-    if node.sightings < MIN_SIGHTINGS <= record.sightings:
-        return min(1.0, level + CONFIRMED_BASE_LEVEL)
+    is_confirmed = node.sightings < MIN_SIGHTINGS <= record.sightings
+    if is_confirmed and level < CONFIRMED_BASE_LEVEL:
+        return level + CONFIRMED_BASE_LEVEL
     return level
 
 

@@ -148,7 +148,9 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         percepts = _all_seen(task.percepts, since_fit)
         found = _relocalize(found, percepts, graph, config, rng)
     elif seen is not None and found.misfit_count:
-        lately = seen_before(graph, odometry, task.stamp_ns - LATELY_NS)
+        # Path integration does not lead from what was seen before it was found to what is seen now.
+        since_ns = max(task.stamp_ns - LATELY_NS, agent.found_ns)
+        lately = seen_before(graph, odometry, since_ns)
         percepts = _all_seen(task.percepts, lately)
         found = _reconsidered(found, percepts, graph, config, rng)
 
@@ -359,13 +361,13 @@ def _reconsidered(
         return doubtful
 
     here = _best_log_likelihood(doubtful.samples, seen, config)
-    enough = here + cost_of_mistake(config.outlier_share)
-    if enough >= 0:
+    required = here + cost_of_mistake(config.outlier_share)
+    if required >= 0:
         return doubtful
 
     samples = relocalize(doubtful.samples, seen, config, rng)
     believed = believed_of(samples, seen, False, MANY, config)
-    if believed is None or _best_log_likelihood(believed, seen, config) <= enough:
+    if believed is None or _best_log_likelihood(believed, seen, config) <= required:
         return doubtful
 
     found = resample(believed, len(samples), 0.0, rng)
@@ -407,6 +409,7 @@ def _self_node(task: Task, agent: Self, found: Estimate) -> Self:
         last_misfit_ns=task.stamp_ns if is_misfit else agent.last_misfit_ns,
         last_fit_ns=agent.last_fit_ns if found.misfit_count else task.stamp_ns,
         not_elsewhere_ns=task.stamp_ns if found.is_not_elsewhere else agent.not_elsewhere_ns,
+        found_ns=task.stamp_ns if found.was_kidnapped else agent.found_ns,
         speed_gain=float(mean[SelfColumn.SPEED_GAIN]),
         turn_gain=float(mean[SelfColumn.TURN_GAIN]),
         range_gain=float(mean[SelfColumn.RANGE_GAIN]),

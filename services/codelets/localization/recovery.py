@@ -9,6 +9,8 @@ import numpy as np
 from cogmap.geometry.arrays import Singles
 from cogmap.geometry.se2 import compose, relative
 from cogmap.graph.graph import Graph
+from cogmap.graph.path import rows_of
+from schemas.nodes import PathSegment, segment_id
 from schemas.sensing import Percept
 from services.codelets.config import Config
 from services.codelets.localization.measurement_model import (
@@ -32,18 +34,17 @@ DRIFT_SHARE = 0.05
 
 def seen_before(graph: Graph, odometry: Samples, since_ns: float) -> list[Percept]:
     """Landmarks that were seen after `since_ns`, as they would be in view now, each as it was seen
-    last.
+    last, from the newest two segments of the path.
 
     Path integration alone has the agent at `odometry` (3,).
     """
-    agent = graph.agent
-    last = graph.last_segment
-    if agent is None or last is None:
-        return []
-
-    rows = last.rows.numpy()
+    segments = _newest_segments(graph)
+    rows = rows_of(segments)
     rows = rows[rows[:, STAMP] > since_ns * 1e-9]
-    observations = [each for each, _ in objects_along(graph, last)]
+
+    observations = []
+    for segment in segments:
+        observations += [each for each, _ in objects_along(graph, segment)]
     seen = Sightings.of(observations, rows[:, STAMP])
 
     latest = {}
@@ -60,6 +61,15 @@ def seen_before(graph: Graph, odometry: Samples, since_ns: float) -> list[Percep
         sd_m = _remembered_sd_m(seen.information[index], moved_m)
         percepts.append(_percept(label, forwards_m, left_m, sd_m))
     return percepts
+
+
+def _newest_segments(graph: Graph) -> list[PathSegment]:
+    last = graph.last_segment
+    if last is None:
+        return []
+
+    before = graph.get(PathSegment, segment_id(last.number - 1))
+    return [last] if before is None else [before, last]
 
 
 def _remembered_sd_m(information: Samples, moved_m: float) -> float:

@@ -1,7 +1,8 @@
 """Objects that the workspace has forgotten by time alone, kept in long-term memory. Pure.
 
 What was broadcast as missing is unlearned: its base level falls by more than decay, and it is none
-of them once it is forgotten, unless it was conscious as present since.
+of them once it is forgotten, unless its base level has risen since: it was conscious as present, or
+placed anew and confirmed.
 """
 
 from __future__ import annotations

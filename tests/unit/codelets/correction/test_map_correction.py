@@ -150,6 +150,25 @@ def test_a_correction_leaves_the_start_where_it_is_or_the_map_as_a_whole() -> No
     assert abs(left[2]) < 0.3 * abs(turned[2])
 
 
+def test_what_was_corrected_before_stays_as_a_whole_where_the_next_lap_is_corrected() -> None:
+    config = msgspec.structs.replace(QUIET, anchor="map")
+    drive = round_once(LoopDrive(config, bias_rad=0.004))
+    drive.meet(3)
+    drive.go(LAP - 10, {})
+    before = _rows(drive.desk)
+    drive.meet(3)
+    drive.go(5, {})
+
+    after_m = _positions_m(drive.desk)[: len(before)]
+    before_m = before[:, POSE][:, :2]
+    closed_s = stamp_ns(LAP + 2) * 1e-9
+    first_lap = before[:, STAMP] <= closed_s
+    assert np.abs(after_m - before_m)[~first_lap].max() > 1.0
+    assert motion_onto(before_m[first_lap], after_m[first_lap]) == pytest.approx(
+        np.zeros(3), abs=0.05
+    )
+
+
 def test_road_moves_with_the_path_that_it_lies_along() -> None:
     drive = round_once(LoopDrive())
     drive.meet(3)
