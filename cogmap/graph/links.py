@@ -68,13 +68,9 @@ class LinkIndex:
             self._drop_exclusive(kind, source, target)
             return
 
-        weights = self._targets[kind].get(source, {})
-        if target in weights:
-            del weights[target]
+        if target in self._targets[kind].get(source, {}):
+            self._drop_target(kind, source, target)
             self._remove_sources(kind, target, {source})
-
-        if not weights:
-            self._targets[kind].pop(source, None)
 
     def drop_node(self, node: str) -> None:
         """Remove all links from and to a node."""
@@ -82,8 +78,8 @@ class LinkIndex:
             for target in list(self.targets(node, kind)):
                 self.drop(kind, node, target)
 
-            for source in self.sources(node, kind):
-                self.drop(kind, source, node)
+            for source in self._sources[kind].pop(node, ()):
+                self._drop_target(kind, source, node)
 
     def targets(self, source: str, kind: str) -> Weights:
         """The targets of a source's links of a kind, and their weights."""
@@ -197,6 +193,17 @@ class LinkIndex:
 
         del self._target[kind][source]
         self._remove_sources(kind, target, {source})
+
+    def _drop_target(self, kind: str, source: str, target: str) -> None:
+        """Remove a link from its source alone."""
+        if kind in EXCLUSIVE_LINKS:
+            del self._target[kind][source]
+            return
+
+        weights = self._targets[kind][source]
+        del weights[target]
+        if not weights:
+            del self._targets[kind][source]
 
     def _add_source(self, kind: str, target: str, source: str) -> None:
         sources = self._sources[kind]
