@@ -8,7 +8,6 @@ view, not with the map.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 
 import msgspec
 import numpy as np
@@ -33,68 +32,38 @@ from schemas.nodes import (
     nearest_place,
     object_id,
 )
-from schemas.sensing import Percept
 from services.codelets.config import SECTION, Config
 from services.codelets.localization.measurement_model import (
     Sighting,
     compare,
-    cost_of_mistake,
     log_likelihood,
     sightings,
 )
+from services.codelets.localization.misfits import (
+    Estimate,
+    inflated,
+    misfit,
+    relocalized,
+    seen_of_late,
+)
 from services.codelets.localization.motion_model import dead_reckon, move, with_gains
 from services.codelets.localization.novelty import novelty, variances_when_placed
-from services.codelets.localization.recovery import (
-    SEVERAL,
-    believed_of,
-    relocalize,
-    relocalize_heading,
-    seen_before,
-)
+from services.codelets.localization.recovery import relocalize_heading
 from services.codelets.localization.sampling import (
     Samples,
     centred,
     generator,
-    inflate,
-    position_sd_m,
     rejection_resample,
     resample,
     tempering_exponent,
 )
 from services.codelets.mapping.path import odometry_of, variances_of
 
-INFLATION = 1.5
-MAX_INFLATIONS = 6
-PATIENCE = 2
-# So many landmarks do not agree by mistake: so few views that fit nothing are enough then.
-MANY = 3
-EARLY_MISFITS = 3
 STAGES = 3
 # Headings a radian apart, and those whose mean direction is no longer than that of a spread of one.
 TURNED_RAD = 1.0
 ALIKE = 0.6
 FORGOTTEN_NS = 20_000_000_000
-LATELY_NS = 10_000_000_000
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """The samples that were kept, the share of those tried that they are, and for how many views
-    nothing has fitted.
-
-    `first_misfit` names the landmark that did not fit first; `is_lost` states whether another did
-    not fit since: then it is the agent that is elsewhere, not the landmark. `was_kidnapped` states
-    that it was found where it cannot have moved to, `is_not_elsewhere` that it can be nowhere else
-    on the map: what it sees is new.
-    """
-
-    samples: Samples
-    share: float = 1.0
-    misfit_count: int = 0
-    first_misfit: str = ""
-    is_lost: bool = False
-    was_kidnapped: bool = False
-    is_not_elsewhere: bool = False
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
@@ -137,22 +106,13 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         since = variances - variances_when_placed(graph, seen)
         weights = novelty(moved, seen, since) / config.correlated_views
         found = _correct(found, seen, weights, config, rng)
-        if found.is_lost and found.misfit_count <= MAX_INFLATIONS:
-            limit_m = _path_sd_m(agent, variances)
-            found = _inflated(found, limit_m, rng)
+        found = inflated(found, _path_sd_m(agent, variances), rng)
 
     gains = found.samples[:, POSE_COLUMNS:].mean(axis=0)
     odometry = dead_reckon(odometry_of(agent), motions, gains)
-    if seen is not None and found.is_lost:
-        since_fit = seen_before(graph, odometry, agent.last_fit_ns)
-        percepts = _all_seen(task.percepts, since_fit)
-        found = _relocalize(found, percepts, graph, config, rng)
-    elif seen is not None and found.misfit_count:
-        # Path integration does not lead from what was seen before it was found to what is seen now.
-        since_ns = max(task.stamp_ns - LATELY_NS, agent.found_ns)
-        lately = seen_before(graph, odometry, since_ns)
-        percepts = _all_seen(task.percepts, lately)
-        found = _reconsidered(found, percepts, graph, config, rng)
+    if seen is not None and found.misfit_count:
+        percepts = seen_of_late(found, task, graph, odometry)
+        found = relocalized(found, percepts, graph, config, rng)
 
     if found.was_kidnapped:
         # Self-motion did not measure the kidnapping: the step there counts as one that was driven,
@@ -232,7 +192,7 @@ def _correct(
     counts = seen.weights.astype(np.float32)
     fitting = (counts @ is_fitting).max()
     if 2 * fitting < counts.sum():
-        return _misfit(past, seen, config)
+        return misfit(past, seen, config)
 
     samples = past.samples
     exponent_left = 1.0
@@ -267,27 +227,6 @@ def _is_heading_unknown(headings_rad: Samples) -> bool:
     return bool(mean_length < ALIKE)
 
 
-def _misfit(past: Estimate, seen: Sighting, config: Config) -> Estimate:
-    """Nothing fits. Where several landmarks do not, the agent is elsewhere; one that does not for
-    long stands elsewhere, or is another.
-    """
-    count = past.misfit_count + 1
-    first = past.first_misfit or seen.labels[0]
-    has_other = any(label != first for label in seen.labels)
-    is_lost = past.is_lost or has_other
-    is_landmark = not is_lost and count >= config.misfits_to_relocalize
-    return Estimate(past.samples, 0.0, count, first, is_lost, is_not_elsewhere=is_landmark)
-
-
-def _inflated(lost: Estimate, limit_m: float, rng: np.random.Generator) -> Estimate:
-    """The pose is less certain than it seemed, but no less than by path integration alone."""
-    if position_sd_m(lost.samples) >= limit_m:
-        return lost
-
-    samples = inflate(lost.samples, INFLATION, rng)
-    return replace(lost, samples=samples)
-
-
 def _path_sd_m(agent: Self, variances: Samples) -> float:
     """The standard deviation of where path integration alone would have the agent, by its
     `variances` since the start, in m^2 and rad^2.
@@ -295,90 +234,6 @@ def _path_sd_m(agent: Self, variances: Samples) -> float:
     variance_m2, variance_rad2 = variances.tolist()
     away_m2 = agent.odometry_x_m**2 + agent.odometry_y_m**2
     return math.sqrt(variance_m2 + variance_rad2 * away_m2)
-
-
-def _all_seen(in_view: list[Percept], before: list[Percept]) -> list[Percept]:
-    """The percepts in view, and those of landmarks that were seen before and are not in view."""
-    labels = {percept.label for percept in in_view}
-
-    percepts = list(in_view)
-    for percept in before:
-        if percept.label not in labels:
-            percepts.append(percept)
-    return percepts
-
-
-def _relocalize(
-    lost: Estimate,
-    percepts: list[Percept],
-    graph: Graph,
-    config: Config,
-    rng: np.random.Generator,
-) -> Estimate:
-    """Where several landmarks have not fitted for long, the agent is elsewhere: relocalize by all
-    `percepts`.
-
-    That is where most of them fit one pose, together, all the sooner where they are MANY; else,
-    after a while, it is nowhere else. It is at once where its position is less certain than one
-    look at a landmark makes it.
-    """
-    seen = sightings(percepts, graph, config.largest_landmark_sd_m, NEVER_NS)
-    if seen is None:
-        return lost
-
-    nearest_m = float(seen.range_m.min())
-    is_unsure = position_sd_m(lost.samples) > nearest_m
-    enough = SEVERAL if is_unsure else config.misfits_to_relocalize
-    if lost.misfit_count < min(enough, EARLY_MISFITS):
-        return lost
-
-    samples = relocalize(lost.samples, seen, config, rng)
-    several = SEVERAL if lost.misfit_count >= enough else MANY
-    believed = believed_of(samples, seen, is_unsure, several, config)
-    if believed is not None:
-        found = resample(believed, len(samples), 0.0, rng)
-        return Estimate(found, 0.0, was_kidnapped=not is_unsure)
-
-    if lost.misfit_count >= PATIENCE * enough:
-        return Estimate(lost.samples, 0.0, is_not_elsewhere=True)
-    return lost
-
-
-def _reconsidered(
-    doubtful: Estimate,
-    percepts: list[Percept],
-    graph: Graph,
-    config: Config,
-    rng: np.random.Generator,
-) -> Estimate:
-    """Where a landmark does not fit: the pose that explains all `percepts` so much better that more
-    than one of them would have to be mistaken for the agent to be where it is believed.
-
-    Others may fit there nevertheless, as landmarks in a row do from several places.
-    """
-    seen = sightings(percepts, graph, config.largest_landmark_sd_m, NEVER_NS)
-    if seen is None or len(seen.labels) < MANY:
-        return doubtful
-
-    here = _best_log_likelihood(doubtful.samples, seen, config)
-    required = here + cost_of_mistake(config.outlier_share)
-    if required >= 0:
-        return doubtful
-
-    samples = relocalize(doubtful.samples, seen, config, rng)
-    believed = believed_of(samples, seen, False, MANY, config)
-    if believed is None or _best_log_likelihood(believed, seen, config) <= required:
-        return doubtful
-
-    found = resample(believed, len(samples), 0.0, rng)
-    return Estimate(found, 0.0, was_kidnapped=True)
-
-
-def _best_log_likelihood(samples: Samples, seen: Sighting, config: Config) -> float:
-    """That of what is seen at the one of (n, 7) samples which explains it best, at most 0."""
-    density = compare(samples, seen).density
-    scores = log_likelihood(density, config.outlier_share, seen.weights)
-    return float(scores.max())
 
 
 def _self_node(task: Task, agent: Self, found: Estimate) -> Self:

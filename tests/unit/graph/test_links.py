@@ -100,6 +100,14 @@ def test_links_of_an_exclusive_kind_are_in_bulk_what_they_are_one_by_one() -> No
             assert found == one_by_one.links.sources(target, LinkKind.AT)
 
 
+def test_of_several_links_of_an_exclusive_kind_in_bulk_the_last_one_is_kept() -> None:
+    links = _graph(Links(kind=LinkKind.AT, weights={"a": {"here": 1.0, "there": 0.5}})).links
+
+    assert links.targets("a", LinkKind.AT) == {"there": 0.5}
+    assert links.sources("here", LinkKind.AT) == ()
+    assert links.sources("there", LinkKind.AT) == ("a",)
+
+
 def test_dropping_a_link_that_is_not_there_changes_nothing() -> None:
     graph = _graph(_link("a", "b"), _link("a", "here", kind=LinkKind.AT))
     before = graph.digest()
