@@ -11,6 +11,7 @@ from schemas.base import PositiveShare, Share
 WeightsPath = Annotated[str, msgspec.Meta(max_length=4096)]
 Pixels = Annotated[int, msgspec.Meta(ge=4, le=1000)]
 Deviations = Annotated[float, msgspec.Meta(gt=0, le=100)]
+Processor = Literal["cpu", "gpu"]
 
 
 class Priming(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -114,6 +115,14 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         WeightsPath,
         msgspec.Meta(description="ONNX file of the road network; empty: the built-in one"),
     ] = ""
+    processor: Annotated[
+        Processor,
+        msgspec.Meta(
+            description="what runs the networks. gpu: the GPU for which the installed ONNX Runtime "
+            "has a provider, as onnxruntime-gpu has for CUDA; sums may round differently there, so "
+            "a log is replayed to the byte by the processor that it was recorded with"
+        ),
+    ] = "cpu"
     base_level: Annotated[
         Share,
         msgspec.Meta(

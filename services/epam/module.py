@@ -133,9 +133,9 @@ def build(config: Config, instance: str) -> Module:
     road_path = _path(config.road_weights, road.DEFAULT_PATH)
     pam = ExtendedPam(
         config,
-        segments.load(segments_path),
-        objects.load(objects_path),
-        road.load(road_path),
+        segments.load(segments_path, config.processor),
+        objects.load(objects_path, config.processor),
+        road.load(road_path, config.processor),
     )
     primer = Primer(config.priming)
     perception = Perception(pam, PlaceRecognizer(), primer, config.mode == "lockstep")

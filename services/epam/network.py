@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,23 +11,42 @@ import numpy as np
 
 from cogmap.errors import ConfigError
 from cogmap.geometry.arrays import Singles
+from services.epam.config import Processor
 
 if TYPE_CHECKING:
     import onnxruntime
 
 WEIGHTS = Path(__file__).with_name("weights")
+CPU_PROVIDER = "CPUExecutionProvider"
+CUDA_PROVIDER = "CUDAExecutionProvider"
+# ONNX Runtime's names; the first that is installed is taken.
+GPU_PROVIDERS = (
+    CUDA_PROVIDER,
+    "MIGraphXExecutionProvider",
+    "DmlExecutionProvider",
+    "CoreMLExecutionProvider",
+)
+# Products of single precision, as on a CPU.
+CUDA_OPTIONS = {"use_tf32": "0"}
 Shape = tuple[int, ...]
 
 
 class Network:
     """The network in the ONNX file at `path`: float32 `input_shape` to float32 outputs, whose
-    shapes are given by name.
+    shapes are given by name, run by `processor`.
 
-    Raises ConfigError if there is no such file, or its network has other inputs or outputs.
+    Raises ConfigError if there is no such file or no such processor, or if its network has other
+    inputs or outputs.
     """
 
-    def __init__(self, path: Path, input_shape: Shape, output_shapes: Mapping[str, Shape]) -> None:
-        self._session = _session(path)
+    def __init__(
+        self,
+        path: Path,
+        input_shape: Shape,
+        output_shapes: Mapping[str, Shape],
+        processor: Processor = "cpu",
+    ) -> None:
+        self._session = _session(path, processor)
         self._beside = ThreadPoolExecutor(1)
         self._input_shape = input_shape
         self._output_names = list(output_shapes)
@@ -53,7 +72,25 @@ class Network:
         return [np.asarray(output, np.float32) for output in outputs]
 
 
-def _session(path: Path) -> onnxruntime.InferenceSession:
+def provider_of(processor: Processor, installed: Collection[str]) -> str:
+    """Return the one of ONNX Runtime's `installed` providers that runs networks on a processor.
+
+    Raises ConfigError where there is none.
+    """
+    if processor == "cpu":
+        return CPU_PROVIDER
+
+    for name in GPU_PROVIDERS:
+        if name in installed:
+            return name
+
+    raise ConfigError(
+        "epam.processor is gpu, but the installed ONNX Runtime has no provider for one: install "
+        "onnxruntime-gpu in its place, or set epam.processor to cpu"
+    )
+
+
+def _session(path: Path, processor: Processor) -> onnxruntime.InferenceSession:
     if not path.is_file():
         raise ConfigError(f"no weights {path}: train them with cogmap train")
 
@@ -63,12 +100,24 @@ def _session(path: Path) -> onnxruntime.InferenceSession:
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
     options.inter_op_num_threads = 1
+    provider = provider_of(processor, onnxruntime.get_available_providers())
+    provider_options = CUDA_OPTIONS if provider == CUDA_PROVIDER else {}
     try:
-        return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+        session = onnxruntime.InferenceSession(
+            path, options, providers=[(provider, provider_options)]
+        )
     except Exception as error:  # the library raises an exception of its own for each status
         raise ConfigError(
             f"{path} does not hold a network ({error}): train it again with cogmap train"
         ) from error
+
+    # Where its driver is missing, ONNX Runtime takes the CPU without an error.
+    if provider not in session.get_providers():
+        raise ConfigError(
+            f"{provider} does not start on this machine: install the driver that it needs, or set "
+            "epam.processor to cpu"
+        )
+    return session
 
 
 def _check(

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Bytes, Singles
+from services.epam.config import Processor
 from services.epam.network import WEIGHTS, Network
 
 DEFAULT_PATH = WEIGHTS / "road.onnx"
@@ -89,11 +90,11 @@ class RoadPass(NamedTuple):
         return _denoised(likelihood)
 
 
-def load(path: Path = DEFAULT_PATH) -> RoadSegmenter:
+def load(path: Path = DEFAULT_PATH, processor: Processor = "cpu") -> RoadSegmenter:
     """Load the road network in the file at `path`. Raises ConfigError if it holds no such
-    network.
+    network, or there is no such processor.
     """
-    return RoadSegmenter(Network(path, INPUT_SHAPE, OUTPUT_SHAPES))
+    return RoadSegmenter(Network(path, INPUT_SHAPE, OUTPUT_SHAPES, processor))
 
 
 def network_input(small: Bytes) -> Singles:

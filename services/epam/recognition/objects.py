@@ -23,6 +23,7 @@ import numpy.typing as npt
 from cogmap.errors import ConfigError
 from cogmap.geometry.arrays import Bytes, Floats, Singles
 from schemas.sensing import Calibration
+from services.epam.config import Processor
 from services.epam.network import WEIGHTS, Network
 from services.epam.recognition.crop import CHANNELS, SIDE_PX, crop, surroundings
 from services.epam.recognition.segments import Segment
@@ -237,11 +238,12 @@ class ObjectRecognizer:
         return list(zip(self._labels, self._embeddings, strict=True))
 
 
-def load(path: Path = DEFAULT_PATH) -> ObjectRecognizer:
+def load(path: Path = DEFAULT_PATH, processor: Processor = "cpu") -> ObjectRecognizer:
     """Load the embedding network in the file at `path` and the prototypes in the .json file beside
-    it. Raises ConfigError if they cannot be read or do not belong together.
+    it. Raises ConfigError if they cannot be read or do not belong together, or there is no such
+    processor.
     """
-    network = Network(path, INPUT_SHAPE, OUTPUT_SHAPES)
+    network = Network(path, INPUT_SHAPE, OUTPUT_SHAPES, processor)
     beside = path.with_suffix(".json")
     try:
         prototypes = msgspec.json.decode(beside.read_bytes(), type=Prototypes)

@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from cogmap.geometry.arrays import Booleans, Bytes, Floats, Singles
 from schemas.sensing import Calibration
+from services.epam.config import Processor
 from services.epam.network import WEIGHTS, Network
 
 DEFAULT_PATH = WEIGHTS / "segments.onnx"
@@ -88,11 +89,11 @@ class Segmenter:
         return divided(unpadded, depth_m.shape)
 
 
-def load(path: Path = DEFAULT_PATH) -> Segmenter:
+def load(path: Path = DEFAULT_PATH, processor: Processor = "cpu") -> Segmenter:
     """Load the segmentation network in the file at `path`. Raises ConfigError if it holds no such
-    network.
+    network, or there is no such processor.
     """
-    return Segmenter(Network(path, INPUT_SHAPE, OUTPUT_SHAPES))
+    return Segmenter(Network(path, INPUT_SHAPE, OUTPUT_SHAPES, processor))
 
 
 def network_input(small: Bytes, depth_m: Singles, camera: Calibration) -> Singles:
