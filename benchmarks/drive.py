@@ -9,16 +9,16 @@ from pathlib import Path
 import msgspec
 from rich.console import Console
 
-from cli.launch.drive import Drive
-from cli.launch.forking.client import fork_server
-from cli.launch.metrics import RunMetrics
-from cli.launch.observer import Errors, Observer
-from cli.launch.outcome import Outcome
-from cli.launch.plan import LOG_NAME, Choices, awaited, effective
-from cli.launch.watch import Watch
-from cli.run import summary
-from cli.run.display import Display, display_on
 from cogmap.bus.session import free_endpoint
+from cogmap.cli.launch.drive import Drive
+from cogmap.cli.launch.forking.client import fork_server
+from cogmap.cli.launch.metrics import RunMetrics
+from cogmap.cli.launch.observer import Errors, Observer
+from cogmap.cli.launch.outcome import Outcome
+from cogmap.cli.launch.plan import LOG_NAME, Choices, awaited, effective
+from cogmap.cli.launch.watch import Watch
+from cogmap.cli.run import summary
+from cogmap.cli.run.display import Display, display_on
 from cogmap.errors import CogmapError
 from cogmap.recording.recorder import Summary
 from cogmap.recording.storage.format import SUMMARY

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_most, more_than, within
-from cli.log.progress import bar
-from experiments.city_maps import measure as city_maps
-from experiments.city_maps.metrics import map_metrics
-from experiments.city_maps.sources import grown_environments
-from experiments.cue_integration import run as cue_integration
+from cogmap.cli.log.progress import bar
+from cogmap.experiments.city_maps import measure as city_maps
+from cogmap.experiments.city_maps.metrics import map_metrics
+from cogmap.experiments.city_maps.sources import grown_environments
+from cogmap.experiments.cue_integration import run as cue_integration
 
 CUE_INTEGRATION_THRESHOLDS = {
     "sd_both_over_optimal": within(0.9, 1.1),

@@ -12,10 +12,10 @@ import click
 from cogmap.errors import CogmapError, UsageError
 from cogmap.runtime.codelet import Written
 from cogmap.runtime.module import Module
-from schemas import topics
-from schemas.topics import Delivery, Topic
-from services import registry
-from services.codelets.table import CODELETS
+from cogmap.schemas import topics
+from cogmap.schemas.topics import Delivery, Topic
+from cogmap.services import registry
+from cogmap.services.codelets.table import CODELETS
 
 PAGE = Path("docs/architecture.md")
 OBSERVERS = "observers"

@@ -11,13 +11,13 @@ import click
 import msgspec
 import tomli_w
 
-from cli.launch.plan import Choices, awaited, effective
-from cli.options import config_option, json_option, set_option
-from cli.run.command import codelets_option, laps_option, lockstep_option, seed_option
+from cogmap.cli.launch.plan import Choices, awaited, effective
+from cogmap.cli.options import config_option, json_option, set_option
+from cogmap.cli.run.command import codelets_option, laps_option, lockstep_option, seed_option
 from cogmap.errors import UsageError
 from cogmap.runtime import config
 from cogmap.runtime.config import Sections
-from services import registry
+from cogmap.services import registry
 
 COLUMNS = 100
 Schema = dict[str, Any]

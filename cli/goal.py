@@ -12,17 +12,17 @@ from pathlib import Path
 import click
 import msgspec
 
-from cli.launch.goals import name_of, nearest_label, routeless
-from cli.options import FiniteRange, agent_option, connect_option, json_option
+from cogmap.cli.launch.goals import name_of, nearest_label, routeless
+from cogmap.cli.options import FiniteRange, agent_option, connect_option, json_option
 from cogmap.errors import NoAnswerError, UsageError
 from cogmap.graph.graph import Graph
 from cogmap.runtime.client import Client
 from cogmap.runtime.module import Module
-from schemas import topics
-from schemas.base import Message
-from schemas.codelets import Offer
-from schemas.graph import Delta, DropNode, Operation
-from schemas.nodes import NEVER_NS, PLAN_ID, Goal, Plan, PlanState, goal_id
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.codelets import Offer
+from cogmap.schemas.graph import Delta, DropNode, Operation
+from cogmap.schemas.nodes import NEVER_NS, PLAN_ID, Goal, Plan, PlanState, goal_id
 
 FARTHEST_M = 1e6
 

@@ -8,11 +8,11 @@ from typing import Any
 
 import click
 
-from cli.options import agent_option, connect_option, json_option
-from cli.topic.observing import inspect_system
 from cogmap.bus.discovery import Process, Role, System
+from cogmap.cli.options import agent_option, connect_option, json_option
+from cogmap.cli.topic.observing import inspect_system
 from cogmap.errors import UsageError
-from schemas.topics import Topic
+from cogmap.schemas.topics import Topic
 
 _VERBS = {Role.PUBLISHES: "publishes", Role.SUBSCRIBES: "subscribes", Role.ANSWERS: "answers"}
 

@@ -16,112 +16,112 @@ Loader = Callable[[], click.Command]
 
 def _architecture() -> click.Command:
     """Write the generated parts of docs/architecture.md."""
-    from cli.architecture import architecture
+    from cogmap.cli.architecture import architecture
 
     return architecture
 
 
 def _config() -> click.Command:
     """Print every setting of every module, as TOML."""
-    from cli.config import print_config
+    from cogmap.cli.config import print_config
 
     return print_config
 
 
 def _doctor() -> click.Command:
     """Report what is wrong, and what to do about it."""
-    from cli.doctor.command import doctor
+    from cogmap.cli.doctor.command import doctor
 
     return doctor
 
 
 def _experiment() -> click.Command:
     """Run the paper's experiments."""
-    from cli.experiment.command import experiment
+    from cogmap.cli.experiment.command import experiment
 
     return experiment
 
 
 def _explain() -> click.Command:
     """Explain a moment of a recorded drive."""
-    from cli.explain.command import explain
+    from cogmap.cli.explain.command import explain
 
     return explain
 
 
 def _goal() -> click.Command:
     """Send the agent somewhere, and print its plan."""
-    from cli.goal import goal
+    from cogmap.cli.goal import goal
 
     return goal
 
 
 def _graph() -> click.Command:
     """Show which process publishes and subscribes what."""
-    from cli.graph import graph
+    from cogmap.cli.graph import graph
 
     return graph
 
 
 def _log() -> click.Command:
     """Record, inspect, draw, replay and compare logs."""
-    from cli.log.command import log
+    from cogmap.cli.log.command import log
 
     return log
 
 
 def _memory() -> click.Command:
     """Look into long-term memory; check, export, import it."""
-    from cli.memory.command import memory
+    from cogmap.cli.memory.command import memory
 
     return memory
 
 
 def _module() -> click.Command:
     """Run one module as this process."""
-    from cli.processes import module
+    from cogmap.cli.processes import module
 
     return module
 
 
 def _router() -> click.Command:
     """Run the router that all modules connect to."""
-    from cli.processes import router
+    from cogmap.cli.processes import router
 
     return router
 
 
 def _run() -> click.Command:
     """Drive the robot around a simulated town."""
-    from cli.run.command import run
+    from cogmap.cli.run.command import run
 
     return run
 
 
 def _schemes() -> click.Command:
     """Write the guidance schemes that a drive has taught."""
-    from cli.schemes import schemes
+    from cogmap.cli.schemes import schemes
 
     return schemes
 
 
 def _street() -> click.Command:
     """Close streets of the simulated town, and open them."""
-    from cli.street import street
+    from cogmap.cli.street import street
 
     return street
 
 
 def _topic() -> click.Command:
     """Watch topics of a running system, or publish on them."""
-    from cli.topic.command import topic
+    from cogmap.cli.topic.command import topic
 
     return topic
 
 
 def _train() -> click.Command:
     """Train the networks of perception."""
-    from training.command import train
+    from cogmap.training.command import train
 
     return train
 

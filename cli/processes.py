@@ -6,9 +6,9 @@ from pathlib import Path
 
 import click
 
-from cli.options import agent_option, config_option, connect_option, set_option
+from cogmap.cli.options import agent_option, config_option, connect_option, set_option
 from cogmap.runtime import config, process
-from services import registry
+from cogmap.services import registry
 
 tied_option = click.option("--tied", is_flag=True, help="End when standard input ends.")
 

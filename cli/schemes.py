@@ -6,13 +6,13 @@ from pathlib import Path
 
 import click
 
-from cli.launch.plan import LOG_NAME
+from cogmap.cli.launch.plan import LOG_NAME
 from cogmap.errors import LogError
 from cogmap.recording.log import open_log
 from cogmap.runtime.state.new_file import new_file
-from schemas import topics
-from schemas.cognition import Behaviours, GuidanceScheme
-from services.procedural.guidance.toml import written
+from cogmap.schemas import topics
+from cogmap.schemas.cognition import Behaviours, GuidanceScheme
+from cogmap.services.procedural.guidance.toml import written
 
 _EPILOG = """\b
 Examples:

@@ -6,16 +6,16 @@ import time
 
 import click
 
-from cli.options import agent_option, connect_option
-from cli.topic.observing import observing
-from cli.topic.pub import Publisher
 from cogmap.bus.interface import Arrival
 from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.cli.options import agent_option, connect_option
+from cogmap.cli.topic.observing import observing
+from cogmap.cli.topic.pub import Publisher
 from cogmap.errors import NoAnswerError
 from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.delivery.intake import Intake
-from schemas import topics
-from schemas.sensing import StreetClosure, TrueTown
+from cogmap.schemas import topics
+from cogmap.schemas.sensing import StreetClosure, TrueTown
 
 ANSWER_S = 10
 

@@ -1,9 +1,9 @@
 """What a module of one's own and a notebook need; `import cogmap` gives these names.
 
-A module:       Module, topics, run_module; its messages are in `schemas`
+A module:       Module, topics, run_module; its messages are in `cogmap.schemas`
 The map:        Graph, Replica, snapshot_over (Module.following is the short form)
 Running:        InProcessRunner in one process; Client beside a running system
-A codelet:      Codelet, CycleContext, Answer; its tasks and nodes are in `schemas`
+A codelet:      Codelet, CycleContext, Answer; its tasks and nodes are in `cogmap.schemas`
 Recorded logs:  open_log, Log, Entry
 Errors:         CogmapError and its kinds
 """
@@ -29,7 +29,7 @@ from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
 from cogmap.runtime.process import run_module
-from schemas import topics
+from cogmap.schemas import topics
 
 __all__ = [
     "Answer",

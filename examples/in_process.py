@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from cogmap import InProcessRunner, Module, topics
+from cogmap.schemas.sensing import TruePose
+from cogmap.services import registry
 from examples import wanderer
-from schemas.sensing import TruePose
-from services import registry
 
 
 def drive(frames: int) -> list[TruePose]:

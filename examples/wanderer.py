@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 
 from cogmap import MessageError, Module, run_module, topics
-from schemas.sensing import MotorCommand, RangeScan
+from cogmap.schemas.sensing import MotorCommand, RangeScan
 
 AHEAD_RAD = 0.3
 

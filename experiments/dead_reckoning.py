@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
+from cogmap.experiments.reading import Pose
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.polylines import interpolate
-from experiments.reading import Pose
-from schemas.sensing import Odometry
+from cogmap.schemas.sensing import Odometry
 
 
 class DeadReckoning:

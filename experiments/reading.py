@@ -10,7 +10,7 @@ from cogmap.errors import CogmapError
 from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
 from cogmap.graph.path import rows_of
-from schemas.nodes import (
+from cogmap.schemas.nodes import (
     ROOT_MAP,
     Object,
     Observations,
@@ -18,7 +18,7 @@ from schemas.nodes import (
     PlaceColumn,
     object_id,
 )
-from services.codelets.mapping.observations import Sightings
+from cogmap.services.codelets.mapping.observations import Sightings
 
 STAMP = 0
 POSE = slice(1, 4)

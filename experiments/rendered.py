@@ -11,11 +11,11 @@ from cogmap.errors import CogmapError
 from cogmap.parallel import Progress
 from cogmap.runtime.config import Sections
 from cogmap.runtime.module import Module
-from schemas import topics
-from schemas.base import Message
-from schemas.sensing import MotorCommand, TruePose
-from services import registry
-from services.sim.layout.catalogue import CATALOGUE
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.sensing import MotorCommand, TruePose
+from cogmap.services import registry
+from cogmap.services.sim.layout.catalogue import CATALOGUE
 
 # Of the time that all runs take.
 DRAWN_SHARE = 0.9

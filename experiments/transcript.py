@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterable
 
 from cogmap.bus.codec import encode
 from cogmap.runtime.module import Module
-from schemas import topics
-from schemas.base import Message
-from schemas.topics import Delivery, Scope, Topic
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.topics import Delivery, Scope, Topic
 
 NAME = "listener"
 # What the model publishes and nobody may miss.

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from schemas.array import Array
-from schemas.base import Count, Message, Name, Part
-from schemas.cognition import Coalition, Event
-from schemas.graph import Operation
-from schemas.sensing import Percept, PlaceMatch
+from cogmap.schemas.array import Array
+from cogmap.schemas.base import Count, Message, Name, Part
+from cogmap.schemas.cognition import Coalition, Event
+from cogmap.schemas.graph import Operation
+from cogmap.schemas.sensing import Percept, PlaceMatch
 
 
 class Task(Message, kw_only=True, frozen=True):

@@ -9,11 +9,11 @@ from typing import Annotated
 
 import msgspec
 
-from schemas.array import Array
-from schemas.base import Count, Finite, Message, Name, Part, Scalar, Unit
-from schemas.feelings import Feeling
-from schemas.graph import Link
-from schemas.nodes import AnyNode
+from cogmap.schemas.array import Array
+from cogmap.schemas.base import Count, Finite, Message, Name, Part, Scalar, Unit
+from cogmap.schemas.feelings import Feeling
+from cogmap.schemas.graph import Link
+from cogmap.schemas.nodes import AnyNode
 
 
 class Replay(Message, kw_only=True, frozen=True, tag="replay"):

@@ -1,9 +1,10 @@
-"""The messages for other languages: `python -m schemas.export DIR` writes a JSON Schema for every
-topic.
+"""The messages for other languages.
+
+`python -m cogmap.schemas.export DIR` writes a JSON Schema for every topic.
 
 With `--golden` it writes the golden bytes instead, which is how they are changed on purpose:
-`python -m schemas.export --golden schemas/golden`. JSON Schema has no bytes: `data` of an array, a
-base64 string there, is msgpack's bin.
+`python -m cogmap.schemas.export --golden schemas/golden`. JSON Schema has no bytes: `data` of an
+array, a base64 string there, is msgpack's bin.
 """
 
 from __future__ import annotations
@@ -14,9 +15,9 @@ from typing import Any
 
 import msgspec
 
-from schemas import topics
-from schemas.examples import example_messages
-from schemas.topics import Topic
+from cogmap.schemas import topics
+from cogmap.schemas.examples import example_messages
+from cogmap.schemas.topics import Topic
 
 GOLDEN = Path(__file__).parent / "golden"
 
@@ -67,7 +68,7 @@ def _write(folder: Path, files: dict[str, bytes]) -> list[Path]:
 
 def main() -> None:
     """Write what the command line asks for, and print how many files that is."""
-    parser = argparse.ArgumentParser(prog="python -m schemas.export", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m cogmap.schemas.export", description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--golden", action="store_true", help="write the golden bytes instead")
     arguments = parser.parse_args()

@@ -10,9 +10,9 @@ from typing import Annotated
 
 import msgspec
 
-from schemas.array import Array
-from schemas.base import Count, Finite, Message, Name, Part, Unit
-from schemas.nodes import ROOT_MAP, AnyNode, LinkKind, PlaceColumn
+from cogmap.schemas.array import Array
+from cogmap.schemas.base import Count, Finite, Message, Name, Part, Unit
+from cogmap.schemas.nodes import ROOT_MAP, AnyNode, LinkKind, PlaceColumn
 
 
 class Phase(enum.StrEnum):

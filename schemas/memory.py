@@ -6,11 +6,11 @@ from typing import Annotated
 
 import msgspec
 
-from schemas.array import Matrix
-from schemas.base import Count, Finite, Message, Name, Part, Unit
-from schemas.nodes import TILE_CELLS, PlaceColumn, RecalledColumn, Remembered, SubMap
-from schemas.nodes.columns import check_matrix
-from schemas.nodes.recollection import TileNumber, check_tree
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.base import Count, Finite, Message, Name, Part, Unit
+from cogmap.schemas.nodes import TILE_CELLS, PlaceColumn, RecalledColumn, Remembered, SubMap
+from cogmap.schemas.nodes.columns import check_matrix
+from cogmap.schemas.nodes.recollection import TileNumber, check_tree
 
 
 class StoredObjects(Part, kw_only=True, frozen=True, tag="objects"):

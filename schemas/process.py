@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from schemas.base import Count, Finite, Message, Name
+from cogmap.schemas.base import Count, Finite, Message, Name
 
 
 class Clock(Message, kw_only=True, frozen=True):

@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 import yaml
 
-from schemas.array import Array, Matrix
+from cogmap.schemas.array import Array, Matrix
 
 _NAMED = (msgspec.Struct, dict)
 _ONE_LINE = 2**31 - 1

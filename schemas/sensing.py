@@ -9,9 +9,9 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
-from schemas.array import Array
-from schemas.base import Count, Finite, Message, Name, Part, Unit
-from schemas.feelings import Feeling, salience_of
+from cogmap.schemas.array import Array
+from cogmap.schemas.base import Count, Finite, Message, Name, Part, Unit
+from cogmap.schemas.feelings import Feeling, salience_of
 
 Metres = Annotated[float, msgspec.Meta(ge=0, le=1e6)]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
-from schemas import codelets, cognition, graph, memory, process, sensing
-from schemas.base import Message
+from cogmap.schemas import codelets, cognition, graph, memory, process, sensing
+from cogmap.schemas.base import Message
 
 KIB = 1024
 MIB = 1024 * KIB

@@ -35,10 +35,10 @@ class Entry:
 
 
 def _sim() -> Entry:
-    from services.sim.config import Config
+    from cogmap.services.sim.config import Config
 
     def built(sections: config.Sections, name: str) -> Module:
-        from services.sim.module import build
+        from cogmap.services.sim.module import build
 
         return build(config.typed(sections, "sim", Config), name)
 
@@ -46,10 +46,10 @@ def _sim() -> Entry:
 
 
 def _sensory() -> Entry:
-    from services.sensory.config import Config
+    from cogmap.services.sensory.config import Config
 
     def built(sections: config.Sections, name: str) -> Module:
-        from services.sensory.module import build
+        from cogmap.services.sensory.module import build
 
         return build(config.typed(sections, "sensory", Config), name)
 
@@ -57,10 +57,10 @@ def _sensory() -> Entry:
 
 
 def _epam() -> Entry:
-    from services.epam.config import Config
+    from cogmap.services.epam.config import Config
 
     def built(sections: config.Sections, name: str) -> Module:
-        from services.epam.module import build
+        from cogmap.services.epam.module import build
 
         return build(config.typed(sections, "epam", Config), name)
 
@@ -68,11 +68,11 @@ def _epam() -> Entry:
 
 
 def _workspace() -> Entry:
-    from services.workspace.config import Config
+    from cogmap.services.workspace.config import Config
 
     def built(sections: config.Sections, name: str) -> Module:
-        from services.codelets.table import all_codelets, configured
-        from services.workspace.module import build
+        from cogmap.services.codelets.table import all_codelets, configured
+        from cogmap.services.workspace.module import build
 
         codelets = configured(sections, all_codelets())
         return build(config.typed(sections, "workspace", Config), name, codelets)
@@ -81,11 +81,11 @@ def _workspace() -> Entry:
 
 
 def _codelets() -> Entry:
-    from services.codelets.config import Config
+    from cogmap.services.codelets.config import Config
 
     def built(sections: config.Sections, name: str) -> Module:
-        from services.codelets.module import build
-        from services.codelets.table import all_codelets, configured
+        from cogmap.services.codelets.module import build
+        from cogmap.services.codelets.table import all_codelets, configured
 
         return build(name, configured(sections, all_codelets()))
 
@@ -93,10 +93,10 @@ def _codelets() -> Entry:
 
 
 def _global_workspace() -> Entry:
-    from services.global_workspace.config import Config
+    from cogmap.services.global_workspace.config import Config
 
     def built(sections: config.Sections, name: str) -> Module:
-        from services.global_workspace.module import build
+        from cogmap.services.global_workspace.module import build
 
         return build(config.typed(sections, "global_workspace", Config), name)
 
@@ -104,10 +104,10 @@ def _global_workspace() -> Entry:
 
 
 def _memory() -> Entry:
-    from services.memory.config import Config
+    from cogmap.services.memory.config import Config
 
     def built(sections: config.Sections, name: str) -> Module:
-        from services.memory.module import build
+        from cogmap.services.memory.module import build
 
         return build(config.typed(sections, "memory", Config), name)
 
@@ -115,10 +115,10 @@ def _memory() -> Entry:
 
 
 def _procedural() -> Entry:
-    from services.procedural.config import Config
+    from cogmap.services.procedural.config import Config
 
     def built(sections: config.Sections, name: str) -> Module:
-        from services.procedural.module import build
+        from cogmap.services.procedural.module import build
 
         return build(config.typed(sections, "procedural", Config), name)
 
@@ -126,10 +126,10 @@ def _procedural() -> Entry:
 
 
 def _action() -> Entry:
-    from services.action.config import Config
+    from cogmap.services.action.config import Config
 
     def built(sections: config.Sections, name: str) -> Module:
-        from services.action.module import build
+        from cogmap.services.action.module import build
 
         return build(config.typed(sections, "action", Config), name)
 
@@ -137,10 +137,10 @@ def _action() -> Entry:
 
 
 def _motor() -> Entry:
-    from services.motor.config import Config
+    from cogmap.services.motor.config import Config
 
     def built(sections: config.Sections, name: str) -> Module:
-        from services.motor.module import build
+        from cogmap.services.motor.module import build
 
         return build(config.typed(sections, "motor", Config), name)
 
@@ -167,13 +167,13 @@ _OF_CODELETS = (
     "scipy.sparse.csgraph",
     "scipy.spatial",
     "scipy.optimize",
-    "services.codelets.table",
+    "cogmap.services.codelets.table",
 )
 
 
 def codelets() -> tuple[Codelet, ...]:
     """All codelets that there are to run: ours, and those of other packages. Raises ConfigError."""
-    from services.codelets.table import all_codelets
+    from cogmap.services.codelets.table import all_codelets
 
     return all_codelets()
 
@@ -191,7 +191,7 @@ def _settings_found_on(path: tuple[str, ...]) -> dict[str, type[msgspec.Struct]]
     if entry_points(group=ENTRY_POINTS):
         return {codelet.section: codelet.config for codelet in codelets()}
 
-    from services.codelets.sections import SECTIONS
+    from cogmap.services.codelets.sections import SECTIONS
 
     return SECTIONS
 
@@ -225,7 +225,7 @@ def prepare(name: str) -> Iterator[None]:
     steps, so that something else can be done between them. Raises what an import raises.
     """
     if name == "sim":
-        from services.sim.rendering import egl_trial
+        from cogmap.services.sim.rendering import egl_trial
 
         egl_trial.trial()
         yield
@@ -235,7 +235,7 @@ def prepare(name: str) -> Iterator[None]:
             import_module(part)
             yield
 
-    import_module(f"services.{name}.module")
+    import_module(f"cogmap.services.{name}.module")
     yield
 
 

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from cogmap.geometry.arrays import Bytes, Floats, Singles
-from services.epam.layout.road import HEIGHT_PX, WIDTH_PX
+from cogmap.services.epam.layout.road import HEIGHT_PX, WIDTH_PX
 
 
 @dataclass(frozen=True)

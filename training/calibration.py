@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.geometry.arrays import Booleans, Floats, Singles
-from services.epam.recognition.objects import Prototypes, posteriors, probability
-from training.crops import VIEWS_A_TOWN, Crops
-from training.rendering.reader import INVENTED
+from cogmap.services.epam.recognition.objects import Prototypes, posteriors, probability
+from cogmap.training.crops import VIEWS_A_TOWN, Crops
+from cogmap.training.rendering.reader import INVENTED
 
 Rows = npt.NDArray[np.intp]
 SHARPNESS = np.geomspace(4, 60, 40).tolist()

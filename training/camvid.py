@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Bytes
-from services.epam.layout.road import CHANNELS
-from training.augment import Augmentation, LabelledImage
-from training.networks.photograph import COLOURS, PhotographNet
-from training.photographs import Photograph, photographs
-from training.road import Schedule, train, write
+from cogmap.services.epam.layout.road import CHANNELS
+from cogmap.training.augment import Augmentation, LabelledImage
+from cogmap.training.networks.photograph import COLOURS, PhotographNet
+from cogmap.training.photographs import Photograph, photographs
+from cogmap.training.road import Schedule, train, write
 
 SIZE_PX = (240, 180)
 WIDTHS = (8, 16, 32, 48, 64)

@@ -76,7 +76,7 @@ def render(*, data_dir: Path, scale: float, jobs: int) -> None:
     """
     from rich.progress import Progress
 
-    from training.rendering import dataset
+    from cogmap.training.rendering import dataset
 
     if not 0 < scale <= MAX_SCALE:
         raise UsageError(f"--scale must be over 0 and at most {MAX_SCALE:.0f}")
@@ -101,10 +101,10 @@ def segments(*, data_dir: Path, out: Path | None, seed: int, epochs: int | None)
     Prints its recall and precision in held-out towns. Takes about a quarter of an hour on one
     thread.
     """
-    from services.epam.recognition.segments import DEFAULT_PATH
+    from cogmap.services.epam.recognition.segments import DEFAULT_PATH
 
     with _needs_torch():
-        from training.segments import train_on_renderings
+        from cogmap.training.segments import train_on_renderings
 
     weights = out or DEFAULT_PATH
     _report(train_on_renderings(data_dir, weights, seed=seed, epochs=epochs), weights)
@@ -122,10 +122,10 @@ def objects(*, data_dir: Path, out: Path | None, seed: int, epochs: int | None) 
     to a .json file beside the weights. Prints metrics in held-out towns. Takes about 40 minutes on
     one thread.
     """
-    from services.epam.recognition.objects import DEFAULT_PATH
+    from cogmap.services.epam.recognition.objects import DEFAULT_PATH
 
     with _needs_torch():
-        from training.objects import train_on_renderings
+        from cogmap.training.objects import train_on_renderings
 
     weights = out or DEFAULT_PATH
     _report(train_on_renderings(data_dir, weights, seed=seed, epochs=epochs), weights)
@@ -170,7 +170,7 @@ def road(
     cogmap train road --camvid DIR
     cogmap train road --camvid-test DIR/val DIR/valannot
     """
-    from services.epam.layout.road import DEFAULT_PATH
+    from cogmap.services.epam.layout.road import DEFAULT_PATH
 
     sources = (data_dir is not None) + (camvid is not None)
     if sources > 1 or (not sources and camvid_test is None):
@@ -181,17 +181,17 @@ def road(
     weights = out or (DEFAULT_PATH if data_dir is not None else CAMVID_ROAD)
     if data_dir is not None:
         with _needs_torch():
-            from training.road import train_on_renderings
+            from cogmap.training.road import train_on_renderings
         _report(train_on_renderings(data_dir, weights, seed=seed, epochs=epochs), weights)
 
     if camvid is not None:
         with _needs_torch():
-            from training.camvid import train_on_photographs
+            from cogmap.training.camvid import train_on_photographs
         train_on_photographs(camvid, weights, seed=seed, epochs=epochs)
         _report({}, weights)
 
     if camvid_test is not None:
-        from training.photographs import camvid_iou
+        from cogmap.training.photographs import camvid_iou
 
         images, labels = camvid_test
         click.echo(f"road IoU on {images}: {camvid_iou(weights, images, labels):.4f}")

@@ -12,9 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.geometry.arrays import Booleans, Bytes
-from services.epam.recognition.crop import CHANNELS, SIDE_PX, crop, surroundings
-from services.epam.recognition.segments import Segment, Segmenter
-from training.rendering.reader import Town
+from cogmap.services.epam.recognition.crop import CHANNELS, SIDE_PX, crop, surroundings
+from cogmap.services.epam.recognition.segments import Segment, Segmenter
+from cogmap.training.rendering.reader import Town
 
 MIN_OVERLAP = 0.5
 MIN_PURITY = 0.5

@@ -20,21 +20,21 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from cogmap.geometry.arrays import Singles
-from services.epam.recognition.crop import CHANNELS, SIDE_PX
-from services.epam.recognition.objects import (
+from cogmap.services.epam.recognition.crop import CHANNELS, SIDE_PX
+from cogmap.services.epam.recognition.objects import (
     DIMENSIONS,
     INPUT_SHAPE,
     OUTPUT_SHAPES,
     Prototypes,
 )
-from services.epam.recognition.segments import load as load_segmenter
-from training.calibration import calibrate
-from training.crops import Crops, crops
-from training.networks.export import export
-from training.networks.loader import Batch, prefetch, shuffled
-from training.networks.optimizer import Optimizer, seed_torch
-from training.networks.unet import convolution
-from training.rendering.reader import INVENTED, files, read
+from cogmap.services.epam.recognition.segments import load as load_segmenter
+from cogmap.training.calibration import calibrate
+from cogmap.training.crops import Crops, crops
+from cogmap.training.networks.export import export
+from cogmap.training.networks.loader import Batch, prefetch, shuffled
+from cogmap.training.networks.optimizer import Optimizer, seed_torch
+from cogmap.training.networks.unet import convolution
+from cogmap.training.rendering.reader import INVENTED, files, read
 
 WIDTHS = (32, 64, 128, 160)
 BATCH = 64

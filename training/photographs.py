@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Booleans, Bytes
-from services.epam.layout.road import load
+from cogmap.services.epam.layout.road import load
 
 ROAD = 3
 UNLABELLED = 11

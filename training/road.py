@@ -16,7 +16,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from cogmap.geometry.arrays import Bytes, Singles
-from services.epam.layout.road import (
+from cogmap.services.epam.layout.road import (
     CHANNELS,
     INPUT_SHAPE,
     OUTPUT_SHAPES,
@@ -24,12 +24,12 @@ from services.epam.layout.road import (
     load,
     network_input,
 )
-from training.augment import Augmentation, LabelledImage, augmented, resized
-from training.networks.export import export
-from training.networks.loader import prefetch
-from training.networks.optimizer import Optimizer, seed_torch
-from training.networks.unet import UNet
-from training.rendering.reader import SURFACES, files, read, towns
+from cogmap.training.augment import Augmentation, LabelledImage, augmented, resized
+from cogmap.training.networks.export import export
+from cogmap.training.networks.loader import prefetch
+from cogmap.training.networks.optimizer import Optimizer, seed_torch
+from cogmap.training.networks.unet import UNet
+from cogmap.training.rendering.reader import SURFACES, files, read, towns
 
 WIDTHS = (8, 16, 32, 48, 64, 64)
 BATCH = 8
@@ -123,7 +123,7 @@ def loss(net: nn.Module, values: Tensor, road: Tensor, known: Tensor) -> Tensor:
 
 
 def write(net: nn.Module, path: Path) -> None:
-    """Write `net` to `path`, as `services.epam.layout.road` reads it."""
+    """Write `net` to `path`, as `cogmap.services.epam.layout.road` reads it."""
     export(net, path, "image", INPUT_SHAPE, OUTPUT_SHAPES)
 
 

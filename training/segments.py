@@ -17,8 +17,8 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from cogmap.geometry.arrays import Bytes, Floats, Singles
-from schemas.sensing import Calibration
-from services.epam.recognition.segments import (
+from cogmap.schemas.sensing import Calibration
+from cogmap.services.epam.recognition.segments import (
     CHANNELS,
     HEIGHT_PX,
     INPUT_SHAPE,
@@ -31,12 +31,12 @@ from services.epam.recognition.segments import (
     network_input,
     padded,
 )
-from training.crops import MIN_OVERLAP, overlap
-from training.networks.export import export
-from training.networks.loader import prefetch, shuffled
-from training.networks.optimizer import Optimizer, seed_torch
-from training.networks.unet import UNet
-from training.rendering.reader import Town, files, read, towns
+from cogmap.training.crops import MIN_OVERLAP, overlap
+from cogmap.training.networks.export import export
+from cogmap.training.networks.loader import prefetch, shuffled
+from cogmap.training.networks.optimizer import Optimizer, seed_torch
+from cogmap.training.networks.unet import UNet
+from cogmap.training.rendering.reader import Town, files, read, towns
 
 WIDTHS = (16, 48, 96, 160)
 BATCH = 16

@@ -20,12 +20,12 @@ from cogmap.graph.graph import Graph
 from cogmap.graph.replica import Replica, snapshot_over
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
-from schemas import topics
-from schemas.array import Matrix
-from schemas.graph import Delta, Links, Operation, Phase
-from schemas.nodes import SELF_ID, AnyNode, Object, Self, object_id
-from schemas.process import Clock
-from services.workspace.commit import Ledger
+from cogmap.schemas import topics
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.graph import Delta, Links, Operation, Phase
+from cogmap.schemas.nodes import SELF_ID, AnyNode, Object, Self, object_id
+from cogmap.schemas.process import Clock
+from cogmap.services.workspace.commit import Ledger
 
 AGENT = "benchmark"
 COST_ROUNDS = 400

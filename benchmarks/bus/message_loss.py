@@ -6,8 +6,8 @@ from pathlib import Path
 
 from benchmarks.drive import drive, recording
 from benchmarks.report import Metrics
-from schemas import topics
-from schemas.topics import Delivery
+from cogmap.schemas import topics
+from cogmap.schemas.topics import Delivery
 
 RUN_S = 60.0
 LAPS = 100.0

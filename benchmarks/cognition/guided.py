@@ -27,15 +27,15 @@ from cogmap.parallel import parallel_map
 from cogmap.runtime.config import Sections
 from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
-from schemas import topics
-from schemas.base import Message
-from schemas.codelets import Offer
-from schemas.cognition import Behaviours, GuidanceScheme
-from schemas.graph import DropNode, Operation
-from schemas.nodes import NEVER_NS, Goal, goal_id
-from schemas.sensing import TruePose, TrueTown
-from services import registry
-from services.procedural.guidance.toml import written
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.codelets import Offer
+from cogmap.schemas.cognition import Behaviours, GuidanceScheme
+from cogmap.schemas.graph import DropNode, Operation
+from cogmap.schemas.nodes import NEVER_NS, Goal, goal_id
+from cogmap.schemas.sensing import TruePose, TrueTown
+from cogmap.services import registry
+from cogmap.services.procedural.guidance.toml import written
 
 ROUTES = 10
 FIRST_SEED = 301

@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.report import Metrics
 from cogmap.recording.storage.reader import LogReader, Record
-from schemas.topics import ACTION, BROADCAST, Topic
+from cogmap.schemas.topics import ACTION, BROADCAST, Topic
 
 MS = 1e6
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from benchmarks.explore.measure import mind, sections
-from cli.launch.tally import EnergyTally
+from cogmap.cli.launch.tally import EnergyTally
 from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
-from schemas import topics
-from schemas.sensing import Energy
-from services import registry
+from cogmap.schemas import topics
+from cogmap.schemas.sensing import Energy
+from cogmap.services import registry
 
 MOTOR = "motor"
 CAPACITY_S = 500.0

@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from cogmap.runtime.module import Module
-from schemas import topics
-from schemas.base import Scalar
-from schemas.cognition import Action, ActionName, Behaviour, Behaviours
+from cogmap.schemas import topics
+from cogmap.schemas.base import Scalar
+from cogmap.schemas.cognition import Action, ActionName, Behaviour, Behaviours
 
 TURNS_RAD = (-math.pi / 2, math.pi / 2)
 

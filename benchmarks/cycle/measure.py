@@ -10,9 +10,9 @@ from benchmarks.cycle.position_error import TOWNS, over_fused
 from benchmarks.drive import drive
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most
-from cli.launch.plan import LOG_NAME
+from cogmap.cli.launch.plan import LOG_NAME
 from cogmap.recording.replaying.replay import replay_into
-from services import registry
+from cogmap.services import registry
 
 REPLAYED = ("sensory", "epam", "workspace", "codelets")
 THRESHOLDS = {

@@ -12,13 +12,13 @@ from functools import partial
 import numpy as np
 
 from benchmarks.report import Metrics
-from cli.launch.observer import OBSERVED, Observer
-from cli.launch.plan import OBSERVER, Choices, awaited, effective
+from cogmap.cli.launch.observer import OBSERVED, Observer
+from cogmap.cli.launch.plan import OBSERVER, Choices, awaited, effective
 from cogmap.errors import CogmapError
 from cogmap.parallel import parallel_map
 from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
-from services import registry
+from cogmap.services import registry
 
 TOWNS = (1, 2, 3)
 LAPS = 3.0

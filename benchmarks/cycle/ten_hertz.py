@@ -8,8 +8,8 @@ from pathlib import Path
 from benchmarks.drive import drive
 from benchmarks.machine import machine_unit_ms
 from benchmarks.report import Metrics
-from schemas import topics
-from schemas.process import Health
+from cogmap.schemas import topics
+from cogmap.schemas.process import Health
 
 FRAME_HZ = 10
 DRIVE_S = 40.0

@@ -12,7 +12,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import dijkstra
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from schemas.sensing import Obstacle, Street, TrueTown
+from cogmap.schemas.sensing import Obstacle, Street, TrueTown
 
 CELL_M = 0.5
 MARGIN_M = 5.0

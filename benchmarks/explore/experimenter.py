@@ -24,12 +24,12 @@ from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_from, transform_to
 from cogmap.graph.graph import Graph
 from cogmap.runtime.module import Module
-from schemas import topics
-from schemas.base import Message
-from schemas.codelets import Offer
-from schemas.graph import DropNode
-from schemas.nodes import NEVER_NS, PLAN_ID, Goal, Plan, goal_id
-from schemas.sensing import StreetClosure, TruePose, TrueTown
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.codelets import Offer
+from cogmap.schemas.graph import DropNode
+from cogmap.schemas.nodes import NEVER_NS, PLAN_ID, Goal, Plan, goal_id
+from cogmap.schemas.sensing import StreetClosure, TruePose, TrueTown
 
 MAX_DRAWS = 20
 

@@ -11,8 +11,8 @@ from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_from, transform_to
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import EVIDENCE_COLUMNS, ROAD_FROM, WEIGHT_COLUMNS
-from schemas.nodes import ROOT_MAP, PlaceColumn
-from schemas.sensing import TrueTown
+from cogmap.schemas.nodes import ROOT_MAP, PlaceColumn
+from cogmap.schemas.sensing import TrueTown
 
 SEEN_WITHIN_M = 1.5
 CORNERS = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)])

@@ -19,8 +19,8 @@ from cogmap.errors import CogmapError
 from cogmap.parallel import Progress, parallel_map
 from cogmap.runtime.config import Sections
 from cogmap.runtime.in_process import InProcessRunner
-from services import registry
-from services.sim.odometry import FUSED
+from cogmap.services import registry
+from cogmap.services.sim.odometry import FUSED
 
 TOWNS = 10
 FIRST_SEED = 101

@@ -10,11 +10,11 @@ import msgspec
 import numpy as np
 
 from benchmarks.explore.drivable import Drivable, barrier_m
-from cli.launch.guide import streets_ahead
+from cogmap.cli.launch.guide import streets_ahead
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.polylines import nearest_on_line, resample
-from schemas.sensing import Street, TrueTown
-from services.codelets.config import Config
+from cogmap.schemas.sensing import Street, TrueTown
+from cogmap.services.codelets.config import Config
 
 LINE_STEP_M = 1.0
 MIN_AWAY_M = 40.0

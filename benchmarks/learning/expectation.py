@@ -20,12 +20,12 @@ from cogmap.graph.graph import Graph
 from cogmap.parallel import parallel_map
 from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
-from schemas import topics
-from schemas.base import Message
-from schemas.codelets import Offer
-from schemas.cognition import Broadcast
-from schemas.graph import DropNode
-from schemas.nodes import (
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.codelets import Offer
+from cogmap.schemas.cognition import Broadcast
+from cogmap.schemas.graph import DropNode
+from cogmap.schemas.nodes import (
     NEVER_NS,
     PLAN_ID,
     Goal,
@@ -36,12 +36,12 @@ from schemas.nodes import (
     look_of,
     place_cell,
 )
-from schemas.sensing import StreetClosure, TruePose, TrueTown
-from services import registry
-from services.codelets.attention import expectation
-from services.sim.config import Config as SimConfig
-from services.sim.config import place_of
-from services.sim.layout.place import Place
+from cogmap.schemas.sensing import StreetClosure, TruePose, TrueTown
+from cogmap.services import registry
+from cogmap.services.codelets.attention import expectation
+from cogmap.services.sim.config import Config as SimConfig
+from cogmap.services.sim.config import place_of
+from cogmap.services.sim.layout.place import Place
 
 TOWNS = 4
 FIRST_SEED = 501

@@ -18,15 +18,15 @@ from benchmarks.report import Metrics
 from cogmap.geometry.arrays import Bytes
 from cogmap.parallel import parallel_map
 from cogmap.runtime.module import Module
-from schemas.array import Array
-from schemas.cognition import Broadcast, Coalition, Relation, Trigger
-from schemas.nodes import Object, object_id
-from schemas.sensing import Calibration, Odometry, Percept, Percepts, Pose, StereoFrame, View
-from services import registry
-from services.epam.recognition.functions import function_of
-from services.sim.layout import town
-from services.sim.layout.catalogue import CATALOGUE
-from services.workspace.config import Config as WorkspaceConfig
+from cogmap.schemas.array import Array
+from cogmap.schemas.cognition import Broadcast, Coalition, Relation, Trigger
+from cogmap.schemas.nodes import Object, object_id
+from cogmap.schemas.sensing import Calibration, Odometry, Percept, Percepts, Pose, StereoFrame, View
+from cogmap.services import registry
+from cogmap.services.epam.recognition.functions import function_of
+from cogmap.services.sim.layout import town
+from cogmap.services.sim.layout.catalogue import CATALOGUE
+from cogmap.services.workspace.config import Config as WorkspaceConfig
 
 TOWNS = 4
 # After the towns of `python -m benchmarks perception`.

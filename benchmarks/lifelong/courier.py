@@ -10,12 +10,12 @@ from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_to
 from cogmap.graph.graph import Graph
 from cogmap.runtime.module import Module
-from schemas import topics
-from schemas.base import Message
-from schemas.codelets import Offer
-from schemas.graph import DropNode
-from schemas.nodes import NEVER_NS, Goal, goal_id
-from schemas.sensing import TruePose, TrueTown
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.codelets import Offer
+from cogmap.schemas.graph import DropNode
+from cogmap.schemas.nodes import NEVER_NS, Goal, goal_id
+from cogmap.schemas.sensing import TruePose, TrueTown
 
 STOPS = 6
 LEG_NS = 300_000_000_000

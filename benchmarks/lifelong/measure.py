@@ -15,17 +15,17 @@ from benchmarks.explore.measure import COGNITION, sections
 from benchmarks.lifelong.courier import Courier
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_most
-from cli.launch.metrics import objects, position_m
-from cli.launch.observer import Observer
 from cogmap.bus.interface import Arrival
 from cogmap.bus.memory import MemoryBus
+from cogmap.cli.launch.metrics import objects, position_m
+from cogmap.cli.launch.observer import Observer
 from cogmap.errors import CogmapError
 from cogmap.parallel import Progress
 from cogmap.runtime.config import Sections
 from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
-from schemas import topics
-from services import registry
+from cogmap.schemas import topics
+from cogmap.services import registry
 
 SEED = 3201
 CYCLES = 20_000

@@ -15,14 +15,14 @@ from cogmap.graph.graph import Graph
 from cogmap.runtime.config import Sections
 from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Handler, Module
-from schemas import topics
-from schemas.array import Array
-from schemas.base import Message
-from schemas.codelets import Proposal
-from schemas.graph import Delta
-from schemas.sensing import Percepts, SelfMotion
-from services import registry
-from services.codelets.localization import landmarks, localization
+from cogmap.schemas import topics
+from cogmap.schemas.array import Array
+from cogmap.schemas.base import Message
+from cogmap.schemas.codelets import Proposal
+from cogmap.schemas.graph import Delta
+from cogmap.schemas.sensing import Percepts, SelfMotion
+from cogmap.services import registry
+from cogmap.services.codelets.localization import landmarks, localization
 
 # A robot whose senses nobody has calibrated, among landmarks no thicker than a finger: its gains
 # may err by what sensory memory takes for the wheels' noise and the paper for that of distances.

@@ -10,9 +10,9 @@ from cogmap.errors import CogmapError
 from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
 from cogmap.graph.path import rows_of
-from schemas.array import Matrix
-from schemas.graph import Decay, Snapshot
-from schemas.nodes import (
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.graph import Decay, Snapshot
+from cogmap.schemas.nodes import (
     ROOT_MAP,
     SELF_ID,
     AnyNode,

@@ -10,8 +10,8 @@ import numpy as np
 from benchmarks.localization.delay import Delay
 from cogmap.data.mrclam import Robot
 from cogmap.geometry.arrays import Floats
-from schemas.sensing import Percept
-from services.sensory.module import Config as SensoryConfig
+from cogmap.schemas.sensing import Percept
+from cogmap.services.sensory.module import Config as SensoryConfig
 
 TICK_S = 0.2
 STAMP_DECIMALS = 6

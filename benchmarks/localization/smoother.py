@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks import optional
 from benchmarks.localization.senses import Moment
 from cogmap.geometry.arrays import Floats
-from schemas.sensing import Percept
+from cogmap.schemas.sensing import Percept
 
 STEPS = 100
 MIN_SD = 1e-4

@@ -14,7 +14,7 @@ from benchmarks.localization.loop import LANDMARK, LOCALIZATION, LocalizationLoo
 from benchmarks.localization.senses import BEARING_SD_RAD, RANGE_NOISE, Moment, label_of, seen
 from benchmarks.report import Metrics
 from cogmap.geometry.arrays import Floats
-from schemas.sensing import Percept
+from cogmap.schemas.sensing import Percept
 
 IN_VIEW = 10
 SMALL = 100

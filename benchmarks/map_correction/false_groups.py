@@ -21,10 +21,10 @@ from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.geometry.se2 import compose, integrate, relative
 from cogmap.parallel import parallel_map
 from cogmap.recording.storage.reader import Progress
-from services.codelets.config import Config
-from services.codelets.correction.gnc import inliers
-from services.codelets.correction.least_squares import optimize
-from services.codelets.correction.pose_graph import Constraints, PoseGraph
+from cogmap.services.codelets.config import Config
+from cogmap.services.codelets.correction.gnc import inliers
+from cogmap.services.codelets.correction.least_squares import optimize
+from cogmap.services.codelets.correction.pose_graph import Constraints, PoseGraph
 
 THRESHOLDS = {
     "ate_ratio": at_most(1.1),

@@ -14,16 +14,20 @@ from benchmarks.map_correction.reference import Gtsam, best_positions
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_most
 from benchmarks.trajectory import trajectory_error_m
-from cli.log.progress import bar
+from cogmap.cli.log.progress import bar
 from cogmap.data.g2o import read_g2o
 from cogmap.data.pose_graph import PoseGraphFile, read_true_positions
 from cogmap.data.toro import read_toro
 from cogmap.errors import MessageError, UsageError
 from cogmap.geometry.arrays import Floats
-from services.codelets.correction.incremental import IncrementalSolver
-from services.codelets.correction.least_squares import optimize
-from services.codelets.correction.pose_graph import Constraints, PoseGraph, cost
-from services.codelets.correction.reverse_replay import close_loops, displacements, position_cost
+from cogmap.services.codelets.correction.incremental import IncrementalSolver
+from cogmap.services.codelets.correction.least_squares import optimize
+from cogmap.services.codelets.correction.pose_graph import Constraints, PoseGraph, cost
+from cogmap.services.codelets.correction.reverse_replay import (
+    close_loops,
+    displacements,
+    position_cost,
+)
 
 THRESHOLDS = {
     "positions_cost_ratio": at_most(1.05),

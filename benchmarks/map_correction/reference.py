@@ -10,8 +10,8 @@ from scipy.sparse.linalg import spsolve
 
 from benchmarks import optional
 from cogmap.geometry.arrays import Floats
-from services.codelets.correction.pose_graph import Constraints, PoseGraph
-from services.codelets.correction.reverse_replay import displacements
+from cogmap.services.codelets.correction.pose_graph import Constraints, PoseGraph
+from cogmap.services.codelets.correction.reverse_replay import displacements
 
 
 def best_positions(graph: PoseGraph) -> Floats:

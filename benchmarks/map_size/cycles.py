@@ -14,9 +14,9 @@ from cogmap.bus.memory import MemoryBus
 from cogmap.errors import CogmapError
 from cogmap.runtime.config import Sections
 from cogmap.runtime.in_process import InProcessRunner
-from schemas import topics
-from schemas.graph import Snapshot
-from services import registry
+from cogmap.schemas import topics
+from cogmap.schemas.graph import Snapshot
+from cogmap.services import registry
 
 COGNITION = ("workspace", "codelets", "global_workspace", "procedural", "action", "motor")
 MODULES = ("sim", *COGNITION)

@@ -20,11 +20,11 @@ from cogmap.errors import CogmapError
 from cogmap.graph.graph import Graph
 from cogmap.runtime.module import Handler, Module, Reply
 from cogmap.runtime.shell import Shell
-from schemas import topics
-from schemas.array import Array
-from schemas.graph import Snapshot
-from schemas.sensing import Percepts, SelfMotion
-from services import registry
+from cogmap.schemas import topics
+from cogmap.schemas.array import Array
+from cogmap.schemas.graph import Snapshot
+from cogmap.schemas.sensing import Percepts, SelfMotion
+from cogmap.services import registry
 
 AGENT = "benchmark"
 TIMEOUT_S = 120.0

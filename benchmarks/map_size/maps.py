@@ -9,9 +9,9 @@ import numpy as np
 
 from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
-from schemas.array import Array, Matrix
-from schemas.graph import Decay, Links, PlaceTile, Snapshot
-from schemas.nodes import (
+from cogmap.schemas.array import Array, Matrix
+from cogmap.schemas.graph import Decay, Links, PlaceTile, Snapshot
+from cogmap.schemas.nodes import (
     ROOT_MAP,
     TILE_SIDE,
     AnyNode,
@@ -23,8 +23,8 @@ from schemas.nodes import (
     nearest_place,
     object_id,
 )
-from services.codelets.config import Config
-from services.codelets.resolution import coarse_places, sub_map_places
+from cogmap.services.codelets.config import Config
+from cogmap.services.codelets.resolution import coarse_places, sub_map_places
 
 SPREAD_M = 0.3
 CELL_M = 1.0

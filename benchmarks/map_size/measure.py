@@ -8,7 +8,7 @@ from benchmarks.map_size import cycles, join
 from benchmarks.map_size.maps import LARGE, SMALL, cognitive_map
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_most
-from schemas.graph import Snapshot
+from cogmap.schemas.graph import Snapshot
 
 THRESHOLDS = {
     "cycle_ratio": at_most(1.3),

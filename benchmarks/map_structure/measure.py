@@ -12,9 +12,9 @@ from benchmarks.map_structure.towns import FUNCTIONS, Town, town
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most, more_than
 from cogmap.geometry.arrays import Indices
-from services.codelets.structure.config import Config
-from services.codelets.structure.crossings import Boundaries
-from services.codelets.structure.sub_maps import SubMaps
+from cogmap.services.codelets.structure.config import Config
+from cogmap.services.codelets.structure.crossings import Boundaries
+from cogmap.services.codelets.structure.sub_maps import SubMaps
 
 THRESHOLDS = {
     "ari": at_least(0.9),

@@ -11,11 +11,11 @@ import msgspec
 import numpy as np
 
 from benchmarks.report import Metrics
-from schemas.memory import TransientEpisode
-from schemas.nodes import Remembered
-from services.memory.episodic.config import EpisodicConfig
-from services.memory.episodic.cues import MAX_LEARNED, EpisodicCues
-from services.memory.sparse.config import SparseConfig
+from cogmap.schemas.memory import TransientEpisode
+from cogmap.schemas.nodes import Remembered
+from cogmap.services.memory.episodic.config import EpisodicConfig
+from cogmap.services.memory.episodic.cues import MAX_LEARNED, EpisodicCues
+from cogmap.services.memory.sparse.config import SparseConfig
 
 CUES = 200
 LOOKS = 20

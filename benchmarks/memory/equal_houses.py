@@ -16,13 +16,13 @@ import numpy as np
 from benchmarks.report import Metrics
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import relative, transform_to
-from schemas.array import Matrix
-from schemas.memory import StoredObjects
-from schemas.nodes import TILE_SIDE, Object, individual_label, object_id
-from services.memory.config import Config
-from services.memory.maps import RememberedMap
-from services.memory.passing import Way
-from services.memory.recall import cues, recalled
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.memory import StoredObjects
+from cogmap.schemas.nodes import TILE_SIDE, Object, individual_label, object_id
+from cogmap.services.memory.config import Config
+from cogmap.services.memory.maps import RememberedMap
+from cogmap.services.memory.passing import Way
+from cogmap.services.memory.recall import cues, recalled
 
 TOWNS = 4
 CROSSINGS = 4

@@ -13,11 +13,11 @@ import numpy as np
 
 from benchmarks.report import Metrics
 from cogmap.geometry.arrays import Bytes
-from services.memory.sparse.build import build
-from services.memory.sparse.config import SparseConfig
-from services.memory.sparse.interface import AssociativeMemory
-from services.memory.sparse.structures import ItemMemory
-from services.memory.sparse.vectors import bundle, contained_below, distances, random_vectors
+from cogmap.services.memory.sparse.build import build
+from cogmap.services.memory.sparse.config import SparseConfig
+from cogmap.services.memory.sparse.interface import AssociativeMemory
+from cogmap.services.memory.sparse.structures import ItemMemory
+from cogmap.services.memory.sparse.vectors import bundle, contained_below, distances, random_vectors
 
 MAPS = 1000
 CUES = 500

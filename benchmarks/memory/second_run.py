@@ -23,12 +23,12 @@ from cogmap.parallel import Progress, parallel_map
 from cogmap.runtime.config import Sections
 from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
-from schemas import topics
-from schemas.graph import Delta, Phase
-from schemas.memory import Restored, Stored, StoredRecord
-from schemas.nodes import ROOT_MAP, Map
-from schemas.sensing import Pose, TruePose
-from services import registry
+from cogmap.schemas import topics
+from cogmap.schemas.graph import Delta, Phase
+from cogmap.schemas.memory import Restored, Stored, StoredRecord
+from cogmap.schemas.nodes import ROOT_MAP, Map
+from cogmap.schemas.sensing import Pose, TruePose
+from cogmap.services import registry
 
 FIRST_SEED = 101
 TOWNS = 10

@@ -8,9 +8,9 @@ from collections.abc import Callable
 import numpy as np
 
 from cogmap.geometry.arrays import Bytes
-from services.memory.sparse.config import SparseConfig
-from services.memory.sparse.memory import SparseMemory, hard_addresses
-from services.memory.sparse.vectors import VALUES, nearest_phases, random_vectors
+from cogmap.services.memory.sparse.config import SparseConfig
+from cogmap.services.memory.sparse.memory import SparseMemory, hard_addresses
+from cogmap.services.memory.sparse.vectors import VALUES, nearest_phases, random_vectors
 
 MASK = np.uint8(VALUES - 1)
 WRITTEN = 50

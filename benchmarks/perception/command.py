@@ -11,9 +11,9 @@ from benchmarks.options import announce, json_option, report_metrics
 from benchmarks.perception import measure as perception
 from benchmarks.perception import photographs, stereo
 from benchmarks.report import Metrics
-from cli.options import FiniteRange
-from services.epam.layout.road import DEFAULT_PATH as ROAD_WEIGHTS
-from training.photographs import camvid_iou
+from cogmap.cli.options import FiniteRange
+from cogmap.services.epam.layout.road import DEFAULT_PATH as ROAD_WEIGHTS
+from cogmap.training.photographs import camvid_iou
 
 THRESHOLDS = (
     perception.THRESHOLDS

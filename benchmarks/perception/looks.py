@@ -21,12 +21,12 @@ from benchmarks.perception.scenes import (
     side_and_range,
 )
 from cogmap.geometry.arrays import Bytes, Floats, Singles
-from schemas.sensing import Calibration, Pose
-from services.epam.layout.road import load
-from services.sim.layout.catalogue import CATALOGUE
-from services.sim.layout.plan import STREET_WIDTH_M
-from services.sim.layout.town import Town
-from training.rendering.towns import KINDS
+from cogmap.schemas.sensing import Calibration, Pose
+from cogmap.services.epam.layout.road import load
+from cogmap.services.sim.layout.catalogue import CATALOGUE
+from cogmap.services.sim.layout.plan import STREET_WIDTH_M
+from cogmap.services.sim.layout.town import Town
+from cogmap.training.rendering.towns import KINDS
 
 TRAINED = frozenset(kind.name for kind in CATALOGUE)
 NOVEL = 20

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from benchmarks.perception.objects import Sight
 from benchmarks.perception.scenes import MIN_TURN_RAD, other_distance
 from cogmap.geometry.arrays import Floats
-from services.workspace.config import Config
+from cogmap.services.workspace.config import Config
 
 RECOGNISED = Config().recognition_threshold
 

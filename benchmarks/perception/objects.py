@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Bytes, Floats
-from schemas.sensing import Percept
+from cogmap.schemas.sensing import Percept
 
 MATCH_IOU = 0.5
 LARGE_SHARE = 0.01

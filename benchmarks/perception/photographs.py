@@ -14,8 +14,8 @@ from benchmarks.report import Metrics
 from benchmarks.threshold import at_least
 from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Booleans, Bytes, Singles
-from services.epam.layout.road import load
-from training.photographs import (
+from cogmap.services.epam.layout.road import load
+from cogmap.training.photographs import (
     Photograph,
     by_drive,
     camvid_iou,
@@ -107,7 +107,7 @@ def _train(
 ) -> None:
     """Raises UsageError where torch is not installed."""
     try:
-        from training.camvid import train_on
+        from cogmap.training.camvid import train_on
     except ImportError as error:
         raise UsageError(f"{error}: it trains a network first, run make train-setup") from None
 

@@ -6,8 +6,8 @@ import time
 from dataclasses import dataclass
 
 from cogmap.geometry.arrays import Booleans, Bytes
-from schemas.array import Array
-from schemas.sensing import (
+from cogmap.schemas.array import Array
+from cogmap.schemas.sensing import (
     Calibration,
     Learned,
     LearnedObject,
@@ -16,12 +16,12 @@ from schemas.sensing import (
     StereoFrame,
     View,
 )
-from services import registry
-from services.epam import module as epam
-from services.epam.layout import road
-from services.epam.pam import ExtendedPam
-from services.epam.recognition import objects, segments
-from services.epam.view import view_arrays
+from cogmap.services import registry
+from cogmap.services.epam import module as epam
+from cogmap.services.epam.layout import road
+from cogmap.services.epam.pam import ExtendedPam
+from cogmap.services.epam.recognition import objects, segments
+from cogmap.services.epam.view import view_arrays
 
 PERIOD_S = 0.2
 PERIOD_NS = round(PERIOD_S * 1e9)

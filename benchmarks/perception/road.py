@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.geometry.arrays import Booleans, Bytes, Floats, Singles
-from schemas.sensing import Calibration
+from cogmap.schemas.sensing import Calibration
 
 GROUND = 1
 ROAD = 2

@@ -15,11 +15,11 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.geometry.arrays import Bytes, Floats, Singles
-from schemas.sensing import Calibration, Pose
-from services.sim.layout import town
-from services.sim.rendering.camera import StereoCamera, calibration
-from services.sim.world import World
-from training.rendering import towns
+from cogmap.schemas.sensing import Calibration, Pose
+from cogmap.services.sim.layout import town
+from cogmap.services.sim.rendering.camera import StereoCamera, calibration
+from cogmap.services.sim.world import World
+from cogmap.training.rendering import towns
 
 # Towns to train on have seeds from 1001, those to validate on from 2001.
 FIRST_SEED = 3101

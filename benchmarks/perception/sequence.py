@@ -17,16 +17,16 @@ import numpy as np
 from benchmarks.report import Metrics
 from cogmap.geometry.arrays import Booleans, Bytes, Floats, Singles
 from cogmap.geometry.polylines import distances_along
-from schemas.sensing import PlaceMatch, Pose
-from services.epam.places.recognizer import PlaceRecognizer
-from services.sensory.disparity import DepthFromStereo
-from services.sensory.rectify import rectification
-from services.sim.layout import town
-from services.sim.layout.plan import Point
-from services.sim.rendering.camera import StereoCamera, calibration
-from services.sim.rendering.light import Light, some_light
-from services.sim.world import World
-from training.rendering import towns
+from cogmap.schemas.sensing import PlaceMatch, Pose
+from cogmap.services.epam.places.recognizer import PlaceRecognizer
+from cogmap.services.sensory.disparity import DepthFromStereo
+from cogmap.services.sensory.rectify import rectification
+from cogmap.services.sim.layout import town
+from cogmap.services.sim.layout.plan import Point
+from cogmap.services.sim.rendering.camera import StereoCamera, calibration
+from cogmap.services.sim.rendering.light import Light, some_light
+from cogmap.services.sim.world import World
+from cogmap.training.rendering import towns
 
 # The last town is built of kinds that nobody was taught alone: no landmark in any view.
 TOWNS = ((3201, 0), (3202, 0), (3203, 28))

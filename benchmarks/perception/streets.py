@@ -11,8 +11,8 @@ import numpy.typing as npt
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.polylines import nearest_on_pieces
 from cogmap.geometry.se2 import transform_from
-from schemas.sensing import Pose
-from services.sim.layout.plan import Rectangle
+from cogmap.schemas.sensing import Pose
+from cogmap.services.sim.layout.plan import Rectangle
 
 Point = tuple[float, float]
 Piece = tuple[Point, Point]

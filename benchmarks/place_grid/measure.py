@@ -14,12 +14,12 @@ from benchmarks.report import Metrics
 from benchmarks.threshold import at_most
 from cogmap.bus.codec import decode, encode
 from cogmap.graph.graph import Graph
-from schemas import topics
-from schemas.array import Array
-from schemas.codelets import Proposal
-from schemas.graph import Cells, Delta, Operation, Phase, Snapshot
-from schemas.nodes import TILE_SIDE, PlaceColumn
-from services.workspace.commit import Ledger
+from cogmap.schemas import topics
+from cogmap.schemas.array import Array
+from cogmap.schemas.codelets import Proposal
+from cogmap.schemas.graph import Cells, Delta, Operation, Phase, Snapshot
+from cogmap.schemas.nodes import TILE_SIDE, PlaceColumn
+from cogmap.services.workspace.commit import Ledger
 
 THRESHOLDS = {
     "nodes_500k_commit_ms": at_most(5.0),

@@ -14,14 +14,14 @@ from scipy.sparse.csgraph import dijkstra
 
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most
-from cli.log.progress import bar
+from cogmap.cli.log.progress import bar
 from cogmap.data.moving_ai import Problem, read_map, read_problems
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from services.codelets.planning.network import Cell, PlaceNetwork, grid_network
-from services.codelets.planning.search.flat import FlatPlanner
-from services.codelets.planning.search.hierarchy import HierarchicalPlanner
-from services.codelets.planning.search.links import Links
-from services.codelets.planning.search.route import NoRoute, NoRouteReason, Route
+from cogmap.services.codelets.planning.network import Cell, PlaceNetwork, grid_network
+from cogmap.services.codelets.planning.search.flat import FlatPlanner
+from cogmap.services.codelets.planning.search.hierarchy import HierarchicalPlanner
+from cogmap.services.codelets.planning.search.links import Links
+from cogmap.services.codelets.planning.search.route import NoRoute, NoRouteReason, Route
 
 THRESHOLDS = {
     "solved_share": at_least(1.0),

@@ -14,11 +14,16 @@ from cogmap.data import tsplib
 from cogmap.data.human_tours import read_folder
 from cogmap.data.tsplib import Problem
 from cogmap.errors import UsageError
+from cogmap.experiments.route_planning.measure import PARTICIPANTS, human_jobs, measure
+from cogmap.experiments.route_planning.metrics import human_metrics
+from cogmap.experiments.route_planning.optimum import shortest_tour
 from cogmap.parallel import Progress, parallel_map
-from experiments.route_planning.measure import PARTICIPANTS, human_jobs, measure
-from experiments.route_planning.metrics import human_metrics
-from experiments.route_planning.optimum import shortest_tour
-from services.codelets.planning.tours import TourSettings, follow_activation, order, route_length
+from cogmap.services.codelets.planning.tours import (
+    TourSettings,
+    follow_activation,
+    order,
+    route_length,
+)
 
 THRESHOLDS = {
     "hierarchical_above_optimum": at_most(0.08),

@@ -12,9 +12,9 @@ from matplotlib.patches import Ellipse
 
 from benchmarks.spiking.measure import SIDE_M, Scene, recording
 from benchmarks.spiking.raster import draw_raster
-from cli.plots.draw import STYLE
-from cli.plots.palette import ESTIMATE, FAINT, INK, KERB, PAPER, TRUE
-from experiments.spiking.cells import (
+from cogmap.cli.plots.draw import STYLE
+from cogmap.cli.plots.palette import ESTIMATE, FAINT, INK, KERB, PAPER, TRUE
+from cogmap.experiments.spiking.cells import (
     PLACE_M,
     SPACINGS_M,
     BorderCells,
@@ -22,7 +22,7 @@ from experiments.spiking.cells import (
     Spikes,
     Values,
 )
-from experiments.spiking.network import Cues, Posterior, Recording
+from cogmap.experiments.spiking.network import Cues, Posterior, Recording
 
 ALL_BITS = 255
 DASHES = (0, (3, 2))

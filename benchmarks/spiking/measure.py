@@ -8,10 +8,10 @@ import numpy as np
 
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_most, within
+from cogmap.experiments.spiking.cells import Values
+from cogmap.experiments.spiking.network import Border, Cues, Posterior, Recording, exact, record
 from cogmap.parallel import Progress, parallel_map
-from experiments.spiking.cells import Values
-from experiments.spiking.network import Border, Cues, Posterior, Recording, exact, record
-from services.codelets.localization.sampling import rejection_mask
+from cogmap.services.codelets.localization.sampling import rejection_mask
 
 SIDE_M = 5.0
 RECORDED_S = 600.0

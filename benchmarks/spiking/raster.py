@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from benchmarks.spiking.measure import SIDE_M
-from cli.plots.palette import ESTIMATE, FAINT, INK, OBJECT, PAPER, TRUE
-from experiments.spiking.cells import (
+from cogmap.cli.plots.palette import ESTIMATE, FAINT, INK, OBJECT, PAPER, TRUE
+from cogmap.experiments.spiking.cells import (
     GAMMA_S,
     SPACINGS_M,
     BorderCells,
@@ -17,7 +17,7 @@ from experiments.spiking.cells import (
     Spikes,
     Values,
 )
-from experiments.spiking.network import WEST, Recording
+from cogmap.experiments.spiking.network import WEST, Recording
 
 SHOWN_S = 2.0
 HALF_HEIGHT = 0.4

@@ -10,19 +10,19 @@ from pathlib import Path
 import click
 import msgspec
 
-from cli.doctor import installation, system
-from cli.doctor.finding import Finding
-from cli.doctor.system import Observed
-from cli.options import agent_option, connect_option, json_option
-from cli.topic.observing import observing
 from cogmap.bus.discovery import discover
 from cogmap.bus.interface import Arrival, Member
 from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.cli.doctor import installation, system
+from cogmap.cli.doctor.finding import Finding
+from cogmap.cli.doctor.system import Observed
+from cogmap.cli.options import agent_option, connect_option, json_option
+from cogmap.cli.topic.observing import observing
 from cogmap.errors import NoRouterError
 from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.delivery.intake import Intake
-from schemas import topics
-from services import registry
+from cogmap.schemas import topics
+from cogmap.services import registry
 
 OBSERVE_S = 3.3
 RUNS = Path("runs")

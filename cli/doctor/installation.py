@@ -11,7 +11,7 @@ from pathlib import Path
 
 from packaging.requirements import Requirement
 
-from cli.doctor.finding import Finding
+from cogmap.cli.doctor.finding import Finding
 from cogmap.errors import UsageError
 
 OLDEST_PYTHON = (3, 11)
@@ -98,7 +98,7 @@ def _dependency(name: str, version: str) -> Iterator[Finding]:
 def renderer() -> Iterator[Finding]:
     """Whether the simulator can render with EGL."""
     try:
-        from services.sim.rendering import egl_trial
+        from cogmap.services.sim.rendering import egl_trial
     except (ImportError, UsageError):  # the missing dependency is a finding of its own
         return
 

@@ -6,13 +6,13 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from cli.doctor.finding import Finding
 from cogmap.bus.discovery import Role, System
 from cogmap.bus.interface import Member
-from schemas import topics
-from schemas.base import Message
-from schemas.process import Clock, Health
-from schemas.topics import Scope, Topic
+from cogmap.cli.doctor.finding import Finding
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.process import Clock, Health
+from cogmap.schemas.topics import Scope, Topic
 
 RATE_TOLERANCE = 0.3
 MIN_MEASURED_HZ = 1.0

@@ -6,15 +6,15 @@ from pathlib import Path
 
 import click
 
-from cli.experiment import live, outcome
-from cli.experiment.options import Common, common_options
-from cli.log.progress import bar
-from cli.options import FiniteRange
+from cogmap.cli.experiment import live, outcome
+from cogmap.cli.experiment.options import Common, common_options
+from cogmap.cli.log.progress import bar
+from cogmap.cli.options import FiniteRange
 from cogmap.errors import UsageError
-from experiments.city_maps.drive import MODULES
-from experiments.city_maps.environment import Environment, environments
-from experiments.city_maps.fit import fitted
-from experiments.city_maps.measure import (
+from cogmap.experiments.city_maps.drive import MODULES
+from cogmap.experiments.city_maps.environment import Environment, environments
+from cogmap.experiments.city_maps.fit import fitted
+from cogmap.experiments.city_maps.measure import (
     MAPS,
     NOISE,
     TRAVERSALS,
@@ -25,9 +25,9 @@ from experiments.city_maps.measure import (
     jobs,
     measure,
 )
-from experiments.city_maps.metrics import camera_metrics, map_metrics
-from experiments.city_maps.sources import folder, from_osm, grown_environments
-from services.sim.odometry import Noise
+from cogmap.experiments.city_maps.metrics import camera_metrics, map_metrics
+from cogmap.experiments.city_maps.sources import folder, from_osm, grown_environments
+from cogmap.services.sim.odometry import Noise
 
 NAME = "city-maps"
 _EPILOG = """\b
@@ -127,7 +127,7 @@ def city_maps(
 
 
 def _save(out: Path, found: list[CityMap], metrics: dict[str, float | str], common: Common) -> None:
-    from cli.plots.cities import figure  # matplotlib takes long to import
+    from cogmap.cli.plots.cities import figure  # matplotlib takes long to import
 
     outcome.save(out, NAME, figure(found, metrics), metrics, common)
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import click
 
-from cli.experiment.city_maps import city_maps
-from cli.experiment.cue_integration import cue_integration
-from cli.experiment.loop_closing import loop_closing
-from cli.experiment.map_structure import map_structure
-from cli.experiment.route_planning import route_planning
+from cogmap.cli.experiment.city_maps import city_maps
+from cogmap.cli.experiment.cue_integration import cue_integration
+from cogmap.cli.experiment.loop_closing import loop_closing
+from cogmap.cli.experiment.map_structure import map_structure
+from cogmap.cli.experiment.route_planning import route_planning
 
 _EPILOG = """\b
 Each leaves a folder with its figure as PNG and PDF, and a JSON file of every metric printed,

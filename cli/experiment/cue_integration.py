@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import click
 
-from cli.experiment import live, outcome
-from cli.experiment.options import Common, common_options
-from cli.log.progress import bar
-from cli.options import FiniteRange
-from experiments.cue_integration import agent, camera_level
-from experiments.cue_integration.run import FIT_TRIALS, FITTED, Budget, Session, fitted, measure
-from experiments.cue_integration.trial import Condition, Noise, Trial
+from cogmap.cli.experiment import live, outcome
+from cogmap.cli.experiment.options import Common, common_options
+from cogmap.cli.log.progress import bar
+from cogmap.cli.options import FiniteRange
+from cogmap.experiments.cue_integration import agent, camera_level
+from cogmap.experiments.cue_integration.run import (
+    FIT_TRIALS,
+    FITTED,
+    Budget,
+    Session,
+    fitted,
+    measure,
+)
+from cogmap.experiments.cue_integration.trial import Condition, Noise, Trial
 
 NAME = "cue-integration"
 _EPILOG = """\b
@@ -71,7 +78,7 @@ def cue_integration(common: Common, trials: int, distance_noise: float, fit: boo
 
     outcome.show(NAME, metrics)
 
-    from cli.plots.cue_integration import figure  # matplotlib takes long to import
+    from cogmap.cli.plots.cue_integration import figure  # matplotlib takes long to import
 
     outcome.save(folder, NAME, figure(found), metrics, common)
     live.check(differing)

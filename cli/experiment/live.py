@@ -8,19 +8,19 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from cli.launch.command_line import cogmap_command
-from cli.launch.plan import CONFIG_NAME, ROUTER, to_toml
-from cli.launch.supervisor import Program, Supervisor
 from cogmap.bus.session import free_endpoint
 from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.cli.launch.command_line import cogmap_command
+from cogmap.cli.launch.plan import CONFIG_NAME, ROUTER, to_toml
+from cogmap.cli.launch.supervisor import Program, Supervisor
 from cogmap.errors import CogmapError
+from cogmap.experiments import transcript
+from cogmap.experiments.transcript import Transcript
 from cogmap.runtime.config import Sections
 from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
-from experiments import transcript
-from experiments.transcript import Transcript
-from services import registry
+from cogmap.services import registry
 
 SPIN_S = 0.005
 TIMEOUT_S = 60.0

@@ -7,13 +7,13 @@ from typing import Any
 
 import click
 
-from cli.experiment import live, outcome
-from cli.experiment.options import Common, common_options
-from cli.log.progress import bar
+from cogmap.cli.experiment import live, outcome
+from cogmap.cli.experiment.options import Common, common_options
+from cogmap.cli.log.progress import bar
+from cogmap.experiments.loop_closing.metrics import loop_metrics, rule_metrics
+from cogmap.experiments.loop_closing.observer import Loop
+from cogmap.experiments.loop_closing.run import METHODS, MODULES, drive, drive_by_cameras, sections
 from cogmap.parallel import parallel_map
-from experiments.loop_closing.metrics import loop_metrics, rule_metrics
-from experiments.loop_closing.observer import Loop
-from experiments.loop_closing.run import METHODS, MODULES, drive, drive_by_cameras, sections
 
 NAME = "loop-closing"
 _EPILOG = """\b
@@ -48,7 +48,7 @@ def loop_closing(common: Common) -> None:
 
     outcome.show(NAME, metrics)
 
-    from cli.plots.loop_closing import figure  # matplotlib takes long to import
+    from cogmap.cli.plots.loop_closing import figure  # matplotlib takes long to import
 
     outcome.save(folder, NAME, figure(loops, metrics), metrics, common)
     live.check(differing)

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import click
 
-from cli.experiment import outcome
-from cli.experiment.options import Common, common_options_without_sensing
-from cli.log.progress import bar
+from cogmap.cli.experiment import outcome
+from cogmap.cli.experiment.options import Common, common_options_without_sensing
+from cogmap.cli.log.progress import bar
 from cogmap.data.osm import SUFFIXES
 from cogmap.errors import UsageError
-from experiments.map_structure.city import StructuredCity, read_city
-from experiments.map_structure.measure import measure, metrics_of
+from cogmap.experiments.map_structure.city import StructuredCity, read_city
+from cogmap.experiments.map_structure.measure import measure, metrics_of
 
 NAME = "map-structure"
 _EPILOG = """\b
@@ -54,7 +54,7 @@ def map_structure(common: Common, osm: Path | None, all_in: Path | None) -> None
     metrics = metrics_of(found)
     outcome.show(NAME, metrics)
 
-    from cli.plots.sub_maps import figure  # matplotlib takes long to import
+    from cogmap.cli.plots.sub_maps import figure  # matplotlib takes long to import
 
     outcome.save(folder, NAME, figure(found), metrics, common)
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.table import Table
 
-from cli.experiment.options import Common
-from cli.plots.palette import PAPER
+from cogmap.cli.experiment.options import Common
+from cogmap.cli.plots.palette import PAPER
 from cogmap.errors import UsageError
 
 if TYPE_CHECKING:

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import click
 
-from cli.experiment import outcome
-from cli.experiment.options import Common, common_options_without_sensing
-from cli.log.progress import bar
+from cogmap.cli.experiment import outcome
+from cogmap.cli.experiment.options import Common, common_options_without_sensing
+from cogmap.cli.log.progress import bar
 from cogmap.data.human_tours import read_folder
-from experiments.route_planning import published
-from experiments.route_planning.measure import (
+from cogmap.experiments.route_planning import published
+from cogmap.experiments.route_planning.measure import (
     DRAWN,
     DRAWN_PARTICIPANTS,
     EXAMPLE_GOALS,
@@ -21,7 +21,7 @@ from experiments.route_planning.measure import (
     human_jobs,
     measure,
 )
-from experiments.route_planning.metrics import drawn_metrics, human_metrics
+from cogmap.experiments.route_planning.metrics import drawn_metrics, human_metrics
 
 NAME = "route-planning"
 _EPILOG = """\b
@@ -90,6 +90,6 @@ def route_planning(
     }
     outcome.show(NAME, metrics)
 
-    from cli.plots.route_planning import figure  # matplotlib takes long to import
+    from cogmap.cli.plots.route_planning import figure  # matplotlib takes long to import
 
     outcome.save(folder, NAME, figure(human, drawn_at_random, metrics), metrics, common)

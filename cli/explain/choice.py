@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 from cogmap.errors import LogError, UsageError
 from cogmap.recording.log import Log
-from schemas import topics
-from schemas.cognition import Broadcast, Competition
-from schemas.graph import Delta, Phase
-from schemas.topics import Topic
+from cogmap.schemas import topics
+from cogmap.schemas.cognition import Broadcast, Competition
+from cogmap.schemas.graph import Delta, Phase
+from cogmap.schemas.topics import Topic
 
 CYCLES = (topics.DELTA, topics.COMPETITION)
 NEEDED = (topics.BROADCAST, topics.ACTION)

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import click
 
-from cli.explain import choice
-from cli.explain.facts import facts
-from cli.explain.moment import Moment, moment
-from cli.explain.screen import print_moment
-from cli.launch.plan import LOG_NAME
-from cli.log import formatting
-from cli.log.files import save
-from cli.options import FiniteRange, json_option
+from cogmap.cli.explain import choice
+from cogmap.cli.explain.facts import facts
+from cogmap.cli.explain.moment import Moment, moment
+from cogmap.cli.explain.screen import print_moment
+from cogmap.cli.launch.plan import LOG_NAME
+from cogmap.cli.log import formatting
+from cogmap.cli.log.files import save
+from cogmap.cli.options import FiniteRange, json_option
 from cogmap.errors import UsageError
 from cogmap.recording.log import Log, open_log
 
@@ -96,6 +96,6 @@ def _check(picture: Path) -> None:
 
 
 def _drawn(found: Moment, suffix: str) -> bytes:
-    from cli.plots.moment import figure as plot  # who reads text has no use for matplotlib
+    from cogmap.cli.plots.moment import figure as plot  # who reads text has no use for matplotlib
 
     return plot.figure(found, suffix)

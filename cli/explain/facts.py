@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from cli.explain import reasons
-from cli.explain.moment import Moment
-from cli.explain.reading import Logged
-from schemas.base import Message
-from schemas.graph import Delta
-from schemas.render import to_jsonable
+from cogmap.cli.explain import reasons
+from cogmap.cli.explain.moment import Moment
+from cogmap.cli.explain.reading import Logged
+from cogmap.schemas.base import Message
+from cogmap.schemas.graph import Delta
+from cogmap.schemas.render import to_jsonable
 
 _IN_FULL = ("percepts", "competition", "broadcast", "earlier_broadcast", "action", "earlier_action")
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from cli.explain.reading import Entered, Logged, Reading
+from cogmap.cli.explain.reading import Entered, Logged, Reading
 from cogmap.recording.log import Log
 from cogmap.runtime import config
-from schemas.cognition import Action, Broadcast, Coalitions, Competition, Fate
-from schemas.graph import Delta
-from schemas.sensing import MotorCommand, Percepts, View
-from services.global_workspace.config import Config
+from cogmap.schemas.cognition import Action, Broadcast, Coalitions, Competition, Fate
+from cogmap.schemas.graph import Delta
+from cogmap.schemas.sensing import MotorCommand, Percepts, View
+from cogmap.services.global_workspace.config import Config
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,9 @@ import math
 from collections import Counter
 from collections.abc import Iterable
 
-from schemas.cognition import Coalition
-from schemas.graph import Delta
-from schemas.nodes import (
+from cogmap.schemas.cognition import Coalition
+from cogmap.schemas.graph import Delta
+from cogmap.schemas.nodes import (
     Episode,
     Goal,
     GraphNode,
@@ -22,8 +22,8 @@ from schemas.nodes import (
     kind_of,
     map_number,
 )
-from schemas.nodes import Percept as PerceptNode
-from schemas.sensing import MotorCommand, Percept, SpeedLimit
+from cogmap.schemas.nodes import Percept as PerceptNode
+from cogmap.schemas.sensing import MotorCommand, Percept, SpeedLimit
 
 NAMED = 6
 STRAIGHT = 0.02

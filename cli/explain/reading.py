@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from cogmap.recording.log import Entry, Log
-from schemas import topics
-from schemas.base import Message
-from schemas.cognition import Action, Broadcast, Coalition, Coalitions, Competition
-from schemas.graph import Delta
-from schemas.sensing import MotorCommand
-from schemas.topics import Topic
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.cognition import Action, Broadcast, Coalition, Coalitions, Competition
+from cogmap.schemas.graph import Delta
+from cogmap.schemas.sensing import MotorCommand
+from cogmap.schemas.topics import Topic
 
 M = TypeVar("M", bound=Message)
 OfCycle = TypeVar("OfCycle", Delta, Coalitions, Competition, Broadcast, Action)

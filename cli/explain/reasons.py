@@ -4,10 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from cli.explain.moment import Moment
-from cli.explain.names import spoken
-from schemas.cognition import Action, Behaviour, Competition, Contender, Fate, Rejection, Trigger
-from services.global_workspace.config import Config
+from cogmap.cli.explain.moment import Moment
+from cogmap.cli.explain.names import spoken
+from cogmap.schemas.cognition import (
+    Action,
+    Behaviour,
+    Competition,
+    Contender,
+    Fate,
+    Rejection,
+    Trigger,
+)
+from cogmap.services.global_workspace.config import Config
 
 OUT_OF_IT = frozenset({Fate.DISPLACED, Fate.DECAYED})
 

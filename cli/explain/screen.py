@@ -6,8 +6,8 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from cli.explain.moment import Moment
-from cli.explain.text import Row, Stage, delay, headline, stages
+from cogmap.cli.explain.moment import Moment
+from cogmap.cli.explain.text import Row, Stage, delay, headline, stages
 
 PIPED_WIDTH = 120
 TITLE = "bold"

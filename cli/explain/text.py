@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from cli.explain import names, reasons
-from cli.explain.moment import Moment
-from cli.explain.reading import Logged
-from schemas.cognition import Contender, Fate, Rejection
-from schemas.graph import Delta, Phase
-from schemas.sensing import Percepts
+from cogmap.cli.explain import names, reasons
+from cogmap.cli.explain.moment import Moment
+from cogmap.cli.explain.reading import Logged
+from cogmap.schemas.cognition import Contender, Fate, Rejection
+from cogmap.schemas.graph import Delta, Phase
+from cogmap.schemas.sensing import Percepts
 
 BAR_CELLS = 10
 EIGHTHS = " ▏▎▍▌▋▊▉█"

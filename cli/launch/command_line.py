@@ -11,7 +11,7 @@ _SOURCES = Path(__file__).parents[2]
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 """One thread a process for linear algebra: there are more processes than cores."""
 
-_COGMAP = (sys.executable, "-P", "-m", "cli.main")
+_COGMAP = (sys.executable, "-P", "-m", "cogmap.cli.main")
 
 
 def cogmap_command(*arguments: str) -> list[str]:

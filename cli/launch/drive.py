@@ -8,11 +8,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from cli.launch.forking.client import ForkServer
-from cli.launch.guide import Guide, Stage
-from cli.launch.observer import Observer
-from cli.launch.outcome import Ending, Outcome
-from cli.launch.plan import (
+from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.cli.launch.forking.client import ForkServer
+from cogmap.cli.launch.guide import Guide, Stage
+from cogmap.cli.launch.observer import Observer
+from cogmap.cli.launch.outcome import Ending, Outcome
+from cogmap.cli.launch.plan import (
     CONFIG_NAME,
     EXPLORE_S,
     RECORDER,
@@ -22,15 +23,14 @@ from cli.launch.plan import (
     programs,
     to_toml,
 )
-from cli.launch.supervisor import Supervisor
-from cli.launch.watch import Watch
-from cli.launch.watchdog import REMEDY, Situation, Watchdog
-from cli.run.display import Display
-from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.cli.launch.supervisor import Supervisor
+from cogmap.cli.launch.watch import Watch
+from cogmap.cli.launch.watchdog import REMEDY, Situation, Watchdog
+from cogmap.cli.run.display import Display
 from cogmap.errors import ProcessFailedError
 from cogmap.runtime.config import Sections
 from cogmap.runtime.process import Stop
-from schemas.sensing import SpeedLimit
+from cogmap.schemas.sensing import SpeedLimit
 
 PUMP_S = 0.05
 SHOW_PERIOD_S = 0.25

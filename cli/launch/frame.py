@@ -6,8 +6,8 @@ import numpy as np
 
 from cogmap.geometry import se2
 from cogmap.geometry.arrays import Floats
-from schemas.graph import Delta
-from schemas.nodes import ROOT_MAP, Map, Recollection
+from cogmap.schemas.graph import Delta
+from cogmap.schemas.nodes import ROOT_MAP, Map, Recollection
 
 NOWHERE = np.zeros(3)
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from cogmap.graph.graph import Graph
 from cogmap.hints import nearest
-from schemas.graph import Delta, DropNode
-from schemas.nodes import NEVER_NS, PLAN_ID, Goal, Object, Plan, PlanState, goal_id
+from cogmap.schemas.graph import Delta, DropNode
+from cogmap.schemas.nodes import NEVER_NS, PLAN_ID, Goal, Object, Plan, PlanState, goal_id
 
 # A goal is at least so far ahead until it is reached.
 LAST_M = 1.0

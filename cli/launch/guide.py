@@ -9,13 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cli.launch.observer import Observer
+from cogmap.cli.launch.observer import Observer
 from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
-from schemas.base import Message
-from schemas.codelets import Offer
-from schemas.nodes import NEVER_NS, PLAN_ID, Goal, Object, Plan, PlanState, goal_id
-from schemas.sensing import Street, StreetClosure, TrueTown
+from cogmap.schemas.base import Message
+from cogmap.schemas.codelets import Offer
+from cogmap.schemas.nodes import NEVER_NS, PLAN_ID, Goal, Object, Plan, PlanState, goal_id
+from cogmap.schemas.sensing import Street, StreetClosure, TrueTown
 
 TOUR_GOALS = 3
 KNOWN_SIGHTINGS = 3

@@ -8,16 +8,16 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from cli.launch.goals import unreached
-from cli.launch.observer import Observer
-from cli.launch.tally import EnergyMetrics, Tally
+from cogmap.cli.launch.goals import unreached
+from cogmap.cli.launch.observer import Observer
+from cogmap.cli.launch.tally import EnergyMetrics, Tally
 from cogmap.errors import LogError
 from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
 from cogmap.recording.recorder import Summary
 from cogmap.recording.storage.format import SUMMARY
 from cogmap.recording.storage.reader import LogReader
-from schemas.nodes import ROOT_MAP, Object, PlaceColumn
+from cogmap.schemas.nodes import ROOT_MAP, Object, PlaceColumn
 
 ROAD_THRESHOLD = 0.5
 

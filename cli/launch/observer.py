@@ -7,17 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cli.launch.frame import MapFrame
-from cli.launch.goals import GoalProgress
-from cli.launch.track import PathIntegrator, Track
+from cogmap.cli.launch.frame import MapFrame
+from cogmap.cli.launch.goals import GoalProgress
+from cogmap.cli.launch.track import PathIntegrator, Track
 from cogmap.errors import MessageError
 from cogmap.geometry import se2
 from cogmap.geometry.arrays import Floats, Indices
-from schemas import topics
-from schemas.base import Message
-from schemas.graph import Delta
-from schemas.nodes import Self
-from schemas.sensing import Odometry, Pose, SelfMotion, TruePose, TrueTown
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.graph import Delta
+from cogmap.schemas.nodes import Self
+from cogmap.schemas.sensing import Odometry, Pose, SelfMotion, TruePose, TrueTown
 
 OBSERVED = (
     topics.TRUE_TOWN,

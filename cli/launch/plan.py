@@ -10,17 +10,17 @@ from typing import Any
 import msgspec
 import tomli_w
 
-from cli.launch.command_line import cogmap_command
-from cli.launch.supervisor import Program
+from cogmap.cli.launch.command_line import cogmap_command
+from cogmap.cli.launch.supervisor import Program
 from cogmap.errors import ConfigError
 from cogmap.runtime import config
 from cogmap.runtime.config import Sections
-from schemas.nodes import Goal, goal_id
-from services import registry
-from services.sim.config import Config as SimConfig
-from services.sim.layout.town import generate
-from services.sim.layout.towns import BLOCKS, LOOP
-from services.sim.odometry import FUSED
+from cogmap.schemas.nodes import Goal, goal_id
+from cogmap.services import registry
+from cogmap.services.sim.config import Config as SimConfig
+from cogmap.services.sim.layout.town import generate
+from cogmap.services.sim.layout.towns import BLOCKS, LOOP
+from cogmap.services.sim.odometry import FUSED
 
 OBSERVER = "observer"
 RECORDER = "recorder"

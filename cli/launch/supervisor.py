@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Protocol
 
-from cli.launch.command_line import arguments_of, environment
-from cli.launch.forking.client import ForkServer
+from cogmap.cli.launch.command_line import arguments_of, environment
+from cogmap.cli.launch.forking.client import ForkServer
 from cogmap.errors import ProcessFailedError
 
 MIN_BACKOFF_S = 0.2

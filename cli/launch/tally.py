@@ -9,17 +9,17 @@ from collections.abc import Mapping
 
 import msgspec
 
-from cli.launch.observer import OBSERVED, Observer
 from cogmap.bus.codec import Envelope
+from cogmap.cli.launch.observer import OBSERVED, Observer
 from cogmap.graph.replica import Replica
-from schemas import topics
-from schemas.base import Message
-from schemas.cognition import Broadcast
-from schemas.graph import Delta, DropNode
-from schemas.nodes import Object
-from schemas.process import Health
-from schemas.sensing import Energy, MotorCommand, SpeedLimit
-from schemas.topics import Delivery
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.cognition import Broadcast
+from cogmap.schemas.graph import Delta, DropNode
+from cogmap.schemas.nodes import Object
+from cogmap.schemas.process import Health
+from cogmap.schemas.sensing import Energy, MotorCommand, SpeedLimit
+from cogmap.schemas.topics import Delivery
 
 MAX_REASONS = 8
 FOLLOWED = (

@@ -8,17 +8,17 @@ from collections.abc import Mapping
 
 import msgspec
 
-from cli.launch.plan import OBSERVER
-from cli.launch.tally import FOLLOWED, Tally
 from cogmap.bus.codec import Envelope, encode
 from cogmap.bus.interface import Arrival, Bus, Member
+from cogmap.cli.launch.plan import OBSERVER
+from cogmap.cli.launch.tally import FOLLOWED, Tally
 from cogmap.errors import MessageError
 from cogmap.graph.replica import Replica, snapshot_over
 from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.delivery.intake import Intake
-from schemas import topics
-from schemas.base import Message
-from schemas.topics import Topic
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.topics import Topic
 
 PUBLISHED = (topics.OFFER, topics.STREET_CLOSURE)
 

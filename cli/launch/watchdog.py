@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from cli.launch.outcome import Ending, Outcome
-from schemas.sensing import SpeedLimit
+from cogmap.cli.launch.outcome import Ending, Outcome
+from cogmap.schemas.sensing import SpeedLimit
 
 STALLED_S = 30.0
 STUCK_S = 30.0

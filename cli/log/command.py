@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import click
 
-from cli.log.drive import draw_map, summary
-from cli.log.inspect import cat, diff, info, recover
-from cli.log.pictures import image, perception
-from cli.log.record import record
-from cli.log.replay import replay
+from cogmap.cli.log.drive import draw_map, summary
+from cogmap.cli.log.inspect import cat, diff, info, recover
+from cogmap.cli.log.pictures import image, perception
+from cogmap.cli.log.record import record
+from cogmap.cli.log.replay import replay
 
 _EPILOG = """\b
 A first session, with `cogmap run` going on in another terminal:

@@ -10,14 +10,14 @@ import click
 import msgspec
 from rich.console import Console
 
-from cli.launch.metrics import RecordedMetrics, Recording, drive_metrics
-from cli.launch.tally import FOLLOWED, Tally
-from cli.log import formatting
-from cli.log.inspect import log_argument
-from cli.log.progress import bar
-from cli.options import json_option
-from cli.run.summary import recorded_table
 from cogmap.bus.interface import Arrival
+from cogmap.cli.launch.metrics import RecordedMetrics, Recording, drive_metrics
+from cogmap.cli.launch.tally import FOLLOWED, Tally
+from cogmap.cli.log import formatting
+from cogmap.cli.log.inspect import log_argument
+from cogmap.cli.log.progress import bar
+from cogmap.cli.options import json_option
+from cogmap.cli.run.summary import recorded_table
 from cogmap.errors import MessageError, NoAnswerError, UsageError
 from cogmap.graph.graph import Graph
 from cogmap.graph.replica import Fetched, Replica
@@ -25,9 +25,9 @@ from cogmap.recording.log import recorded_config
 from cogmap.recording.storage.reader import LogReader
 from cogmap.recording.storage.writer import cannot_write
 from cogmap.runtime.delivery.intake import Intake
-from schemas import topics
-from schemas.graph import SnapshotRequest
-from services import registry
+from cogmap.schemas import topics
+from cogmap.schemas.graph import SnapshotRequest
+from cogmap.services import registry
 
 PLOTS = (".png", ".pdf")
 _MAP_EPILOG = """\b
@@ -63,7 +63,7 @@ def draw_map(log: Path, output: Path | None) -> None:
     It is the map.png of `cogmap run`: streets and buildings, the true path, the estimated one and
     path integration alone, the streets and buildings that were learned.
     """
-    from cli.plots import map as plot  # other commands have no use for matplotlib
+    from cogmap.cli.plots import map as plot  # other commands have no use for matplotlib
 
     path = output or Path(f"{log.stem}-map{PLOTS[0]}")
     if path.suffix.lower() not in PLOTS:

@@ -11,16 +11,16 @@ from typing import Any
 import click
 import msgspec
 
-from cli.log import formatting
-from cli.log.progress import bar
-from cli.options import FiniteRange, json_option
+from cogmap.cli.log import formatting
+from cogmap.cli.log.progress import bar
+from cogmap.cli.options import FiniteRange, json_option
 from cogmap.errors import MessageError
 from cogmap.recording import diff as differ
 from cogmap.recording import info as informer
 from cogmap.recording import selection
 from cogmap.recording.storage import recover as rescuer
 from cogmap.recording.storage.reader import LogReader, Record
-from schemas.render import to_jsonable, to_text
+from cogmap.schemas.render import to_jsonable, to_text
 
 _CAT_EPILOG = """\b
 Examples:

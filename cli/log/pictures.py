@@ -8,17 +8,17 @@ from pathlib import Path
 import click
 import msgspec
 
-from cli.log import formatting
-from cli.log.files import save
-from cli.log.progress import bar
-from cli.options import FiniteRange, json_option
+from cogmap.cli.log import formatting
+from cogmap.cli.log.files import save
+from cogmap.cli.log.progress import bar
+from cogmap.cli.options import FiniteRange, json_option
 from cogmap.errors import LogError, UsageError
 from cogmap.recording import views
 from cogmap.recording.storage.reader import LogReader
 from cogmap.recording.views import CameraFrame, Depth
-from schemas import topics
-from schemas.sensing import Percepts, StereoFrame, View
-from schemas.topics import Topic
+from cogmap.schemas import topics
+from cogmap.schemas.sensing import Percepts, StereoFrame, View
+from cogmap.schemas.topics import Topic
 
 IMAGES = (".png", ".jpg", ".jpeg")
 PLOTS = (".png", ".pdf")
@@ -188,7 +188,7 @@ def _output(
 
 def _camera_image(reader: LogReader, frame: CameraFrame, camera: str, suffix: str) -> bytes:
     """A camera's image as a file. Raises LogError."""
-    from cli.plots import draw
+    from cogmap.cli.plots import draw
 
     message = views.message(reader, frame.record)
     assert isinstance(message, StereoFrame)
@@ -200,7 +200,7 @@ def _view_image(
     reader: LogReader, frame: CameraFrame, depth: bool, recognised: Percepts | None, suffix: str
 ) -> bytes:
     """A view as a file, drawn over where depth or percepts are to be shown. Raises LogError."""
-    from cli.plots import draw
+    from cogmap.cli.plots import draw
 
     view = _view(reader, frame)
     name = _name(reader, frame)
@@ -216,7 +216,7 @@ def _perception_plot(
     reader: LogReader, frame: CameraFrame, recognised: Percepts, suffix: str
 ) -> bytes:
     """The plot of a view and its percepts as a file. Raises LogError."""
-    from cli.plots import perception as plot  # other commands have no use for matplotlib
+    from cogmap.cli.plots import perception as plot  # other commands have no use for matplotlib
 
     view = _view(reader, frame)
     name = _name(reader, frame)

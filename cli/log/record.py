@@ -8,8 +8,9 @@ from pathlib import Path
 
 import click
 
-from cli.log import formatting
-from cli.options import (
+from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.cli.log import formatting
+from cogmap.cli.options import (
     FiniteRange,
     agent_option,
     config_option,
@@ -17,7 +18,6 @@ from cli.options import (
     json_option,
     set_option,
 )
-from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.errors import LogError
 from cogmap.recording import recorder, selection
 from cogmap.runtime import config

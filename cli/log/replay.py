@@ -7,10 +7,11 @@ from pathlib import Path
 
 import click
 
-from cli.log import formatting
-from cli.log.keys import Keys
-from cli.log.progress import bar
-from cli.options import (
+from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.cli.log import formatting
+from cogmap.cli.log.keys import Keys
+from cogmap.cli.log.progress import bar
+from cogmap.cli.options import (
     FiniteRange,
     agent_option,
     config_option,
@@ -18,14 +19,13 @@ from cli.options import (
     json_option,
     set_option,
 )
-from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.recording import selection
 from cogmap.recording.replaying.player import Choices, Player
 from cogmap.recording.replaying.replay import replay_into
 from cogmap.recording.storage.reader import LogReader
 from cogmap.runtime import config
 from cogmap.runtime.process import Stop
-from services import registry
+from cogmap.services import registry
 
 CLOCK_HZ = 40.0
 _EPILOG = """\b

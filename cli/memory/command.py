@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import click
 
-from cli.memory.inspect import check, show
-from cli.memory.transfer import export, import_
+from cogmap.cli.memory.inspect import check, show
+from cogmap.cli.memory.transfer import export, import_
 
 _EPILOG = """\b
 Examples:

@@ -8,10 +8,10 @@ from pathlib import Path
 import click
 import msgspec
 
-from cli.log.formatting import megabytes, print_json, print_table
-from cli.log.progress import bar
-from cli.memory.source import checked, database_argument
-from cli.options import json_option
+from cogmap.cli.log.formatting import megabytes, print_json, print_table
+from cogmap.cli.log.progress import bar
+from cogmap.cli.memory.source import checked, database_argument
+from cogmap.cli.options import json_option
 from cogmap.runtime.state.record import Record
 
 _COLUMNS = ["kind:", "records", "size", "newest:"]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from cli.log.progress import bar
+from cogmap.cli.log.progress import bar
 from cogmap.runtime.state.database import Database
 
 existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import click
 
-from cli.log.progress import bar
-from cli.memory import lines
-from cli.memory.source import checked, database_argument, existing_file
+from cogmap.cli.log.progress import bar
+from cogmap.cli.memory import lines
+from cogmap.cli.memory.source import checked, database_argument, existing_file
 from cogmap.runtime.state.database import write_new
 from cogmap.runtime.state.new_file import new_file
 from cogmap.runtime.state.record import Record

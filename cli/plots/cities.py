@@ -13,8 +13,8 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from cli.plots.draw import STYLE
-from cli.plots.palette import (
+from cogmap.cli.plots.draw import STYLE
+from cogmap.cli.plots.palette import (
     ESTIMATE,
     FAINT,
     INK,
@@ -26,11 +26,11 @@ from cli.plots.palette import (
     TRUE,
     WHEELS,
 )
-from experiments.city_maps import published
-from experiments.city_maps.drive import SENSING
-from experiments.city_maps.measure import CityMap
-from experiments.city_maps.metrics import NAMES
-from experiments.city_maps.observer import WHEELS as WHEELS_ALONE
+from cogmap.experiments.city_maps import published
+from cogmap.experiments.city_maps.drive import SENSING
+from cogmap.experiments.city_maps.measure import CityMap
+from cogmap.experiments.city_maps.metrics import NAMES
+from cogmap.experiments.city_maps.observer import WHEELS as WHEELS_ALONE
 
 SHOWN = {
     WHEELS_ALONE: "wheels alone",

@@ -10,13 +10,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
-from cli.plots.draw import STYLE
-from cli.plots.palette import ESTIMATE, FAINT, INK, KERB, OBJECT, PAPER, SEVERAL, TRUE
-from experiments.cue_integration import published
-from experiments.cue_integration.analysis import rmse_m
-from experiments.cue_integration.geometry import LANDMARKS, POSTS, ROUTES, START, Points
-from experiments.cue_integration.run import Outcome
-from experiments.cue_integration.trial import Condition
+from cogmap.cli.plots.draw import STYLE
+from cogmap.cli.plots.palette import ESTIMATE, FAINT, INK, KERB, OBJECT, PAPER, SEVERAL, TRUE
+from cogmap.experiments.cue_integration import published
+from cogmap.experiments.cue_integration.analysis import rmse_m
+from cogmap.experiments.cue_integration.geometry import LANDMARKS, POSTS, ROUTES, START, Points
+from cogmap.experiments.cue_integration.run import Outcome
+from cogmap.experiments.cue_integration.trial import Condition
 
 NAMES = {
     Condition.SELF_MOTION: "self-motion",

@@ -17,10 +17,10 @@ from matplotlib.image import AxesImage
 from matplotlib.patches import Polygon
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from cli.plots.labels import Label, place
-from cli.plots.palette import FAINT, KERB, PAPER, SEVERAL
+from cogmap.cli.plots.labels import Label, place
+from cogmap.cli.plots.palette import FAINT, KERB, PAPER, SEVERAL
 from cogmap.recording.views import Depth, Image
-from schemas.sensing import Calibration, Percept
+from cogmap.schemas.sensing import Calibration, Percept
 
 logging.getLogger("matplotlib").setLevel(logging.WARNING)
 STYLE: dict[Any, Any] = {"font.family": "sans-serif", "font.size": 9, "axes.edgecolor": KERB}

@@ -11,12 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Circle, Ellipse, Polygon
 
-from cli.plots.draw import colours_of, spoken
-from cli.plots.labels import Label, place
-from cli.plots.palette import ESTIMATE, INK, KERB, ROAD, ROAD_OPACITY, STREET
-from schemas.array import Array
-from schemas.sensing import Calibration, Percept, Percepts
-from services.epam.layout.ground import CELL_M
+from cogmap.cli.plots.draw import colours_of, spoken
+from cogmap.cli.plots.labels import Label, place
+from cogmap.cli.plots.palette import ESTIMATE, INK, KERB, ROAD, ROAD_OPACITY, STREET
+from cogmap.schemas.array import Array
+from cogmap.schemas.sensing import Calibration, Percept, Percepts
+from cogmap.services.epam.layout.ground import CELL_M
 
 Floats = npt.NDArray[np.float64]
 NEAREST_M = 0.4

@@ -10,7 +10,7 @@ from adjustText import adjust_text
 from matplotlib.axes import Axes
 from matplotlib.text import Text
 
-from cli.plots.palette import PAPER
+from cogmap.cli.plots.palette import PAPER
 
 # Iterations, not seconds: the same labels are placed the same on every machine.
 MAX_ITERATIONS = 500

@@ -12,10 +12,20 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from cli.plots.draw import STYLE
-from cli.plots.palette import ESTIMATE, FAINT, INK, OBJECT, PAPER, ROAD, SEVERAL, TRUE, WHEELS
-from experiments.loop_closing.observer import Loop, Map, Replayed
-from experiments.loop_closing.run import SENSING
+from cogmap.cli.plots.draw import STYLE
+from cogmap.cli.plots.palette import (
+    ESTIMATE,
+    FAINT,
+    INK,
+    OBJECT,
+    PAPER,
+    ROAD,
+    SEVERAL,
+    TRUE,
+    WHEELS,
+)
+from cogmap.experiments.loop_closing.observer import Loop, Map, Replayed
+from cogmap.experiments.loop_closing.run import SENSING
 
 
 def figure(loops: dict[str, Loop], metrics: dict[str, Any]) -> Figure:

@@ -11,13 +11,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from cli.launch.metrics import RecordedMetrics
-from cli.launch.observer import Observer
-from cli.plots import map_layers as layers
-from cli.plots import palette
-from cli.plots.map_structure import draw_structure
-from cli.plots.palette import ESTIMATE, FAINT, FUSED, INK, PAPER, TRUE, WHEELS
-from cli.plots.town_layer import CHARGING_MARKER, draw_town
+from cogmap.cli.launch.metrics import RecordedMetrics
+from cogmap.cli.launch.observer import Observer
+from cogmap.cli.plots import map_layers as layers
+from cogmap.cli.plots import palette
+from cogmap.cli.plots.map_structure import draw_structure
+from cogmap.cli.plots.palette import ESTIMATE, FAINT, FUSED, INK, PAPER, TRUE, WHEELS
+from cogmap.cli.plots.town_layer import CHARGING_MARKER, draw_town
 from cogmap.graph.graph import Graph
 
 MARGIN_M = 5.0

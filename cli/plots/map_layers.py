@@ -8,12 +8,12 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Ellipse
 from matplotlib.transforms import Affine2D, Transform
 
-from cli.launch.metrics import objects, position_m
-from cli.launch.observer import Observer
-from cli.plots.palette import OBJECT, ROAD, ROAD_OPACITY
+from cogmap.cli.launch.metrics import objects, position_m
+from cogmap.cli.launch.observer import Observer
+from cogmap.cli.plots.palette import OBJECT, ROAD, ROAD_OPACITY
 from cogmap.graph.graph import Graph
-from schemas.nodes import ROOT_MAP, TILE_SIDE, Object, PlaceColumn
-from schemas.sensing import Pose
+from cogmap.schemas.nodes import ROOT_MAP, TILE_SIDE, Object, PlaceColumn
+from cogmap.schemas.sensing import Pose
 
 
 def _agent_frame(axes: Axes, frame: Pose | None) -> Transform:

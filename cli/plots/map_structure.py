@@ -9,13 +9,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 from scipy.spatial import ConvexHull, QhullError
 
-from cli.launch.observer import Observer
-from cli.plots.palette import CUT, GOAL, PLAN, SEVERAL, SHORTCUT
+from cogmap.cli.launch.observer import Observer
+from cogmap.cli.plots.palette import CUT, GOAL, PLAN, SEVERAL, SHORTCUT
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_from
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import CUT_BELOW, LINK_OFFSETS, ROAD_FROM, WEIGHT_COLUMNS
-from schemas.nodes import (
+from cogmap.schemas.nodes import (
     NEVER_NS,
     PLAN_ID,
     ROOT_MAP,

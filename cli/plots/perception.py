@@ -15,10 +15,10 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from cli.plots import draw, ground
-from cli.plots.palette import ESTIMATE, FAINT, INK, KERB, OBJECT, PAPER, ROAD, ROAD_OPACITY
+from cogmap.cli.plots import draw, ground
+from cogmap.cli.plots.palette import ESTIMATE, FAINT, INK, KERB, OBJECT, PAPER, ROAD, ROAD_OPACITY
 from cogmap.recording.views import Depth, Image
-from schemas.sensing import Percepts, View
+from cogmap.schemas.sensing import Percepts, View
 
 PALER = 0.55
 # Without the time of day in it, the same log gives the same bytes.

@@ -12,13 +12,24 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cli.plots.draw import STYLE
-from cli.plots.palette import ESTIMATE, FAINT, INK, KERB, PAPER, ROAD, SEVERAL, STREET, TRUE, WHEELS
+from cogmap.cli.plots.draw import STYLE
+from cogmap.cli.plots.palette import (
+    ESTIMATE,
+    FAINT,
+    INK,
+    KERB,
+    PAPER,
+    ROAD,
+    SEVERAL,
+    STREET,
+    TRUE,
+    WHEELS,
+)
+from cogmap.experiments.route_planning import published
+from cogmap.experiments.route_planning.activation import Spread, free_ground, walled_ground
+from cogmap.experiments.route_planning.measure import EXAMPLE_GOALS, Planned
 from cogmap.geometry.arrays import Floats, Indices
-from experiments.route_planning import published
-from experiments.route_planning.activation import Spread, free_ground, walled_ground
-from experiments.route_planning.measure import EXAMPLE_GOALS, Planned
-from services.codelets.planning.tours import TourSettings
+from cogmap.services.codelets.planning.tours import TourSettings
 
 PEOPLE = TRUE
 PUBLISHED = SEVERAL[0]

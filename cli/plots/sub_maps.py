@@ -13,11 +13,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from scipy.spatial import ConvexHull, QhullError
 
-from cli.plots.draw import STYLE
-from cli.plots.palette import FAINT, HOUSE, INK, KERB, PAPER, SEVERAL, STREET, WALL
+from cogmap.cli.plots.draw import STYLE
+from cogmap.cli.plots.palette import FAINT, HOUSE, INK, KERB, PAPER, SEVERAL, STREET, WALL
+from cogmap.experiments.map_structure.functions import FUNCTIONS
+from cogmap.experiments.map_structure.measure import Structured
 from cogmap.geometry.arrays import Floats, Indices
-from experiments.map_structure.functions import FUNCTIONS
-from experiments.map_structure.measure import Structured
 
 COLUMNS = 2
 MARGIN_M = 40.0

@@ -14,9 +14,9 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Polygon, Rectangle
 from matplotlib.transforms import Affine2D
 
-from cli.plots.palette import CHARGING, CLOSED, HOUSE, KERB, NAME, SEVERAL, STREET, WALL
-from schemas.sensing import Building, Obstacle, Street, TrueTown
-from services.sim.layout.furniture import CHARGING_PLACE
+from cogmap.cli.plots.palette import CHARGING, CLOSED, HOUSE, KERB, NAME, SEVERAL, STREET, WALL
+from cogmap.schemas.sensing import Building, Obstacle, Street, TrueTown
+from cogmap.services.sim.layout.furniture import CHARGING_PLACE
 
 # A plus, filled.
 CHARGING_MARKER: dict[str, Any] = {"marker": "P", "ms": 9, "ls": "", "color": CHARGING}

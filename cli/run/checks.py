@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from cli.launch.plan import MEMORY, Choices
-from cli.memory.source import checked
+from cogmap.cli.launch.plan import MEMORY, Choices
+from cogmap.cli.memory.source import checked
 from cogmap.runtime import config
 from cogmap.runtime.config import Sections
-from services import registry
-from services.sim.config import Config, check
-from services.sim.layout import towns
+from cogmap.services import registry
+from cogmap.services.sim.config import Config, check
+from cogmap.services.sim.layout import towns
 
 PROCEDURAL = "procedural"
 SIM = "sim"

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cli.launch.command_line import ONE_THREAD
-from cli.launch.forking.client import fork_server
-from cli.options import FiniteRange, agent_option, config_option, connect_option, set_option
+from cogmap.cli.launch.command_line import ONE_THREAD
+from cogmap.cli.launch.forking.client import fork_server
+from cogmap.cli.options import FiniteRange, agent_option, config_option, connect_option, set_option
 from cogmap.runtime import config
-from services import registry
+from cogmap.services import registry
 
 if TYPE_CHECKING:
-    from cli.launch.plan import Choices
+    from cogmap.cli.launch.plan import Choices
 
 LAP_LIMIT_S = 85.0
 AROUND_S = 30.0
@@ -29,7 +29,7 @@ seed_option = click.option(
 def _known_town(context: click.Context, option: click.Parameter, value: str | None) -> str | None:
     """Refuse a town that there is none of. Raises ConfigError."""
     if value is not None:
-        from services.sim.layout import towns
+        from cogmap.services.sim.layout import towns
 
         towns.check(value)
     return value
@@ -158,9 +158,9 @@ def run(
         # While the server imports what it is to fork, this process imports what it needs itself.
         # Threads of linear algebra would wait for work in a loop, on the server's processor.
         os.environ.update(ONE_THREAD)
-        from cli.goal import read_goals
-        from cli.launch.plan import Choices
-        from cli.run.drive import Start, run_drive
+        from cogmap.cli.goal import read_goals
+        from cogmap.cli.launch.plan import Choices
+        from cogmap.cli.run.drive import Start, run_drive
 
         choices = Choices(
             seed=seed,
@@ -196,7 +196,7 @@ def default_limit_s(sim: dict[str, Any], choices: Choices) -> float:
     It grows with each lap, and is one lap's at least; without laps it is the drive's duration, and
     time to start and to end.
     """
-    from services.sim.layout.towns import LOOP
+    from cogmap.services.sim.layout.towns import LOOP
 
     has_laps = not (choices.tour or choices.goals or choices.explore_s)
     if sim["town"] == LOOP and has_laps:

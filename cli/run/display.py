@@ -8,7 +8,7 @@ from typing import Protocol
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
-from cli.launch.observer import Errors, Observer
+from cogmap.cli.launch.observer import Errors, Observer
 from cogmap.geometry.arrays import Floats
 
 PLAIN_PERIOD_S = 5.0

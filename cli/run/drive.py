@@ -12,19 +12,19 @@ import click
 import msgspec
 from rich.console import Console
 
-from cli import BEGAN_S
-from cli.launch.drive import Drive
-from cli.launch.forking.client import ForkServer
-from cli.launch.plan import CONFIG_NAME, Choices, awaited, effective
-from cli.run import summary
-from cli.run.checks import check_inputs
-from cli.run.command import default_limit_s
-from cli.run.display import Display, display_on
 from cogmap.bus.session import check_free
+from cogmap.cli import BEGAN_S
+from cogmap.cli.launch.drive import Drive
+from cogmap.cli.launch.forking.client import ForkServer
+from cogmap.cli.launch.plan import CONFIG_NAME, Choices, awaited, effective
+from cogmap.cli.run import summary
+from cogmap.cli.run.checks import check_inputs
+from cogmap.cli.run.command import default_limit_s
+from cogmap.cli.run.display import Display, display_on
 from cogmap.errors import ConfigError, StorageError
 from cogmap.runtime.config import Sections
 from cogmap.runtime.process import Stop
-from services.sim.layout.towns import BLOCKS, LOOP, OSM
+from cogmap.services.sim.layout.towns import BLOCKS, LOOP, OSM
 
 RUNS = Path("runs")
 FINISH_S = 4.0

@@ -11,8 +11,8 @@ import msgspec
 from rich.markup import escape
 from rich.table import Table
 
-from cli.launch.drive import Drive
-from cli.launch.metrics import (
+from cogmap.cli.launch.drive import Drive
+from cogmap.cli.launch.metrics import (
     DriveMetrics,
     ErrorMetrics,
     RecordedMetrics,
@@ -20,10 +20,10 @@ from cli.launch.metrics import (
     RunMetrics,
     drive_metrics,
 )
-from cli.launch.outcome import Ending, Outcome
-from cli.launch.plan import LOG_NAME
-from cli.launch.tally import EnergyMetrics
-from cli.launch.watch import Watch
+from cogmap.cli.launch.outcome import Ending, Outcome
+from cogmap.cli.launch.plan import LOG_NAME
+from cogmap.cli.launch.tally import EnergyMetrics
+from cogmap.cli.launch.watch import Watch
 
 SUMMARY_NAME = "summary.json"
 MAP_NAME = "map.png"
@@ -63,7 +63,9 @@ def _run_metrics(drive: Drive, watch: Watch, ending: Ending) -> RunMetrics:
 
 
 def _draw_map(path: Path, watch: Watch, metrics: RunMetrics) -> None:
-    from cli.plots import map as plot  # half a second, which the start of a run has no use for
+    from cogmap.cli.plots import (
+        map as plot,  # half a second, which the start of a run has no use for
+    )
 
     logging.getLogger("matplotlib").setLevel(logging.WARNING)
     plot.draw(path, watch.tally.observer, watch.tally.replica.graph, metrics)

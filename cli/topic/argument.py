@@ -6,8 +6,8 @@ import click
 
 from cogmap.errors import UsageError
 from cogmap.hints import did_you_mean
-from schemas import topics
-from schemas.topics import Delivery, Topic
+from cogmap.schemas import topics
+from cogmap.schemas.topics import Delivery, Topic
 
 
 def topic_named(name: str) -> Topic:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import click
 
-from cli.topic.echo import echo
-from cli.topic.listing import find, info, listing, type_
-from cli.topic.pub import pub
-from cli.topic.rates import bw, delay, hz
+from cogmap.cli.topic.echo import echo
+from cogmap.cli.topic.listing import find, info, listing, type_
+from cogmap.cli.topic.pub import pub
+from cogmap.cli.topic.rates import bw, delay, hz
 
 
 @click.group()

@@ -11,19 +11,19 @@ from typing import Any
 import click
 import msgspec
 
-from cli.options import agent_option, connect_option, json_option
-from cli.topic.argument import streamed_argument
-from cli.topic.observing import TICK_S, RouterWatch, observing
 from cogmap.bus.interface import Arrival
+from cogmap.cli.options import agent_option, connect_option, json_option
+from cogmap.cli.topic.argument import streamed_argument
+from cogmap.cli.topic.observing import TICK_S, RouterWatch, observing
 from cogmap.errors import UsageError
 from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.delivery.intake import Intake
 from cogmap.runtime.process import Stop
-from schemas.array import Array, Matrix
-from schemas.base import Message
-from schemas.render import field as field_at
-from schemas.render import to_jsonable, to_text
-from schemas.topics import Topic
+from cogmap.schemas.array import Array, Matrix
+from cogmap.schemas.base import Message
+from cogmap.schemas.render import field as field_at
+from cogmap.schemas.render import to_jsonable, to_text
+from cogmap.schemas.topics import Topic
 
 Format = Callable[[Message], str]
 

@@ -7,12 +7,12 @@ from typing import Any
 
 import click
 
-from cli.options import agent_option, connect_option, json_option
-from cli.topic.argument import topic_argument
-from cli.topic.observing import inspect_system
 from cogmap.bus.discovery import Process, Role, System
-from schemas import topics
-from schemas.topics import Delivery, Topic
+from cogmap.cli.options import agent_option, connect_option, json_option
+from cogmap.cli.topic.argument import topic_argument
+from cogmap.cli.topic.observing import inspect_system
+from cogmap.schemas import topics
+from cogmap.schemas.topics import Delivery, Topic
 
 _ROLES = {
     Role.PUBLISHES: ("Published topics:", "publisher"),

@@ -8,8 +8,8 @@ from typing import Any
 
 import msgspec
 
-from cli.topic.observing import Reception
-from cli.topic.statistics import Bandwidth, Delay, Rate
+from cogmap.cli.topic.observing import Reception
+from cogmap.cli.topic.statistics import Bandwidth, Delay, Rate
 
 MIN_PERIOD_S = 1e-9
 

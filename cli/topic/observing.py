@@ -17,7 +17,7 @@ from cogmap.bus.interface import Arrival, Member
 from cogmap.bus.session import CONNECT_TIMEOUT_S, open_client
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.errors import NoRouterError
-from schemas.topics import Topic
+from cogmap.schemas.topics import Topic
 
 TICK_S = 0.1
 CLI = "cli"

@@ -12,9 +12,9 @@ import yaml
 
 from cogmap.errors import UsageError
 from cogmap.hints import did_you_mean
-from schemas.array import DTYPES
-from schemas.base import Message
-from schemas.topics import Topic
+from cogmap.schemas.array import DTYPES
+from cogmap.schemas.base import Message
+from cogmap.schemas.topics import Topic
 
 
 def parse(topic: Topic, text: str) -> Message:

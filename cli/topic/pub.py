@@ -7,16 +7,16 @@ import time
 import click
 import msgspec
 
-from cli.options import FiniteRange, agent_option, connect_option
-from cli.topic.argument import streamed_argument
-from cli.topic.observing import CLI, RouterWatch, observing
-from cli.topic.parse import parse
 from cogmap.bus.codec import Envelope, decode, encode
 from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.cli.options import FiniteRange, agent_option, connect_option
+from cogmap.cli.topic.argument import streamed_argument
+from cogmap.cli.topic.observing import CLI, RouterWatch, observing
+from cogmap.cli.topic.parse import parse
 from cogmap.errors import MessageError, UsageError
 from cogmap.runtime.process import Stop
-from schemas.base import Message
-from schemas.topics import Topic
+from cogmap.schemas.base import Message
+from cogmap.schemas.topics import Topic
 
 
 @click.command()

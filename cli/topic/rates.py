@@ -9,12 +9,12 @@ from typing import Any, TypeVar
 
 import click
 
-from cli.options import agent_option, connect_option, json_option
-from cli.topic.argument import streamed_argument
-from cli.topic.metrics import BandwidthMetrics, DelayMetrics, Metrics, RateMetrics
-from cli.topic.observing import TICK_S, Reception, Receptions, RouterWatch, observing
+from cogmap.cli.options import agent_option, connect_option, json_option
+from cogmap.cli.topic.argument import streamed_argument
+from cogmap.cli.topic.metrics import BandwidthMetrics, DelayMetrics, Metrics, RateMetrics
+from cogmap.cli.topic.observing import TICK_S, Reception, Receptions, RouterWatch, observing
 from cogmap.runtime.process import Stop
-from schemas.topics import Topic
+from cogmap.schemas.topics import Topic
 
 REPORT_S = 1.0
 F = TypeVar("F", bound=Callable[..., Any])

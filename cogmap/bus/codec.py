@@ -9,8 +9,8 @@ import msgspec
 import numpy as np
 
 from cogmap.errors import MessageError
-from schemas.base import Message
-from schemas.topics import Topic
+from cogmap.schemas.base import Message
+from cogmap.schemas.topics import Topic
 
 Cause = tuple[str, str, int]
 Stage = tuple[str, int, int]

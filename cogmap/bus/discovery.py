@@ -15,8 +15,8 @@ import zenoh
 
 from cogmap.bus.interface import Member
 from cogmap.bus.session import ready_key
-from schemas import topics
-from schemas.topics import Topic
+from cogmap.schemas import topics
+from cogmap.schemas.topics import Topic
 
 ANSWER_TIMEOUT_S = 2.0
 # By default a query's channel has room for 256 tokens, and the next one blocks the session.

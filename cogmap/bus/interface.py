@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from cogmap.bus.codec import Envelope
-from schemas.topics import Topic
+from cogmap.schemas.topics import Topic
 
 # How many messages of a NEVER_DROP topic a publisher keeps for subscribers that missed them.
 CACHED_MESSAGES = 1024

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from cogmap.bus.codec import Envelope
 from cogmap.bus.interface import CACHED_MESSAGES, Answer, Arrival, Job, Member
 from cogmap.errors import NoAnswerError
-from schemas.topics import Delivery, Topic
+from cogmap.schemas.topics import Delivery, Topic
 
 Handler = Callable[[bytes], Answer]
 Watcher = Callable[[Member, bool], None]

@@ -16,7 +16,7 @@ from cogmap.bus.discovery import Role, announce_use, identify
 from cogmap.bus.interface import CACHED_MESSAGES, Answer, Arrival, Job, Member
 from cogmap.bus.session import check_name, open_client, ready_key
 from cogmap.errors import MessageError, NoAnswerError
-from schemas.topics import Delivery, Scope, Topic
+from cogmap.schemas.topics import Delivery, Scope, Topic
 
 # Zenoh delivers on a thread of its own, which at Python's default would wait 5 ms for a module that
 # computes.

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from bisect import bisect_left
 
-from schemas.graph import Decay
-from schemas.nodes import KINDS, GraphNode
+from cogmap.schemas.graph import Decay
+from cogmap.schemas.nodes import KINDS, GraphNode
 
 NEVER = 2**62
 _MAX_AGE = 2**40

@@ -11,7 +11,7 @@ from cogmap.bus.codec import encode
 from cogmap.graph import decay
 from cogmap.graph.links import LinkIndex
 from cogmap.graph.places import Place, PlaceGrid
-from schemas.graph import (
+from cogmap.schemas.graph import (
     Cells,
     Decay,
     Delta,
@@ -25,7 +25,7 @@ from schemas.graph import (
     PlaceTile,
     Snapshot,
 )
-from schemas.nodes import (
+from cogmap.schemas.nodes import (
     KINDS,
     ROOT_MAP,
     SELF_ID,

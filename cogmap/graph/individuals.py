@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from schemas.nodes import Object, look_of
+from cogmap.schemas.nodes import Object, look_of
 
 APART_M = 6.0
 """Buildings stand at least so far from one another."""

@@ -6,8 +6,8 @@ from collections import defaultdict
 from collections.abc import Callable, Collection, Iterator
 from itertools import islice
 
-from schemas.graph import Links
-from schemas.nodes import EXCLUSIVE_LINKS
+from cogmap.schemas.graph import Links
+from cogmap.schemas.nodes import EXCLUSIVE_LINKS
 
 Weights = dict[str, float]
 Targets = dict[str, Weights]

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from cogmap.geometry.arrays import Floats
-from schemas.nodes import PathColumn, PathSegment
+from cogmap.schemas.nodes import PathColumn, PathSegment
 
 
 def rows_of(path: Iterable[PathSegment]) -> Floats:

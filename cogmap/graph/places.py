@@ -12,9 +12,9 @@ from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.graph.tiles import by_tile, overlap, positions_in
 from cogmap.graph.window import LINK_OFFSETS, WEIGHT_COLUMNS, Extent, Window
-from schemas.array import Array
-from schemas.graph import Cells, Link, PlaceTile
-from schemas.nodes import TILE_SIDE, LinkKind, PlaceColumn, place_id
+from cogmap.schemas.array import Array
+from cogmap.schemas.graph import Cells, Link, PlaceTile
+from cogmap.schemas.nodes import TILE_SIDE, LinkKind, PlaceColumn, place_id
 
 Column = npt.NDArray[np.float32]
 TileKey = tuple[str, int, int]

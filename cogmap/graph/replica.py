@@ -9,8 +9,8 @@ from cogmap.bus.codec import decode, encode
 from cogmap.bus.interface import Bus
 from cogmap.errors import MessageError, NoAnswerError
 from cogmap.graph.graph import Graph
-from schemas import topics
-from schemas.graph import Delta, Snapshot, SnapshotRequest
+from cogmap.schemas import topics
+from cogmap.schemas.graph import Delta, Snapshot, SnapshotRequest
 
 SNAPSHOT_TIMEOUT_S = 2.0
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from cogmap.geometry.arrays import Indices
 from cogmap.graph.window import Extent
-from schemas.nodes import TILE_SIDE
+from cogmap.schemas.nodes import TILE_SIDE
 
 Slices = tuple[slice, slice]
 _KEY_STEP = 2**32

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cogmap.geometry.arrays import Singles
-from schemas.nodes import PlaceColumn
+from cogmap.schemas.nodes import PlaceColumn
 
 WEIGHT_COLUMNS = (
     PlaceColumn.WEIGHT_E,

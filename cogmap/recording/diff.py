@@ -10,8 +10,8 @@ import msgspec
 
 from cogmap.recording.replaying import compare
 from cogmap.recording.storage.reader import LogReader, Progress, Record
-from schemas import topics
-from schemas.topics import Scope, Topic
+from cogmap.schemas import topics
+from cogmap.schemas.topics import Scope, Topic
 
 Key = tuple[str, str, int, int]
 

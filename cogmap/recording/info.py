@@ -13,7 +13,7 @@ from cogmap.recording.log import recorded_config
 from cogmap.recording.storage import format as layout
 from cogmap.recording.storage.reader import LogReader, Progress, Record
 from cogmap.recording.storage.sequences import SequenceTracker
-from schemas.topics import BY_NAME
+from cogmap.schemas.topics import BY_NAME
 
 
 class TopicInfo(msgspec.Struct, kw_only=True):

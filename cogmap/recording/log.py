@@ -15,10 +15,10 @@ from cogmap.recording import selection
 from cogmap.recording.storage import format as layout
 from cogmap.recording.storage.format import MAX_TIME_NS
 from cogmap.recording.storage.reader import LogReader, Record
-from schemas import topics as table
-from schemas.base import Message
-from schemas.graph import Delta
-from schemas.topics import Topic
+from cogmap.schemas import topics as table
+from cogmap.schemas.base import Message
+from cogmap.schemas.graph import Delta
+from cogmap.schemas.topics import Topic
 
 BISECTED_S = 0.5
 """A span of a log that is read as it is, not bisected any more: about a chunk."""

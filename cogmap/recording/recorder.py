@@ -18,7 +18,7 @@ from cogmap.recording.storage.sequences import SequenceTracker
 from cogmap.recording.storage.write_queue import LIMIT_BYTES, WriteQueue
 from cogmap.recording.storage.writer import FlushTimer, LogWriter
 from cogmap.runtime.delivery.intake import Intake
-from schemas.topics import BY_NAME, Delivery, Topic
+from cogmap.schemas.topics import BY_NAME, Delivery, Topic
 
 log = logging.getLogger("cogmap")
 MODULE = "recorder"

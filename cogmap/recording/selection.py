@@ -8,8 +8,8 @@ from collections.abc import Iterable
 
 from cogmap.errors import UsageError
 from cogmap.recording.storage.format import topics_to_record
-from schemas import topics
-from schemas.topics import Topic
+from cogmap.schemas import topics
+from cogmap.schemas.topics import Topic
 
 
 def named(names: Iterable[str]) -> list[Topic]:

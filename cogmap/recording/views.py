@@ -10,11 +10,11 @@ import numpy.typing as npt
 
 from cogmap.errors import LogError, MessageError, UsageError
 from cogmap.recording.storage.reader import LogReader, Progress, Record
-from schemas import topics
-from schemas.array import Array
-from schemas.base import Count, Message
-from schemas.sensing import Percepts
-from schemas.topics import Topic
+from cogmap.schemas import topics
+from cogmap.schemas.array import Array
+from cogmap.schemas.base import Count, Message
+from cogmap.schemas.sensing import Percepts
+from cogmap.schemas.topics import Topic
 
 Image = npt.NDArray[np.uint8]
 Depth = npt.NDArray[np.float32]

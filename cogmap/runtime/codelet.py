@@ -10,12 +10,12 @@ import msgspec
 import numpy as np
 
 from cogmap.graph.graph import Graph
-from schemas.array import Array
-from schemas.codelets import Task
-from schemas.cognition import Coalition, Event
-from schemas.graph import Operation, Phase
-from schemas.nodes import GraphNode, LinkKind, PlaceColumn
-from schemas.sensing import Percept, Percepts, PlaceMatch, RangeScan
+from cogmap.schemas.array import Array
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.cognition import Coalition, Event
+from cogmap.schemas.graph import Operation, Phase
+from cogmap.schemas.nodes import GraphNode, LinkKind, PlaceColumn
+from cogmap.schemas.sensing import Percept, Percepts, PlaceMatch, RangeScan
 
 ENTRY_POINTS = "cogmap.codelets"
 """The group of entry points by which codelets of other packages are found."""

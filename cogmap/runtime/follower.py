@@ -9,7 +9,7 @@ from cogmap.bus.interface import Bus
 from cogmap.errors import NoAnswerError
 from cogmap.graph.graph import Graph
 from cogmap.graph.replica import Fetched, Replica, snapshot_over
-from schemas.graph import Delta, SnapshotRequest
+from cogmap.schemas.graph import Delta, SnapshotRequest
 
 RETRY_S = 0.5
 TIMEOUT_S = 20.0

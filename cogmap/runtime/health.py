@@ -11,7 +11,7 @@ from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.delivery.intake import Intake
 from cogmap.runtime.delivery.publisher import Publisher
 from cogmap.runtime.module import Module
-from schemas.process import Health
+from cogmap.schemas.process import Health
 
 _RECENT = 512
 

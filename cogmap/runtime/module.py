@@ -11,10 +11,10 @@ from msgspec.structs import replace
 
 from cogmap.errors import CogmapError
 from cogmap.graph.graph import Graph
-from schemas import topics
-from schemas.base import Message
-from schemas.graph import Delta
-from schemas.topics import Topic
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.graph import Delta
+from cogmap.schemas.topics import Topic
 
 Reply = Message | Iterable[Message] | None
 Handler = Callable[[Any], Reply]

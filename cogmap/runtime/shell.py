@@ -22,10 +22,10 @@ from cogmap.runtime.state.journal import Journal
 from cogmap.runtime.state.published import PublishedCounts
 from cogmap.runtime.state.store import Store
 from cogmap.runtime.timers import Due, Timers
-from schemas import topics
-from schemas.base import Message
-from schemas.graph import Delta
-from schemas.process import Presence
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.graph import Delta
+from cogmap.schemas.process import Presence
 
 log = logging.getLogger("cogmap")
 HEALTH_PERIOD_NS = 1_000_000_000

@@ -8,9 +8,9 @@ import msgspec
 import numpy as np
 
 from cogmap import Answer, Codelet, CycleContext, Graph, MessageError
-from schemas.codelets import Task
-from schemas.graph import Phase
-from schemas.nodes import Node
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.graph import Phase
+from cogmap.schemas.nodes import Node
 
 TRIP = "trip"
 SPEED = 0

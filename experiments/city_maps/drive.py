@@ -9,15 +9,15 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
+from cogmap.experiments import in_memory
+from cogmap.experiments.city_maps.correction import settings
+from cogmap.experiments.city_maps.environment import Environment
+from cogmap.experiments.city_maps.observer import Observer, Traversal
+from cogmap.experiments.city_maps.streets import Points
 from cogmap.runtime.config import Sections
 from cogmap.runtime.module import Module
-from experiments import in_memory
-from experiments.city_maps.correction import settings
-from experiments.city_maps.environment import Environment
-from experiments.city_maps.observer import Observer, Traversal
-from experiments.city_maps.streets import Points
-from services import registry
-from services.sim.odometry import Noise
+from cogmap.services import registry
+from cogmap.services.sim.odometry import Noise
 
 COGNITION = ("workspace", "codelets", "global_workspace", "procedural", "action", "motor")
 MODULES = ("sim", *COGNITION)

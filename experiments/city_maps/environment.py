@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.errors import UsageError
+from cogmap.experiments.city_maps.streets import Points, Streets, shortest_path
+from cogmap.experiments.city_maps.tour import shortest_tour
 from cogmap.geometry.arrays import Indices
 from cogmap.geometry.polylines import distances_along, interpolate
-from experiments.city_maps.streets import Points, Streets, shortest_path
-from experiments.city_maps.tour import shortest_tour
 
 BUILDINGS = 8
 MAX_KM2 = 4.0

@@ -9,13 +9,20 @@ from functools import cache
 
 import numpy as np
 
+from cogmap.experiments.city_maps import published
+from cogmap.experiments.city_maps.drive import traverse
+from cogmap.experiments.city_maps.environment import Environment
+from cogmap.experiments.city_maps.measure import (
+    NOISE,
+    Budget,
+    Job,
+    configurations,
+    jobs,
+    map_error_km2,
+)
+from cogmap.experiments.cue_integration.fit import coordinate_descent
 from cogmap.parallel import parallel_map
-from experiments.city_maps import published
-from experiments.city_maps.drive import traverse
-from experiments.city_maps.environment import Environment
-from experiments.city_maps.measure import NOISE, Budget, Job, configurations, jobs, map_error_km2
-from experiments.cue_integration.fit import coordinate_descent
-from services.sim.odometry import Noise
+from cogmap.services.sim.odometry import Noise
 
 FIT_TRAVERSALS = 2
 FACTORS = (1.4, 1.15)

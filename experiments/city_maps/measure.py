@@ -7,15 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cogmap.experiments import rendered
+from cogmap.experiments.city_maps.correction import METHODS
+from cogmap.experiments.city_maps.drive import COGNITION, Tour, driven, sections, traverse
+from cogmap.experiments.city_maps.environment import BUILDINGS, Environment
+from cogmap.experiments.city_maps.observer import Traversal
+from cogmap.experiments.city_maps.streets import Points
 from cogmap.parallel import Progress, parallel_map
 from cogmap.runtime.config import Sections
-from experiments import rendered
-from experiments.city_maps.correction import METHODS
-from experiments.city_maps.drive import COGNITION, Tour, driven, sections, traverse
-from experiments.city_maps.environment import BUILDINGS, Environment
-from experiments.city_maps.observer import Traversal
-from experiments.city_maps.streets import Points
-from services.sim.odometry import Noise
+from cogmap.services.sim.odometry import Noise
 
 TRAVERSALS = 12
 MAPS = 8

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from experiments.city_maps import published
-from experiments.city_maps.drive import SENSING
-from experiments.city_maps.measure import CityMap, Learned
-from experiments.city_maps.observer import FUSED, WHEELS
-from services.sim.odometry import Noise
+from cogmap.experiments.city_maps import published
+from cogmap.experiments.city_maps.drive import SENSING
+from cogmap.experiments.city_maps.measure import CityMap, Learned
+from cogmap.experiments.city_maps.observer import FUSED, WHEELS
+from cogmap.services.sim.odometry import Noise
 
 # Of what was learned, how it is named: by wheels alone, without closing loops, by the paper's own
 # rule, and by ours, which corrects headings too.

@@ -7,16 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from cogmap.errors import CogmapError
+from cogmap.experiments import reading
+from cogmap.experiments.city_maps.streets import Points
+from cogmap.experiments.dead_reckoning import DeadReckoning
+from cogmap.experiments.reading import Pose
 from cogmap.geometry.se2 import transform_from
 from cogmap.graph.graph import Graph
 from cogmap.runtime.module import Module
-from experiments import reading
-from experiments.city_maps.streets import Points
-from experiments.dead_reckoning import DeadReckoning
-from experiments.reading import Pose
-from schemas import topics
-from schemas.graph import Delta, Phase
-from schemas.sensing import TruePose
+from cogmap.schemas import topics
+from cogmap.schemas.graph import Delta, Phase
+from cogmap.schemas.sensing import TruePose
 
 WHEELS = "wheels"
 FUSED = "fused"

@@ -13,9 +13,9 @@ from cogmap.data import osm, street_graphs
 from cogmap.data.osm import Extract, Tags, Way
 from cogmap.data.street_graphs import StreetGraph
 from cogmap.errors import UsageError
+from cogmap.experiments.city_maps.environment import City, Environment, environments
+from cogmap.experiments.city_maps.streets import Indices, Points, Streets
 from cogmap.geometry.se2 import rotate
-from experiments.city_maps.environment import City, Environment, environments
-from experiments.city_maps.streets import Indices, Points, Streets
 
 EARTH_M = 6_371_008.8
 STREETS = frozenset(

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from cogmap.runtime.module import Module
-from schemas.graph import Decay, Snapshot
-from services import registry
+from cogmap.schemas.graph import Decay, Snapshot
+from cogmap.services import registry
 
 # Distances err anew with each look here, so each counts (eq. 1); the room is small, and so are its
 # places.

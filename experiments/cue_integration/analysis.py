@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cogmap.experiments.cue_integration.geometry import CONFLICT_RAD, Points
+from cogmap.experiments.cue_integration.trial import Response, Trial
 from cogmap.geometry.se2 import rotate
-from experiments.cue_integration.geometry import CONFLICT_RAD, Points
-from experiments.cue_integration.trial import Response, Trial
 
 FAR = 5.0
 SHARES = 201

@@ -14,20 +14,20 @@ from collections.abc import Mapping
 
 import msgspec
 
+from cogmap.experiments.cue_integration import senses
+from cogmap.experiments.cue_integration.geometry import POSTS, START, Point
+from cogmap.experiments.cue_integration.room import Room
+from cogmap.experiments.cue_integration.run import Session, respond
+from cogmap.experiments.cue_integration.trial import Condition, Noise, Response, Trial
+from cogmap.experiments.rendered import named
 from cogmap.parallel import Progress
-from experiments.cue_integration import senses
-from experiments.cue_integration.geometry import POSTS, START, Point
-from experiments.cue_integration.room import Room
-from experiments.cue_integration.run import Session, respond
-from experiments.cue_integration.trial import Condition, Noise, Response, Trial
-from experiments.rendered import named
-from schemas import sensing
-from schemas.sensing import Odometry, Percept, Percepts, StereoFrame, View
-from services import registry
-from services.sim.layout import roadside
-from services.sim.rendering.camera import StereoCamera, calibration
-from services.sim.scripted.trajectory import Trajectory
-from services.sim.world import World
+from cogmap.schemas import sensing
+from cogmap.schemas.sensing import Odometry, Percept, Percepts, StereoFrame, View
+from cogmap.services import registry
+from cogmap.services.sim.layout import roadside
+from cogmap.services.sim.rendering.camera import StereoCamera, calibration
+from cogmap.services.sim.scripted.trajectory import Trajectory
+from cogmap.services.sim.world import World
 
 SCALE = 10.0
 # A camera sees 75°: of what two pictures cut, another shows the whole.

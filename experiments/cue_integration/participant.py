@@ -5,15 +5,15 @@ workspace.
 from __future__ import annotations
 
 from cogmap.errors import MessageError
+from cogmap.experiments.cue_integration.geometry import REACH_M, Point, Pose, step
+from cogmap.experiments.cue_integration.room import FOLLOW, STOP, WAIT, WALK
 from cogmap.graph.graph import Graph
 from cogmap.runtime.module import Module
-from experiments.cue_integration.geometry import REACH_M, Point, Pose, step
-from experiments.cue_integration.room import FOLLOW, STOP, WAIT, WALK
-from schemas import topics
-from schemas.base import Scalar
-from schemas.cognition import Action
-from schemas.graph import Delta, Phase
-from schemas.nodes import Object, Percept, Self, object_id
+from cogmap.schemas import topics
+from cogmap.schemas.base import Scalar
+from cogmap.schemas.cognition import Action
+from cogmap.schemas.graph import Delta, Phase
+from cogmap.schemas.nodes import Object, Percept, Self, object_id
 
 POSTS_CARRIED = 3
 NEAR_M = 0.1

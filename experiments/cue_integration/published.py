@@ -7,7 +7,7 @@ public file that we know.
 
 from __future__ import annotations
 
-from experiments.cue_integration.trial import Condition
+from cogmap.experiments.cue_integration.trial import Condition
 
 SOURCE = "simulation by Kessler et al. 2024"
 SD_M = {

@@ -9,10 +9,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cogmap.runtime.module import Module
-from experiments import transcript
-from experiments.cue_integration import senses
-from experiments.cue_integration.geometry import (
+from cogmap.experiments import transcript
+from cogmap.experiments.cue_integration import senses
+from cogmap.experiments.cue_integration.geometry import (
     CONFLICT_RAD,
     LANDMARKS,
     POSTS,
@@ -24,13 +23,14 @@ from experiments.cue_integration.geometry import (
     step,
     turned,
 )
-from experiments.cue_integration.senses import Rows
-from experiments.cue_integration.trial import Condition, Response, Trial
-from schemas import topics
-from schemas.array import Array
-from schemas.base import Message
-from schemas.cognition import Action
-from schemas.sensing import Percept, Percepts, SelfMotion
+from cogmap.experiments.cue_integration.senses import Rows
+from cogmap.experiments.cue_integration.trial import Condition, Response, Trial
+from cogmap.runtime.module import Module
+from cogmap.schemas import topics
+from cogmap.schemas.array import Array
+from cogmap.schemas.base import Message
+from cogmap.schemas.cognition import Action
+from cogmap.schemas.sensing import Percept, Percepts, SelfMotion
 
 PERIOD_NS = 500_000_000
 TOLERANCE_M = 1e-6

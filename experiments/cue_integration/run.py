@@ -9,16 +9,16 @@ from functools import cache
 import numpy as np
 
 from cogmap.errors import CogmapError
+from cogmap.experiments.cue_integration import agent, analysis, participant, published, room
+from cogmap.experiments.cue_integration.analysis import Gaussian
+from cogmap.experiments.cue_integration.fit import coordinate_descent
+from cogmap.experiments.cue_integration.geometry import Points
+from cogmap.experiments.cue_integration.trial import Condition, Noise, Response, Trial
+from cogmap.experiments.transcript import Transcript
 from cogmap.parallel import Progress, parallel_map
 from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
-from experiments.cue_integration import agent, analysis, participant, published, room
-from experiments.cue_integration.analysis import Gaussian
-from experiments.cue_integration.fit import coordinate_descent
-from experiments.cue_integration.geometry import Points
-from experiments.cue_integration.trial import Condition, Noise, Response, Trial
-from experiments.transcript import Transcript
-from schemas import topics
+from cogmap.schemas import topics
 
 # What `fitted` returns with the seed and budget that the command has by default, rounded.
 FITTED = Noise(speed=0.3, turn=0.173)

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from experiments.cue_integration.geometry import STEP_M, STEP_RAD, Point, Pose
-from experiments.cue_integration.trial import Noise
-from schemas.sensing import Percept
+from cogmap.experiments.cue_integration.geometry import STEP_M, STEP_RAD, Point, Pose
+from cogmap.experiments.cue_integration.trial import Noise
+from cogmap.schemas.sensing import Percept
 
 Rows = list[tuple[float, float, float, float, float]]
 HALF_S = 0.25

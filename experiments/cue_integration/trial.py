@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
-from experiments.cue_integration.geometry import CONFLICT_RAD, POSTS, ROUTES, Point, turned
+from cogmap.experiments.cue_integration.geometry import CONFLICT_RAD, POSTS, ROUTES, Point, turned
 
 
 class Condition(enum.Enum):

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from experiments.loop_closing.observer import Loop, Replayed, rms_m
-from experiments.loop_closing.rule import close_laps
-from experiments.loop_closing.run import CORNERS_M, FRAME_HZ, NOISE, SPEED_M_S
-from services.sim.odometry import Noise
+from cogmap.experiments.loop_closing.observer import Loop, Replayed, rms_m
+from cogmap.experiments.loop_closing.rule import close_laps
+from cogmap.experiments.loop_closing.run import CORNERS_M, FRAME_HZ, NOISE, SPEED_M_S
+from cogmap.services.sim.odometry import Noise
 
 LAPS = 1000
 MIN_PAIRS = 3

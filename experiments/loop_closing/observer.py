@@ -8,15 +8,15 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.errors import CogmapError
+from cogmap.experiments import reading
+from cogmap.experiments.dead_reckoning import DeadReckoning
 from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
 from cogmap.runtime.module import Module
-from experiments import reading
-from experiments.dead_reckoning import DeadReckoning
-from schemas import topics
-from schemas.cognition import Replay
-from schemas.graph import Delta, Phase
-from schemas.sensing import TruePose
+from cogmap.schemas import topics
+from cogmap.schemas.cognition import Replay
+from cogmap.schemas.graph import Delta, Phase
+from cogmap.schemas.sensing import TruePose
 
 
 @dataclass(frozen=True)

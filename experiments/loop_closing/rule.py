@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from services.sim.odometry import Noise
-from services.sim.scripted.trajectory import Line
+from cogmap.services.sim.odometry import Noise
+from cogmap.services.sim.scripted.trajectory import Line
 
 Floats = npt.NDArray[np.float64]
 

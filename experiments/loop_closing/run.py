@@ -9,14 +9,14 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from cogmap.experiments import in_memory, rendered
+from cogmap.experiments.loop_closing.observer import Loop, Observer
 from cogmap.parallel import Progress
 from cogmap.runtime.config import Sections
 from cogmap.runtime.module import Module
-from experiments import in_memory, rendered
-from experiments.loop_closing.observer import Loop, Observer
-from services import registry
-from services.sim.config import Config
-from services.sim.odometry import Noise
+from cogmap.services import registry
+from cogmap.services.sim.config import Config
+from cogmap.services.sim.odometry import Noise
 
 COGNITION = ("workspace", "codelets", "global_workspace", "procedural", "action", "motor")
 MODULES = ("sim", *COGNITION)

@@ -15,10 +15,10 @@ from scipy.spatial import cKDTree
 from cogmap.data import osm
 from cogmap.data.osm import Extract, Tags, Way
 from cogmap.errors import UsageError
+from cogmap.experiments.city_maps.sources import middle_of, name_of, plane_m, streets_of
+from cogmap.experiments.city_maps.streets import Streets
+from cogmap.experiments.map_structure.functions import FUNCTIONS, function_of
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from experiments.city_maps.sources import middle_of, name_of, plane_m, streets_of
-from experiments.city_maps.streets import Streets
-from experiments.map_structure.functions import FUNCTIONS, function_of
 
 UNKNOWN = -1
 MIN_OBJECTS = 20

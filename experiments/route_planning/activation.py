@@ -10,8 +10,8 @@ import numpy as np
 
 from cogmap.errors import CogmapError
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from services.codelets.planning.activation import climb, spread
-from services.codelets.planning.network import grid_network
+from cogmap.services.codelets.planning.activation import climb, spread
+from cogmap.services.codelets.planning.network import grid_network
 
 SIDE = 27
 START = (3, 6)

@@ -11,11 +11,11 @@ import numpy as np
 
 from cogmap.data.human_tours import HumanTours
 from cogmap.data.tsplib import straight
+from cogmap.experiments.route_planning.optimum import shortest_tour
+from cogmap.experiments.route_planning.participants import tours_of
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.parallel import Progress, parallel_map
-from experiments.route_planning.optimum import shortest_tour
-from experiments.route_planning.participants import tours_of
-from services.codelets.planning.tours import route_length
+from cogmap.services.codelets.planning.tours import route_length
 
 # Of people's problems: medians over fewer participants differ from seed to seed.
 PARTICIPANTS = 400

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cogmap.experiments.route_planning import published
+from cogmap.experiments.route_planning.measure import Planned
 from cogmap.geometry.arrays import Floats
-from experiments.route_planning import published
-from experiments.route_planning.measure import Planned
 
 MIN_PROBLEMS = 3
 # How tours are planned: see Planned.

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cogmap.geometry.arrays import Floats, Indices
-from services.codelets.planning.tours import TourSettings, follow_activation, order
+from cogmap.services.codelets.planning.tours import TourSettings, follow_activation, order
 
 LENGTH_ERROR = 0.03
 SPANS = (3, 4, 5)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import msgspec
 
-from schemas.base import Message
-from schemas.examples import codelets, cognition, graph, memory, process, sensing
+from cogmap.schemas.base import Message
+from cogmap.schemas.examples import codelets, cognition, graph, memory, process, sensing
 
 _STAMP_NS = 1_200_000_000
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from schemas.array import Array, Matrix, MatrixType
+from cogmap.schemas.array import Array, Matrix, MatrixType
 
 
 def ramp(*shape: int, dtype: str) -> Array:

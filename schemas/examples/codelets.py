@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from schemas.base import Message
-from schemas.codelets import Assignment, Leases, Offer, Proposal, Task
-from schemas.examples import cognition, graph, nodes, sensing
-from schemas.examples.arrays import ramp
+from cogmap.schemas.base import Message
+from cogmap.schemas.codelets import Assignment, Leases, Offer, Proposal, Task
+from cogmap.schemas.examples import cognition, graph, nodes, sensing
+from cogmap.schemas.examples.arrays import ramp
 
 
 def proposal() -> Proposal:

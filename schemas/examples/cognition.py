@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from schemas.base import Message
-from schemas.cognition import (
+from cogmap.schemas.base import Message
+from cogmap.schemas.cognition import (
     Action,
     Behaviour,
     Behaviours,
@@ -23,10 +23,10 @@ from schemas.cognition import (
     Silence,
     Trigger,
 )
-from schemas.examples import nodes
-from schemas.examples.arrays import ramp
-from schemas.examples.graph import instance_link
-from schemas.feelings import Feeling
+from cogmap.schemas.examples import nodes
+from cogmap.schemas.examples.arrays import ramp
+from cogmap.schemas.examples.graph import instance_link
+from cogmap.schemas.feelings import Feeling
 
 
 def messages() -> list[Message]:

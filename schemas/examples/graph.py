@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from schemas.base import Message
-from schemas.examples import nodes
-from schemas.examples.arrays import ramp
-from schemas.graph import (
+from cogmap.schemas.base import Message
+from cogmap.schemas.examples import nodes
+from cogmap.schemas.examples.arrays import ramp
+from cogmap.schemas.graph import (
     Cells,
     Decay,
     Delta,
@@ -20,7 +20,7 @@ from schemas.graph import (
     Snapshot,
     SnapshotRequest,
 )
-from schemas.nodes import TILE_SIDE, LinkKind, PlaceColumn
+from cogmap.schemas.nodes import TILE_SIDE, LinkKind, PlaceColumn
 
 
 def messages() -> list[Message]:

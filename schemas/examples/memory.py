@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from schemas.array import Matrix
-from schemas.examples.arrays import matrix
-from schemas.memory import (
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.examples.arrays import matrix
+from cogmap.schemas.memory import (
     DeclarativeEpisode,
     Restored,
     Stored,
@@ -16,7 +16,7 @@ from schemas.memory import (
     StoredTree,
     TransientEpisode,
 )
-from schemas.nodes import TILE_CELLS, PlaceColumn, Remembered, SubMap
+from cogmap.schemas.nodes import TILE_CELLS, PlaceColumn, Remembered, SubMap
 
 MAP = "remembered:1"
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from schemas.array import Matrix
-from schemas.examples.arrays import matrix
-from schemas.nodes import (
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.examples.arrays import matrix
+from cogmap.schemas.nodes import (
     CORRECTION_ID,
     PLAN_ID,
     RECOLLECTION_ID,

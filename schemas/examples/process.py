@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from schemas.base import Message
-from schemas.process import Clock, Health, Presence
+from cogmap.schemas.base import Message
+from cogmap.schemas.process import Clock, Health, Presence
 
 
 def messages() -> list[Message]:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from schemas.array import Array
-from schemas.base import Message
-from schemas.examples.arrays import ramp
-from schemas.feelings import Feeling
-from schemas.sensing import (
+from cogmap.schemas.array import Array
+from cogmap.schemas.base import Message
+from cogmap.schemas.examples.arrays import ramp
+from cogmap.schemas.feelings import Feeling
+from cogmap.schemas.sensing import (
     Associations,
     Building,
     Calibration,

@@ -5,9 +5,9 @@ known here travels as the generic `Node`: a codelet of somebody else's package n
 this table. Positions are in metres in the frame of the map that the node is on, x east, y north.
 """
 
-from schemas.nodes.attention import ENERGY, SATISFIED_BY, Attention, Need
-from schemas.nodes.base import NEVER_NS, GraphNode, Node
-from schemas.nodes.columns import (
+from cogmap.schemas.nodes.attention import ENERGY, SATISFIED_BY, Attention, Need
+from cogmap.schemas.nodes.base import NEVER_NS, GraphNode, Node
+from cogmap.schemas.nodes.columns import (
     POSE_COLUMNS,
     TILE_CELLS,
     TILE_SIDE,
@@ -20,8 +20,8 @@ from schemas.nodes.columns import (
     RouteColumn,
     SelfColumn,
 )
-from schemas.nodes.episode import Episode, Remembered
-from schemas.nodes.ids import (
+from cogmap.schemas.nodes.episode import Episode, Remembered
+from cogmap.schemas.nodes.ids import (
     CORRECTION_ID,
     PLAN_ID,
     RECOLLECTION_ID,
@@ -50,12 +50,12 @@ from schemas.nodes.ids import (
     relation_id,
     segment_id,
 )
-from schemas.nodes.links import EXCLUSIVE_LINKS, LinkKind
-from schemas.nodes.path import Correction, LoopClosure, Observations, PathSegment
-from schemas.nodes.planning import Goal, Plan, PlanState
-from schemas.nodes.recollection import Recollection, SubMap
-from schemas.nodes.rules import KINDS, AnyNode, KindRules, kind_name, kind_of
-from schemas.nodes.situation import FUNCTIONS, Map, Object, Percept, Self
+from cogmap.schemas.nodes.links import EXCLUSIVE_LINKS, LinkKind
+from cogmap.schemas.nodes.path import Correction, LoopClosure, Observations, PathSegment
+from cogmap.schemas.nodes.planning import Goal, Plan, PlanState
+from cogmap.schemas.nodes.recollection import Recollection, SubMap
+from cogmap.schemas.nodes.rules import KINDS, AnyNode, KindRules, kind_name, kind_of
+from cogmap.schemas.nodes.situation import FUNCTIONS, Map, Object, Percept, Self
 
 __all__ = [
     "CORRECTION_ID",

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from schemas.base import Count, Name, Unit
-from schemas.nodes.base import GraphNode
+from cogmap.schemas.base import Count, Name, Unit
+from cogmap.schemas.nodes.base import GraphNode
 
 ENERGY = "energy"
 """The label of the need of a body that has a battery."""

@@ -6,8 +6,8 @@ from typing import Annotated
 
 import msgspec
 
-from schemas.array import Matrix
-from schemas.base import Count, Name, Part, Scalar, Unit
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.base import Count, Name, Part, Scalar, Unit
 
 NEVER_NS = -1
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 
-from schemas.array import Matrix
+from cogmap.schemas.array import Matrix
 
 POSE_COLUMNS = 3
 MAX_ROWS = 100_000

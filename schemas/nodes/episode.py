@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from schemas.base import Count, Finite, Name, Part
-from schemas.nodes.base import GraphNode, Salience
-from schemas.nodes.ids import ROOT_MAP
+from cogmap.schemas.base import Count, Finite, Name, Part
+from cogmap.schemas.nodes.base import GraphNode, Salience
+from cogmap.schemas.nodes.ids import ROOT_MAP
 
 
 class Remembered(Part, kw_only=True, frozen=True):

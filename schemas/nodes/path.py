@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from schemas.array import Matrix
-from schemas.base import Count, Finite, Name
-from schemas.nodes.base import GraphNode, Metres, Spread, Stamp
-from schemas.nodes.columns import (
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.base import Count, Finite, Name
+from cogmap.schemas.nodes.base import GraphNode, Metres, Spread, Stamp
+from cogmap.schemas.nodes.columns import (
     CorrectionColumn,
     JoinColumn,
     ObservationColumn,

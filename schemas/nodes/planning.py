@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import enum
 
-from schemas.array import Matrix
-from schemas.base import Count, Finite, Name
-from schemas.nodes.base import NEVER_NS, GraphNode, Metres, Stamp
-from schemas.nodes.columns import RouteColumn, check_matrix
-from schemas.nodes.ids import ROOT_MAP
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.base import Count, Finite, Name
+from cogmap.schemas.nodes.base import NEVER_NS, GraphNode, Metres, Stamp
+from cogmap.schemas.nodes.columns import RouteColumn, check_matrix
+from cogmap.schemas.nodes.ids import ROOT_MAP
 
 
 class PlanState(enum.StrEnum):

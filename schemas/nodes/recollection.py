@@ -7,10 +7,10 @@ from typing import Annotated
 
 import msgspec
 
-from schemas.array import Matrix
-from schemas.base import Finite, Name, Part
-from schemas.nodes.base import GraphNode, Metres
-from schemas.nodes.columns import TILE_CELLS, PlaceColumn, RecalledColumn, check_matrix
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.base import Finite, Name, Part
+from cogmap.schemas.nodes.base import GraphNode, Metres
+from cogmap.schemas.nodes.columns import TILE_CELLS, PlaceColumn, RecalledColumn, check_matrix
 
 TileNumber = Annotated[int, msgspec.Meta(ge=-(2**31), le=2**31)]
 MapNumber = Annotated[int, msgspec.Meta(ge=1, le=2**31)]

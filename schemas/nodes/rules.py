@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from schemas.nodes.attention import Attention, Need
-from schemas.nodes.base import GraphNode, Node
-from schemas.nodes.episode import Episode
-from schemas.nodes.path import Correction, LoopClosure, Observations, PathSegment
-from schemas.nodes.planning import Goal, Plan
-from schemas.nodes.recollection import Recollection
-from schemas.nodes.situation import Map, Object, Percept, Self
+from cogmap.schemas.nodes.attention import Attention, Need
+from cogmap.schemas.nodes.base import GraphNode, Node
+from cogmap.schemas.nodes.episode import Episode
+from cogmap.schemas.nodes.path import Correction, LoopClosure, Observations, PathSegment
+from cogmap.schemas.nodes.planning import Goal, Plan
+from cogmap.schemas.nodes.recollection import Recollection
+from cogmap.schemas.nodes.situation import Map, Object, Percept, Self
 
 AnyNode = (
     Node

@@ -8,12 +8,12 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from schemas.array import Matrix
-from schemas.base import Count, Finite, Name, Unit
-from schemas.nodes.attention import SATISFIED_BY
-from schemas.nodes.base import NEVER_NS, GraphNode, Metres, Positive, Spread, Stamp
-from schemas.nodes.columns import POSE_COLUMNS, SelfColumn, check_matrix
-from schemas.nodes.ids import ROOT_MAP
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.base import Count, Finite, Name, Unit
+from cogmap.schemas.nodes.attention import SATISFIED_BY
+from cogmap.schemas.nodes.base import NEVER_NS, GraphNode, Metres, Positive, Spread, Stamp
+from cogmap.schemas.nodes.columns import POSE_COLUMNS, SelfColumn, check_matrix
+from cogmap.schemas.nodes.ids import ROOT_MAP
 
 
 class Self(GraphNode, kw_only=True, frozen=True, tag="self"):

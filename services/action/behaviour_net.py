@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from schemas.cognition import Behaviour
-from services.action.config import Config
-from services.action.selection import Level
+from cogmap.schemas.cognition import Behaviour
+from cogmap.services.action.config import Config
+from cogmap.services.action.selection import Level
 
 Key = tuple[str, tuple[tuple[str, str], ...]]
 

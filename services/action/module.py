@@ -6,12 +6,12 @@ from collections.abc import Iterable
 
 from cogmap.errors import MessageError
 from cogmap.runtime.module import Module
-from schemas import topics
-from schemas.base import Message
-from schemas.cognition import Action, Behaviours
-from services.action.behaviour_net import BehaviourNet
-from services.action.config import Config
-from services.action.selection import ActionSelection, MostActive, Selector
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.cognition import Action, Behaviours
+from cogmap.services.action.behaviour_net import BehaviourNet
+from cogmap.services.action.config import Config
+from cogmap.services.action.selection import ActionSelection, MostActive, Selector
 
 __all__ = ["ActionModule", "Config", "build"]
 

@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 
 import msgspec
 
-from schemas.cognition import Action, Behaviour, Rejection
+from cogmap.schemas.cognition import Action, Behaviour, Rejection
 
 
 class Level(NamedTuple):

@@ -6,8 +6,8 @@ import numpy as np
 
 from cogmap.geometry.arrays import Singles
 from cogmap.graph.window import Window
-from schemas.array import Array
-from schemas.graph import Cells, Operation
+from cogmap.schemas.array import Array
+from cogmap.schemas.graph import Cells, Operation
 
 
 def changed_cells(map_id: str, known: Window, after: Singles) -> list[Operation]:

@@ -8,10 +8,10 @@ from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, ConfiguredCodelet
 from cogmap.runtime.module import Module
-from schemas import topics
-from schemas.codelets import Assignment, Leases, Proposal, Task
-from schemas.graph import Delta
-from services.codelets.config import Config
+from cogmap.schemas import topics
+from cogmap.schemas.codelets import Assignment, Leases, Proposal, Task
+from cogmap.schemas.graph import Delta
+from cogmap.services.codelets.config import Config
 
 __all__ = ["Config", "Worker", "build"]
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import TypeVar
 
 from cogmap.graph.graph import Graph
-from schemas.nodes import GraphNode
+from cogmap.schemas.nodes import GraphNode
 
 K = TypeVar("K", bound=GraphNode)
 

@@ -6,11 +6,11 @@ from __future__ import annotations
 
 import msgspec
 
-from services.codelets import config as common
-from services.codelets.attention import config as attention
-from services.codelets.planning import config as planning
-from services.codelets.resolution import config as resolution
-from services.codelets.structure import config as structure
+from cogmap.services.codelets import config as common
+from cogmap.services.codelets.attention import config as attention
+from cogmap.services.codelets.planning import config as planning
+from cogmap.services.codelets.resolution import config as resolution
+from cogmap.services.codelets.structure import config as structure
 
 SECTIONS: dict[str, type[msgspec.Struct]] = {
     common.SECTION: common.Config,

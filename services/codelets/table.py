@@ -12,7 +12,7 @@ from importlib.metadata import EntryPoint, entry_points
 from cogmap.errors import ConfigError
 from cogmap.runtime import config
 from cogmap.runtime.codelet import ENTRY_POINTS, Codelet, ConfiguredCodelet
-from services.codelets.attention import (
+from cogmap.services.codelets.attention import (
     danger,
     episode,
     expectation,
@@ -22,9 +22,9 @@ from services.codelets.attention import (
     place_lost,
     whereabouts,
 )
-from services.codelets.correction import apply_correction, map_correction
-from services.codelets.localization import landmarks, localization
-from services.codelets.mapping import (
+from cogmap.services.codelets.correction import apply_correction, map_correction
+from cogmap.services.codelets.localization import landmarks, localization
+from cogmap.services.codelets.mapping import (
     boundary,
     charging_place,
     loop_detection,
@@ -32,11 +32,11 @@ from services.codelets.mapping import (
     path,
     road_place,
 )
-from services.codelets.planning import route_plan
-from services.codelets.recollection import join_map
-from services.codelets.resolution import coarse_places, sub_map_places
-from services.codelets.sparse import sparse_path
-from services.codelets.structure import map_structure
+from cogmap.services.codelets.planning import route_plan
+from cogmap.services.codelets.recollection import join_map
+from cogmap.services.codelets.resolution import coarse_places, sub_map_places
+from cogmap.services.codelets.sparse import sparse_path
+from cogmap.services.codelets.structure import map_structure
 
 CODELETS: tuple[Codelet, ...] = (
     apply_correction.CODELET,

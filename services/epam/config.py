@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from schemas.base import PositiveShare, Share
+from cogmap.schemas.base import PositiveShare, Share
 
 WeightsPath = Annotated[str, msgspec.Meta(max_length=4096)]
 Pixels = Annotated[int, msgspec.Meta(ge=4, le=1000)]

@@ -9,18 +9,18 @@ import cv2
 import msgspec
 
 from cogmap.runtime.module import Module
-from schemas import topics
-from schemas.array import Array
-from schemas.base import Message
-from schemas.cognition import Broadcast, Competition
-from schemas.sensing import Learned, Percepts, View
-from services.epam.association.memory import Primer
-from services.epam.config import Config
-from services.epam.layout import road
-from services.epam.pam import ExtendedPam
-from services.epam.places.recognizer import PlaceRecognizer
-from services.epam.recognition import objects, segments
-from services.epam.view import view_arrays
+from cogmap.schemas import topics
+from cogmap.schemas.array import Array
+from cogmap.schemas.base import Message
+from cogmap.schemas.cognition import Broadcast, Competition
+from cogmap.schemas.sensing import Learned, Percepts, View
+from cogmap.services.epam.association.memory import Primer
+from cogmap.services.epam.config import Config
+from cogmap.services.epam.layout import road
+from cogmap.services.epam.pam import ExtendedPam
+from cogmap.services.epam.places.recognizer import PlaceRecognizer
+from cogmap.services.epam.recognition import objects, segments
+from cogmap.services.epam.view import view_arrays
 
 __all__ = ["Config", "build"]
 

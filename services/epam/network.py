@@ -11,7 +11,7 @@ import numpy as np
 
 from cogmap.errors import ConfigError
 from cogmap.geometry.arrays import Singles
-from services.epam.config import Processor
+from cogmap.services.epam.config import Processor
 
 if TYPE_CHECKING:
     import onnxruntime

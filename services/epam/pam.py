@@ -13,31 +13,31 @@ from typing import NamedTuple
 import numpy as np
 
 from cogmap.geometry.arrays import Singles
-from schemas.array import Array
-from schemas.sensing import Calibration, LearnedObject, Percept
-from services.epam.association.prior import NOTHING_EXPECTED, Prior
-from services.epam.association.relations import Seen, beside
-from services.epam.config import Config
-from services.epam.layout.footprint_fit import ObjectPose, Silhouette, locate
-from services.epam.layout.ground import project
-from services.epam.layout.road import RoadSegmenter
-from services.epam.layout.walls import Walls, walls
-from services.epam.recognition.candidate import (
+from cogmap.schemas.array import Array
+from cogmap.schemas.sensing import Calibration, LearnedObject, Percept
+from cogmap.services.epam.association.prior import NOTHING_EXPECTED, Prior
+from cogmap.services.epam.association.relations import Seen, beside
+from cogmap.services.epam.config import Config
+from cogmap.services.epam.layout.footprint_fit import ObjectPose, Silhouette, locate
+from cogmap.services.epam.layout.ground import project
+from cogmap.services.epam.layout.road import RoadSegmenter
+from cogmap.services.epam.layout.walls import Walls, walls
+from cogmap.services.epam.recognition.candidate import (
     Candidate,
     height_m,
     is_beside,
     joined,
     outline_px,
 )
-from services.epam.recognition.functions import function_of
-from services.epam.recognition.objects import (
+from cogmap.services.epam.recognition.functions import function_of
+from cogmap.services.epam.recognition.objects import (
     Appearance,
     EmbeddingPass,
     ObjectRecognizer,
     Recognition,
 )
-from services.epam.recognition.segments import Segment, Segmenter
-from services.epam.view import ViewArrays
+from cogmap.services.epam.recognition.segments import Segment, Segmenter
+from cogmap.services.epam.view import ViewArrays
 
 NEW_LABEL = "new-building-{}"
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Bytes, Singles
-from schemas.sensing import Calibration, View
+from cogmap.schemas.sensing import Calibration, View
 
 MIN_FOCAL_LENGTH_PX = 1.0
 

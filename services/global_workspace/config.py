@@ -6,7 +6,7 @@ from typing import Annotated
 
 import msgspec
 
-from schemas.base import Share
+from cogmap.schemas.base import Share
 
 TickCount = Annotated[int, msgspec.Meta(ge=0, le=10**9)]
 ActivationSum = Annotated[float, msgspec.Meta(ge=0, le=1000)]

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 from cogmap.errors import MessageError
 from cogmap.runtime.module import Module
-from schemas import topics
-from schemas.base import Message
-from schemas.cognition import (
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.cognition import (
     Broadcast,
     Coalition,
     Coalitions,
@@ -22,7 +22,7 @@ from schemas.cognition import (
     Silence,
     Trigger,
 )
-from services.global_workspace.config import Config
+from cogmap.services.global_workspace.config import Config
 
 __all__ = ["Config", "GlobalWorkspace", "build"]
 

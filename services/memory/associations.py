@@ -12,11 +12,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from cogmap.geometry.arrays import Bytes, Floats
-from services.memory.sparse.build import build
-from services.memory.sparse.clean_up import CleanUpMemory
-from services.memory.sparse.config import SparseConfig
-from services.memory.sparse.structures import ItemMemory
-from services.memory.sparse.vectors import bundle
+from cogmap.services.memory.sparse.build import build
+from cogmap.services.memory.sparse.clean_up import CleanUpMemory
+from cogmap.services.memory.sparse.config import SparseConfig
+from cogmap.services.memory.sparse.structures import ItemMemory
+from cogmap.services.memory.sparse.vectors import bundle
 
 NEIGHBOURS = 6
 APART_STEP_M = 5.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from schemas.memory import StoredRecord
+from cogmap.schemas.memory import StoredRecord
 
 
 class Changes(NamedTuple):

@@ -6,9 +6,9 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from schemas.base import PositiveMetres, PositiveShare, Share
-from services.memory.episodic.config import EpisodicConfig
-from services.memory.sparse.config import SparseConfig
+from cogmap.schemas.base import PositiveMetres, PositiveShare, Share
+from cogmap.services.memory.episodic.config import EpisodicConfig
+from cogmap.services.memory.sparse.config import SparseConfig
 
 Cycles = Annotated[int, msgspec.Meta(ge=1, le=100_000)]
 

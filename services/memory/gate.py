@@ -4,7 +4,7 @@ what was sensed. Pure.
 
 from __future__ import annotations
 
-from schemas.cognition import Broadcast, Competition
+from cogmap.schemas.cognition import Broadcast, Competition
 
 
 class LockstepGate:

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cogmap.geometry.arrays import Floats
-from schemas.array import Matrix
-from schemas.memory import StoredObjects, StoredRecord, StoredTile, StoredTree, tile_key
-from schemas.nodes import PlaceColumn, RecalledColumn, look_of
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.memory import StoredObjects, StoredRecord, StoredTile, StoredTree, tile_key
+from cogmap.schemas.nodes import PlaceColumn, RecalledColumn, look_of
 
 NUMBERED = "remembered:"
 POSITION = slice(RecalledColumn.X_M, RecalledColumn.Y_M + 1)

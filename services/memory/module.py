@@ -6,18 +6,18 @@ from collections.abc import Iterable
 
 from cogmap.graph.graph import Graph
 from cogmap.runtime.module import Module
-from schemas import topics
-from schemas.base import Message
-from schemas.codelets import Offer
-from schemas.cognition import Broadcast, Competition
-from schemas.graph import Delta, Operation, Phase
-from schemas.memory import Restored, Stored
-from schemas.nodes import NEVER_NS, ROOT_MAP
-from schemas.sensing import RangeScan
-from services.memory.config import Config
-from services.memory.episodic.memory import EpisodicMemory
-from services.memory.gate import LockstepGate
-from services.memory.spatial import SpatialMemory
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.codelets import Offer
+from cogmap.schemas.cognition import Broadcast, Competition
+from cogmap.schemas.graph import Delta, Operation, Phase
+from cogmap.schemas.memory import Restored, Stored
+from cogmap.schemas.nodes import NEVER_NS, ROOT_MAP
+from cogmap.schemas.sensing import RangeScan
+from cogmap.services.memory.config import Config
+from cogmap.services.memory.episodic.memory import EpisodicMemory
+from cogmap.services.memory.gate import LockstepGate
+from cogmap.services.memory.spatial import SpatialMemory
 
 __all__ = ["Config", "LongTermMemory", "build"]
 

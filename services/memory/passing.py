@@ -14,9 +14,9 @@ import numpy as np
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import transform_from
 from cogmap.graph.graph import Graph
-from schemas.nodes import Object, PathColumn, look_of
-from services.memory.config import Config
-from services.memory.maps import RememberedMap
+from cogmap.schemas.nodes import Object, PathColumn, look_of
+from cogmap.services.memory.config import Config
+from cogmap.services.memory.maps import RememberedMap
 
 SEGMENTS = 3
 """The way is that of the last segments of the path, 130 m at least where it is as long."""

@@ -10,11 +10,11 @@ import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.geometry.se2 import transform_from
-from schemas.nodes import TILE_SIDE, Object, look_of
-from services.memory.config import Config
-from services.memory.maps import RememberedMap
-from services.memory.matching import NOWHERE, Landmarks, Match, best_matches
-from services.memory.passing import Way, is_as_passed
+from cogmap.schemas.nodes import TILE_SIDE, Object, look_of
+from cogmap.services.memory.config import Config
+from cogmap.services.memory.maps import RememberedMap
+from cogmap.services.memory.matching import NOWHERE, Landmarks, Match, best_matches
+from cogmap.services.memory.passing import Way, is_as_passed
 
 MAX_CUES = 24
 """So many objects, the nearest to the agent, cue a recall."""

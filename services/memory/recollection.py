@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from schemas.array import Matrix
-from schemas.nodes import RECOLLECTION_ID, TILE_CELLS, PlaceColumn, Recollection
-from services.memory.maps import RememberedMap
-from services.memory.recall import Recalled
-from services.memory.storing import COLUMNS
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.nodes import RECOLLECTION_ID, TILE_CELLS, PlaceColumn, Recollection
+from cogmap.services.memory.maps import RememberedMap
+from cogmap.services.memory.recall import Recalled
+from cogmap.services.memory.storing import COLUMNS
 
 
 def recollection(found: Recalled) -> Recollection:

@@ -9,20 +9,20 @@ from collections.abc import Iterable
 import numpy as np
 
 from cogmap.graph.graph import Graph
-from schemas.cognition import Broadcast
-from schemas.graph import Delta
-from schemas.memory import Stored, StoredObjects, StoredRecord, StoredTile
-from schemas.nodes import RECOLLECTION_ID, ROOT_MAP, Map, Object, Recollection, look_of
-from services.memory.associations import Associations
-from services.memory.changes import Changes
-from services.memory.config import Config
-from services.memory.maps import RememberedMap, RememberedMaps
-from services.memory.objects.cueing import ObjectCues
-from services.memory.objects.forgotten import ForgottenObjects
-from services.memory.passing import way_of
-from services.memory.recall import cues, recalled
-from services.memory.recollection import recollection
-from services.memory.storing import ChangedPlaces, stored_objects, stored_tree
+from cogmap.schemas.cognition import Broadcast
+from cogmap.schemas.graph import Delta
+from cogmap.schemas.memory import Stored, StoredObjects, StoredRecord, StoredTile
+from cogmap.schemas.nodes import RECOLLECTION_ID, ROOT_MAP, Map, Object, Recollection, look_of
+from cogmap.services.memory.associations import Associations
+from cogmap.services.memory.changes import Changes
+from cogmap.services.memory.config import Config
+from cogmap.services.memory.maps import RememberedMap, RememberedMaps
+from cogmap.services.memory.objects.cueing import ObjectCues
+from cogmap.services.memory.objects.forgotten import ForgottenObjects
+from cogmap.services.memory.passing import way_of
+from cogmap.services.memory.recall import cues, recalled
+from cogmap.services.memory.recollection import recollection
+from cogmap.services.memory.storing import ChangedPlaces, stored_objects, stored_tree
 
 
 class SpatialMemory:

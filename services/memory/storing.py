@@ -10,10 +10,10 @@ from cogmap.graph.graph import Graph
 from cogmap.graph.places import Tile
 from cogmap.graph.tiles import tiles_of
 from cogmap.graph.window import EVIDENCE_COLUMNS
-from schemas.array import Matrix
-from schemas.graph import Cells, Operation
-from schemas.memory import StoredObjects, StoredRecord, StoredTile, StoredTree
-from schemas.nodes import (
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.graph import Cells, Operation
+from cogmap.schemas.memory import StoredObjects, StoredRecord, StoredTile, StoredTree
+from cogmap.schemas.nodes import (
     ROOT_MAP,
     TILE_CELLS,
     LinkKind,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from schemas.sensing import Pose, SpeedLimit
-from services.motor.config import Config
+from cogmap.schemas.sensing import Pose, SpeedLimit
+from cogmap.services.motor.config import Config
 
 
 class Speed(NamedTuple):

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from schemas.base import (
+from cogmap.schemas.base import (
     PositiveAcceleration,
     PositiveMetres,
     PositiveSeconds,

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from cogmap.errors import MessageError
-from schemas.cognition import Action, MotorProgram
-from schemas.nodes import Plan, Self
-from schemas.sensing import Pose, SpeedLimit
-from services.motor.aim import Aim
-from services.motor.config import Config
-from services.motor.guide import Guide, Track
-from services.motor.parameters import Parameters
-from services.motor.programs import FollowPlan, Halt, Program, program_of
+from cogmap.schemas.cognition import Action, MotorProgram
+from cogmap.schemas.nodes import Plan, Self
+from cogmap.schemas.sensing import Pose, SpeedLimit
+from cogmap.services.motor.aim import Aim
+from cogmap.services.motor.config import Config
+from cogmap.services.motor.guide import Guide, Track
+from cogmap.services.motor.parameters import Parameters
+from cogmap.services.motor.programs import FollowPlan, Halt, Program, program_of
 
 
 class Execution:

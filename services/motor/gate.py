@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from schemas.cognition import Competition
+from cogmap.schemas.cognition import Competition
 
 
 class LockstepGate:

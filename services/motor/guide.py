@@ -9,11 +9,11 @@ import numpy as np
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.polylines import distances_along
 from cogmap.geometry.se2 import move_with, transform_from
-from schemas.sensing import Pose, SpeedLimit
-from services.motor.aim import Aim
-from services.motor.config import Config
-from services.motor.parameters import Parameters, number, stamp
-from services.motor.route import Route, pursuit
+from cogmap.schemas.sensing import Pose, SpeedLimit
+from cogmap.services.motor.aim import Aim
+from cogmap.services.motor.config import Config
+from cogmap.services.motor.parameters import Parameters, number, stamp
+from cogmap.services.motor.route import Route, pursuit
 
 TRACKED_POSES = 64
 SHORT_M = 2.0

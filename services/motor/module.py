@@ -8,23 +8,23 @@ from typing import NamedTuple
 
 from cogmap.graph.graph import Graph
 from cogmap.runtime.module import Module
-from schemas import topics
-from schemas.base import Message
-from schemas.codelets import Offer
-from schemas.cognition import Action, Competition, MotorProgram
-from schemas.graph import Delta, Operation, Phase
-from schemas.nodes import PLAN_ID, Goal, Plan, Self
-from schemas.process import Clock
-from schemas.sensing import MotorCommand, Pose, RangeScan, SelfMotion, SpeedLimit
-from services.motor.aim import Aim
-from services.motor.config import Config
-from services.motor.execution import Execution
-from services.motor.gate import LockstepGate
-from services.motor.motor import SensoryMotorMemory, halted, obstacle_ahead_m
-from services.motor.reactive.escape import Escape
-from services.motor.reactive.near import NearObstacles
-from services.motor.reactive.stuck import StuckDetector
-from services.motor.seeking import sought_by
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.codelets import Offer
+from cogmap.schemas.cognition import Action, Competition, MotorProgram
+from cogmap.schemas.graph import Delta, Operation, Phase
+from cogmap.schemas.nodes import PLAN_ID, Goal, Plan, Self
+from cogmap.schemas.process import Clock
+from cogmap.schemas.sensing import MotorCommand, Pose, RangeScan, SelfMotion, SpeedLimit
+from cogmap.services.motor.aim import Aim
+from cogmap.services.motor.config import Config
+from cogmap.services.motor.execution import Execution
+from cogmap.services.motor.gate import LockstepGate
+from cogmap.services.motor.motor import SensoryMotorMemory, halted, obstacle_ahead_m
+from cogmap.services.motor.reactive.escape import Escape
+from cogmap.services.motor.reactive.near import NearObstacles
+from cogmap.services.motor.reactive.stuck import StuckDetector
+from cogmap.services.motor.seeking import sought_by
 
 __all__ = ["Config", "MotorModule", "build"]
 

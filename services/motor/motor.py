@@ -9,10 +9,10 @@ import math
 import numpy as np
 
 from cogmap.errors import MessageError
-from schemas.sensing import MotorCommand, RangeScan, SpeedLimit
-from services.motor.aim import Aim, Speed, in_bend, slowest
-from services.motor.config import Config
-from services.motor.reactive.near import NearObstacles
+from cogmap.schemas.sensing import MotorCommand, RangeScan, SpeedLimit
+from cogmap.services.motor.aim import Aim, Speed, in_bend, slowest
+from cogmap.services.motor.config import Config
+from cogmap.services.motor.reactive.near import NearObstacles
 
 MAX_BEARING_RAD = math.pi / 3
 TURNING_SPEED_M_S = 0.5

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from cogmap.errors import MessageError
-from schemas.base import Scalar
+from cogmap.schemas.base import Scalar
 
 Parameters = Mapping[str, Scalar]
 

@@ -8,14 +8,14 @@ from typing import Protocol
 import numpy as np
 
 from cogmap.errors import MessageError
-from schemas.cognition import ActionName
-from schemas.nodes import NEVER_NS, Plan, PlanState, Self
-from schemas.sensing import Pose, SpeedLimit
-from services.motor.aim import Aim, Speed, bearing_of
-from services.motor.config import Config
-from services.motor.guide import Guide, Track
-from services.motor.parameters import Parameters, number
-from services.motor.route import Route, pursuit
+from cogmap.schemas.cognition import ActionName
+from cogmap.schemas.nodes import NEVER_NS, Plan, PlanState, Self
+from cogmap.schemas.sensing import Pose, SpeedLimit
+from cogmap.services.motor.aim import Aim, Speed, bearing_of
+from cogmap.services.motor.config import Config
+from cogmap.services.motor.guide import Guide, Track
+from cogmap.services.motor.parameters import Parameters, number
+from cogmap.services.motor.route import Route, pursuit
 
 TURNED_RAD = 0.05
 

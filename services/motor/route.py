@@ -8,9 +8,9 @@ import numpy as np
 
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.polylines import resample
-from schemas.sensing import Pose, SpeedLimit
-from services.motor.aim import Aim, Speed, bearing_of, in_bend, slowest
-from services.motor.config import Config
+from cogmap.schemas.sensing import Pose, SpeedLimit
+from cogmap.services.motor.aim import Aim, Speed, bearing_of, in_bend, slowest
+from cogmap.services.motor.config import Config
 
 STEP_M = 0.25
 SEARCH_M = 6.0

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from cogmap.errors import MessageError
-from schemas.base import Scalar
-from schemas.cognition import ActionName, MotorProgram
-from schemas.nodes import Goal, goal_id
+from cogmap.schemas.base import Scalar
+from cogmap.schemas.cognition import ActionName, MotorProgram
+from cogmap.schemas.nodes import Goal, goal_id
 
 
 def sought_by(program: MotorProgram) -> Goal | None:

@@ -8,8 +8,8 @@ from typing import Any
 
 import msgspec
 
-from schemas.base import Scalar
-from schemas.nodes import FUNCTIONS, KINDS, SATISFIED_BY, GraphNode, Node, kind_name
+from cogmap.schemas.base import Scalar
+from cogmap.schemas.nodes import FUNCTIONS, KINDS, SATISFIED_BY, GraphNode, Node, kind_name
 
 NEED = "need"
 FUNCTION = "function"

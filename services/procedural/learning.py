@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import msgspec
 
-from schemas.cognition import Action, Behaviour
-from services.procedural.patterns import Active
-from services.procedural.schemes import Scheme
+from cogmap.schemas.cognition import Action, Behaviour
+from cogmap.services.procedural.patterns import Active
+from cogmap.services.procedural.schemes import Scheme
 
 
 @dataclass

@@ -12,13 +12,13 @@ import msgspec
 
 from cogmap.errors import ConfigError
 from cogmap.hints import did_you_mean
-from schemas.base import Count, Finite, Name, PositiveSeconds, Scalar, Share
-from schemas.cognition import PARAMETERS, ActionName, GuidanceScheme, Relation
-from schemas.feelings import Feeling
-from services.procedural.kinds import NEED, NodeKinds
-from services.procedural.patterns import Condition, Pattern
-from services.procedural.schemes import Reference, Result, Scheme
-from services.procedural.source import GUIDANCE, Source
+from cogmap.schemas.base import Count, Finite, Name, PositiveSeconds, Scalar, Share
+from cogmap.schemas.cognition import PARAMETERS, ActionName, GuidanceScheme, Relation
+from cogmap.schemas.feelings import Feeling
+from cogmap.services.procedural.kinds import NEED, NodeKinds
+from cogmap.services.procedural.patterns import Condition, Pattern
+from cogmap.services.procedural.schemes import Reference, Result, Scheme
+from cogmap.services.procedural.source import GUIDANCE, Source
 
 BUILT_IN = Path(__file__).with_name("schemes.toml")
 KIND = "kind"

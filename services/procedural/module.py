@@ -10,15 +10,15 @@ from msgspec.structs import replace
 from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
 from cogmap.runtime.module import Module
-from schemas import topics
-from schemas.base import Message
-from schemas.cognition import Action, Behaviours, Broadcast
-from schemas.graph import Delta
-from services.procedural.config import Config
-from services.procedural.guidance.memory import GuidanceMemory
-from services.procedural.learning import Reliability
-from services.procedural.loading import BUILT_IN, load, load_guidance
-from services.procedural.situations import Situations
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.cognition import Action, Behaviours, Broadcast
+from cogmap.schemas.graph import Delta
+from cogmap.services.procedural.config import Config
+from cogmap.services.procedural.guidance.memory import GuidanceMemory
+from cogmap.services.procedural.learning import Reliability
+from cogmap.services.procedural.loading import BUILT_IN, load, load_guidance
+from cogmap.services.procedural.situations import Situations
 
 __all__ = ["Config", "ProceduralMemory", "build"]
 

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from schemas.base import Scalar
-from schemas.feelings import Feeling
-from schemas.nodes import GraphNode, Node, kind_of
+from cogmap.schemas.base import Scalar
+from cogmap.schemas.feelings import Feeling
+from cogmap.schemas.nodes import GraphNode, Node, kind_of
 
 Bindings = Mapping[str, str]
 

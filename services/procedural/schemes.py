@@ -9,9 +9,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from schemas.base import Scalar
-from schemas.cognition import Behaviour, Rejection
-from services.procedural.patterns import Active, Pattern, value_of
+from cogmap.schemas.base import Scalar
+from cogmap.schemas.cognition import Behaviour, Rejection
+from cogmap.services.procedural.patterns import Active, Pattern, value_of
 
 
 class Result(NamedTuple):

@@ -6,10 +6,10 @@ from collections.abc import Iterable
 
 from cogmap.errors import ConfigError
 from cogmap.graph.graph import Graph
-from schemas.cognition import Broadcast
-from schemas.graph import Phase
-from schemas.nodes import KINDS, GraphNode, kind_name
-from services.procedural.patterns import Active
+from cogmap.schemas.cognition import Broadcast
+from cogmap.schemas.graph import Phase
+from cogmap.schemas.nodes import KINDS, GraphNode, kind_name
+from cogmap.services.procedural.patterns import Active
 
 BEFORE_POSE = frozenset({Phase.PERCEPTS, Phase.CORRECTION})
 REMEMBERED_CYCLES = 64

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import msgspec
 
-from schemas.base import PositiveSeconds, Share
+from cogmap.schemas.base import PositiveSeconds, Share
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):

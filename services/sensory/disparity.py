@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.geometry.arrays import Bytes, Singles
-from schemas.sensing import Calibration
+from cogmap.schemas.sensing import Calibration
 
 STEPS_PER_PIXEL = 16
 BLOCK_PX = 5

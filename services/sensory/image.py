@@ -6,8 +6,8 @@ import numpy as np
 
 from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Bytes
-from schemas.array import Array
-from schemas.sensing import Calibration
+from cogmap.schemas.array import Array
+from cogmap.schemas.sensing import Calibration
 
 
 def colour_image(array: Array, calibration: Calibration, name: str) -> Bytes:

@@ -9,18 +9,18 @@ import numpy as np
 
 from cogmap.geometry.arrays import Floats
 from cogmap.runtime.module import Module
-from schemas import topics
-from schemas.array import Array
-from schemas.base import Message
-from schemas.sensing import Calibration, Odometry, RangeScan, SelfMotion, StereoFrame, View
-from services.sensory.config import Config
-from services.sensory.disparity import DepthFromStereo
-from services.sensory.image import colour_image
-from services.sensory.odometry_buffer import OdometryBuffer
-from services.sensory.rectify import rectification
-from services.sensory.scan import scan
-from services.sensory.visual_odometry import VisualOdometry
-from services.sensory.wheels import WheelNoise, fuse
+from cogmap.schemas import topics
+from cogmap.schemas.array import Array
+from cogmap.schemas.base import Message
+from cogmap.schemas.sensing import Calibration, Odometry, RangeScan, SelfMotion, StereoFrame, View
+from cogmap.services.sensory.config import Config
+from cogmap.services.sensory.disparity import DepthFromStereo
+from cogmap.services.sensory.image import colour_image
+from cogmap.services.sensory.odometry_buffer import OdometryBuffer
+from cogmap.services.sensory.rectify import rectification
+from cogmap.services.sensory.scan import scan
+from cogmap.services.sensory.visual_odometry import VisualOdometry
+from cogmap.services.sensory.wheels import WheelNoise, fuse
 
 __all__ = ["Config", "SensoryMemory", "build"]
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Floats
-from schemas.sensing import Odometry
+from cogmap.schemas.sensing import Odometry
 
 NS_PER_S = 1_000_000_000
 MAX_SPEED_M_S = 100.0

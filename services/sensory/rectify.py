@@ -11,7 +11,7 @@ import numpy as np
 
 from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Bytes, Floats, Singles
-from schemas.sensing import Calibration
+from cogmap.schemas.sensing import Calibration
 
 Maps = tuple[Singles, Singles]
 

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.geometry.arrays import Floats, Singles
-from schemas.sensing import Calibration
+from cogmap.schemas.sensing import Calibration
 
 MIN_AHEAD_M = 0.3
 

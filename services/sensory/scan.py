@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from cogmap.geometry.arrays import Floats, Indices, Singles
-from schemas.sensing import Calibration
+from cogmap.schemas.sensing import Calibration
 
 LOWEST_M = 0.3
 HIGHEST_M = 2.0

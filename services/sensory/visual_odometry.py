@@ -16,8 +16,8 @@ import cv2
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Bytes, Floats, Singles
-from schemas.sensing import Calibration
-from services.sensory.reprojection import Points, points_at, project_back, surface
+from cogmap.schemas.sensing import Calibration
+from cogmap.services.sensory.reprojection import Points, points_at, project_back, surface
 
 CORNERS = 160
 MIN_TRACKED = 12

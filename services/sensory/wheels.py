@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cogmap.geometry.arrays import Floats
-from services.sensory.visual_odometry import Motion
+from cogmap.services.sensory.visual_odometry import Motion
 
 STILL_M = 1e-3
 

@@ -10,9 +10,9 @@ from typing import Annotated
 
 import msgspec
 
-from schemas.base import Message, PositiveMetres, PositiveSeconds, Share
-from schemas.sensing import Energy, Pose
-from services.sim.layout.plan import Point
+from cogmap.schemas.base import Message, PositiveMetres, PositiveSeconds, Share
+from cogmap.schemas.sensing import Energy, Pose
+from cogmap.services.sim.layout.plan import Point
 
 STANDS_M_S = 0.05
 

@@ -7,16 +7,16 @@ from typing import Annotated, Literal
 import msgspec
 
 from cogmap.errors import ConfigError
-from schemas.base import PositiveSeconds
-from services.sim.battery import Battery
-from services.sim.layout import towns
-from services.sim.layout.catalogue import CATALOGUE
-from services.sim.layout.closures import Closure
-from services.sim.layout.place import Place
-from services.sim.layout.removals import Removal
-from services.sim.odometry import Noise
-from services.sim.scripted.percepts import PerceptErrors
-from services.sim.scripted.trajectory import Trajectory
+from cogmap.schemas.base import PositiveSeconds
+from cogmap.services.sim.battery import Battery
+from cogmap.services.sim.layout import towns
+from cogmap.services.sim.layout.catalogue import CATALOGUE
+from cogmap.services.sim.layout.closures import Closure
+from cogmap.services.sim.layout.place import Place
+from cogmap.services.sim.layout.removals import Removal
+from cogmap.services.sim.odometry import Noise
+from cogmap.services.sim.scripted.percepts import PerceptErrors
+from cogmap.services.sim.scripted.trajectory import Trajectory
 
 STEP_S = 1 / 240
 """A step of the physics."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from schemas.base import Message
-from schemas.process import Clock
-from schemas.sensing import MotorCommand, TruePose, TrueTown
+from cogmap.schemas.base import Message
+from cogmap.schemas.process import Clock
+from cogmap.schemas.sensing import MotorCommand, TruePose, TrueTown
 
 REPEAT_CHECK_NS = 1_000_000_000
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from cogmap.runtime.module import Module
-from schemas import topics
-from services.sim.config import Config, check
-from services.sim.driven.percept_level import DrivenPerceptLevelSim
-from services.sim.lockstep import REPEAT_CHECK_NS, Lockstep, SteppedSim
-from services.sim.real_time import RealTime
-from services.sim.scripted.camera_level import CameraLevelSim
-from services.sim.scripted.percept_level import PerceptLevelSim
-from services.sim.scripted.trajectory import Trajectory
-from services.sim.simulation import Simulation
+from cogmap.schemas import topics
+from cogmap.services.sim.config import Config, check
+from cogmap.services.sim.driven.percept_level import DrivenPerceptLevelSim
+from cogmap.services.sim.lockstep import REPEAT_CHECK_NS, Lockstep, SteppedSim
+from cogmap.services.sim.real_time import RealTime
+from cogmap.services.sim.scripted.camera_level import CameraLevelSim
+from cogmap.services.sim.scripted.percept_level import PerceptLevelSim
+from cogmap.services.sim.scripted.trajectory import Trajectory
+from cogmap.services.sim.simulation import Simulation
 
 __all__ = ["Config", "build"]
 

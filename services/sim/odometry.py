@@ -8,8 +8,8 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
-from schemas.base import Share
-from schemas.sensing import Odometry, Pose
+from cogmap.schemas.base import Share
+from cogmap.schemas.sensing import Odometry, Pose
 
 
 class Noise(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from schemas.sensing import MotorCommand, SpeedLimit
+from cogmap.schemas.sensing import MotorCommand, SpeedLimit
 
 
 class Progress:

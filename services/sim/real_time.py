@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import deque
 
 from cogmap.errors import MessageError
-from schemas.base import Message
-from schemas.sensing import MotorCommand
-from services.sim.simulation import Simulation
+from cogmap.schemas.base import Message
+from cogmap.schemas.sensing import MotorCommand
+from cogmap.services.sim.simulation import Simulation
 
 CATCH_UP_NS = 250_000_000
 TOWN_PERIOD_NS = 5_000_000_000

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from schemas.sensing import Pose
-from services.sim.stdio import pybullet
+from cogmap.schemas.sensing import Pose
+from cogmap.services.sim.stdio import pybullet
 
 TRACK_M = 0.8
 WHEEL_RADIUS_M = 0.2

@@ -7,17 +7,17 @@ from collections.abc import Iterable
 
 import msgspec
 
-from schemas.base import Message
-from schemas.process import Clock
-from schemas.sensing import MotorCommand, Odometry, StereoFrame, TruePose, TrueTown
-from services.sim.battery import PowerSupply
-from services.sim.config import Config, place_of
-from services.sim.layout.closures import ClosedStreets
-from services.sim.layout.town import Town
-from services.sim.odometry import WheelOdometry
-from services.sim.progress import Progress
-from services.sim.rendering.camera import StereoCamera, calibration
-from services.sim.world import World
+from cogmap.schemas.base import Message
+from cogmap.schemas.process import Clock
+from cogmap.schemas.sensing import MotorCommand, Odometry, StereoFrame, TruePose, TrueTown
+from cogmap.services.sim.battery import PowerSupply
+from cogmap.services.sim.config import Config, place_of
+from cogmap.services.sim.layout.closures import ClosedStreets
+from cogmap.services.sim.layout.town import Town
+from cogmap.services.sim.odometry import WheelOdometry
+from cogmap.services.sim.progress import Progress
+from cogmap.services.sim.rendering.camera import StereoCamera, calibration
+from cogmap.services.sim.world import World
 
 
 class Simulation:

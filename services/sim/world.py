@@ -11,21 +11,21 @@ from functools import partial
 import numpy as np
 
 from cogmap.geometry.arrays import Singles
-from schemas.sensing import Pose
-from services.sim.config import STEP_S
-from services.sim.layout.barriers import barriers
-from services.sim.layout.furniture import Prop
-from services.sim.layout.place import Place
-from services.sim.layout.plan import Plot, Point, Road
-from services.sim.rendering import scenery
-from services.sim.rendering.egl import Egl
-from services.sim.rendering.egl_trial import works as egl_works
-from services.sim.rendering.light import relief
-from services.sim.robot import Robot
-from services.sim.scene.bodies import Bodies
-from services.sim.scene.builder import Builder
-from services.sim.scene.nearby import Nearby, Piece
-from services.sim.stdio import pybullet, quiet
+from cogmap.schemas.sensing import Pose
+from cogmap.services.sim.config import STEP_S
+from cogmap.services.sim.layout.barriers import barriers
+from cogmap.services.sim.layout.furniture import Prop
+from cogmap.services.sim.layout.place import Place
+from cogmap.services.sim.layout.plan import Plot, Point, Road
+from cogmap.services.sim.rendering import scenery
+from cogmap.services.sim.rendering.egl import Egl
+from cogmap.services.sim.rendering.egl_trial import works as egl_works
+from cogmap.services.sim.rendering.light import relief
+from cogmap.services.sim.robot import Robot
+from cogmap.services.sim.scene.bodies import Bodies
+from cogmap.services.sim.scene.builder import Builder
+from cogmap.services.sim.scene.nearby import Nearby, Piece
+from cogmap.services.sim.stdio import pybullet, quiet
 
 _GRAVITY_M_S2 = -9.81
 _CONTACT_BODY = 2

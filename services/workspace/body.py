@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from schemas.nodes import ENERGY, Need, need_id
-from schemas.sensing import Energy
-from services.workspace.config import Config
+from cogmap.schemas.nodes import ENERGY, Need, need_id
+from cogmap.schemas.sensing import Energy
+from cogmap.services.workspace.config import Config
 
 MAX_KEPT = 16
 

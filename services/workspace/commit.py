@@ -9,11 +9,11 @@ import msgspec
 from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import CycleContext
-from schemas.codelets import Offer, Proposal
-from schemas.cognition import Coalitions
-from schemas.graph import Cells, Delta, Links, Operation, Phase, Snapshot
-from schemas.nodes import KINDS, ROOT_MAP, LinkKind, Map
-from services.workspace.rules import Key, Writer, check_operation, written_by
+from cogmap.schemas.codelets import Offer, Proposal
+from cogmap.schemas.cognition import Coalitions
+from cogmap.schemas.graph import Cells, Delta, Links, Operation, Phase, Snapshot
+from cogmap.schemas.nodes import KINDS, ROOT_MAP, LinkKind, Map
+from cogmap.services.workspace.rules import Key, Writer, check_operation, written_by
 
 MAX_REASONS = 8
 MAX_REASON_CHARACTERS = 200

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from schemas.base import Finite, Name, Unit
+from cogmap.schemas.base import Finite, Name, Unit
 
 Milliseconds = Annotated[float, msgspec.Meta(gt=0, le=3.6e6)]
 

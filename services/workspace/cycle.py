@@ -9,16 +9,16 @@ import msgspec
 
 from cogmap.errors import MessageError
 from cogmap.runtime.codelet import ConfiguredCodelet, CycleContext
-from schemas.base import Message
-from schemas.codelets import Offer, Proposal
-from schemas.cognition import Broadcast, Competition
-from schemas.graph import Delta, Operation, Phase, Snapshot, SnapshotRequest
-from schemas.process import Clock, Presence
-from schemas.sensing import Energy, Percepts, RangeScan, SelfMotion
-from services.workspace.commit import Ledger, coalitions_of
-from services.workspace.config import Config
-from services.workspace.dispatch import Dispatch
-from services.workspace.entrance import (
+from cogmap.schemas.base import Message
+from cogmap.schemas.codelets import Offer, Proposal
+from cogmap.schemas.cognition import Broadcast, Competition
+from cogmap.schemas.graph import Delta, Operation, Phase, Snapshot, SnapshotRequest
+from cogmap.schemas.process import Clock, Presence
+from cogmap.schemas.sensing import Energy, Percepts, RangeScan, SelfMotion
+from cogmap.services.workspace.commit import Ledger, coalitions_of
+from cogmap.services.workspace.config import Config
+from cogmap.services.workspace.dispatch import Dispatch
+from cogmap.services.workspace.entrance import (
     check_percepts,
     expected_operations,
     first_goals,
@@ -26,13 +26,13 @@ from services.workspace.entrance import (
     percept_operations,
     recognised,
 )
-from services.workspace.forgetting import Forgetting
-from services.workspace.individuals import as_entered, individuals
-from services.workspace.lane import Lanes
-from services.workspace.learning.base_level import learned_operations
-from services.workspace.learning.consciousness import Consciousness
-from services.workspace.offers import Offers
-from services.workspace.sensed import Sensed
+from cogmap.services.workspace.forgetting import Forgetting
+from cogmap.services.workspace.individuals import as_entered, individuals
+from cogmap.services.workspace.lane import Lanes
+from cogmap.services.workspace.learning.base_level import learned_operations
+from cogmap.services.workspace.learning.consciousness import Consciousness
+from cogmap.services.workspace.offers import Offers
+from cogmap.services.workspace.sensed import Sensed
 
 WORKERS = "codelets"
 MAX_LATE_TASKS = 256

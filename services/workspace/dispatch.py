@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import msgspec
 
-from schemas.base import Message
-from schemas.codelets import Assignment, Leases, Proposal, Task
+from cogmap.schemas.base import Message
+from cogmap.schemas.codelets import Assignment, Leases, Proposal, Task
 
 BUSY = 1000
 

@@ -9,9 +9,9 @@ from cogmap.errors import MessageError
 from cogmap.graph import decay
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import CycleContext
-from schemas.array import Matrix
-from schemas.graph import Decay, Links, Operation
-from schemas.nodes import (
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.graph import Decay, Links, Operation
+from cogmap.schemas.nodes import (
     POSE_COLUMNS,
     ROOT_MAP,
     SELF_ID,
@@ -25,8 +25,8 @@ from schemas.nodes import (
     object_id,
     percept_id,
 )
-from schemas.sensing import Percepts
-from services.workspace.config import Config
+from cogmap.schemas.sensing import Percepts
+from cogmap.services.workspace.config import Config
 
 
 def first_operations(graph: Graph, config: Config) -> list[Operation]:

@@ -6,8 +6,8 @@ from collections import defaultdict
 
 from cogmap.graph import decay
 from cogmap.graph.graph import Graph
-from schemas.graph import Delta, DropNode
-from schemas.nodes import GraphNode
+from cogmap.schemas.graph import Delta, DropNode
+from cogmap.schemas.nodes import GraphNode
 
 Buckets = defaultdict[int, dict[str, None]]
 

@@ -20,10 +20,10 @@ from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import integrate
 from cogmap.graph.graph import Graph
 from cogmap.graph.individuals import APART_M
-from schemas import nodes
-from schemas.array import Array
-from schemas.nodes import NEVER_NS, Object, Self, individual_label, object_id
-from schemas.sensing import Percept, Percepts
+from cogmap.schemas import nodes
+from cogmap.schemas.array import Array
+from cogmap.schemas.nodes import NEVER_NS, Object, Self, individual_label, object_id
+from cogmap.schemas.sensing import Percept, Percepts
 
 # Beyond so many standard deviations a percept is of another object.
 GATE = 2.0

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 
 from cogmap.runtime.codelet import ConfiguredCodelet, CycleContext
-from schemas.base import Message
-from schemas.codelets import Proposal
-from schemas.graph import Phase
-from services.workspace.commit import Ledger
-from services.workspace.config import Config
-from services.workspace.dispatch import Dispatch
+from cogmap.schemas.base import Message
+from cogmap.schemas.codelets import Proposal
+from cogmap.schemas.graph import Phase
+from cogmap.services.workspace.commit import Ledger
+from cogmap.services.workspace.config import Config
+from cogmap.services.workspace.dispatch import Dispatch
 
 
 class Lanes:

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from cogmap.errors import ConfigError
 from cogmap.runtime.codelet import ConfiguredCodelet
 from cogmap.runtime.module import Module
-from schemas import topics
-from services.workspace.config import Config
-from services.workspace.cycle import Workspace
+from cogmap.schemas import topics
+from cogmap.services.workspace.config import Config
+from cogmap.services.workspace.cycle import Workspace
 
 __all__ = ["Config", "Workspace", "build"]
 

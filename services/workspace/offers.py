@@ -8,11 +8,11 @@ import msgspec
 
 from cogmap.errors import MessageError
 from cogmap.graph.individuals import is_among
-from schemas.codelets import Offer
-from schemas.graph import Link, Operation
-from schemas.nodes import GraphNode, LinkKind, Object, nearest_place, percept_id
-from services.workspace.commit import Ledger
-from services.workspace.rules import may_offer
+from cogmap.schemas.codelets import Offer
+from cogmap.schemas.graph import Link, Operation
+from cogmap.schemas.nodes import GraphNode, LinkKind, Object, nearest_place, percept_id
+from cogmap.services.workspace.commit import Ledger
+from cogmap.services.workspace.rules import may_offer
 
 
 class Offers:

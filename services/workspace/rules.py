@@ -9,8 +9,8 @@ import numpy as np
 from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
 from cogmap.graph.tiles import tiles_of
-from schemas.array import Array
-from schemas.graph import (
+from cogmap.schemas.array import Array
+from cogmap.schemas.graph import (
     Cells,
     Decay,
     DropLink,
@@ -21,7 +21,7 @@ from schemas.graph import (
     Operation,
     PlaceTile,
 )
-from schemas.nodes import (
+from cogmap.schemas.nodes import (
     KINDS,
     ROOT_MAP,
     GraphNode,

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from cogmap.runtime.codelet import CycleContext
-from schemas.array import Array
-from schemas.nodes import Need
-from schemas.sensing import Energy, Percepts, RangeScan, SelfMotion
-from services.workspace.body import Body
-from services.workspace.config import Config
-from services.workspace.senses import Scans, SelfMotions
+from cogmap.schemas.array import Array
+from cogmap.schemas.nodes import Need
+from cogmap.schemas.sensing import Energy, Percepts, RangeScan, SelfMotion
+from cogmap.services.workspace.body import Body
+from cogmap.services.workspace.config import Config
+from cogmap.services.workspace.senses import Scans, SelfMotions
 
 
 class Sensed:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.errors import MessageError
-from schemas.array import Array
-from schemas.sensing import RangeScan, SelfMotion
-from services.workspace.config import Config
+from cogmap.schemas.array import Array
+from cogmap.schemas.sensing import RangeScan, SelfMotion
+from cogmap.services.workspace.config import Config
 
 SELF_MOTION_COLUMNS = 5
 MAX_SCANS = 16

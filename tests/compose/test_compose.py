@@ -12,12 +12,12 @@ from pathlib import Path
 
 import pytest
 
-from cli.launch.metrics import Recording
-from cli.launch.watch import Watch
 from cogmap.bus.interface import Member
 from cogmap.bus.session import free_endpoint
 from cogmap.bus.zenoh_bus import ZenohBus
-from services import registry
+from cogmap.cli.launch.metrics import Recording
+from cogmap.cli.launch.watch import Watch
+from cogmap.services import registry
 
 pytestmark = pytest.mark.compose
 

@@ -13,10 +13,10 @@ from cogmap.bus.codec import Envelope, decode
 from cogmap.bus.interface import Answer, Bus, Job, Member
 from cogmap.bus.zenoh_bus import BATCHED_BYTES, TRANSIT_S, ZenohBus
 from cogmap.errors import NoAnswerError, UsageError
-from schemas import topics
-from schemas.examples import example_messages
-from schemas.process import Clock
-from schemas.topics import Delivery
+from cogmap.schemas import topics
+from cogmap.schemas.examples import example_messages
+from cogmap.schemas.process import Clock
+from cogmap.schemas.topics import Delivery
 from tests.support.logs import odometry
 from tests.support.system.networks import TIMEOUT_S, Network, OverZenoh, Peer, meet, publish
 

@@ -14,9 +14,9 @@ import pytest
 
 from cogmap import ConfigError, Graph, InProcessRunner, Module, open_log, topics
 from cogmap.bus.session import free_endpoint
-from schemas.nodes import Node
-from schemas.sensing import SelfMotion
-from services import registry
+from cogmap.schemas.nodes import Node
+from cogmap.schemas.sensing import SelfMotion
+from cogmap.services import registry
 from tests.support.includes import ROOT
 
 TIMEOUT_S = 90.0
@@ -112,7 +112,7 @@ def test_the_codelet_runs_in_processes(site: Path, tmp_path: Path) -> None:
     folder = tmp_path / "run"
     config = tmp_path / "trajectory.toml"
     config.write_text(CONFIG)
-    command = [sys.executable, "-m", "cli.main", "run", "--lockstep", "--config", config]
+    command = [sys.executable, "-m", "cogmap.cli.main", "run", "--lockstep", "--config", config]
     options = ["--out", folder, "--connect", free_endpoint(), "--time-limit", "60"]
 
     run = subprocess.run(

@@ -6,14 +6,14 @@ from collections.abc import Callable
 
 import pytest
 
-from cli.graph import to_dot, to_json, to_tree
 from cogmap.bus.discovery import Process, Role, System, discover, read, use_key
 from cogmap.bus.interface import Answer, Member
 from cogmap.bus.session import open_client
+from cogmap.cli.graph import to_dot, to_json, to_tree
 from cogmap.runtime.shell import Shell
-from schemas import topics
-from schemas.topics import Scope
-from services import registry
+from cogmap.schemas import topics
+from cogmap.schemas.topics import Scope
+from cogmap.services import registry
 from tests.support.system.networks import TIMEOUT_S, OverZenoh, Peer, meet
 
 TRUTH = [topic for topic in topics.ALL if topic.scope is Scope.TRUTH]

@@ -20,11 +20,11 @@ from cogmap.bus.codec import decode, encode
 from cogmap.bus.interface import Bus, Member
 from cogmap.errors import MessageError
 from cogmap.runtime.module import Module
+from cogmap.schemas import topics
+from cogmap.schemas.array import Array
+from cogmap.schemas.export import GOLDEN
+from cogmap.schemas.sensing import MotorCommand, RangeScan
 from examples import in_process, wanderer, wanderer_msgpack
-from schemas import topics
-from schemas.array import Array
-from schemas.export import GOLDEN
-from schemas.sensing import MotorCommand, RangeScan
 from tests.support.includes import LANGUAGES, PAGES, ROOT, included, included_paths
 from tests.support.system.networks import TIMEOUT_S, OverZenoh, Peer, publish
 

@@ -12,11 +12,11 @@ from cogmap.bus.interface import Member
 from cogmap.graph.graph import Graph
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
-from schemas import topics
-from schemas.base import Message
-from schemas.graph import Delta, DropNode, Link, Operation, Phase, SnapshotRequest
-from schemas.nodes import Node
-from schemas.sensing import MotorCommand
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.graph import Delta, DropNode, Link, Operation, Phase, SnapshotRequest
+from cogmap.schemas.nodes import Node
+from cogmap.schemas.sensing import MotorCommand
 from tests.support.logs import odometry
 from tests.support.system.networks import (
     TIMEOUT_S,

@@ -13,9 +13,9 @@ from cogmap.errors import StorageError, UsageError
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
 from cogmap.runtime.state.journal import Journal
-from schemas import topics
-from schemas.base import Message
-from schemas.graph import Decay, Delta, Link, Phase, Snapshot
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.graph import Decay, Delta, Link, Phase, Snapshot
 from tests.support.system.disks import full_after
 
 

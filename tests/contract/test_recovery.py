@@ -13,9 +13,9 @@ from cogmap.bus.session import free_endpoint
 from cogmap.graph.graph import Graph
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
-from schemas import topics
-from schemas.graph import Delta, Phase
-from schemas.nodes import Node
+from cogmap.schemas import topics
+from cogmap.schemas.graph import Delta, Phase
+from cogmap.schemas.nodes import Node
 from tests.support.logs import odometry
 from tests.support.system.networks import OverZenoh, Peer, meet, publish, spin_until, working
 
@@ -28,7 +28,15 @@ class Router:
         self.start()
 
     def start(self) -> None:
-        command = [sys.executable, "-m", "cli.main", "router", "--tied", "--connect", self.endpoint]
+        command = [
+            sys.executable,
+            "-m",
+            "cogmap.cli.main",
+            "router",
+            "--tied",
+            "--connect",
+            self.endpoint,
+        ]
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )

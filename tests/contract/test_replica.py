@@ -6,9 +6,9 @@ from cogmap.graph.graph import Graph
 from cogmap.graph.replica import Replica, snapshot_over
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
-from schemas import topics
-from schemas.graph import Delta, Link, Phase
-from schemas.nodes import Node
+from cogmap.schemas import topics
+from cogmap.schemas.graph import Delta, Link, Phase
+from cogmap.schemas.nodes import Node
 from tests.support.system.networks import Network, meet, working
 
 

@@ -14,11 +14,11 @@ import pytest
 from msgspec.inspect import FloatType
 
 from cogmap.bus.codec import Envelope, decode, encode
-from schemas import sensing, topics
-from schemas.base import Message
-from schemas.examples import example_messages
-from schemas.export import GOLDEN, export_golden, export_schemas, file_name, json_schema
-from schemas.topics import Delivery, Scope, Topic
+from cogmap.schemas import sensing, topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.examples import example_messages
+from cogmap.schemas.export import GOLDEN, export_golden, export_schemas, file_name, json_schema
+from cogmap.schemas.topics import Delivery, Scope, Topic
 from tests.support.damage import golden
 
 BY_TOPIC = {topics.of(message): message for message in example_messages()}
@@ -102,7 +102,7 @@ def test_golden_bytes_are_written_the_same_every_time(tmp_path: Path) -> None:
 
 def test_every_export_is_one_command(tmp_path: Path) -> None:
     run = subprocess.run(
-        [sys.executable, "-m", "schemas.export", str(tmp_path)],
+        [sys.executable, "-m", "cogmap.schemas.export", str(tmp_path)],
         capture_output=True,
         text=True,
         check=True,

@@ -7,11 +7,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-from cli.experiment import live
-from experiments.loop_closing.run import MODULES, driven, sections
-from services import registry
+from cogmap.cli.experiment import live
+from cogmap.experiments.loop_closing.run import MODULES, driven, sections
+from cogmap.services import registry
 
-COGMAP = [sys.executable, "-m", "cli.main", "experiment"]
+COGMAP = [sys.executable, "-m", "cogmap.cli.main", "experiment"]
 TIMEOUT_S = 110.0
 LOOP_M = [(0.0, 0.0), (60.0, 0.0), (60.0, 40.0), (0.0, 40.0), (0.0, 0.0), (60.0, 0.0)]
 

@@ -21,8 +21,8 @@ from cogmap.errors import UsageError
 from cogmap.recording.diff import diff
 from cogmap.recording.recorder import Recorder
 from cogmap.recording.storage.format import topics_to_record
-from schemas.array import Array
-from schemas.base import Message
+from cogmap.schemas.array import Array
+from cogmap.schemas.base import Message
 from tests.support.logs import SECOND_NS, odometry, scan, write_log
 from tests.support.system.commands import log_command, log_facts
 from tests.support.system.networks import routed
@@ -30,7 +30,7 @@ from tests.support.system.networks import routed
 COUNT = 5
 TIMEOUT_S = 30.0
 AGENT = "replayed"
-REPLAY = [sys.executable, "-m", "cli.main", "log", "replay"]
+REPLAY = [sys.executable, "-m", "cogmap.cli.main", "log", "replay"]
 PLAYED = {"odometry": COUNT, "sensory/scan": COUNT}
 
 

@@ -16,8 +16,8 @@ import pytest
 from cogmap.bus.session import check_free, free_endpoint, open_client
 from cogmap.runtime.client import Client
 from cogmap.runtime.module import Module
-from schemas import topics
-from schemas.sensing import MotorCommand
+from cogmap.schemas import topics
+from cogmap.schemas.sensing import MotorCommand
 from tests.support.system.processes import shared_memory
 from tests.support.system.runs import COGMAP, DRIVING, TIMEOUT_S, Run, processes_at, wait_until
 

@@ -13,10 +13,10 @@ from collections.abc import Iterator
 import pytest
 
 from cogmap import Client, Module, topics
-from schemas.base import Message
-from schemas.examples import example_messages
-from schemas.sensing import MotorCommand, Odometry
-from services import registry
+from cogmap.schemas.base import Message
+from cogmap.schemas.examples import example_messages
+from cogmap.schemas.sensing import MotorCommand, Odometry
+from cogmap.services import registry
 from tests.support.system.networks import routed
 
 TIMEOUT_S = 30.0
@@ -66,7 +66,7 @@ def robot(endpoint: str) -> Iterator[Robot]:
 def start(endpoint: str, *arguments: str) -> subprocess.Popen[str]:
     """A command, whose router is at `endpoint`."""
     return subprocess.Popen(
-        [sys.executable, "-m", "cli.main", *arguments],
+        [sys.executable, "-m", "cogmap.cli.main", *arguments],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

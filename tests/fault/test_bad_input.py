@@ -13,12 +13,12 @@ import pytest
 from cogmap.bus.session import open_client
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
-from schemas import topics
-from schemas.array import Array
-from schemas.base import Message
-from schemas.graph import Delta, Phase
-from schemas.sensing import Percepts, SelfMotion
-from schemas.topics import Delivery
+from cogmap.schemas import topics
+from cogmap.schemas.array import Array
+from cogmap.schemas.base import Message
+from cogmap.schemas.graph import Delta, Phase
+from cogmap.schemas.sensing import Percepts, SelfMotion
+from cogmap.schemas.topics import Delivery
 from tests.support.damage import damaged
 from tests.support.system.live import Witness
 from tests.support.system.networks import working

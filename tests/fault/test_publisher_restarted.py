@@ -7,8 +7,8 @@ import signal
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
 from cogmap.runtime.state.published import PublishedCounts
-from schemas import topics
-from schemas.sensing import Odometry
+from cogmap.schemas import topics
+from cogmap.schemas.sensing import Odometry
 from tests.support.system.networks import working
 from tests.support.system.processes import System, wait_until
 

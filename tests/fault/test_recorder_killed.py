@@ -20,7 +20,7 @@ from cogmap.bus.interface import Member
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.recording.storage.reader import LogReader, Record
 from cogmap.recording.storage.recover import recover
-from schemas import topics
+from cogmap.schemas import topics
 from tests.support.logs import odometry
 from tests.support.system.disks import full_after
 from tests.support.system.networks import routed
@@ -85,7 +85,7 @@ def publisher(endpoint: str) -> Iterator[Publisher]:
 
 def start(endpoint: str, path: Path, *options: str) -> subprocess.Popen[str]:
     """A recorder of what is published at `endpoint`."""
-    program = [sys.executable, "-m", "cli.main", "log", "record"]
+    program = [sys.executable, "-m", "cogmap.cli.main", "log", "record"]
     target = ["-o", str(path), "--connect", endpoint, "--agent", AGENT]
     return subprocess.Popen(
         [*program, *target, *options],

@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 from cogmap.bus.discovery import discover
 from cogmap.bus.session import open_client
-from schemas import topics
+from cogmap.schemas import topics
 from tests.support.system.processes import AGENT, System
 
 JOINING = 3

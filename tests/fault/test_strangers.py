@@ -16,10 +16,10 @@ from cogmap.bus.session import open_client
 from cogmap.errors import NoAnswerError
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
-from schemas import topics
-from schemas.base import Message
-from schemas.topics import Delivery, Topic
-from services import registry
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.topics import Delivery, Topic
+from cogmap.services import registry
 from tests.support.damage import damaged, golden
 from tests.support.system.live import Feeder, Witness
 from tests.support.system.networks import working

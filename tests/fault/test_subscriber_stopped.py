@@ -18,12 +18,12 @@ import pytest
 from cogmap.recording.storage.reader import LogReader
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
-from schemas import topics
-from schemas.array import Array
-from schemas.base import Message
-from schemas.examples import example_messages
-from schemas.sensing import StereoFrame
-from schemas.topics import Topic
+from cogmap.schemas import topics
+from cogmap.schemas.array import Array
+from cogmap.schemas.base import Message
+from cogmap.schemas.examples import example_messages
+from cogmap.schemas.sensing import StereoFrame
+from cogmap.schemas.topics import Topic
 from tests.support.system.live import Feeder, Witness
 from tests.support.system.networks import working
 from tests.support.system.processes import AGENT, Process, System, wait_until

@@ -9,8 +9,8 @@ import pytest
 
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
-from schemas import topics
-from schemas.codelets import Assignment, Leases, Proposal
+from cogmap.schemas import topics
+from cogmap.schemas.codelets import Assignment, Leases, Proposal
 from tests.support.system.live import Feeder, Witness
 from tests.support.system.networks import working
 from tests.support.system.processes import System, wait_until

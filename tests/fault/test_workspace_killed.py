@@ -6,7 +6,7 @@ import signal
 
 import pytest
 
-from schemas.graph import Phase
+from cogmap.schemas.graph import Phase
 from tests.support.system.live import Feeder, Witness
 from tests.support.system.processes import System, wait_until
 

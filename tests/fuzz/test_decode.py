@@ -14,9 +14,9 @@ import pytest
 
 from cogmap.bus.codec import Envelope, decode, decode_envelope, encode
 from cogmap.errors import MessageError
-from schemas import topics
-from schemas.array import Array
-from schemas.topics import Topic
+from cogmap.schemas import topics
+from cogmap.schemas.array import Array
+from cogmap.schemas.topics import Topic
 from tests.support.damage import golden
 
 ROUNDS = 1500

@@ -21,11 +21,11 @@ from cogmap.recording.selection import to_record
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
 from cogmap.runtime.state.journal import Journal
-from schemas import topics
-from schemas.array import Array
-from schemas.base import Message
-from schemas.process import Clock
-from schemas.sensing import MotorCommand, Odometry, RangeScan
+from cogmap.schemas import topics
+from cogmap.schemas.array import Array
+from cogmap.schemas.base import Message
+from cogmap.schemas.process import Clock
+from cogmap.schemas.sensing import MotorCommand, Odometry, RangeScan
 
 Sections = dict[str, dict[str, Any]]
 NEVER_NS = 10**15

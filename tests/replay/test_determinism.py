@@ -12,10 +12,10 @@ import pytest
 
 from cogmap.bus.codec import decode, encode
 from cogmap.graph.graph import Graph
-from schemas import topics
-from schemas.base import Message
-from schemas.graph import Delta
-from schemas.topics import Delivery, Topic
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.graph import Delta
+from cogmap.schemas.topics import Delivery, Topic
 from tests.support.messages import of_type
 from tests.support.reference import COMPARED, Published, drive, graph
 

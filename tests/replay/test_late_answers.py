@@ -18,15 +18,15 @@ from cogmap.recording.recorder import Recorder
 from cogmap.recording.replaying.replay import replay_into
 from cogmap.recording.selection import to_record
 from cogmap.runtime.shell import Shell
-from schemas import topics
-from schemas.array import Array, Matrix
-from schemas.base import Message
-from schemas.codelets import Proposal, Task
-from schemas.graph import Decay, Delta, Operation, Phase
-from schemas.nodes import SELF_ID, Self
-from schemas.process import Clock
-from schemas.sensing import Percepts, SelfMotion
-from services import registry
+from cogmap.schemas import topics
+from cogmap.schemas.array import Array, Matrix
+from cogmap.schemas.base import Message
+from cogmap.schemas.codelets import Proposal, Task
+from cogmap.schemas.graph import Decay, Delta, Operation, Phase
+from cogmap.schemas.nodes import SELF_ID, Self
+from cogmap.schemas.process import Clock
+from cogmap.schemas.sensing import Percepts, SelfMotion
+from cogmap.services import registry
 
 MS = 1_000_000
 PERIOD_NS = 200 * MS

@@ -13,9 +13,9 @@ from cogmap.bus.interface import Arrival
 from cogmap.bus.memory import MemoryBus
 from cogmap.runtime.config import Sections
 from cogmap.runtime.in_process import InProcessRunner
-from schemas import topics
-from services import registry
-from services.sim.odometry import FUSED
+from cogmap.schemas import topics
+from cogmap.services import registry
+from cogmap.services.sim.odometry import FUSED
 from tests.support.reference import COMPARED, Published
 
 COMMANDS = 20

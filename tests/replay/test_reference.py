@@ -14,9 +14,9 @@ import pytest
 from cogmap.recording.replaying.outcome import Outcome
 from cogmap.recording.replaying.replay import replay_into
 from cogmap.recording.storage.reader import LogReader
-from schemas import topics
-from schemas.sensing import MotorCommand
-from services import registry
+from cogmap.schemas import topics
+from cogmap.schemas.sensing import MotorCommand
+from cogmap.services import registry
 from tests.support.reference import FRAMES, REFERENCE, compared, drive, in_words, other_arithmetic
 
 SAME_EVERYWHERE = ("workspace", "global_workspace")

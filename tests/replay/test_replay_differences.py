@@ -17,10 +17,10 @@ from cogmap.recording.selection import to_record
 from cogmap.recording.storage.reader import LogReader
 from cogmap.recording.storage.writer import LogWriter
 from cogmap.runtime.module import Module
-from schemas import topics
-from schemas.array import Array
-from schemas.base import Message
-from schemas.sensing import RangeScan
+from cogmap.schemas import topics
+from cogmap.schemas.array import Array
+from cogmap.schemas.base import Message
+from cogmap.schemas.sensing import RangeScan
 from tests.replay.mixer import Sections, Session, build, clock, odometry, record, replay
 
 

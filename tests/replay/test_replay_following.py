@@ -17,10 +17,10 @@ from cogmap.recording.replaying.replay import replay_into
 from cogmap.recording.selection import to_record
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
-from schemas import topics
-from schemas.graph import Delta, Phase, Snapshot
-from schemas.nodes import Node
-from schemas.sensing import MotorCommand
+from cogmap.schemas import topics
+from cogmap.schemas.graph import Delta, Phase, Snapshot
+from cogmap.schemas.nodes import Node
+from cogmap.schemas.sensing import MotorCommand
 
 
 def build(name: str, sections: dict[str, Any], instance: str) -> Module:

@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from cogmap.recording.storage.reader import LogReader
 from cogmap.runtime.state.journal import Journal
-from schemas import topics
+from cogmap.schemas import topics
 from tests.replay.mixer import Session, odometry, record, replay
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from schemas.array import Array, Matrix
-from schemas.base import Message
-from schemas.cognition import (
+from cogmap.schemas.array import Array, Matrix
+from cogmap.schemas.base import Message
+from cogmap.schemas.cognition import (
     Action,
     Behaviour,
     Broadcast,
@@ -14,11 +14,11 @@ from schemas.cognition import (
     Coalitions,
     Rejection,
 )
-from schemas.graph import Delta, DropNode, Phase
-from schemas.nodes import SELF_ID, Object, Self, object_id
-from schemas.sensing import MotorCommand, Percept, Percepts
-from services.global_workspace.config import Config
-from services.global_workspace.module import GlobalWorkspace
+from cogmap.schemas.graph import Delta, DropNode, Phase
+from cogmap.schemas.nodes import SELF_ID, Object, Self, object_id
+from cogmap.schemas.sensing import MotorCommand, Percept, Percepts
+from cogmap.services.global_workspace.config import Config
+from cogmap.services.global_workspace.module import GlobalWorkspace
 from tests.support.logs import Row
 
 MS_NS = 10**6

@@ -9,9 +9,9 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from schemas import topics
-from schemas.export import GOLDEN, file_name
-from schemas.topics import Topic
+from cogmap.schemas import topics
+from cogmap.schemas.export import GOLDEN, file_name
+from cogmap.schemas.topics import Topic
 
 
 def golden(topic: Topic) -> bytes:

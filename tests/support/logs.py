@@ -10,10 +10,10 @@ import numpy as np
 from cogmap.bus.codec import Envelope, encode
 from cogmap.recording.storage.format import topics_to_record
 from cogmap.recording.storage.writer import LogWriter
-from schemas import topics
-from schemas.array import Array
-from schemas.base import Message
-from schemas.sensing import Odometry, RangeScan
+from cogmap.schemas import topics
+from cogmap.schemas.array import Array
+from cogmap.schemas.base import Message
+from cogmap.schemas.sensing import Odometry, RangeScan
 
 SECOND_NS = 10**9
 ABOUT = {"agent": "a", "config": "{}", "began_ns": "1"}

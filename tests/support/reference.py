@@ -21,9 +21,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from cli.launch.plan import Choices, effective
 from cogmap.bus.interface import Arrival
 from cogmap.bus.memory import MemoryBus
+from cogmap.cli.launch.plan import Choices, effective
 from cogmap.errors import LogError
 from cogmap.graph.graph import Graph
 from cogmap.recording.diff import Diff, diff
@@ -34,10 +34,10 @@ from cogmap.recording.storage.reader import LogReader
 from cogmap.runtime.config import Sections
 from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
-from schemas import topics
-from schemas.graph import Delta
-from schemas.topics import Scope
-from services import registry
+from cogmap.schemas import topics
+from cogmap.schemas.graph import Delta
+from cogmap.schemas.topics import Scope
+from cogmap.services import registry
 
 REFERENCE = Path(__file__).parents[1] / "replay" / "reference.mcap"
 FRAMES = 10

@@ -18,7 +18,7 @@ def export(
     input_shape: tuple[int, ...],
     output_names: Iterable[str],
 ) -> None:
-    """Write `net` to `path`, as `services.epam.network` reads it."""
+    """Write `net` to `path`, as `cogmap.services.epam.network` reads it."""
     path.parent.mkdir(parents=True, exist_ok=True)
     torch.onnx.export(
         net.eval(),

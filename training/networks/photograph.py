@@ -10,7 +10,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from training.networks.unet import UNet
+from cogmap.training.networks.unet import UNet
 
 COLOURS = 3
 # Of the network's input, as services/epam/layout/road.py makes it: from there to shares of the

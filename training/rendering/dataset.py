@@ -20,8 +20,8 @@ import numpy as np
 
 from cogmap.errors import CogmapError
 from cogmap.parallel import Progress, parallel_map
-from training.rendering.stereo import with_stereo_depth
-from training.rendering.towns import render_town
+from cogmap.training.rendering.stereo import with_stereo_depth
+from cogmap.training.rendering.towns import render_town
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 
 from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Bytes, Floats, Singles
-from schemas.sensing import Calibration
+from cogmap.schemas.sensing import Calibration
 
 # What a pixel of `surface` shows: a row of this.
 SURFACES = ("sky", "ground", "road", "building", "prop")

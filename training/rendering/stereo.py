@@ -6,11 +6,11 @@ import cv2
 import msgspec
 import numpy as np
 
-from schemas.sensing import Calibration
-from services.sensory.disparity import DepthFromStereo
-from services.sensory.module import Config
-from services.sensory.rectify import rectification
-from training.rendering.towns import Views
+from cogmap.schemas.sensing import Calibration
+from cogmap.services.sensory.disparity import DepthFromStereo
+from cogmap.services.sensory.module import Config
+from cogmap.services.sensory.rectify import rectification
+from cogmap.training.rendering.towns import Views
 
 
 def with_stereo_depth(views: Views) -> Views:

@@ -18,13 +18,13 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.geometry.arrays import Bytes
-from schemas.sensing import Pose
-from services.sim.layout import plan, town
-from services.sim.layout.catalogue import CATALOGUE, BuildingType, invented
-from services.sim.rendering.camera import Exposure, StereoCamera, calibration
-from services.sim.rendering.light import some_light
-from services.sim.world import World
-from training.rendering.reader import SURFACES
+from cogmap.schemas.sensing import Pose
+from cogmap.services.sim.layout import plan, town
+from cogmap.services.sim.layout.catalogue import CATALOGUE, BuildingType, invented
+from cogmap.services.sim.rendering.camera import Exposure, StereoCamera, calibration
+from cogmap.services.sim.rendering.light import some_light
+from cogmap.services.sim.world import World
+from cogmap.training.rendering.reader import SURFACES
 
 KINDS = 30
 BUILDING_MARGIN_M = 3.0

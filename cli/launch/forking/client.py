@@ -16,12 +16,12 @@ from typing import IO
 
 import msgspec
 
-from cli.launch.command_line import environment
-from cli.launch.forking.protocol import MAX_BYTES, Request, report_decoder
+from cogmap.cli.launch.command_line import environment
+from cogmap.cli.launch.forking.protocol import MAX_BYTES, Request, report_decoder
 
 # Room for the command lines of those that are forked: see `title`.
 _ROOM = " " * 4096
-_SERVER = (sys.executable, "-P", "-m", "cli.launch.forking.server")
+_SERVER = (sys.executable, "-P", "-m", "cogmap.cli.launch.forking.server")
 
 
 class Forked:

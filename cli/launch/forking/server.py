@@ -17,13 +17,13 @@ from contextlib import suppress
 
 import msgspec
 
-from cli.launch.command_line import cogmap_command
-from cli.launch.forking.protocol import MAX_BYTES, Report, request_decoder
-from cli.launch.forking.title import show_command_line
-from services import registry
+from cogmap.cli.launch.command_line import cogmap_command
+from cogmap.cli.launch.forking.protocol import MAX_BYTES, Report, request_decoder
+from cogmap.cli.launch.forking.title import show_command_line
+from cogmap.services import registry
 
-COMMON = ("cli.main", "cli.processes")
-RECORDING = ("cli.log.command", "cli.log.record")
+COMMON = ("cogmap.cli.main", "cogmap.cli.processes")
+RECORDING = ("cogmap.cli.log.command", "cogmap.cli.log.record")
 
 
 class Server:
@@ -151,7 +151,7 @@ def main() -> None:
         return
 
     sys.argv = ["cogmap", *arguments]
-    from cli.main import main as cogmap
+    from cogmap.cli.main import main as cogmap
 
     cogmap()
 

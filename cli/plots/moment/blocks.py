@@ -9,8 +9,8 @@ from typing import Protocol
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
-from cli.plots.moment.lettering import line_in
-from cli.plots.palette import FAINT, INK, STREET, TRUE
+from cogmap.cli.plots.moment.lettering import line_in
+from cogmap.cli.plots.palette import FAINT, INK, STREET, TRUE
 
 BAR_IN = 0.09
 VALUE_IN = 0.36

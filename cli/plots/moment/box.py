@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from cli.plots.moment.blocks import Block, Gap, Words
-from cli.plots.moment.lettering import shortened, width_of, wrapped
-from cli.plots.palette import FAINT, INK
+from cogmap.cli.plots.moment.blocks import Block, Gap, Words
+from cogmap.cli.plots.moment.lettering import shortened, width_of, wrapped
+from cogmap.cli.plots.palette import FAINT, INK
 
 PAD_IN = 0.14
 MOST = 8

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from cli.explain import names, reasons, text
-from cli.explain.moment import Moment
-from cli.plots.moment.blocks import Bar, Block, Words
-from cli.plots.moment.box import (
+from cogmap.cli.explain import names, reasons, text
+from cogmap.cli.explain.moment import Moment
+from cogmap.cli.plots.moment.blocks import Bar, Block, Words
+from cogmap.cli.plots.moment.box import (
     BETWEEN,
     LARGE,
     MOST,
@@ -18,10 +18,10 @@ from cli.plots.moment.box import (
     note,
     others,
 )
-from cli.plots.moment.lettering import shortened, wrapped
-from cli.plots.moment.robot import Robot
-from cli.plots.palette import ESTIMATE, FAINT, PLAN, TRUE, WALL, WHEELS
-from schemas.cognition import Behaviour, Coalition, Contender, Fate, Rejection
+from cogmap.cli.plots.moment.lettering import shortened, wrapped
+from cogmap.cli.plots.moment.robot import Robot
+from cogmap.cli.plots.palette import ESTIMATE, FAINT, PLAN, TRUE, WALL, WHEELS
+from cogmap.schemas.cognition import Behaviour, Coalition, Contender, Fate, Rejection
 
 
 def coalitions(moment: Moment) -> Box:

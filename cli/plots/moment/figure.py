@@ -10,14 +10,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch, Rectangle
 
-from cli.explain import reasons, text
-from cli.explain.moment import Moment
-from cli.plots import draw
-from cli.plots.moment import deciding, sensing
-from cli.plots.moment.blocks import Words
-from cli.plots.moment.box import LARGE, PAD_IN, Box, inner_in
-from cli.plots.moment.lettering import wrapped
-from cli.plots.palette import FAINT, INK, KERB, PAPER, WALL
+from cogmap.cli.explain import reasons, text
+from cogmap.cli.explain.moment import Moment
+from cogmap.cli.plots import draw
+from cogmap.cli.plots.moment import deciding, sensing
+from cogmap.cli.plots.moment.blocks import Words
+from cogmap.cli.plots.moment.box import LARGE, PAD_IN, Box, inner_in
+from cogmap.cli.plots.moment.lettering import wrapped
+from cogmap.cli.plots.palette import FAINT, INK, KERB, PAPER, WALL
 from cogmap.recording import views
 from cogmap.recording.views import Image
 

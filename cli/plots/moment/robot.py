@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from matplotlib.axes import Axes
 from matplotlib.patches import FancyArrow, FancyBboxPatch, Rectangle
 
-from cli.plots.palette import FAINT, INK, KERB, STREET, TRUE
+from cogmap.cli.plots.palette import FAINT, INK, KERB, STREET, TRUE
 
 HALF_ROBOT_IN = 0.24
 ARROW_IN = 0.6

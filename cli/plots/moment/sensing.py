@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from cli.explain import names, text
-from cli.explain.moment import Moment
-from cli.plots import draw
-from cli.plots.moment.blocks import Bar, Block, Words
-from cli.plots.moment.box import (
+from cogmap.cli.explain import names, text
+from cogmap.cli.explain.moment import Moment
+from cogmap.cli.plots import draw
+from cogmap.cli.plots.moment.blocks import Bar, Block, Words
+from cogmap.cli.plots.moment.box import (
     BETWEEN,
     MOST,
     SMALL,
@@ -17,9 +17,9 @@ from cli.plots.moment.box import (
     note,
     others,
 )
-from cli.plots.moment.lettering import wrapped
-from cli.plots.palette import FAINT, FUSED, OBJECT, TRUE
-from schemas.sensing import Percept
+from cogmap.cli.plots.moment.lettering import wrapped
+from cogmap.cli.plots.palette import FAINT, FUSED, OBJECT, TRUE
+from cogmap.schemas.sensing import Percept
 
 SENSED_IN = 2.3
 

@@ -18,7 +18,7 @@ from cogmap.recording.replaying.plan import (
 )
 from cogmap.recording.storage.reader import LogReader, Progress, Record
 from cogmap.runtime.shell import START, TIMER
-from schemas.topics import SNAPSHOT
+from cogmap.schemas.topics import SNAPSHOT
 
 
 def jobs(reader: LogReader, modules: Sequence[str], progress: Progress | None = None) -> list[Job]:

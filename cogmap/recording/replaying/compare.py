@@ -10,9 +10,9 @@ import numpy as np
 
 from cogmap.bus.codec import decode
 from cogmap.errors import MessageError
-from schemas.array import Array, Matrix
-from schemas.base import Message
-from schemas.topics import Topic
+from cogmap.schemas.array import Array, Matrix
+from cogmap.schemas.base import Message
+from cogmap.schemas.topics import Topic
 
 _MAX_SHOWN = 60
 Sides = tuple[str, str]

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from cogmap.errors import LogError
 from cogmap.graph.graph import Graph
 from cogmap.recording.storage.reader import LogReader
-from schemas import topics
-from schemas.graph import Delta, Snapshot
+from cogmap.schemas import topics
+from cogmap.schemas.graph import Delta, Snapshot
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,9 +10,9 @@ from cogmap.recording.replaying.outcome import Outcome
 from cogmap.recording.replaying.plan import Job, Kind, Step
 from cogmap.recording.storage.reader import LogReader, Record
 from cogmap.runtime.module import Module
-from schemas import topics
-from schemas.base import Message
-from schemas.graph import Delta
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.graph import Delta
 
 SIDES = ("the log", "the replay")
 

@@ -7,8 +7,8 @@ from typing import Protocol
 
 from cogmap.bus.codec import Envelope, encode
 from cogmap.bus.interface import Bus
-from schemas import topics
-from schemas.process import Clock
+from cogmap.schemas import topics
+from cogmap.schemas.process import Clock
 
 _PAUSE_S = 60.0
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from cogmap.errors import LogError
 from cogmap.recording.storage import format as layout
 from cogmap.recording.storage.reader import LogReader, Record
-from schemas.topics import PRESENCE, Scope
+from cogmap.schemas.topics import PRESENCE, Scope
 
 
 class Kind(enum.Enum):

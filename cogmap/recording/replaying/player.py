@@ -14,8 +14,8 @@ from cogmap.bus.interface import Bus, Member
 from cogmap.errors import UsageError
 from cogmap.recording.replaying.pacing import ClockPublisher, Control, Pacer
 from cogmap.recording.storage.reader import LogReader, Record
-from schemas import topics
-from schemas.topics import Scope, Topic
+from cogmap.schemas import topics
+from cogmap.schemas.topics import Scope, Topic
 
 SOURCE = "replay"
 

@@ -17,10 +17,10 @@ import msgspec
 from msgspec.structs import asdict
 
 from cogmap.bus.codec import UNKNOWN, Cause, Envelope, Stage
+from cogmap.schemas import topics
+from cogmap.schemas.export import json_schema
+from cogmap.schemas.topics import Delivery, Topic
 from cogmap.version import VERSION
-from schemas import topics
-from schemas.export import json_schema
-from schemas.topics import Delivery, Topic
 
 PROFILE = ""
 SOFTWARE = f"cogmap {VERSION}"

@@ -24,8 +24,8 @@ from cogmap.recording.storage.index import (
     read_index,
 )
 from cogmap.recording.storage.versions import check_readable
-from schemas.base import Message
-from schemas.topics import BY_NAME, Topic
+from cogmap.schemas.base import Message
+from cogmap.schemas.topics import BY_NAME, Topic
 
 _CACHED_CHUNKS = 12
 _envelope_decoder = msgspec.msgpack.Decoder(EnvelopeRecord)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from cogmap.bus.codec import UNKNOWN, Envelope
-from schemas.topics import Delivery, Topic
+from cogmap.schemas.topics import Delivery, Topic
 
 _MAX_SPANS = 4
 Span = tuple[int, int]

@@ -6,7 +6,7 @@ import threading
 from collections import Counter, deque
 
 from cogmap.bus.interface import Arrival, Job
-from schemas.topics import Delivery
+from cogmap.schemas.topics import Delivery
 
 LIMIT_BYTES = 256 * 2**20
 _OVERHEAD_BYTES = 1024

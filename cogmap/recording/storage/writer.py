@@ -15,7 +15,7 @@ from cogmap.bus.codec import Envelope, encode
 from cogmap.errors import LogError
 from cogmap.recording.storage import format as layout
 from cogmap.recording.storage.format import EnvelopeRecord
-from schemas.topics import Topic
+from cogmap.schemas.topics import Topic
 
 FLUSH_S = 0.25
 CHUNK_BYTES = 4 * 2**20

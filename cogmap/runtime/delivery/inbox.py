@@ -7,7 +7,7 @@ from collections import Counter
 from queue import Empty, SimpleQueue
 
 from cogmap.bus.interface import Arrival, Job
-from schemas.topics import Delivery
+from cogmap.schemas.topics import Delivery
 
 _Slot = tuple[str, str]
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from cogmap.bus.codec import UNKNOWN, Envelope, decode
 from cogmap.bus.interface import Arrival
 from cogmap.errors import MessageError
-from schemas.base import Message
-from schemas.topics import Delivery, Topic
+from cogmap.schemas.base import Message
+from cogmap.schemas.topics import Delivery, Topic
 
 log = logging.getLogger("cogmap")
 LOG_INTERVAL_S = 1.0

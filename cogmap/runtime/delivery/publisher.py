@@ -14,11 +14,11 @@ from cogmap.runtime.module import Module
 from cogmap.runtime.state.journal import Journal
 from cogmap.runtime.state.published import PublishedCounts
 from cogmap.runtime.state.store import Store
-from schemas import topics
-from schemas.base import Message
-from schemas.memory import Stored
-from schemas.process import Health
-from schemas.topics import Delivery, Topic
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.memory import Stored
+from cogmap.schemas.process import Health
+from cogmap.schemas.topics import Delivery, Topic
 
 MAX_CAUSES = 1000
 MAX_TRACES = 32

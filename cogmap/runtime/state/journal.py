@@ -11,8 +11,8 @@ from pathlib import Path
 from cogmap.bus.codec import decode, encode
 from cogmap.errors import MessageError, UsageError
 from cogmap.runtime.state.files import open_file, write_at
-from schemas import topics
-from schemas.base import Message
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
 
 _HEAD = struct.Struct("<IIH")
 COMPACT_BYTES = 64 * 2**20

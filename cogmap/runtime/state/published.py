@@ -13,7 +13,7 @@ from pathlib import Path
 
 from cogmap.errors import StorageError
 from cogmap.runtime.state.files import open_file, write_at
-from schemas.topics import Topic
+from cogmap.schemas.topics import Topic
 
 _RECORD = struct.Struct("<120sQ")
 _COUNT = struct.Struct("<Q")

@@ -10,7 +10,7 @@ from cogmap.bus.codec import encode
 from cogmap.errors import StorageError
 from cogmap.runtime.state.database import Database
 from cogmap.runtime.state.record import Record
-from schemas.memory import Restored, Stored, StoredRecord, kind_of_record
+from cogmap.schemas.memory import Restored, Stored, StoredRecord, kind_of_record
 
 _DECODER: msgspec.msgpack.Decoder[StoredRecord] = msgspec.msgpack.Decoder(StoredRecord)
 

@@ -12,9 +12,9 @@ import numpy as np
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.geometry.se2 import transform_from, wrap_angle
 from cogmap.graph.graph import Graph
-from schemas.array import Array
-from schemas.nodes import PLAN_ID, SELF_ID, Plan, Self, place_cell, place_id
-from services.codelets.attention.lanes import Lane, lanes
+from cogmap.schemas.array import Array
+from cogmap.schemas.nodes import PLAN_ID, SELF_ID, Plan, Self, place_cell, place_id
+from cogmap.services.codelets.attention.lanes import Lane, lanes
 
 # Farther away, rays are farther apart than a lane is wide; nearer, what stands there was seen
 # before.

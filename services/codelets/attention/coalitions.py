@@ -7,13 +7,13 @@ from collections.abc import Container, Iterable
 import msgspec
 
 from cogmap.graph.graph import Graph
-from schemas.array import Matrix
-from schemas.cognition import Coalition, Relation
-from schemas.feelings import Feeling
-from schemas.graph import Link
-from schemas.nodes import AnyNode, Goal, LinkKind, Object, Plan, Self, look_of, object_id
-from schemas.sensing import Percept
-from services.codelets.nodes import nodes_of
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.cognition import Coalition, Relation
+from cogmap.schemas.feelings import Feeling
+from cogmap.schemas.graph import Link
+from cogmap.schemas.nodes import AnyNode, Goal, LinkKind, Object, Plan, Self, look_of, object_id
+from cogmap.schemas.sensing import Percept
+from cogmap.services.codelets.nodes import nodes_of
 
 
 def coalition(

@@ -7,7 +7,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from schemas.base import PositiveMetres, PositiveRadians, PositiveShare, Share
+from cogmap.schemas.base import PositiveMetres, PositiveRadians, PositiveShare, Share
 
 SECTION = "attention"
 

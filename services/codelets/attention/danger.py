@@ -9,14 +9,14 @@ import numpy as np
 
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
-from schemas.codelets import Task
-from schemas.feelings import Feeling
-from schemas.graph import Phase
-from schemas.nodes import SELF_ID, AnyNode, Attention, Object, Self, object_id
-from schemas.sensing import Percept
-from services.codelets.attention.coalitions import coalition, felt
-from services.codelets.attention.config import SECTION, Config, Danger
-from services.codelets.attention.memory import (
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.feelings import Feeling
+from cogmap.schemas.graph import Phase
+from cogmap.schemas.nodes import SELF_ID, AnyNode, Attention, Object, Self, object_id
+from cogmap.schemas.sensing import Percept
+from cogmap.services.codelets.attention.coalitions import coalition, felt
+from cogmap.services.codelets.attention.config import SECTION, Config, Danger
+from cogmap.services.codelets.attention.memory import (
     brought,
     is_refractory,
     kept,

@@ -10,10 +10,10 @@ import numpy as np
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import wrap_angle
 from cogmap.graph.graph import Graph
-from schemas.codelets import Task
-from schemas.nodes import LinkKind, Object, Self, object_id, place_id
-from services.codelets.attention.config import Expectation
-from services.codelets.nodes import nodes_of
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.nodes import LinkKind, Object, Self, object_id, place_id
+from cogmap.services.codelets.attention.config import Expectation
+from cogmap.services.codelets.nodes import nodes_of
 
 # The scan hits the front of a building, whose position is its middle: a ray that goes beyond
 # passes.

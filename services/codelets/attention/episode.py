@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
-from schemas import nodes
-from schemas.codelets import Task
-from schemas.graph import Phase
-from schemas.nodes import SELF_ID, Attention, Self
-from services.codelets.attention.coalitions import coalition
-from services.codelets.attention.config import SECTION, Config
-from services.codelets.attention.memory import brought, is_refractory, memory_of
+from cogmap.schemas import nodes
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.graph import Phase
+from cogmap.schemas.nodes import SELF_ID, Attention, Self
+from cogmap.services.codelets.attention.coalitions import coalition
+from cogmap.services.codelets.attention.config import SECTION, Config
+from cogmap.services.codelets.attention.memory import brought, is_refractory, memory_of
 
 NAME = "episode"
 

@@ -11,10 +11,10 @@ import msgspec
 from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
-from schemas.codelets import Task
-from schemas.feelings import Feeling
-from schemas.graph import Link, Phase
-from schemas.nodes import (
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.feelings import Feeling
+from cogmap.schemas.graph import Link, Phase
+from cogmap.schemas.nodes import (
     PLAN_ID,
     SELF_ID,
     AnyNode,
@@ -28,11 +28,11 @@ from schemas.nodes import (
     object_id,
     place_cell,
 )
-from services.codelets.attention.closure import closed_places, expected_by, is_known
-from services.codelets.attention.coalitions import coalition, felt
-from services.codelets.attention.config import SECTION, Config, Expectation
-from services.codelets.attention.disappearance import missing_objects
-from services.codelets.attention.memory import (
+from cogmap.services.codelets.attention.closure import closed_places, expected_by, is_known
+from cogmap.services.codelets.attention.coalitions import coalition, felt
+from cogmap.services.codelets.attention.config import SECTION, Config, Expectation
+from cogmap.services.codelets.attention.disappearance import missing_objects
+from cogmap.services.codelets.attention.memory import (
     brought,
     is_refractory,
     kept,
@@ -40,7 +40,7 @@ from services.codelets.attention.memory import (
     with_pending,
     without_conscious,
 )
-from services.codelets.nodes import nodes_of
+from cogmap.services.codelets.nodes import nodes_of
 
 NAME = "expectation"
 SURPRISE = -1.0

@@ -10,10 +10,10 @@ import msgspec
 
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
-from schemas import nodes
-from schemas.codelets import Task
-from schemas.graph import Link, Phase
-from schemas.nodes import (
+from cogmap.schemas import nodes
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.graph import Link, Phase
+from cogmap.schemas.nodes import (
     NEVER_NS,
     PLAN_ID,
     SELF_ID,
@@ -24,9 +24,9 @@ from schemas.nodes import (
     PlanState,
     Self,
 )
-from services.codelets.attention.coalitions import coalition, felt
-from services.codelets.attention.config import SECTION, Config
-from services.codelets.attention.memory import (
+from cogmap.services.codelets.attention.coalitions import coalition, felt
+from cogmap.services.codelets.attention.config import SECTION, Config
+from cogmap.services.codelets.attention.memory import (
     brought,
     is_refractory,
     kept,
@@ -34,7 +34,7 @@ from services.codelets.attention.memory import (
     with_pending,
     without_conscious,
 )
-from services.codelets.nodes import nodes_of
+from cogmap.services.codelets.nodes import nodes_of
 
 NAME = "goal"
 

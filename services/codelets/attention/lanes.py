@@ -11,8 +11,8 @@ from cogmap.geometry.se2 import wrap_angle
 from cogmap.graph.graph import Graph
 from cogmap.graph.path import rows_of
 from cogmap.graph.window import ROAD_FROM, Extent
-from schemas.nodes import PLAN_ID, PathColumn, PlaceColumn, Plan, Self
-from services.codelets.planning.driven import POSITION
+from cogmap.schemas.nodes import PLAN_ID, PathColumn, PlaceColumn, Plan, Self
+from cogmap.services.codelets.planning.driven import POSITION
 
 # A lane is straight that turns by no more so far before and behind. Where it bends, what stands
 # beyond the bend seems to stand across it.

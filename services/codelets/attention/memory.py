@@ -10,8 +10,8 @@ import msgspec
 
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer
-from schemas.cognition import Coalition
-from schemas.nodes import Attention, attention_id
+from cogmap.schemas.cognition import Coalition
+from cogmap.schemas.nodes import Attention, attention_id
 
 
 def memory_of(codelet: str, graph: Graph) -> Attention:

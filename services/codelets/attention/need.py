@@ -6,11 +6,11 @@ import math
 
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
-from schemas import nodes
-from schemas.codelets import Task
-from schemas.feelings import Feeling
-from schemas.graph import Phase
-from schemas.nodes import (
+from cogmap.schemas import nodes
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.feelings import Feeling
+from cogmap.schemas.graph import Phase
+from cogmap.schemas.nodes import (
     PLAN_ID,
     SATISFIED_BY,
     SELF_ID,
@@ -23,9 +23,9 @@ from schemas.nodes import (
     goal_id,
     object_id,
 )
-from services.codelets.attention.coalitions import coalition, felt
-from services.codelets.attention.config import SECTION, Config, Need
-from services.codelets.attention.memory import brought, is_refractory, memory_of
+from cogmap.services.codelets.attention.coalitions import coalition, felt
+from cogmap.services.codelets.attention.config import SECTION, Config, Need
+from cogmap.services.codelets.attention.memory import brought, is_refractory, memory_of
 
 NAME = "need"
 

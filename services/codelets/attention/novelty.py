@@ -6,14 +6,14 @@ import msgspec
 
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
-from schemas.codelets import Task
-from schemas.feelings import Feeling
-from schemas.graph import Phase
-from schemas.nodes import SELF_ID, AnyNode, Attention, Object, Self
-from schemas.sensing import Percept
-from services.codelets.attention.coalitions import coalition, objects_in_view
-from services.codelets.attention.config import SECTION, Config, Novelty
-from services.codelets.attention.memory import brought, is_refractory, memory_of
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.feelings import Feeling
+from cogmap.schemas.graph import Phase
+from cogmap.schemas.nodes import SELF_ID, AnyNode, Attention, Object, Self
+from cogmap.schemas.sensing import Percept
+from cogmap.services.codelets.attention.coalitions import coalition, objects_in_view
+from cogmap.services.codelets.attention.config import SECTION, Config, Novelty
+from cogmap.services.codelets.attention.memory import brought, is_refractory, memory_of
 
 NAME = "novelty"
 

@@ -6,13 +6,13 @@ import msgspec
 
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
-from schemas.codelets import Task
-from schemas.feelings import Feeling
-from schemas.graph import Phase
-from schemas.nodes import SELF_ID, AnyNode, Attention, Object, Self, object_id
-from services.codelets.attention.coalitions import coalition, felt
-from services.codelets.attention.config import SECTION, Config
-from services.codelets.attention.memory import (
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.feelings import Feeling
+from cogmap.schemas.graph import Phase
+from cogmap.schemas.nodes import SELF_ID, AnyNode, Attention, Object, Self, object_id
+from cogmap.services.codelets.attention.coalitions import coalition, felt
+from cogmap.services.codelets.attention.config import SECTION, Config
+from cogmap.services.codelets.attention.memory import (
     brought,
     is_refractory,
     kept,
@@ -20,7 +20,7 @@ from services.codelets.attention.memory import (
     with_pending,
     without_conscious,
 )
-from services.codelets.nodes import nodes_of
+from cogmap.services.codelets.nodes import nodes_of
 
 NAME = "place_lost"
 LOST = "lost"

@@ -16,10 +16,10 @@ from cogmap.geometry.se2 import mean_pose, move_with, wrap_angle
 from cogmap.graph.graph import Graph
 from cogmap.graph.path import rows_of
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
-from schemas.array import Matrix
-from schemas.codelets import Task
-from schemas.graph import DropNode, Link, Operation, Phase
-from schemas.nodes import (
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.graph import DropNode, Link, Operation, Phase
+from cogmap.schemas.nodes import (
     CORRECTION_ID,
     POSE_COLUMNS,
     ROOT_MAP,
@@ -34,10 +34,10 @@ from schemas.nodes import (
     is_coarse_map,
     nearest_place,
 )
-from services.codelets.config import SECTION, Config
-from services.codelets.correction.place_columns import MOVED_COLUMNS, move_places
-from services.codelets.mapping.observations import Sightings
-from services.codelets.mapping.path import POSE, STAMP, with_rows
+from cogmap.services.codelets.config import SECTION, Config
+from cogmap.services.codelets.correction.place_columns import MOVED_COLUMNS, move_places
+from cogmap.services.codelets.mapping.observations import Sightings
+from cogmap.services.codelets.mapping.path import POSE, STAMP, with_rows
 
 OLD = slice(CorrectionColumn.OLD_X_M, CorrectionColumn.OLD_HEADING_RAD + 1)
 NEW = slice(CorrectionColumn.NEW_X_M, CorrectionColumn.NEW_HEADING_RAD + 1)

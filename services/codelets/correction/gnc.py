@@ -13,9 +13,9 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats
-from services.codelets.correction.hypotheses import Hypotheses
-from services.codelets.correction.least_squares import optimize
-from services.codelets.correction.pose_graph import PoseGraph, mahalanobis2, residuals
+from cogmap.services.codelets.correction.hypotheses import Hypotheses
+from cogmap.services.codelets.correction.least_squares import optimize
+from cogmap.services.codelets.correction.pose_graph import PoseGraph, mahalanobis2, residuals
 
 CONVEXITY_FACTOR = 1.4
 MAX_ROUNDS = 60

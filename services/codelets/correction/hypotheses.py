@@ -16,9 +16,9 @@ from scipy.spatial import KDTree
 from scipy.special import chdtri
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from services.codelets.correction.incremental import IncrementalSolver
-from services.codelets.correction.least_squares import optimize
-from services.codelets.correction.pose_graph import Constraints, PoseGraph, cost
+from cogmap.services.codelets.correction.incremental import IncrementalSolver
+from cogmap.services.codelets.correction.least_squares import optimize
+from cogmap.services.codelets.correction.pose_graph import Constraints, PoseGraph, cost
 
 SAME_PLACES = 5
 # A path that a false hypothesis has bent is far from linear: so many in a row, of those that seem

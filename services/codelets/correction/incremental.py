@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from cogmap.geometry.arrays import Floats, Indices
-from services.codelets.correction.least_squares import (
+from cogmap.services.codelets.correction.least_squares import (
     MAX_ITERATIONS,
     NormalEquations,
     factor,
     optimize,
 )
-from services.codelets.correction.pose_graph import (
+from cogmap.services.codelets.correction.pose_graph import (
     Constraints,
     PoseGraph,
     cost,

@@ -8,10 +8,10 @@ import numpy as np
 
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import FULL_TURN_RAD
-from services.codelets.config import Config
-from services.codelets.correction.least_squares import optimize
-from services.codelets.correction.pose_graph import PoseGraph
-from services.codelets.mapping.observations import Sightings
+from cogmap.services.codelets.config import Config
+from cogmap.services.codelets.correction.least_squares import optimize
+from cogmap.services.codelets.correction.pose_graph import PoseGraph
+from cogmap.services.codelets.mapping.observations import Sightings
 
 ROUNDS = 5
 

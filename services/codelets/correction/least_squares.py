@@ -9,7 +9,7 @@ from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from services.codelets.correction.pose_graph import (
+from cogmap.services.codelets.correction.pose_graph import (
     Constraints,
     PoseGraph,
     adjacency,

@@ -24,10 +24,10 @@ from cogmap.geometry.se2 import (
 from cogmap.graph.graph import Graph
 from cogmap.graph.path import rows_of
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
-from schemas.array import Matrix
-from schemas.codelets import Task
-from schemas.graph import Operation, Phase
-from schemas.nodes import (
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.graph import Operation, Phase
+from cogmap.schemas.nodes import (
     CORRECTION_ID,
     NEVER_NS,
     Correction,
@@ -35,12 +35,12 @@ from schemas.nodes import (
     Observations,
     PathSegment,
 )
-from services.codelets.config import SECTION, Config
-from services.codelets.correction.gnc import inliers
-from services.codelets.correction.joint import optimize_jointly
-from services.codelets.correction.least_squares import optimize
-from services.codelets.correction.pairwise_consistency import MIN_AGREEING, Views, consistent
-from services.codelets.correction.pose_graph import (
+from cogmap.services.codelets.config import SECTION, Config
+from cogmap.services.codelets.correction.gnc import inliers
+from cogmap.services.codelets.correction.joint import optimize_jointly
+from cogmap.services.codelets.correction.least_squares import optimize
+from cogmap.services.codelets.correction.pairwise_consistency import MIN_AGREEING, Views, consistent
+from cogmap.services.codelets.correction.pose_graph import (
     NO_CONSTRAINTS,
     Constraints,
     PoseGraph,
@@ -49,12 +49,12 @@ from services.codelets.correction.pose_graph import (
     matvec,
     residuals,
 )
-from services.codelets.correction.reverse_replay import close_loops
-from services.codelets.correction.synapses import replay_of
-from services.codelets.correction.waiting import may_wait
-from services.codelets.mapping.observations import Sightings
-from services.codelets.mapping.path import POSE, STAMP, joins_of, steps_of
-from services.codelets.mapping.views import constraints_of, views_of
+from cogmap.services.codelets.correction.reverse_replay import close_loops
+from cogmap.services.codelets.correction.synapses import replay_of
+from cogmap.services.codelets.correction.waiting import may_wait
+from cogmap.services.codelets.mapping.observations import Sightings
+from cogmap.services.codelets.mapping.path import POSE, STAMP, joins_of, steps_of
+from cogmap.services.codelets.mapping.views import constraints_of, views_of
 
 MIN_ROWS = 10
 IMPOSSIBLE_SD = 5.0

@@ -16,7 +16,7 @@ from scipy.special import chdtri
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.geometry.se2 import cumulative, integrate, transform_from, wrap_angle
-from services.codelets.correction.pose_graph import Constraints, adjacency
+from cogmap.services.codelets.correction.pose_graph import Constraints, adjacency
 
 MIN_AGREEING = 3
 # With more uncertainty between them than this, any two views would agree.

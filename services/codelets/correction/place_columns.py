@@ -15,10 +15,10 @@ from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import move_with, rotate
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import EVIDENCE_COLUMNS, LINK_OFFSETS, WEIGHT_COLUMNS
-from schemas.array import Array
-from schemas.graph import Cells, Operation
-from schemas.nodes import ROOT_MAP, PlaceColumn
-from services.codelets.mapping.evidence import weights_of
+from cogmap.schemas.array import Array
+from cogmap.schemas.graph import Cells, Operation
+from cogmap.schemas.nodes import ROOT_MAP, PlaceColumn
+from cogmap.services.codelets.mapping.evidence import weights_of
 
 SHARE_COLUMNS = (PlaceColumn.ROAD, PlaceColumn.OBSTACLE)
 MOVED_COLUMNS = (*SHARE_COLUMNS, *EVIDENCE_COLUMNS, *WEIGHT_COLUMNS)

@@ -19,7 +19,7 @@ import numpy as np
 
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import cumulative, rotate, rotation_matrices
-from services.codelets.correction.pose_graph import Constraints, PoseGraph, matvec, residuals
+from cogmap.services.codelets.correction.pose_graph import Constraints, PoseGraph, matvec, residuals
 
 CHECK_EVERY = 10
 

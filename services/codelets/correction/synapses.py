@@ -7,10 +7,10 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.geometry.arrays import Floats, Indices
-from schemas.array import Array
-from schemas.cognition import Replay
-from services.codelets.correction.pose_graph import Constraints
-from services.codelets.mapping.path import POSE, STAMP
+from cogmap.schemas.array import Array
+from cogmap.schemas.cognition import Replay
+from cogmap.services.codelets.correction.pose_graph import Constraints
+from cogmap.services.codelets.mapping.path import POSE, STAMP
 
 
 def replay_of(rows: Floats, poses: Floats, loops: Constraints, decay_per_m: float) -> Replay:

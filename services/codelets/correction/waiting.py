@@ -8,12 +8,12 @@ import numpy as np
 from scipy.special import chdtri
 
 from cogmap.geometry.arrays import Floats
-from schemas.nodes import LoopClosure
-from services.codelets.config import Config
-from services.codelets.correction.pairwise_consistency import MIN_AGREEING
-from services.codelets.correction.pose_graph import mahalanobis2, residuals
-from services.codelets.mapping.path import POSE
-from services.codelets.mapping.views import constraints_of, views_of
+from cogmap.schemas.nodes import LoopClosure
+from cogmap.services.codelets.config import Config
+from cogmap.services.codelets.correction.pairwise_consistency import MIN_AGREEING
+from cogmap.services.codelets.correction.pose_graph import mahalanobis2, residuals
+from cogmap.services.codelets.mapping.path import POSE
+from cogmap.services.codelets.mapping.views import constraints_of, views_of
 
 
 def may_wait(closures: list[LoopClosure], rows: Floats, config: Config) -> bool:

@@ -11,10 +11,10 @@ from cogmap.errors import MessageError
 from cogmap.geometry.se2 import mean_pose, wrap_angle
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
-from schemas.array import Matrix
-from schemas.codelets import Task
-from schemas.graph import Link, Operation, Phase
-from schemas.nodes import (
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.graph import Link, Operation, Phase
+from cogmap.schemas.nodes import (
     NEVER_NS,
     POSE_COLUMNS,
     SELF_ID,
@@ -25,14 +25,14 @@ from schemas.nodes import (
     nearest_place,
     object_id,
 )
-from schemas.sensing import Percept
-from services.codelets.config import SECTION, Config
-from services.codelets.localization.measurement_model import (
+from cogmap.schemas.sensing import Percept
+from cogmap.services.codelets.config import SECTION, Config
+from cogmap.services.codelets.localization.measurement_model import (
     MIN_SIGHTINGS,
     is_seen_from_here,
 )
-from services.codelets.localization.motion_model import with_gains
-from services.codelets.localization.sampling import (
+from cogmap.services.codelets.localization.motion_model import with_gains
+from cogmap.services.codelets.localization.sampling import (
     Samples,
     generator,
     rejection_mask,

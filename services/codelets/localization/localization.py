@@ -16,10 +16,10 @@ from cogmap.errors import MessageError
 from cogmap.geometry.se2 import compose, mean_pose, relative
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
-from schemas.array import Matrix
-from schemas.codelets import Task
-from schemas.graph import Link, Operation, Phase
-from schemas.nodes import (
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.graph import Link, Operation, Phase
+from cogmap.schemas.nodes import (
     NEVER_NS,
     POSE_COLUMNS,
     SELF_ID,
@@ -32,24 +32,24 @@ from schemas.nodes import (
     nearest_place,
     object_id,
 )
-from services.codelets.config import SECTION, Config
-from services.codelets.localization.measurement_model import (
+from cogmap.services.codelets.config import SECTION, Config
+from cogmap.services.codelets.localization.measurement_model import (
     Sighting,
     compare,
     log_likelihood,
     sightings,
 )
-from services.codelets.localization.misfits import (
+from cogmap.services.codelets.localization.misfits import (
     Estimate,
     inflated,
     misfit,
     relocalized,
     seen_of_late,
 )
-from services.codelets.localization.motion_model import dead_reckon, move, with_gains
-from services.codelets.localization.novelty import novelty, variances_when_placed
-from services.codelets.localization.recovery import relocalize_heading
-from services.codelets.localization.sampling import (
+from cogmap.services.codelets.localization.motion_model import dead_reckon, move, with_gains
+from cogmap.services.codelets.localization.novelty import novelty, variances_when_placed
+from cogmap.services.codelets.localization.recovery import relocalize_heading
+from cogmap.services.codelets.localization.sampling import (
     Samples,
     centred,
     generator,
@@ -57,7 +57,7 @@ from services.codelets.localization.sampling import (
     resample,
     tempering_exponent,
 )
-from services.codelets.mapping.path import odometry_of, variances_of
+from cogmap.services.codelets.mapping.path import odometry_of, variances_of
 
 STAGES = 3
 # Headings a radian apart, and those whose mean direction is no longer than that of a spread of one.

@@ -12,9 +12,9 @@ import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Singles
 from cogmap.graph.graph import Graph
-from schemas.nodes import NEVER_NS, Object, object_id
-from schemas.sensing import Percept
-from services.codelets.localization.motion_model import RANGE
+from cogmap.schemas.nodes import NEVER_NS, Object, object_id
+from cogmap.schemas.sensing import Percept
+from cogmap.services.codelets.localization.motion_model import RANGE
 
 MAX_SD_SHARE = 0.5
 MIN_SIGHTINGS = 2

@@ -12,19 +12,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cogmap.graph.graph import Graph
-from schemas.codelets import Task
-from schemas.nodes import NEVER_NS
-from schemas.sensing import Percept
-from services.codelets.config import Config
-from services.codelets.localization.measurement_model import (
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.nodes import NEVER_NS
+from cogmap.schemas.sensing import Percept
+from cogmap.services.codelets.config import Config
+from cogmap.services.codelets.localization.measurement_model import (
     Sighting,
     compare,
     cost_of_mistake,
     log_likelihood,
     sightings,
 )
-from services.codelets.localization.recovery import SEVERAL, believed_of, relocalize, seen_before
-from services.codelets.localization.sampling import Samples, inflate, position_sd_m, resample
+from cogmap.services.codelets.localization.recovery import (
+    SEVERAL,
+    believed_of,
+    relocalize,
+    seen_before,
+)
+from cogmap.services.codelets.localization.sampling import Samples, inflate, position_sd_m, resample
 
 INFLATION = 1.5
 MAX_INFLATIONS = 6

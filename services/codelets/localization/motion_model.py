@@ -12,9 +12,9 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.geometry.se2 import wrap_angle
-from schemas.nodes import POSE_COLUMNS, SelfColumn
-from services.codelets.config import Config
-from services.codelets.localization.sampling import Samples, standard_normal
+from cogmap.schemas.nodes import POSE_COLUMNS, SelfColumn
+from cogmap.services.codelets.config import Config
+from cogmap.services.codelets.localization.sampling import Samples, standard_normal
 
 SPEED = SelfColumn.SPEED_GAIN
 TURN = SelfColumn.TURN_GAIN

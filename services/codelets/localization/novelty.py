@@ -15,9 +15,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from cogmap.graph.graph import Graph
-from schemas.nodes import NEVER_NS, Object, PathColumn, PathSegment, object_id
-from services.codelets.localization.measurement_model import Sighting
-from services.codelets.localization.sampling import Samples, centred
+from cogmap.schemas.nodes import NEVER_NS, Object, PathColumn, PathSegment, object_id
+from cogmap.services.codelets.localization.measurement_model import Sighting
+from cogmap.services.codelets.localization.sampling import Samples, centred
 
 VARIANCES = slice(PathColumn.VARIANCE_M2, PathColumn.VARIANCE_RAD2 + 1)
 STAMP_FORMAT = struct.Struct("<d")

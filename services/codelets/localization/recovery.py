@@ -10,19 +10,19 @@ from cogmap.geometry.arrays import Singles
 from cogmap.geometry.se2 import compose, relative
 from cogmap.graph.graph import Graph
 from cogmap.graph.path import rows_of
-from schemas.nodes import PathSegment, segment_id
-from schemas.sensing import Percept
-from services.codelets.config import Config
-from services.codelets.localization.measurement_model import (
+from cogmap.schemas.nodes import PathSegment, segment_id
+from cogmap.schemas.sensing import Percept
+from cogmap.services.codelets.config import Config
+from cogmap.services.codelets.localization.measurement_model import (
     MAX_SD_SHARE,
     Sighting,
     compare,
     log_likelihood,
 )
-from services.codelets.localization.motion_model import COLUMNS, RANGE
-from services.codelets.localization.sampling import Samples, position_sd_m
-from services.codelets.mapping.observations import Sightings
-from services.codelets.mapping.path import ODOMETRY, STAMP, objects_along
+from cogmap.services.codelets.localization.motion_model import COLUMNS, RANGE
+from cogmap.services.codelets.localization.sampling import Samples, position_sd_m
+from cogmap.services.codelets.mapping.observations import Sightings
+from cogmap.services.codelets.mapping.path import ODOMETRY, STAMP, objects_along
 
 CANDIDATES = 16
 SEVERAL = 2

@@ -16,15 +16,15 @@ from cogmap.geometry.arrays import Booleans, Floats, Singles
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import EVIDENCE_COLUMNS, LINK_OFFSETS, WEIGHT_COLUMNS, Window
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
-from schemas.array import Array
-from schemas.codelets import Task
-from schemas.graph import Phase
-from schemas.nodes import SELF_ID, PlaceColumn, Self
-from services.codelets.config import SECTION, Config
-from services.codelets.mapping.edges import Edges, cut_links, edges_of
-from services.codelets.mapping.evidence import accumulated, blended, weights_of
-from services.codelets.mapping.local_grid import LocalGrid
-from services.codelets.mapping.rays import Rays, clear_cells, rays_of
+from cogmap.schemas.array import Array
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.graph import Phase
+from cogmap.schemas.nodes import SELF_ID, PlaceColumn, Self
+from cogmap.services.codelets.config import SECTION, Config
+from cogmap.services.codelets.mapping.edges import Edges, cut_links, edges_of
+from cogmap.services.codelets.mapping.evidence import accumulated, blended, weights_of
+from cogmap.services.codelets.mapping.local_grid import LocalGrid
+from cogmap.services.codelets.mapping.rays import Rays, clear_cells, rays_of
 
 # In cells, from the middle of one along both axes: road there is road at the place node, and an
 # edge there is right beside it.

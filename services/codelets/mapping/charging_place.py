@@ -9,9 +9,9 @@ import math
 
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
-from schemas.codelets import Task
-from schemas.graph import Link, Phase
-from schemas.nodes import (
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.graph import Link, Phase
+from cogmap.schemas.nodes import (
     SATISFIED_BY,
     SELF_ID,
     LinkKind,
@@ -22,7 +22,7 @@ from schemas.nodes import (
     nearest_place,
     object_id,
 )
-from services.codelets.config import SECTION, Config
+from cogmap.services.codelets.config import SECTION, Config
 
 LOOK = "charging-place"
 # As near to it the agent is charged as well by the one that it knows.

@@ -9,8 +9,8 @@ import numpy as np
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.graph.crossings import Crossings, crossings
 from cogmap.graph.window import LINK_OFFSETS
-from services.codelets.mapping.local_grid import LocalGrid
-from services.codelets.mapping.rays import Rays, walls
+from cogmap.services.codelets.mapping.local_grid import LocalGrid
+from cogmap.services.codelets.mapping.rays import Rays, walls
 
 JOIN_M = 1.2
 

@@ -10,10 +10,10 @@ import numpy as np
 from cogmap.geometry.arrays import Booleans, Floats, Indices, Singles
 from cogmap.geometry.se2 import transform_from
 from cogmap.graph.window import Extent, Window
-from schemas.graph import Operation
-from schemas.nodes import PlaceColumn, Self
-from services.codelets.cells import changed_cells
-from services.codelets.config import Config
+from cogmap.schemas.graph import Operation
+from cogmap.schemas.nodes import PlaceColumn, Self
+from cogmap.services.codelets.cells import changed_cells
+from cogmap.services.codelets.config import Config
 
 MARGIN_CELLS = 2
 

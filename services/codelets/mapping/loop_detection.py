@@ -16,9 +16,9 @@ from cogmap.geometry.se2 import rotation_matrices
 from cogmap.graph.graph import Graph
 from cogmap.graph.path import rows_of
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
-from schemas.codelets import Task
-from schemas.graph import Operation, Phase
-from schemas.nodes import (
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.graph import Operation, Phase
+from cogmap.schemas.nodes import (
     LinkKind,
     LoopClosure,
     Object,
@@ -28,13 +28,13 @@ from schemas.nodes import (
     object_id,
     segment_id,
 )
-from schemas.sensing import Percept, PlaceMatch
-from services.codelets.config import SECTION, Config
-from services.codelets.correction.pairwise_consistency import MIN_AGREEING
-from services.codelets.correction.pose_graph import matvec
-from services.codelets.mapping.observations import Sightings
-from services.codelets.mapping.path import ODOMETRY, STAMP, path_grows
-from services.codelets.nodes import nodes_of
+from cogmap.schemas.sensing import Percept, PlaceMatch
+from cogmap.services.codelets.config import SECTION, Config
+from cogmap.services.codelets.correction.pairwise_consistency import MIN_AGREEING
+from cogmap.services.codelets.correction.pose_graph import matvec
+from cogmap.services.codelets.mapping.observations import Sightings
+from cogmap.services.codelets.mapping.path import ODOMETRY, STAMP, path_grows
+from cogmap.services.codelets.nodes import nodes_of
 
 SAME_M = 6.0
 PLACE_CUE = ""

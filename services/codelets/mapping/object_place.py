@@ -7,20 +7,20 @@ from __future__ import annotations
 from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
-from schemas.codelets import Task
-from schemas.graph import Phase
-from schemas.nodes import SELF_ID, LinkKind, Object, Self, object_id
-from schemas.sensing import Percept
-from services.codelets.config import SECTION, Config
-from services.codelets.localization.landmarks import (
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.graph import Phase
+from cogmap.schemas.nodes import SELF_ID, LinkKind, Object, Self, object_id
+from cogmap.schemas.sensing import Percept
+from cogmap.services.codelets.config import SECTION, Config
+from cogmap.services.codelets.localization.landmarks import (
     FIRST,
     Seen,
     first_positions,
     located,
     nearby_selves,
 )
-from services.codelets.localization.motion_model import with_gains
-from services.codelets.localization.sampling import generator, resample
+from cogmap.services.codelets.localization.motion_model import with_gains
+from cogmap.services.codelets.localization.sampling import generator, resample
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:

@@ -16,10 +16,10 @@ from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import mean_pose, relative
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
-from schemas.array import Matrix
-from schemas.codelets import Task
-from schemas.graph import Link, Operation, Phase
-from schemas.nodes import (
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.graph import Link, Operation, Phase
+from cogmap.schemas.nodes import (
     SELF_ID,
     JoinColumn,
     LinkKind,
@@ -32,11 +32,11 @@ from schemas.nodes import (
     observations_id,
     segment_id,
 )
-from schemas.sensing import Percept
-from services.codelets.config import SECTION, Config
-from services.codelets.correction.pose_graph import Constraints, diagonal_information
-from services.codelets.mapping.observations import Viewpoint, extended, is_observed_from
-from services.codelets.nodes import nodes_of
+from cogmap.schemas.sensing import Percept
+from cogmap.services.codelets.config import SECTION, Config
+from cogmap.services.codelets.correction.pose_graph import Constraints, diagonal_information
+from cogmap.services.codelets.mapping.observations import Viewpoint, extended, is_observed_from
+from cogmap.services.codelets.nodes import nodes_of
 
 ROWS = 64
 COLUMNS = len(PathColumn)

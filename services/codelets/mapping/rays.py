@@ -8,8 +8,8 @@ import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.geometry.se2 import rotate
-from schemas.array import Array
-from services.codelets.mapping.local_grid import LocalGrid
+from cogmap.schemas.array import Array
+from cogmap.services.codelets.mapping.local_grid import LocalGrid
 
 STEP = 0.5
 MIN_WIDTH_M = 0.3

@@ -13,14 +13,14 @@ from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Booleans, Floats, Singles
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
-from schemas.array import Array
-from schemas.codelets import Task
-from schemas.graph import Cells, Operation, Phase
-from schemas.nodes import SELF_ID, PlaceColumn, Self
-from services.codelets.config import SECTION, Config
-from services.codelets.mapping.evidence import blended
-from services.codelets.mapping.local_grid import LocalGrid
-from services.codelets.mapping.rays import clear_cells, rays_of
+from cogmap.schemas.array import Array
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.graph import Cells, Operation, Phase
+from cogmap.schemas.nodes import SELF_ID, PlaceColumn, Self
+from cogmap.services.codelets.config import SECTION, Config
+from cogmap.services.codelets.mapping.evidence import blended
+from cogmap.services.codelets.mapping.local_grid import LocalGrid
+from cogmap.services.codelets.mapping.rays import clear_cells, rays_of
 
 ROAD_REACH_M = 12.0
 ENOUGH_POINTS = 3

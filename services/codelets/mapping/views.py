@@ -6,10 +6,10 @@ import numpy as np
 
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import relative, rotation_matrices
-from schemas.nodes import LoopClosure
-from services.codelets.correction.pairwise_consistency import Views
-from services.codelets.correction.pose_graph import Constraints, matvec
-from services.codelets.mapping.path import STAMP
+from cogmap.schemas.nodes import LoopClosure
+from cogmap.services.codelets.correction.pairwise_consistency import Views
+from cogmap.services.codelets.correction.pose_graph import Constraints, matvec
+from cogmap.services.codelets.mapping.path import STAMP
 
 MIN_SD_M = 1e-3
 

@@ -13,15 +13,15 @@ import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
 from cogmap.geometry.arrays import Floats, Indices
-from services.codelets.planning.network import Cell, PlaceNetwork
-from services.codelets.planning.search.links import Links
-from services.codelets.planning.search.route import (
+from cogmap.services.codelets.planning.network import Cell, PlaceNetwork
+from cogmap.services.codelets.planning.search.links import Links
+from cogmap.services.codelets.planning.search.route import (
     NoRoute,
     NoRouteReason,
     Route,
     refusal,
 )
-from services.codelets.planning.search.slots import MAX_COST_M
+from cogmap.services.codelets.planning.search.slots import MAX_COST_M
 
 DECAY_PER_CELL = 2.0
 

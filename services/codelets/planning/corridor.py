@@ -12,7 +12,7 @@ from scipy import ndimage
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import Extent
-from schemas.nodes import (
+from cogmap.schemas.nodes import (
     PLAN_ID,
     ROOT_MAP,
     Map,
@@ -20,11 +20,11 @@ from schemas.nodes import (
     Self,
     coarse_map_id,
 )
-from services.codelets.planning.config import Config
-from services.codelets.planning.held import held_routes
-from services.codelets.planning.network import SQUARE, Here, PlaceNetwork
-from services.codelets.planning.rough import Routes, rough_network, routes_between
-from services.codelets.resolution.coarsening import FACTOR
+from cogmap.services.codelets.planning.config import Config
+from cogmap.services.codelets.planning.held import held_routes
+from cogmap.services.codelets.planning.network import SQUARE, Here, PlaceNetwork
+from cogmap.services.codelets.planning.rough import Routes, rough_network, routes_between
+from cogmap.services.codelets.resolution.coarsening import FACTOR
 
 MARGIN = 2
 """In cells of a coarse map, unknown places planned over around it."""

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import msgspec
 
-from schemas.graph import Operation
-from schemas.nodes import Goal, Plan
-from services.codelets.planning.config import Config
-from services.codelets.planning.targets import Target, next_goal
+from cogmap.schemas.graph import Operation
+from cogmap.schemas.nodes import Goal, Plan
+from cogmap.services.codelets.planning.config import Config
+from cogmap.services.codelets.planning.targets import Target, next_goal
 
 
 def may_doubt(goal: Goal, before: Plan | None, stamp_ns: int, config: Config) -> bool:

@@ -8,9 +8,9 @@ import numpy as np
 from scipy import ndimage
 
 from cogmap.geometry.arrays import Booleans, Floats
-from schemas.nodes import PathColumn, Self
-from services.codelets.planning.config import Config
-from services.codelets.planning.network import SQUARE, Here
+from cogmap.schemas.nodes import PathColumn, Self
+from cogmap.services.codelets.planning.config import Config
+from cogmap.services.codelets.planning.network import SQUARE, Here
 
 BLIND_STEP_M = 0.5
 LEFT_START_M = 3.0

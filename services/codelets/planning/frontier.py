@@ -10,10 +10,10 @@ import numpy as np
 from scipy import ndimage
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from services.codelets.planning.activation import spread
-from services.codelets.planning.config import Config
-from services.codelets.planning.ground import Ground
-from services.codelets.planning.network import SQUARE
+from cogmap.services.codelets.planning.activation import spread
+from cogmap.services.codelets.planning.config import Config
+from cogmap.services.codelets.planning.ground import Ground
+from cogmap.services.codelets.planning.network import SQUARE
 
 
 class Standpoint(NamedTuple):

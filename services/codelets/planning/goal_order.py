@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from cogmap.geometry.arrays import Floats, Indices
-from services.codelets.planning.config import Config
-from services.codelets.planning.tours import TourSettings, order_from
+from cogmap.services.codelets.planning.config import Config
+from cogmap.services.codelets.planning.tours import TourSettings, order_from
 
 
 def goal_order(

@@ -24,10 +24,10 @@ from cogmap.graph.window import (
     WEIGHT_COLUMNS,
     Extent,
 )
-from schemas.nodes import Goal, PlaceColumn, Self
-from services.codelets.planning.config import Config
-from services.codelets.planning.corridor import Corridor
-from services.codelets.planning.driven import (
+from cogmap.schemas.nodes import Goal, PlaceColumn, Self
+from cogmap.services.codelets.planning.config import Config
+from cogmap.services.codelets.planning.corridor import Corridor
+from cogmap.services.codelets.planning.driven import (
     POSITION,
     ahead_m,
     driven_lately_m,
@@ -35,8 +35,8 @@ from services.codelets.planning.driven import (
     is_road_ahead,
     way_back,
 )
-from services.codelets.planning.looks import looked_ago_s
-from services.codelets.planning.network import SQUARE, Here, PlaceNetwork, ends, link_weights
+from cogmap.services.codelets.planning.looks import looked_ago_s
+from cogmap.services.codelets.planning.network import SQUARE, Here, PlaceNetwork, ends, link_weights
 
 COLUMNS = (PlaceColumn.ROAD, PlaceColumn.OBSTACLE, *WEIGHT_COLUMNS)
 SPREAD_FROM = 0.2

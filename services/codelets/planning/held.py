@@ -11,11 +11,11 @@ import numpy as np
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_from, transform_to
 from cogmap.graph.graph import Graph
-from schemas.nodes import Map
-from services.codelets.planning.config import Config
-from services.codelets.planning.rough import rough_network, routes_between
-from services.codelets.resolution.sub_map_grid import area_of, with_places
-from services.codelets.structure.members import pose_of
+from cogmap.schemas.nodes import Map
+from cogmap.services.codelets.planning.config import Config
+from cogmap.services.codelets.planning.rough import rough_network, routes_between
+from cogmap.services.codelets.resolution.sub_map_grid import area_of, with_places
+from cogmap.services.codelets.structure.members import pose_of
 
 
 class HeldRoutes(NamedTuple):

@@ -6,8 +6,8 @@ import numpy as np
 from scipy import ndimage
 
 from cogmap.geometry.arrays import Floats
-from schemas.nodes import PathColumn, Self
-from services.codelets.planning.network import Here
+from cogmap.schemas.nodes import PathColumn, Self
+from cogmap.services.codelets.planning.network import Here
 
 LOOK_M = 20.0
 BESIDE_M = 4.0

@@ -9,11 +9,11 @@ import numpy as np
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import ROAD_FROM, WEIGHT_COLUMNS, Extent
-from schemas.nodes import PlaceColumn
-from services.codelets.planning.activation import climb, spread_over
-from services.codelets.planning.config import Config
-from services.codelets.planning.network import Cell, Here, PlaceNetwork, link_weights
-from services.codelets.planning.search.links import Links
+from cogmap.schemas.nodes import PlaceColumn
+from cogmap.services.codelets.planning.activation import climb, spread_over
+from cogmap.services.codelets.planning.config import Config
+from cogmap.services.codelets.planning.network import Cell, Here, PlaceNetwork, link_weights
+from cogmap.services.codelets.planning.search.links import Links
 
 COLUMNS = (PlaceColumn.ROAD, *WEIGHT_COLUMNS)
 SNAP = 2

@@ -14,11 +14,11 @@ from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
-from schemas.array import Array, Matrix
-from schemas.codelets import Task
-from schemas.cognition import Direction, RouteReplay
-from schemas.graph import DropLink, Link, Operation, Phase
-from schemas.nodes import (
+from cogmap.schemas.array import Array, Matrix
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.cognition import Direction, RouteReplay
+from cogmap.schemas.graph import DropLink, Link, Operation, Phase
+from cogmap.schemas.nodes import (
     PLAN_ID,
     SELF_ID,
     Goal,
@@ -32,21 +32,21 @@ from schemas.nodes import (
     Self,
     place_id,
 )
-from services.codelets.planning.config import SECTION, Config
-from services.codelets.planning.corridor import corridor
-from services.codelets.planning.doubt import doubted, may_doubt
-from services.codelets.planning.frontier import Standpoint, best_frontier
-from services.codelets.planning.goal_order import goal_order, order_before
-from services.codelets.planning.ground import COLUMNS, Ground, ground
-from services.codelets.planning.network import PlaceNetwork
-from services.codelets.planning.routes import (
+from cogmap.services.codelets.planning.config import SECTION, Config
+from cogmap.services.codelets.planning.corridor import corridor
+from cogmap.services.codelets.planning.doubt import doubted, may_doubt
+from cogmap.services.codelets.planning.frontier import Standpoint, best_frontier
+from cogmap.services.codelets.planning.goal_order import goal_order, order_before
+from cogmap.services.codelets.planning.ground import COLUMNS, Ground, ground
+from cogmap.services.codelets.planning.network import PlaceNetwork
+from cogmap.services.codelets.planning.routes import (
     Visit,
     cost_m,
     lengths_m,
     route_to,
     visits,
 )
-from services.codelets.planning.targets import (
+from cogmap.services.codelets.planning.targets import (
     Cell,
     Target,
     as_reached,
@@ -61,8 +61,8 @@ from services.codelets.planning.targets import (
     pending_goals,
     target_of,
 )
-from services.codelets.planning.taut import taut
-from services.codelets.planning.urgency import is_done, is_urgent
+from cogmap.services.codelets.planning.taut import taut
+from cogmap.services.codelets.planning.urgency import is_done, is_urgent
 
 START_M = 6.0
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.graph.window import LINK_OFFSETS
-from services.codelets.planning.activation import Field, climb, spread_over
-from services.codelets.planning.network import PlaceNetwork
-from services.codelets.planning.search.links import Links
-from services.codelets.planning.targets import Cell, Target
+from cogmap.services.codelets.planning.activation import Field, climb, spread_over
+from cogmap.services.codelets.planning.network import PlaceNetwork
+from cogmap.services.codelets.planning.search.links import Links
+from cogmap.services.codelets.planning.targets import Cell, Target
 
 
 class Route(NamedTuple):

@@ -11,8 +11,8 @@ import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.graph.graph import Graph
-from schemas.graph import DropNode, Operation
-from schemas.nodes import (
+from cogmap.schemas.graph import DropNode, Operation
+from cogmap.schemas.nodes import (
     NEVER_NS,
     Goal,
     Need,
@@ -23,8 +23,8 @@ from schemas.nodes import (
     need_id,
     object_id,
 )
-from services.codelets.planning.config import Config
-from services.codelets.planning.ground import Ground
+from cogmap.services.codelets.planning.config import Config
+from cogmap.services.codelets.planning.ground import Ground
 
 Cell = tuple[int, int]
 

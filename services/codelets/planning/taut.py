@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from services.codelets.planning.network import Cell
+from cogmap.services.codelets.planning.network import Cell
 
 LONGEST_CELLS = 100
 # Half a cell, nearly: from there on another cell is nearer.

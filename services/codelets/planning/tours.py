@@ -20,8 +20,8 @@ import numpy as np
 
 from cogmap.errors import CogmapError
 from cogmap.geometry.arrays import Floats, Indices
-from services.codelets.planning.activation import DECAY_PER_CELL
-from services.codelets.planning.tour_refinement import length_of, reorder, straighten
+from cogmap.services.codelets.planning.activation import DECAY_PER_CELL
+from cogmap.services.codelets.planning.tour_refinement import length_of, reorder, straighten
 
 # Of the longest length: sums of thousands of lengths stay exact.
 _UNITS = 2**40

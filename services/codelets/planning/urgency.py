@@ -6,10 +6,10 @@ import numpy as np
 
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import Extent
-from schemas.nodes import PLAN_ID, PlaceColumn, Plan, PlanState, Self
-from services.codelets.planning.config import Config
-from services.codelets.planning.ground import stands_there
-from services.codelets.planning.targets import has_arrived, open_goals
+from cogmap.schemas.nodes import PLAN_ID, PlaceColumn, Plan, PlanState, Self
+from cogmap.services.codelets.planning.config import Config
+from cogmap.services.codelets.planning.ground import stands_there
+from cogmap.services.codelets.planning.targets import has_arrived, open_goals
 
 BLOCKED_M = 30.0
 

@@ -15,10 +15,10 @@ from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_from
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
-from schemas.array import Matrix
-from schemas.codelets import Task
-from schemas.graph import DropNode, Operation, Phase
-from schemas.nodes import (
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.graph import DropNode, Operation, Phase
+from cogmap.schemas.nodes import (
     CORRECTION_ID,
     PLAN_ID,
     RECOLLECTION_ID,
@@ -35,12 +35,12 @@ from schemas.nodes import (
     Recollection,
     Self,
 )
-from services.codelets.config import SECTION, Config
-from services.codelets.correction.apply_correction import moved
-from services.codelets.correction.place_columns import MOVED_COLUMNS
-from services.codelets.recollection.places import recalled_places
-from services.codelets.recollection.recalled_objects import recalled_objects
-from services.codelets.recollection.sub_maps import recalled_sub_maps
+from cogmap.services.codelets.config import SECTION, Config
+from cogmap.services.codelets.correction.apply_correction import moved
+from cogmap.services.codelets.correction.place_columns import MOVED_COLUMNS
+from cogmap.services.codelets.recollection.places import recalled_places
+from cogmap.services.codelets.recollection.recalled_objects import recalled_objects
+from cogmap.services.codelets.recollection.sub_maps import recalled_sub_maps
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:

@@ -8,10 +8,10 @@ import numpy as np
 
 from cogmap.geometry.arrays import Indices, Singles
 from cogmap.graph.window import EVIDENCE_COLUMNS, WEIGHT_COLUMNS
-from schemas.array import Array
-from schemas.graph import Cells, Operation
-from schemas.nodes import ROOT_MAP, TILE_SIDE, PlaceColumn, Recollection
-from services.codelets.mapping.evidence import weights_of
+from cogmap.schemas.array import Array
+from cogmap.schemas.graph import Cells, Operation
+from cogmap.schemas.nodes import ROOT_MAP, TILE_SIDE, PlaceColumn, Recollection
+from cogmap.services.codelets.mapping.evidence import weights_of
 
 MAX_CELLS = 2**16
 

@@ -13,8 +13,8 @@ import numpy as np
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_from
 from cogmap.graph.graph import Graph
-from schemas.graph import Link, Operation
-from schemas.nodes import (
+from cogmap.schemas.graph import Link, Operation
+from cogmap.schemas.nodes import (
     NEVER_NS,
     ROOT_MAP,
     LinkKind,

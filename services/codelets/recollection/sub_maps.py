@@ -10,9 +10,9 @@ import numpy as np
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import compose
 from cogmap.graph.graph import Graph
-from schemas.graph import DropNode, Links, Operation
-from schemas.nodes import LinkKind, Map, Object, Recollection, SubMap, map_id
-from services.codelets.structure.members import next_number, sub_maps_of
+from cogmap.schemas.graph import DropNode, Links, Operation
+from cogmap.schemas.nodes import LinkKind, Map, Object, Recollection, SubMap, map_id
+from cogmap.services.codelets.structure.members import next_number, sub_maps_of
 
 
 def recalled_sub_maps(

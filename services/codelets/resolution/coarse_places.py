@@ -15,19 +15,19 @@ from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import WEIGHT_COLUMNS, Extent
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
-from schemas.codelets import Task
-from schemas.graph import Operation, Phase
-from schemas.nodes import ROOT_MAP, SELF_ID, Map, PlaceColumn, Self, coarse_map_id
-from services.codelets.cells import changed_cells
-from services.codelets.resolution.coarsening import (
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.graph import Operation, Phase
+from cogmap.schemas.nodes import ROOT_MAP, SELF_ID, Map, PlaceColumn, Self, coarse_map_id
+from cogmap.services.codelets.cells import changed_cells
+from cogmap.services.codelets.resolution.coarsening import (
     FACTOR,
     MARGIN,
     Places,
     coarser,
     places_of,
 )
-from services.codelets.resolution.config import COARSE_PLACES
-from services.codelets.resolution.config import CoarsePlacesConfig as Config
+from cogmap.services.codelets.resolution.config import COARSE_PLACES
+from cogmap.services.codelets.resolution.config import CoarsePlacesConfig as Config
 
 LEVELS = 2
 CELLS = FACTOR**LEVELS

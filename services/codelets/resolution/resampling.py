@@ -19,8 +19,8 @@ from cogmap.graph.window import (
     Extent,
     Window,
 )
-from schemas.nodes import PlaceColumn
-from services.codelets.resolution.coarsening import places_of
+from cogmap.schemas.nodes import PlaceColumn
+from cogmap.services.codelets.resolution.coarsening import places_of
 
 COLUMNS = (PlaceColumn.ROAD, PlaceColumn.OBSTACLE, *WEIGHT_COLUMNS, *EVIDENCE_COLUMNS)
 BESIDE = 2

@@ -10,12 +10,12 @@ from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_to
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import Extent
-from schemas.graph import Operation
-from schemas.nodes import ROOT_MAP, Map
-from services.codelets.cells import changed_cells
-from services.codelets.resolution.resampling import COLUMNS, Grid, cells_below, resampled
-from services.codelets.structure.extents import COARSEST
-from services.codelets.structure.members import is_sub_map, pose_of, sub_maps_of
+from cogmap.schemas.graph import Operation
+from cogmap.schemas.nodes import ROOT_MAP, Map
+from cogmap.services.codelets.cells import changed_cells
+from cogmap.services.codelets.resolution.resampling import COLUMNS, Grid, cells_below, resampled
+from cogmap.services.codelets.structure.extents import COARSEST
+from cogmap.services.codelets.structure.members import is_sub_map, pose_of, sub_maps_of
 
 BLOCK = 48
 """The cells of the root map along the side of a block."""

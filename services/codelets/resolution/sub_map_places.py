@@ -16,13 +16,13 @@ import numpy as np
 from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
-from schemas.codelets import Task
-from schemas.graph import Operation, Phase
-from schemas.nodes import ROOT_MAP, SELF_ID, Map, Self
-from services.codelets.resolution.config import SUB_MAP_PLACES
-from services.codelets.resolution.config import SubMapPlacesConfig as Config
-from services.codelets.resolution.resampling import COLUMNS
-from services.codelets.resolution.sub_map_grid import (
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.graph import Operation, Phase
+from cogmap.schemas.nodes import ROOT_MAP, SELF_ID, Map, Self
+from cogmap.services.codelets.resolution.config import SUB_MAP_PLACES
+from cogmap.services.codelets.resolution.config import SubMapPlacesConfig as Config
+from cogmap.services.codelets.resolution.resampling import COLUMNS
+from cogmap.services.codelets.resolution.sub_map_grid import (
     SETTLED_CYCLES,
     any_with_places,
     block,

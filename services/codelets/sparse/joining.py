@@ -11,9 +11,9 @@ import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.geometry.se2 import compose, relative, wrap_angle
-from services.codelets.config import Config
-from services.codelets.correction.pose_graph import residuals
-from services.codelets.mapping.path import JOINED, LAST, POSE, STAMP, steps_of
+from cogmap.services.codelets.config import Config
+from cogmap.services.codelets.correction.pose_graph import residuals
+from cogmap.services.codelets.mapping.path import JOINED, LAST, POSE, STAMP, steps_of
 
 SAME_M = 2.0
 SAME_RAD = np.pi / 8

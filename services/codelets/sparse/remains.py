@@ -15,20 +15,20 @@ import numpy as np
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import transform_from
 from cogmap.graph.graph import Graph
-from schemas.array import Matrix
-from schemas.graph import DropNode, Operation
-from schemas.nodes import (
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.graph import DropNode, Operation
+from cogmap.schemas.nodes import (
     LinkKind,
     LoopClosure,
     ObservationColumn,
     Observations,
     observations_id,
 )
-from services.codelets.correction.pairwise_consistency import Views
-from services.codelets.mapping.observations import DIRECTION, SPREAD, WHERE
-from services.codelets.mapping.path import STAMP, links_of
-from services.codelets.nodes import nodes_of
-from services.codelets.sparse.joining import JOIN_SD_M, Joining
+from cogmap.services.codelets.correction.pairwise_consistency import Views
+from cogmap.services.codelets.mapping.observations import DIRECTION, SPREAD, WHERE
+from cogmap.services.codelets.mapping.path import STAMP, links_of
+from cogmap.services.codelets.nodes import nodes_of
+from cogmap.services.codelets.sparse.joining import JOIN_SD_M, Joining
 
 
 def observations_left(

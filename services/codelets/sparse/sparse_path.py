@@ -15,10 +15,10 @@ from cogmap.geometry.arrays import Floats, Indices
 from cogmap.graph.graph import Graph
 from cogmap.graph.path import rows_of
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
-from schemas.array import Matrix
-from schemas.codelets import Task
-from schemas.graph import DropNode, Operation, Phase
-from schemas.nodes import (
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.graph import DropNode, Operation, Phase
+from cogmap.schemas.nodes import (
     CORRECTION_ID,
     RECOLLECTION_ID,
     LinkKind,
@@ -26,11 +26,11 @@ from schemas.nodes import (
     Observations,
     PathSegment,
 )
-from services.codelets.config import SECTION, Config
-from services.codelets.mapping.path import JOINED, STAMP, with_rows
-from services.codelets.mapping.views import views_of
-from services.codelets.sparse.joining import Joining, joining, joins, left, visited
-from services.codelets.sparse.remains import closures_left, observations_left
+from cogmap.services.codelets.config import SECTION, Config
+from cogmap.services.codelets.mapping.path import JOINED, STAMP, with_rows
+from cogmap.services.codelets.mapping.views import views_of
+from cogmap.services.codelets.sparse.joining import Joining, joining, joins, left, visited
+from cogmap.services.codelets.sparse.remains import closures_left, observations_left
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:

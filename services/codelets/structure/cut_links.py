@@ -9,8 +9,8 @@ import numpy as np
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import CUT_BELOW, LINK_OFFSETS, WEIGHT_COLUMNS, Extent
-from schemas.nodes import ROOT_MAP
-from services.codelets.planning.network import PlaceNetwork
+from cogmap.schemas.nodes import ROOT_MAP
+from cogmap.services.codelets.planning.network import PlaceNetwork
 
 STEPS_A_CELL = 2
 

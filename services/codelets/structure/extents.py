@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
-from schemas.nodes import ROOT_MAP, Map, Object, map_id
-from services.codelets.structure.config import Config
-from services.codelets.structure.members import positions_of
+from cogmap.schemas.nodes import ROOT_MAP, Map, Object, map_id
+from cogmap.services.codelets.structure.config import Config
+from cogmap.services.codelets.structure.members import positions_of
 
 MIN_SIDE_M = 1.0
 COARSEST = 4

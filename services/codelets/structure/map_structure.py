@@ -14,15 +14,15 @@ from cogmap.geometry.arrays import Indices
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import WEIGHT_COLUMNS
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
-from schemas.codelets import Task
-from schemas.graph import DropNode, DropPlaces, Links, Operation, Phase
-from schemas.nodes import ROOT_MAP, LinkKind, Map, Object, map_id, object_id
-from services.codelets.nodes import nodes_of
-from services.codelets.structure.config import SECTION, Config
-from services.codelets.structure.cut_links import boundaries_around
-from services.codelets.structure.extents import extent_of, is_outdated, sub_map_node
-from services.codelets.structure.labels import NEW
-from services.codelets.structure.members import (
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.graph import DropNode, DropPlaces, Links, Operation, Phase
+from cogmap.schemas.nodes import ROOT_MAP, LinkKind, Map, Object, map_id, object_id
+from cogmap.services.codelets.nodes import nodes_of
+from cogmap.services.codelets.structure.config import SECTION, Config
+from cogmap.services.codelets.structure.cut_links import boundaries_around
+from cogmap.services.codelets.structure.extents import extent_of, is_outdated, sub_map_node
+from cogmap.services.codelets.structure.labels import NEW
+from cogmap.services.codelets.structure.members import (
     maps_around,
     members_of,
     next_number,
@@ -30,7 +30,7 @@ from services.codelets.structure.members import (
     positions_of,
     sub_maps_of,
 )
-from services.codelets.structure.sub_maps import SubMaps
+from cogmap.services.codelets.structure.sub_maps import SubMaps
 
 MANY = 50
 MANY_SHARE = 0.25

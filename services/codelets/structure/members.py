@@ -8,8 +8,8 @@ import numpy as np
 
 from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
-from schemas.nodes import ROOT_MAP, LinkKind, Map, Object, map_number
-from services.codelets.nodes import nodes_of
+from cogmap.schemas.nodes import ROOT_MAP, LinkKind, Map, Object, map_number
+from cogmap.services.codelets.nodes import nodes_of
 
 
 def sub_maps_of(graph: Graph) -> list[Map]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from services.codelets.structure.mixture import COUNT, Mixture, Scene, summed
+from cogmap.services.codelets.structure.mixture import COUNT, Mixture, Scene, summed
 
 
 class Merging:

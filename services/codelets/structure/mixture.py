@@ -28,7 +28,7 @@ import numpy as np
 from scipy.special import gammaln
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from services.codelets.structure.config import Config
+from cogmap.services.codelets.structure.config import Config
 
 MEAN_PRIOR_COUNT = 1e-3
 SCATTER_PRIOR_COUNT = 4.0

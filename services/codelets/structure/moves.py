@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from services.codelets.structure.mixture import Mixture, Scene, summed
+from cogmap.services.codelets.structure.mixture import Mixture, Scene, summed
 
 
 class Moves(NamedTuple):

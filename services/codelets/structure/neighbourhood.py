@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from services.codelets.structure.neighbours import comes_between, neighbours, neighbours_of
+from cogmap.services.codelets.structure.neighbours import comes_between, neighbours, neighbours_of
 
 CROSSED_SHARE = 0.01
 MIN_SPACING = 0.01

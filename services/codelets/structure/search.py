@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.geometry.arrays import Floats, Indices
-from services.codelets.structure.merging import Merging
-from services.codelets.structure.mixture import Mixture, Scene
-from services.codelets.structure.moves import best_moves, gain_most
+from cogmap.services.codelets.structure.merging import Merging
+from cogmap.services.codelets.structure.mixture import Mixture, Scene
+from cogmap.services.codelets.structure.moves import best_moves, gain_most
 
 MAX_SWEEPS = 50
 PIECES_A_LEVEL = 4

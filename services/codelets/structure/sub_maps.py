@@ -7,17 +7,17 @@ import math
 import numpy as np
 
 from cogmap.geometry.arrays import Floats, Indices
-from services.codelets.structure.config import Config
-from services.codelets.structure.labels import NEW, kept_labels
-from services.codelets.structure.mixture import (
+from cogmap.services.codelets.structure.config import Config
+from cogmap.services.codelets.structure.labels import NEW, kept_labels
+from cogmap.services.codelets.structure.mixture import (
     SPACING_SQUARES,
     SPACING_SUM,
     Mixture,
     Scene,
     rows_of,
 )
-from services.codelets.structure.neighbourhood import Neighbourhood, Separation
-from services.codelets.structure.search import (
+from cogmap.services.codelets.structure.neighbourhood import Neighbourhood, Separation
+from cogmap.services.codelets.structure.search import (
     compact,
     merge_clusters,
     move_objects,

@@ -13,11 +13,11 @@ import numpy as np
 
 from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Booleans, Floats
-from schemas.array import Array
-from schemas.feelings import Feeling
-from schemas.nodes import feeling_id, is_relation
-from schemas.sensing import Associations
-from services.epam.config import Priming
+from cogmap.schemas.array import Array
+from cogmap.schemas.feelings import Feeling
+from cogmap.schemas.nodes import feeling_id, is_relation
+from cogmap.schemas.sensing import Associations
+from cogmap.services.epam.config import Priming
 
 MAX_NODES = 512
 FAINT = 0.01

@@ -6,14 +6,14 @@ from collections import deque
 
 import msgspec
 
-from schemas.cognition import Broadcast
-from schemas.feelings import Feeling
-from schemas.nodes import Object, category_id, feeling_id, look_of, map_number, object_id
-from schemas.sensing import Associations, Percept
-from services.epam.association.graph import AssociativeGraph
-from services.epam.association.prior import Prior
-from services.epam.association.relations import related
-from services.epam.config import Priming
+from cogmap.schemas.cognition import Broadcast
+from cogmap.schemas.feelings import Feeling
+from cogmap.schemas.nodes import Object, category_id, feeling_id, look_of, map_number, object_id
+from cogmap.schemas.sensing import Associations, Percept
+from cogmap.services.epam.association.graph import AssociativeGraph
+from cogmap.services.epam.association.prior import Prior
+from cogmap.services.epam.association.relations import related
+from cogmap.services.epam.config import Priming
 
 BEHIND = 2
 """A view is primed by what was conscious up to so many views before it."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from cogmap.geometry.arrays import Floats
-from schemas.nodes import object_id
+from cogmap.schemas.nodes import object_id
 
 
 @dataclass(frozen=True)

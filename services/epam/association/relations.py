@@ -8,8 +8,8 @@ from collections.abc import Iterable, Mapping
 from itertools import pairwise
 from typing import NamedTuple
 
-from schemas.cognition import Relation
-from schemas.nodes import Side, object_id, relation_id
+from cogmap.schemas.cognition import Relation
+from cogmap.schemas.nodes import Side, object_id, relation_id
 
 
 def related(relations: Iterable[Relation]) -> dict[str, str]:

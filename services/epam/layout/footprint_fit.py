@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.geometry.arrays import Floats
-from schemas.sensing import Calibration
-from services.epam.layout.footprint_model import (
+from cogmap.schemas.sensing import Calibration
+from cogmap.services.epam.layout.footprint_model import (
     COLUMNS,
     MIN_RANGE_M,
     FootprintProblem,

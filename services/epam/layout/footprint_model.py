@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.geometry.arrays import Booleans, Floats
-from schemas.sensing import Calibration
+from cogmap.schemas.sensing import Calibration
 
 COLUMNS = 20
 EDGE_SD_PX = 1.2

@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.geometry.arrays import Booleans, Floats, Singles
-from schemas.sensing import Calibration
-from services.epam.layout.ground_plane import GroundPlane, fit, focal_baseline, ray_slopes
+from cogmap.schemas.sensing import Calibration
+from cogmap.services.epam.layout.ground_plane import GroundPlane, fit, focal_baseline, ray_slopes
 
 MAX_RANGE_M = 15.0
 CELL_M = 0.5

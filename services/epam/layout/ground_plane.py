@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.geometry.arrays import Booleans, Floats
-from schemas.sensing import Calibration
+from cogmap.schemas.sensing import Calibration
 
 STRIDE_PX = 4
 DISPARITY_SD_PX = 0.3

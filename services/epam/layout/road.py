@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Bytes, Singles
-from services.epam.config import Processor
-from services.epam.network import WEIGHTS, Network
+from cogmap.services.epam.config import Processor
+from cogmap.services.epam.network import WEIGHTS, Network
 
 DEFAULT_PATH = WEIGHTS / "road.onnx"
 WIDTH_PX = 160

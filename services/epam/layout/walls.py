@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from cogmap.geometry.arrays import Floats, Singles
-from schemas.sensing import Calibration
-from services.epam.layout.footprint_fit import ObjectPose, Silhouette
-from services.epam.recognition.segments import Segment
+from cogmap.schemas.sensing import Calibration
+from cogmap.services.epam.layout.footprint_fit import ObjectPose, Silhouette
+from cogmap.services.epam.recognition.segments import Segment
 
 MIN_PIXELS = 4
 MIN_COLUMNS = 3

@@ -18,10 +18,10 @@ import numpy as np
 
 from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Bytes, Floats, Singles
-from schemas.array import Array
-from schemas.base import PositiveShare
-from schemas.sensing import PlaceMatch, RememberedView
-from services.epam.places.descriptor import (
+from cogmap.schemas.array import Array
+from cogmap.schemas.base import PositiveShare
+from cogmap.schemas.sensing import PlaceMatch, RememberedView
+from cogmap.services.epam.places.descriptor import (
     DESCRIPTOR_BYTES,
     UNSHIFTED,
     descriptors,

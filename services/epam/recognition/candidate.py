@@ -11,10 +11,10 @@ import cv2
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Bytes, Singles
-from schemas.sensing import Calibration
-from services.epam.layout.walls import Walls, walls
-from services.epam.recognition.objects import Recognition
-from services.epam.recognition.segments import Segment
+from cogmap.schemas.sensing import Calibration
+from cogmap.services.epam.layout.walls import Walls, walls
+from cogmap.services.epam.recognition.objects import Recognition
+from cogmap.services.epam.recognition.segments import Segment
 
 OUTLINE_TOLERANCE_PX = 1.0
 BRIDGED_PX = (9, 25, 65)

@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.geometry.arrays import Booleans, Bytes, Singles
-from schemas.sensing import Calibration
-from services.epam.recognition.segments import Segment
+from cogmap.schemas.sensing import Calibration
+from cogmap.services.epam.recognition.segments import Segment
 
 SIDE_PX = 48
 CHANNELS = 12

@@ -22,11 +22,11 @@ import numpy.typing as npt
 
 from cogmap.errors import ConfigError
 from cogmap.geometry.arrays import Bytes, Floats, Singles
-from schemas.sensing import Calibration
-from services.epam.config import Processor
-from services.epam.network import WEIGHTS, Network
-from services.epam.recognition.crop import CHANNELS, SIDE_PX, crop, surroundings
-from services.epam.recognition.segments import Segment
+from cogmap.schemas.sensing import Calibration
+from cogmap.services.epam.config import Processor
+from cogmap.services.epam.network import WEIGHTS, Network
+from cogmap.services.epam.recognition.crop import CHANNELS, SIDE_PX, crop, surroundings
+from cogmap.services.epam.recognition.segments import Segment
 
 DEFAULT_PATH = WEIGHTS / "objects.onnx"
 DIMENSIONS = 64

@@ -18,9 +18,9 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.geometry.arrays import Booleans, Bytes, Floats, Singles
-from schemas.sensing import Calibration
-from services.epam.config import Processor
-from services.epam.network import WEIGHTS, Network
+from cogmap.schemas.sensing import Calibration
+from cogmap.services.epam.config import Processor
+from cogmap.services.epam.network import WEIGHTS, Network
 
 DEFAULT_PATH = WEIGHTS / "segments.onnx"
 WIDTH_PX = 160

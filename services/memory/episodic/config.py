@@ -7,7 +7,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from schemas.base import PositiveMetres, PositiveShare, Share
+from cogmap.schemas.base import PositiveMetres, PositiveShare, Share
 
 Hours = Annotated[float, Meta(ge=0, le=1e4)]
 

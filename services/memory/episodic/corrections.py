@@ -10,8 +10,8 @@ from scipy.spatial import cKDTree
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import move_with
 from cogmap.graph.graph import Graph
-from schemas.graph import DropNode, Operation
-from schemas.nodes import CORRECTION_ID, Correction, CorrectionColumn, PathSegment
+from cogmap.schemas.graph import DropNode, Operation
+from cogmap.schemas.nodes import CORRECTION_ID, Correction, CorrectionColumn, PathSegment
 
 OLD = slice(CorrectionColumn.OLD_X_M, CorrectionColumn.OLD_HEADING_RAD + 1)
 NEW = slice(CorrectionColumn.NEW_X_M, CorrectionColumn.NEW_HEADING_RAD + 1)

@@ -6,13 +6,13 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from cogmap.geometry.arrays import Bytes
-from schemas.memory import StoredEpisode
-from services.memory.episodic.encoding import cues, encoded
-from services.memory.sparse.build import build
-from services.memory.sparse.clean_up import CleanUpMemory
-from services.memory.sparse.config import SparseConfig
-from services.memory.sparse.structures import ItemMemory
-from services.memory.sparse.vectors import distance, mean_distance
+from cogmap.schemas.memory import StoredEpisode
+from cogmap.services.memory.episodic.encoding import cues, encoded
+from cogmap.services.memory.sparse.build import build
+from cogmap.services.memory.sparse.clean_up import CleanUpMemory
+from cogmap.services.memory.sparse.config import SparseConfig
+from cogmap.services.memory.sparse.structures import ItemMemory
+from cogmap.services.memory.sparse.vectors import distance, mean_distance
 
 MAX_LEARNED = 50
 """So many episodes are learned at once, in a quarter of a second, where many were restored."""

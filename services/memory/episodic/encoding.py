@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from cogmap.geometry.arrays import Bytes
-from schemas.memory import StoredEpisode
-from services.memory.sparse.structures import ItemMemory, encode_sequence
-from services.memory.sparse.vectors import bind, bundle
+from cogmap.schemas.memory import StoredEpisode
+from cogmap.services.memory.sparse.structures import ItemMemory, encode_sequence
+from cogmap.services.memory.sparse.vectors import bind, bundle
 
 WHERE = "where"
 PATH = "path"

@@ -8,10 +8,10 @@ from typing import TypeGuard
 
 import msgspec
 
-from schemas.memory import DeclarativeEpisode, StoredRecord, TransientEpisode
-from services.memory.changes import Changes
-from services.memory.episodic.config import EpisodicConfig
-from services.memory.episodic.encoding import squares
+from cogmap.schemas.memory import DeclarativeEpisode, StoredRecord, TransientEpisode
+from cogmap.services.memory.changes import Changes
+from cogmap.services.memory.episodic.config import EpisodicConfig
+from cogmap.services.memory.episodic.encoding import squares
 
 HOUR_NS = 3_600_000_000_000
 

@@ -15,17 +15,17 @@ import numpy as np
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_from
 from cogmap.graph.graph import Graph
-from schemas import nodes
-from schemas.cognition import Broadcast, Coalition
-from schemas.graph import Delta
-from schemas.memory import Stored, StoredRecord
-from schemas.nodes import RECOLLECTION_ID, ROOT_MAP, Map, Recollection, Self, episode_id
-from services.memory.changes import Changes
-from services.memory.config import Config
-from services.memory.episodic.corrections import Corrections, Shift
-from services.memory.episodic.cues import EpisodicCues
-from services.memory.episodic.episodes import Episodes, KeptEpisode, is_episode
-from services.memory.episodic.visit import Position, Visit
+from cogmap.schemas import nodes
+from cogmap.schemas.cognition import Broadcast, Coalition
+from cogmap.schemas.graph import Delta
+from cogmap.schemas.memory import Stored, StoredRecord
+from cogmap.schemas.nodes import RECOLLECTION_ID, ROOT_MAP, Map, Recollection, Self, episode_id
+from cogmap.services.memory.changes import Changes
+from cogmap.services.memory.config import Config
+from cogmap.services.memory.episodic.corrections import Corrections, Shift
+from cogmap.services.memory.episodic.cues import EpisodicCues
+from cogmap.services.memory.episodic.episodes import Episodes, KeptEpisode, is_episode
+from cogmap.services.memory.episodic.visit import Position, Visit
 
 PATH = 3
 """So many places before that of an episode belong to it."""

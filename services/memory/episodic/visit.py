@@ -5,9 +5,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from schemas.cognition import Broadcast
-from schemas.memory import TransientEpisode
-from schemas.nodes import AnyNode, Goal, Need, Node, Object, Remembered, goal_id, kind_of, look_of
+from cogmap.schemas.cognition import Broadcast
+from cogmap.schemas.memory import TransientEpisode
+from cogmap.schemas.nodes import (
+    AnyNode,
+    Goal,
+    Need,
+    Node,
+    Object,
+    Remembered,
+    goal_id,
+    kind_of,
+    look_of,
+)
 
 Name = tuple[str, str]
 Position = tuple[float, float]

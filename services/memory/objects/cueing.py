@@ -9,8 +9,8 @@ import msgspec
 
 from cogmap.graph.graph import Graph
 from cogmap.graph.individuals import is_among
-from schemas.cognition import Broadcast
-from schemas.nodes import (
+from cogmap.schemas.cognition import Broadcast
+from cogmap.schemas.nodes import (
     CORRECTION_ID,
     RECOLLECTION_ID,
     ROOT_MAP,
@@ -18,7 +18,7 @@ from schemas.nodes import (
     object_id,
     percept_id,
 )
-from services.memory.config import Config
+from cogmap.services.memory.config import Config
 
 Position = tuple[float, float]
 

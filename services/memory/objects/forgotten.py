@@ -17,9 +17,9 @@ from cogmap.geometry.se2 import transform_from
 from cogmap.graph import decay
 from cogmap.graph.graph import Graph
 from cogmap.graph.individuals import is_among, is_same
-from schemas.graph import Delta, DropNode, Phase
-from schemas.memory import StoredObjects
-from schemas.nodes import (
+from cogmap.schemas.graph import Delta, DropNode, Phase
+from cogmap.schemas.memory import StoredObjects
+from cogmap.schemas.nodes import (
     NEVER_NS,
     RECOLLECTION_ID,
     ROOT_MAP,
@@ -31,8 +31,8 @@ from schemas.nodes import (
     look_of,
     object_id,
 )
-from services.memory.config import Config
-from services.memory.episodic.corrections import Corrections, Shift
+from cogmap.services.memory.config import Config
+from cogmap.services.memory.episodic.corrections import Corrections, Shift
 
 ROUNDING = 1e-9
 

@@ -6,10 +6,10 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.geometry.arrays import Booleans, Bytes
-from services.memory.sparse.codes import bit_codes, hamming
-from services.memory.sparse.config import SparseConfig
-from services.memory.sparse.interface import Recall, iterated_read
-from services.memory.sparse.vectors import random_vectors
+from cogmap.services.memory.sparse.codes import bit_codes, hamming
+from cogmap.services.memory.sparse.config import SparseConfig
+from cogmap.services.memory.sparse.interface import Recall, iterated_read
+from cogmap.services.memory.sparse.vectors import random_vectors
 
 DIMENSIONS = 1000
 VALUES = 2

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from services.memory.sparse.binary import BinaryMemory
-from services.memory.sparse.config import SparseConfig
-from services.memory.sparse.interface import AssociativeMemory
-from services.memory.sparse.memory import SparseMemory
+from cogmap.services.memory.sparse.binary import BinaryMemory
+from cogmap.services.memory.sparse.config import SparseConfig
+from cogmap.services.memory.sparse.interface import AssociativeMemory
+from cogmap.services.memory.sparse.memory import SparseMemory
 
 
 def build(config: SparseConfig) -> AssociativeMemory:

@@ -8,7 +8,7 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from cogmap.geometry.arrays import Bytes
-from services.memory.sparse.vectors import VALUES, contains, distances
+from cogmap.services.memory.sparse.vectors import VALUES, contains, distances
 
 Key = TypeVar("Key", bound=Hashable)
 

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.geometry.arrays import Bytes
-from services.memory.sparse.vectors import VALUES
+from cogmap.services.memory.sparse.vectors import VALUES
 
 Counts = npt.NDArray[np.int32]
 BITS = VALUES // 2

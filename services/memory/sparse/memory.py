@@ -19,10 +19,10 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.geometry.arrays import Bytes, Floats, Indices, Singles
-from services.memory.sparse.codes import hamming, johnson_codes
-from services.memory.sparse.config import SparseConfig
-from services.memory.sparse.interface import Recall, iterated_read
-from services.memory.sparse.vectors import (
+from cogmap.services.memory.sparse.codes import hamming, johnson_codes
+from cogmap.services.memory.sparse.config import SparseConfig
+from cogmap.services.memory.sparse.interface import Recall, iterated_read
+from cogmap.services.memory.sparse.vectors import (
     VALUES,
     mean_distance,
     nearest_phases,

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cogmap.geometry.arrays import Bytes
-from services.memory.sparse.vectors import VALUES, bind, bundle, permuted
+from cogmap.services.memory.sparse.vectors import VALUES, bind, bundle, permuted
 
 
 class ItemMemory:

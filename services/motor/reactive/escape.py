@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import msgspec
 
-from schemas.sensing import MotorCommand, SpeedLimit
-from services.motor.config import Config
+from cogmap.schemas.sensing import MotorCommand, SpeedLimit
+from cogmap.services.motor.config import Config
 
 PATIENCE_S = 2.0
 BACK_S = 2.0

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cogmap.errors import MessageError
-from schemas.sensing import SelfMotion
+from cogmap.schemas.sensing import SelfMotion
 
 MIN_COMMANDED = 3.0
 MIN_TURN_RAD_S = 0.05

@@ -9,7 +9,7 @@ import cmath
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from schemas.cognition import Relation
+from cogmap.schemas.cognition import Relation
 
 NEAR_SD_M = 0.3
 RANGE_SD_SHARE = 0.04

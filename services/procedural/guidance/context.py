@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from schemas.base import Scalar
-from schemas.cognition import ActionName, Behaviour, GuidanceScheme, Relation
-from services.procedural.guidance.alignment import Motion, aligned, pairs_of
+from cogmap.schemas.base import Scalar
+from cogmap.schemas.cognition import ActionName, Behaviour, GuidanceScheme, Relation
+from cogmap.services.procedural.guidance.alignment import Motion, aligned, pairs_of
 
 HALF_AWAY_M = 4.0
 HALF_TURNED_RAD = 0.5

@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from schemas.cognition import Relation
-from schemas.nodes import NEVER_NS, Self
+from cogmap.schemas.cognition import Relation
+from cogmap.schemas.nodes import NEVER_NS, Self
 
 TURNED_RAD = 0.3
 STOP_NS = 5_000_000_000

@@ -7,12 +7,12 @@ from collections.abc import Iterable, Sequence
 
 from msgspec.structs import replace
 
-from schemas.cognition import Action, ActionName, Behaviour, Broadcast, GuidanceScheme
-from schemas.nodes import Plan, PlanState, Self
-from services.procedural.guidance.arrivals import Arrivals
-from services.procedural.guidance.context import SEEN_NS, Fit, end_of, fit, reliability
-from services.procedural.guidance.lessons import Lesson, Lessons, Place
-from services.procedural.patterns import Active
+from cogmap.schemas.cognition import Action, ActionName, Behaviour, Broadcast, GuidanceScheme
+from cogmap.schemas.nodes import Plan, PlanState, Self
+from cogmap.services.procedural.guidance.arrivals import Arrivals
+from cogmap.services.procedural.guidance.context import SEEN_NS, Fit, end_of, fit, reliability
+from cogmap.services.procedural.guidance.lessons import Lesson, Lessons, Place
+from cogmap.services.procedural.patterns import Active
 
 REMEMBERED_PLACES = 64
 MIN_FIT = 0.25

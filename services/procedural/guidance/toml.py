@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 
-from schemas.cognition import GuidanceScheme, Relation
+from cogmap.schemas.cognition import GuidanceScheme, Relation
 
 
 def written(schemes: Iterable[GuidanceScheme]) -> str:

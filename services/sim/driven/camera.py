@@ -14,7 +14,7 @@ import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.geometry.se2 import transform_to
-from schemas.sensing import Calibration
+from cogmap.schemas.sensing import Calibration
 
 NEAR_M = 0.05
 NOTHING = -1

@@ -9,11 +9,11 @@ import msgspec
 import numpy as np
 
 from cogmap.geometry.arrays import Floats
-from schemas.nodes import ENERGY, SATISFIED_BY
-from schemas.sensing import Percept, Pose
-from services.sim.driven.camera import NEAR_M, ColumnCamera
-from services.sim.layout.furniture import Prop
-from services.sim.scripted.percepts import Landmark, PerceptErrors, PerceptSim
+from cogmap.schemas.nodes import ENERGY, SATISFIED_BY
+from cogmap.schemas.sensing import Percept, Pose
+from cogmap.services.sim.driven.camera import NEAR_M, ColumnCamera
+from cogmap.services.sim.layout.furniture import Prop
+from cogmap.services.sim.scripted.percepts import Landmark, PerceptErrors, PerceptSim
 
 FUNCTION = SATISFIED_BY[ENERGY]
 NEAREST_M = 2.2

@@ -10,8 +10,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices, Singles
 from cogmap.geometry.se2 import rotate
-from services.sim.driven.camera import ColumnCamera
-from services.sim.layout.boundaries import Surfaces
+from cogmap.services.sim.driven.camera import ColumnCamera
+from cogmap.services.sim.layout.boundaries import Surfaces
 
 MAX_RANGE_M = 15.0
 CELL_M = 0.5

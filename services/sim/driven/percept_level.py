@@ -12,10 +12,10 @@ import msgspec
 import numpy as np
 
 from cogmap.geometry.arrays import Floats
-from schemas.array import Array
-from schemas.base import Message
-from schemas.process import Clock
-from schemas.sensing import (
+from cogmap.schemas.array import Array
+from cogmap.schemas.base import Message
+from cogmap.schemas.process import Clock
+from cogmap.schemas.sensing import (
     MotorCommand,
     Odometry,
     Percepts,
@@ -24,17 +24,17 @@ from schemas.sensing import (
     TruePose,
     TrueTown,
 )
-from services.sim.battery import PowerSupply
-from services.sim.config import Config, place_of
-from services.sim.driven.robot import KinematicRobot
-from services.sim.driven.sensors import Sensors
-from services.sim.driven.surroundings import Surroundings
-from services.sim.layout.closures import ClosedStreets
-from services.sim.layout.removals import RemovedBuildings
-from services.sim.odometry import Noise, WheelOdometry
-from services.sim.progress import Progress
-from services.sim.rendering.camera import calibration
-from services.sim.scripted.places import PlaceSim
+from cogmap.services.sim.battery import PowerSupply
+from cogmap.services.sim.config import Config, place_of
+from cogmap.services.sim.driven.robot import KinematicRobot
+from cogmap.services.sim.driven.sensors import Sensors
+from cogmap.services.sim.driven.surroundings import Surroundings
+from cogmap.services.sim.layout.closures import ClosedStreets
+from cogmap.services.sim.layout.removals import RemovedBuildings
+from cogmap.services.sim.odometry import Noise, WheelOdometry
+from cogmap.services.sim.progress import Progress
+from cogmap.services.sim.rendering.camera import calibration
+from cogmap.services.sim.scripted.places import PlaceSim
 
 Row = tuple[float, float, float, float, float]
 

@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import math
 
-from schemas.sensing import MotorCommand, Pose, TruePose
-from services.sim.driven.surroundings import Surroundings
-from services.sim.layout.boundaries import clearance_m
+from cogmap.schemas.sensing import MotorCommand, Pose, TruePose
+from cogmap.services.sim.driven.surroundings import Surroundings
+from cogmap.services.sim.layout.boundaries import clearance_m
 
 TRACK_M = 0.8
 WHEEL_RADIUS_M = 0.2

@@ -10,14 +10,14 @@ from typing import NamedTuple
 import numpy as np
 
 from cogmap.geometry.arrays import Floats, Singles
-from schemas.sensing import Calibration, Percept, Pose
-from services.sim.driven.camera import NEAR_M, NOTHING, Buffer, ColumnCamera, depths_m
-from services.sim.driven.charging_sight import ChargingSight
-from services.sim.driven.ground import Lattice, boundary_points_m, road_points_m, thin
-from services.sim.driven.surroundings import Near
-from services.sim.layout.place import Place
-from services.sim.layout.plan import Plot
-from services.sim.scripted.percepts import Landmark, PerceptErrors, PerceptSim
+from cogmap.schemas.sensing import Calibration, Percept, Pose
+from cogmap.services.sim.driven.camera import NEAR_M, NOTHING, Buffer, ColumnCamera, depths_m
+from cogmap.services.sim.driven.charging_sight import ChargingSight
+from cogmap.services.sim.driven.ground import Lattice, boundary_points_m, road_points_m, thin
+from cogmap.services.sim.driven.surroundings import Near
+from cogmap.services.sim.layout.place import Place
+from cogmap.services.sim.layout.plan import Plot
+from cogmap.services.sim.scripted.percepts import Landmark, PerceptErrors, PerceptSim
 
 SECTORS = 32
 # Stereo matching takes what is nearer for as near as this; what is farther is not simulated.

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from services.sim.layout.barriers import barriers
-from services.sim.layout.boundaries import Surfaces, outlines, surfaces
-from services.sim.layout.place import Place
+from cogmap.services.sim.layout.barriers import barriers
+from cogmap.services.sim.layout.boundaries import Surfaces, outlines, surfaces
+from cogmap.services.sim.layout.place import Place
 
 REACH_M = 60.0
 GROUND_REACH_M = 16.0

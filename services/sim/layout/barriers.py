@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from services.sim.layout.furniture import Prop
-from services.sim.layout.plan import PAVEMENT_WIDTH_M, Road
+from cogmap.services.sim.layout.furniture import Prop
+from cogmap.services.sim.layout.plan import PAVEMENT_WIDTH_M, Road
 
 THICKNESS_M = 0.4
 HEIGHT_M = 1.2

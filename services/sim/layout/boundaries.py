@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from services.sim.layout.plan import Point, Road, corners
+from cogmap.services.sim.layout.plan import Point, Road, corners
 
 CHUNK = 256
 SHORTEST_M = 1e-3

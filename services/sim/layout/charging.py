@@ -13,10 +13,10 @@ import numpy as np
 from cogmap.errors import ConfigError
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.geometry.se2 import transform_to
-from services.sim.layout.boundaries import clearance_m, surfaces
-from services.sim.layout.furniture import CHARGING_PLACE, Prop
-from services.sim.layout.place import Place
-from services.sim.layout.plan import Point, Road
+from cogmap.services.sim.layout.boundaries import clearance_m, surfaces
+from cogmap.services.sim.layout.furniture import CHARGING_PLACE, Prop
+from cogmap.services.sim.layout.place import Place
+from cogmap.services.sim.layout.plan import Point, Road
 
 SIZE_M = (0.6, 0.6, 2.6)
 KERB_GAP_M = 0.15

@@ -8,9 +8,9 @@ from typing import Annotated
 import msgspec
 
 from cogmap.errors import ConfigError, MessageError
-from schemas.base import Name
-from schemas.sensing import StreetClosure
-from services.sim.layout.plan import Road
+from cogmap.schemas.base import Name
+from cogmap.schemas.sensing import StreetClosure
+from cogmap.services.sim.layout.plan import Road
 
 Seconds = Annotated[float, msgspec.Meta(ge=0, le=1e9)]
 

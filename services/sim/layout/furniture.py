@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from services.sim.layout.plan import (
+from cogmap.services.sim.layout.plan import (
     PAVEMENT_WIDTH_M,
     Plot,
     Point,

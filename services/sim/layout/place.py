@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from cogmap.geometry.arrays import Floats
-from schemas.array import Array
-from schemas.sensing import Building, Obstacle, Pose, Street, TrueTown
-from services.sim.layout.boundaries import kerbs, outlines
-from services.sim.layout.furniture import CHARGING_PLACE, Prop
-from services.sim.layout.plan import Plot, Point, Road
+from cogmap.schemas.array import Array
+from cogmap.schemas.sensing import Building, Obstacle, Pose, Street, TrueTown
+from cogmap.services.sim.layout.boundaries import kerbs, outlines
+from cogmap.services.sim.layout.furniture import CHARGING_PLACE, Prop
+from cogmap.services.sim.layout.plan import Plot, Point, Road
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from services.sim.layout.catalogue import BuildingType
+from cogmap.services.sim.layout.catalogue import BuildingType
 
 STREET_WIDTH_M = 8.0
 PAVEMENT_WIDTH_M = 2.0

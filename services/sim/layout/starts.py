@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from schemas.sensing import Pose
-from services.sim.layout.furniture import Prop
-from services.sim.layout.place import Place
-from services.sim.layout.plan import Point, Road
+from cogmap.schemas.sensing import Pose
+from cogmap.services.sim.layout.furniture import Prop
+from cogmap.services.sim.layout.place import Place
+from cogmap.services.sim.layout.plan import Point, Road
 
 CLEAR_M = 8.0
 STEP_M = 1.0

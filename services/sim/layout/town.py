@@ -9,11 +9,11 @@ from itertools import pairwise
 import numpy as np
 
 from cogmap.geometry.se2 import transform_to
-from schemas.sensing import Pose
-from services.sim.layout.catalogue import CATALOGUE, BuildingType
-from services.sim.layout.furniture import furnish
-from services.sim.layout.place import Place
-from services.sim.layout.plan import (
+from cogmap.schemas.sensing import Pose
+from cogmap.services.sim.layout.catalogue import CATALOGUE, BuildingType
+from cogmap.services.sim.layout.furniture import furnish
+from cogmap.services.sim.layout.place import Place
+from cogmap.services.sim.layout.plan import (
     PAVEMENT_WIDTH_M,
     STREET_WIDTH_M,
     Plot,

@@ -6,11 +6,11 @@ import dataclasses
 from pathlib import Path
 
 from cogmap.errors import ConfigError
-from services.sim.layout.blocks import town as blocks
-from services.sim.layout.charging import with_charging_places
-from services.sim.layout.place import Place
-from services.sim.layout.starts import another_start
-from services.sim.layout.town import generate
+from cogmap.services.sim.layout.blocks import town as blocks
+from cogmap.services.sim.layout.charging import with_charging_places
+from cogmap.services.sim.layout.place import Place
+from cogmap.services.sim.layout.starts import another_start
+from cogmap.services.sim.layout.town import generate
 
 LOOP = "loop"
 BLOCKS = "blocks"
@@ -48,7 +48,7 @@ def _bare(town: str, seed: int, size_m: float) -> Place:
         return generate(seed)
     if town.startswith(OSM):
         # It takes as long to import as all the rest, and few drive there.
-        from services.sim.layout.osm import town as osm
+        from cogmap.services.sim.layout.osm import town as osm
 
         return osm.read(Path(town.removeprefix(OSM)))
 

@@ -11,12 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.geometry.arrays import Floats, Singles
-from schemas.array import Array
-from schemas.sensing import Calibration, StereoFrame
-from services.sim.rendering.light import Light, brightness, expose, shadow_top
-from services.sim.rendering.wall import Image
-from services.sim.stdio import pybullet, quiet
-from services.sim.world import World
+from cogmap.schemas.array import Array
+from cogmap.schemas.sensing import Calibration, StereoFrame
+from cogmap.services.sim.rendering.light import Light, brightness, expose, shadow_top
+from cogmap.services.sim.rendering.wall import Image
+from cogmap.services.sim.stdio import pybullet, quiet
+from cogmap.services.sim.world import World
 
 NEAR_M = 0.2
 FAR_M = 400.0

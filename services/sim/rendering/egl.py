@@ -6,7 +6,7 @@ import importlib.util
 import threading
 
 from cogmap.errors import CogmapError
-from services.sim.stdio import pybullet, quiet
+from cogmap.services.sim.stdio import pybullet, quiet
 
 _ENTRY_POINT = "_eglRendererPlugin"
 

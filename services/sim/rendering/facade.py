@@ -8,9 +8,9 @@ import zlib
 
 import numpy as np
 
-from services.sim.layout.catalogue import BuildingType, Colour
-from services.sim.rendering.patterns import PAINT, STOREY_M
-from services.sim.rendering.wall import PX_PER_M, Image, Wall, roughen, shaded
+from cogmap.services.sim.layout.catalogue import BuildingType, Colour
+from cogmap.services.sim.rendering.patterns import PAINT, STOREY_M
+from cogmap.services.sim.rendering.wall import PX_PER_M, Image, Wall, roughen, shaded
 
 _GLASS: Colour = (58, 74, 96)
 _PLINTH_M = 0.5

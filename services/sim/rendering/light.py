@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Singles
-from services.sim.layout.plan import Rectangle
-from services.sim.rendering.wall import Image
+from cogmap.services.sim.layout.plan import Rectangle
+from cogmap.services.sim.rendering.wall import Image
 
 Box = tuple[Rectangle, float]
 

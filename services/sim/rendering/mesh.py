@@ -10,10 +10,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from services.sim.layout.catalogue import BuildingType
-from services.sim.layout.plan import Point, Rectangle
-from services.sim.rendering import facade
-from services.sim.rendering.wall import PX_PER_M, Image
+from cogmap.services.sim.layout.catalogue import BuildingType
+from cogmap.services.sim.layout.plan import Point, Rectangle
+from cogmap.services.sim.rendering import facade
+from cogmap.services.sim.rendering.wall import PX_PER_M, Image
 
 Vertex = tuple[float, float, float]
 UV = tuple[float, float]

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from services.sim.rendering.wall import Wall
+from cogmap.services.sim.rendering.wall import Wall
 
 STOREY_M = 3.0
 

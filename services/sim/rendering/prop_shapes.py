@@ -10,10 +10,10 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from services.sim.layout.catalogue import Colour
-from services.sim.layout.furniture import CHARGING_PLACE, Prop, Size
-from services.sim.rendering.mesh import UV, Mesh, Vertex
-from services.sim.rendering.wall import Image, roughen
+from cogmap.services.sim.layout.catalogue import Colour
+from cogmap.services.sim.layout.furniture import CHARGING_PLACE, Prop, Size
+from cogmap.services.sim.rendering.mesh import UV, Mesh, Vertex
+from cogmap.services.sim.rendering.wall import Image, roughen
 
 Colours = tuple[Colour, Colour]
 

@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 
 from cogmap.geometry.arrays import Floats, Singles
-from services.sim.layout.plan import PAVEMENT_WIDTH_M, Point, Road
-from services.sim.rendering.mesh import Mesh, Vertex
-from services.sim.rendering.wall import Image, plain, roughen
+from cogmap.services.sim.layout.plan import PAVEMENT_WIDTH_M, Point, Road
+from cogmap.services.sim.rendering.mesh import Mesh, Vertex
+from cogmap.services.sim.rendering.wall import Image, plain, roughen
 
 GROUND_M = 200.0
 GRASS_TILE_M = 8.0

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.geometry.arrays import Singles
-from services.sim.layout.catalogue import BuildingType, Colour
+from cogmap.services.sim.layout.catalogue import BuildingType, Colour
 
 PX_PER_M = 20
 GRAIN = ((1, 0.5), (4, 0.5), (12, 0.45), (40, 0.3))

@@ -11,11 +11,11 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from services.sim.layout.plan import Point
-from services.sim.rendering.mesh import Mesh
-from services.sim.rendering.wall import Image
-from services.sim.robot import upright_quaternion
-from services.sim.stdio import pybullet
+from cogmap.services.sim.layout.plan import Point
+from cogmap.services.sim.rendering.mesh import Mesh
+from cogmap.services.sim.rendering.wall import Image
+from cogmap.services.sim.robot import upright_quaternion
+from cogmap.services.sim.stdio import pybullet
 
 NOT_SOLID = -1
 HIDDEN_M = -1000.0

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from services.sim.layout.furniture import Prop
-from services.sim.layout.plan import Plot, Road
-from services.sim.rendering import mesh, prop_shapes, scenery
-from services.sim.scene.bodies import NOT_SOLID, Bodies
+from cogmap.services.sim.layout.furniture import Prop
+from cogmap.services.sim.layout.plan import Plot, Road
+from cogmap.services.sim.rendering import mesh, prop_shapes, scenery
+from cogmap.services.sim.scene.bodies import NOT_SOLID, Bodies
 
 
 class Builder:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cogmap.geometry.arrays import Floats
-from services.sim.layout.plan import Point
+from cogmap.services.sim.layout.plan import Point
 
 ADDED_M = 80.0
 HIDDEN_M = 95.0

@@ -7,15 +7,15 @@ from __future__ import annotations
 
 import msgspec
 
-from schemas.base import Message
-from schemas.sensing import Odometry, Pose, TrueTown
-from services.sim.config import Config
-from services.sim.layout import roadside
-from services.sim.odometry import WheelOdometry
-from services.sim.rendering.camera import StereoCamera, calibration
-from services.sim.scripted.follower import TURN_AS_M, LineFollower
-from services.sim.scripted.trajectory import Leg, Trajectory
-from services.sim.world import World
+from cogmap.schemas.base import Message
+from cogmap.schemas.sensing import Odometry, Pose, TrueTown
+from cogmap.services.sim.config import Config
+from cogmap.services.sim.layout import roadside
+from cogmap.services.sim.odometry import WheelOdometry
+from cogmap.services.sim.rendering.camera import StereoCamera, calibration
+from cogmap.services.sim.scripted.follower import TURN_AS_M, LineFollower
+from cogmap.services.sim.scripted.trajectory import Leg, Trajectory
+from cogmap.services.sim.world import World
 
 _ORIGIN = Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)
 

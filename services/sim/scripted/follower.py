@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from schemas.process import Clock
-from schemas.sensing import MotorCommand, Pose, TruePose
-from services.sim.scripted.trajectory import Leg, Line, Trajectory
+from cogmap.schemas.process import Clock
+from cogmap.schemas.sensing import MotorCommand, Pose, TruePose
+from cogmap.services.sim.scripted.trajectory import Leg, Line, Trajectory
 
 # A turn by a radian on the spot takes as long as this distance.
 TURN_AS_M = 1.0

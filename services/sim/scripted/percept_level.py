@@ -12,9 +12,9 @@ import numpy as np
 
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_to
-from schemas.array import Array
-from schemas.base import Message
-from schemas.sensing import (
+from cogmap.schemas.array import Array
+from cogmap.schemas.base import Message
+from cogmap.schemas.sensing import (
     Building,
     Percepts,
     Pose,
@@ -23,11 +23,11 @@ from schemas.sensing import (
     Street,
     TrueTown,
 )
-from services.sim.odometry import Noise
-from services.sim.scripted.follower import TURN_AS_M, LineFollower
-from services.sim.scripted.percepts import Landmark, PerceptErrors, PerceptSim
-from services.sim.scripted.places import PlaceSim
-from services.sim.scripted.trajectory import Leg, Trajectory
+from cogmap.services.sim.odometry import Noise
+from cogmap.services.sim.scripted.follower import TURN_AS_M, LineFollower
+from cogmap.services.sim.scripted.percepts import Landmark, PerceptErrors, PerceptSim
+from cogmap.services.sim.scripted.places import PlaceSim
+from cogmap.services.sim.scripted.trajectory import Leg, Trajectory
 
 ROAD_AHEAD_M = (0.0, 3.0, 6.0, 9.0)
 STREET_HALF_WIDTH_M = 12.0

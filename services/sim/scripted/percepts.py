@@ -16,8 +16,8 @@ import msgspec
 import numpy as np
 
 from cogmap.geometry.arrays import Floats
-from schemas.base import Name, PositiveMetres, PositiveRadians, PositiveShare, Share
-from schemas.sensing import Percept, Pose
+from cogmap.schemas.base import Name, PositiveMetres, PositiveRadians, PositiveShare, Share
+from cogmap.schemas.sensing import Percept, Pose
 
 Metres = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
 NORMAL_MEDIAN = 0.6745

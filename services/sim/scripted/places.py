@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.geometry.arrays import Floats
-from schemas.sensing import PlaceMatch, Pose
-from services.sim.scripted.percepts import PerceptErrors
+from cogmap.schemas.sensing import PlaceMatch, Pose
+from cogmap.services.sim.scripted.percepts import PerceptErrors
 
 MAX_APART_M = 3.0
 MAX_TURN_RAD = 0.35

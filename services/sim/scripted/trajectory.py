@@ -11,9 +11,9 @@ import numpy as np
 
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.polylines import distances_along, nearest_on_line
-from schemas.base import PositiveSpeed
-from schemas.sensing import Pose
-from services.sim.scripted.percepts import Landmark, Metres
+from cogmap.schemas.base import PositiveSpeed
+from cogmap.schemas.sensing import Pose
+from cogmap.services.sim.scripted.percepts import Landmark, Metres
 
 Leg = tuple[float, float]
 SAME_POINT_M = 1e-6

@@ -12,11 +12,11 @@ import msgspec
 
 from cogmap.graph import decay
 from cogmap.graph.graph import Graph
-from schemas.cognition import Broadcast, Coalition
-from schemas.feelings import Feeling
-from schemas.graph import Operation
-from schemas.nodes import KINDS, AnyNode, Attention, attention_id
-from services.workspace.config import Config
+from cogmap.schemas.cognition import Broadcast, Coalition
+from cogmap.schemas.feelings import Feeling
+from cogmap.schemas.graph import Operation
+from cogmap.schemas.nodes import KINDS, AnyNode, Attention, attention_id
+from cogmap.services.workspace.config import Config
 
 # The sigmoid rises as fast as the line in its middle.
 STEEPNESS = 4.0

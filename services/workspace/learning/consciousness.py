@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from schemas.cognition import Broadcast, Competition
+from cogmap.schemas.cognition import Broadcast, Competition
 
 
 class Consciousness:

@@ -7,8 +7,8 @@ from cogmap.bus.interface import Member
 from cogmap.runtime.delivery.publisher import MAX_CAUSES
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
-from schemas import topics
-from schemas.sensing import MotorCommand, Odometry
+from cogmap.schemas import topics
+from cogmap.schemas.sensing import MotorCommand, Odometry
 from tests.support.logs import odometry
 from tests.support.system.networks import Network, Peer, meet, next_health, publish, spin_until
 

@@ -13,10 +13,10 @@ from cogmap.bus.codec import Envelope, decode, encode
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
 from cogmap.runtime.state.published import PublishedCounts
-from schemas import topics
-from schemas.base import Message
-from schemas.process import Clock
-from schemas.topics import Delivery, Topic
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.process import Clock
+from cogmap.schemas.topics import Delivery, Topic
 from tests.support.damage import damaged, golden
 from tests.support.logs import odometry
 from tests.support.system.networks import Network, Peer, envelope_of, meet, publish, spin_until

@@ -5,9 +5,9 @@ from __future__ import annotations
 from cogmap.bus.interface import Member
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
-from schemas import topics
-from schemas.process import Presence
-from schemas.sensing import Odometry
+from cogmap.schemas import topics
+from cogmap.schemas.process import Presence
+from cogmap.schemas.sensing import Odometry
 from tests.support.logs import odometry
 from tests.support.system.networks import Network, spin_until
 

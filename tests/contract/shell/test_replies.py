@@ -10,9 +10,9 @@ from cogmap.bus.codec import decode, encode
 from cogmap.errors import MessageError, NoAnswerError
 from cogmap.runtime.module import Module, Reply
 from cogmap.runtime.shell import Shell
-from schemas import topics
-from schemas.graph import Decay, Snapshot, SnapshotRequest
-from schemas.sensing import MotorCommand, Odometry
+from cogmap.schemas import topics
+from cogmap.schemas.graph import Decay, Snapshot, SnapshotRequest
+from cogmap.schemas.sensing import MotorCommand, Odometry
 from tests.support.logs import odometry
 from tests.support.system.networks import (
     TIMEOUT_S,

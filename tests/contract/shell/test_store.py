@@ -12,10 +12,10 @@ from cogmap.runtime.shell import Shell
 from cogmap.runtime.state.database import Database
 from cogmap.runtime.state.record import Record
 from cogmap.runtime.state.store import Store
-from schemas import topics
-from schemas.examples import memory
-from schemas.memory import Restored, Stored, StoredRecord
-from schemas.sensing import Odometry
+from cogmap.schemas import topics
+from cogmap.schemas.examples import memory
+from cogmap.schemas.memory import Restored, Stored, StoredRecord
+from cogmap.schemas.sensing import Odometry
 from tests.support.logs import odometry
 from tests.support.system.networks import Network, Peer, meet, publish, spin_until
 

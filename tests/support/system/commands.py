@@ -8,7 +8,7 @@ from typing import Any
 
 from click.testing import CliRunner, Result
 
-from cli.main import cogmap
+from cogmap.cli.main import cogmap
 
 
 def log_command(*arguments: str | Path, code: int = 0) -> Result:

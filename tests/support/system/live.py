@@ -10,12 +10,12 @@ from cogmap.errors import NoAnswerError
 from cogmap.graph.graph import Graph
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
-from schemas import topics
-from schemas.array import Array
-from schemas.base import Message
-from schemas.graph import Delta, Snapshot, SnapshotRequest
-from schemas.process import Clock, Health
-from schemas.sensing import MotorCommand, Percept, Percepts, SelfMotion
+from cogmap.schemas import topics
+from cogmap.schemas.array import Array
+from cogmap.schemas.base import Message
+from cogmap.schemas.graph import Delta, Snapshot, SnapshotRequest
+from cogmap.schemas.process import Clock, Health
+from cogmap.schemas.sensing import MotorCommand, Percept, Percepts, SelfMotion
 from tests.support.system.processes import wait_until
 
 PERIOD_NS = 100_000_000

@@ -19,10 +19,10 @@ from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.errors import MessageError
 from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.shell import Shell
-from schemas import topics
-from schemas.base import Message
-from schemas.process import Health
-from schemas.topics import Topic
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.process import Health
+from cogmap.schemas.topics import Topic
 
 TIMEOUT_S = 20.0
 INCARNATION = 1

@@ -44,7 +44,7 @@ class Process:
         self._log = log
         with log.open("ab") as output:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "cli.main", *arguments],
+                [sys.executable, "-m", "cogmap.cli.main", *arguments],
                 stdin=subprocess.PIPE,
                 stdout=output,
                 stderr=output,

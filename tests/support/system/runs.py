@@ -15,7 +15,7 @@ from typing import Any
 from cogmap.bus.session import free_endpoint
 from tests.support.system import processes
 
-COGMAP = [sys.executable, "-m", "cli.main"]
+COGMAP = [sys.executable, "-m", "cogmap.cli.main"]
 TIMEOUT_S = 90.0
 DRIVING = "path integration alone"
 # What the command lines of those that are no modules have in them.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from schemas.cognition import Behaviour, Behaviours, Rejection
+from cogmap.schemas.cognition import Behaviour, Behaviours, Rejection
 
 
 def behaviour(scheme: str, activation: float = 1.0, **facts: Any) -> Behaviour:

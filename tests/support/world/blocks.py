@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from schemas.sensing import Calibration
+from cogmap.schemas.sensing import Calibration
 
 CAMERA = Calibration(
     width_px=320,

@@ -5,9 +5,16 @@ from __future__ import annotations
 import cmath
 from typing import Any
 
-from schemas.base import Scalar
-from schemas.cognition import Action, ActionName, Broadcast, Coalition, GuidanceScheme, Relation
-from schemas.nodes import Object, Self, object_id
+from cogmap.schemas.base import Scalar
+from cogmap.schemas.cognition import (
+    Action,
+    ActionName,
+    Broadcast,
+    Coalition,
+    GuidanceScheme,
+    Relation,
+)
+from cogmap.schemas.nodes import Object, Self, object_id
 from tests.support.world.scenes import PERIOD_NS, agent
 
 TOWN_M = {"bakery": 20 + 5j, "school": 25 - 8j, "library": 40 + 2j, "museum": 60 - 6j}

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from schemas.array import Array
-from schemas.graph import Operation
-from schemas.nodes import Object, Self
-from services.codelets.config import Config
+from cogmap.schemas.array import Array
+from cogmap.schemas.graph import Operation
+from cogmap.schemas.nodes import Object, Self
+from cogmap.services.codelets.config import Config
 from tests.support.world.scenes import graph_of, landmark, run, task
 
 EXACT = Config(samples=4000, kept_samples=2000, outlier_share=1e-9, correlated_views=1.0)

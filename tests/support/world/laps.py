@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.geometry.se2 import integrate
-from services.codelets.correction.pose_graph import Constraints, PoseGraph
+from cogmap.services.codelets.correction.pose_graph import Constraints, PoseGraph
 
 SIDE = 20
 LAP = 4 * SIDE

@@ -7,8 +7,8 @@ import math
 import msgspec
 import numpy as np
 
-from schemas.sensing import Percept, Percepts, PlaceMatch
-from services.codelets.module import Config as WorkerConfig
+from cogmap.schemas.sensing import Percept, Percepts, PlaceMatch
+from cogmap.services.codelets.module import Config as WorkerConfig
 from tests.support.world.scenes import Desk, Rows, motion, percept, percepts, stamp_ns
 
 STEP_M = 2.0

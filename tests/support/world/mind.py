@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from schemas.base import Message
-from schemas.codelets import Offer
-from schemas.cognition import Broadcast, Coalition, Competition, Trigger
-from schemas.graph import Delta, Operation, Phase
-from schemas.memory import (
+from cogmap.schemas.base import Message
+from cogmap.schemas.codelets import Offer
+from cogmap.schemas.cognition import Broadcast, Coalition, Competition, Trigger
+from cogmap.schemas.graph import Delta, Operation, Phase
+from cogmap.schemas.memory import (
     Restored,
     Stored,
     StoredEpisode,
     StoredRecord,
 )
-from schemas.nodes import (
+from cogmap.schemas.nodes import (
     ROOT_MAP,
     AnyNode,
     Episode,
@@ -23,9 +23,9 @@ from schemas.nodes import (
     Object,
     object_id,
 )
-from services.memory.episodic.config import EpisodicConfig
-from services.memory.module import Config, build
-from services.memory.sparse.config import SparseConfig
+from cogmap.services.memory.episodic.config import EpisodicConfig
+from cogmap.services.memory.module import Config, build
+from cogmap.services.memory.sparse.config import SparseConfig
 from tests.support.messages import of_type
 from tests.support.world.scenes import agent
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.runtime.module import Module
-from schemas.array import Array
-from schemas.base import Message
-from schemas.cognition import Action, ActionName, Competition, Trigger
-from schemas.graph import Delta, Phase
-from schemas.sensing import MotorCommand, RangeScan, SelfMotion
-from services.motor.module import Config, build
+from cogmap.schemas.array import Array
+from cogmap.schemas.base import Message
+from cogmap.schemas.cognition import Action, ActionName, Competition, Trigger
+from cogmap.schemas.graph import Delta, Phase
+from cogmap.schemas.sensing import MotorCommand, RangeScan, SelfMotion
+from cogmap.services.motor.module import Config, build
 from tests.support.messages import of_type
 from tests.support.world.plans import Point, joined, plan_along
 from tests.support.world.scenes import agent

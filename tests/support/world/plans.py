@@ -7,9 +7,9 @@ import numpy.typing as npt
 
 from cogmap.geometry.polylines import distances_along, points_at
 from cogmap.runtime.module import Module
-from schemas.array import Matrix
-from schemas.graph import Operation
-from schemas.nodes import PLAN_ID, Plan, PlanState
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.graph import Operation
+from cogmap.schemas.nodes import PLAN_ID, Plan, PlanState
 
 Floats = npt.NDArray[np.float64]
 Point = tuple[float, float]

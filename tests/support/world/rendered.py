@@ -5,11 +5,11 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 
-from schemas.array import Array
-from schemas.sensing import Calibration, View
-from services.sensory.disparity import DepthFromStereo
-from services.sensory.rectify import rectification
-from training.rendering.towns import Views
+from cogmap.schemas.array import Array
+from cogmap.schemas.sensing import Calibration, View
+from cogmap.services.sensory.disparity import DepthFromStereo
+from cogmap.services.sensory.rectify import rectification
+from cogmap.training.rendering.towns import Views
 
 PERIOD_NS = 200_000_000
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer
-from schemas.codelets import Task
-from schemas.nodes import (
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.nodes import (
     PLAN_ID,
     Goal,
     Plan,
     goal_id,
 )
-from services.codelets.planning.config import Config
-from services.codelets.planning.route_plan import run
+from cogmap.services.codelets.planning.config import Config
+from cogmap.services.codelets.planning.route_plan import run
 
 STAMP_NS = 7_000_000_000
 

@@ -13,18 +13,18 @@ from cogmap.bus.codec import decode, encode
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, ConfiguredCodelet
 from cogmap.runtime.module import Module
-from schemas import topics
-from schemas.array import Array, Matrix
-from schemas.base import Message
-from schemas.codelets import Assignment, Leases, Proposal, Task
-from schemas.graph import Delta, Operation, Phase, Snapshot, SnapshotRequest
-from schemas.nodes import ROOT_MAP, SELF_ID, Map, Node, Object, Self, object_id
-from schemas.process import Clock, Presence
-from schemas.sensing import Percept, Percepts, SelfMotion
-from services.codelets.module import Config as WorkerConfig
-from services.codelets.module import build as build_worker
-from services.codelets.table import CODELETS
-from services.workspace.module import Config, build
+from cogmap.schemas import topics
+from cogmap.schemas.array import Array, Matrix
+from cogmap.schemas.base import Message
+from cogmap.schemas.codelets import Assignment, Leases, Proposal, Task
+from cogmap.schemas.graph import Delta, Operation, Phase, Snapshot, SnapshotRequest
+from cogmap.schemas.nodes import ROOT_MAP, SELF_ID, Map, Node, Object, Self, object_id
+from cogmap.schemas.process import Clock, Presence
+from cogmap.schemas.sensing import Percept, Percepts, SelfMotion
+from cogmap.services.codelets.module import Config as WorkerConfig
+from cogmap.services.codelets.module import build as build_worker
+from cogmap.services.codelets.table import CODELETS
+from cogmap.services.workspace.module import Config, build
 
 PERIOD_NS = 200_000_000
 Rows = Sequence[Sequence[float]]

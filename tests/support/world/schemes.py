@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from schemas.nodes import GraphNode, Node
-from services.procedural.loading import load
-from services.procedural.patterns import Active
-from services.procedural.schemes import Scheme
+from cogmap.schemas.nodes import GraphNode, Node
+from cogmap.services.procedural.loading import load
+from cogmap.services.procedural.patterns import Active
+from cogmap.services.procedural.schemes import Scheme
 
 HEADER = 'generic_kinds = ["sign", "door"]\n'
 FOLLOW = """

@@ -11,10 +11,10 @@ import numpy.typing as npt
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.geometry.se2 import transform_to
 from cogmap.graph.graph import Graph
-from schemas.array import Array
-from schemas.codelets import Task
-from schemas.nodes import Self
-from services.codelets.config import Config
+from cogmap.schemas.array import Array
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.nodes import Self
+from cogmap.services.codelets.config import Config
 from tests.support.world.scenes import agent, run, task
 
 HALF_VIEW_RAD = math.radians(37)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.graph.graph import Graph
-from schemas.array import Array
-from schemas.graph import Cells, Operation
-from schemas.nodes import ROOT_MAP, Map, PlaceColumn
+from cogmap.schemas.array import Array
+from cogmap.schemas.graph import Cells, Operation
+from cogmap.schemas.nodes import ROOT_MAP, Map, PlaceColumn
 from tests.support.world.scenes import agent
 
 SOUTH = (0, 60, -3, 3)

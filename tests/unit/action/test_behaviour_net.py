@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from schemas.cognition import Behaviour
-from services.action.behaviour_net import BehaviourNet
-from services.action.config import Config
+from cogmap.schemas.cognition import Behaviour
+from cogmap.services.action.behaviour_net import BehaviourNet
+from cogmap.services.action.config import Config
 from tests.support.world.behaviours import behaviour, lacking
 
 CONFIG = Config()

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from cogmap.runtime.module import Module
-from schemas.cognition import Action
-from services.action.module import Config, build
+from cogmap.schemas.cognition import Action
+from cogmap.services.action.module import Config, build
 from tests.support.world.behaviours import behaviour, behaviours_of, lacking
 
 FOLLOW = behaviour("follow", 1.0, action="follow_plan", parameters={"x_m": 2.0})

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from schemas.cognition import Behaviour, Rejection
-from services.action.selection import ActionSelection, MostActive, Selection
+from cogmap.schemas.cognition import Behaviour, Rejection
+from cogmap.services.action.selection import ActionSelection, MostActive, Selection
 from tests.support.world.behaviours import behaviour, lacking
 
 

@@ -6,7 +6,7 @@ from collections import Counter
 
 from benchmarks.cognition.life import Life
 from benchmarks.cognition.random_actions import RandomActions
-from schemas.cognition import ActionName, Behaviour, Behaviours, Rejection
+from cogmap.schemas.cognition import ActionName, Behaviour, Behaviours, Rejection
 
 SEEK = Behaviour(
     scheme="satisfy_need", activation=1.0, action=ActionName.SEEK, parameters={"need": "energy"}

@@ -24,11 +24,11 @@ from benchmarks.threshold import Threshold, at_least, at_most, more_than, within
 from cogmap.bus.codec import encode
 from cogmap.errors import UsageError
 from cogmap.parallel import parallel_map
-from schemas.examples import example_messages
-from schemas.graph import Links
-from schemas.nodes import GraphNode
-from schemas.process import Health
-from services.workspace.commit import Ledger
+from cogmap.schemas.examples import example_messages
+from cogmap.schemas.graph import Links
+from cogmap.schemas.nodes import GraphNode
+from cogmap.schemas.process import Health
+from cogmap.services.workspace.commit import Ledger
 
 
 def test_the_thresholds_are_those_of_the_keys_promised() -> None:

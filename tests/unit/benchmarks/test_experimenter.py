@@ -9,12 +9,12 @@ import numpy as np
 from benchmarks.explore.drivable import Drivable
 from benchmarks.explore.experimenter import MAX_DRAWS, Experimenter
 from benchmarks.explore.trials import closed_as
-from schemas.array import Array, Matrix
-from schemas.base import Message
-from schemas.codelets import Offer
-from schemas.graph import DropNode, Operation
-from schemas.nodes import PLAN_ID, ROOT_MAP, Goal, Map, Plan, PlanState
-from schemas.sensing import Pose, Street, StreetClosure, TruePose, TrueTown
+from cogmap.schemas.array import Array, Matrix
+from cogmap.schemas.base import Message
+from cogmap.schemas.codelets import Offer
+from cogmap.schemas.graph import DropNode, Operation
+from cogmap.schemas.nodes import PLAN_ID, ROOT_MAP, Goal, Map, Plan, PlanState
+from cogmap.schemas.sensing import Pose, Street, StreetClosure, TruePose, TrueTown
 
 EVERY_S = 1_000_000_000
 KERB = np.array([[0.0, -4.0, 100.0, -4.0]], np.float32)

@@ -22,10 +22,10 @@ from benchmarks.explore.trials import (
     street_to_close,
 )
 from cogmap.graph.graph import Graph
-from schemas.array import Array
-from schemas.graph import Cells
-from schemas.nodes import ROOT_MAP, Map, PlaceColumn
-from schemas.sensing import Street, TrueTown
+from cogmap.schemas.array import Array
+from cogmap.schemas.graph import Cells
+from cogmap.schemas.nodes import ROOT_MAP, Map, PlaceColumn
+from cogmap.schemas.sensing import Street, TrueTown
 
 ORIGIN = np.zeros(3)
 CORNERS = ((0.0, 0.0), (60.0, 0.0), (60.0, 40.0), (0.0, 40.0))

@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 
 from benchmarks.cognition.guided import STOOD_S, Driven, Route
-from schemas.sensing import Pose, TruePose
+from cogmap.schemas.sensing import Pose, TruePose
 
 GOOD = Route(
     length_m=120.0,

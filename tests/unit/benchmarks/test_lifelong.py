@@ -8,11 +8,11 @@ import numpy as np
 
 from benchmarks.lifelong.courier import LEG_NS, STOPS, Courier
 from benchmarks.lifelong.measure import SPAN, Mark, Meter, measure
-from schemas.array import Array
-from schemas.base import Message
-from schemas.codelets import Offer
-from schemas.nodes import ROOT_MAP, Goal, Map
-from schemas.sensing import Pose, Street, TruePose, TrueTown
+from cogmap.schemas.array import Array
+from cogmap.schemas.base import Message
+from cogmap.schemas.codelets import Offer
+from cogmap.schemas.nodes import ROOT_MAP, Goal, Map
+from cogmap.schemas.sensing import Pose, Street, TruePose, TrueTown
 
 
 def _town() -> TrueTown:

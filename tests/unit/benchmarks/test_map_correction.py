@@ -14,8 +14,12 @@ from benchmarks.map_correction.measure import measure, read_graph
 from benchmarks.trajectory import trajectory_error_m
 from cogmap.errors import UsageError
 from cogmap.geometry.se2 import compose, integrate, relative
-from services.codelets.correction.pose_graph import cost
-from services.codelets.correction.reverse_replay import close_loops, displacements, position_cost
+from cogmap.services.codelets.correction.pose_graph import cost
+from cogmap.services.codelets.correction.reverse_replay import (
+    close_loops,
+    displacements,
+    position_cost,
+)
 from tests.support.world.laps import laps
 
 SQUARE = """VERTEX_SE2 0 0 0 0

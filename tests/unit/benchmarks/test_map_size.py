@@ -6,7 +6,7 @@ from benchmarks.map_size import cycles
 from benchmarks.map_size.join import join, replica_memory_mb
 from benchmarks.map_size.maps import Size, cognitive_map
 from cogmap.graph.graph import Graph
-from schemas.nodes import TILE_SIDE, LinkKind, Object, PlaceColumn
+from cogmap.schemas.nodes import TILE_SIDE, LinkKind, Object, PlaceColumn
 
 TINY = Size(objects=5, places=2_000)
 

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from cli.architecture import architecture, diagram, renewed, topic_table
+from cogmap.cli.architecture import architecture, diagram, renewed, topic_table
 from cogmap.errors import CogmapError, UsageError
 from cogmap.runtime.module import Module
-from schemas import topics
-from schemas.topics import Scope
+from cogmap.schemas import topics
+from cogmap.schemas.topics import Scope
 
 PAGE = Path(__file__).parents[3] / "docs" / "architecture.md"
 

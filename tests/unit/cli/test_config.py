@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
-from cli.config import commented_toml, file_schema, print_config
-from cli.launch.plan import Choices, awaited, effective
-from services import registry
+from cogmap.cli.config import commented_toml, file_schema, print_config
+from cogmap.cli.launch.plan import Choices, awaited, effective
+from cogmap.services import registry
 
 TICKS_PER_CYCLE = 40
 CYCLES_PER_S = 5

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import yaml
 
-from services import registry
+from cogmap.services import registry
 
 ROOT = Path(__file__).parents[3]
 

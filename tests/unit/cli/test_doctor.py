@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from cli.doctor import installation
-from cli.doctor.system import Observed, examine
 from cogmap.bus.discovery import Process, Role, System, Use
 from cogmap.bus.interface import Member
-from schemas import topics
-from schemas.process import Health
-from schemas.topics import Topic
+from cogmap.cli.doctor import installation
+from cogmap.cli.doctor.system import Observed, examine
+from cogmap.schemas import topics
+from cogmap.schemas.process import Health
+from cogmap.schemas.topics import Topic
 
 SENSORY = Member("sensory", "sensory")
 

@@ -10,8 +10,8 @@ import pytest
 from click import UsageError as ClickUsageError
 from click.testing import CliRunner
 
-from cli.launch.plan import LOG_NAME
-from cli.main import cogmap
+from cogmap.cli.launch.plan import LOG_NAME
+from cogmap.cli.main import cogmap
 from cogmap.errors import LogError, UsageError
 from tests.support.cycles import Cycles
 from tests.support.logs import write_log

@@ -6,12 +6,12 @@ from pathlib import Path
 
 from msgspec import structs
 
-from cli.explain import choice
-from cli.explain.moment import Moment, moment
+from cogmap.cli.explain import choice
+from cogmap.cli.explain.moment import Moment, moment
 from cogmap.recording.log import open_log
-from schemas.base import Message
-from schemas.graph import Phase
-from services.global_workspace.config import Config
+from cogmap.schemas.base import Message
+from cogmap.schemas.graph import Phase
+from cogmap.services.global_workspace.config import Config
 from tests.support.cycles import CYCLE_NS, MS_NS, Cycles, action, command, delta
 from tests.support.logs import Row, write_log
 from tests.support.reference import REFERENCE

@@ -11,18 +11,18 @@ import pytest
 from click.testing import CliRunner
 from msgspec import structs
 
-from cli.explain import choice
-from cli.explain.moment import Moment, moment
-from cli.main import cogmap
-from cli.plots.moment import deciding, lettering, sensing
-from cli.plots.moment.blocks import Bar, Words
-from cli.plots.moment.box import MOST, Box, inner_in
-from cli.plots.moment.figure import figure
-from cli.plots.moment.robot import Robot
-from cli.plots.palette import ESTIMATE, PLAN
+from cogmap.cli.explain import choice
+from cogmap.cli.explain.moment import Moment, moment
+from cogmap.cli.main import cogmap
+from cogmap.cli.plots.moment import deciding, lettering, sensing
+from cogmap.cli.plots.moment.blocks import Bar, Words
+from cogmap.cli.plots.moment.box import MOST, Box, inner_in
+from cogmap.cli.plots.moment.figure import figure
+from cogmap.cli.plots.moment.robot import Robot
+from cogmap.cli.plots.palette import ESTIMATE, PLAN
 from cogmap.errors import LogError
 from cogmap.recording.log import open_log
-from schemas.array import Array
+from cogmap.schemas.array import Array
 from tests.support.cycles import Cycles, percepts
 from tests.support.logs import write_log
 from tests.support.reference import REFERENCE

@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 from msgspec import structs
 
-from cli.explain import choice, names, reasons, text
-from cli.explain.moment import Moment, moment
+from cogmap.cli.explain import choice, names, reasons, text
+from cogmap.cli.explain.moment import Moment, moment
 from cogmap.recording.log import open_log
-from schemas.cognition import Behaviour, Rejection
-from schemas.feelings import Feeling
-from schemas.graph import Phase
-from schemas.nodes import (
+from cogmap.schemas.cognition import Behaviour, Rejection
+from cogmap.schemas.feelings import Feeling
+from cogmap.schemas.graph import Phase
+from cogmap.schemas.nodes import (
     PLAN_ID,
     ROOT_MAP,
     Episode,
@@ -29,8 +29,8 @@ from schemas.nodes import (
     goal_id,
     map_id,
 )
-from schemas.sensing import MotorCommand, SpeedLimit
-from services.global_workspace.config import Config
+from cogmap.schemas.sensing import MotorCommand, SpeedLimit
+from cogmap.services.global_workspace.config import Config
 from tests.support.cycles import AGENT, Cycles, action, coalition, delta, percept
 from tests.support.logs import write_log
 

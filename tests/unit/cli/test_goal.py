@@ -8,9 +8,9 @@ import msgspec
 import pytest
 from click.testing import CliRunner
 
-from cli.goal import goal, parsed, plan_json, plan_text, read_goals
+from cogmap.cli.goal import goal, parsed, plan_json, plan_text, read_goals
 from cogmap.errors import UsageError
-from schemas.nodes import PLAN_ID, Object, Plan, PlanState, goal_id, object_id
+from cogmap.schemas.nodes import PLAN_ID, Object, Plan, PlanState, goal_id, object_id
 from tests.support.world.scenes import graph_of
 
 

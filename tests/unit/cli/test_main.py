@@ -9,7 +9,7 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from cli.main import COMMANDS, cogmap
+from cogmap.cli.main import COMMANDS, cogmap
 from cogmap.recording.storage.format import SOFTWARE
 
 HEAVY = {"matplotlib", "cv2", "pybullet", "scipy"}
@@ -24,7 +24,7 @@ def test_version_is_the_one_that_logs_name_too() -> None:
 def test_help_lists_every_command_and_imports_none_of_them() -> None:
     script = (
         "import sys\n"
-        "from cli.main import cogmap\n"
+        "from cogmap.cli.main import cogmap\n"
         "cogmap(['--help'], standalone_mode=False)\n"
         "print(*sys.modules, file=sys.stderr)\n"
     )

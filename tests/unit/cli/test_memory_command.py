@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from cli.main import cogmap, main
+from cogmap.cli.main import cogmap, main
 from cogmap.errors import StorageError
 from cogmap.runtime.state.database import Database
 from cogmap.runtime.state.record import Record, digest_of

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from cli.launch.plan import Choices, awaited, effective
-from cli.run.checks import check_inputs
+from cogmap.cli.launch.plan import Choices, awaited, effective
+from cogmap.cli.run.checks import check_inputs
 from cogmap.errors import CogmapError, ConfigError, StorageError
 from cogmap.runtime.state.database import Database
 from tests.support.world.schemes import FOLLOW, HEADER, written

@@ -5,10 +5,10 @@ from __future__ import annotations
 import click
 import pytest
 
-from cli.launch.plan import Choices
-from cli.options import FiniteRange
-from cli.run.command import LAP_LIMIT_S, default_limit_s
-from schemas.nodes import Goal
+from cogmap.cli.launch.plan import Choices
+from cogmap.cli.options import FiniteRange
+from cogmap.cli.run.command import LAP_LIMIT_S, default_limit_s
+from cogmap.schemas.nodes import Goal
 
 
 def test_the_time_limit_grows_with_the_laps_and_is_one_laps_at_least() -> None:

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from cli.main import cogmap
+from cogmap.cli.main import cogmap
 from cogmap.errors import LogError, StorageError
-from schemas.cognition import Behaviours, GuidanceScheme
-from services.procedural.loading import load_guidance
+from cogmap.schemas.cognition import Behaviours, GuidanceScheme
+from cogmap.services.procedural.loading import load_guidance
 from tests.support.logs import SECOND_NS, write_log
 from tests.support.world.guidance import guidance
 

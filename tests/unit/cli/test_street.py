@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from cli.street import is_as_asked
-from schemas.sensing import Street, StreetClosure, TrueTown
+from cogmap.cli.street import is_as_asked
+from cogmap.schemas.sensing import Street, StreetClosure, TrueTown
 
 
 def _town(*closed: str) -> TrueTown:

@@ -8,8 +8,8 @@ import pytest
 
 from cogmap.errors import ConfigError
 from cogmap.runtime.codelet import ENTRY_POINTS
-from services.codelets import table
-from services.codelets.sections import SECTIONS
+from cogmap.services.codelets import table
+from cogmap.services.codelets.sections import SECTIONS
 
 
 def _installed(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
@@ -41,7 +41,7 @@ def test_an_entry_point_that_is_no_codelet_is_refused(monkeypatch: pytest.Monkey
 
 
 def test_two_codelets_of_one_name_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    _installed(monkeypatch, "services.codelets.mapping.path:CODELET")
+    _installed(monkeypatch, "cogmap.services.codelets.mapping.path:CODELET")
 
     with pytest.raises(ConfigError, match="there is a codelet 'path'"):
         table.all_codelets()

@@ -10,11 +10,11 @@ from cogmap.bus.codec import encode
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, ConfiguredCodelet
 from cogmap.runtime.module import Module
-from schemas.array import Array, Matrix
-from schemas.base import Message
-from schemas.codelets import Assignment, Leases, Proposal, Task
-from schemas.graph import Cells, Delta, Link, Phase
-from schemas.nodes import (
+from cogmap.schemas.array import Array, Matrix
+from cogmap.schemas.base import Message
+from cogmap.schemas.codelets import Assignment, Leases, Proposal, Task
+from cogmap.schemas.graph import Cells, Delta, Link, Phase
+from cogmap.schemas.nodes import (
     CORRECTION_ID,
     RECOLLECTION_ID,
     Correction,
@@ -29,10 +29,10 @@ from schemas.nodes import (
     goal_id,
     need_id,
 )
-from schemas.sensing import PlaceMatch
-from services.codelets.config import Config
-from services.codelets.module import build
-from services.codelets.table import CODELETS
+from cogmap.schemas.sensing import PlaceMatch
+from cogmap.services.codelets.config import Config
+from cogmap.services.codelets.module import build
+from cogmap.services.codelets.table import CODELETS
 from tests.support.messages import of_type
 from tests.support.world.scenes import (
     agent,

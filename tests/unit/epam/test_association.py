@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from cogmap.errors import MessageError
-from schemas.cognition import Broadcast, Coalition, Trigger
-from schemas.feelings import Feeling
-from schemas.nodes import Object, category_id, object_id
-from schemas.sensing import Associations
-from services.epam.association.graph import MAX_NODES, AssociativeGraph
-from services.epam.association.memory import Primer, nodes_of
-from services.epam.association.prior import Prior
-from services.epam.config import Priming
+from cogmap.schemas.cognition import Broadcast, Coalition, Trigger
+from cogmap.schemas.feelings import Feeling
+from cogmap.schemas.nodes import Object, category_id, object_id
+from cogmap.schemas.sensing import Associations
+from cogmap.services.epam.association.graph import MAX_NODES, AssociativeGraph
+from cogmap.services.epam.association.memory import Primer, nodes_of
+from cogmap.services.epam.association.prior import Prior
+from cogmap.services.epam.config import Priming
 
 SECOND_NS = 1_000_000_000
 CONFIG = Priming()

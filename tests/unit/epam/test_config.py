@@ -5,8 +5,8 @@ from __future__ import annotations
 import msgspec
 import pytest
 
-from services.epam.config import Config
-from services.epam.places.recognizer import PlaceConfig
+from cogmap.services.epam.config import Config
+from cogmap.services.epam.places.recognizer import PlaceConfig
 
 BOUNDED = [
     "base_level",

@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from services.epam.recognition.crop import CHANNELS, SIDE_PX, colours, crop, surroundings
-from services.epam.recognition.segments import Segment
+from cogmap.services.epam.recognition.crop import CHANNELS, SIDE_PX, colours, crop, surroundings
+from cogmap.services.epam.recognition.segments import Segment
 from tests.support.world.blocks import CAMERA, painted
 
 SIZE = (240, 320)

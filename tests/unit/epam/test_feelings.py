@@ -5,13 +5,13 @@ from __future__ import annotations
 import msgspec
 import pytest
 
-from schemas.cognition import Broadcast, Coalition, Trigger
-from schemas.feelings import Feeling, salience_of
-from schemas.nodes import Object, feeling_id, object_id
-from schemas.sensing import Associations
-from services.epam.association.graph import MAX_NODES, AssociativeGraph
-from services.epam.association.memory import BEHIND, Primer
-from services.epam.config import Priming
+from cogmap.schemas.cognition import Broadcast, Coalition, Trigger
+from cogmap.schemas.feelings import Feeling, salience_of
+from cogmap.schemas.nodes import Object, feeling_id, object_id
+from cogmap.schemas.sensing import Associations
+from cogmap.services.epam.association.graph import MAX_NODES, AssociativeGraph
+from cogmap.services.epam.association.memory import BEHIND, Primer
+from cogmap.services.epam.config import Priming
 from tests.support.world.scenes import percept
 
 SECOND_NS = 1_000_000_000

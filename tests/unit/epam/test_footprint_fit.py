@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from services.epam.layout.footprint_fit import ObjectPose, Silhouette, locate
+from cogmap.services.epam.layout.footprint_fit import ObjectPose, Silhouette, locate
 from tests.support.world.blocks import CAMERA, Block
 
 SIDES_M = (12.0, 8.0)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 
-from schemas.nodes import FUNCTIONS
-from services.epam.recognition.functions import LABELS_OF, function_of
-from services.epam.recognition.objects import DEFAULT_PATH
+from cogmap.schemas.nodes import FUNCTIONS
+from cogmap.services.epam.recognition.functions import LABELS_OF, function_of
+from cogmap.services.epam.recognition.objects import DEFAULT_PATH
 
 
 def test_everything_that_was_trained_has_a_function() -> None:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from services.epam.layout.ground import CELL_M, MAX_RANGE_M, project
-from services.epam.layout.ground_plane import fit
+from cogmap.services.epam.layout.ground import CELL_M, MAX_RANGE_M, project
+from cogmap.services.epam.layout.ground_plane import fit
 from tests.support.world.blocks import CAMERA, Block, painted
 
 HALF_M = 4.0

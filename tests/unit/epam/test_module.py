@@ -15,18 +15,18 @@ from cogmap.bus import codec
 from cogmap.errors import ConfigError, MessageError
 from cogmap.runtime.module import Module
 from cogmap.runtime.state.journal import Journal
-from schemas import topics
-from schemas.array import Array
-from schemas.base import Message
-from schemas.cognition import Broadcast, Coalition, Competition, Trigger
-from schemas.feelings import Feeling
-from schemas.nodes import Object, object_id
-from schemas.sensing import Learned, Percepts, View
-from services.epam.module import Config, build
+from cogmap.schemas import topics
+from cogmap.schemas.array import Array
+from cogmap.schemas.base import Message
+from cogmap.schemas.cognition import Broadcast, Coalition, Competition, Trigger
+from cogmap.schemas.feelings import Feeling
+from cogmap.schemas.nodes import Object, object_id
+from cogmap.schemas.sensing import Learned, Percepts, View
+from cogmap.services.epam.module import Config, build
+from cogmap.training.rendering.towns import render_town
 from tests.support.messages import of_type
 from tests.support.world.blocks import CAMERA
 from tests.support.world.rendered import seen
-from training.rendering.towns import render_town
 
 UNLABELLED = 4005
 

@@ -6,9 +6,9 @@ import onnxruntime
 import pytest
 
 from cogmap.errors import ConfigError
-from services.epam.config import Config
-from services.epam.module import build
-from services.epam.network import CPU_PROVIDER, CUDA_PROVIDER, GPU_PROVIDERS, provider_of
+from cogmap.services.epam.config import Config
+from cogmap.services.epam.module import build
+from cogmap.services.epam.network import CPU_PROVIDER, CUDA_PROVIDER, GPU_PROVIDERS, provider_of
 
 COREML = "CoreMLExecutionProvider"
 

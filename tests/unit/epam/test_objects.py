@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from cogmap.errors import ConfigError
-from services.epam.network import Network
-from services.epam.recognition.objects import DEFAULT_PATH as WEIGHTS
-from services.epam.recognition.objects import (
+from cogmap.services.epam.network import Network
+from cogmap.services.epam.recognition.objects import DEFAULT_PATH as WEIGHTS
+from cogmap.services.epam.recognition.objects import (
     DIMENSIONS,
     INPUT_SHAPE,
     MAX_APPEARANCES,
@@ -21,7 +21,7 @@ from services.epam.recognition.objects import (
     load,
     posteriors,
 )
-from services.sim.layout.catalogue import CATALOGUE
+from cogmap.services.sim.layout.catalogue import CATALOGUE
 
 
 def _direction(number: int, towards: int = 0, share: float = 0.0) -> np.ndarray:

@@ -12,10 +12,10 @@ import numpy.typing as npt
 import pytest
 
 from cogmap.errors import MessageError
-from schemas.array import Array
-from schemas.sensing import PlaceMatch, RememberedView
-from services.epam.places.descriptor import DESCRIPTOR_BYTES
-from services.epam.places.recognizer import PlaceConfig, PlaceRecognizer
+from cogmap.schemas.array import Array
+from cogmap.schemas.sensing import PlaceMatch, RememberedView
+from cogmap.services.epam.places.descriptor import DESCRIPTOR_BYTES
+from cogmap.services.epam.places.recognizer import PlaceConfig, PlaceRecognizer
 
 Image = npt.NDArray[np.uint8]
 HEIGHT = 240

@@ -5,13 +5,13 @@ from __future__ import annotations
 import msgspec
 import pytest
 
-from schemas.cognition import Broadcast, Coalition, Relation, Trigger
-from schemas.nodes import ROOT_MAP, Object, Side, category_id, map_id, object_id, relation_id
-from schemas.sensing import Associations
-from services.epam.association.memory import BEHIND, Primer, nodes_of
-from services.epam.association.prior import Prior
-from services.epam.association.relations import Seen, beside, related
-from services.epam.config import Priming
+from cogmap.schemas.cognition import Broadcast, Coalition, Relation, Trigger
+from cogmap.schemas.nodes import ROOT_MAP, Object, Side, category_id, map_id, object_id, relation_id
+from cogmap.schemas.sensing import Associations
+from cogmap.services.epam.association.memory import BEHIND, Primer, nodes_of
+from cogmap.services.epam.association.prior import Prior
+from cogmap.services.epam.association.relations import Seen, beside, related
+from cogmap.services.epam.config import Priming
 
 SECOND_NS = 1_000_000_000
 CONFIG = Priming(kept_broadcasts=1)

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from cogmap.geometry.se2 import rotate
-from schemas import topics
-from schemas.base import Message
-from schemas.sensing import Building, Learned, Percept, Percepts
-from services.epam.module import Config, build
-from services.sim.layout import town
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.sensing import Building, Learned, Percept, Percepts
+from cogmap.services.epam.module import Config, build
+from cogmap.services.sim.layout import town
+from cogmap.training.rendering.towns import Views, render_town
 from tests.support.messages import of_type
 from tests.support.world.rendered import seen
-from training.rendering.towns import Views, render_town
 
 SEED = 4003
 COUNT = 24

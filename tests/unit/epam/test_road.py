@@ -16,14 +16,20 @@ from benchmarks.perception.road import (
     road_iou,
 )
 from cogmap.errors import ConfigError
-from schemas.sensing import Calibration
-from services.epam.layout.ground import project
-from services.epam.layout.road import DEFAULT_PATH, INPUT_SHAPE, OUTPUT_SHAPES, RoadSegmenter, load
-from services.epam.network import Network
-from services.sensory.disparity import DepthFromStereo
-from services.sensory.rectify import rectification
+from cogmap.schemas.sensing import Calibration
+from cogmap.services.epam.layout.ground import project
+from cogmap.services.epam.layout.road import (
+    DEFAULT_PATH,
+    INPUT_SHAPE,
+    OUTPUT_SHAPES,
+    RoadSegmenter,
+    load,
+)
+from cogmap.services.epam.network import Network
+from cogmap.services.sensory.disparity import DepthFromStereo
+from cogmap.services.sensory.rectify import rectification
+from cogmap.training.rendering.towns import render_town
 from tests.support.world.blocks import painted
-from training.rendering.towns import render_town
 
 # Of towns, from 1001 on for training and from 2001 for validation, nobody trains on this one.
 SEED = 4001

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from services.epam.layout.walls import Walls, walls
-from services.epam.recognition.segments import (
+from cogmap.services.epam.layout.walls import Walls, walls
+from cogmap.services.epam.recognition.segments import (
     HEIGHT_PX,
     OFFSET_PX,
     WIDTH_PX,

@@ -10,16 +10,22 @@ import numpy as np
 import pytest
 
 from cogmap.errors import CogmapError, UsageError
-from experiments.city_maps.correction import settings
-from experiments.city_maps.drive import Tour, sections, traverse
-from experiments.city_maps.environment import BUILDINGS, MAX_KM2, City, Environment, environments
-from experiments.city_maps.measure import NOISE, CityMap, Learned, map_error_km2
-from experiments.city_maps.metrics import map_metrics
-from experiments.city_maps.observer import WHEELS
-from experiments.city_maps.sources import from_osm, grown, plane_m
-from experiments.city_maps.streets import Streets, shortest_path
-from experiments.city_maps.tour import shortest_tour
-from services.sim.odometry import Noise
+from cogmap.experiments.city_maps.correction import settings
+from cogmap.experiments.city_maps.drive import Tour, sections, traverse
+from cogmap.experiments.city_maps.environment import (
+    BUILDINGS,
+    MAX_KM2,
+    City,
+    Environment,
+    environments,
+)
+from cogmap.experiments.city_maps.measure import NOISE, CityMap, Learned, map_error_km2
+from cogmap.experiments.city_maps.metrics import map_metrics
+from cogmap.experiments.city_maps.observer import WHEELS
+from cogmap.experiments.city_maps.sources import from_osm, grown, plane_m
+from cogmap.experiments.city_maps.streets import Streets, shortest_path
+from cogmap.experiments.city_maps.tour import shortest_tour
+from cogmap.services.sim.odometry import Noise
 from tests.support.paths import steps_m
 
 CROSS = Streets(

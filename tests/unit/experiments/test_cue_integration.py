@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pytest
 
-from experiments.cue_integration import analysis
-from experiments.cue_integration.analysis import Gaussian
-from experiments.cue_integration.fit import coordinate_descent
-from experiments.cue_integration.geometry import (
+from cogmap.experiments.cue_integration import analysis
+from cogmap.experiments.cue_integration.analysis import Gaussian
+from cogmap.experiments.cue_integration.fit import coordinate_descent
+from cogmap.experiments.cue_integration.geometry import (
     CONFLICT_RAD,
     POSTS,
     REACH_M,
@@ -20,9 +20,9 @@ from experiments.cue_integration.geometry import (
     step,
     turned,
 )
-from experiments.cue_integration.run import Budget, Outcome, Session, measure
-from experiments.cue_integration.senses import self_motion, sightings
-from experiments.cue_integration.trial import Condition, Noise, Response, Trial
+from cogmap.experiments.cue_integration.run import Budget, Outcome, Session, measure
+from cogmap.experiments.cue_integration.senses import self_motion, sightings
+from cogmap.experiments.cue_integration.trial import Condition, Noise, Response, Trial
 
 STILL = Noise(speed=1e-9, turn=1e-9, distance=1e-3)
 NOISY = Noise(speed=0.15, turn=0.15)

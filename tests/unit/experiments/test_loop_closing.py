@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.loop_closing.metrics import loop_metrics
-from experiments.loop_closing.observer import Loop, Map, Replayed
-from experiments.loop_closing.rule import close_laps
-from experiments.loop_closing.run import CORNERS_M, METHODS, trajectory
-from schemas.array import Array
-from schemas.cognition import Replay
-from services.sim.odometry import Noise
+from cogmap.experiments.loop_closing.metrics import loop_metrics
+from cogmap.experiments.loop_closing.observer import Loop, Map, Replayed
+from cogmap.experiments.loop_closing.rule import close_laps
+from cogmap.experiments.loop_closing.run import CORNERS_M, METHODS, trajectory
+from cogmap.schemas.array import Array
+from cogmap.schemas.cognition import Replay
+from cogmap.services.sim.odometry import Noise
 from tests.support.paths import distances_m
 
 DECAY = 0.2

@@ -8,11 +8,16 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from cli.experiment.command import experiment
+from cogmap.cli.experiment.command import experiment
 from cogmap.errors import UsageError
-from experiments.map_structure.city import UNKNOWN, read_city
-from experiments.map_structure.functions import FUNCTIONS, HOME, SHOP, WORKS, function_of
-from experiments.map_structure.measure import Job, adjusted_rand_index, metrics_of, structured
+from cogmap.experiments.map_structure.city import UNKNOWN, read_city
+from cogmap.experiments.map_structure.functions import FUNCTIONS, HOME, SHOP, WORKS, function_of
+from cogmap.experiments.map_structure.measure import (
+    Job,
+    adjusted_rand_index,
+    metrics_of,
+    structured,
+)
 
 DEGREE = 1e-5
 """About a metre."""

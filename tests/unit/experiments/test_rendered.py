@@ -7,21 +7,21 @@ from collections.abc import Sequence
 
 import pytest
 
-from cli.experiment import live
+from cogmap.cli.experiment import live
 from cogmap.errors import CogmapError
+from cogmap.experiments.cue_integration.camera_level import PicturedRoom
+from cogmap.experiments.cue_integration.geometry import LANDMARKS
+from cogmap.experiments.cue_integration.run import FITTED
+from cogmap.experiments.cue_integration.trial import Condition, Trial
+from cogmap.experiments.loop_closing.run import COGNITION, sections
+from cogmap.experiments.rendered import by_cameras, named, with_cameras
+from cogmap.experiments.transcript import MODEL, Transcript
 from cogmap.runtime.config import Sections
 from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
-from experiments.cue_integration.camera_level import PicturedRoom
-from experiments.cue_integration.geometry import LANDMARKS
-from experiments.cue_integration.run import FITTED
-from experiments.cue_integration.trial import Condition, Trial
-from experiments.loop_closing.run import COGNITION, sections
-from experiments.rendered import by_cameras, named, with_cameras
-from experiments.transcript import MODEL, Transcript
-from schemas import topics
-from schemas.cognition import Action
-from schemas.sensing import MotorCommand, Percepts
+from cogmap.schemas import topics
+from cogmap.schemas.cognition import Action
+from cogmap.schemas.sensing import MotorCommand, Percepts
 
 FRAMES = 5
 

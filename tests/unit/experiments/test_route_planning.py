@@ -9,13 +9,19 @@ import pytest
 
 from cogmap.data.human_tours import HumanTours
 from cogmap.data.tsplib import EUC_2D, Problem, straight
+from cogmap.experiments.route_planning import activation, published
+from cogmap.experiments.route_planning.measure import (
+    Planned,
+    drawn_jobs,
+    human_jobs,
+    measure,
+    planned,
+)
+from cogmap.experiments.route_planning.metrics import correlation, drawn_metrics, human_metrics
+from cogmap.experiments.route_planning.optimum import shortest_tour
+from cogmap.experiments.route_planning.participants import tours_of
 from cogmap.geometry.arrays import Floats
-from experiments.route_planning import activation, published
-from experiments.route_planning.measure import Planned, drawn_jobs, human_jobs, measure, planned
-from experiments.route_planning.metrics import correlation, drawn_metrics, human_metrics
-from experiments.route_planning.optimum import shortest_tour
-from experiments.route_planning.participants import tours_of
-from services.codelets.planning.tours import route_length
+from cogmap.services.codelets.planning.tours import route_length
 
 
 def _goals(number: int, seed: int = 0) -> Floats:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.spiking import measure as spiking
-from experiments.spiking.cells import (
+from cogmap.experiments.spiking.cells import (
     GAMMA_S,
     PEAK,
     BorderCells,
@@ -14,7 +14,7 @@ from experiments.spiking.cells import (
     generate,
     place_centres_m,
 )
-from experiments.spiking.network import Border, Cues, exact, record
+from cogmap.experiments.spiking.network import Border, Cues, exact, record
 
 ROUND = Cues((2.5, 2.5), ((0.09, 0.0), (0.0, 0.09)), (Border(0, 2.8, 0.3),))
 TOP_CELLS = 20

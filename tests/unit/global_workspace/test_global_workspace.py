@@ -6,8 +6,8 @@ import pytest
 
 from cogmap.errors import MessageError
 from cogmap.runtime.module import Module
-from schemas.cognition import Broadcast, Coalition, Coalitions, Competition, Fate, Trigger
-from services.global_workspace.module import Config, build
+from cogmap.schemas.cognition import Broadcast, Coalition, Coalitions, Competition, Fate, Trigger
+from cogmap.services.global_workspace.module import Config, build
 
 TICK_NS = 5_000_000
 LIDA = {"ticks_per_decay": 1}

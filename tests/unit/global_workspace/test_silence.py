@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from cogmap.runtime.module import Module
-from schemas.cognition import Coalition, Coalitions, Competition, Silence
-from services.global_workspace.module import Config, build
+from cogmap.schemas.cognition import Coalition, Coalitions, Competition, Silence
+from cogmap.services.global_workspace.module import Config, build
 
 CYCLE_NS = 200_000_000
 ENOUGH = 0.6

@@ -6,8 +6,8 @@ import numpy as np
 
 from cogmap.bus.codec import encode
 from cogmap.graph.graph import Graph
-from schemas.graph import DropLink, DropNode, Link, Links, Operation
-from schemas.nodes import LinkKind
+from cogmap.schemas.graph import DropLink, DropNode, Link, Links, Operation
+from cogmap.schemas.nodes import LinkKind
 from tests.support.world.scenes import thing
 
 NEAR = "near"

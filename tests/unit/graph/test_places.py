@@ -7,9 +7,9 @@ import pytest
 
 from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
-from schemas.array import Array
-from schemas.graph import Cells, Decay, DropNode, DropPlaces, Operation, PlaceTile
-from schemas.nodes import ROOT_MAP, TILE_SIDE, Map, PlaceColumn
+from cogmap.schemas.array import Array
+from cogmap.schemas.graph import Cells, Decay, DropNode, DropPlaces, Operation, PlaceTile
+from cogmap.schemas.nodes import ROOT_MAP, TILE_SIDE, Map, PlaceColumn
 
 
 def _cells(

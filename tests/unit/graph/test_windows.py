@@ -9,9 +9,9 @@ from cogmap.errors import MessageError
 from cogmap.graph.crossings import crossings
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import EVIDENCE_COLUMNS, LINK_OFFSETS, WEIGHT_COLUMNS, Extent
-from schemas.array import Array
-from schemas.graph import Cells
-from schemas.nodes import ROOT_MAP, TILE_SIDE, Map, PlaceColumn
+from cogmap.schemas.array import Array
+from cogmap.schemas.graph import Cells
+from cogmap.schemas.nodes import ROOT_MAP, TILE_SIDE, Map, PlaceColumn
 
 FAR = 2**19
 Link = tuple[int, int, int]

@@ -5,8 +5,8 @@ import pytest
 
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_to
-from services.memory.associations import Associations
-from services.memory.sparse.config import SparseConfig
+from cogmap.services.memory.associations import Associations
+from cogmap.services.memory.sparse.config import SparseConfig
 
 POSE = np.array([30.0, -10.0, 0.7])
 TOWNS = 4

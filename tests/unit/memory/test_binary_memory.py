@@ -7,12 +7,12 @@ import pytest
 
 from benchmarks.memory.recall import corrupted
 from cogmap.geometry.arrays import Bytes
-from services.memory.sparse import binary
-from services.memory.sparse.build import build
-from services.memory.sparse.config import SparseConfig
-from services.memory.sparse.interface import AssociativeMemory
-from services.memory.sparse.memory import SparseMemory
-from services.memory.sparse.vectors import distance, random_vectors
+from cogmap.services.memory.sparse import binary
+from cogmap.services.memory.sparse.build import build
+from cogmap.services.memory.sparse.config import SparseConfig
+from cogmap.services.memory.sparse.interface import AssociativeMemory
+from cogmap.services.memory.sparse.memory import SparseMemory
+from cogmap.services.memory.sparse.vectors import distance, random_vectors
 
 
 def _vectors(count: int) -> Bytes:

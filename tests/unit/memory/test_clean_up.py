@@ -7,8 +7,8 @@ import pytest
 
 from benchmarks.memory.recall import corrupted
 from cogmap.geometry.arrays import Bytes
-from services.memory.sparse.clean_up import CleanUpMemory
-from services.memory.sparse.vectors import random_vectors
+from cogmap.services.memory.sparse.clean_up import CleanUpMemory
+from cogmap.services.memory.sparse.vectors import random_vectors
 
 KINDS = [(1024, 16), (1000, 2)]
 

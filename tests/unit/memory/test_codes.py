@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from services.memory.sparse.codes import bit_codes, hamming, johnson_codes
-from services.memory.sparse.vectors import distance, distances, random_vectors
+from cogmap.services.memory.sparse.codes import bit_codes, hamming, johnson_codes
+from cogmap.services.memory.sparse.vectors import distance, distances, random_vectors
 
 
 def test_the_codes_of_any_two_values_differ_by_their_distance_around_the_circle() -> None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import msgspec
 import pytest
 
-from schemas.memory import DeclarativeEpisode, TransientEpisode
-from schemas.nodes import Remembered
-from services.memory.episodic.config import EpisodicConfig
-from services.memory.episodic.episodes import HOUR_NS, Episodes
+from cogmap.schemas.memory import DeclarativeEpisode, TransientEpisode
+from cogmap.schemas.nodes import Remembered
+from cogmap.services.memory.episodic.config import EpisodicConfig
+from cogmap.services.memory.episodic.episodes import HOUR_NS, Episodes
 
 BAKERY = Remembered(kind="object", label="bakery")
 CONFIG = EpisodicConfig(

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from schemas.array import Matrix
-from schemas.graph import DropNode, Phase
-from schemas.nodes import (
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.graph import DropNode, Phase
+from cogmap.schemas.nodes import (
     CORRECTION_ID,
     RECOLLECTION_ID,
     ROOT_MAP,

@@ -7,10 +7,10 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-from schemas.memory import TransientEpisode
-from schemas.nodes import Remembered
-from services.memory.episodic.cues import MAX_LEARNED, EpisodicCues, Found
-from services.memory.sparse.config import SparseConfig
+from cogmap.schemas.memory import TransientEpisode
+from cogmap.schemas.nodes import Remembered
+from cogmap.services.memory.episodic.cues import MAX_LEARNED, EpisodicCues, Found
+from cogmap.services.memory.sparse.config import SparseConfig
 
 PLACE_M = 10.0
 SMALL = SparseConfig(hard_locations=2000, dimensions=512)

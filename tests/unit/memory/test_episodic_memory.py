@@ -9,8 +9,8 @@ import pytest
 
 from cogmap.bus.codec import encode
 from cogmap.runtime.state.store import Store
-from schemas.codelets import Offer
-from schemas.memory import (
+from cogmap.schemas.codelets import Offer
+from cogmap.schemas.memory import (
     DeclarativeEpisode,
     Restored,
     Stored,
@@ -18,7 +18,7 @@ from schemas.memory import (
     StoredObjects,
     TransientEpisode,
 )
-from schemas.nodes import (
+from cogmap.schemas.nodes import (
     ROOT_MAP,
     Need,
     Remembered,

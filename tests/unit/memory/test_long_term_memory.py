@@ -6,13 +6,13 @@ import pytest
 
 from cogmap.geometry.se2 import transform_to
 from cogmap.runtime.module import Module
-from schemas.array import Array, Matrix
-from schemas.base import Message
-from schemas.codelets import Offer
-from schemas.cognition import Broadcast, Coalition, Competition, Trigger
-from schemas.graph import Cells, Delta, Link, Operation, Phase
-from schemas.memory import Restored, Stored, StoredObjects, StoredTile, StoredTree
-from schemas.nodes import (
+from cogmap.schemas.array import Array, Matrix
+from cogmap.schemas.base import Message
+from cogmap.schemas.codelets import Offer
+from cogmap.schemas.cognition import Broadcast, Coalition, Competition, Trigger
+from cogmap.schemas.graph import Cells, Delta, Link, Operation, Phase
+from cogmap.schemas.memory import Restored, Stored, StoredObjects, StoredTile, StoredTree
+from cogmap.schemas.nodes import (
     RECOLLECTION_ID,
     ROOT_MAP,
     LinkKind,
@@ -27,8 +27,8 @@ from schemas.nodes import (
     object_id,
     segment_id,
 )
-from schemas.sensing import RangeScan
-from services.memory.module import Config, build
+from cogmap.schemas.sensing import RangeScan
+from cogmap.services.memory.module import Config, build
 from tests.support.messages import of_type
 from tests.support.world.scenes import agent
 

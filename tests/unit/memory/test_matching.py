@@ -5,7 +5,7 @@ import pytest
 
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_to
-from services.memory.matching import NOWHERE, Landmarks, best_matches
+from cogmap.services.memory.matching import NOWHERE, Landmarks, best_matches
 
 WITHIN_M = 2.5
 POSE = np.array([40.0, -25.0, 1.2])

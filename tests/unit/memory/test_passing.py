@@ -8,13 +8,20 @@ import pytest
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_to
 from cogmap.graph.graph import Graph
-from schemas.array import Matrix
-from schemas.memory import StoredObjects
-from schemas.nodes import Object, PathColumn, PathSegment, individual_label, object_id, segment_id
-from services.memory.config import Config
-from services.memory.maps import RememberedMap
-from services.memory.passing import Way, way_of
-from services.memory.recall import Recalled, recalled
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.memory import StoredObjects
+from cogmap.schemas.nodes import (
+    Object,
+    PathColumn,
+    PathSegment,
+    individual_label,
+    object_id,
+    segment_id,
+)
+from cogmap.services.memory.config import Config
+from cogmap.services.memory.maps import RememberedMap
+from cogmap.services.memory.passing import Way, way_of
+from cogmap.services.memory.recall import Recalled, recalled
 
 CONFIG = Config()
 POSE = np.array([30.0, -10.0, 0.7])

@@ -11,10 +11,15 @@ import pytest
 from benchmarks.memory.recall import corrupted
 from benchmarks.memory.speed import NumpyLoop
 from cogmap.geometry.arrays import Bytes
-from services.memory.sparse.build import build
-from services.memory.sparse.config import SparseConfig
-from services.memory.sparse.memory import COUNTER_LIMIT, SparseMemory, access_radius, hard_addresses
-from services.memory.sparse.vectors import (
+from cogmap.services.memory.sparse.build import build
+from cogmap.services.memory.sparse.config import SparseConfig
+from cogmap.services.memory.sparse.memory import (
+    COUNTER_LIMIT,
+    SparseMemory,
+    access_radius,
+    hard_addresses,
+)
+from cogmap.services.memory.sparse.vectors import (
     contains,
     distance,
     distances,

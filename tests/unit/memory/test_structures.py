@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from services.memory.sparse.structures import ItemMemory, encode_sequence
-from services.memory.sparse.vectors import contains, permuted, unbind
+from cogmap.services.memory.sparse.structures import ItemMemory, encode_sequence
+from cogmap.services.memory.sparse.vectors import contains, permuted, unbind
 
 KINDS = [(1024, 16), (1000, 2)]
 

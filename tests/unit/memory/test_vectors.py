@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cogmap.geometry.arrays import Bytes
-from services.memory.sparse.vectors import (
+from cogmap.services.memory.sparse.vectors import (
     bind,
     bundle,
     contained_below,

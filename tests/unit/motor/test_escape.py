@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from schemas.sensing import MotorCommand, SpeedLimit
-from services.motor.config import Config
-from services.motor.motor import halted
-from services.motor.reactive.escape import BACK_S, PATIENCE_S, Escape
+from cogmap.schemas.sensing import MotorCommand, SpeedLimit
+from cogmap.services.motor.config import Config
+from cogmap.services.motor.motor import halted
+from cogmap.services.motor.reactive.escape import BACK_S, PATIENCE_S, Escape
 
 
 def _forward(seconds: float) -> MotorCommand:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from schemas.cognition import Competition, Trigger
-from services.motor.gate import LockstepGate
+from cogmap.schemas.cognition import Competition, Trigger
+from cogmap.services.motor.gate import LockstepGate
 
 
 def _gate() -> LockstepGate:

@@ -6,12 +6,12 @@ import pytest
 
 from cogmap.errors import MessageError
 from cogmap.runtime.module import Module
-from schemas.base import Scalar
-from schemas.cognition import ActionName, MotorProgram
-from schemas.sensing import Pose, SpeedLimit
-from services.motor.aim import Aim
-from services.motor.config import Config
-from services.motor.guide import Guide, Track
+from cogmap.schemas.base import Scalar
+from cogmap.schemas.cognition import ActionName, MotorProgram
+from cogmap.schemas.sensing import Pose, SpeedLimit
+from cogmap.services.motor.aim import Aim
+from cogmap.services.motor.config import Config
+from cogmap.services.motor.guide import Guide, Track
 from tests.support.world.motor import (
     PERIOD_NS,
     action_of,

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from cogmap.runtime.module import Module
-from schemas.cognition import ActionName, MotorProgram, Trigger
-from schemas.sensing import MotorCommand, SpeedLimit
+from cogmap.schemas.cognition import ActionName, MotorProgram, Trigger
+from cogmap.schemas.sensing import MotorCommand, SpeedLimit
 from tests.support.world.motor import (
     PERIOD_NS,
     action_of,

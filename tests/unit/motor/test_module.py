@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from cogmap.errors import MessageError
-from schemas.array import Array, Matrix
-from schemas.cognition import ActionName, MotorProgram
-from schemas.graph import Phase
-from schemas.nodes import PLAN_ID, Plan, PlanState
-from schemas.process import Clock
-from schemas.sensing import SpeedLimit
-from services.motor.module import Config
+from cogmap.schemas.array import Array, Matrix
+from cogmap.schemas.cognition import ActionName, MotorProgram
+from cogmap.schemas.graph import Phase
+from cogmap.schemas.nodes import PLAN_ID, Plan, PlanState
+from cogmap.schemas.process import Clock
+from cogmap.schemas.sensing import SpeedLimit
+from cogmap.services.motor.module import Config
 from tests.support.world.motor import (
     PERIOD_NS,
     action_of,

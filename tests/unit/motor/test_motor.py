@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from cogmap.errors import MessageError
-from schemas.array import Array
-from schemas.sensing import MotorCommand, Pose, RangeScan, SpeedLimit
-from services.motor.aim import Aim
-from services.motor.config import Config
-from services.motor.motor import SensoryMotorMemory, obstacle_ahead_m
-from services.motor.programs import FollowPlan
-from services.motor.reactive.near import NearObstacles
-from services.motor.route import SMOOTHED_M
+from cogmap.schemas.array import Array
+from cogmap.schemas.sensing import MotorCommand, Pose, RangeScan, SpeedLimit
+from cogmap.services.motor.aim import Aim
+from cogmap.services.motor.config import Config
+from cogmap.services.motor.motor import SensoryMotorMemory, obstacle_ahead_m
+from cogmap.services.motor.programs import FollowPlan
+from cogmap.services.motor.reactive.near import NearObstacles
+from cogmap.services.motor.route import SMOOTHED_M
 from tests.support.world.plans import Point, plan_along
 
 

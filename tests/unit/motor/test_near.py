@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from cogmap.geometry.arrays import Floats
-from schemas.array import Array
-from schemas.sensing import RangeScan, SelfMotion
-from services.motor.reactive.near import NearObstacles
+from cogmap.schemas.array import Array
+from cogmap.schemas.sensing import RangeScan, SelfMotion
+from cogmap.services.motor.reactive.near import NearObstacles
 
 CLEARANCE_M = 0.7
 STEP_NS = 200_000_000

@@ -9,12 +9,12 @@ import pytest
 
 from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
-from schemas import topics
-from schemas.base import Message
-from schemas.graph import Delta, Phase
-from schemas.process import Clock
-from schemas.sensing import MotorCommand, SpeedLimit
-from services.motor.module import Config, build
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.graph import Delta, Phase
+from cogmap.schemas.process import Clock
+from cogmap.schemas.sensing import MotorCommand, SpeedLimit
+from cogmap.services.motor.module import Config, build
 from tests.support.world.motor import action_of
 from tests.support.world.plans import joined, plan_along
 from tests.support.world.scenes import agent

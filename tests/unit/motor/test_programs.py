@@ -8,15 +8,15 @@ import pytest
 
 from cogmap.errors import MessageError
 from cogmap.runtime.module import Module
-from schemas.base import Scalar
-from schemas.cognition import PARAMETERS, ActionName, MotorProgram
-from schemas.nodes import PLAN_ID, Plan, PlanState
-from schemas.sensing import Pose, SpeedLimit
-from services.motor.aim import Aim
-from services.motor.config import Config
-from services.motor.guide import Track
-from services.motor.programs import FollowPlan, Program, program_of
-from services.motor.seeking import sought_by
+from cogmap.schemas.base import Scalar
+from cogmap.schemas.cognition import PARAMETERS, ActionName, MotorProgram
+from cogmap.schemas.nodes import PLAN_ID, Plan, PlanState
+from cogmap.schemas.sensing import Pose, SpeedLimit
+from cogmap.services.motor.aim import Aim
+from cogmap.services.motor.config import Config
+from cogmap.services.motor.guide import Track
+from cogmap.services.motor.programs import FollowPlan, Program, program_of
+from cogmap.services.motor.seeking import sought_by
 from tests.support.world.motor import action_of, command_after, module_ahead, pose_delta, scan_of
 from tests.support.world.plans import plan_along
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
-from schemas.cognition import ActionName, MotorProgram
+from cogmap.schemas.cognition import ActionName, MotorProgram
 from tests.support.world.motor import (
     action_of,
     commands_in,

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from services.motor.route import SMOOTHED_M, STEP_M, Route
+from cogmap.services.motor.route import SMOOTHED_M, STEP_M, Route
 from tests.support.paths import steps_m
 from tests.support.world.plans import Point, places_m
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from cogmap.errors import MessageError
-from schemas.base import Scalar
-from schemas.cognition import ActionName, MotorProgram
-from schemas.nodes import Goal, goal_id
-from services.motor.seeking import sought_by
+from cogmap.schemas.base import Scalar
+from cogmap.schemas.cognition import ActionName, MotorProgram
+from cogmap.schemas.nodes import Goal, goal_id
+from cogmap.services.motor.seeking import sought_by
 
 
 def program(action: str, **parameters: Scalar) -> MotorProgram:

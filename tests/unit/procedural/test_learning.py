@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from schemas.cognition import Action, Behaviour
-from services.procedural.learning import Reliability
+from cogmap.schemas.cognition import Action, Behaviour
+from cogmap.services.procedural.learning import Reliability
 from tests.support.world.schemes import FOLLOW, active, scheme_of, sign
 
 GREEN = active(sign(colour="green"))

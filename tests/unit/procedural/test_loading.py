@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from cogmap.errors import ConfigError
-from schemas.cognition import ActionName
-from schemas.feelings import Feeling
-from schemas.nodes import PlanState
-from services.procedural.loading import BUILT_IN, load
+from cogmap.schemas.cognition import ActionName
+from cogmap.schemas.feelings import Feeling
+from cogmap.schemas.nodes import PlanState
+from cogmap.services.procedural.loading import BUILT_IN, load
 from tests.support.world.schemes import FOLLOW, HEADER, written
 
 SECOND = """

@@ -9,11 +9,11 @@ import pytest
 
 from cogmap.errors import ConfigError
 from cogmap.runtime.module import Module
-from schemas.base import Message
-from schemas.cognition import Action, Behaviour, Behaviours, Broadcast, Coalition, Rejection
-from schemas.feelings import Feeling
-from schemas.graph import Delta, Operation, Phase
-from schemas.nodes import (
+from cogmap.schemas.base import Message
+from cogmap.schemas.cognition import Action, Behaviour, Behaviours, Broadcast, Coalition, Rejection
+from cogmap.schemas.feelings import Feeling
+from cogmap.schemas.graph import Delta, Operation, Phase
+from cogmap.schemas.nodes import (
     NEVER_NS,
     PLAN_ID,
     AnyNode,
@@ -23,7 +23,7 @@ from schemas.nodes import (
     Remembered,
     episode_id,
 )
-from services.procedural.module import Config, build
+from cogmap.services.procedural.module import Config, build
 from tests.support.world.guidance import broadcast, driven, relations, selected
 from tests.support.world.scenes import PERIOD_NS, agent
 from tests.support.world.schemes import FOLLOW, HEADER, written

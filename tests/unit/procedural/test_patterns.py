@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from schemas.feelings import Feeling
-from schemas.nodes import PLAN_ID, Goal, Plan, PlanState
-from services.procedural.patterns import Active, Condition, Pattern
+from cogmap.schemas.feelings import Feeling
+from cogmap.schemas.nodes import PLAN_ID, Goal, Plan, PlanState
+from cogmap.services.procedural.patterns import Active, Condition, Pattern
 from tests.support.world.schemes import active, sign
 
 READY = Plan(id=PLAN_ID, state=PlanState.READY, base_level=1.0)

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from schemas.cognition import Rejection
-from services.procedural.patterns import Pattern
-from services.procedural.schemes import Result, Scheme
+from cogmap.schemas.cognition import Rejection
+from cogmap.services.procedural.patterns import Pattern
+from cogmap.services.procedural.schemes import Result, Scheme
 from tests.support.world.schemes import active, scheme_of, sign
 
 DOCK = """

@@ -12,12 +12,12 @@ import pytest
 from cogmap.bus.codec import encode
 from cogmap.recording.diff import Diff, diff
 from cogmap.recording.replaying.compare import describe, difference
-from schemas import topics
-from schemas.array import Array, Matrix
-from schemas.base import Message
-from schemas.graph import Delta, DropNode, Link, Phase
-from schemas.nodes import Node
-from schemas.sensing import Odometry, RangeScan
+from cogmap.schemas import topics
+from cogmap.schemas.array import Array, Matrix
+from cogmap.schemas.base import Message
+from cogmap.schemas.graph import Delta, DropNode, Link, Phase
+from cogmap.schemas.nodes import Node
+from cogmap.schemas.sensing import Odometry, RangeScan
 from tests.support.logs import odometry, scan, write_log
 from tests.support.messages import of_type
 

@@ -19,8 +19,8 @@ from cogmap.recording.storage.format import topics_to_record
 from cogmap.recording.storage.reader import LogReader
 from cogmap.recording.storage.recover import recover
 from cogmap.recording.storage.writer import LogWriter
+from cogmap.schemas import topics
 from cogmap.version import VERSION
-from schemas import topics
 from tests.support.logs import odometry
 from tests.support.mcap_doctor import Doctor
 

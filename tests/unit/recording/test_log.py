@@ -10,12 +10,12 @@ from msgspec import structs
 from cogmap.errors import LogError, UsageError
 from cogmap.recording import open_log
 from cogmap.recording.storage.writer import LogWriter
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.examples import example_messages
+from cogmap.schemas.graph import Delta
+from cogmap.schemas.sensing import Odometry
 from cogmap.version import VERSION
-from schemas import topics
-from schemas.base import Message
-from schemas.examples import example_messages
-from schemas.graph import Delta
-from schemas.sensing import Odometry
 from tests.support.logs import SECOND_NS, odometry, write_log
 from tests.support.messages import of_type
 

@@ -13,8 +13,8 @@ from cogmap.recording.storage.format import topics_to_record
 from cogmap.recording.storage.index import read_index
 from cogmap.recording.storage.reader import LogReader
 from cogmap.recording.storage.writer import LogWriter
-from schemas import topics
-from schemas.base import Message
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
 from tests.support.logs import ABOUT, SECOND_NS, odometry
 
 CHUNKS = 40

@@ -16,9 +16,9 @@ from cogmap.recording.storage.format import topics_to_record
 from cogmap.recording.storage.reader import LogReader
 from cogmap.recording.storage.writer import LogWriter
 from cogmap.runtime.delivery.intake import Intake
-from schemas import topics
-from schemas.base import Message
-from schemas.process import Clock, Presence
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.process import Clock, Presence
 from tests.support.logs import SECOND_NS, odometry
 
 MILLISECOND_NS = 10**6

@@ -14,8 +14,8 @@ from cogmap.errors import LogError
 from cogmap.recording.recorder import Recorder, Summary
 from cogmap.recording.selection import to_record
 from cogmap.recording.storage.reader import LogReader
-from schemas import topics
-from schemas.base import Message
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
 from tests.support.logs import odometry, scan
 
 

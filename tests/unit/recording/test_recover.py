@@ -19,7 +19,7 @@ from cogmap.recording.storage.reader import LogReader
 from cogmap.recording.storage.recover import recover
 from cogmap.recording.storage.resync import LogBytes
 from cogmap.recording.storage.writer import LogWriter
-from schemas import topics
+from cogmap.schemas import topics
 from tests.support.logs import odometry
 
 CHUNKS = 6

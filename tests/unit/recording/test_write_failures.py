@@ -16,9 +16,9 @@ from cogmap.recording.selection import to_record
 from cogmap.recording.storage.reader import LogReader
 from cogmap.recording.storage.recover import recover
 from cogmap.recording.storage.writer import CHUNK_BYTES
-from schemas import topics
-from schemas.array import Array
-from schemas.sensing import RangeScan
+from cogmap.schemas import topics
+from cogmap.schemas.array import Array
+from cogmap.schemas.sensing import RangeScan
 from tests.support.system.disks import full_after
 
 FULL_BYTES = 6_000_000

@@ -8,7 +8,7 @@ import pytest
 
 from cogmap.errors import StorageError
 from cogmap.runtime.state.published import PublishedCounts
-from schemas import topics
+from cogmap.schemas import topics
 
 
 def count(path: Path, *numbers: int) -> None:

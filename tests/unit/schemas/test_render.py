@@ -7,10 +7,10 @@ import json
 import numpy as np
 import pytest
 
-from schemas.array import Array, Matrix
-from schemas.graph import Delta, DropNode, Phase
-from schemas.nodes import Node
-from schemas.render import field, to_jsonable, to_text
+from cogmap.schemas.array import Array, Matrix
+from cogmap.schemas.graph import Delta, DropNode, Phase
+from cogmap.schemas.nodes import Node
+from cogmap.schemas.render import field, to_jsonable, to_text
 
 DELTA = Delta(
     stamp_ns=5,

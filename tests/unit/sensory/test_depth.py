@@ -9,10 +9,10 @@ import numpy.typing as npt
 import pytest
 
 from cogmap.errors import MessageError
-from schemas.sensing import Calibration
-from services.sensory.disparity import DepthFromStereo
-from services.sensory.rectify import rectification
-from services.sensory.scan import scan
+from cogmap.schemas.sensing import Calibration
+from cogmap.services.sensory.disparity import DepthFromStereo
+from cogmap.services.sensory.rectify import rectification
+from cogmap.services.sensory.scan import scan
 
 WIDTH = 320
 HEIGHT = 240

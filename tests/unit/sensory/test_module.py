@@ -10,11 +10,11 @@ import pytest
 
 from cogmap.bus import codec
 from cogmap.errors import MessageError
-from schemas import topics
-from schemas.array import Array
-from schemas.base import Message
-from schemas.sensing import Calibration, Odometry, RangeScan, SelfMotion, StereoFrame, View
-from services.sensory.module import Config, build
+from cogmap.schemas import topics
+from cogmap.schemas.array import Array
+from cogmap.schemas.base import Message
+from cogmap.schemas.sensing import Calibration, Odometry, RangeScan, SelfMotion, StereoFrame, View
+from cogmap.services.sensory.module import Config, build
 from tests.support.messages import of_type
 
 STEP_NS = 50_000_000

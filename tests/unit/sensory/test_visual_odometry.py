@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from schemas.sensing import Calibration
-from services.sensory.visual_odometry import Motion, VisualOdometry
-from services.sensory.wheels import WheelNoise, fuse
+from cogmap.schemas.sensing import Calibration
+from cogmap.services.sensory.visual_odometry import Motion, VisualOdometry
+from cogmap.services.sensory.wheels import WheelNoise, fuse
 
 CAMERA = Calibration(
     width_px=320,

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from cogmap.bus.codec import encode
-from schemas import nodes
-from services.sim.layout.blocks import streets
-from services.sim.layout.blocks.districts import FUNCTIONS
-from services.sim.layout.blocks.town import BlocksTown, generate
-from services.sim.layout.boundaries import kerbs
-from services.sim.layout.plan import PAVEMENT_WIDTH_M, Point, Road, overlap
+from cogmap.schemas import nodes
+from cogmap.services.sim.layout.blocks import streets
+from cogmap.services.sim.layout.blocks.districts import FUNCTIONS
+from cogmap.services.sim.layout.blocks.town import BlocksTown, generate
+from cogmap.services.sim.layout.boundaries import kerbs
+from cogmap.services.sim.layout.plan import PAVEMENT_WIDTH_M, Point, Road, overlap
 
 SEEDS = range(1, 7)
 TOWNS = [generate(seed, 150.0 + 20.0 * seed) for seed in SEEDS]

@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 
 from cogmap.errors import ConfigError
-from schemas.sensing import Percept, Pose, TrueTown
-from services.sim.driven.sensors import Sensors
-from services.sim.driven.surroundings import Surroundings
-from services.sim.layout import towns
-from services.sim.layout.boundaries import clearance_m, surfaces
-from services.sim.layout.catalogue import CATALOGUE
-from services.sim.layout.charging import with_charging_places
-from services.sim.layout.furniture import CHARGING_PLACE, Prop
-from services.sim.layout.place import Place
-from services.sim.layout.plan import Plot, Road
-from services.sim.rendering.camera import calibration
-from services.sim.scripted.percepts import PerceptErrors
+from cogmap.schemas.sensing import Percept, Pose, TrueTown
+from cogmap.services.sim.driven.sensors import Sensors
+from cogmap.services.sim.driven.surroundings import Surroundings
+from cogmap.services.sim.layout import towns
+from cogmap.services.sim.layout.boundaries import clearance_m, surfaces
+from cogmap.services.sim.layout.catalogue import CATALOGUE
+from cogmap.services.sim.layout.charging import with_charging_places
+from cogmap.services.sim.layout.furniture import CHARGING_PLACE, Prop
+from cogmap.services.sim.layout.place import Place
+from cogmap.services.sim.layout.plan import Plot, Road
+from cogmap.services.sim.rendering.camera import calibration
+from cogmap.services.sim.scripted.percepts import PerceptErrors
 
 COUNT = 3
 NEAR_M = 5.0

@@ -10,8 +10,8 @@ import pytest
 
 from cogmap.bus.codec import encode
 from cogmap.errors import ConfigError
-from schemas.base import Message
-from schemas.sensing import (
+from cogmap.schemas.base import Message
+from cogmap.schemas.sensing import (
     MotorCommand,
     Percepts,
     Pose,
@@ -20,21 +20,21 @@ from schemas.sensing import (
     TruePose,
     TrueTown,
 )
-from services.sim.driven.camera import ColumnCamera, depths_m
-from services.sim.driven.ground import MAX_RANGE_M
-from services.sim.driven.robot import BODY_RADIUS_M, KinematicRobot
-from services.sim.driven.sensors import Sensors, scan
-from services.sim.driven.surroundings import Surroundings
-from services.sim.layout.blocks.town import generate
-from services.sim.layout.boundaries import clearance_m
-from services.sim.layout.catalogue import CATALOGUE
-from services.sim.layout.closures import Closure
-from services.sim.layout.place import Place
-from services.sim.layout.plan import Plot, Road
-from services.sim.module import Config, build
-from services.sim.odometry import Noise
-from services.sim.rendering.camera import calibration
-from services.sim.scripted.percepts import PerceptErrors
+from cogmap.services.sim.driven.camera import ColumnCamera, depths_m
+from cogmap.services.sim.driven.ground import MAX_RANGE_M
+from cogmap.services.sim.driven.robot import BODY_RADIUS_M, KinematicRobot
+from cogmap.services.sim.driven.sensors import Sensors, scan
+from cogmap.services.sim.driven.surroundings import Surroundings
+from cogmap.services.sim.layout.blocks.town import generate
+from cogmap.services.sim.layout.boundaries import clearance_m
+from cogmap.services.sim.layout.catalogue import CATALOGUE
+from cogmap.services.sim.layout.closures import Closure
+from cogmap.services.sim.layout.place import Place
+from cogmap.services.sim.layout.plan import Plot, Road
+from cogmap.services.sim.module import Config, build
+from cogmap.services.sim.odometry import Noise
+from cogmap.services.sim.rendering.camera import calibration
+from cogmap.services.sim.scripted.percepts import PerceptErrors
 from tests.support.messages import of_type
 
 MOUNT = calibration()

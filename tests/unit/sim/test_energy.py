@@ -9,13 +9,21 @@ import pytest
 
 from cogmap.bus.codec import decode, encode
 from cogmap.errors import ConfigError
-from schemas import topics
-from schemas.base import Message
-from schemas.sensing import Energy, MotorCommand, Percepts, Pose, StereoFrame, TruePose, TrueTown
-from services.sim.battery import Battery, PowerSupply
-from services.sim.layout.furniture import CHARGING_PLACE
-from services.sim.module import Config, build
-from services.sim.scripted.trajectory import Trajectory
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.sensing import (
+    Energy,
+    MotorCommand,
+    Percepts,
+    Pose,
+    StereoFrame,
+    TruePose,
+    TrueTown,
+)
+from cogmap.services.sim.battery import Battery, PowerSupply
+from cogmap.services.sim.layout.furniture import CHARGING_PLACE
+from cogmap.services.sim.module import Config, build
+from cogmap.services.sim.scripted.trajectory import Trajectory
 from tests.support.messages import of_type
 
 HERE = Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)

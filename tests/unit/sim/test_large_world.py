@@ -8,16 +8,16 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from schemas.sensing import MotorCommand, Odometry, Pose, StreetClosure, TrueTown
-from services.sim.config import Config
-from services.sim.layout.blocks.town import generate
-from services.sim.layout.catalogue import BuildingType
-from services.sim.layout.place import Place
-from services.sim.layout.plan import Plot, Road
-from services.sim.scene.nearby import ADDED_M, HIDDEN_M, Nearby, Piece
-from services.sim.simulation import Simulation
-from services.sim.stdio import pybullet
-from services.sim.world import World
+from cogmap.schemas.sensing import MotorCommand, Odometry, Pose, StreetClosure, TrueTown
+from cogmap.services.sim.config import Config
+from cogmap.services.sim.layout.blocks.town import generate
+from cogmap.services.sim.layout.catalogue import BuildingType
+from cogmap.services.sim.layout.place import Place
+from cogmap.services.sim.layout.plan import Plot, Road
+from cogmap.services.sim.scene.nearby import ADDED_M, HIDDEN_M, Nearby, Piece
+from cogmap.services.sim.simulation import Simulation
+from cogmap.services.sim.stdio import pybullet
+from cogmap.services.sim.world import World
 
 TOWN = generate(1, 150.0)
 START = TOWN.start

@@ -6,7 +6,14 @@ import math
 
 import numpy as np
 
-from services.sim.rendering.light import Light, brightness, expose, relief, shadow_top, some_light
+from cogmap.services.sim.rendering.light import (
+    Light,
+    brightness,
+    expose,
+    relief,
+    shadow_top,
+    some_light,
+)
 
 TOWER = ((-2.0, -2.0, 2.0, 2.0), 10.0)
 EVENING = Light(sun_azimuth_rad=0.0, sun_elevation_rad=math.radians(45), shade=0.5)

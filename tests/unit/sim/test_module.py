@@ -11,9 +11,9 @@ import pytest
 from cogmap.bus.codec import encode
 from cogmap.errors import ConfigError, MessageError
 from cogmap.runtime.module import Module
-from schemas.base import Message
-from schemas.process import Clock
-from schemas.sensing import (
+from cogmap.schemas.base import Message
+from cogmap.schemas.process import Clock
+from cogmap.schemas.sensing import (
     MotorCommand,
     Odometry,
     SpeedLimit,
@@ -21,7 +21,7 @@ from schemas.sensing import (
     TruePose,
     TrueTown,
 )
-from services.sim.module import Config, build
+from cogmap.services.sim.module import Config, build
 from tests.support.messages import of_type
 
 M = TypeVar("M", bound=Message)

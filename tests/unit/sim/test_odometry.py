@@ -9,9 +9,9 @@ import math
 import numpy as np
 import pytest
 
-from schemas.sensing import Pose
-from services.sim.layout import town
-from services.sim.odometry import Noise, WheelOdometry
+from cogmap.schemas.sensing import Pose
+from cogmap.services.sim.layout import town
+from cogmap.services.sim.odometry import Noise, WheelOdometry
 
 DT_S = 0.05
 WITHOUT_NOISE = Noise(speed=0.0, turn=0.0, drift_rad_per_sqrt_m=0.0)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from cogmap.errors import ConfigError
-from services.sim.layout.boundaries import clearance_m
-from services.sim.layout.osm import town as osm
-from services.sim.layout.osm.buildings import function, height_m
-from services.sim.layout.osm.streets import metres, width_m
+from cogmap.services.sim.layout.boundaries import clearance_m
+from cogmap.services.sim.layout.osm import town as osm
+from cogmap.services.sim.layout.osm.buildings import function, height_m
+from cogmap.services.sim.layout.osm.streets import metres, width_m
 
 METRE_DEG = 1 / 111_194.93
 # Metres east and north of a point on the equator, by the number of the node.

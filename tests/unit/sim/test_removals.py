@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from cogmap.errors import ConfigError
-from schemas.sensing import MotorCommand, Percepts, TrueTown
-from services.sim.layout.removals import Removal, RemovedBuildings
-from services.sim.module import Config, build
-from services.sim.scripted.percepts import PerceptErrors
+from cogmap.schemas.sensing import MotorCommand, Percepts, TrueTown
+from cogmap.services.sim.layout.removals import Removal, RemovedBuildings
+from cogmap.services.sim.module import Config, build
+from cogmap.services.sim.scripted.percepts import PerceptErrors
 from tests.support.messages import of_type
 
 

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from cogmap.errors import ConfigError
-from schemas import topics
-from schemas.sensing import MotorCommand, Percept, Percepts, Pose, SelfMotion, TruePose
-from services.sim.module import Config, build
-from services.sim.odometry import Noise
-from services.sim.scripted.percept_level import PerceptLevelSim
-from services.sim.scripted.percepts import Landmark, PerceptErrors, PerceptSim
-from services.sim.scripted.places import PlaceSim
-from services.sim.scripted.trajectory import Line, Trajectory
+from cogmap.schemas import topics
+from cogmap.schemas.sensing import MotorCommand, Percept, Percepts, Pose, SelfMotion, TruePose
+from cogmap.services.sim.module import Config, build
+from cogmap.services.sim.odometry import Noise
+from cogmap.services.sim.scripted.percept_level import PerceptLevelSim
+from cogmap.services.sim.scripted.percepts import Landmark, PerceptErrors, PerceptSim
+from cogmap.services.sim.scripted.places import PlaceSim
+from cogmap.services.sim.scripted.trajectory import Line, Trajectory
 
 SILENT = Noise(speed=0.0, turn=0.0, drift_rad_per_sqrt_m=0.0)
 EXACT = PerceptErrors(

@@ -10,8 +10,8 @@ import pytest
 
 from cogmap.errors import ConfigError
 from cogmap.runtime.module import Module
-from schemas.base import Message
-from schemas.sensing import (
+from cogmap.schemas.base import Message
+from cogmap.schemas.sensing import (
     MotorCommand,
     Odometry,
     Percepts,
@@ -21,16 +21,16 @@ from schemas.sensing import (
     TrueTown,
     View,
 )
-from services import registry
-from services.sim.layout import roadside
-from services.sim.module import Config, build
-from services.sim.odometry import Noise
-from services.sim.rendering.camera import StereoCamera, calibration
-from services.sim.scripted.percepts import Landmark
-from services.sim.scripted.trajectory import Trajectory
-from services.sim.world import World
+from cogmap.services import registry
+from cogmap.services.sim.layout import roadside
+from cogmap.services.sim.module import Config, build
+from cogmap.services.sim.odometry import Noise
+from cogmap.services.sim.rendering.camera import StereoCamera, calibration
+from cogmap.services.sim.scripted.percepts import Landmark
+from cogmap.services.sim.scripted.trajectory import Trajectory
+from cogmap.services.sim.world import World
+from cogmap.training.rendering import towns
 from tests.support.messages import of_type
-from training.rendering import towns
 
 SILENT = Noise(speed=0.0, turn=0.0, drift_rad_per_sqrt_m=0.0)
 BAKERY = Landmark(name="bakery", x_m=40.0, y_m=14.0)

@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from services.sim.layout import towns
-from services.sim.layout.place import Place
+from cogmap.services.sim.layout import towns
+from cogmap.services.sim.layout.place import Place
 
 
 def town(start: int = 0) -> Place:

@@ -10,10 +10,10 @@ import pytest
 
 from cogmap.bus.codec import encode
 from cogmap.geometry.se2 import transform_from
-from services.sim.layout import town
-from services.sim.layout.catalogue import CATALOGUE, invented
-from services.sim.layout.plan import PAVEMENT_WIDTH_M, STREET_WIDTH_M, overlap
-from services.sim.rendering import facade, mesh
+from cogmap.services.sim.layout import town
+from cogmap.services.sim.layout.catalogue import CATALOGUE, invented
+from cogmap.services.sim.layout.plan import PAVEMENT_WIDTH_M, STREET_WIDTH_M, overlap
+from cogmap.services.sim.rendering import facade, mesh
 
 SEEDS = range(25)
 TOWNS = [town.generate(seed) for seed in SEEDS]

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 
 from cogmap.errors import CogmapError
-from schemas.sensing import Calibration, Pose
-from services.sim.layout import town
-from services.sim.layout.plan import Plot
-from services.sim.rendering.camera import Exposure, StereoCamera, calibration
-from services.sim.robot import TRACK_M, WHEEL_RADIUS_M
-from services.sim.world import World
-from training.rendering import towns
+from cogmap.schemas.sensing import Calibration, Pose
+from cogmap.services.sim.layout import town
+from cogmap.services.sim.layout.plan import Plot
+from cogmap.services.sim.rendering.camera import Exposure, StereoCamera, calibration
+from cogmap.services.sim.robot import TRACK_M, WHEEL_RADIUS_M
+from cogmap.services.sim.world import World
+from cogmap.training.rendering import towns
 
 OPEN_FIELD = Pose(x_m=90.0, y_m=90.0, heading_rad=0.3)
 FRONT_AHEAD_M = 9.0

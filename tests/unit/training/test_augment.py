@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from training.augment import Augmentation, LabelledImage, augmented
+from cogmap.training.augment import Augmentation, LabelledImage, augmented
 
 SIZE = (180, 240)
 STILL = Augmentation(

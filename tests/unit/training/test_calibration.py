@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from services.epam.recognition.objects import DIMENSIONS, Prototypes
-from training.calibration import Calibrated, calibrate, calibration_error
-from training.crops import Crops
+from cogmap.services.epam.recognition.objects import DIMENSIONS, Prototypes
+from cogmap.training.calibration import Calibrated, calibrate, calibration_error
+from cogmap.training.crops import Crops
 
 TAUGHT = ["bakery", "bank", "cafe"]
 NOVEL = [f"invented-9-{number}" for number in range(6)]

@@ -11,9 +11,9 @@ import pytest
 from click.testing import CliRunner
 
 from cogmap.errors import CogmapError, UsageError
-from training.command import train
-from training.rendering.dataset import SPLITS, Job, jobs, render, render_all
-from training.rendering.reader import INVENTED, files, read
+from cogmap.training.command import train
+from cogmap.training.rendering.dataset import SPLITS, Job, jobs, render, render_all
+from cogmap.training.rendering.reader import INVENTED, files, read
 
 
 def test_no_town_is_in_two_splits_and_each_has_untaught_buildings() -> None:

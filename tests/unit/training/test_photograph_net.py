@@ -18,8 +18,8 @@ NORMALIZED = """
 import json
 import numpy as np
 import torch
-from services.epam.layout.road import HEIGHT_PX, WIDTH_PX, network_input
-from training.networks.photograph import normalized
+from cogmap.services.epam.layout.road import HEIGHT_PX, WIDTH_PX, network_input
+from cogmap.training.networks.photograph import normalized
 
 rng = np.random.default_rng(3)
 coarse = rng.uniform(60, 250, (1, HEIGHT_PX // 8, WIDTH_PX // 8, 3))

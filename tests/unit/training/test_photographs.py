@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from cogmap.errors import UsageError
-from services.epam.layout.road import DEFAULT_PATH, RoadSegmenter, load
+from cogmap.services.epam.layout.road import DEFAULT_PATH, RoadSegmenter, load
+from cogmap.training.photographs import camvid_iou
 from tests.support.world.blocks import Block, painted
-from training.photographs import camvid_iou
 
 SIZE = (240, 320)
 ROAD = 3

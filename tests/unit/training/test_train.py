@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from cli.main import cogmap
+from cogmap.cli.main import cogmap
 from cogmap.errors import UsageError
-from services.epam.layout.road import load
-from services.epam.recognition import objects, segments
-from services.sim.layout.catalogue import CATALOGUE
+from cogmap.services.epam.layout.road import load
+from cogmap.services.epam.recognition import objects, segments
+from cogmap.services.sim.layout.catalogue import CATALOGUE
+from cogmap.training.command import train
+from cogmap.training.rendering.dataset import Job, render_all
 from tests.support.world.blocks import CAMERA, painted
-from training.command import train
-from training.rendering.dataset import Job, render_all
 
 needs_torch = pytest.mark.skipif(
     find_spec("torch") is None and "CI" not in os.environ,
@@ -29,7 +29,7 @@ needs_torch = pytest.mark.skipif(
 TRAINING = """
 import sys
 from pathlib import Path
-from training.camvid import train_on_photographs
+from cogmap.training.camvid import train_on_photographs
 
 folder, out = map(Path, sys.argv[1:])
 for name, seed in (("a", 3), ("b", 3), ("c", 4)):
@@ -39,7 +39,7 @@ BATCHES = """
 import sys
 import numpy as np
 import torch
-from training.networks.loader import prefetch
+from cogmap.training.networks.loader import prefetch
 
 def batches():
     for number in range(7):
@@ -120,7 +120,7 @@ def test_train_is_a_command_of_cogmap() -> None:
 def test_without_torch_the_remedy_is_named(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with_torch = ("training.networks", "training.camvid", f"training.{name}")
+    with_torch = ("cogmap.training.networks", "cogmap.training.camvid", f"cogmap.training.{name}")
     for module in [*sys.modules]:
         if module.startswith(with_torch):
             monkeypatch.delitem(sys.modules, module)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from schemas.nodes import Need, need_id
-from schemas.sensing import Energy
-from services.workspace.body import Body
-from services.workspace.config import Config
+from cogmap.schemas.nodes import Need, need_id
+from cogmap.schemas.sensing import Energy
+from cogmap.services.workspace.body import Body
+from cogmap.services.workspace.config import Config
 
 LOCKSTEP = Config(mode="lockstep", awaits_energy=True)
 

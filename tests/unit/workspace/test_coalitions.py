@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from schemas.cognition import Coalitions
-from schemas.graph import Delta
+from cogmap.schemas.cognition import Coalitions
+from cogmap.schemas.graph import Delta
 from tests.support.messages import of_type
 from tests.support.world.scenes import Desk, percept
 

@@ -8,9 +8,9 @@ import pytest
 
 from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
-from schemas.array import Array
-from schemas.codelets import Proposal
-from schemas.graph import (
+from cogmap.schemas.array import Array
+from cogmap.schemas.codelets import Proposal
+from cogmap.schemas.graph import (
     Cells,
     Decay,
     DropLink,
@@ -22,8 +22,8 @@ from schemas.graph import (
     Phase,
     PlaceTile,
 )
-from schemas.nodes import ROOT_MAP, TILE_SIDE, LinkKind, Map, Node, PlaceColumn, object_id
-from services.workspace.commit import Ledger
+from cogmap.schemas.nodes import ROOT_MAP, TILE_SIDE, LinkKind, Map, Node, PlaceColumn, object_id
+from cogmap.services.workspace.commit import Ledger
 from tests.support.world.scenes import Desk, agent, answer, landmark, percept, task, thing
 
 WRITABLE = frozenset({Node, *PlaceColumn})

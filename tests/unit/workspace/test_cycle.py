@@ -10,12 +10,12 @@ import pytest
 
 from cogmap.bus.codec import encode
 from cogmap.errors import MessageError
-from schemas import nodes, topics
-from schemas.array import Array
-from schemas.codelets import Leases, Task
-from schemas.feelings import Feeling
-from schemas.graph import Delta, SnapshotRequest
-from schemas.nodes import LinkKind, Self, object_id, percept_id
+from cogmap.schemas import nodes, topics
+from cogmap.schemas.array import Array
+from cogmap.schemas.codelets import Leases, Task
+from cogmap.schemas.feelings import Feeling
+from cogmap.schemas.graph import Delta, SnapshotRequest
+from cogmap.schemas.nodes import LinkKind, Self, object_id, percept_id
 from tests.support.world.scenes import (
     Desk,
     agent,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from schemas.nodes import Object, object_id
+from cogmap.schemas.nodes import Object, object_id
 from tests.support.world.scenes import Desk, percept
 
 

@@ -8,9 +8,9 @@ import msgspec
 import pytest
 
 from cogmap.errors import ConfigError
-from schemas.graph import Snapshot
-from schemas.nodes import NEVER_NS, Goal, goal_id
-from services.workspace.module import Config, build
+from cogmap.schemas.graph import Snapshot
+from cogmap.schemas.nodes import NEVER_NS, Goal, goal_id
+from cogmap.services.workspace.module import Config, build
 from tests.support.world.scenes import Desk
 
 INN = {"name": "inn", "object": "inn"}

@@ -11,10 +11,10 @@ import pytest
 from cogmap.graph import decay
 from cogmap.graph.graph import Graph
 from cogmap.graph.places import Place
-from schemas.array import Array
-from schemas.graph import Cells, Decay, Delta, DropNode, Link, Phase
-from schemas.nodes import KINDS, AnyNode, Node, PlaceColumn, coarse_map_id
-from services.workspace.forgetting import Forgetting
+from cogmap.schemas.array import Array
+from cogmap.schemas.graph import Cells, Decay, Delta, DropNode, Link, Phase
+from cogmap.schemas.nodes import KINDS, AnyNode, Node, PlaceColumn, coarse_map_id
+from cogmap.services.workspace.forgetting import Forgetting
 from tests.support.messages import of_type
 from tests.support.world.scenes import Desk, agent, percept
 

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from schemas.array import Array
-from schemas.graph import Phase
-from schemas.nodes import NEVER_NS, Object, object_id, percept_id
-from schemas.nodes import Percept as PerceptNode
-from schemas.sensing import Percept
-from services.workspace.individuals import individuals
+from cogmap.schemas.array import Array
+from cogmap.schemas.graph import Phase
+from cogmap.schemas.nodes import NEVER_NS, Object, object_id, percept_id
+from cogmap.schemas.nodes import Percept as PerceptNode
+from cogmap.schemas.sensing import Percept
+from cogmap.services.workspace.individuals import individuals
 from tests.support.world.scenes import (
     Desk,
     agent,

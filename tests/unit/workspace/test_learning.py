@@ -5,10 +5,10 @@ from __future__ import annotations
 import msgspec
 import pytest
 
-from schemas.cognition import Broadcast, Coalition, Competition, Trigger
-from schemas.feelings import Feeling
-from schemas.graph import Decay, Phase
-from schemas.nodes import (
+from cogmap.schemas.cognition import Broadcast, Coalition, Competition, Trigger
+from cogmap.schemas.feelings import Feeling
+from cogmap.schemas.graph import Decay, Phase
+from cogmap.schemas.nodes import (
     AnyNode,
     Attention,
     Node,
@@ -16,8 +16,8 @@ from schemas.nodes import (
     attention_id,
     object_id,
 )
-from services.workspace.config import Config
-from services.workspace.learning.base_level import learned_operations, risen
+from cogmap.services.workspace.config import Config
+from cogmap.services.workspace.learning.base_level import learned_operations, risen
 from tests.support.world.scenes import Desk, agent, graph_of, landmark, motion, percept, percepts
 
 LINEAR = Config(learning_rate=0.1, unlearning_rate=0.4)

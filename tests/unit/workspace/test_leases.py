@@ -6,10 +6,10 @@ from collections import Counter
 
 import pytest
 
-from schemas.codelets import Task
-from schemas.nodes import Self
-from schemas.process import Presence
-from services.codelets.resolution.coarse_places import Config as CoarsePlacesConfig
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.nodes import Self
+from cogmap.schemas.process import Presence
+from cogmap.services.codelets.resolution.coarse_places import Config as CoarsePlacesConfig
 from tests.support.messages import of_type
 from tests.support.world.scenes import (
     PERIOD_NS,

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from schemas.codelets import Offer
-from schemas.graph import Phase
-from schemas.nodes import (
+from cogmap.schemas.codelets import Offer
+from cogmap.schemas.graph import Phase
+from cogmap.schemas.nodes import (
     Episode,
     LinkKind,
     Node,

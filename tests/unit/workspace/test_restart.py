@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import pytest
 
-from schemas.base import Message
-from schemas.codelets import Offer
-from schemas.graph import Phase
-from schemas.nodes import Node
+from cogmap.schemas.base import Message
+from cogmap.schemas.codelets import Offer
+from cogmap.schemas.graph import Phase
+from cogmap.schemas.nodes import Node
 from tests.support.messages import of_type
 from tests.support.world.scenes import Desk, percept, thing
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from cogmap.errors import MessageError
-from schemas.array import Array
-from schemas.codelets import Task
-from schemas.sensing import RangeScan
+from cogmap.schemas.array import Array
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.sensing import RangeScan
 from tests.support.world.scenes import Desk, motion, percepts, stamp_ns
 
 RAYS = ((0.1, 5.0), (0.0, 0.0))

@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from cogmap.geometry.arrays import Floats, Indices
-from services.codelets.planning.network import Cell, PlaceNetwork
-from services.codelets.planning.search.links import Links, octile
-from services.codelets.planning.search.route import NoRoute, NoRouteReason, Route, refusal
-from services.codelets.planning.search.slots import Part
+from cogmap.services.codelets.planning.network import Cell, PlaceNetwork
+from cogmap.services.codelets.planning.search.links import Links, octile
+from cogmap.services.codelets.planning.search.route import NoRoute, NoRouteReason, Route, refusal
+from cogmap.services.codelets.planning.search.slots import Part
 
 # How much longer than over free ground a route may be that is sought first.
 DETOUR = 1.3

@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Indices
-from services.codelets.planning.network import NEIGHBOUR_OFFSETS, Cell, PlaceNetwork
-from services.codelets.planning.search.links import BLOCK, Links
-from services.codelets.planning.search.regions import Regions, Rows, Traits
-from services.codelets.planning.search.route import NoRoute, NoRouteReason, Route, refusal
-from services.codelets.planning.search.slots import Part
+from cogmap.services.codelets.planning.network import NEIGHBOUR_OFFSETS, Cell, PlaceNetwork
+from cogmap.services.codelets.planning.search.links import BLOCK, Links
+from cogmap.services.codelets.planning.search.regions import Regions, Rows, Traits
+from cogmap.services.codelets.planning.search.route import NoRoute, NoRouteReason, Route, refusal
+from cogmap.services.codelets.planning.search.slots import Part
 
 FACTOR = 3
 # A route over so few regions of the middle level is refined within those beside it too, for blocks

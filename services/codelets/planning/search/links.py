@@ -15,12 +15,12 @@ from scipy import sparse
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices, Singles
 from cogmap.graph.window import LINK_OFFSETS
-from services.codelets.planning.network import (
+from cogmap.services.codelets.planning.network import (
     NEIGHBOUR_OFFSETS,
     Cell,
     PlaceNetwork,
 )
-from services.codelets.planning.search.slots import Numbers, SlotGraph
+from cogmap.services.codelets.planning.search.slots import Numbers, SlotGraph
 
 # Costs are multiples of this, so that their sums are exact and ties are ties on every machine.
 COST_UNIT_M = 2.0**-20

@@ -16,8 +16,8 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices, Singles
-from services.codelets.planning.search.links import in_cost_units, octile
-from services.codelets.planning.search.slots import SlotGraph
+from cogmap.services.codelets.planning.search.links import in_cost_units, octile
+from cogmap.services.codelets.planning.search.slots import SlotGraph
 
 Integers = npt.NDArray[np.integer[Any]]
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cogmap.geometry.arrays import Indices
-from services.codelets.planning.network import Cell
-from services.codelets.planning.search.links import Links
+from cogmap.services.codelets.planning.network import Cell
+from cogmap.services.codelets.planning.search.links import Links
 
 
 class NoRouteReason(enum.StrEnum):

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from services.sim.layout.blocks.districts import Builder, District, Districts, function_of
-from services.sim.layout.catalogue import BuildingType
-from services.sim.layout.plan import PAVEMENT_WIDTH_M, Plot, Rectangle, Road
+from cogmap.services.sim.layout.blocks.districts import Builder, District, Districts, function_of
+from cogmap.services.sim.layout.catalogue import BuildingType
+from cogmap.services.sim.layout.plan import PAVEMENT_WIDTH_M, Plot, Rectangle, Road
 
 STREET_GAP_M = 0.2
 BUILDING_GAP_M = 1.0

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from services.sim.layout.blocks.streets import Grid
-from services.sim.layout.catalogue import CATALOGUE, BuildingType, Colour
-from services.sim.layout.plan import Point
+from cogmap.services.sim.layout.blocks.streets import Grid
+from cogmap.services.sim.layout.catalogue import CATALOGUE, BuildingType, Colour
+from cogmap.services.sim.layout.plan import Point
 
 OWN_FUNCTION = 0.85
 FEWEST = 3

@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from services.sim.layout.blocks.streets import Streets
-from services.sim.layout.furniture import Prop, line_pavements, prop_of_kind
-from services.sim.layout.plan import Plot, Road
+from cogmap.services.sim.layout.blocks.streets import Streets
+from cogmap.services.sim.layout.furniture import Prop, line_pavements, prop_of_kind
+from cogmap.services.sim.layout.plan import Plot, Road
 
 PAVEMENT_SPACING_M = 9.0
 KERB_GAP_M = 0.25

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from services.sim.layout.plan import Point, Road
+from cogmap.services.sim.layout.plan import Point, Road
 
 Crossing = tuple[int, int]
 Stretch = tuple[Crossing, Crossing]

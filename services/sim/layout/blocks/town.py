@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from services.sim.layout.blocks import districts, obstacles, streets
-from services.sim.layout.blocks.buildings import settle
-from services.sim.layout.place import Place
-from services.sim.layout.plan import Road
-from services.sim.layout.starts import start_on
+from cogmap.services.sim.layout.blocks import districts, obstacles, streets
+from cogmap.services.sim.layout.blocks.buildings import settle
+from cogmap.services.sim.layout.place import Place
+from cogmap.services.sim.layout.plan import Road
+from cogmap.services.sim.layout.starts import start_on
 
 SIZE_M = 200.0
 

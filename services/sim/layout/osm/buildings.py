@@ -14,9 +14,9 @@ import numpy as np
 
 from cogmap.data.osm import Extract, Tags, Way
 from cogmap.geometry.arrays import Floats
-from services.sim.layout.catalogue import BuildingType, Colour
-from services.sim.layout.osm.streets import Positions, metres
-from services.sim.layout.plan import Plot, Point
+from cogmap.services.sim.layout.catalogue import BuildingType, Colour
+from cogmap.services.sim.layout.osm.streets import Positions, metres
+from cogmap.services.sim.layout.plan import Plot, Point
 
 LEVEL_M = 3.0
 USUAL_M = 7.0

@@ -11,7 +11,7 @@ import numpy as np
 
 from cogmap.data.osm import Extract, Tags, Way
 from cogmap.geometry.arrays import Floats
-from services.sim.layout.plan import Point, Road
+from cogmap.services.sim.layout.plan import Point, Road
 
 # Usual widths between the kerbs, by the value of `highway`; other ways carry no cars.
 WIDTHS_M = {

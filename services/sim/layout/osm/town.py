@@ -13,12 +13,12 @@ from cogmap.data import osm
 from cogmap.data.osm import Extract
 from cogmap.errors import ConfigError
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from schemas.sensing import Pose
-from services.sim.layout.boundaries import clearance_m, outlines
-from services.sim.layout.osm.buildings import plots
-from services.sim.layout.osm.streets import Positions, roads
-from services.sim.layout.place import Place
-from services.sim.layout.plan import Plot, Point, Road
+from cogmap.schemas.sensing import Pose
+from cogmap.services.sim.layout.boundaries import clearance_m, outlines
+from cogmap.services.sim.layout.osm.buildings import plots
+from cogmap.services.sim.layout.osm.streets import Positions, roads
+from cogmap.services.sim.layout.place import Place
+from cogmap.services.sim.layout.plan import Plot, Point, Road
 
 EARTH_M = 6_371_008.8
 LARGEST_KM2 = 4.0

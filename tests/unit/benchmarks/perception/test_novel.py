@@ -9,8 +9,8 @@ import numpy as np
 from benchmarks.perception import scenes
 from benchmarks.perception.novel import Meeting, remembered
 from benchmarks.perception.objects import Building, Segment, Sight
-from services.sim.layout import town
-from training.rendering import towns
+from cogmap.services.sim.layout import town
+from cogmap.training.rendering import towns
 
 TRAINED = frozenset({"bakery", "bank"})
 

@@ -13,7 +13,7 @@ import pytest
 from benchmarks.perception import objects
 from benchmarks.perception.measure import THRESHOLDS
 from benchmarks.perception.objects import Building, Segment, Sight
-from schemas.sensing import Percept
+from cogmap.schemas.sensing import Percept
 
 TRAINED = frozenset({"bakery", "bank"})
 SIZE = (10, 10)

@@ -17,7 +17,13 @@ from click.testing import CliRunner
 from benchmarks.commands import benchmarks
 from benchmarks.perception.photographs import mean_mask, measure_by_drive
 from cogmap.errors import UsageError
-from training.photographs import Photograph, by_drive, photographs, road_iou, training_folders
+from cogmap.training.photographs import (
+    Photograph,
+    by_drive,
+    photographs,
+    road_iou,
+    training_folders,
+)
 
 needs_torch = pytest.mark.skipif(
     find_spec("torch") is None and "CI" not in os.environ,

@@ -22,8 +22,8 @@ from benchmarks.perception.sequence import (
     poses,
     recall,
 )
-from schemas.sensing import PlaceMatch, Pose
-from services.sim.layout import town
+from cogmap.schemas.sensing import PlaceMatch, Pose
+from cogmap.services.sim.layout import town
 
 LINE = [(0.0, 0.0), (40.0, 0.0), (40.0, 30.0)]
 EASTWARDS = [(0.0, 0.0), (80.0, 0.0)]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.perception import depth, streets
-from schemas.sensing import Pose
+from cogmap.schemas.sensing import Pose
 
 
 def test_depth_is_judged_from_three_to_thirty_metres_where_it_is_known() -> None:

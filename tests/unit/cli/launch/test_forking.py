@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from cli.launch.command_line import cogmap_command, environment
-from cli.launch.forking.client import Forked, ForkServer
-from cli.launch.supervisor import Program, Supervisor
 from cogmap.bus.session import free_endpoint
+from cogmap.cli.launch.command_line import cogmap_command, environment
+from cogmap.cli.launch.forking.client import Forked, ForkServer
+from cogmap.cli.launch.supervisor import Program, Supervisor
 from tests.support.system.processes import wait_until
 
 TIMEOUT_S = 30.0
@@ -157,10 +157,10 @@ def test_what_one_module_cannot_import_keeps_no_other_from_its_start(
 
 def test_a_failed_import_fails_again_after_all_was_prepared(broken_library: str) -> None:
     script = (
-        "from cli.launch.forking.server import preparation\n"
+        "from cogmap.cli.launch.forking.server import preparation\n"
         "from services import registry\n"
         "for _ in preparation(): pass\n"
-        "import services.motor.module\n"
+        "import cogmap.services.motor.module\n"
         "registry.build('sensory', {})\n"
     )
     command = [sys.executable, "-c", script]
@@ -199,7 +199,7 @@ def test_a_held_module_ends_with_its_standard_input(fork: Fork) -> None:
 def test_nothing_that_is_imported_before_a_fork_starts_a_thread() -> None:
     script = (
         "import os\n"
-        "from cli.launch.forking.server import preparation\n"
+        "from cogmap.cli.launch.forking.server import preparation\n"
         "for _ in preparation(): pass\n"
         "print(len(os.listdir('/proc/self/task')))\n"
     )

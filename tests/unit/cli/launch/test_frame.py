@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from cli.launch.observer import Observer
-from schemas.array import Matrix
-from schemas.graph import Delta, Operation, Phase
-from schemas.nodes import RECOLLECTION_ID, ROOT_MAP, Map, Recollection
-from schemas.sensing import Pose, TruePose
+from cogmap.cli.launch.observer import Observer
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.graph import Delta, Operation, Phase
+from cogmap.schemas.nodes import RECOLLECTION_ID, ROOT_MAP, Map, Recollection
+from cogmap.schemas.sensing import Pose, TruePose
 from tests.support.world.scenes import agent
 
 START = Pose(x_m=10.0, y_m=20.0, heading_rad=math.pi / 2)

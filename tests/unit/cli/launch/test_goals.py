@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from cli.launch.goals import unreached
+from cogmap.cli.launch.goals import unreached
 from cogmap.graph.graph import Graph
-from schemas.nodes import PLAN_ID, Goal, Object, Plan, PlanState, goal_id, object_id
+from cogmap.schemas.nodes import PLAN_ID, Goal, Object, Plan, PlanState, goal_id, object_id
 from tests.support.world.scenes import graph_of
 
 KNOWN = ("bakery", "school")

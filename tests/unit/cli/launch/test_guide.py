@@ -5,14 +5,14 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 
-from cli.launch.guide import Guide, Stage, street_ahead
-from cli.launch.observer import Observer
+from cogmap.cli.launch.guide import Guide, Stage, street_ahead
+from cogmap.cli.launch.observer import Observer
 from cogmap.graph.graph import Graph
-from schemas.array import Matrix
-from schemas.base import Message
-from schemas.codelets import Offer
-from schemas.nodes import PLAN_ID, Goal, Object, Plan, PlanState, object_id
-from schemas.sensing import Pose, Street, StreetClosure, TruePose, TrueTown
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.base import Message
+from cogmap.schemas.codelets import Offer
+from cogmap.schemas.nodes import PLAN_ID, Goal, Object, Plan, PlanState, object_id
+from cogmap.schemas.sensing import Pose, Street, StreetClosure, TruePose, TrueTown
 from tests.support.world.scenes import agent
 
 CORNERS = ((0.0, 0.0), (60.0, 0.0), (60.0, 40.0), (0.0, 40.0))

@@ -8,14 +8,14 @@ import msgspec
 import numpy as np
 import pytest
 
-from cli.launch.observer import Errors, Observer
-from cli.launch.track import Track
+from cogmap.cli.launch.observer import Errors, Observer
+from cogmap.cli.launch.track import Track
 from cogmap.errors import MessageError
-from schemas.array import Array
-from schemas.cognition import Competition
-from schemas.graph import Delta, DropNode, Operation, Phase
-from schemas.nodes import Goal
-from schemas.sensing import Odometry, Pose, SelfMotion, TruePose
+from cogmap.schemas.array import Array
+from cogmap.schemas.cognition import Competition
+from cogmap.schemas.graph import Delta, DropNode, Operation, Phase
+from cogmap.schemas.nodes import Goal
+from cogmap.schemas.sensing import Odometry, Pose, SelfMotion, TruePose
 from tests.support.world.plans import plan_along
 from tests.support.world.scenes import agent, thing
 

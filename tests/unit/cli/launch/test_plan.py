@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from cli.goal import parsed
-from cli.launch.plan import (
+from cogmap.cli.goal import parsed
+from cogmap.cli.launch.plan import (
     OBSERVER,
     RECORDER,
     ROUTER,
@@ -20,12 +20,12 @@ from cli.launch.plan import (
     programs,
     to_toml,
 )
-from cli.launch.supervisor import Program
-from cli.run.command import LAP_LIMIT_S
+from cogmap.cli.launch.supervisor import Program
+from cogmap.cli.run.command import LAP_LIMIT_S
 from cogmap.errors import ConfigError
-from services import registry
-from services.sim.config import Config as SimConfig
-from services.sim.layout.town import generate
+from cogmap.services import registry
+from cogmap.services.sim.config import Config as SimConfig
+from cogmap.services.sim.layout.town import generate
 
 
 def configured(choices: Choices, **sections: dict[str, object]) -> dict[str, dict[str, Any]]:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.launch.supervisor import Program, Supervisor
+from cogmap.cli.launch.supervisor import Program, Supervisor
 from cogmap.errors import ProcessFailedError
 
 TIMEOUT_S = 20.0
@@ -163,8 +163,8 @@ def test_a_child_that_was_released_is_not_held_again(
 
 LAUNCHER = """
 import pathlib, sys
-from cli.launch.command_line import cogmap_command
-from cli.launch.supervisor import Supervisor, Program
+from cogmap.cli.launch.command_line import cogmap_command
+from cogmap.cli.launch.supervisor import Supervisor, Program
 supervisor = Supervisor(pathlib.Path(sys.argv[1]))
 for name, port in (("one", sys.argv[2]), ("two", sys.argv[3])):
     command = cogmap_command("router", "--tied", "--connect", f"tcp/127.0.0.1:{port}")

@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 from rich.text import Text
 
-from cli.launch.metrics import DriveMetrics, RunMetrics, drive_metrics
-from cli.launch.watch import Watch
-from cli.plots import map as plot
-from cli.run.summary import drive_rows
 from cogmap.bus.codec import Envelope, encode
 from cogmap.bus.memory import MemoryBus, MemoryNetwork
-from schemas import topics
-from schemas.array import Array
-from schemas.base import Message
-from schemas.graph import Cells, Delta, DropNode, Phase
-from schemas.nodes import PlaceColumn
-from schemas.process import Health
-from schemas.sensing import (
+from cogmap.cli.launch.metrics import DriveMetrics, RunMetrics, drive_metrics
+from cogmap.cli.launch.watch import Watch
+from cogmap.cli.plots import map as plot
+from cogmap.cli.run.summary import drive_rows
+from cogmap.schemas import topics
+from cogmap.schemas.array import Array
+from cogmap.schemas.base import Message
+from cogmap.schemas.graph import Cells, Delta, DropNode, Phase
+from cogmap.schemas.nodes import PlaceColumn
+from cogmap.schemas.process import Health
+from cogmap.schemas.sensing import (
     Energy,
     MotorCommand,
     Odometry,
@@ -30,7 +30,7 @@ from schemas.sensing import (
     SpeedLimit,
     TruePose,
 )
-from services.sim.layout.town import generate
+from cogmap.services.sim.layout.town import generate
 from tests.support.world.scenes import agent, landmark
 
 MS = 1_000_000

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from cli.launch.outcome import Ending, Outcome
-from cli.launch.watchdog import MIN_MOVE_M, STALLED_S, STUCK_S, Situation, Watchdog
-from schemas.sensing import SpeedLimit
+from cogmap.cli.launch.outcome import Ending, Outcome
+from cogmap.cli.launch.watchdog import MIN_MOVE_M, STALLED_S, STUCK_S, Situation, Watchdog
+from cogmap.schemas.sensing import SpeedLimit
 
 
 def after(wall_s: float, drive_s: float, moved_m: float = 0.0, **more: object) -> Ending | None:

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from cogmap.errors import LogError, UsageError
-from schemas.base import Message
-from schemas.sensing import Odometry, Pose, TruePose
+from cogmap.schemas.base import Message
+from cogmap.schemas.sensing import Odometry, Pose, TruePose
 from tests.support.logs import SECOND_NS, odometry, write_log
 from tests.support.system.commands import log_command, log_facts
 

@@ -19,13 +19,13 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
-from cli.plots import draw, ground
-from cli.plots.labels import Label, place
-from cli.plots.palette import KERB, SEVERAL
+from cogmap.cli.plots import draw, ground
+from cogmap.cli.plots.labels import Label, place
+from cogmap.cli.plots.palette import KERB, SEVERAL
 from cogmap.errors import LogError, UsageError
-from schemas.array import Array
-from schemas.base import Message
-from schemas.sensing import Percept, Percepts, StereoFrame, View
+from cogmap.schemas.array import Array
+from cogmap.schemas.base import Message
+from cogmap.schemas.sensing import Percept, Percepts, StereoFrame, View
 from tests.support.logs import SECOND_NS, write_log
 from tests.support.system.commands import log_command, log_facts
 from tests.support.world.blocks import ASPHALT, CAMERA, GRASS, Block, painted

@@ -7,10 +7,10 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
-from cli.plots.palette import CLOSED
-from cli.plots.town_layer import MAX_NAMES, draw_town
-from schemas.sensing import Building, Obstacle, Pose, Street, TrueTown
-from services.sim.layout.furniture import CHARGING_PLACE
+from cogmap.cli.plots.palette import CLOSED
+from cogmap.cli.plots.town_layer import MAX_NAMES, draw_town
+from cogmap.schemas.sensing import Building, Obstacle, Pose, Street, TrueTown
+from cogmap.services.sim.layout.furniture import CHARGING_PLACE
 
 LINE_M = [(0.0, 0.0), (40.0, 0.0)]
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from cli.launch.observer import Observer
-from cli.plots.map_structure import draw_structure
-from schemas.array import Array
-from schemas.graph import Cells, Links
-from schemas.nodes import ROOT_MAP, LinkKind, Map, PlaceColumn, map_id
+from cogmap.cli.launch.observer import Observer
+from cogmap.cli.plots.map_structure import draw_structure
+from cogmap.schemas.array import Array
+from cogmap.schemas.graph import Cells, Links
+from cogmap.schemas.nodes import ROOT_MAP, LinkKind, Map, PlaceColumn, map_id
 from tests.support.world.scenes import graph_of, landmark
 
 

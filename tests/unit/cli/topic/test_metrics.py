@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from cli.topic.metrics import in_bytes
-from cli.topic.statistics import Bandwidth, Delay, Rate
+from cogmap.cli.topic.metrics import in_bytes
+from cogmap.cli.topic.statistics import Bandwidth, Delay, Rate
 
 S = 1_000_000_000
 

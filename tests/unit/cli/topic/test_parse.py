@@ -6,14 +6,14 @@ import json
 
 import pytest
 
-from cli.topic.argument import streamed_topic, topic_named
-from cli.topic.echo import formatter
-from cli.topic.parse import parse
+from cogmap.cli.topic.argument import streamed_topic, topic_named
+from cogmap.cli.topic.echo import formatter
+from cogmap.cli.topic.parse import parse
 from cogmap.errors import UsageError
-from schemas import topics
-from schemas.examples import example_messages
-from schemas.sensing import MotorCommand, Odometry
-from schemas.topics import Topic
+from cogmap.schemas import topics
+from cogmap.schemas.examples import example_messages
+from cogmap.schemas.sensing import MotorCommand, Odometry
+from cogmap.schemas.topics import Topic
 
 BY_TOPIC = {topics.of(message): message for message in example_messages()}
 ODOMETRY = Odometry(speed_m_s=1.5, turn_rate_rad_s=0.0, dt_s=0.05, stamp_ns=7, seq=3, source="sim")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from schemas.array import Matrix
-from schemas.feelings import Feeling
-from schemas.graph import Link
-from schemas.nodes import (
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.feelings import Feeling
+from cogmap.schemas.graph import Link
+from cogmap.schemas.nodes import (
     ROOT_MAP,
     AnyNode,
     LinkKind,
@@ -18,8 +18,8 @@ from schemas.nodes import (
     Self,
     map_id,
 )
-from services.codelets.attention.coalitions import coalition
-from services.codelets.attention.config import Config
+from cogmap.services.codelets.attention.coalitions import coalition
+from cogmap.services.codelets.attention.config import Config
 from tests.support.world.scenes import agent, graph_of, landmark, percept, run, task
 
 CONFIG = Config()

@@ -8,13 +8,13 @@ import pytest
 
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, CycleContext
-from schemas.array import Array
-from schemas.feelings import Feeling
-from schemas.graph import Delta, Operation, Phase
-from schemas.nodes import Attention, attention_id
-from schemas.sensing import Percept, RangeScan
-from services.codelets.attention import danger
-from services.codelets.attention.config import Config, Danger
+from cogmap.schemas.array import Array
+from cogmap.schemas.feelings import Feeling
+from cogmap.schemas.graph import Delta, Operation, Phase
+from cogmap.schemas.nodes import Attention, attention_id
+from cogmap.schemas.sensing import Percept, RangeScan
+from cogmap.services.codelets.attention import danger
+from cogmap.services.codelets.attention.config import Config, Danger
 from tests.support.world.scenes import agent, graph_of, landmark, percept, percepts, run
 
 CONFIG = Config(danger=Danger(refractory_cycles=1, same_cycles=5))

@@ -7,11 +7,11 @@ import pytest
 
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import CycleContext
-from schemas.array import Array
-from schemas.graph import Decay, Delta, Phase
-from schemas.nodes import Episode, Remembered, episode_id
-from services.codelets.attention import episode
-from services.codelets.attention.config import Config
+from cogmap.schemas.array import Array
+from cogmap.schemas.graph import Decay, Delta, Phase
+from cogmap.schemas.nodes import Episode, Remembered, episode_id
+from cogmap.services.codelets.attention import episode
+from cogmap.services.codelets.attention.config import Config
 from tests.support.world.scenes import agent, graph_of, percepts, run, task
 
 CONFIG = Config()

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from cogmap.graph.graph import Graph
-from schemas.array import Array, Matrix
-from schemas.codelets import Task
-from schemas.cognition import Coalition
-from schemas.graph import Cells, Delta, Link, Operation, Phase
-from schemas.nodes import (
+from cogmap.schemas.array import Array, Matrix
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.cognition import Coalition
+from cogmap.schemas.graph import Cells, Delta, Link, Operation, Phase
+from cogmap.schemas.nodes import (
     PLAN_ID,
     AnyNode,
     Attention,
@@ -28,8 +28,8 @@ from schemas.nodes import (
     place_cell,
     segment_id,
 )
-from services.codelets.attention.config import Config, Expectation
-from services.codelets.attention.disappearance import MANY_OBJECTS
+from cogmap.services.codelets.attention.config import Config, Expectation
+from cogmap.services.codelets.attention.disappearance import MANY_OBJECTS
 from tests.support.world.scenes import agent, graph_of, landmark, percept, run, task
 
 VIEWS = 3

@@ -9,9 +9,9 @@ import numpy as np
 
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, CycleContext
-from schemas.array import Array, Matrix
-from schemas.graph import Delta, Link, Operation, Phase
-from schemas.nodes import (
+from cogmap.schemas.array import Array, Matrix
+from cogmap.schemas.graph import Delta, Link, Operation, Phase
+from cogmap.schemas.nodes import (
     NEVER_NS,
     PLAN_ID,
     Attention,
@@ -22,9 +22,9 @@ from schemas.nodes import (
     attention_id,
     goal_id,
 )
-from services.codelets.attention import goal
-from services.codelets.attention.config import Config
-from services.codelets.attention.config import Goal as Settings
+from cogmap.services.codelets.attention import goal
+from cogmap.services.codelets.attention.config import Config
+from cogmap.services.codelets.attention.config import Goal as Settings
 from tests.support.world.scenes import agent, graph_of, percepts, run
 
 CONFIG = Config(goal=Settings(refractory_cycles=1, change_salience=0.5))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from schemas.cognition import Coalition
-from schemas.nodes import (
+from cogmap.schemas.cognition import Coalition
+from cogmap.schemas.nodes import (
     PLAN_ID,
     Goal,
     Need,
@@ -16,7 +16,7 @@ from schemas.nodes import (
     need_id,
     object_id,
 )
-from services.codelets.attention.config import Config
+from cogmap.services.codelets.attention.config import Config
 from tests.support.world.scenes import agent, graph_of, run, task
 
 CONFIG = Config()

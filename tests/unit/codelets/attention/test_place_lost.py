@@ -7,12 +7,12 @@ import numpy as np
 
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, CycleContext
-from schemas.array import Array
-from schemas.feelings import Feeling
-from schemas.graph import Delta, Operation, Phase
-from schemas.nodes import Attention, attention_id
-from services.codelets.attention import place_lost
-from services.codelets.attention.config import Config
+from cogmap.schemas.array import Array
+from cogmap.schemas.feelings import Feeling
+from cogmap.schemas.graph import Delta, Operation, Phase
+from cogmap.schemas.nodes import Attention, attention_id
+from cogmap.services.codelets.attention import place_lost
+from cogmap.services.codelets.attention.config import Config
 from tests.support.world.scenes import agent, graph_of, landmark, percepts, run, task
 
 CONFIG = Config()

@@ -8,12 +8,12 @@ import pytest
 
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import CycleContext
-from schemas.array import Array
-from schemas.graph import Delta, Phase
-from schemas.nodes import Attention, Need, attention_id, need_id
-from services.codelets.attention import need, novelty, whereabouts
-from services.codelets.attention.config import Config, Novelty, Whereabouts
-from services.codelets.attention.memory import without_conscious
+from cogmap.schemas.array import Array
+from cogmap.schemas.graph import Delta, Phase
+from cogmap.schemas.nodes import Attention, Need, attention_id, need_id
+from cogmap.services.codelets.attention import need, novelty, whereabouts
+from cogmap.services.codelets.attention.config import Config, Novelty, Whereabouts
+from cogmap.services.codelets.attention.memory import without_conscious
 from tests.support.world.scenes import agent, graph_of, landmark, percept, percepts, run, task
 
 PATIENT = Config(novelty=Novelty(refractory_cycles=2))

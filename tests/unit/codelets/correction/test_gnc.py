@@ -10,10 +10,10 @@ import pytest
 from benchmarks.map_correction.false_groups import false_closures
 from cogmap.geometry.arrays import Booleans
 from cogmap.geometry.se2 import relative
-from services.codelets.correction.gnc import inliers
-from services.codelets.correction.hypotheses import Hypotheses
-from services.codelets.correction.least_squares import optimize
-from services.codelets.correction.pose_graph import Constraints, PoseGraph
+from cogmap.services.codelets.correction.gnc import inliers
+from cogmap.services.codelets.correction.hypotheses import Hypotheses
+from cogmap.services.codelets.correction.least_squares import optimize
+from cogmap.services.codelets.correction.pose_graph import Constraints, PoseGraph
 from tests.support.world.laps import (
     CLOSURE_SD,
     LAP,

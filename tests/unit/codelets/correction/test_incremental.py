@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from services.codelets.correction import incremental
-from services.codelets.correction.incremental import IncrementalSolver
-from services.codelets.correction.least_squares import optimize
-from services.codelets.correction.pose_graph import cost
+from cogmap.services.codelets.correction import incremental
+from cogmap.services.codelets.correction.incremental import IncrementalSolver
+from cogmap.services.codelets.correction.least_squares import optimize
+from cogmap.services.codelets.correction.pose_graph import cost
 from tests.support.world.laps import CLOSURE_SD, laps, one_between
 
 FAR = one_between(0, 80, (15.0, -15.0, 1.0), CLOSURE_SD / 10)

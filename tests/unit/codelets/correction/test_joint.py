@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from cogmap.geometry.se2 import integrate, transform_to
-from services.codelets.config import Config
-from services.codelets.correction.joint import by_side, optimize_jointly
-from services.codelets.correction.least_squares import optimize
-from services.codelets.correction.pose_graph import Constraints, PoseGraph
-from services.codelets.mapping.observations import Sightings
+from cogmap.services.codelets.config import Config
+from cogmap.services.codelets.correction.joint import by_side, optimize_jointly
+from cogmap.services.codelets.correction.least_squares import optimize
+from cogmap.services.codelets.correction.pose_graph import Constraints, PoseGraph
+from cogmap.services.codelets.mapping.observations import Sightings
 from tests.support.paths import mean_distance_m
 
 SIDE = 20

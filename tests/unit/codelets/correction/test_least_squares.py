@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from cogmap.errors import MessageError
-from services.codelets.correction.least_squares import optimize
-from services.codelets.correction.pose_graph import (
+from cogmap.services.codelets.correction.least_squares import optimize
+from cogmap.services.codelets.correction.pose_graph import (
     PoseGraph,
     cost,
     jacobians,

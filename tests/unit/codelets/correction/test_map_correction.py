@@ -11,8 +11,8 @@ import pytest
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import motion_onto, relative
 from cogmap.graph.path import rows_of
-from schemas.graph import Phase
-from schemas.nodes import (
+from cogmap.schemas.graph import Phase
+from cogmap.schemas.nodes import (
     CORRECTION_ID,
     ROOT_MAP,
     LinkKind,
@@ -23,7 +23,7 @@ from schemas.nodes import (
     nearest_place,
     object_id,
 )
-from services.codelets.mapping.path import ODOMETRY, POSE, STAMP
+from cogmap.services.codelets.mapping.path import ODOMETRY, POSE, STAMP
 from tests.support.paths import mean_distance_m, steps_m
 from tests.support.world.loop_drive import HOUSE, LAP, QUIET, SLIP, TOWER, LoopDrive, round_once
 from tests.support.world.scenes import Desk, stamp_ns

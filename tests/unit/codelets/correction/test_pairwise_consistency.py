@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.geometry.se2 import rotate
-from services.codelets.config import Config
-from services.codelets.correction.pairwise_consistency import Views, consistent
-from services.codelets.mapping.path import steps_of
-from services.codelets.mapping.views import constraints_of
+from cogmap.services.codelets.config import Config
+from cogmap.services.codelets.correction.pairwise_consistency import Views, consistent
+from cogmap.services.codelets.mapping.path import steps_of
+from cogmap.services.codelets.mapping.views import constraints_of
 
 FALSE_CLOSURE = 1e-3
 TOWER = np.array([30.0, 8.0])

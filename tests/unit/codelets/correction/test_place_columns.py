@@ -12,12 +12,12 @@ from cogmap.geometry.se2 import rotate
 from cogmap.graph.crossings import crossings
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import EVIDENCE_COLUMNS, WEIGHT_COLUMNS
-from schemas.array import Array, Matrix
-from schemas.graph import Cells
-from schemas.nodes import CORRECTION_ID, ROOT_MAP, Correction, Map, PlaceColumn
-from services.codelets.config import Config
-from services.codelets.correction.place_columns import MAX_CELLS, move_places
-from services.codelets.mapping.evidence import weights_of
+from cogmap.schemas.array import Array, Matrix
+from cogmap.schemas.graph import Cells
+from cogmap.schemas.nodes import CORRECTION_ID, ROOT_MAP, Correction, Map, PlaceColumn
+from cogmap.services.codelets.config import Config
+from cogmap.services.codelets.correction.place_columns import MAX_CELLS, move_places
+from cogmap.services.codelets.mapping.evidence import weights_of
 from tests.support.world.scenes import graph_of, run, task
 
 CUT = -3.0

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from cogmap.geometry.arrays import Floats
-from schemas.cognition import Replay
-from schemas.graph import Delta, Phase
-from services.codelets.correction.joint import ROUNDS
+from cogmap.schemas.cognition import Replay
+from cogmap.schemas.graph import Delta, Phase
+from cogmap.services.codelets.correction.joint import ROUNDS
 from tests.support.messages import of_type
 from tests.support.world.loop_drive import QUIET, LoopDrive, round_once
 from tests.support.world.scenes import stamp_ns

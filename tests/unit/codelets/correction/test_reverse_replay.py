@@ -7,8 +7,8 @@ import pytest
 
 from benchmarks.map_correction.reference import best_positions
 from cogmap.geometry.se2 import integrate, rotate
-from services.codelets.correction.pose_graph import Constraints, PoseGraph
-from services.codelets.correction.reverse_replay import (
+from cogmap.services.codelets.correction.pose_graph import Constraints, PoseGraph
+from cogmap.services.codelets.correction.reverse_replay import (
     Loops,
     close_loops,
     displacements,

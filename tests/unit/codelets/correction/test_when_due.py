@@ -8,11 +8,11 @@ import pytest
 
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import CycleContext
-from schemas.array import Array, Matrix
-from schemas.nodes import LoopClosure, PathColumn, PathSegment, segment_id
-from schemas.sensing import Percepts
-from services.codelets.config import Config
-from services.codelets.correction.map_correction import CODELET
+from cogmap.schemas.array import Array, Matrix
+from cogmap.schemas.nodes import LoopClosure, PathColumn, PathSegment, segment_id
+from cogmap.schemas.sensing import Percepts
+from cogmap.services.codelets.config import Config
+from cogmap.services.codelets.correction.map_correction import CODELET
 from tests.support.world.scenes import graph_of
 
 CONFIG = Config(closure_spacing_s=2.0, revisit_s=100.0, waiting_share=0.0)

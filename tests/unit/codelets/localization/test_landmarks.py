@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from schemas.nodes import Object
-from services.codelets.config import Config
+from cogmap.schemas.nodes import Object
+from cogmap.services.codelets.config import Config
 from tests.support.world.landmarks import house
 from tests.support.world.scenes import agent, graph_of, landmark, percept, run, task
 

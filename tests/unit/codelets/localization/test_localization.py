@@ -10,9 +10,9 @@ import pytest
 
 from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
-from schemas.graph import Link
-from schemas.nodes import LinkKind, Self
-from services.codelets.config import Config
+from cogmap.schemas.graph import Link
+from cogmap.schemas.nodes import LinkKind, Self
+from cogmap.services.codelets.config import Config
 from tests.support.world.landmarks import (
     house,
     localized,

@@ -7,16 +7,16 @@ import math
 import numpy as np
 import pytest
 
-from schemas.nodes import NEVER_NS
-from services.codelets.config import Config
-from services.codelets.localization.measurement_model import (
+from cogmap.schemas.nodes import NEVER_NS
+from cogmap.services.codelets.config import Config
+from cogmap.services.codelets.localization.measurement_model import (
     Sighting,
     compare,
     log_likelihood,
     sightings,
 )
-from services.codelets.localization.novelty import novelty, variances_at
-from services.codelets.mapping.path import segments
+from cogmap.services.codelets.localization.novelty import novelty, variances_at
+from cogmap.services.codelets.mapping.path import segments
 from tests.support.world.scenes import graph_of, landmark, percept
 
 CONFIG = Config()

@@ -10,10 +10,10 @@ import pytest
 
 from benchmarks.localization.loop import LocalizationLoop
 from benchmarks.localization.senses import Moment
-from schemas.array import Array
-from schemas.nodes import Object, Self
-from schemas.sensing import Percept
-from services.codelets.config import Config
+from cogmap.schemas.array import Array
+from cogmap.schemas.nodes import Object, Self
+from cogmap.schemas.sensing import Percept
+from cogmap.services.codelets.config import Config
 from tests.support.world.scenes import agent as self_node
 from tests.support.world.scenes import graph_of, percept, run, task
 from tests.support.world.scenes import landmark as object_node

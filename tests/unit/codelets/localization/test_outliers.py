@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from services.codelets.config import Config
+from cogmap.services.codelets.config import Config
 from tests.support.world.landmarks import (
     house,
     localized,

@@ -12,8 +12,8 @@ from benchmarks.localization.loop import LocalizationLoop
 from benchmarks.localization.senses import TICK_S, Moment, seen
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import compose, relative, transform_to
-from schemas.sensing import Percept
-from services.codelets.localization.measurement_model import cost_of_mistake
+from cogmap.schemas.sensing import Percept
+from cogmap.services.codelets.localization.measurement_model import cost_of_mistake
 
 LANDMARKS = {
     "a": (10.0, 4.0),

@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 
 from cogmap.geometry.se2 import mean_pose, wrap_angle
-from services.codelets.localization.sampling import generator, rejection_mask, resample, spread
+from cogmap.services.codelets.localization.sampling import (
+    generator,
+    rejection_mask,
+    resample,
+    spread,
+)
 
 
 def test_rejection_keeps_samples_by_their_likelihood() -> None:

@@ -14,12 +14,12 @@ from cogmap.geometry.se2 import rotate
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import EVIDENCE_COLUMNS, WEIGHT_COLUMNS
 from cogmap.runtime.codelet import CycleContext
-from schemas.array import Array
-from schemas.graph import Cells, Operation
-from schemas.nodes import ROOT_MAP, Map, PlaceColumn
-from schemas.sensing import RangeScan
-from services.codelets.config import Config
-from services.codelets.mapping import boundary
+from cogmap.schemas.array import Array
+from cogmap.schemas.graph import Cells, Operation
+from cogmap.schemas.nodes import ROOT_MAP, Map, PlaceColumn
+from cogmap.schemas.sensing import RangeScan
+from cogmap.services.codelets.config import Config
+from cogmap.services.codelets.mapping import boundary
 from tests.support.world.scenes import graph_of, percepts, run
 from tests.support.world.street import Street, View, see, self_at
 

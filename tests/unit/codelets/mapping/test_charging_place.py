@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from schemas.graph import Link
-from schemas.nodes import Need, Object, need_id, object_id
-from services.codelets.config import Config
+from cogmap.schemas.graph import Link
+from cogmap.schemas.nodes import Need, Object, need_id, object_id
+from cogmap.services.codelets.config import Config
 from tests.support.messages import of_type
 from tests.support.world.scenes import agent, graph_of, run, task
 

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from schemas.graph import Link
-from schemas.nodes import Object, object_id
-from services.codelets.config import Config
+from cogmap.schemas.graph import Link
+from cogmap.schemas.nodes import Object, object_id
+from cogmap.services.codelets.config import Config
 from tests.support.world.scenes import Desk, agent, graph_of, percept, run, task
 
 CONFIG = Config(landmark_samples=40)

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from cogmap.geometry.se2 import compose, relative
-from schemas.nodes import Observations, PathSegment
-from schemas.sensing import Percept
-from services.codelets.correction.joint import with_landmarks
-from services.codelets.correction.least_squares import optimize
-from services.codelets.correction.pose_graph import Constraints, PoseGraph
-from services.codelets.mapping.observations import Sightings, Viewpoint, extended
+from cogmap.schemas.nodes import Observations, PathSegment
+from cogmap.schemas.sensing import Percept
+from cogmap.services.codelets.correction.joint import with_landmarks
+from cogmap.services.codelets.correction.least_squares import optimize
+from cogmap.services.codelets.correction.pose_graph import Constraints, PoseGraph
+from cogmap.services.codelets.mapping.observations import Sightings, Viewpoint, extended
 from tests.support.paths import mean_distance_m
 from tests.support.world.scenes import Desk, percept
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from cogmap.graph.graph import Graph
-from schemas.graph import Cells
-from schemas.nodes import ROOT_MAP, PlaceColumn
-from services.codelets.config import Config
-from services.codelets.mapping.road_place import ROAD_REACH_M
+from cogmap.schemas.graph import Cells
+from cogmap.schemas.nodes import ROOT_MAP, PlaceColumn
+from cogmap.services.codelets.config import Config
+from cogmap.services.codelets.mapping.road_place import ROAD_REACH_M
 from tests.support.world.scenes import graph_of, run, task
 from tests.support.world.street import View, see, self_at
 

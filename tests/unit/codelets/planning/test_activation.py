@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from services.codelets.planning.activation import (
+from cogmap.services.codelets.planning.activation import (
     NoRoute,
     NoRouteReason,
     Route,
@@ -11,7 +11,7 @@ from services.codelets.planning.activation import (
     find_route,
     spread,
 )
-from services.codelets.planning.network import grid_network
+from cogmap.services.codelets.planning.network import grid_network
 
 
 def open_grid(width=6, height=5, **settings):

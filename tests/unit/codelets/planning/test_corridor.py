@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from cogmap.graph.graph import Graph
-from schemas.array import Array
-from schemas.graph import Cells, DropNode, DropPlaces
-from schemas.nodes import (
+from cogmap.schemas.array import Array
+from cogmap.schemas.graph import Cells, DropNode, DropPlaces
+from cogmap.schemas.nodes import (
     PLAN_ID,
     ROOT_MAP,
     Goal,
@@ -20,13 +20,13 @@ from schemas.nodes import (
     goal_id,
     map_id,
 )
-from services.codelets.planning.config import Config
-from services.codelets.planning.corridor import corridor
-from services.codelets.planning.held import held_routes
-from services.codelets.planning.route_plan import run
-from services.codelets.planning.targets import goals_m
-from services.codelets.resolution import coarse_places, sub_map_places
-from services.codelets.resolution.sub_map_grid import SETTLED_CYCLES
+from cogmap.services.codelets.planning.config import Config
+from cogmap.services.codelets.planning.corridor import corridor
+from cogmap.services.codelets.planning.held import held_routes
+from cogmap.services.codelets.planning.route_plan import run
+from cogmap.services.codelets.planning.targets import goals_m
+from cogmap.services.codelets.resolution import coarse_places, sub_map_places
+from cogmap.services.codelets.resolution.sub_map_grid import SETTLED_CYCLES
 from tests.support.world.scenes import agent, graph_of, task
 
 SIDE = 240

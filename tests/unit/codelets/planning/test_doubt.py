@@ -6,9 +6,9 @@ import msgspec
 import numpy as np
 import pytest
 
-from schemas.array import Matrix
-from schemas.codelets import Task
-from schemas.nodes import (
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.nodes import (
     PLAN_ID,
     Goal,
     PathColumn,
@@ -19,8 +19,8 @@ from schemas.nodes import (
     goal_id,
     segment_id,
 )
-from services.codelets.planning.config import Config
-from services.codelets.planning.route_plan import run
+from cogmap.services.codelets.planning.config import Config
+from cogmap.services.codelets.planning.route_plan import run
 from tests.support.world.route_planning import STAMP_NS, goal_at, planned
 from tests.support.world.scenes import agent
 from tests.support.world.street_loop import barrier, block_of, loop

@@ -7,10 +7,10 @@ import pytest
 
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import WEIGHT_COLUMNS
-from schemas.array import Matrix
-from schemas.nodes import ROOT_MAP, Map, PathColumn, PathSegment, PlaceColumn, segment_id
-from services.codelets.planning.config import Config
-from services.codelets.planning.ground import Ground, ground
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.nodes import ROOT_MAP, Map, PathColumn, PathSegment, PlaceColumn, segment_id
+from cogmap.services.codelets.planning.config import Config
+from cogmap.services.codelets.planning.ground import Ground, ground
 from tests.support.world.scenes import agent
 from tests.support.world.street_loop import block_of
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from cogmap.geometry.arrays import Floats
-from schemas.nodes import PathColumn
-from services.codelets.planning.looks import LOOK_M, looked_ago_s
-from services.codelets.planning.network import Here
+from cogmap.schemas.nodes import PathColumn
+from cogmap.services.codelets.planning.looks import LOOK_M, looked_ago_s
+from cogmap.services.codelets.planning.network import Here
 from tests.support.world.scenes import agent
 
 NOW_S = 1000.0

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from cogmap.graph.graph import Graph
-from schemas.codelets import Task
-from schemas.graph import Operation
-from schemas.nodes import (
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.graph import Operation
+from cogmap.schemas.nodes import (
     PLAN_ID,
     Goal,
     Need,
@@ -18,8 +18,8 @@ from schemas.nodes import (
     need_id,
     object_id,
 )
-from services.codelets.planning.config import Config
-from services.codelets.planning.route_plan import run
+from cogmap.services.codelets.planning.config import Config
+from cogmap.services.codelets.planning.route_plan import run
 from tests.support.world.street_loop import loop
 
 CHARGING = goal_id("energy")

@@ -9,9 +9,9 @@ import pytest
 
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import WEIGHT_COLUMNS
-from schemas.array import Matrix
-from schemas.codelets import Task
-from schemas.nodes import (
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.nodes import (
     PLAN_ID,
     ROOT_MAP,
     Map,
@@ -23,9 +23,9 @@ from schemas.nodes import (
     Self,
     segment_id,
 )
-from services.codelets.planning.config import Config
-from services.codelets.planning.ground import ground
-from services.codelets.planning.route_plan import run
+from cogmap.services.codelets.planning.config import Config
+from cogmap.services.codelets.planning.ground import ground
+from cogmap.services.codelets.planning.route_plan import run
 from tests.support.world.scenes import agent
 from tests.support.world.street_loop import block_of
 

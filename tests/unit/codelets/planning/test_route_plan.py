@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from cogmap.runtime.codelet import Answer, CycleContext
-from schemas.array import Array
-from schemas.cognition import Direction, RouteReplay
-from schemas.graph import DropNode
-from schemas.nodes import (
+from cogmap.schemas.array import Array
+from cogmap.schemas.cognition import Direction, RouteReplay
+from cogmap.schemas.graph import DropNode
+from cogmap.schemas.nodes import (
     NEVER_NS,
     Goal,
     LinkKind,
@@ -23,8 +23,8 @@ from schemas.nodes import (
     object_id,
     place_id,
 )
-from services.codelets.planning.config import Config
-from services.codelets.planning.route_plan import due
+from cogmap.services.codelets.planning.config import Config
+from cogmap.services.codelets.planning.route_plan import due
 from tests.support.world.route_planning import STAMP_NS, answered, goal_at, planned
 from tests.support.world.scenes import agent, percepts
 from tests.support.world.street_loop import barrier, cells_of, loop

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from services.codelets.planning.network import grid_network
-from services.codelets.planning.routes import cost_m
-from services.codelets.planning.taut import straight, taut
+from cogmap.services.codelets.planning.network import grid_network
+from cogmap.services.codelets.planning.routes import cost_m
+from cogmap.services.codelets.planning.taut import straight, taut
 
 CLEAR = np.ones((40, 40), bool)
 

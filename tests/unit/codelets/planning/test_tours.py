@@ -10,7 +10,7 @@ import pytest
 from cogmap.data.tsplib import straight
 from cogmap.errors import CogmapError
 from cogmap.geometry.arrays import Floats, Indices
-from services.codelets.planning.tours import (
+from cogmap.services.codelets.planning.tours import (
     TourSettings,
     follow_activation,
     order,

@@ -8,9 +8,9 @@ import pytest
 
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import CycleContext
-from schemas.array import Array, Matrix
-from schemas.graph import Delta, Link, Operation, Phase
-from schemas.nodes import (
+from cogmap.schemas.array import Array, Matrix
+from cogmap.schemas.graph import Delta, Link, Operation, Phase
+from cogmap.schemas.nodes import (
     CORRECTION_ID,
     PLAN_ID,
     RECOLLECTION_ID,
@@ -31,8 +31,8 @@ from schemas.nodes import (
     map_id,
     object_id,
 )
-from services.codelets.config import Config
-from services.codelets.recollection import join_map
+from cogmap.services.codelets.config import Config
+from cogmap.services.codelets.recollection import join_map
 from tests.support.world.scenes import agent, graph_of, landmark, percepts, run, task
 
 QUARTER_RAD = math.pi / 2

@@ -6,10 +6,10 @@ import msgspec
 import numpy as np
 
 from cogmap.graph.graph import Graph
-from schemas.array import Array
-from schemas.graph import Cells, Operation
-from schemas.nodes import ROOT_MAP, Map, PlaceColumn, coarse_map_id
-from services.codelets.resolution.coarse_places import Config, run
+from cogmap.schemas.array import Array
+from cogmap.schemas.graph import Cells, Operation
+from cogmap.schemas.nodes import ROOT_MAP, Map, PlaceColumn, coarse_map_id
+from cogmap.services.codelets.resolution.coarse_places import Config, run
 from tests.support.world.scenes import agent, graph_of, task
 
 CONFIG = Config()

@@ -9,11 +9,11 @@ import pytest
 
 from cogmap.geometry.arrays import Singles
 from cogmap.graph.window import CUT_BELOW, WEIGHT_COLUMNS, Extent, Window
-from schemas.nodes import PlaceColumn
-from services.codelets.planning.network import PlaceNetwork
-from services.codelets.planning.search.flat import FlatPlanner
-from services.codelets.planning.search.route import Route
-from services.codelets.resolution.resampling import COLUMNS, Grid, cells_below, resampled
+from cogmap.schemas.nodes import PlaceColumn
+from cogmap.services.codelets.planning.network import PlaceNetwork
+from cogmap.services.codelets.planning.search.flat import FlatPlanner
+from cogmap.services.codelets.planning.search.route import Route
+from cogmap.services.codelets.resolution.resampling import COLUMNS, Grid, cells_below, resampled
 
 HALF = 70
 AREA = Extent((-10, -10), (11, 11))

@@ -9,13 +9,13 @@ import pytest
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import Extent
 from cogmap.runtime.codelet import CycleContext
-from schemas.array import Array
-from schemas.codelets import Task
-from schemas.graph import Cells, Operation
-from schemas.nodes import ROOT_MAP, Map, PlaceColumn, map_id
-from services.codelets.resolution.resampling import COLUMNS
-from services.codelets.resolution.sub_map_grid import BLOCK, SETTLED_CYCLES
-from services.codelets.resolution.sub_map_places import Config, due, make_all, run
+from cogmap.schemas.array import Array
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.graph import Cells, Operation
+from cogmap.schemas.nodes import ROOT_MAP, Map, PlaceColumn, map_id
+from cogmap.services.codelets.resolution.resampling import COLUMNS
+from cogmap.services.codelets.resolution.sub_map_grid import BLOCK, SETTLED_CYCLES
+from cogmap.services.codelets.resolution.sub_map_places import Config, due, make_all, run
 from tests.support.world.scenes import agent, graph_of, percepts, task
 
 CONFIG = Config()

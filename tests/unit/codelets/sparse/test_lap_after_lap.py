@@ -8,8 +8,8 @@ import pytest
 
 from cogmap.geometry.arrays import Floats
 from cogmap.graph.path import rows_of
-from schemas.nodes import LoopClosure, PathSegment
-from services.codelets.mapping.path import POSE
+from cogmap.schemas.nodes import LoopClosure, PathSegment
+from cogmap.services.codelets.mapping.path import POSE
 from tests.support.world.loop_drive import LAP, QUIET, LoopDrive, round_once
 
 NEVER_S = 1e9

@@ -10,9 +10,9 @@ from cogmap.geometry.se2 import compose, transform_from
 from cogmap.graph.graph import Graph
 from cogmap.graph.path import rows_of
 from cogmap.runtime.codelet import CycleContext
-from schemas.array import Array, Matrix
-from schemas.graph import Link
-from schemas.nodes import (
+from cogmap.schemas.array import Array, Matrix
+from cogmap.schemas.graph import Link
+from cogmap.schemas.nodes import (
     CORRECTION_ID,
     Correction,
     LinkKind,
@@ -24,10 +24,10 @@ from schemas.nodes import (
     observations_id,
     segment_id,
 )
-from schemas.sensing import Percepts
-from services.codelets.config import Config
-from services.codelets.correction.pose_graph import residuals
-from services.codelets.mapping.path import (
+from cogmap.schemas.sensing import Percepts
+from cogmap.services.codelets.config import Config
+from cogmap.services.codelets.correction.pose_graph import residuals
+from cogmap.services.codelets.mapping.path import (
     JOINED,
     LAST,
     ODOMETRY,
@@ -37,7 +37,7 @@ from services.codelets.mapping.path import (
     links_of,
     steps_of,
 )
-from services.codelets.sparse.sparse_path import CODELET
+from cogmap.services.codelets.sparse.sparse_path import CODELET
 from tests.support.world.scenes import graph_of, run, task
 
 CONFIG = Config(sparse_after_s=50.0, revisit_s=20.0)

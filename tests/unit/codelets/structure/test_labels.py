@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from services.codelets.structure.labels import NEW, kept_labels
+from cogmap.services.codelets.structure.labels import NEW, kept_labels
 
 
 def kept(before, after, next_label=10):

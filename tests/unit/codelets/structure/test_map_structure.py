@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 from cogmap.runtime.codelet import CycleContext
-from schemas.array import Array
-from schemas.graph import Cells, Delta, DropNode, Links, Phase
-from schemas.nodes import ROOT_MAP, LinkKind, Map, Object, PlaceColumn, map_id
-from services.codelets.config import Config as WorkerConfig
-from services.codelets.structure.config import Config
-from services.codelets.structure.map_structure import MANY, due
+from cogmap.schemas.array import Array
+from cogmap.schemas.graph import Cells, Delta, DropNode, Links, Phase
+from cogmap.schemas.nodes import ROOT_MAP, LinkKind, Map, Object, PlaceColumn, map_id
+from cogmap.services.codelets.config import Config as WorkerConfig
+from cogmap.services.codelets.structure.config import Config
+from cogmap.services.codelets.structure.map_structure import MANY, due
 from tests.support.world.scenes import graph_of, landmark, percept, percepts, run, task
 
 CONFIG = Config()

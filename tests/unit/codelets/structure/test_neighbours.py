@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from services.codelets.planning.network import grid_network
-from services.codelets.structure.crossings import Boundaries
-from services.codelets.structure.cut_links import CutLinks
-from services.codelets.structure.neighbours import comes_between, neighbours, neighbours_of
+from cogmap.services.codelets.planning.network import grid_network
+from cogmap.services.codelets.structure.crossings import Boundaries
+from cogmap.services.codelets.structure.cut_links import CutLinks
+from cogmap.services.codelets.structure.neighbours import comes_between, neighbours, neighbours_of
 
 
 def scattered(count, seed=4):

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from services.codelets.structure.config import Config
-from services.codelets.structure.crossings import Boundaries
-from services.codelets.structure.sub_maps import SubMaps
+from cogmap.services.codelets.structure.config import Config
+from cogmap.services.codelets.structure.crossings import Boundaries
+from cogmap.services.codelets.structure.sub_maps import SubMaps
 
 SHOP, HOME = 0, 1
 KINDS = 2

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
-from schemas.base import Message
-from schemas.codelets import Offer
-from schemas.cognition import Broadcast, Coalition, Trigger
-from schemas.feelings import Feeling
-from schemas.memory import Stored, StoredObjects
-from schemas.nodes import ROOT_MAP, AnyNode, Object, object_id
-from services.memory.module import Config, build
+from cogmap.schemas.base import Message
+from cogmap.schemas.codelets import Offer
+from cogmap.schemas.cognition import Broadcast, Coalition, Trigger
+from cogmap.schemas.feelings import Feeling
+from cogmap.schemas.memory import Stored, StoredObjects
+from cogmap.schemas.nodes import ROOT_MAP, AnyNode, Object, object_id
+from cogmap.services.memory.module import Config, build
 from tests.support.messages import of_type
 from tests.support.world.scenes import Desk, percept, received
 

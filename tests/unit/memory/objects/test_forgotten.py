@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from cogmap.graph.graph import Graph
-from schemas.array import Matrix
-from schemas.base import Message
-from schemas.codelets import Offer
-from schemas.cognition import Broadcast, Coalition, Trigger
-from schemas.graph import Decay, Delta, DropNode, Operation, Phase
-from schemas.memory import Stored, StoredObjects
-from schemas.nodes import (
+from cogmap.schemas.array import Matrix
+from cogmap.schemas.base import Message
+from cogmap.schemas.codelets import Offer
+from cogmap.schemas.cognition import Broadcast, Coalition, Trigger
+from cogmap.schemas.graph import Decay, Delta, DropNode, Operation, Phase
+from cogmap.schemas.memory import Stored, StoredObjects
+from cogmap.schemas.nodes import (
     CORRECTION_ID,
     RECOLLECTION_ID,
     ROOT_MAP,
@@ -31,7 +31,7 @@ from schemas.nodes import (
     object_id,
     segment_id,
 )
-from services.memory.module import Config, build
+from cogmap.services.memory.module import Config, build
 from tests.support.messages import of_type
 from tests.support.world.scenes import agent
 

@@ -6,7 +6,7 @@ import cmath
 
 import pytest
 
-from services.procedural.guidance.alignment import Motion, aligned, pairs_of
+from cogmap.services.procedural.guidance.alignment import Motion, aligned, pairs_of
 from tests.support.world.guidance import relation, relations
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from schemas.cognition import Relation
-from services.procedural.guidance.lessons import STOP_NS, Lesson, Lessons
+from cogmap.schemas.cognition import Relation
+from cogmap.services.procedural.guidance.lessons import STOP_NS, Lesson, Lessons
 from tests.support.world.guidance import driven, relations
 from tests.support.world.scenes import PERIOD_NS
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from schemas.cognition import ActionName, Behaviour, GuidanceScheme
-from schemas.nodes import PLAN_ID, Plan, PlanState
-from services.procedural.guidance.memory import GuidanceMemory
-from services.procedural.patterns import Active
+from cogmap.schemas.cognition import ActionName, Behaviour, GuidanceScheme
+from cogmap.schemas.nodes import PLAN_ID, Plan, PlanState
+from cogmap.services.procedural.guidance.memory import GuidanceMemory
+from cogmap.services.procedural.patterns import Active
 from tests.support.world.guidance import broadcast, driven, guidance, relations, selected
 from tests.support.world.scenes import PERIOD_NS
 from tests.support.world.schemes import active

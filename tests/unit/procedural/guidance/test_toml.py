@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from cogmap.errors import ConfigError
-from services.procedural.guidance.toml import written
-from services.procedural.loading import load, load_guidance
+from cogmap.services.procedural.guidance.toml import written
+from cogmap.services.procedural.loading import load, load_guidance
 from tests.support.world.guidance import guidance
 from tests.support.world.schemes import FOLLOW, HEADER
 from tests.support.world.schemes import written as file_of

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.sparse.csgraph import dijkstra
 
-from services.codelets.planning.activation import find_route
-from services.codelets.planning.network import PlaceNetwork, grid_network
-from services.codelets.planning.search.flat import FlatPlanner
-from services.codelets.planning.search.hierarchy import HierarchicalPlanner
-from services.codelets.planning.search.links import Links
-from services.codelets.planning.search.route import NoRoute, NoRouteReason, Route
+from cogmap.services.codelets.planning.activation import find_route
+from cogmap.services.codelets.planning.network import PlaceNetwork, grid_network
+from cogmap.services.codelets.planning.search.flat import FlatPlanner
+from cogmap.services.codelets.planning.search.hierarchy import HierarchicalPlanner
+from cogmap.services.codelets.planning.search.links import Links
+from cogmap.services.codelets.planning.search.route import NoRoute, NoRouteReason, Route
 
 SIDE = 48
 
