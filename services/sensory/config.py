@@ -6,6 +6,7 @@ from typing import Annotated
 
 import msgspec
 
+from cogmap.robot import NEAREST_DEPTH_M
 from cogmap.schemas.base import Share
 
 
@@ -15,7 +16,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     nearest_m: Annotated[
         float,
         msgspec.Meta(ge=0.1, le=100, description="Least depth that stereo matching finds, in m."),
-    ] = 2.5
+    ] = NEAREST_DEPTH_M
     speed_noise: Annotated[
         Share,
         msgspec.Meta(description="Standard deviation of the factor on the wheels' speed."),
