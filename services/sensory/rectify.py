@@ -36,7 +36,7 @@ class Rectification:
     right_maps: Maps | None
 
     def apply(self, left: Bytes, right: Bytes) -> tuple[Bytes, Bytes]:
-        """Return the rectified images, uint8 of the same shapes, black outside the cameras' view."""
+        """Return the rectified images, uint8 of the same shapes, black outside the view."""
         rectified_left = _remap(left, self.left_maps)
         rectified_right = _remap(right, self.right_maps)
         return rectified_left, rectified_right

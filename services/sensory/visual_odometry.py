@@ -58,7 +58,7 @@ class Scale:
         self._information = 1 / SCALE_SD**2
 
     def correct(self, seen: Motion, wheels: Motion) -> Motion:
-        """Return what was seen, in the wheels' metres; if the robot moves, both improve the scale."""
+        """Return what was seen, in the wheels' metres; while moving, both improve the scale."""
         shortest_m = min(abs(seen.distance_m), abs(wheels.distance_m))
         if shortest_m > MIN_SCALED_M and wheels.distance_sd_m > 0.0:
             information = (seen.distance_m / wheels.distance_sd_m) ** 2

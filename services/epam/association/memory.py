@@ -56,7 +56,7 @@ class Primer:
         return len(self._views_ns) < BEHIND or self._competition_ns >= self._views_ns[0]
 
     def begin(self, view_ns: int) -> Associations | None:
-        """Learn from the broadcasts that a view is primed by; return the graph from time to time."""
+        """Learn from the broadcasts that prime a view; return the graph from time to time."""
         until_ns = self._views_ns[0] if len(self._views_ns) == BEHIND else -1
         self._views_ns.append(view_ns)
 
