@@ -19,15 +19,15 @@ from cogmap.data.g2o import read_g2o
 from cogmap.data.pose_graph import PoseGraphFile, read_true_positions
 from cogmap.data.toro import read_toro
 from cogmap.errors import MessageError, UsageError
-from cogmap.geometry.arrays import Floats
-from cogmap.services.codelets.correction.incremental import IncrementalSolver
-from cogmap.services.codelets.correction.least_squares import optimize
-from cogmap.services.codelets.correction.pose_graph import Constraints, PoseGraph, cost
-from cogmap.services.codelets.correction.reverse_replay import (
+from cogmap.estimation.incremental import IncrementalSolver
+from cogmap.estimation.least_squares import optimize
+from cogmap.estimation.pose_graph import Constraints, PoseGraph, cost
+from cogmap.estimation.reverse_replay import (
     close_loops,
     displacements,
     position_cost,
 )
+from cogmap.geometry.arrays import Floats
 
 THRESHOLDS = {
     "positions_cost_ratio": at_most(1.05),

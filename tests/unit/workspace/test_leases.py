@@ -9,7 +9,7 @@ import pytest
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.nodes import Self
 from cogmap.schemas.process import Presence
-from cogmap.services.codelets.resolution.coarse_places import Config as CoarsePlacesConfig
+from cogmap.services.codelets.sub_maps.coarse_places import Config as CoarsePlacesConfig
 from tests.support.messages import of_type
 from tests.support.world.scenes import (
     PERIOD_NS,
