@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cogmap.estimation import incremental
 from cogmap.estimation.incremental import IncrementalSolver
 from cogmap.estimation.least_squares import optimize
 from cogmap.estimation.pose_graph import cost
-from cogmap.estimation import incremental
 from tests.support.world.laps import CLOSURE_SD, laps, one_between
 
 FAR = one_between(0, 80, (15.0, -15.0, 1.0), CLOSURE_SD / 10)
