@@ -6,6 +6,7 @@ from typing import Annotated
 
 import msgspec
 
+from cogmap import robot
 from cogmap.schemas.base import (
     PositiveAcceleration,
     PositiveMetres,
@@ -13,9 +14,6 @@ from cogmap.schemas.base import (
     PositiveShare,
     PositiveSpeed,
 )
-
-NEAREST_SCAN_M = 2.6
-"""The range scan has no range below 2.5 m: what it has there may be nearer."""
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -46,18 +44,18 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         msgspec.Meta(
             description="Distance to an obstacle at which the robot stops, in m, above 0 to 10000."
         ),
-    ] = NEAREST_SCAN_M
+    ] = robot.CLEARANCE_M
     half_width_m: Annotated[
         PositiveMetres,
         msgspec.Meta(description="Half the width that must be free ahead, in m, above 0 to 10000."),
-    ] = 0.7
+    ] = robot.HALF_WIDTH_M
     wheel_radius_m: Annotated[
         PositiveMetres, msgspec.Meta(description="Radius of driven wheels, in m, above 0 to 10000.")
-    ] = 0.2
+    ] = robot.WHEEL_RADIUS_M
     track_m: Annotated[
         PositiveMetres,
         msgspec.Meta(description="Distance between the driven wheels, in m, above 0 to 10000."),
-    ] = 0.8
+    ] = robot.TRACK_M
     blind_m: Annotated[
         PositiveMetres,
         msgspec.Meta(

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import msgspec
 
+from cogmap.robot import NEAREST_DEPTH_M
 from cogmap.schemas.base import PositiveSeconds, Share
 
 
@@ -17,7 +18,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         msgspec.Meta(
             ge=0.1, le=100, description="Least depth that stereo matching finds, in m, 0.1 to 100."
         ),
-    ] = 2.5
+    ] = NEAREST_DEPTH_M
     scan_sectors: Annotated[
         int, msgspec.Meta(ge=1, le=1024, description="Sectors of the range scan, 1 to 1024.")
     ] = 32

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 
 import msgspec
 
+from cogmap.robot import calibration
 from cogmap.schemas.base import Message
 from cogmap.schemas.process import Clock
 from cogmap.schemas.sensing import MotorCommand, Odometry, StereoFrame, TruePose, TrueTown
@@ -16,7 +17,7 @@ from cogmap.services.sim.layout.closures import ClosedStreets
 from cogmap.services.sim.layout.town import Town
 from cogmap.services.sim.odometry import WheelOdometry
 from cogmap.services.sim.progress import Progress
-from cogmap.services.sim.rendering.camera import StereoCamera, calibration
+from cogmap.services.sim.rendering.camera import StereoCamera
 from cogmap.services.sim.world import World
 
 

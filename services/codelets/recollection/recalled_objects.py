@@ -13,6 +13,7 @@ import numpy as np
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_from
 from cogmap.graph.graph import Graph
+from cogmap.graph.individuals import APART_M
 from cogmap.schemas.graph import Link, Operation
 from cogmap.schemas.nodes import (
     NEVER_NS,
@@ -26,9 +27,6 @@ from cogmap.schemas.nodes import (
     nearest_place,
     object_id,
 )
-
-SAME_WITHIN_M = 4.0
-"""Two buildings of one look are never nearer to each other."""
 
 POSITION = slice(RecalledColumn.X_M, RecalledColumn.Y_M + 1)
 
@@ -81,7 +79,7 @@ def _standing_there(
     look = look_of(recalled.labels[number])
     at_m = recalled.objects.numpy()[number, POSITION]
     found = ""
-    nearest_m = SAME_WITHIN_M
+    nearest_m = APART_M
     for node, there_m in zip(known, here_m, strict=True):
         if look_of(node.label) != look or node.label in taken:
             continue

@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 
 from cogmap.geometry.arrays import Floats
+from cogmap.robot import calibration
 from cogmap.schemas.array import Array
 from cogmap.schemas.base import Message
 from cogmap.schemas.process import Clock
@@ -33,7 +34,6 @@ from cogmap.services.sim.layout.closures import ClosedStreets
 from cogmap.services.sim.layout.removals import RemovedBuildings
 from cogmap.services.sim.odometry import Noise, WheelOdometry
 from cogmap.services.sim.progress import Progress
-from cogmap.services.sim.rendering.camera import calibration
 from cogmap.services.sim.scripted.places import PlaceSim
 
 Row = tuple[float, float, float, float, float]

@@ -10,6 +10,7 @@ import pytest
 
 from cogmap.bus.codec import encode
 from cogmap.errors import ConfigError
+from cogmap.robot import BODY_RADIUS_M, calibration
 from cogmap.runtime.run import LOCKSTEP
 from cogmap.schemas.base import Message
 from cogmap.schemas.sensing import (
@@ -23,7 +24,7 @@ from cogmap.schemas.sensing import (
 )
 from cogmap.services.sim.driven.camera import ColumnCamera, depths_m
 from cogmap.services.sim.driven.ground import MAX_RANGE_M
-from cogmap.services.sim.driven.robot import BODY_RADIUS_M, KinematicRobot
+from cogmap.services.sim.driven.robot import KinematicRobot
 from cogmap.services.sim.driven.sensors import Sensors, scan
 from cogmap.services.sim.driven.surroundings import Surroundings
 from cogmap.services.sim.layout.blocks.town import generate
@@ -34,7 +35,6 @@ from cogmap.services.sim.layout.place import Place
 from cogmap.services.sim.layout.plan import Plot, Road
 from cogmap.services.sim.module import Config, build
 from cogmap.services.sim.odometry import Noise
-from cogmap.services.sim.rendering.camera import calibration
 from cogmap.services.sim.scripted.percepts import PerceptErrors
 from tests.support.messages import of_type
 

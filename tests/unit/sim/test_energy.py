@@ -189,5 +189,5 @@ def test_a_true_pose_without_energy_reads_back_without_it() -> None:
 def test_a_trajectory_with_energy_is_refused() -> None:
     line = Trajectory(line_m=[(0.0, 0.0), (9.0, 0.0)], landmarks=[])
 
-    with pytest.raises(ConfigError, match="set run.energy to false"):
+    with pytest.raises(ConfigError, match=r"set run\.energy to false"):
         build(Config(trajectory=line), run=SUPPLIED)

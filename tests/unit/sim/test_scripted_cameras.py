@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from cogmap.errors import ConfigError
+from cogmap.robot import calibration
 from cogmap.runtime.module import Module
 from cogmap.runtime.run import LOCKSTEP
 from cogmap.schemas.base import Message
@@ -26,7 +27,7 @@ from cogmap.services import registry
 from cogmap.services.sim.layout import roadside
 from cogmap.services.sim.module import Config, build
 from cogmap.services.sim.odometry import Noise
-from cogmap.services.sim.rendering.camera import StereoCamera, calibration
+from cogmap.services.sim.rendering.camera import StereoCamera
 from cogmap.services.sim.scripted.percepts import Landmark
 from cogmap.services.sim.scripted.trajectory import Trajectory
 from cogmap.services.sim.world import World
