@@ -40,7 +40,6 @@ LIDA = {
     "workspace.learning": "linear",
     "workspace.recognition_threshold": "0.7 of total activation",
     "epam.percept_threshold": "0.7 of total activation",
-    "epam.base_level": "learned",
     "epam.priming.share": 0.9,
     "epam.priming.half_life_s": 0.5 / 0.05 / TICKS_PER_CYCLE / CYCLES_PER_S,
     "epam.priming.feeling_threshold": 0.7,

@@ -85,18 +85,6 @@ def test_a_segment_under_the_threshold_is_no_percept(views: list[View]) -> None:
     assert some > fewer > none == 0
 
 
-def test_base_level_activation_adds_to_the_current_one(views: list[View]) -> None:
-    bare, raised = (
-        [
-            percept.activation
-            for percept in _percepts(build(Config(base_level=level), "epam"), views[1]).objects
-        ]
-        for level in (0.0, 0.3)
-    )
-
-    assert raised == pytest.approx([min(1.0, activation + 0.3) for activation in bare])
-
-
 def test_a_percept_is_outlined_boxed_and_measured(views: list[View]) -> None:
     module = build(Config(), "epam")
     found = []

@@ -1,5 +1,5 @@
 """The walls of a segment: the disparity of each of its columns, and whether the object truly ends
-where the segment does.
+at the segment's ends.
 """
 
 from __future__ import annotations
@@ -13,13 +13,20 @@ from cogmap.schemas.sensing import Calibration
 from cogmap.services.epam.layout.footprint_fit import ObjectPose, Silhouette
 from cogmap.services.epam.recognition.segments import Segment
 
+# A column with fewer known pixels has no disparity; a segment with fewer such columns has no walls.
 MIN_PIXELS = 4
 MIN_COLUMNS = 3
-BESIDE_PX = 4
+# An end of a segment is compared from so many columns within to so many beyond it; something beyond
+# with a disparity that is larger by more than NEARER_PX hides the rest.
 WITHIN_PX = 3
+BESIDE_PX = 4
 NEARER_PX = 0.3
+# Columns at a true and at a hidden end whose depth mixes two objects: depth spreads from the nearer
+# object over the one that it hides.
 MIXED_PX = 2
-MIXED_WHERE_HIDDEN_PX = 5
+MIXED_AT_HIDDEN_END_PX = 5
+# Half the side of a building of unknown size, as the simulator's catalogue has them, and its
+# standard deviation.
 USUAL_HALF_M = 4.5
 USUAL_SD_M = 1.5
 MIN_DISPARITY_PX = 0.5
@@ -41,18 +48,25 @@ class Walls:
 
     @property
     def whole(self) -> bool:
-        """Whether neither the image's border nor another object cuts the object."""
+        """True if neither the image's border nor another object cuts the object."""
         return self.left_true and self.right_true
+
+    @property
+    def middle(self) -> float:
+        """The column in the middle of the segment."""
+        return (self.left + self.right) / 2
 
     def silhouette(self, sides_m: tuple[float, float]) -> Silhouette:
         """Return the input of a footprint's fit, without the columns at each end whose depth mixes
         two objects.
-
-        Depth spreads from what is nearer over what it hides, so more columns are left out where the
-        object is hidden.
         """
-        first = self._mixed_columns(self.left_true)
-        last = len(self.columns) - self._mixed_columns(self.right_true)
+        spare = (len(self.columns) - MIN_COLUMNS) // 2
+        mixed = [
+            max(0, min(MIXED_PX if end_is_true else MIXED_AT_HIDDEN_END_PX, spare))
+            for end_is_true in (self.left_true, self.right_true)
+        ]
+        first = mixed[0]
+        last = len(self.columns) - mixed[1]
         columns = self.columns[first:last]
         disparity_px = self.disparity_px[first:last]
 
@@ -72,14 +86,14 @@ class Walls:
             sides_m=sides_m,
         )
 
-    def _mixed_columns(self, end_is_true: bool) -> int:
-        mixed = MIXED_PX if end_is_true else MIXED_WHERE_HIDDEN_PX
-        spare = (len(self.columns) - MIN_COLUMNS) // 2
-        return max(0, min(mixed, spare))
-
     def usual_pose(self, camera: Calibration) -> ObjectPose:
-        """Return the pose of a building of the usual size, behind the middle of what is seen."""
-        forward_m, left_m = self._middle_m(camera)
+        """Return the pose of a building of the usual size, behind the middle of these walls."""
+        median_px = float(np.median(self.disparity_px))
+        depth_m = camera.fx_px * camera.baseline_m / max(median_px, MIN_DISPARITY_PX)
+        slope = (camera.cx_px - self.middle) / camera.fx_px
+        forward_m = depth_m + camera.mount_forward_m
+        left_m = slope * depth_m
+
         wall_m = float(np.hypot(forward_m, left_m))
         range_m = min(wall_m + USUAL_HALF_M, MAX_RANGE_M)
         hidden_m = 0.0 if self.whole else USUAL_HALF_M / 2
@@ -92,17 +106,6 @@ class Walls:
             range_sd_m=float(np.hypot(USUAL_SD_M, 0.05 * range_m)),
             misfit=0.0,
         )
-
-    def _middle_m(self, camera: Calibration) -> tuple[float, float]:
-        """The middle of what is seen, forward and left of the robot."""
-        median_px = float(np.median(self.disparity_px))
-        safe_px = max(median_px, MIN_DISPARITY_PX)
-        depth_m = camera.fx_px * camera.baseline_m / safe_px
-        forward_m = depth_m + camera.mount_forward_m
-
-        middle_px = (self.left + self.right) / 2
-        slope = (camera.cx_px - middle_px) / camera.fx_px
-        return forward_m, slope * depth_m
 
     def width_m(self, camera: Calibration) -> float:
         """Return the distance between the first and the last column."""
@@ -118,13 +121,12 @@ class Walls:
 
 
 def walls(segment: Segment, disparity_px: Singles) -> Walls | None:
-    """Return the walls of `segment`, where `disparity_px` (h, w) is that of the view, 0 unknown, or
-    None if too few columns have a known disparity.
+    """Return the walls of `segment`, or None if too few columns have a known disparity;
+    `disparity_px` (h, w) is that of the view, 0 unknown.
     """
     left, _, width, _ = segment.box_px
     span = slice(left, left + width)
-    own = segment.mask[:, span]
-    own_px = np.where(own, disparity_px[:, span], 0.0)
+    own_px = np.where(segment.mask[:, span], disparity_px[:, span], 0.0)
     medians_px = _column_medians(own_px)
 
     known = np.flatnonzero(medians_px)
@@ -142,12 +144,11 @@ def walls(segment: Segment, disparity_px: Singles) -> Walls | None:
 
 
 def _column_medians(values: Singles) -> Singles:
-    """The upper median of the positive values in each column of (h, w), 0 where there are fewer
-    than MIN_PIXELS.
+    """The upper median of the positive values in each column of (h, w), 0 if there are fewer than
+    MIN_PIXELS.
     """
     height, width = values.shape
-    is_known = values > 0
-    count = is_known.sum(0)
+    count = (values > 0).sum(0)
     above_median = np.maximum(count - 1, 0) // 2
 
     # The unknown ones are 0 and come first.
@@ -155,12 +156,11 @@ def _column_medians(values: Singles) -> Singles:
     row = height - 1 - above_median
     medians = ascending[row, np.arange(width)]
 
-    enough = count >= MIN_PIXELS
-    return np.where(enough, medians, 0.0).astype(np.float32)
+    return np.where(count >= MIN_PIXELS, medians, 0.0).astype(np.float32)
 
 
 def _truly_ends(segment: Segment, disparity_px: Singles, medians_px: Singles, outward: int) -> bool:
-    """Whether the object itself ends on that side (-1 left, 1 right), and is neither hidden by
+    """True if the object itself ends on that side (-1 left, 1 right), and is neither hidden by
     something nearer nor cut by the view.
 
     On the left, the view ends where the right camera's does: as many columns in as the disparity.
@@ -179,15 +179,6 @@ def _truly_ends(segment: Segment, disparity_px: Singles, medians_px: Singles, ou
         return False
 
     rows = segment.mask[:, left + inside]
-    return not _is_nearer(disparity_px[rows, beyond], own_px)
-
-
-def _is_nearer(beside_px: Singles, own_px: float) -> bool:
-    """Whether what is beside a wall, with disparities 0 where unknown, is nearer than the wall."""
+    beside_px = disparity_px[rows, beyond]
     known_px = beside_px[beside_px > 0]
-    if len(known_px) < MIN_PIXELS:
-        return False
-
-    neighbour_px = np.median(known_px)
-    nearer_px = own_px + NEARER_PX
-    return bool(neighbour_px > nearer_px)
+    return len(known_px) < MIN_PIXELS or bool(np.median(known_px) <= own_px + NEARER_PX)
