@@ -45,21 +45,20 @@ def town_sections(seed: int, has_cameras: bool = False) -> Sections:
     """
     sim: dict[str, Any] = {
         "seed": seed,
-        "mode": "lockstep",
         "town": "blocks",
         "sensing": "cameras" if has_cameras else "percepts",
         "duration_s": MAX_DRIVE_S,
-        "awaits": dict.fromkeys(agent_modules(has_cameras), 1),
     }
     if not has_cameras:
         sim["noise"] = msgspec.to_builtins(FUSED)
 
     return {
+        "run": {
+            "lockstep": True,
+            "participants": dict.fromkeys(("sim", *agent_modules(has_cameras)), 1),
+        },
         "sim": sim,
-        "workspace": {"mode": "lockstep", "background_cycles": PLANNING_CYCLES},
-        "procedural": {"mode": "lockstep"},
-        "motor": {"mode": "lockstep"},
-        "epam": {"mode": "lockstep"},
+        "workspace": {"background_cycles": PLANNING_CYCLES},
         "planning": {"explore": True},
     }
 

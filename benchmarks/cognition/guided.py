@@ -173,7 +173,7 @@ def drive_twice(seed: int) -> Route:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "schemes.toml"
         file.write_text(written(teacher.learned.values()))
-        sections["procedural"] = {"mode": "lockstep", "schemes": str(file)}
+        sections["procedural"] = {"schemes": str(file)}
         observer = Module("observer").on(topics.TRUE_POSE, guided.on_pose)
         with running([*build(("sim", *COGNITION), sections), observer]) as runner:
             runner.run(lambda: guided.is_over)

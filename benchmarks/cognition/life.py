@@ -9,7 +9,6 @@ from cogmap.cli.launch.tally import EnergyTally
 from cogmap.runtime.module import Module
 from cogmap.schemas import topics
 
-MOTOR = "motor"
 CAPACITY_S = 500.0
 """How long a full battery lasts at rest: for less than a life, so that to stand still is no way to
 live.
@@ -40,12 +39,10 @@ def live(
     """
     configured = town_sections(seed, has_cameras)
     configured["sim"] |= {
-        "energy": True,
         "battery": {"capacity_s": CAPACITY_S},
         "duration_s": max_s,
     }
-    configured["workspace"] |= {"awaits_energy": True, "offering": [MOTOR]}
-    configured[MOTOR] |= {"makes_offers": True}
+    configured["run"] |= {"energy": True}
 
     modules = build(("sim", *agent_modules(has_cameras)), configured)
     if acting is not None:

@@ -13,7 +13,7 @@ import numpy as np
 from benchmarks.harness import build, running
 from benchmarks.report import Metrics
 from cogmap.cli.launch.observer import OBSERVED, Observer
-from cogmap.cli.launch.plan import OBSERVER, Choices, awaited, effective
+from cogmap.cli.launch.plan import OBSERVER, Choices, effective
 from cogmap.errors import CogmapError
 from cogmap.parallel import parallel_map
 from cogmap.runtime.module import Module
@@ -46,7 +46,7 @@ def mean_errors_m(town: int, laps: float) -> tuple[float, float, float]:
     fused self-motion alone and of wheels alone. Raises CogmapError if not all goals are reached.
     """
     choices = Choices(seed=town, laps=laps, lockstep=True, record=False)
-    sections = effective({}, choices, awaited(choices, observer=True))
+    sections = effective({}, choices, observer=True)
 
     # The simulator waits for the observer too.
     observer = Observer()
