@@ -81,21 +81,20 @@ def sections(seed: int, has_cameras: bool = False) -> Sections:
     """
     sim: dict[str, Any] = {
         "seed": seed,
-        "mode": "lockstep",
         "town": "blocks",
         "sensing": "cameras" if has_cameras else "percepts",
         "duration_s": LONGEST_S,
-        "awaits": dict.fromkeys(mind(has_cameras), 1),
     }
     if not has_cameras:
         sim["noise"] = msgspec.to_builtins(FUSED)
 
     return {
+        "run": {
+            "lockstep": True,
+            "participants": dict.fromkeys(("sim", *mind(has_cameras)), 1),
+        },
         "sim": sim,
-        "workspace": {"mode": "lockstep", "background_cycles": PLANNING_CYCLES},
-        "procedural": {"mode": "lockstep"},
-        "motor": {"mode": "lockstep"},
-        "epam": {"mode": "lockstep"},
+        "workspace": {"background_cycles": PLANNING_CYCLES},
         "planning": {"explore": True},
     }
 

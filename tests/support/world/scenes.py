@@ -11,6 +11,7 @@ from cogmap.bus.codec import decode, encode
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, ConfiguredCodelet
 from cogmap.runtime.module import Module
+from cogmap.runtime.run import LOCKSTEP, Run
 from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Assignment, Leases, Proposal, Task
@@ -104,14 +105,13 @@ class Desk:
     def __init__(
         self,
         *workers: str,
-        mode: str = "lockstep",
+        run: Run = LOCKSTEP,
         codelets: WorkerConfig | None = None,
         **settings: Any,
     ) -> None:
         self._configured = configured(codelets)
-        facts = {"awaits_scan": False, "awaits_competition": False} | settings
-        config = Config(mode=mode, **facts)  # type: ignore[arg-type]
-        self.module: Module = build(config, "workspace", self._configured)
+        config = Config(**settings)
+        self.module: Module = build(config, "workspace", self._configured, run)
         self.withheld: list[Assignment] = []
         self.withhold = ""
         self.busy: list[str] = []
