@@ -95,19 +95,14 @@ class Town:
 
 def sections(seed: int, settings: Mapping[str, Mapping[str, Any]]) -> Sections:
     """Return the configuration of such a town, with `settings` in it."""
-    lockstep = {"mode": "lockstep"}
     configured: Sections = {
+        "run": {"lockstep": True, "participants": dict.fromkeys(("sim", *COGNITION), 1)},
         "sim": {
-            **lockstep,
             "seed": seed,
             "town": "blocks",
             "sensing": "percepts",
             "noise": msgspec.to_builtins(FUSED),
-            "awaits": dict.fromkeys(COGNITION, 1),
         },
-        "workspace": {**lockstep},
-        "procedural": {**lockstep},
-        "motor": {**lockstep},
         "planning": {"explore": True},
     }
     for section, values in settings.items():
