@@ -52,13 +52,6 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     its name.
     """
 
-    mode: Annotated[
-        Literal["lockstep", "real_time"],
-        msgspec.Meta(
-            description="lockstep: a view waits for the competition that it is primed by. "
-            "real_time: it does not."
-        ),
-    ] = "real_time"
     priming: Annotated[
         Priming,
         msgspec.Meta(

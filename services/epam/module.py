@@ -9,6 +9,7 @@ import cv2
 import msgspec
 
 from cogmap.runtime.module import Module
+from cogmap.runtime.run import REAL_TIME, Run
 from cogmap.schemas import topics
 from cogmap.schemas.array import Array
 from cogmap.schemas.base import Message
@@ -125,7 +126,7 @@ class Perception:
         )
 
 
-def build(config: Config, instance: str) -> Module:
+def build(config: Config, instance: str, run: Run = REAL_TIME) -> Module:
     """Build the extended PAM as a module. Raises ConfigError if its networks cannot be read."""
     cv2.setNumThreads(1)
     segments_path = Path(config.segments_weights or segments.DEFAULT_PATH)
@@ -138,7 +139,7 @@ def build(config: Config, instance: str) -> Module:
         road.load(road_path, config.processor),
     )
     primer = Primer(config.priming)
-    perception = Perception(pam, PlaceRecognizer(), primer, config.mode == "lockstep")
+    perception = Perception(pam, PlaceRecognizer(), primer, run.lockstep)
 
     published = (topics.PERCEPTS, topics.LEARNED)
     return (

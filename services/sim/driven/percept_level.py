@@ -25,7 +25,7 @@ from cogmap.schemas.sensing import (
     TruePose,
     TrueTown,
 )
-from cogmap.services.sim.battery import PowerSupply
+from cogmap.services.sim.battery import Battery, PowerSupply
 from cogmap.services.sim.config import Config, place_of
 from cogmap.services.sim.driven.robot import KinematicRobot
 from cogmap.services.sim.driven.sensors import Sensors
@@ -45,13 +45,13 @@ class DrivenPerceptLevelSim:
     Simulated time starts at 0 and advances by `tick_ns` with every step.
     """
 
-    def __init__(self, config: Config) -> None:
+    def __init__(self, config: Config, battery: Battery | None = None) -> None:
         self.tick_ns = 1_000_000_000 // config.odometry_hz
         self.ticks_per_frame = config.odometry_hz // config.frame_hz
         self.now_ns = 0
         self.progress = 0.0
 
-        self._place = place_of(config)
+        self._place = place_of(config, battery)
         self.closed_streets = ClosedStreets(self._place.roads, config.closures)
         self._removed = RemovedBuildings(len(self._place.plots), config.removals)
         self._surroundings = Surroundings(self._place)
@@ -62,7 +62,7 @@ class DrivenPerceptLevelSim:
         self._places = PlaceSim(config.percepts, config.seed)
         self._odometry = WheelOdometry(config.noise, config.seed)
         self._noise = config.noise
-        self._power = PowerSupply(config.supplied_by, self._place.charging_places_m)
+        self._power = PowerSupply(battery, self._place.charging_places_m)
 
         self._progress = Progress(config.duration_s, config.ends_at_goal)
         self._motions: list[Row] = []

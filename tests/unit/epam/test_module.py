@@ -14,6 +14,7 @@ import pytest
 from cogmap.bus import codec
 from cogmap.errors import ConfigError, MessageError
 from cogmap.runtime.module import Module
+from cogmap.runtime.run import LOCKSTEP
 from cogmap.runtime.state.journal import Journal
 from cogmap.schemas import topics
 from cogmap.schemas.array import Array
@@ -316,7 +317,7 @@ def _competition(stamp_ns: int) -> Competition:
 
 
 def test_in_lockstep_a_view_waits_for_the_competition_that_primes_it(views: list[View]) -> None:
-    module = build(Config(mode="lockstep"), "epam")
+    module = build(Config(), "epam", LOCKSTEP)
     for view in views[:2]:
         assert of_type(Percepts, module.feed(view))
 
@@ -326,7 +327,7 @@ def test_in_lockstep_a_view_waits_for_the_competition_that_primes_it(views: list
 
 
 def test_in_lockstep_a_view_that_comes_again_waits_for_nothing(views: list[View]) -> None:
-    module = build(Config(mode="lockstep"), "epam")
+    module = build(Config(), "epam", LOCKSTEP)
     for view in views[:3]:
         module.feed(view)
 
