@@ -32,6 +32,13 @@ OWN_IMPORTS = {
     ),
     "module_test": "from cogmap.errors import MessageError",
 }
+TEST_IMPORTS = {
+    "codelet": (
+        "from cogmap.testing import Town, context, graph_of, percept, percepts, run_codelet",
+        "CODELET, NAME, Config",
+    ),
+    "module": ("from cogmap.testing import Town, range_scan", "NAME, Config, build"),
+}
 MAIN = """
 
 if __name__ == "__main__":
@@ -43,9 +50,9 @@ if __name__ == "__main__":
 def new() -> None:
     """Write a first version of a codelet or a module.
 
-    In Cogmap's own source tree: the file, its test, and its rows in the tables. Elsewhere: a package
-    of its own, in a folder NAME, to install beside Cogmap. It runs as it is; CONTRIBUTING.md and
-    docs/modules.md explain what to change.
+    In Cogmap's own source tree: the file, its test, and its rows in the tables. Elsewhere: a
+    package of its own, in a folder NAME, to install beside Cogmap. It runs as it is;
+    CONTRIBUTING.md and docs/modules.md explain what to change.
     """
 
 
@@ -59,7 +66,10 @@ def codelet(name: str) -> None:
         _announce(f"[{name}] has its settings; python -m pytest tests/unit/codelets/test_{name}.py")
         return
 
-    values = {"imports": PUBLIC_IMPORTS["codelet"], "path": name}
+    values = {
+        "imports": PUBLIC_IMPORTS["codelet"],
+        "imported": _test_imports("codelet", name),
+    }
     entry = f'[project.entry-points."cogmap.codelets"]\n{name} = "{name}:CODELET"'
     _write_package(name, "codelet", values, entry)
     _announce(f"pip install ./{name}, then cogmap run: [{name}] has its settings")
@@ -86,7 +96,7 @@ def module(name: str) -> None:
         "config_imports": "from typing import Annotated\n\nimport msgspec",
         "config": f"\n\n{config}\n",
         "class_name": class_name,
-        "path": name,
+        "imported": _test_imports("module", name),
         "main": MAIN,
     }
     _write_package(name, "module", values, "")
@@ -103,6 +113,12 @@ def _is_project() -> bool:
     return PROJECT_MARK.exists() and Path("cogmap").is_dir()
 
 
+def _test_imports(kind: str, path: str) -> str:
+    """Make the last import lines of a test, in the order that ruff has them in."""
+    harness, names = TEST_IMPORTS[kind]
+    return "\n".join(sorted([harness, f"from {path} import {names}"]))
+
+
 def _write_package(name: str, kind: str, values: Mapping[str, str], entry: str) -> None:
     """Write a package of one file with its test."""
     values = {**values, "name": name, "distribution": name.replace("_", "-"), "entry": entry}
@@ -117,17 +133,22 @@ def _write_package(name: str, kind: str, values: Mapping[str, str], entry: str) 
 
 def _write_project_codelet(name: str) -> None:
     path = f"cogmap.services.codelets.{name}"
-    values = {"name": name, "imports": OWN_IMPORTS["codelet"], "path": path}
+    values = {
+        "name": name,
+        "imports": OWN_IMPORTS["codelet"],
+        "imported": _test_imports("codelet", path),
+    }
     codelets = Path("services") / "codelets"
     files = {
         codelets / f"{name}.py": _filled("codelet", values),
         Path("tests/unit/codelets") / f"test_{name}.py": _filled("codelet_test", values),
     }
     imported = f"from cogmap.services.codelets import {name}"
+    first = "from cogmap.services.codelets.attention import"
     rows = [
-        before(codelets / "table.py", "from cogmap.services.codelets.attention import", imported),
+        before(codelets / "table.py", first, imported),
         at_end_of(codelets / "table.py", "CODELETS: ", f"    {name}.CODELET,"),
-        before(codelets / "sections.py", "from cogmap.services.codelets import", imported),
+        before(codelets / "sections.py", first, imported),
         at_end_of(codelets / "sections.py", "SECTIONS: ", f"    {name}.NAME: {name}.Config,"),
     ]
     _write(files, rows)
@@ -143,7 +164,7 @@ def _write_project_module(name: str, class_name: str) -> None:
         "config_imports": "",
         "config": f"from {path}.config import Config\n",
         "main": "",
-        "path": f"{path}.module",
+        "imported": _test_imports("module", f"{path}.module"),
     }
     code = _filled("module", values).replace("annotations\n\n\nimport", "annotations\n\nimport")
     config = (
@@ -160,7 +181,9 @@ def _write_project_module(name: str, class_name: str) -> None:
     service = f"  {name}:\n    <<: *module\n    command: module {name} --state runs/latest/state\n"
     rows = [
         at_end_of(Path("services/registry.py"), "MODULES = (", f'    "{name}",'),
-        in_list(Path("pyproject.toml"), '"cogmap.services.motor",', f'    "cogmap.services.{name}",'),
+        in_list(
+            Path("pyproject.toml"), '"cogmap.services.motor",', f'    "cogmap.services.{name}",'
+        ),
         before(Path("compose.yaml"), "volumes:", service),
     ]
     _write(files, rows)
@@ -172,8 +195,9 @@ def _filled(template: str, values: Mapping[str, str]) -> str:
 
 
 def _write(files: Mapping[Path, str], rows: list[Row]) -> None:
-    """Write new files, and rows into tables. Raises UsageError, having written nothing, if a file is
-    there already or a table is not as it was.
+    """Write new files, and rows into tables.
+
+    Raises UsageError, having written nothing, if a file is there already or a table has changed.
     """
     for path in files:
         if path.exists():
@@ -183,7 +207,7 @@ def _write(files: Mapping[Path, str], rows: list[Row]) -> None:
     for row in rows:
         changed[row.path] = row.added_to(changed.get(row.path) or row.path.read_text())
 
-    for path, text in (files | changed).items():
+    for path, text in {**files, **changed}.items():
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text.rstrip("\n") + "\n")
         click.echo(f"{'changed' if path in changed else 'wrote'} {path}")
