@@ -16,7 +16,7 @@ from cogmap.schemas.memory import Restored, Stored
 from cogmap.schemas.nodes import NEVER_NS, ROOT_MAP
 from cogmap.schemas.sensing import RangeScan
 from cogmap.services.memory.config import Config
-from cogmap.services.memory.episodic.memory import EpisodicMemory
+from cogmap.services.memory.episodic.episodic_memory import EpisodicMemory
 from cogmap.services.memory.gate import LockstepGate
 from cogmap.services.memory.spatial import SpatialMemory
 
