@@ -25,8 +25,8 @@ from cogmap.services.codelets.planning.corridor import corridor
 from cogmap.services.codelets.planning.held import held_routes
 from cogmap.services.codelets.planning.route_plan import run
 from cogmap.services.codelets.planning.targets import goals_m
-from cogmap.services.codelets.resolution import coarse_places, sub_map_places
-from cogmap.services.codelets.resolution.sub_map_grid import SETTLED_CYCLES
+from cogmap.services.codelets.sub_maps import coarse_places, sub_map_places
+from cogmap.services.codelets.sub_maps.sub_map_grid import SETTLED_CYCLES
 from tests.support.world.scenes import agent, graph_of, task
 
 SIDE = 240
@@ -55,10 +55,7 @@ def _city(*goals: Goal, wall: slice | None = None) -> Graph:
 
     graph = graph_of(agent(x_m=3.0, y_m=3.0), *goals)
     graph.change([_column(PlaceColumn.ROAD, is_road), _column(PlaceColumn.OBSTACLE, stands)])
-    config = coarse_places.Config()
-    for number in range(8):
-        asked = msgspec.structs.replace(task("coarse_places"), cycle=number * config.every_cycles)
-        graph.change(coarse_places.run(asked, graph, config).operations)
+    coarse_places.make_all(graph)
     return graph
 
 

@@ -1,0 +1,74 @@
+"""How much a view of a landmark informs: less, the less has happened since the landmark was placed.
+
+A landmark was placed from where the agent took itself to be, and shares the error of that. It can
+correct only the error that came since; taken for independent, it would pull the agent after its own
+mistakes. (In a filter of the joint state their correlation does this.)
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from bisect import bisect_right
+from collections.abc import Sequence
+
+import numpy as np
+
+from cogmap.geometry.arrays import Floats
+from cogmap.graph.graph import Graph
+from cogmap.schemas.nodes import NEVER_NS, Object, PathColumn, PathSegment, object_id
+from cogmap.services.codelets.localization.measurement_model import Sighting
+from cogmap.services.codelets.localization.sampling import centred
+
+VARIANCES = slice(PathColumn.VARIANCE_M2, PathColumn.VARIANCE_RAD2 + 1)
+STAMP_FORMAT = struct.Struct("<d")
+STAMP_OFFSET = PathColumn.STAMP_S * STAMP_FORMAT.size
+
+
+def new_share(samples: Floats, seen: Sighting, since: Floats) -> Floats:
+    """(k,): the share, 0 to 1, of the uncertainty of (n, 7) samples' position that came since each
+    landmark was placed: `since` (k, 2), by path integration's variances in m^2 and rad^2.
+    """
+    _, deviations = centred(samples[:, :2])
+    variances_m2 = np.square(deviations).mean(axis=0)
+    position_m2 = max(float(variances_m2.sum()), 1e-9)
+
+    since_m2, since_rad2 = since.T
+    by_turns_m2 = since_rad2 * seen.range_m**2
+    share: Floats = (2 * since_m2 + by_turns_m2) / position_m2
+    return share.clip(0.0, 1.0)
+
+
+def variances_when_placed(graph: Graph, seen: Sighting) -> Floats:
+    """(k, 2): path integration's variances at which each landmark in view was placed."""
+    path = graph.path
+    variances = []
+    for label in seen.labels:
+        landmark = graph.get(Object, object_id(label))
+        created_ns = NEVER_NS if landmark is None else landmark.created_ns
+        variances.append(variances_at(path, created_ns))
+
+    return np.array(variances)
+
+
+def variances_at(path: Sequence[PathSegment], stamp_ns: int) -> tuple[float, float]:
+    """Path integration's variances, in m^2 and rad^2, at the place of a `path`, its oldest segment
+    first, at `stamp_ns`, or the next before it; -inf each before the path begins.
+    """
+    stamp_s = stamp_ns * 1e-9
+    index = bisect_right(path, stamp_s, key=_begin_s) - 1
+    if index < 0:
+        return -math.inf, -math.inf
+
+    rows = path[index].rows.numpy()
+    following = int(rows[:, PathColumn.STAMP_S].searchsorted(stamp_s, side="right"))
+    variance_m2, variance_rad2 = rows[following - 1, VARIANCES].tolist()
+    return variance_m2, variance_rad2
+
+
+def _begin_s(segment: PathSegment) -> float:
+    """The stamp of a path segment's first place, without decoding the rows: most of a search's
+    time.
+    """
+    (begin_s,) = STAMP_FORMAT.unpack_from(segment.rows.data, STAMP_OFFSET)
+    return float(begin_s)
