@@ -42,8 +42,6 @@ LIDA = {
     "memory.sparse.kind": "binary",
     "memory.sparse.hard_locations": 10_000,
     "memory.sparse.dimensions": 1024,
-    "memory.sparse.activated_share": 0.001,
-    "memory.sparse.max_reads": 19,
     "memory.episodic.decay_per_h": "hours, up to a day",
 }
 
