@@ -29,8 +29,8 @@ from benchmarks.place_grid import measure as place_grid
 from benchmarks.planning.command import planning_command
 from benchmarks.report import Outcome, summary, write
 from benchmarks.spiking import measure as spiking
-from cogmap.cli.experiment.outcome import save_figure
-from cogmap.cli.log.progress import bar
+from cogmap.cli.experiment.results import save_figure
+from cogmap.cli.progress import bar
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})

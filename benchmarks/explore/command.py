@@ -8,7 +8,7 @@ import click
 
 from benchmarks.explore import measure as explore
 from benchmarks.options import json_option, processes_option, report_metrics
-from cogmap.cli.log.progress import bar
+from cogmap.cli.progress import bar
 
 
 @click.command(name="explore")

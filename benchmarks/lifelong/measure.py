@@ -17,7 +17,7 @@ from benchmarks.report import Metrics
 from benchmarks.threshold import at_most
 from cogmap.bus.interface import Arrival
 from cogmap.bus.memory import MemoryBus
-from cogmap.cli.launch.metrics import objects, position_m
+from cogmap.cli.launch.drive_metrics import objects, position_m
 from cogmap.cli.launch.observer import Observer
 from cogmap.errors import CogmapError
 from cogmap.parallel import Progress

@@ -14,7 +14,7 @@ from benchmarks.map_correction.reference import Gtsam, best_positions
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_most
 from benchmarks.trajectory import trajectory_error_m
-from cogmap.cli.log.progress import bar
+from cogmap.cli.progress import bar
 from cogmap.data.g2o import read_g2o
 from cogmap.data.pose_graph import PoseGraphFile, read_true_positions
 from cogmap.data.toro import read_toro

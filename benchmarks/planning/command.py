@@ -9,7 +9,7 @@ import click
 from benchmarks.options import json_option, processes_option, report_metrics
 from benchmarks.planning import grid, tours
 from benchmarks.report import Metrics
-from cogmap.cli.log.progress import bar
+from cogmap.cli.progress import bar
 
 
 @click.command(name="planning")
