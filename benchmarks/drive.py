@@ -17,7 +17,7 @@ from cogmap.cli.launch.drive_metrics import RunMetrics
 from cogmap.cli.launch.forking.client import fork_server
 from cogmap.cli.launch.observer import Errors, Observer
 from cogmap.cli.launch.outcome import Outcome
-from cogmap.cli.launch.plan import Choices, awaited, effective
+from cogmap.cli.launch.plan import Choices, effective
 from cogmap.cli.launch.watch import Watch
 from cogmap.cli.run import summary
 from cogmap.errors import CogmapError
@@ -89,8 +89,7 @@ def drive(
 
     with fork_server() as server:
         choices = Choices(laps=laps)
-        members = awaited(choices, observer=True)
-        sections = effective(settings or {}, choices, members)
+        sections = effective(settings or {}, choices, observer=True)
         run = Drive(folder, free_endpoint(), "agent", choices, sections, began_s, server)
         try:
             watch, ending = run.run(began_s + TIMEOUT_S, stop, stop)

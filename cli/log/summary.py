@@ -25,6 +25,7 @@ from cogmap.recording.log import recorded_config
 from cogmap.recording.storage.reader import LogReader
 from cogmap.recording.storage.writer import cannot_write
 from cogmap.runtime.delivery.intake import Intake
+from cogmap.runtime.run import SECTION, Run
 from cogmap.schemas import topics
 from cogmap.schemas.graph import SnapshotRequest
 from cogmap.services.sim.config import Config as SimConfig
@@ -105,14 +106,15 @@ def _followed(reader: LogReader) -> tuple[RecordedMetrics, Tally]:
             err=True,
         )
 
-    recorded = recorded_config(reader).get("sim", {})
-    default = SimConfig()
+    recorded = recorded_config(reader)
+    seed = recorded.get("sim", {}).get("seed", SimConfig().seed)
+    lockstep = recorded.get(SECTION, {}).get("lockstep", Run().lockstep)
     metrics = drive_metrics(tally, tally.gaps(intake.gaps), tally.rejected(intake.rejected))
     of_log = RecordedMetrics(
         **msgspec.structs.asdict(metrics),
         completed=metrics.progress >= 1.0,
-        seed=int(recorded.get("seed", default.seed)),
-        mode=str(recorded.get("mode", default.mode)),
+        seed=int(seed),
+        lockstep=bool(lockstep),
         log=Recording.read(reader.path),
     )
     return of_log, tally
