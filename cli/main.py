@@ -27,6 +27,7 @@ VERBS = {
         "Show, check, export and import long-term memory.",
     ),
     "module": ("cogmap.cli.processes:module", "Run one module as this process."),
+    "new": ("cogmap.cli.new.command:new", "Write a new codelet or module to begin with."),
     "router": ("cogmap.cli.processes:router", "Run the router that all modules connect to."),
     "run": ("cogmap.cli.run.command:run", "Drive the robot through a simulated town."),
     "schemes": ("cogmap.cli.schemes:schemes", "Write the guidance schemes learned on a drive."),
