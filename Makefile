@@ -4,7 +4,7 @@ INSTALLED := .venv/installed
 TRAINS := .venv/trains
 MEASURES := .venv/measures
 
-.PHONY: help setup train-setup bench-setup demo test test-compose lint bench clean
+.PHONY: help setup train-setup bench-setup demo test test-compose lint bench release clean
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 16
@@ -42,8 +42,10 @@ demo: setup ## explore a simulated town and drive home; TOUR=1 for goals and a c
 	$(BIN)/cogmap run $(if $(TOUR),--tour,--town blocks $(if $(MINUTES),$(LIVES),--explore 45)) $(ARGS)
 
 test: setup ## every test but those of the containers; those of training are skipped without torch
-	$(BIN)/python -m pytest -n auto --dist loadfile --ignore tests/e2e --ignore tests/fault
+	$(BIN)/python -m pytest -n auto --dist loadfile --ignore tests/e2e --ignore tests/fault --cov --cov-report=
 	$(BIN)/python -m pytest tests/e2e tests/fault
+	@echo "lines covered by tests within one process: $$($(BIN)/coverage report --format=total) %;" \
+	    "$(BIN)/coverage report --show-missing lists the others"
 
 test-compose: setup ## build the containers and test them as they run
 	$(BIN)/python -m pytest tests/compose -m compose --timeout 1200
@@ -57,6 +59,12 @@ lint: setup ## style, types, and which package imports which; needs no torch
 bench: bench-setup ## every benchmark and experiment that has a threshold; make bench ARGS="--data DIR"
 	$(BIN)/python -m benchmarks all $(ARGS)
 
+release: setup ## check the version, style and tests, and tag the commit; CONTRIBUTING.md has the steps
+	$(BIN)/python -m tests.support.release
+	$(MAKE) lint test
+	git tag --annotate --message "Cogmap $$($(BIN)/cogmap --version | cut -d' ' -f2)" \
+	    v$$($(BIN)/cogmap --version | cut -d' ' -f2)
+
 clean: ## remove what was installed and built; runs stay
-	rm -rf .venv build *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
+	rm -rf .venv build *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .coverage*
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

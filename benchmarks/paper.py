@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from benchmarks.benchmark import Setting
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_most, more_than, within
 from cogmap.cli.log.progress import bar
@@ -19,21 +20,21 @@ SEED = 1
 TRIALS = 200
 
 
-def measure_cue_integration(processes: int) -> Metrics:
-    """Experiment 1, as `cogmap experiment cue-integration` runs it."""
+def measure_cue_integration(setting: Setting) -> Metrics:
+    """Measure experiment 1, as `cogmap experiment cue-integration` runs it."""
     with bar("trials") as progress:
-        budget = cue_integration.Budget(TRIALS, SEED, processes, progress)
+        budget = cue_integration.Budget(TRIALS, SEED, setting.processes, progress)
         outcome = cue_integration.measure(cue_integration.FITTED, budget)
 
     return outcome.metrics()
 
 
-def measure_city_maps(processes: int) -> Metrics:
-    """Experiment 2, as `cogmap experiment city-maps` runs it: cities grown from seeds."""
+def measure_city_maps(setting: Setting) -> Metrics:
+    """Measure experiment 2, as `cogmap experiment city-maps` runs it: cities grown from seeds."""
     places = grown_environments(city_maps.MAPS, SEED)
 
     with bar("traversals") as progress:
-        budget = city_maps.Budget(city_maps.TRAVERSALS, SEED, processes, progress)
+        budget = city_maps.Budget(city_maps.TRAVERSALS, SEED, setting.processes, progress)
         maps = city_maps.measure(places, city_maps.NOISE, budget)
 
     metrics: Metrics = {}

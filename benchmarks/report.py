@@ -13,6 +13,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from benchmarks.threshold import Threshold
+from benchmarks.timing import machine_unit_ms
 
 Metrics = dict[str, float]
 
@@ -36,6 +37,11 @@ class Outcome:
                 missed.append(key)
 
         return missed
+
+
+def with_machine_unit(metrics: Metrics) -> Metrics:
+    """Add the unit of this machine's speed to metrics that have just been measured."""
+    return metrics | {"machine_unit_ms": machine_unit_ms()}
 
 
 def report(outcome: Outcome, json_path: Path | None) -> None:

@@ -14,6 +14,8 @@ Name = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
 Finite = Annotated[float, msgspec.Meta(ge=-sys.float_info.max, le=sys.float_info.max)]
 Scalar = Finite | int | str | bool
 Unit = Annotated[float, msgspec.Meta(ge=0, le=1)]
+Metres = Annotated[float, msgspec.Meta(ge=0, le=1e6)]
+Coordinate = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
 
 # Quantities of settings, bounded against infinite and absurd values. A key adds its description:
 # Annotated[Share, msgspec.Meta(description="...")].

@@ -10,10 +10,8 @@ import msgspec
 import numpy as np
 
 from cogmap.schemas.array import Array
-from cogmap.schemas.base import Count, Finite, Message, Name, Part, Unit
+from cogmap.schemas.base import Count, Finite, Message, Metres, Name, Part, Unit
 from cogmap.schemas.feelings import Feeling, salience_of
-
-Metres = Annotated[float, msgspec.Meta(ge=0, le=1e6)]
 
 
 class Calibration(Part, kw_only=True, frozen=True):

@@ -194,7 +194,7 @@ def drive_twice(seed: int) -> Route:
         file.write_text(written(teacher.learned.values()))
         observer = Module("observer").on(topics.TRUE_POSE, guided.on_pose)
         _run(
-            _settings(seed) | {"procedural": {"mode": "lockstep", "schemes": str(file)}},
+            _settings(seed) | {"procedural": {"schemes": str(file)}},
             observer,
             guided,
         )

@@ -12,7 +12,6 @@ from cogmap.schemas import topics
 from cogmap.schemas.sensing import Energy
 from cogmap.services import registry
 
-MOTOR = "motor"
 CAPACITY_S = 500.0
 """How long a full battery lasts at rest: for less than a life, so that to stand still is no way to
 live.
@@ -53,12 +52,10 @@ def live(
     """
     configured = sections(seed, has_cameras)
     configured["sim"] = configured["sim"] | {
-        "energy": True,
         "battery": {"capacity_s": CAPACITY_S},
         "duration_s": longest_s,
     }
-    configured["workspace"] |= {"awaits_energy": True, "offering": [MOTOR]}
-    configured[MOTOR] |= {"makes_offers": True}
+    configured["run"] = configured["run"] | {"energy": True}
 
     observer = _Observer()
     watching = Module("observer").on(topics.ENERGY, observer.on_energy)

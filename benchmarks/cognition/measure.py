@@ -4,12 +4,11 @@ lives by it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
+from benchmarks.benchmark import Setting
 from benchmarks.cognition.guided import ROUTES, guidance
 from benchmarks.cognition.latency import latencies
 from benchmarks.cognition.life import Life, live
@@ -43,21 +42,25 @@ class Stay:
     has_cameras: bool = False
 
 
-def measure(
-    folder: Path, processes: int, announce: Callable[[str], None], towns: int = TOWNS
-) -> Metrics:
-    """The metrics of THRESHOLDS, `random_survived_share` of an agent that acts at random, and more
-    of guidance; `folder` holds a drive's log.
+def measure(setting: Setting) -> Metrics:
+    """Measure how fast something is conscious and acted on, whether the agent keeps its energy, and
+    whether it finds its way by guidance.
+
+    Drives a lap of the demo's town in real time, every module a process. Then an agent lives in ten
+    towns for ten minutes, with percept-level sensing and a battery that lasts for three as it
+    drives, and one beside it that acts at random; in the first town also with cameras, which is
+    reported beside. Ten routes in other towns are driven once, and again by the guidance schemes
+    that were learned. Takes half an hour on two cores.
     """
-    announce("driving one lap in real time")
-    drive(folder)
-    metrics = latencies(folder / LOG_NAME)
+    setting.announce("driving one lap in real time")
+    drive(setting.folder)
+    metrics = latencies(setting.folder / LOG_NAME)
 
-    announce(f"living in {towns} towns for {LIFE_S:g} s each, twice")
-    metrics |= survival(processes, towns)
+    setting.announce(f"living in {TOWNS} towns for {LIFE_S:g} s each, twice")
+    metrics |= survival(setting.processes)
 
-    announce(f"driving {ROUTES} routes twice, the second time by guidance")
-    return metrics | guidance(processes)
+    setting.announce(f"driving {ROUTES} routes twice, the second time by guidance")
+    return metrics | guidance(setting.processes)
 
 
 def survival(processes: int, towns: int = TOWNS) -> Metrics:

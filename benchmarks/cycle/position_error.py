@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.report import Metrics
 from cogmap.cli.launch.observer import OBSERVED, Observer
-from cogmap.cli.launch.plan import OBSERVER, Choices, awaited, effective
+from cogmap.cli.launch.plan import OBSERVER, Choices, effective
 from cogmap.errors import CogmapError
 from cogmap.parallel import parallel_map
 from cogmap.runtime.in_process import InProcessRunner
@@ -69,7 +69,7 @@ def mean_errors(town: int, laps: float) -> MeanErrors:
 def _drive(town: int, laps: float) -> Observer:
     """Run all modules in this process until every goal is reached."""
     choices = Choices(seed=town, laps=laps, lockstep=True, record=False)
-    sections = effective({}, choices, awaited(choices, observer=True))
+    sections = effective({}, choices, observer=True)
     observer = Observer()
     modules = [registry.build(name, sections) for name in registry.MODULES]
     runner = InProcessRunner([*modules, _observing(observer)])

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from benchmarks.drive import drive
-from benchmarks.machine import machine_unit_ms
 from benchmarks.report import Metrics
+from benchmarks.timing import machine_unit_ms
 from cogmap.schemas import topics
 from cogmap.schemas.process import Health
 

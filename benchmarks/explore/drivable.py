@@ -12,11 +12,11 @@ from scipy import sparse
 from scipy.sparse.csgraph import dijkstra
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
+from cogmap.robot import HALF_WIDTH_M
 from cogmap.schemas.sensing import Obstacle, Street, TrueTown
 
 CELL_M = 0.5
 MARGIN_M = 5.0
-HALF_WIDTH_M = 0.7
 BARRIER_M = 1.0
 MOVES = ((1, 0), (1, 1), (0, 1), (-1, 1), (2, 1), (1, 2), (-1, 2), (-2, 1))
 """Half of the moves on the grid: with the knight's of chess, a length is 2.7 % too long at most."""

@@ -7,10 +7,12 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple
 
+import click
 import numpy as np
 import psutil
 from scipy.spatial import KDTree
 
+from benchmarks.benchmark import Setting
 from benchmarks.explore.measure import COGNITION, sections
 from benchmarks.lifelong.courier import Courier
 from benchmarks.report import Metrics
@@ -19,6 +21,7 @@ from cogmap.bus.interface import Arrival
 from cogmap.bus.memory import MemoryBus
 from cogmap.cli.launch.metrics import objects, position_m
 from cogmap.cli.launch.observer import Observer
+from cogmap.cli.log.progress import bar
 from cogmap.errors import CogmapError
 from cogmap.parallel import Progress
 from cogmap.runtime.config import Sections
@@ -41,6 +44,15 @@ THRESHOLDS = {
     "memory_ratio": at_most(1.3),
     "map_error_ratio": at_most(1.0),
 }
+OPTIONS = (
+    click.Option(
+        ["--cycles"],
+        type=click.IntRange(EARLY_AT + SPAN, 10_000_000),
+        default=CYCLES,
+        show_default=True,
+        help="How many; the last thousand are compared with the third.",
+    ),
+)
 
 
 class Mark(NamedTuple):
@@ -126,15 +138,20 @@ class _Days:
         return float(np.mean(away_m))
 
 
-def measure(
-    progress: Progress = lambda share: None,
-    *,
-    cycles: int = CYCLES,
-    early_at: int = EARLY_AT,
-    seed: int = SEED,
-) -> Metrics:
-    """The metrics of THRESHOLDS, of so many cycles in one town. Raises CogmapError where a module
-    rejected a message, or the drive ended before.
+def measure(setting: Setting, *, cycles: int = CYCLES) -> Metrics:
+    """Measure the cost of a cycle after hours in one town over its cost early, and the error of the
+    map.
+
+    One agent drives laps past the same places of a town, and to others, at the level of percepts;
+    all modules in one process on the in-memory bus.
+    """
+    with bar("driving") as progress:
+        return drive(cycles, progress)
+
+
+def drive(cycles: int, progress: Progress, early_at: int = EARLY_AT, seed: int = SEED) -> Metrics:
+    """Return the metrics of so many cycles in one town. Raises CogmapError if a module rejected a
+    message, or the drive ended before.
     """
     days = _Days(seed, early_at)
     configured = _sections(seed, cycles)

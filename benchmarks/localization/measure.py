@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks import optional
+from benchmarks.benchmark import PROCESSES, Setting, path_option
 from benchmarks.localization import speed
 from benchmarks.localization.drives import evaluate
 from benchmarks.localization.recovery import evaluate_recovery
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_most
 from cogmap.cli.log.progress import bar
-from cogmap.data.mrclam import Recording, read
+from cogmap.data.mrclam import read
 from cogmap.parallel import parallel_map
 
 THRESHOLDS = {
@@ -29,13 +30,26 @@ THRESHOLDS = {
     "recovery_s": at_most(15.0),
     "recovery_worst_s": at_most(40.0),
 }
+OPTIONS = (
+    path_option(
+        "--mrclam",
+        "folder",
+        required=True,
+        metavar="DIR",
+        text="A folder of the UTIAS MRCLAM sets, as published, its files packed with xz or not.",
+    ),
+    PROCESSES,
+)
 OF_EACH_ROBOT = ("known_map_rmse_m", "slam_rmse_m", "smoother_rmse_m")
 
 
-def measure(folder: Path, processes: int) -> Metrics:
-    """The metrics of THRESHOLDS, each the mean over the robots, and others that explain them.
+def measure(setting: Setting, *, folder: Path) -> Metrics:
+    """Measure how well real robots localize, on a map that is known and on one that they make, and
+    how fast.
 
-    Raises UsageError where `folder` is no set, or gtsam or evo is not installed.
+    Each of the set's robots alone, through the town's workspace and codelets; observations of other
+    robots are left out. The map that it makes is aligned with the truth, and compared with gtsam's
+    batch smoother, which `make bench-setup` installs. Takes some minutes.
     """
     optional.gtsam()
     recording = read(folder)
@@ -43,46 +57,28 @@ def measure(folder: Path, processes: int) -> Metrics:
 
     with bar("robots' logs") as progress:
         work = partial(evaluate, landmarks=recording.landmarks)
-        rows = parallel_map(work, recording.robots, processes, progress)
+        rows = parallel_map(work, recording.robots, setting.processes, progress)
 
-    metrics: Metrics = {}
-    for key in rows[0]:
-        of_robots = [row[key] for row in rows]
-        metrics[key] = float(np.mean(of_robots))
-
-    metrics["slam_vs_smoother"] = metrics["slam_rmse_m"] / metrics["smoother_rmse_m"]
-    metrics |= _recovery(recording, processes)
-    return metrics | timings | _of_each_robot(recording, rows) | _counts(recording)
-
-
-def _recovery(recording: Recording, processes: int) -> Metrics:
-    """The means over the robots, and the worst of all."""
     with bar("recoveries") as progress:
         work = partial(evaluate_recovery, landmarks=recording.landmarks)
-        rows = parallel_map(work, recording.robots, processes, progress)
+        recoveries = parallel_map(work, recording.robots, setting.processes, progress)
 
-    worst_s = max(row["recovery_worst_s"] for row in rows)
-    means = {key: float(np.mean([row[key] for row in rows])) for key in rows[0]}
-    return means | {"recovery_worst_s": worst_s}
+    metrics = _means(rows)
+    metrics["slam_vs_smoother"] = metrics["slam_rmse_m"] / metrics["smoother_rmse_m"]
+    metrics |= _means(recoveries)
+    metrics["recovery_worst_s"] = max(row["recovery_worst_s"] for row in recoveries)
+    metrics |= timings
 
-
-def _of_each_robot(recording: Recording, rows: Sequence[Metrics]) -> Metrics:
-    metrics = {}
     for robot, row in zip(recording.robots, rows, strict=True):
         for key in OF_EACH_ROBOT:
             metrics[f"robot{robot.number}_{key}"] = row[key]
 
+    observed = sum(len(robot.landmark_observations) for robot in recording.robots)
+    metrics["landmark_sightings"] = float(observed)
+    metrics["unread_barcodes"] = float(sum(robot.unread for robot in recording.robots))
     return metrics
 
 
-def _counts(recording: Recording) -> Metrics:
-    observations = 0
-    unread = 0
-    for robot in recording.robots:
-        observations += len(robot.landmark_observations)
-        unread += robot.unread
-
-    return {
-        "landmark_sightings": float(observations),
-        "unread_barcodes": float(unread),
-    }
+def _means(rows: Sequence[Metrics]) -> Metrics:
+    """Return the means over the robots."""
+    return {key: float(np.mean([row[key] for row in rows])) for key in rows[0]}

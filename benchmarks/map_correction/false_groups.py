@@ -12,19 +12,19 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.map_correction.measure import read_graph, read_truth
+from benchmarks.map_correction.files import read_truth
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most
 from benchmarks.trajectory import trajectory_error_m
+from cogmap.cli.log.progress import bar
 from cogmap.errors import UsageError
+from cogmap.estimation.gnc import inliers
+from cogmap.estimation.least_squares import optimize
+from cogmap.estimation.pose_graph import Constraints, PoseGraph
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.geometry.se2 import compose, integrate, relative
 from cogmap.parallel import parallel_map
-from cogmap.recording.storage.reader import Progress
 from cogmap.services.codelets.config import Config
-from cogmap.services.codelets.correction.gnc import inliers
-from cogmap.services.codelets.correction.least_squares import optimize
-from cogmap.services.codelets.correction.pose_graph import Constraints, PoseGraph
 
 THRESHOLDS = {
     "ate_ratio": at_most(1.1),
@@ -36,18 +36,15 @@ MIN_APART = 100
 POSITION_M = 1.0
 HEADING_SD_RAD = 0.05
 SEED = 7
-Setting = tuple[int, int]
+Groups = tuple[int, int]
 
 
-def measure(
-    graph_path: Path, truth_path: Path | None, processes: int, progress: Progress
-) -> Metrics:
-    """The worst of each over all counts of false closures and sizes of groups, and each one's.
+def measure(graph: PoseGraph, graph_path: Path, truth_path: Path | None, processes: int) -> Metrics:
+    """Return the worst of each metric over all counts of false closures and sizes of groups, and
+    each one's. Errors are measured if there is a truth.
 
-    Errors are only measured where there is a truth. Raises UsageError where a file cannot be read,
-    or evo is not installed.
+    Raises UsageError if the graph is too short, or evo is not installed.
     """
-    graph = read_graph(graph_path)
     if len(graph.poses) < 2 * MIN_APART:
         raise UsageError(f"{graph_path} has {len(graph.poses)} poses: give one of {2 * MIN_APART}")
 
@@ -56,7 +53,8 @@ def measure(
 
     settings = list(product(COUNTS, SIZES))
     work = partial(_kept, graph=graph)
-    kept = parallel_map(work, settings, processes, progress)
+    with bar("judging false closures") as progress:
+        kept = parallel_map(work, settings, processes, progress)
 
     metrics: Metrics = {}
     ratios = []
@@ -78,9 +76,9 @@ def measure(
     return metrics | {"true_kept": min(true_shares)}
 
 
-def _kept(setting: Setting, graph: PoseGraph) -> tuple[Booleans, Floats]:
+def _kept(groups: Groups, graph: PoseGraph) -> tuple[Booleans, Floats]:
     """Which closures are inliers, the graph's own before the false ones, and the path by those."""
-    count, size = setting
+    count, size = groups
     rng = np.random.default_rng([SEED, count, size])
     closures = graph.closures + false_closures(graph, count, size, rng)
 
@@ -122,7 +120,7 @@ def false_closures(
 def _group(
     path: Floats, places: tuple[int, int], size: int, rng: np.random.Generator
 ) -> list[tuple[int, int, Floats]]:
-    """From where to where each closure of a group leads, and what it measures, (3,)."""
+    """The places that each closure of a group leads from and to, and its measurement, (3,)."""
     first, later = places
     turned_rad = rng.choice([0.0, np.pi]) + rng.normal(0.0, HEADING_SD_RAD)
     seen = np.array([*rng.uniform(-POSITION_M, POSITION_M, 2), turned_rad])

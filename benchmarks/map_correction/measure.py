@@ -2,31 +2,30 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
 
+import click
 import numpy as np
 
+from benchmarks.benchmark import PROCESSES, Setting, path_option
+from benchmarks.map_correction import false_groups
+from benchmarks.map_correction.files import read_graph, read_truth
 from benchmarks.map_correction.reference import Gtsam, best_positions
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_most
+from benchmarks.timing import timed
 from benchmarks.trajectory import trajectory_error_m
 from cogmap.cli.log.progress import bar
-from cogmap.data import pose_graph
-from cogmap.data.pose_graph import read_true_positions
-from cogmap.errors import UsageError
-from cogmap.geometry.arrays import Floats
-from cogmap.services.codelets.correction.incremental import IncrementalSolver
-from cogmap.services.codelets.correction.least_squares import optimize
-from cogmap.services.codelets.correction.pose_graph import Constraints, PoseGraph, cost
-from cogmap.services.codelets.correction.reverse_replay import (
+from cogmap.estimation.incremental import IncrementalSolver
+from cogmap.estimation.least_squares import optimize
+from cogmap.estimation.pose_graph import PoseGraph, cost
+from cogmap.estimation.reverse_replay import (
     close_loops,
     displacements,
     position_cost,
 )
+from cogmap.geometry.arrays import Floats
 
 THRESHOLDS = {
     "positions_cost_ratio": at_most(1.05),
@@ -34,22 +33,54 @@ THRESHOLDS = {
     "time_vs_gtsam": at_most(1.0),
     "incremental_ms_p99": at_most(20.0),
 }
-# A sum of squared, whitened errors below which two solutions are the same: rounding.
-SAME_COST = 1e-9
+OPTIONS = (
+    path_option(
+        "--graph",
+        "graph_path",
+        required=True,
+        metavar="FILE",
+        text="A pose graph in the plane of yours: .g2o, or TORO's .graph; packed or not.",
+    ),
+    path_option(
+        "--truth",
+        "truth_path",
+        metavar="FILE",
+        text="Its true poses, a line each: x, y and heading, with an index before them or not.",
+    ),
+    click.Option(
+        ["--false-groups", "has_false_groups"],
+        is_flag=True,
+        help="Add false closures, alone and in groups that agree, and tell which are believed.",
+    ),
+    PROCESSES,
+)
 PAIRS = 7
+# A sum of squared, whitened residuals that is rounding: two solutions below it are the same.
+SAME_COST = 1e-9
 MAX_NEW_CLOSURES = 200
 MAX_HELD_OUT_SHARE = 0.5
 RELINEARIZE_EVERY = 20
 SEED = 4
-T = TypeVar("T")
 
 
-def measure(graph_path: Path, truth_path: Path | None) -> Metrics:
-    """The metrics of THRESHOLDS, and others that explain them; errors only where there is a truth.
+def measure(
+    setting: Setting,
+    *,
+    graph_path: Path,
+    truth_path: Path | None = None,
+    has_false_groups: bool = False,
+) -> Metrics:
+    """Measure how well and how fast loops are closed, on a pose graph that was recorded elsewhere.
 
-    Raises UsageError where a file cannot be read, or gtsam or evo is not installed.
+    By the paper's rule, for positions only, against exact least squares; with headings too, against
+    gtsam, which `make bench-setup` installs; and one closure at a time. Takes up to half a minute.
+    With --false-groups instead: 10, 50 and 100 false closures, alone and in groups of 3 and 5; the
+    errors that they cause are measured if there is a --truth. Takes some minutes.
     """
     graph = read_graph(graph_path)
+    if has_false_groups:
+        return false_groups.measure(graph, graph_path, truth_path, setting.processes)
+
     truth_m = read_truth(truth_path, graph_path, len(graph.poses))
     peer = Gtsam(graph.poses, graph.constraints)
 
@@ -57,8 +88,8 @@ def measure(graph_path: Path, truth_path: Path | None) -> Metrics:
         "poses": float(len(graph.poses)),
         "closures": float(len(graph.closures)),
     }
-    positions_m, of_positions = _positions(graph)
-    poses, peers_poses, of_headings = _headings(graph, peer)
+    positions_m, of_positions = _correct_positions(graph)
+    poses, peers_poses, of_headings = _correct_headings(graph, peer)
     metrics |= of_positions | of_headings
 
     if truth_m is not None:
@@ -68,52 +99,19 @@ def measure(graph_path: Path, truth_path: Path | None) -> Metrics:
             "ate_m": poses[:, :2],
             "ate_gtsam_m": peers_poses[:, :2],
         }
-        metrics |= _trajectory_errors(paths_m, truth_m)
+        metrics |= {key: trajectory_error_m(path_m, truth_m) for key, path_m in paths_m.items()}
+        metrics["ate_vs_gtsam"] = metrics["ate_m"] / metrics["ate_gtsam_m"]
 
     batch_cost = cost(poses, graph.constraints)
-    return metrics | _incremental(graph, batch_cost)
+    return metrics | _add_closures(graph, batch_cost)
 
 
-def _trajectory_errors(paths_m: Mapping[str, Floats], truth_m: Floats) -> Metrics:
-    """Each path's absolute trajectory error by its key, and ours over gtsam's."""
-    errors_m = {}
-    for key, path_m in paths_m.items():
-        errors_m[key] = trajectory_error_m(path_m, truth_m)
-
-    ratio = errors_m["ate_m"] / errors_m["ate_gtsam_m"]
-    return errors_m | {"ate_vs_gtsam": ratio}
-
-
-def read_graph(path: Path) -> PoseGraph:
-    """Read the pose graph in a file. Raises UsageError if it cannot be read."""
-    file = pose_graph.read(path)
-    constraints = Constraints(file.i, file.j, file.measurement, file.information)
-    return PoseGraph.of(file.poses, constraints)
-
-
-def cost_ratio(cost: float, reference: float) -> float:
-    """Return the one cost over the other; 1 if both are rounding, as in a graph without loops."""
-    return (cost + SAME_COST) / (reference + SAME_COST)
-
-
-def read_truth(path: Path | None, graph_path: Path, count: int) -> Floats | None:
-    if path is None:
-        return None
-
-    truth_m = read_true_positions(path)
-    if len(truth_m) != count:
-        raise UsageError(f"{path} has {len(truth_m)} poses, {graph_path} has {count}")
-
-    return truth_m
-
-
-def _positions(graph: PoseGraph) -> tuple[Floats, Metrics]:
+def _correct_positions(graph: PoseGraph) -> tuple[Floats, Metrics]:
     """By the paper's rule, positions only, against exact least squares."""
-    took_s, found = _timed(partial(close_loops, graph))
+    took_s, found = timed(partial(close_loops, graph))
     constraints = graph.constraints
     known = displacements(graph.poses, constraints)
     min_cost = position_cost(best_positions(graph), constraints, known)
-
     found_cost = position_cost(found.positions_m, constraints, known)
 
     metrics = {
@@ -124,13 +122,21 @@ def _positions(graph: PoseGraph) -> tuple[Floats, Metrics]:
     return found.positions_m, metrics
 
 
-def _headings(graph: PoseGraph, peer: Gtsam) -> tuple[Floats, Floats, Metrics]:
+def _correct_headings(graph: PoseGraph, peer: Gtsam) -> tuple[Floats, Floats, Metrics]:
     """Both from the same poses, each once to warm up, then in turn; each one's median time."""
     by_qr = peer.gives_up()
     poses = optimize(graph)
     peers_poses = peer.poses(peer.solve())
-    ours_s, peers_s = _in_turn(graph, peer)
 
+    took_s = []
+    with bar("correcting headings, and gtsam the same") as progress:
+        for pair in range(1, PAIRS + 1):
+            our_s, _ = timed(partial(optimize, graph))
+            peer_s, _ = timed(peer.solve)
+            took_s.append((our_s, peer_s))
+            progress(pair / PAIRS)
+
+    ours_s, peers_s = np.median(took_s, axis=0).tolist()
     heading_cost = cost(poses, graph.constraints)
     peers_cost = cost(peers_poses, graph.constraints)
     metrics = {
@@ -144,23 +150,7 @@ def _headings(graph: PoseGraph, peer: Gtsam) -> tuple[Floats, Floats, Metrics]:
     return poses, peers_poses, metrics
 
 
-def _in_turn(graph: PoseGraph, peer: Gtsam) -> tuple[float, float]:
-    """The median seconds of PAIRS runs of ours and of gtsam's."""
-    ours_s = []
-    peers_s = []
-
-    with bar("correcting headings, and gtsam the same") as progress:
-        for pair in range(1, PAIRS + 1):
-            our_s, _ = _timed(partial(optimize, graph))
-            peer_s, _ = _timed(peer.solve)
-            ours_s.append(our_s)
-            peers_s.append(peer_s)
-            progress(pair / PAIRS)
-
-    return float(np.median(ours_s)), float(np.median(peers_s))
-
-
-def _incremental(graph: PoseGraph, batch_cost: float) -> Metrics:
+def _add_closures(graph: PoseGraph, batch_cost: float) -> Metrics:
     """Closures left out at random are added one at a time.
 
     Relinearizing, which happens between two closures, is timed apart.
@@ -170,12 +160,23 @@ def _incremental(graph: PoseGraph, batch_cost: float) -> Metrics:
     if not count:
         return {}
 
-    order = np.random.default_rng(SEED).permutation(closures)
-    held_out = order[:count]
+    held_out = np.random.default_rng(SEED).permutation(closures)[:count]
     rest = np.setdiff1d(np.arange(closures), held_out)
-    known = graph.closures.select(rest)
-    solver = IncrementalSolver(PoseGraph(graph.poses, graph.steps, known))
-    added_ms, relinearized_ms = _add_each(solver, graph.closures, held_out.tolist())
+    solver = IncrementalSolver(PoseGraph(graph.poses, graph.steps, graph.closures.select(rest)))
+    added_ms = []
+    relinearized_ms = []
+
+    with bar("closing one more loop") as progress:
+        for number, index in enumerate(held_out.tolist(), start=1):
+            closure = graph.closures.select(np.array([index]))
+            add_s, _ = timed(partial(solver.add, closure))
+            added_ms.append(1e3 * add_s)
+
+            if number % RELINEARIZE_EVERY == 0:
+                relinearize_s, _ = timed(solver.relinearize)
+                relinearized_ms.append(1e3 * relinearize_s)
+
+            progress(number / count)
 
     final_cost = cost(solver.graph.poses, solver.graph.constraints)
     return {
@@ -186,32 +187,3 @@ def _incremental(graph: PoseGraph, batch_cost: float) -> Metrics:
         "incremental_closures": float(count),
         "settle_ms_p50": float(np.median(relinearized_ms or [0.0])),
     }
-
-
-def _add_each(
-    solver: IncrementalSolver, closures: Constraints, indices: Sequence[int]
-) -> tuple[list[float], list[float]]:
-    """Add one closure after the other: the times of adding, and those of relinearizing, in ms."""
-    added_ms = []
-    relinearized_ms = []
-
-    with bar("closing one more loop") as progress:
-        for number, index in enumerate(indices, start=1):
-            closure = closures.select(np.array([index]))
-            add_s, _ = _timed(partial(solver.add, closure))
-            added_ms.append(1e3 * add_s)
-
-            if number % RELINEARIZE_EVERY == 0:
-                relinearize_s, _ = _timed(solver.relinearize)
-                relinearized_ms.append(1e3 * relinearize_s)
-
-            progress(number / len(indices))
-
-    return added_ms, relinearized_ms
-
-
-def _timed(work: Callable[[], T]) -> tuple[float, T]:
-    """The seconds that `work` took, and what it returned."""
-    began_s = time.perf_counter()
-    result = work()
-    return time.perf_counter() - began_s, result

@@ -20,6 +20,8 @@ from cogmap.services import registry
 
 COGNITION = ("workspace", "codelets", "global_workspace", "procedural", "action", "motor")
 MODULES = ("sim", *COGNITION)
+PARTICIPANTS = ("sim", "workspace", "global_workspace")
+"""Not motor: the first cycle on a map of another run would wait for its offer in the one before."""
 WARM_UP = 10
 CYCLES = 60
 SPEED_M_S = 2.0
@@ -74,17 +76,14 @@ def sections() -> Sections:
         "speed_m_s": SPEED_M_S,
     }
     sim = {
-        "mode": "lockstep",
         "trajectory": trajectory,
         "frame_hz": 1,
         "odometry_hz": 5,
-        "awaits": dict.fromkeys(COGNITION, 1),
     }
     return {
+        "run": {"lockstep": True, "participants": dict.fromkeys(PARTICIPANTS, 1)},
         "sim": sim,
-        "workspace": {"mode": "lockstep", "cell_m": CELL_M, "base_level_decay": 0.0},
-        "procedural": {"mode": "lockstep"},
-        "motor": {"mode": "lockstep"},
+        "workspace": {"cell_m": CELL_M, "base_level_decay": 0.0},
     }
 
 

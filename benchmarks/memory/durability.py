@@ -46,19 +46,6 @@ class Damaged(NamedTuple):
     refused: int
 
 
-def lost_after_kill(folder: Path, kills: int = 50) -> int:
-    """How many acknowledged records are missing or different after any of `kills` kills -9.
-
-    A database in `folder` is continued over all of them.
-    """
-    return kill_writers(folder, kills).lost
-
-
-def damaged_store_opened(folder: Path, stores: int = 200) -> int:
-    """How many of `stores` damaged copies in `folder` open with other records than were stored."""
-    return open_damaged(folder, stores).changed
-
-
 def kill_writers(folder: Path, kills: int) -> Killed:
     """Kill a writer `kills` times, and look for what it acknowledged after each.
 

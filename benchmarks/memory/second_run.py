@@ -168,9 +168,7 @@ def sections(chosen: Visit) -> Sections:
     configured = explored(chosen.seed)
     sim = configured["sim"]
     sim["start"] = chosen.start
-    sim["awaits"] = {**sim["awaits"], MEMORY: 1}
-    configured["workspace"]["offering"] = [MEMORY]
-    configured[MEMORY] = {"mode": "lockstep"}
+    configured["run"]["participants"][MEMORY] = 1
     return configured
 
 

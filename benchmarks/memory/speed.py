@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-
 import numpy as np
 
+from benchmarks.timing import least_cpu_s
 from cogmap.geometry.arrays import Bytes
 from cogmap.services.memory.sparse.config import SparseConfig
 from cogmap.services.memory.sparse.memory import SparseMemory, hard_addresses
@@ -47,8 +45,7 @@ class NumpyLoop:
 def reads_vs_numpy_loop(seed: int) -> float:
     """Single reads a second of a memory with the default settings, over those of the loop.
 
-    Both are the least CPU time of several reads, of all threads together, so that other load on the
-    machine hardly counts.
+    Both are the least CPU time of several reads.
     """
     config = SparseConfig(seed=seed)
     memory = SparseMemory(config)
@@ -58,17 +55,6 @@ def reads_vs_numpy_loop(seed: int) -> float:
 
     (cue,) = random_vectors(rng, 1, config.dimensions)
     loop = NumpyLoop(config, memory)
-    loop_s = _least_s(LOOP_READS, lambda: loop.read_once(cue))
-    memory_s = _least_s(MEMORY_READS, lambda: memory.read_once(cue))
+    loop_s = least_cpu_s(lambda: loop.read_once(cue), LOOP_READS)
+    memory_s = least_cpu_s(lambda: memory.read_once(cue), MEMORY_READS)
     return loop_s / memory_s
-
-
-def _least_s(reads: int, read: Callable[[], object]) -> float:
-    """The least CPU time of a read, in seconds."""
-    times_s = []
-    for _ in range(reads):
-        began_s = time.process_time()
-        read()
-        times_s.append(time.process_time() - began_s)
-
-    return min(times_s)

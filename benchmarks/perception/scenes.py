@@ -15,9 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.geometry.arrays import Bytes, Floats, Singles
+from cogmap.robot import calibration
 from cogmap.schemas.sensing import Calibration, Pose
 from cogmap.services.sim.layout import town
-from cogmap.services.sim.rendering.camera import StereoCamera, calibration
+from cogmap.services.sim.rendering.camera import StereoCamera
 from cogmap.services.sim.world import World
 from cogmap.training.rendering import towns
 

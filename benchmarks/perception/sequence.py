@@ -17,13 +17,14 @@ import numpy as np
 from benchmarks.report import Metrics
 from cogmap.geometry.arrays import Booleans, Bytes, Floats, Singles
 from cogmap.geometry.polylines import distances_along
+from cogmap.robot import NEAREST_DEPTH_M, calibration
 from cogmap.schemas.sensing import PlaceMatch, Pose
 from cogmap.services.epam.places.recognizer import PlaceRecognizer
 from cogmap.services.sensory.disparity import DepthFromStereo
 from cogmap.services.sensory.rectify import rectification
 from cogmap.services.sim.layout import town
 from cogmap.services.sim.layout.plan import Point
-from cogmap.services.sim.rendering.camera import StereoCamera, calibration
+from cogmap.services.sim.rendering.camera import StereoCamera
 from cogmap.services.sim.rendering.light import Light, some_light
 from cogmap.services.sim.world import World
 from cogmap.training.rendering import towns
@@ -41,7 +42,6 @@ SPACING_M = 0.1
 SPEED_CHANGES_M = 10.0
 OFFSET_CHANGES_M = 8.0
 TURN_CHANGES_M = 4.0
-NEAREST_M = 2.5
 SAME_M = 3.0
 SAME_RAD = math.radians(30)
 PRECISION = 0.99
@@ -99,7 +99,7 @@ def _views(place: town.Town) -> Iterator[tuple[Stretch, Pose, Bytes, Singles]]:
     try:
         camera = StereoCamera(world, calibration())
         straight = rectification(camera.calibration)
-        stereo = DepthFromStereo(straight.calibration, NEAREST_M)
+        stereo = DepthFromStereo(straight.calibration, NEAREST_DEPTH_M)
         rng = np.random.default_rng([place.seed, 0x5F])
 
         for stretch in course(place):

@@ -10,6 +10,7 @@ import numpy as np
 
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most
+from cogmap.cli.log.progress import bar
 from cogmap.data import tsplib
 from cogmap.data.human_tours import read_folder
 from cogmap.data.tsplib import Problem
@@ -17,7 +18,7 @@ from cogmap.errors import UsageError
 from cogmap.experiments.route_planning.measure import PARTICIPANTS, human_jobs, measure
 from cogmap.experiments.route_planning.metrics import human_metrics
 from cogmap.experiments.route_planning.optimum import shortest_tour
-from cogmap.parallel import Progress, parallel_map
+from cogmap.parallel import parallel_map
 from cogmap.services.codelets.planning.tours import (
     TourSettings,
     follow_activation,
@@ -32,10 +33,6 @@ THRESHOLDS = {
 MIN_CITIES = 50
 MAX_CITIES = 80
 SEED = 1
-
-
-def _ignore(share: float) -> None:
-    """Where nobody waits."""
 
 
 class _Excess(NamedTuple):
@@ -54,7 +51,7 @@ class _Job(NamedTuple):
     problem: Problem
 
 
-def measure_tsp(folder: Path, processes: int, progress: Progress = _ignore) -> Metrics:
+def measure_tsp(folder: Path, processes: int) -> Metrics:
     """The mean excess over the problems of MIN_CITIES to MAX_CITIES cities in a folder, and each.
 
     A problem's own is the mean over tours that begin at each of its cities. The optimum is that of
@@ -63,7 +60,9 @@ def measure_tsp(folder: Path, processes: int, progress: Progress = _ignore) -> M
     """
     read = tsplib.folder(folder)
     jobs = _jobs(folder, read.problems)
-    found = parallel_map(_excess, jobs, processes, progress)
+    with bar("planning tours") as progress:
+        found = parallel_map(_excess, jobs, processes, progress)
+
     metrics: Metrics = {}
     for planned in ("hierarchical", "unstraightened", "flat"):
         excess = [getattr(one, planned) for one in found]
@@ -80,11 +79,13 @@ def measure_tsp(folder: Path, processes: int, progress: Progress = _ignore) -> M
     return metrics
 
 
-def measure_human(folder: Path, processes: int, progress: Progress = _ignore) -> Metrics:
+def measure_human(folder: Path, processes: int) -> Metrics:
     """How far the model's participants agree with the people of a folder of tours."""
     problems = read_folder(folder)
     jobs = human_jobs(problems, PARTICIPANTS, SEED)
-    planned = measure(jobs, processes, progress)
+    with bar("planning people's problems") as progress:
+        planned = measure(jobs, processes, progress)
+
     return human_metrics(planned)
 
 

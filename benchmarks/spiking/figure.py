@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -30,7 +31,7 @@ LineStyle = str | tuple[int, tuple[int, int]]
 MOSAIC: Any = [["grid", "border", "place"], ["raster", "raster", "agreement"]]
 
 
-def figure(scenes: list[Scene], seeds: list[int]) -> Figure:
+def figure(scenes: list[Scene], seeds: Sequence[int]) -> Figure:
     """The sheet: the first scene with two walls in detail, and all of `scenes` (their `seeds`)
     against Bayes' rule.
     """

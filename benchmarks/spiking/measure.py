@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
+import click
 import numpy as np
 
+from benchmarks.benchmark import PROCESSES, Setting
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_most, within
+from cogmap.cli.experiment.outcome import save_figure
+from cogmap.cli.log.progress import bar
 from cogmap.experiments.spiking.cells import Values
 from cogmap.experiments.spiking.network import Border, Cues, Posterior, Recording, exact, record
-from cogmap.parallel import Progress, parallel_map
+from cogmap.parallel import parallel_map
 from cogmap.services.codelets.localization.sampling import rejection_mask
 
 SIDE_M = 5.0
@@ -28,6 +33,24 @@ THRESHOLDS = {
     "posterior_sd_ratio": within(0.9, 1.1),
     "posterior_mean_error": at_most(0.1),
 }
+
+
+OPTIONS = (
+    click.Option(
+        ["--seed"],
+        type=click.IntRange(0, 2**16),
+        default=SEED,
+        show_default=True,
+        help="Which scenes.",
+    ),
+    PROCESSES,
+    click.Option(
+        ["--figure", "folder"],
+        type=click.Path(file_okay=False, exists=True, path_type=Path),
+        metavar="FOLDER",
+        help="Draw figure 4 there too, spiking.png and spiking.pdf.",
+    ),
+)
 
 
 @dataclass(frozen=True)
@@ -107,15 +130,25 @@ def _rejection(given: Cues, seed: int) -> Posterior:
     return Posterior(kept.mean(axis=0), np.cov(kept, rowvar=False))
 
 
-def seeds(seed: int) -> list[int]:
-    """Those of the SCENES scenes."""
-    first = seed * SCENES
-    return list(range(first, first + SCENES))
+def measure(setting: Setting, *, seed: int = SEED, folder: Path | None = None) -> Metrics:
+    """Measure the posterior that spikes of place cells give, and that by rejection sampling,
+    against the exact one.
 
+    Scenes with cues drawn at random: a position by path integration, and the distance to one or two
+    walls. A ratio is of standard deviations along x and y, an error is of the mean in exact
+    standard deviations.
+    """
+    seeds = range(seed * SCENES, (seed + 1) * SCENES)
+    with bar("recording") as progress:
+        scenes = parallel_map(scene, seeds, setting.processes, progress)
 
-def measure(seed: int, processes: int, progress: Progress = lambda share: None) -> list[Scene]:
-    """SCENES scenes, the same for the same seed."""
-    return parallel_map(scene, seeds(seed), processes, progress)
+    if folder is not None:
+        from benchmarks.spiking.figure import figure  # matplotlib takes long to import
+
+        for path in save_figure(folder, "spiking", figure(scenes, seeds)):
+            setting.announce(str(path))
+
+    return metrics(scenes)
 
 
 def metrics(scenes: list[Scene]) -> Metrics:

@@ -16,6 +16,7 @@ from cogmap.errors import UsageError
 
 OLDEST_PYTHON = (3, 11)
 PACKAGE = "cogmap"
+EXTRAS = ("", "rendering")  # what a drive in a simulated town needs
 
 
 def examine(runs: Path) -> list[Finding]:
@@ -23,7 +24,7 @@ def examine(runs: Path) -> list[Finding]:
     return [
         *python_version(sys.version_info[:2]),
         *simulator(sys.version_info[:2], sys.platform, platform.machine()),
-        *dependencies(pins(_requirements())),
+        *dependencies(required(_requirements())),
         *renderer(),
         *write_access(runs),
     ]
@@ -57,42 +58,35 @@ def _requirements() -> list[str]:
         return []
 
 
-def pins(requirements: Iterable[str]) -> dict[str, str]:
-    """The version that each package required here is pinned to; those of an extra, or for another
-    Python or platform, are not required here.
+def required(lines: Iterable[str]) -> list[Requirement]:
+    """The requirements that hold here, those of rendering included; not those of another extra, or
+    for another Python or platform.
     """
-    versions = {}
-    for line in requirements:
+    requirements = []
+    for line in lines:
         requirement = Requirement(line)
         marker = requirement.marker
-        if marker is None or marker.evaluate({"extra": ""}):
-            versions[requirement.name] = str(requirement.specifier).removeprefix("==")
-    return versions
+        if marker is None or any(marker.evaluate({"extra": extra}) for extra in EXTRAS):
+            requirements.append(requirement)
+    return requirements
 
 
-def dependencies(pinned: dict[str, str]) -> Iterator[Finding]:
-    """Whether each dependency is installed in the version that it is pinned to."""
-    if not pinned:
+def dependencies(requirements: Iterable[Requirement]) -> Iterator[Finding]:
+    """Report each dependency that is not installed, or in a version out of its range."""
+    requirements = list(requirements)
+    if not requirements:
         yield Finding(PACKAGE, "it is not installed as a package", "run `make setup`")
-    for name, version in pinned.items():
-        yield from _dependency(name, version)
 
-
-def _dependency(name: str, version: str) -> Iterator[Finding]:
-    try:
-        installed = metadata.version(name)
-    except metadata.PackageNotFoundError:
-        yield Finding(
-            name, "it is not installed", f"install {name}=={version}, as `make setup` does"
-        )
-        return
-
-    if installed != version:
-        yield Finding(
-            name,
-            f"{installed} is installed, {version} is required",
-            f"install {name}=={version}, as `make setup` does",
-        )
+    for requirement in requirements:
+        name, versions = requirement.name, requirement.specifier
+        remedy = f"install '{name}{versions}', as `make setup` does"
+        try:
+            installed = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            yield Finding(name, "it is not installed", remedy)
+            continue
+        if installed not in versions:
+            yield Finding(name, f"{installed} is installed, {versions} is required", remedy)
 
 
 def renderer() -> Iterator[Finding]:

@@ -21,11 +21,12 @@ from cogmap.experiments.cue_integration.run import Session, respond
 from cogmap.experiments.cue_integration.trial import Condition, Noise, Response, Trial
 from cogmap.experiments.rendered import named
 from cogmap.parallel import Progress
+from cogmap.robot import calibration
 from cogmap.schemas import sensing
 from cogmap.schemas.sensing import Odometry, Percept, Percepts, StereoFrame, View
 from cogmap.services import registry
 from cogmap.services.sim.layout import roadside
-from cogmap.services.sim.rendering.camera import StereoCamera, calibration
+from cogmap.services.sim.rendering.camera import StereoCamera
 from cogmap.services.sim.scripted.trajectory import Trajectory
 from cogmap.services.sim.world import World
 

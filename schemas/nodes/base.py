@@ -11,7 +11,6 @@ from cogmap.schemas.base import Count, Name, Part, Scalar, Unit
 
 NEVER_NS = -1
 
-Metres = Annotated[float, msgspec.Meta(ge=0, le=1e6)]
 Positive = Annotated[float, msgspec.Meta(gt=0, le=1e9)]
 Salience = Annotated[float, msgspec.Meta(ge=-1, le=1)]
 Spread = Annotated[float, msgspec.Meta(ge=0, le=1e9)]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from cogmap.schemas.array import Matrix
-from cogmap.schemas.base import Count, Finite, Name
-from cogmap.schemas.nodes.base import GraphNode, Metres, Spread, Stamp
+from cogmap.schemas.base import Count, Finite, Metres, Name
+from cogmap.schemas.nodes.base import GraphNode, Spread, Stamp
 from cogmap.schemas.nodes.columns import (
     CorrectionColumn,
     JoinColumn,

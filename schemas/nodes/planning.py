@@ -5,8 +5,8 @@ from __future__ import annotations
 import enum
 
 from cogmap.schemas.array import Matrix
-from cogmap.schemas.base import Count, Finite, Name
-from cogmap.schemas.nodes.base import NEVER_NS, GraphNode, Metres, Stamp
+from cogmap.schemas.base import Count, Finite, Metres, Name
+from cogmap.schemas.nodes.base import NEVER_NS, GraphNode, Stamp
 from cogmap.schemas.nodes.columns import RouteColumn, check_matrix
 from cogmap.schemas.nodes.ids import ROOT_MAP
 

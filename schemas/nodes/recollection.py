@@ -8,8 +8,8 @@ from typing import Annotated
 import msgspec
 
 from cogmap.schemas.array import Matrix
-from cogmap.schemas.base import Finite, Name, Part
-from cogmap.schemas.nodes.base import GraphNode, Metres
+from cogmap.schemas.base import Finite, Metres, Name, Part
+from cogmap.schemas.nodes.base import GraphNode
 from cogmap.schemas.nodes.columns import TILE_CELLS, PlaceColumn, RecalledColumn, check_matrix
 
 TileNumber = Annotated[int, msgspec.Meta(ge=-(2**31), le=2**31)]

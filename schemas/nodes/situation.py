@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.schemas.array import Matrix
-from cogmap.schemas.base import Count, Finite, Name, Unit
+from cogmap.schemas.base import Count, Finite, Metres, Name, Unit
 from cogmap.schemas.nodes.attention import SATISFIED_BY
-from cogmap.schemas.nodes.base import NEVER_NS, GraphNode, Metres, Positive, Spread, Stamp
+from cogmap.schemas.nodes.base import NEVER_NS, GraphNode, Positive, Spread, Stamp
 from cogmap.schemas.nodes.columns import POSE_COLUMNS, SelfColumn, check_matrix
 from cogmap.schemas.nodes.ids import ROOT_MAP
 

@@ -7,10 +7,11 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from cogmap.schemas.base import PositiveMetres
+
 SECTION = "codelets"
 
 Gain = Annotated[float, Meta(ge=0, le=1)]
-Metres = Annotated[float, Meta(gt=0, le=10_000)]
 Seconds = Annotated[float, Meta(gt=0, le=1e9)]
 Positive = Annotated[float, Meta(gt=0, le=100)]
 Share = Annotated[float, Meta(ge=0, le=1)]
@@ -56,14 +57,14 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         ),
     ] = 60.0
     largest_landmark_sd_m: Annotated[
-        Metres,
+        PositiveMetres,
         Meta(
             description="landmarks whose position is less certain do not inform localization, "
             "standard deviation in m, above 0, at most 10000"
         ),
     ] = 4.0
     landmark_jitter_m: Annotated[
-        Metres,
+        PositiveMetres,
         Meta(
             description="least noise added to a landmark's samples at each view, standard "
             "deviation in m, above 0, at most 10000"
@@ -123,14 +124,14 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         ),
     ] = 8
     farthest_m: Annotated[
-        Metres,
+        PositiveMetres,
         Meta(
             description="distance up to which a landmark seen by its bearing alone may stand, in "
             "m, above 0, at most 10000"
         ),
     ] = 50.0
     path_spacing_m: Annotated[
-        Metres,
+        PositiveMetres,
         Meta(description="distance between places of the path, in m, above 0, at most 10000"),
     ] = 1.0
     boundary_reach_m: Annotated[
@@ -217,7 +218,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         ),
     ] = 5.0
     place_match_sd_m: Annotated[
-        Metres,
+        PositiveMetres,
         Meta(
             description="standard deviation of the position at which a place is recognised, in m, "
             "above 0, at most 10000"

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 import msgspec
 
+from cogmap import robot
 from cogmap.schemas.base import (
     PositiveAcceleration,
     PositiveMetres,
@@ -14,27 +15,10 @@ from cogmap.schemas.base import (
     PositiveSpeed,
 )
 
-NEAREST_SCAN_M = 2.6
-"""The range scan has no range below 2.5 m: what it has there may be nearer."""
-
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """Sensory-motor memory: motor programs, and the reactive layers under them."""
 
-    mode: Annotated[
-        Literal["lockstep", "real_time"],
-        msgspec.Meta(
-            description="lockstep: a command waits for all that it depends on. "
-            "real_time: it does not."
-        ),
-    ] = "real_time"
-    makes_offers: Annotated[
-        bool,
-        msgspec.Meta(
-            description="In lockstep, whether it makes an offer in each cycle, perhaps of nothing, "
-            "which the next cycle waits for where workspace.offering names it."
-        ),
-    ] = False
     cruise_m_s: Annotated[
         PositiveSpeed, msgspec.Meta(description="Speed on a free straight, in m/s, above 0 to 100.")
     ] = 4.0
@@ -60,18 +44,18 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         msgspec.Meta(
             description="Distance to an obstacle at which the robot stops, in m, above 0 to 10000."
         ),
-    ] = NEAREST_SCAN_M
+    ] = robot.CLEARANCE_M
     half_width_m: Annotated[
         PositiveMetres,
         msgspec.Meta(description="Half the width that must be free ahead, in m, above 0 to 10000."),
-    ] = 0.7
+    ] = robot.HALF_WIDTH_M
     wheel_radius_m: Annotated[
         PositiveMetres, msgspec.Meta(description="Radius of driven wheels, in m, above 0 to 10000.")
-    ] = 0.2
+    ] = robot.WHEEL_RADIUS_M
     track_m: Annotated[
         PositiveMetres,
         msgspec.Meta(description="Distance between the driven wheels, in m, above 0 to 10000."),
-    ] = 0.8
+    ] = robot.TRACK_M
     blind_m: Annotated[
         PositiveMetres,
         msgspec.Meta(

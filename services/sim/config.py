@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 import msgspec
 
 from cogmap.errors import ConfigError
+from cogmap.runtime.run import Run
 from cogmap.schemas.base import PositiveSeconds
 from cogmap.services.sim.battery import Battery
 from cogmap.services.sim.layout import towns
@@ -23,7 +24,6 @@ STEP_S = 1 / 240
 
 Rate = Annotated[int, msgspec.Meta(ge=1, le=240)]
 Side = Annotated[int, msgspec.Meta(ge=64, le=1024)]
-Instances = Annotated[int, msgspec.Meta(ge=1, le=1000)]
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -33,13 +33,6 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         int,
         msgspec.Meta(ge=0, le=2**32, description="Seed of the town and of all noise, 0 to 2^32."),
     ] = 1
-    mode: Annotated[
-        Literal["lockstep", "real_time"],
-        msgspec.Meta(
-            description="lockstep: time advances by a frame for each motor command. "
-            "real_time: it follows the wall's."
-        ),
-    ] = "real_time"
     frame_hz: Annotated[
         Rate,
         msgspec.Meta(description="Stereo frames a second, in Hz, 1 to 240; divides odometry_hz."),
@@ -62,15 +55,8 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         PerceptErrors,
         msgspec.Meta(description="Errors of percepts without cameras."),
     ] = PerceptErrors()
-    energy: Annotated[
-        bool,
-        msgspec.Meta(
-            description="Whether the robot has a battery that runs down, and the town charging "
-            "places."
-        ),
-    ] = False
     battery: Annotated[
-        Battery, msgspec.Meta(description="The battery and its charging, where energy is on.")
+        Battery, msgspec.Meta(description="The battery and its charging, if run.energy is set.")
     ] = Battery()
     town: Annotated[
         str,
@@ -148,34 +134,22 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             "in lockstep, in s of wall time, above 0 to 3600."
         ),
     ] = 10.0
-    awaits: Annotated[
-        dict[str, Instances],
-        msgspec.Meta(description="Modules, and instances of each, required before time begins."),
-    ] = {}
-
-    @property
-    def supplied_by(self) -> Battery | None:
-        """The robot's battery, where it has one."""
-        return self.battery if self.energy else None
-
-    @property
-    def charging_places(self) -> int:
-        """How many charging places the town has."""
-        return self.battery.places if self.energy else 0
 
 
-def place_of(config: Config) -> Place:
-    """The town that is configured. Raises UsageError where there is none."""
+def place_of(config: Config, battery: Battery | None = None) -> Place:
+    """The town that is configured, with charging places for `battery`. Raises UsageError where
+    there is none.
+    """
     return towns.place(
         config.town,
         config.seed,
         config.town_size_m,
         start=config.start,
-        charging_places=config.charging_places,
+        charging_places=0 if battery is None else battery.places,
     )
 
 
-def check(config: Config) -> None:
+def check(config: Config, run: Run) -> None:
     """Raise ConfigError where the rates do not divide one another, or a trajectory, or the removal
     of buildings, is not possible as it is set up.
     """
@@ -193,9 +167,9 @@ def check(config: Config) -> None:
 
     towns.check(config.town)
 
-    if config.sensing == "percepts" and config.mode != "lockstep":
+    if config.sensing == "percepts" and not run.lockstep:
         raise ConfigError(
-            '[sim] a town is sensed by percepts in lockstep only: set mode to "lockstep"'
+            "[sim] a town is sensed by percepts in lockstep only: set run.lockstep to true"
         )
 
     if config.removals and config.sensing != "percepts":
@@ -204,18 +178,18 @@ def check(config: Config) -> None:
         )
 
     if config.trajectory is not None:
-        _check_trajectory(config.trajectory, config.mode, config.energy)
+        _check_trajectory(config.trajectory, run)
 
 
-def _check_trajectory(trajectory: Trajectory, mode: str, energy: bool) -> None:
-    if energy:
+def _check_trajectory(trajectory: Trajectory, run: Run) -> None:
+    if run.energy:
         raise ConfigError(
-            "[sim] a robot that follows a trajectory needs no energy: set energy to false"
+            "[sim] a robot that follows a trajectory needs no energy: set run.energy to false"
         )
 
-    if mode != "lockstep":
+    if not run.lockstep:
         raise ConfigError(
-            '[sim] a robot follows a trajectory in lockstep only: set mode to "lockstep"'
+            "[sim] a robot follows a trajectory in lockstep only: set run.lockstep to true"
         )
 
     if trajectory.sensing != "cameras":

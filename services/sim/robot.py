@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 
+from cogmap.robot import MAX_WHEEL_RAD_S, TRACK_M, WHEEL_RADIUS_M
 from cogmap.schemas.sensing import Pose
 from cogmap.services.sim.stdio import pybullet
 
-TRACK_M = 0.8
-WHEEL_RADIUS_M = 0.2
-MAX_WHEEL_RAD_S = 30.0
 _MASS_KG = 30.0
 _WHEEL_KG = 2.0
 _CASTER_KG = 0.5

@@ -7,37 +7,38 @@ from collections.abc import Iterable
 
 import msgspec
 
+from cogmap.robot import calibration
 from cogmap.schemas.base import Message
 from cogmap.schemas.process import Clock
 from cogmap.schemas.sensing import MotorCommand, Odometry, StereoFrame, TruePose, TrueTown
-from cogmap.services.sim.battery import PowerSupply
+from cogmap.services.sim.battery import Battery, PowerSupply
 from cogmap.services.sim.config import Config, place_of
 from cogmap.services.sim.layout.closures import ClosedStreets
 from cogmap.services.sim.layout.town import Town
 from cogmap.services.sim.odometry import WheelOdometry
 from cogmap.services.sim.progress import Progress
-from cogmap.services.sim.rendering.camera import StereoCamera, calibration
+from cogmap.services.sim.rendering.camera import StereoCamera
 from cogmap.services.sim.world import World
 
 
 class Simulation:
     """A town with a robot. Simulated time starts at 0 and advances by `tick_ns` with every tick."""
 
-    def __init__(self, config: Config) -> None:
+    def __init__(self, config: Config, battery: Battery | None = None) -> None:
         self.config = config
         self.tick_ns = 1_000_000_000 // config.odometry_hz
         self.ticks_per_frame = config.odometry_hz // config.frame_hz
         self.now_ns = 0
         self.progress = 0.0
 
-        place = place_of(config)
+        place = place_of(config, battery)
         self.closed_streets = ClosedStreets(place.roads, config.closures)
         self.world = World(place, config.egl, whole=isinstance(place, Town))
         mount = calibration(config.width_px, config.height_px)
         self.camera = StereoCamera(self.world, mount)
 
         self._odometry = WheelOdometry(config.noise, config.seed)
-        self._power = PowerSupply(config.supplied_by, place.charging_places_m)
+        self._power = PowerSupply(battery, place.charging_places_m)
         self._progress = Progress(config.duration_s, config.ends_at_goal)
         self._pose = self.world.pose()
         self._travelled_m = 0.0

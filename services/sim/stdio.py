@@ -33,8 +33,8 @@ try:
         import pybullet
 except ModuleNotFoundError:
     raise UsageError(
-        "the simulator needs pybullet, which has wheels for Python 3.11 on Linux x86-64 only: "
-        "run it there or in the container; everything else runs here"
+        "rendering needs pybullet, which has wheels for Python 3.11 on Linux x86-64 only: "
+        "`pip install 'cogmap[rendering]'` there, or use the container; everything else runs here"
     ) from None
 
 __all__ = ["pybullet", "quiet"]

@@ -21,19 +21,15 @@ from tests.support.includes import ROOT
 
 TIMEOUT_S = 90.0
 SECTIONS: dict[str, dict[str, Any]] = {
+    "run": {"lockstep": True, "participants": {"sim": 1}},
     "sim": {
-        "mode": "lockstep",
         "frame_hz": 2,
         "odometry_hz": 2,
         "trajectory": {
             "line_m": [[0.0, 0.0], [20.0, 0.0]],
             "landmarks": [{"name": "bakery", "x_m": 20.0, "y_m": 8.0}],
         },
-        "awaits": {},
     },
-    "workspace": {"mode": "lockstep"},
-    "procedural": {"mode": "lockstep"},
-    "motor": {"mode": "lockstep"},
 }
 CONFIG = """\
 [sim]

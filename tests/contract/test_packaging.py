@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
+import tomllib
 import zipfile
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
 
 from tests.support.includes import ROOT
 from tests.support.reference import REFERENCE
 
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 SUBPACKAGES = ("schemas", "services", "training", "experiments", "cli")
 
 
@@ -51,3 +55,55 @@ def test_a_module_of_the_users_with_a_name_of_a_part_breaks_nothing(
 
     assert run.returncode == 0, run.stderr
     assert run.stdout == "motor\n"
+
+
+def _pins(*names: str) -> dict[str, Requirement]:
+    """The requirements in these files of requirements/, by package."""
+    pinned = {}
+    for name in names:
+        for line in (ROOT / "requirements" / f"{name}.txt").read_text().splitlines():
+            if line and not line.startswith(("-r", "#")):
+                requirement = Requirement(line)
+                pinned[requirement.name] = requirement
+    return pinned
+
+
+def _ranges(*extras: str) -> dict[str, Requirement]:
+    """What the library requires, or these extras of it, by package."""
+    lines = [] if extras else PROJECT["dependencies"]
+    for extra in extras:
+        lines = lines + PROJECT["optional-dependencies"][extra]
+    return {requirement.name: requirement for requirement in map(Requirement, lines)}
+
+
+def test_the_library_requires_ranges_and_the_application_one_version_within_each() -> None:
+    ranges = _ranges() | _ranges("rendering", "train")
+    pins = _pins("run", "train")
+
+    assert pins.keys() == ranges.keys()
+    for name, pin in pins.items():
+        (version,) = pin.specifier
+        assert version.operator == "=="
+        assert version.version in ranges[name].specifier, name
+        assert not any(each.operator == "==" for each in ranges[name].specifier), name
+        assert pin.marker == ranges[name].marker, name
+
+
+def test_what_renders_or_trains_is_optional_for_the_library() -> None:
+    assert _ranges("rendering").keys() == {"pybullet"}
+    assert _ranges("train").keys() == _pins("train").keys()
+
+
+def test_the_build_of_the_package_uses_the_pinned_setuptools() -> None:
+    build = tomllib.loads((ROOT / "pyproject.toml").read_text())["build-system"]
+
+    assert build["requires"] == [str(_pins("build")["setuptools"])]
+
+
+def test_the_notices_name_every_dependency_with_its_licence() -> None:
+    notices = (ROOT / "docs" / "third-party.md").read_text()
+    rows = re.findall(r"^\| ([\w-]+) \| ([^|]+) \| [^|]+ \|$", notices, re.MULTILINE)
+
+    named = {name: licence for name, licence in rows if name != "package"}
+    assert named.keys() == _pins("run", "train", "bench", "build", "dev").keys()
+    assert all(licence.strip() for licence in named.values())

@@ -18,10 +18,11 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.geometry.arrays import Bytes
+from cogmap.robot import calibration
 from cogmap.schemas.sensing import Pose
 from cogmap.services.sim.layout import plan, town
 from cogmap.services.sim.layout.catalogue import CATALOGUE, BuildingType, invented
-from cogmap.services.sim.rendering.camera import Exposure, StereoCamera, calibration
+from cogmap.services.sim.rendering.camera import Exposure, StereoCamera
 from cogmap.services.sim.rendering.light import some_light
 from cogmap.services.sim.world import World
 from cogmap.training.rendering.reader import SURFACES

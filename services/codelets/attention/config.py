@@ -7,6 +7,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
+from cogmap import robot
 from cogmap.schemas.base import PositiveMetres, PositiveRadians, PositiveShare, Share
 
 SECTION = "attention"
@@ -150,11 +151,7 @@ class Danger(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             description="Distance within which something ahead is a danger, in m, above 0 to "
             "10000: little more than motor.clearance_m, at which the robot is stopped."
         ),
-    ] = 3.0
-    half_width_m: Annotated[
-        PositiveMetres,
-        Meta(description="Half the width of the lane ahead, in m, above 0 to 10000."),
-    ] = 0.7
+    ] = robot.CLEARANCE_M + 0.4
     same_cycles: Annotated[
         Count,
         Meta(

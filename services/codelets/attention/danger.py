@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 
 from cogmap.graph.graph import Graph
+from cogmap.robot import HALF_WIDTH_M
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.feelings import Feeling
@@ -94,7 +95,7 @@ def is_blocked(task: Task, settings: Danger) -> bool:
 
     bearing_rad, range_m = np.asarray(task.scan.numpy(), np.float64).T
     ahead_m = range_m * np.cos(bearing_rad)
-    is_in_lane = np.abs(range_m * np.sin(bearing_rad)) < settings.half_width_m
+    is_in_lane = np.abs(range_m * np.sin(bearing_rad)) < HALF_WIDTH_M
     is_near = (range_m > 0) & (ahead_m > 0) & (ahead_m <= settings.nearest_m)
     return int((is_in_lane & is_near).sum()) > 1
 

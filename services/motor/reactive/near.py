@@ -12,8 +12,8 @@ import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.geometry.se2 import compose, transform_to
+from cogmap.robot import NEAREST_SCAN_M
 from cogmap.schemas.sensing import RangeScan, SelfMotion
-from cogmap.services.motor.config import NEAREST_SCAN_M
 
 REMEMBERED_M = 6.0
 REMEMBERED_S = 20.0

@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 
 from cogmap.geometry.arrays import Floats
+from cogmap.robot import NEAREST_DEPTH_M
 from cogmap.schemas.nodes import ENERGY, SATISFIED_BY
 from cogmap.schemas.sensing import Percept, Pose
 from cogmap.services.sim.driven.camera import NEAR_M, ColumnCamera
@@ -16,7 +17,6 @@ from cogmap.services.sim.layout.furniture import Prop
 from cogmap.services.sim.scripted.percepts import Landmark, PerceptErrors, PerceptSim
 
 FUNCTION = SATISFIED_BY[ENERGY]
-NEAREST_M = 2.2
 FARTHEST_M = 30.0
 # So much of a post must be seen past the walls, and so much of a whole one.
 MIN_SHARE = 0.5
@@ -44,7 +44,7 @@ class ChargingSight:
 
         nearer = msgspec.structs.replace(
             errors,
-            nearest_m=min(NEAREST_M, errors.nearest_m),
+            nearest_m=min(NEAREST_DEPTH_M, errors.nearest_m),
             farthest_m=min(FARTHEST_M, errors.farthest_m),
         )
         landmarks = [_landmark(place) for place in places]

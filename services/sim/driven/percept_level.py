@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 
 from cogmap.geometry.arrays import Floats
+from cogmap.robot import calibration
 from cogmap.schemas.array import Array
 from cogmap.schemas.base import Message
 from cogmap.schemas.process import Clock
@@ -24,7 +25,7 @@ from cogmap.schemas.sensing import (
     TruePose,
     TrueTown,
 )
-from cogmap.services.sim.battery import PowerSupply
+from cogmap.services.sim.battery import Battery, PowerSupply
 from cogmap.services.sim.config import Config, place_of
 from cogmap.services.sim.driven.robot import KinematicRobot
 from cogmap.services.sim.driven.sensors import Sensors
@@ -33,7 +34,6 @@ from cogmap.services.sim.layout.closures import ClosedStreets
 from cogmap.services.sim.layout.removals import RemovedBuildings
 from cogmap.services.sim.odometry import Noise, WheelOdometry
 from cogmap.services.sim.progress import Progress
-from cogmap.services.sim.rendering.camera import calibration
 from cogmap.services.sim.scripted.places import PlaceSim
 
 Row = tuple[float, float, float, float, float]
@@ -45,13 +45,13 @@ class DrivenPerceptLevelSim:
     Simulated time starts at 0 and advances by `tick_ns` with every step.
     """
 
-    def __init__(self, config: Config) -> None:
+    def __init__(self, config: Config, battery: Battery | None = None) -> None:
         self.tick_ns = 1_000_000_000 // config.odometry_hz
         self.ticks_per_frame = config.odometry_hz // config.frame_hz
         self.now_ns = 0
         self.progress = 0.0
 
-        self._place = place_of(config)
+        self._place = place_of(config, battery)
         self.closed_streets = ClosedStreets(self._place.roads, config.closures)
         self._removed = RemovedBuildings(len(self._place.plots), config.removals)
         self._surroundings = Surroundings(self._place)
@@ -62,7 +62,7 @@ class DrivenPerceptLevelSim:
         self._places = PlaceSim(config.percepts, config.seed)
         self._odometry = WheelOdometry(config.noise, config.seed)
         self._noise = config.noise
-        self._power = PowerSupply(config.supplied_by, self._place.charging_places_m)
+        self._power = PowerSupply(battery, self._place.charging_places_m)
 
         self._progress = Progress(config.duration_s, config.ends_at_goal)
         self._motions: list[Row] = []

@@ -6,17 +6,13 @@ from __future__ import annotations
 
 import math
 
+from cogmap.robot import BODY_RADIUS_M, MAX_WHEEL_RAD_S, TRACK_M, WHEEL_RADIUS_M
 from cogmap.schemas.sensing import MotorCommand, Pose, TruePose
 from cogmap.services.sim.driven.surroundings import Surroundings
 from cogmap.services.sim.layout.boundaries import clearance_m
 
-TRACK_M = 0.8
-WHEEL_RADIUS_M = 0.2
-MAX_WHEEL_RAD_S = 30.0
 # What the motors of the robot with physics give its mass: 20 Nm a wheel, 35.5 kg.
 MAX_WHEEL_RAD_S2 = 28.0
-# Half the width of the robot with physics, over its wheels.
-BODY_RADIUS_M = 0.6
 # A collision is over where what was touched is so far from the middle of the body.
 RELEASED_M = BODY_RADIUS_M + 0.3
 

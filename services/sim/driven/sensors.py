@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cogmap.geometry.arrays import Floats, Singles
+from cogmap.robot import CAMERA_RANGE_M, NEAREST_DEPTH_M
 from cogmap.schemas.sensing import Calibration, Percept, Pose
 from cogmap.services.sim.driven.camera import NEAR_M, NOTHING, Buffer, ColumnCamera, depths_m
 from cogmap.services.sim.driven.charging_sight import ChargingSight
@@ -20,9 +21,6 @@ from cogmap.services.sim.layout.plan import Plot
 from cogmap.services.sim.scripted.percepts import Landmark, PerceptErrors, PerceptSim
 
 SECTORS = 32
-# Stereo matching takes what is nearer for as near as this; what is farther is not simulated.
-NEAREST_M = 2.2
-FARTHEST_M = 60.0
 # A building is seen where so many columns show it, and whole where so large a part of it is seen.
 MIN_COLUMNS = 8
 WHOLE_SHARE = 0.9
@@ -138,8 +136,9 @@ def scan(camera: ColumnCamera, depth_m: Floats) -> tuple[Floats, Floats]:
     nearest in it, 0 where there is nothing; both from the robot's origin. `depth_m` (width,) is
     that of each image column.
     """
-    is_measured = depth_m <= FARTHEST_M
-    seen_m = np.maximum(depth_m[is_measured], NEAREST_M)
+    is_measured = depth_m <= CAMERA_RANGE_M
+    # Stereo matching takes what is nearer for as near as this.
+    seen_m = np.maximum(depth_m[is_measured], NEAREST_DEPTH_M)
     forward_m = seen_m + camera.mount.mount_forward_m
     left_m = camera.left_slope[is_measured] * seen_m
     range_m = np.hypot(forward_m, left_m)

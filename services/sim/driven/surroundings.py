@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
+from cogmap.robot import CAMERA_RANGE_M
 from cogmap.services.sim.layout.barriers import barriers
 from cogmap.services.sim.layout.boundaries import Surfaces, outlines, surfaces
 from cogmap.services.sim.layout.place import Place
 
-REACH_M = 60.0
 GROUND_REACH_M = 16.0
 BODY_REACH_M = 2.0
 # How far the robot moves before what is near it is chosen again.
@@ -70,7 +70,7 @@ class Surroundings:
         self._middle_m = None
 
     def near(self, x_m: float, y_m: float) -> Near:
-        """What is within REACH_M of a place, and of the ground within GROUND_REACH_M."""
+        """What is within the camera's range of a place, and of the ground within GROUND_REACH_M."""
         middle_m = self._middle_m
         if middle_m is None or np.hypot(middle_m[0] - x_m, middle_m[1] - y_m) > MOVED_M:
             self._middle_m = (x_m, y_m)
@@ -79,7 +79,7 @@ class Surroundings:
         return self._near
 
     def _search(self, x_m: float, y_m: float) -> Near:
-        reach_m = REACH_M + MOVED_M
+        reach_m = CAMERA_RANGE_M + MOVED_M
         seen_m = np.vstack([self._seen_props_m, self._closing_m])
         walls_m = self._walls_m[self._is_standing]
         is_wall = _within(walls_m, x_m, y_m, reach_m)

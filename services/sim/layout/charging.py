@@ -13,6 +13,7 @@ import numpy as np
 from cogmap.errors import ConfigError
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.geometry.se2 import transform_to
+from cogmap.graph.individuals import APART_M
 from cogmap.services.sim.layout.boundaries import clearance_m, surfaces
 from cogmap.services.sim.layout.furniture import CHARGING_PLACE, Prop
 from cogmap.services.sim.layout.place import Place
@@ -23,8 +24,8 @@ KERB_GAP_M = 0.15
 # From the end of a street, where others may cross it.
 JUNCTION_M = 8.0
 WALL_M = 1.0
-# Objects nearer to one another than the workspace tells them apart are taken for one.
-BUILDING_M = 6.5
+# Objects that stand nearer to one another than buildings are taken for one.
+BUILDING_M = APART_M + 0.5
 PROP_M = 3.5
 POST_M = 15.0
 CANDIDATES = 1000

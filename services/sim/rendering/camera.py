@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -23,30 +22,6 @@ FAR_M = 400.0
 _NOON = (-0.4, -0.7, 1.0)
 # The camera's axes (x right, y down, z forward) in the robot's (x forward, y left, z up).
 _MOUNT: Floats = np.array([[0, 0, 1], [-1, 0, 0], [0, -1, 0]], float)
-
-
-def calibration(
-    width_px: int = 320, height_px: int = 240, fov_rad: float = math.radians(75)
-) -> Calibration:
-    """A camera of this size and horizontal field of view.
-
-    The left camera sits on the robot's middle line. The right one is turned by
-    `right_rotation_rad`, which takes directions in the right camera's frame to the left one's:
-    OpenCV's R is its inverse.
-    """
-    focal_px = width_px / 2 / math.tan(fov_rad / 2)
-    return Calibration(
-        width_px=width_px,
-        height_px=height_px,
-        fx_px=focal_px,
-        fy_px=focal_px,
-        cx_px=(width_px - 1) / 2,
-        cy_px=(height_px - 1) / 2,
-        baseline_m=0.5,
-        mount_height_m=1.5,
-        mount_forward_m=0.3,
-        right_rotation_rad=(0.004, -0.003, 0.006),
-    )
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import msgspec
 
+from cogmap.robot import calibration
 from cogmap.schemas.base import Message
 from cogmap.schemas.sensing import Odometry, Pose, TrueTown
 from cogmap.services.sim.config import Config
 from cogmap.services.sim.layout import roadside
 from cogmap.services.sim.odometry import WheelOdometry
-from cogmap.services.sim.rendering.camera import StereoCamera, calibration
+from cogmap.services.sim.rendering.camera import StereoCamera
 from cogmap.services.sim.scripted.follower import TURN_AS_M, LineFollower
 from cogmap.services.sim.scripted.trajectory import Leg, Trajectory
 from cogmap.services.sim.world import World

@@ -16,10 +16,17 @@ import msgspec
 import numpy as np
 
 from cogmap.geometry.arrays import Floats
-from cogmap.schemas.base import Name, PositiveMetres, PositiveRadians, PositiveShare, Share
+from cogmap.robot import CAMERA_RANGE_M
+from cogmap.schemas.base import (
+    Coordinate,
+    Name,
+    PositiveMetres,
+    PositiveRadians,
+    PositiveShare,
+    Share,
+)
 from cogmap.schemas.sensing import Percept, Pose
 
-Metres = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
 NORMAL_MEDIAN = 0.6745
 MIN_RANGE_M = 0.1
 MIN_RANGE_SD_M = 1e-3
@@ -30,8 +37,8 @@ class Landmark(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=
     """A building that perception knows by name."""
 
     name: Annotated[Name, msgspec.Meta(description="Its name, 1 to 200 characters.")]
-    x_m: Annotated[Metres, msgspec.Meta(description="x of its centre, in m, -1e6 to 1e6.")]
-    y_m: Annotated[Metres, msgspec.Meta(description="y of its centre, in m, -1e6 to 1e6.")]
+    x_m: Annotated[Coordinate, msgspec.Meta(description="x of its centre, in m, -1e6 to 1e6.")]
+    y_m: Annotated[Coordinate, msgspec.Meta(description="y of its centre, in m, -1e6 to 1e6.")]
     width_m: Annotated[
         PositiveMetres, msgspec.Meta(description="Its apparent width, in m, above 0 to 10000.")
     ] = 10.0
@@ -116,7 +123,7 @@ class PerceptErrors(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fi
     farthest_m: Annotated[
         PositiveMetres,
         msgspec.Meta(description="Greatest range of a percept, in m, above 0 to 10000."),
-    ] = 60.0
+    ] = CAMERA_RANGE_M
     field_of_view_rad: Annotated[
         PositiveRadians,
         msgspec.Meta(description="Horizontal field of view, in rad, above 0 to 6.28."),

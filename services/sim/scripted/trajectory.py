@@ -11,9 +11,9 @@ import numpy as np
 
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.polylines import distances_along, nearest_on_line
-from cogmap.schemas.base import PositiveSpeed
+from cogmap.schemas.base import Coordinate, PositiveSpeed
 from cogmap.schemas.sensing import Pose
-from cogmap.services.sim.scripted.percepts import Landmark, Metres
+from cogmap.services.sim.scripted.percepts import Landmark
 
 Leg = tuple[float, float]
 SAME_POINT_M = 1e-6
@@ -27,7 +27,7 @@ class Trajectory(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_field
     """
 
     line_m: Annotated[
-        list[tuple[Metres, Metres]],
+        list[tuple[Coordinate, Coordinate]],
         msgspec.Meta(min_length=2, description="Points of the line, x and y in m, -1e6 to 1e6."),
     ]
     landmarks: Annotated[list[Landmark], msgspec.Meta(description="Buildings along the line.")]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 
+from cogmap.robot import NEAREST_DEPTH_M
 from cogmap.schemas.array import Array
 from cogmap.schemas.sensing import Calibration, View
 from cogmap.services.sensory.disparity import DepthFromStereo
@@ -18,7 +19,7 @@ def seen(views: Views) -> list[View]:
     """The views of a town, one every 200 ms."""
     calibration = msgspec.json.decode(views["calibration"].tobytes(), type=Calibration)
     rectified = rectification(calibration)
-    matcher = DepthFromStereo(rectified.calibration, 2.5)
+    matcher = DepthFromStereo(rectified.calibration, NEAREST_DEPTH_M)
     lefts = np.asarray(views["left"], np.uint8)
     rights = np.asarray(views["right"], np.uint8)
 

@@ -13,6 +13,7 @@ from cogmap.bus.codec import decode, encode
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, ConfiguredCodelet
 from cogmap.runtime.module import Module
+from cogmap.runtime.run import LOCKSTEP, Run
 from cogmap.schemas import topics
 from cogmap.schemas.array import Array, Matrix
 from cogmap.schemas.base import Message
@@ -161,14 +162,13 @@ class Desk:
     def __init__(
         self,
         *workers: str,
-        mode: str = "lockstep",
+        run: Run = LOCKSTEP,
         codelets: WorkerConfig | None = None,
         **settings: Any,
     ) -> None:
         self._configured = configured(codelets)
-        facts = {"awaits_scan": False, "awaits_competition": False} | settings
-        config = Config(mode=mode, **facts)  # type: ignore[arg-type]
-        self.module: Module = build(config, "workspace", self._configured)
+        config = Config(**settings)
+        self.module: Module = build(config, "workspace", self._configured, run)
         self.withheld: list[Assignment] = []
         self.withhold = ""
         self.busy: list[str] = []

@@ -12,14 +12,14 @@ import pytest
 from click.testing import CliRunner
 from msgspec.structs import replace
 
-from benchmarks import machine, suite
+from benchmarks import suite, timing
+from benchmarks.benchmark import Benchmark, Setting
 from benchmarks.bus import deltas
 from benchmarks.bus import measure as bus
 from benchmarks.commands import benchmarks
 from benchmarks.cycle import measure as cycle
 from benchmarks.cycle.ten_hertz import superseded_share
 from benchmarks.report import Metrics, Outcome, report
-from benchmarks.suite import Benchmark, Setting
 from benchmarks.threshold import Threshold, at_least, at_most, more_than, within
 from cogmap.bus.codec import encode
 from cogmap.errors import UsageError
@@ -180,7 +180,8 @@ def test_a_benchmark_that_fails_is_a_row_with_its_reason_and_others_run(
 def test_a_benchmark_ends_with_the_processes_that_it_used(tmp_path: Path) -> None:
     outcome = suite.run(
         Benchmark("spiking", {}, _parallel),
-        Setting(tmp_path, 2, None, _silent),
+        Setting(tmp_path, 2, _silent),
+        None,
     )
 
     assert outcome.metrics["total"] == 3.0
@@ -189,7 +190,8 @@ def test_a_benchmark_ends_with_the_processes_that_it_used(tmp_path: Path) -> Non
 def test_a_benchmark_of_a_set_that_is_not_there_names_its_folder(tmp_path: Path) -> None:
     outcome = suite.run(
         next(each for each in suite.SUITE if each.name == "cones"),
-        Setting(tmp_path, 1, tmp_path, _silent),
+        Setting(tmp_path, 1, _silent),
+        tmp_path,
     )
 
     assert f"there is no folder {tmp_path / 'stereo_cones'}" in outcome.failure
@@ -208,8 +210,8 @@ def test_all_benchmarks_thresholds_have_keys_of_their_own_in_one_file() -> None:
 
 
 def test_the_unit_of_a_machine_is_repeatable() -> None:
-    first = machine.machine_unit_ms()
-    second = machine.machine_unit_ms()
+    first = timing.machine_unit_ms()
+    second = timing.machine_unit_ms()
 
     assert 0 < first < 1000
     assert second == pytest.approx(first, rel=0.5)

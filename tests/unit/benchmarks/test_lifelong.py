@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from benchmarks.lifelong.courier import LEG_NS, STOPS, Courier
-from benchmarks.lifelong.measure import SPAN, Mark, Meter, measure
+from benchmarks.lifelong.measure import SPAN, Mark, Meter, drive
 from cogmap.schemas.array import Array
 from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Offer
@@ -85,7 +85,7 @@ def test_costs_are_those_of_the_last_thousand_cycles() -> None:
 
 
 def test_a_short_drive_is_measured() -> None:
-    metrics = measure(cycles=30, early_at=15)
+    metrics = drive(30, lambda share: None, early_at=15)
 
     assert metrics["travelled_m"] > 1.0
     assert metrics["log_bytes_late"] > 0.0

@@ -8,18 +8,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.map_correction import false_groups, reference
+from benchmarks.benchmark import Setting
+from benchmarks.map_correction import reference
 from benchmarks.map_correction.false_groups import MIN_APART, false_closures
-from benchmarks.map_correction.measure import measure, read_graph
+from benchmarks.map_correction.files import read_graph
+from benchmarks.map_correction.measure import measure
 from benchmarks.trajectory import trajectory_error_m
 from cogmap.errors import UsageError
-from cogmap.geometry.se2 import compose, integrate, relative
-from cogmap.services.codelets.correction.pose_graph import cost
-from cogmap.services.codelets.correction.reverse_replay import (
+from cogmap.estimation.pose_graph import cost
+from cogmap.estimation.reverse_replay import (
     close_loops,
     displacements,
     position_cost,
 )
+from cogmap.geometry.se2 import compose, integrate, relative
 from tests.support.world.laps import laps
 
 SQUARE = """VERTEX_SE2 0 0 0 0
@@ -43,12 +45,16 @@ def _square(folder: Path, without: str = "") -> Path:
     return path
 
 
+def _setting(folder: Path) -> Setting:
+    return Setting(folder, 1, print)
+
+
 def test_a_graph_is_measured_against_exact_least_squares_and_gtsam(tmp_path: Path) -> None:
     pytest.importorskip("gtsam")
     pytest.importorskip("evo")
     truth = tmp_path / "truth.txt"
     truth.write_text("0 0 0\n1 0 1.57\n1 1 3.14\n0 1 -1.57\n0 0 0\n")
-    metrics = measure(_square(tmp_path), truth)
+    metrics = measure(_setting(tmp_path), graph_path=_square(tmp_path), truth_path=truth)
 
     assert metrics["positions_cost_ratio"] <= 1.05
     assert metrics["ate_m"] < metrics["ate_uncorrected_m"]
@@ -89,7 +95,7 @@ def test_without_gtsam_the_remedy_is_named(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setitem(sys.modules, "gtsam", None)
 
     with pytest.raises(UsageError, match="run make bench-setup"):
-        measure(_square(tmp_path), None)
+        measure(_setting(tmp_path), graph_path=_square(tmp_path))
 
 
 def test_a_file_of_another_kind_or_a_path_with_a_gap_is_refused(tmp_path: Path) -> None:
@@ -128,7 +134,7 @@ def test_a_truth_of_another_length_is_refused(tmp_path: Path) -> None:
     truth.write_text("0 0 0\n")
 
     with pytest.raises(UsageError, match="has 1 poses"):
-        measure(_square(tmp_path), truth)
+        measure(_setting(tmp_path), graph_path=_square(tmp_path), truth_path=truth)
 
 
 def test_the_false_closures_of_a_group_agree_with_one_another() -> None:
@@ -146,4 +152,4 @@ def test_the_false_closures_of_a_group_agree_with_one_another() -> None:
 
 def test_a_path_too_short_for_false_closures_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="5 poses"):
-        false_groups.measure(_square(tmp_path), None, 1, lambda share: None)
+        measure(_setting(tmp_path), graph_path=_square(tmp_path), has_false_groups=True)

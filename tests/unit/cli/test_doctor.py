@@ -163,27 +163,33 @@ def test_a_python_or_platform_without_the_simulator_is_named(
 
 
 def test_a_dependency_that_is_missing_or_of_another_version_is_named() -> None:
-    found = installation.dependencies({"numpy": "0.0.1", "no-such-package-here": "1.0"})
+    needs = ["numpy>=0.0.1,<0.1", "no-such-package-here>=1.0", "msgspec>=0.1"]
+
+    found = installation.dependencies(installation.required(needs))
 
     assert [finding.about for finding in found] == ["numpy", "no-such-package-here"]
 
 
-def test_what_an_extra_needs_is_optional() -> None:
+def test_what_rendering_needs_is_required_and_another_extra_is_not() -> None:
     needs = [
-        "numpy==2.4.6",
-        'torch==2.15.0; extra == "train"',
-        'lz4==4.4.5; python_version > "3"',
-        'pybullet==3.2.7; python_version < "3"',
+        "numpy>=2.4,<3",
+        'torch>=2.15; extra == "train"',
+        'lz4>=4.4; python_version > "3"',
+        'pybullet>=3.2; extra == "rendering"',
+        'evo>=1; python_version < "3"',
     ]
 
-    assert installation.pins(needs) == {"numpy": "2.4.6", "lz4": "4.4.5"}
+    names = [requirement.name for requirement in installation.required(needs)]
+
+    assert names == ["numpy", "lz4", "pybullet"]
 
 
 def test_the_installed_package_names_what_it_needs() -> None:
-    pins = installation.pins(metadata.requires("cogmap") or [])
+    requirements = installation.required(metadata.requires("cogmap") or [])
 
-    assert {"eclipse-zenoh", "numpy", "msgspec", "pybullet"} <= set(pins)
-    assert "torch" not in pins
+    names = {requirement.name for requirement in requirements}
+    assert {"eclipse-zenoh", "numpy", "msgspec", "pybullet"} <= names
+    assert "torch" not in names
 
 
 def test_a_place_for_runs_that_cannot_be_written_to_is_named(tmp_path: Path) -> None:

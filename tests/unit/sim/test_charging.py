@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from cogmap.errors import ConfigError
+from cogmap.robot import calibration
 from cogmap.schemas.sensing import Percept, Pose, TrueTown
 from cogmap.services.sim.driven.sensors import Sensors
 from cogmap.services.sim.driven.surroundings import Surroundings
@@ -18,7 +19,6 @@ from cogmap.services.sim.layout.charging import with_charging_places
 from cogmap.services.sim.layout.furniture import CHARGING_PLACE, Prop
 from cogmap.services.sim.layout.place import Place
 from cogmap.services.sim.layout.plan import Plot, Road
-from cogmap.services.sim.rendering.camera import calibration
 from cogmap.services.sim.scripted.percepts import PerceptErrors
 
 COUNT = 3

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from cogmap.errors import ConfigError
+from cogmap.robot import calibration
 from cogmap.runtime.module import Module
+from cogmap.runtime.run import LOCKSTEP
 from cogmap.schemas.base import Message
 from cogmap.schemas.sensing import (
     MotorCommand,
@@ -25,7 +27,7 @@ from cogmap.services import registry
 from cogmap.services.sim.layout import roadside
 from cogmap.services.sim.module import Config, build
 from cogmap.services.sim.odometry import Noise
-from cogmap.services.sim.rendering.camera import StereoCamera, calibration
+from cogmap.services.sim.rendering.camera import StereoCamera
 from cogmap.services.sim.scripted.percepts import Landmark
 from cogmap.services.sim.scripted.trajectory import Trajectory
 from cogmap.services.sim.world import World
@@ -48,11 +50,8 @@ def _trajectory(line=BENT, landmarks=(BAKERY, CINEMA)) -> Trajectory:
 
 
 def _module(line: Trajectory, **settings) -> Module:
-    return build(
-        Config(
-            mode="lockstep", trajectory=line, frame_hz=1, odometry_hz=2, noise=SILENT, **settings
-        )
-    )
+    config = Config(trajectory=line, frame_hz=1, odometry_hz=2, noise=SILENT, **settings)
+    return build(config, run=LOCKSTEP)
 
 
 def _ride(module: Module) -> list[list[Message]]:

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from cogmap.errors import CogmapError
+from cogmap.robot import TRACK_M, WHEEL_RADIUS_M, calibration
 from cogmap.schemas.sensing import Calibration, Pose
 from cogmap.services.sim.layout import town
 from cogmap.services.sim.layout.plan import Plot
-from cogmap.services.sim.rendering.camera import Exposure, StereoCamera, calibration
-from cogmap.services.sim.robot import TRACK_M, WHEEL_RADIUS_M
+from cogmap.services.sim.rendering.camera import Exposure, StereoCamera
 from cogmap.services.sim.world import World
 from cogmap.training.rendering import towns
 

@@ -11,8 +11,8 @@ import numpy.typing as npt
 import pytest
 
 from benchmarks.perception import objects
-from benchmarks.perception.measure import THRESHOLDS
 from benchmarks.perception.objects import Building, Segment, Sight
+from benchmarks.perception.towns import THRESHOLDS
 from cogmap.schemas.sensing import Percept
 
 TRAINED = frozenset({"bakery", "bank"})

@@ -1,0 +1,127 @@
+"""The objects of a recalled map on the root map: those that are known here already, and new ones.
+Pure.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import msgspec
+import numpy as np
+
+from cogmap.geometry.arrays import Floats
+from cogmap.geometry.se2 import transform_from
+from cogmap.graph.graph import Graph
+from cogmap.graph.individuals import APART_M
+from cogmap.schemas.graph import Link, Operation
+from cogmap.schemas.nodes import (
+    NEVER_NS,
+    ROOT_MAP,
+    LinkKind,
+    Object,
+    RecalledColumn,
+    Recollection,
+    individual_label,
+    look_of,
+    nearest_place,
+    object_id,
+)
+
+POSITION = slice(RecalledColumn.X_M, RecalledColumn.Y_M + 1)
+
+
+def recalled_objects(recalled: Recollection, graph: Graph, pose: Floats) -> list[Operation]:
+    """The recalled objects, where they stand in the recalled map's frame, in which the root map's
+    has that `pose`. One that is known here keeps its label; others get one that is free.
+    """
+    known = [node for node in graph.of_kind(Object) if node.map == ROOT_MAP]
+    labels = _labels(recalled, known, pose)
+    node_of = {node.label: node for node in known}
+    taken = set(node_of) | {label for label in labels if label}
+
+    operations: list[Operation] = []
+    for number, label in enumerate(labels):
+        own = label or _free_label(recalled.labels[number], taken)
+        taken.add(own)
+        node = _recalled_object(recalled, number, own, node_of.get(own), graph)
+        place = nearest_place(node.x_m, node.y_m, graph.cell_m(ROOT_MAP))
+        operations += [node, Link(source=node.id, target=place, kind=LinkKind.AT)]
+
+    return operations
+
+
+def _labels(recalled: Recollection, known: list[Object], pose: Floats) -> list[str]:
+    """The label here of each recalled object: the one it is matched with, or that of the object of
+    its look that stands there too; empty where there is none.
+    """
+    positions_m = np.array([(node.x_m, node.y_m) for node in known]).reshape(-1, 2)
+    here_m = transform_from(pose, positions_m).tolist()
+    taken = {label for label in recalled.matched if label}
+
+    labels = []
+    for number, matched in enumerate(recalled.matched):
+        label = matched or _standing_there(recalled, number, known, here_m, taken)
+        taken.add(label)
+        labels.append(label)
+
+    return labels
+
+
+def _standing_there(
+    recalled: Recollection,
+    number: int,
+    known: list[Object],
+    here_m: list[list[float]],
+    taken: Iterable[str],
+) -> str:
+    """The label of the nearest object of a recalled one's look that is not `taken`."""
+    look = look_of(recalled.labels[number])
+    at_m = recalled.objects.numpy()[number, POSITION]
+    found = ""
+    nearest_m = APART_M
+    for node, there_m in zip(known, here_m, strict=True):
+        if look_of(node.label) != look or node.label in taken:
+            continue
+
+        away_m = math.dist(there_m, at_m)
+        if away_m <= nearest_m:
+            found = node.label
+            nearest_m = away_m
+
+    return found
+
+
+def _free_label(label: str, taken: set[str]) -> str:
+    """The first label of a look that is not taken."""
+    number = 1
+    while individual_label(look_of(label), number) in taken:
+        number += 1
+
+    return individual_label(look_of(label), number)
+
+
+def _recalled_object(
+    recalled: Recollection, number: int, label: str, known: Object | None, graph: Graph
+) -> Object:
+    """A recalled object, with what was learned of it in this run."""
+    row = recalled.objects.numpy()[number].tolist()
+    sightings = int(row[RecalledColumn.SIGHTINGS])
+    node = known
+    if node is None:
+        node = Object(id=object_id(label), label=label, x_m=0.0, y_m=0.0, last_seen_ns=NEVER_NS)
+
+    return msgspec.structs.replace(
+        node,
+        base_level=1.0,
+        cycle=graph.cycle,
+        function=recalled.functions[number] or node.function,
+        x_m=row[RecalledColumn.X_M],
+        y_m=row[RecalledColumn.Y_M],
+        x_sd_m=row[RecalledColumn.X_SD_M],
+        y_sd_m=row[RecalledColumn.Y_SD_M],
+        width_m=row[RecalledColumn.WIDTH_M],
+        height_m=row[RecalledColumn.HEIGHT_M],
+        sightings=node.sightings + sightings,
+        offsets_m=None,
+    )
