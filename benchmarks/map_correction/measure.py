@@ -106,6 +106,11 @@ def measure(
     return metrics | _add_closures(graph, batch_cost)
 
 
+def cost_ratio(found: float, reference: float) -> float:
+    """Return the one cost over the other; 1 if both are rounding, as in a graph without loops."""
+    return (found + SAME_COST) / (reference + SAME_COST)
+
+
 def _correct_positions(graph: PoseGraph) -> tuple[Floats, Metrics]:
     """By the paper's rule, positions only, against exact least squares."""
     took_s, found = timed(partial(close_loops, graph))
