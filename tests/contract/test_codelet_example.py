@@ -104,6 +104,21 @@ def test_without_the_package_there_is_no_such_section() -> None:
         registry.build("codelets", {"trip": {"min_speed_m_s": 1.0}})
 
 
+def test_the_tests_of_the_package_pass(site: Path) -> None:
+    command = [sys.executable, "-m", "pytest", "-q", "-c", "/dev/null", "-p", "no:cacheprovider"]
+    run = subprocess.run(
+        [*command, "--rootdir", ".", "test_trip_codelet.py"],
+        check=False,
+        cwd=site.parent / "source",
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(site), str(ROOT)])},
+        capture_output=True,
+        text=True,
+        timeout=TIMEOUT_S,
+    )
+
+    assert run.returncode == 0, run.stdout
+
+
 def test_the_codelet_runs_in_processes(site: Path, tmp_path: Path) -> None:
     folder = tmp_path / "run"
     config = tmp_path / "trajectory.toml"

@@ -1,6 +1,4 @@
-"""What could be seen of a town from a true pose, by its ground plan: with all buildings that once
-stood there, and with barriers.
-"""
+"""The buildings and barriers of a town that a camera would see, by the town's ground plan."""
 
 from __future__ import annotations
 
@@ -18,8 +16,8 @@ from cogmap.services.sim.layout.boundaries import outlines
 from cogmap.services.sim.layout.place import Place
 
 
-class Eyes:
-    """A camera in the town as it was built."""
+class Visibility:
+    """A camera's view of a town with all the buildings that it began with."""
 
     def __init__(self, place: Place) -> None:
         self._plots = place.plots
@@ -29,7 +27,7 @@ class Eyes:
         for name, barrier in barriers(place.roads).items():
             self._barriers_m[name] = outlines([barrier.solid])
 
-    def sees_building(self, at: Floats, number: int) -> bool:
+    def building(self, at: Floats, number: int) -> bool:
         """Whether at least half of a building would be seen from x, y, heading: its middle is in
         the image, and others hide no more than half of it.
         """
@@ -48,7 +46,7 @@ class Eyes:
         needed = max(MIN_COLUMNS, int((alone != NOTHING).sum()) / 2)
         return columns >= needed
 
-    def sees_barrier(self, at: Floats, street: str, reach_m: float) -> bool:
+    def barrier(self, at: Floats, street: str, reach_m: float) -> bool:
         """Whether a barrier would be seen that closes a street, within so many metres."""
         barrier_m = self._barriers_m[street]
         middle_m = barrier_m.reshape(-1, 2).mean(axis=0)
