@@ -14,8 +14,8 @@ import pytest
 from cogmap.data import pose_graph
 from cogmap.data.pose_graph import PoseGraphFile, read_true_positions
 from cogmap.errors import UsageError
+from cogmap.estimation.pose_graph import Constraints, cost
 from cogmap.geometry.se2 import relative
-from cogmap.services.codelets.correction.pose_graph import Constraints, cost
 
 G2O = """VERTEX_SE2 0 0 0 0
 VERTEX_SE2 1 1.5 -2 0.25
