@@ -8,6 +8,7 @@ numbers with `#` comments, as published, or packed.
 from __future__ import annotations
 
 import io
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -143,9 +144,8 @@ def _table(folder: Path, name: str, columns: _Columns) -> Floats:
 
 def _parsed(text: str) -> Floats:
     """Parse lines of numbers, (n, columns); an array of no columns if they are none."""
-    if not text.strip():
-        return np.empty((0, 0))
     try:
-        return np.loadtxt(io.StringIO(text), comments="#", ndmin=2)
+        with warnings.catch_warnings(action="ignore"):  # that there is no line, which is checked
+            return np.loadtxt(io.StringIO(text), comments="#", ndmin=2)
     except ValueError:
         return np.empty((1, 0))
