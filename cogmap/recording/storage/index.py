@@ -125,7 +125,12 @@ def _from_summary(path: Path) -> LogIndex | None:
         with path.open("rb") as file:
             reader = SeekingReader(file, record_size_limit=path.stat().st_size)
             summary = reader.get_summary()
-            if summary is None or not summary.chunk_indexes:
+            facts = summary.statistics if summary else None
+            if summary is None or facts is None or not facts.chunk_count:
+                return None
+            if facts.chunk_count != len(summary.chunk_indexes):
+                return None
+            if facts.metadata_count != len(summary.metadata_indexes):
                 return None
             header = reader.get_header()
             metadata = [(record.name, record.metadata) for record in reader.iter_metadata()]

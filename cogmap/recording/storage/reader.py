@@ -58,8 +58,12 @@ class Record:
 
 
 class _Located(NamedTuple):
-    """A record of a message, or of an envelope, with its place in the log."""
+    """A record of a message, or of an envelope, with its place in the log.
 
+    `order` is its log time and then its place in the file.
+    """
+
+    order: tuple[int, int, int]
     chunk: int
     position: int
     message: Written
@@ -129,13 +133,15 @@ class LogReader:
         for done, number in enumerate(numbers, start=1):
             for position, message in enumerate(self._messages(number)):
                 if start_ns <= message.log_time < end_ns:
-                    waiting.append(_Located(number, position, message))
-            waiting.sort(key=_log_time_ns)
+                    order = message.log_time, self._chunks[number].offset, position
+                    waiting.append(_Located(order, number, position, message))
+            waiting.sort(key=_order)
 
             # Chunks may overlap: what is as late as the next one's first message waits for it.
             ready = len(waiting)
             if number + 1 < len(self._chunks):
-                ready = bisect_left(waiting, self._chunks[number + 1].first_ns, key=_log_time_ns)
+                next_begins: tuple[int, ...] = (self._chunks[number + 1].first_ns,)
+                ready = bisect_left(waiting, next_begins, key=_order)
             yield from self._with_envelopes(waiting[:ready], topics)
             del waiting[:ready]
 
@@ -174,11 +180,11 @@ class LogReader:
         other programs may have put chunks between the two, or have changed their order.
         """
         envelopes: dict[tuple[int, int], list[bytes]] = defaultdict(list)
-        for _, _, message in window:
+        for _, _, _, message in window:
             if self._topic_name(message) == layout.ENVELOPES:
                 envelopes[message.log_time, message.sequence].append(message.data)
 
-        for chunk, position, message in window:
+        for _, chunk, position, message in window:
             name = self._topic_name(message)
             topic = BY_NAME.get(name)
             if topic is None or (topics is not None and topic not in topics):
@@ -224,9 +230,8 @@ class LogReader:
         return messages
 
 
-def _log_time_ns(located: _Located) -> int:
-    time_ns: int = located.message.log_time
-    return time_ns
+def _order(located: _Located) -> tuple[int, ...]:
+    return located.order
 
 
 def _take(candidates: list[bytes], topic_name: str) -> Envelope | None:

@@ -83,8 +83,10 @@ class LogBytes:
         if kind is None:
             return None
         content = ReadDataStream(BytesIO(self._bytes[span.start : span.end]))
+        # Of a message, the length determines where its content ends.
+        length = [span.end - span.start] if kind is Message else []
         try:
-            record: McapRecord = kind.read(content)  # type: ignore[attr-defined]
+            record: McapRecord = kind.read(content, *length)  # type: ignore[attr-defined]
         except Exception as error:  # the library raises whatever the nonsense in it leads to
             raise DamageError(f"a record of kind {span.opcode} cannot be read: {error}") from error
         return record

@@ -115,7 +115,7 @@ def test_a_chain_and_an_exact_loop_have_a_cost_ratio_of_1(tmp_path: Path, loop: 
     poses = "".join(f"VERTEX_SE2 {number} {number} 0 0\n" for number in range(3))
     steps = "".join(f"EDGE_SE2 {i} {i + 1} 1 0 0 100 0 0 100 0 100\n" for i in range(2))
     path.write_text(poses + steps + loop)
-    metrics = measure(graph_path=path)
+    metrics = measure(_setting(tmp_path), graph_path=path)
 
     assert metrics["positions_cost_ratio"] == pytest.approx(1.0)
     assert metrics["cost_vs_gtsam"] == pytest.approx(1.0)
