@@ -40,6 +40,45 @@ class Corridor(NamedTuple):
     extent: Extent
     is_inside: Booleans
 
+    @classmethod
+    def around(cls, near_m: Floats, reach_m: float, cell_m: float) -> Corridor:
+        """Return all places within reach of (n, 2) positions."""
+        margin = int(np.ceil(reach_m / cell_m)) + 1
+        cells = np.rint(near_m / cell_m).astype(np.int64)
+        first_i, first_j = (cells.min(axis=0) - margin).tolist()
+        last_i, last_j = (cells.max(axis=0) + margin + 1).tolist()
+
+        extent = Extent((first_i, first_j), (last_i, last_j))
+        grid = PlaceGrid(extent.lower, extent.shape, cell_m)
+        return cls(extent, grid.is_within(reach_m, near_m))
+
+    @classmethod
+    def beside(cls, routes: Routes) -> Corridor:
+        """Return the finer cells of those that routes on a coarse map pass, and of those beside."""
+        is_near = ndimage.binary_dilation(np.pad(routes.is_passed, 1), SQUARE)
+        i, j = np.nonzero(is_near)
+        rows = slice(int(i.min()), int(i.max()) + 1)
+        columns = slice(int(j.min()), int(j.max()) + 1)
+
+        is_inside = is_near[rows, columns].repeat(FACTOR, axis=0).repeat(FACTOR, axis=1)
+        width, height = is_inside.shape
+        first_i = FACTOR * (routes.lower[0] - 1 + rows.start) - FACTOR // 2
+        first_j = FACTOR * (routes.lower[1] - 1 + columns.start) - FACTOR // 2
+        return cls(Extent((first_i, first_j), (first_i + width, first_j + height)), is_inside)
+
+    def united(self, other: Corridor) -> Corridor:
+        """Return the places of both corridors."""
+        first_i, first_j = np.minimum(self.extent.lower, other.extent.lower).tolist()
+        last_i, last_j = np.maximum(self.extent.upper, other.extent.upper).tolist()
+
+        extent = Extent((first_i, first_j), (last_i, last_j))
+        is_inside = np.zeros(extent.shape, bool)
+        for part in (self, other):
+            i, j = np.subtract(part.extent.lower, extent.lower).tolist()
+            width, height = part.extent.shape
+            is_inside[i : i + width, j : j + height] |= part.is_inside
+        return Corridor(extent, is_inside)
+
 
 def corridor(graph: Graph, agent: Self, goals_m: Floats, config: Config) -> Corridor | None:
     """Find the places beside routes between the agent and (n, 2) goals, and beside the route of the
@@ -57,27 +96,34 @@ def corridor(graph: Graph, agent: Self, goals_m: Floats, config: Config) -> Corr
     within: Corridor | None = None
     found = sub_map_routes(graph, ends_m, config)
     if found is not None:
-        within = _around(found.passed_m, BESIDE_CELLS * found.cell_m + BESIDE_M, cell_m)
+        reach_m = BESIDE_CELLS * found.cell_m + BESIDE_M
+        within = Corridor.around(found.passed_m, reach_m, cell_m)
     else:
-        for map_id in _coarse_maps(graph, config):
+        for map_id in coarse_maps(graph, config):
             if within is None:
-                network = coarse_network(
-                    graph, map_id, graph.places.extent(map_id).grown(MARGIN), config
-                )
+                extent = graph.places.extent(map_id).grown(MARGIN)
+                network = coarse_network(graph, map_id, extent, config)
             else:
                 network = coarse_network(graph, map_id, within.extent, config, within.is_inside)
             routes = routes_between(network, ends_m)
             if routes is None:
                 return None
-            within = _refined(routes)
+            within = Corridor.beside(routes)
 
     if within is None:
         return None
-    near_m = np.vstack([ends_m, _route_left_m(graph, agent)])
-    return _united(within, _around(near_m, config.approach_m, cell_m))
+
+    # What the agent has not driven yet of the route before stays in the corridor.
+    near_m = ends_m
+    plan = graph.get(Plan, PLAN_ID)
+    if plan is not None and plan.route is not None:
+        route_m = np.asarray(plan.route.numpy(), np.float64)
+        away_m = np.hypot(*(route_m - ends_m[0]).T)
+        near_m = np.vstack([near_m, route_m[int(away_m.argmin()) :]])
+    return within.united(Corridor.around(near_m, config.approach_m, cell_m))
 
 
-def _coarse_maps(graph: Graph, config: Config) -> list[str]:
+def coarse_maps(graph: Graph, config: Config) -> list[str]:
     """Return the maps on which a route is found first, from the coarsest: each level until one is
     small enough to be searched whole.
     """
@@ -92,57 +138,6 @@ def _coarse_maps(graph: Graph, config: Config) -> list[str]:
 
 
 def _places(graph: Graph, map_id: str) -> int:
+    """Count the places of a map's rectangle."""
     width, height = graph.places.extent(map_id).shape
     return width * height
-
-
-def _route_left_m(graph: Graph, agent: Self) -> Floats:
-    """Return the (k, 2) positions of its plan's route that the agent has not driven yet."""
-    plan = graph.get(Plan, PLAN_ID)
-    if plan is None or plan.route is None:
-        return np.zeros((0, 2))
-
-    route_m = np.asarray(plan.route.numpy(), np.float64)
-    away_m = np.hypot(*(route_m - (agent.x_m, agent.y_m)).T)
-    left_m: Floats = route_m[int(away_m.argmin()) :]
-    return left_m
-
-
-def _refined(routes: Routes) -> Corridor:
-    """Return the finer cells of those that routes lead through, and of those beside."""
-    is_near = ndimage.binary_dilation(np.pad(routes.is_passed, 1), SQUARE)
-    i, j = np.nonzero(is_near)
-    rows = slice(int(i.min()), int(i.max()) + 1)
-    columns = slice(int(j.min()), int(j.max()) + 1)
-
-    is_inside = is_near[rows, columns].repeat(FACTOR, axis=0).repeat(FACTOR, axis=1)
-    width, height = is_inside.shape
-    first_i = FACTOR * (routes.lower[0] - 1 + rows.start) - FACTOR // 2
-    first_j = FACTOR * (routes.lower[1] - 1 + columns.start) - FACTOR // 2
-    return Corridor(Extent((first_i, first_j), (first_i + width, first_j + height)), is_inside)
-
-
-def _around(near_m: Floats, reach_m: float, cell_m: float) -> Corridor:
-    """Return all places within reach of (n, 2) positions."""
-    margin = int(np.ceil(reach_m / cell_m)) + 1
-    cells = np.rint(near_m / cell_m).astype(np.int64)
-    first_i, first_j = (cells.min(axis=0) - margin).tolist()
-    last_i, last_j = (cells.max(axis=0) + margin + 1).tolist()
-
-    extent = Extent((first_i, first_j), (last_i, last_j))
-    grid = PlaceGrid(extent.lower, extent.shape, cell_m)
-    return Corridor(extent, grid.is_within(reach_m, near_m))
-
-
-def _united(one: Corridor, other: Corridor) -> Corridor:
-    """Unite the places of both corridors."""
-    first_i, first_j = np.minimum(one.extent.lower, other.extent.lower).tolist()
-    last_i, last_j = np.maximum(one.extent.upper, other.extent.upper).tolist()
-
-    extent = Extent((first_i, first_j), (last_i, last_j))
-    is_inside = np.zeros(extent.shape, bool)
-    for part in (one, other):
-        i, j = np.subtract(part.extent.lower, extent.lower).tolist()
-        width, height = part.extent.shape
-        is_inside[i : i + width, j : j + height] |= part.is_inside
-    return Corridor(extent, is_inside)

@@ -35,7 +35,9 @@ def straightened(route: Indices, cost: Floats, origin: Cell) -> Floats:
     at = 0
     while at < len(inside) - 1:
         end = _farthest(inside, spent, cost, at)
-        positions.append(_along(inside[at], inside[end])[1:])
+        cells, _ = straight(inside[at], inside[end][None])
+        exact = np.linspace(inside[at], inside[end], len(cells[0]))
+        positions.append(exact.clip(cells[0] - _INSIDE, cells[0] + _INSIDE)[1:])
         at = end
 
     line: Floats = np.concatenate(positions) + np.array(origin)
@@ -54,14 +56,6 @@ def straight(start: Indices, ends: Indices) -> tuple[Indices, Indices]:
     moved = (2 * along[..., None] * away + steps[:, None]) // (2 * steps[:, None])
     cells: Indices = start + moved.swapaxes(0, 1)
     return cells, steps
-
-
-def _along(start: Indices, end: Indices) -> Floats:
-    """Return the (n, 2) positions of a straight line that are nearest to its cells."""
-    cells, steps = straight(start, end[None])
-    exact = start + np.arange(steps[0] + 1)[:, None] * (end - start) / steps[0]
-    positions: Floats = exact.clip(cells[0] - _INSIDE, cells[0] + _INSIDE)
-    return positions
 
 
 def _farthest(route: Indices, spent: Floats, cost: Floats, at: int) -> int:

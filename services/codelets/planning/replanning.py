@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import Extent
 from cogmap.schemas.nodes import PLAN_ID, PlaceColumn, Plan, PlanState, Self
 from cogmap.services.codelets.planning.config import Config
-from cogmap.services.codelets.planning.place_cost import is_obstructed
+from cogmap.services.codelets.planning.ground import is_obstructed
 from cogmap.services.codelets.planning.targets import has_arrived, open_goals
 
 BLOCKED_M = 30.0
@@ -38,24 +39,25 @@ def is_urgent(graph: Graph, agent: Self, config: Config) -> bool:
         return False
 
     away_m = np.hypot(*(plan.route.numpy() - (agent.x_m, agent.y_m)).T)
-    is_at_end = bool(away_m[-1] <= config.reached_m)
-    return is_at_end or _is_blocked(plan, int(away_m.argmin()), graph)
+    if away_m[-1] <= config.reached_m:
+        return True
+    # A plan that leads over blocked road is to find out whether something stands there.
+    route_m = plan.route.numpy()
+    nearest = int(away_m.argmin())
+    return not plan.doubtful and is_obstructed_ahead(route_m, nearest, graph, plan.map)
 
 
-def _is_blocked(plan: Plan, nearest: int, graph: Graph) -> bool:
-    """Decide whether something stands within BLOCKED_M ahead on a plan's route, at whose place
-    number `nearest` the agent is; not if the plan is to find out whether it does.
+def is_obstructed_ahead(route_m: Floats, nearest: int, graph: Graph, map_id: str) -> bool:
+    """Decide whether something stands on a route (n, 2), within BLOCKED_M of its place number
+    `nearest`.
     """
-    if plan.route is None or plan.doubtful:
-        return False
-
-    cell_m = graph.cell_m(plan.map)
+    cell_m = graph.cell_m(map_id)
     last = nearest + round(BLOCKED_M / cell_m)
-    ahead = np.rint(plan.route.numpy()[nearest:last] / cell_m).astype(np.int64)
+    ahead = np.rint(route_m[nearest:last] / cell_m).astype(np.int64)
     first_i, first_j = (ahead.min(axis=0) - 1).tolist()
     last_i, last_j = (ahead.max(axis=0) + 2).tolist()
 
     around = Extent((first_i, first_j), (last_i, last_j))
-    window = graph.places.window(plan.map, [PlaceColumn.OBSTACLE], around)
+    window = graph.places.window(map_id, [PlaceColumn.OBSTACLE], around)
     is_obstacle = is_obstructed(window.column(PlaceColumn.OBSTACLE))
     return bool(is_obstacle[tuple((ahead - around.lower).T)].any())

@@ -19,7 +19,7 @@ from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from cogmap.schemas.array import Array, Matrix
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.cognition import Direction, RouteReplay
-from cogmap.schemas.graph import DropLink, Link, Operation, Phase
+from cogmap.schemas.graph import DropLink, Link, Phase
 from cogmap.schemas.nodes import (
     MAX_DETOUR_M,
     PLAN_ID,
@@ -44,9 +44,10 @@ from cogmap.services.codelets.planning.frontier import (
     Standpoint,
     best_frontier,
 )
+from cogmap.services.codelets.planning.ground import COLUMNS
 from cogmap.services.codelets.planning.line_of_sight import straightened
 from cogmap.services.codelets.planning.network import Cell, PlaceNetwork
-from cogmap.services.codelets.planning.place_cost import COLUMNS, PlaceCosts, place_costs
+from cogmap.services.codelets.planning.place_cost import PlaceCosts, place_costs
 from cogmap.services.codelets.planning.replanning import is_done, is_urgent
 from cogmap.services.codelets.planning.targets import (
     Target,
@@ -141,7 +142,7 @@ CODELET = Codelet(
 
 def planned(situation: Situation, costs: PlaceCosts) -> Outcome:
     """Plan on places of these costs."""
-    task, graph, agent, config, _ = situation
+    task, graph, agent, config, before = situation
     network = costs.network()
     plan = Plan(
         id=PLAN_ID,
@@ -204,7 +205,11 @@ def planned(situation: Situation, costs: PlaceCosts) -> Outcome:
         network = costs.known_network()
         field = spread(network, np.array([start]))
         standpoint = Standpoint(start, agent.heading_rad)
-        frontier = best_frontier(costs, field, standpoint, config, _frontier_before(situation))
+        near: Cell | None = None
+        if before is not None and before.explores and before.route is not None:
+            i, j = _cells(before, costs)[-1].tolist()
+            near = (i, j)
+        frontier = best_frontier(costs, field, standpoint, config, near)
         back = None if frontier is None else field.climb(frontier.cell)
         if back is not None:
             return outcome(
@@ -247,7 +252,15 @@ def answer(outcome: Outcome, situation: Situation) -> Answer:
     if before is not None and before.route is not None and before.goals[:1] == plan.goals[:1]:
         cells = _left_of(before, agent, costs)
         plan = msgspec.structs.replace(plan, detour_for=_added_m(costs, cells))
-    changes.operations.extend(_written(plan, before))
+    changes.operations.append(plan)
+    if plan.goals:
+        changes.operations.append(
+            Link(source=PLAN_ID, target=next_goal(plan), kind=LinkKind.TOWARDS)
+        )
+    elif next_goal(before):
+        changes.operations.append(
+            DropLink(source=PLAN_ID, target=next_goal(before), kind=LinkKind.TOWARDS)
+        )
     if plan.route is not None and next_goal(plan) != next_goal(before):
         changes.events.append(_replay(plan, Direction.FORWARD, task, costs))
     return changes
@@ -311,17 +324,6 @@ def _ordered(
     return [found[number - 1] for number in order.tolist()[1:]]
 
 
-def _frontier_before(situation: Situation) -> Cell | None:
-    """Return the cell of the frontier that the agent goes to by the plan before."""
-    before = situation.before
-    if before is None or not before.explores or before.route is None:
-        return None
-
-    cell_m = situation.graph.cell_m(before.map)
-    i, j = np.rint(before.route.numpy()[-1] / cell_m).astype(np.int64).tolist()
-    return i, j
-
-
 def _along(positions_m: Floats) -> dict[str, Any]:
     """Return a plan's route along (n, 2) positions, and its length, as fields of the plan."""
     length_m = float(np.hypot(*np.diff(positions_m, axis=0).T).sum())
@@ -382,19 +384,6 @@ def _added_m(costs: PlaceCosts, cells: Indices) -> dict[CostLayer, float]:
         if by_layer_m >= 1.0:
             added_m[layer] = min(by_layer_m, MAX_DETOUR_M)
     return added_m
-
-
-def _written(plan: Plan, before: Plan | None) -> list[Operation]:
-    """Return the plan, and its link to the next goal."""
-    operations: list[Operation] = [plan]
-    goal = next_goal(plan)
-    goal_before = next_goal(before)
-    if goal:
-        operations.append(Link(source=PLAN_ID, target=goal, kind=LinkKind.TOWARDS))
-    elif goal_before:
-        operations.append(DropLink(source=PLAN_ID, target=goal_before, kind=LinkKind.TOWARDS))
-
-    return operations
 
 
 def _replay(plan: Plan, direction: Direction, task: Task, costs: PlaceCosts) -> RouteReplay:

@@ -29,36 +29,22 @@ def sub_map_routes(graph: Graph, ends_m: Floats, config: Config) -> SubMapRoutes
     """Find the routes between each two of (n, 2) positions within the largest sub-map that holds
     them all; None if there is none, or a route that leaves it might be shorter.
     """
-    for node in _sub_maps_around(graph, ends_m):
-        pose = pose_of(node)
-        own_m = transform_to(pose, ends_m)
+    maps = with_places(graph, graph.cycle)
+    for node in sorted(maps, key=lambda node: -node.width_m * node.height_m):
+        own_m = transform_to(pose_of(node), ends_m)
+        if (np.abs(own_m) > (node.width_m / 2, node.height_m / 2)).any():
+            continue
+
         network = coarse_network(graph, node.id, area_of(node), config)
-        routes = routes_between(network, own_m, _outside_m(node, own_m))
+        routes = routes_between(network, own_m, outside_m(node, own_m))
         if routes is not None:
             cells = np.argwhere(routes.is_passed) + np.array(routes.lower)
-            return SubMapRoutes(transform_from(pose, cells * node.cell_m), node.cell_m)
+            return SubMapRoutes(transform_from(pose_of(node), cells * node.cell_m), node.cell_m)
 
     return None
 
 
-def _sub_maps_around(graph: Graph, ends_m: Floats) -> list[Map]:
-    """Return the sub-maps with places whose area has all of (n, 2) positions in it, the largest
-    first.
-    """
-    maps = with_places(graph, graph.cycle)
-    if not maps:
-        return []
-
-    poses = np.array([pose_of(node) for node in maps])
-    halves_m = np.array([(node.width_m, node.height_m) for node in maps]) / 2
-    own_m = transform_to(poses[:, None], ends_m)
-    is_around = (np.abs(own_m) <= halves_m[:, None]).all(axis=(1, 2))
-
-    around = [maps[number] for number in np.flatnonzero(is_around).tolist()]
-    return sorted(around, key=lambda node: -node.width_m * node.height_m)
-
-
-def _outside_m(node: Map, ends_m: Floats) -> Floats:
+def outside_m(node: Map, ends_m: Floats) -> Floats:
     """Return the (n, n) lengths that a route between each two of (n, 2) positions has at least if
     it leaves a sub-map: those of the straight line to the other's mirror image beyond the border.
     """

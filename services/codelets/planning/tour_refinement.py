@@ -16,52 +16,41 @@ from cogmap.geometry.arrays import Indices
 
 
 def length_of(route: Indices, lengths: Indices) -> int:
-    """From the first stop to the last."""
+    """Add up the legs from the first stop to the last."""
     legs = lengths[route[:-1], route[1:]]
     return int(legs.sum())
 
 
 def reorder(route: Indices, lengths: Indices, span: int) -> Indices:
-    """The route once no `span` successive stops have a better order between their neighbours."""
+    """Reorder a route until no `span` successive stops have a better order between their
+    neighbours.
+    """
     size = min(span, len(route) - 2)
     if size < 2:
         return route
 
-    orders = _orders(size)
+    orders = all_orders(size)
     better = route.copy()
     is_better = True
     while is_better:
         is_better = False
         for first in range(len(route) - size - 1):
             window = better[first : first + size + 2]
-            best = _best_order(window, lengths, orders)
-            if best is not None:
-                better[first : first + size + 2] = window[best]
+            between = lengths[np.ix_(window, window)]
+            sums = between[orders[:, :-1], orders[:, 1:]].sum(axis=1)
+            best = int(sums.argmin())
+            # The first order is the present one.
+            if sums[best] < sums[0]:
+                better[first : first + size + 2] = window[orders[best]]
                 is_better = True
 
     return better
 
 
-def _best_order(window: Indices, lengths: Indices, orders: Indices) -> Indices | None:
-    """The shortest of `orders` of a window's stops, None where that is the present one, the first
-    of `orders`.
-    """
-    between = lengths[np.ix_(window, window)]
-    legs = between[orders[:, :-1], orders[:, 1:]]
-    sums = legs.sum(axis=1)
-
-    best = int(sums.argmin())
-    if sums[best] == sums[0]:
-        return None
-
-    chosen: Indices = orders[best]
-    return chosen
-
-
 @functools.cache
-def _orders(size: int) -> Indices:
-    """(size!, size + 2): every order of `size` stops between two that stay; the present one comes
-    first.
+def all_orders(size: int) -> Indices:
+    """Return every order (size!, size + 2) of `size` stops between two that stay; the present one
+    comes first.
     """
     end = size + 1
     orders = []
@@ -73,31 +62,23 @@ def _orders(size: int) -> Indices:
 
 
 def straighten(route: Indices, lengths: Indices) -> Indices:
-    """The route once no part of it is shorter in reverse; what saves most is reversed first.
+    """Straighten a route until no part of it is shorter in reverse; what saves most is reversed
+    first.
 
     By straight distances, no two legs cross then (Flood 1956).
     """
     straight = route.copy()
-
     while True:
-        savings = _savings(straight, lengths)
+        # What is saved by reversing the part between two legs, the first of them earlier.
+        froms = straight[:-1]
+        tos = straight[1:]
+        legs = lengths[froms, tos]
+        crossed = lengths[np.ix_(froms, froms)] + lengths[np.ix_(tos, tos)]
+        savings = np.triu(legs[:, None] + legs - crossed, 2)
+
         first, last = np.unravel_index(savings.argmax(), savings.shape)
         if savings[first, last] <= 0:
             return straight
 
         part = slice(first + 1, last + 1)
         straight[part] = straight[part][::-1].copy()
-
-
-def _savings(route: Indices, lengths: Indices) -> Indices:
-    """(m - 1, m - 1): what is saved by reversing the part between two legs, the first leg earlier;
-    elsewhere 0.
-    """
-    froms = route[:-1]
-    tos = route[1:]
-    legs = lengths[froms, tos]
-
-    present = legs[:, None] + legs
-    between_froms = lengths[np.ix_(froms, froms)]
-    between_tos = lengths[np.ix_(tos, tos)]
-    return np.triu(present - between_froms - between_tos, 2)

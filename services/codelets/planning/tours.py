@@ -110,75 +110,70 @@ def _units(lengths: Floats) -> Indices:
 def _ordered(
     units: Indices, positions_m: Floats, settings: TourSettings, *, closed: bool
 ) -> Indices:
+    """Find the order of stops, the end of the route being a stop of its own, with the number n."""
     end = len(units)
     if end <= 2:
         return np.arange(end)
 
-    lengths = _with_end(units, closed)
-    route = np.array([_START, end])
-    clusters = [np.arange(1, end)]
-
-    for level, cells in enumerate(_grids(positions_m, settings), start=1):
-        cell_length = lengths.max() / settings.factor**level
-        clusters = _finer(clusters, cells, lengths, cell_length)
-        route, clusters = _reordered(clusters, lengths, settings.span)
-
-    if settings.straightens:
-        route = _straightened(route, lengths, settings.span)
-    return route[:-1]
-
-
-def _with_end(units: Indices, closed: bool) -> Indices:
-    """(n + 1, n + 1) lengths, the end of the route being a stop of its own, with the number n.
-
-    It stands where the start does, or, of an open route, nowhere: no length leads to it.
-    """
+    # The end stands where the start does; of an open route no length leads to it.
     lengths = np.pad(units, (0, 1))
     if closed:
         lengths[:-1, -1] = units[:, _START]
         lengths[-1, :-1] = units[_START]
-    return lengths
+
+    route = np.array([_START, end])
+    clusters = [np.arange(1, end)]
+    for level, cells in enumerate(grids(positions_m, settings), start=1):
+        cell_length = lengths.max() / settings.factor**level
+        clusters = _finer(clusters, cells, lengths, cell_length)
+
+        # A goal stands for each cluster; as many as `span` at a time are put into their best order.
+        by_stop = {_middle(members, lengths): members for members in clusters}
+        route = reorder(np.array([_START, *by_stop, end]), lengths, settings.span)
+        clusters = [by_stop[stop] for stop in route[1:-1].tolist()]
+
+    before = None
+    while settings.straightens and length_of(route, lengths) != before:
+        before = length_of(route, lengths)
+        route = straighten(route, lengths)
+        route = reorder(route, lengths, settings.span)
+
+    return route[:-1]
 
 
-def _grids(positions_m: Floats, settings: TourSettings) -> list[Indices]:
-    """The cell (n,) of each goal on every grid, the coarsest first, and at last the goals
-    themselves.
-
-    The grids cover the same square around all goals.
+def grids(positions_m: Floats, settings: TourSettings) -> list[Indices]:
+    """Return the cell (n,) of each goal on every grid, the coarsest first, and at last the goals
+    themselves. The grids cover the same square around all goals.
     """
-    share = _shares(positions_m)
-    grids = []
-
-    for level in range(1, settings.levels + 1):
-        cells = settings.factor**level
-        indices = np.floor(share * cells).astype(np.int64)
-        column, row = np.clip(indices, 0, cells - 1).T
-        grids.append(column * cells + row)
-
-    every_goal = np.arange(len(positions_m))
-    return [*grids, every_goal]
-
-
-def _shares(positions_m: Floats) -> Floats:
-    """(n, 2): where in the square around all goals each lies, 0 to 1 along both of its sides."""
     lowest_m = positions_m.min(axis=0)
     highest_m = positions_m.max(axis=0)
     side_m = float(np.max(highest_m - lowest_m)) or 1.0
     corner_m = (lowest_m + highest_m - side_m) / 2
-    return np.asarray((positions_m - corner_m) / side_m)
+    share = (positions_m - corner_m) / side_m
+
+    found = []
+    for level in range(1, settings.levels + 1):
+        cells = settings.factor**level
+        indices = np.floor(share * cells).astype(np.int64)
+        column, row = np.clip(indices, 0, cells - 1).T
+        found.append(column * cells + row)
+
+    return [*found, np.arange(len(positions_m))]
 
 
 def _finer(
     clusters: Sequence[Indices], cells: Indices, lengths: Indices, cell_length: float
 ) -> list[Indices]:
-    """Each cluster of goals divided by the cells of the next grid, in the order of activation."""
+    """Divide each cluster of goals by the cells of the next grid, in the order of activation."""
     found: list[Indices] = []
     here = _START
 
     for cluster in clusters:
         left = [cluster[cells[cluster] == cell] for cell in np.unique(cells[cluster])]
         while left:
-            activations = [_log_activation(lengths[here, part], cell_length) for part in left]
+            # The logarithm of the activation that arrives here from each part.
+            decays = [-DECAY_PER_CELL * lengths[here, part] / cell_length for part in left]
+            activations = [float(np.logaddexp.reduce(decay)) for decay in decays]
             strongest = int(np.argmax(activations))
             found.append(left.pop(strongest))
             here = _middle(found[-1], lengths)
@@ -186,41 +181,8 @@ def _finer(
     return found
 
 
-def _log_activation(lengths: Indices, cell_length: float) -> float:
-    """The logarithm of the activation that arrives here from goals at those lengths."""
-    cells = lengths / cell_length
-    return float(np.logaddexp.reduce(-DECAY_PER_CELL * cells))
-
-
 def _middle(members: Indices, lengths: Indices) -> int:
-    """Of a cluster's goals, the one nearest to all others: it stands for them."""
+    """Return the goal of a cluster that is nearest to all others: it stands for them."""
     between = lengths[np.ix_(members, members)]
     nearest = between.sum(axis=0).argmin()
     return int(members[nearest])
-
-
-def _reordered(
-    clusters: Sequence[Indices], lengths: Indices, span: int
-) -> tuple[Indices, list[Indices]]:
-    """The route past the stops that stand for the clusters, as many at a time in their best order
-    as `span`; the clusters in its order.
-    """
-    by_stop = {_middle(members, lengths): members for members in clusters}
-    end = len(lengths) - 1
-    rough = np.array([_START, *by_stop, end])
-
-    route = reorder(rough, lengths, span)
-    visited = route[1:-1].tolist()
-    return route, [by_stop[stop] for stop in visited]
-
-
-def _straightened(route: Indices, lengths: Indices, span: int) -> Indices:
-    """The route straightened, and its stops again in their best order, until neither helps."""
-    before = None
-
-    while length_of(route, lengths) != before:
-        before = length_of(route, lengths)
-        route = straighten(route, lengths)
-        route = reorder(route, lengths, span)
-
-    return route

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from cogmap.geometry.arrays import Floats
+from cogmap.graph.window import Window
 from cogmap.schemas.nodes import PathColumn
+from cogmap.services.codelets.planning.ground import COLUMNS, LOOK_M, Ground
 from cogmap.services.codelets.planning.network import PlaceGrid
-from cogmap.services.codelets.planning.place_cost import LOOK_M, looked_ago_s
 from tests.support.world.scenes import agent
 
 NOW_S = 1000.0
@@ -25,7 +26,9 @@ def _looked_ago_s(*rows: tuple[float, float, float]) -> Floats:
         row[PathColumn.HEADING_RAD] = heading_rad
         row[PathColumn.LAST_S] = NOW_S - ago_s
 
-    return looked_ago_s(path, agent(stamp_ns=round(NOW_S * 1e9)), 600.0, HERE)
+    window = Window(HERE.origin, COLUMNS, np.zeros((len(COLUMNS), *HERE.shape), np.float32))
+    here = agent(stamp_ns=round(NOW_S * 1e9))
+    return Ground(window, HERE, path, here).looked_ago_s(600.0)
 
 
 def _at(x_m: int, ago_s: Floats) -> float:
