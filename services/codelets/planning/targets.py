@@ -110,9 +110,9 @@ def has_arrived(graph: Graph, at: Collection[str] = ()) -> bool:
 def target_of(goal: Goal, graph: Graph, agent: Self, costs: PlaceCosts, config: Config) -> Target:
     """Find the free places nearest to a goal.
 
-    An object is reached from a known place within `approach_m`, and a goal that serves a need at
-    any object of the agent's map that satisfies it. A position that is not free is reached from a
-    place within SNAP_M.
+    An object is reached from a known place within `approach_m`, beside which nothing stands if
+    there is one, and a goal that serves a need at any object of the agent's map that satisfies it.
+    A position that is not free is reached from a place within SNAP_M.
     """
     if goal.object:
         found = _objects_of(goal, graph, agent)
@@ -121,7 +121,11 @@ def target_of(goal: Goal, graph: Graph, agent: Self, costs: PlaceCosts, config: 
 
         cells = []
         for node in found:
-            cell = nearest_free(node.x_m, node.y_m, costs, costs.is_known_free, config.approach_m)
+            # The robot stops before what stands ahead of it: it stands clear of that if it can.
+            within_m = config.approach_m
+            cell = nearest_free(node.x_m, node.y_m, costs, costs.cost() == 1, within_m)
+            if cell is None:
+                cell = nearest_free(node.x_m, node.y_m, costs, costs.is_known_free, within_m)
             if cell is not None:
                 cells.append(cell)
         return Target(goal, cells, PlanState.READY if cells else PlanState.NO_ROUTE)
