@@ -91,9 +91,11 @@ class PoseGraph:
 
         Raises MessageError where a pose has no step to the next.
         """
-        steps = _first_steps(constraints)
+        successive = np.flatnonzero(constraints.j == constraints.i + 1)
+        _, first = np.unique(constraints.i[successive], return_index=True)
+        steps = successive[first]
         if len(steps) != len(poses) - 1:
-            pose = _pose_without_step(len(poses), constraints.i[steps])
+            pose = int(np.setdiff1d(np.arange(len(poses) - 1), constraints.i[steps])[0])
             raise MessageError(
                 f"no constraint leads from pose {pose} to the next: a path needs every step"
             )
@@ -114,23 +116,6 @@ class PoseGraph:
     def constraints(self) -> Constraints:
         """All constraints, the steps first."""
         return self.steps + self.joins + self.closures
-
-
-def _first_steps(constraints: Constraints) -> Indices:
-    """The first constraint from each pose to the next, by number."""
-    successive = np.flatnonzero(constraints.j == constraints.i + 1)
-    origins = constraints.i[successive]
-
-    _, first = np.unique(origins, return_index=True)
-    steps: Indices = successive[first]
-    return steps
-
-
-def _pose_without_step(poses: int, origins: Indices) -> int:
-    """The first of the poses, but the last, that no step leads from."""
-    expected = np.arange(poses - 1)
-    missing = np.setdiff1d(expected, origins)
-    return int(missing[0])
 
 
 def diagonal_information(position: Floats, heading: Floats) -> Floats:

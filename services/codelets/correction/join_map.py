@@ -11,7 +11,6 @@ import msgspec
 import numpy as np
 
 from cogmap.errors import MessageError
-from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_from
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext, NoSettings
@@ -56,12 +55,31 @@ def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
     if recalled is None or root is None:
         raise MessageError(f"task {task.task_id}: the map was joined before")
 
+    # A correction that moves everything into the recalled map's frame, in which the present one has
+    # this pose.
     pose = np.array([recalled.x_m, recalled.y_m, recalled.heading_rad])
+    row = np.zeros((1, len(CorrectionColumn)))
+    row[0, CorrectionColumn.NEW_X_M :] = pose
     operations: list[Operation] = [DropNode(id=RECOLLECTION_ID)]
     operations.append(msgspec.structs.replace(root, remembered=recalled.map))
-    operations += moved(graph, _as_correction(pose))
-    operations += _moved_goals(graph, pose)
-    operations += _moved_plan(graph, pose, task.stamp_ns)
+    operations += moved(graph, row)
+
+    for goal in graph.of_kind(Goal):
+        if not goal.object and goal.map == ROOT_MAP:
+            ((x_m, y_m),) = transform_from(pose, np.array([[goal.x_m, goal.y_m]])).tolist()
+            operations.append(msgspec.structs.replace(goal, x_m=x_m, y_m=y_m))
+
+    # The plan is driven until there is a better one. It is written as one that was made just
+    # before, so that one made in this very cycle is newer.
+    plan = graph.get(Plan, PLAN_ID)
+    if plan is not None and plan.map == ROOT_MAP:
+        route = None
+        if plan.route is not None:
+            route_m = np.asarray(plan.route.numpy(), np.float64)
+            route = Matrix.of(transform_from(pose, route_m))
+        planned_ns = task.stamp_ns - 1
+        operations.append(msgspec.structs.replace(plan, route=route, planned_ns=planned_ns))
+
     known = recalled_objects(recalled, graph, pose)
     operations += known
     objects = [each for each in known if isinstance(each, Object)]
@@ -80,39 +98,3 @@ CODELET = Codelet(
     reads=frozenset({*MOVED, Recollection, Observations, LinkKind.WITHIN, *MOVED_COLUMNS}),
     writes=frozenset({*MOVED, Recollection, LinkKind.AT, LinkKind.WITHIN, *MOVED_COLUMNS}),
 )
-
-
-def _as_correction(pose: Floats) -> Floats:
-    """(1, 7): the row of a correction that moves everything into a frame in which the present one
-    has that pose.
-    """
-    row = np.zeros((1, len(CorrectionColumn)))
-    row[0, CorrectionColumn.NEW_X_M :] = pose
-    return row
-
-
-def _moved_goals(graph: Graph, pose: Floats) -> list[Operation]:
-    """The goals that are positions."""
-    operations: list[Operation] = []
-    for goal in graph.of_kind(Goal):
-        if not goal.object and goal.map == ROOT_MAP:
-            ((x_m, y_m),) = transform_from(pose, np.array([[goal.x_m, goal.y_m]])).tolist()
-            operations.append(msgspec.structs.replace(goal, x_m=x_m, y_m=y_m))
-
-    return operations
-
-
-def _moved_plan(graph: Graph, pose: Floats, stamp_ns: int) -> list[Operation]:
-    """The plan, which is driven on until there is a better one.
-
-    It is written as one that was made just before, so that one made in this very cycle is newer.
-    """
-    plan = graph.get(Plan, PLAN_ID)
-    if plan is None or plan.map != ROOT_MAP:
-        return []
-
-    route = None
-    if plan.route is not None:
-        route_m = np.asarray(plan.route.numpy(), np.float64)
-        route = Matrix.of(transform_from(pose, route_m))
-    return [msgspec.structs.replace(plan, route=route, planned_ns=stamp_ns - 1)]

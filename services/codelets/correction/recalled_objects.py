@@ -4,6 +4,7 @@ Pure.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable
 
@@ -42,7 +43,12 @@ def recalled_objects(recalled: Recollection, graph: Graph, pose: Floats) -> list
 
     operations: list[Operation] = []
     for number, label in enumerate(labels):
-        own = label or _free_label(recalled.labels[number], taken)
+        own = label
+        if not own:
+            look = look_of(recalled.labels[number])
+            names = (individual_label(look, each) for each in itertools.count(1))
+            own = next(name for name in names if name not in taken)
+
         taken.add(own)
         node = _recalled_object(recalled, number, own, node_of.get(own), graph)
         place = nearest_place(node.x_m, node.y_m, graph.cell_m(ROOT_MAP))
@@ -53,7 +59,7 @@ def recalled_objects(recalled: Recollection, graph: Graph, pose: Floats) -> list
 
 def _labels(recalled: Recollection, known: list[Object], pose: Floats) -> list[str]:
     """The label here of each recalled object: the one it is matched with, or that of the object of
-    its look that stands there too; empty where there is none.
+    its look that stands there too; empty if there is none.
     """
     positions_m = np.array([(node.x_m, node.y_m) for node in known]).reshape(-1, 2)
     here_m = transform_from(pose, positions_m).tolist()
@@ -90,15 +96,6 @@ def _standing_there(
             nearest_m = away_m
 
     return found
-
-
-def _free_label(label: str, taken: set[str]) -> str:
-    """The first label of a look that is not taken."""
-    number = 1
-    while individual_label(look_of(label), number) in taken:
-        number += 1
-
-    return individual_label(look_of(label), number)
 
 
 def _recalled_object(
