@@ -12,6 +12,7 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
+from cogmap.estimation.alignment import motion_onto
 from cogmap.estimation.gnc import inliers
 from cogmap.estimation.least_squares import optimize
 from cogmap.estimation.pairwise_consistency import MIN_AGREEING, Views, consistent
@@ -27,7 +28,6 @@ from cogmap.estimation.reverse_replay import close_loops, with_positions_only
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.geometry.se2 import (
     cumulative,
-    motion_onto,
     rotation_matrices,
     transform_from,
     wrap_angle,

@@ -26,11 +26,13 @@ from cogmap.services.codelets.sub_maps.search import (
     parts,
 )
 
+# A sub-map is parted, or sorted anew with its neighbours, each time that it has grown by a factor;
+# more objects than these are sorted anew more seldom, and not parted.
 PARTING_GROWTH = 1.25
 REVIEW_GROWTH = 1.6
-MANY = 600
-MANY_TO_PART = 150
-MANY_REVIEW_GROWTH = REVIEW_GROWTH**2
+MAX_REVIEWED = 600
+RARE_REVIEW_GROWTH = REVIEW_GROWTH**2
+MAX_PARTED = 150
 
 
 class SubMaps:
@@ -82,7 +84,12 @@ class SubMaps:
         """The label of one more object, at (2,). Sub-maps near it may merge, part or exchange
         objects.
         """
-        near = self._append(position_m, function, clear_m)
+        near = self._near.append(position_m, clear_m)
+        row = self._rows_of(position_m[None], np.array([function]))
+        self._rows = np.vstack([self._rows, row])
+        self._set_spacings()
+        self.labels = np.append(self.labels, NEW)
+
         is_member = np.isin(self.labels, np.unique(self.labels[near])) & (self.labels != NEW)
         is_member[-1] = True
         members = np.flatnonzero(is_member)
@@ -101,49 +108,27 @@ class SubMaps:
         """Sort anew, or part, a sub-map that has grown by its last object: the more seldom the
         larger it is, so that this costs little for each object.
         """
-        size = int((self.labels == label).sum())
+        is_own = self.labels == label
+        size = int(is_own.sum())
         if _has_grown(size, REVIEW_GROWTH):
-            members = self._around(label)
-            if len(members) <= MANY or _has_grown(size, MANY_REVIEW_GROWTH):
-                self._review(members)
+            edges = self._near.edges
+            beside = edges[is_own[edges[:, 0]] | is_own[edges[:, 1]]]
+            is_around = np.isin(self.labels, np.unique(self.labels[beside])) | is_own
+            members = np.flatnonzero(is_around)
+            if len(members) <= MAX_REVIEWED or _has_grown(size, RARE_REVIEW_GROWTH):
+                found = partition(self._mixture, self._scene(members), self.labels[members])
+                self._relabel(members, found)
                 return
 
-        if size <= MANY_TO_PART and _has_grown(size, PARTING_GROWTH):
-            self._part(label)
-
-    def _part(self, label: int) -> None:
-        """Part a sub-map where that is more probable."""
-        members = np.flatnonzero(self.labels == label)
-        self._relabel(members, parts(self._mixture, self._scene(members)))
-
-    def _around(self, label: int) -> Indices:
-        """(m,): the objects of a sub-map and of those that neighbour it."""
-        is_own = self.labels == label
-        edges = self._near.edges
-        beside = edges[is_own[edges[:, 0]] | is_own[edges[:, 1]]]
-        labels = np.unique(self.labels[beside])
-        return np.flatnonzero(np.isin(self.labels, labels) | is_own)
-
-    def _review(self, members: Indices) -> None:
-        """Sort some objects, (m,), anew, from the labels that they have."""
-        found = partition(self._mixture, self._scene(members), self.labels[members])
-        self._relabel(members, found)
+        if size <= MAX_PARTED and _has_grown(size, PARTING_GROWTH):
+            members = np.flatnonzero(is_own)
+            self._relabel(members, parts(self._mixture, self._scene(members)))
 
     def _relabel(self, members: Indices, clusters: Indices) -> None:
-        """Give the clusters of some objects, (m,), the labels that they had, where they had any."""
+        """Give the clusters of some objects, (m,), the labels that they had, if they had any."""
         labels = kept_labels(self.labels[members], clusters, self.next_label)
         self.labels[members] = labels
         self.next_label = max(self.next_label, int(labels.max(initial=NEW)) + 1)
-
-    def _append(self, position_m: Floats, function: int, clear_m: float) -> Indices:
-        """Add an object that is in no sub-map; its neighbours."""
-        near = self._near.append(position_m, clear_m)
-        row = self._rows_of(position_m[None], np.array([function]))
-        self._rows = np.vstack([self._rows, row])
-        self._set_spacings()
-
-        self.labels = np.append(self.labels, NEW)
-        return near
 
     def _rows_of(self, positions_m: Floats, functions: Indices) -> Floats:
         return rows_of(positions_m - self._centre_m, functions, self._kinds)
@@ -166,7 +151,7 @@ class SubMaps:
 
 
 def _has_grown(size: int, growth: float) -> bool:
-    """Whether the last of so many objects completes another growth by a factor, since the first."""
+    """If the last of so many objects completes another growth by a factor, since the first."""
     if size < 2:
         return False
 
