@@ -68,8 +68,8 @@ class Hypotheses:
         return result
 
     def truncated_cost(self, accepted: Booleans) -> float:
-        """What truncated least squares makes least: the cost of the path by the accepted closures,
-        and the thresholds of all others, each hypothesis counted once.
+        """Return what truncated least squares makes least: the cost of the path by the accepted
+        closures, and the thresholds of all others, each hypothesis counted once.
         """
         closures = self._graph.closures.weighted(self.shares).select(accepted)
         graph = self._graph.with_closures(closures)

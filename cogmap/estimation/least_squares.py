@@ -109,7 +109,7 @@ class _BlockPattern:
         self._compress(blocks, unknown_poses)
 
     def _compress(self, keys: Indices, unknown_poses: int) -> None:
-        """Where blocks are stored: by column, and by row within it, as `keys` count them."""
+        """Note where blocks are stored: by column, and by row within it, as `keys` count them."""
         self._indices = (keys % unknown_poses).astype(np.int32)
 
         first_keys = np.arange(unknown_poses + 1) * unknown_poses

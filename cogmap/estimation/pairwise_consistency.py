@@ -1,7 +1,7 @@
 """Which loop closures agree with one another: a single view may be of another place or landmark
 than it seems.
 
-Beyond the paper, whose landmarks are never confused. Two closures agree where what they join is as
+Beyond the paper, whose landmarks are never confused. Two closures agree if what they join is as
 far apart on this pass as it was on the earlier one, by path integration within each pass alone;
 what the agent believes of its pose is not used. At least MIN_AGREEING must agree with one another
 (pairwise consistency, as in Mangelson et al. 2018, doi 10.1109/ICRA.2018.8460217).
@@ -42,7 +42,7 @@ class Views(NamedTuple):
 
     It stands at `there_m` (m, 2) in the frame of place i and at `here_m` (m, 2) in that of place j,
     x forward, y left, known to `sd_m` (m,). The heading between the two places is known to
-    `sd_rad` (m,), or unknown where that is 0.
+    `sd_rad` (m,), or unknown if that is 0.
     """
 
     i: Indices
@@ -59,12 +59,12 @@ class Views(NamedTuple):
 
     @property
     def there(self) -> Points:
-        """What was seen, from the places before."""
+        """The points that were seen, from the places before."""
         return Points(self.i, self.there_m)
 
     @property
     def here(self) -> Points:
-        """What was seen, from the later places."""
+        """The same points, from the later places."""
         return Points(self.j, self.here_m)
 
     def select(self, chosen: Booleans | Indices) -> Views:

@@ -54,7 +54,7 @@ class Displacements:
 
 
 def displacements(poses: Floats, constraints: Constraints) -> Displacements:
-    """What `constraints` measure of positions if the headings are those of `poses`."""
+    """Return what `constraints` measure of positions if the headings are those of `poses`."""
     covariance = _inverse(constraints.information[:, :2, :2])
 
     # If position and heading are measured together, the position that is expected changes with the
@@ -219,7 +219,7 @@ def with_positions_only(graph: PoseGraph) -> PoseGraph:
 class _ConjugateGradients:
     """The forces of `loops`, corrected replay by replay, as many as `replays` so far.
 
-    `gained` is what the next replay would gain; it is not above 0 where nothing is left to gain.
+    `gained` is what the next replay would gain; it is not above 0 if nothing is left to gain.
     """
 
     def __init__(self, loops: Loops) -> None:

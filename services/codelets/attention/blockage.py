@@ -65,7 +65,7 @@ def expected_by(place: str, graph: Graph) -> str:
 
 
 def is_known(place: str, noted: Mapping[str, int], since_cycle: int, cell_m: float) -> bool:
-    """If a place node is near one that was noted, by its id, in `since_cycle` or later."""
+    """Return whether a place node is near one that was noted in `since_cycle` or later, by id."""
     here = place_cell(place)
     for known, cycle in noted.items():
         there = place_cell(known)

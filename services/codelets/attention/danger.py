@@ -35,7 +35,7 @@ SAME_CYCLES = 25
 
 
 def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
-    """One task if something stands near ahead, and until that is conscious."""
+    """Return one task if something stands near ahead, and until that is conscious."""
     if graph.agent is None or context.scan is None:
         return []
     if is_refractory(NAME, graph, context.cycle):
@@ -88,8 +88,8 @@ CODELET = Codelet(
 
 
 def is_blocked(task: Task) -> bool:
-    """If the range scan has something near in the lane ahead, in two of its rays: one alone
-    may be noise.
+    """Return whether the range scan has something near in the lane ahead, in two of its rays: one
+    alone may be noise.
     """
     if task.scan is None:
         return False
@@ -102,7 +102,7 @@ def is_blocked(task: Task) -> bool:
 
 
 def _nearest_object(percepts: list[Percept], graph: Graph) -> Object | None:
-    """The object of the map that is perceived the nearest; None where there is none."""
+    """The object of the map that is perceived the nearest; None if there is none."""
     nearest = None
     nearest_m = math.inf
     for percept in sorted(percepts, key=lambda each: each.label):

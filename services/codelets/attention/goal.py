@@ -41,8 +41,8 @@ CHANGE_SALIENCE = 0.5
 
 
 def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
-    """One task if there is a route to a goal or frontier, or a plan or goal has changed, and the
-    codelet does not wait.
+    """Return one task if there is a route to a goal or frontier, or a plan or goal has changed, and
+    the codelet does not wait.
     """
     if is_refractory(NAME, graph, context.cycle, REFRACTORY_CYCLES):
         return []

@@ -45,7 +45,7 @@ BESIDE_M = 10.0
 
 
 def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
-    """One task if a correction waits to be applied."""
+    """Return one task if a correction waits to be applied."""
     if CORRECTION_ID not in graph.nodes:
         return []
     return [context.task(CODELET.name, about=[CORRECTION_ID])]

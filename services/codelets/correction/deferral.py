@@ -23,8 +23,8 @@ UNEXPLAINED_SHARE = 0.1
 
 
 def may_be_deferred(closures: list[LoopClosure], rows: Floats) -> bool:
-    """If the path `rows`, as it is believed, explains all but a share of the closures, or all but
-    so few that they close no loop.
+    """Return whether the path `rows`, as it is believed, explains all but a share of the closures,
+    or all but so few that they close no loop.
     """
     poses = rows[:, POSE]
     views = views_of(closures, rows)

@@ -42,7 +42,7 @@ from cogmap.services.codelets.correction.recalled_sub_maps import recalled_sub_m
 
 
 def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
-    """One task where a recalled map waits to be joined, and no correction to be applied."""
+    """Return one task if a recalled map waits to be joined, and no correction to be applied."""
     if RECOLLECTION_ID not in graph.nodes or CORRECTION_ID in graph.nodes:
         return []
     return [context.task(CODELET.name, about=[RECOLLECTION_ID])]

@@ -69,8 +69,8 @@ class Joining(NamedTuple):
 
 
 def joining(known: Floats, places: Floats, config: Config) -> Joining:
-    """Which of the places (n, COLUMNS) are joined into which of the `known` ones, (k, COLUMNS): the
-    nearest that the agent left `revisit_s` before at least, headed as it was then.
+    """Return which of the places (n, COLUMNS) are joined into which of the `known` ones, (k,
+    COLUMNS): the nearest that the agent left `revisit_s` before at least, headed as it was then.
     """
     into = np.full(len(places), STAYS)
     if not len(known):

@@ -62,9 +62,9 @@ SHORT_SEGMENTS = 8
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task if closures of the present pass were not judged yet, and enough of it are there to
-    agree; unless some were judged just now, a correction waits to be applied, or the path, part of
-    which is sparse, explains them.
+    """Return one task if closures of the present pass were not judged yet, and enough of it are
+    there to agree; unless some were judged just now, a correction waits to be applied, or the path,
+    part of which is sparse, explains them.
     """
     if CORRECTION_ID in graph.nodes:
         return []
@@ -94,7 +94,7 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
-    """What becomes of all closures, the correction of the path, and its replay."""
+    """Return what becomes of all closures, the correction of the path, and its replay."""
     rows = rows_of(graph.of_kind(PathSegment))
     closures = sorted(graph.of_kind(LoopClosure), key=lambda closure: closure.to_ns)
     if not closures or len(rows) < 2:
@@ -157,7 +157,7 @@ class _Judgement(NamedTuple):
 
 
 def _judge(closures: list[LoopClosure], path: list[PathSegment], config: Config) -> _Judgement:
-    """Which of the closures of a path are consistent, and of these accepted."""
+    """Return which of the closures of a path are consistent, and of these accepted."""
     rows = rows_of(path)
     steps = steps_of(rows, config)
     views = views_of(closures, rows)

@@ -141,7 +141,7 @@ def move_places(graph: Graph, old: Floats, new: Floats) -> list[Operation]:
 
 
 def _move_shares(graph: Graph, column: PlaceColumn, movement: Movement) -> Iterator[Operation]:
-    """If several cells move to one, it has the largest of their shares."""
+    """Move the shares of cells; if several move to one, it has the largest."""
     cells, shares = graph.places.written_cells(ROOT_MAP, column)
     if not len(cells):
         return
@@ -163,7 +163,7 @@ def _move_shares(graph: Graph, column: PlaceColumn, movement: Movement) -> Itera
 
 
 def _move_links(graph: Graph, movement: Movement) -> Iterator[Operation]:
-    """If several links move to one, it is cut if one of them is."""
+    """Move the evidence of links; if several move to one, it is cut if one of them is."""
     directions = []
     found = []
     values = []

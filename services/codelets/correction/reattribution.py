@@ -71,8 +71,8 @@ def observations_left(
 
 
 def closures_left(closures: Sequence[LoopClosure], ends: Views, joined: Joining) -> list[Operation]:
-    """What becomes of loop closures, the places of whose `ends` are counted from the first of the
-    joined ones on.
+    """Return what becomes of loop closures, the places of whose `ends` are counted from the first
+    of the joined ones on.
 
     Of those to these places the accepted ones to places that stay are left. Those from a joined
     place are from what that becomes.

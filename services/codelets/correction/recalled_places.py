@@ -14,7 +14,9 @@ from cogmap.services.codelets.mapping.evidence import weights_of
 
 
 def recalled_places(recalled: Recollection) -> Iterator[Operation]:
-    """What is known of the recalled place nodes, and the weights of their links by the evidence."""
+    """Return what is known of the recalled place nodes, and the weights of their links by the
+    evidence.
+    """
     weight_of = dict(zip(EVIDENCE_COLUMNS, WEIGHT_COLUMNS, strict=True))
     corners = np.array(recalled.tiles).reshape(-1, 2) * TILE_SIDE
     for column, matrix in recalled.columns.items():

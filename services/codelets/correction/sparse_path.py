@@ -34,8 +34,8 @@ from cogmap.services.codelets.mapping.views import views_of
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task about the oldest segment of the path that is not sparse yet, once it is so old that
-    no mistaken correction of it is undone any more; none while the path is to be moved.
+    """Return one task about the oldest segment of the path that is not sparse yet, once it is so
+    old that no mistaken correction of it is undone any more; none while the path is to be moved.
     """
     if CORRECTION_ID in graph.nodes or RECOLLECTION_ID in graph.nodes:
         return []

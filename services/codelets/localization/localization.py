@@ -74,7 +74,7 @@ FORGOTTEN_NS = 20_000_000_000
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task in each cycle."""
+    """Return one task in each cycle."""
     percepts = context.percepts.objects
     seen = [object_id(label) for label in sorted(percept.label for percept in percepts)]
     about = [SELF_ID, *(name for name in seen if name in graph.nodes)]
@@ -202,7 +202,7 @@ def correct(
 
 
 def _is_heading_unknown(headings_rad: Floats) -> bool:
-    """If the headings (n,) are so far apart that nearly any may be the agent's."""
+    """Return whether the headings (n,) are so far apart that nearly any may be the agent's."""
     if np.ptp(headings_rad) <= TURNED_RAD:
         return False
 

@@ -39,7 +39,7 @@ class Sighting(NamedTuple):
 
     `mean_m` (k, 2) and `covariance_m2` (k, 2, 2) are of the landmark on the map; the rest, (k,)
     each, of the percept; `evidence` is how likely its name is, by the view alone. A bearing is
-    unknown where its standard deviation is at least a half turn, a range where it is at least the
+    unknown if its standard deviation is at least a half turn, a range if it is at least the
     range.
     """
 
@@ -202,8 +202,8 @@ def sightings(
 
 
 def is_seen_from_here(node: Object, stationary_since_ns: int) -> bool:
-    """If an agent that stands since `stationary_since_ns` has seen the landmark from where it
-    stands.
+    """Return whether an agent that stands since `stationary_since_ns` has seen the landmark from
+    where it stands.
     """
     is_stationary = stationary_since_ns != NEVER_NS
     return is_stationary and node.last_seen_ns >= stationary_since_ns

@@ -1,7 +1,7 @@
 """Decides what follows from landmarks that do not fit: the agent is elsewhere, or they are.
 
 One landmark that does not fit may be mistaken for another. The agent is lost if several do not fit;
-if a single one does not, the agent is elsewhere only where all that was seen in the last seconds
+if a single one does not, the agent is elsewhere only if all that was seen in the last seconds
 fits another pose.
 """
 
@@ -89,9 +89,9 @@ def inflated(found: Estimate, limit_m: float, rng: np.random.Generator) -> Estim
 def recent_percepts(
     found: Estimate, task: Task, agent: Self, graph: Graph, odometry: Floats
 ) -> list[Percept]:
-    """What is evidence of where the agent is, in the view of `task` and before, while something
-    does not fit: everything since a landmark fitted, if the agent is lost, else that of the last
-    seconds.
+    """Return what is evidence of where the agent is, in the view of `task` and before, while
+    something does not fit: everything since a landmark fitted, if the agent is lost, else that of
+    the last seconds.
 
     Path integration alone has the agent at `odometry` (3,).
     """
@@ -112,7 +112,7 @@ def relocalized(
     config: Config,
     rng: np.random.Generator,
 ) -> Estimate:
-    """Where the agent is by all `percepts`, after a view in which something does not fit."""
+    """Return where the agent is by all `percepts`, after a view in which something does not fit."""
     seen = sightings(percepts, graph, config.largest_landmark_sd_m, NEVER_NS)
     if seen is None:
         return found

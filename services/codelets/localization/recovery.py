@@ -26,7 +26,7 @@ from cogmap.services.codelets.mapping.observations import Sightings
 from cogmap.services.codelets.mapping.path import ODOMETRY, STAMP, objects_along
 
 CANDIDATES = 16
-# A pose is believed that so many landmarks fit, and such a share of those in view.
+# A pose is accepted that so many landmarks fit, and such a share of those in view.
 MIN_FITTING = 2
 FITTING_SHARE = 2 / 3
 SURE_M = 1.0

@@ -35,7 +35,7 @@ COLUMNS = (*WRITTEN, PlaceColumn.ROAD)
 
 
 def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
-    """One task in each cycle whose view shows where the road ends, or what stands around."""
+    """Return one task in each cycle whose view shows where the road ends, or what stands around."""
     ends = context.percepts.road_boundary_m.shape[0]
     rays = 0 if context.scan is None else context.scan.range_m.shape[0]
     if not ends and not rays:

@@ -31,7 +31,7 @@ MAX_PLACES = 64
 
 
 def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
-    """One task if a need is eased, and nothing is known nearby that eases it."""
+    """Return one task if a need is eased, and nothing is known nearby that eases it."""
     agent = graph.agent
     if agent is None or agent.misfits.is_lost or not _unexplained(agent, graph):
         return []

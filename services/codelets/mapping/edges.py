@@ -27,7 +27,7 @@ class Edges(NamedTuple):
 
 
 def edges_of(boundary_m: Floats, rays: Rays, grid: LocalGrid) -> Edges:
-    """Where the road ends, by (n, 2) points in the robot's frame, and what rays hit.
+    """Return where the road ends, by (n, 2) points in the robot's frame, and what rays hit.
 
     Each two points within reach that are at most JOIN_M apart are joined; a point alone is taken
     for a mistake.

@@ -41,8 +41,8 @@ PLACE_CUE = ""
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task if a landmark comes again that was away for long, or the path grows along it since,
-    or along a known path.
+    """Return one task if a landmark comes again that was away for long, or the path grows along it
+    since, or along a known path.
     """
     percepts = context.percepts
     long_ago_ns = context.stamp_ns - config.revisit_s * 1e9

@@ -73,7 +73,7 @@ def extended(before: Observations | None, viewpoint: Viewpoint, percept: Percept
 
 
 def is_observed_from(observations: Observations | None, stamp_s: float) -> bool:
-    """If the newest observation is from the place at `stamp_s`, or from a later one."""
+    """Return whether the newest observation is from the place at `stamp_s`, or from a later one."""
     if observations is None:
         return False
 

@@ -49,8 +49,8 @@ VARIANCES = slice(PathColumn.VARIANCE_M2, PathColumn.VARIANCE_RAD2 + 1)
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task if the path grows, or a landmark is in view that was not observed from the path's
-    last place.
+    """Return one task if the path grows, or a landmark is in view that was not observed from the
+    path's last place.
     """
     percepts = context.percepts.objects
     last = graph.last_segment
@@ -123,8 +123,8 @@ CODELET = Codelet(
 
 
 def path_grows(graph: Graph, config: Config) -> bool:
-    """If the agent has gone `path_spacing_m` from the path's last place, or has got lost
-    there, or there is no path.
+    """Return whether the agent has gone `path_spacing_m` from the path's last place, or has got
+    lost there, or there is no path.
 
     That is by path integration alone: the pose believed may jump, or hardly move while the agent is
     lost.
@@ -210,7 +210,9 @@ def joins_of(path: Iterable[PathSegment], stamps_s: Floats) -> Constraints:
 
 
 def _is_apart(rows: Floats, agent: Self, spacing_m: float) -> bool:
-    """If path integration leads `spacing_m` or more from the last row, or there is none."""
+    """Return whether path integration leads `spacing_m` or more from the last row, or there is
+    none.
+    """
     if not len(rows):
         return True
 
@@ -219,7 +221,7 @@ def _is_apart(rows: Floats, agent: Self, spacing_m: float) -> bool:
 
 
 def _is_lost_since(rows: Floats, agent: Self) -> bool:
-    """If the agent has got lost since the last row: what it sees now, it may see from
+    """Return whether the agent has got lost since the last row: what it sees now, it may see from
     elsewhere.
     """
     if not agent.misfits.is_lost:

@@ -105,7 +105,7 @@ def clear_cells(rays: Rays, grid: LocalGrid) -> Booleans:
 
 
 def walls(rays: Rays, cell_m: float) -> tuple[Floats, Floats]:
-    """What was hit, as straight segments from (k, 2) to (k, 2).
+    """Return what was hit, as straight segments from (k, 2) to (k, 2).
 
     Each hit stands across its ray, as wide as the ray is there; hits of successive rays that are
     near each other are joined, for a wall that runs away from the agent.

@@ -2,7 +2,7 @@
 (paper §5.2).
 
 How much a place node is road follows from the last few views of it. What was taken for road is
-withdrawn where later views show other ground there.
+withdrawn if later views show other ground there.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ NOT_ROAD_M = (3.0, 8.0)
 
 
 def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
-    """One task in each cycle."""
+    """Return one task in each cycle."""
     task = context.task(CODELET.name, about=[SELF_ID], with_road=True, with_scan=True)
     return [task]
 

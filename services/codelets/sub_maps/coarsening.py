@@ -50,8 +50,8 @@ def coarser(fine: Places) -> Places:
     """The coarse place nodes of a rectangle that `fine` covers with a margin of MARGIN on each
     side.
 
-    One is as much road as any place in it. A link can be traversed where some row of the finer
-    links leads from beside the one node to beside the other; diagonally, where the row between them
+    One is as much road as any place in it. A link can be traversed if some row of the finer
+    links leads from beside the one node to beside the other; diagonally, if the row between them
     does.
     """
     road = np.max([_block(fine.road, i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)], axis=0)

@@ -31,7 +31,7 @@ class Extent(NamedTuple):
     height_m: float
 
     def differs_from(self, node: Map, tolerance_m: float) -> bool:
-        """Whether any border of it lies elsewhere than that of a sub-map, by more than this."""
+        """Return whether any border of it lies elsewhere than a sub-map's, by more than this."""
         sides_m = (self.width_m - node.width_m) / 2, (self.height_m - node.height_m) / 2
         middle_m = self.x_m - node.x_m, self.y_m - node.y_m
         for moved_m, grown_m in zip(middle_m, sides_m, strict=True):
@@ -42,7 +42,7 @@ class Extent(NamedTuple):
 
 
 def extent_of(positions_m: Floats) -> Extent:
-    """What (n, 2) positions cover."""
+    """Return what (n, 2) positions cover."""
     low_m = positions_m.min(axis=0)
     high_m = positions_m.max(axis=0)
     x_m, y_m = ((low_m + high_m) / 2).tolist()
@@ -51,7 +51,7 @@ def extent_of(positions_m: Floats) -> Extent:
 
 
 def is_outdated(node: Map, members: Mapping[int, Sequence[Object]]) -> bool:
-    """Whether a sub-map has lost its objects, or they cover another area by now."""
+    """Return whether a sub-map has lost its objects, or they cover another area by now."""
     (objects,) = members.values()
     if not objects:
         return True

@@ -42,9 +42,9 @@ ALL_ANEW_SHARE = 0.25
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task about the objects in view that are in no sub-map yet, and about one sub-map, another
-    in each cycle, if its objects are no longer where it says; about no node if so many objects are
-    in none that all are sorted anew.
+    """Return one task about the objects in view that are in no sub-map yet, and about one sub-map,
+    another in each cycle, if its objects are no longer where it says; about no node if so many
+    objects are in none that all are sorted anew.
     """
     maps = sub_maps_of(graph)
     known = sum(len(graph.links.sources(node.id, LinkKind.WITHIN)) for node in maps)
@@ -124,7 +124,7 @@ def _is_new(node: Object, graph: Graph) -> bool:
 
 
 def _scope(task: Task, graph: Graph) -> _Scope:
-    """What a task is about, and what that may change."""
+    """Return what a task is about, and what that may change."""
     if task.about:
         new = [node for node in nodes_of(graph, Object, task.about) if _is_new(node, graph)]
         moved = nodes_of(graph, Map, task.about)

@@ -1,4 +1,4 @@
-"""Which objects are neighbours: the Gabriel graph. Two are where no other lies inside the circle
+"""Which objects are neighbours: the Gabriel graph. Two are if no other lies inside the circle
 over the line between them.
 """
 
@@ -65,7 +65,7 @@ def comes_between(positions_m: Floats, edges: Indices, point_m: Floats) -> Boole
 
 
 def _without_self(found: Indices, rows: Indices) -> Indices:
-    """(k, c - 1): each row's nearest objects (k, c) without the object itself; where others at the
+    """(k, c - 1): each row's nearest objects (k, c) without the object itself; if others at the
     same place have displaced it, without the last.
     """
     is_other = found != rows[:, None]

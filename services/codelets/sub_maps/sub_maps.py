@@ -38,7 +38,7 @@ MAX_PARTED = 150
 class SubMaps:
     """Objects, and the labels of their sub-maps, (n,), which are kept as long as a sub-map exists.
 
-    Positions are (n, 2); functions (n,), from 0 to `kinds` - 1, or -1 where unknown; `boundaries`
+    Positions are (n, 2); functions (n,), from 0 to `kinds` - 1, or -1 if unknown; `boundaries`
     are what separates objects. A boundary within `clear_m`, (n,), of an object is of the object
     itself and separates nothing. Objects labelled NEW are in none yet.
     """
@@ -139,7 +139,7 @@ class SubMaps:
         self._rows[:, SPACING_SQUARES] = spacings**2
 
     def _scene(self, members: Indices) -> Scene:
-        """What is to be clustered of some objects, (m,)."""
+        """Return what is to be clustered of some objects, (m,)."""
         count = len(self._rows)
         number = np.full(count, -1)
         number[members] = np.arange(len(members))
@@ -151,7 +151,9 @@ class SubMaps:
 
 
 def _has_grown(size: int, growth: float) -> bool:
-    """If the last of so many objects completes another growth by a factor, since the first."""
+    """Return whether the last of so many objects completes another growth by a factor, since the
+    first.
+    """
     if size < 2:
         return False
 
