@@ -104,19 +104,12 @@ class IncrementalSolver:
         closures = graph.closures + closure
         self.graph = replace(graph, poses=poses, closures=closures)
 
+        # The cost of the path may be above what the linear updates predict.
         self._cost += update.chi_square
-        if self._is_inaccurate():
+        if cost(poses, self.graph.constraints) > (1 + TOLERANCE) * self._cost:
             self._relinearize(self.graph, ITERATIONS_PER_CLOSURE)
 
         return self.graph.poses
-
-    def _is_inaccurate(self) -> bool:
-        """Return whether the cost of the path is above what the linear updates predict."""
-        graph = self.graph
-        after = cost(graph.poses, graph.constraints)
-
-        predicted = (1 + TOLERANCE) * self._cost
-        return after > predicted
 
     def _update(self, closure: Constraints) -> _Update:
         root = sqrt_information(closure.information)[0]

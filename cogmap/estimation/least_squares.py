@@ -106,17 +106,12 @@ class _BlockPattern:
         blocks, target = np.unique(keys, return_inverse=True)
 
         self._sum = _summing(target, used, len(blocks), len(rows))
-        self._compress(blocks, unknown_poses)
 
-    def _compress(self, keys: Indices, unknown_poses: int) -> None:
-        """Note where blocks are stored: by column, and by row within it, as `keys` count them."""
-        self._indices = (keys % unknown_poses).astype(np.int32)
-
+        # Blocks are stored by column, and by row within it, as their keys count them.
         first_keys = np.arange(unknown_poses + 1) * unknown_poses
-        self._starts = np.searchsorted(keys, first_keys).astype(np.int32)
-
-        side = 3 * unknown_poses
-        self._shape = (side, side)
+        self._indices = (blocks % unknown_poses).astype(np.int32)
+        self._starts = np.searchsorted(blocks, first_keys).astype(np.int32)
+        self._shape = (3 * unknown_poses, 3 * unknown_poses)
 
     def summed(self, blocks: Floats) -> sparse.csc_matrix:
         """The matrix of (4 m, 3, 3) blocks, each transposed: columns are stored, and blocks by

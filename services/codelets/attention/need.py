@@ -101,19 +101,16 @@ def nearest_that_satisfies(need: nodes.Need, agent: Self, graph: Graph) -> Objec
     """
     function = SATISFIED_BY.get(need.label)
     found = [node for node in graph.of_kind(Object) if node.function == function]
-    unreachable = _sought_in_vain(need, graph)
+
+    # The goal for the need is sought in vain if the plan has no route to it.
+    plan = graph.get(Plan, PLAN_ID)
+    goal = graph.get(Goal, goal_id(need.label))
+    unreachable = ""
+    if plan is not None and goal is not None and goal.id in plan.unreachable:
+        unreachable = object_id(goal.object)
 
     def order(node: Object) -> tuple[float, str]:
         return math.dist((node.x_m, node.y_m), (agent.x_m, agent.y_m)), node.id
 
     here = [node for node in found if node.map == agent.map and node.id != unreachable]
     return min(here, key=order, default=None)
-
-
-def _sought_in_vain(need: nodes.Need, graph: Graph) -> str:
-    """The object that is the goal for a need and has no route; empty if there is none."""
-    plan = graph.get(Plan, PLAN_ID)
-    goal = graph.get(Goal, goal_id(need.label))
-    if plan is None or goal is None or goal.id not in plan.unreachable:
-        return ""
-    return object_id(goal.object)

@@ -53,8 +53,8 @@ class Movement:
         return moved_m / self._cell_m, after[:, 2] - before[:, 2]
 
 
-class Links(NamedTuple):
-    """Links by the direction, (k,), and the cell, (k, 2), that each belongs to."""
+class CellLinks(NamedTuple):
+    """CellLinks by the direction, (k,), and the cell, (k, 2), that each belongs to."""
 
     direction: Indices
     cells: Indices
@@ -63,7 +63,7 @@ class Links(NamedTuple):
         """(k,): a number for each link."""
         return _keys(self.cells) * _DIRECTIONS + self.direction
 
-    def moved(self, movement: Movement) -> Links:
+    def moved(self, movement: Movement) -> CellLinks:
         """The links nearest to where these move to."""
         offsets = LINK_OFFSETS[self.direction]
         middles, turned_rad = movement.moved(self.cells + offsets / 2)
@@ -74,17 +74,17 @@ class Links(NamedTuple):
         direction = octant % _DIRECTIONS
 
         cells = np.rint(middles - LINK_OFFSETS[direction] / 2)
-        return Links(direction, cells.astype(np.int64))
+        return CellLinks(direction, cells.astype(np.int64))
 
-    def neighbourhood(self) -> Links:
+    def neighbourhood(self) -> CellLinks:
         """These links and those of their direction in the eight cells around, once each."""
         cells = self.cells[:, None, :] + NEIGHBOURHOOD
         direction = np.repeat(self.direction, len(NEIGHBOURHOOD))
-        links = Links(direction, cells.reshape(-1, 2))
-        return Links.of(np.unique(links.keys()))
+        links = CellLinks(direction, cells.reshape(-1, 2))
+        return CellLinks.of(np.unique(links.keys()))
 
     @classmethod
-    def of(cls, keys: Indices) -> Links:
+    def of(cls, keys: Indices) -> CellLinks:
         """The links with these numbers."""
         cell_keys, direction = np.divmod(keys, _DIRECTIONS)
         return cls(direction, _cells(cell_keys))
@@ -177,7 +177,7 @@ def _move_links(graph: Graph, movement: Movement) -> Iterator[Operation]:
     if not len(evidence):
         return
 
-    links = Links(np.concatenate(directions), np.concatenate(found))
+    links = CellLinks(np.concatenate(directions), np.concatenate(found))
     known = Known(links.keys(), evidence)
     arrived = links.moved(movement)
     around = arrived.neighbourhood()
@@ -196,7 +196,7 @@ def _move_links(graph: Graph, movement: Movement) -> Iterator[Operation]:
 
     before = known.values_at(merged.keys)
     is_changed = after != before
-    changed = Links.of(merged.keys[is_changed])
+    changed = CellLinks.of(merged.keys[is_changed])
     weights = weights_of(after[is_changed].astype(np.float32))
     has_new_weight = weights != weights_of(before[is_changed].astype(np.float32))
     for direction, column in enumerate(EVIDENCE_COLUMNS):

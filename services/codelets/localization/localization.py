@@ -42,10 +42,10 @@ from cogmap.services.codelets.localization.information import (
 )
 from cogmap.services.codelets.localization.measurement_model import (
     GATE,
-    Sighting,
+    Measurements,
     compare,
     log_likelihood,
-    sightings,
+    measurements,
 )
 from cogmap.services.codelets.localization.misfits import (
     Estimate,
@@ -112,7 +112,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         before_it = agent.misfits
         found = Estimate(moved, 1.0, before_it.count, before_it.label, before_it.is_lost)
 
-    seen = sightings(task.percepts, graph, config.largest_landmark_sd_m, stationary_since_ns)
+    seen = measurements(task.percepts, graph, config.largest_landmark_sd_m, stationary_since_ns)
     if seen is not None:
         since = variances - variances_when_placed(graph, seen)
         weights = new_share(moved, seen, since) / config.correlated_views
@@ -160,7 +160,7 @@ CODELET = Codelet(
 
 
 def correct(
-    past: Estimate, seen: Sighting, weights: Floats, config: Config, rng: np.random.Generator
+    past: Estimate, seen: Measurements, weights: Floats, config: Config, rng: np.random.Generator
 ) -> Estimate:
     """Reject samples by what is in view, each landmark by its weight (k,).
 

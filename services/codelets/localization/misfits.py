@@ -18,11 +18,11 @@ from cogmap.schemas.nodes import NEVER_NS, Self
 from cogmap.schemas.sensing import Percept
 from cogmap.services.codelets.config import Config
 from cogmap.services.codelets.localization.measurement_model import (
-    Sighting,
+    Measurements,
     compare,
     cost_of_mistake,
     log_likelihood,
-    sightings,
+    measurements,
 )
 from cogmap.services.codelets.localization.recovery import (
     MIN_FITTING,
@@ -64,7 +64,7 @@ class Estimate:
     is_not_elsewhere: bool = False
 
 
-def misfit(past: Estimate, seen: Sighting) -> Estimate:
+def misfit(past: Estimate, seen: Measurements) -> Estimate:
     """The estimate after a view in which nothing fits. If several landmarks do not, the agent is
     elsewhere; one that does not for long stands elsewhere, or is another.
     """
@@ -113,7 +113,7 @@ def relocalized(
     rng: np.random.Generator,
 ) -> Estimate:
     """Return where the agent is by all `percepts`, after a view in which something does not fit."""
-    seen = sightings(percepts, graph, config.largest_landmark_sd_m, NEVER_NS)
+    seen = measurements(percepts, graph, config.largest_landmark_sd_m, NEVER_NS)
     if seen is None:
         return found
     if found.is_lost:
@@ -121,7 +121,7 @@ def relocalized(
     return _reconsidered(found, seen, rng)
 
 
-def _where_most_fits(lost: Estimate, seen: Sighting, rng: np.random.Generator) -> Estimate:
+def _where_most_fits(lost: Estimate, seen: Measurements, rng: np.random.Generator) -> Estimate:
     """Relocalize by all that is `seen`, once several landmarks have not fitted for long.
 
     The agent is where most of them fit one pose, together, all the sooner the more do; else, after
@@ -146,7 +146,7 @@ def _where_most_fits(lost: Estimate, seen: Sighting, rng: np.random.Generator) -
     return lost
 
 
-def _reconsidered(doubtful: Estimate, seen: Sighting, rng: np.random.Generator) -> Estimate:
+def _reconsidered(doubtful: Estimate, seen: Measurements, rng: np.random.Generator) -> Estimate:
     """The pose that explains all that is `seen` so much better that more than one landmark would
     have to be mistaken for the agent to be where it is believed.
 
@@ -168,7 +168,7 @@ def _reconsidered(doubtful: Estimate, seen: Sighting, rng: np.random.Generator) 
     return Estimate(found, 0.0, was_kidnapped=True)
 
 
-def _best_log_likelihood(samples: Floats, seen: Sighting) -> float:
+def _best_log_likelihood(samples: Floats, seen: Measurements) -> float:
     """The logarithm of the likelihood of what is seen at the one of (n, 7) samples which explains
     it best, at most 0.
     """

@@ -48,7 +48,8 @@ def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
 
     answer = Answer()
     for function in _unexplained(agent, graph):
-        label = _unused_label(graph)
+        labels = (individual_label(LOOK, number) for number in range(1, MAX_PLACES + 1))
+        label = next((each for each in labels if object_id(each) not in graph.nodes), "")
         if not label:
             continue
 
@@ -94,13 +95,3 @@ def _unexplained(agent: Self, graph: Graph) -> list[str]:
 
     eased = [SATISFIED_BY.get(need.label, "") for need in graph.of_kind(Need) if need.is_eased]
     return [function for function in eased if function and function not in near]
-
-
-def _unused_label(graph: Graph) -> str:
-    """The label of an individual that the map lacks; empty if it has MAX_PLACES of them."""
-    for number in range(1, MAX_PLACES + 1):
-        label = individual_label(LOOK, number)
-        if object_id(label) not in graph.nodes:
-            return label
-
-    return ""

@@ -18,9 +18,14 @@ from cogmap.schemas.codelets import Task
 from cogmap.schemas.graph import DropNode, DropPlaces, Links, Operation, Phase
 from cogmap.schemas.nodes import ROOT_MAP, LinkKind, Map, Object, map_id, object_id
 from cogmap.services.codelets.nodes import nodes_of
+from cogmap.services.codelets.sub_maps.areas import (
+    MOVED_M,
+    area_covered,
+    is_outdated,
+    sub_map_node,
+)
 from cogmap.services.codelets.sub_maps.config import SECTION, Config
 from cogmap.services.codelets.sub_maps.cut_links import CutLinks
-from cogmap.services.codelets.sub_maps.extents import MOVED_M, extent_of, is_outdated, sub_map_node
 from cogmap.services.codelets.sub_maps.labels import NEW
 from cogmap.services.codelets.sub_maps.members import (
     maps_around,
@@ -76,10 +81,10 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     operations: list[Operation] = []
     positions_m = positions_of(scope.objects)
     for number in np.unique(numbers).tolist():
-        extent = extent_of(positions_m[numbers == number])
+        area = area_covered(positions_m[numbers == number])
         before = graph.get(Map, map_id(number))
-        if before is None or extent.differs_from(before, MOVED_M):
-            operations.append(sub_map_node(number, extent, graph))
+        if before is None or area.differs_from(before, MOVED_M):
+            operations.append(sub_map_node(number, area, graph))
             if before is not None:
                 operations.append(DropPlaces(map=before.id))
 

@@ -13,7 +13,7 @@ from cogmap.graph.window import Extent
 from cogmap.schemas.graph import Operation
 from cogmap.schemas.nodes import ROOT_MAP, Map
 from cogmap.services.codelets.cells import changed_cells
-from cogmap.services.codelets.sub_maps.extents import COARSEST
+from cogmap.services.codelets.sub_maps.areas import COARSEST
 from cogmap.services.codelets.sub_maps.members import is_sub_map, pose_of, sub_maps_of
 from cogmap.services.codelets.sub_maps.resampling import COLUMNS, Grid, cells_below, resampled
 
