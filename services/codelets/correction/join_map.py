@@ -7,12 +7,15 @@ of the recalled map, whose objects and place nodes are then known as if it had s
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import msgspec
 import numpy as np
 
 from cogmap.errors import MessageError
 from cogmap.geometry.se2 import transform_from
 from cogmap.graph.graph import Graph
+from cogmap.graph.window import EVIDENCE_COLUMNS, WEIGHT_COLUMNS
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext, NoSettings
 from cogmap.schemas.array import Matrix
 from cogmap.schemas.codelets import Task
@@ -22,6 +25,7 @@ from cogmap.schemas.nodes import (
     PLAN_ID,
     RECOLLECTION_ID,
     ROOT_MAP,
+    TILE_SIDE,
     CorrectionColumn,
     Goal,
     GraphNode,
@@ -34,11 +38,12 @@ from cogmap.schemas.nodes import (
     Recollection,
     Self,
 )
+from cogmap.services.codelets.cells import written_cells
 from cogmap.services.codelets.correction.apply_correction import moved
 from cogmap.services.codelets.correction.place_columns import MOVED_COLUMNS
 from cogmap.services.codelets.correction.recalled_objects import recalled_objects
-from cogmap.services.codelets.correction.recalled_places import recalled_places
 from cogmap.services.codelets.correction.recalled_sub_maps import recalled_sub_maps
+from cogmap.services.codelets.mapping.evidence import weights_of
 
 
 def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
@@ -98,3 +103,21 @@ CODELET = Codelet(
     reads=frozenset({*MOVED, Recollection, Observations, LinkKind.WITHIN, *MOVED_COLUMNS}),
     writes=frozenset({*MOVED, Recollection, LinkKind.AT, LinkKind.WITHIN, *MOVED_COLUMNS}),
 )
+
+
+def recalled_places(recalled: Recollection) -> Iterator[Operation]:
+    """Return what is known of the recalled place nodes, and the weights of their links by the
+    evidence.
+    """
+    weight_of = dict(zip(EVIDENCE_COLUMNS, WEIGHT_COLUMNS, strict=True))
+    corners = np.array(recalled.tiles).reshape(-1, 2) * TILE_SIDE
+    for column, matrix in recalled.columns.items():
+        every = np.asarray(matrix.numpy(), np.float32)
+        tile, number = np.nonzero(every)
+        i, j = np.divmod(number, TILE_SIDE)
+        cells = corners[tile] + np.column_stack([i, j])
+        values = every[tile, number]
+
+        yield from written_cells(column, cells, values)
+        if column in weight_of:
+            yield from written_cells(weight_of[column], cells, weights_of(values))

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import msgspec
 import numpy as np
+from scipy.special import chdtri
 
 from cogmap.estimation.alignment import motion_onto
 from cogmap.estimation.gnc import inliers
@@ -47,7 +48,6 @@ from cogmap.schemas.nodes import (
     PathSegment,
 )
 from cogmap.services.codelets.config import SECTION, Config
-from cogmap.services.codelets.correction.deferral import FALSE_CLOSURE, may_be_deferred
 from cogmap.services.codelets.correction.joint import optimize_jointly
 from cogmap.services.codelets.correction.synapses import replay_of
 from cogmap.services.codelets.mapping.observations import Sightings
@@ -59,6 +59,12 @@ IMPOSSIBLE_SD = 5.0
 MAX_ROUNDS = 3
 SAME_RAD = 0.05
 SHORT_SEGMENTS = 8
+# A loop closure is rejected if a true one would misfit as much with a smaller probability.
+FALSE_CLOSURE = 1e-3
+# The path explains a closure whose misfit is at most this share of that at which it is rejected.
+EXPLAINED_MISFIT = 0.1
+# The path is corrected from this share of new closures on that it does not explain.
+UNEXPLAINED_SHARE = 0.1
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
@@ -144,6 +150,21 @@ CODELET = Codelet(
     config=Config,
     section=SECTION,
 )
+
+
+def may_be_deferred(closures: list[LoopClosure], rows: Floats) -> bool:
+    """Return whether the path `rows`, as it is believed, explains all but a share of the closures,
+    or all but so few that they close no loop.
+    """
+    poses = rows[:, POSE]
+    views = views_of(closures, rows)
+    constraints = constraints_of(views, poses)
+    squared = mahalanobis2(residuals(poses, constraints), constraints.information)
+
+    degrees = np.where(views.has_heading, 3, 2)
+    misfit = squared / chdtri(degrees, FALSE_CLOSURE)
+    unexplained = int((misfit > EXPLAINED_MISFIT).sum())
+    return unexplained < max(MIN_AGREEING, UNEXPLAINED_SHARE * len(closures))
 
 
 class _Judgement(NamedTuple):

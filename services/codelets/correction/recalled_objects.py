@@ -50,7 +50,26 @@ def recalled_objects(recalled: Recollection, graph: Graph, pose: Floats) -> list
             own = next(name for name in names if name not in taken)
 
         taken.add(own)
-        node = _recalled_object(recalled, number, own, node_of.get(own), graph)
+        row = recalled.objects.numpy()[number].tolist()
+        here = node_of.get(own)
+        if here is None:
+            here = Object(id=object_id(own), label=own, x_m=0.0, y_m=0.0, last_seen_ns=NEVER_NS)
+
+        # It is as it was recalled, with what was learned of it in this run.
+        node = msgspec.structs.replace(
+            here,
+            base_level=1.0,
+            cycle=graph.cycle,
+            function=recalled.functions[number] or here.function,
+            x_m=row[RecalledColumn.X_M],
+            y_m=row[RecalledColumn.Y_M],
+            x_sd_m=row[RecalledColumn.X_SD_M],
+            y_sd_m=row[RecalledColumn.Y_SD_M],
+            width_m=row[RecalledColumn.WIDTH_M],
+            height_m=row[RecalledColumn.HEIGHT_M],
+            sightings=here.sightings + int(row[RecalledColumn.SIGHTINGS]),
+            offsets_m=None,
+        )
         place = nearest_place(node.x_m, node.y_m, graph.cell_m(ROOT_MAP))
         operations += [node, Link(source=node.id, target=place, kind=LinkKind.AT)]
 
@@ -96,29 +115,3 @@ def _standing_there(
             nearest_m = away_m
 
     return found
-
-
-def _recalled_object(
-    recalled: Recollection, number: int, label: str, known: Object | None, graph: Graph
-) -> Object:
-    """A recalled object, with what was learned of it in this run."""
-    row = recalled.objects.numpy()[number].tolist()
-    sightings = int(row[RecalledColumn.SIGHTINGS])
-    node = known
-    if node is None:
-        node = Object(id=object_id(label), label=label, x_m=0.0, y_m=0.0, last_seen_ns=NEVER_NS)
-
-    return msgspec.structs.replace(
-        node,
-        base_level=1.0,
-        cycle=graph.cycle,
-        function=recalled.functions[number] or node.function,
-        x_m=row[RecalledColumn.X_M],
-        y_m=row[RecalledColumn.Y_M],
-        x_sd_m=row[RecalledColumn.X_SD_M],
-        y_sd_m=row[RecalledColumn.Y_SD_M],
-        width_m=row[RecalledColumn.WIDTH_M],
-        height_m=row[RecalledColumn.HEIGHT_M],
-        sightings=node.sightings + sightings,
-        offsets_m=None,
-    )

@@ -117,7 +117,9 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         since = variances - variances_when_placed(graph, seen)
         weights = new_share(moved, seen, since) / config.correlated_views
         found = correct(found, seen, weights, config, rng)
-        found = inflated(found, _path_sd_m(agent.odometry, variances), rng)
+        away_m2 = agent.odometry.x_m**2 + agent.odometry.y_m**2
+        path_m2 = float(variances[0]) + float(variances[1]) * away_m2
+        found = inflated(found, math.sqrt(path_m2), rng)
 
     gains = found.samples[:, POSE_COLUMNS:].mean(axis=0)
     odometry = dead_reckon(agent.odometry.pose(), motions, gains)
@@ -209,15 +211,6 @@ def _is_heading_unknown(headings_rad: Floats) -> bool:
     mean_x = np.cos(headings_rad).mean()
     mean_y = np.sin(headings_rad).mean()
     return bool(np.hypot(mean_x, mean_y) < ALIKE)
-
-
-def _path_sd_m(odometry: PathIntegration, variances: Floats) -> float:
-    """The standard deviation of the position by path integration alone, by its `variances` since
-    the start, in m^2 and rad^2.
-    """
-    variance_m2, variance_rad2 = variances.tolist()
-    away_m2 = odometry.x_m**2 + odometry.y_m**2
-    return math.sqrt(variance_m2 + variance_rad2 * away_m2)
 
 
 def _self_node(task: Task, agent: Self, found: Estimate) -> Self:

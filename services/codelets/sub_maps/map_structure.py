@@ -26,7 +26,6 @@ from cogmap.services.codelets.sub_maps.areas import (
 )
 from cogmap.services.codelets.sub_maps.config import SECTION, Config
 from cogmap.services.codelets.sub_maps.cut_links import CutLinks
-from cogmap.services.codelets.sub_maps.labels import NEW
 from cogmap.services.codelets.sub_maps.members import (
     maps_around,
     members_of,
@@ -35,7 +34,7 @@ from cogmap.services.codelets.sub_maps.members import (
     positions_of,
     sub_maps_of,
 )
-from cogmap.services.codelets.sub_maps.sub_maps import SubMaps
+from cogmap.services.codelets.sub_maps.sub_maps import NEW, SubMaps
 
 # Views of an object before it gets into a sub-map.
 MIN_SIGHTINGS = 2

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.services.codelets.sub_maps.config import Config
-from cogmap.services.codelets.sub_maps.labels import NEW, kept_labels
 from cogmap.services.codelets.sub_maps.mixture import (
     SPACING_SQUARES,
     SPACING_SUM,
@@ -33,6 +33,8 @@ REVIEW_GROWTH = 1.6
 MAX_REVIEWED = 600
 RARE_REVIEW_GROWTH = REVIEW_GROWTH**2
 MAX_PARTED = 150
+# The label of objects that are in no sub-map yet.
+NEW = -1
 
 
 class SubMaps:
@@ -159,3 +161,30 @@ def _has_grown(size: int, growth: float) -> bool:
 
     step = math.log(growth)
     return math.floor(math.log(size) / step) > math.floor(math.log(size - 1) / step)
+
+
+def kept_labels(before: Indices, after: Indices, next_label: int) -> Indices:
+    """(n,): the partition `after` with the labels of `before`, NEW of objects that had none.
+
+    Each cluster keeps the label of the one that it shares most objects with; of several that claim
+    one label, and of several labels for one cluster, the most objects in all decide. Clusters that
+    are left over get new labels from `next_label`, in the order of their first objects.
+    """
+    names, number = np.unique(after, return_inverse=True)
+    had_label = before != NEW
+    old_names, old_number = np.unique(before[had_label], return_inverse=True)
+
+    shared = np.zeros((len(names), len(old_names)))
+    np.add.at(shared, (number[had_label], old_number), 1.0)
+    clusters, olds = linear_sum_assignment(shared, maximize=True)
+    is_shared = shared[clusters, olds] > 0
+
+    labels = np.full(len(names), NEW)
+    labels[clusters[is_shared]] = old_names[olds[is_shared]]
+
+    _, first = np.unique(after, return_index=True)
+    fresh = np.flatnonzero(labels == NEW)
+    fresh = fresh[np.argsort(first[fresh])]
+    labels[fresh] = next_label + np.arange(len(fresh))
+    kept: Indices = labels[number]
+    return kept
