@@ -121,7 +121,11 @@ def by_cameras(
 
     for name, sections in configured.items():
         rendered = with_cameras(sections)
-        modules = _replayed(sensor_log) if results else _sensing(rendered, sensor_log)
+        if results:
+            modules = [sensor_log.player()]
+        else:
+            modules = [registry.build(module, rendered) for module in ("sim", *SENSES)]
+            modules.append(sensor_log.recorder())
         modules += [registry.build(module, rendered) for module in cognition]
         results[name] = drive(rendered, modules)
 
@@ -132,12 +136,3 @@ def by_cameras(
 
     progress(1.0)
     return results
-
-
-def _sensing(rendered: Sections, sensor_log: SensorLog) -> list[Module]:
-    senses = [registry.build(module, rendered) for module in ("sim", *SENSES)]
-    return [*senses, sensor_log.recorder()]
-
-
-def _replayed(sensor_log: SensorLog) -> list[Module]:
-    return [sensor_log.player()]

@@ -102,36 +102,39 @@ class Outcome:
         return analysis.landmark_weight(self_motion_m, landmarks_m)
 
     def metrics(self) -> Metrics:
-        """Every metric, flat; lengths in metres."""
+        """Return every metric, flat, beside those published; lengths in metres."""
         metrics: Metrics = {}
-        for condition in self.errors_m:
-            metrics |= self._of(condition)
+        for condition, errors_m in self.errors_m.items():
+            name = condition.value
+            metrics |= {
+                f"sd_{name}_m": self.sd_m(condition),
+                f"rmse_{name}_m": self.rmse_m(condition),
+                f"lost_trials_{name}": float(analysis.lost(errors_m)),
+                f"published_simulation_sd_{name}_m": published.SD_M[condition],
+                f"published_simulation_rmse_{name}_m": published.RMSE_M[condition],
+            }
 
         metrics["sd_optimal_m"] = self.optimal_sd_m
         metrics["sd_both_over_optimal"] = metrics["sd_both_m"] / self.optimal_sd_m
-        return metrics | self._conflict() | self._protocol()
-
-    def _of(self, condition: Condition) -> Metrics:
-        """The metrics of one condition, beside those published."""
-        name = condition.value
-        lost = analysis.lost(self.errors_m[condition])
-        return {
-            f"sd_{name}_m": self.sd_m(condition),
-            f"rmse_{name}_m": self.rmse_m(condition),
-            f"lost_trials_{name}": float(lost),
-            f"published_simulation_sd_{name}_m": published.SD_M[condition],
-            f"published_simulation_rmse_{name}_m": published.RMSE_M[condition],
+        metrics |= self.conflict_metrics()
+        return metrics | {
+            "sigma_v": self.noise.speed,
+            "sigma_w": self.noise.turn,
+            "distance_noise": self.noise.distance,
+            "trials_a_condition": float(len(self.errors_m[Condition.BOTH])),
         }
 
-    def _conflict(self) -> Metrics:
-        """How likely the conflict's responses are where cues are integrated, and where they
+    def conflict_metrics(self) -> Metrics:
+        """Return how likely the conflict's responses are if cues are integrated, and if they
         alternate.
 
         Both predictions follow from the conditions with one cue, with nothing left to fit; the best
         alternation has the share of landmarks that suits it most.
         """
         conflict_m = self.errors_m[Condition.CONFLICT]
-        own, seen = self._single_cues()
+        own = Gaussian.of(self.errors_m[Condition.SELF_MOTION])
+        landmarks_m = self.errors_m[Condition.LANDMARKS]
+        seen = Gaussian.of(analysis.turned_errors(landmarks_m, self.shift_m))
 
         integrated = analysis.combined(own, seen).log_density(conflict_m)
         alternated = analysis.alternation_log_densities(conflict_m, own, seen, self.landmark_weight)
@@ -150,25 +153,6 @@ class Outcome:
             "integration_over_alternation_median_of_a_trial": float(np.median(differences)),
             "integration_likelier_share": float(is_likelier.mean()),
             "integration_over_best_alternation": total - best,
-        }
-
-    def _single_cues(self) -> tuple[Gaussian, Gaussian]:
-        """The conflict's responses by self-motion alone, and by the turned landmarks alone."""
-        self_motion_m = self.errors_m[Condition.SELF_MOTION]
-        self_motion = Gaussian.of(self_motion_m)
-
-        landmarks_m = self.errors_m[Condition.LANDMARKS]
-        turned_m = analysis.turned_errors(landmarks_m, self.shift_m)
-        landmarks = Gaussian.of(turned_m)
-        return self_motion, landmarks
-
-    def _protocol(self) -> Metrics:
-        trials = len(self.errors_m[Condition.BOTH])
-        return {
-            "sigma_v": self.noise.speed,
-            "sigma_w": self.noise.turn,
-            "distance_noise": self.noise.distance,
-            "trials_a_condition": float(trials),
         }
 
 

@@ -54,7 +54,7 @@ def _sd_of_true(felt: float, noise: float) -> float:
 def sightings(
     pose: Pose, things: Mapping[str, Point], noise: Noise, rng: np.random.Generator
 ) -> list[Percept]:
-    """All things, by label, wherever the participant faces: it looks around."""
+    """Return percepts of all things, by label, wherever the participant faces: it looks around."""
     sd = noise.distance
     seen = []
 
@@ -62,25 +62,20 @@ def sightings(
         true_bearing_rad, distance_m = pose.towards(position)
         range_m = distance_m * float(rng.normal(1.0, sd))
         bearing_rad = true_bearing_rad + float(rng.normal(0.0, sd))
-        seen.append(_percept(label, bearing_rad, range_m, sd, sd * range_m))
+        seen.append(
+            Percept(
+                label=label,
+                activation=1.0,
+                evidence=1.0,
+                bearing_rad=bearing_rad,
+                range_m=range_m,
+                bearing_sd_rad=sd,
+                range_sd_m=sd * range_m,
+                width_m=0.1,
+                height_m=0.1,
+                whole=True,
+                box_px=(0, 0, 1, 1),
+            )
+        )
 
     return seen
-
-
-def _percept(
-    label: str, bearing_rad: float, range_m: float, bearing_sd_rad: float, range_sd_m: float
-) -> Percept:
-    """A small glowing thing."""
-    return Percept(
-        label=label,
-        activation=1.0,
-        evidence=1.0,
-        bearing_rad=bearing_rad,
-        range_m=range_m,
-        bearing_sd_rad=bearing_sd_rad,
-        range_sd_m=range_sd_m,
-        width_m=0.1,
-        height_m=0.1,
-        whole=True,
-        box_px=(0, 0, 1, 1),
-    )

@@ -120,7 +120,10 @@ def _labels(city: StructuredCity) -> Indices:
 def _metrics(found: Structured) -> dict[str, float]:
     city = found.city
     sizes = np.unique(found.labels, return_counts=True)[1]
-    areas_ha = [_area_ha(city.positions_m[found.labels == label]) for label in range(found.count)]
+    areas_ha = []
+    for label in range(found.count):
+        width_m, height_m = np.ptp(city.positions_m[found.labels == label], axis=0).tolist()
+        areas_ha.append(width_m * height_m / 1e4)
     stable = [adjusted_rand_index(found.labels, repeat) for repeat in found.repeats]
 
     metrics = {
@@ -155,12 +158,6 @@ def _separation(found: Structured) -> dict[str, float]:
         separation["crossed_between_share"] = float(is_crossed[~is_within].mean())
 
     return separation
-
-
-def _area_ha(positions_m: Floats) -> float:
-    """The area of the rectangle around (n, 2) positions, in hectares."""
-    width_m, height_m = np.ptp(positions_m, axis=0).tolist()
-    return float(width_m * height_m) / 1e4
 
 
 def _silhouette(positions_m: Floats, labels: Indices) -> float:

@@ -76,9 +76,10 @@ class _Programme:
 
 
 def shortest_tour(lengths: Floats) -> Indices:
-    """The order (n,) of the shortest closed tour by (n, n) symmetric lengths, beginning with 0.
+    """Find the order (n,) of the shortest closed tour by (n, n) symmetric lengths, beginning with
+    0.
 
-    A hundred goals take seconds, or half a minute. Raises CogmapError where the solver fails.
+    A hundred goals take seconds, or half a minute. Raises CogmapError if the solver fails.
     """
     count = len(lengths)
     if count < 4:
@@ -86,10 +87,7 @@ def shortest_tour(lengths: Floats) -> Indices:
 
     first, second = np.triu_indices(count, 1)
     edges = np.column_stack([first, second])
-    return _shortest(_Programme(count, edges, lengths[first, second]))
-
-
-def _shortest(programme: _Programme) -> Indices:
+    programme = _Programme(count, edges, lengths[first, second])
     bound, reduced_costs = _relaxation(programme)
     slack = _FIRST_SLACK * bound
 
@@ -131,7 +129,7 @@ def _relaxation(programme: _Programme) -> tuple[float, Floats]:
 
 
 def _whole(programme: _Programme) -> Floats | None:
-    """Which edges (m,) the shortest tour has, 1 or 0, None where there is no tour of them."""
+    """Choose the edges (m,) of the shortest tour, 1 or 0; None if there is no tour of them."""
     while True:
         leaves_sets = LinearConstraint(programme.cuts, 2, np.inf)
         result = milp(
@@ -152,7 +150,7 @@ def _whole(programme: _Programme) -> Floats | None:
 
 
 def _violated_sets(graph: csr_array) -> list[Booleans]:
-    """Sets of goals that a fractional tour leaves by less than two edges."""
+    """Return sets of goals that a fractional tour leaves by less than two edges."""
     parts, part = connected_components(graph, directed=False)
     if parts > 1:
         return [part == number for number in range(parts)]
@@ -165,19 +163,15 @@ def _violated_sets(graph: csr_array) -> list[Booleans]:
     for goal in range(1, graph.shape[0]):
         flow = maximum_flow(capacities, 0, goal)
         if flow.flow_value < 2 * _CAPACITY - _MIN_VIOLATION:
-            members = _reached(capacities - flow.flow)
+            # The goals that more could flow to from goal 0.
+            residual = capacities - flow.flow
+            residual.data[residual.data < 0] = 0
+            residual.eliminate_zeros()
+            members = np.zeros(residual.shape[0], bool)
+            members[breadth_first_order(residual, 0, return_predecessors=False)] = True
             violated[members.tobytes()] = members
 
     return list(violated.values())
-
-
-def _reached(residual: csr_array) -> Booleans:
-    """The goals that more could flow to from goal 0."""
-    residual.data[residual.data < 0] = 0
-    residual.eliminate_zeros()
-    reached = np.zeros(residual.shape[0], bool)
-    reached[breadth_first_order(residual, 0, return_predecessors=False)] = True
-    return reached
 
 
 def _visited(graph: csr_array) -> Indices:
