@@ -52,7 +52,7 @@ class Recorder:
     thread, `close()` it.
 
     `about` is kept in the file: the agent, the configuration, what else is to be known of the run.
-    `limit_bytes` may wait to be written. Raises LogError where the file cannot be written.
+    `limit_bytes` may wait to be written. Raises LogError if the file cannot be written.
     """
 
     def __init__(
@@ -84,7 +84,7 @@ class Recorder:
 
     @property
     def received(self) -> Counter[str]:
-        """How many messages of each topic have been written."""
+        """Return how many messages of each topic have been written."""
         return self._intake.received
 
     def open(self) -> None:
@@ -97,7 +97,7 @@ class Recorder:
     def pump(self, timeout_s: float | None = 0.0) -> bool:
         """Write the oldest arrival, waiting up to `timeout_s` for one, and flush when it is time.
 
-        Returns whether one came. Raises LogError where the disk takes no more.
+        Returns whether one came. Raises LogError if the disk takes no more.
         """
         due_s = self._flush_timer.due_in_s()
         found = self._take(due_s if timeout_s is None else min(timeout_s, due_s))
@@ -181,7 +181,7 @@ def run(
 ) -> Summary:
     """Record until `stop()` is true or the time is over.
 
-    Raises LogError where the disk takes no more; the log then holds what was flushed before.
+    Raises LogError if the disk takes no more; the log then holds what was flushed before.
     """
     recorder.open()
     log.info("recording to %s", recorder.path)

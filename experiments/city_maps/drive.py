@@ -41,7 +41,7 @@ class Tour:
 
 
 def sections(environment: Environment, tour: Tour, noise: Noise, method: str) -> Sections:
-    """The configuration of every module for one traversal, as for `cogmap run --config`."""
+    """Return the configuration of every module for one traversal, as for `cogmap run --config`."""
     correction = settings(method, SPEED_M_S / FRAME_HZ)
     sim = {
         "seed": tour.seed,
@@ -74,7 +74,7 @@ def _trajectory(environment: Environment, tour: Tour) -> dict[str, object]:
 
 
 def traverse(configured: Sections) -> Traversal:
-    """Drive one tour to its end. Raises CogmapError where a message was lost or refused."""
+    """Drive one tour to its end. Raises CogmapError if a message was lost or refused."""
     modules = [registry.build(name, configured) for name in MODULES]
     return driven(configured, modules)
 

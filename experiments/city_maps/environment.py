@@ -58,7 +58,7 @@ class Environment:
         return float(sum(_step_lengths_m(leg).sum() for leg in self.legs_m))
 
     def line(self, start: int, backward: bool, lead_m: float, overrun_m: float) -> Points:
-        """The tour past building `start`, all others and `start` again.
+        """Return the tour past building `start`, all others and `start` again.
 
         It begins `lead_m` before `start`, so that the building is approached, and ends `overrun_m`
         beyond where it began.
@@ -75,9 +75,9 @@ class Environment:
 
 
 def environments(city: City, number: int, seed: int) -> list[Environment]:
-    """`number` environments of `city`, from seeds of their own.
+    """Return `number` environments of `city`, from seeds of their own.
 
-    Raises UsageError where the city has no eight buildings that lie far enough apart along its
+    Raises UsageError if the city has no eight buildings that lie far enough apart along its
     streets.
     """
     streets = city.streets.connected()
@@ -144,7 +144,7 @@ def _choose(buildings_m: Points, usable: Indices, rng: np.random.Generator) -> l
 
 
 def _apart(buildings_m: Points, candidates: Sequence[int], min_m: float) -> list[int]:
-    """The first BUILDINGS of `candidates` that lie `min_m` from each other, or fewer."""
+    """Return the first BUILDINGS of `candidates` that lie `min_m` from each other, or fewer."""
     chosen: list[int] = []
 
     for candidate in candidates:
@@ -159,7 +159,9 @@ def _apart(buildings_m: Points, candidates: Sequence[int], min_m: float) -> list
 
 
 def _tour(streets: Streets, buildings_m: Points) -> tuple[list[int], list[Points]]:
-    """The order of the shortest tour past (n, 2) buildings, and its line from each to the next."""
+    """Return the order of the shortest tour past (n, 2) buildings, and its line from each to the
+    next.
+    """
     joined, fronts = streets.with_points(buildings_m)
     distances_m, before = joined.shortest_paths(fronts)
 
@@ -185,7 +187,7 @@ def _joined(lines: Sequence[Points]) -> Points:
 
 
 def _beginning(line_m: Points, length_m: float) -> Points:
-    """The first `length_m` of a line."""
+    """Return the first `length_m` of a line."""
     along_m = distances_along(line_m)
     before_m = line_m[along_m < length_m]
     end_m = interpolate(along_m, line_m, np.array([length_m]))

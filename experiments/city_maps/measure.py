@@ -66,7 +66,7 @@ class CityMap:
     learned: tuple[Learned, ...]
 
     def error_km2(self, method: str) -> float:
-        """The mean over the traversals."""
+        """Return the mean over the traversals."""
         errors_km2 = [one.error_km2[method] for one in self.learned]
         return float(np.mean(errors_km2))
 
@@ -81,7 +81,7 @@ class CityMap:
 
 
 def measure(environments: Sequence[Environment], noise: Noise, budget: Budget) -> list[CityMap]:
-    """All environments, the same from the same seed whatever the number of processes."""
+    """Return all environments, the same from the same seed whatever the number of processes."""
     every = jobs(environments, noise, budget.traversals, budget.seed)
     learned = parallel_map(traversed, every, budget.processes, budget.progress)
     maps = []
@@ -98,7 +98,7 @@ def measure(environments: Sequence[Environment], noise: Noise, budget: Budget) -
 def jobs(
     environments: Sequence[Environment], noise: Noise, traversals: int, seed: int
 ) -> list[Job]:
-    """All traversals of each environment, one environment after the other."""
+    """Return all traversals of each environment, one environment after the other."""
     found = []
 
     for place, environment in enumerate(environments):
@@ -146,7 +146,7 @@ def configurations(job: Job) -> dict[str, Sections]:
 
 
 def map_error_km2(learned_m: Points, true_m: Points) -> float:
-    """The sum of squared errors of the positions in km^2, as the paper has it.
+    """Return the sum of squared errors of the positions in km^2, as the paper has it.
 
     One that is missing errs as the others do on average; nothing known is NaN.
     """

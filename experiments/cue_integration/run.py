@@ -46,14 +46,14 @@ class Session:
         self.transcript = Transcript(COMPARED)
 
     def bodies(self) -> list[Module]:
-        """All that is not the mind. The room is the last, for it begins."""
+        """Return all that is not the mind. The room is the last, for it begins."""
         listener = self.transcript.module()
         subject = participant.build()
         world = room.build(self.room)
         return [listener, subject, world]
 
     def run(self) -> Response:
-        """Run it on the in-memory bus. Raises CogmapError where no response comes."""
+        """Run it on the in-memory bus. Raises CogmapError if no response comes."""
         mind = agent.modules(self.trial.number)
         runner = InProcessRunner([*mind, *self.bodies()])
         runner.run()
@@ -80,11 +80,13 @@ class Outcome:
     shift_m: float
 
     def sd_m(self, condition: Condition) -> float:
-        """The standard deviation of a condition's responses."""
+        """Return the standard deviation of a condition's responses."""
         return analysis.sd_m(self.errors_m[condition])
 
     def rmse_m(self, condition: Condition) -> float:
-        """The root mean squared distance of a condition's responses from where the post stood."""
+        """Return the root mean squared distance of a condition's responses from where the post
+        stood.
+        """
         return analysis.rmse_m(self.errors_m[condition])
 
     @property
@@ -96,7 +98,7 @@ class Outcome:
 
     @property
     def landmark_weight(self) -> float:
-        """What landmarks would weigh then."""
+        """Return what landmarks would weigh then."""
         self_motion_m = self.sd_m(Condition.SELF_MOTION)
         landmarks_m = self.sd_m(Condition.LANDMARKS)
         return analysis.landmark_weight(self_motion_m, landmarks_m)

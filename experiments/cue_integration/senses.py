@@ -23,7 +23,7 @@ UNKNOWN: Rows = [
 
 
 def self_motion(turn_rad: float, forward_m: float, noise: Noise, rng: np.random.Generator) -> Rows:
-    """A turn on the spot, then a distance straight on, as rows of SelfMotion: multiplied by
+    """Return a turn on the spot, then a distance straight on, as rows of SelfMotion: multiplied by
     Gaussians of mean one (§5.4).
 
     Their standard deviations follow from what is felt, all that a participant knows of them.
@@ -42,8 +42,8 @@ def self_motion(turn_rad: float, forward_m: float, noise: Noise, rng: np.random.
 
 
 def _sd_of_true(felt: float, noise: float) -> float:
-    """The standard deviation of the true value where that times a Gaussian of mean one was felt, to
-    the fourth order.
+    """Return the standard deviation of the true value where that times a Gaussian of mean one was
+    felt, to the fourth order.
 
     It is more than that of the factor: who has felt little may have felt a fraction of much.
     """

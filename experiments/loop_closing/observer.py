@@ -126,7 +126,7 @@ class Observer:
         )
 
     def loop(self) -> Loop:
-        """What was observed. Raises CogmapError where no loop was closed."""
+        """Return what was observed. Raises CogmapError if no loop was closed."""
         if self._before is None or self._after is None:
             raise CogmapError("no loop was closed on the path")
 

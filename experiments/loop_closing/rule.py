@@ -73,7 +73,7 @@ def close_laps(
 def _measured(
     distance_m: Floats, turn_rad: Floats, noise: Noise, laps: int, rng: np.random.Generator
 ) -> tuple[Floats, Floats]:
-    """Distances and errors of headings, (laps, n) each, as the wheels measure the n legs."""
+    """Return distances and errors of headings, (laps, n) each, as the wheels measure the n legs."""
     legs = len(distance_m)
     speed, drift, turn = rng.normal(0.0, 1.0, (3, laps, legs))
     measured_m = distance_m * (1 + noise.speed * speed)
@@ -96,7 +96,7 @@ def _displacements_m(distance_m: Floats, heading_rad: Floats) -> Floats:
 
 
 def _sum_before(values: Floats) -> Floats:
-    """The sum of all values before each, along the last axis."""
+    """Return the sum of all values before each, along the last axis."""
     sums: Floats = np.cumsum(values, axis=-1) - values
     return sums
 

@@ -45,7 +45,7 @@ NOISE = Noise(speed=Noise().speed / READINGS**0.5, turn=Noise().turn / READINGS*
 
 
 def trajectory() -> dict[str, Any]:
-    """A line round some blocks and a bit of it again, and landmarks along it."""
+    """Return a line round some blocks and a bit of it again, and landmarks along it."""
     line_m = [*CORNERS_M, AGAIN_M]
     landmarks = []
 
@@ -76,7 +76,7 @@ def _landmarks_m() -> list[list[float]]:
 
 
 def sections(seed: int, method: str) -> Sections:
-    """The configuration of every module, as for `cogmap run --config`, for one of METHODS."""
+    """Return the configuration of every module, as for `cogmap run --config`, for one of METHODS."""
     step_m = SPEED_M_S / FRAME_HZ
     sim = {
         "seed": seed,
@@ -106,7 +106,7 @@ def sections(seed: int, method: str) -> Sections:
 
 
 def drive(seed: int, method: str) -> Loop:
-    """Drive the loop once. Raises CogmapError where no loop is closed, or a message is refused."""
+    """Drive the loop once. Raises CogmapError if no loop is closed, or a message is refused."""
     configured = sections(seed, method)
     modules = [registry.build(name, configured) for name in MODULES]
     return driven(configured, modules)

@@ -47,8 +47,8 @@ class StructuredCity:
 
 
 def read_city(path: Path) -> StructuredCity:
-    """The city of an OpenStreetMap extract. Raises UsageError where it cannot be read, or has too
-    few buildings.
+    """Return the city of an OpenStreetMap extract. Raises UsageError if it cannot be read, or has
+    too few buildings.
     """
     extract = osm.read(path)
     streets = streets_of(extract, path)
@@ -76,7 +76,7 @@ def read_city(path: Path) -> StructuredCity:
 
 
 def _buildings(extract: Extract, middle: Floats) -> tuple[Floats, Floats, Indices]:
-    """The centres of buildings, (n, 2), half their widths, (n,), and their functions, (n,)."""
+    """Return the centres of buildings, (n, 2), half their widths, (n,), and their functions, (n,)."""
     centres_m = []
     half_widths_m = []
     functions = []

@@ -45,7 +45,7 @@ _OF_KEY = {
 
 
 def function_of(tags: Tags) -> str:
-    """One of FUNCTIONS; empty where the tags imply none."""
+    """One of FUNCTIONS; empty if the tags imply none."""
     for key, table in (("amenity", _OF_AMENITY), ("building", _OF_BUILDING)):
         function = _looked_up(tags, key, table)
         if function:

@@ -36,7 +36,7 @@ class Structured:
 
     @property
     def count(self) -> int:
-        """How many sub-maps there are."""
+        """Return how many sub-maps there are."""
         return len(np.unique(self.labels))
 
 
@@ -51,13 +51,13 @@ class Job:
 def measure(
     cities: Sequence[StructuredCity], seed: int, processes: int, progress: Progress
 ) -> list[Structured]:
-    """The sub-maps of each city."""
+    """Return the sub-maps of each city."""
     jobs = [Job(city, seed) for city in cities]
     return parallel_map(structured, jobs, processes, progress)
 
 
 def structured(job: Job) -> Structured:
-    """The sub-maps of one city, by all features and the weights that the system runs with."""
+    """Return the sub-maps of one city, by all features and the weights that the system runs with."""
     city = job.city
     rng = np.random.default_rng([job.seed, 0x5B])
     repeats = []
@@ -70,7 +70,7 @@ def structured(job: Job) -> Structured:
 
 
 def metrics_of(found: Sequence[Structured]) -> dict[str, float | str]:
-    """What is reported of each city, by keys that begin with its name."""
+    """Return what is reported of each city, by keys that begin with its name."""
     metrics: dict[str, float | str] = {}
     for each in found:
         for key, value in _metrics(each).items():
@@ -80,8 +80,8 @@ def metrics_of(found: Sequence[Structured]) -> dict[str, float | str]:
 
 
 def adjusted_rand_index(first: Indices, second: Indices) -> float:
-    """The adjusted Rand index of two partitions (n,) (Hubert and Arabie 1985): 1 where they are the
-    same, about 0 where they agree by chance alone.
+    """Return the adjusted Rand index of two partitions (n,) (Hubert and Arabie 1985): 1 where they
+    are the same, about 0 where they agree by chance alone.
     """
     _, row = np.unique(first, return_inverse=True)
     _, column = np.unique(second, return_inverse=True)
@@ -146,7 +146,7 @@ def _metrics(found: Structured) -> dict[str, float]:
 
 
 def _separation(found: Structured) -> dict[str, float]:
-    """How often a boundary is between neighbours of one sub-map, and of two."""
+    """Return how often a boundary is between neighbours of one sub-map, and of two."""
     city = found.city
     edges = neighbours(city.positions_m)
     clear_m = (city.half_widths_m + CLEARANCE_M)[edges]
@@ -161,8 +161,8 @@ def _separation(found: Structured) -> dict[str, float]:
 
 
 def _silhouette(positions_m: Floats, labels: Indices) -> float:
-    """The mean silhouette by distance (Rousseeuw 1987), of at most MAX_COMPARED objects, evenly
-    chosen; 0 where there is one sub-map.
+    """Return the mean silhouette by distance (Rousseeuw 1987), of at most MAX_COMPARED objects,
+    evenly chosen; 0 if there is one sub-map.
     """
     step = -(-len(labels) // MAX_COMPARED)
     positions_m = positions_m[::step]

@@ -59,7 +59,7 @@ class _Programme:
         return csr_array(rows)
 
     def reduced(self, is_kept: Booleans) -> _Programme:
-        """The same with fewer edges; a set that is added to one is added to both."""
+        """Return the same with fewer edges; a set that is added to one is added to both."""
         edges = self.edges[is_kept]
         lengths = self.lengths[is_kept]
         return _Programme(self.count, edges, lengths, self.sets)
@@ -107,8 +107,8 @@ def shortest_tour(lengths: Floats) -> Indices:
 
 
 def _relaxation(programme: _Programme) -> tuple[float, Floats]:
-    """The length of the shortest fractional tour, and by how much longer each edge (m,) that it
-    lacks would make it; cuts are added to the programme.
+    """Return the length of the shortest fractional tour, and by how much longer each edge (m,) that
+    it lacks would make it; cuts are added to the programme.
     """
     while True:
         result = _solved(
@@ -175,7 +175,9 @@ def _violated_sets(graph: csr_array) -> list[Booleans]:
 
 
 def _visited(graph: csr_array) -> Indices:
-    """The goals in the order of the tour that the graph consists of, to the nearer number first."""
+    """Return the goals in the order of the tour that the graph consists of, to the nearer number
+    first.
+    """
     order = [0]
     before = -1
 
@@ -190,7 +192,7 @@ def _visited(graph: csr_array) -> Indices:
 
 
 def _solved(result: OptimizeResult) -> OptimizeResult:
-    """The result. Raises CogmapError where there is none."""
+    """Return the result. Raises CogmapError if there is none."""
     if result.x is None:
         raise CogmapError(f"no shortest tour: {result.message}")
     return result

@@ -95,12 +95,14 @@ class BorderCells:
 
     @property
     def distances_m(self) -> Values:
-        """What each cell prefers."""
+        """Return what each cell prefers."""
         end_m = self.farthest_m + BORDER_M / 2
         return np.arange(0.0, end_m, BORDER_M)
 
     def tuning(self, sensed_m: float, sd_m: float) -> npt.NDArray[np.float32]:
-        """How much of its peak each cell fires at a sensed distance of that precision: (cells,)."""
+        """Return how much of its peak each cell fires at a sensed distance of that precision:
+        (cells,).
+        """
         deviations = (self.distances_m - sensed_m) / sd_m
         share = np.exp(-(deviations**2) / 2)
         return share.astype(np.float32)
@@ -112,7 +114,7 @@ class BorderCells:
 
 
 def place_centres_m(side_m: float) -> Values:
-    """Where place cells have their fields in a square room: (n, 2), PLACE_M apart."""
+    """Return where place cells have their fields in a square room: (n, 2), PLACE_M apart."""
     line_m = np.arange(PLACE_M / 2, side_m, PLACE_M)
     return _pairs(line_m)
 

@@ -48,7 +48,7 @@ class Played(msgspec.Struct, kw_only=True):
 class Player:
     """Publishes the messages of `reader` on `bus`, each when it is due.
 
-    Raises UsageError where the rate is not above 0.
+    Raises UsageError if the rate is not above 0.
     """
 
     def __init__(self, reader: LogReader, bus: Bus, choices: Choices, control: Control) -> None:

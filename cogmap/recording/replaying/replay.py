@@ -72,7 +72,7 @@ def run_job(job: Job, path: Path, build: Build, sections: Sections) -> Outcome:
 
 
 def _merged(sections: Sections, overrides: Sections) -> Sections:
-    """`sections`, with the keys of `overrides` in place of theirs."""
+    """Return `sections`, with the keys of `overrides` in place of theirs."""
     merged = {name: dict(section) for name, section in sections.items()}
     for name, section in overrides.items():
         merged.setdefault(name, {}).update(section)
@@ -85,7 +85,7 @@ def _run_all(
     processes: int,
     progress: Progress | None,
 ) -> list[Outcome]:
-    """Every job's outcome, in the order of `todo`; the longest begin first."""
+    """Return every job's outcome, in the order of `todo`; the longest begin first."""
     order = sorted(range(len(todo)), key=lambda index: -_cost(todo[index]))
     longest_first = [todo[index] for index in order]
     done = list(accumulate(_cost(job) for job in longest_first))
@@ -101,5 +101,5 @@ def _run_all(
 
 
 def _cost(job: Job) -> int:
-    """How long a job takes, beside others."""
+    """Return how long a job takes, beside others."""
     return 1 + job.input_bytes + len(job.steps)

@@ -17,7 +17,7 @@ class Stream:
     """The numbers of one source on one topic in one incarnation.
 
     `missing` are spans [start, end) of numbers up to `last` that have not come. `earlier` counts
-    the messages that the source published in earlier incarnations, UNKNOWN where it does not.
+    the messages that the source published in earlier incarnations, UNKNOWN if it does not.
     """
 
     topic: Topic
@@ -29,7 +29,7 @@ class Stream:
 
     @property
     def lost(self) -> int:
-        """How many numbers are missing."""
+        """Return how many numbers are missing."""
         lost = 0
         for start, end in self.missing:
             lost += end - start
@@ -77,7 +77,7 @@ class SequenceTracker:
             stream.follow(envelope.seq)
 
     def _begun(self, topic: Topic, envelope: Envelope) -> Stream:
-        """The stream that begins with a message; the source's stream before it has ended.
+        """Return the stream that begins with a message; the source's stream before it has ended.
 
         What came before the message is missing if it should be there.
         """
@@ -106,13 +106,13 @@ class SequenceTracker:
         return [self._streams[key] for key in sorted(self._streams)]
 
     def gaps(self) -> list[str]:
-        """A sentence for each stream that misses numbers, those of NEVER_DROP topics first."""
+        """Return a sentence for each stream that misses numbers, those of NEVER_DROP topics first."""
         broken = [stream for stream in self.streams if stream.missing]
         broken.sort(key=lambda stream: stream.topic.delivery is not Delivery.NEVER_DROP)
         return [_sentence(stream) for stream in broken]
 
     def lost(self) -> dict[str, int]:
-        """How many messages are missing, by topic."""
+        """Return how many messages are missing, by topic."""
         lost: dict[str, int] = {}
         for stream in self.streams:
             if stream.missing:
