@@ -32,7 +32,15 @@ def shortest_tour(distance: Matrix) -> tuple[float, list[int]]:
     if not np.isfinite(length):
         raise CogmapError("no tour: some of the buildings cannot be reached from the others")
 
-    return length, _order(best, _set_of(stops), last)
+    visited = _set_of(stops)
+    order = []
+    while last:
+        order.append(last)
+        _, before = best[visited, last]
+        visited &= ~(1 << last)
+        last = before
+
+    return length, [0, *reversed(order)]
 
 
 def _best_paths(distance: Matrix) -> Paths:
@@ -69,16 +77,3 @@ def _extended(best: Paths, visited: Sequence[int], onward: Matrix) -> tuple[floa
 def _set_of(stops: Iterable[int]) -> int:
     """Return a set of stops, a bit each."""
     return sum(1 << stop for stop in stops)
-
-
-def _order(best: Paths, visited: int, last: int) -> list[int]:
-    """Return the stops of the best path through `visited` that ends in `last`, from 0 on."""
-    order = []
-
-    while last:
-        order.append(last)
-        _, before = best[visited, last]
-        visited &= ~(1 << last)
-        last = before
-
-    return [0, *reversed(order)]

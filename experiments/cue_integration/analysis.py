@@ -27,23 +27,14 @@ def errors(trials: Sequence[Trial], responses: Sequence[Response]) -> Points:
     placed_m = np.array([response.position for response in responses])
     offsets_m = placed_m - targets_m
 
-    along, inward = _directions(trials)
+    turned_m = np.array([trial.turned_target for trial in trials])
+    shifts_m = turned_m - targets_m
+    along = shifts_m / np.hypot(*shifts_m.T)[:, None]
+    left = np.column_stack([-along[:, 1], along[:, 0]])
+    inward = left * np.array([[trial.side] for trial in trials])
     along_m = (offsets_m * along).sum(axis=1)
     inward_m = (offsets_m * inward).sum(axis=1)
     return np.column_stack([along_m, inward_m])
-
-
-def _directions(trials: Sequence[Trial]) -> tuple[Points, Points]:
-    """Unit vectors (n, 2) along and inward, as `errors` has them."""
-    targets_m = np.array([trial.target for trial in trials])
-    turned_m = np.array([trial.turned_target for trial in trials])
-    shifts_m = turned_m - targets_m
-    distances_m = np.hypot(*shifts_m.T)
-    along = shifts_m / distances_m[:, None]
-
-    left = np.column_stack([-along[:, 1], along[:, 0]])
-    sides = np.array([[trial.side] for trial in trials])
-    return along, left * sides
 
 
 def turned_errors(errors_m: Points, shift: float) -> Points:

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.optimize import Bounds, LinearConstraint, OptimizeResult, linprog, milp
+from scipy.optimize import Bounds, LinearConstraint, linprog, milp
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components, maximum_flow
 
@@ -111,17 +111,17 @@ def _relaxation(programme: _Programme) -> tuple[float, Floats]:
     it lacks would make it; cuts are added to the programme.
     """
     while True:
-        result = _solved(
-            linprog(
-                programme.lengths,
-                A_ub=-programme.cuts,
-                b_ub=np.full(len(programme.sets), -2.0),
-                A_eq=programme.degrees,
-                b_eq=np.full(programme.count, 2.0),
-                bounds=(0, 1),
-                method="highs",
-            )
+        result = linprog(
+            programme.lengths,
+            A_ub=-programme.cuts,
+            b_ub=np.full(len(programme.sets), -2.0),
+            A_eq=programme.degrees,
+            b_eq=np.full(programme.count, 2.0),
+            bounds=(0, 1),
+            method="highs",
         )
+        if result.x is None:
+            raise CogmapError(f"no shortest tour: {result.message}")
         violated = _violated_sets(programme.graph(result.x))
         if not violated:
             return float(result.fun), np.asarray(result.lower.marginals)
@@ -189,10 +189,3 @@ def _visited(graph: csr_array) -> Indices:
         if following[0] == 0:
             return np.array(order, np.int64)
         order.append(following[0])
-
-
-def _solved(result: OptimizeResult) -> OptimizeResult:
-    """Return the result. Raises CogmapError if there is none."""
-    if result.x is None:
-        raise CogmapError(f"no shortest tour: {result.message}")
-    return result

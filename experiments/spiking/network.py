@@ -126,7 +126,8 @@ def record(cues: Cues, side_m: float, seconds: float, rng: np.random.Generator) 
     centres_m = place_centres_m(side_m)
     integrated_m = rng.multivariate_normal(cues.mean_m, cues.covariance_m2, cycles)
 
-    place = _in_every_cycle(len(centres_m), cycles)
+    # Packed, all ones: a place cell fires in the cycles in which each of its inputs does.
+    place: Spikes = np.full((len(centres_m), math.ceil(cycles / 8)), 0xFF, np.uint8)
     grid = []
     border = []
 
@@ -145,9 +146,3 @@ def record(cues: Cues, side_m: float, seconds: float, rng: np.random.Generator) 
         border.append(spikes)
 
     return Recording(tuple(grid), tuple(border), place, centres_m)
-
-
-def _in_every_cycle(cells: int, cycles: int) -> Spikes:
-    """Packed spikes of cells that fire in all of so many cycles."""
-    groups = math.ceil(cycles / 8)
-    return np.full((cells, groups), 0xFF, np.uint8)
