@@ -20,7 +20,7 @@ class TopicDiff(msgspec.Struct, kw_only=True):
     """How a topic compares: messages in each log, the `same` in both, those that differ or are in
     one only.
 
-    `first` is the first difference in words, empty where there is none.
+    `first` is the first difference in words, empty if there is none.
     """
 
     topic: str
@@ -44,7 +44,7 @@ class Diff(msgspec.Struct, kw_only=True):
 
 
 def model_topics() -> list[Topic]:
-    """The topics whose bytes are the same for the same seed."""
+    """Return the topics whose bytes are the same for the same seed."""
     return [topic for topic in topics.ALL if topic.scope is Scope.MODEL]
 
 
@@ -57,7 +57,7 @@ def diff(
     """Compare the messages on `chosen`, every MODEL topic where it is None, by source, incarnation
     and number.
 
-    Raises LogError where one is no log, or damaged.
+    Raises LogError if one is no log, or damaged.
     """
     if chosen is None:
         chosen = model_topics()
@@ -139,7 +139,9 @@ class _Comparison:
 
 
 def _names(left: Path, right: Path) -> tuple[str, str]:
-    """How sentences call the two logs: by their files' names, or by paths where these are equal."""
+    """Return how sentences call the two logs: by their files' names, or by paths if these are
+    equal.
+    """
     if left.name != right.name:
         return left.name, right.name
     return str(left), str(right)
@@ -148,7 +150,7 @@ def _names(left: Path, right: Path) -> tuple[str, str]:
 def _keyed(
     reader: LogReader, chosen: Collection[Topic], progress: Progress | None
 ) -> Iterator[tuple[Key, Record]]:
-    """Each message with what names it in either log.
+    """Yield each message with what names it in either log.
 
     A source's incarnations are counted, as the times that they are known by differ.
     """

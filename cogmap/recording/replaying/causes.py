@@ -22,9 +22,9 @@ from cogmap.schemas.topics import SNAPSHOT
 
 
 def jobs(reader: LogReader, modules: Sequence[str], progress: Progress | None = None) -> list[Job]:
-    """The jobs that replay `modules`, in the order of the log.
+    """Return the jobs that replay `modules`, in the order of the log.
 
-    Raises LogError where one of them published nothing in it.
+    Raises LogError if one of them published nothing in it.
     """
     records = list(reader.records(progress=progress))
     has_envelopes = all(record.envelope is not None for record in records)
@@ -56,7 +56,7 @@ class _Planner:
         return sorted(self._published)
 
     def jobs(self, source: str, module: str) -> list[Job]:
-        """A job for each incarnation of an instance in which something happened."""
+        """Return a job for each incarnation of an instance in which something happened."""
         found: list[Job] = []
         earlier: list[Record] = []
         for number, incarnation in enumerate(sorted(self._published[source])):
@@ -85,7 +85,7 @@ class _Planner:
 
 
 def _step(cause: Cause, inputs: _Inputs, before_ns: int) -> Step | None:
-    """What `cause` names, before the message that names it; None where the log lacks it."""
+    """Return what `cause` names, before the message that names it; None if the log lacks it."""
     name, _, number = cause
     if name == START:
         return Step(Kind.START)
@@ -113,7 +113,7 @@ class _Inputs:
         self._last: dict[tuple[str, str], int] = {}
 
     def find(self, cause: Cause) -> Record | None:
-        """The message that `cause` names; None where the log lacks it."""
+        """Return the message that `cause` names; None if the log lacks it."""
         topic, source, seq = cause
         candidates = self._by_cause.get(cause)
         if not candidates:
@@ -134,7 +134,9 @@ class _Inputs:
         self._last = {key: last for key, last in self._last.items() if key[1] != source}
 
     def _choose(self, candidates: list[Record], cause: Cause) -> Record:
-        """The candidate of the first incarnation that it can be of; the last one if none can."""
+        """Return the candidate of the first incarnation that it can be of; the last one if none
+        can.
+        """
         topic, source, seq = cause
         current = self._incarnation.get(source)
         if current is None:

@@ -60,14 +60,14 @@ class Job:
 
     @property
     def input_bytes(self) -> int:
-        """How much it receives."""
+        """Return how much it receives."""
         return sum(step.record.size for step in self.steps if step.record is not None)
 
 
 def modules_of(reader: LogReader, sources: Sequence[str], modules: Sequence[str]) -> dict[str, str]:
     """Which of `modules` each of `sources` is an instance of, by source.
 
-    Raises LogError where one of `modules` has no instance.
+    Raises LogError if one of `modules` has no instance.
     """
     recorded = _recorded_members(reader)
     found: dict[str, str] = {}
@@ -86,7 +86,7 @@ def modules_of(reader: LogReader, sources: Sequence[str], modules: Sequence[str]
 
 
 def of_model(records: Iterable[tuple[int, Record]]) -> Expected:
-    """The records (number, record) whose bytes a replay must reproduce, by topic and number."""
+    """Return the records (number, record) whose bytes a replay must reproduce, by topic and number."""
     expected: Expected = defaultdict(dict)
     for seq, record in records:
         if record.topic.scope is Scope.MODEL:
@@ -95,7 +95,7 @@ def of_model(records: Iterable[tuple[int, Record]]) -> Expected:
 
 
 def without_envelope(record: Record) -> Record:
-    """A record as a job keeps it: its envelope is not needed to feed it."""
+    """Return a record as a job keeps it: its envelope is not needed to feed it."""
     return replace(record, envelope=None)
 
 
@@ -121,13 +121,13 @@ def inexact_jobs(reader: LogReader, records: Sequence[Record], modules: Sequence
 
 
 def _receives(source: str, publisher: str, record: Record) -> bool:
-    """Whether an instance may have received a message: of presence, only its own observations."""
+    """Return if an instance may have received a message: of presence, only its own observations."""
     is_own = publisher == source
     return is_own if record.topic is PRESENCE else not is_own
 
 
 def _recorded_members(reader: LogReader) -> dict[str, str]:
-    """The module of each instance that the recorder saw."""
+    """Return the module of each instance that the recorder saw."""
     members = {}
     for name, facts in reader.metadata:
         if name == layout.MEMBER:

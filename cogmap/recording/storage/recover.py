@@ -46,14 +46,14 @@ class Recovery(msgspec.Struct, kw_only=True):
 
     @property
     def whole(self) -> bool:
-        """Whether nothing was wrong with the file."""
+        """Return if nothing was wrong with the file."""
         return not self.damaged
 
 
 def recover(source: Path, target: Path, progress: Progress | None = None) -> Recovery:
     """Write every message of `source` that can be read into a new log at `target`.
 
-    Raises LogError where there is no log at `source`, or `target` exists or cannot be written.
+    Raises LogError if there is no log at `source`, or `target` exists or cannot be written.
     """
     found = LogBytes(source)
     stream = open_new(target)
@@ -95,7 +95,7 @@ class _Rescue:
         return self._recovery
 
     def _library(self) -> str:
-        """The program that wrote the log, which determines its messages; ours if damaged."""
+        """Return the program that wrote the log, which determines its messages; ours if damaged."""
         for span in self._source.all_records(_ignore):
             header = self._parsed(span)
             return header.library if isinstance(header, Header) else layout.SOFTWARE
@@ -158,7 +158,7 @@ class _Rescue:
         self._recovery.chunks += 1
 
     def _check_channels(self, messages: list[Message]) -> None:
-        """Raise DamageError where nothing that can be read declares a message's channel."""
+        """Raise DamageError if nothing that can be read declares a message's channel."""
         used = {message.channel_id for message in messages}
         if not used <= self._channels.keys():
             self._read_summary()
@@ -184,7 +184,7 @@ class _Rescue:
                 self._schemas[record.id] = record
 
     def _parsed(self, span: RecordSpan) -> McapRecord | None:
-        """A record's content, None where it is damaged."""
+        """Return a record's content, None if it is damaged."""
         try:
             return self._source.parse(span)
         except DamageError:
