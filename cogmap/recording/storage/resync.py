@@ -117,20 +117,15 @@ class LogBytes:
         lose(self.size, self.size, "the file is cut off here")
 
     def _records_up_to_damage(self, offset: int) -> Iterator[RecordSpan]:
-        """Yield the records from `offset` on, up to one whose length reaches over the next chunk.
-        """
+        """Yield the records from `offset` on, up to one whose length reaches over the next chunk."""
         for span in self.records_from(offset):
-            if not self._is_followed(span):
+            # If neither a record nor the end of the file follows, the length may be wrong.
+            is_last = span.opcode == Opcode.FOOTER or span.end == self.size
+            if not is_last and not self._begins_record(span.end):
                 inside = self._next_chunk(span.offset + 1)
                 if inside is not None and inside < span.end:
                     return
             yield span
-
-    def _is_followed(self, span: RecordSpan) -> bool:
-        """Return if a record or the end of the file follows: if not, the length may be wrong."""
-        if span.opcode == Opcode.FOOTER or span.end == self.size:
-            return True
-        return self._begins_record(span.end)
 
     def _begins_record(self, offset: int) -> bool:
         return next(self.records_from(offset), None) is not None
