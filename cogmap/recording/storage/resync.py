@@ -117,7 +117,8 @@ class LogBytes:
         lose(self.size, self.size, "the file is cut off here")
 
     def _records_up_to_damage(self, offset: int) -> Iterator[RecordSpan]:
-        """Yield the records from `offset` on, up to one whose length reaches over the next chunk.
+        """Yield the records from `offset` on, up to one whose length reaches over the next
+        chunk.
         """
         for span in self.records_from(offset):
             if not self._is_followed(span):
