@@ -176,7 +176,8 @@ def open_log(path: Path | str) -> Log:
 
 
 def recorded_config(reader: LogReader) -> dict[str, dict[str, Any]]:
-    """Return the configuration that a log was recorded with. Raises LogError if it cannot be read.
+    """Return the configuration that a log was recorded with. Raises LogError if it cannot be
+    read.
     """
     try:
         sections = json.loads(reader.about(layout.RECORDING).get("config", "{}"))

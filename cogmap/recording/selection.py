@@ -13,7 +13,9 @@ from cogmap.schemas.topics import Topic
 
 
 def named(names: Iterable[str]) -> list[Topic]:
-    """Return the topics of those names. Raises UsageError naming the one that is not in the table."""
+    """Return the topics of those names. Raises UsageError naming the one that is not in the
+    table.
+    """
     found = []
     for name in names:
         if name not in topics.BY_NAME:

@@ -122,7 +122,8 @@ class Gaussian:
 
 
 def combined(first: Gaussian, second: Gaussian) -> Gaussian:
-    """Return the optimal combination, direction by direction: precisions add, means weigh by them.
+    """Return the optimal combination, direction by direction: precisions add, means weigh by
+    them.
     """
     first_precision = np.linalg.inv(first.covariance_m2)
     second_precision = np.linalg.inv(second.covariance_m2)

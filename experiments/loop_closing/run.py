@@ -66,7 +66,8 @@ def trajectory() -> dict[str, Any]:
 
 
 def sections(seed: int, method: str) -> Sections:
-    """Return the configuration of every module, as for `cogmap run --config`, for one of METHODS.
+    """Return the configuration of every module, as for `cogmap run --config`, for one of
+    METHODS.
     """
     step_m = SPEED_M_S / FRAME_HZ
     sim = {

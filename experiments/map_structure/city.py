@@ -81,7 +81,8 @@ def read_city(path: Path) -> StructuredCity:
 
 
 def _buildings(extract: Extract, middle: Floats) -> tuple[Floats, Floats, Indices]:
-    """Return the centres of buildings, (n, 2), half their widths, (n,), and their functions, (n,).
+    """Return the centres of buildings, (n, 2), half their widths, (n,), and their functions,
+    (n,).
     """
     centres_m = []
     half_widths_m = []

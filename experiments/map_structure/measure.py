@@ -57,7 +57,8 @@ def measure(
 
 
 def structured(job: Job) -> Structured:
-    """Return the sub-maps of one city, by all features and the weights that the system runs with.
+    """Return the sub-maps of one city, by all features and the weights that the system runs
+    with.
     """
     city = job.city
     rng = np.random.default_rng([job.seed, 0x5B])

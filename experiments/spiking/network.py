@@ -63,7 +63,8 @@ class Posterior:
         return np.sqrt(variances_m2)
 
     def off(self, mean_m: Values) -> float:
-        """Return how far another mean is from this one's, in its standard deviations (Mahalanobis).
+        """Return how far another mean is from this one's, in its standard deviations
+        (Mahalanobis).
         """
         offset_m = mean_m - self.mean_m
         precision = np.linalg.inv(self.covariance_m2)

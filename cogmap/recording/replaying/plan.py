@@ -89,7 +89,9 @@ def modules_of(reader: LogReader, sources: Sequence[str], modules: Sequence[str]
 
 
 def of_model(records: Iterable[tuple[int, Record]]) -> Expected:
-    """Return the records (number, record) whose bytes a replay must reproduce, by topic and number."""
+    """Return the records (number, record) whose bytes a replay must reproduce, by topic and
+    number.
+    """
     expected: Expected = defaultdict(dict)
     for seq, record in records:
         if record.topic.scope is Scope.MODEL:

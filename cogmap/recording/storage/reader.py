@@ -160,7 +160,8 @@ class LogReader:
         return data
 
     def message(self, record: Record) -> Message:
-        """Return the message, decoded. Raises LogError; MessageError if it does not fit its topic.
+        """Return the message, decoded. Raises LogError; MessageError if it does not fit its
+        topic.
         """
         return decode(record.topic, self.payload(record))
 

@@ -117,7 +117,9 @@ class LogBytes:
         lose(self.size, self.size, "the file is cut off here")
 
     def _records_up_to_damage(self, offset: int) -> Iterator[RecordSpan]:
-        """Yield the records from `offset` on, up to one whose length reaches over the next chunk."""
+        """Yield the records from `offset` on, up to one whose length reaches over the next
+        chunk.
+        """
         for span in self.records_from(offset):
             # If neither a record nor the end of the file follows, the length may be wrong.
             is_last = span.opcode == Opcode.FOOTER or span.end == self.size

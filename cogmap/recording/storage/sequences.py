@@ -106,7 +106,8 @@ class SequenceTracker:
         return [self._streams[key] for key in sorted(self._streams)]
 
     def gaps(self) -> list[str]:
-        """Return a sentence for each stream that misses numbers, those of NEVER_DROP topics first.
+        """Return a sentence for each stream that misses numbers, those of NEVER_DROP topics
+        first.
         """
         broken = [stream for stream in self.streams if stream.missing]
         broken.sort(key=lambda stream: stream.topic.delivery is not Delivery.NEVER_DROP)

@@ -49,7 +49,8 @@ class WriteQueue:
             self._changed.notify()
 
     def take(self, timeout_s: float | None) -> Arrival | Job | None:
-        """Return the oldest arrival or job; None if none comes within `timeout_s` (None: no limit).
+        """Return the oldest arrival or job; None if none comes within `timeout_s` (None: no
+        limit).
         """
         with self._changed:
             if not self._waiting and timeout_s != 0:
