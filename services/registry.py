@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -229,6 +230,10 @@ def prepare(name: str) -> Iterator[None]:
 
         egl_trial.trial()
         yield
+
+        if find_spec("pybullet") is not None:
+            import_module("cogmap.services.sim.camera_level")
+            yield
 
     if runs_codelets(name):
         for part in _OF_CODELETS:

@@ -77,7 +77,6 @@ def sections() -> Sections:
         "mode": "lockstep",
         "trajectory": trajectory,
         "frame_hz": 1,
-        "odometry_hz": 5,
         "awaits": dict.fromkeys(COGNITION, 1),
     }
     return {

@@ -12,7 +12,6 @@ import numpy as np
 
 from cogmap.geometry.arrays import Singles
 from cogmap.schemas.sensing import Pose
-from cogmap.services.sim.config import STEP_S
 from cogmap.services.sim.layout.barriers import barriers
 from cogmap.services.sim.layout.furniture import Prop
 from cogmap.services.sim.layout.place import Place
@@ -26,6 +25,9 @@ from cogmap.services.sim.scene.bodies import Bodies
 from cogmap.services.sim.scene.builder import Builder
 from cogmap.services.sim.scene.nearby import Nearby, Piece
 from cogmap.services.sim.stdio import pybullet, quiet
+
+STEP_S = 1 / 240
+"""A step of the physics, pybullet's own."""
 
 _GRAVITY_M_S2 = -9.81
 _CONTACT_BODY = 2

@@ -13,8 +13,7 @@ from cogmap.errors import ConfigError
 from cogmap.services.sim.layout.catalogue import CATALOGUE
 from cogmap.services.sim.layout.place import Place
 from cogmap.services.sim.layout.plan import Plot, Point, Road
-from cogmap.services.sim.scripted.percepts import Landmark
-from cogmap.services.sim.scripted.trajectory import Line, Trajectory
+from cogmap.services.sim.trajectory import Landmark, Line, Trajectory
 
 CLEAR_M = 1.0
 _KINDS = {kind.name: kind for kind in CATALOGUE}

@@ -9,7 +9,7 @@ from cogmap.errors import ConfigError
 from cogmap.schemas.sensing import MotorCommand, Percepts, TrueTown
 from cogmap.services.sim.layout.removals import Removal, RemovedBuildings
 from cogmap.services.sim.module import Config, build
-from cogmap.services.sim.scripted.percepts import PerceptErrors
+from cogmap.services.sim.percept_level.percepts import PerceptErrors
 from tests.support.messages import of_type
 
 
